@@ -1,0 +1,55 @@
+# Everything a person types. Details live in CMakePresets.json and scripts/.
+#
+#   make demo     from a bare Debian 12 machine to an enhanced splat and a picture
+#   make test     everything that is checked, sanitizers included
+#   make build    the program only: build/anchorsplat
+#   make lint     clang-tidy and clang-format
+#   make fuzz     mutated files against all readers, SECONDS=60 by default
+#   make realdata DATA=DIR   checks on splats of your own
+#   make bench    measured ratios and figures
+
+JOBS ?= $(shell nproc)
+SECONDS ?= 60
+
+.PHONY: all build debug demo test lint format fuzz realdata bench clean
+all: build
+
+dependencies:
+	@scripts/install-dependencies.sh
+.PHONY: dependencies
+
+build: dependencies
+	@cmake --preset release $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
+	@rm -f build-configure.log
+	@cmake --build --preset release -j $(JOBS)
+
+debug: dependencies
+	@cmake --preset debug $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
+	@rm -f build-configure.log
+	@cmake --build --preset debug -j $(JOBS)
+
+demo: build
+	@scripts/demo.sh
+
+test: build debug
+	@ctest --preset release -j $(JOBS)
+	@ctest --preset debug -j $(JOBS)
+
+bench: build
+	@build/anchorsplat bench render
+	@build/anchorsplat bench io
+
+lint:
+	@scripts/lint.sh
+
+format:
+	@git ls-files 'src/*.h' 'src/*.cc' | xargs clang-format -i
+
+fuzz: debug
+	@scripts/fuzz.sh $(SECONDS)
+
+realdata: build
+	@scripts/realdata.sh "$(DATA)"
+
+clean:
+	@rm -rf build

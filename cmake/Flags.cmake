@@ -1,0 +1,23 @@
+# Compile flags of our own code, as one interface target that every room links.
+add_library(anchorsplat_flags INTERFACE)
+target_include_directories(anchorsplat_flags INTERFACE "${CMAKE_SOURCE_DIR}/src")
+target_compile_definitions(anchorsplat_flags INTERFACE ANCHORSPLAT_VERSION="${PROJECT_VERSION}")
+target_compile_options(anchorsplat_flags INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+  # a*b+c must round twice unless a kernel asks for FMA by name: row counts of the network's input depend on it, and
+  # results must not change with the compiler's mood.
+  -ffp-contract=off)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  # g++ 12 sees overlapping copies in std::string's operator+ that are not there (GCC bug 105651).
+  target_compile_options(anchorsplat_flags INTERFACE -Wno-restrict)
+endif()
+if(ANCHORSPLAT_WERROR)
+  target_compile_options(anchorsplat_flags INTERFACE -Werror)
+endif()
+
+set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
+if(ANCHORSPLAT_SANITIZE)
+  # -O1 keeps the fuzz tests quick; frame pointers make their reports readable.
+  add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer -O1 -g1)
+  add_link_options(-fsanitize=address,undefined)
+endif()

@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# Makes sure that everything the build needs is there: on Debian and its relatives by apt (sudo only when not root),
+# elsewhere it says what is missing. Quick when nothing is missing.
+set -euo pipefail
+
+packages=(g++ cmake ninja-build pkg-config
+  libhwy-dev libtbb-dev libcli11-dev nlohmann-json3-dev libpng-dev libjpeg-dev zlib1g-dev
+  libgtest-dev libgmock-dev libbenchmark-dev)
+
+if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
+  # Not a Debian system: look for one header or program of each package.
+  missing=()
+  have_header() { echo "#include <$1>" | ${CXX:-c++} -std=c++20 -E -x c++ - >/dev/null 2>&1; }
+  for program in "${CXX:-c++}" cmake ninja; do command -v "$program" >/dev/null || missing+=("$program"); done
+  for header in hwy/highway.h tbb/parallel_for.h CLI/CLI.hpp nlohmann/json.hpp png.h jpeglib.h zlib.h \
+                gtest/gtest.h gmock/gmock.h benchmark/benchmark.h; do
+    have_header "$header" || missing+=("<$header>")
+  done
+  [ ${#missing[@]} -eq 0 ] && exit 0
+  echo "anchorsplat: this is not a Debian system, so nothing was installed. Missing: ${missing[*]}" >&2
+  echo "Install a C++20 compiler, CMake >= 3.22, Ninja and the development packages of Highway (>= 1.0.3), oneTBB," >&2
+  echo "CLI11, nlohmann-json, libpng, libjpeg, zlib, GoogleTest and Google Benchmark, then call make again." >&2
+  exit 1
+fi
+
+missing=()
+for package in "${packages[@]}"; do
+  dpkg-query -W -f='${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
+done
+[ ${#missing[@]} -eq 0 ] && exit 0
+
+sudo=()
+if [ "$(id -u)" -ne 0 ]; then
+  if ! command -v sudo >/dev/null; then
+    echo "anchorsplat: missing packages and neither root nor sudo. Ask an administrator for:" >&2
+    echo "  apt-get install ${missing[*]}" >&2
+    exit 1
+  fi
+  sudo=(sudo)
+fi
+echo "Installing Debian packages: ${missing[*]}"
+export DEBIAN_FRONTEND=noninteractive
+"${sudo[@]}" apt-get update -qq
+"${sudo[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}"

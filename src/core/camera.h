@@ -1,0 +1,66 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// Pinhole intrinsics in pixels; pixel (0,0) covers [0,1)², its centre is at 0.5. No distortion.
+struct Pinhole {
+  int width = 0;
+  int height = 0;
+  double fx = 0;
+  double fy = 0;
+  double cx = 0;
+  double cy = 0;
+};
+
+// Rigid world-to-camera transform in OpenCV axes (x right, y down, z forward): p_camera = R·p_world + t.
+struct Pose {
+  std::array<double, 9> rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1};  // row-major
+  std::array<double, 3> translation = {0, 0, 0};
+};
+
+struct Camera {
+  std::string name;             // image path without extension, as the camera file gives it ("lr/001")
+  std::filesystem::path image;  // the view's picture where the camera file knows one; may be empty
+  Pinhole intrinsics;
+  Pose world_to_camera;
+
+  std::array<double, 3> Center() const;                                  // −Rᵀt, world
+  std::array<double, 3> ToCamera(const std::array<double, 3>& p) const;  // R·p + t
+};
+
+struct CameraSet {
+  std::vector<Camera> cameras;
+  std::optional<std::array<float, 3>> background;  // rgb 0–1, where the file says which one the views have
+};
+
+// The same view with `factor` times as many pixels per side (width and height rounded, at least 1); the rays through
+// the image corners stay where they were, up to that rounding.
+Pinhole Scaled(const Pinhole& intrinsics, double factor);
+
+// Camera at `center` looking at `target`. `up` is the world's up; where it is parallel to the view direction, another
+// axis is taken. kBadArgument when center and target coincide or anything is not finite.
+Result<Pose> LookAt(const std::array<double, 3>& center, const std::array<double, 3>& target,
+                    const std::array<double, 3>& up);
+
+// From camera-to-world in OpenGL axes (x right, y up, z backward), row-major 4×4: NeRF's `transform_matrix`.
+// kBadArgument when the upper 3×3 is not a rotation (up to uniform rounding, 1e-3) or something is not finite.
+Result<Pose> PoseFromOpenGlCameraToWorld(const std::array<double, 16>& camera_to_world);
+std::array<double, 16> OpenGlCameraToWorld(const Pose& pose);
+
+// `count` poses on a Fibonacci sphere of `radius` around `target`, evenly spread, the same on every machine. Names are
+// "000", "001", … All share `intrinsics`. kBadArgument: count < 1, radius not positive.
+Result<CameraSet> OrbitCameras(int count, double radius, const std::array<double, 3>& target,
+                               const Pinhole& intrinsics);
+
+// Square pixels, centred principal point; `fov_x` is the horizontal field of view in radians.
+Pinhole PinholeFromFov(int width, int height, double fov_x);
+
+}  // namespace anchorsplat

@@ -1,0 +1,124 @@
+#include "core/gaussian_cloud.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/text.h"
+
+namespace anchorsplat {
+
+namespace {
+
+void GatherRows(const Buffer<float>& from, int64_t width, std::span<const int64_t> rows, Buffer<float>& to) {
+  to.resize(rows.size() * static_cast<size_t>(width));
+  float* out = to.data();
+  for (const int64_t row : rows) out = std::copy_n(from.data() + row * width, width, out);
+}
+
+void AppendRows(Buffer<float>& to, const Buffer<float>& from) { to.insert(to.end(), from.begin(), from.end()); }
+
+bool FiniteOrMinusInf(float x) { return std::isfinite(x) || x == -std::numeric_limits<float>::infinity(); }
+
+}  // namespace
+
+int64_t GaussianCloud::bytes() const {
+  return static_cast<int64_t>(sizeof(float) *
+                              (means.size() + log_scales.size() + quats.size() + opacity_logits.size() + sh.size()));
+}
+
+void GaussianCloud::Resize(int64_t n, int degree) {
+  sh_degree = degree;
+  const size_t count = static_cast<size_t>(n);
+  means.resize(3 * count);
+  log_scales.resize(3 * count);
+  quats.resize(4 * count);
+  opacity_logits.resize(count);
+  sh.resize(count * static_cast<size_t>(sh_stride()));
+}
+
+Status Validate(const GaussianCloud& cloud) {
+  if (cloud.sh_degree < 0 || cloud.sh_degree > kMaxShDegree) {
+    return Error{ErrorCode::kBadArgument, Cat("SH degree ", cloud.sh_degree, " is not 0 to ", kMaxShDegree)};
+  }
+  const size_t n = cloud.opacity_logits.size();
+  const auto check = [n](const Buffer<float>& array, int64_t width, const char* name) -> Status {
+    if (array.size() == n * static_cast<size_t>(width)) return {};
+    return Error{ErrorCode::kBadArgument,
+                 Cat("Gaussian cloud: ", name, " has ", array.size(), " values, expected ", n, " x ", width)};
+  };
+  ANCHORSPLAT_RETURN_IF_ERROR(check(cloud.means, 3, "means"));
+  ANCHORSPLAT_RETURN_IF_ERROR(check(cloud.log_scales, 3, "log_scales"));
+  ANCHORSPLAT_RETURN_IF_ERROR(check(cloud.quats, 4, "quats"));
+  return check(cloud.sh, cloud.sh_stride(), "sh");
+}
+
+std::optional<Bounds> ComputeBounds(const GaussianCloud& cloud) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  Bounds box{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    const float* p = &cloud.means[static_cast<size_t>(3 * i)];
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) continue;
+    for (size_t a = 0; a < 3; ++a) {
+      box.min[a] = std::min(box.min[a], p[a]);
+      box.max[a] = std::max(box.max[a], p[a]);
+    }
+  }
+  if (box.min[0] > box.max[0]) return std::nullopt;
+  return box;
+}
+
+Result<GaussianCloud> Subset(const GaussianCloud& cloud, std::span<const int64_t> rows) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
+  for (const int64_t row : rows) {
+    if (row < 0 || row >= cloud.size()) {
+      return Error{ErrorCode::kBadArgument, Cat("row ", row, " of a cloud of ", cloud.size(), " Gaussians")};
+    }
+  }
+  GaussianCloud out;
+  out.sh_degree = cloud.sh_degree;
+  out.render_mode = cloud.render_mode;
+  out.comments = cloud.comments;
+  GatherRows(cloud.means, 3, rows, out.means);
+  GatherRows(cloud.log_scales, 3, rows, out.log_scales);
+  GatherRows(cloud.quats, 4, rows, out.quats);
+  GatherRows(cloud.opacity_logits, 1, rows, out.opacity_logits);
+  GatherRows(cloud.sh, cloud.sh_stride(), rows, out.sh);
+  return out;
+}
+
+Status Append(GaussianCloud& cloud, const GaussianCloud& more) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(more));
+  if (cloud.sh_degree < more.sh_degree) cloud = WithShDegree(cloud, more.sh_degree);
+  AppendRows(cloud.means, more.means);
+  AppendRows(cloud.log_scales, more.log_scales);
+  AppendRows(cloud.quats, more.quats);
+  AppendRows(cloud.opacity_logits, more.opacity_logits);
+  AppendRows(cloud.sh, more.sh_degree == cloud.sh_degree ? more.sh : WithShDegree(more, cloud.sh_degree).sh);
+  return {};
+}
+
+GaussianCloud WithShDegree(const GaussianCloud& cloud, int degree) {
+  GaussianCloud out = cloud;
+  if (degree == cloud.sh_degree) return out;
+  out.sh_degree = degree;
+  out.sh.assign(static_cast<size_t>(cloud.size() * out.sh_stride()), 0.0f);
+  const int64_t kept = std::min(cloud.sh_stride(), out.sh_stride());
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    std::copy_n(cloud.sh.data() + i * cloud.sh_stride(), kept, out.sh.data() + i * out.sh_stride());
+  }
+  return out;
+}
+
+bool IsUsable(const GaussianCloud& cloud, int64_t i) {
+  const auto all_finite = [](const float* p, int64_t n) {
+    return std::all_of(p, p + n, [](float x) { return std::isfinite(x); });
+  };
+  const float* scales = cloud.log_scales.data() + 3 * i;
+  return all_finite(cloud.means.data() + 3 * i, 3) && std::all_of(scales, scales + 3, FiniteOrMinusInf) &&
+         all_finite(cloud.quats.data() + 4 * i, 4) && FiniteOrMinusInf(cloud.opacity_logits[static_cast<size_t>(i)]) &&
+         all_finite(cloud.sh.data() + i * cloud.sh_stride(), cloud.sh_stride());
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+
+#include "core/buffer.h"
+
+namespace anchorsplat {
+
+// Planar float picture: pixels[(c·height + y)·width + x]. Colours are 0–1 as in the file (value/255, no colour-space
+// conversion), not premultiplied; channel order r g b [a]; one channel for depth or alpha alone.
+struct Image {
+  int width = 0;
+  int height = 0;
+  int channels = 0;
+  Buffer<float> pixels;  // [C,H,W]
+
+  Image() = default;
+  Image(int w, int h, int c)
+      : width(w),
+        height(h),
+        channels(c),
+        pixels(static_cast<size_t>(w) * static_cast<size_t>(h) * static_cast<size_t>(c)) {}
+
+  int64_t plane() const { return int64_t{width} * height; }
+  float* channel(int c) { return pixels.data() + c * plane(); }
+  const float* channel(int c) const { return pixels.data() + c * plane(); }
+  float& at(int c, int y, int x) { return pixels[static_cast<size_t>((int64_t{c} * height + y) * width + x)]; }
+  float at(int c, int y, int x) const { return pixels[static_cast<size_t>((int64_t{c} * height + y) * width + x)]; }
+};
+
+}  // namespace anchorsplat

@@ -1,0 +1,54 @@
+#include "core/parallel.h"
+
+#include <tbb/global_control.h>
+#include <tbb/info.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+namespace anchorsplat {
+
+namespace {
+// Kept alive for the whole process: oneTBB honours a limit only while its object lives.
+std::unique_ptr<tbb::global_control>& Limit() {
+  static std::unique_ptr<tbb::global_control> limit;
+  return limit;
+}
+}  // namespace
+
+void SetThreadCount(int threads) {
+  Limit().reset();
+  if (threads > 0) {
+    Limit() = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
+                                                    static_cast<size_t>(threads));
+  }
+}
+
+int ThreadCount() {
+  return static_cast<int>(
+      std::min<size_t>(static_cast<size_t>(tbb::info::default_concurrency()),
+                       tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
+}
+
+namespace internal {
+
+void ParallelRanges(int64_t begin, int64_t end, int64_t grain, RangeFunction function, void* context) {
+  if (begin >= end) return;
+  grain = std::max<int64_t>(1, grain);
+  const int64_t chunks = (end - begin + grain - 1) / grain;
+  if (chunks == 1) {
+    function(context, begin, end);
+    return;
+  }
+  tbb::parallel_for(
+      int64_t{0}, chunks,
+      [&](int64_t chunk) {
+        const int64_t first = begin + chunk * grain;
+        function(context, first, std::min(end, first + grain));
+      },
+      tbb::simple_partitioner());
+}
+
+}  // namespace internal
+
+}  // namespace anchorsplat

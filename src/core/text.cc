@@ -1,0 +1,63 @@
+#include "core/text.h"
+
+#include <cmath>
+#include <cstdio>
+
+namespace anchorsplat {
+
+std::string WithThousands(int64_t n) {
+  std::string digits = std::to_string(n);
+  const size_t first = digits[0] == '-' ? 1 : 0;
+  for (size_t at = digits.size(); at > first + 3;) {
+    at -= 3;
+    digits.insert(at, ",");
+  }
+  return digits;
+}
+
+std::string Fixed(double value, int digits) {
+  if (std::isnan(value)) return "nan";
+  if (std::isinf(value)) return value > 0 ? "inf" : "-inf";
+  char text[400];  // longest double in %f: 309 digits and a fraction
+  std::snprintf(text, sizeof text, "%.*f", digits, value);
+  return text;
+}
+
+std::string HumanBytes(uint64_t bytes) {
+  static constexpr const char* kUnits[] = {"B", "kB", "MB", "GB", "TB", "PB", "EB"};
+  double value = static_cast<double>(bytes);
+  size_t unit = 0;
+  while (value >= 999.5 && unit + 1 < std::size(kUnits)) {
+    value /= 1000;
+    ++unit;
+  }
+  return Fixed(value, unit == 0 || value >= 99.5 ? 0 : 1) + " " + kUnits[unit];
+}
+
+std::string HumanSeconds(double seconds) {
+  if (seconds < 0.9995) return Fixed(seconds * 1000, seconds < 0.00995 ? 2 : 0) + " ms";
+  if (seconds < 119.5) return Fixed(seconds, 1) + " s";
+  const int64_t whole = std::llround(seconds);
+  char text[64];
+  std::snprintf(text, sizeof text, "%lld min %02lld s", static_cast<long long>(whole / 60),
+                static_cast<long long>(whole % 60));
+  return text;
+}
+
+std::string Printable(const std::string& bytes) {
+  std::string out;
+  for (const char c : bytes) {
+    if (out.size() >= 60) return out + "…";
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte >= 0x20 && byte != 0x7f) {
+      out += c;
+    } else {
+      char escaped[8];
+      std::snprintf(escaped, sizeof escaped, "\\x%02x", byte);
+      out += escaped;
+    }
+  }
+  return out;
+}
+
+}  // namespace anchorsplat

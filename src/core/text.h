@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstdint>
+#include <sstream>
+#include <string>
+
+namespace anchorsplat {
+
+// All arguments written one after the other: Cat("byte ", 17, ": bad").
+template <typename... Args>
+std::string Cat(const Args&... args) {
+  std::ostringstream out;
+  (out << ... << args);
+  return std::move(out).str();
+}
+
+std::string WithThousands(int64_t n);             // 1,234,567
+std::string Fixed(double value, int digits);      // Fixed(3.14159, 2) = "3.14"; "inf", "nan" as such
+std::string HumanBytes(uint64_t bytes);           // "4.7 MB" (powers of 1000, as file managers show)
+std::string HumanSeconds(double seconds);         // "850 ms", "12.3 s", "4 min 05 s"
+std::string Printable(const std::string& bytes);  // for messages about hostile input: control bytes escaped, cut at 60
+
+}  // namespace anchorsplat

@@ -99,9 +99,8 @@ TEST(GaussianCloud, MinusInfinityIsLegalOnlyWhereItMeansZero) {
   EXPECT_TRUE(IsUsable(cloud, 0));
   cloud.opacity_logits[0] = kInfinity;
   EXPECT_FALSE(IsUsable(cloud, 0));
-  for (Buffer<float> GaussianCloud::* array :
-       {&GaussianCloud::means, &GaussianCloud::log_scales, &GaussianCloud::quats, &GaussianCloud::opacity_logits,
-        &GaussianCloud::sh}) {
+  for (Buffer<float> GaussianCloud::*array : {&GaussianCloud::means, &GaussianCloud::log_scales, &GaussianCloud::quats,
+                                              &GaussianCloud::opacity_logits, &GaussianCloud::sh}) {
     cloud = good;
     (cloud.*array).back() = std::nanf("");
     EXPECT_FALSE(IsUsable(cloud, 0));

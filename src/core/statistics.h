@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "core/gaussian_cloud.h"
+
+namespace anchorsplat {
+
+// Value below which the fraction `q` (0–1) of `values` lies, linear between neighbours. NaN for no values. Reorders
+// them.
+float Quantile(std::span<float> values, double q);
+
+// 1 %, 10 %, 50 %, 90 % and 99 % quantiles.
+inline constexpr std::array<double, 5> kPercentiles = {0.01, 0.10, 0.50, 0.90, 0.99};
+using Percentiles = std::array<float, kPercentiles.size()>;
+
+// What a person wants to know about a cloud before trusting it. Percentiles are over usable rows with three finite
+// scales; all are NaN when there are none.
+struct CloudStatistics {
+  int64_t gaussians = 0;
+  int sh_degree = 0;
+  std::optional<Bounds> bounds;  // of all finite means
+  Percentiles largest_axis{};    // exp of the largest log-scale, world units
+  Percentiles smallest_axis{};   // exp of the smallest
+  Percentiles axis_ratio{};      // largest / smallest
+  Percentiles opacity{};         // 0–1
+
+  // Problems, as row counts.
+  int64_t not_finite = 0;                 // NaN anywhere, or Inf where it has no meaning (see IsUsable)
+  int64_t zero_quaternions = 0;           // norm below 1e-12: no rotation at all
+  int64_t unnormalised_quaternions = 0;   // norm off by more than 1 %: legal, but some programs expect 1
+  int64_t zero_scales = 0;                // a log-scale of −Inf
+  int64_t invisible = 0;                  // opacity below 1/255: no rasterizer draws them
+  int64_t outliers = 0;                   // farther out than ten times the box that holds the middle 98 % of the means
+  bool linear_looking_scales = false;     // stored scales look like lengths, not logarithms
+  bool linear_looking_opacities = false;  // stored opacities look like 0–1, not logits
+};
+CloudStatistics ComputeStatistics(const GaussianCloud& cloud);
+
+}  // namespace anchorsplat

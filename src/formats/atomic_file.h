@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string_view>
+
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// A file that appears under its name whole or not at all: bytes go to a hidden temporary in the same folder, Commit()
+// renames it. Without Commit() the destructor removes the temporary; a killed process leaves at most a hidden
+// ".anchorsplat-*.partial", never half a file under the final name. Nothing is fsynced: this protects against crashes
+// of the program, not of the machine, and costs no disk flush.
+//
+//   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+//   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(bytes));
+//   return file.Commit();
+class OutputFile {
+ public:
+  // Errors: kExists when `path` exists and `overwrite` is false; kNotFound when its folder does not; kIo when the
+  // system refuses or `path` is something that cannot be replaced by a file.
+  static Result<OutputFile> Create(const std::filesystem::path& path, bool overwrite);
+
+  OutputFile(OutputFile&& other) noexcept;
+  OutputFile& operator=(OutputFile&& other) noexcept;
+  ~OutputFile();
+
+  // Claims disk space, so that a full disk is an error now and not at the last byte. The final size is still decided by
+  // what is written; file systems that cannot reserve are no error.
+  Status Reserve(uint64_t bytes);
+  // Appends to what Write() wrote before.
+  Status Write(const void* data, size_t size);
+  Status Write(std::string_view bytes) { return Write(bytes.data(), bytes.size()); }
+  // Writes at a byte offset of its own; may be called from several threads for disjoint ranges.
+  Status WriteAt(uint64_t offset, const void* data, size_t size) const;
+
+  // Gives the file its name. A file that came into being under that name since Create() is kExists unless `overwrite`.
+  Status Commit();
+
+ private:
+  OutputFile() = default;
+  void Discard() noexcept;
+
+  std::filesystem::path path_;    // as the caller said it: for messages
+  std::filesystem::path target_;  // what is renamed over: `path_` with a symbolic link followed
+  std::filesystem::path temporary_;
+  int descriptor_ = -1;
+  bool overwrite_ = false;
+  uint64_t written_ = 0;
+};
+
+// The whole of `bytes` as a file: Create, Write, Commit.
+Status WriteWholeFile(const std::filesystem::path& path, std::string_view bytes, bool overwrite);
+
+}  // namespace anchorsplat

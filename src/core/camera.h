@@ -36,7 +36,11 @@ struct Camera {
   std::array<double, 3> ToCamera(const std::array<double, 3>& p) const;  // R·p + t
 };
 
+// Which program's conventions a set of cameras came with; they differ in whether the size is the one trained at.
+enum class CameraSource { kUnknown, kTransforms, kInria, kColmap };
+
 struct CameraSet {
+  CameraSource source = CameraSource::kUnknown;
   std::vector<Camera> cameras;
   std::optional<std::array<float, 3>> background;  // rgb 0–1, where the file says which one the views have
 };

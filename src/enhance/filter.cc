@@ -1,0 +1,65 @@
+#include "enhance/filter.h"
+
+#include <atomic>
+#include <cmath>
+
+#include "core/parallel.h"
+#include "core/text.h"
+#include "render/constants.h"
+
+namespace anchorsplat {
+
+namespace {
+constexpr int64_t kRowsPerTask = 16384;
+
+// ln of sqrt(exp(2·log_scale) + variance), in a form that neither overflows for huge scales nor loses tiny ones.
+float WidenedLogScale(float log_scale, double variance) {
+  const double twice = 2.0 * log_scale;  // −Inf for a scale of zero
+  const double log_variance = std::log(variance);
+  const double high = std::max(twice, log_variance), low = std::min(twice, log_variance);
+  return static_cast<float>(0.5 * (high + std::log1p(std::exp(low - high))));
+}
+
+}  // namespace
+
+double DefaultFilterStrength(double upscale) { return 1 - (1 - 1 / (upscale * upscale)) / 3.6; }
+
+Result<int64_t> ApplyFilter(GaussianCloud& cloud, std::span<const float> pixel_sizes, const FilterOptions& options) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
+  if (!(options.upscale >= 1) || !std::isfinite(options.upscale)) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("upscale ", options.upscale, " is below 1: the filter is for seeing a splat closer, not farther")};
+  }
+  const double strength = options.strength.value_or(DefaultFilterStrength(options.upscale));
+  if (!(strength >= 0) || !std::isfinite(strength)) {
+    return Error{ErrorCode::kBadArgument, Cat("filter strength ", strength, " is negative or not a number")};
+  }
+  if (pixel_sizes.size() != 1 && pixel_sizes.size() != static_cast<size_t>(cloud.size())) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat(pixel_sizes.size(), " pixel sizes for ", cloud.size(), " Gaussians: expected one, or one each")};
+  }
+  for (const float p : pixel_sizes) {
+    if (!(p > 0) || !std::isfinite(p)) {
+      return Error{ErrorCode::kBadArgument, Cat("pixel size ", p, " is not a positive length")};
+    }
+  }
+
+  // In units of p_LR²: the same for every Gaussian.
+  const double gain = kDilation * (strength - 1 / (options.upscale * options.upscale));
+  if (!(gain > 0)) return int64_t{0};
+  std::atomic<int64_t> grown = 0;
+  ParallelFor(0, cloud.size(), kRowsPerTask, [&](int64_t first, int64_t last) {
+    int64_t count = 0;
+    for (int64_t i = first; i < last; ++i) {
+      float* scales = cloud.log_scales.data() + 3 * i;
+      if (!IsUsable(cloud, i)) continue;
+      const double p = pixel_sizes[pixel_sizes.size() == 1 ? 0 : static_cast<size_t>(i)];
+      for (int axis = 0; axis < 3; ++axis) scales[axis] = WidenedLogScale(scales[axis], gain * p * p);
+      ++count;
+    }
+    grown += count;
+  });
+  return grown.load();
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// The training-free filter. The standard rasterizer adds 0.3 px² to every projected variance and fits absorb it, so
+// each Gaussian comes out eroded by that much at the pixel size of its training views. The filter gives it back,
+//     Σ' = Σ + max(0, f·0.3·p_LR² − 0.3·p_HR²)·I,   p_HR = p_LR / upscale,
+// in world units, opacity unchanged (scaling it down to keep the integral costs 4 dB). Adding a multiple of I only
+// lengthens the three axes; the rotation stays. docs/method.md derives it and shows the curve over f.
+struct FilterOptions {
+  double upscale = 4;              // u ≥ 1: how many times closer the splat will be seen
+  std::optional<double> strength;  // f ≥ 0; DefaultFilterStrength(upscale) unless given
+};
+
+// f = 1 − (1 − 1/u²)/3.6: the box variance (1/12 px²) of the low-resolution pixel is taken out of the 0.3 px² and that
+// of the high-resolution pixel put back. 0.740 at u = 4, 1 at u = 1, where the filter changes nothing.
+double DefaultFilterStrength(double upscale);
+
+// Applies the filter in place. `pixel_sizes` is p_LR in world units, one value for all Gaussians or one per Gaussian.
+// Log-scales of −Inf (scale 0) become finite wherever variance is added; rows that are not finite stay as they are.
+// Returns how many Gaussians grew. kBadArgument: upscale < 1, negative strength, a pixel size that is not positive and
+// finite, or the wrong number of them.
+Result<int64_t> ApplyFilter(GaussianCloud& cloud, std::span<const float> pixel_sizes, const FilterOptions& options);
+
+}  // namespace anchorsplat

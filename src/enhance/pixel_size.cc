@@ -87,7 +87,8 @@ Result<CameraPixelSizes> PixelSizesFromCameras(const GaussianCloud& cloud, const
   out.unseen = unseen;
 
   Buffer<float> finite;
-  std::copy_if(out.sizes.begin(), out.sizes.end(), std::back_inserter(finite), [](float x) { return std::isfinite(x); });
+  std::copy_if(out.sizes.begin(), out.sizes.end(), std::back_inserter(finite),
+               [](float x) { return std::isfinite(x); });
   out.median = Quantile(finite, 0.5);
   for (float& size : out.sizes) {
     if (!std::isfinite(size)) size = out.median;

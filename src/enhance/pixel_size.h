@@ -17,9 +17,9 @@ namespace anchorsplat {
 // length shrinks with it; cameras that are already narrower stay as they are).
 // Rows whose mean is not finite get the median of the others. kBadArgument: no cameras, train_width < 1.
 struct CameraPixelSizes {
-  Buffer<float> sizes;      // [N] world units
-  float median = 0;         // of `sizes`
-  int64_t unseen = 0;       // Gaussians that no view holds
+  Buffer<float> sizes;  // [N] world units
+  float median = 0;     // of `sizes`
+  int64_t unseen = 0;   // Gaussians that no view holds
 };
 Result<CameraPixelSizes> PixelSizesFromCameras(const GaussianCloud& cloud, const CameraSet& cameras,
                                                std::optional<int> train_width);

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include "core/camera.h"
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// Checks that all camera readers share. Their messages are the end of a sentence: the reader puts file and place
+// before.
+
+// Sizes at least 1 and no more pixels than a picture may have, focal lengths positive and finite, principal point
+// finite. kBadFile.
+Status CheckIntrinsics(const Pinhole& intrinsics);
+
+// From camera-to-world in OpenCV axes. kBadFile when it is not a rotation or something is not finite.
+Result<Pose> PoseFromCameraToWorld(const std::array<double, 9>& rotation, const std::array<double, 3>& center);
+
+// From world-to-camera. kBadFile as above; the quaternion (wxyz) must have norm 1.
+Result<Pose> PoseFromUnitQuaternion(const std::array<double, 4>& quaternion, const std::array<double, 3>& translation);
+
+// "./train/r_0.png" → "train/r_0": the camera's name. Only extensions of pictures go, as "r_0.5" has none.
+std::string ViewName(const std::string& image_path);
+
+// The first of `folder/relative` that is a file, where .png, .jpg and .jpeg are tried when there is none as such; empty
+// if there is none at all.
+std::filesystem::path FindPicture(std::span<const std::filesystem::path> folders, const std::string& relative);
+
+}  // namespace anchorsplat

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// A value inside a JSON file that knows where it stands, so that every complaint names the file and the JSON path
+// ("views.json: frames[3].w: expected a whole number, found a string"). Views into the JsonFile it came from.
+class JsonValue {
+ public:
+  JsonValue(const std::string& file, const nlohmann::json& value, std::string path)
+      : file_(&file), value_(&value), path_(std::move(path)) {}
+
+  const nlohmann::json& raw() const { return *value_; }
+  bool has(const char* key) const { return value_->is_object() && value_->contains(key); }
+
+  std::optional<JsonValue> Find(const char* key) const;  // member of an object; empty when it has none
+  Result<JsonValue> Get(const char* key) const;          // the same, or an error
+  Result<std::vector<JsonValue>> Elements() const;       // of an array
+  Result<double> Number() const;                         // always finite: JSON has no others
+  Result<std::vector<double>> Numbers(size_t count) const;
+  Result<int> WholeNumber(int min, int max) const;  // 800 and 800.0 alike
+  Result<std::string> Text() const;
+
+  Error Complain(const std::string& sentence) const;  // kBadFile
+
+ private:
+  const std::string* file_;
+  const nlohmann::json* value_;
+  std::string path_;  // "" for the root
+};
+
+// A parsed JSON file. Errors: as ReadFileBytes; kBadFile with line and column of a syntax error, more than 256 MiB,
+// nesting deeper than 64, more than 2^24 values (bounds on the memory a hostile file can claim).
+class JsonFile {
+ public:
+  static Result<JsonFile> Read(const std::filesystem::path& path);
+  JsonValue root() const { return {name_, value_, ""}; }
+
+ private:
+  std::string name_;
+  nlohmann::json value_;
+};
+
+}  // namespace anchorsplat

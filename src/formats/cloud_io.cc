@@ -1,0 +1,62 @@
+#include "formats/cloud_io.h"
+
+#include <new>
+#include <string>
+
+#include "core/text.h"
+#include "formats/input_file.h"
+#include "formats/registry.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// "PLY (.ply), SPZ (.spz)": the formats that have the given direction.
+template <typename Direction>
+std::string Known(Direction SplatFormat::*direction) {
+  std::string list;
+  for (const SplatFormat& format : Formats()) {
+    if (format.*direction == nullptr) continue;
+    if (!list.empty()) list += ", ";
+    list += Cat(format.name, " (", format.extensions.front(), ")");
+  }
+  return list;
+}
+
+Error OutOfMemory(const std::filesystem::path& path) {
+  return {ErrorCode::kIo, Cat(path.string(), ": there is not enough memory for its Gaussians")};
+}
+
+}  // namespace
+
+Result<GaussianCloud> ReadCloud(const std::filesystem::path& path, const ReadLimits& limits) try {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
+  const SplatFormat* format = FormatOfFile(head, path);
+  if (format == nullptr) {
+    return Error{ErrorCode::kBadFile, Cat(path.string(), ": byte 0: is no splat file of a known format: found \"",
+                                          Printable(head.substr(0, 8)), "\", expected ", Known(&SplatFormat::read))};
+  }
+  if (format->read == nullptr) {
+    return Error{ErrorCode::kBadFile,
+                 Cat(path.string(), ": is a ", format->name, " file, which this version does not read; it reads ",
+                     Known(&SplatFormat::read))};
+  }
+  return format->read(file, limits);
+} catch (const std::bad_alloc&) {
+  return OutOfMemory(path);
+}
+
+Status WriteCloud(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) try {
+  const SplatFormat* format = FormatOfExtension(path);
+  if (format == nullptr || format->write == nullptr) {
+    const std::string what = format == nullptr ? Cat("has no extension of a splat format")
+                                               : Cat("is a ", format->name, " file, which this version does not write");
+    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", what, "; it writes ", Known(&SplatFormat::write))};
+  }
+  return format->write(path, cloud, options);
+} catch (const std::bad_alloc&) {
+  return OutOfMemory(path);
+}
+
+}  // namespace anchorsplat

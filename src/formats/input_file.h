@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// A file opened for reading: a byte range of known size that any thread may read anywhere. Regular files are read with
+// pread, not mapped: a mapped file that someone truncates while we read kills the process (SIGBUS), and copying from
+// the page cache into a buffer that stays in the processor's cache is as fast. Pipes (`… | anchorsplat /dev/stdin`)
+// are taken into memory first.
+class InputFile {
+ public:
+  // Errors: kNotFound; kIo for folders, devices, files we may not read and pipes with more than 4 GiB.
+  static Result<InputFile> Open(const std::filesystem::path& path);
+  // Bytes in memory that read like a file; `name` is what messages call it.
+  static InputFile FromBytes(std::string name, std::string bytes);
+
+  InputFile(InputFile&& other) noexcept;
+  InputFile& operator=(InputFile&& other) noexcept;
+  ~InputFile();
+
+  const std::filesystem::path& path() const { return path_; }
+  std::string name() const { return path_.string(); }  // for messages
+  uint64_t size() const { return size_; }              // bytes, when it was opened
+
+  // Exactly `size` bytes from `offset`. kBadFile when the file ends before (it may have been cut since it was opened).
+  Status ReadAt(uint64_t offset, void* out, size_t size) const;
+  // The first `size` bytes, or all there are.
+  Result<std::string> Head(size_t size) const;
+  // The whole file; kBadFile when it is larger than `max_size`.
+  Result<std::string> ReadAll(uint64_t max_size) const;
+
+ private:
+  InputFile() = default;
+
+  std::filesystem::path path_;
+  int descriptor_ = -1;  // −1: the bytes are in memory
+  std::string memory_;
+  uint64_t size_ = 0;
+};
+
+// Forward reading with a block buffer, for the parts of files whose layout is only known while reading.
+class SequentialReader {
+ public:
+  SequentialReader(const InputFile& file, uint64_t offset);
+
+  uint64_t position() const { return block_begin_ + at_; }  // byte in the file
+  // The next `size` bytes (≤ kMaxView), valid until the next call; an error like InputFile::ReadAt at the file's end.
+  Result<const char*> View(size_t size);
+  // Passes over bytes without reading them; kBadFile when the file has fewer.
+  Status Skip(uint64_t size);
+  // What is left in the block, at least one byte unless the file has ended; Consume() passes over part of it.
+  Result<std::string_view> Peek();
+  void Consume(size_t size) { at_ += size; }
+
+  static constexpr size_t kMaxView = 4096;
+
+ private:
+  Status Fill(size_t at_least);
+
+  const InputFile* file_;
+  std::unique_ptr<char[]> block_;
+  uint64_t block_begin_;   // byte in the file where the block begins
+  size_t block_size_ = 0;  // bytes in the block
+  size_t at_ = 0;          // next byte in the block
+};
+
+}  // namespace anchorsplat

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "formats/input_file.h"
+#include "formats/ply_header.h"
+
+namespace anchorsplat {
+
+// Where one float of a Gaussian goes: component `component` of the row of `array`.
+struct PlyTarget {
+  Buffer<float> GaussianCloud::*array = nullptr;
+  int64_t width = 0;  // floats per row of the array
+  int component = 0;
+};
+
+// How the rows of element "vertex" become Gaussians.
+struct PlyLayout {
+  const PlyElement* vertex = nullptr;  // of the header given to PlanPly
+  int sh_degree = 0;
+  std::vector<std::optional<PlyTarget>> targets;  // one per property of `vertex`; nothing: skipped
+};
+
+// Finds the INRIA properties x y z, f_dc_0..2, f_rest_* (0, 9, 24 or 45, channel-major), opacity, scale_0..2, rot_0..3
+// by name and checks that they are float or double. Errors (kBadFile) say what is missing, or what the file is instead.
+// `header` must outlive the layout.
+Result<PlyLayout> PlanPly(const InputFile& file, const PlyHeader& header);
+
+}  // namespace anchorsplat

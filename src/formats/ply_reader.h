@@ -1,0 +1,22 @@
+#pragma once
+
+#include <filesystem>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "formats/cloud_io.h"
+#include "formats/input_file.h"
+
+namespace anchorsplat {
+
+// Reads a Gaussian splat from a PLY file in the INRIA convention, ASCII or binary of either byte order: properties are
+// found by name, extra ones (lists too) and extra elements are skipped. Values stay as stored: log-scales, opacity
+// logits, wxyz quaternions of any norm; doubles are rounded to float. f_rest_* (channel-major in the file) becomes
+// coefficient-major `sh`; clouds without f_rest have SH degree 0. Render mode and comments are kept.
+//
+// Errors (kBadFile): not a PLY, a required property missing or of list or integer type, f_rest not 0, 9, 24 or 45, no
+// Gaussians, fewer bytes than the header promises (checked before anything is allocated), more than
+// `limits.max_gaussians`, in ASCII a value that is no number (the message gives the line).
+Result<GaussianCloud> ReadPly(const InputFile& file, const ReadLimits& limits = {});
+
+}  // namespace anchorsplat

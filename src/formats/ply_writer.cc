@@ -1,0 +1,123 @@
+#include "formats/ply_writer.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <mutex>
+
+#include "core/parallel.h"
+#include "core/text.h"
+#include "formats/atomic_file.h"
+#include "formats/ply_header.h"
+
+namespace anchorsplat {
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "rows are copied as they lie in memory");
+
+// x y z nx ny nz, f_dc and f_rest, opacity scale rot
+int64_t RowFloats(int sh_degree) { return 6 + 3 * ShCoefficients(sh_degree) + 8; }
+
+std::string Header(int64_t count, int sh_degree, std::optional<RenderMode> render_mode,
+                   std::span<const std::string> comments) {
+  std::string header = "ply\nformat binary_little_endian 1.0\n";
+  for (const std::string& comment : comments) {
+    std::string line = comment;
+    for (char& c : line) {
+      if (static_cast<unsigned char>(c) < 0x20) c = ' ';  // a line end would turn the rest into header lines
+    }
+    header += "comment " + line + "\n";
+  }
+  if (render_mode) header += "comment " + CommentFromRenderMode(*render_mode) + "\n";
+  header += Cat("element vertex ", count, "\n");
+  const auto property = [&header](const auto&... name) { header += Cat("property float ", name..., "\n"); };
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) property(name);
+  for (int k = 0; k < 3; ++k) property("f_dc_", k);
+  for (int k = 0; k < 3 * (ShCoefficients(sh_degree) - 1); ++k) property("f_rest_", k);
+  property("opacity");
+  for (int k = 0; k < 3; ++k) property("scale_", k);
+  for (int k = 0; k < 4; ++k) property("rot_", k);
+  return header + "end_header\n";
+}
+
+template <int kDegree>
+void PackRows(const GaussianCloud& cloud, int64_t first, int64_t last, float* out) {
+  constexpr int kCoefficients = ShCoefficients(kDegree);
+  const float* mean = cloud.means.data() + 3 * first;
+  const float* scale = cloud.log_scales.data() + 3 * first;
+  const float* quat = cloud.quats.data() + 4 * first;
+  const float* sh = cloud.sh.data() + 3 * kCoefficients * first;
+  for (int64_t i = first; i < last; ++i) {
+    out = std::copy_n(mean, 3, out);
+    out = std::fill_n(out, 3, 0.0f);
+    out = std::copy_n(sh, 3, out);
+    for (int channel = 0; channel < 3; ++channel) {
+      for (int k = 1; k < kCoefficients; ++k) *out++ = sh[3 * k + channel];
+    }
+    *out++ = cloud.opacity_logits[static_cast<size_t>(i)];
+    out = std::copy_n(scale, 3, out);
+    out = std::copy_n(quat, 4, out);
+    mean += 3, scale += 3, quat += 4, sh += 3 * kCoefficients;
+  }
+}
+
+void Pack(const GaussianCloud& cloud, int64_t first, int64_t last, float* out) {
+  switch (cloud.sh_degree) {
+    case 0:
+      return PackRows<0>(cloud, first, last, out);
+    case 1:
+      return PackRows<1>(cloud, first, last, out);
+    case 2:
+      return PackRows<2>(cloud, first, last, out);
+    default:
+      return PackRows<3>(cloud, first, last, out);
+  }
+}
+
+}  // namespace
+
+uint64_t PredictedPlySize(int64_t count, int sh_degree, std::optional<RenderMode> render_mode,
+                          std::span<const std::string> comments) {
+  return Header(count, sh_degree, render_mode, comments).size() +
+         static_cast<uint64_t>(count) * static_cast<uint64_t>(RowFloats(sh_degree)) * sizeof(float);
+}
+
+Status WritePly(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
+  if (cloud.empty()) {
+    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": there are no Gaussians to write")};
+  }
+  const std::string header = Header(cloud.size(), cloud.sh_degree, cloud.render_mode, cloud.comments);
+  if (header.size() > kMaxPlyHeader) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat(path.string(), ": comments of ", HumanBytes(header.size()),
+                     " do not fit a PLY header, which ends within ", HumanBytes(kMaxPlyHeader))};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  const auto row_size = static_cast<uint64_t>(RowFloats(cloud.sh_degree)) * sizeof(float);
+  ANCHORSPLAT_RETURN_IF_ERROR(file.Reserve(header.size() + static_cast<uint64_t>(cloud.size()) * row_size));
+  ANCHORSPLAT_RETURN_IF_ERROR(file.WriteAt(0, header.data(), header.size()));
+
+  // A block stays in the L2 cache between packing and writing; a task is many blocks that share one buffer.
+  const auto block = static_cast<int64_t>((size_t{256} << 10) / row_size);
+  std::mutex mutex;
+  Status failure;
+  ParallelFor(0, cloud.size(), 16 * block, [&](int64_t first, int64_t last) {
+    Buffer<float> rows(static_cast<size_t>(std::min(block, last - first) * RowFloats(cloud.sh_degree)));
+    for (int64_t i = first; i < last; i += block) {
+      const int64_t end = std::min(last, i + block);
+      Pack(cloud, i, end, rows.data());
+      const Status status = file.WriteAt(header.size() + static_cast<uint64_t>(i) * row_size, rows.data(),
+                                         static_cast<size_t>(static_cast<uint64_t>(end - i) * row_size));
+      if (status.ok()) continue;
+      const std::lock_guard lock(mutex);
+      failure = status;
+      return;
+    }
+  });
+  ANCHORSPLAT_RETURN_IF_ERROR(failure);
+  return file.Commit();
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,68 @@
+#include "formats/registry.h"
+
+#include <array>
+#include <cctype>
+#include <string>
+
+#include "formats/ply_reader.h"
+#include "formats/ply_writer.h"
+
+namespace anchorsplat {
+
+namespace {
+
+bool IsPly(std::string_view head) { return head.starts_with("ply\n") || head.starts_with("ply\r"); }
+
+// PlayCanvas's packed PLY keeps the ranges of its chunks in an element before the vertices.
+bool IsCompressedPly(std::string_view head) { return IsPly(head) && head.find("\nelement chunk ") != head.npos; }
+
+// Version 4 begins with its own mark, earlier ones are gzip streams.
+bool IsSpz(std::string_view head) { return head.starts_with("NGSP") || head.starts_with("\x1f\x8b"); }
+
+bool IsZip(std::string_view head) { return head.starts_with("PK\x03\x04"); }
+
+constexpr std::string_view kCompressedPlyExtensions[] = {".compressed.ply"};
+constexpr std::string_view kPlyExtensions[] = {".ply"};
+constexpr std::string_view kSpzExtensions[] = {".spz"};
+constexpr std::string_view kSogExtensions[] = {".sog"};
+constexpr std::string_view kSplatExtensions[] = {".splat"};
+constexpr std::string_view kKsplatExtensions[] = {".ksplat"};
+
+constexpr SplatFormat kFormats[] = {
+    {"compressed PLY", kCompressedPlyExtensions, IsCompressedPly, nullptr, nullptr, nullptr},
+    {"PLY", kPlyExtensions, IsPly, ReadPly, WritePly,
+     [](int64_t count, int sh_degree) { return PredictedPlySize(count, sh_degree); }},
+    {"SPZ", kSpzExtensions, IsSpz, nullptr, nullptr, nullptr},
+    {"SOG", kSogExtensions, IsZip, nullptr, nullptr, nullptr},
+    {"splat", kSplatExtensions, nullptr, nullptr, nullptr, nullptr},
+    {"ksplat", kKsplatExtensions, nullptr, nullptr, nullptr, nullptr},
+};
+
+}  // namespace
+
+std::span<const SplatFormat> Formats() { return kFormats; }
+
+const SplatFormat* FormatOfExtension(const std::filesystem::path& path) {
+  std::string name = path.filename().string();
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const SplatFormat* best = nullptr;
+  size_t longest = 0;
+  for (const SplatFormat& format : Formats()) {
+    for (const std::string_view extension : format.extensions) {
+      if (extension.size() > longest && name.ends_with(extension)) {
+        best = &format;
+        longest = extension.size();
+      }
+    }
+  }
+  return best;
+}
+
+const SplatFormat* FormatOfFile(std::string_view head, const std::filesystem::path& path) {
+  for (const SplatFormat& format : Formats()) {
+    if (format.sniff != nullptr && format.sniff(head)) return &format;
+  }
+  return FormatOfExtension(path);
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,349 @@
+#include "model/kernels/attention.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/buffer.h"
+#include "core/parallel.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "model/kernels/attention.cc"
+#include <hwy/foreach_target.h>  // compiles this file once per SIMD target
+#include <hwy/highway.h>
+
+#include "model/kernels/unroll.h"
+#include "model/kernels/vector_math-inl.h"
+
+#ifndef ANCHORSPLAT_ATTENTION_ONCE
+#define ANCHORSPLAT_ATTENTION_ONCE
+namespace anchorsplat {
+
+// Patches are split at multiples of this, which every SIMD target's group of queries divides.
+constexpr int64_t kLargestGroup = 64;
+
+// Reused by the tasks of a thread.
+struct AttentionScratch {
+  Buffer<float> keys;           // [keys, depth], padded with zeros to whole tiles
+  Buffer<float> values;         // [keys, depth]
+  Buffer<float> queries;        // [depth][group] of the queries at hand, scaled
+  Buffer<float> probabilities;  // [keys of a block][group], not normalised
+  Buffer<float> sums;           // [depth][group] Σ probability · value
+};
+
+// Queries [first, last) of a patch, one head.
+struct AttentionTask {
+  int64_t patch_begin;  // first slot
+  int64_t keys;         // slots of the patch
+  int64_t first;        // slots of the queries, within the patch
+  int64_t last;
+  int64_t head;
+};
+
+}  // namespace anchorsplat
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace anchorsplat {
+namespace HWY_NAMESPACE {
+
+// Queries stand in the lanes: the softmax of a query is then a matter of its lane, and keys and values are broadcast.
+using GroupTag = hn::CappedTag<float, 16>;
+#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
+inline constexpr int kVectors = 4;  // of queries, a group
+inline constexpr int kKeyTile = 6;  // keys whose scores are in registers at once
+inline constexpr int kDimTile = 4;  // channels of the output whose sums are
+#elif HWY_TARGET == HWY_NEON
+inline constexpr int kVectors = 4;
+inline constexpr int kKeyTile = 6;
+inline constexpr int kDimTile = 4;
+#else
+inline constexpr int kVectors = 2;
+inline constexpr int kKeyTile = 4;
+inline constexpr int kDimTile = 4;
+#endif
+inline constexpr int kLanes = static_cast<int>(HWY_MIN(HWY_LANES(float), size_t{16}));
+inline constexpr int kGroup = kVectors * kLanes;
+static_assert(kLargestGroup % kGroup == 0);
+inline constexpr int64_t kKeyBlock = 10 * kKeyTile;  // its probabilities stay in the first cache
+
+using V = hn::VFromD<GroupTag>;
+
+// Scores of kKeyTile keys and a group of queries, minus `shift`.
+HWY_INLINE void Scores(const float* HWY_RESTRICT keys, const float* HWY_RESTRICT queries, int64_t depth,
+                       const V (&shift)[kVectors], V (&scores)[kKeyTile][kVectors]) {
+  const GroupTag d;
+  ANCHORSPLAT_UNROLL
+  for (int v = 0; v < kVectors; ++v) {
+    ANCHORSPLAT_UNROLL
+    for (int j = 0; j < kKeyTile; ++j) scores[j][v] = shift[v];
+  }
+  for (int64_t c = 0; c < depth; ++c) {
+    V q[kVectors];
+    ANCHORSPLAT_UNROLL
+    for (int v = 0; v < kVectors; ++v) q[v] = hn::LoadU(d, queries + c * kGroup + v * kLanes);
+    ANCHORSPLAT_UNROLL
+    for (int j = 0; j < kKeyTile; ++j) {
+      const V k = hn::Set(d, keys[j * depth + c]);
+      ANCHORSPLAT_UNROLL
+      for (int v = 0; v < kVectors; ++v) scores[j][v] = hn::MulAdd(k, q[v], scores[j][v]);
+    }
+  }
+}
+
+// The largest score of each query among the first `keys` keys. NaN may get lost here, but not in the probabilities.
+HWY_NOINLINE void LargestScores(const float* keys, int64_t key_count, const float* queries, int64_t depth,
+                                float* HWY_RESTRICT largest) {
+  const GroupTag d;
+  V best[kVectors];
+  V zero[kVectors];
+  ANCHORSPLAT_UNROLL
+  for (int v = 0; v < kVectors; ++v) {
+    best[v] = hn::Set(d, -3.0e38f);
+    zero[v] = hn::Zero(d);
+  }
+  for (int64_t j0 = 0; j0 < key_count; j0 += kKeyTile) {
+    V scores[kKeyTile][kVectors];
+    Scores(keys + j0 * depth, queries, depth, zero, scores);
+    ANCHORSPLAT_UNROLL
+    for (int j = 0; j < kKeyTile; ++j) {
+      if (j0 + j >= key_count) break;
+      ANCHORSPLAT_UNROLL
+      for (int v = 0; v < kVectors; ++v) best[v] = hn::Max(best[v], scores[j][v]);
+    }
+  }
+  ANCHORSPLAT_UNROLL
+  for (int v = 0; v < kVectors; ++v) hn::StoreU(best[v], d, largest + v * kLanes);
+}
+
+enum class ScoreRange : uint8_t {
+  kBounded,  // −125 … 125 after the shift
+  kAny,      // at most 125 after the shift, but perhaps far below
+};
+
+// Probabilities exp2(score − shift) of a block of keys, and their sums over the keys added to `total`.
+template <ScoreRange kRange, Rounding kRounding>
+HWY_NOINLINE void Probabilities(const float* keys, int64_t key_count, const float* queries, int64_t depth,
+                                const float* HWY_RESTRICT shifts, float* HWY_RESTRICT probabilities,
+                                float* HWY_RESTRICT totals) {
+  const GroupTag d;
+  V total[kVectors];
+  V shift[kVectors];
+  ANCHORSPLAT_UNROLL
+  for (int v = 0; v < kVectors; ++v) {
+    total[v] = hn::LoadU(d, totals + v * kLanes);
+    shift[v] = hn::Neg(hn::LoadU(d, shifts + v * kLanes));
+  }
+  for (int64_t j0 = 0; j0 < key_count; j0 += kKeyTile) {
+    V scores[kKeyTile][kVectors];
+    Scores(keys + j0 * depth, queries, depth, shift, scores);
+    ANCHORSPLAT_UNROLL
+    for (int j = 0; j < kKeyTile; ++j) {
+      if (j0 + j >= key_count) break;
+      ANCHORSPLAT_UNROLL
+      for (int v = 0; v < kVectors; ++v) {
+        const V p = kRange == ScoreRange::kBounded ? Exp2Bounded(d, scores[j][v]) : Exp2(d, scores[j][v]);
+        total[v] = hn::Add(total[v], p);
+        hn::StoreU(Round<kRounding>(d, p), d, probabilities + (j0 + j) * kGroup + v * kLanes);
+      }
+    }
+  }
+  ANCHORSPLAT_UNROLL
+  for (int v = 0; v < kVectors; ++v) hn::StoreU(total[v], d, totals + v * kLanes);
+}
+
+// sums[c] += Σ_j value[j,c] · probability[j] over a block of keys.
+HWY_NOINLINE void Accumulate(const float* HWY_RESTRICT probabilities, const float* HWY_RESTRICT values,
+                             int64_t key_count, int64_t depth, float* HWY_RESTRICT sums) {
+  const GroupTag d;
+  for (int64_t c = 0; c < depth; c += kDimTile) {
+    V sum[kDimTile][kVectors];
+    ANCHORSPLAT_UNROLL
+    for (int i = 0; i < kDimTile; ++i) {
+      ANCHORSPLAT_UNROLL
+      for (int v = 0; v < kVectors; ++v) sum[i][v] = hn::LoadU(d, sums + (c + i) * kGroup + v * kLanes);
+    }
+    for (int64_t j = 0; j < key_count; ++j) {
+      V p[kVectors];
+      ANCHORSPLAT_UNROLL
+      for (int v = 0; v < kVectors; ++v) p[v] = hn::LoadU(d, probabilities + j * kGroup + v * kLanes);
+      ANCHORSPLAT_UNROLL
+      for (int i = 0; i < kDimTile; ++i) {
+        const V x = hn::Set(d, values[j * depth + c + i]);
+        ANCHORSPLAT_UNROLL
+        for (int v = 0; v < kVectors; ++v) sum[i][v] = hn::MulAdd(x, p[v], sum[i][v]);
+      }
+    }
+    ANCHORSPLAT_UNROLL
+    for (int i = 0; i < kDimTile; ++i) {
+      ANCHORSPLAT_UNROLL
+      for (int v = 0; v < kVectors; ++v) hn::StoreU(sum[i][v], d, sums + (c + i) * kGroup + v * kLanes);
+    }
+  }
+}
+
+float RoundOne(Rounding rounding, float x) {
+  const hn::CappedTag<float, 1> d;
+  const auto v = hn::Set(d, x);
+  switch (rounding) {
+    case Rounding::kHalf:
+      return hn::GetLane(RoundToHalf(d, v));
+    case Rounding::kBFloat16:
+      return hn::GetLane(RoundToBFloat16(d, v));
+    case Rounding::kNone:
+      break;
+  }
+  return x;
+}
+
+template <Rounding kRounding>
+void AttendGroup(const AttentionParams& p, const AttentionTask& task, int64_t depth, float longest_key, int64_t query,
+                 AttentionScratch& s) {
+  const GroupTag d;
+  const int64_t width = p.channels / p.heads;
+  const int64_t count = std::min<int64_t>(kGroup, task.last - query);
+  const int32_t* rows = p.patch_rows + task.patch_begin + query;
+  // Scores are wanted as exponents of 2.
+  const float scale = p.scale * 1.44269504088896341f;
+  float longest_query = 0;
+  bool finite = true;
+  std::fill(s.queries.begin(), s.queries.end(), 0.0f);
+  for (int64_t i = 0; i < count; ++i) {
+    const float* q = p.qkv + int64_t{3} * rows[i] * p.channels + task.head * width;
+    float squares = 0;
+    for (int64_t c = 0; c < width; ++c) {
+      const float value = RoundOne(kRounding, q[c]) * scale;
+      squares += value * value;
+      s.queries[static_cast<size_t>(c * kGroup + i)] = value;
+    }
+    finite = finite && std::isfinite(squares);
+    longest_query = std::max(longest_query, squares);
+  }
+  // Softmax does not change when a query's scores are all shifted. No shift is needed when no exponential can leave
+  // the range of floats, and |q·k| ≤ |q||k| tells. Otherwise, and where probabilities get rounded, the largest score
+  // is the shift.
+  constexpr float kSafeExponent = 60;
+  const bool bounded = finite && std::sqrt(longest_query) * longest_key <= kSafeExponent;
+  alignas(64) float shifts[kGroup] = {};
+  alignas(64) float totals[kGroup] = {};
+  const bool shifted = kRounding != Rounding::kNone || !bounded;
+  if (shifted) LargestScores(s.keys.data(), task.keys, s.queries.data(), depth, shifts);
+  std::fill(s.sums.begin(), s.sums.end(), 0.0f);
+  for (int64_t j = 0; j < task.keys; j += kKeyBlock) {
+    const int64_t keys = std::min(kKeyBlock, task.keys - j);
+    const float* block = s.keys.data() + j * depth;
+    if (bounded) {
+      Probabilities<ScoreRange::kBounded, kRounding>(block, keys, s.queries.data(), depth, shifts,
+                                                     s.probabilities.data(), totals);
+    } else {
+      Probabilities<ScoreRange::kAny, kRounding>(block, keys, s.queries.data(), depth, shifts, s.probabilities.data(),
+                                                 totals);
+    }
+    Accumulate(s.probabilities.data(), s.values.data() + j * depth, keys, depth, s.sums.data());
+  }
+  for (int64_t c = 0; c < width; ++c) {
+    ANCHORSPLAT_UNROLL
+    for (int v = 0; v < kVectors; ++v) {
+      float* sum = s.sums.data() + c * kGroup + v * kLanes;
+      const V mean = hn::Div(hn::LoadU(d, sum), hn::LoadU(d, totals + v * kLanes));
+      hn::StoreU(Round<kRounding>(d, mean), d, sum);
+    }
+  }
+  for (int64_t i = 0; i < count; ++i) {
+    float* out = p.out + rows[i] * p.channels + task.head * width;
+    for (int64_t c = 0; c < width; ++c) out[c] = s.sums[static_cast<size_t>(c * kGroup + i)];
+  }
+}
+
+template <Rounding kRounding>
+void AttendRounded(const AttentionParams& p, const AttentionTask& task, AttentionScratch& s) {
+  const int64_t width = p.channels / p.heads;
+  const int64_t depth = (width + kDimTile - 1) / kDimTile * kDimTile;
+  const int64_t padded = (task.keys + kKeyTile - 1) / kKeyTile * kKeyTile;
+  s.keys.resize(static_cast<size_t>(padded * depth));
+  s.values.resize(static_cast<size_t>(padded * depth));
+  s.queries.resize(static_cast<size_t>(depth * kGroup));
+  s.sums.resize(static_cast<size_t>(depth * kGroup));
+  s.probabilities.resize(static_cast<size_t>(kKeyBlock * kGroup));
+  float longest = 0;
+  bool finite = true;
+  for (int64_t j = 0; j < padded; ++j) {
+    float* key = s.keys.data() + j * depth;
+    float* value = s.values.data() + j * depth;
+    if (j >= task.keys) {
+      std::fill(key, key + depth, 0.0f);
+      std::fill(value, value + depth, 0.0f);
+      continue;
+    }
+    const float* k = p.qkv + (int64_t{3} * p.patch_rows[task.patch_begin + j] + 1) * p.channels + task.head * width;
+    const float* v = k + p.channels;
+    float squares = 0;
+    for (int64_t c = 0; c < width; ++c) {
+      key[c] = RoundOne(kRounding, k[c]);
+      value[c] = RoundOne(kRounding, v[c]);
+      squares += key[c] * key[c];
+    }
+    std::fill(key + width, key + depth, 0.0f);
+    std::fill(value + width, value + depth, 0.0f);
+    finite = finite && std::isfinite(squares);
+    longest = std::max(longest, squares);
+  }
+  const float longest_key = finite ? std::sqrt(longest) : INFINITY;
+  for (int64_t query = task.first; query < task.last; query += kGroup) {
+    AttendGroup<kRounding>(p, task, depth, longest_key, query, s);
+  }
+}
+
+void Attend(const AttentionParams& p, const AttentionTask& task, AttentionScratch& scratch) {
+  switch (p.rounding) {
+    case Rounding::kNone:
+      return AttendRounded<Rounding::kNone>(p, task, scratch);
+    case Rounding::kHalf:
+      return AttendRounded<Rounding::kHalf>(p, task, scratch);
+    case Rounding::kBFloat16:
+      return AttendRounded<Rounding::kBFloat16>(p, task, scratch);
+  }
+}
+
+// NOLINTNEXTLINE(google-readability-namespace-comments)
+}  // namespace HWY_NAMESPACE
+}  // namespace anchorsplat
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace anchorsplat {
+
+HWY_EXPORT(Attend);
+
+void AttentionCpu(const AttentionParams& p) {
+  if (p.count <= 0) return;
+  const auto attend = HWY_DYNAMIC_DISPATCH(Attend);
+  const int64_t padded = PaddedCount(p.count, p.patch_size);
+  const int64_t patch = std::min(padded, p.patch_size);
+  const int64_t patches = padded / patch;
+  // Whole patches are cheapest; they are split (at multiples of every group, so that no bit changes) when that leaves
+  // threads without work.
+  const auto whole_groups = [](int64_t n) { return (n + kLargestGroup - 1) / kLargestGroup * kLargestGroup; };
+  int64_t chunk = whole_groups(patch);
+  const int64_t wanted = 4 * static_cast<int64_t>(ThreadCount());
+  while (chunk > 128 && patches * p.heads * ((patch + chunk - 1) / chunk) < wanted) chunk = whole_groups(chunk / 2);
+  const int64_t chunks = (patch + chunk - 1) / chunk;
+  ParallelFor(0, patches * p.heads * chunks, 1, [&](int64_t begin, int64_t end) {
+    thread_local AttentionScratch scratch;
+    for (int64_t index = begin; index < end; ++index) {
+      const int64_t slot = index / (p.heads * chunks) * patch;
+      const int64_t own = std::min(patch, p.count - slot);  // the rest of a last patch is borrowed
+      const int64_t first = index % chunks * chunk;
+      if (first >= own) continue;
+      attend(p,
+             {.patch_begin = slot,
+              .keys = patch,
+              .first = first,
+              .last = std::min(own, first + chunk),
+              .head = index / chunks % p.heads},
+             scratch);
+    }
+  });
+}
+
+}  // namespace anchorsplat
+#endif

@@ -1,0 +1,233 @@
+#include "model/kernels/attention.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "core/parallel.h"
+#include "core/random.h"
+#include "model/kernels/simd_targets_testing.h"
+
+namespace anchorsplat {
+namespace {
+
+struct Problem {
+  int64_t count = 0;
+  int64_t channels = 0;
+  int64_t heads = 0;
+  int64_t patch_size = 0;
+  float scale = 0;
+  Rounding rounding = Rounding::kNone;
+  std::vector<float> qkv = {};
+  std::vector<int32_t> order = {};
+  Buffer<int32_t> patch_rows = {};
+};
+
+Problem RandomProblem(uint64_t seed, int64_t count, int64_t channels, int64_t heads, int64_t patch_size,
+                      double size = 1) {
+  Random random(seed);
+  Problem p{.count = count, .channels = channels, .heads = heads, .patch_size = patch_size};
+  p.scale = static_cast<float>(1 / std::sqrt(static_cast<double>(channels) / static_cast<double>(heads)));
+  p.qkv.resize(static_cast<size_t>(count * 3 * channels));
+  for (float& x : p.qkv) x = static_cast<float>(size * random.Normal());
+  for (int64_t i = 0; i < count; ++i) p.order.push_back(static_cast<int32_t>(i));
+  for (int64_t i = count - 1; i > 0; --i)
+    std::swap(p.order[static_cast<size_t>(i)], p.order[static_cast<size_t>(random.Below(i + 1))]);
+  p.patch_rows = PatchRows(p.order, patch_size);
+  return p;
+}
+
+std::vector<float> Attend(const Problem& p) {
+  std::vector<float> out(static_cast<size_t>(p.count * p.channels), -77.0f);
+  AttentionCpu({.count = p.count,
+                .channels = p.channels,
+                .heads = p.heads,
+                .scale = p.scale,
+                .qkv = p.qkv.data(),
+                .patch_rows = p.patch_rows.data(),
+                .patch_size = p.patch_size,
+                .rounding = p.rounding,
+                .out = out.data()});
+  return out;
+}
+
+// Nearest value with `bits` explicit bits of mantissa and smallest exponent `lowest`, ties to even.
+double RoundedTo(double x, int bits, int lowest, double largest) {
+  if (x == 0 || !std::isfinite(x)) return x;
+  const int exponent = std::max(std::ilogb(x), lowest);
+  const double unit = std::ldexp(1.0, exponent - bits);
+  const double y = std::nearbyint(x / unit) * unit;
+  return std::abs(y) > largest ? std::copysign(std::numeric_limits<double>::infinity(), x) : y;
+}
+
+double Rounded(Rounding rounding, double x) {
+  switch (rounding) {
+    case Rounding::kHalf:
+      return RoundedTo(x, 10, -14, 65504);
+    case Rounding::kBFloat16:
+      return RoundedTo(x, 7, -126, 3.4e38);
+    case Rounding::kNone:
+      break;
+  }
+  return x;
+}
+
+// One query at a time: the patch is the 1024 consecutive points of the order around it, the last patch reaches back.
+std::vector<double> AttendReference(const Problem& p) {
+  std::vector<double> out(static_cast<size_t>(p.count * p.channels));
+  const int64_t width = p.channels / p.heads;
+  for (int64_t position = 0; position < p.count; ++position) {
+    std::vector<int64_t> keys;  // rows of points
+    if (p.count <= p.patch_size) {
+      keys.assign(p.order.begin(), p.order.end());
+    } else {
+      const int64_t begin = position / p.patch_size * p.patch_size;
+      for (int64_t i = 0; i < p.patch_size; ++i) {
+        const int64_t at = begin + i;
+        keys.push_back(p.order[static_cast<size_t>(at < p.count ? at : at - p.patch_size)]);
+      }
+    }
+    const int64_t row = p.order[static_cast<size_t>(position)];
+    for (int64_t h = 0; h < p.heads; ++h) {
+      const auto value = [&](int64_t point, int64_t part, int64_t c) {
+        return Rounded(p.rounding, p.qkv[static_cast<size_t>((point * 3 + part) * p.channels + h * width + c)]);
+      };
+      std::vector<double> scores;
+      for (int64_t key : keys) {
+        double dot = 0;
+        for (int64_t c = 0; c < width; ++c) dot += value(row, 0, c) * value(key, 1, c);
+        scores.push_back(dot * p.scale);
+      }
+      const double largest = *std::max_element(scores.begin(), scores.end());
+      double total = 0;
+      for (double& s : scores) total += s = std::exp(s - largest);
+      for (int64_t c = 0; c < width; ++c) {
+        double sum = 0;
+        for (size_t j = 0; j < keys.size(); ++j) sum += Rounded(p.rounding, scores[j]) * value(keys[j], 2, c);
+        out[static_cast<size_t>(row * p.channels + h * width + c)] = Rounded(p.rounding, sum / total);
+      }
+    }
+  }
+  return out;
+}
+
+void ExpectNear(const std::vector<float>& actual, const std::vector<double>& expected, double tolerance) {
+  ASSERT_EQ(actual.size(), expected.size());
+  for (size_t i = 0; i < actual.size(); ++i) {
+    ASSERT_NEAR(actual[i], expected[i], tolerance) << "element " << i;
+  }
+}
+
+TEST(Attention, MatchesReferenceForEveryPatchRemainder) {
+  ForEachSimdTarget([] {
+    for (int64_t count : {1, 2, 31, 63, 64, 65, 96, 97, 128, 129, 150, 191, 192, 193, 211}) {
+      const Problem p = RandomProblem(static_cast<uint64_t>(count), count, 48, 3, 64);
+      ExpectNear(Attend(p), AttendReference(p), 2e-6);
+    }
+  });
+}
+
+TEST(Attention, MatchesReferenceForTheHeadsOfTheNetworkAndOddOnes) {
+  ForEachSimdTarget([] {
+    const int64_t shapes[][2] = {{64, 2}, {96, 4}, {128, 8}, {32, 32}, {35, 5}, {13, 1}, {60, 2}};
+    for (const auto& [channels, heads] : shapes) {
+      const Problem p = RandomProblem(static_cast<uint64_t>(channels), 300, channels, heads, 128);
+      ExpectNear(Attend(p), AttendReference(p), 2e-6);
+    }
+  });
+}
+
+TEST(Attention, MatchesReferenceAtThePatchSizeOfTheNetwork) {
+  for (int64_t count : {1023, 1024, 1025, 2500}) {
+    const Problem p = RandomProblem(7, count, 32, 2, kPatchSize);
+    ExpectNear(Attend(p), AttendReference(p), 2e-6);
+  }
+}
+
+// Scores of thousands: no exponential may overflow, whichever way the kernel keeps them in range.
+TEST(Attention, SurvivesHugeAndTinyScores) {
+  ForEachSimdTarget([] {
+    for (double size : {1e-20, 1e-3, 3.0, 5.0, 8.0, 30.0, 100.0}) {
+      const Problem p = RandomProblem(11, 150, 32, 2, 64, size);
+      ExpectNear(Attend(p), AttendReference(p), 1e-6 * size * std::max(10.0, size * size));
+    }
+  });
+}
+
+TEST(Attention, RoundsLikeFusedAttentionInHalfPrecision) {
+  ForEachSimdTarget([] {
+    for (Rounding rounding : {Rounding::kHalf, Rounding::kBFloat16}) {
+      const double unit = rounding == Rounding::kHalf ? std::ldexp(1.0, -11) : std::ldexp(1.0, -8);
+      for (double size : {1.0, 4.0}) {
+        Problem p = RandomProblem(5, 150, 48, 3, 64, size);
+        p.rounding = rounding;
+        const std::vector<float> out = Attend(p);
+        const std::vector<double> expected = AttendReference(p);
+        Problem exact = p;
+        exact.rounding = Rounding::kNone;
+        const std::vector<double> unrounded = AttendReference(exact);
+        double off = 0;
+        double effect = 0;
+        for (size_t i = 0; i < out.size(); ++i) {
+          // values are of the grid, and off by at most a step where a probability or the output is close to a tie
+          ASSERT_EQ(out[i], Rounded(rounding, out[i]));
+          ASSERT_NEAR(out[i], expected[i], 2.1 * unit * std::max(std::abs(expected[i]), 0.25));
+          off += std::abs(out[i] - expected[i]);
+          effect += std::abs(unrounded[i] - expected[i]);
+        }
+        EXPECT_LT(off, 0.05 * effect);  // the rounding is the reference's, not some other one
+      }
+    }
+  });
+}
+
+TEST(Attention, SameBitsForAnyNumberOfThreads) {
+  const Problem p = RandomProblem(3, 2500, 64, 2, kPatchSize, 3.0);
+  SetThreadCount(1);
+  const std::vector<float> one = Attend(p);
+  for (int threads : {2, 3, 16}) {
+    SetThreadCount(threads);
+    const std::vector<float> many = Attend(p);
+    EXPECT_EQ(0, std::memcmp(one.data(), many.data(), one.size() * sizeof(float))) << threads;
+  }
+  SetThreadCount(0);
+}
+
+TEST(Attention, NothingForNoPoints) {
+  AttentionCpu(
+      {.count = 0, .channels = 64, .heads = 2, .scale = 1, .qkv = nullptr, .patch_rows = nullptr, .out = nullptr});
+}
+
+TEST(Attention, NanAndInfinityStayInTheirPatchAndHead) {
+  ForEachSimdTarget([] {
+    for (float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+      for (int part : {0, 1, 2}) {
+        const Problem clean = RandomProblem(9, 192, 32, 2, 64);
+        const std::vector<float> expected = Attend(clean);
+        Problem p = clean;
+        const int64_t victim = p.order[70];                                   // second patch
+        p.qkv[static_cast<size_t>((victim * 3 + part) * 32 + 16 + 3)] = bad;  // second head
+        const std::vector<float> out = Attend(p);
+        for (int64_t position = 0; position < p.count; ++position) {
+          const int64_t row = p.order[static_cast<size_t>(position)];
+          for (int64_t c = 0; c < 32; ++c) {
+            const auto at = static_cast<size_t>(row * 32 + c);
+            const bool reached = position / 64 == 1 && c >= 16 && (part != 0 || row == victim);
+            if (!reached) {
+              ASSERT_NEAR(out[at], expected[at], 1e-6) << part << ' ' << position << ' ' << c;
+            } else if (std::isnan(bad) && (part != 2 || c == 19)) {
+              ASSERT_TRUE(std::isnan(out[at])) << part << ' ' << position << ' ' << c;
+            }
+          }
+        }
+      }
+    }
+  });
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -1,0 +1,153 @@
+// The inner loop of every matrix product of the network, once per SIMD target (no include guard of the usual kind).
+#if defined(ANCHORSPLAT_MODEL_MATRIX_TILE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef ANCHORSPLAT_MODEL_MATRIX_TILE_INL_H_
+#undef ANCHORSPLAT_MODEL_MATRIX_TILE_INL_H_
+#else
+#define ANCHORSPLAT_MODEL_MATRIX_TILE_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstdint>
+
+#include "model/kernels/packed_weights.h"
+#include "model/kernels/unroll.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace anchorsplat {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// At most a panel wide, so that a panel is a whole number of vectors.
+using TileTag = hn::CappedTag<float, PackedWeights::kPanel>;
+
+// A tile's sums stay in registers: rows × vectors of them, plus the vectors of weights and one input.
+#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
+inline constexpr int kTilePanels = 2;  // 14 · 2 of 32 registers
+inline constexpr int kTileRows = 14;
+#elif HWY_TARGET == HWY_AVX2
+inline constexpr int kTilePanels = 1;  // 6 · 2 of 16
+inline constexpr int kTileRows = 6;
+#elif HWY_TARGET == HWY_NEON
+inline constexpr int kTilePanels = 1;  // 6 · 4 of 32
+inline constexpr int kTileRows = 6;
+#else
+inline constexpr int kTilePanels = 1;  // 2 · 4 of 16: SSE has no fused multiply-add, the product needs a register too
+inline constexpr int kTileRows = 2;
+#endif
+inline constexpr int64_t kTileColumns = kTilePanels * PackedWeights::kPanel;
+
+// One product of a tile: out[r] = (bias or 0) + (added[r] or 0) + Σ_k input[r·stride + k] · weights[k].
+struct Tile {
+  int64_t depth;              // K
+  const float* input;         // rows of K values
+  int64_t stride;             // from row to row of `input`
+  const float* weights;       // panels [K][kPanel]
+  int64_t panel_stride;       // from panel to panel
+  const float* bias;          // [columns] or null
+  const float* const* added;  // [rows] where the addends of each row begin, or null
+  float* const* out;          // [rows] where the sums of each row go
+};
+
+template <int kRows, int kPanels>
+HWY_INLINE void MultiplyTile(const Tile& t) {
+  const TileTag d;
+  using V = hn::VFromD<TileTag>;
+  constexpr int kLanes = static_cast<int>(HWY_MIN(HWY_LANES(float), size_t{PackedWeights::kPanel}));
+  constexpr int kPerPanel = static_cast<int>(PackedWeights::kPanel) / kLanes;
+  constexpr int kVectors = kPanels * kPerPanel;
+  V sums[kRows][kVectors];
+  if (t.bias != nullptr) {
+    ANCHORSPLAT_UNROLL
+    for (int v = 0; v < kVectors; ++v) {
+      const V bias = hn::LoadU(d, t.bias + v * kLanes);
+      ANCHORSPLAT_UNROLL
+      for (int r = 0; r < kRows; ++r) sums[r][v] = bias;
+    }
+  } else {
+    ANCHORSPLAT_UNROLL
+    for (int v = 0; v < kVectors; ++v) {
+      ANCHORSPLAT_UNROLL
+      for (int r = 0; r < kRows; ++r) sums[r][v] = hn::Zero(d);
+    }
+  }
+  const float* HWY_RESTRICT input = t.input;
+  const float* HWY_RESTRICT weights = t.weights;
+  for (int64_t k = 0; k < t.depth; ++k) {
+    V w[kVectors];
+    ANCHORSPLAT_UNROLL
+    for (int v = 0; v < kVectors; ++v) {
+      w[v] = hn::LoadU(d, weights + v / kPerPanel * t.panel_stride + v % kPerPanel * kLanes);
+    }
+    ANCHORSPLAT_UNROLL
+    for (int r = 0; r < kRows; ++r) {
+      const V x = hn::Set(d, input[r * t.stride]);
+      ANCHORSPLAT_UNROLL
+      for (int v = 0; v < kVectors; ++v) sums[r][v] = hn::MulAdd(x, w[v], sums[r][v]);
+    }
+    weights += PackedWeights::kPanel;
+    ++input;
+  }
+  if (t.added != nullptr) {
+    ANCHORSPLAT_UNROLL
+    for (int r = 0; r < kRows; ++r) {
+      ANCHORSPLAT_UNROLL
+      for (int v = 0; v < kVectors; ++v) sums[r][v] = hn::Add(sums[r][v], hn::LoadU(d, t.added[r] + v * kLanes));
+    }
+  }
+  ANCHORSPLAT_UNROLL
+  for (int r = 0; r < kRows; ++r) {
+    ANCHORSPLAT_UNROLL
+    for (int v = 0; v < kVectors; ++v) hn::StoreU(sums[r][v], d, t.out[r] + v * kLanes);
+  }
+}
+
+template <int kRows, int kPanels>
+HWY_NOINLINE void MultiplyTileOutOfLine(const Tile& t) {
+  MultiplyTile<kRows, kPanels>(t);
+}
+
+// `rows` ≤ kRows.
+template <int kPanels, int kRows = kTileRows>
+HWY_INLINE void MultiplyRows(int64_t rows, const Tile& t) {
+  if constexpr (kRows > 1) {
+    if (rows < kRows) return MultiplyRows<kPanels, kRows - 1>(rows, t);
+  }
+  MultiplyTileOutOfLine<kRows, kPanels>(t);
+}
+
+// A tile of rows ≤ kTileRows and columns ≤ kTileColumns; columns that are no whole number of panels take the longer
+// way.
+HWY_INLINE void MultiplyTile(int64_t rows, int64_t columns, Tile t) {
+  if (columns == kTileColumns) return MultiplyRows<kTilePanels>(rows, t);
+  if (columns == PackedWeights::kPanel) return MultiplyRows<1>(rows, t);
+  // The last panel is partly beyond the matrix: let the tile write it whole next door.
+  const int64_t whole = columns / PackedWeights::kPanel * PackedWeights::kPanel;
+  float* outs[kTileRows];
+  const float* addends[kTileRows];
+  if (whole > 0) MultiplyRows<1>(rows, t);
+  alignas(64) float rest[kTileRows][PackedWeights::kPanel];
+  for (int64_t r = 0; r < rows; ++r) {
+    outs[r] = rest[r];
+    for (int64_t c = 0; c < PackedWeights::kPanel; ++c) {
+      rest[r][c] = t.added != nullptr && whole + c < columns ? t.added[r][whole + c] : 0.0f;
+    }
+    addends[r] = rest[r];
+  }
+  Tile last = t;
+  last.weights += whole / PackedWeights::kPanel * t.panel_stride;
+  if (t.bias != nullptr) last.bias += whole;
+  last.added = addends;
+  last.out = outs;
+  MultiplyRows<1>(rows, last);
+  for (int64_t r = 0; r < rows; ++r) {
+    for (int64_t c = whole; c < columns; ++c) t.out[r][c] = rest[r][c - whole];
+  }
+}
+
+// NOLINTNEXTLINE(google-readability-namespace-comments)
+}  // namespace HWY_NAMESPACE
+}  // namespace anchorsplat
+HWY_AFTER_NAMESPACE();
+
+#endif

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 namespace anchorsplat {
 
 // All numbers of the classic 3DGS rasterizer, in one place.
@@ -11,5 +13,16 @@ inline constexpr float kNear = 0.01f;              // world units along z
 inline constexpr float kFar = 1e10f;
 inline constexpr int kTile = 16;               // px: the unit of gsplat's screen culling, part of its output
 inline constexpr float kFrustumMargin = 0.3f;  // the Jacobian's x/z is clamped to the image plus 30 % of its tangent
+inline constexpr double kExtent14 = 3.0;       // σ_max: half side of the square of gsplat 1.0–1.4
+inline constexpr double kExtent15 = 3.33;      // σ per axis at most in gsplat 1.5: where opacity 1 falls to 1/255
+inline constexpr double kMinEigenGap = 0.01;  // px⁴: floor under b² − det in gsplat 1.0–1.4's largest eigenvalue
+
+// Numbers of this implementation. They change its speed and memory, never its pixels.
+inline constexpr int kBlock = 4;                        // px: a 4×4 block is one 16-lane register
+inline constexpr int64_t kProjectChunk = 1024;          // Gaussians per task of the per-Gaussian kernels
+inline constexpr int64_t kMaxPairs = int64_t{1} << 26;  // (tile, Gaussian) pairs listed at once: 256 MiB
+
+// 2^19 px: beyond it tile indices would not fit their 16 bits (and the picture no memory).
+inline constexpr int kMaxImageSide = 1 << 19;
 
 }  // namespace anchorsplat

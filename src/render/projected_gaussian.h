@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+
+namespace anchorsplat {
+
+// A Gaussian as its pixels see it: one cache line, because blending fetches it at random.
+//
+// The conic is kept as its Cholesky factor, scaled so that blending needs neither a logarithm nor a sign check:
+//   with d = pixel − (x, y):  u = u_xx·d_x + u_xy·d_y,  v = u_yy·d_y,  log2 α = log2_opacity − (u² + v²).
+// The sum of squares cannot become negative by rounding and keeps the accuracy of a long thin Gaussian, whose
+// A·dx² + 2B·dx·dy + C·dy² would be a small difference of large numbers.
+struct alignas(64) ProjectedGaussian {
+  double x, y;         // mean, pixels, pixel centres at +0.5. At x = 1000 a float is 6e-5 px wide: too coarse
+  float u_xx;          // 1/px, sqrt(½·log2 e)·sqrt(Σyy/det)
+  float u_xy;          // 1/px, −sqrt(½·log2 e)·Σxy/sqrt(Σyy·det)
+  float u_yy;          // 1/px, sqrt(½·log2 e)/sqrt(Σyy)
+  float log2_opacity;  // ≤ 0; includes the compensation of RenderMode::kAntialiased
+  float rgb[3];        // ≥ 0; written by the spherical harmonics stage
+  float depth;         // camera z, world units
+  float compensation;  // sqrt(det Σ₂ / det(Σ₂ + dilation)), 1 in RenderMode::kClassic; for the backward pass
+};
+static_assert(sizeof(ProjectedGaussian) == 64);
+
+// Tiles that a Gaussian may touch, half-open: columns [x0, x1), rows [y0, y1). All 0 where it is culled.
+struct TileRect {
+  uint16_t x0, y0, x1, y1;
+};
+
+}  // namespace anchorsplat

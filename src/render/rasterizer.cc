@@ -1,0 +1,255 @@
+#include "render/rasterizer.h"
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <new>
+#include <numeric>
+
+#include "core/buffer.h"
+#include "core/parallel.h"
+#include "core/text.h"
+#include "render/bin.h"
+#include "render/blend.h"
+#include "render/project.h"
+#include "render/sort.h"
+#include "render/spherical_harmonics.h"
+
+namespace anchorsplat {
+
+namespace {
+
+Error BadArgument(std::string message) { return {ErrorCode::kBadArgument, std::move(message)}; }
+
+Status CheckCamera(const Camera& camera) {
+  const Pinhole& k = camera.intrinsics;
+  if (k.width < 1 || k.height < 1 || k.width > kMaxImageSide || k.height > kMaxImageSide) {
+    return BadArgument(Cat("camera of ", k.width, " x ", k.height, " pixels; each side must be 1 to ", kMaxImageSide));
+  }
+  if (!(k.fx > 0) || !(k.fy > 0) || !std::isfinite(k.fx) || !std::isfinite(k.fy)) {
+    return BadArgument(Cat("camera focal length (", k.fx, ", ", k.fy, ") must be positive and finite"));
+  }
+  const auto finite = [](double x) { return std::isfinite(x); };
+  const Pose& pose = camera.world_to_camera;
+  if (!finite(k.cx) || !finite(k.cy) || !std::all_of(pose.rotation.begin(), pose.rotation.end(), finite) ||
+      !std::all_of(pose.translation.begin(), pose.translation.end(), finite)) {
+    return BadArgument("camera has a principal point or a pose that is not finite");
+  }
+  return {};
+}
+
+Status CheckOptions(const RenderOptions& o) {
+  if (!(o.near_plane > 0)) return BadArgument(Cat("near plane ", o.near_plane, " must be positive"));
+  if (!(o.dilation >= 0) || !std::isfinite(o.dilation)) {
+    return BadArgument(Cat("dilation ", o.dilation, " must not be negative"));
+  }
+  if (o.sh_degree < 0) return BadArgument(Cat("SH degree ", o.sh_degree, " must not be negative"));
+  if (!(o.min_alpha > 0 && o.min_alpha < 1)) return BadArgument(Cat("min_alpha ", o.min_alpha, " is not in (0, 1)"));
+  if (!(o.min_transmittance >= 0 && o.min_transmittance < 1)) {
+    return BadArgument(Cat("min_transmittance ", o.min_transmittance, " is not in [0, 1)"));
+  }
+  if (o.max_pairs < 1) return BadArgument(Cat("max_pairs ", o.max_pairs, " must be at least 1"));
+  return {};
+}
+
+void Shape(int width, int height, int channels, Image& image) {
+  image.width = width;
+  image.height = height;
+  image.channels = channels;
+  image.pixels.resize(static_cast<size_t>(channels) * static_cast<size_t>(image.plane()));
+}
+
+// Only ever grows, so that a warm rasterizer does not allocate; the old contents are not kept.
+template <typename T>
+T* Room(Buffer<T>& buffer, int64_t size) {
+  const size_t needed = static_cast<size_t>(size);
+  if (buffer.size() < needed) {
+    buffer.clear();  // nothing to copy to the new place
+    buffer.resize(needed + needed / 8);
+  }
+  return buffer.data();
+}
+
+class Stopwatch {
+ public:
+  double Lap() {  // seconds since the last one
+    const auto now = std::chrono::steady_clock::now();
+    return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+struct Rasterizer::State {
+  Buffer<ProjectedGaussian> projected;
+  Buffer<TileRect> tiles;
+  Buffer<int32_t> visible, visible_counts, rows, spare_rows, pairs;
+  Buffer<uint32_t> keys, spare_keys, histograms, chunk_counts;
+  Buffer<int64_t> tile_offsets, evaluations;
+  RenderStatistics statistics;
+
+  int64_t Project(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options, Stopwatch& watch);
+  void Sort(int64_t count, int64_t total);
+  void BinAndBlend(int64_t visible_total, const Camera& camera, const RenderOptions& options, RenderOutput& output,
+                   Stopwatch& watch);
+};
+
+// Projection and colours. Returns how many Gaussians are visible.
+int64_t Rasterizer::State::Project(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options,
+                                   Stopwatch& watch) {
+  const int64_t n = cloud.size();
+  const int64_t chunks = ProjectChunks(n);
+  ProjectParams project{};
+  project.count = n;
+  project.means = cloud.means.data();
+  project.log_scales = cloud.log_scales.data();
+  project.quats = cloud.quats.data();
+  project.opacity_logits = cloud.opacity_logits.data();
+  project.intrinsics = camera.intrinsics;
+  project.world_to_camera = camera.world_to_camera;
+  project.profile = options.profile;
+  project.mode = options.mode;
+  project.near_plane = options.near_plane;
+  project.far_plane = options.far_plane;
+  project.dilation = options.dilation;
+  project.min_alpha = options.min_alpha;
+  project.projected = Room(projected, n);
+  project.tiles = Room(tiles, n);
+  project.visible = Room(visible, n);
+  project.visible_counts = Room(visible_counts, chunks);
+  ProjectCpu(project);
+  statistics.project = watch.Lap();
+
+  SphericalHarmonicsParams sh{};
+  sh.count = n;
+  sh.degree = std::min(options.sh_degree, cloud.sh_degree);
+  sh.stride = cloud.sh_stride();
+  sh.means = cloud.means.data();
+  sh.sh = cloud.sh.data();
+  sh.center = camera.Center();
+  sh.visible = visible.data();
+  sh.visible_counts = visible_counts.data();
+  sh.tiles = tiles.data();
+  sh.projected = projected.data();
+  SphericalHarmonicsCpu(sh);
+  statistics.spherical_harmonics = watch.Lap();
+  return std::accumulate(visible_counts.data(), visible_counts.data() + chunks, int64_t{0});
+}
+
+// Pieces of per-Gaussian work that has to be split by hand: enough for all threads, but not so many that the tables
+// each one needs outweigh its work.
+int64_t PieceCount(int64_t count) { return std::clamp<int64_t>(count / 4096, 1, ThreadCount()); }
+
+// `rows` becomes the visible Gaussians by depth; those of the same depth stay in order.
+void Rasterizer::State::Sort(int64_t count, int64_t total) {
+  SortParams sort{};
+  sort.count = total;
+  sort.keys = Room(keys, total);
+  sort.rows = Room(rows, total);
+  sort.spare_keys = Room(spare_keys, total);
+  sort.spare_rows = Room(spare_rows, total);
+  sort.chunks = PieceCount(total);
+  sort.histograms = Room(histograms, sort.chunks * kSortBuckets);
+  int64_t to = 0;
+  for (int64_t chunk = 0; chunk < ProjectChunks(count); ++chunk) {
+    const int32_t* from = visible.data() + chunk * kProjectChunk;
+    for (int64_t k = 0; k < visible_counts[static_cast<size_t>(chunk)]; ++k, ++to) {
+      const int32_t i = from[k];
+      sort.rows[to] = i;
+      // Depths are positive (the near plane is), so their bits sort like they do.
+      sort.keys[to] = std::bit_cast<uint32_t>(projected[static_cast<size_t>(i)].depth);
+    }
+  }
+  SortCpu(sort);
+}
+
+void Rasterizer::State::BinAndBlend(int64_t visible_total, const Camera& camera, const RenderOptions& options,
+                                    RenderOutput& output, Stopwatch& watch) {
+  BinParams bin{};
+  bin.count = visible_total;
+  bin.order = rows.data();
+  bin.tiles = tiles.data();
+  bin.projected = projected.data();
+  bin.min_alpha = options.min_alpha;
+  bin.tiles_x = TilesAcross(camera.intrinsics.width);
+  bin.tiles_y = TilesAcross(camera.intrinsics.height);
+  bin.chunks = PieceCount(visible_total);
+  const int64_t tile_count = int64_t{bin.tiles_x} * bin.tiles_y;
+  bin.chunk_counts = Room(chunk_counts, bin.chunks * tile_count);
+  bin.tile_offsets = Room(tile_offsets, tile_count + 1);
+  CountPairs(bin);
+  statistics.pairs = bin.tile_offsets[tile_count];
+
+  BlendParams blend{};
+  blend.width = camera.intrinsics.width;
+  blend.height = camera.intrinsics.height;
+  blend.tiles_x = bin.tiles_x;
+  blend.projected = projected.data();
+  blend.tile_offsets = bin.tile_offsets;
+  std::copy(options.background.begin(), options.background.end(), blend.background);
+  blend.min_alpha = options.min_alpha;
+  blend.min_transmittance = options.min_transmittance;
+  blend.color = output.color.pixels.data();
+  blend.alpha = output.alpha.pixels.data();
+  blend.depth = options.depth ? output.depth.pixels.data() : nullptr;
+  blend.evaluations = Room(evaluations, tile_count);
+  statistics.bin = watch.Lap();
+  statistics.blend = 0;
+  statistics.runs = 0;
+  for (int64_t first = 0; first < tile_count; first = blend.last_tile) {
+    blend.first_tile = first;
+    blend.last_tile = EndOfRun(bin, first, options.max_pairs);
+    int32_t* list = Room(pairs, bin.tile_offsets[blend.last_tile] - bin.tile_offsets[first]);
+    ListPairs(bin, first, blend.last_tile, list);
+    statistics.bin += watch.Lap();
+    blend.pairs = list;
+    BlendCpu(blend);
+    statistics.blend += watch.Lap();
+    ++statistics.runs;
+  }
+  statistics.evaluations = std::accumulate(blend.evaluations, blend.evaluations + tile_count, int64_t{0});
+}
+
+Rasterizer::Rasterizer() : state_(std::make_unique<State>()) {}
+Rasterizer::~Rasterizer() = default;
+Rasterizer::Rasterizer(Rasterizer&&) noexcept = default;
+Rasterizer& Rasterizer::operator=(Rasterizer&&) noexcept = default;
+
+const RenderStatistics& Rasterizer::statistics() const { return state_->statistics; }
+
+Status Rasterizer::Render(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options,
+                          RenderOutput& output) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckCamera(camera));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
+  if (cloud.size() > std::numeric_limits<int32_t>::max()) {
+    return BadArgument(Cat("cloud of ", WithThousands(cloud.size()), " Gaussians; at most 2,147,483,647 can be drawn"));
+  }
+  const int width = camera.intrinsics.width, height = camera.intrinsics.height;
+  try {
+    Shape(width, height, 3, output.color);
+    Shape(width, height, 1, output.alpha);
+    if (options.depth) {
+      Shape(width, height, 1, output.depth);
+    } else {
+      output.depth = Image();
+    }
+    Stopwatch watch;
+    const int64_t total = state_->Project(cloud, camera, options, watch);
+    state_->statistics.visible = total;
+    state_->Sort(cloud.size(), total);
+    state_->statistics.sort = watch.Lap();
+    state_->BinAndBlend(total, camera, options, output, watch);
+  } catch (const std::bad_alloc&) {
+    return BadArgument(Cat("not enough memory for a picture of ", width, " x ", height, " pixels of ",
+                           WithThousands(cloud.size()), " Gaussians"));
+  }
+  return {};
+}
+
+}  // namespace anchorsplat

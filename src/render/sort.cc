@@ -1,0 +1,56 @@
+#include "render/sort.h"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include "core/parallel.h"
+#include "render/piece.h"
+
+namespace anchorsplat {
+
+void SortCpu(const SortParams& p) {
+  if (p.count < 2) return;
+  const auto [smallest_at, largest_at] = std::minmax_element(p.keys, p.keys + p.count);
+  const uint32_t smallest = *smallest_at;
+  const int bits = std::bit_width(*largest_at - smallest);
+  const int passes = (bits + kSortDigit - 1) / kSortDigit;
+  if (passes == 0) return;  // all equal
+  const int digit = (bits + passes - 1) / passes;
+  const uint32_t mask = (uint32_t{1} << digit) - 1;
+
+  uint32_t* keys = p.keys;
+  int32_t* rows = p.rows;
+  uint32_t* to_keys = p.spare_keys;
+  int32_t* to_rows = p.spare_rows;
+  for (int pass = 0; pass < passes; ++pass) {
+    const int shift = pass * digit;
+    ParallelFor(0, p.chunks, 1, [&](int64_t c, int64_t) {
+      uint32_t* histogram = p.histograms + c * kSortBuckets;
+      std::fill_n(histogram, mask + size_t{1}, 0u);
+      const auto [first, last] = PieceOf(p.count, p.chunks, c);
+      for (int64_t i = first; i < last; ++i) ++histogram[((keys[i] - smallest) >> shift) & mask];
+    });
+    // Where each chunk's share of each bucket starts: buckets first, then chunks, which is what makes it stable.
+    uint32_t start = 0;
+    for (int64_t bucket = 0; bucket <= mask; ++bucket) {
+      for (int64_t c = 0; c < p.chunks; ++c) {
+        start += std::exchange(p.histograms[c * kSortBuckets + bucket], start);
+      }
+    }
+    ParallelFor(0, p.chunks, 1, [&](int64_t c, int64_t) {
+      uint32_t* next = p.histograms + c * kSortBuckets;
+      const auto [first, last] = PieceOf(p.count, p.chunks, c);
+      for (int64_t i = first; i < last; ++i) {
+        const uint32_t to = next[((keys[i] - smallest) >> shift) & mask]++;
+        to_keys[to] = keys[i];
+        to_rows[to] = rows[i];
+      }
+    });
+    std::swap(keys, to_keys);
+    std::swap(rows, to_rows);
+  }
+  if (rows != p.rows) std::copy_n(rows, p.count, p.rows);
+}
+
+}  // namespace anchorsplat

@@ -23,6 +23,7 @@ std::string Bytes(const std::filesystem::path& path) {
 }
 
 void Write(const std::filesystem::path& path, const std::string& bytes) {
+  std::filesystem::remove(path);  // some file systems flush a file that is emptied and written again
   std::ofstream(path, std::ios::binary | std::ios::trunc) << bytes;
 }
 

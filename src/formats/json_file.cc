@@ -35,6 +35,12 @@ Error JsonValue::Complain(const std::string& sentence) const {
   return Error{ErrorCode::kBadFile, Cat(*file_, ": ", path_, path_.empty() ? "" : ": ", sentence)};
 }
 
+Error JsonValue::Named(const Error& error, const char* key) const {
+  const auto name = Find(key);
+  if (!name || !name->value_->is_string()) return error;
+  return Error{error.code, Cat(error.message, " (view ", Printable(name->value_->get<std::string>()), ")")};
+}
+
 std::optional<JsonValue> JsonValue::Find(const char* key) const {
   if (!value_->is_object()) return std::nullopt;
   const auto member = value_->find(key);

@@ -30,6 +30,9 @@ class JsonValue {
   Result<std::string> Text() const;
 
   Error Complain(const std::string& sentence) const;  // kBadFile
+  // The error with the text of this object's member `key` behind it, where it has one: "frames[117]" alone is hard to
+  // find in a file of matrices.
+  Error Named(const Error& error, const char* key) const;
 
  private:
   const std::string* file_;

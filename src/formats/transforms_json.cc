@@ -9,7 +9,6 @@
 
 #include "core/text.h"
 #include "formats/camera_checks.h"
-#include "formats/camera_io.h"
 #include "formats/image_io.h"
 
 namespace anchorsplat {
@@ -145,13 +144,7 @@ Result<CameraSet> CamerasFromTransforms(const JsonValue& root, const std::filesy
   if (elements.empty()) return frames.Complain("expected at least one frame");
   for (const JsonValue& frame : elements) {
     auto camera = ReadFrame(frame, root, folder);
-    if (!camera.ok()) {
-      // The place alone ("frames[117]") is hard to find in a file of matrices: say whose it is.
-      const auto path = frame.Find("file_path");
-      if (!path || !path->raw().is_string()) return camera.error();
-      return Error{camera.error().code,
-                   Cat(camera.error().message, " (view ", Printable(path->raw().get<std::string>()), ")")};
-    }
+    if (!camera.ok()) return frame.Named(camera.error(), "file_path");
     set.cameras.push_back(*std::move(camera));
   }
   return set;

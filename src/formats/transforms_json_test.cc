@@ -18,6 +18,7 @@ namespace {
 const char kIdentity[] = R"("transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]])";
 
 Result<CameraSet> ReadText(const TestFolder& folder, const std::string& text) {
+  std::filesystem::remove(folder / "transforms.json");  // some file systems flush a file that is emptied and rewritten
   std::ofstream(folder / "transforms.json", std::ios::trunc) << text;
   return ReadCameras(folder / "transforms.json");
 }

@@ -9,8 +9,8 @@
 #include <cstddef>
 
 #include "core/buffer.h"
-#include "hwy/foreach_target.h"
-#include "hwy/highway.h"
+#include <hwy/foreach_target.h>  // must come before highway.h
+#include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
 namespace anchorsplat::HWY_NAMESPACE {

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/camera.h"
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// One of COLMAP's camera models. Its parameters are the focal length (one or two), the principal point, then
+// distortion.
+struct ColmapCameraModel {
+  int id;  // in cameras.bin
+  const char* name;
+  size_t focals;
+  size_t params;
+  bool fisheye;  // not a pinhole even where every distortion parameter is zero
+};
+const ColmapCameraModel* FindColmapCameraModel(int id);  // nullptr: unknown
+const ColmapCameraModel* FindColmapCameraModel(const std::string& name);
+
+// Cameras of a sparse model by their COLMAP id.
+using ColmapCameras = std::map<uint32_t, Pinhole>;
+
+// A registered image as its file gives it.
+struct ColmapImage {
+  std::string name;                  // path below the project's image folder
+  std::array<double, 4> quaternion;  // world-to-camera, wxyz
+  std::array<double, 3> translation;
+  uint32_t camera = 0;
+};
+
+// The two below give sentences without file and place, which their callers know. Errors: kBadFile.
+Result<Pinhole> PinholeFromColmap(const ColmapCameraModel& model, uint64_t width, uint64_t height,
+                                  std::span<const double> params);
+Result<Camera> CameraFromColmap(const ColmapImage& image, const ColmapCameras& cameras,
+                                std::span<const std::filesystem::path> picture_folders);
+
+// Whether the folder holds cameras.bin and images.bin, or the two as .txt.
+bool IsColmapModel(const std::filesystem::path& folder);
+
+// A sparse model: binary where both kinds are there, as COLMAP itself prefers it. Pictures are looked for in `images`
+// beside the model and up to two folders above it (PROJECT/sparse/0 → PROJECT/images). Order as in the file.
+// Errors: kNotFound, kIo; kBadFile with byte or line.
+Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder);
+
+// Parts of ReadColmapModel, a file per kind.
+using PictureFolders = std::span<const std::filesystem::path>;
+Result<ColmapCameras> ReadColmapCamerasText(const std::filesystem::path& path);
+Result<std::vector<Camera>> ReadColmapImagesText(const std::filesystem::path& path, const ColmapCameras& cameras,
+                                                 PictureFolders picture_folders);
+Result<ColmapCameras> ReadColmapCamerasBinary(const std::filesystem::path& path);
+Result<std::vector<Camera>> ReadColmapImagesBinary(const std::filesystem::path& path, const ColmapCameras& cameras,
+                                                   PictureFolders picture_folders);
+
+}  // namespace anchorsplat

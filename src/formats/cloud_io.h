@@ -13,8 +13,18 @@ struct ReadLimits {
   int64_t max_gaussians = int64_t{1} << 28;  // 268 million: 63 GB at SH 3, more than any published scene
 };
 
+// In which order Gaussians go into a file (splat_order.h).
+enum class SplatOrder {
+  kFormat,      // as the format likes it: importance in .splat, Morton in compressed PLY and SOG, kept elsewhere
+  kKeep,        // as in the cloud
+  kMorton,      // neighbours in space are neighbours in the file
+  kImportance,  // largest size × opacity first
+};
+
 struct WriteOptions {
   bool overwrite = false;  // an existing file is kExists otherwise
+  SplatOrder order = SplatOrder::kFormat;
+  int spz_version = 4;  // 3: one gzip stream, which older programs read; 4: zstd streams
 };
 
 // Reads a splat file of any known format, found by its content first and its extension second.

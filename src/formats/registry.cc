@@ -4,8 +4,14 @@
 #include <cctype>
 #include <string>
 
+#include "formats/compressed_ply_reader.h"
+#include "formats/compressed_ply_writer.h"
 #include "formats/ply_reader.h"
 #include "formats/ply_writer.h"
+#include "formats/splat_reader.h"
+#include "formats/splat_writer.h"
+#include "formats/spz_reader.h"
+#include "formats/spz_writer.h"
 
 namespace anchorsplat {
 
@@ -29,12 +35,13 @@ constexpr std::string_view kSplatExtensions[] = {".splat"};
 constexpr std::string_view kKsplatExtensions[] = {".ksplat"};
 
 constexpr SplatFormat kFormats[] = {
-    {"compressed PLY", kCompressedPlyExtensions, IsCompressedPly, nullptr, nullptr, nullptr},
+    {"compressed PLY", kCompressedPlyExtensions, IsCompressedPly, ReadCompressedPly, WriteCompressedPly,
+     PredictedCompressedPlySize, SplatOrder::kMorton},
     {"PLY", kPlyExtensions, IsPly, ReadPly, WritePly,
      [](int64_t count, int sh_degree) { return PredictedPlySize(count, sh_degree); }},
-    {"SPZ", kSpzExtensions, IsSpz, nullptr, nullptr, nullptr},
+    {"SPZ", kSpzExtensions, IsSpz, ReadSpz, WriteSpz, nullptr},
     {"SOG", kSogExtensions, IsZip, nullptr, nullptr, nullptr},
-    {"splat", kSplatExtensions, nullptr, nullptr, nullptr, nullptr},
+    {"splat", kSplatExtensions, nullptr, ReadSplat, WriteSplat, PredictedSplatSize, SplatOrder::kImportance},
     {"ksplat", kKsplatExtensions, nullptr, nullptr, nullptr, nullptr},
 };
 

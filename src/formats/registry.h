@@ -26,6 +26,8 @@ struct SplatFormat {
   Status (*write)(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options);
   // Bytes of the file `write` makes of a cloud without comments. Null where it depends on the values.
   uint64_t (*predicted_size)(int64_t count, int sh_degree);
+  // The order in which `write` puts Gaussians by default.
+  SplatOrder order = SplatOrder::kKeep;
 };
 
 inline constexpr size_t kSniffBytes = 4096;

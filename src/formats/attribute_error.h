@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/buffer.h"
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// How far one cloud's attributes are from another's, over the rows that are usable in both.
+struct Deviation {
+  double rms = 0;
+  double max = 0;
+};
+
+struct AttributeError {
+  int64_t compared = 0;  // rows
+  int64_t left_out = 0;  // rows with values that are not numbers in either cloud
+  Deviation means;       // distance, world units
+  Deviation log_scales;  // per axis; scales below e⁻²⁰ count as e⁻²⁰, what no rasterizer can tell from 0
+  Deviation rotations;   // angle between the two, radians, 0–π
+  Deviation opacities;   // 0–1, not logits
+  Deviation colors;      // f_dc as colour: 0.2820948·difference, per channel
+  Deviation harmonics;   // SH of degree ≥ 1 as stored, per coefficient; missing ones count as zero
+};
+
+// Row i of `a` against row rows[i] of `b` (empty `rows`: row i). kBadArgument when the sizes differ.
+Result<AttributeError> CompareAttributes(const GaussianCloud& a, const GaussianCloud& b,
+                                         const Buffer<uint32_t>& rows = {});
+
+// One line per attribute, for people.
+std::string FormatAttributeError(const AttributeError& error);
+
+}  // namespace anchorsplat

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "formats/cloud_io.h"
+
+namespace anchorsplat {
+
+// What every writer asks first: arrays that agree and at least one Gaussian (kBadArgument otherwise).
+Status CheckWritable(const std::filesystem::path& path, const GaussianCloud& cloud);
+
+// What every reader asks before it allocates: 1 … `limits.max_gaussians` (kBadFile otherwise). `where` begins the
+// message: "scene.spz: byte 8".
+Status CheckCount(const std::string& where, uint64_t count, const ReadLimits& limits);
+
+// That compressed data of `compressed` bytes may become `raw` bytes. Real splats shrink to a tenth; what promises two
+// hundred times its size would take memory that the file never paid for. kBadFile otherwise.
+Status CheckRatio(const std::string& where, uint64_t compressed, uint64_t raw);
+
+}  // namespace anchorsplat

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+namespace anchorsplat {
+
+// Rounding to the few bits that splat formats keep. NaN becomes 0 and values beyond the range its ends, so that no
+// cloud can make a conversion to an integer undefined.
+
+// `unit` in 0–1 to 0 … max (≤ 2²⁴), nearest.
+inline uint32_t QuantizeUnit(float unit, uint32_t max) {
+  const float scaled = unit * static_cast<float>(max) + 0.5f;
+  if (!(scaled > 0)) return 0;
+  return scaled >= static_cast<float>(max) ? max : static_cast<uint32_t>(scaled);
+}
+
+// To a byte, nearest.
+inline uint8_t QuantizeByte(float value) {
+  const float shifted = value + 0.5f;
+  const float bounded = shifted > 0 ? (shifted < 255.5f ? shifted : 255.5f) : 0.0f;
+  return static_cast<uint8_t>(static_cast<int32_t>(bounded));
+}
+
+inline float Sigmoid(float logit) { return 1.0f / (1.0f + std::exp(-logit)); }
+
+// Logit of an opacity stored in 0–1. The ends become ∓13.8 (opacity 1e-6 and 1 − 1e-6), as infinite logits trip other
+// programs and a byte cannot tell 1 from 0.999 anyway.
+inline float LogitFromOpacity(float opacity) {
+  constexpr float kEnd = 1e-6f;
+  const float inside = opacity > kEnd ? (opacity < 1 - kEnd ? opacity : 1 - kEnd) : kEnd;  // NaN: invisible
+  return std::log(inside / (1 - inside));
+}
+
+// ln of a scale stored as a length; zero, negative and NaN lengths become −Inf, a Gaussian without extent.
+inline float LogFromScale(float scale) { return scale > 0 ? std::log(scale) : -INFINITY; }
+
+// A unit quaternion without its largest component, which follows from the others: the sign is chosen so that it is
+// positive. `rest` keeps the order of the components that are left; each lies in ±√½. A quaternion without direction
+// (zero, NaN) counts as (1, 0, 0, 0) of `quat`'s own order, given by `identity`.
+struct SmallestThree {
+  uint32_t largest = 0;
+  float rest[3] = {0, 0, 0};
+};
+inline constexpr float kSqrtHalf = 0.70710678118654752f;
+
+inline SmallestThree DropLargest(const float quat[4], uint32_t identity) {
+  SmallestThree out;
+  const float norm = std::sqrt(quat[0] * quat[0] + quat[1] * quat[1] + quat[2] * quat[2] + quat[3] * quat[3]);
+  if (!(norm > 0) || !std::isfinite(norm)) {
+    out.largest = identity;
+    return out;
+  }
+  for (uint32_t k = 1; k < 4; ++k) {
+    if (std::fabs(quat[k]) > std::fabs(quat[out.largest])) out.largest = k;
+  }
+  const float factor = (quat[out.largest] < 0 ? -1.0f : 1.0f) / norm;
+  int to = 0;
+  for (uint32_t k = 0; k < 4; ++k) {
+    if (k != out.largest) out.rest[to++] = quat[k] * factor;
+  }
+  return out;
+}
+
+inline void RestoreLargest(const SmallestThree& packed, float quat[4]) {
+  float squares = 0;
+  int from = 0;
+  for (uint32_t k = 0; k < 4; ++k) {
+    if (k == packed.largest) continue;
+    quat[k] = packed.rest[from++];
+    squares += quat[k] * quat[k];
+  }
+  quat[packed.largest] = std::sqrt(squares < 1 ? 1 - squares : 0.0f);
+}
+
+}  // namespace anchorsplat

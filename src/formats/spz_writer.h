@@ -1,0 +1,20 @@
+#pragma once
+
+#include <filesystem>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "formats/cloud_io.h"
+
+namespace anchorsplat {
+
+// Writes Niantic's SPZ (layout: spz_reader.h, spz_sections.h) of `options.spz_version`, 3 or 4, with axes RUB as the
+// specification says, so y and z change sign. The antialiased flag is set when the render mode is kAntialiased.
+// Fractional bits of the means: 12 as everywhere, more where a scene is so small that 1/4096 would be more than 1/65536
+// of it, fewer where a mean would not fit into 24 bits.
+// Lost: means are rounded to 2^−bits, log-scales to 1/16 within −10 … 5.9, quaternion components to 1/723, opacities to
+// 1/255, f_dc to 1/38 within ±3.33, SH to 1/16 (degree 1) and 1/8 within ±1. Comments have no place.
+// Errors: kExists, kIo, kBadArgument (arrays that disagree, no Gaussians, another version).
+Status WriteSpz(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options = {});
+
+}  // namespace anchorsplat

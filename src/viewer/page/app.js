@@ -1,0 +1,424 @@
+'use strict';
+// The viewer: what is compared, from where, and when to draw.
+
+const LENS_MAGNIFICATION = 4;
+const DIFFERENCE_TOP = 0.25;
+const NAMES = {before: 'Before', after: 'After', truth: 'Truth'};
+const OWN_VIEWS = [
+  ['Three quarters', [0.9, 0.45, 0.9]], ['Front', [0, 0.12, 1]], ['Right', [1, 0.12, 0]], ['Back', [0, 0.12, -1]],
+  ['Left', [-1, 0.12, 0]], ['Above', [0, 1, 0.001]],
+];
+
+class Viewer {
+  constructor(description, canvas) {
+    this.description = description;
+    this.canvas = canvas;
+    this.renderer = new Renderer(canvas, description.constants);
+    const source = elementText('worker-source');
+    const order = (splat, indices, count) => {
+      this.renderer.setOrder(splat, indices, count);
+      this.draw();
+    };
+    this.splats = {};
+    for (const name of ['before', 'after']) {
+      if (description[name]) this.splats[name] = new Splat(description[name], source, order, fail);
+    }
+    this.pairs = this.splats.before ? [['before', 'after']] : [['after', 'after']];
+    if (description.views.some((view) => view.picture)) {
+      this.pairs.push(['after', 'truth']);
+      if (this.splats.before) this.pairs.push(['before', 'truth']);
+    }
+    this.pair = 0;
+    this.mode = 'slider';
+    this.side = 1;        // which of the pair A / B shows
+    this.split = 0.5;
+    this.lens = null;     // [x, y] in CSS pixels
+    this.view = null;     // index of the view the camera is still at
+    this.pictures = new Map();
+    const same = (a, b) => a.every((x, k) => Math.abs(x - b[k]) < 0.02);
+    this.backgrounds = [description.background];
+    for (const shade of [0, 1, 0.5, 0.16]) {
+      const color = [shade, shade, shade];
+      if (!this.backgrounds.some((b) => same(b, color))) this.backgrounds.push(color);
+    }
+    this.backgroundIndex = 0;
+    this.frameRequested = false;
+    this.ready = false;
+  }
+
+  async load() {
+    const splats = Object.values(this.splats);
+    const loaded = await Promise.all(splats.map((splat) => splat.load()));
+    splats.forEach((splat, k) => this.renderer.addSplat(splat, loaded[k]));
+    const after = this.splats.after.description;
+    this.camera = new OrbitCamera(after.center, loaded[splats.indexOf(this.splats.after)].radius,
+      worldUp(this.description.views));
+    const names = this.description.views.map((view, k) => view.name || `View ${k + 1}`);
+    fillViews([...names, ...OWN_VIEWS.map(([name]) => name)], this.description.views.map((view) => view.picture), this);
+    this.pairs.forEach(([first, second], k) => {
+      const option = document.createElement('option');
+      option.value = String(k);
+      option.textContent = first === second ? 'nothing' : `${NAMES[first].toLowerCase()} and ${NAMES[second].toLowerCase()}`;
+      byId('pair').append(option);
+    });
+    show(byId('compare'), this.pairs.length > 1);
+    byId('legend-top').textContent = `${DIFFERENCE_TOP}+ apart`;
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+    this.goTo(0);
+  }
+
+  get comparing() { return this.pairs[this.pair][0] !== this.pairs[this.pair][1]; }
+  get ratio() { return Math.min(devicePixelRatio || 1, 2); }
+  get lensRadius() { return Math.round(Math.max(78, Math.min(150, 0.23 * Math.min(innerWidth, innerHeight)))); }
+
+  // What a person can do.
+
+  goTo(k) {
+    const views = this.description.views;
+    if (k >= views.length + OWN_VIEWS.length) return;
+    if (k < views.length) this.camera.lookThrough(views[k]);
+    else this.camera.lookFrom(OWN_VIEWS[k - views.length][1]);
+    this.view = k;
+    if (this.pairs[this.pair].includes('truth') && !this.truthHere()) this.pair = 0;
+    this.cameraChanged();
+  }
+
+  orbit(yaw, pitch) {
+    this.camera.orbit(yaw, pitch);
+    this.leaveView();
+  }
+
+  pan(dx, dy, x, y) {
+    this.camera.pan(dx * this.ratio, dy * this.ratio, this.regionAt(x, y));
+    this.leaveView();
+  }
+
+  zoom(factor, x, y) {
+    this.camera.zoom(factor, x * this.ratio, y * this.ratio, this.regionAt(x, y));
+    this.leaveView();
+  }
+
+  // A true picture was taken from one place: elsewhere there is nothing to compare with.
+  leaveView() {
+    this.view = null;
+    if (this.pairs[this.pair].includes('truth')) this.pair = 0;
+    this.cameraChanged();
+  }
+
+  setMode(mode) {
+    if (!this.comparing) return;
+    this.mode = mode;
+    this.draw();
+  }
+
+  blink(side) {
+    if (!this.comparing) return;
+    this.side = side !== undefined ? side : this.mode === 'blink' ? 1 - this.side : this.side;
+    this.mode = 'blink';
+    this.draw();
+  }
+
+  setSplit(split) {
+    if (!this.comparing) return;
+    this.mode = 'slider';
+    this.split = Math.max(0, Math.min(1, split));
+    this.draw();
+  }
+
+  setPair(k) {
+    this.pair = k;
+    if (this.pairs[k].includes('truth') && !this.truthHere()) {
+      this.goTo(this.description.views.findIndex((view) => view.picture));
+    }
+    this.draw();
+  }
+
+  toggleTruth() {
+    const k = this.pairs.findIndex((pair) => pair.includes('truth'));
+    if (k >= 0) this.setPair(this.pair >= k ? 0 : k);
+  }
+
+  toggleLens() {
+    this.lens = this.lens ? null : [innerWidth * (this.mode === 'side' && innerWidth > innerHeight ? 0.25 : 0.5),
+      innerHeight * (this.mode === 'side' && innerWidth <= innerHeight ? 0.25 : 0.45)];
+    this.draw();
+  }
+
+  moveLens(x, y) {
+    if (!this.lens) return;
+    this.lens = [x, y];
+    this.draw();
+  }
+
+  shiftLens(dx, dy) { this.moveLens(this.lens[0] + dx, this.lens[1] + dy); }
+
+  insideLens(x, y) {
+    return this.lens !== null &&
+      this.lensPlaces().some(([lx, ly]) => Math.hypot(x - lx, y - ly) < this.lensRadius);
+  }
+
+  nextBackground() {
+    this.backgroundIndex = (this.backgroundIndex + 1) % this.backgrounds.length;
+    this.draw();
+  }
+
+  nextUp() {
+    const all = [[0, -1, 0], [0, 1, 0], [0, 0, 1], [0, 0, -1], [1, 0, 0], [-1, 0, 0]];
+    const k = all.findIndex((up) => dot(up, this.camera.up) > 0.99);
+    this.camera.up = all[(k + 1) % all.length];
+    this.camera.lookFrom(OWN_VIEWS[0][1]);
+    this.leaveView();
+  }
+
+  toggleBare() {
+    document.body.classList.toggle('bare');
+    this.draw();
+  }
+
+  toggleHelp() {
+    this.closeMenus();
+    byId('help').showModal();
+  }
+
+  toggleViews() {
+    const open = byId('views').hidden;
+    show(byId('views'), open);
+    byId('open-views').setAttribute('aria-expanded', String(open));
+  }
+
+  closeMenus() {
+    if (!byId('views').hidden) this.toggleViews();
+  }
+
+  // Where things are, in device pixels unless said otherwise.
+
+  regions() {
+    const {width, height} = this.canvas;
+    const whole = {x: 0, y: 0, width, height};
+    if (this.mode !== 'side' || !this.comparing) return [whole, whole];
+    if (width > height) {
+      return [{...whole, width: width / 2}, {...whole, x: width / 2, width: width / 2}];
+    }
+    return [{...whole, height: height / 2}, {...whole, y: height / 2, height: height / 2}];
+  }
+
+  regionAt(x, y) {
+    const [first, second] = this.regions();
+    return x * this.ratio < second.x || y * this.ratio < second.y ? first : second;
+  }
+
+  // Centres of the lens in the first and in the second region, in CSS pixels: the same place twice when side by side.
+  lensPlaces() {
+    const [first, second] = this.regions();
+    const shift = [second.x / this.ratio, second.y / this.ratio];
+    const [x, y] = this.lens;
+    const inSecond = (shift[0] > 0 && x >= shift[0]) || (shift[1] > 0 && y >= shift[1]);
+    const place = inSecond ? [x - shift[0], y - shift[1]] : [x, y];
+    return first === second ? [place] : [place, [place[0] + shift[0], place[1] + shift[1]]];
+  }
+
+  truthHere() {
+    const view = this.view === null ? undefined : this.description.views[this.view];
+    return view && view.picture ? view.picture : null;
+  }
+
+  // The texture of the true picture at this view; null while it is being decoded.
+  truthTexture() {
+    const picture = this.truthHere();
+    if (!picture) return null;
+    const id = picture.element;
+    if (!this.pictures.has(id)) {
+      this.pictures.set(id, null);
+      const image = new Image();
+      image.onload = () => {
+        this.pictures.set(id, this.renderer.pictureTexture(image));
+        this.draw();
+      };
+      image.onerror = () => fail(new Error('a picture in this file cannot be decoded'));
+      image.src = `data:${picture.type};base64,${elementText(id)}`;
+    }
+    return this.pictures.get(id);
+  }
+
+  // Drawing.
+
+  cameraChanged() {
+    const {camera} = this;
+    for (const splat of Object.values(this.splats)) {
+      const depth = dot(camera.forward, add(splat.description.center, camera.eye, -1));
+      splat.requestOrder(camera.forward, depth, this.description.constants.near);
+    }
+    this.draw();
+  }
+
+  draw() {
+    if (this.frameRequested) return;
+    document.documentElement.dataset.settled = 'false';
+    this.frameRequested = true;
+    requestAnimationFrame(() => {
+      this.frameRequested = false;
+      try {
+        this.frame();
+      } catch (error) {
+        fail(error);
+      }
+    });
+  }
+
+  drawSource(k, name, intrinsics, tangents) {
+    if (name === 'truth') {
+      const texture = this.truthTexture();
+      if (texture) this.renderer.drawPicture(k, texture, intrinsics);
+    } else {
+      this.renderer.drawSplat(k, this.splats[name], this.camera.axes, this.camera.eye, intrinsics, tangents);
+    }
+  }
+
+  frame() {
+    const {canvas, renderer, ratio} = this;
+    const width = Math.max(1, Math.round(canvas.clientWidth * ratio));
+    const height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+    if (canvas.width !== width || canvas.height !== height) {
+      canvas.width = width;
+      canvas.height = height;
+    }
+    const mode = this.comparing ? this.mode : 'blink';
+    const side = this.comparing ? this.side : 1;
+    const pair = this.pairs[this.pair];
+    const regions = this.regions();
+    const splitX = Math.round(this.split * width);
+    const places = this.lens ? this.lensPlaces() : [];
+    const lensSize = 2 * Math.ceil(this.lensRadius * ratio);
+
+    for (const k of [0, 1]) {
+      const region = regions[k];
+      let clip = region;
+      if (mode === 'slider') {
+        clip = k === 0 ? {...region, width: splitX} : {...region, x: splitX, width: width - splitX};
+      }
+      renderer.begin(k, width, height, clip);
+      const wanted = mode !== 'blink' || side === k;
+      const intrinsics = this.camera.intrinsics(region);
+      const {fx, fy, cx, cy} = intrinsics;
+      const margin = 0.5 * this.description.constants.frustumMargin;
+      const tangents = [
+        (region.x - cx - margin * region.width) / fx, (region.x - cx + (1 + margin) * region.width) / fx,
+        (region.y - cy - margin * region.height) / fy, (region.y - cy + (1 + margin) * region.height) / fy,
+      ];
+      if (wanted && clip.width > 0) this.drawSource(k, pair[k], intrinsics, tangents);
+      renderer.begin(2 + k, lensSize, lensSize, {x: 0, y: 0, width: lensSize, height: lensSize});
+      if (!wanted || places.length === 0) continue;
+      // The scene itself four times closer, not the picture's pixels four times larger.
+      const [x, y] = places[Math.min(k, places.length - 1)].map((c) => c * ratio);
+      const m = LENS_MAGNIFICATION;
+      const closer = (value, origin) => (value - origin) * m + lensSize / 2;
+      this.drawSource(2 + k, pair[k], {
+        fx: fx * m, fy: fy * m, cx: closer(cx, x), cy: closer(cy, y),
+        left: closer(intrinsics.left, x), top: closer(intrinsics.top, y),
+        width: intrinsics.width * m, height: intrinsics.height * m,
+      }, tangents);
+    }
+
+    const nowhere = [0, 0, 0, 1];
+    const lenses = places.map(([x, y]) => [x * ratio, y * ratio, this.lensRadius * ratio, LENS_MAGNIFICATION]);
+    const splits = {slider: [splitX, -1], side: [regions[1].x, regions[1].y], difference: [-1, -1],
+      blink: side === 0 ? [2 * width, -1] : [-1, -1]};
+    renderer.show({
+      width, height, split: splits[mode], difference: mode === 'difference', differenceTop: DIFFERENCE_TOP,
+      background: this.backgrounds[this.backgroundIndex], lenses: [...lenses, nowhere, nowhere].slice(0, 2), lensSize,
+    });
+    this.overlay(mode, places);
+    this.settle();
+  }
+
+  // The page over the picture.
+  overlay(mode, places) {
+    const divider = byId('divider');
+    const portrait = innerWidth <= innerHeight;
+    show(divider, mode === 'slider' || mode === 'side');
+    divider.classList.toggle('fixed', mode === 'side');
+    divider.classList.toggle('level', mode === 'side' && portrait);
+    const at = mode === 'slider' ? this.split * 100 : 50;
+    divider.style.left = mode === 'side' && portrait ? '' : `${at}%`;
+    divider.style.top = mode === 'side' && portrait ? '50%' : '';
+    divider.setAttribute('aria-valuenow', String(Math.round(at)));
+
+    const tags = [byId('tag-first'), byId('tag-second')];
+    const top = innerWidth < 680 ? byId('card').getBoundingClientRect().bottom + 10 : 16;
+    tags.forEach((tag, k) => {
+      tag.textContent = NAMES[this.pairs[this.pair][k]];
+      show(tag, this.comparing && (mode === 'slider' || mode === 'side' || (mode === 'blink' && this.side === k)));
+      tag.style.top = `${mode === 'side' && portrait && k === 1 ? innerHeight / 2 + 12 : top}px`;
+      tag.style.left = mode === 'blink' || (mode === 'side' && portrait) ? '50%' : `${at}%`;
+      const shift = mode === 'blink' || (mode === 'side' && portrait) ? '-50%' : k === 0 ? 'calc(-100% - 14px)' : '14px';
+      tag.style.transform = `translateX(${shift})`;
+    });
+
+    const rings = [byId('ring-first'), byId('ring-second')];
+    rings.forEach((ring, k) => {
+      show(ring, k < places.length);
+      if (k < places.length) placeRing(ring, places[k][0], places[k][1], this.lensRadius);
+    });
+
+    show(byId('legend'), mode === 'difference');
+    show(byId('modes'), true);
+    for (const button of document.querySelectorAll('#modes [data-mode]')) {
+      show(button, this.comparing);
+      button.setAttribute('aria-pressed', String(button.dataset.mode === mode));
+    }
+    show(document.querySelector('#modes hr'), this.comparing);
+    byId('lens').setAttribute('aria-pressed', String(this.lens !== null));
+    byId('pair').value = String(this.pair);
+    [...byId('views').children].forEach((button, k) => button.setAttribute('aria-pressed', String(k === this.view)));
+    const {pixelSize} = this.description;
+    if (pixelSize !== null) {
+      drawScale(pixelSize * this.camera.intrinsics(this.regions()[0]).fx / this.camera.distance, this.ratio);
+    }
+  }
+
+  // The page says when what is on screen is final: for those who take pictures of it.
+  settle() {
+    const splats = Object.values(this.splats);
+    const waiting = splats.some((splat) => splat.sorting) ||
+      (this.pairs[this.pair].includes('truth') && !this.truthTexture());
+    if (waiting) return;
+    if (!this.ready) {
+      this.ready = true;
+      setState('ready');
+      document.documentElement.dataset.readyAfter = String(Math.round(performance.now()));
+      this.draw();  // measures of the overlay are known only now that it is visible
+      return;
+    }
+    document.documentElement.dataset.settled = 'true';
+  }
+}
+
+function fail(error) {
+  console.warn(error);
+  setState('error', `This page cannot be shown. ${error.message || error}`);
+}
+
+async function main() {
+  byId('reload').addEventListener('click', () => location.reload());
+  addEventListener('error', (event) => fail(event.error || new Error(event.message)));
+  addEventListener('unhandledrejection', (event) => fail(event.reason));
+  try {
+    const description = readDescription();
+    fillCard(description);
+    const canvas = byId('canvas');
+    canvas.addEventListener('webglcontextlost', (event) => {
+      event.preventDefault();
+      fail(new Error('The graphics card was reset or is out of memory.'));
+    });
+    const viewer = new Viewer(description, canvas);
+    await viewer.load();
+    new PointerControl(canvas, viewer);
+    listenToKeys(viewer);
+    listenToDivider(viewer);
+    listenToButtons(viewer);
+  } catch (error) {
+    fail(error);
+  }
+}
+
+main();

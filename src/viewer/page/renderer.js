@@ -1,0 +1,206 @@
+'use strict';
+// WebGL 2: splats and pictures into half-float targets, and from there onto the screen.
+
+class Renderer {
+  constructor(canvas, constants) {
+    const gl = canvas.getContext('webgl2', {alpha: false, antialias: false, powerPreference: 'high-performance'});
+    if (!gl) throw new Error('This page needs WebGL 2, which this browser does not offer or has switched off.');
+    this.gl = gl;
+    this.constants = constants;
+    // 8 bits per blend add up to visible error where hundreds of faint Gaussians overlap.
+    const half = gl.getExtension('EXT_color_buffer_float') || gl.getExtension('EXT_color_buffer_half_float');
+    this.format = half ? gl.RGBA16F : gl.RGBA8;
+    this.maxTexture = gl.getParameter(gl.MAX_TEXTURE_SIZE);
+    this.splatPrograms = new Map();
+    this.pictureProgram = this.program(pictureVertexSource, pictureFragmentSource);
+    this.screenProgram = this.program(screenVertexSource, screenFragmentSource);
+    this.emptyArray = gl.createVertexArray();
+    this.targets = [0, 1, 2, 3].map(() => this.target());  // first, second, and the same under the lens
+    gl.disable(gl.DEPTH_TEST);
+  }
+
+  program(vertex, fragment) {
+    const gl = this.gl;
+    const program = gl.createProgram();
+    for (const [type, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+      const shader = gl.createShader(type);
+      gl.shaderSource(shader, source);
+      gl.compileShader(shader);
+      gl.attachShader(program, shader);
+    }
+    gl.linkProgram(program);
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
+      const logs = gl.getAttachedShaders(program).map((shader) => gl.getShaderInfoLog(shader));
+      throw new Error(`The graphics driver refused a shader: ${[gl.getProgramInfoLog(program), ...logs].join(' ')}`);
+    }
+    const uniforms = {};
+    const count = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS);
+    for (let i = 0; i < count; ++i) {
+      const name = gl.getActiveUniform(program, i).name.replace('[0]', '');
+      uniforms[name] = gl.getUniformLocation(program, name);
+    }
+    return {program, uniforms};
+  }
+
+  dataTexture(shape, data) {
+    const gl = this.gl;
+    if (shape.height > this.maxTexture) {
+      throw new Error('This splat is too large for this device: its graphics memory takes no texture of that size.');
+    }
+    const texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32UI, shape.width, shape.height, 0, gl.RGBA_INTEGER, gl.UNSIGNED_INT, data);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+    return texture;
+  }
+
+  addSplat(splat, {geometry, harmonics}) {
+    const gl = this.gl;
+    const degree = splat.description.degree;
+    if (!this.splatPrograms.has(degree)) {
+      this.splatPrograms.set(degree, this.program(splatVertexSource(degree), splatFragmentSource));
+    }
+    splat.geometry = this.dataTexture(splat.geometryShape, geometry);
+    splat.harmonics = degree > 0 ? this.dataTexture(splat.harmonicsShape, harmonics) : null;
+    splat.visible = 0;
+    splat.order = gl.createBuffer();
+    splat.array = gl.createVertexArray();
+    gl.bindVertexArray(splat.array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, splat.order);
+    gl.bufferData(gl.ARRAY_BUFFER, 4 * splat.description.count, gl.DYNAMIC_DRAW);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribIPointer(0, 1, gl.UNSIGNED_INT, 0, 0);
+    gl.vertexAttribDivisor(0, 1);
+    gl.bindVertexArray(null);
+  }
+
+  setOrder(splat, order, count) {
+    const gl = this.gl;
+    gl.bindBuffer(gl.ARRAY_BUFFER, splat.order);
+    gl.bufferSubData(gl.ARRAY_BUFFER, 0, order);
+    splat.visible = count;
+  }
+
+  pictureTexture(image) {
+    const gl = this.gl;
+    const texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, true);
+    gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, image);
+    gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
+    gl.generateMipmap(gl.TEXTURE_2D);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
+    return texture;
+  }
+
+  target() {
+    const gl = this.gl;
+    return {texture: gl.createTexture(), framebuffer: gl.createFramebuffer(), width: 0, height: 0};
+  }
+
+  // Binds target k at the given size, cleared to nothing, drawing only inside `region` (y down).
+  begin(k, width, height, region) {
+    const gl = this.gl;
+    const target = this.targets[k];
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+    if (target.width !== width || target.height !== height) {
+      gl.bindTexture(gl.TEXTURE_2D, target.texture);
+      const half = this.format === gl.RGBA16F;
+      gl.texImage2D(gl.TEXTURE_2D, 0, this.format, width, height, 0, gl.RGBA,
+        half ? gl.HALF_FLOAT : gl.UNSIGNED_BYTE, null);
+      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+      gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target.texture, 0);
+      target.width = width;
+      target.height = height;
+    }
+    gl.viewport(0, 0, width, height);
+    gl.disable(gl.SCISSOR_TEST);
+    gl.clearColor(0, 0, 0, 0);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    gl.enable(gl.SCISSOR_TEST);
+    gl.scissor(Math.floor(region.x), Math.floor(height - region.y - region.height),
+      Math.ceil(region.width), Math.ceil(region.height));
+  }
+
+  // `intrinsics` in pixels of the target; `tangents` as the shader wants them.
+  drawSplat(k, splat, axes, eye, intrinsics, tangents) {
+    const gl = this.gl;
+    const d = splat.description;
+    const {program, uniforms: u} = this.splatPrograms.get(d.degree);
+    const target = this.targets[k];
+    const fromCenter = add(eye, d.center, -1);
+    gl.useProgram(program);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, splat.geometry);
+    gl.uniform1i(u.uGeometry, 0);
+    if (splat.harmonics) {
+      gl.activeTexture(gl.TEXTURE1);
+      gl.bindTexture(gl.TEXTURE_2D, splat.harmonics);
+      gl.uniform1i(u.uHarmonics, 1);
+      gl.uniform3fv(u.uHarmonicMax, d.shMax);
+    }
+    gl.uniformMatrix3fv(u.uRotation, true, axes.flat());
+    gl.uniform3fv(u.uTranslation, axes.map((a) => -dot(a, fromCenter)));
+    gl.uniform3fv(u.uEye, fromCenter);
+    gl.uniform4f(u.uIntrinsics, intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy);
+    gl.uniform2f(u.uSize, target.width, target.height);
+    gl.uniform4fv(u.uTangents, tangents);
+    gl.uniform2fv(u.uLogScale, d.logScale);
+    gl.uniform2fv(u.uDc, d.dc);
+    gl.uniform1f(u.uScalarTop, 2 ** d.scalarBits - 1);
+    gl.uniform1f(u.uDilation, this.constants.dilation);
+    gl.uniform1f(u.uMinAlpha, this.constants.minAlpha);
+    gl.uniform1f(u.uMaxAlpha, this.constants.maxAlpha);
+    gl.uniform1f(u.uNear, this.constants.near);
+    gl.uniform1i(u.uAntialiased, d.antialiased ? 1 : 0);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.bindVertexArray(splat.array);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, splat.visible);
+    gl.bindVertexArray(null);
+    gl.disable(gl.BLEND);
+  }
+
+  drawPicture(k, texture, {left, top, width, height}) {
+    const gl = this.gl;
+    const {program, uniforms: u} = this.pictureProgram;
+    const target = this.targets[k];
+    gl.useProgram(program);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.uniform1i(u.uPicture, 0);
+    gl.uniform4f(u.uRectangle, left, top, width, height);
+    gl.uniform2f(u.uSize, target.width, target.height);
+    gl.bindVertexArray(this.emptyArray);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+  }
+
+  // All four targets onto the canvas; `lenses` are [x, y, radius, magnification], two of them.
+  show({width, height, background, split, difference, differenceTop, lenses, lensSize}) {
+    const gl = this.gl;
+    const {program, uniforms: u} = this.screenProgram;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.viewport(0, 0, width, height);
+    gl.disable(gl.SCISSOR_TEST);
+    gl.useProgram(program);
+    ['uFirst', 'uSecond', 'uLensFirst', 'uLensSecond'].forEach((name, k) => {
+      gl.activeTexture(gl.TEXTURE0 + k);
+      gl.bindTexture(gl.TEXTURE_2D, this.targets[k].texture);
+      gl.uniform1i(u[name], k);
+    });
+    gl.uniform2f(u.uSize, width, height);
+    gl.uniform3fv(u.uBackground, background);
+    gl.uniform2fv(u.uSplit, split);
+    gl.uniform1i(u.uDifference, difference ? 1 : 0);
+    gl.uniform1f(u.uDifferenceTop, differenceTop);
+    gl.uniform4fv(u.uLenses, lenses.flat());
+    gl.uniform2f(u.uLensSize, lensSize, lensSize);
+    gl.bindVertexArray(this.emptyArray);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+  }
+}

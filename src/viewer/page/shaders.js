@@ -1,0 +1,218 @@
+'use strict';
+// The rasterizer of Kerbl et al. 2023 in the order a GPU likes: Gaussians as quads, farthest first, blended
+// premultiplied. Same projection, dilation and cut-offs as anchorsplat's own renderer; the numbers come with the page.
+
+// Spherical harmonics up to `degree`, as 3DGS orders and signs them. GLSL that adds them to `color` for the direction (x, y, z).
+function harmonicsSource(degree) {
+  const terms = [
+    '-0.48860251190291992 * y', '0.48860251190291992 * z', '-0.48860251190291992 * x',
+    '1.0925484305920792 * x * y', '-1.0925484305920792 * y * z', '0.94617469575755997 * z2 - 0.31539156525251999',
+    '-1.0925484305920792 * x * z', '0.54627421529603959 * (x2 - y2)',
+    '-0.59004358992664352 * y * (3.0 * x2 - y2)', '2.8906114426405538 * x * y * z',
+    'y * (0.45704579946446572 - 2.2852289973223288 * z2)', 'z * (1.865881662950577 * z2 - 1.1195289977703462)',
+    'x * (0.45704579946446572 - 2.2852289973223288 * z2)', '1.4453057213202769 * z * (x2 - y2)',
+    '-0.59004358992664352 * x * (x2 - 3.0 * y2)',
+  ];
+  const count = (degree + 1) ** 2 - 1;
+  const lines = [];
+  const words = Math.ceil(3 * count / 4);
+  for (let texel = 0; 4 * texel < words; ++texel) {
+    lines.push(`uvec4 w${texel} = fetch(uHarmonics, index * ${Math.ceil(words / 4)}u + ${texel}u);`);
+    for (let k = 4 * texel; k < Math.min(words, 4 * texel + 4); ++k) {
+      lines.push(`vec4 v${k} = companded(w${texel}[${k % 4}]);`);
+    }
+  }
+  const value = (j) => `v${j >> 2}[${j & 3}]`;
+  for (let c = 0; c < count; ++c) {
+    const band = c < 3 ? 0 : c < 8 ? 1 : 2;
+    lines.push(`color += (${terms[c]}) * uHarmonicMax[${band}] * vec3(${[0, 1, 2].map((k) => value(3 * c + k))});`);
+  }
+  return lines.join('\n  ');
+}
+
+const splatVertexSource = (degree) => `#version 300 es
+precision highp float;
+precision highp int;
+precision highp usampler2D;
+
+uniform usampler2D uGeometry;
+uniform usampler2D uHarmonics;
+uniform mat3 uRotation;       // world to camera
+uniform vec3 uTranslation;    // camera position of the splat's centre
+uniform vec3 uEye;            // camera centre, relative to the splat's centre
+uniform vec4 uIntrinsics;     // fx, fy, cx, cy in pixels
+uniform vec2 uSize;           // of the target, pixels
+uniform vec4 uTangents;       // limits of x/z (min, max) and y/z (min, max) in the Jacobian
+uniform vec2 uLogScale;       // min, max
+uniform vec2 uDc;             // min, max
+uniform vec3 uHarmonicMax;    // per degree
+uniform float uScalarTop;     // largest scalar code
+uniform float uDilation;      // px²
+uniform float uMinAlpha;
+uniform float uNear;
+uniform bool uAntialiased;
+
+layout(location = 0) in uint aIndex;
+out vec2 vOffset;             // from the mean, in standard deviations
+flat out vec4 vColor;         // rgb, opacity
+
+uvec4 fetch(usampler2D data, uint texel) {
+  return texelFetch(data, ivec2(int(texel) & ${TEXTURE_WIDTH - 1}, int(texel) / ${TEXTURE_WIDTH}), 0);
+}
+
+vec4 companded(uint word) {
+  int w = int(word);
+  vec4 t = vec4(ivec4(w << 24, w << 16, w << 8, w) >> 24) / 127.0;
+  return t * abs(t);
+}
+
+mat3 rotation(uint code) {
+  vec3 q = vec3((uvec3(code) >> uvec3(20u, 10u, 0u)) & 1023u) / 1023.0 * 1.41421356237 - 0.70710678119;
+  float largest = sqrt(max(0.0, 1.0 - dot(q, q)));
+  uint which = code >> 30;
+  vec4 p = which == 0u ? vec4(largest, q)
+         : which == 1u ? vec4(q.x, largest, q.yz)
+         : which == 2u ? vec4(q.xy, largest, q.z) : vec4(q, largest);  // wxyz
+  float w = p.x, x = p.y, y = p.z, z = p.w;
+  return mat3(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y),
+              2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x),
+              2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y));
+}
+
+void main() {
+  gl_Position = vec4(0.0, 0.0, 2.0, 1.0);  // outside, until something is to be seen
+  vOffset = vec2(0.0);
+  vColor = vec4(0.0);
+  uint index = aIndex;
+  uvec4 g0 = fetch(uGeometry, index * 2u);
+  uvec4 g1 = fetch(uGeometry, index * 2u + 1u);
+
+  vec3 mean = uintBitsToFloat(g0.xyz);
+  vec3 p = uRotation * mean + uTranslation;
+  if (!(p.z >= uNear)) return;
+  float opacity = float(g1.y >> 16) / uScalarTop;
+  if (opacity < uMinAlpha) return;
+
+  vec3 s = exp(mix(vec3(uLogScale.x), vec3(uLogScale.y),
+                   vec3(g1.x & 65535u, g1.x >> 16, g1.y & 65535u) / uScalarTop));
+  mat3 m = uRotation * rotation(g0.w);
+  m = mat3(m[0] * s.x, m[1] * s.y, m[2] * s.z);
+  vec2 tangent = clamp(p.xy / p.z, uTangents.xz, uTangents.yw);
+  vec2 f = uIntrinsics.xy / p.z;
+  // Rows of J·W·R·S; the covariance is its product with its own transpose.
+  vec3 rows[3] = vec3[3](vec3(m[0].x, m[1].x, m[2].x), vec3(m[0].y, m[1].y, m[2].y), vec3(m[0].z, m[1].z, m[2].z));
+  vec3 u = f.x * (rows[0] - tangent.x * rows[2]);
+  vec3 v = f.y * (rows[1] - tangent.y * rows[2]);
+  float xx = dot(u, u), xy = dot(u, v), yy = dot(v, v);
+  float before = xx * yy - xy * xy;
+  xx += uDilation;
+  yy += uDilation;
+  if (uAntialiased) {
+    opacity *= sqrt(max(0.0, before / (xx * yy - xy * xy)));
+    if (opacity < uMinAlpha) return;
+  }
+
+  // Half axes where alpha falls to the cut-off, along the eigenvectors.
+  float middle = 0.5 * (xx + yy);
+  float radius = length(vec2(0.5 * (xx - yy), xy));
+  float angle = 0.5 * atan(2.0 * xy, xx - yy);
+  vec2 axis = vec2(cos(angle), sin(angle));
+  vec2 sigma = sqrt(vec2(middle + radius, max(middle - radius, uDilation)));
+  float reach = sqrt(max(0.0, 2.0 * log(opacity / uMinAlpha)));
+  vec2 center = uIntrinsics.xy * p.xy / p.z + uIntrinsics.zw;
+  vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0;
+  vOffset = corner * reach;
+  vec2 pixel = center + vOffset.x * sigma.x * axis + vOffset.y * sigma.y * vec2(-axis.y, axis.x);
+
+  vec3 color = mix(vec3(uDc.x), vec3(uDc.y), vec3(g1.z & 65535u, g1.z >> 16, g1.w & 65535u) / uScalarTop);
+  color = 0.28209479177387814 * color + 0.5;
+  vec3 direction = normalize(mean - uEye);
+  float x = direction.x, y = direction.y, z = direction.z;
+  float x2 = x * x, y2 = y * y, z2 = z * z;
+  ${harmonicsSource(degree)}
+  vColor = vec4(max(color, 0.0), opacity);
+  gl_Position = vec4(pixel / uSize * vec2(2.0, -2.0) + vec2(-1.0, 1.0), 0.0, 1.0);
+}`;
+
+const splatFragmentSource = `#version 300 es
+precision highp float;
+uniform float uMinAlpha;
+uniform float uMaxAlpha;
+in vec2 vOffset;
+flat in vec4 vColor;
+out vec4 fragment;
+void main() {
+  float alpha = min(uMaxAlpha, vColor.a * exp(-0.5 * dot(vOffset, vOffset)));
+  if (alpha < uMinAlpha) discard;
+  fragment = vec4(vColor.rgb * alpha, alpha);
+}`;
+
+// A picture, where the camera would see it.
+const pictureVertexSource = `#version 300 es
+uniform vec4 uRectangle;      // left, top, width, height in pixels
+uniform vec2 uSize;
+out vec2 vTexture;
+void main() {
+  vTexture = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1));
+  vec2 pixel = uRectangle.xy + vTexture * uRectangle.zw;
+  gl_Position = vec4(pixel / uSize * vec2(2.0, -2.0) + vec2(-1.0, 1.0), 0.0, 1.0);
+}`;
+
+const pictureFragmentSource = `#version 300 es
+precision highp float;
+uniform sampler2D uPicture;
+in vec2 vTexture;
+out vec4 fragment;
+void main() { fragment = texture(uPicture, vTexture); }`;
+
+const screenVertexSource = `#version 300 es
+void main() {
+  gl_Position = vec4(vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 4.0 - 1.0, 0.0, 1.0);
+}`;
+
+// What is on screen: one of the two pictures on either side of a line, or how far they are apart; magnified under the
+// lens. Textures have y up, the page y down.
+const screenFragmentSource = `#version 300 es
+precision highp float;
+uniform sampler2D uFirst, uSecond;          // premultiplied
+uniform sampler2D uLensFirst, uLensSecond;
+uniform vec2 uSize;
+uniform vec3 uBackground;
+uniform vec2 uSplit;                        // first where x < uSplit.x or y < uSplit.y
+uniform bool uDifference;
+uniform float uDifferenceTop;               // mean absolute difference shown as the brightest colour
+uniform vec4 uLenses[2];                    // x, y of the centre, radius (0: none), magnification
+uniform vec2 uLensSize;
+out vec4 fragment;
+
+vec3 over(vec4 c) { return clamp(c.rgb + (1.0 - c.a) * uBackground, 0.0, 1.0); }
+
+vec3 heat(float t) {
+  const vec3 stops[6] = vec3[6](vec3(0.02, 0.02, 0.03), vec3(0.21, 0.07, 0.36), vec3(0.55, 0.15, 0.41),
+                                vec3(0.88, 0.33, 0.25), vec3(0.98, 0.66, 0.22), vec3(0.99, 0.98, 0.80));
+  float x = clamp(t, 0.0, 1.0) * 5.0;
+  int k = int(min(x, 4.0));
+  return mix(stops[k], stops[k + 1], x - float(k));
+}
+
+vec3 shown(vec4 first, vec4 second, vec2 place) {
+  vec3 a = over(first), b = over(second);
+  if (uDifference) return heat(dot(abs(a - b), vec3(1.0 / 3.0)) / uDifferenceTop);
+  return place.x < uSplit.x || place.y < uSplit.y ? a : b;
+}
+
+void main() {
+  vec2 pixel = vec2(gl_FragCoord.x, uSize.y - gl_FragCoord.y);
+  for (int k = 0; k < 2; ++k) {
+    vec4 lens = uLenses[k];
+    vec2 d = pixel - lens.xy;
+    if (lens.z > 0.0 && dot(d, d) < lens.z * lens.z) {
+      ivec2 texel = ivec2(floor(vec2(d.x, -d.y) + 0.5 * uLensSize));
+      fragment = vec4(shown(texelFetch(uLensFirst, texel, 0), texelFetch(uLensSecond, texel, 0),
+                            lens.xy + d / lens.w), 1.0);
+      return;
+    }
+  }
+  ivec2 texel = ivec2(gl_FragCoord.xy);
+  fragment = vec4(shown(texelFetch(uFirst, texel, 0), texelFetch(uSecond, texel, 0), pixel), 1.0);
+}`;

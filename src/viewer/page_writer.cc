@@ -1,0 +1,222 @@
+#include "viewer/page_writer.h"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+#include "core/parallel.h"
+#include "core/text.h"
+#include "formats/atomic_file.h"
+#include "render/constants.h"
+#include "viewer/base64.h"
+#include "viewer/html_text.h"
+#include "viewer/page_files.h"
+#include "viewer/quantized_cloud.h"
+
+namespace anchorsplat {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Planes are deflated in pieces of this size, each a stream of its own: several threads write them, and the page never
+// holds more than one piece as text and bytes at a time.
+constexpr size_t kPieceBytes = size_t{1} << 22;
+// A picture is for comparing by eye; anything above this is not one.
+constexpr uint64_t kMaxPictureBytes = 50'000'000;
+
+// A part of the page that its code finds by id and decodes.
+struct DataElement {
+  std::string id;
+  std::string base64;
+};
+
+Error TooLarge(const std::filesystem::path& path, uint64_t bytes) {
+  return {ErrorCode::kBadArgument,
+          Cat(path.string(), ": the page would take ", HumanBytes(bytes), ", more than the ", HumanBytes(kMaxPageBytes),
+              " a browser opens well; leave out view-dependent colour (--sh-degree 0), BEFORE or the true pictures, "
+              "or show a part of the scene")};
+}
+
+Result<std::string> DeflateBase64(std::span<const uint8_t> bytes) {
+  uLongf size = compressBound(static_cast<uLong>(bytes.size()));
+  std::vector<uint8_t> out(size);
+  if (compress2(out.data(), &size, bytes.data(), static_cast<uLong>(bytes.size()), 6) != Z_OK) {
+    return Error{ErrorCode::kIo, "zlib cannot compress the page's data: out of memory?"};
+  }
+  return Base64({out.data(), size});
+}
+
+// Any bytes as JSON: what is not UTF-8 becomes U+FFFD, nothing ends the script element early.
+std::string ScriptJson(const Json& json) {
+  return EscapeJsonForScript(json.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+Result<Json> AddSplat(const ViewerSplat& splat, const std::string& id, int max_sh_degree,
+                      std::vector<DataElement>& elements) {
+  if (splat.cloud == nullptr) return Error{ErrorCode::kBadArgument, Cat("no cloud to show as \"", id, "\"")};
+  auto quantized = Quantize(*splat.cloud, max_sh_degree);
+  if (!quantized.ok())
+    return Error{quantized.error().code, Cat(Printable(splat.name), ": ", quantized.error().message)};
+  const QuantizedCloud& q = *quantized;
+
+  const size_t pieces = (q.planes.size() + kPieceBytes - 1) / kPieceBytes;
+  std::vector<std::optional<Result<std::string>>> texts(pieces);
+  ParallelFor(0, static_cast<int64_t>(pieces), 1, [&](int64_t first, int64_t last) {
+    for (auto k = static_cast<size_t>(first); k < static_cast<size_t>(last); ++k) {
+      const size_t begin = k * kPieceBytes;
+      texts[k] = DeflateBase64({q.planes.data() + begin, std::min(kPieceBytes, q.planes.size() - begin)});
+    }
+  });
+  Json ids = Json::array();
+  for (size_t k = 0; k < pieces; ++k) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(std::string text, *std::move(texts[k]));
+    elements.push_back({Cat(id, "-", k), std::move(text)});
+    ids.push_back(elements.back().id);
+  }
+  return Json{{"name", splat.name},
+              {"fileBytes", splat.file_bytes ? Json(*splat.file_bytes) : Json()},
+              {"fileCount", splat.cloud->size()},
+              {"count", q.count},
+              {"degree", q.sh_degree},
+              {"fileDegree", splat.cloud->sh_degree},
+              {"antialiased", splat.cloud->render_mode == RenderMode::kAntialiased},
+              {"center", q.center},
+              {"spread", q.spread},
+              {"reach", q.reach},
+              {"logScale", q.log_scale},
+              {"dc", q.dc},
+              {"shMax", q.sh_max},
+              {"meanBits", kMeanBits},
+              {"scalarBits", kScalarBits},
+              {"pieceBytes", kPieceBytes},
+              {"planes", PlanesPerGaussian(q.sh_degree)},
+              {"pieces", std::move(ids)}};
+}
+
+// The picture's MIME type goes by its first bytes: a browser that is told the truth does not guess.
+Result<Json> AddPicture(const std::filesystem::path& path, const std::string& id, std::vector<DataElement>& elements) {
+  std::error_code failed;
+  const uint64_t size = std::filesystem::file_size(path, failed);
+  if (failed) return Error{ErrorCode::kNotFound, Cat(path.string(), ": cannot be read: ", failed.message())};
+  if (size > kMaxPictureBytes) {
+    return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", HumanBytes(size), ", more than the ",
+                                          HumanBytes(kMaxPictureBytes), " allowed for a picture")};
+  }
+  std::vector<uint8_t> bytes(size);
+  std::ifstream file(path, std::ios::binary);
+  if (!file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size))) {
+    return Error{ErrorCode::kIo, Cat(path.string(), ": cannot be read")};
+  }
+  const std::string_view head(reinterpret_cast<const char*>(bytes.data()), std::min<size_t>(bytes.size(), 8));
+  std::string type;
+  if (head == "\x89PNG\r\n\x1a\n") type = "image/png";
+  if (head.starts_with("\xff\xd8\xff")) type = "image/jpeg";
+  if (type.empty()) return Error{ErrorCode::kBadFile, Cat(path.string(), ": neither a PNG nor a JPEG")};
+  elements.push_back({id, Base64(bytes)});
+  return Json{{"type", type}, {"element", id}};
+}
+
+Result<Json> AddView(const ViewerView& view, size_t index, std::vector<DataElement>& elements) {
+  const Pinhole& k = view.camera.intrinsics;
+  const Pose& pose = view.camera.world_to_camera;
+  Json picture;
+  if (!view.picture.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(picture, AddPicture(view.picture, Cat("picture-", index), elements));
+  }
+  return Json{{"name", view.camera.name},
+              {"width", k.width},
+              {"height", k.height},
+              {"fx", k.fx},
+              {"fy", k.fy},
+              {"cx", k.cx},
+              {"cy", k.cy},
+              {"rotation", pose.rotation},
+              {"translation", pose.translation},
+              {"picture", std::move(picture)}};
+}
+
+// Replaces the one occurrence of `mark`; the template is ours, so it is there.
+void Substitute(std::string& text, std::string_view mark, std::string_view value) {
+  text.replace(text.find(mark), mark.size(), value);
+}
+
+std::string InlineScripts() {
+  std::string out;
+  for (const char* name : {"payload.js", "camera.js", "shaders.js", "renderer.js", "interface.js", "app.js"}) {
+    out += Cat("<script>\n", PageFile(name), "</script>\n");
+  }
+  return out;
+}
+
+}  // namespace
+
+Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page, const WriteOptions& options) {
+  if (page.pixel_size && !(std::isfinite(*page.pixel_size) && *page.pixel_size > 0)) {
+    return Error{ErrorCode::kBadArgument, "the training pixel size must be positive and finite"};
+  }
+  // Refused before the work is done: random bytes do not deflate, splats shrink by a quarter at most.
+  uint64_t at_least = 0;
+  for (const ViewerSplat* splat : {&page.after, page.before ? &*page.before : nullptr}) {
+    if (splat == nullptr || splat->cloud == nullptr) continue;
+    const int degree = std::clamp(page.max_sh_degree, 0, splat->cloud->sh_degree);
+    at_least += static_cast<uint64_t>(splat->cloud->size()) * static_cast<uint64_t>(PlanesPerGaussian(degree)) / 2;
+  }
+  if (at_least > kMaxPageBytes) return TooLarge(path, at_least);
+
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  std::vector<DataElement> elements;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Json after, AddSplat(page.after, "after", page.max_sh_degree, elements));
+  Json before;
+  if (page.before) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(before, AddSplat(*page.before, "before", page.max_sh_degree, elements));
+  }
+  Json views = Json::array();
+  for (size_t k = 0; k < page.views.size(); ++k) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(Json view, AddView(page.views[k], k, elements));
+    views.push_back(std::move(view));
+  }
+  const std::string& title = page.title.empty() ? page.after.name : page.title;
+  const Json description = {{"title", title},
+                            {"after", std::move(after)},
+                            {"before", std::move(before)},
+                            {"views", std::move(views)},
+                            {"pixelSize", page.pixel_size ? Json(*page.pixel_size) : Json()},
+                            {"background", page.background},
+                            // The page draws with the renderer's own numbers.
+                            {"constants",
+                             {{"dilation", kDilation},
+                              {"minAlpha", kMinAlpha},
+                              {"maxAlpha", kMaxAlpha},
+                              {"near", kNear},
+                              {"frustumMargin", kFrustumMargin}}}};
+
+  std::string head(PageFile("page.html"));
+  const std::string end = head.substr(head.find("{{data}}") + std::string_view("{{data}}").size());
+  head.resize(head.find("{{data}}"));
+  Substitute(head, "{{style}}", PageFile("page.css"));
+  // JSON's way to replace what is not UTF-8 serves the title too.
+  const std::string printable_title = Json::parse(Json(title).dump(-1, ' ', false, Json::error_handler_t::replace));
+  Substitute(head, "{{title}}", EscapeHtml(printable_title));
+  const std::string tail = Cat("<script type=\"application/json\" id=\"description\">", ScriptJson(description),
+                               "</script>\n", "<script type=\"text/plain\" id=\"worker-source\">\n",
+                               PageFile("worker.js"), "</script>\n", InlineScripts(), end);
+
+  uint64_t bytes = head.size() + tail.size();
+  for (const DataElement& element : elements) bytes += element.base64.size() + element.id.size() + 50;
+  if (bytes > kMaxPageBytes) return TooLarge(path, bytes);
+
+  ANCHORSPLAT_RETURN_IF_ERROR(file.Write(head));
+  for (const DataElement& element : elements) {
+    ANCHORSPLAT_RETURN_IF_ERROR(file.Write(Cat("<script type=\"text/plain\" id=\"", element.id, "\">")));
+    ANCHORSPLAT_RETURN_IF_ERROR(file.Write(element.base64));
+    ANCHORSPLAT_RETURN_IF_ERROR(file.Write("</script>\n"));
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(file.Write(tail));
+  return file.Commit();
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/camera.h"
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "formats/cloud_io.h"
+
+namespace anchorsplat {
+
+struct ViewerSplat {
+  const GaussianCloud* cloud = nullptr;  // read only while the page is written
+  std::string name;                      // as people know it ("input.ply"); any bytes
+  std::optional<uint64_t> file_bytes;    // size of the file it came from
+};
+
+// A camera to jump to and, where there is one, the true picture from there: a PNG or JPEG, put into the page as it is.
+struct ViewerView {
+  Camera camera;
+  std::filesystem::path picture;  // empty: none
+};
+
+struct ViewerPage {
+  std::string title;  // any bytes; the name of `after` where it is empty
+  ViewerSplat after;
+  std::optional<ViewerSplat> before;
+  std::vector<ViewerView> views;      // the first one opens the page; without any the page finds its own
+  std::optional<float> pixel_size;    // world units one training pixel covers at the object; for the scale bar
+  std::array<float, 3> background{};  // rgb 0–1
+  int max_sh_degree = kMaxShDegree;   // higher coefficients are left out: they are most of the page
+};
+
+// A page above this is refused: browsers need several times its size in memory to open it.
+inline constexpr uint64_t kMaxPageBytes = 300'000'000;
+
+// One HTML file that shows the splats in any browser with WebGL 2, from disk, with no network: the clouds quantised
+// (quantized_cloud.h), deflated and in base64, the page's own code beside them. Classic and antialiased rendering
+// follow each cloud's `render_mode`.
+// Errors: kExists; kIo; kNotFound or kBadFile (a picture that is missing or neither PNG nor JPEG); kBadArgument: a
+// cloud without usable Gaussians, a pixel size that is not positive, a page larger than kMaxPageBytes.
+Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page, const WriteOptions& options = {});
+
+}  // namespace anchorsplat

@@ -28,15 +28,18 @@ constexpr size_t kPieceBytes = size_t{1} << 22;
 // A picture is for comparing by eye; anything above this is not one.
 constexpr uint64_t kMaxPictureBytes = 50'000'000;
 
+// Per Gaussian: half of three means and a rotation.
+constexpr uint64_t kLeastBytes = 6;
+
 // A part of the page that its code finds by id and decodes.
 struct DataElement {
   std::string id;
   std::string base64;
 };
 
-Error TooLarge(const std::filesystem::path& path, uint64_t bytes) {
+Error TooLarge(const std::filesystem::path& path, uint64_t bytes, uint64_t limit) {
   return {ErrorCode::kBadArgument,
-          Cat(path.string(), ": the page would take ", HumanBytes(bytes), ", more than the ", HumanBytes(kMaxPageBytes),
+          Cat(path.string(), ": the page would take ", HumanBytes(bytes), ", more than the ", HumanBytes(limit),
               " a browser opens well; leave out view-dependent colour (--sh-degree 0), BEFORE or the true pictures, "
               "or show a part of the scene")};
 }
@@ -92,6 +95,7 @@ Result<Json> AddSplat(const ViewerSplat& splat, const std::string& id, int max_s
               {"shMax", q.sh_max},
               {"meanBits", kMeanBits},
               {"scalarBits", kScalarBits},
+              {"harmonicTop", kHarmonicTop},
               {"pieceBytes", kPieceBytes},
               {"planes", PlanesPerGaussian(q.sh_degree)},
               {"pieces", std::move(ids)}};
@@ -158,14 +162,11 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
   if (page.pixel_size && !(std::isfinite(*page.pixel_size) && *page.pixel_size > 0)) {
     return Error{ErrorCode::kBadArgument, "the training pixel size must be positive and finite"};
   }
-  // Refused before the work is done: random bytes do not deflate, splats shrink by a quarter at most.
-  uint64_t at_least = 0;
-  for (const ViewerSplat* splat : {&page.after, page.before ? &*page.before : nullptr}) {
-    if (splat == nullptr || splat->cloud == nullptr) continue;
-    const int degree = std::clamp(page.max_sh_degree, 0, splat->cloud->sh_degree);
-    at_least += static_cast<uint64_t>(splat->cloud->size()) * static_cast<uint64_t>(PlanesPerGaussian(degree)) / 2;
-  }
-  if (at_least > kMaxPageBytes) return TooLarge(path, at_least);
+  // Refused before the work is done where that is certain: means and rotations never deflate by more than half.
+  uint64_t at_least = static_cast<uint64_t>(page.after.cloud == nullptr ? 0 : page.after.cloud->size());
+  if (page.before && page.before->cloud != nullptr) at_least += static_cast<uint64_t>(page.before->cloud->size());
+  at_least *= kLeastBytes;
+  if (at_least > page.max_bytes) return TooLarge(path, at_least, page.max_bytes);
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
   std::vector<DataElement> elements;
@@ -207,7 +208,7 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
 
   uint64_t bytes = head.size() + tail.size();
   for (const DataElement& element : elements) bytes += element.base64.size() + element.id.size() + 50;
-  if (bytes > kMaxPageBytes) return TooLarge(path, bytes);
+  if (bytes > page.max_bytes) return TooLarge(path, bytes, page.max_bytes);
 
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(head));
   for (const DataElement& element : elements) {

@@ -26,6 +26,9 @@ struct ViewerView {
   std::filesystem::path picture;  // empty: none
 };
 
+// A page above this is refused: browsers need several times its size in memory to open it.
+inline constexpr uint64_t kMaxPageBytes = 300'000'000;
+
 struct ViewerPage {
   std::string title;  // any bytes; the name of `after` where it is empty
   ViewerSplat after;
@@ -34,16 +37,14 @@ struct ViewerPage {
   std::optional<float> pixel_size;    // world units one training pixel covers at the object; for the scale bar
   std::array<float, 3> background{};  // rgb 0–1
   int max_sh_degree = kMaxShDegree;   // higher coefficients are left out: they are most of the page
+  uint64_t max_bytes = kMaxPageBytes;
 };
-
-// A page above this is refused: browsers need several times its size in memory to open it.
-inline constexpr uint64_t kMaxPageBytes = 300'000'000;
 
 // One HTML file that shows the splats in any browser with WebGL 2, from disk, with no network: the clouds quantised
 // (quantized_cloud.h), deflated and in base64, the page's own code beside them. Classic and antialiased rendering
 // follow each cloud's `render_mode`.
 // Errors: kExists; kIo; kNotFound or kBadFile (a picture that is missing or neither PNG nor JPEG); kBadArgument: a
-// cloud without usable Gaussians, a pixel size that is not positive, a page larger than kMaxPageBytes.
+// cloud without usable Gaussians, a pixel size that is not positive, a page above `max_bytes`.
 Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page, const WriteOptions& options = {});
 
 }  // namespace anchorsplat

@@ -56,7 +56,7 @@ uint32_t RotationCode(const float* wxyz) {
 uint8_t HarmonicCode(double value, double max) {
   if (!(max > 0)) return 0;
   const double t = std::sqrt(std::min(std::abs(value) / max, 1.0));
-  const auto code = static_cast<int>(std::lround(t * 127));
+  const auto code = static_cast<int>(std::lround(t * kHarmonicTop));
   return static_cast<uint8_t>(static_cast<int8_t>(value < 0 ? -code : code));
 }
 

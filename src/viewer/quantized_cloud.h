@@ -15,18 +15,19 @@ namespace anchorsplat {
 // original's by less than 45 dB PSNR can show.
 //
 // value            code                                                    bits
-// mean, per axis   t = asinh((x − center)/spread) over [−reach, reach]     22   fine near the middle, and one stray
+// mean, per axis   t = asinh((x − center)/spread) over [−reach, reach]     20   fine near the middle, and one stray
 //                                                                               Gaussian far out costs nobody precision
-// log-scale        over [log_scale_min, log_scale_max]                     12   step < 0.4 % of the length
-// opacity          0–1 (after the sigmoid)                                 12
-// f_dc             over [dc_min, dc_max]                                   12
-// rotation         smallest three of the unit quaternion                   32   2 bits which one is left out, 3 × 10
-// f_rest           m·t·|t|, t = q/127, m per degree                         8   fine where most coefficients are
+// log-scale        over [log_scale_min, log_scale_max]                     10   step < 3.2 % of the length, far less
+// for any sane file opacity          0–1 (after the sigmoid)                                 10 f_dc             over
+// [dc_min, dc_max]                                   10 rotation         smallest three of the unit quaternion 32   2
+// bits which one is left out, 3 × 10 f_rest           m·t·|t|, t = q/31, m per degree                          6   fine
+// where most coefficients are
 //
 // Linear codes put 0 at the lower end and 2^bits − 1 at the upper. A value of b > 8 bits takes ceil(b/8) planes, the
 // top 8 bits first; the last plane holds what is left, in its low bits.
-inline constexpr int kMeanBits = 22;
-inline constexpr int kScalarBits = 12;
+inline constexpr int kMeanBits = 20;
+inline constexpr int kScalarBits = 10;
+inline constexpr int kHarmonicTop = 31;  // codes −31…31
 
 struct QuantizedCloud {
   int64_t count = 0;

@@ -64,7 +64,15 @@ class Viewer {
     show(byId('compare'), this.pairs.length > 1);
     byId('legend-top').textContent = `${DIFFERENCE_TOP}+ apart`;
     new ResizeObserver(() => this.draw()).observe(this.canvas);
-    this.goTo(0);
+    for (const ring of document.querySelectorAll('.ring span')) ring.textContent = `×${LENS_MAGNIFICATION}`;
+    this.goTo(this.openingView());
+  }
+
+  // The first view, unless it looks straight down or up and another one does not.
+  openingView() {
+    const {views} = this.description;
+    const level = views.findIndex((view) => Math.abs(dot(view.rotation.slice(6, 9), this.camera.up)) < 0.6);
+    return Math.max(0, level);
   }
 
   get comparing() { return this.pairs[this.pair][0] !== this.pairs[this.pair][1]; }
@@ -139,8 +147,8 @@ class Viewer {
   }
 
   toggleLens() {
-    this.lens = this.lens ? null : [innerWidth * (this.mode === 'side' && innerWidth > innerHeight ? 0.25 : 0.5),
-      innerHeight * (this.mode === 'side' && innerWidth <= innerHeight ? 0.25 : 0.45)];
+    const {x, y, width, height} = this.regions()[0];
+    this.lens = this.lens ? null : [(x + width / 2) / this.ratio, (y + height / 2) / this.ratio];
     this.draw();
   }
 
@@ -192,29 +200,44 @@ class Viewer {
 
   // Where things are, in device pixels unless said otherwise.
 
-  regions() {
+  // The parts of the screen that the first and the second picture have to themselves.
+  halves() {
     const {width, height} = this.canvas;
     const whole = {x: 0, y: 0, width, height};
     if (this.mode !== 'side' || !this.comparing) return [whole, whole];
     if (width > height) {
-      return [{...whole, width: width / 2}, {...whole, x: width / 2, width: width / 2}];
+      const middle = Math.round(width / 2);
+      return [{...whole, width: middle}, {...whole, x: middle, width: width - middle}];
     }
-    return [{...whole, height: height / 2}, {...whole, y: height / 2, height: height / 2}];
+    const middle = Math.round(height / 2);
+    return [{...whole, height: middle}, {...whole, y: middle, height: height - middle}];
   }
 
-  regionAt(x, y) {
-    const [first, second] = this.regions();
-    return x * this.ratio < second.x || y * this.ratio < second.y ? first : second;
+  // Where in them the camera's frame is fitted: one above the other on a phone, clear of what is drawn over them.
+  regions() {
+    const halves = this.halves();
+    if (halves[1].y === 0 || document.body.classList.contains('bare')) return halves;
+    const top = (byId('card').getBoundingClientRect().bottom + 4) * this.ratio;
+    const bottom = (innerHeight - byId('modes').getBoundingClientRect().top + 4) * this.ratio;
+    const height = Math.max(0.5 * halves[0].height, halves[0].height - Math.max(top, bottom));
+    return [{...halves[0], y: halves[0].height - height, height}, {...halves[1], height}];
   }
 
-  // Centres of the lens in the first and in the second region, in CSS pixels: the same place twice when side by side.
+  inSecond(x, y) {
+    const [, second] = this.halves();
+    return (second.x > 0 && x * this.ratio >= second.x) || (second.y > 0 && y * this.ratio >= second.y);
+  }
+
+  regionAt(x, y) { return this.regions()[this.inSecond(x, y) ? 1 : 0]; }
+
+  // Centres of the lens in CSS pixels, one, or one in each half: the same place of the object twice.
   lensPlaces() {
     const [first, second] = this.regions();
-    const shift = [second.x / this.ratio, second.y / this.ratio];
+    const shift = [(second.x - first.x) / this.ratio, (second.y - first.y) / this.ratio];
+    if (shift[0] === 0 && shift[1] === 0) return [this.lens];
     const [x, y] = this.lens;
-    const inSecond = (shift[0] > 0 && x >= shift[0]) || (shift[1] > 0 && y >= shift[1]);
-    const place = inSecond ? [x - shift[0], y - shift[1]] : [x, y];
-    return first === second ? [place] : [place, [place[0] + shift[0], place[1] + shift[1]]];
+    const place = this.inSecond(x, y) ? [x - shift[0], y - shift[1]] : [x, y];
+    return [place, [place[0] + shift[0], place[1] + shift[1]]];
   }
 
   truthHere() {
@@ -286,42 +309,32 @@ class Viewer {
     const side = this.comparing ? this.side : 1;
     const pair = this.pairs[this.pair];
     const regions = this.regions();
+    const halves = this.halves();
     const splitX = Math.round(this.split * width);
     const places = this.lens ? this.lensPlaces() : [];
     const lensSize = 2 * Math.ceil(this.lensRadius * ratio);
 
     for (const k of [0, 1]) {
-      const region = regions[k];
-      let clip = region;
+      let clip = halves[k];
       if (mode === 'slider') {
-        clip = k === 0 ? {...region, width: splitX} : {...region, x: splitX, width: width - splitX};
+        clip = k === 0 ? {...clip, width: splitX} : {...clip, x: splitX, width: width - splitX};
       }
       renderer.begin(k, width, height, clip);
-      const wanted = mode !== 'blink' || side === k;
-      const intrinsics = this.camera.intrinsics(region);
-      const {fx, fy, cx, cy} = intrinsics;
-      const margin = 0.5 * this.description.constants.frustumMargin;
-      const tangents = [
-        (region.x - cx - margin * region.width) / fx, (region.x - cx + (1 + margin) * region.width) / fx,
-        (region.y - cy - margin * region.height) / fy, (region.y - cy + (1 + margin) * region.height) / fy,
-      ];
-      if (wanted && clip.width > 0) this.drawSource(k, pair[k], intrinsics, tangents);
       renderer.begin(2 + k, lensSize, lensSize, {x: 0, y: 0, width: lensSize, height: lensSize});
-      if (!wanted || places.length === 0) continue;
-      // The scene itself four times closer, not the picture's pixels four times larger.
-      const [x, y] = places[Math.min(k, places.length - 1)].map((c) => c * ratio);
-      const m = LENS_MAGNIFICATION;
-      const closer = (value, origin) => (value - origin) * m + lensSize / 2;
-      this.drawSource(2 + k, pair[k], {
-        fx: fx * m, fy: fy * m, cx: closer(cx, x), cy: closer(cy, y),
-        left: closer(intrinsics.left, x), top: closer(intrinsics.top, y),
-        width: intrinsics.width * m, height: intrinsics.height * m,
-      }, tangents);
+      if (mode === 'blink' && side !== k) continue;
+      const intrinsics = this.camera.intrinsics(regions[k]);
+      const tangents = this.tangents(intrinsics, halves[k]);
+      renderer.begin(k, width, height, clip);
+      if (clip.width > 0) this.drawSource(k, pair[k], intrinsics, tangents);
+      if (places.length === 0) continue;
+      renderer.begin(2 + k, lensSize, lensSize, {x: 0, y: 0, width: lensSize, height: lensSize});
+      const place = places[Math.min(k, places.length - 1)].map((c) => c * ratio);
+      this.drawSource(2 + k, pair[k], this.closer(intrinsics, place, lensSize), tangents);
     }
 
-    const nowhere = [0, 0, 0, 1];
-    const lenses = places.map(([x, y]) => [x * ratio, y * ratio, this.lensRadius * ratio, LENS_MAGNIFICATION]);
-    const splits = {slider: [splitX, -1], side: [regions[1].x, regions[1].y], difference: [-1, -1],
+    const nowhere = [0, 0, 0];
+    const lenses = places.map(([x, y]) => [x * ratio, y * ratio, this.lensRadius * ratio]);
+    const splits = {slider: [splitX, -1], side: [halves[1].x, halves[1].y], difference: [-1, -1],
       blink: side === 0 ? [2 * width, -1] : [-1, -1]};
     renderer.show({
       width, height, split: splits[mode], difference: mode === 'difference', differenceTop: DIFFERENCE_TOP,
@@ -329,6 +342,21 @@ class Viewer {
     });
     this.overlay(mode, places);
     this.settle();
+  }
+
+  // How far x/z and y/z may go in the Jacobian: what is seen and a margin, as the renderer has it.
+  tangents({fx, fy, cx, cy}, {x, y, width, height}) {
+    const margin = 0.5 * this.description.constants.frustumMargin;
+    return [(x - cx - margin * width) / fx, (x - cx + (1 + margin) * width) / fx,
+      (y - cy - margin * height) / fy, (y - cy + (1 + margin) * height) / fy];
+  }
+
+  // Under the lens: the scene itself four times closer, not the picture's pixels four times larger.
+  closer({fx, fy, cx, cy, left, top, width, height}, [x, y], size) {
+    const m = LENS_MAGNIFICATION;
+    const place = (value, origin) => (value - origin) * m + size / 2;
+    return {fx: fx * m, fy: fy * m, cx: place(cx, x), cy: place(cy, y),
+      left: place(left, x), top: place(top, y), width: width * m, height: height * m};
   }
 
   // The page over the picture.

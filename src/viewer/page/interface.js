@@ -107,7 +107,7 @@ function listenToKeys(viewer) {
     '=': () => viewer.zoom(0.9, ...center()),
     '-': () => viewer.zoom(1 / 0.9, ...center()),
     '_': () => viewer.zoom(1 / 0.9, ...center()),
-    0: () => viewer.goTo(0),
+    0: () => viewer.goTo(viewer.openingView()),
   };
   for (let k = 1; k <= 9; ++k) keys[k] = () => viewer.goTo(k - 1);
   addEventListener('keydown', (event) => {
@@ -164,10 +164,11 @@ function fillCard(description) {
     if (!splat) continue;
     const term = document.createElement('dt');
     term.textContent = description.before ? label : 'Splat';
-    const facts = [`${splat.fileCount.toLocaleString('en')} Gaussians`];
-    if (splat.fileBytes !== null) facts.push(sizeText(splat.fileBytes));
     const text = document.createElement('dd');
-    text.textContent = facts.join(' · ');
+    const unit = document.createElement('span');
+    unit.textContent = ' Gaussians';  // left away on a narrow screen
+    text.append(splat.fileCount.toLocaleString('en'), unit);
+    if (splat.fileBytes !== null) text.append(` · ${sizeText(splat.fileBytes)}`);
     const more = [splat.name, `SH degree ${splat.fileDegree}`];
     if (splat.degree < splat.fileDegree) more.push(`shown with degree ${splat.degree}`);
     if (splat.antialiased) more.push('antialiased');

@@ -102,7 +102,7 @@ class Renderer {
     return {texture: gl.createTexture(), framebuffer: gl.createFramebuffer(), width: 0, height: 0};
   }
 
-  // Binds target k at the given size, cleared to nothing, drawing only inside `region` (y down).
+  // Makes target k the one to draw to, at the given size and empty, only inside `region` (y down).
   begin(k, width, height, region) {
     const gl = this.gl;
     const target = this.targets[k];
@@ -143,6 +143,7 @@ class Renderer {
       gl.bindTexture(gl.TEXTURE_2D, splat.harmonics);
       gl.uniform1i(u.uHarmonics, 1);
       gl.uniform3fv(u.uHarmonicMax, d.shMax);
+      gl.uniform1f(u.uHarmonicTop, d.harmonicTop);
     }
     gl.uniformMatrix3fv(u.uRotation, true, axes.flat());
     gl.uniform3fv(u.uTranslation, axes.map((a) => -dot(a, fromCenter)));
@@ -180,7 +181,7 @@ class Renderer {
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
   }
 
-  // All four targets onto the canvas; `lenses` are [x, y, radius, magnification], two of them.
+  // All four targets onto the canvas; `lenses` are [x, y, radius], two of them.
   show({width, height, background, split, difference, differenceTop, lenses, lensSize}) {
     const gl = this.gl;
     const {program, uniforms: u} = this.screenProgram;
@@ -198,7 +199,7 @@ class Renderer {
     gl.uniform2fv(u.uSplit, split);
     gl.uniform1i(u.uDifference, difference ? 1 : 0);
     gl.uniform1f(u.uDifferenceTop, differenceTop);
-    gl.uniform4fv(u.uLenses, lenses.flat());
+    gl.uniform3fv(u.uLenses, lenses.flat());
     gl.uniform2f(u.uLensSize, lensSize, lensSize);
     gl.bindVertexArray(this.emptyArray);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);

@@ -17,7 +17,7 @@ function harmonicsSource(degree) {
   const lines = [];
   const words = Math.ceil(3 * count / 4);
   for (let texel = 0; 4 * texel < words; ++texel) {
-    lines.push(`uvec4 w${texel} = fetch(uHarmonics, index * ${Math.ceil(words / 4)}u + ${texel}u);`);
+    lines.push(`uvec4 w${texel} = texel(uHarmonics, index * ${Math.ceil(words / 4)}u + ${texel}u);`);
     for (let k = 4 * texel; k < Math.min(words, 4 * texel + 4); ++k) {
       lines.push(`vec4 v${k} = companded(w${texel}[${k % 4}]);`);
     }
@@ -46,6 +46,7 @@ uniform vec4 uTangents;       // limits of x/z (min, max) and y/z (min, max) in 
 uniform vec2 uLogScale;       // min, max
 uniform vec2 uDc;             // min, max
 uniform vec3 uHarmonicMax;    // per degree
+uniform float uHarmonicTop;   // largest code of a harmonic
 uniform float uScalarTop;     // largest scalar code
 uniform float uDilation;      // px²
 uniform float uMinAlpha;
@@ -56,13 +57,13 @@ layout(location = 0) in uint aIndex;
 out vec2 vOffset;             // from the mean, in standard deviations
 flat out vec4 vColor;         // rgb, opacity
 
-uvec4 fetch(usampler2D data, uint texel) {
-  return texelFetch(data, ivec2(int(texel) & ${TEXTURE_WIDTH - 1}, int(texel) / ${TEXTURE_WIDTH}), 0);
+uvec4 texel(usampler2D data, uint index) {
+  return texelFetch(data, ivec2(int(index) & ${TEXTURE_WIDTH - 1}, int(index) / ${TEXTURE_WIDTH}), 0);
 }
 
 vec4 companded(uint word) {
   int w = int(word);
-  vec4 t = vec4(ivec4(w << 24, w << 16, w << 8, w) >> 24) / 127.0;
+  vec4 t = vec4(ivec4(w << 24, w << 16, w << 8, w) >> 24) / uHarmonicTop;
   return t * abs(t);
 }
 
@@ -84,8 +85,8 @@ void main() {
   vOffset = vec2(0.0);
   vColor = vec4(0.0);
   uint index = aIndex;
-  uvec4 g0 = fetch(uGeometry, index * 2u);
-  uvec4 g1 = fetch(uGeometry, index * 2u + 1u);
+  uvec4 g0 = texel(uGeometry, index * 2u);
+  uvec4 g1 = texel(uGeometry, index * 2u + 1u);
 
   vec3 mean = uintBitsToFloat(g0.xyz);
   vec3 p = uRotation * mean + uTranslation;
@@ -181,7 +182,7 @@ uniform vec3 uBackground;
 uniform vec2 uSplit;                        // first where x < uSplit.x or y < uSplit.y
 uniform bool uDifference;
 uniform float uDifferenceTop;               // mean absolute difference shown as the brightest colour
-uniform vec4 uLenses[2];                    // x, y of the centre, radius (0: none), magnification
+uniform vec3 uLenses[2];                    // x, y of the centre, radius; 0: none
 uniform vec2 uLensSize;
 out vec4 fragment;
 
@@ -204,12 +205,11 @@ vec3 shown(vec4 first, vec4 second, vec2 place) {
 void main() {
   vec2 pixel = vec2(gl_FragCoord.x, uSize.y - gl_FragCoord.y);
   for (int k = 0; k < 2; ++k) {
-    vec4 lens = uLenses[k];
+    vec3 lens = uLenses[k];
     vec2 d = pixel - lens.xy;
     if (lens.z > 0.0 && dot(d, d) < lens.z * lens.z) {
       ivec2 texel = ivec2(floor(vec2(d.x, -d.y) + 0.5 * uLensSize));
-      fragment = vec4(shown(texelFetch(uLensFirst, texel, 0), texelFetch(uLensSecond, texel, 0),
-                            lens.xy + d / lens.w), 1.0);
+      fragment = vec4(shown(texelFetch(uLensFirst, texel, 0), texelFetch(uLensSecond, texel, 0), pixel), 1.0);
       return;
     }
   }

@@ -1,0 +1,273 @@
+#include "viewer/page_writer.h"
+
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <array>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
+#include <string_view>
+
+#include "core/text.h"
+#include "formats/image_io.h"
+#include "formats/test_folder.h"
+#include "viewer/fitted_cloud.h"
+#include "viewer/page_files.h"
+#include "viewer/quantized_cloud.h"
+
+namespace anchorsplat {
+namespace {
+
+std::string FileText(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+// The text of the element with this id, as a browser would find it: up to the next end tag.
+std::string ElementText(const std::string& page, const std::string& id) {
+  const std::string mark = Cat("id=\"", id, "\">");
+  const size_t begin = page.find(mark);
+  if (begin == std::string::npos) return {};
+  const size_t first = begin + mark.size();
+  return page.substr(first, page.find("</script", first) - first);
+}
+
+std::vector<uint8_t> FromBase64(const std::string& text) {
+  static const std::string alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::array<uint32_t, 256> codes{};
+  for (uint32_t k = 0; k < 64; ++k) codes[static_cast<uint8_t>(alphabet[k])] = k;
+  std::vector<uint8_t> bytes;
+  uint32_t bits = 0;
+  int count = 0;
+  for (char c : text) {
+    if (c == '=') break;
+    bits = bits << 6 | codes[static_cast<uint8_t>(c)];
+    count += 6;
+    if (count >= 8) {
+      count -= 8;
+      bytes.push_back(static_cast<uint8_t>(bits >> count & 255));
+    }
+  }
+  return bytes;
+}
+
+// The planes of a splat, as the page's worker puts them together.
+std::vector<uint8_t> Planes(const std::string& page, const nlohmann::json& splat) {
+  std::vector<uint8_t> planes;
+  for (const auto& id : splat.at("pieces")) {
+    const std::vector<uint8_t> packed = FromBase64(ElementText(page, id));
+    std::vector<uint8_t> piece(splat.at("pieceBytes").get<size_t>());
+    uLongf size = piece.size();
+    if (uncompress(piece.data(), &size, packed.data(), packed.size()) != Z_OK) ADD_FAILURE() << id;
+    planes.insert(planes.end(), piece.begin(), piece.begin() + static_cast<std::ptrdiff_t>(size));
+  }
+  return planes;
+}
+
+size_t Count(const std::string& text, std::string_view what) {
+  size_t n = 0;
+  for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++n;
+  return n;
+}
+
+ViewerView View(const std::string& name) {
+  ViewerView view;
+  view.camera.name = name;
+  view.camera.intrinsics = PinholeFromFov(64, 48, 0.8);
+  view.camera.world_to_camera = *LookAt({0, 0, 2}, {0, 0, 0}, {0, 1, 0});
+  return view;
+}
+
+TEST(PageWriter, DataComesBackAsItWentIn) {
+  TestFolder folder;
+  const GaussianCloud after = FittedLookingCloud(70'000, 3, 1);  // more than one piece
+  const GaussianCloud before = FittedLookingCloud(100, 1, 2);
+  ViewerPage page;
+  page.after = {&after, "after.ply", 12345};
+  page.before = ViewerSplat{&before, "before.ply", {}};
+  page.views = {View("a")};
+  page.pixel_size = 0.5f;
+  page.background = {1, 0.5f, 0.25f};
+  const Status status = WriteViewerPage(folder / "page.html", page);
+  ASSERT_TRUE(status.ok()) << status.error().message;
+
+  const std::string text = FileText(folder / "page.html");
+  const auto description = nlohmann::json::parse(ElementText(text, "description"));
+  EXPECT_EQ(description["title"], "after.ply");
+  EXPECT_EQ(description["after"]["fileBytes"], 12345);
+  EXPECT_TRUE(description["before"]["fileBytes"].is_null());
+  EXPECT_EQ(description["pixelSize"], 0.5);
+  EXPECT_EQ(description["background"], (nlohmann::json{1, 0.5, 0.25}));
+  EXPECT_EQ(description["views"].size(), 1u);
+  EXPECT_GE(description["after"]["pieces"].size(), 2u);
+
+  const QuantizedCloud q = *Quantize(after, 3);
+  EXPECT_EQ(Planes(text, description["after"]), q.planes);
+  EXPECT_EQ(description["after"]["center"].get<decltype(q.center)>(), q.center);
+  EXPECT_EQ(description["after"]["spread"], q.spread);
+  EXPECT_EQ(description["after"]["reach"], q.reach);
+  EXPECT_EQ(description["after"]["logScale"].get<decltype(q.log_scale)>(), q.log_scale);
+  EXPECT_EQ(description["after"]["dc"].get<decltype(q.dc)>(), q.dc);
+  EXPECT_EQ(description["after"]["shMax"].get<decltype(q.sh_max)>(), q.sh_max);
+  EXPECT_EQ(description["after"]["planes"], PlanesPerGaussian(3));
+  EXPECT_EQ(description["before"]["planes"], PlanesPerGaussian(1));
+  EXPECT_EQ(Planes(text, description["before"]), Quantize(before, 3)->planes);
+}
+
+TEST(PageWriter, APairOfFourTimesAsManyGaussiansFitsEightMegabytes) {
+  TestFolder folder;
+  const GaussianCloud before = FittedLookingCloud(17'000, 3, 1);
+  const GaussianCloud after = FittedLookingCloud(68'000, 3, 2);
+  ViewerPage page;
+  page.after = {&after, "after", {}};
+  page.before = ViewerSplat{&before, "before", {}};
+  ASSERT_TRUE(WriteViewerPage(folder / "page.html", page).ok());
+  EXPECT_LT(std::filesystem::file_size(folder / "page.html"), 8'000'000u);
+}
+
+TEST(PageWriter, NothingIsFetchedAndNoCodeIsMade) {
+  TestFolder folder;
+  const GaussianCloud cloud = FittedLookingCloud(10, 0, 1);
+  ViewerPage page;
+  page.after = {&cloud, "x", {}};
+  ASSERT_TRUE(WriteViewerPage(folder / "page.html", page).ok());
+  const std::string text = FileText(folder / "page.html");
+  for (const char* word :
+       {"http:", "https:", "ftp:", "@import", "url(", "fetch(", "XMLHttpRequest", "WebSocket", "EventSource",
+        "sendBeacon", "importScripts", "eval(", "Function(", "innerHTML", "document.write", "javascript:", "{{"}) {
+    EXPECT_EQ(text.find(word), std::string::npos) << word;
+  }
+  EXPECT_NE(text.find("Content-Security-Policy\" content=\"default-src 'none';"), std::string::npos);
+  EXPECT_FALSE(std::regex_search(text, std::regex("<[a-z]+ [^>]*\\bon[a-z]+=")));  // no handlers in attributes
+  const std::regex address("\\b(src|href)=\"([^\"]*)\"");
+  for (std::sregex_iterator it(text.begin(), text.end(), address), end; it != end; ++it) {
+    EXPECT_EQ((*it)[2].str().substr(0, 5), "data:") << (*it)[0];
+  }
+}
+
+TEST(PageWriter, ItsOwnFilesStayInsideTheirElements) {
+  for (const char* name :
+       {"page.css", "payload.js", "camera.js", "shaders.js", "renderer.js", "interface.js", "app.js", "worker.js"}) {
+    const std::string text(PageFile(name));
+    EXPECT_GT(text.size(), 500u) << name;
+    EXPECT_EQ(text.find("</s"), std::string::npos) << name;
+    EXPECT_EQ(text.find("<!--"), std::string::npos) << name;
+    if (std::string_view(name).ends_with(".js")) {
+      EXPECT_EQ(text.rfind("'use strict';", 0), 0u) << name;
+    }
+  }
+  EXPECT_TRUE(PageFile("nothing").empty());
+}
+
+TEST(PageWriter, HostileNamesStayText) {
+  TestFolder folder;
+  const GaussianCloud cloud = FittedLookingCloud(10, 0, 1);
+  const auto write = [&](const std::string& name) {
+    ViewerPage page;
+    page.title = name;
+    page.after = {&cloud, name, {}};
+    page.before = ViewerSplat{&cloud, name, {}};
+    page.views = {View(name)};
+    EXPECT_TRUE(WriteViewerPage(folder / "page.html", page, {.overwrite = true}).ok());
+    return FileText(folder / "page.html");
+  };
+  const std::string plain = write("plain");
+  for (const std::string& name :
+       {std::string("</title></style><script>alert(1)</script>"), std::string("</script><!--<script>"),
+        std::string("{{data}}{{style}}{{title}}"), std::string("\" onload=\"alert(1)"), std::string("-->]]>&lt;"),
+        std::string("\xff\xfe</script>\xc3"), std::string("\xe2\x80\xa8'\\u003c"), std::string("a\0<b>", 5)}) {
+    const std::string text = write(name);
+    for (const char* tag : {"<script", "</script", "<!--", "</title", "</style", "<b>"}) {
+      EXPECT_EQ(Count(text, tag), Count(plain, tag)) << Printable(name) << ": " << tag;
+    }
+    const auto description = nlohmann::json::parse(ElementText(text, "description"));
+    if (name[0] != '\xff') {
+      EXPECT_EQ(description["after"]["name"], name);
+      EXPECT_EQ(description["views"][0]["name"], name);
+    }
+  }
+}
+
+TEST(PageWriter, RenderModeAndDegreeAreTheClouds) {
+  TestFolder folder;
+  GaussianCloud cloud = FittedLookingCloud(10, 3, 1);
+  cloud.render_mode = RenderMode::kAntialiased;
+  ViewerPage page;
+  page.after = {&cloud, "x", {}};
+  page.max_sh_degree = 1;
+  ASSERT_TRUE(WriteViewerPage(folder / "page.html", page).ok());
+  const auto description = nlohmann::json::parse(ElementText(FileText(folder / "page.html"), "description"));
+  EXPECT_EQ(description["after"]["antialiased"], true);
+  EXPECT_EQ(description["after"]["degree"], 1);
+  EXPECT_EQ(description["after"]["fileDegree"], 3);
+  EXPECT_TRUE(description["before"].is_null());
+  EXPECT_NEAR(description["constants"]["dilation"].get<double>(), 0.3, 1e-7);
+}
+
+TEST(PageWriter, PicturesTravelAsTheyAre) {
+  TestFolder folder;
+  const GaussianCloud cloud = FittedLookingCloud(10, 0, 1);
+  ASSERT_TRUE(WritePng(folder / "truth.png", Image(5, 4, 3)).ok());
+  ViewerPage page;
+  page.after = {&cloud, "x", {}};
+  page.views = {View("none"), View("some")};
+  page.views[1].picture = folder / "truth.png";
+  ASSERT_TRUE(WriteViewerPage(folder / "page.html", page).ok());
+  const std::string text = FileText(folder / "page.html");
+  const auto views = nlohmann::json::parse(ElementText(text, "description"))["views"];
+  EXPECT_TRUE(views[0]["picture"].is_null());
+  EXPECT_EQ(views[1]["picture"]["type"], "image/png");
+  const std::vector<uint8_t> bytes = FromBase64(ElementText(text, views[1]["picture"]["element"]));
+  EXPECT_EQ(std::string(bytes.begin(), bytes.end()), FileText(folder / "truth.png"));
+}
+
+TEST(PageWriter, ErrorsSayWhatToDoAndLeaveNothingBehind) {
+  TestFolder folder;
+  const GaussianCloud cloud = FittedLookingCloud(1000, 3, 1);
+  ViewerPage good;
+  good.after = {&cloud, "x", {}};
+  const auto error = [&](const ViewerPage& page) {
+    const Status status = WriteViewerPage(folder / "page.html", page);
+    EXPECT_FALSE(status.ok());
+    EXPECT_EQ(folder.Entries(), 1);  // the one that is no picture
+    return status.ok() ? Error{ErrorCode::kIo, "none"} : status.error();
+  };
+  std::ofstream(folder / "text.png") << "no picture at all";
+
+  ViewerPage page = good;
+  page.pixel_size = 0.f;
+  EXPECT_EQ(error(page).code, ErrorCode::kBadArgument);
+
+  const GaussianCloud empty;
+  page = good;
+  page.before = ViewerSplat{&empty, "nothing.ply", {}};
+  EXPECT_EQ(error(page).code, ErrorCode::kBadArgument);
+  EXPECT_NE(error(page).message.find("nothing.ply"), std::string::npos);
+
+  page = good;
+  page.after.cloud = nullptr;
+  EXPECT_EQ(error(page).code, ErrorCode::kBadArgument);
+
+  page = good;
+  page.views = {View("a")};
+  page.views[0].picture = folder / "missing.png";
+  EXPECT_EQ(error(page).code, ErrorCode::kNotFound);
+  page.views[0].picture = folder / "text.png";
+  EXPECT_EQ(error(page).code, ErrorCode::kBadFile);
+
+  for (uint64_t limit : {uint64_t{5'000}, uint64_t{60'000}}) {  // before and after packing
+    page = good;
+    page.max_bytes = limit;
+    EXPECT_EQ(error(page).code, ErrorCode::kBadArgument);
+    EXPECT_NE(error(page).message.find("--sh-degree"), std::string::npos);
+  }
+
+  ASSERT_TRUE(WriteViewerPage(folder / "page.html", good).ok());
+  EXPECT_EQ(WriteViewerPage(folder / "page.html", good).error().code, ErrorCode::kExists);
+  EXPECT_TRUE(WriteViewerPage(folder / "page.html", good, {.overwrite = true}).ok());
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "model/kernels/level.h"
+
+namespace anchorsplat {
+
+// One kind of block of the U-Net and how many of them a forward pass runs.
+struct BlockMix {
+  int level;
+  int64_t channels;
+  int64_t heads;
+  int64_t blocks;
+};
+
+// Encoder and decoder of the published network.
+inline constexpr BlockMix kForwardMix[] = {{0, 64, 2, 2},   {1, 96, 4, 2},   {2, 128, 8, 2},
+                                           {3, 256, 16, 6}, {4, 512, 32, 2}, {0, 96, 4, 2},
+                                           {1, 96, 4, 2},   {2, 128, 8, 2},  {3, 256, 16, 2}};
+
+// Voxels [N,3] of a closed surface whose hierarchy resembles that of a fitted object: most of its points have a voxel
+// of their own, and three poolings leave about a sixth of them.
+std::vector<int32_t> SurfaceVoxels(int64_t count);
+
+}  // namespace anchorsplat

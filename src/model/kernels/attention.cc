@@ -90,8 +90,9 @@ HWY_INLINE void Scores(const float* HWY_RESTRICT keys, const float* HWY_RESTRICT
   }
 }
 
-// The largest score of each query among the first `keys` keys. NaN may get lost here, but not in the probabilities.
-HWY_NOINLINE void LargestScores(const float* keys, int64_t key_count, const float* queries, int64_t depth,
+// The largest score of each query, looking at every `step`-th tile of keys. NaN may get lost here, but not in the
+// probabilities.
+HWY_NOINLINE void LargestScores(const float* keys, int64_t key_count, int64_t step, const float* queries, int64_t depth,
                                 float* HWY_RESTRICT largest) {
   const GroupTag d;
   V best[kVectors];
@@ -101,7 +102,7 @@ HWY_NOINLINE void LargestScores(const float* keys, int64_t key_count, const floa
     best[v] = hn::Set(d, -3.0e38f);
     zero[v] = hn::Zero(d);
   }
-  for (int64_t j0 = 0; j0 < key_count; j0 += kKeyTile) {
+  for (int64_t j0 = 0; j0 < key_count; j0 += step * kKeyTile) {
     V scores[kKeyTile][kVectors];
     Scores(keys + j0 * depth, queries, depth, zero, scores);
     ANCHORSPLAT_UNROLL
@@ -119,6 +120,32 @@ enum class ScoreRange : uint8_t {
   kBounded,  // −125 … 125 after the shift
   kAny,      // at most 125 after the shift, but perhaps far below
 };
+
+// What is subtracted from the scores of each query of a group. Softmax does not change with it, so it only has to keep
+// the exponentials in range: of floats, and of fp16 where they are rounded to that. `bounds` hold |q||k| ≥ |q·k| for
+// the longest key; often that is small and nothing needs to be subtracted, or the largest score of a few keys is close
+// enough to the bound to serve for all. Only the rest pays for finding the largest score of all keys.
+ScoreRange ChooseShifts(Rounding rounding, const float* keys, int64_t key_count, const float* queries, int64_t depth,
+                        const float* bounds, float* HWY_RESTRICT shifts) {
+  const float unshifted = rounding == Rounding::kHalf ? 10.0f : 60.0f;  // 2^-10 is still a normal fp16
+  const float highest = rounding == Rounding::kHalf ? 15.0f : 60.0f;    // 2^15 is below its largest
+  constexpr float kLowest = 120.0f;
+  constexpr int64_t kProbes = 10;  // tiles
+  const auto all_within = [&](float limit, float sign, bool magnitudes) {
+    bool within = true;  // of NaN: false
+    for (int i = 0; i < kGroup; ++i) {
+      const float shift = magnitudes ? std::abs(shifts[i]) : shifts[i];
+      within = (bounds[i] + sign * shift <= limit) && within;
+    }
+    return within;
+  };
+  std::fill(shifts, shifts + kGroup, 0.0f);
+  if (all_within(unshifted, 0, false)) return ScoreRange::kBounded;
+  const int64_t tiles = (key_count + kKeyTile - 1) / kKeyTile;
+  LargestScores(keys, key_count, std::max<int64_t>(1, tiles / kProbes), queries, depth, shifts);
+  if (!all_within(highest, -1, false)) LargestScores(keys, key_count, 1, queries, depth, shifts);
+  return all_within(kLowest, 1, true) ? ScoreRange::kBounded : ScoreRange::kAny;
+}
 
 // Probabilities exp2(score − shift) of a block of keys, and their sums over the keys added to `total`.
 template <ScoreRange kRange, Rounding kRounding>
@@ -204,8 +231,7 @@ void AttendGroup(const AttentionParams& p, const AttentionTask& task, int64_t de
   const int32_t* rows = p.patch_rows + task.patch_begin + query;
   // Scores are wanted as exponents of 2.
   const float scale = p.scale * 1.44269504088896341f;
-  float longest_query = 0;
-  bool finite = true;
+  alignas(64) float bounds[kGroup] = {};
   std::fill(s.queries.begin(), s.queries.end(), 0.0f);
   for (int64_t i = 0; i < count; ++i) {
     const float* q = p.qkv + int64_t{3} * rows[i] * p.channels + task.head * width;
@@ -215,23 +241,16 @@ void AttendGroup(const AttentionParams& p, const AttentionTask& task, int64_t de
       squares += value * value;
       s.queries[static_cast<size_t>(c * kGroup + i)] = value;
     }
-    finite = finite && std::isfinite(squares);
-    longest_query = std::max(longest_query, squares);
+    bounds[i] = std::sqrt(squares) * longest_key;
   }
-  // Softmax does not change when a query's scores are all shifted. No shift is needed when no exponential can leave
-  // the range of floats, and |q·k| ≤ |q||k| tells. Otherwise, and where probabilities get rounded, the largest score
-  // is the shift.
-  constexpr float kSafeExponent = 60;
-  const bool bounded = finite && std::sqrt(longest_query) * longest_key <= kSafeExponent;
-  alignas(64) float shifts[kGroup] = {};
+  alignas(64) float shifts[kGroup];
   alignas(64) float totals[kGroup] = {};
-  const bool shifted = kRounding != Rounding::kNone || !bounded;
-  if (shifted) LargestScores(s.keys.data(), task.keys, s.queries.data(), depth, shifts);
+  const ScoreRange range = ChooseShifts(kRounding, s.keys.data(), task.keys, s.queries.data(), depth, bounds, shifts);
   std::fill(s.sums.begin(), s.sums.end(), 0.0f);
   for (int64_t j = 0; j < task.keys; j += kKeyBlock) {
     const int64_t keys = std::min(kKeyBlock, task.keys - j);
     const float* block = s.keys.data() + j * depth;
-    if (bounded) {
+    if (range == ScoreRange::kBounded) {
       Probabilities<ScoreRange::kBounded, kRounding>(block, keys, s.queries.data(), depth, shifts,
                                                      s.probabilities.data(), totals);
     } else {
@@ -265,7 +284,7 @@ void AttendRounded(const AttentionParams& p, const AttentionTask& task, Attentio
   s.sums.resize(static_cast<size_t>(depth * kGroup));
   s.probabilities.resize(static_cast<size_t>(kKeyBlock * kGroup));
   float longest = 0;
-  bool finite = true;
+  bool ordered = true;  // no NaN
   for (int64_t j = 0; j < padded; ++j) {
     float* key = s.keys.data() + j * depth;
     float* value = s.values.data() + j * depth;
@@ -284,10 +303,10 @@ void AttendRounded(const AttentionParams& p, const AttentionTask& task, Attentio
     }
     std::fill(key + width, key + depth, 0.0f);
     std::fill(value + width, value + depth, 0.0f);
-    finite = finite && std::isfinite(squares);
+    ordered = ordered && squares == squares;
     longest = std::max(longest, squares);
   }
-  const float longest_key = finite ? std::sqrt(longest) : INFINITY;
+  const float longest_key = ordered ? std::sqrt(longest) : NAN;
   for (int64_t query = task.first; query < task.last; query += kGroup) {
     AttendGroup<kRounding>(p, task, depth, longest_key, query, s);
   }

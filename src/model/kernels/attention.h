@@ -20,8 +20,10 @@ struct AttentionParams {
   const float* qkv;           // [N,3C] q | k | v of each point
   const int32_t* patch_rows;  // [PaddedCount(N, patch_size)] point in each slot of the padded order (patches.h)
   int64_t patch_size = kPatchSize;
-  // What q, k, v, the probabilities before their normalisation (largest = 1), and the output are rounded to. kHalf and
-  // kBFloat16 follow the arithmetic of fused attention on a GPU, whose scores, softmax and sums stay in fp32.
+  // What q, k, v, the probabilities before their normalisation, and the output are rounded to. kHalf and kBFloat16
+  // follow the arithmetic of fused attention on a GPU, whose scores, softmax and sums stay in fp32. There too the
+  // probabilities are relative to some score near the largest, so two implementations agree up to the rounding, not to
+  // the bit.
   Rounding rounding = Rounding::kNone;
   // out
   float* out;  // [N,C]; must not overlap `qkv`

@@ -170,16 +170,47 @@ TEST(Attention, RoundsLikeFusedAttentionInHalfPrecision) {
         Problem exact = p;
         exact.rounding = Rounding::kNone;
         const std::vector<double> unrounded = AttendReference(exact);
-        double off = 0;
-        double effect = 0;
+        double error = 0;
+        double expected_error = 0;
         for (size_t i = 0; i < out.size(); ++i) {
-          // values are of the grid, and off by at most a step where a probability or the output is close to a tie
-          ASSERT_EQ(out[i], Rounded(rounding, out[i]));
+          ASSERT_EQ(out[i], Rounded(rounding, out[i]));  // on the grid
           ASSERT_NEAR(out[i], expected[i], 2.1 * unit * std::max(std::abs(expected[i]), 0.25));
-          off += std::abs(out[i] - expected[i]);
-          effect += std::abs(unrounded[i] - expected[i]);
+          error += std::abs(out[i] - unrounded[i]);
+          expected_error += std::abs(expected[i] - unrounded[i]);
         }
-        EXPECT_LT(off, 0.05 * effect);  // the rounding is the reference's, not some other one
+        // Probabilities are rounded relative to another score than here: other errors, but no larger or smaller ones.
+        EXPECT_NEAR(error / expected_error, 1, 0.1);
+      }
+    }
+  });
+}
+
+// Bits of all fp16 numbers and of what lies half-way between them.
+TEST(Attention, ValuesAreRoundedToNearestEven) {
+  ForEachSimdTarget([] {
+    for (Rounding rounding : {Rounding::kHalf, Rounding::kBFloat16}) {
+      Random random(1);
+      std::vector<float> values = {0.0f,     -0.0f,    1.0f,     65504.0f, 65519.0f,     65520.0f,    -70000.0f,
+                                   0x1p-24f, 0x1p-25f, 0x3p-26f, 0x1p-14f, 0x1.ffcp-15f, 0x1.ffep-15f};
+      for (int i = 0; i < 300; ++i) {
+        const double scale = std::ldexp(1.0, static_cast<int>(random.Below(40)) - 26);
+        values.push_back(static_cast<float>(random.Uniform(-1, 1) * scale));                    // anything
+        values.push_back(static_cast<float>(static_cast<double>(random.Below(4096)) * scale));  // ties
+      }
+      // A point alone attends to itself: its output is its value, rounded.
+      for (float v : values) {
+        const float qkv[3] = {0.0f, 0.0f, v};
+        const int32_t row = 0;
+        float out = -1;
+        AttentionCpu({.count = 1,
+                      .channels = 1,
+                      .heads = 1,
+                      .scale = 1,
+                      .qkv = qkv,
+                      .patch_rows = &row,
+                      .rounding = rounding,
+                      .out = &out});
+        ASSERT_EQ(out, static_cast<float>(Rounded(rounding, v))) << v;
       }
     }
   });

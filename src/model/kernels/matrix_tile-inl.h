@@ -6,6 +6,7 @@
 #define ANCHORSPLAT_MODEL_MATRIX_TILE_INL_H_
 #endif
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <cstdint>
@@ -69,6 +70,14 @@ HWY_INLINE void MultiplyTile(const Tile& t) {
     for (int v = 0; v < kVectors; ++v) {
       ANCHORSPLAT_UNROLL
       for (int r = 0; r < kRows; ++r) sums[r][v] = hn::Zero(d);
+    }
+  }
+  if (t.added != nullptr) {
+    // They are wanted when the products are done: by then they have come nearer.
+    ANCHORSPLAT_UNROLL
+    for (int r = 0; r < kRows; ++r) {
+      ANCHORSPLAT_UNROLL
+      for (int i = 0; i < kPanels; ++i) hwy::Prefetch(t.added[r] + i * PackedWeights::kPanel);
     }
   }
   const float* HWY_RESTRICT input = t.input;

@@ -84,6 +84,10 @@ HWY_INLINE V Gelu(D d, V x) {
 // To the nearest fp16 value, ties to even, as a float: infinity from 65520, subnormals kept, NaN stays NaN.
 template <class D, class V = hn::VFromD<D>>
 HWY_INLINE V RoundToHalf(D d, V x) {
+#if HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL || HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_NEON
+  return hn::PromoteTo(d, hn::DemoteTo(hn::Rebind<hwy::float16_t, D>(), x));
+#else
+  // Without an instruction for it, and Highway's substitute truncates.
   const hn::RebindToUnsigned<D> du;
   const V magnitude = hn::Abs(x);
   const auto bits = hn::BitCast(du, magnitude);
@@ -93,9 +97,9 @@ HWY_INLINE V RoundToHalf(D d, V x) {
   // Below 2^-14 the grid is 2^-24 wide, which is the spacing of floats from 1/2 to 1.
   const V offset = hn::Set(d, 0.5f);
   y = hn::IfThenElse(hn::Lt(magnitude, hn::Set(d, 6.103515625e-05f)), hn::Sub(hn::Add(magnitude, offset), offset), y);
-  const hn::RebindToSigned<D> di;
-  y = hn::IfThenElse(hn::Ge(magnitude, hn::Set(d, 65520.0f)), hn::BitCast(d, hn::Set(di, 0x7f800000)), y);
+  y = hn::IfThenElse(hn::Ge(magnitude, hn::Set(d, 65520.0f)), hn::BitCast(d, hn::Set(du, 0x7f800000u)), y);
   return hn::IfThenElse(hn::Eq(x, x), hn::CopySign(y, x), x);
+#endif
 }
 
 // To the nearest bfloat16 value, ties to even, as a float; NaN stays NaN.

@@ -12,8 +12,9 @@ namespace anchorsplat {
 
 namespace {
 
-// Smaller rectangles are listed whole: blending drops a tile without a hit faster than this file finds it.
-constexpr int kWorthCutting = 4;  // tiles
+// Smaller rectangles are listed whole: blending drops a tile that the ellipse misses faster than it is found here. The
+// few larger ones are cut so that a long needle across the image is not listed for all of it.
+constexpr int kWorthCutting = 64;  // tiles
 
 // Columns [x0, x1) of one row of tiles that the ellipse α = min_alpha meets.
 class EllipseRows {
@@ -55,16 +56,16 @@ class EllipseRows {
   double x_, y_, reach2_, u_yy_, half_, shear_, height_, rightmost_;
 };
 
-// Calls row(tile_y, x0, x1) for every row of tiles of Gaussian i within tile rows [first_row, last_row).
+// Calls row(tile_y, x0, x1) for every row of tiles of the k-th Gaussian within tile rows [first_row, last_row).
 template <typename Row>
-void VisitRows(const BinParams& p, double log2_min_alpha, int32_t i, int first_row, int last_row, Row&& row) {
-  const TileRect rect = p.tiles[i];
+void VisitRows(const BinParams& p, double log2_min_alpha, int64_t k, int first_row, int last_row, Row&& row) {
+  const TileRect rect = p.tiles_by_depth[k];
   const int begin = std::max<int>(rect.y0, first_row), end = std::min<int>(rect.y1, last_row);
   if ((rect.x1 - rect.x0) * (rect.y1 - rect.y0) <= kWorthCutting) {
     for (int y = begin; y < end; ++y) row(y, rect.x0, rect.x1);
     return;
   }
-  const EllipseRows ellipse(p.projected[i], log2_min_alpha);
+  const EllipseRows ellipse(p.projected[p.order[k]], log2_min_alpha);
   for (int y = begin; y < end; ++y) {
     const auto [x0, x1] = ellipse.Columns(y, rect.x0, rect.x1);
     row(y, x0, x1);
@@ -80,8 +81,10 @@ void CountPairs(const BinParams& p) {
     uint32_t* counts = p.chunk_counts + c * tiles;
     std::fill_n(counts, tiles, 0u);
     const auto [first, last] = PieceOf(p.count, p.chunks, c);
+    // Fetched in a loop of its own, which waits for many cache misses at a time.
+    for (int64_t k = first; k < last; ++k) p.tiles_by_depth[k] = p.tiles[p.order[k]];
     for (int64_t k = first; k < last; ++k) {
-      VisitRows(p, log2_min_alpha, p.order[k], 0, p.tiles_y, [&](int y, int x0, int x1) {
+      VisitRows(p, log2_min_alpha, k, 0, p.tiles_y, [&](int y, int x0, int x1) {
         uint32_t* row = counts + int64_t{y} * p.tiles_x;
         for (int x = x0; x < x1; ++x) ++row[x];
       });
@@ -105,14 +108,15 @@ void ListPairs(const BinParams& p, int64_t first_tile, int64_t last_tile, int32_
   const int first_row = static_cast<int>(first_tile / p.tiles_x);
   const int last_row = static_cast<int>((last_tile - 1) / p.tiles_x) + 1;
   ParallelFor(0, p.chunks, 1, [&](int64_t c, int64_t) {
-    uint32_t* next = p.chunk_counts + c * tiles;
+    uint32_t* next = p.chunk_counts + c * tiles;  // within the tile; from here on, within the run
+    for (int64_t t = first_tile; t < last_tile; ++t) next[t] += static_cast<uint32_t>(p.tile_offsets[t] - base);
     const auto [first, last] = PieceOf(p.count, p.chunks, c);
     for (int64_t k = first; k < last; ++k) {
       const int32_t i = p.order[k];
-      VisitRows(p, log2_min_alpha, i, first_row, last_row, [&](int y, int x0, int x1) {
+      VisitRows(p, log2_min_alpha, k, first_row, last_row, [&](int y, int x0, int x1) {
         const int64_t row = int64_t{y} * p.tiles_x;
         const int64_t begin = std::max(row + x0, first_tile), end = std::min(row + x1, last_tile);
-        for (int64_t t = begin; t < end; ++t) pairs[p.tile_offsets[t] - base + next[t]++] = i;
+        for (int64_t t = begin; t < end; ++t) pairs[next[t]++] = i;
       });
     }
   });

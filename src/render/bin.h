@@ -19,8 +19,9 @@ struct BinParams {
   float min_alpha;                     // edge of the ellipse
   int tiles_x, tiles_y;                // T = tiles_x·tiles_y tiles
   int64_t chunks;                      // C ≥ 1 pieces of the order that may be worked on at the same time
-  // out of CountPairs, scratch afterwards
-  uint32_t* chunk_counts;  // [C,T]
+  // out of CountPairs, which ListPairs needs and changes
+  TileRect* tiles_by_depth;  // [M]
+  uint32_t* chunk_counts;    // [C,T]
   // out of CountPairs
   int64_t* tile_offsets;  // [T+1] first pair of each tile
 };

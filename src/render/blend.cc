@@ -292,7 +292,13 @@ void StorePlane(const T (*blocks)[kPixels], int width, int columns, int rows, T*
 
 template <typename T>
 void FillPlane(T value, int width, int columns, int rows, T* out) {
-  for (int y = 0; y < rows; ++y) std::fill_n(out + int64_t{y} * width, columns, value);
+  if (columns == kTile) {  // of a length known when compiling: a few stores instead of a call
+    for (int y = 0; y < rows; ++y) {
+      for (int x = 0; x < kTile; ++x) out[int64_t{y} * width + x] = value;
+    }
+  } else {
+    for (int y = 0; y < rows; ++y) std::fill_n(out + int64_t{y} * width, columns, value);
+  }
 }
 
 template <bool kDepth, bool kContributors>

@@ -50,7 +50,9 @@ Status CheckOptions(const RenderOptions& o) {
   if (!(o.min_transmittance >= 0 && o.min_transmittance < 1)) {
     return BadArgument(Cat("min_transmittance ", o.min_transmittance, " is not in [0, 1)"));
   }
-  if (o.max_pairs < 1) return BadArgument(Cat("max_pairs ", o.max_pairs, " must be at least 1"));
+  if (o.max_pairs < 1 || o.max_pairs > int64_t{1} << 31) {
+    return BadArgument(Cat("max_pairs ", o.max_pairs, " is not 1 to 2^31"));
+  }
   return {};
 }
 
@@ -87,10 +89,10 @@ class Stopwatch {
 
 struct Rasterizer::State {
   Buffer<ProjectedGaussian> projected;
-  Buffer<TileRect> tiles;
+  Buffer<TileRect> tiles, tiles_by_depth;
   Buffer<int32_t> visible, visible_counts, rows, spare_rows, pairs;
   Buffer<uint32_t> keys, spare_keys, histograms, chunk_counts;
-  Buffer<int64_t> tile_offsets, evaluations;
+  Buffer<int64_t> visible_starts, tile_offsets, evaluations;
   RenderStatistics statistics;
 
   int64_t Project(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options, Stopwatch& watch);
@@ -155,16 +157,22 @@ void Rasterizer::State::Sort(int64_t count, int64_t total) {
   sort.spare_rows = Room(spare_rows, total);
   sort.chunks = PieceCount(total);
   sort.histograms = Room(histograms, sort.chunks * kSortBuckets);
-  int64_t to = 0;
-  for (int64_t chunk = 0; chunk < ProjectChunks(count); ++chunk) {
-    const int32_t* from = visible.data() + chunk * kProjectChunk;
-    for (int64_t k = 0; k < visible_counts[static_cast<size_t>(chunk)]; ++k, ++to) {
-      const int32_t i = from[k];
-      sort.rows[to] = i;
-      // Depths are positive (the near plane is), so their bits sort like they do.
-      sort.keys[to] = std::bit_cast<uint32_t>(projected[static_cast<size_t>(i)].depth);
+  // Closes the gaps between the chunks' lists.
+  const int64_t chunk_total = ProjectChunks(count);
+  int64_t* starts = Room(visible_starts, chunk_total);
+  std::exclusive_scan(visible_counts.data(), visible_counts.data() + chunk_total, starts, int64_t{0});
+  ParallelFor(0, chunk_total, 4, [&](int64_t first, int64_t last) {
+    for (int64_t chunk = first; chunk < last; ++chunk) {
+      const int32_t* from = visible.data() + chunk * kProjectChunk;
+      const int64_t to = starts[chunk];
+      for (int64_t k = 0; k < visible_counts[static_cast<size_t>(chunk)]; ++k) {
+        const int32_t i = from[k];
+        sort.rows[to + k] = i;
+        // Depths are positive (the near plane is), so their bits sort like they do.
+        sort.keys[to + k] = std::bit_cast<uint32_t>(projected[static_cast<size_t>(i)].depth);
+      }
     }
-  }
+  });
   SortCpu(sort);
 }
 
@@ -180,6 +188,7 @@ void Rasterizer::State::BinAndBlend(int64_t visible_total, const Camera& camera,
   bin.tiles_y = TilesAcross(camera.intrinsics.height);
   bin.chunks = PieceCount(visible_total);
   const int64_t tile_count = int64_t{bin.tiles_x} * bin.tiles_y;
+  bin.tiles_by_depth = Room(tiles_by_depth, visible_total);
   bin.chunk_counts = Room(chunk_counts, bin.chunks * tile_count);
   bin.tile_offsets = Room(tile_offsets, tile_count + 1);
   CountPairs(bin);

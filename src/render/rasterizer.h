@@ -25,8 +25,8 @@ struct RenderOptions {
   // Cut-offs of blending. Other values than the defaults are for tests: no cut-offs make the picture smooth.
   float min_alpha = kMinAlpha;                  // in (0, 1)
   float min_transmittance = kMinTransmittance;  // in [0, 1)
-  // (tile, Gaussian) pairs listed at once, 4 bytes each; when there are more, the picture is made in several runs of
-  // tiles, without a difference in its pixels. Every run holds at least one tile, that is at most N pairs.
+  // (tile, Gaussian) pairs listed at once, 4 bytes each, 1 to 2^31; when there are more, the picture is made in several
+  // runs of tiles, without a difference in its pixels. Every run holds at least one tile, that is at most N pairs.
   int64_t max_pairs = kMaxPairs;
 };
 

@@ -11,9 +11,22 @@ namespace anchorsplat {
 
 void SortCpu(const SortParams& p) {
   if (p.count < 2) return;
-  const auto [smallest_at, largest_at] = std::minmax_element(p.keys, p.keys + p.count);
-  const uint32_t smallest = *smallest_at;
-  const int bits = std::bit_width(*largest_at - smallest);
+  ParallelFor(0, p.chunks, 1, [&](int64_t c, int64_t) {
+    uint32_t low = p.keys[0], high = p.keys[0];
+    const auto [first, last] = PieceOf(p.count, p.chunks, c);
+    for (int64_t i = first; i < last; ++i) {
+      low = std::min(low, p.keys[i]);
+      high = std::max(high, p.keys[i]);
+    }
+    p.histograms[c * kSortBuckets] = low;
+    p.histograms[c * kSortBuckets + 1] = high;
+  });
+  uint32_t smallest = p.keys[0], largest = p.keys[0];
+  for (int64_t c = 0; c < p.chunks; ++c) {
+    smallest = std::min(smallest, p.histograms[c * kSortBuckets]);
+    largest = std::max(largest, p.histograms[c * kSortBuckets + 1]);
+  }
+  const int bits = std::bit_width(largest - smallest);
   const int passes = (bits + kSortDigit - 1) / kSortDigit;
   if (passes == 0) return;  // all equal
   const int digit = (bits + passes - 1) / passes;

@@ -168,7 +168,7 @@ TEST(TransformsJson, MalformedFilesSayWhatIsWrong) {
   }
 }
 
-TEST(TransformsJson, DeepNestingAndManyValuesAreRefused) {
+TEST(TransformsJson, DeepNestingAndHugeFilesAreRefused) {
   const TestFolder folder;
   for (const char* open : {"[", "{\"a\":"}) {
     std::string text;
@@ -177,6 +177,10 @@ TEST(TransformsJson, DeepNestingAndManyValuesAreRefused) {
     ASSERT_FALSE(set.ok());
     EXPECT_NE(set.error().message.find("nested deeper"), std::string::npos) << set.error().message;
   }
+  std::filesystem::resize_file(folder / "transforms.json", (uint64_t{256} << 20) + 1);  // sparse: takes no space
+  const auto set = ReadCameras(folder / "transforms.json");
+  ASSERT_FALSE(set.ok());
+  EXPECT_NE(set.error().message.find("268 MB allowed"), std::string::npos) << set.error().message;
 }
 
 TEST(TransformsJson, EveryTruncationIsAnError) {

@@ -3,14 +3,15 @@
 #define HWY_TARGET_INCLUDE "metrics/ssim.cc"
 #include "metrics/ssim.h"
 
+#include <hwy/foreach_target.h>  // must come before highway.h
+#include <hwy/highway.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 
 #include "core/buffer.h"
-#include <hwy/foreach_target.h>  // must come before highway.h
-#include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
 namespace anchorsplat::HWY_NAMESPACE {

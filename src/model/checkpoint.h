@@ -1,0 +1,38 @@
+#pragma once
+
+#include <filesystem>
+
+#include "core/result.h"
+#include "formats/tensor_file.h"
+#include "model/network_config.h"
+#include "model/packed_network.h"
+#include "model/weights.h"
+
+namespace anchorsplat {
+
+// A file of the network's weights (.pth of torch.save, .safetensors), checked against the network it describes.
+class Checkpoint {
+ public:
+  // K, widths, stages and blocks are read from the tensors' shapes. Errors: those of TensorFile::Open; kBadFile with
+  // the path when the file is no AnchorSplat checkpoint, when tensors are missing or belong to nothing (named), or when
+  // one has another shape than its neighbours ask for (named, with both shapes). Tensors called num_batches_tracked may
+  // be absent: inference does not need them. Values are looked at when they are loaded.
+  static Result<Checkpoint> Open(const std::filesystem::path& path);
+
+  const NetworkConfig& config() const { return config_; }
+  const TensorFile& file() const { return file_; }
+
+  // Reads from the file, which this object must outlive. Errors are those of TensorFile::ReadFloat32.
+  WeightSource Weights() const;
+
+ private:
+  Checkpoint(TensorFile file, NetworkConfig config) : file_(std::move(file)), config_(std::move(config)) {}
+
+  TensorFile file_;
+  NetworkConfig config_;
+};
+
+// The network of a checkpoint, ready for inference. Errors: of Checkpoint::Open; weights that are NaN or infinite.
+Result<PackedNetwork> LoadNetwork(const std::filesystem::path& path);
+
+}  // namespace anchorsplat

@@ -29,20 +29,27 @@ Error OutOfMemory(const std::filesystem::path& path) {
 
 }  // namespace
 
-Result<GaussianCloud> ReadCloud(const std::filesystem::path& path, const ReadLimits& limits) try {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
+Result<GaussianCloud> ReadOpenCloud(const InputFile& file, const ReadLimits& limits) try {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
-  const SplatFormat* format = FormatOfFile(head, path);
+  const SplatFormat* format = FormatOfFile(head, file.path());
   if (format == nullptr) {
-    return Error{ErrorCode::kBadFile, Cat(path.string(), ": byte 0: is no splat file of a known format: found \"",
-                                          Printable(head.substr(0, 8)), "\", expected ", Known(&SplatFormat::read))};
+    return Error{ErrorCode::kBadFile,
+                 Cat(file.name(), ": byte 0: is no splat file of a known format: found \"",
+                     Printable(head.substr(0, 8)), "\", expected ", Known(&SplatFormat::read))};
   }
   if (format->read == nullptr) {
-    return Error{ErrorCode::kBadFile,
-                 Cat(path.string(), ": is a ", format->name, " file, which this version does not read; it reads ",
-                     Known(&SplatFormat::read))};
+    return Error{ErrorCode::kBadFile, Cat(file.name(), ": is a ", format->name,
+                                          " file, which this version does not read; it reads ",
+                                          Known(&SplatFormat::read))};
   }
   return format->read(file, limits);
+} catch (const std::bad_alloc&) {
+  return OutOfMemory(file.path());
+}
+
+Result<GaussianCloud> ReadCloud(const std::filesystem::path& path, const ReadLimits& limits) try {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
+  return ReadOpenCloud(file, limits);
 } catch (const std::bad_alloc&) {
   return OutOfMemory(path);
 }

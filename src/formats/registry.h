@@ -39,4 +39,7 @@ std::span<const SplatFormat> Formats();
 const SplatFormat* FormatOfFile(std::string_view head, const std::filesystem::path& path);
 const SplatFormat* FormatOfExtension(const std::filesystem::path& path);
 
+// ReadCloud of a file that is open already.
+Result<GaussianCloud> ReadOpenCloud(const InputFile& file, const ReadLimits& limits = {});
+
 }  // namespace anchorsplat

@@ -1,0 +1,10 @@
+#!/usr/bin/env bash
+# Damaged files against all readers, under AddressSanitizer and UndefinedBehaviorSanitizer, for the given seconds.
+# A new seed every time; it is printed, and inputs that crash are saved in build/fuzz.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+seconds="${1:-60}"
+seed="${2:-$(date +%s)}"
+mkdir -p build/fuzz
+echo "fuzzing all readers for $seconds s with seed $seed"
+exec build/debug/src/formats/fuzz_readers --seconds "$seconds" --seed "$seed" --save-in build/fuzz

@@ -1,0 +1,139 @@
+#include "formats/fuzz/readers.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <utility>
+
+#include "core/gaussian_cloud.h"
+#include "core/random.h"
+#include "core/text.h"
+#include "formats/camera_io.h"
+#include "formats/fuzz/seeds.h"
+#include "formats/image_io.h"
+#include "formats/registry.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// An accepted input that should not have been is a bug like a crash, and is reported like one.
+void Require(bool condition, const char* what) {
+  if (condition) return;
+  std::fprintf(stderr, "a reader accepted a file and gave %s\n", what);
+  std::abort();
+}
+
+Status CheckError(const Error& error, std::string_view file) {
+  Require(error.message.find(file) != std::string::npos, "an error that does not name the file");
+  return error;
+}
+
+Status ReadAsCloud(const std::string& file, const std::string& bytes) {
+  const auto cloud = ReadOpenCloud(InputFile::FromBytes(file, bytes));
+  if (!cloud.ok()) return CheckError(cloud.error(), file);
+  Require(!cloud->empty(), "an empty cloud");
+  Require(Validate(*cloud).ok(), "a cloud whose arrays disagree");
+  return {};
+}
+
+// The file of a reader by path. Removed before it is written: some file systems flush a file that is emptied.
+void Put(const fs::path& path, const std::string& bytes) {
+  fs::remove(path);
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+Status ReadAsCameras(const fs::path& file, const fs::path& target, const std::string& bytes) {
+  Put(file, bytes);
+  const auto set = ReadCameras(target);
+  if (!set.ok()) return CheckError(set.error(), target.filename().string());
+  for (const Camera& camera : set->cameras) {
+    Require(camera.intrinsics.width > 0 && camera.intrinsics.height > 0, "a camera without pixels");
+  }
+  return {};
+}
+
+Status ReadAsImage(const fs::path& file, const std::string& bytes) {
+  Put(file, bytes);
+  const auto image = ReadImage(file);
+  if (!image.ok()) return CheckError(image.error(), file.filename().string());
+  Require(image->width > 0 && image->height > 0 && (image->channels == 3 || image->channels == 4), "no picture");
+  Require(static_cast<int64_t>(image->pixels.size()) == image->plane() * image->channels, "an image of another size");
+  return {};
+}
+
+// Splat formats: a reader for each row of the registry that has one, its seeds made by its own writer where there is
+// one, besides those made by hand.
+void AddSplatFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
+  for (const SplatFormat& format : Formats()) {
+    if (format.read == nullptr) continue;
+    const std::string file = "fuzz" + std::string(format.extensions.front());
+    FuzzReader reader{
+        std::string(format.name), {}, {}, [file](const std::string& bytes) { return ReadAsCloud(file, bytes); }};
+    if (format.write != nullptr) {
+      for (int degree = 0; degree <= kMaxShDegree; ++degree) {
+        (void)format.write(folder / file, SeedCloud(5, degree), {.overwrite = true});
+        std::ifstream in(folder / file, std::ios::binary);
+        reader.seeds.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+      }
+    }
+    if (format.name == "PLY") {
+      for (std::string& seed : PlySeeds()) reader.seeds.push_back(std::move(seed));
+      reader.words = PlyWords();
+    }
+    if (!reader.seeds.empty()) readers.push_back(std::move(reader));
+  }
+}
+
+void AddCameraFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
+  const auto add = [&](const char* file, std::vector<std::string> seeds, std::vector<std::string_view> words) {
+    readers.push_back({file, std::move(seeds), std::move(words),
+                       [path = folder / file](const std::string& bytes) { return ReadAsCameras(path, path, bytes); }});
+  };
+  add("transforms.json", TransformsSeeds(), JsonWords());
+  add("cameras.json", InriaCamerasSeeds(), JsonWords());
+  // A COLMAP model is two files: one is damaged, the other stays good.
+  const auto add_colmap = [&](const char* kind, const char* damaged, const ColmapSeeds& good, bool cameras) {
+    const fs::path model = folder / Cat("colmap_", kind, "_", cameras ? "cameras" : "images");
+    fs::create_directories(model);
+    Put(model / Cat("cameras.", kind), good.cameras);
+    Put(model / Cat("images.", kind), good.images);
+    readers.push_back({Cat("colmap ", damaged),
+                       {cameras ? good.cameras : good.images},
+                       {"PINHOLE", "OPENCV", "#"},
+                       [path = model / damaged](const std::string& bytes) {
+                         Put(path, bytes);
+                         const auto set = ReadCameras(path.parent_path());
+                         return set.ok() ? Status() : CheckError(set.error(), path.parent_path().filename().string());
+                       }});
+  };
+  add_colmap("bin", "cameras.bin", ColmapBinarySeeds(), true);
+  add_colmap("bin", "images.bin", ColmapBinarySeeds(), false);
+  add_colmap("txt", "cameras.txt", ColmapTextSeeds(), true);
+  add_colmap("txt", "images.txt", ColmapTextSeeds(), false);
+}
+
+void AddImageFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
+  readers.push_back({"png", PngSeeds(folder), {}, [path = folder / "fuzz.png"](const std::string& bytes) {
+                       return ReadAsImage(path, bytes);
+                     }});
+  readers.push_back({"jpeg", JpegSeeds(), {}, [path = folder / "fuzz.jpg"](const std::string& bytes) {
+                       return ReadAsImage(path, bytes);
+                     }});
+}
+
+}  // namespace
+
+std::vector<FuzzReader> FuzzReaders(const fs::path& folder) {
+  std::vector<FuzzReader> readers;
+  AddSplatFormats(folder, readers);
+  AddCameraFormats(folder, readers);
+  AddImageFormats(folder, readers);
+  return readers;
+}
+
+}  // namespace anchorsplat

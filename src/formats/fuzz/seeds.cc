@@ -1,0 +1,268 @@
+#include "formats/fuzz/seeds.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+
+// Behind <cstdio>: it needs FILE.
+#include <jpeglib.h>
+
+#include "core/image.h"
+#include "core/random.h"
+#include "core/text.h"
+#include "formats/image_io.h"
+
+namespace anchorsplat {
+
+namespace {
+
+class Binary {
+ public:
+  explicit Binary(bool big_endian) : big_endian_(big_endian) {}
+  template <typename T>
+  void Put(T value) {
+    char raw[sizeof(T)];
+    std::memcpy(raw, &value, sizeof(T));
+    if (big_endian_) std::reverse(raw, raw + sizeof(T));
+    bytes_.append(raw, sizeof(T));
+  }
+  void Text(std::string_view text) { bytes_ += text; }
+  const std::string& bytes() const { return bytes_; }
+
+ private:
+  bool big_endian_;
+  std::string bytes_;
+};
+
+constexpr std::string_view kGaussianNames[] = {"rot_0",   "rot_1",   "rot_2",   "rot_3",  "x",
+                                               "y",       "z",       "f_dc_0",  "f_dc_1", "f_dc_2",
+                                               "opacity", "scale_0", "scale_1", "scale_2"};
+
+// Two rows of doubles and floats in turn behind a list, between elements with and without lists.
+std::string PlyHeaderText(std::string_view encoding) {
+  std::string header =
+      Cat("ply\nformat ", encoding, " 1.0\ncomment SplatRenderMode: mip\nobj_info seed\n",
+          "element camera 1\nproperty int id\nproperty uchar kind\n",
+          "element strip 2\nproperty list uchar int indices\n", "element vertex 2\nproperty list ushort short tags\n");
+  bool wide = false;
+  for (const std::string_view name : kGaussianNames) {
+    header += Cat("property ", (wide = !wide) ? "double " : "float ", name, "\n");
+  }
+  return header + "property uchar label\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+}
+
+std::string BinaryPly(bool big_endian) {
+  Binary out(big_endian);
+  out.Text(PlyHeaderText(big_endian ? "binary_big_endian" : "binary_little_endian"));
+  out.Put(int32_t{1});
+  out.Put(uint8_t{2});
+  for (uint8_t n : {uint8_t{0}, uint8_t{3}}) {
+    out.Put(n);
+    for (int32_t k = 0; k < n; ++k) out.Put(k);
+  }
+  for (int row = 0; row < 2; ++row) {
+    out.Put(static_cast<uint16_t>(row));
+    for (int k = 0; k < row; ++k) out.Put(int16_t{-1});
+    bool wide = false;
+    for (size_t k = 0; k < std::size(kGaussianNames); ++k) {
+      const double value = 0.25 * static_cast<double>(k) - row;
+      if ((wide = !wide)) {
+        out.Put(value);
+      } else {
+        out.Put(static_cast<float>(value));
+      }
+    }
+    out.Put(uint8_t{9});
+  }
+  out.Put(uint8_t{3});
+  for (int32_t k = 0; k < 3; ++k) out.Put(k);
+  return out.bytes();
+}
+
+std::string AsciiPly(const char* line_end) {
+  std::string text = PlyHeaderText("ascii") + "1 2\n0\n3 0 1 2\n";
+  text += "0 1 0 0 0 0.5 -0.5 1e-3 1 2 3 -2.5 -4 -4 -5.25 9\n";
+  text += "1 -1 0.5 .5 0 0 nan -0.5 1e+3 1 2 3 +2.5 -inf -4 -5.25 0\n3 0 1 0\n";
+  std::string out;
+  for (const char c : text) out += c == '\n' ? line_end : std::string(1, c);
+  return out;
+}
+
+std::string Jpeg(bool progressive) {
+  jpeg_compress_struct info{};
+  jpeg_error_mgr errors{};
+  info.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&info);
+  unsigned char* memory = nullptr;
+  unsigned long size = 0;  // NOLINT(google-runtime-int): libjpeg's type
+  jpeg_mem_dest(&info, &memory, &size);
+  info.image_width = 19;
+  info.image_height = 17;
+  info.input_components = 3;
+  info.in_color_space = JCS_RGB;
+  jpeg_set_defaults(&info);
+  if (progressive) jpeg_simple_progression(&info);
+  jpeg_start_compress(&info, TRUE);
+  std::vector<JSAMPLE> row(3 * info.image_width);
+  for (JDIMENSION y = 0; y < info.image_height; ++y) {
+    for (size_t k = 0; k < row.size(); ++k) row[k] = static_cast<JSAMPLE>(4 * k + 7 * y);
+    JSAMPROW rows = row.data();
+    jpeg_write_scanlines(&info, &rows, 1);
+  }
+  jpeg_finish_compress(&info);
+  jpeg_destroy_compress(&info);
+  std::string bytes(reinterpret_cast<const char*>(memory), size);
+  std::free(memory);
+  return bytes;
+}
+
+constexpr char kMatrix[] = "[[1,0,0,0.5],[0,1,0,-2],[0,0,1,3],[0,0,0,1]]";
+
+}  // namespace
+
+GaussianCloud SeedCloud(int64_t count, int sh_degree) {
+  GaussianCloud cloud;
+  cloud.Resize(count, sh_degree);
+  Random random(static_cast<uint64_t>(sh_degree));
+  for (Buffer<float>* array : {&cloud.means, &cloud.log_scales, &cloud.quats, &cloud.opacity_logits, &cloud.sh}) {
+    for (float& x : *array) x = static_cast<float>(random.Normal());
+  }
+  cloud.render_mode = RenderMode::kAntialiased;
+  cloud.comments = {"a seed"};
+  return cloud;
+}
+
+std::vector<std::string> PlySeeds() {
+  return {BinaryPly(false), BinaryPly(true), AsciiPly("\n"), AsciiPly("\r\n"), AsciiPly("\r")};
+}
+
+std::vector<std::string_view> PlyWords() {
+  return {"ply",
+          "format",
+          "ascii",
+          "binary_little_endian",
+          "binary_big_endian",
+          "1.0",
+          "element",
+          "vertex",
+          "face",
+          "chunk",
+          "property",
+          "list",
+          "char",
+          "uchar",
+          "short",
+          "ushort",
+          "int",
+          "uint",
+          "float",
+          "double",
+          "x",
+          "opacity",
+          "scale_0",
+          "rot_3",
+          "f_dc_0",
+          "f_rest_0",
+          "f_rest_8",
+          "f_rest_44",
+          "comment",
+          "obj_info",
+          "end_header",
+          "element vertex 1000000000\n",
+          "property list uchar int q\n",
+          "\r\n"};
+}
+
+std::vector<std::string> TransformsSeeds() {
+  return {Cat(R"({"camera_angle_x": 0.7, "w": 40, "h": 30, "background": [0, 0.5, 1],)", "\n",
+              R"("frames": [{"file_path": "a", "transform_matrix": )", kMatrix, "},\n",
+              R"({"file_path": "b/c.png", "transform_matrix": )", kMatrix, "}]}\n"),
+          Cat(R"({"fl_x": 50.5, "fl_y": 49, "cx": 20, "cy": 15, "w": 40, "h": 30, "camera_model": "OPENCV", "k1": 0,)",
+              "\n", R"("frames": [{"file_path": "a", "fl_x": 10, "transform_matrix": )", kMatrix, "}]}\n")};
+}
+
+std::vector<std::string> InriaCamerasSeeds() {
+  const char* camera =
+      R"({"id": 0, "img_name": "a", "width": 40, "height": 30, "position": [1, 2, 3.5],
+"rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "fy": 50.25, "fx": 51})";
+  return {Cat("[", camera, "]\n"), Cat("[", camera, ",\n", camera, "]\n")};
+}
+
+std::vector<std::string_view> JsonWords() {
+  return {"[",
+          "]",
+          "{",
+          "}",
+          ",",
+          "null",
+          "true",
+          "\"",
+          "frames",
+          "file_path",
+          "w",
+          "h",
+          "[[[[[[[[[[",
+          "transform_matrix",
+          "k1",
+          "fl_x",
+          "camera_angle_x",
+          "cx",
+          "id",
+          "rotation",
+          "position",
+          "\\u0000",
+          "img_name",
+          "width",
+          "fx",
+          "{\"a\":{\"a\":{\"a\":"};
+}
+
+ColmapSeeds ColmapBinarySeeds() {
+  Binary cameras(false), images(false);
+  cameras.Put(uint64_t{2});
+  for (uint32_t id : {7u, 9u}) {
+    cameras.Put(id);
+    cameras.Put(id == 7 ? 1 : 0);  // PINHOLE, SIMPLE_PINHOLE
+    cameras.Put(uint64_t{40});
+    cameras.Put(uint64_t{30});
+    for (int k = id == 7 ? 0 : 1; k < 4; ++k) cameras.Put(20.5 + k);
+  }
+  images.Put(uint64_t{2});
+  for (uint32_t id : {7u, 9u}) {
+    images.Put(id);
+    for (const double x : {1.0, 0.0, 0.0, 0.0, 0.5, -1.0, 2.0}) images.Put(x);
+    images.Put(id);
+    images.Text(std::string_view("view.png", 9));  // with the zero that ends it
+    images.Put(uint64_t{2});
+    for (int k = 0; k < 2; ++k) {
+      images.Put(1.5);
+      images.Put(2.5);
+      images.Put(~uint64_t{0});
+    }
+  }
+  return {cameras.bytes(), images.bytes()};
+}
+
+ColmapSeeds ColmapTextSeeds() {
+  return {"# Camera list\n7 PINHOLE 40 30 50 60 21 14\n9 SIMPLE_PINHOLE 40 30 50 21 14\n",
+          "# Image list\n1 1 0 0 0 0.5 -1 2 7 a.png\n1.5 2.5 -1 3 4 12\n2 0.6 0 0 -0.8 0.5 -1 2 9 b c.png\n\n"};
+}
+
+std::vector<std::string> PngSeeds(const std::filesystem::path& folder) {
+  std::vector<std::string> seeds;
+  for (const int channels : {1, 3, 4}) {
+    Image image(7, 5, channels);
+    for (size_t k = 0; k < image.pixels.size(); ++k) image.pixels[k] = static_cast<float>(k % 11) / 10;
+    (void)WritePng(folder / "seed.png", image, {.overwrite = true});
+    std::ifstream in(folder / "seed.png", std::ios::binary);
+    seeds.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+  }
+  return seeds;
+}
+
+std::vector<std::string> JpegSeeds() { return {Jpeg(false), Jpeg(true)}; }
+
+}  // namespace anchorsplat

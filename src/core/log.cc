@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <mutex>
@@ -41,8 +42,9 @@ class TerminalSink : public LogSink {
     const double seconds = std::chrono::duration<double>(now - begin_).count();
     std::string line = name_;
     if (total_ > 0) {
-      constexpr int kWidth = 24;
-      const int filled = static_cast<int>(kWidth * done / total_);
+      constexpr int64_t kWidth = 24;
+      // More steps than announced are a small mistake of the caller, not a reason to fall over.
+      const int64_t filled = kWidth * std::clamp<int64_t>(done, 0, total_) / total_;
       line += " [" + std::string(static_cast<size_t>(filled), '#') +
               std::string(static_cast<size_t>(kWidth - filled), '.') + "] " + Cat(done, "/", total_);
       if (done > 0 && done < total_ && seconds > 1) {

@@ -1,0 +1,42 @@
+#!/usr/bin/env bash
+# The page of `anchorsplat view` in headless Chromium: viewer_test.sh PROGRAM [OUT]. Needs the network once, for a
+# browser (Debian's chromium) and playwright-core (npm), which go to build/viewer-test; `make test` needs neither.
+# Screenshots of everything it looked at stay in OUT (build/viewer-test/pictures).
+set -euo pipefail
+cd "$(dirname "$0")/.."
+program=$(realpath "$1")
+tools=$PWD/build/viewer-test
+out=${2:-$tools/pictures}
+mkdir -p "$tools" "$out"
+
+export CHROMIUM=${CHROMIUM:-/usr/bin/chromium}
+missing=()
+[ -x "$CHROMIUM" ] || missing+=(chromium)
+command -v node >/dev/null || missing+=(nodejs)
+command -v npm >/dev/null || missing+=(npm)
+if [ ${#missing[@]} -gt 0 ]; then
+  if ! command -v apt-get >/dev/null; then
+    echo "viewer-test: please install ${missing[*]} (CHROMIUM=PATH names a browser elsewhere)" >&2
+    exit 1
+  fi
+  sudo=()
+  [ "$(id -u)" -eq 0 ] || sudo=(sudo)
+  export DEBIAN_FRONTEND=noninteractive
+  "${sudo[@]}" apt-get update -qq
+  "${sudo[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}"
+fi
+export NODE_FOLDER=$tools
+if [ ! -d "$tools/node_modules/playwright-core" ]; then
+  echo '{"private": true}' >"$tools/package.json"
+  npm install --prefix "$tools" --no-audit --no-fund --silent playwright-core@1.56.1
+fi
+
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+example=examples/biplane
+"$program" enhance $example/input.ply -o "$work/after.ply" --cameras $example/transforms_lr.json -q
+"$program" render $example/input.ply -o "$work/before" --cameras $example/transforms_hr.json --size 512x512 -q
+"$program" render "$work/after.ply" -o "$work/after" --cameras $example/transforms_hr.json --size 512x512 -q
+"$program" view "$work/after.ply" --before $example/input.ply --truth $example/hr \
+  --cameras $example/transforms_hr.json -o "$work/page.html" -q
+node scripts/viewer_test.mjs "$work/page.html" "$work" "$out"

@@ -6,6 +6,11 @@
 
 namespace anchorsplat {
 
+// No picture or view is larger, so that a file or a flag of a few bytes cannot make us allocate more than a few GB; and
+// pixel coordinates and their squares stay exact enough in float.
+inline constexpr int kMaxImageSide = 1 << 19;
+inline constexpr int64_t kMaxImagePixels = int64_t{1} << 28;
+
 // Planar float picture: pixels[(c·height + y)·width + x]. Colours are 0–1 as in the file (value/255, no colour-space
 // conversion), not premultiplied; channel order r g b [a]; one channel for depth or alpha alone.
 struct Image {

@@ -10,10 +10,6 @@
 
 namespace anchorsplat {
 
-// No picture or view is larger, so that a header of a few bytes cannot make us allocate more than a few GB.
-inline constexpr int64_t kMaxImagePixels = int64_t{1} << 28;
-inline constexpr int kMaxImageSide = 1 << 20;
-
 // Reads a PNG or JPEG (found by content) as floats value/255 (16-bit: /65535): 3 channels, or 4 where the file has
 // alpha. Grey becomes rgb. Errors: kNotFound, kIo, kBadFile.
 Result<Image> ReadImage(const std::filesystem::path& path);

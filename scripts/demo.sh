@@ -1,0 +1,23 @@
+#!/usr/bin/env bash
+# Enhances the example splats, compares them with ground truth that no fit has seen, and makes the pictures.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+program=build/anchorsplat
+out=build/demo
+mkdir -p "$out"
+
+for object in biplane stone_lantern; do
+  example=examples/$object
+  echo
+  echo "== $object: a 3DGS fit of 256x256 pictures, seen at 1024x1024 from ten new places"
+  "$program" info "$example/input.ply" | sed -n '2,6p'
+  echo
+  "$program" enhance "$example/input.ply" -o "$out/$object-4x.ply" --cameras "$example/transforms_lr.json" -w
+  echo
+  "$program" compare "$example/input.ply" "$out/$object-4x.ply" --truth "$example/hr" \
+    --cameras "$example/transforms_hr.json" --side-by-side "$out/$object.png" -w
+done
+
+echo
+echo "Look at   $out/biplane.png and $out/stone_lantern.png  (before, after, ground truth)"
+echo "Enhanced  $out/biplane-4x.ply and $out/stone_lantern-4x.ply"

@@ -1,0 +1,143 @@
+#!/usr/bin/env bash
+# The program from outside: cli_test.sh PROGRAM SOURCE_DIR. Prints every failed expectation and fails if there is one.
+set -uo pipefail
+program=$1
+source=$2
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+input=$source/examples/biplane/input.ply
+cameras=$source/examples/biplane/transforms_hr.json
+checks=0
+failures=0
+
+# expect CODE NAME COMMAND...: runs it, keeps stdout and stderr in $work.
+expect() {
+  local code=$1 name=$2
+  shift 2
+  "$@" >"$work/stdout" 2>"$work/stderr" </dev/null
+  local got=$?
+  checks=$((checks + 1))
+  if [ $got -ne "$code" ]; then
+    failures=$((failures + 1))
+    echo "FAILED $name: exit code $got, expected $code: $*"
+    cat "$work/stderr"
+  fi
+}
+# says STREAM TEXT: the last command's stdout or stderr holds the text.
+says() {
+  checks=$((checks + 1))
+  if ! grep -qF -- "$2" "$work/$1"; then
+    failures=$((failures + 1))
+    echo "FAILED: $1 does not say '$2', but:"
+    head -n 5 "$work/$1"
+  fi
+}
+silent() {
+  checks=$((checks + 1))
+  if [ -s "$work/$1" ]; then
+    failures=$((failures + 1))
+    echo "FAILED: $1 should be empty:"
+    head -n 5 "$work/$1"
+  fi
+}
+
+# Help, version, usage errors.
+expect 0 "version" "$program" --version
+says stdout "anchorsplat 0."
+expect 0 "help" "$program" --help
+for verb in enhance info render compare bench; do
+  says stdout "$verb"
+  expect 0 "help of $verb" "$program" $verb --help
+  says stdout "Example:"
+  expect 0 "help again" "$program" --help
+done
+expect 2 "no verb" "$program"
+expect 2 "unknown verb" "$program" polish
+expect 2 "unknown flag" "$program" info "$input" --colour
+
+# enhance.
+expect 0 "enhance" "$program" enhance "$input" -o "$work/out.ply" --pixel-size 0.0055
+says stdout "19,984 Gaussians in, 19,984 out"
+expect 5 "enhance does not overwrite" "$program" enhance "$input" -o "$work/out.ply" --pixel-size 0.0055
+says stderr "exists"
+expect 0 "enhance overwrites when told" "$program" enhance "$input" -o "$work/out.ply" --pixel-size 0.0055 -w -q
+silent stdout
+expect 0 "enhance with cameras" "$program" enhance "$input" -o "$work/cameras.ply" --cameras "$source/examples/biplane/transforms_lr.json" --json
+silent stderr
+says stdout '"source": "cameras"'
+expect 0 "enhance with estimated pixel size" "$program" enhance "$input" -o "$work/auto.ply"
+says stderr "estimated"
+expect 0 "upscale 1 changes nothing" "$program" enhance "$input" -o "$work/same.ply" --upscale 1 --pixel-size 1
+checks=$((checks + 1))
+cmp -s <(tail -c 1000000 "$input") <(tail -c 1000000 "$work/same.ply") || { failures=$((failures + 1)); echo "FAILED: --upscale 1 changed values"; }
+expect 2 "upscale below 1" "$program" enhance "$input" -o "$work/bad.ply" --upscale 0.5
+expect 2 "nonsense pixel size" "$program" enhance "$input" -o "$work/bad.ply" --pixel-size big
+says stderr "pixel-size"
+expect 2 "negative strength" "$program" enhance "$input" -o "$work/bad.ply" --filter-strength -1
+expect 2 "unknown method" "$program" enhance "$input" -o "$work/bad.ply" --method magic
+says stderr "filter"
+expect 2 "nowhere to write" "$program" enhance "$input"
+expect 2 "two inputs, one output" "$program" enhance "$input" "$input" -o "$work/bad.ply"
+expect 2 "two inputs of one name" "$program" enhance "$input" "$source/examples/stone_lantern/input.ply" --out-dir "$work/many"
+expect 3 "missing input" "$program" enhance "$work/nothing.ply" -o "$work/bad.ply"
+says stderr "nothing.ply"
+expect 0 "folder of outputs" "$program" enhance "$input" "$work/out.ply" --out-dir "$work/many" --pixel-size 0.0055
+expect 5 "folder of outputs again" "$program" enhance "$input" "$work/out.ply" --out-dir "$work/many" --pixel-size 0.0055
+checks=$((checks + 1))
+[ ! -e "$work/bad.ply" ] || { failures=$((failures + 1)); echo "FAILED: an error left bad.ply behind"; }
+checks=$((checks + 1))
+[ "$(find "$work/many" -type f | wc -l)" -eq 2 ] || { failures=$((failures + 1)); echo "FAILED: --out-dir left something else than two files"; }
+
+# info.
+expect 0 "info" "$program" info "$input"
+says stdout "19,984, SH degree 3"
+expect 0 "info as JSON" "$program" info "$input" --json
+silent stderr
+says stdout '"gaussians": 19984'
+printf 'ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n' >"$work/points.ply"
+expect 4 "info of a point cloud" "$program" info "$work/points.ply"
+says stderr "points.ply"
+expect 4 "error as JSON" "$program" info "$work/points.ply" --json
+says stdout '"bad_file"'
+
+# render.
+expect 0 "render one" "$program" render "$input" -o "$work/one.png" --orbit 1 --size 96x64
+expect 5 "render does not overwrite" "$program" render "$input" -o "$work/one.png" --orbit 1 --size 96x64
+expect 0 "render a folder" "$program" render "$input" -o "$work/views" --cameras "$cameras" --size 128x128
+checks=$((checks + 1))
+[ "$(find "$work/views" -name '*.png' | wc -l)" -eq 10 ] || { failures=$((failures + 1)); echo "FAILED: ten cameras should make ten pictures"; }
+expect 2 "several views into one file" "$program" render "$input" -o "$work/two.png" --orbit 2
+expect 0 "one view by name" "$program" render "$input" -o "$work/016.png" --cameras "$cameras" --view 016 --size 64x64 --transparent
+expect 2 "no such view" "$program" render "$input" -o "$work/x.png" --cameras "$cameras" --view 999
+expect 2 "nonsense size" "$program" render "$input" -o "$work/x.png" --orbit 1 --size 0x5
+expect 2 "other shape" "$program" render "$input" -o "$work/x" --cameras "$cameras" --size 100x50
+expect 2 "cameras and orbit" "$program" render "$input" -o "$work/x" --cameras "$cameras" --orbit 3
+expect 3 "missing cameras" "$program" render "$input" -o "$work/x" --cameras "$work/none.json"
+
+# compare.
+expect 0 "two splats" "$program" compare "$input" "$work/out.ply" --orbit 2 --size 64x64 --json
+says stdout '"views"'
+silent stderr
+expect 0 "a splat with itself" "$program" compare "$input" "$input" --orbit 2 --size 64x64
+says stdout "inf"
+expect 0 "identical, as JSON" "$program" compare "$input" "$input" --orbit 1 --size 64x64 --json
+says stdout '"psnr": null'
+expect 0 "splat with its renders" "$program" compare "$input" "$work/views" --cameras "$cameras" --size 128x128
+expect 2 "splats without views" "$program" compare "$input" "$work/out.ply"
+says stderr "--orbit"
+expect 2 "views without partner" "$program" compare "$input" "$work/views" --cameras "$source/examples/biplane/transforms_lr.json"
+expect 2 "different sizes" "$program" compare "$input" "$work/views" --cameras "$cameras"
+says stderr "1024x1024"
+expect 0 "two pictures of other names" "$program" compare "$work/views/000.png" "$work/views/016.png" --side-by-side "$work/sides.png"
+expect 5 "side by side does not overwrite" "$program" compare "$work/views/000.png" "$work/views/016.png" --side-by-side "$work/sides.png"
+expect 0 "both against truth" "$program" compare "$input" "$work/out.ply" --truth "$work/views" --cameras "$cameras" --size 128x128 --side-by-side "$work/truth.png"
+says stdout "gain"
+
+# Same bits for any number of threads.
+expect 0 "one thread" "$program" render "$input" -o "$work/t1.png" --orbit 1 --size 200x150 --threads 1
+expect 0 "three threads" "$program" render "$input" -o "$work/t3.png" --orbit 1 --size 200x150 --threads 3
+checks=$((checks + 1))
+cmp -s "$work/t1.png" "$work/t3.png" || { failures=$((failures + 1)); echo "FAILED: threads change the picture"; }
+
+echo "$checks checks, $failures failed"
+[ $failures -eq 0 ]

@@ -1,0 +1,199 @@
+#include "metrics/compare.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "cli/table.h"
+#include "cli/verb.h"
+#include "cli/views.h"
+#include "core/text.h"
+#include "eval/comparison.h"
+#include "eval/view_source.h"
+#include "formats/image_io.h"
+#include "metrics/side_by_side.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CompareFlags {
+  std::string a;
+  std::string b;
+  std::string truth;
+  std::string side_by_side;
+  ViewFlags views;
+};
+
+// The two things compared and, with --truth, what both are compared with.
+struct Sides {
+  std::unique_ptr<ViewSource> a;
+  std::unique_ptr<ViewSource> b;
+  std::unique_ptr<ViewSource> truth;
+};
+
+Result<std::unique_ptr<ViewSource>> OpenSide(const std::string& path, const GaussianCloud* cloud,
+                                             const std::optional<CameraSet>& cameras, const RenderOptions& options) {
+  if (cloud == nullptr) return OpenImageViews(path, options.background);
+  return MakeSplatViews(*cloud, *cameras, options);
+}
+
+Result<Sides> OpenSides(const CompareFlags& flags) {
+  const std::array<const std::string*, 3> paths = {&flags.a, &flags.b, &flags.truth};
+  std::array<std::optional<GaussianCloud>, 3> clouds;
+  const GaussianCloud* first = nullptr;
+  for (size_t k = 0; k < 3; ++k) {
+    if (paths[k]->empty() || LooksLikeImages(*paths[k])) continue;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(clouds[k], ReadCloud(*paths[k]));
+    if (first == nullptr) first = &*clouds[k];
+  }
+  std::optional<CameraSet> cameras;
+  if (first != nullptr) {
+    if (flags.views.cameras.empty() && flags.views.orbit == 0) {
+      return Error{ErrorCode::kBadArgument,
+                   "comparing a splat needs views: --cameras FILE, or --orbit N for views around it"};
+    }
+    ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, MakeViews(flags.views, *first));
+  } else if (!flags.views.cameras.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, MakeViews(flags.views, GaussianCloud{}));  // for its background
+  }
+  Sides sides;
+  const std::array<std::unique_ptr<ViewSource>*, 3> out = {&sides.a, &sides.b, &sides.truth};
+  for (size_t k = 0; k < 3; ++k) {
+    if (paths[k]->empty()) continue;
+    const GaussianCloud* cloud = clouds[k] ? &*clouds[k] : nullptr;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(
+        const RenderOptions options,
+        MakeRenderOptions(flags.views, cloud != nullptr ? *cloud : GaussianCloud{}, cameras.value_or(CameraSet{})));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(*out[k], OpenSide(*paths[k], cloud, cameras, options));
+    if (cloud == nullptr && !flags.views.view.empty()) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t kept, FindView((*out[k])->names(), flags.views.view));
+      (*out[k])->KeepOnly(kept);
+    }
+  }
+  return sides;
+}
+
+nlohmann::json ToJson(const Comparison& comparison) {
+  const auto psnr = [](double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); };
+  nlohmann::json json = {{"mean", {{"psnr", psnr(comparison.mean_psnr)}, {"ssim", comparison.mean_ssim}}},
+                         {"views", nlohmann::json::array()}};
+  for (const ViewScore& view : comparison.views) {
+    json["views"].push_back({{"name", view.name}, {"psnr", psnr(view.psnr)}, {"ssim", view.ssim}});
+  }
+  return json;
+}
+
+std::string Signed(double gain) { return (gain >= 0 ? "+" : "") + Fixed(gain, 2); }
+
+void PrintTable(const CompareFlags& flags, const std::vector<Comparison>& results) {
+  std::vector<std::vector<std::string>> rows;
+  const auto add = [&](const std::string& name, auto&& psnr, auto&& ssim) {
+    std::vector<std::string> row = {name};
+    for (const Comparison& result : results) {
+      row.push_back(Fixed(psnr(result), 2));
+      row.push_back(Fixed(ssim(result), 4));
+    }
+    if (results.size() == 2) row.push_back(Signed(psnr(results[1]) - psnr(results[0])));
+    rows.push_back(row);
+  };
+  if (results.size() == 1) {
+    rows.push_back({"view", "PSNR", "SSIM"});
+  } else {
+    rows.push_back({"view", "A PSNR", "A SSIM", "B PSNR", "B SSIM", "gain dB"});
+    std::cout << "A  " << flags.a << "\nB  " << flags.b << "\nboth against  " << flags.truth << "\n\n";
+  }
+  for (size_t v = 0; v < results[0].views.size(); ++v) {
+    add(
+        results[0].views[v].name, [v](const Comparison& c) { return c.views[v].psnr; },
+        [v](const Comparison& c) { return c.views[v].ssim; });
+  }
+  add(
+      "mean", [](const Comparison& c) { return c.mean_psnr; }, [](const Comparison& c) { return c.mean_ssim; });
+  std::cout << FormatTable(rows);
+}
+
+// The view whose score is the middle one: neither the best nor the worst picture to show.
+size_t MedianView(const Comparison& comparison) {
+  std::vector<size_t> order(comparison.views.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](size_t x, size_t y) { return comparison.views[x].psnr < comparison.views[y].psnr; });
+  return order[order.size() / 2];
+}
+
+// The last two parts of a path: "biplane/input.ply" says more than "input.ply".
+std::string ShortName(const fs::path& path) {
+  const fs::path parent =
+      path.has_filename() ? path.parent_path().filename() : path.parent_path().parent_path().filename();
+  return (parent / (path.has_filename() ? path.filename() : path.parent_path().filename())).string();
+}
+
+Status WriteSideBySide(const CompareFlags& flags, Sides& sides, const std::vector<Comparison>& results,
+                       const SharedFlags& shared) {
+  std::vector<ViewSource*> sources = {sides.a.get()};
+  ViewSource& reference = sides.truth ? *sides.truth : *sides.b;
+  if (sides.truth) sources.push_back(sides.b.get());
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto partners, MatchSources(sources, reference));
+  const size_t view = MedianView(results.back());
+
+  std::vector<Image> pictures;
+  for (size_t s = 0; s < sources.size(); ++s) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(pictures.emplace_back(), sources[s]->Load(partners[s][view]));
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(pictures.emplace_back(), reference.Load(view));
+  const std::array<std::string, 2> names = {flags.a, flags.b};
+  std::vector<LabelledImage> images;
+  for (size_t s = 0; s < sources.size(); ++s) {
+    const ViewScore& score = results[s].views[view];
+    images.push_back(
+        {ShortName(names[s]), Cat(Fixed(score.psnr, 2), " dB  SSIM ", Fixed(score.ssim, 4)), &pictures[s]});
+  }
+  images.push_back(
+      {sides.truth ? "ground truth" : ShortName(flags.b), "view " + results[0].views[view].name, &pictures.back()});
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Image picture, SideBySide(images));
+  return WritePng(flags.side_by_side, picture, WriteOptionsFrom(shared));
+}
+
+Status RunCompare(const CompareFlags& flags, const SharedFlags& shared) {
+  if (!flags.side_by_side.empty() && !shared.overwrite && fs::exists(flags.side_by_side)) {
+    return Error{ErrorCode::kExists, Cat(flags.side_by_side, " exists; -w replaces it")};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Sides sides, OpenSides(flags));
+  std::vector<ViewSource*> sources = {sides.a.get()};
+  if (sides.truth) sources.push_back(sides.b.get());
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto results, CompareToReference(sources, sides.truth ? *sides.truth : *sides.b));
+  if (!flags.side_by_side.empty()) {
+    ANCHORSPLAT_RETURN_IF_ERROR(WriteSideBySide(flags, sides, results, shared));
+  }
+  if (shared.json) {
+    // Without --truth the document is the comparison itself.
+    PrintJson(sides.truth ? nlohmann::json{{"a", ToJson(results[0])}, {"b", ToJson(results[1])}} : ToJson(results[0]));
+  } else {
+    PrintTable(flags, results);
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddCompare(CLI::App& app, Program& program) {
+  CLI::App& verb = AddVerb(app, program, "compare", "PSNR and SSIM of two splats, folders of pictures or pictures",
+                           "anchorsplat compare before.ply after.ply --truth photos/ --cameras transforms.json");
+  const auto flags = std::make_shared<CompareFlags>();
+  verb.add_option("a", flags->a, "Splat, folder of pictures or picture")->required();
+  verb.add_option("b", flags->b, "The same; what A is compared with, unless there is a --truth")->required();
+  verb.add_option("--truth", flags->truth, "Compare both A and B with this instead, and show the gain");
+  verb.add_option("--side-by-side", flags->side_by_side,
+                  "Write a PNG of the view with the median score: pictures, zoomed crop, difference");
+  flags->views.AddTo(verb);
+  verb.callback([flags, &program] { program.run = [flags, &program] { return RunCompare(*flags, program.flags); }; });
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,174 @@
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/table.h"
+#include "cli/verb.h"
+#include "core/statistics.h"
+#include "core/text.h"
+#include "enhance/pixel_size_estimate.h"
+#include "formats/registry.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// Everything `info` found, once for the table and once for JSON.
+struct Findings {
+  std::string file;
+  uint64_t file_bytes = 0;
+  GaussianCloud cloud;
+  CloudStatistics statistics;
+  Result<PixelSizeEstimate> pixel_size = Error{};
+  std::vector<std::string> problems;  // sentences
+};
+
+std::string Rows(int64_t count, int64_t of) {
+  return Cat(WithThousands(count), " of ", WithThousands(of), count == 1 ? " Gaussian" : " Gaussians");
+}
+
+std::vector<std::string> Problems(const CloudStatistics& s) {
+  std::vector<std::string> out;
+  const auto add = [&](int64_t count, const char* what) {
+    if (count > 0) out.push_back(Rows(count, s.gaussians) + " " + what);
+  };
+  add(s.not_finite, "with NaN or infinite values; enhance drops them");
+  add(s.zero_quaternions, "with a zero quaternion; rendered without rotation");
+  add(s.zero_scales, "with a scale of zero (log-scale -Inf) on some axis");
+  add(s.outliers, "more than ten times farther out than the middle 98 %");
+  add(s.unnormalised_quaternions, "with quaternions that are not normalised; legal, as trainers leave them so");
+  add(s.invisible, "with an opacity below 1/255; never drawn");
+  if (s.linear_looking_scales)
+    out.push_back("scales look like lengths, not logarithms: was the file converted wrongly?");
+  if (s.linear_looking_opacities)
+    out.push_back("opacities look like 0 to 1, not logits: was the file converted wrongly?");
+  return out;
+}
+
+const char* ModeName(const GaussianCloud& cloud) {
+  if (!cloud.render_mode) return "not said (classic is assumed)";
+  return *cloud.render_mode == RenderMode::kAntialiased ? "antialiased" : "classic";
+}
+
+std::string Number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", value);
+  return text;
+}
+
+void PrintTable(const Findings& f) {
+  const CloudStatistics& s = f.statistics;
+  std::cout << f.file << "\n"
+            << "  Gaussians    " << WithThousands(s.gaussians) << ", SH degree " << s.sh_degree << "\n"
+            << "  file         " << HumanBytes(f.file_bytes) << "\n"
+            << "  render mode  " << ModeName(f.cloud) << "\n";
+  if (s.bounds) {
+    std::cout << "  bounds      ";
+    for (size_t a = 0; a < 3; ++a) {
+      std::cout << (a == 0 ? " x " : ", ")
+                << (a == 1   ? "y "
+                    : a == 2 ? "z "
+                             : "")
+                << Number(s.bounds->min[a]) << " to " << Number(s.bounds->max[a]);
+    }
+    std::cout << "\n";
+  }
+  if (f.pixel_size.ok()) {
+    std::cout << "  training pixel, estimated  " << Number(f.pixel_size->size) << " (likely "
+              << Number(f.pixel_size->low) << " to " << Number(f.pixel_size->high) << ")\n";
+  } else {
+    std::cout << "  training pixel  no estimate: " << f.pixel_size.error().message << "\n";
+  }
+  std::cout << "\n";
+  const auto row = [](const char* name, const Percentiles& p) {
+    std::vector<std::string> cells = {name};
+    for (const float value : p) cells.push_back(Number(value));
+    return cells;
+  };
+  std::cout << FormatTable({{"percentile", "1 %", "10 %", "50 %", "90 %", "99 %"},
+                            row("largest axis", s.largest_axis),
+                            row("smallest axis", s.smallest_axis),
+                            row("axis ratio", s.axis_ratio),
+                            row("opacity", s.opacity)});
+  std::cout << "\nwritten as:";
+  for (const SplatFormat& format : Formats()) {
+    if (format.write == nullptr || format.predicted_size == nullptr) continue;
+    std::cout << "  " << format.name << " " << HumanBytes(format.predicted_size(s.gaussians, s.sh_degree));
+  }
+  std::cout << "\n\n" << (f.problems.empty() ? "no problems found" : "found:") << "\n";
+  for (const std::string& problem : f.problems) std::cout << "  - " << problem << "\n";
+}
+
+nlohmann::json ToJson(const Findings& f) {
+  const CloudStatistics& s = f.statistics;
+  const auto percentiles = [](const Percentiles& values) {
+    nlohmann::json out;
+    for (size_t k = 0; k < values.size(); ++k) out[Cat("p", std::lround(100 * kPercentiles[k]))] = values[k];
+    return out;
+  };
+  nlohmann::json json = {{"file", f.file},
+                         {"bytes", f.file_bytes},
+                         {"gaussians", s.gaussians},
+                         {"sh_degree", s.sh_degree},
+                         {"bounds", nullptr},
+                         {"render_mode", nullptr},
+                         {"comments", f.cloud.comments},
+                         {"largest_axis", percentiles(s.largest_axis)},
+                         {"smallest_axis", percentiles(s.smallest_axis)},
+                         {"axis_ratio", percentiles(s.axis_ratio)},
+                         {"opacity", percentiles(s.opacity)},
+                         {"pixel_size", nullptr},
+                         {"counts",
+                          {{"not_finite", s.not_finite},
+                           {"zero_quaternions", s.zero_quaternions},
+                           {"unnormalised_quaternions", s.unnormalised_quaternions},
+                           {"zero_scales", s.zero_scales},
+                           {"invisible", s.invisible},
+                           {"outliers", s.outliers}}},
+                         {"linear_looking_scales", s.linear_looking_scales},
+                         {"linear_looking_opacities", s.linear_looking_opacities},
+                         {"problems", f.problems},
+                         {"predicted_bytes", nlohmann::json::object()}};
+  if (s.bounds) json["bounds"] = {{"min", s.bounds->min}, {"max", s.bounds->max}};
+  if (f.cloud.render_mode) json["render_mode"] = ModeName(f.cloud);
+  if (f.pixel_size.ok()) {
+    json["pixel_size"] = {{"estimate", f.pixel_size->size}, {"low", f.pixel_size->low}, {"high", f.pixel_size->high}};
+  }
+  for (const SplatFormat& format : Formats()) {
+    if (format.write == nullptr || format.predicted_size == nullptr) continue;
+    json["predicted_bytes"][std::string(format.name)] = format.predicted_size(s.gaussians, s.sh_degree);
+  }
+  return json;
+}
+
+Status RunInfo(const std::string& file, const SharedFlags& shared) {
+  Findings findings;
+  findings.file = file;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(findings.cloud, ReadCloud(file));
+  std::error_code code;
+  findings.file_bytes = std::filesystem::file_size(file, code);
+  if (code) findings.file_bytes = 0;  // a pipe has no size
+  findings.statistics = ComputeStatistics(findings.cloud);
+  findings.pixel_size = EstimatePixelSize(findings.cloud);
+  findings.problems = Problems(findings.statistics);
+  if (shared.json) {
+    PrintJson(ToJson(findings));
+  } else {
+    PrintTable(findings);
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddInfo(CLI::App& app, Program& program) {
+  CLI::App& verb = AddVerb(app, program, "info", "What is in a splat file, and what is wrong with it",
+                           "anchorsplat info scan.ply --json");
+  const auto file = std::make_shared<std::string>();
+  verb.add_option("file", *file, "Splat file")->required();
+  verb.callback([file, &program] { program.run = [file, &program] { return RunInfo(*file, program.flags); }; });
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,75 @@
+#include "cli/parse.h"
+
+#include <charconv>
+#include <cmath>
+
+#include "core/text.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// The whole of `text` as a finite number.
+std::optional<double> ParseNumber(std::string_view text) {
+  double value = 0;
+  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+Result<std::array<double, 3>> ParseTriple(const std::string& option, const std::string& text, const char* form) {
+  const Error error{ErrorCode::kBadArgument, Cat(option, ": '", Printable(text), "' is not ", form)};
+  std::array<double, 3> out{};
+  std::string_view rest = text;
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t comma = rest.find(',');
+    if ((comma == std::string_view::npos) != (k == 2)) return error;
+    const auto number = ParseNumber(rest.substr(0, comma));
+    if (!number) return error;
+    out[k] = *number;
+    if (k < 2) rest.remove_prefix(comma + 1);
+  }
+  return out;
+}
+
+}  // namespace
+
+Result<SizeOption> ParseSize(const std::string& option, const std::string& text) {
+  const Error error{
+      ErrorCode::kBadArgument,
+      Cat(option, ": '", Printable(text), "' is not WIDTHxHEIGHT in pixels, such as 1024x768, at most 32768 each")};
+  const size_t x = text.find('x');
+  if (x == std::string::npos) return error;
+  const auto width = ParseNumber(std::string_view(text).substr(0, x));
+  const auto height = ParseNumber(std::string_view(text).substr(x + 1));
+  if (!width || !height) return error;
+  const auto fits = [](double v) { return v >= 1 && v <= 32768 && v == std::floor(v); };
+  if (!fits(*width) || !fits(*height)) return error;
+  return SizeOption{static_cast<int>(*width), static_cast<int>(*height)};
+}
+
+Result<std::array<float, 3>> ParseColor(const std::string& option, const std::string& text) {
+  constexpr const char* kForm = "R,G,B with numbers from 0 to 1, such as 1,1,1 for white";
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto triple, ParseTriple(option, text, kForm));
+  for (const double c : triple) {
+    if (c < 0 || c > 1) return Error{ErrorCode::kBadArgument, Cat(option, ": '", Printable(text), "' is not ", kForm)};
+  }
+  return std::array<float, 3>{static_cast<float>(triple[0]), static_cast<float>(triple[1]),
+                              static_cast<float>(triple[2])};
+}
+
+Result<std::array<double, 3>> ParsePoint(const std::string& option, const std::string& text) {
+  return ParseTriple(option, text, "X,Y,Z in world units, such as 0,0.5,0");
+}
+
+Result<std::optional<double>> ParsePixelSize(const std::string& option, const std::string& text) {
+  if (text == "auto") return std::optional<double>();
+  const auto number = ParseNumber(text);
+  if (!number || !(*number > 0)) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat(option, ": '", Printable(text), "' is neither 'auto' nor a positive length in world units")};
+  }
+  return number;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// Option values with a form of their own. Errors (kBadArgument) name the option and show the form.
+struct SizeOption {
+  int width = 0;
+  int height = 0;
+};
+Result<SizeOption> ParseSize(const std::string& option, const std::string& text);              // "1024x768"
+Result<std::array<float, 3>> ParseColor(const std::string& option, const std::string& text);   // "R,G,B", each 0–1
+Result<std::array<double, 3>> ParsePoint(const std::string& option, const std::string& text);  // "X,Y,Z"
+// A positive number, or nothing for "auto".
+Result<std::optional<double>> ParsePixelSize(const std::string& option, const std::string& text);
+
+}  // namespace anchorsplat

@@ -1,0 +1,117 @@
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/verb.h"
+#include "cli/views.h"
+#include "core/log.h"
+#include "core/text.h"
+#include "formats/image_io.h"
+#include "render/rasterizer.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RenderFlags {
+  std::string input;
+  std::string output;
+  bool transparent = false;
+  ViewFlags views;
+};
+
+// One picture goes to a file, several to a folder under the views' names.
+Result<std::vector<fs::path>> OutputPaths(const std::string& output, const CameraSet& cameras, bool overwrite) {
+  const bool to_file = fs::path(output).extension() == ".png";
+  if (to_file && cameras.cameras.size() > 1) {
+    return Error{ErrorCode::kBadArgument, Cat("-o ", output, " is one picture and there are ", cameras.cameras.size(),
+                                              " views: give a folder, or choose one with --view NAME")};
+  }
+  std::vector<fs::path> paths;
+  std::map<fs::path, std::string> taken;
+  for (const Camera& camera : cameras.cameras) {
+    paths.push_back(to_file ? fs::path(output)
+                            : fs::path(output) / (fs::path(camera.name).filename().string() + ".png"));
+    const auto [other, fresh] = taken.emplace(paths.back(), camera.name);
+    if (!fresh) {
+      return Error{ErrorCode::kBadArgument,
+                   Cat("views ", other->second, " and ", camera.name, " would both become ", paths.back().string())};
+    }
+    if (!overwrite && fs::exists(paths.back())) {
+      return Error{ErrorCode::kExists, Cat(paths.back().string(), " exists; -w replaces it")};
+    }
+  }
+  if (!to_file) {
+    std::error_code code;
+    fs::create_directories(output, code);
+    if (code) return Error{ErrorCode::kIo, Cat(output, ": cannot make this folder: ", code.message())};
+  }
+  return paths;
+}
+
+// Colour over black divided by coverage: what a picture with an alpha channel stores.
+Image WithAlpha(const RenderOutput& render) {
+  Image out(render.color.width, render.color.height, 4);
+  for (int c = 0; c < 3; ++c) {
+    for (int64_t i = 0; i < out.plane(); ++i) {
+      const float alpha = render.alpha.pixels[static_cast<size_t>(i)];
+      out.channel(c)[i] = alpha > 0 ? render.color.channel(c)[i] / alpha : 0;
+    }
+  }
+  std::copy_n(render.alpha.pixels.data(), out.plane(), out.channel(3));
+  return out;
+}
+
+Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(flags.input));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraSet cameras, MakeViews(flags.views, cloud));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(RenderOptions options, MakeRenderOptions(flags.views, cloud, cameras));
+  if (flags.transparent) options.background = {0, 0, 0};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto paths, OutputPaths(flags.output, cameras, shared.overwrite));
+
+  Rasterizer rasterizer;
+  RenderOutput render;
+  double seconds = 0;
+  nlohmann::json views = nlohmann::json::array();
+  {
+    Progress progress("render", static_cast<int64_t>(paths.size()));
+    for (size_t i = 0; i < paths.size(); ++i) {
+      const auto begin = std::chrono::steady_clock::now();
+      ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, cameras.cameras[i], options, render));
+      seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+      ANCHORSPLAT_RETURN_IF_ERROR(
+          WritePng(paths[i], flags.transparent ? WithAlpha(render) : render.color, WriteOptionsFrom(shared)));
+      views.push_back({{"name", cameras.cameras[i].name}, {"file", paths[i].string()}});
+      progress.Advance();
+    }
+  }
+  if (shared.json) {
+    PrintJson({{"input", flags.input}, {"gaussians", cloud.size()}, {"render_seconds", seconds}, {"views", views}});
+  } else if (!shared.quiet) {
+    std::cout << "rendered " << paths.size() << (paths.size() == 1 ? " view of " : " views of ")
+              << WithThousands(cloud.size()) << " Gaussians in " << HumanSeconds(seconds) << " (without reading and "
+              << "writing) to " << flags.output << '\n';
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddRender(CLI::App& app, Program& program) {
+  CLI::App& verb = AddVerb(app, program, "render", "Render a splat to PNG pictures",
+                           "anchorsplat render scan.ply -o views/ --orbit 8 --size 800x600 --background 1,1,1");
+  const auto flags = std::make_shared<RenderFlags>();
+  verb.add_option("input", flags->input, "Splat file")->required();
+  verb.add_option("-o,--output", flags->output, "A .png file for one view, a folder for several")->required();
+  verb.add_flag("--transparent", flags->transparent, "Write an alpha channel instead of a background");
+  flags->views.AddTo(verb);
+  verb.callback([flags, &program] { program.run = [flags, &program] { return RunRender(*flags, program.flags); }; });
+}
+
+}  // namespace anchorsplat

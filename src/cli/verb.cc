@@ -1,0 +1,115 @@
+#include "cli/verb.h"
+
+#include <cstdio>
+#include <iostream>
+#include <new>
+#include <nlohmann/json.hpp>
+
+#include "core/log.h"
+#include "core/parallel.h"
+#include "core/text.h"
+
+namespace anchorsplat {
+
+namespace {
+
+const char* CodeName(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kBadArgument:
+      return "bad_argument";
+    case ErrorCode::kNotFound:
+      return "not_found";
+    case ErrorCode::kBadFile:
+      return "bad_file";
+    case ErrorCode::kExists:
+      return "exists";
+    case ErrorCode::kIo:
+      return "io";
+    case ErrorCode::kInterrupted:
+      return "interrupted";
+  }
+  return "unknown";
+}
+
+int Fail(const SharedFlags& flags, const Error& error) {
+  LogError(error.message);
+  if (flags.json) PrintJson({{"error", {{"code", CodeName(error.code)}, {"message", error.message}}}});
+  return ExitCode(error.code);
+}
+
+}  // namespace
+
+CLI::App& AddVerb(CLI::App& app, Program& program, const std::string& name, const std::string& description,
+                  const std::string& example) {
+  CLI::App& verb = *app.add_subcommand(name, description);
+  verb.footer("Example:\n  " + example);
+  SharedFlags& flags = program.flags;
+  const std::string group = "Shared flags";
+  verb.add_flag("-w,--overwrite", flags.overwrite, "Replace files that exist (else refuse)")->group(group);
+  verb.add_flag("-q,--quiet", flags.quiet, "Only warnings and errors on stderr")->group(group);
+  verb.add_flag("--json", flags.json, "Results as one JSON document on stdout")->group(group);
+  verb.add_option("--threads", flags.threads, "Threads to use; 0 is the whole machine")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--seed", flags.seed, "Seed of everything random")->capture_default_str()->group(group);
+  return verb;
+}
+
+int ExitCode(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kBadArgument:
+      return kUsageExitCode;
+    case ErrorCode::kNotFound:
+      return 3;
+    case ErrorCode::kBadFile:
+      return 4;
+    case ErrorCode::kExists:
+      return 5;
+    case ErrorCode::kIo:
+      return 6;
+    case ErrorCode::kInterrupted:
+      return 130;
+  }
+  return 1;
+}
+
+void PrintJson(const nlohmann::json& json) {
+  // Replacing invalid UTF-8: file names are bytes, JSON is text.
+  std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
+}
+
+int RunProgram(int argc, const char* const* argv) {
+  CLI::App app{"anchorsplat: makes a low-quality 3D Gaussian splat hold up when seen closer", "anchorsplat"};
+  app.set_version_flag("--version", std::string("anchorsplat ") + ANCHORSPLAT_VERSION);
+  app.require_subcommand(1);
+  Program program;
+  AddEnhance(app, program);
+  AddInfo(app, program);
+  AddRender(app, program);
+  AddCompare(app, program);
+  AddBench(app, program);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    // CLI11 answers --help and --version through this path with exit code 0.
+    return app.exit(error) == 0 ? 0 : kUsageExitCode;
+  }
+
+  const SharedFlags& flags = program.flags;
+  SetLogSink(MakeTerminalSink(flags.quiet));
+  SetThreadCount(flags.threads);
+  try {
+    const Status status = program.run();
+    if (!status.ok()) return Fail(flags, status.error());
+    std::cout.flush();
+    if (!std::cout) return Fail(flags, {ErrorCode::kIo, "standard output could not be written"});
+    return 0;
+  } catch (const std::bad_alloc&) {
+    return Fail(flags, {ErrorCode::kIo, "out of memory"});
+  } catch (const std::exception& error) {
+    return Fail(flags, {ErrorCode::kIo, Cat("unexpected failure: ", error.what(), " (please report this)")});
+  }
+}
+
+}  // namespace anchorsplat

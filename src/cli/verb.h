@@ -1,0 +1,52 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <functional>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "core/result.h"
+#include "formats/cloud_io.h"
+
+namespace anchorsplat {
+
+// The flags that every verb has. Declared once, in AddVerb.
+struct SharedFlags {
+  bool overwrite = false;
+  bool quiet = false;
+  bool json = false;  // stdout carries one JSON document and nothing else
+  int threads = 0;    // 0: the whole machine
+  uint64_t seed = 0;
+};
+
+// What the command line asked for; main runs it once parsing is over.
+struct Program {
+  SharedFlags flags;
+  std::function<Status()> run;
+};
+
+// A subcommand with the shared flags, its description and an example for --help.
+CLI::App& AddVerb(CLI::App& app, Program& program, const std::string& name, const std::string& description,
+                  const std::string& example);
+
+// One function per verb file.
+void AddEnhance(CLI::App& app, Program& program);
+void AddInfo(CLI::App& app, Program& program);
+void AddRender(CLI::App& app, Program& program);
+void AddCompare(CLI::App& app, Program& program);
+void AddBench(CLI::App& app, Program& program);
+
+// 0 on success; each kind of failure has a number of its own (docs/cli.md).
+int ExitCode(ErrorCode code);
+inline constexpr int kUsageExitCode = 2;
+
+inline WriteOptions WriteOptionsFrom(const SharedFlags& flags) { return {.overwrite = flags.overwrite}; }
+
+// Prints a JSON document to stdout. Numbers that are not finite become null.
+void PrintJson(const nlohmann::json& json);
+
+// Runs the program. Never throws.
+int RunProgram(int argc, const char* const* argv);
+
+}  // namespace anchorsplat

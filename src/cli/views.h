@@ -1,0 +1,36 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "core/camera.h"
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "render/rasterizer.h"
+
+namespace anchorsplat {
+
+// The options of every verb that renders: from where, how large, on what background, in which mode.
+struct ViewFlags {
+  std::string cameras;     // file or folder; empty: an orbit
+  int orbit = 0;           // views on a sphere around the cloud
+  double radius = 0;       // of the orbit, world units; 0: what frames the cloud
+  std::string target;      // "X,Y,Z" the orbit looks at; empty: the cloud's middle
+  double fov = 45;         // horizontal, degrees, of the orbit
+  std::string size;        // "WxH"; empty: the cameras' own, 1024x1024 for an orbit
+  std::string background;  // "R,G,B"; empty: what the camera file says, else black
+  std::string mode;        // "classic" or "antialiased"; empty: the file's tag, else classic
+  std::string view;        // the only view wanted, by name; empty: all
+  std::string profile = "gsplat14";
+
+  void AddTo(CLI::App& verb);
+};
+
+// The views to render, all or the one of --view. An orbit is laid around `cloud`. `--size` must keep the cameras'
+// aspect ratio. Errors name the option.
+Result<CameraSet> MakeViews(const ViewFlags& flags, const GaussianCloud& cloud);
+
+// Mode (flags, else the file's tag, else classic), profile and background (flags, else the cameras', else black).
+Result<RenderOptions> MakeRenderOptions(const ViewFlags& flags, const GaussianCloud& cloud, const CameraSet& cameras);
+
+}  // namespace anchorsplat

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <array>
+
+#include "core/camera.h"
+#include "core/gaussian_cloud.h"
+
+namespace anchorsplat {
+
+// Where to look from when nobody says: the centre of the box that holds the middle 98 % of the visible Gaussians'
+// means along each axis, and the radius of the sphere around that centre that holds 98 % of them.
+struct Framing {
+  std::array<double, 3> target = {0, 0, 0};  // world
+  double radius = 1;                         // world; always positive
+};
+Framing FrameCloud(const GaussianCloud& cloud);
+
+// Distance from which a sphere of `radius` fills the smaller side of the image, with a tenth to spare.
+double FramingDistance(const Framing& framing, const Pinhole& intrinsics);
+
+}  // namespace anchorsplat

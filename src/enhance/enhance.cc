@@ -1,0 +1,168 @@
+#include "enhance/enhance.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "core/log.h"
+#include "core/statistics.h"
+#include "core/text.h"
+#include "enhance/filter.h"
+#include "enhance/pixel_size.h"
+#include "enhance/pixel_size_estimate.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// Cameras and estimate further apart than this are worth a word: one of them does not belong to this splat.
+constexpr double kSuspiciousRatio = 1.5;
+
+std::vector<EnhanceMethod>& Registry() {
+  static std::vector<EnhanceMethod> methods = {
+      {.name = "filter",
+       .summary = "give the width back that the fit absorbed; instant, no weights",
+       .rank = 0,
+       .ready = [](const EnhanceOptions&) { return Status(); },
+       .run = [](EnhanceInput input, const EnhanceOptions& options) -> Result<GaussianCloud> {
+         ANCHORSPLAT_RETURN_IF_ERROR([&]() -> Status {
+           const auto grown = ApplyFilter(input.cloud, input.pixel_sizes,
+                                          {.upscale = options.upscale, .strength = input.filter_strength});
+           return grown.ok() ? Status() : Status(grown.error());
+         }());
+         return std::move(input.cloud);
+       }}};
+  return methods;
+}
+
+Result<const EnhanceMethod*> ChooseMethod(const EnhanceOptions& options) {
+  const EnhanceMethod* best = nullptr;
+  std::string names;
+  for (const EnhanceMethod& method : Registry()) {
+    names += ", " + method.name;
+    if (method.name == options.method) {
+      ANCHORSPLAT_RETURN_IF_ERROR(method.ready(options));
+      return &method;
+    }
+    if ((best == nullptr || method.rank > best->rank) && method.ready(options).ok()) best = &method;
+  }
+  if (options.method == "auto") return best;  // never null: the filter is always ready
+  return Error{ErrorCode::kBadArgument, Cat("there is no method '", options.method, "' (known: auto", names, ")")};
+}
+
+// Drops the rows no method and no viewer can use; says how many.
+Status DropUnusable(GaussianCloud& cloud) {
+  std::vector<int64_t> kept;
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    if (IsUsable(cloud, i)) kept.push_back(i);
+  }
+  const int64_t dropped = cloud.size() - static_cast<int64_t>(kept.size());
+  if (dropped == 0) return {};
+  if (kept.empty()) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("none of the ", WithThousands(cloud.size()), " Gaussians has finite values")};
+  }
+  LogWarning(Cat("dropped ", WithThousands(dropped), " of ", WithThousands(cloud.size()),
+                 " Gaussians: NaN or infinite values"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(cloud, Subset(cloud, kept));
+  return {};
+}
+
+Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
+  std::optional<int> train_width = options.train_width;
+  if (!train_width) {
+    train_width = AssumedTrainWidth(*options.cameras);
+    if (train_width) {
+      LogWarning(Cat("the cameras are wider than ", *train_width, " pixels; assuming that training shrank them to ",
+                     *train_width, " as INRIA's trainer does. If not, give the true width with --train-width"));
+    }
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes from_cameras,
+                               PixelSizesFromCameras(input.cloud, *options.cameras, train_width));
+  if (from_cameras.unseen > 0) {
+    LogInfo(Cat(WithThousands(from_cameras.unseen), " of ", WithThousands(input.cloud.size()),
+                " Gaussians lie outside all views; their pixel size is that of the nearest camera"));
+  }
+  const auto estimate = EstimatePixelSize(input.cloud);
+  if (estimate.ok()) {
+    const double ratio = estimate->size / from_cameras.median;
+    if (ratio > kSuspiciousRatio || ratio < 1 / kSuspiciousRatio) {
+      LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
+                     " (median), the splat itself looks like ", estimate->size,
+                     ": are these its training cameras, at the size it was trained at (--train-width)?"));
+    }
+  }
+  report.pixel_size = from_cameras.median;
+  report.pixel_size_source = "cameras";
+  input.pixel_sizes = std::move(from_cameras.sizes);
+  return {};
+}
+
+Status ChoosePixelSizes(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
+  if (options.pixel_size && options.cameras) {
+    return Error{ErrorCode::kBadArgument,
+                 "a pixel size and cameras were given; the cameras already say the pixel size"};
+  }
+  if (options.train_width && !options.cameras) {
+    return Error{ErrorCode::kBadArgument, "--train-width says how cameras were shrunk; it needs --cameras"};
+  }
+  if (options.cameras) return PixelSizesFromTrainingCameras(options, input, report);
+  if (options.pixel_size) {
+    report.pixel_size = *options.pixel_size;
+    report.pixel_size_source = "given";
+  } else {
+    const auto estimate = EstimatePixelSize(input.cloud);
+    if (!estimate.ok()) {
+      return Error{estimate.error().code, estimate.error().message + "; give --pixel-size or --cameras"};
+    }
+    report.pixel_size = estimate->size;
+    report.pixel_size_source = "estimated";
+    LogInfo(Cat("estimated size of a training pixel: ", estimate->size, " (likely ", estimate->low, " to ",
+                estimate->high, "); --cameras or --pixel-size make it exact"));
+  }
+  input.pixel_sizes.assign(1, static_cast<float>(report.pixel_size));
+  return {};
+}
+
+}  // namespace
+
+void RegisterEnhanceMethod(EnhanceMethod method) { Registry().push_back(std::move(method)); }
+std::span<const EnhanceMethod> EnhanceMethods() { return Registry(); }
+
+Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
+  if (cloud.empty()) return Error{ErrorCode::kBadArgument, "the splat has no Gaussians"};
+  if (!(options.upscale >= 1) || !std::isfinite(options.upscale)) {
+    return Error{ErrorCode::kBadArgument, Cat("--upscale ", options.upscale, " must be at least 1")};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const EnhanceMethod* method, ChooseMethod(options));
+
+  EnhanceReport report;
+  report.method = method->name;
+  report.upscale = options.upscale;
+  report.gaussians_in = cloud.size();
+  EnhanceInput input;
+  input.cloud = std::move(cloud);
+  ANCHORSPLAT_RETURN_IF_ERROR(DropUnusable(input.cloud));
+  report.dropped = report.gaussians_in - input.cloud.size();
+
+  input.filter_strength = options.filter_strength.value_or(DefaultFilterStrength(options.upscale));
+  if (input.cloud.render_mode == RenderMode::kAntialiased && !options.filter_strength) {
+    input.filter_strength = 0;
+    LogWarning(
+        "the file is tagged antialiased: its fit did not absorb the 0.3 px² dilation, so there is no lost width to "
+        "give "
+        "back and the filter leaves it as it is (--filter-strength F to filter it all the same)");
+  }
+  report.filter_strength = input.filter_strength;
+  ANCHORSPLAT_RETURN_IF_ERROR(ChoosePixelSizes(options, input, report));
+
+  const auto begin = std::chrono::steady_clock::now();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, method->run(std::move(input), options));
+  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  report.gaussians_out = out.size();
+  return Enhanced{std::move(out), std::move(report)};
+}
+
+}  // namespace anchorsplat

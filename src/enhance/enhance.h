@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/camera.h"
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// What every method is told. Spaces: the cloud in stored space, lengths in world units.
+struct EnhanceOptions {
+  std::string method = "auto";            // a registered name, or "auto": the best that is ready without further input
+  double upscale = 4;                     // u ≥ 1: how many times closer the splat will be seen
+  std::optional<double> filter_strength;  // f of the filter; its default otherwise, 0 for antialiased splats
+  std::optional<double> pixel_size;       // p_LR for all Gaussians; from `cameras` or estimated otherwise
+  std::optional<CameraSet> cameras;       // the training cameras
+  std::optional<int> train_width;         // pixels; see AssumedTrainWidth
+  uint64_t seed = 0;
+};
+
+// What was done, for people and for --json.
+struct EnhanceReport {
+  std::string method;
+  int64_t gaussians_in = 0;
+  int64_t dropped = 0;  // rows with values that are not finite
+  int64_t gaussians_out = 0;
+  double upscale = 1;
+  double filter_strength = 0;
+  double pixel_size = 0;          // p_LR, the median when there is one per Gaussian
+  std::string pixel_size_source;  // "given", "cameras" or "estimated"
+  double seconds = 0;             // of the method itself, without reading and writing
+};
+
+// The cloud as methods get it: rows that are not finite are gone, p_LR is known.
+struct EnhanceInput {
+  GaussianCloud cloud;
+  Buffer<float> pixel_sizes;  // one for all, or one per Gaussian
+  double filter_strength = 0;
+};
+
+// A way to enhance. `ready` says whether it can run with these options alone (weights there, images given, …) and is
+// what "auto" asks; `rank` orders them, higher is better.
+struct EnhanceMethod {
+  std::string name;
+  std::string summary;  // one line for --help
+  int rank = 0;
+  std::function<Status(const EnhanceOptions&)> ready;
+  std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&)> run;
+};
+
+// The filter is always there; higher rooms add theirs at start-up (before threads), from main, by name.
+void RegisterEnhanceMethod(EnhanceMethod method);
+std::span<const EnhanceMethod> EnhanceMethods();
+
+struct Enhanced {
+  GaussianCloud cloud;
+  EnhanceReport report;
+};
+
+// Runs the method. Logs what it assumed: pixel size and how sure it is, training width, why a splat tagged
+// antialiased is left alone, how many rows were dropped. kBadArgument: unknown method, both pixel_size and cameras,
+// upscale < 1, no usable Gaussian; and whatever the method reports.
+Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options);
+
+}  // namespace anchorsplat

@@ -1,0 +1,205 @@
+#include "enhance/enhance.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+
+#include "core/log.h"
+#include "core/random.h"
+#include "enhance/filter.h"
+#include "enhance/pixel_size_estimate.h"
+
+namespace anchorsplat {
+namespace {
+
+// Keeps what was logged for as long as it lives.
+class Recorder : public LogSink {
+ public:
+  static std::shared_ptr<Recorder> Install() {
+    auto recorder = std::make_shared<Recorder>();
+    recorder->before_ = SetLogSink(recorder);
+    return recorder;
+  }
+  void Restore() { SetLogSink(before_); }
+  void Message(LogLevel, const std::string& text) override { text_ += text + "\n"; }
+  void TaskBegin(const std::string&, int64_t) override {}
+  void TaskProgress(int64_t, const std::string&) override {}
+  void TaskEnd() override {}
+  bool Says(const std::string& what) const { return text_.find(what) != std::string::npos; }
+  const std::string& text() const { return text_; }
+
+ private:
+  std::shared_ptr<LogSink> before_;
+  std::string text_;
+};
+
+class EnhanceDoor : public testing::Test {
+ protected:
+  void SetUp() override { log_ = Recorder::Install(); }
+  void TearDown() override { log_->Restore(); }
+  std::shared_ptr<Recorder> log_;
+};
+
+// A ball of opaque discs on its surface, as a fit of a smooth object with pixels of `pixel` leaves them: eroded, that
+// is with the variance 0.3 px² taken out of discs that closed the surface.
+GaussianCloud Ball(double pixel, int64_t n = 6000) {
+  GaussianCloud cloud;
+  cloud.Resize(n, 0);
+  Random random(11);
+  const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
+  const double spacing = std::sqrt(4 * std::numbers::pi * 0.25 / static_cast<double>(n));  // radius one half
+  for (size_t i = 0; i < static_cast<size_t>(n); ++i) {
+    const double y = 1 - 2 * (static_cast<double>(i) + 0.5) / static_cast<double>(n), ring = std::sqrt(1 - y * y);
+    const double x = ring * std::cos(golden * static_cast<double>(i)),
+                 z = ring * std::sin(golden * static_cast<double>(i));
+    cloud.means[3 * i] = static_cast<float>(0.5 * x);
+    cloud.means[3 * i + 1] = static_cast<float>(0.5 * y);
+    cloud.means[3 * i + 2] = static_cast<float>(0.5 * z);
+    // Turns z onto the normal.
+    const double w = std::sqrt(0.5 * (1 + z)), s = w > 1e-6 ? 0.5 / w : 0;
+    cloud.quats[4 * i] = static_cast<float>(w);
+    cloud.quats[4 * i + 1] = static_cast<float>(-y * s);
+    cloud.quats[4 * i + 2] = static_cast<float>(x * s);
+    cloud.quats[4 * i + 3] = 0;
+    const double width = 0.9 * spacing * (1 + 0.2 * random.Normal());
+    const double eroded = std::sqrt(std::max(0.01 * width * width, width * width - 0.3 * pixel * pixel));
+    cloud.log_scales[3 * i] = cloud.log_scales[3 * i + 1] = static_cast<float>(std::log(eroded));
+    cloud.log_scales[3 * i + 2] = -9;
+    cloud.opacity_logits[i] = 3;
+    for (size_t c = 0; c < 3; ++c) cloud.sh[3 * i + c] = static_cast<float>(random.Uniform(-1, 1));
+  }
+  return cloud;
+}
+
+CameraSet CamerasForPixel(double pixel) {
+  const Pinhole intrinsics = PinholeFromFov(256, 256, std::numbers::pi / 4);
+  auto cameras = OrbitCameras(20, pixel * intrinsics.fx + 0.5, {0, 0, 0}, intrinsics);  // nearest point of the ball
+  return std::move(cameras).value();
+}
+
+TEST_F(EnhanceDoor, AutoIsTheFilterToday) {
+  const GaussianCloud ball = Ball(0.01);
+  EnhanceOptions options;
+  options.pixel_size = 0.01;
+  const auto enhanced = Enhance(ball, options);
+  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+  EXPECT_EQ(enhanced->report.method, "filter");
+  EXPECT_EQ(enhanced->report.gaussians_in, 6000);
+  EXPECT_EQ(enhanced->report.gaussians_out, 6000);
+  EXPECT_EQ(enhanced->report.dropped, 0);
+  EXPECT_DOUBLE_EQ(enhanced->report.filter_strength, DefaultFilterStrength(4));
+  GaussianCloud expected = ball;
+  ASSERT_TRUE(ApplyFilter(expected, std::vector<float>{0.01f}, {}).ok());
+  EXPECT_EQ(enhanced->cloud.log_scales, expected.log_scales);
+}
+
+TEST_F(EnhanceDoor, DropsBrokenRowsAndSaysSo) {
+  GaussianCloud ball = Ball(0.01);
+  ball.means[3] = std::nanf("");
+  ball.sh[6] = std::numeric_limits<float>::infinity();
+  EnhanceOptions options;
+  options.pixel_size = 0.01;
+  const auto enhanced = Enhance(ball, options);
+  ASSERT_TRUE(enhanced.ok());
+  EXPECT_EQ(enhanced->report.dropped, 2);
+  EXPECT_EQ(enhanced->cloud.size(), 5998);
+  EXPECT_TRUE(log_->Says("dropped 2 of 6,000")) << log_->text();
+  for (float& x : ball.means) x = std::nanf("");
+  EXPECT_FALSE(Enhance(ball, options).ok());
+  EXPECT_FALSE(Enhance(GaussianCloud{}, options).ok());
+}
+
+TEST_F(EnhanceDoor, LeavesAntialiasedSplatsAlone) {
+  GaussianCloud ball = Ball(0.01);
+  ball.render_mode = RenderMode::kAntialiased;
+  EnhanceOptions options;
+  options.pixel_size = 0.01;
+  auto enhanced = Enhance(ball, options);
+  ASSERT_TRUE(enhanced.ok());
+  EXPECT_EQ(enhanced->cloud.log_scales, ball.log_scales);
+  EXPECT_TRUE(log_->Says("antialiased")) << log_->text();
+  options.filter_strength = 0.7;
+  enhanced = Enhance(ball, options);
+  ASSERT_TRUE(enhanced.ok());
+  EXPECT_NE(enhanced->cloud.log_scales, ball.log_scales);
+}
+
+TEST_F(EnhanceDoor, PixelSizeFromCameras) {
+  EnhanceOptions options;
+  options.cameras = CamerasForPixel(0.01);
+  const auto enhanced = Enhance(Ball(0.01), options);
+  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+  EXPECT_EQ(enhanced->report.pixel_size_source, "cameras");
+  EXPECT_NEAR(enhanced->report.pixel_size, 0.0105, 0.0005);
+  options.pixel_size = 0.01;
+  EXPECT_FALSE(Enhance(Ball(0.01), options).ok());  // both
+}
+
+TEST_F(EnhanceDoor, WarnsWhenCamerasAreNotThoseOfTheSplat) {
+  EnhanceOptions options;
+  options.cameras = CamerasForPixel(0.05);
+  ASSERT_TRUE(Enhance(Ball(0.01), options).ok());
+  EXPECT_TRUE(log_->Says("are these its training cameras")) << log_->text();
+}
+
+TEST_F(EnhanceDoor, SaysWhichTrainingWidthItAssumes) {
+  EnhanceOptions options;
+  options.cameras = CamerasForPixel(0.01);
+  options.cameras->source = CameraSource::kColmap;
+  for (Camera& camera : options.cameras->cameras) camera.intrinsics = Scaled(camera.intrinsics, 3200.0 / 256);
+  auto enhanced = Enhance(Ball(0.01), options);
+  ASSERT_TRUE(enhanced.ok());
+  EXPECT_TRUE(log_->Says("1600")) << log_->text();
+  const double assumed = enhanced->report.pixel_size;
+  options.train_width = 3200;
+  enhanced = Enhance(Ball(0.01), options);
+  ASSERT_TRUE(enhanced.ok());
+  EXPECT_NEAR(enhanced->report.pixel_size, assumed / 2, 1e-6);
+  options.cameras.reset();
+  EXPECT_FALSE(Enhance(Ball(0.01), options).ok());  // a training width without cameras
+}
+
+TEST_F(EnhanceDoor, EstimateFollowsTheScaleOfTheCloud) {
+  const GaussianCloud ball = Ball(0.01);
+  const auto estimate = EstimatePixelSize(ball);
+  ASSERT_TRUE(estimate.ok()) << estimate.error().message;
+  EXPECT_GT(estimate->size, 0.003);
+  EXPECT_LT(estimate->size, 0.03);
+  EXPECT_LE(estimate->low, estimate->size);
+  EXPECT_GE(estimate->high, estimate->size);
+  GaussianCloud large = ball;
+  for (float& x : large.means) x *= 100;
+  for (float& x : large.log_scales) x += std::log(100.0f);
+  const auto scaled = EstimatePixelSize(large);
+  ASSERT_TRUE(scaled.ok());
+  EXPECT_NEAR(scaled->size / estimate->size, 100, 2);
+}
+
+TEST_F(EnhanceDoor, EstimateRefusesWhatSaysNothing) {
+  GaussianCloud few = Ball(0.01, 10);
+  EXPECT_FALSE(EstimatePixelSize(few).ok());
+  GaussianCloud invisible = Ball(0.01);
+  for (float& x : invisible.opacity_logits) x = -8;
+  EXPECT_FALSE(EstimatePixelSize(invisible).ok());
+  const auto enhanced = Enhance(few, EnhanceOptions{});
+  ASSERT_FALSE(enhanced.ok());
+  EXPECT_NE(enhanced.error().message.find("--pixel-size"), std::string::npos) << enhanced.error().message;
+}
+
+TEST_F(EnhanceDoor, RefusesNonsense) {
+  EnhanceOptions options;
+  options.pixel_size = 0.01;
+  options.method = "magic";
+  auto enhanced = Enhance(Ball(0.01), options);
+  ASSERT_FALSE(enhanced.ok());
+  EXPECT_NE(enhanced.error().message.find("filter"), std::string::npos);
+  options.method = "auto";
+  options.upscale = 0.9;
+  EXPECT_FALSE(Enhance(Ball(0.01), options).ok());
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -1,0 +1,108 @@
+#include "eval/view_source.h"
+
+#include <algorithm>
+#include <cctype>
+#include <utility>
+
+#include "core/text.h"
+#include "formats/image_io.h"
+#include "metrics/compare.h"
+#include "metrics/image_metrics.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+class SplatViews : public ViewSource {
+ public:
+  SplatViews(GaussianCloud cloud, CameraSet cameras, const RenderOptions& options)
+      : cloud_(std::move(cloud)), cameras_(std::move(cameras)), options_(options) {
+    for (const Camera& camera : cameras_.cameras) names_.push_back(camera.name);
+  }
+  const std::vector<std::string>& names() const override { return names_; }
+  bool is_pictures() const override { return false; }
+  Result<Image> Load(size_t view) override {
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud_, cameras_.cameras[view], options_, output_));
+    Image image = output_.color;
+    Clamp01(image);
+    return image;
+  }
+  void KeepOnly(size_t view) override {
+    cameras_.cameras = {cameras_.cameras[view]};
+    names_ = {names_[view]};
+  }
+
+ private:
+  GaussianCloud cloud_;
+  CameraSet cameras_;
+  RenderOptions options_;
+  Rasterizer rasterizer_;
+  RenderOutput output_;
+  std::vector<std::string> names_;
+};
+
+class ImageViews : public ViewSource {
+ public:
+  ImageViews(std::vector<fs::path> files, const std::array<float, 3>& background)
+      : files_(std::move(files)), background_(background) {
+    for (const fs::path& file : files_) names_.push_back(file.string());
+  }
+  const std::vector<std::string>& names() const override { return names_; }
+  bool is_pictures() const override { return true; }
+  Result<Image> Load(size_t view) override {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Image image, ReadImage(files_[view]));
+    return CompositeOver(image, background_);
+  }
+  void KeepOnly(size_t view) override {
+    files_ = {files_[view]};
+    names_ = {names_[view]};
+  }
+
+ private:
+  std::vector<fs::path> files_;
+  std::array<float, 3> background_;
+  std::vector<std::string> names_;
+};
+
+}  // namespace
+
+Result<size_t> FindView(const std::vector<std::string>& names, const std::string& name) {
+  std::vector<size_t> found;
+  for (size_t i = 0; i < names.size(); ++i) {
+    const fs::path path = names[i];
+    if (path == name || path.filename() == name || path.stem() == name) found.push_back(i);
+  }
+  if (found.size() == 1) return found[0];
+  return Error{ErrorCode::kBadArgument,
+               Cat(found.empty() ? "no view is called '" : "several views are called '", Printable(name),
+                   "' (there are ", names.size(), names.empty() ? "" : ", the first is " + names.front(), ")")};
+}
+
+std::unique_ptr<ViewSource> MakeSplatViews(GaussianCloud cloud, CameraSet cameras, const RenderOptions& options) {
+  return std::make_unique<SplatViews>(std::move(cloud), std::move(cameras), options);
+}
+
+Result<std::unique_ptr<ViewSource>> OpenImageViews(const fs::path& path, const std::array<float, 3>& background) {
+  std::vector<fs::path> files = {path};
+  if (fs::is_directory(path)) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(files, ListPictures(path));
+  } else if (!fs::exists(path)) {
+    return Error{ErrorCode::kNotFound, Cat(path.string(), ": no such file or folder")};
+  }
+  return std::unique_ptr<ViewSource>(std::make_unique<ImageViews>(std::move(files), background));
+}
+
+bool LooksLikeImages(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension == ".png" || extension == ".jpg" || extension == ".jpeg") return true;
+  std::error_code code;
+  if (!fs::is_directory(path, code)) return false;
+  const auto files = ListPictures(path);
+  return files.ok() && !files->empty();
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/camera.h"
+#include "core/gaussian_cloud.h"
+#include "core/image.h"
+#include "core/result.h"
+#include "render/rasterizer.h"
+
+namespace anchorsplat {
+
+// One side of a comparison: named pictures, rendered or read when asked for, so that a hundred views need the memory
+// of one.
+class ViewSource {
+ public:
+  virtual ~ViewSource() = default;
+  // Of the views, in the order of the cameras or sorted by file name; as the camera file or the folder has them.
+  virtual const std::vector<std::string>& names() const = 0;
+  virtual bool is_pictures() const = 0;  // files, not renders
+  // Three channels in 0–1: renders are clamped and not quantised, files are byte/255 over the background.
+  virtual Result<Image> Load(size_t view) = 0;
+  // Forgets all views but this one.
+  virtual void KeepOnly(size_t view) = 0;
+};
+
+// The view called `name`, with its folder and extension or without. kBadArgument when there is none, or several.
+Result<size_t> FindView(const std::vector<std::string>& names, const std::string& name);
+
+// Renders `cloud` through `cameras`.
+std::unique_ptr<ViewSource> MakeSplatViews(GaussianCloud cloud, CameraSet cameras, const RenderOptions& options);
+
+// A folder of PNG and JPEG pictures, or a single one. Errors: kNotFound, kBadFile (no pictures in the folder).
+Result<std::unique_ptr<ViewSource>> OpenImageViews(const std::filesystem::path& path,
+                                                   const std::array<float, 3>& background);
+
+// True for a folder of pictures and for a file named .png, .jpg or .jpeg: what OpenImageViews takes.
+bool LooksLikeImages(const std::filesystem::path& path);
+
+}  // namespace anchorsplat

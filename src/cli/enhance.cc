@@ -131,6 +131,13 @@ void AddEnhance(CLI::App& app, Program& program) {
                   "Image width in training where it was less than the cameras say")
       ->check(CLI::PositiveNumber)
       ->needs(cameras);
+  verb.add_option("--camera-rule", options.camera_rule,
+                  "Which of the views that hold a Gaussian says its pixel size: the smallest never blurs, the median "
+                  "suits objects seen from all around")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, CameraPixelRule>{
+          {"smallest", CameraPixelRule::kSmallest}, {"median", CameraPixelRule::kMedian}}))
+      ->default_str("smallest")
+      ->needs(cameras);
   verb.add_option("--filter-strength", options.filter_strength,
                   "Share of the absorbed 0.3 px² to give back (default: 1 - (1 - 1/upscale²)/3.6)");
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunEnhance(*flags, program.flags); }; });

@@ -9,7 +9,6 @@
 #include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/filter.h"
-#include "enhance/pixel_size.h"
 #include "enhance/pixel_size_estimate.h"
 
 namespace anchorsplat {
@@ -79,7 +78,7 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
     }
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes from_cameras,
-                               PixelSizesFromCameras(input.cloud, *options.cameras, train_width));
+                               PixelSizesFromCameras(input.cloud, *options.cameras, train_width, options.camera_rule));
   if (from_cameras.unseen > 0) {
     LogInfo(Cat(WithThousands(from_cameras.unseen), " of ", WithThousands(input.cloud.size()),
                 " Gaussians lie outside all views; their pixel size is that of the nearest camera"));

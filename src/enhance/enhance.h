@@ -10,6 +10,7 @@
 #include "core/camera.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
+#include "enhance/pixel_size.h"
 
 namespace anchorsplat {
 
@@ -21,6 +22,7 @@ struct EnhanceOptions {
   std::optional<double> pixel_size;       // p_LR for all Gaussians; from `cameras` or estimated otherwise
   std::optional<CameraSet> cameras;       // the training cameras
   std::optional<int> train_width;         // pixels; see AssumedTrainWidth
+  CameraPixelRule camera_rule = CameraPixelRule::kSmallest;
   uint64_t seed = 0;
 };
 

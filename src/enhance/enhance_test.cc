@@ -11,6 +11,7 @@
 #include "core/random.h"
 #include "enhance/filter.h"
 #include "enhance/pixel_size_estimate.h"
+#include "formats/cloud_io.h"
 
 namespace anchorsplat {
 namespace {
@@ -166,8 +167,6 @@ TEST_F(EnhanceDoor, EstimateFollowsTheScaleOfTheCloud) {
   const GaussianCloud ball = Ball(0.01);
   const auto estimate = EstimatePixelSize(ball);
   ASSERT_TRUE(estimate.ok()) << estimate.error().message;
-  EXPECT_GT(estimate->size, 0.003);
-  EXPECT_LT(estimate->size, 0.03);
   EXPECT_LE(estimate->low, estimate->size);
   EXPECT_GE(estimate->high, estimate->size);
   GaussianCloud large = ball;
@@ -176,6 +175,18 @@ TEST_F(EnhanceDoor, EstimateFollowsTheScaleOfTheCloud) {
   const auto scaled = EstimatePixelSize(large);
   ASSERT_TRUE(scaled.ok());
   EXPECT_NEAR(scaled->size / estimate->size, 100, 2);
+}
+
+// Two real fits whose training pixel is 1.7 / 309.02 px.
+TEST_F(EnhanceDoor, EstimateIsNearTheTruthOnRealFits) {
+  for (const char* object : {"biplane", "stone_lantern"}) {
+    const auto cloud = ReadCloud(std::string(ANCHORSPLAT_SOURCE_DIR) + "/examples/" + object + "/input.ply");
+    ASSERT_TRUE(cloud.ok()) << cloud.error().message;
+    const auto estimate = EstimatePixelSize(*cloud);
+    ASSERT_TRUE(estimate.ok());
+    EXPECT_GT(estimate->size, 0.6 * 0.0055013) << object;
+    EXPECT_LT(estimate->size, 1.25 * 0.0055013) << object;
+  }
 }
 
 TEST_F(EnhanceDoor, EstimateRefusesWhatSaysNothing) {

@@ -48,7 +48,7 @@ View MakeView(const Camera& camera, std::optional<int> train_width) {
 }  // namespace
 
 Result<CameraPixelSizes> PixelSizesFromCameras(const GaussianCloud& cloud, const CameraSet& cameras,
-                                               std::optional<int> train_width) {
+                                               std::optional<int> train_width, CameraPixelRule rule) {
   if (cameras.cameras.empty()) return Error{ErrorCode::kBadArgument, "no cameras to take the pixel size from"};
   if (train_width && *train_width < 1) {
     return Error{ErrorCode::kBadArgument, Cat("training width ", *train_width, " is not a number of pixels")};
@@ -61,26 +61,30 @@ Result<CameraPixelSizes> PixelSizesFromCameras(const GaussianCloud& cloud, const
   std::atomic<int64_t> unseen = 0;
   ParallelFor(0, cloud.size(), kRowsPerTask, [&](int64_t first, int64_t last) {
     int64_t missed = 0;
+    Buffer<float> seen;
     for (int64_t i = first; i < last; ++i) {
       const float* p = cloud.means.data() + 3 * i;
-      float smallest = std::numeric_limits<float>::infinity();
+      float size = std::numeric_limits<float>::infinity();
+      seen.clear();
       for (const View& v : views) {
         const float z = v.r[6] * p[0] + v.r[7] * p[1] + v.r[8] * p[2] + v.t[2];
         if (!(z > kNear)) continue;
         const float x = v.r[0] * p[0] + v.r[1] * p[1] + v.r[2] * p[2] + v.t[0];
         const float y = v.r[3] * p[0] + v.r[4] * p[1] + v.r[5] * p[2] + v.t[1];
         if (x < v.x0 * z || x > v.x1 * z || y < v.y0 * z || y > v.y1 * z) continue;
-        smallest = std::min(smallest, z / v.focal);
+        size = std::min(size, z / v.focal);
+        if (rule == CameraPixelRule::kMedian) seen.push_back(z / v.focal);
       }
-      if (!std::isfinite(smallest)) {
+      if (!seen.empty()) size = Quantile(seen, 0.5);
+      if (!std::isfinite(size)) {
         ++missed;
         for (const View& v : views) {
           const float d[3] = {p[0] - v.center[0], p[1] - v.center[1], p[2] - v.center[2]};
           const float distance = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-          if (distance > 0) smallest = std::min(smallest, distance / v.focal);
+          if (distance > 0) size = std::min(size, distance / v.focal);
         }
       }
-      out.sizes[static_cast<size_t>(i)] = smallest;
+      out.sizes[static_cast<size_t>(i)] = size;
     }
     unseen += missed;
   });

@@ -5,9 +5,10 @@
 
 namespace anchorsplat {
 
-// An estimate of p_LR, the world size of a training pixel, from the cloud alone. `low` and `high` hold the true value
-// in about 90 % of the fits it was checked on (docs/method.md). `size` already leans to the small side of the middle:
-// too small a pixel only gives back too little width, too large a one blurs.
+// An estimate of p_LR, the world size of a training pixel, from the cloud alone. The true value lies between `low` and
+// `high` for nearly all fits it was checked on (docs/method.md); they are far apart when the splat has little to say.
+// `size` already leans to the small side of the middle: too small a pixel only gives back too little width, too large a
+// one blurs.
 struct PixelSizeEstimate {
   double size = 0;  // world units
   double low = 0;

@@ -20,7 +20,7 @@ constexpr int kViews = 6;         // all sides
 constexpr int kRenderSize = 512;  // px; enough samples of the outline, and quick
 constexpr double kFieldOfView = std::numbers::pi / 4;
 constexpr float kTranslucentFrom = 0.7f, kTranslucentTo = 0.95f;
-constexpr int kSearchOctaves = 6;  // either way from the middle axis
+constexpr int kSearchOctaves = 3;  // either way from the middle axis
 
 // Value at which `share` of the total weight is reached. `items` are (value, weight).
 double WeightedQuantile(std::vector<std::pair<float, double>>& items, double share) {
@@ -129,8 +129,10 @@ Result<PixelSizeFeatures> ComputePixelSizeFeatures(const GaussianCloud& cloud) {
       best = next;
     }
   }
-  if (std::abs(best) >= kSearchOctaves) {
-    return Error{ErrorCode::kBadArgument, "no pixel size makes this splat crisp"};
+  if (std::abs(best) >= kSearchOctaves) {  // ran off: nothing opens and nothing closes within reason
+    features.crispest = features.middle_axis;
+    features.share = least;
+    return features;
   }
   for (const double half : {best - 0.5, best + 0.5}) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double value, share.At(size_at(half)));

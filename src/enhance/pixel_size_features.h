@@ -24,8 +24,8 @@ struct PixelSizeFeatures {
 // (world units at the middle of the cloud), seen from all sides: pixels with 0.7 < alpha < 0.95 over the sum of alpha.
 // The rendered picture itself always has the same resolution; it only samples.
 //
-// kBadArgument: fewer than kLeastGaussians usable Gaussians with an opacity of 10 % or more and three positive scales,
-// or no minimum between a sixty-fourth and sixty-four times the middle axis.
+// Splats without gaps at any pixel size have no minimum; `fall` is 0 then and `crispest` means nothing.
+// kBadArgument: fewer than kLeastGaussians usable Gaussians with an opacity of 10 % or more and three positive scales.
 inline constexpr int64_t kLeastGaussians = 16;
 Result<PixelSizeFeatures> ComputePixelSizeFeatures(const GaussianCloud& cloud);
 

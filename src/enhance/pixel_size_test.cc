@@ -45,6 +45,17 @@ TEST(PixelSizesFromCameras, SmallestOverTheViewsThatSeeIt) {
   EXPECT_FLOAT_EQ(sizes->median, 0.5f * (4.0f + 10.0f) / 50);
 }
 
+TEST(PixelSizesFromCameras, MedianOverTheViewsThatSeeIt) {
+  const GaussianCloud cloud = CloudAt({{0, 0, 4}, {9, 0, 4}, {0, 0, -20}});
+  CameraSet cameras;
+  cameras.cameras = {CameraAt(0), CameraAt(-6), CameraAt(-10)};
+  const auto sizes = PixelSizesFromCameras(cloud, cameras, std::nullopt, CameraPixelRule::kMedian);
+  ASSERT_TRUE(sizes.ok());
+  EXPECT_FLOAT_EQ(sizes->sizes[0], 10.0f / 50);  // of 4, 10 and 14
+  EXPECT_FLOAT_EQ(sizes->sizes[1], 12.0f / 50);  // of 10 and 14
+  EXPECT_FLOAT_EQ(sizes->sizes[2], 10.0f / 50);  // behind all: the nearest camera's distance
+}
+
 TEST(PixelSizesFromCameras, TrainWidthOnlyShrinks) {
   const GaussianCloud cloud = CloudAt({{0, 0, 5}});
   CameraSet cameras;

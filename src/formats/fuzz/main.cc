@@ -23,6 +23,11 @@
 #include "formats/fuzz/mutation.h"
 #include "formats/fuzz/readers.h"
 
+#if defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define __SANITIZE_ADDRESS__ 1  // clang asks in another way
+#endif
+#endif
 #if defined(__SANITIZE_ADDRESS__)
 // Inputs have a megabyte at most: a reader that asks for this much at once has believed a header.
 extern "C" const char* __asan_default_options() {  // NOLINT: the sanitizer's name

@@ -14,6 +14,7 @@
 #include "formats/fuzz/seeds.h"
 #include "formats/image_io.h"
 #include "formats/registry.h"
+#include "formats/tensor_file.h"
 
 namespace anchorsplat {
 
@@ -89,6 +90,36 @@ void AddSplatFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
   }
 }
 
+// Up to version 3, SPZ is one gzip stream, whose checksum refuses nearly every damage: here the content is damaged and
+// packed again.
+void AddSpzContent(const fs::path& folder, std::vector<FuzzReader>& readers) {
+  FuzzReader reader{
+      "SPZ in gzip", {}, {}, [](const std::string& bytes) { return ReadAsCloud("fuzz.spz", Gzip(bytes)); }};
+  for (int degree = 0; degree <= kMaxShDegree; ++degree) reader.seeds.push_back(SpzContentSeed(folder, degree));
+  readers.push_back(std::move(reader));
+}
+
+Status ReadAsTensors(const std::string& file, const std::string& bytes) {
+  Buffer<std::byte> copy(bytes.size());
+  if (!bytes.empty()) std::memcpy(copy.data(), bytes.data(), bytes.size());
+  const auto tensors = TensorFile::FromBytes(std::move(copy), file);
+  if (!tensors.ok()) return CheckError(tensors.error(), file);
+  for (const TensorEntry& entry : tensors->tensors()) {
+    // Strides may name one element many times over; who asks for a copy knows the shape it expects.
+    if (entry.bytes() > (int64_t{16} << 20)) continue;
+    const auto values = CopyContiguous(entry);
+    Require(!values.ok() || static_cast<int64_t>(values->size()) == entry.bytes(), "a tensor of another size");
+  }
+  return {};
+}
+
+void AddTensorFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
+  readers.push_back({"PyTorch checkpoint", TorchSeeds(), TorchWords(),
+                     [](const std::string& bytes) { return ReadAsTensors("fuzz.pth", bytes); }});
+  readers.push_back({"safetensors", SafetensorsSeeds(folder), JsonWords(),
+                     [](const std::string& bytes) { return ReadAsTensors("fuzz.safetensors", bytes); }});
+}
+
 void AddCameraFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
   const auto add = [&](const char* file, std::vector<std::string> seeds, std::vector<std::string_view> words) {
     readers.push_back({file, std::move(seeds), std::move(words),
@@ -131,6 +162,8 @@ void AddImageFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
 std::vector<FuzzReader> FuzzReaders(const fs::path& folder) {
   std::vector<FuzzReader> readers;
   AddSplatFormats(folder, readers);
+  AddSpzContent(folder, readers);
+  AddTensorFormats(folder, readers);
   AddCameraFormats(folder, readers);
   AddImageFormats(folder, readers);
   return readers;

@@ -1,5 +1,7 @@
 #include "formats/fuzz/seeds.h"
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -14,6 +16,9 @@
 #include "core/random.h"
 #include "core/text.h"
 #include "formats/image_io.h"
+#include "formats/safetensors.h"
+#include "formats/spz_writer.h"
+#include "formats/tensor_entry.h"
 
 namespace anchorsplat {
 
@@ -119,6 +124,11 @@ std::string Jpeg(bool progressive) {
   return bytes;
 }
 
+std::string Content(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
 constexpr char kMatrix[] = "[[1,0,0,0.5],[0,1,0,-2],[0,0,1,3],[0,0,0,1]]";
 
 }  // namespace
@@ -174,6 +184,59 @@ std::vector<std::string_view> PlyWords() {
           "element vertex 1000000000\n",
           "property list uchar int q\n",
           "\r\n"};
+}
+
+std::string SpzContentSeed(const std::filesystem::path& folder, int sh_degree) {
+  (void)WriteSpz(folder / "seed.spz", SeedCloud(5, sh_degree), {.overwrite = true, .spz_version = 3});
+  const std::string packed = Content(folder / "seed.spz");
+  std::string content(4096, '\0');  // 5 Gaussians have less
+  z_stream stream{};
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
+  stream.avail_in = static_cast<uInt>(packed.size());
+  stream.next_out = reinterpret_cast<Bytef*>(content.data());
+  stream.avail_out = static_cast<uInt>(content.size());
+  (void)inflateInit2(&stream, 31);  // 31: with the gzip header
+  (void)inflate(&stream, Z_FINISH);
+  content.resize(stream.total_out);
+  inflateEnd(&stream);
+  return content;
+}
+
+std::string Gzip(const std::string& content) {
+  z_stream stream{};
+  (void)deflateInit2(&stream, Z_BEST_SPEED, Z_DEFLATED, 31, 8, Z_DEFAULT_STRATEGY);
+  std::string packed(deflateBound(&stream, static_cast<uLong>(content.size())), '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(content.data()));
+  stream.avail_in = static_cast<uInt>(content.size());
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  (void)deflate(&stream, Z_FINISH);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  return packed;
+}
+
+std::vector<std::string> TorchSeeds() {
+  std::vector<std::string> seeds;
+  for (const char* name : {"ckpt_degree1.pt", "legacy.pth", "parameters.pth", "protocol4.pth", "state_dict.pth",
+                           "types.pth", "views.pth", "wrapped.pth"}) {
+    seeds.push_back(Content(std::filesystem::path(ANCHORSPLAT_SOURCE_DIR) / "testdata/tensors" / name));
+  }
+  return seeds;
+}
+
+std::vector<std::string_view> TorchWords() {
+  return {"torch",       "_utils",  "_rebuild_tensor_v2", "FloatStorage", "storage", "OrderedDict",
+          "collections", "archive", "data.pkl",           "PK",           "os",      "system"};
+}
+
+std::vector<std::string> SafetensorsSeeds(const std::filesystem::path& folder) {
+  const std::vector<float> values = {0, 1, 2, 3, 4, 5};
+  const std::vector<int64_t> integers = {7, -8};
+  const std::vector<TensorEntry> tensors = {MakeEntry("weights", {2, 3}, values), MakeEntry("steps", {2}, integers),
+                                            MakeEntry("nothing", {0, 4}, std::span<const float>())};
+  (void)WriteSafetensors(folder / "seed.safetensors", tensors, {{"format", "pt"}}, {.overwrite = true});
+  return {Content(folder / "seed.safetensors")};
 }
 
 std::vector<std::string> TransformsSeeds() {
@@ -257,8 +320,7 @@ std::vector<std::string> PngSeeds(const std::filesystem::path& folder) {
     Image image(7, 5, channels);
     for (size_t k = 0; k < image.pixels.size(); ++k) image.pixels[k] = static_cast<float>(k % 11) / 10;
     (void)WritePng(folder / "seed.png", image, {.overwrite = true});
-    std::ifstream in(folder / "seed.png", std::ios::binary);
-    seeds.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+    seeds.push_back(Content(folder / "seed.png"));
   }
   return seeds;
 }

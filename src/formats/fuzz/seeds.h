@@ -15,6 +15,14 @@ GaussianCloud SeedCloud(int64_t count, int sh_degree);
 std::vector<std::string> PlySeeds();  // both byte orders and ASCII, with doubles, lists, extra elements, CR LF
 std::vector<std::string_view> PlyWords();
 
+// An SPZ file of version 3 without the gzip around it, and the gzip.
+std::string SpzContentSeed(const std::filesystem::path& folder, int sh_degree);
+std::string Gzip(const std::string& content);
+
+std::vector<std::string> TorchSeeds();  // the checkpoints of testdata/ that are good ones
+std::vector<std::string_view> TorchWords();
+std::vector<std::string> SafetensorsSeeds(const std::filesystem::path& folder);
+
 std::vector<std::string> TransformsSeeds();
 std::vector<std::string> InriaCamerasSeeds();
 std::vector<std::string_view> JsonWords();

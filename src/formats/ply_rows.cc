@@ -130,7 +130,7 @@ Result<uint64_t> ReadListCount(SequentialReader& reader, const InputFile& file, 
   int64_t count = 0;
   switch (*property.list_count) {
     case PlyType::kInt8:
-      count = Load<int8_t>(bytes, false);
+      count = std::bit_cast<int8_t>(*bytes);
       break;
     case PlyType::kUint8:
       count = Load<uint8_t>(bytes, false);

@@ -116,7 +116,7 @@ Status WritePly(const std::filesystem::path& path, const GaussianCloud& cloud, c
       return;
     }
   });
-  ANCHORSPLAT_RETURN_IF_ERROR(failure);
+  if (!failure.ok()) return failure;
   return file.Commit();
 }
 

@@ -104,5 +104,34 @@ TEST(Blend, WhatTheBackwardPassNeedsMatchesPlainLoop) {
   }
 }
 
+TEST(Blend, ExponentialIsGoodToAMillionth) {
+  // One Gaussian of red 1, so wide that its α is its opacity everywhere: red is then α itself.
+  ProjectedGaussian g{};
+  g.u_xx = g.u_yy = 1e-9f;
+  g.rgb[0] = 1;
+  const std::vector<int64_t> offsets = {0, 1};
+  const std::vector<int32_t> pairs = {0};
+  std::vector<float> color(3 * 16), alpha(16);
+  BlendParams p{};
+  p.width = p.height = kBlock;
+  p.tiles_x = 1;
+  p.projected = &g;
+  p.tile_offsets = offsets.data();
+  p.pairs = pairs.data();
+  p.last_tile = 1;
+  p.color = color.data();
+  p.alpha = alpha.data();
+  double largest = 0;
+  for (int step = 0; step < 4000; ++step) {
+    g.log2_opacity = -0.01f - 0.00199f * static_cast<float>(step);
+    BlendCpu(p);
+    const double expected = std::exp2(double{g.log2_opacity});
+    for (int i = 0; i < 16; ++i) {
+      largest = std::max(largest, std::abs(color[static_cast<size_t>(i)] / expected - 1));
+    }
+  }
+  EXPECT_LT(largest, 1e-6);
+}
+
 }  // namespace
 }  // namespace anchorsplat

@@ -46,12 +46,12 @@ struct RenderStatistics {
 };
 
 // The 3DGS rasterizer on the CPU (Kerbl et al. 2023). Keeps its buffers, so one object per thread of control renders
-// many views without allocating: 64 + 28 bytes per Gaussian and 4 per pair. The result is bit-identical for every
-// number of threads.
+// many views without allocating: 100 bytes per Gaussian and 4 per pair listed at once. The result is bit-identical for
+// every number of threads.
 //
 // Two things follow gsplat in spirit rather than to the letter. Coordinates and covariances are calculated in double,
-// where gsplat's floats are good to a few 1e-4 at best for long thin Gaussians. The zero quaternion is the identity
-// (core/rotation.h), where gsplat divides by zero.
+// because in floats the determinant of a long thin Gaussian's covariance keeps only three or four digits. The zero
+// quaternion is the identity (core/rotation.h), where gsplat divides by zero.
 class Rasterizer {
  public:
   Rasterizer();

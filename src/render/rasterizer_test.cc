@@ -35,7 +35,7 @@ struct Difference {
   int64_t compared = 0, left_out = 0;      // pixels
 };
 
-// Compares every `step`-th pixel. A pixel where an α comes within 1e-4 of the 1/255 cut-off or a T within 1e-3 of the
+// Compares every `step`-th pixel. A pixel where an α comes within 1e-3 of the 1/255 cut-off or a T within 1e-3 of the
 // 1e-4 cut-off (both relative) is left out: rounding may decide either way there.
 Difference Compare(const RenderOutput& output, const GaussianCloud& cloud, const Camera& camera,
                    const RenderOptions& options, int64_t step = 1) {
@@ -118,7 +118,7 @@ TEST(Rasterizer, MatchesReferenceWithThousandsOfLayers) {
       largest = std::max(largest, std::abs(output.color.at(0, y, x) - expected.rgb[0]));
     }
   }
-  EXPECT_LE(largest, 4e-5);
+  EXPECT_LE(largest, 2e-5);
 }
 
 TEST(Rasterizer, NeedlesAndGiantsMatchReference) {

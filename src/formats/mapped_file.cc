@@ -30,7 +30,7 @@ Status ReadWhole(int descriptor, const std::filesystem::path& path, Buffer<std::
   while (done < out.size()) {
     const ssize_t got = read(descriptor, out.data() + done, out.size() - done);
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot be read: ", SystemMessage(errno))};
+    if (got < 0) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot read: ", SystemMessage(errno))};
     if (got == 0) {
       return Error{ErrorCode::kIo, Cat(path.string(), ": became shorter while it was being read")};
     }
@@ -45,17 +45,18 @@ Result<MappedFile> MappedFile::Open(const std::filesystem::path& path) {
   // O_NONBLOCK: opening a pipe that nobody writes to must not wait for ever; regular files ignore it.
   const Descriptor file{open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
   if (file.number < 0) {
-    const ErrorCode code = errno == ENOENT || errno == ENOTDIR ? ErrorCode::kNotFound : ErrorCode::kIo;
-    return Error{code, Cat(path.string(), ": cannot be opened: ", SystemMessage(errno))};
+    if (errno == ENOENT || errno == ENOTDIR) return Error{ErrorCode::kNotFound, Cat(path.string(), ": no such file")};
+    return Error{ErrorCode::kIo, Cat(path.string(), ": cannot open: ", SystemMessage(errno))};
   }
   struct stat info {};
   if (fstat(file.number, &info) != 0) {
-    return Error{ErrorCode::kIo, Cat(path.string(), ": cannot be examined: ", SystemMessage(errno))};
+    return Error{ErrorCode::kIo, Cat(path.string(), ": cannot read: ", SystemMessage(errno))};
   }
   if (!S_ISREG(info.st_mode)) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat(path.string(), S_ISDIR(info.st_mode) ? ": is a folder, a file was expected"
-                                                          : ": is not a regular file, so it cannot be mapped")};
+    return Error{
+        ErrorCode::kIo,
+        Cat(path.string(), S_ISDIR(info.st_mode) ? ": is a folder, expected a file"
+                                                 : ": is a pipe or a device, which cannot be mapped; expected a file")};
   }
   MappedFile mapped;
   if (info.st_size == 0) return mapped;

@@ -21,7 +21,7 @@ namespace anchorsplat {
 class MappedFile {
  public:
   // Maps a regular file. A file system that cannot map is read into memory instead.
-  // Errors: kNotFound; kBadArgument (a folder, a pipe or a device); kIo.
+  // Errors: kNotFound; kIo, also for folders, pipes and devices.
   static Result<MappedFile> Open(const std::filesystem::path& path);
   // The same view of bytes that are in memory already.
   static MappedFile FromBytes(Buffer<std::byte> bytes);

@@ -6,6 +6,7 @@
 
 #include "formats/compressed_ply_reader.h"
 #include "formats/compressed_ply_writer.h"
+#include "formats/gsplat_checkpoint.h"
 #include "formats/ply_reader.h"
 #include "formats/ply_writer.h"
 #include "formats/splat_reader.h"
@@ -30,6 +31,7 @@ bool IsZip(std::string_view head) { return head.starts_with("PK\x03\x04"); }
 constexpr std::string_view kCompressedPlyExtensions[] = {".compressed.ply"};
 constexpr std::string_view kPlyExtensions[] = {".ply"};
 constexpr std::string_view kSpzExtensions[] = {".spz"};
+constexpr std::string_view kGsplatExtensions[] = {".pt", ".pth"};
 constexpr std::string_view kSogExtensions[] = {".sog"};
 constexpr std::string_view kSplatExtensions[] = {".splat"};
 constexpr std::string_view kKsplatExtensions[] = {".ksplat"};
@@ -40,6 +42,7 @@ constexpr SplatFormat kFormats[] = {
     {"PLY", kPlyExtensions, IsPly, ReadPly, WritePly,
      [](int64_t count, int sh_degree) { return PredictedPlySize(count, sh_degree); }},
     {"SPZ", kSpzExtensions, IsSpz, ReadSpz, WriteSpz, nullptr},
+    {"gsplat checkpoint", kGsplatExtensions, IsTorchCheckpoint, ReadGsplatCheckpoint, nullptr, nullptr},
     {"SOG", kSogExtensions, IsZip, nullptr, nullptr, nullptr},
     {"splat", kSplatExtensions, nullptr, ReadSplat, WriteSplat, PredictedSplatSize, SplatOrder::kImportance},
     {"ksplat", kKsplatExtensions, nullptr, nullptr, nullptr, nullptr},

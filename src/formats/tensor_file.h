@@ -57,8 +57,8 @@ class Float32Values {
 //  * safetensors.
 class TensorFile {
  public:
-  // Errors: kNotFound, kIo; kBadArgument (not a regular file); kBadFile with path, byte and reason: cut off, damaged or
-  // hostile, unknown format, big-endian, TorchScript, two tensors of the same name.
+  // Errors: kNotFound; kIo, also for folders, pipes and devices; kBadFile with path, byte and reason: cut off, damaged
+  // or hostile, unknown format, big-endian, TorchScript, two tensors of the same name.
   static Result<TensorFile> Open(const std::filesystem::path& path);
   // The same for bytes in memory; `name` takes the place of the path in messages.
   static Result<TensorFile> FromBytes(Buffer<std::byte> bytes, std::string name);

@@ -153,8 +153,8 @@ TEST(TensorFile, MessagesSayWhatWasExpected) {
 
 TEST(TensorFile, OpeningFailsWithTheRightCode) {
   EXPECT_EQ(TensorFile::Open(TestPath("nowhere.pth")).error().code, ErrorCode::kNotFound);
-  EXPECT_EQ(TensorFile::Open(TestPath("")).error().code, ErrorCode::kBadArgument);
-  EXPECT_EQ(TensorFile::Open("/dev/null").error().code, ErrorCode::kBadArgument);
+  EXPECT_EQ(TensorFile::Open(TestPath("")).error().code, ErrorCode::kIo);
+  EXPECT_EQ(TensorFile::Open("/dev/null").error().code, ErrorCode::kIo);
   EXPECT_THAT(TensorFile::FromBytes({}, "x").error().message, HasSubstr("x: is empty"));
   EXPECT_THAT(TensorFile::FromBytes(tensor_bytes::ToBuffer("ply\nformat ascii 1.0\n"), "x").error().message,
               HasSubstr("neither a PyTorch checkpoint"));

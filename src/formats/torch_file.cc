@@ -19,7 +19,7 @@ namespace {
 // Bounds against graphs that name few bytes very often. A training checkpoint with optimiser state has some thousands
 // of values, five levels deep.
 constexpr int kMaxDepth = 32;
-constexpr size_t kMaxVisits = size_t{1} << 20;
+constexpr size_t kMaxVisits = size_t{1} << 18;
 constexpr size_t kMaxNameBytes = 1024;
 // A tensor with strides of 0 has more elements than its storage; this many are allowed when it does.
 constexpr int64_t kMaxRepeatedElements = int64_t{1} << 20;

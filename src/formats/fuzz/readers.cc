@@ -86,6 +86,10 @@ void AddSplatFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
       for (std::string& seed : PlySeeds()) reader.seeds.push_back(std::move(seed));
       reader.words = PlyWords();
     }
+    if (format.name == "gsplat checkpoint") {
+      reader.seeds = GsplatSeeds();
+      reader.words = TorchWords();
+    }
     if (!reader.seeds.empty()) readers.push_back(std::move(reader));
   }
 }
@@ -109,6 +113,8 @@ Status ReadAsTensors(const std::string& file, const std::string& bytes) {
     if (entry.bytes() > (int64_t{16} << 20)) continue;
     const auto values = CopyContiguous(entry);
     Require(!values.ok() || static_cast<int64_t>(values->size()) == entry.bytes(), "a tensor of another size");
+    Require(CopyFloat32(entry).ok() || CopyInt64(entry).ok() || entry.type == TensorType::kUint64,
+            "a tensor without numbers");
   }
   return {};
 }

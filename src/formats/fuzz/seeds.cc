@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <initializer_list>
 #include <iterator>
 
 // Behind <cstdio>: it needs FILE.
@@ -129,6 +130,14 @@ std::string Content(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
+std::vector<std::string> TestFiles(std::initializer_list<const char*> names) {
+  std::vector<std::string> files;
+  for (const char* name : names) {
+    files.push_back(Content(std::filesystem::path(ANCHORSPLAT_SOURCE_DIR) / "testdata/tensors" / name));
+  }
+  return files;
+}
+
 constexpr char kMatrix[] = "[[1,0,0,0.5],[0,1,0,-2],[0,0,1,3],[0,0,0,1]]";
 
 }  // namespace
@@ -217,17 +226,38 @@ std::string Gzip(const std::string& content) {
 }
 
 std::vector<std::string> TorchSeeds() {
-  std::vector<std::string> seeds;
-  for (const char* name : {"ckpt_degree1.pt", "legacy.pth", "parameters.pth", "protocol4.pth", "state_dict.pth",
-                           "types.pth", "views.pth", "wrapped.pth"}) {
-    seeds.push_back(Content(std::filesystem::path(ANCHORSPLAT_SOURCE_DIR) / "testdata/tensors" / name));
-  }
-  return seeds;
+  return TestFiles({"ckpt_degree1.pt", "legacy.pth", "parameters.pth", "protocol4.pth", "state_dict.pth", "types.pth",
+                    "views.pth", "wrapped.pth"});
 }
 
+std::vector<std::string> GsplatSeeds() { return TestFiles({"ckpt_degree0.pt", "ckpt_degree1.pt", "ckpt_degree3.pt"}); }
+
 std::vector<std::string_view> TorchWords() {
-  return {"torch",       "_utils",  "_rebuild_tensor_v2", "FloatStorage", "storage", "OrderedDict",
-          "collections", "archive", "data.pkl",           "PK",           "os",      "system"};
+  return {"torch",
+          "_utils",
+          "_rebuild_tensor_v2",
+          "FloatStorage",
+          "storage",
+          "OrderedDict",
+          "collections",
+          "archive",
+          "data.pkl",
+          "PK",
+          "os",
+          "system",
+          "ctorch\nDoubleStorage\n",
+          "ccollections\nOrderedDict\n)R",
+          "(",
+          "Q",
+          "R",
+          "b",
+          "e",
+          "t",
+          "u",
+          "]",
+          "}",
+          "\x8a\x08\xff\xff\xff\xff\xff\xff\xff\x7f",
+          "\x8a\x01\xff"};
 }
 
 std::vector<std::string> SafetensorsSeeds(const std::filesystem::path& folder) {

@@ -19,8 +19,9 @@ std::vector<std::string_view> PlyWords();
 std::string SpzContentSeed(const std::filesystem::path& folder, int sh_degree);
 std::string Gzip(const std::string& content);
 
-std::vector<std::string> TorchSeeds();  // the checkpoints of testdata/ that are good ones
-std::vector<std::string_view> TorchWords();
+std::vector<std::string> TorchSeeds();       // the checkpoints of testdata/ that are good ones
+std::vector<std::string> GsplatSeeds();      // those with Gaussians
+std::vector<std::string_view> TorchWords();  // what pickles mention, and opcodes
 std::vector<std::string> SafetensorsSeeds(const std::filesystem::path& folder);
 
 std::vector<std::string> TransformsSeeds();

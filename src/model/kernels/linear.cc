@@ -2,7 +2,9 @@
 
 #include <algorithm>
 
+#include "core/buffer.h"
 #include "core/parallel.h"
+#include "model/kernels/bfloat16_tile.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "model/kernels/linear.cc"
@@ -45,49 +47,77 @@ void AddRows(int64_t rows, int64_t columns, const float* const* added, float* co
   }
 }
 
-void LinearRows(const LinearParams& p, int64_t begin, int64_t end) {
-  const PackedWeights& w = *p.weights;
-  const int64_t panel_stride = w.inputs() * PackedWeights::kPanel;
+// Rows [begin, end) in tiles of at most `tile_rows` and `tile_columns`, whose products `multiply(row, rows, column,
+// columns, added, out)` computes.
+template <typename Multiply>
+void LinearTiles(const LinearParams& p, int64_t begin, int64_t end, int64_t tile_rows, int64_t tile_columns,
+                 const Multiply& multiply) {
   // A residual joins the sums in registers unless an activation stands between.
   const bool residual_inside = p.residual != nullptr && p.activation == Activation::kNone;
-  for (int64_t column = 0; column < w.outputs(); column += kTileColumns) {
-    const int64_t columns = std::min(kTileColumns, w.outputs() - column);
-    for (int64_t row = begin; row < end; row += kTileRows) {
-      const int64_t rows = std::min<int64_t>(kTileRows, end - row);
-      float* out[kTileRows];
-      const float* added[kTileRows];
+  const bool residual_after = p.residual != nullptr && !residual_inside;
+  constexpr int64_t kMostColumns = 2 * PackedWeights::kPanel;
+  for (int64_t column = 0; column < p.weights->outputs(); column += tile_columns) {
+    const int64_t columns = std::min(tile_columns, p.weights->outputs() - column);
+    for (int64_t row = begin; row < end; row += tile_rows) {
+      const int64_t rows = std::min<int64_t>(tile_rows, end - row);
+      float* out[kMostTileRows];
+      const float* added[kMostTileRows];
       for (int64_t r = 0; r < rows; ++r) {
         out[r] = p.out + (row + r) * p.output_stride + column;
         added[r] = p.residual != nullptr ? p.residual + (row + r) * p.output_stride + column : nullptr;
       }
-      const bool separate = p.residual != nullptr && !residual_inside;
-      float kept[kTileRows][kTileColumns];  // the residual may be where the sums go
-      if (separate) {
+      float kept[kMostTileRows][kMostColumns];  // the residual may be where the sums go
+      if (residual_after) {
         for (int64_t r = 0; r < rows; ++r) {
           std::copy_n(added[r], columns, kept[r]);
           added[r] = kept[r];
         }
       }
-      MultiplyTile(rows, columns,
-                   {.depth = w.inputs(),
-                    .input = p.input + row * p.input_stride,
-                    .stride = p.input_stride,
-                    .weights = w.panel(0, column / PackedWeights::kPanel),
-                    .panel_stride = panel_stride,
-                    .bias = w.bias() + column,
-                    .added = residual_inside ? added : nullptr,
-                    .out = out});
+      multiply(row, rows, column, columns, residual_inside ? added : nullptr, out);
       if (p.activation != Activation::kNone) Activate(p.activation, rows, columns, out);
-      if (separate) AddRows(rows, columns, added, out);
+      if (residual_after) AddRows(rows, columns, added, out);
     }
   }
 }
 
-int64_t RowsPerTask(int64_t depth) {
-  // Its inputs should stay in the second cache while the weights stream by.
-  constexpr int64_t kInputBytes = int64_t{256} << 10;
-  const int64_t tiles = kInputBytes / (int64_t{4} * kTileRows * std::max<int64_t>(1, depth));
-  return kTileRows * std::clamp<int64_t>(tiles, 2, 16);
+void LinearRows(const LinearParams& p, int64_t begin, int64_t end) {
+  const PackedWeights& w = *p.weights;
+  LinearTiles(
+      p, begin, end, kTileRows, kTileColumns,
+      [&](int64_t row, int64_t rows, int64_t column, int64_t columns, const float* const* added, float* const* out) {
+        MultiplyTile(rows, columns,
+                     {.depth = w.inputs(),
+                      .input = p.input + row * p.input_stride,
+                      .stride = p.input_stride,
+                      .weights = w.panel(0, column / PackedWeights::kPanel),
+                      .panel_stride = w.inputs() * PackedWeights::kPanel,
+                      .bias = w.bias() + column,
+                      .added = added,
+                      .out = out});
+      });
+}
+
+// The same with inputs rounded to bfloat16 into `rounded`.
+void LinearRowsBFloat16(const LinearParams& p, int64_t begin, int64_t end, Buffer<BFloat16Pair>& rounded) {
+  const PackedWeights& w = *p.weights;
+  const BFloat16Product product = ChooseBFloat16Product();
+  rounded.resize(static_cast<size_t>((end - begin) * w.pairs()));
+  for (int64_t row = begin; row < end; ++row) {
+    RoundToPairs(p.input + row * p.input_stride, w.inputs(), rounded.data() + (row - begin) * w.pairs());
+  }
+  LinearTiles(
+      p, begin, end, product.rows, product.columns,
+      [&](int64_t row, int64_t rows, int64_t column, int64_t columns, const float* const* added, float* const* out) {
+        product.multiply(rows, columns,
+                         {.depth = w.pairs(),
+                          .input = rounded.data() + (row - begin) * w.pairs(),
+                          .stride = w.pairs(),
+                          .weights = w.pair_panel(0, column / PackedWeights::kPanel),
+                          .panel_stride = w.pairs() * PackedWeights::kPanel,
+                          .bias = w.bias() + column,
+                          .added = added,
+                          .out = out});
+      });
 }
 
 // NOLINTNEXTLINE(google-readability-namespace-comments)
@@ -99,12 +129,34 @@ HWY_AFTER_NAMESPACE();
 namespace anchorsplat {
 
 HWY_EXPORT(LinearRows);
-HWY_EXPORT(RowsPerTask);
+HWY_EXPORT(LinearRowsBFloat16);
+
+namespace {
+
+// A multiple of every tile's rows, so that only the last tile of all is not full. The inputs of a task should stay in
+// the second cache while the weights stream by; what a row becomes does not depend on its task.
+int64_t RowsPerTask(int64_t rows, int64_t depth) {
+  constexpr int64_t kTiles = 2 * 3 * 7;  // of 2, 6 or 14 rows
+  constexpr int64_t kInputBytes = int64_t{256} << 10;
+  int64_t tasks = std::clamp<int64_t>(kInputBytes / (4 * kTiles * std::max<int64_t>(1, depth)), 1, 5);
+  while (tasks > 1 && rows / (kTiles * tasks) < 4 * ThreadCount()) --tasks;
+  return kTiles * tasks;
+}
+
+}  // namespace
 
 void LinearCpu(const LinearParams& p) {
+  const int64_t rows_per_task = RowsPerTask(p.rows, p.weights->inputs());
+  if (p.weights->precision() == WeightPrecision::kBFloat16) {
+    const auto rows = HWY_DYNAMIC_DISPATCH(LinearRowsBFloat16);
+    ParallelFor(0, p.rows, rows_per_task, [&](int64_t begin, int64_t end) {
+      thread_local Buffer<BFloat16Pair> rounded;
+      rows(p, begin, end, rounded);
+    });
+    return;
+  }
   const auto rows = HWY_DYNAMIC_DISPATCH(LinearRows);
-  ParallelFor(0, p.rows, HWY_DYNAMIC_DISPATCH(RowsPerTask)(p.weights->inputs()),
-              [&](int64_t begin, int64_t end) { rows(p, begin, end); });
+  ParallelFor(0, p.rows, rows_per_task, [&](int64_t begin, int64_t end) { rows(p, begin, end); });
 }
 
 }  // namespace anchorsplat

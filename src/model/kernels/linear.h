@@ -8,7 +8,8 @@ namespace anchorsplat {
 
 enum class Activation : uint8_t { kNone, kRelu, kGelu };
 
-// out = activation(x · Wᵀ + b) + residual, the linear layers of the network in fp32.
+// out = activation(x · Wᵀ + b) + residual, the linear layers of the network, in fp32 or with
+// weights and inputs rounded to bfloat16 (packed_weights.h).
 struct LinearParams {
   int64_t rows;                  // N
   const float* input;            // [N, weights.inputs()], rows `input_stride` floats apart

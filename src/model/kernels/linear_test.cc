@@ -36,7 +36,15 @@ struct Layer {
   int64_t rows, inputs, outputs;
   Activation activation;
   std::vector<float> x, w, b, residual;
+  WeightPrecision precision = WeightPrecision::kFloat;
 };
+
+// To 8 significant bits, ties to even.
+double BFloat16(double x) {
+  if (x == 0 || !std::isfinite(x)) return x;
+  const double unit = std::ldexp(1.0, std::ilogb(x) - 7);
+  return std::nearbyint(x / unit) * unit;
+}
 
 Layer RandomLayer(int64_t rows, int64_t inputs, int64_t outputs, Activation activation, bool residual) {
   Random random(static_cast<uint64_t>(rows * 7919 + inputs * 31 + outputs));
@@ -51,7 +59,7 @@ Layer RandomLayer(int64_t rows, int64_t inputs, int64_t outputs, Activation acti
 }
 
 std::vector<float> Apply(const Layer& l, bool in_place = false) {
-  const PackedWeights weights(l.w.data(), l.b.data(), l.outputs, l.inputs);
+  const PackedWeights weights(l.w.data(), l.b.data(), l.outputs, l.inputs, 1, l.precision);
   std::vector<float> out(static_cast<size_t>(l.rows * l.outputs), -77.0f);
   if (in_place) out = l.residual;
   LinearCpu({.rows = l.rows,
@@ -70,8 +78,9 @@ std::vector<float> Apply(const Layer& l, bool in_place = false) {
 double Reference(const Layer& l, int64_t row, int64_t column) {
   double sum = l.b[static_cast<size_t>(column)];
   for (int64_t k = 0; k < l.inputs; ++k) {
-    sum += static_cast<double>(l.x[static_cast<size_t>(row * l.inputs + k)]) *
-           l.w[static_cast<size_t>(column * l.inputs + k)];
+    const double x = l.x[static_cast<size_t>(row * l.inputs + k)];
+    const double w = l.w[static_cast<size_t>(column * l.inputs + k)];
+    sum += l.precision == WeightPrecision::kBFloat16 ? BFloat16(x) * BFloat16(w) : x * w;
   }
   sum = Activated(l.activation, sum);
   return l.residual.empty() ? sum : sum + l.residual[static_cast<size_t>(row * l.outputs + column)];
@@ -94,6 +103,20 @@ TEST(Linear, MatchesReferenceForEveryTileRemainder) {
       for (int64_t outputs : {1, 15, 16, 17, 32, 33, 48, 60, 80}) {
         const Layer l = RandomLayer(rows, 19, outputs, Activation::kNone, false);
         ExpectReference(l, Apply(l));
+      }
+    }
+  });
+}
+
+TEST(Linear, MatchesReferenceInBFloat16) {
+  ForEachSimdTarget([] {
+    for (int64_t rows = 1; rows <= 30; ++rows) {
+      for (int64_t outputs : {1, 16, 17, 32, 45, 80}) {
+        for (int64_t inputs : {1, 18, 33}) {
+          Layer l = RandomLayer(rows, inputs, outputs, Activation::kGelu, true);
+          l.precision = WeightPrecision::kBFloat16;
+          ExpectReference(l, Apply(l));
+        }
       }
     }
   });
@@ -126,24 +149,30 @@ TEST(Linear, NoRowsAndNoInputs) {
 }
 
 TEST(Linear, SameBitsForAnyNumberOfThreads) {
-  const Layer l = RandomLayer(1000, 96, 96, Activation::kGelu, true);
-  SetThreadCount(1);
-  const std::vector<float> one = Apply(l);
-  for (int threads : {2, 5}) {
-    SetThreadCount(threads);
-    const std::vector<float> many = Apply(l);
-    EXPECT_EQ(0, std::memcmp(one.data(), many.data(), one.size() * sizeof(float))) << threads;
+  for (WeightPrecision precision : {WeightPrecision::kFloat, WeightPrecision::kBFloat16}) {
+    Layer l = RandomLayer(1000, 96, 96, Activation::kGelu, true);
+    l.precision = precision;
+    SetThreadCount(1);
+    const std::vector<float> one = Apply(l);
+    for (int threads : {2, 5}) {
+      SetThreadCount(threads);
+      const std::vector<float> many = Apply(l);
+      EXPECT_EQ(0, std::memcmp(one.data(), many.data(), one.size() * sizeof(float))) << threads;
+    }
   }
   SetThreadCount(0);
 }
 
 TEST(Linear, NanStaysInItsRow) {
   ForEachSimdTarget([] {
-    for (Activation activation : {Activation::kNone, Activation::kRelu, Activation::kGelu}) {
-      Layer l = RandomLayer(20, 16, 24, activation, true);
-      l.x[5 * 16 + 3] = std::numeric_limits<float>::quiet_NaN();
-      const std::vector<float> out = Apply(l);
-      for (size_t i = 0; i < out.size(); ++i) ASSERT_EQ(std::isnan(out[i]), i / 24 == 5) << i;
+    for (WeightPrecision precision : {WeightPrecision::kFloat, WeightPrecision::kBFloat16}) {
+      for (Activation activation : {Activation::kNone, Activation::kRelu, Activation::kGelu}) {
+        Layer l = RandomLayer(20, 16, 24, activation, true);
+        l.precision = precision;
+        l.x[5 * 16 + 3] = std::numeric_limits<float>::quiet_NaN();
+        const std::vector<float> out = Apply(l);
+        for (size_t i = 0; i < out.size(); ++i) ASSERT_EQ(std::isnan(out[i]), i / 24 == 5) << i;
+      }
     }
   });
 }

@@ -11,6 +11,7 @@
 
 #include <cstdint>
 
+#include "model/kernels/matrix_tile.h"
 #include "model/kernels/packed_weights.h"
 #include "model/kernels/unroll.h"
 
@@ -38,20 +39,10 @@ inline constexpr int kTileRows = 2;
 #endif
 inline constexpr int64_t kTileColumns = kTilePanels * PackedWeights::kPanel;
 
-// One product of a tile: out[r] = (bias or 0) + (added[r] or 0) + Σ_k input[r·stride + k] · weights[k].
-struct Tile {
-  int64_t depth;              // K
-  const float* input;         // rows of K values
-  int64_t stride;             // from row to row of `input`
-  const float* weights;       // panels [K][kPanel]
-  int64_t panel_stride;       // from panel to panel
-  const float* bias;          // [columns] or null
-  const float* const* added;  // [rows] where the addends of each row begin, or null
-  float* const* out;          // [rows] where the sums of each row go
-};
+static_assert(kTileRows <= kMostTileRows);
 
 template <int kRows, int kPanels>
-HWY_INLINE void MultiplyTile(const Tile& t) {
+HWY_INLINE void MultiplyTile(const Tile<float>& t) {
   const TileTag d;
   using V = hn::VFromD<TileTag>;
   constexpr int kLanes = static_cast<int>(HWY_MIN(HWY_LANES(float), size_t{PackedWeights::kPanel}));
@@ -112,46 +103,23 @@ HWY_INLINE void MultiplyTile(const Tile& t) {
 }
 
 template <int kRows, int kPanels>
-HWY_NOINLINE void MultiplyTileOutOfLine(const Tile& t) {
+HWY_NOINLINE void MultiplyTileOutOfLine(const Tile<float>& t) {
   MultiplyTile<kRows, kPanels>(t);
 }
 
 // `rows` ≤ kRows.
 template <int kPanels, int kRows = kTileRows>
-HWY_INLINE void MultiplyRows(int64_t rows, const Tile& t) {
+HWY_INLINE void MultiplyRows(int64_t rows, const Tile<float>& t) {
   if constexpr (kRows > 1) {
     if (rows < kRows) return MultiplyRows<kPanels, kRows - 1>(rows, t);
   }
   MultiplyTileOutOfLine<kRows, kPanels>(t);
 }
 
-// A tile of rows ≤ kTileRows and columns ≤ kTileColumns; columns that are no whole number of panels take the longer
-// way.
-HWY_INLINE void MultiplyTile(int64_t rows, int64_t columns, Tile t) {
+// A tile of rows ≤ kTileRows and columns ≤ kTileColumns.
+HWY_INLINE void MultiplyTile(int64_t rows, int64_t columns, const Tile<float>& t) {
   if (columns == kTileColumns) return MultiplyRows<kTilePanels>(rows, t);
-  if (columns == PackedWeights::kPanel) return MultiplyRows<1>(rows, t);
-  // The last panel is partly beyond the matrix: let the tile write it whole next door.
-  const int64_t whole = columns / PackedWeights::kPanel * PackedWeights::kPanel;
-  float* outs[kTileRows];
-  const float* addends[kTileRows];
-  if (whole > 0) MultiplyRows<1>(rows, t);
-  alignas(64) float rest[kTileRows][PackedWeights::kPanel];
-  for (int64_t r = 0; r < rows; ++r) {
-    outs[r] = rest[r];
-    for (int64_t c = 0; c < PackedWeights::kPanel; ++c) {
-      rest[r][c] = t.added != nullptr && whole + c < columns ? t.added[r][whole + c] : 0.0f;
-    }
-    addends[r] = rest[r];
-  }
-  Tile last = t;
-  last.weights += whole / PackedWeights::kPanel * t.panel_stride;
-  if (t.bias != nullptr) last.bias += whole;
-  last.added = addends;
-  last.out = outs;
-  MultiplyRows<1>(rows, last);
-  for (int64_t r = 0; r < rows; ++r) {
-    for (int64_t c = whole; c < columns; ++c) t.out[r][c] = rest[r][c - whole];
-  }
+  MultiplyPartialPanels(rows, columns, t, [](int64_t n, const Tile<float>& panel) { MultiplyRows<1>(n, panel); });
 }
 
 // NOLINTNEXTLINE(google-readability-namespace-comments)

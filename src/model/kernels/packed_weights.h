@@ -6,11 +6,23 @@
 
 namespace anchorsplat {
 
+// Two consecutive inputs in bfloat16, as the processor's dot products take them.
+struct BFloat16Pair {
+  uint16_t first;
+  uint16_t second;
+};
+
+enum class WeightPrecision : uint8_t {
+  kFloat,
+  kBFloat16,  // weights and inputs are rounded to bfloat16, the sums stay in fp32
+};
+
 // The matrices of a linear layer or of a convolution in the order in which the matrix kernels read them. Made once per
 // model: the kernels then stream through memory instead of striding over it.
 //
-// A panel holds kPanel output channels: [inputs][kPanel], channel fastest. Panels of a tap stand one after the other;
-// channels beyond the last are zeros. The layout is the same for every SIMD width.
+// A panel holds kPanel output channels: [inputs][kPanel], channel fastest, or [pairs of inputs][kPanel] in bfloat16.
+// Panels of a tap stand one after the other; channels beyond the last, and the second half of a last pair of an odd
+// number of inputs, are zeros. The layout is the same for every SIMD width.
 class PackedWeights {
  public:
   static constexpr int64_t kPanel = 16;
@@ -19,22 +31,30 @@ class PackedWeights {
 
   // `weights` as PyTorch stores them, [outputs, taps, inputs] row-major: a linear layer has one tap, a 3×3×3
   // convolution 27. `bias` [outputs] may be null: zeros.
-  PackedWeights(const float* weights, const float* bias, int64_t outputs, int64_t inputs, int64_t taps = 1);
+  PackedWeights(const float* weights, const float* bias, int64_t outputs, int64_t inputs, int64_t taps = 1,
+                WeightPrecision precision = WeightPrecision::kFloat);
 
   int64_t outputs() const { return outputs_; }
   int64_t inputs() const { return inputs_; }
   int64_t taps() const { return taps_; }
+  WeightPrecision precision() const { return precision_; }
   int64_t panels() const { return (outputs_ + kPanel - 1) / kPanel; }
-  const float* panel(int64_t tap, int64_t index) const {
+  const float* panel(int64_t tap, int64_t index) const {  // kFloat
     return values_.data() + (tap * panels() + index) * inputs_ * kPanel;
   }
+  const BFloat16Pair* pair_panel(int64_t tap, int64_t index) const {  // kBFloat16
+    return pairs_.data() + (tap * panels() + index) * pairs() * kPanel;
+  }
+  int64_t pairs() const { return (inputs_ + 1) / 2; }
   const float* bias() const { return bias_.data(); }  // [panels()·kPanel], zeros beyond the last output
 
  private:
   int64_t outputs_ = 0;
   int64_t inputs_ = 0;
   int64_t taps_ = 0;
+  WeightPrecision precision_ = WeightPrecision::kFloat;
   Buffer<float> values_;
+  Buffer<BFloat16Pair> pairs_;
   Buffer<float> bias_;
 };
 

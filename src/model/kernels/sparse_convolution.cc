@@ -5,6 +5,7 @@
 
 #include "core/buffer.h"
 #include "core/parallel.h"
+#include "model/kernels/bfloat16_tile.h"
 #include "model/kernels/voxel_neighbours.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -28,7 +29,8 @@ constexpr int64_t kConvolutionColumns = 256;
 struct ConvolutionScratch {
   int32_t targets[kConvolutionRows];
   int32_t sources[kConvolutionRows];
-  Buffer<float> gathered;  // inputs of one tile
+  Buffer<float> gathered;        // inputs of one tile
+  Buffer<BFloat16Pair> rounded;  // the same in bfloat16
 };
 
 }  // namespace anchorsplat
@@ -38,15 +40,16 @@ HWY_BEFORE_NAMESPACE();
 namespace anchorsplat {
 namespace HWY_NAMESPACE {
 
-// Rows [begin, end) and output channels [first, last) of the convolution.
-void ConvolveBlock(const SparseConvolutionParams& p, int64_t begin, int64_t end, int64_t first, int64_t last,
-                   ConvolutionScratch& scratch) {
+// Rows [begin, end) and output channels [first, last) of the convolution, in tiles of at most `tile_rows` and
+// `tile_columns`. `gather(slot, row)` puts the inputs of a row into a slot of the tile, `multiply(k, column, rows,
+// columns, out)` adds the products of the tile to the sums.
+template <typename Gather, typename Multiply>
+void ConvolveTiles(const SparseConvolutionParams& p, int64_t begin, int64_t end, int64_t first, int64_t last,
+                   int64_t tile_rows, int64_t tile_columns, ConvolutionScratch& scratch, const Gather& gather,
+                   const Multiply& multiply) {
   const PackedWeights& w = *p.weights;
-  const int64_t inputs = w.inputs();
-  const int64_t outputs = w.outputs();
-  scratch.gathered.resize(static_cast<size_t>(kTileRows * inputs));
   for (int64_t row = begin; row < end; ++row) {
-    std::copy(w.bias() + first, w.bias() + last, p.out + row * outputs + first);
+    std::copy(w.bias() + first, w.bias() + last, p.out + row * w.outputs() + first);
   }
   for (int k = 0; k < kNeighbours; ++k) {
     int64_t pairs = 0;
@@ -56,39 +59,68 @@ void ConvolveBlock(const SparseConvolutionParams& p, int64_t begin, int64_t end,
       scratch.sources[pairs] = source;
       pairs += source != kNoNeighbour;
     }
-    // The centre of all rows is a plain matrix product.
-    const bool dense = k == kCentre && pairs == end - begin;
-    for (int64_t i = 0; i < pairs; i += kTileRows) {
-      const int64_t rows = std::min<int64_t>(kTileRows, pairs - i);
-      const float* input = p.input + (begin + i) * inputs;
-      if (!dense) {
-        input = scratch.gathered.data();
-        for (int64_t r = 0; r < rows; ++r) {
-          std::memcpy(scratch.gathered.data() + r * inputs, p.input + scratch.sources[i + r] * inputs,
-                      static_cast<size_t>(inputs) * sizeof(float));
-        }
-        // The rows of the next tile come nearer meanwhile.
-        for (int64_t r = i + rows; r < std::min(pairs, i + 2 * kTileRows); ++r) {
-          const float* ahead = p.input + scratch.sources[r] * inputs;
-          for (int64_t c = 0; c < inputs; c += 64 / sizeof(float)) hwy::Prefetch(ahead + c);
-        }
+    for (int64_t i = 0; i < pairs; i += tile_rows) {
+      const int64_t rows = std::min<int64_t>(tile_rows, pairs - i);
+      for (int64_t r = 0; r < rows; ++r) gather(r, scratch.sources[i + r]);
+      // The rows of the next tile come nearer meanwhile.
+      for (int64_t r = i + rows; r < std::min(pairs, i + 2 * tile_rows); ++r) {
+        const float* ahead = p.input + scratch.sources[r] * w.inputs();
+        for (int64_t c = 0; c < w.inputs(); c += 64 / sizeof(float)) hwy::Prefetch(ahead + c);
       }
-      for (int64_t column = first; column < last; column += kTileColumns) {
-        const int64_t columns = std::min(kTileColumns, last - column);
-        float* out[kTileRows];
-        for (int64_t r = 0; r < rows; ++r) out[r] = p.out + (begin + scratch.targets[i + r]) * outputs + column;
-        MultiplyTile(rows, columns,
-                     {.depth = inputs,
-                      .input = input,
-                      .stride = inputs,
-                      .weights = w.panel(k, column / PackedWeights::kPanel),
-                      .panel_stride = inputs * PackedWeights::kPanel,
-                      .bias = nullptr,
-                      .added = out,
-                      .out = out});
+      for (int64_t column = first; column < last; column += tile_columns) {
+        float* out[kMostTileRows];
+        for (int64_t r = 0; r < rows; ++r) out[r] = p.out + (begin + scratch.targets[i + r]) * w.outputs() + column;
+        multiply(k, column, rows, std::min(tile_columns, last - column), out);
       }
     }
   }
+}
+
+void ConvolveBlock(const SparseConvolutionParams& p, int64_t begin, int64_t end, int64_t first, int64_t last,
+                   ConvolutionScratch& scratch) {
+  const PackedWeights& w = *p.weights;
+  scratch.gathered.resize(static_cast<size_t>(kTileRows * w.inputs()));
+  ConvolveTiles(
+      p, begin, end, first, last, kTileRows, kTileColumns, scratch,
+      [&](int64_t slot, int64_t row) {
+        std::memcpy(scratch.gathered.data() + slot * w.inputs(), p.input + row * w.inputs(),
+                    static_cast<size_t>(w.inputs()) * sizeof(float));
+      },
+      [&](int k, int64_t column, int64_t rows, int64_t columns, float* const* out) {
+        MultiplyTile(rows, columns,
+                     {.depth = w.inputs(),
+                      .input = scratch.gathered.data(),
+                      .stride = w.inputs(),
+                      .weights = w.panel(k, column / PackedWeights::kPanel),
+                      .panel_stride = w.inputs() * PackedWeights::kPanel,
+                      .bias = nullptr,
+                      .added = out,
+                      .out = out});
+      });
+}
+
+// The same with inputs rounded to bfloat16.
+void ConvolveBlockBFloat16(const SparseConvolutionParams& p, int64_t begin, int64_t end, int64_t first, int64_t last,
+                           ConvolutionScratch& scratch) {
+  const PackedWeights& w = *p.weights;
+  const BFloat16Product product = ChooseBFloat16Product();
+  scratch.rounded.resize(static_cast<size_t>(product.rows * w.pairs()));
+  ConvolveTiles(
+      p, begin, end, first, last, product.rows, product.columns, scratch,
+      [&](int64_t slot, int64_t row) {
+        RoundToPairs(p.input + row * w.inputs(), w.inputs(), scratch.rounded.data() + slot * w.pairs());
+      },
+      [&](int k, int64_t column, int64_t rows, int64_t columns, float* const* out) {
+        product.multiply(rows, columns,
+                         {.depth = w.pairs(),
+                          .input = scratch.rounded.data(),
+                          .stride = w.pairs(),
+                          .weights = w.pair_panel(k, column / PackedWeights::kPanel),
+                          .panel_stride = w.pairs() * PackedWeights::kPanel,
+                          .bias = nullptr,
+                          .added = out,
+                          .out = out});
+      });
 }
 
 // NOLINTNEXTLINE(google-readability-namespace-comments)
@@ -100,9 +132,12 @@ HWY_AFTER_NAMESPACE();
 namespace anchorsplat {
 
 HWY_EXPORT(ConvolveBlock);
+HWY_EXPORT(ConvolveBlockBFloat16);
 
 void SparseConvolutionCpu(const SparseConvolutionParams& p) {
-  const auto convolve = HWY_DYNAMIC_DISPATCH(ConvolveBlock);
+  const auto convolve = p.weights->precision() == WeightPrecision::kBFloat16
+                            ? HWY_DYNAMIC_DISPATCH(ConvolveBlockBFloat16)
+                            : HWY_DYNAMIC_DISPATCH(ConvolveBlock);
   const int64_t outputs = p.weights->outputs();
   const int64_t column_blocks = (outputs + kConvolutionColumns - 1) / kConvolutionColumns;
   // A row's sum is the same in whichever block it stands, so that many threads may have smaller ones.

@@ -20,6 +20,7 @@ struct Convolution {
   std::vector<int32_t> voxels = {};
   Buffer<int32_t> neighbours = {};
   std::vector<float> x = {}, w = {}, b = {};
+  WeightPrecision precision = WeightPrecision::kFloat;
 };
 
 // Points in a cube of `side` voxels, with its far corner and the grid's: small sides make duplicates.
@@ -42,7 +43,7 @@ Convolution RandomConvolution(int64_t count, int64_t inputs, int64_t outputs, in
 }
 
 std::vector<float> Convolve(const Convolution& c) {
-  const PackedWeights weights(c.w.data(), c.b.data(), c.outputs, c.inputs, kNeighbours);
+  const PackedWeights weights(c.w.data(), c.b.data(), c.outputs, c.inputs, kNeighbours, c.precision);
   std::vector<float> out(static_cast<size_t>(c.count * c.outputs), -77.0f);
   SparseConvolutionCpu({.count = c.count,
                         .input = c.x.data(),
@@ -50,6 +51,13 @@ std::vector<float> Convolve(const Convolution& c) {
                         .weights = &weights,
                         .out = out.data()});
   return out;
+}
+
+// To 8 significant bits, ties to even.
+double BFloat16(double x) {
+  if (x == 0) return x;
+  const double unit = std::ldexp(1.0, std::ilogb(x) - 7);
+  return std::nearbyint(x / unit) * unit;
 }
 
 // Straight from the voxels, without the neighbour table: out(p) = b + Σ_δ W_δ · in(winner of voxel(p) + δ).
@@ -68,8 +76,9 @@ double Reference(const Convolution& c, int64_t i, int64_t channel) {
     if (k > 13 && winner(v[0], v[1], v[2]) != i) source = -1;
     if (source < 0) continue;
     for (int64_t n = 0; n < c.inputs; ++n) {
-      sum += static_cast<double>(c.w[static_cast<size_t>((channel * 27 + k) * c.inputs + n)]) *
-             c.x[static_cast<size_t>(source * c.inputs + n)];
+      const double weight = c.w[static_cast<size_t>((channel * 27 + k) * c.inputs + n)];
+      const double x = c.x[static_cast<size_t>(source * c.inputs + n)];
+      sum += c.precision == WeightPrecision::kBFloat16 ? BFloat16(weight) * BFloat16(x) : weight * x;
     }
   }
   return sum;
@@ -77,13 +86,16 @@ double Reference(const Convolution& c, int64_t i, int64_t channel) {
 
 TEST(SparseConvolution, MatchesReferenceWithDuplicateVoxels) {
   ForEachSimdTarget([] {
-    for (int64_t count : {1, 2, 14, 15, 60, 130}) {
-      for (int64_t outputs : {16, 64, 40}) {
-        const Convolution c = RandomConvolution(count, 24, outputs, 4);
-        const std::vector<float> out = Convolve(c);
-        for (int64_t i = 0; i < count; ++i) {
-          for (int64_t o = 0; o < outputs; ++o) {
-            ASSERT_NEAR(out[static_cast<size_t>(i * outputs + o)], Reference(c, i, o), 5e-6) << i << ' ' << o;
+    for (WeightPrecision precision : {WeightPrecision::kFloat, WeightPrecision::kBFloat16}) {
+      for (int64_t count : {1, 2, 14, 15, 60, 130}) {
+        for (int64_t outputs : {16, 64, 40}) {
+          Convolution c = RandomConvolution(count, 23, outputs, 4);
+          c.precision = precision;
+          const std::vector<float> out = Convolve(c);
+          for (int64_t i = 0; i < count; ++i) {
+            for (int64_t o = 0; o < outputs; ++o) {
+              ASSERT_NEAR(out[static_cast<size_t>(i * outputs + o)], Reference(c, i, o), 5e-6) << i << ' ' << o;
+            }
           }
         }
       }
@@ -104,13 +116,16 @@ TEST(SparseConvolution, MatchesReferenceAcrossTasks) {
 TEST(SparseConvolution, NothingForNoPoints) { EXPECT_TRUE(Convolve(RandomConvolution(0, 8, 8, 4)).empty()); }
 
 TEST(SparseConvolution, SameBitsForAnyNumberOfThreads) {
-  const Convolution c = RandomConvolution(3000, 48, 160, 12);
-  SetThreadCount(1);
-  const std::vector<float> one = Convolve(c);
-  for (int threads : {2, 5}) {
-    SetThreadCount(threads);
-    const std::vector<float> many = Convolve(c);
-    EXPECT_EQ(0, std::memcmp(one.data(), many.data(), one.size() * sizeof(float))) << threads;
+  for (WeightPrecision precision : {WeightPrecision::kFloat, WeightPrecision::kBFloat16}) {
+    Convolution c = RandomConvolution(3000, 48, 160, 12);
+    c.precision = precision;
+    SetThreadCount(1);
+    const std::vector<float> one = Convolve(c);
+    for (int threads : {2, 5}) {
+      SetThreadCount(threads);
+      const std::vector<float> many = Convolve(c);
+      EXPECT_EQ(0, std::memcmp(one.data(), many.data(), one.size() * sizeof(float))) << threads;
+    }
   }
   SetThreadCount(0);
 }

@@ -1,0 +1,128 @@
+#include "model/kernels/bfloat16_tile.h"
+
+#include <cstring>
+
+#include "model/kernels/bfloat16_dot.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "model/kernels/bfloat16_tile.cc"
+#include <hwy/foreach_target.h>  // compiles this file once per SIMD target
+#include <hwy/highway.h>
+
+#include "model/kernels/matrix_tile-inl.h"
+#include "model/kernels/vector_math-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace anchorsplat {
+namespace HWY_NAMESPACE {
+
+// A bfloat16 is the upper half of a float.
+template <int kRows>
+HWY_NOINLINE void MultiplyPairs(const Tile<BFloat16Pair>& t) {
+  const TileTag d;
+  const hn::RebindToUnsigned<TileTag> du;
+  using V = hn::VFromD<TileTag>;
+  constexpr int kLanes = static_cast<int>(HWY_MIN(HWY_LANES(float), size_t{PackedWeights::kPanel}));
+  constexpr int kVectors = static_cast<int>(PackedWeights::kPanel) / kLanes;
+  const auto upper = hn::Set(du, 0xffff0000u);
+  V sums[kRows][kVectors];
+  ANCHORSPLAT_UNROLL
+  for (int v = 0; v < kVectors; ++v) {
+    const V bias = t.bias != nullptr ? hn::LoadU(d, t.bias + v * kLanes) : hn::Zero(d);
+    ANCHORSPLAT_UNROLL
+    for (int r = 0; r < kRows; ++r) sums[r][v] = bias;
+  }
+  for (int64_t k = 0; k < t.depth; ++k) {
+    V first[kVectors];
+    V second[kVectors];
+    ANCHORSPLAT_UNROLL
+    for (int v = 0; v < kVectors; ++v) {
+      alignas(64) uint32_t bits[kLanes];
+      std::memcpy(bits, t.weights + k * PackedWeights::kPanel + v * kLanes, sizeof(bits));
+      const auto w = hn::Load(du, bits);
+      first[v] = hn::BitCast(d, hn::ShiftLeft<16>(w));
+      second[v] = hn::BitCast(d, hn::And(w, upper));
+    }
+    ANCHORSPLAT_UNROLL
+    for (int r = 0; r < kRows; ++r) {
+      const BFloat16Pair pair = t.input[r * t.stride + k];
+      const V x = hn::BitCast(d, hn::Set(du, uint32_t{pair.first} << 16));
+      const V y = hn::BitCast(d, hn::Set(du, uint32_t{pair.second} << 16));
+      ANCHORSPLAT_UNROLL
+      for (int v = 0; v < kVectors; ++v) {
+        sums[r][v] = hn::MulAdd(y, second[v], hn::MulAdd(x, first[v], sums[r][v]));
+      }
+    }
+  }
+  ANCHORSPLAT_UNROLL
+  for (int r = 0; r < kRows; ++r) {
+    ANCHORSPLAT_UNROLL
+    for (int v = 0; v < kVectors; ++v) {
+      if (t.added != nullptr) sums[r][v] = hn::Add(sums[r][v], hn::LoadU(d, t.added[r] + v * kLanes));
+      hn::StoreU(sums[r][v], d, t.out[r] + v * kLanes);
+    }
+  }
+}
+
+template <int kRows>
+void MultiplyPairRows(int64_t rows, const Tile<BFloat16Pair>& t) {
+  if constexpr (kRows > 1) {
+    if (rows < kRows) return MultiplyPairRows<kRows - 1>(rows, t);
+  }
+  MultiplyPairs<kRows>(t);
+}
+
+void MultiplyWidened(int64_t rows, int64_t columns, const Tile<BFloat16Pair>& tile) {
+  MultiplyPartialPanels(rows, columns, tile, MultiplyPairRows<kTileRows>);
+}
+
+int64_t WidenedRows() { return kTileRows; }
+
+void RoundToPairs(const float* values, int64_t count, uint16_t* out) {
+  const TileTag d;
+  const hn::RebindToUnsigned<TileTag> du;
+  const auto lanes = static_cast<int64_t>(hn::Lanes(d));
+  alignas(64) uint32_t bits[PackedWeights::kPanel];
+  alignas(64) float rest[PackedWeights::kPanel] = {};
+  for (int64_t i = 0; i < count; i += lanes) {
+    const int64_t n = HWY_MIN(lanes, count - i);
+    const float* from = values + i;
+    if (n < lanes) {
+      std::memcpy(rest, from, static_cast<size_t>(n) * sizeof(float));
+      from = rest;
+    }
+    hn::Store(hn::ShiftRight<16>(hn::BitCast(du, RoundToBFloat16(d, hn::LoadU(d, from)))), du, bits);
+    for (int64_t j = 0; j < n; ++j) out[i + j] = static_cast<uint16_t>(bits[j]);
+  }
+  if (count % 2 != 0) out[count] = 0;
+}
+
+// NOLINTNEXTLINE(google-readability-namespace-comments)
+}  // namespace HWY_NAMESPACE
+}  // namespace anchorsplat
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace anchorsplat {
+
+HWY_EXPORT(MultiplyWidened);
+HWY_EXPORT(WidenedRows);
+HWY_EXPORT(RoundToPairs);
+
+BFloat16Product ChooseBFloat16Product() {
+  // Tests that ask for a narrow SIMD target shall not get the widest instructions there are.
+  if ((hwy::SupportedTargets() & HWY_AVX3) != 0 && HasBFloat16Dot()) {
+    return {.rows = kBFloat16DotRows, .columns = kBFloat16DotColumns, .multiply = MultiplyBFloat16Dot};
+  }
+  return {.rows = HWY_DYNAMIC_DISPATCH(WidenedRows)(),
+          .columns = PackedWeights::kPanel,
+          .multiply = HWY_DYNAMIC_DISPATCH(MultiplyWidened)};
+}
+
+void RoundToPairs(const float* values, int64_t count, BFloat16Pair* pairs) {
+  static_assert(sizeof(BFloat16Pair) == 4);
+  HWY_DYNAMIC_DISPATCH(RoundToPairs)(values, count, reinterpret_cast<uint16_t*>(pairs));
+}
+
+}  // namespace anchorsplat
+#endif

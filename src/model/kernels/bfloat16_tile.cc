@@ -1,5 +1,6 @@
 #include "model/kernels/bfloat16_tile.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "model/kernels/bfloat16_dot.h"
@@ -81,18 +82,21 @@ int64_t WidenedRows() { return kTileRows; }
 void RoundToPairs(const float* values, int64_t count, uint16_t* out) {
   const TileTag d;
   const hn::RebindToUnsigned<TileTag> du;
+  const hn::RebindToSigned<TileTag> di;
+  const hn::Rebind<uint16_t, TileTag> du16;
   const auto lanes = static_cast<int64_t>(hn::Lanes(d));
-  alignas(64) uint32_t bits[PackedWeights::kPanel];
-  alignas(64) float rest[PackedWeights::kPanel] = {};
-  for (int64_t i = 0; i < count; i += lanes) {
-    const int64_t n = HWY_MIN(lanes, count - i);
-    const float* from = values + i;
-    if (n < lanes) {
-      std::memcpy(rest, from, static_cast<size_t>(n) * sizeof(float));
-      from = rest;
-    }
-    hn::Store(hn::ShiftRight<16>(hn::BitCast(du, RoundToBFloat16(d, hn::LoadU(d, from)))), du, bits);
-    for (int64_t j = 0; j < n; ++j) out[i + j] = static_cast<uint16_t>(bits[j]);
+  const auto round = [&](const float* from, uint16_t* to) HWY_ATTR {
+    const auto upper = hn::ShiftRight<16>(hn::BitCast(du, RoundToBFloat16(d, hn::LoadU(d, from))));
+    hn::StoreU(hn::DemoteTo(du16, hn::BitCast(di, upper)), du16, to);
+  };
+  int64_t i = 0;
+  for (; i + lanes <= count; i += lanes) round(values + i, out + i);
+  if (i < count) {
+    float rest[PackedWeights::kPanel] = {};
+    uint16_t rounded[PackedWeights::kPanel];
+    std::copy(values + i, values + count, rest);
+    round(rest, rounded);
+    std::copy(rounded, rounded + (count - i), out + i);
   }
   if (count % 2 != 0) out[count] = 0;
 }

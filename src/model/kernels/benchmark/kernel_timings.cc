@@ -48,10 +48,11 @@ class Stopwatch {
   double peak_ = 0;
 };
 
-double LinearSeconds(Stopwatch& watch, int64_t rows, int64_t inputs, int64_t outputs, Activation activation) {
+double LinearSeconds(Stopwatch& watch, int64_t rows, int64_t inputs, int64_t outputs, Activation activation,
+                     WeightPrecision precision) {
   const Buffer<float> x = RandomFloats(rows * inputs, 1);
   const Buffer<float> w = RandomFloats(outputs * inputs, 0.1);
-  const PackedWeights weights(w.data(), nullptr, outputs, inputs);
+  const PackedWeights weights(w.data(), nullptr, outputs, inputs, 1, precision);
   Buffer<float> out(static_cast<size_t>(rows * outputs));
   return watch.Best([&] {
     LinearCpu({.rows = rows,
@@ -73,8 +74,8 @@ KernelTimings TimeKernels(const std::vector<int32_t>& voxels, int repeats) {
   const std::vector<Level>& levels = *hierarchy;
   Stopwatch watch(repeats);
   KernelTiming attention[] = {{.name = "attention fp32"}, {.name = "attention fp16"}, {.name = "attention bf16"}};
-  KernelTiming convolution{.name = "convolution fp32"};
-  KernelTiming linear{.name = "linear fp32"};
+  KernelTiming convolution[] = {{.name = "convolution fp32"}, {.name = "convolution bf16"}};
+  KernelTiming linear[] = {{.name = "linear fp32"}, {.name = "linear bf16"}};
   std::vector<KernelTiming> rows;
   for (const BlockMix& mix : kForwardMix) {
     const Level& level = levels[static_cast<size_t>(mix.level)];
@@ -101,21 +102,6 @@ KernelTimings TimeKernels(const std::vector<int32_t>& voxels, int repeats) {
       sum.seconds += blocks * seconds;
       sum.operations += blocks * operations;
     }
-    {
-      const Buffer<float> w = RandomFloats(c * kNeighbours * c, 0.1);
-      const PackedWeights weights(w.data(), nullptr, c, c, kNeighbours);
-      const double seconds = watch.Best([&] {
-        SparseConvolutionCpu({.count = n,
-                              .input = qkv.data(),
-                              .neighbours = level.neighbours.data(),
-                              .weights = &weights,
-                              .out = out.data()});
-      });
-      const double operations = 2.0 * static_cast<double>(level.neighbour_pairs * c * c);
-      rows.push_back({.name = convolution.name + where, .seconds = seconds, .operations = operations});
-      convolution.seconds += blocks * seconds;
-      convolution.operations += blocks * operations;
-    }
     struct Shape {
       int64_t inputs, outputs;
       Activation activation;
@@ -126,19 +112,37 @@ KernelTimings TimeKernels(const std::vector<int32_t>& voxels, int repeats) {
                             {c, 3 * c, Activation::kNone},
                             {c, 4 * c, Activation::kGelu},
                             {4 * c, c, Activation::kNone}};
-    for (const Shape& shape : shapes) {
-      const double seconds = LinearSeconds(watch, n, shape.inputs, shape.outputs, shape.activation);
-      const double operations = 2.0 * static_cast<double>(n * shape.inputs * shape.outputs);
-      rows.push_back({.name = linear.name + where + " to " + std::to_string(shape.outputs),
-                      .seconds = seconds,
-                      .operations = operations});
-      linear.seconds += blocks * seconds;
-      linear.operations += blocks * operations;
+    const Buffer<float> w = RandomFloats(c * kNeighbours * c, 0.1);
+    for (WeightPrecision precision : {WeightPrecision::kFloat, WeightPrecision::kBFloat16}) {
+      const PackedWeights weights(w.data(), nullptr, c, c, kNeighbours, precision);
+      KernelTiming& sum = convolution[static_cast<size_t>(precision)];
+      const double seconds = watch.Best([&] {
+        SparseConvolutionCpu({.count = n,
+                              .input = qkv.data(),
+                              .neighbours = level.neighbours.data(),
+                              .weights = &weights,
+                              .out = out.data()});
+      });
+      const double operations = 2.0 * static_cast<double>(level.neighbour_pairs * c * c);
+      rows.push_back({.name = sum.name + where, .seconds = seconds, .operations = operations});
+      sum.seconds += blocks * seconds;
+      sum.operations += blocks * operations;
+
+      KernelTiming& layers = linear[static_cast<size_t>(precision)];
+      for (const Shape& shape : shapes) {
+        const double took = LinearSeconds(watch, n, shape.inputs, shape.outputs, shape.activation, precision);
+        const double work = 2.0 * static_cast<double>(n * shape.inputs * shape.outputs);
+        rows.push_back({.name = layers.name + where + " to " + std::to_string(shape.outputs),
+                        .seconds = took,
+                        .operations = work});
+        layers.seconds += blocks * took;
+        layers.operations += blocks * work;
+      }
     }
   }
   timings.kernels.assign(std::begin(attention), std::end(attention));
-  timings.kernels.push_back(convolution);
-  timings.kernels.push_back(linear);
+  timings.kernels.insert(timings.kernels.end(), std::begin(convolution), std::end(convolution));
+  timings.kernels.insert(timings.kernels.end(), std::begin(linear), std::end(linear));
   timings.kernels.insert(timings.kernels.end(), rows.begin(), rows.end());
   timings.peak_flops = watch.peak();
   for (KernelTiming& k : timings.kernels) k.of_peak = k.operations / k.seconds / timings.peak_flops;

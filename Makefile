@@ -2,7 +2,7 @@
 #
 #   make demo     from a bare Debian 12 machine to an enhanced splat and a picture
 #   make test     everything that is checked, sanitizers included
-#   make build    the program only: build/anchorsplat
+#   make build    the program only: build/anchorsplat; LEAN=1 leaves out LibTorch, which only training needs
 #   make lint     clang-tidy and clang-format
 #   make fuzz     mutated files against all readers, SECONDS=60 by default
 #   make realdata DATA=DIR   checks on splats of your own
@@ -14,12 +14,24 @@ SECONDS ?= 60
 .PHONY: all build debug demo test lint format fuzz realdata bench clean
 all: build
 
+# LibTorch is fetched into .venv unless LEAN is set (scripts/install-torch.sh says from where).
+ifdef LEAN
+TORCH_FLAGS := -DANCHORSPLAT_TORCH=OFF
+else
+TORCH_FLAGS := -DANCHORSPLAT_TORCH=ON
+endif
+
 dependencies:
+ifdef LEAN
 	@scripts/install-dependencies.sh
+else
+	@scripts/install-dependencies.sh --with-torch
+	@scripts/install-torch.sh
+endif
 .PHONY: dependencies
 
 build: dependencies
-	@cmake --preset release $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
+	@cmake --preset release $(TORCH_FLAGS) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
 	@rm -f build-configure.log
 	@cmake --build --preset release -j $(JOBS)
 

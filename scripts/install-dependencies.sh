@@ -1,11 +1,14 @@
 #!/usr/bin/env bash
 # Makes sure that everything the build needs is there: on Debian and its relatives by apt (sudo only when not root),
-# elsewhere it says what is missing. Quick when nothing is missing.
+# elsewhere it says what is missing. Quick when nothing is missing. With --with-torch also what installing LibTorch takes.
 set -euo pipefail
 
 packages=(g++ cmake ninja-build pkg-config
   libhwy-dev libtbb-dev libcli11-dev nlohmann-json3-dev libpng-dev libjpeg-dev zlib1g-dev libzstd-dev
   libgtest-dev libgmock-dev libbenchmark-dev)
+
+# LibTorch comes in a Python wheel (scripts/install-torch.sh).
+[ "${1:-}" = --with-torch ] && packages+=(python3-venv python3-pip)
 
 if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
   # Not a Debian system: look for one header or program of each package.

@@ -21,12 +21,12 @@ double Seconds(const std::chrono::steady_clock::time_point& begin) {
 // The product that the ratio is against: as many rows as the published demo has Gaussians, the widest layer.
 class PlainProduct {
  public:
-  PlainProduct() : input_(kRows * kInputs), out_(kRows * kOutputs) {
+  explicit PlainProduct(WeightPrecision precision) : input_(kRows * kInputs), out_(kRows * kOutputs) {
     Random random(1);
     Buffer<float> weights(kInputs * kOutputs);
     for (float& v : input_) v = static_cast<float>(random.Uniform(-1, 1));
     for (float& v : weights) v = static_cast<float>(random.Uniform(-1, 1));
-    weights_ = PackedWeights(weights.data(), nullptr, kOutputs, kInputs);
+    weights_ = PackedWeights(weights.data(), nullptr, kOutputs, kInputs, 1, precision);
     Flops();  // touches the pages
   }
 
@@ -56,7 +56,7 @@ Result<NetworkBenchReport> BenchNetwork(const GaussianCloud& cloud, const Packed
   report.threads = ThreadCount();
   report.copies = network.config().copies;
   report.seconds = report.enhance_seconds = std::numeric_limits<double>::infinity();
-  PlainProduct product;
+  PlainProduct product(network.precision());
   for (int i = 0; i <= options.repeats; ++i) {
     report.gemm_flops = std::max(report.gemm_flops, product.Flops());
     NetworkProfile profile;

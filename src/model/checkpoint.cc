@@ -70,9 +70,9 @@ WeightSource Checkpoint::Weights() const {
   };
 }
 
-Result<PackedNetwork> LoadNetwork(const std::filesystem::path& path) {
+Result<PackedNetwork> LoadNetwork(const std::filesystem::path& path, WeightPrecision precision) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Checkpoint checkpoint, Checkpoint::Open(path));
-  auto network = PackedNetwork::Load(checkpoint.config(), checkpoint.Weights());
+  auto network = PackedNetwork::Load(checkpoint.config(), checkpoint.Weights(), precision);
   if (!network.ok() && network.error().message.find(checkpoint.file().name()) == std::string::npos) {
     return Error{network.error().code, Cat(checkpoint.file().name(), ": ", network.error().message)};
   }

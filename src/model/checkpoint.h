@@ -33,6 +33,7 @@ class Checkpoint {
 };
 
 // The network of a checkpoint, ready for inference. Errors: of Checkpoint::Open; weights that are NaN or infinite.
-Result<PackedNetwork> LoadNetwork(const std::filesystem::path& path);
+Result<PackedNetwork> LoadNetwork(const std::filesystem::path& path,
+                                  WeightPrecision precision = WeightPrecision::kFloat);
 
 }  // namespace anchorsplat

@@ -61,7 +61,8 @@ struct PackedNetwork::Workspace {
 // Takes tensors by name from the source and checks that they are numbers.
 class PackedNetwork::Loader {
  public:
-  Loader(const NetworkConfig& config, const WeightSource& source) : source_(source) {
+  Loader(const NetworkConfig& config, const WeightSource& source, WeightPrecision precision)
+      : source_(source), precision_(precision) {
     for (TensorSpec& tensor : NetworkTensors(config)) tensors_.emplace(tensor.name, std::move(tensor));
   }
 
@@ -105,7 +106,7 @@ class PackedNetwork::Loader {
     const TensorSpec& tensor = tensors_.at(name + ".weight");
     const Buffer<float> weight = Values(name + ".weight"), bias = Values(name + ".bias");
     const int64_t taps = tensor.shape.size() == 5 ? kNeighbours : 1;
-    return PackedWeights(weight.data(), bias.data(), tensor.shape[0], tensor.shape.back(), taps);
+    return PackedWeights(weight.data(), bias.data(), tensor.shape[0], tensor.shape.back(), taps, precision_);
   }
 
   // A linear layer with the BatchNorm that follows it.
@@ -147,14 +148,17 @@ class PackedNetwork::Loader {
 
  private:
   const WeightSource& source_;
+  const WeightPrecision precision_;
   std::map<std::string, TensorSpec> tensors_;
 };
 
-Result<PackedNetwork> PackedNetwork::Load(const NetworkConfig& config, const WeightSource& source) {
+Result<PackedNetwork> PackedNetwork::Load(const NetworkConfig& config, const WeightSource& source,
+                                          WeightPrecision precision) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(config));
   PackedNetwork network;
   network.config_ = config;
-  Loader load(config, source);
+  network.precision_ = precision;
+  Loader load(config, source, precision);
   const std::string backbone = "backbone.backbone.";
   network.embedding_ = load.LinearThenNorm(backbone + "embedding.0", backbone + "embedding.1");
   for (size_t s = 0; s < config.encoder_channels.size(); ++s) {
@@ -189,7 +193,7 @@ Result<PackedNetwork> PackedNetwork::Load(const NetworkConfig& config, const Wei
                               load.LastOfHead(name + "6", Cat("point_embeddings.", attribute.name))});
   }
   network.head_first_ = PackedWeights(first_weight.data(), first_bias.data(), static_cast<int64_t>(first_bias.size()),
-                                      static_cast<int64_t>(first_weight.size() / first_bias.size()));
+                                      static_cast<int64_t>(first_weight.size() / first_bias.size()), 1, precision);
   if (!load.status.ok()) return load.status.error();
   return network;
 }
@@ -369,7 +373,8 @@ void PackedNetwork::Gaussians(const float* context, const float* features, int64
 
 int64_t PackedNetwork::bytes() const {
   const auto size = [](const PackedWeights& w) {
-    return w.taps() * w.panels() * w.inputs() * PackedWeights::kPanel * 4;
+    const int64_t row = w.precision() == WeightPrecision::kFloat ? 4 * w.inputs() : 4 * w.pairs();
+    return w.taps() * w.panels() * PackedWeights::kPanel * row;
   };
   int64_t sum = size(embedding_) + size(head_first_);
   for (const auto* stages : {&encoder_, &decoder_}) {

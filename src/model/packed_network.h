@@ -22,9 +22,14 @@ namespace anchorsplat {
 class PackedNetwork {
  public:
   // Errors: of Validate(config) and of `source`; kBadFile naming the tensor when a weight is NaN or infinite.
-  static Result<PackedNetwork> Load(const NetworkConfig& config, const WeightSource& source);
+  //
+  // kBFloat16 rounds weights and inputs of the blocks' matrices and convolutions; sums, the residual stream, norms and
+  // softmax stay in fp32, and so do the embedding and the last layers of the heads, which cost little and show most.
+  static Result<PackedNetwork> Load(const NetworkConfig& config, const WeightSource& source,
+                                    WeightPrecision precision = WeightPrecision::kFloat);
 
   const NetworkConfig& config() const { return config_; }
+  WeightPrecision precision() const { return precision_; }
 
   // features [N,59] of the normalised cloud (kAttributes) → context [N, config().context_channels()]. `levels`: of
   // these N points (BuildHierarchy with HierarchyOptionsFor). `rounding`: of the attention's arithmetic. The same bits
@@ -63,6 +68,7 @@ class PackedNetwork {
                 Workspace& workspace, NetworkProfile* profile) const;
 
   NetworkConfig config_;
+  WeightPrecision precision_ = WeightPrecision::kFloat;
   PackedWeights embedding_;
   std::vector<Stage> encoder_;  // finest first
   std::vector<Stage> decoder_;  // finest first

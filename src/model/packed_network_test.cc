@@ -16,9 +16,15 @@ namespace {
 
 using testing::HasSubstr;
 
-Buffer<float> RunNetwork(const GoldenRun& golden, Rounding rounding = Rounding::kNone) {
-  auto network = PackedNetwork::Load(golden.config, HashWeights());
-  EXPECT_TRUE(network.ok());
+// Made once: 48 million weights take their time.
+const PackedNetwork& GoldenNetwork(const GoldenRun& golden) {
+  static const PackedNetwork network = *PackedNetwork::Load(golden.config, HashWeights());
+  return network;
+}
+
+Buffer<float> RunNetwork(const GoldenRun& golden, Rounding rounding = Rounding::kNone,
+                         const PackedNetwork* network = nullptr) {
+  if (network == nullptr) network = &GoldenNetwork(golden);
   const Buffer<float> context = network->Context(golden.features.data(), golden.Levels(), rounding);
   Buffer<float> out(golden.expected.size());
   network->Gaussians(context.data(), golden.features.data(), golden.count, out.data());
@@ -59,6 +65,17 @@ TEST(PackedNetwork, RoundedAttentionStaysAsCloseAsThePublishedOne) {
   }
 }
 
+TEST(PackedNetwork, BFloat16StaysWithinItsRoundings) {
+  const GoldenRun golden;
+  const auto network = PackedNetwork::Load(golden.config, HashWeights(), WeightPrecision::kBFloat16);
+  ASSERT_TRUE(network.ok());
+  const double error = LargestDifference(RunNetwork(golden, Rounding::kNone, &*network), golden.expected);
+  // Eight bits of mantissa through 22 blocks; the attributes' changes are of size 1.
+  EXPECT_LT(error, 0.1);
+  EXPECT_GT(error, 1e-3) << "nothing was rounded";
+  RecordProperty("max_abs_error", std::to_string(error));
+}
+
 TEST(PackedNetwork, SameBitsForAnyNumberOfThreads) {
   const GoldenRun golden;
   SetThreadCount(1);
@@ -69,9 +86,22 @@ TEST(PackedNetwork, SameBitsForAnyNumberOfThreads) {
   EXPECT_TRUE(one == two);
 }
 
-TEST(PackedNetwork, RefusesBrokenWeights) {
+NetworkConfig SmallConfig(int64_t copies) {
   NetworkConfig config;
-  config.copies = 1;
+  config.copies = copies;
+  config.encoder_channels = {8, 12};
+  config.encoder_blocks = {1, 1};
+  config.encoder_heads = {2, 4};
+  config.decoder_channels = {8};
+  config.decoder_blocks = {1};
+  config.decoder_heads = {4};
+  config.strides = {1};
+  config.head_hidden = 16;
+  return config;
+}
+
+TEST(PackedNetwork, RefusesBrokenWeights) {
+  const NetworkConfig config = SmallConfig(1);
   const WeightSource hash = HashWeights();
   const auto with = [&](const std::string& name, float value) {
     return PackedNetwork::Load(config, [&](const TensorSpec& tensor, std::span<float> values) -> Status {
@@ -90,8 +120,7 @@ TEST(PackedNetwork, RefusesBrokenWeights) {
 }
 
 TEST(PackedNetwork, OneAnchor) {
-  NetworkConfig config;
-  config.copies = 3;
+  const NetworkConfig config = SmallConfig(3);
   const auto network = PackedNetwork::Load(config, HashWeights());
   ASSERT_TRUE(network.ok());
   Buffer<float> features;
@@ -99,7 +128,7 @@ TEST(PackedNetwork, OneAnchor) {
   const auto levels = BuildHierarchy(GridVoxels(features.data(), 1, kFeatures), HierarchyOptionsFor(config));
   ASSERT_TRUE(levels.ok());
   const Buffer<float> context = network->Context(features.data(), *levels);
-  ASSERT_EQ(context.size(), 96u);
+  ASSERT_EQ(context.size(), 8u);
   Buffer<float> out(3 * kFeatures);
   network->Gaussians(context.data(), features.data(), 1, out.data());
   for (const float v : out) EXPECT_TRUE(std::isfinite(v));

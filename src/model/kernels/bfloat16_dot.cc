@@ -4,8 +4,6 @@
 
 #include <immintrin.h>
 
-#include <cstring>
-
 #include "model/kernels/unroll.h"
 
 #define ANCHORSPLAT_BF16 __attribute__((target("avx512f,avx512bw,avx512vl,avx512dq,avx512bf16")))
@@ -43,9 +41,7 @@ ANCHORSPLAT_BF16 __attribute__((noinline)) void MultiplyDot(const Tile<BFloat16P
     for (int v = 0; v < kPanels; ++v) w[v] = (__m512bh)_mm512_loadu_si512(weights + v * t.panel_stride);
     ANCHORSPLAT_UNROLL
     for (int r = 0; r < kRows; ++r) {
-      int32_t pair;
-      std::memcpy(&pair, input + r * t.stride, sizeof(pair));
-      const __m512bh x = (__m512bh)_mm512_set1_epi32(pair);
+      const __m512bh x = (__m512bh)_mm512_set1_epi32(static_cast<int32_t>(input[r * t.stride]));
       ANCHORSPLAT_UNROLL
       for (int v = 0; v < kPanels; ++v) sums[r][v] = _mm512_dpbf16_ps(sums[r][v], x, w[v]);
     }

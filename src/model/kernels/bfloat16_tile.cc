@@ -1,7 +1,6 @@
 #include "model/kernels/bfloat16_tile.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "model/kernels/bfloat16_dot.h"
 
@@ -38,17 +37,15 @@ HWY_NOINLINE void MultiplyPairs(const Tile<BFloat16Pair>& t) {
     V second[kVectors];
     ANCHORSPLAT_UNROLL
     for (int v = 0; v < kVectors; ++v) {
-      alignas(64) uint32_t bits[kLanes];
-      std::memcpy(bits, t.weights + k * PackedWeights::kPanel + v * kLanes, sizeof(bits));
-      const auto w = hn::Load(du, bits);
+      const auto w = hn::LoadU(du, t.weights + k * PackedWeights::kPanel + v * kLanes);
       first[v] = hn::BitCast(d, hn::ShiftLeft<16>(w));
       second[v] = hn::BitCast(d, hn::And(w, upper));
     }
     ANCHORSPLAT_UNROLL
     for (int r = 0; r < kRows; ++r) {
-      const BFloat16Pair pair = t.input[r * t.stride + k];
-      const V x = hn::BitCast(d, hn::Set(du, uint32_t{pair.first} << 16));
-      const V y = hn::BitCast(d, hn::Set(du, uint32_t{pair.second} << 16));
+      const auto pair = hn::Set(du, t.input[r * t.stride + k]);
+      const V x = hn::BitCast(d, hn::ShiftLeft<16>(pair));
+      const V y = hn::BitCast(d, hn::And(pair, upper));
       ANCHORSPLAT_UNROLL
       for (int v = 0; v < kVectors; ++v) {
         sums[r][v] = hn::MulAdd(y, second[v], hn::MulAdd(x, first[v], sums[r][v]));

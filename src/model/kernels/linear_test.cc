@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -132,6 +133,30 @@ TEST(Linear, MatchesReferenceForActivationsAndResiduals) {
           if (residual) ExpectReference(l, Apply(l, true));
         }
       }
+    }
+  });
+}
+
+// x·Φ(x) through a layer of one weight 1: every range of the approximation, and where it is cut off.
+TEST(Linear, GeluIsExactToFloats) {
+  ForEachSimdTarget([] {
+    Layer l{.rows = 0,
+            .inputs = 1,
+            .outputs = 1,
+            .activation = Activation::kGelu,
+            .x = {},
+            .w = {1},
+            .b = {0},
+            .residual = {}};
+    for (double x = -12; x <= 12; x += 0.00917) l.x.push_back(static_cast<float>(x));
+    for (float x : {0.0f, 1e-30f, -1e-30f, 1e30f, -1e30f, 5.656854f, -5.656854f}) l.x.push_back(x);
+    l.rows = static_cast<int64_t>(l.x.size());
+    const std::vector<float> out = Apply(l);
+    for (size_t i = 0; i < out.size(); ++i) {
+      const double x = l.x[i];
+      ASSERT_NEAR(out[i], x * 0.5 * std::erfc(-x / std::sqrt(2.0)),
+                  3e-7 * std::max(std::min(std::abs(x), 6.0), static_cast<double>(std::abs(out[i]))))
+          << x;
     }
   });
 }

@@ -9,10 +9,10 @@ namespace anchorsplat {
 
 namespace {
 
-uint16_t NearestBFloat16(float x) {
+uint32_t NearestBFloat16(float x) {
   const auto bits = std::bit_cast<uint32_t>(x);
-  if (x != x) return static_cast<uint16_t>(bits >> 16 | 0x40);  // NaN whose low bits would make it infinity
-  return static_cast<uint16_t>((bits + 0x7fff + (bits >> 16 & 1)) >> 16);
+  if (x != x) return bits >> 16 | 0x40;  // NaN whose low bits would make it infinity
+  return (bits + 0x7fff + (bits >> 16 & 1)) >> 16;
 }
 
 }  // namespace
@@ -41,7 +41,7 @@ PackedWeights::PackedWeights(const float* weights, const float* bias, int64_t ou
         } else {
           BFloat16Pair* packed = pairs_.data() + index * pairs() * kPanel + channel;
           for (int64_t i = 0; i < pairs(); ++i) {
-            packed[i * kPanel] = {NearestBFloat16(weight(2 * i)), NearestBFloat16(weight(2 * i + 1))};
+            packed[i * kPanel] = NearestBFloat16(weight(2 * i)) | NearestBFloat16(weight(2 * i + 1)) << 16;
           }
         }
       }

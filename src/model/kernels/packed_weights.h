@@ -6,11 +6,8 @@
 
 namespace anchorsplat {
 
-// Two consecutive inputs in bfloat16, as the processor's dot products take them.
-struct BFloat16Pair {
-  uint16_t first;
-  uint16_t second;
-};
+// Two consecutive inputs in bfloat16, the first in the low half, as the processor's dot products take them.
+using BFloat16Pair = uint32_t;
 
 enum class WeightPrecision : uint8_t {
   kFloat,

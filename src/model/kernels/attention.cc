@@ -208,18 +208,24 @@ HWY_NOINLINE void Accumulate(const float* HWY_RESTRICT probabilities, const floa
   }
 }
 
-float RoundOne(Rounding rounding, float x) {
-  const hn::CappedTag<float, 1> d;
-  const auto v = hn::Set(d, x);
-  switch (rounding) {
-    case Rounding::kHalf:
-      return hn::GetLane(RoundToHalf(d, v));
-    case Rounding::kBFloat16:
-      return hn::GetLane(RoundToBFloat16(d, v));
-    case Rounding::kNone:
-      break;
+// Rounds `count` values, a multiple of kLanes, and multiplies them by `factor`.
+template <Rounding kRounding>
+void RoundAndScale(float* values, int64_t count, float factor) {
+  const GroupTag d;
+  for (int64_t i = 0; i < count; i += kLanes) {
+    const V rounded = Round<kRounding>(d, hn::LoadU(d, values + i));
+    hn::StoreU(hn::Mul(rounded, hn::Set(d, factor)), d, values + i);
   }
-  return x;
+}
+
+// The sum of squares of a key; `depth` is a multiple of four, whose sums do not wait for each other.
+float Squares(const float* key, int64_t depth) {
+  static_assert(kDimTile % 4 == 0);
+  float sums[4] = {};
+  for (int64_t c = 0; c < depth; c += 4) {
+    for (int i = 0; i < 4; ++i) sums[i] += key[c + i] * key[c + i];
+  }
+  return sums[0] + sums[1] + (sums[2] + sums[3]);
 }
 
 template <Rounding kRounding>
@@ -231,17 +237,20 @@ void AttendGroup(const AttentionParams& p, const AttentionTask& task, int64_t de
   const int32_t* rows = p.patch_rows + task.patch_begin + query;
   // Scores are wanted as exponents of 2.
   const float scale = p.scale * 1.44269504088896341f;
-  alignas(64) float bounds[kGroup] = {};
   std::fill(s.queries.begin(), s.queries.end(), 0.0f);
   for (int64_t i = 0; i < count; ++i) {
     const float* q = p.qkv + int64_t{3} * rows[i] * p.channels + task.head * width;
-    float squares = 0;
+    for (int64_t c = 0; c < width; ++c) s.queries[static_cast<size_t>(c * kGroup + i)] = q[c];
+  }
+  RoundAndScale<kRounding>(s.queries.data(), depth * kGroup, scale);
+  alignas(64) float bounds[kGroup];
+  for (int i = 0; i < kGroup; i += kLanes) {
+    V squares = hn::Zero(d);
     for (int64_t c = 0; c < width; ++c) {
-      const float value = RoundOne(kRounding, q[c]) * scale;
-      squares += value * value;
-      s.queries[static_cast<size_t>(c * kGroup + i)] = value;
+      const V q = hn::LoadU(d, s.queries.data() + c * kGroup + i);
+      squares = hn::MulAdd(q, q, squares);
     }
-    bounds[i] = std::sqrt(squares) * longest_key;
+    hn::StoreU(hn::Mul(hn::Sqrt(squares), hn::Set(d, longest_key)), d, bounds + i);
   }
   alignas(64) float shifts[kGroup];
   alignas(64) float totals[kGroup] = {};
@@ -278,31 +287,30 @@ void AttendRounded(const AttentionParams& p, const AttentionTask& task, Attentio
   const int64_t width = p.channels / p.heads;
   const int64_t depth = (width + kDimTile - 1) / kDimTile * kDimTile;
   const int64_t padded = (task.keys + kKeyTile - 1) / kKeyTile * kKeyTile;
-  s.keys.resize(static_cast<size_t>(padded * depth));
-  s.values.resize(static_cast<size_t>(padded * depth));
+  const int64_t floats = (padded * depth + kLanes - 1) / kLanes * kLanes;
+  s.keys.resize(static_cast<size_t>(floats));
+  s.values.resize(static_cast<size_t>(floats));
   s.queries.resize(static_cast<size_t>(depth * kGroup));
   s.sums.resize(static_cast<size_t>(depth * kGroup));
   s.probabilities.resize(static_cast<size_t>(kKeyBlock * kGroup));
-  float longest = 0;
-  bool ordered = true;  // no NaN
-  for (int64_t j = 0; j < padded; ++j) {
+  for (int64_t j = 0; j < task.keys; ++j) {
     float* key = s.keys.data() + j * depth;
     float* value = s.values.data() + j * depth;
-    if (j >= task.keys) {
-      std::fill(key, key + depth, 0.0f);
-      std::fill(value, value + depth, 0.0f);
-      continue;
-    }
     const float* k = p.qkv + (int64_t{3} * p.patch_rows[task.patch_begin + j] + 1) * p.channels + task.head * width;
     const float* v = k + p.channels;
-    float squares = 0;
-    for (int64_t c = 0; c < width; ++c) {
-      key[c] = RoundOne(kRounding, k[c]);
-      value[c] = RoundOne(kRounding, v[c]);
-      squares += key[c] * key[c];
-    }
-    std::fill(key + width, key + depth, 0.0f);
-    std::fill(value + width, value + depth, 0.0f);
+    std::fill(std::copy_n(k, width, key), key + depth, 0.0f);
+    std::fill(std::copy_n(v, width, value), value + depth, 0.0f);
+  }
+  std::fill(s.keys.begin() + task.keys * depth, s.keys.end(), 0.0f);
+  std::fill(s.values.begin() + task.keys * depth, s.values.end(), 0.0f);
+  if constexpr (kRounding != Rounding::kNone) {
+    RoundAndScale<kRounding>(s.keys.data(), floats, 1);
+    RoundAndScale<kRounding>(s.values.data(), floats, 1);
+  }
+  float longest = 0;
+  bool ordered = true;  // no NaN
+  for (int64_t j = 0; j < task.keys; ++j) {
+    const float squares = Squares(s.keys.data() + j * depth, depth);
     ordered = ordered && squares == squares;
     longest = std::max(longest, squares);
   }

@@ -4,8 +4,10 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/io_bench.h"
+#include "bench/render_bench.h"
 #include "cli/table.h"
 #include "cli/verb.h"
+#include "core/parallel.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -43,12 +45,82 @@ Status RunIo(const IoBenchOptions& options, const SharedFlags& shared) {
   return {};
 }
 
+struct RenderFlags {
+  std::string file;
+  RenderBenchOptions options;
+};
+
+Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(flags.file));
+  RenderBenchOptions options = flags.options;
+  options.seed = shared.seed;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const RenderBenchReport report,
+                               BenchRender(cloud, std::filesystem::path(flags.file).stem().string(), options));
+  if (shared.json) {
+    nlohmann::json rows = nlohmann::json::array();
+    for (const RenderBenchRow& row : report.rows) {
+      rows.push_back({{"scene", row.scene},
+                      {"gaussians", row.gaussians},
+                      {"width", row.width},
+                      {"ms", row.ms},
+                      {"stages_ms",
+                       {{"project", row.project_ms},
+                        {"spherical_harmonics", row.spherical_harmonics_ms},
+                        {"sort", row.sort_ms},
+                        {"bin", row.bin_ms},
+                        {"blend", row.blend_ms}}},
+                      {"visible", row.visible},
+                      {"pairs", row.pairs},
+                      {"evaluations", row.evaluations},
+                      {"blend_of_fma_limit", row.blend_of_fma_limit},
+                      {"project_of_memory_limit", row.project_of_memory_limit}});
+    }
+    PrintJson({{"bench", "render"}, {"threads", ThreadCount()}, {"rows", rows}});
+    return {};
+  }
+  std::vector<std::vector<std::string>> table = {
+      {"scene", "Gaussians", "size", "ms", "project", "SH", "sort", "bin", "blend", "blend/FMA", "project/memory"}};
+  for (const RenderBenchRow& row : report.rows) {
+    table.push_back({row.scene, WithThousands(row.gaussians), Cat(row.width, "²"), Fixed(row.ms, 2),
+                     Fixed(row.project_ms, 2), Fixed(row.spherical_harmonics_ms, 2), Fixed(row.sort_ms, 2),
+                     Fixed(row.bin_ms, 2), Fixed(row.blend_ms, 2), Fixed(row.blend_of_fma_limit, 2),
+                     Fixed(row.project_of_memory_limit, 2)});
+  }
+  std::cout << "milliseconds per picture, mean over " << options.poses << " poses, fastest of " << options.repeats
+            << " repeats, " << ThreadCount() << " threads\n\n"
+            << FormatTable(table)
+            << "\nblend/FMA: share of this machine's multiply-add rate; project/memory: share of its memory speed\n";
+  return {};
+}
+
 }  // namespace
 
 void AddBench(CLI::App& app, Program& program) {
   CLI::App& verb = *app.add_subcommand("bench", "Measure this machine, as ratios to its own limits");
   verb.require_subcommand(1);
   verb.footer("Example:\n  anchorsplat bench render");
+
+  CLI::App& render = AddVerb(verb, program, "render", "The rasterizer at 256², at 1024², and with every Gaussian split",
+                             "anchorsplat bench render examples/biplane/input.ply");
+  const auto render_flags = std::make_shared<RenderFlags>();
+  render_flags->file = "examples/biplane/input.ply";
+  render.add_option("file", render_flags->file, "Splat file, an object near the origin about one unit in size")
+      ->capture_default_str();
+  render.add_option("--poses", render_flags->options.poses, "On the orbit")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  render.add_option("--radius", render_flags->options.radius, "Of the orbit, world units")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  render.add_option("--repeats", render_flags->options.repeats, "The fastest counts")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  render.add_option("--split", render_flags->options.split, "Gaussians made of each in the last load")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  render.callback([render_flags, &program] {
+    program.run = [render_flags, &program] { return RunRender(*render_flags, program.flags); };
+  });
 
   CLI::App& io = AddVerb(verb, program, "io", "Reading and writing PLY against bare reads, writes and copies",
                          "anchorsplat bench io --gaussians 500000");

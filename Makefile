@@ -2,7 +2,7 @@
 #
 #   make demo     from a bare Debian 12 machine to an enhanced splat and a picture
 #   make test     everything that is checked, sanitizers included
-#   make build    the program only: build/anchorsplat; LEAN=1 leaves out LibTorch, which only training needs
+#   make build    the program only: build/anchorsplat
 #   make lint     clang-tidy and clang-format
 #   make fuzz     mutated files against all readers, SECONDS=60 by default
 #   make realdata DATA=DIR   checks on splats of your own
@@ -14,21 +14,23 @@ SECONDS ?= 60
 .PHONY: all build debug demo test lint format fuzz realdata bench clean
 all: build
 
-# LibTorch is fetched into .venv unless LEAN is set (scripts/install-torch.sh says from where).
+# Only training needs LibTorch. It is a download of some hundred megabytes, so `build` and `demo` do without unless it is
+# there already; `test` fetches it into .venv (scripts/install-torch.sh says from where). LEAN=1 leaves it out always.
 ifdef LEAN
-TORCH_FLAGS := -DANCHORSPLAT_TORCH=OFF
+TORCH_FLAGS = -DANCHORSPLAT_TORCH=OFF
 else
-TORCH_FLAGS := -DANCHORSPLAT_TORCH=ON
+TORCH_FLAGS = -DANCHORSPLAT_TORCH=$(if $(wildcard .venv/anchorsplat-torch),ON,OFF)
 endif
 
+.PHONY: dependencies torch
 dependencies:
-ifdef LEAN
 	@scripts/install-dependencies.sh
-else
+
+torch:
+ifndef LEAN
 	@scripts/install-dependencies.sh --with-torch
 	@scripts/install-torch.sh
 endif
-.PHONY: dependencies
 
 build: dependencies
 	@cmake --preset release $(TORCH_FLAGS) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
@@ -43,7 +45,9 @@ debug: dependencies
 demo: build
 	@scripts/demo.sh
 
-test: build debug
+# A second make, because .venv decides the flags of the first when it starts.
+test: torch
+	@$(MAKE) --no-print-directory build debug
 	@ctest --preset release -j $(JOBS)
 	@ctest --preset debug -j $(JOBS)
 

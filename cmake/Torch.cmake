@@ -9,7 +9,7 @@ if(NOT Torch_DIR)
                     OUTPUT_VARIABLE torch_prefix OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET RESULT_VARIABLE failed)
   endif()
   if(NOT torch_prefix OR failed)
-    message(FATAL_ERROR "No LibTorch: run scripts/install-torch.sh, pass -DTorch_DIR=<libtorch>/share/cmake/Torch, "
+    message(FATAL_ERROR "No LibTorch: run make torch, pass -DTorch_DIR=<libtorch>/share/cmake/Torch, "
                         "or build without the network by 'make build LEAN=1' (-DANCHORSPLAT_TORCH=OFF).")
   endif()
   set(Torch_DIR "${torch_prefix}/Torch" CACHE PATH "Folder of TorchConfig.cmake" FORCE)

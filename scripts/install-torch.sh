@@ -14,7 +14,7 @@ wanted="torch==$version from ${TORCH_INDEX_URL:-the default}"
 [ "$(cat "$stamp" 2>/dev/null)" = "$wanted" ] && exit 0
 
 give_up() {
-  echo "anchorsplat: LibTorch could not be installed ($1); 'make build LEAN=1' builds everything but training without it." >&2
+  echo "anchorsplat: LibTorch could not be installed ($1); 'make build LEAN=1' builds and tests everything but training without it." >&2
   exit 1
 }
 

@@ -4,11 +4,16 @@
 #include <nlohmann/json.hpp>
 
 #include "bench/io_bench.h"
+#include "bench/network_bench.h"
 #include "bench/render_bench.h"
+#include "cli/choice.h"
 #include "cli/table.h"
 #include "cli/verb.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "formats/cloud_io.h"
+#include "model/checkpoint.h"
+#include "model/weights.h"
 
 namespace anchorsplat {
 
@@ -93,6 +98,51 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
   return {};
 }
 
+struct NetworkFlags {
+  std::string file = "examples/biplane/input.ply";
+  std::string model;
+  WeightPrecision precision = WeightPrecision::kFloat;
+  NetworkBenchOptions options;
+};
+
+Status RunNetwork(const NetworkFlags& flags, const SharedFlags& shared) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(flags.file));
+  const NetworkConfig published;
+  auto loaded = flags.model.empty() ? PackedNetwork::Load(published, HashWeights(), flags.precision)
+                                    : LoadNetwork(flags.model, flags.precision);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PackedNetwork network, std::move(loaded));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const NetworkBenchReport report, BenchNetwork(cloud, network, flags.options));
+  if (shared.json) {
+    nlohmann::json steps = nlohmann::json::array();
+    for (const NetworkBenchStep& step : report.steps) {
+      steps.push_back({{"name", step.name}, {"seconds", step.seconds}, {"multiply_adds", step.multiply_adds}});
+    }
+    PrintJson({{"bench", "network"},
+               {"threads", report.threads},
+               {"gaussians", report.gaussians},
+               {"copies", report.copies},
+               {"seconds", report.seconds},
+               {"multiply_adds", report.multiply_adds},
+               {"gemm_flops", report.gemm_flops},
+               {"ratio", report.ratio},
+               {"enhance_seconds", report.enhance_seconds},
+               {"steps", steps}});
+    return {};
+  }
+  std::vector<std::vector<std::string>> table = {{"step", "time", "G multiply-adds", "of GEMM rate"}};
+  for (const NetworkBenchStep& step : report.steps) {
+    const bool counted = step.multiply_adds > 0 && step.seconds > 0;
+    table.push_back({step.name, HumanSeconds(step.seconds), counted ? Fixed(step.multiply_adds / 1e9, 1) : "",
+                     counted ? Fixed(2 * step.multiply_adds / step.seconds / report.gemm_flops, 2) : ""});
+  }
+  std::cout << WithThousands(report.gaussians) << " Gaussians, K = " << report.copies << ", " << report.threads
+            << " threads; plain matrix product: " << Fixed(report.gemm_flops / 1e9, 0) << " GFLOP/s\n\n"
+            << FormatTable(table) << "\nforward pass " << HumanSeconds(report.seconds) << ", "
+            << Fixed(report.multiply_adds / 1e9, 1) << " G multiply-adds; ratio to the matrix product's rate "
+            << Fixed(report.ratio, 2) << "\nwhole enhancement " << HumanSeconds(report.enhance_seconds) << "\n";
+  return {};
+}
+
 }  // namespace
 
 void AddBench(CLI::App& app, Program& program) {
@@ -120,6 +170,25 @@ void AddBench(CLI::App& app, Program& program) {
       ->capture_default_str();
   render.callback([render_flags, &program] {
     program.run = [render_flags, &program] { return RunRender(*render_flags, program.flags); };
+  });
+
+  CLI::App& network = AddVerb(verb, program, "network", "The AnchorSplat network against a plain matrix product",
+                              "anchorsplat bench network scan.ply --model anchorsplat_20x.pth");
+  const auto network_flags = std::make_shared<NetworkFlags>();
+  network.add_option("file", network_flags->file, "Splat file")->capture_default_str();
+  network.add_option("--model", network_flags->model,
+                     "Checkpoint (default: made-up weights of the published size, K = 20)");
+  AddChoice(network, "--precision", network_flags->precision,
+            {{"fp32", WeightPrecision::kFloat}, {"bf16", WeightPrecision::kBFloat16}},
+            "Of matrix products and convolutions");
+  AddChoice(network, "--attention-rounding", network_flags->options.rounding,
+            {{"none", Rounding::kNone}, {"fp16", Rounding::kHalf}, {"bf16", Rounding::kBFloat16}},
+            "Of the attention's arithmetic");
+  network.add_option("--repeats", network_flags->options.repeats, "The fastest counts")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  network.callback([network_flags, &program] {
+    program.run = [network_flags, &program] { return RunNetwork(*network_flags, program.flags); };
   });
 
   CLI::App& io = AddVerb(verb, program, "io", "Reading and writing PLY against bare reads, writes and copies",

@@ -1,16 +1,19 @@
 #include "enhance/enhance.h"
 
+#include <charconv>
 #include <filesystem>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "cli/choice.h"
 #include "cli/parse.h"
 #include "cli/verb.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "formats/camera_io.h"
+#include "model/model_method.h"
 
 namespace anchorsplat {
 
@@ -25,6 +28,10 @@ struct EnhanceFlags {
   std::string pixel_size = "auto";
   std::string cameras;
   EnhanceOptions options;
+  std::shared_ptr<ModelMethod> model = std::make_shared<ModelMethod>();
+  std::string model_file;
+  std::string shuffles = "identity";
+  std::string compat;
 };
 
 // Where each input goes. Nothing may be written twice or over its own input by accident.
@@ -62,17 +69,44 @@ Result<std::vector<fs::path>> OutputPaths(const EnhanceFlags& flags, bool overwr
 }
 
 nlohmann::json ToJson(const std::string& input, const fs::path& output, const EnhanceReport& r) {
-  return {{"input", input},
-          {"output", output.string()},
-          {"method", r.method},
-          {"upscale", r.upscale},
-          {"filter_strength", r.filter_strength},
-          {"pixel_size", {{"value", r.pixel_size}, {"source", r.pixel_size_source}}},
-          {"gaussians", {{"in", r.gaussians_in}, {"dropped", r.dropped}, {"out", r.gaussians_out}}},
-          {"seconds", r.seconds}};
+  nlohmann::json json = {{"input", input},
+                         {"output", output.string()},
+                         {"method", r.method},
+                         {"upscale", r.upscale},
+                         {"gaussians", {{"in", r.gaussians_in}, {"dropped", r.dropped}, {"out", r.gaussians_out}}},
+                         {"seconds", r.seconds}};
+  if (!r.pixel_size_source.empty()) {
+    json["filter_strength"] = r.filter_strength;
+    json["pixel_size"] = {{"value", r.pixel_size}, {"source", r.pixel_size_source}};
+  }
+  return json;
+}
+
+// "identity", or the seed of PyTorch's generator.
+Result<Shuffles> ParseShuffles(const std::string& text) {
+  if (text == "identity") return kNoShuffles;
+  uint64_t seed = 0;
+  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), seed);
+  if (code == std::errc() && end == text.data() + text.size() && !text.empty()) return ShufflesFromSeed(seed);
+  return Error{ErrorCode::kBadArgument, Cat("--shuffles: '", Printable(text), "' is neither 'identity' nor a seed")};
+}
+
+Status FinishModelOptions(const EnhanceFlags& flags) {
+  flags.model->file = flags.model_file;
+  flags.model->options.upstream = flags.compat == "upstream";
+  ANCHORSPLAT_ASSIGN_OR_RETURN(flags.model->options.shuffles, ParseShuffles(flags.shuffles));
+  return {};
+}
+
+// What the method worked with, where it is the filter's business.
+std::string Details(const EnhanceReport& r) {
+  if (r.pixel_size_source.empty()) return "";
+  return Cat(" x", r.upscale, ", strength ", Fixed(r.filter_strength, 3), ", pixel size ", r.pixel_size, " (",
+             r.pixel_size_source, ")");
 }
 
 Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared) {
+  ANCHORSPLAT_RETURN_IF_ERROR(FinishModelOptions(flags));
   EnhanceOptions options = flags.options;
   options.seed = shared.seed;
   ANCHORSPLAT_ASSIGN_OR_RETURN(options.pixel_size, ParsePixelSize("--pixel-size", flags.pixel_size));
@@ -93,9 +127,8 @@ Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared) {
     results.push_back(ToJson(flags.inputs[i], outputs[i], r));
     if (!shared.json && !shared.quiet) {
       std::cout << flags.inputs[i] << " -> " << outputs[i].string() << "\n  " << WithThousands(r.gaussians_in)
-                << " Gaussians in, " << WithThousands(r.gaussians_out) << " out; " << r.method << " x" << r.upscale
-                << ", strength " << Fixed(r.filter_strength, 3) << ", pixel size " << r.pixel_size << " ("
-                << r.pixel_size_source << "), " << HumanSeconds(r.seconds) << '\n';
+                << " Gaussians in, " << WithThousands(r.gaussians_out) << " out; " << r.method << Details(r) << ", "
+                << HumanSeconds(r.seconds) << '\n';
     }
   }
   if (shared.json) PrintJson(results);
@@ -114,6 +147,7 @@ void AddEnhance(CLI::App& app, Program& program) {
   CLI::App& verb = AddVerb(app, program, "enhance", "Make a splat hold up when seen closer",
                            "anchorsplat enhance scan.ply -o scan-4x.ply --cameras transforms.json");
   const auto flags = std::make_shared<EnhanceFlags>();
+  RegisterModelMethod(flags->model);  // before --method lists what there is
   EnhanceOptions& options = flags->options;
   verb.add_option("inputs", flags->inputs, "Splat files")->required();
   auto* output = verb.add_option("-o,--output", flags->output, "File to write (one input)");
@@ -131,15 +165,50 @@ void AddEnhance(CLI::App& app, Program& program) {
                   "Image width in training where it was less than the cameras say")
       ->check(CLI::PositiveNumber)
       ->needs(cameras);
-  verb.add_option("--camera-rule", options.camera_rule,
-                  "Which of the views that hold a Gaussian says its pixel size: the smallest never blurs, the median "
-                  "suits objects seen from all around")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, CameraPixelRule>{
-          {"smallest", CameraPixelRule::kSmallest}, {"median", CameraPixelRule::kMedian}}))
-      ->default_str("smallest")
+  AddChoice(verb, "--camera-rule", options.camera_rule,
+            {{"smallest", CameraPixelRule::kSmallest}, {"median", CameraPixelRule::kMedian}},
+            "Which of the views that hold a Gaussian says its pixel size: the smallest never blurs, the median suits "
+            "objects seen from all around")
       ->needs(cameras);
   verb.add_option("--filter-strength", options.filter_strength,
                   "Share of the absorbed 0.3 px² to give back (default: 1 - (1 - 1/upscale²)/3.6)");
+
+  const std::string group = "Model";
+  ModelOptions& model = flags->model->options;
+  auto* file =
+      verb.add_option("--model", flags->model_file, "Checkpoint of an AnchorSplat network, .pth or .safetensors")
+          ->group(group);
+  const auto model_option = [&](CLI::Option* option) { return option->needs(file)->group(group); };
+  model_option(
+      verb.add_option("--compat", flags->compat, "upstream: do what the published script does, quirks included"))
+      ->check(CLI::IsMember({"upstream"}));
+  model_option(AddChoice(verb, "--normalisation", model.normalisation,
+                         {{"auto", NormalisationMode::kAuto},
+                          {"centered", NormalisationMode::kCentered},
+                          {"bbox", NormalisationMode::kBbox},
+                          {"unit", NormalisationMode::kUnit}},
+                         "How the splat is brought into the network's cube"));
+  model_option(AddChoice(verb, "--precision", flags->model->precision,
+                         {{"fp32", WeightPrecision::kFloat}, {"bf16", WeightPrecision::kBFloat16}},
+                         "Of matrix products and convolutions"));
+  model_option(AddChoice(verb, "--attention-rounding", model.rounding,
+                         {{"none", Rounding::kNone}, {"fp16", Rounding::kHalf}, {"bf16", Rounding::kBFloat16}},
+                         "Of queries, keys, values and probabilities; the release: fp16"));
+  model_option(verb.add_option("--shuffles", flags->shuffles,
+                               "Order of the space-filling curves: identity, or a seed of PyTorch's"))
+      ->capture_default_str();
+  model_option(verb.add_option("--max-gaussians", model.max_gaussians,
+                               "Anchors at most, the largest by opacity x size; 0 is all"))
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  model_option(verb.add_option("--prune-opacity", model.prune_opacity,
+                               "Leave output Gaussians of less opacity out; 1/255 = 0.0039 is invisible"))
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  model_option(verb.add_option("--block-gaussians", model.block_gaussians,
+                               "Larger splats are enhanced in overlapping blocks of this many"))
+      ->check(CLI::Range(int64_t{1000}, int64_t{100'000'000}))
+      ->capture_default_str();
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunEnhance(*flags, program.flags); }; });
 }
 

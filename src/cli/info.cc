@@ -1,6 +1,7 @@
 #include <cmath>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -10,6 +11,8 @@
 #include "core/text.h"
 #include "enhance/pixel_size_estimate.h"
 #include "formats/registry.h"
+#include "formats/tensor_file.h"
+#include "model/checkpoint_writer.h"
 
 namespace anchorsplat {
 
@@ -143,7 +146,40 @@ nlohmann::json ToJson(const Findings& f) {
   return json;
 }
 
+// Weights have their own extensions, one of which gsplat uses for splats too.
+bool LooksLikeModel(const std::filesystem::path& path) {
+  const std::string extension = path.extension().string();
+  if (extension != ".pth" && extension != ".pt" && extension != ".safetensors") return false;
+  const auto file = TensorFile::Open(path);
+  return !file.ok() || file->Find("splats.means") == nullptr;
+}
+
+// A network's weights instead of a splat.
+Status RunModelInfo(const std::string& file, const SharedFlags& shared) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Checkpoint checkpoint, Checkpoint::Open(file));
+  const NetworkConfig& config = checkpoint.config();
+  int64_t parameters = 0;
+  for (const TensorSpec& tensor : NetworkTensors(config)) {
+    if (tensor.counter || tensor.name.ends_with("running_mean") || tensor.name.ends_with("running_var")) continue;
+    int64_t size = 1;
+    for (const int64_t side : tensor.shape) size *= side;
+    parameters += size;
+  }
+  std::map<std::string, std::string> facts = checkpoint.file().metadata();
+  for (const auto& [key, value] : ArchitectureMetadata(config)) facts[key] = value;
+  const size_t tensors = checkpoint.file().tensors().size();
+  if (shared.json) {
+    PrintJson(
+        {{"file", file}, {"kind", "model"}, {"tensors", tensors}, {"parameters", parameters}, {"metadata", facts}});
+    return {};
+  }
+  std::cout << file << "\n  parameters   " << WithThousands(parameters) << " in " << tensors << " tensors\n";
+  for (const auto& [key, value] : facts) std::cout << "  " << key << "  " << Printable(value, 2000) << "\n";
+  return {};
+}
+
 Status RunInfo(const std::string& file, const SharedFlags& shared) {
+  if (LooksLikeModel(file)) return RunModelInfo(file, shared);
   Findings findings;
   findings.file = file;
   ANCHORSPLAT_ASSIGN_OR_RETURN(findings.cloud, ReadCloud(file));
@@ -164,10 +200,10 @@ Status RunInfo(const std::string& file, const SharedFlags& shared) {
 }  // namespace
 
 void AddInfo(CLI::App& app, Program& program) {
-  CLI::App& verb = AddVerb(app, program, "info", "What is in a splat file, and what is wrong with it",
+  CLI::App& verb = AddVerb(app, program, "info", "What is in a splat file or a model, and what is wrong with it",
                            "anchorsplat info scan.ply --json");
   const auto file = std::make_shared<std::string>();
-  verb.add_option("file", *file, "Splat file")->required();
+  verb.add_option("file", *file, "Splat file, or checkpoint of a network")->required();
   verb.callback([file, &program] { program.run = [file, &program] { return RunInfo(*file, program.flags); }; });
 }
 

@@ -44,10 +44,10 @@ std::string HumanSeconds(double seconds) {
   return text;
 }
 
-std::string Printable(const std::string& bytes) {
+std::string Printable(const std::string& bytes, size_t longest) {
   std::string out;
   for (const char c : bytes) {
-    if (out.size() >= 60) return out + "…";
+    if (out.size() >= longest) return out + "…";
     const auto byte = static_cast<unsigned char>(c);
     if (byte >= 0x20 && byte != 0x7f) {
       out += c;

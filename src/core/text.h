@@ -14,10 +14,11 @@ std::string Cat(const Args&... args) {
   return std::move(out).str();
 }
 
-std::string WithThousands(int64_t n);             // 1,234,567
-std::string Fixed(double value, int digits);      // Fixed(3.14159, 2) = "3.14"; "inf", "nan" as such
-std::string HumanBytes(uint64_t bytes);           // "4.7 MB" (powers of 1000, as file managers show)
-std::string HumanSeconds(double seconds);         // "850 ms", "12.3 s", "4 min 05 s"
-std::string Printable(const std::string& bytes);  // for messages about hostile input: control bytes escaped, cut at 60
+std::string WithThousands(int64_t n);         // 1,234,567
+std::string Fixed(double value, int digits);  // Fixed(3.14159, 2) = "3.14"; "inf", "nan" as such
+std::string HumanBytes(uint64_t bytes);       // "4.7 MB" (powers of 1000, as file managers show)
+std::string HumanSeconds(double seconds);     // "850 ms", "12.3 s", "4 min 05 s"
+std::string Printable(const std::string& bytes,
+                      size_t longest = 60);  // for messages about hostile input: control bytes escaped
 
 }  // namespace anchorsplat

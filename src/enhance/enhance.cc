@@ -124,6 +124,18 @@ Status ChoosePixelSizes(const EnhanceOptions& options, EnhanceInput& input, Enha
   return {};
 }
 
+// Of the filter. Splats that absorbed nothing have nothing to get back.
+double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud) {
+  if (options.filter_strength) return *options.filter_strength;
+  if (cloud.render_mode == RenderMode::kAntialiased) {
+    LogWarning(
+        "the file is tagged antialiased: its fit did not absorb the 0.3 px² dilation, so there is no lost width to give "
+        "back and the filter leaves it as it is (--filter-strength F to filter it all the same)");
+    return 0;
+  }
+  return DefaultFilterStrength(options.upscale);
+}
+
 }  // namespace
 
 void RegisterEnhanceMethod(EnhanceMethod method) { Registry().push_back(std::move(method)); }
@@ -146,16 +158,11 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(DropUnusable(input.cloud));
   report.dropped = report.gaussians_in - input.cloud.size();
 
-  input.filter_strength = options.filter_strength.value_or(DefaultFilterStrength(options.upscale));
-  if (input.cloud.render_mode == RenderMode::kAntialiased && !options.filter_strength) {
-    input.filter_strength = 0;
-    LogWarning(
-        "the file is tagged antialiased: its fit did not absorb the 0.3 px² dilation, so there is no lost width to "
-        "give "
-        "back and the filter leaves it as it is (--filter-strength F to filter it all the same)");
+  if (method->needs_pixel_size) {
+    input.filter_strength = ChooseStrength(options, input.cloud);
+    report.filter_strength = input.filter_strength;
+    ANCHORSPLAT_RETURN_IF_ERROR(ChoosePixelSizes(options, input, report));
   }
-  report.filter_strength = input.filter_strength;
-  ANCHORSPLAT_RETURN_IF_ERROR(ChoosePixelSizes(options, input, report));
 
   const auto begin = std::chrono::steady_clock::now();
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, method->run(std::move(input), options));

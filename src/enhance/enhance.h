@@ -35,11 +35,11 @@ struct EnhanceReport {
   double upscale = 1;
   double filter_strength = 0;
   double pixel_size = 0;          // p_LR, the median when there is one per Gaussian
-  std::string pixel_size_source;  // "given", "cameras" or "estimated"
+  std::string pixel_size_source;  // "given", "cameras" or "estimated"; empty for methods that need none
   double seconds = 0;             // of the method itself, without reading and writing
 };
 
-// The cloud as methods get it: rows that are not finite are gone, p_LR is known.
+// The cloud as methods get it: rows that are not finite are gone; p_LR is known to those that need it.
 struct EnhanceInput {
   GaussianCloud cloud;
   Buffer<float> pixel_sizes;  // one for all, or one per Gaussian
@@ -52,6 +52,7 @@ struct EnhanceMethod {
   std::string name;
   std::string summary;  // one line for --help
   int rank = 0;
+  bool needs_pixel_size = true;  // else EnhanceInput::pixel_sizes is empty and nothing is estimated
   std::function<Status(const EnhanceOptions&)> ready;
   std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&)> run;
 };

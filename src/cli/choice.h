@@ -1,0 +1,29 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace anchorsplat {
+
+// An option that takes one of several words for the values of an enumeration. Help shows the words and the default;
+// numbers are not accepted.
+template <typename Enum>
+CLI::Option* AddChoice(CLI::App& verb, const std::string& name, Enum& value,
+                       const std::vector<std::pair<std::string, Enum>>& choices, const std::string& help) {
+  std::vector<std::string> words;
+  std::string now;
+  for (const auto& [word, meaning] : choices) {
+    words.push_back(word);
+    if (meaning == value) now = word;
+  }
+  const auto assign = [&value, choices](const std::string& word) {
+    for (const auto& [known, meaning] : choices) {
+      if (known == word) value = meaning;
+    }
+  };
+  return verb.add_option_function<std::string>(name, assign, help)->check(CLI::IsMember(words))->default_str(now);
+}
+
+}  // namespace anchorsplat

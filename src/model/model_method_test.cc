@@ -1,0 +1,119 @@
+#include "model/model_method.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/random.h"
+#include "enhance/enhance.h"
+#include "formats/safetensors.h"
+#include "model/checkpoint_writer.h"
+
+namespace anchorsplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+NetworkConfig SmallConfig() {
+  NetworkConfig config;
+  config.copies = 2;
+  config.encoder_channels = {8, 12};
+  config.encoder_blocks = {1, 1};
+  config.encoder_heads = {2, 4};
+  config.decoder_channels = {8};
+  config.decoder_blocks = {1};
+  config.decoder_heads = {4};
+  config.strides = {1};
+  config.head_hidden = 16;
+  return config;
+}
+
+// A folder of its own with a small checkpoint of made-up weights, small.safetensors.
+class SmallModel : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(testing::TempDir()) /
+              (std::string("anchorsplat_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    std::vector<std::vector<float>> values;
+    std::vector<TensorEntry> entries;
+    const auto specs = NetworkTensors(SmallConfig());
+    values.reserve(specs.size());
+    for (const TensorSpec& spec : specs) {
+      if (spec.counter) continue;
+      int64_t count = 1;
+      for (const int64_t side : spec.shape) count *= side;
+      std::vector<float>& array = values.emplace_back(static_cast<size_t>(count));
+      ASSERT_TRUE(HashWeights()(spec, array).ok());
+      entries.push_back(MakeEntry(spec.name, spec.shape, array));
+    }
+    ASSERT_TRUE(WriteSafetensors(file(), entries, {{"licence", "CC0"}}).ok());
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  fs::path file() const { return folder_ / "small.safetensors"; }
+
+  fs::path folder_;
+};
+
+GaussianCloud RandomCloud(int64_t n) {
+  GaussianCloud cloud;
+  cloud.Resize(n, 3);
+  Random random(4);
+  for (float& x : cloud.means) x = static_cast<float>(random.Uniform(-1, 1));
+  for (float& x : cloud.log_scales) x = static_cast<float>(-4 + random.Normal());
+  for (float& x : cloud.quats) x = static_cast<float>(random.Normal());
+  for (float& x : cloud.opacity_logits) x = static_cast<float>(random.Normal());
+  for (float& x : cloud.sh) x = static_cast<float>(0.2 * random.Normal());
+  return cloud;
+}
+
+TEST_F(SmallModel, AutoPrefersTheModelOnceThereIsAFile) {
+  const auto method = std::make_shared<ModelMethod>();
+  RegisterModelMethod(method);
+  EnhanceOptions options;
+  options.pixel_size = 0.01;
+  auto enhanced = Enhance(RandomCloud(300), options);
+  ASSERT_TRUE(enhanced.ok());
+  EXPECT_EQ(enhanced->report.method, "filter");
+
+  options.method = "model";
+  enhanced = Enhance(RandomCloud(300), options);
+  ASSERT_FALSE(enhanced.ok());
+  EXPECT_THAT(enhanced.error().message, testing::HasSubstr("--model"));
+
+  method->file = file();
+  options.method = "auto";
+  for (int repeat = 0; repeat < 2; ++repeat) {  // the second finds the network loaded
+    enhanced = Enhance(RandomCloud(300), options);
+    ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+    EXPECT_EQ(enhanced->report.method, "model");
+    EXPECT_EQ(enhanced->report.gaussians_out, 600);
+    EXPECT_TRUE(enhanced->report.pixel_size_source.empty());
+  }
+}
+
+TEST_F(SmallModel, ConvertKeepsTensorsAndTellsTheArchitecture) {
+  const fs::path out = folder_ / "copy.safetensors";
+  const Status converted = ConvertCheckpoint(file(), out, {});
+  ASSERT_TRUE(converted.ok()) << converted.error().message;
+  EXPECT_FALSE(ConvertCheckpoint(file(), out, {}).ok());  // exists
+  const auto before = Checkpoint::Open(file()), after = Checkpoint::Open(out);
+  ASSERT_TRUE(after.ok()) << after.error().message;
+  EXPECT_EQ(after->file().metadata().at("licence"), "CC0");
+  EXPECT_EQ(after->file().metadata().at("K"), "2");
+  EXPECT_EQ(after->file().metadata().at("encoder_channels"), "8,12");
+  ASSERT_EQ(after->file().tensors().size(), before->file().tensors().size());
+  for (const TensorEntry& tensor : before->file().tensors()) {
+    const TensorEntry* copy = after->file().Find(tensor.name);
+    ASSERT_NE(copy, nullptr) << tensor.name;
+    EXPECT_EQ(*CopyFloat32(*copy), *CopyFloat32(tensor)) << tensor.name;
+  }
+  EXPECT_FALSE(ConvertCheckpoint(folder_ / "none.pth", out, {.overwrite = true}).ok());
+}
+
+}  // namespace
+}  // namespace anchorsplat

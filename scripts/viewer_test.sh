@@ -28,7 +28,7 @@ fi
 export NODE_FOLDER=$tools
 if [ ! -d "$tools/node_modules/playwright-core" ]; then
   echo '{"private": true}' >"$tools/package.json"
-  npm install --prefix "$tools" --no-audit --no-fund --silent playwright-core@1.56.1
+  npm install --prefix "$tools" --no-audit --no-fund --silent playwright-core@1.65.1
 fi
 
 work=$(mktemp -d)

@@ -6,12 +6,13 @@
 #   make lint     clang-tidy and clang-format
 #   make fuzz     mutated files against all readers, SECONDS=60 by default
 #   make realdata DATA=DIR   checks on splats of your own
+#   make viewer-test   the page of `anchorsplat view` in headless Chromium (installs a browser)
 #   make bench    measured ratios and figures
 
 JOBS ?= $(shell nproc)
 SECONDS ?= 60
 
-.PHONY: all build debug demo test lint format fuzz realdata bench clean
+.PHONY: all build debug demo test viewer-test lint format fuzz realdata bench clean
 all: build
 
 # Only training needs LibTorch. It is a download of some hundred megabytes, so `build` and `demo` do without unless it is
@@ -50,6 +51,9 @@ test: torch
 	@$(MAKE) --no-print-directory build debug
 	@ctest --preset release -j $(JOBS)
 	@ctest --preset debug -j $(JOBS)
+
+viewer-test: build
+	@scripts/viewer_test.sh build/anchorsplat
 
 bench: build
 	@build/anchorsplat bench render

@@ -258,6 +258,7 @@ await expectMessage('damaged data', broken('damaged', `${whole.slice(0, at)}AAAA
 await expectMessage('no base64', broken('garbage', `${whole.slice(0, at)}????????${whole.slice(at + 8)}`),
   /cannot be shown/);
 await expectMessage('missing part', broken('missing', whole.replace('id="after-0"', 'id="gone"')), /after-0/);
+await expectMessage('an old browser', page, /Safari 16/, () => { delete globalThis.DecompressionStream; });
 await expectMessage('no WebGL 2', page, /WebGL 2/,
   () => { HTMLCanvasElement.prototype.getContext = () => null; });
 {

@@ -45,7 +45,7 @@ silent() {
 expect 0 "version" "$program" --version
 says stdout "anchorsplat 0."
 expect 0 "help" "$program" --help
-for verb in enhance info render compare bench; do
+for verb in enhance info render compare view bench; do
   says stdout "$verb"
   expect 0 "help of $verb" "$program" $verb --help
   says stdout "Example:"
@@ -113,6 +113,22 @@ expect 2 "nonsense size" "$program" render "$input" -o "$work/x.png" --orbit 1 -
 expect 2 "other shape" "$program" render "$input" -o "$work/x" --cameras "$cameras" --size 100x50
 expect 2 "cameras and orbit" "$program" render "$input" -o "$work/x" --cameras "$cameras" --orbit 3
 expect 3 "missing cameras" "$program" render "$input" -o "$work/x" --cameras "$work/none.json"
+
+# view.
+expect 0 "page" "$program" view "$work/out.ply" --before "$input" --truth "$source/examples/biplane/hr" --cameras "$cameras" --views 3 -o "$work/page.html" --json
+says stdout '"views": 3'
+silent stderr
+says_page() { checks=$((checks + 1)); grep -qF -- "$1" "$work/page.html" || { failures=$((failures + 1)); echo "FAILED: page.html does not hold '$1'"; }; }
+says_page '"title":"out.ply"'
+says_page 'id="picture-2"'
+expect 5 "page does not overwrite" "$program" view "$input" -o "$work/page.html"
+expect 0 "page of one splat" "$program" view "$input" -o "$work/page.html" -w --sh-degree 0 --title 'a</script>b'
+says stdout "browser"
+says_page '"degree":0'
+says_page 'a\u003c/script\u003eb'
+expect 2 "truth without cameras" "$program" view "$input" -o "$work/x.html" --truth "$work"
+expect 3 "truth of other names" "$program" view "$input" -o "$work/x.html" --truth "$source/src" --cameras "$cameras"
+expect 2 "SH degree 4" "$program" view "$input" -o "$work/x.html" --sh-degree 4
 
 # compare.
 expect 0 "two splats" "$program" compare "$input" "$work/out.ply" --orbit 2 --size 64x64 --json

@@ -88,6 +88,7 @@ int RunProgram(int argc, const char* const* argv) {
   AddInfo(app, program);
   AddRender(app, program);
   AddCompare(app, program);
+  AddView(app, program);
   AddBench(app, program);
   try {
     app.parse(argc, argv);

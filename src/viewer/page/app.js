@@ -431,6 +431,9 @@ async function main() {
   addEventListener('error', (event) => fail(event.error || new Error(event.message)));
   addEventListener('unhandledrejection', (event) => fail(event.reason));
   try {
+    if (typeof DecompressionStream === 'undefined') {
+      throw new Error('It needs a browser of 2023 or later (Chrome or Edge 80, Safari 16.4, Firefox 113).');
+    }
     const description = readDescription();
     fillCard(description);
     const canvas = byId('canvas');

@@ -21,8 +21,8 @@ namespace {
 constexpr float kLargestLogit = 20;
 constexpr float kLargestLogScale = 5;
 constexpr float kLargestSh = 10;
-// Anchors whose Gaussians are made at once: 20 copies of them are 19 MB.
-constexpr int64_t kHeadRows = 4096;
+// Anchors whose Gaussians are made at once: 20 copies of them are 5 MB and stay in the cache until they are restored.
+constexpr int64_t kHeadRows = 1024;
 constexpr uint64_t kUpstreamSubsetSeed = 918;
 
 bool AllFinite(const float* values, int64_t count) {

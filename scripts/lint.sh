@@ -1,11 +1,16 @@
 #!/usr/bin/env bash
-# clang-format and clang-tidy over our own code.
+# clang-format over our own code, clang-tidy over all of it that needs no LibTorch. FILES="a.cc b.cc" looks at some.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 for tool in clang-format clang-tidy; do
   command -v "$tool" >/dev/null || { echo "make lint needs $tool (Debian: apt-get install clang-format clang-tidy)" >&2; exit 1; }
 done
 git ls-files 'src/*.h' 'src/*.cc' | xargs clang-format --dry-run -Werror
-[ -f build/release/compile_commands.json ] || cmake --preset release >/dev/null
-git ls-files 'src/*.cc' | xargs -P "$(nproc)" -n 4 clang-tidy --quiet -p build/release
+cmake --preset lean >/dev/null
+# Only files of the lean build have a command to be read with. g++ knows warnings that clang does not.
+files=${FILES:-$(sed -n 's/^ *"file": "\(.*\)",*$/\1/p' build/lean/compile_commands.json | grep '/src/' | sort -u)}
+# shellcheck disable=SC2086
+printf '%s\n' $files | xargs -P "$(nproc)" -n 1 clang-tidy --quiet -p build/lean --extra-arg=-Wno-unknown-warning-option 2>&1 |
+  { grep -vE '^[0-9]+ warnings? (and [0-9]+ errors? )?generated\.$' || true; }
+[ "${PIPESTATUS[0]}" -eq 0 ] && [ "${PIPESTATUS[1]}" -eq 0 ] || { echo "lint: see above" >&2; exit 1; }
 echo "lint: clean"

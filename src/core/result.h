@@ -68,10 +68,13 @@ class [[nodiscard]] Status {
 
 #define ANCHORSPLAT_CONCAT_INNER(a, b) a##b
 #define ANCHORSPLAT_CONCAT(a, b) ANCHORSPLAT_CONCAT_INNER(a, b)
+// NOLINTBEGIN(bugprone-macro-parentheses): a declaration cannot stand in parentheses
 #define ANCHORSPLAT_ASSIGN_OR_RETURN_INNER(result, declaration, expression) \
   auto result = (expression);                                               \
   if (!result.ok()) return result.error();                                  \
   declaration = *std::move(result)
+
+// NOLINTEND(bugprone-macro-parentheses)
 
 // ANCHORSPLAT_ASSIGN_OR_RETURN(auto cloud, ReadCloud(path)): the value, or leaves the function with the error.
 #define ANCHORSPLAT_ASSIGN_OR_RETURN(declaration, expression) \

@@ -9,9 +9,7 @@
 namespace anchorsplat {
 namespace {
 
-TEST(Text, CatWritesEverything) {
-  EXPECT_EQ(Cat("byte ", 17, ": ", 0.5, ' ', true), "byte 17: 0.5 1");
-}
+TEST(Text, CatWritesEverything) { EXPECT_EQ(Cat("byte ", 17, ": ", 0.5, ' ', true), "byte 17: 0.5 1"); }
 
 TEST(Text, Thousands) {
   EXPECT_EQ(WithThousands(0), "0");

@@ -129,7 +129,8 @@ double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud)
   if (options.filter_strength) return *options.filter_strength;
   if (cloud.render_mode == RenderMode::kAntialiased) {
     LogWarning(
-        "the file is tagged antialiased: its fit did not absorb the 0.3 px² dilation, so there is no lost width to give "
+        "the file is tagged antialiased: its fit did not absorb the 0.3 px² dilation, so there is no lost width to "
+        "give "
         "back and the filter leaves it as it is (--filter-strength F to filter it all the same)");
     return 0;
   }

@@ -33,14 +33,13 @@ Result<GaussianCloud> ReadOpenCloud(const InputFile& file, const ReadLimits& lim
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
   const SplatFormat* format = FormatOfFile(head, file.path());
   if (format == nullptr) {
-    return Error{ErrorCode::kBadFile,
-                 Cat(file.name(), ": byte 0: is no splat file of a known format: found \"",
-                     Printable(head.substr(0, 8)), "\", expected ", Known(&SplatFormat::read))};
+    return Error{ErrorCode::kBadFile, Cat(file.name(), ": byte 0: is no splat file of a known format: found \"",
+                                          Printable(head.substr(0, 8)), "\", expected ", Known(&SplatFormat::read))};
   }
   if (format->read == nullptr) {
-    return Error{ErrorCode::kBadFile, Cat(file.name(), ": is a ", format->name,
-                                          " file, which this version does not read; it reads ",
-                                          Known(&SplatFormat::read))};
+    return Error{ErrorCode::kBadFile,
+                 Cat(file.name(), ": is a ", format->name, " file, which this version does not read; it reads ",
+                     Known(&SplatFormat::read))};
   }
   return format->read(file, limits);
 } catch (const std::bad_alloc&) {

@@ -22,5 +22,4 @@ inline constexpr int kBlock = 4;                        // px: a 4×4 block is o
 inline constexpr int64_t kProjectChunk = 1024;          // Gaussians per task of the per-Gaussian kernels
 inline constexpr int64_t kMaxPairs = int64_t{1} << 26;  // (tile, Gaussian) pairs listed at once: 256 MiB
 
-
 }  // namespace anchorsplat

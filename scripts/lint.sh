@@ -10,7 +10,10 @@ cmake --preset lean >/dev/null
 # Only files of the lean build have a command to be read with. g++ knows warnings that clang does not.
 files=${FILES:-$(sed -n 's/^ *"file": "\(.*\)",*$/\1/p' build/lean/compile_commands.json | grep '/src/' | sort -u)}
 # shellcheck disable=SC2086
-printf '%s\n' $files | xargs -P "$(nproc)" -n 1 clang-tidy --quiet -p build/lean --extra-arg=-Wno-unknown-warning-option 2>&1 |
-  { grep -vE '^[0-9]+ warnings? (and [0-9]+ errors? )?generated\.$' || true; }
-[ "${PIPESTATUS[0]}" -eq 0 ] && [ "${PIPESTATUS[1]}" -eq 0 ] || { echo "lint: see above" >&2; exit 1; }
+if ! printf '%s\n' $files |
+  xargs -P "$(nproc)" -n 1 clang-tidy --quiet -p build/lean --extra-arg=-Wno-unknown-warning-option 2>&1 |
+  { grep -vE '^[0-9]+ warnings? (and [0-9]+ errors? )?generated\.$' || true; }; then
+  echo "lint: see above" >&2
+  exit 1
+fi
 echo "lint: clean"

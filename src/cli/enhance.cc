@@ -82,13 +82,26 @@ nlohmann::json ToJson(const std::string& input, const fs::path& output, const En
   return json;
 }
 
-// "identity", or the seed of PyTorch's generator.
+// "identity", the seed of PyTorch's generator, or five permutations such as 1230,0321,1023,3102,0321.
 Result<Shuffles> ParseShuffles(const std::string& text) {
   if (text == "identity") return kNoShuffles;
+  Shuffles shuffles;
+  constexpr size_t kWidth = std::tuple_size_v<Shuffle> + 1;  // digits and a comma
+  if (text.size() + 1 == kWidth * shuffles.size()) {
+    bool well_formed = true;
+    for (size_t i = 0; i < text.size(); ++i) {
+      const bool comma = i % kWidth == kWidth - 1;
+      well_formed &= comma ? text[i] == ',' : text[i] >= '0' && text[i] <= '9';
+      if (!comma) shuffles[i / kWidth][i % kWidth] = static_cast<uint8_t>(text[i] - '0');
+    }
+    if (well_formed && Validate(shuffles).ok()) return shuffles;
+  }
   uint64_t seed = 0;
   const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), seed);
-  if (code == std::errc() && end == text.data() + text.size() && !text.empty()) return ShufflesFromSeed(seed);
-  return Error{ErrorCode::kBadArgument, Cat("--shuffles: '", Printable(text), "' is neither 'identity' nor a seed")};
+  if (code == std::errc() && end == text.data() + text.size()) return ShufflesFromSeed(seed);
+  return Error{ErrorCode::kBadArgument,
+               Cat("--shuffles: '", Printable(text),
+                   "' is neither 'identity', nor a seed, nor five permutations such as 1230,0321,1023,3102,0321")};
 }
 
 Status FinishModelOptions(const EnhanceFlags& flags) {
@@ -194,8 +207,12 @@ void AddEnhance(CLI::App& app, Program& program) {
   model_option(AddChoice(verb, "--attention-rounding", model.rounding,
                          {{"none", Rounding::kNone}, {"fp16", Rounding::kHalf}, {"bf16", Rounding::kBFloat16}},
                          "Of queries, keys, values and probabilities; the release: fp16"));
-  model_option(verb.add_option("--shuffles", flags->shuffles,
-                               "Order of the space-filling curves: identity, or a seed of PyTorch's"))
+  model_option(AddChoice(verb, "--curve-depth", model.depth_rule,
+                         {{"v1.5", DepthRule::kLargest}, {"v1.6", DepthRule::kLargestPlusOne}},
+                         "Bits of the space-filling curves as Pointcept's release counted them"));
+  model_option(
+      verb.add_option("--shuffles", flags->shuffles,
+                      "Orders of the space-filling curves: identity, a seed of PyTorch's, or five permutations"))
       ->capture_default_str();
   model_option(verb.add_option("--max-gaussians", model.max_gaussians,
                                "Anchors at most, the largest by opacity x size; 0 is all"))

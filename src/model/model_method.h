@@ -17,6 +17,6 @@ struct ModelMethod {
 
 // Adds the method "model", which "auto" prefers to the filter once there is a file. The checkpoint is loaded at the
 // first cloud and kept for the next.
-void RegisterModelMethod(std::shared_ptr<const ModelMethod> method);
+void RegisterModelMethod(const std::shared_ptr<const ModelMethod>& method);
 
 }  // namespace anchorsplat

@@ -2,7 +2,7 @@
 #
 #   make demo     from a bare Debian 12 machine to an enhanced splat and a picture
 #   make test     everything that is checked, sanitizers included
-#   make build    the program only: build/anchorsplat
+#   make build    the program (build/anchorsplat) and its tests
 #   make lint     clang-tidy and clang-format
 #   make fuzz     mutated files against all readers, SECONDS=60 by default
 #   make realdata DATA=DIR   checks on splats of your own
@@ -38,12 +38,19 @@ build: dependencies
 	@rm -f build-configure.log
 	@cmake --build --preset release -j $(JOBS)
 
+# Only the program, without the tests: what `make demo` needs.
+program: dependencies
+	@cmake --preset release $(TORCH_FLAGS) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
+	@rm -f build-configure.log
+	@cmake --build --preset release -j $(JOBS) --target anchorsplat
+.PHONY: program
+
 debug: dependencies
 	@cmake --preset debug $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
 	@rm -f build-configure.log
 	@cmake --build --preset debug -j $(JOBS)
 
-demo: build
+demo: program
 	@scripts/demo.sh
 
 # A second make, because .venv decides the flags of the first when it starts.
@@ -55,7 +62,7 @@ test: torch
 viewer-test: build
 	@scripts/viewer_test.sh build/anchorsplat
 
-bench: build
+bench: program
 	@build/anchorsplat bench render
 	@build/anchorsplat bench io
 
@@ -68,7 +75,7 @@ format:
 fuzz: debug
 	@scripts/fuzz.sh $(SECONDS)
 
-realdata: build
+realdata: program
 	@scripts/realdata.sh "$(DATA)"
 
 clean:

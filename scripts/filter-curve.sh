@@ -26,5 +26,6 @@ for object in biplane stone_lantern; do
     echo "  x $factor: $(mean "$object" --pixel-size "$(awk "BEGIN {print $true_pixel * $factor}")")"
   done
   echo "$object, --cameras: $(mean "$object" --cameras "examples/$object/transforms_lr.json")"
+  echo "$object, --cameras, --camera-rule median: $(mean "$object" --cameras "examples/$object/transforms_lr.json" --camera-rule median)"
   echo "$object, --pixel-size auto: $(mean "$object")"
 done

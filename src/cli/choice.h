@@ -7,6 +7,11 @@
 
 namespace anchorsplat {
 
+// For paths: an empty one is a variable that was not set, not a wish for the default.
+inline CLI::Validator NotEmpty() {
+  return CLI::Validator([](const std::string& text) { return text.empty() ? "must not be empty" : ""; }, "");
+}
+
 // An option that takes one of several words for the values of an enumeration. Help shows the words and the default;
 // numbers are not accepted.
 template <typename Enum>

@@ -88,6 +88,18 @@ checks=$((checks + 1))
 checks=$((checks + 1))
 [ "$(find "$work/many" -type f | wc -l)" -eq 2 ] || { failures=$((failures + 1)); echo "FAILED: --out-dir left something else than two files"; }
 
+expect 2 "unknown extension, before reading" "$program" enhance "$work/nothing.ply" -o "$work/bad.xyz"
+says stderr "bad.xyz"
+expect 3 "no such folder" "$program" enhance "$input" -o "$work/nowhere/out.ply"
+expect 2 "empty cameras" "$program" enhance "$input" -o "$work/bad.ply" --cameras ""
+expect 2 "huge strength" "$program" enhance "$input" -o "$work/bad.ply" --filter-strength 1e300
+expect 2 "command line error as JSON" "$program" enhance --json
+says stdout '"bad_argument"'
+printf '[{"id":0,"img_name":"a","width":4096,"height":4096,"position":[0,0,-1.7],"rotation":[[1,0,0],[0,1,0],[0,0,1]],"fx":4944,"fy":4944}]' >"$work/cameras.json"
+expect 0 "wide cameras are said to be shrunk" "$program" enhance "$input" -o "$work/wide.ply" --cameras "$work/cameras.json" --json
+says stderr "1600"
+says stdout '"train_width": 1600'
+
 # info.
 expect 0 "info" "$program" info "$input"
 says stdout "19,984, SH degree 3"
@@ -112,6 +124,8 @@ expect 2 "no such view" "$program" render "$input" -o "$work/x.png" --cameras "$
 expect 2 "nonsense size" "$program" render "$input" -o "$work/x.png" --orbit 1 --size 0x5
 expect 2 "other shape" "$program" render "$input" -o "$work/x" --cameras "$cameras" --size 100x50
 expect 2 "cameras and orbit" "$program" render "$input" -o "$work/x" --cameras "$cameras" --orbit 3
+expect 2 "not a PNG" "$program" render "$input" -o "$work/x.jpg" --orbit 1
+expect 2 "too many pixels" "$program" render "$input" -o "$work/x.png" --orbit 1 --size 32768x32768
 expect 3 "missing cameras" "$program" render "$input" -o "$work/x" --cameras "$work/none.json"
 
 # view.
@@ -139,6 +153,10 @@ says stdout "inf"
 expect 0 "identical, as JSON" "$program" compare "$input" "$input" --orbit 1 --size 64x64 --json
 says stdout '"psnr": null'
 expect 0 "splat with its renders" "$program" compare "$input" "$work/views" --cameras "$cameras" --size 128x128
+expect 2 "nothing to compare" "$program" compare "" "$input" --orbit 1
+mkdir "$work/empty"
+expect 3 "an empty folder" "$program" compare "$input" "$work/empty" --orbit 1
+says stderr "no PNG or JPEG"
 expect 2 "splats without views" "$program" compare "$input" "$work/out.ply"
 says stderr "--orbit"
 expect 2 "views without partner" "$program" compare "$input" "$work/views" --cameras "$source/examples/biplane/transforms_lr.json"

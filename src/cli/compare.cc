@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "cli/choice.h"
+#include "cli/parse.h"
 #include "cli/table.h"
 #include "cli/verb.h"
 #include "cli/views.h"
@@ -162,8 +164,14 @@ Status WriteSideBySide(const CompareFlags& flags, Sides& sides, const std::vecto
 }
 
 Status RunCompare(const CompareFlags& flags, const SharedFlags& shared) {
-  if (!flags.side_by_side.empty() && !shared.overwrite && fs::exists(flags.side_by_side)) {
-    return Error{ErrorCode::kExists, Cat(flags.side_by_side, " exists; -w replaces it")};
+  if (!flags.side_by_side.empty()) {
+    if (!IsPngName(flags.side_by_side)) {
+      return Error{ErrorCode::kBadArgument,
+                   Cat("--side-by-side ", flags.side_by_side, ": pictures are written as .png")};
+    }
+    if (!shared.overwrite && fs::exists(flags.side_by_side)) {
+      return Error{ErrorCode::kExists, Cat(flags.side_by_side, " exists; -w replaces it")};
+    }
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(Sides sides, OpenSides(flags));
   std::vector<ViewSource*> sources = {sides.a.get()};
@@ -187,11 +195,15 @@ void AddCompare(CLI::App& app, Program& program) {
   CLI::App& verb = AddVerb(app, program, "compare", "PSNR and SSIM of two splats, folders of pictures or pictures",
                            "anchorsplat compare before.ply after.ply --truth photos/ --cameras transforms.json");
   const auto flags = std::make_shared<CompareFlags>();
-  verb.add_option("a", flags->a, "Splat, folder of pictures or picture")->required();
-  verb.add_option("b", flags->b, "The same; what A is compared with, unless there is a --truth")->required();
-  verb.add_option("--truth", flags->truth, "Compare both A and B with this instead, and show the gain");
+  verb.add_option("a", flags->a, "Splat, folder of pictures or picture")->required()->check(NotEmpty());
+  verb.add_option("b", flags->b, "The same; what A is compared with, unless there is a --truth")
+      ->required()
+      ->check(NotEmpty());
+  verb.add_option("--truth", flags->truth, "Compare both A and B with this instead, and show the gain")
+      ->check(NotEmpty());
   verb.add_option("--side-by-side", flags->side_by_side,
-                  "Write a PNG of the view with the median score: pictures, zoomed crop, difference");
+                  "Write a PNG of the view with the median score: pictures, zoomed crop, difference")
+      ->check(NotEmpty());
   flags->views.AddTo(verb);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunCompare(*flags, program.flags); }; });
 }

@@ -13,6 +13,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "formats/camera_io.h"
+#include "formats/registry.h"
 #include "model/model_method.h"
 
 namespace anchorsplat {
@@ -34,6 +35,23 @@ struct EnhanceFlags {
   std::string compat;
 };
 
+// What can be known to fail before anything is read.
+Status CheckOutput(const fs::path& output, bool overwrite) {
+  const SplatFormat* format = FormatOfExtension(output);
+  if (format == nullptr || format->write == nullptr) {
+    std::string known;
+    for (const SplatFormat& f : Formats()) {
+      if (f.write != nullptr) known += Cat(" ", f.extensions.front());
+    }
+    return Error{ErrorCode::kBadArgument, Cat(output.string(), ": not a format that is written; known are", known)};
+  }
+  if (!overwrite && fs::exists(output))
+    return Error{ErrorCode::kExists, Cat(output.string(), " exists; -w replaces it")};
+  const fs::path folder = output.parent_path();
+  if (folder.empty() || fs::is_directory(folder)) return {};
+  return Error{ErrorCode::kNotFound, Cat(output.string(), ": there is no folder ", folder.string())};
+}
+
 // Where each input goes. Nothing may be written twice or over its own input by accident.
 Result<std::vector<fs::path>> OutputPaths(const EnhanceFlags& flags, bool overwrite) {
   if (flags.output.empty() == flags.out_dir.empty()) {
@@ -43,6 +61,7 @@ Result<std::vector<fs::path>> OutputPaths(const EnhanceFlags& flags, bool overwr
     if (flags.inputs.size() > 1) {
       return Error{ErrorCode::kBadArgument, Cat(flags.inputs.size(), " inputs and one -o file: use --out-dir DIR")};
     }
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(flags.output, overwrite));
     return std::vector<fs::path>{flags.output};
   }
   std::vector<fs::path> outputs;
@@ -56,15 +75,11 @@ Result<std::vector<fs::path>> OutputPaths(const EnhanceFlags& flags, bool overwr
     }
     outputs.push_back(output);
   }
-  // Checked for all before the first is computed: a batch should not fail half-way on something known at its start.
-  for (const fs::path& output : outputs) {
-    if (!overwrite && fs::exists(output)) {
-      return Error{ErrorCode::kExists, Cat(output.string(), " exists; -w replaces it")};
-    }
-  }
   std::error_code code;
   fs::create_directories(flags.out_dir, code);
   if (code) return Error{ErrorCode::kIo, Cat(flags.out_dir, ": cannot make this folder: ", code.message())};
+  // For all before the first is computed: a batch should not fail half-way on something known at its start.
+  for (const fs::path& output : outputs) ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(output, overwrite));
   return outputs;
 }
 
@@ -78,6 +93,7 @@ nlohmann::json ToJson(const std::string& input, const fs::path& output, const En
   if (!r.pixel_size_source.empty()) {
     json["filter_strength"] = r.filter_strength;
     json["pixel_size"] = {{"value", r.pixel_size}, {"source", r.pixel_size_source}};
+    if (r.train_width) json["train_width"] = *r.train_width;
   }
   return json;
 }
@@ -130,9 +146,6 @@ Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared) {
 
   nlohmann::json results = nlohmann::json::array();
   for (size_t i = 0; i < flags.inputs.size(); ++i) {
-    if (!shared.overwrite && fs::exists(outputs[i])) {
-      return Error{ErrorCode::kExists, Cat(outputs[i].string(), " exists; -w replaces it")};
-    }
     ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, ReadCloud(flags.inputs[i]));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Enhanced enhanced, Enhance(std::move(cloud), options));
     ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(outputs[i], enhanced.cloud, WriteOptionsFrom(shared)));
@@ -162,18 +175,17 @@ void AddEnhance(CLI::App& app, Program& program) {
   const auto flags = std::make_shared<EnhanceFlags>();
   RegisterModelMethod(flags->model);  // before --method lists what there is
   EnhanceOptions& options = flags->options;
-  verb.add_option("inputs", flags->inputs, "Splat files")->required();
+  verb.add_option("inputs", flags->inputs, "Splat files")->required()->check(NotEmpty());
   auto* output = verb.add_option("-o,--output", flags->output, "File to write (one input)");
   verb.add_option("--out-dir", flags->out_dir, "Folder to write to, under the inputs' names")->excludes(output);
   verb.add_option("--method", options.method, MethodHelp())->capture_default_str();
   verb.add_option("--upscale", options.upscale, "How many times closer it will be seen; at least 1")
       ->capture_default_str();
-  auto* pixel_size =
-      verb.add_option("--pixel-size", flags->pixel_size,
-                      "World size of one pixel of the training views (depth / focal length), or auto to estimate it")
-          ->capture_default_str();
+  verb.add_option("--pixel-size", flags->pixel_size,
+                  "World size of one pixel of the training views (depth / focal length), or auto to estimate it")
+      ->capture_default_str();
   auto* cameras = verb.add_option("--cameras", flags->cameras, "Training cameras: exact pixel size for every Gaussian")
-                      ->excludes(pixel_size);
+                      ->check(NotEmpty());
   verb.add_option("--train-width", options.train_width,
                   "Image width in training where it was less than the cameras say")
       ->check(CLI::PositiveNumber)

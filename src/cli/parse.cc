@@ -1,8 +1,13 @@
 #include "cli/parse.h"
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
+#include <set>
 
+#include "core/image.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -32,7 +37,23 @@ Result<std::array<double, 3>> ParseTriple(const std::string& option, const std::
   return out;
 }
 
+// Lower case, with the dot.
+std::string Extension(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
 }  // namespace
+
+bool IsPngName(const std::string& path) { return Extension(path) == ".png"; }
+
+bool IsPictureName(const std::string& path) {
+  static const std::set<std::string> known = {".png",  ".jpg", ".jpeg", ".webp", ".tif",
+                                              ".tiff", ".bmp", ".gif",  ".exr",  ".ppm"};
+  return known.contains(Extension(path));
+}
 
 Result<SizeOption> ParseSize(const std::string& option, const std::string& text) {
   const Error error{
@@ -45,6 +66,9 @@ Result<SizeOption> ParseSize(const std::string& option, const std::string& text)
   if (!width || !height) return error;
   const auto fits = [](double v) { return v >= 1 && v <= 32768 && v == std::floor(v); };
   if (!fits(*width) || !fits(*height)) return error;
+  if (*width * *height > static_cast<double>(kMaxImagePixels)) {
+    return Error{ErrorCode::kBadArgument, Cat(option, " ", text, ": more than ", kMaxImagePixels, " pixels")};
+  }
   return SizeOption{static_cast<int>(*width), static_cast<int>(*height)};
 }
 

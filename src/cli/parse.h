@@ -9,6 +9,8 @@
 namespace anchorsplat {
 
 // Option values with a form of their own. Errors (kBadArgument) name the option and show the form.
+bool IsPngName(const std::string& path);      // *.png in any case
+bool IsPictureName(const std::string& path);  // the extension of some picture format, ours or not
 struct SizeOption {
   int width = 0;
   int height = 0;

@@ -6,6 +6,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "cli/choice.h"
+#include "cli/parse.h"
 #include "cli/verb.h"
 #include "cli/views.h"
 #include "core/log.h"
@@ -28,7 +30,10 @@ struct RenderFlags {
 
 // One picture goes to a file, several to a folder under the views' names.
 Result<std::vector<fs::path>> OutputPaths(const std::string& output, const CameraSet& cameras, bool overwrite) {
-  const bool to_file = fs::path(output).extension() == ".png";
+  const bool to_file = IsPngName(output);
+  if (!to_file && IsPictureName(output)) {
+    return Error{ErrorCode::kBadArgument, Cat("-o ", output, ": pictures are written as .png")};
+  }
   if (to_file && cameras.cameras.size() > 1) {
     return Error{ErrorCode::kBadArgument, Cat("-o ", output, " is one picture and there are ", cameras.cameras.size(),
                                               " views: give a folder, or choose one with --view NAME")};
@@ -108,7 +113,9 @@ void AddRender(CLI::App& app, Program& program) {
                            "anchorsplat render scan.ply -o views/ --orbit 8 --size 800x600 --background 1,1,1");
   const auto flags = std::make_shared<RenderFlags>();
   verb.add_option("input", flags->input, "Splat file")->required();
-  verb.add_option("-o,--output", flags->output, "A .png file for one view, a folder for several")->required();
+  verb.add_option("-o,--output", flags->output, "A .png file for one view, a folder for several")
+      ->required()
+      ->check(NotEmpty());
   verb.add_flag("--transparent", flags->transparent, "Write an alpha channel instead of a background");
   flags->views.AddTo(verb);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunRender(*flags, program.flags); }; });

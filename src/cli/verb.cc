@@ -52,7 +52,10 @@ CLI::App& AddVerb(CLI::App& app, Program& program, const std::string& name, cons
       ->check(CLI::Range(0, 1024))
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--seed", flags.seed, "Seed of everything random")->capture_default_str()->group(group);
+  verb.add_option("--seed", flags.seed, "Seed of everything random")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->group(group);
   return verb;
 }
 
@@ -94,7 +97,11 @@ int RunProgram(int argc, const char* const* argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     // CLI11 answers --help and --version through this path with exit code 0.
-    return app.exit(error) == 0 ? 0 : kUsageExitCode;
+    if (error.get_exit_code() == 0) return app.exit(error);
+    // Parsing failed, so whether JSON was asked for has to be read off the words themselves.
+    SharedFlags flags;
+    for (int i = 1; i < argc; ++i) flags.json |= std::string_view(argv[i]) == "--json";
+    return Fail(flags, {ErrorCode::kBadArgument, Cat(error.what(), " (--help shows how)")});
   }
 
   const SharedFlags& flags = program.flags;

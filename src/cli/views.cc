@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "cli/choice.h"
 #include "cli/parse.h"
 #include "core/framing.h"
 #include "core/text.h"
@@ -57,7 +58,8 @@ Status Resize(CameraSet& cameras, const std::string& text) {
 
 void ViewFlags::AddTo(CLI::App& verb) {
   auto* cameras_option =
-      verb.add_option("--cameras", cameras, "transforms.json, cameras.json or a COLMAP folder with the views");
+      verb.add_option("--cameras", cameras, "transforms.json, cameras.json or a COLMAP folder with the views")
+          ->check(NotEmpty());
   verb.add_option("--orbit", orbit, "Views on a sphere around the splat instead")
       ->check(CLI::Range(1, 100000))
       ->excludes(cameras_option);

@@ -17,6 +17,8 @@ namespace {
 
 // Cameras and estimate further apart than this are worth a word: one of them does not belong to this splat.
 constexpr double kSuspiciousRatio = 1.5;
+// An estimate whose range is wider than this is a rough one.
+constexpr double kVague = 3;
 
 std::vector<EnhanceMethod>& Registry() {
   static std::vector<EnhanceMethod> methods = {
@@ -92,6 +94,7 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
                      ": are these its training cameras, at the size it was trained at (--train-width)?"));
     }
   }
+  report.train_width = train_width;
   report.pixel_size = from_cameras.median;
   report.pixel_size_source = "cameras";
   input.pixel_sizes = std::move(from_cameras.sizes);
@@ -99,6 +102,9 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
 }
 
 Status ChoosePixelSizes(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
+  if (options.pixel_size && !(*options.pixel_size > 0 && std::isfinite(*options.pixel_size))) {
+    return Error{ErrorCode::kBadArgument, Cat("pixel size ", *options.pixel_size, " is not a positive length")};
+  }
   if (options.pixel_size && options.cameras) {
     return Error{ErrorCode::kBadArgument,
                  "a pixel size and cameras were given; the cameras already say the pixel size"};
@@ -117,6 +123,11 @@ Status ChoosePixelSizes(const EnhanceOptions& options, EnhanceInput& input, Enha
     }
     report.pixel_size = estimate->size;
     report.pixel_size_source = "estimated";
+    if (estimate->high > kVague * estimate->low) {
+      LogWarning(
+          "this splat says little about the pixels it was trained at, so the estimate is rough and rather too small; "
+          "--cameras or --pixel-size will do better");
+    }
     LogInfo(Cat("estimated size of a training pixel: ", estimate->size, " (likely ", estimate->low, " to ",
                 estimate->high, "); --cameras or --pixel-size make it exact"));
   }
@@ -148,6 +159,10 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   if (!(options.upscale >= 1) || !std::isfinite(options.upscale)) {
     return Error{ErrorCode::kBadArgument, Cat("--upscale ", options.upscale, " must be at least 1")};
   }
+  if (options.filter_strength && !(*options.filter_strength >= 0 && *options.filter_strength <= kMaxFilterStrength)) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--filter-strength ", *options.filter_strength, " is not between 0 and ", kMaxFilterStrength)};
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const EnhanceMethod* method, ChooseMethod(options));
 
   EnhanceReport report;
@@ -162,6 +177,12 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   if (method->needs_pixel_size) {
     input.filter_strength = ChooseStrength(options, input.cloud);
     report.filter_strength = input.filter_strength;
+    if (input.filter_strength > 0 && input.filter_strength * options.upscale * options.upscale <= 1 &&
+        options.upscale > 1) {
+      LogWarning(Cat("a strength of ", input.filter_strength,
+                     " is no more than what the closer view's own pixels add (1/", options.upscale,
+                     "²): nothing changes"));
+    }
     ANCHORSPLAT_RETURN_IF_ERROR(ChoosePixelSizes(options, input, report));
   }
 

@@ -34,9 +34,10 @@ struct EnhanceReport {
   int64_t gaussians_out = 0;
   double upscale = 1;
   double filter_strength = 0;
-  double pixel_size = 0;          // p_LR, the median when there is one per Gaussian
-  std::string pixel_size_source;  // "given", "cameras" or "estimated"; empty for methods that need none
-  double seconds = 0;             // of the method itself, without reading and writing
+  double pixel_size = 0;           // p_LR, the median when there is one per Gaussian
+  std::string pixel_size_source;   // "given", "cameras" or "estimated"; empty for methods that need none
+  std::optional<int> train_width;  // pixels, given or assumed; nothing when the cameras' own size was taken
+  double seconds = 0;              // of the method itself, without reading and writing
 };
 
 // The cloud as methods get it: rows that are not finite are gone; p_LR is known to those that need it.

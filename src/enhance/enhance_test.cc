@@ -189,6 +189,39 @@ TEST_F(EnhanceDoor, EstimateIsNearTheTruthOnRealFits) {
   }
 }
 
+// What captures of real places have behind their subject must not decide.
+TEST_F(EnhanceDoor, EstimateIsNotMovedByGiantsAndSkies) {
+  const auto example = ReadCloud(std::string(ANCHORSPLAT_SOURCE_DIR) + "/examples/biplane/input.ply");
+  ASSERT_TRUE(example.ok());
+  const double plain = EstimatePixelSize(*example)->size;
+  struct Addition {
+    int count;
+    float log_scale, distance;
+  };
+  for (const Addition added : {Addition{1, 3, 50}, {1, 5, 0}, {200, 1.5f, 20}, {3, 80, 1}, {100, 0, 8}}) {
+    GaussianCloud cloud = *example;
+    std::vector<int64_t> rows(static_cast<size_t>(added.count), 0);
+    GaussianCloud more = *Subset(cloud, rows);
+    Random random(7);
+    for (size_t i = 0; i < rows.size(); ++i) {
+      double direction[3], norm = 0;
+      for (double& d : direction) {
+        d = random.Normal();
+        norm += d * d;
+      }
+      for (size_t a = 0; a < 3; ++a) {
+        more.means[3 * i + a] = static_cast<float>(added.distance * direction[a] / std::sqrt(norm));
+        more.log_scales[3 * i + a] = added.log_scale;
+      }
+      more.opacity_logits[i] = 4;
+    }
+    ASSERT_TRUE(Append(cloud, more).ok());
+    const auto estimate = EstimatePixelSize(cloud);
+    ASSERT_TRUE(estimate.ok()) << estimate.error().message;
+    EXPECT_NEAR(estimate->size / plain, 1, 0.1) << added.count << " of ln scale " << added.log_scale;
+  }
+}
+
 TEST_F(EnhanceDoor, EstimateRefusesWhatSaysNothing) {
   GaussianCloud few = Ball(0.01, 10);
   EXPECT_FALSE(EstimatePixelSize(few).ok());

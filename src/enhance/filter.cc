@@ -31,8 +31,9 @@ Result<int64_t> ApplyFilter(GaussianCloud& cloud, std::span<const float> pixel_s
                  Cat("upscale ", options.upscale, " is below 1: the filter is for seeing a splat closer, not farther")};
   }
   const double strength = options.strength.value_or(DefaultFilterStrength(options.upscale));
-  if (!(strength >= 0) || !std::isfinite(strength)) {
-    return Error{ErrorCode::kBadArgument, Cat("filter strength ", strength, " is negative or not a number")};
+  if (!(strength >= 0) || strength > kMaxFilterStrength) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("filter strength ", strength, " is not between 0 and ", kMaxFilterStrength)};
   }
   if (pixel_sizes.size() != 1 && pixel_sizes.size() != static_cast<size_t>(cloud.size())) {
     return Error{ErrorCode::kBadArgument,

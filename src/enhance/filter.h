@@ -15,17 +15,18 @@ namespace anchorsplat {
 // lengthens the three axes; the rotation stays. docs/method.md derives it and shows the curve over f.
 struct FilterOptions {
   double upscale = 4;              // u ≥ 1: how many times closer the splat will be seen
-  std::optional<double> strength;  // f ≥ 0; DefaultFilterStrength(upscale) unless given
+  std::optional<double> strength;  // f, 0 to kMaxFilterStrength; DefaultFilterStrength(upscale) unless given
 };
 
 // f = 1 − (1 − 1/u²)/3.6: the box variance (1/12 px²) of the low-resolution pixel is taken out of the 0.3 px² and that
 // of the high-resolution pixel put back. 0.740 at u = 4, 1 at u = 1, where the filter changes nothing.
 double DefaultFilterStrength(double upscale);
+inline constexpr double kMaxFilterStrength = 100;  // far beyond anything sensible; keeps typing errors out
 
 // Applies the filter in place. `pixel_sizes` is p_LR in world units, one value for all Gaussians or one per Gaussian.
 // Log-scales of −Inf (scale 0) become finite wherever variance is added; rows that are not finite stay as they are.
-// Returns how many Gaussians grew. kBadArgument: upscale < 1, negative strength, a pixel size that is not positive and
-// finite, or the wrong number of them.
+// Returns how many Gaussians grew. kBadArgument: upscale < 1, a strength out of range, a pixel size that is not
+// positive and finite, or the wrong number of them.
 Result<int64_t> ApplyFilter(GaussianCloud& cloud, std::span<const float> pixel_sizes, const FilterOptions& options);
 
 }  // namespace anchorsplat

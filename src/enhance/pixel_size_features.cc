@@ -21,6 +21,10 @@ constexpr int kRenderSize = 512;  // px; enough samples of the outline, and quic
 constexpr double kFieldOfView = std::numbers::pi / 4;
 constexpr float kTranslucentFrom = 0.7f, kTranslucentTo = 0.95f;
 constexpr int kSearchOctaves = 3;  // either way from the middle axis
+// Sky shells, floaters and giants say nothing about pixels and would drown what does: only Gaussians this close to the
+// middle and this small count, in units of the radius that frames the cloud.
+constexpr double kFarthest = 1.5;
+constexpr double kLargestAxis = 0.25;
 
 // Value at which `share` of the total weight is reached. `items` are (value, weight).
 double WeightedQuantile(std::vector<std::pair<float, double>>& items, double share) {
@@ -35,18 +39,46 @@ double WeightedQuantile(std::vector<std::pair<float, double>>& items, double sha
   return items.back().first;
 }
 
+// The part of the cloud that says something, without its colours.
+GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing) {
+  std::vector<int64_t> rows;
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    if (!IsUsable(cloud, i)) continue;
+    double distance = 0;
+    for (size_t a = 0; a < 3; ++a) {
+      const double d = cloud.means[static_cast<size_t>(3 * i) + a] - framing.target[a];
+      distance += d * d;
+    }
+    const float* scales = cloud.log_scales.data() + 3 * i;
+    const float longest = std::max({scales[0], scales[1], scales[2]});
+    if (std::sqrt(distance) <= kFarthest * framing.radius && longest <= std::log(kLargestAxis * framing.radius)) {
+      rows.push_back(i);
+    }
+  }
+  GaussianCloud out;
+  out.Resize(static_cast<int64_t>(rows.size()), 0);
+  std::fill(out.sh.begin(), out.sh.end(), 0.0f);
+  for (size_t k = 0; k < rows.size(); ++k) {
+    const int64_t i = rows[k];
+    std::copy_n(cloud.means.data() + 3 * i, 3, out.means.data() + 3 * k);
+    std::copy_n(cloud.log_scales.data() + 3 * i, 3, out.log_scales.data() + 3 * k);
+    std::copy_n(cloud.quats.data() + 4 * i, 4, out.quats.data() + 4 * k);
+    out.opacity_logits[k] = cloud.opacity_logits[static_cast<size_t>(i)];
+  }
+  return out;
+}
+
 // Fills the axis features; false when there are too few Gaussians to say anything.
 bool AxisFeatures(const GaussianCloud& cloud, PixelSizeFeatures& features) {
   std::vector<std::pair<float, double>> largest, middle;
   for (int64_t i = 0; i < cloud.size(); ++i) {
-    if (!IsUsable(cloud, i)) continue;
     const float opacity = 1 / (1 + std::exp(-cloud.opacity_logits[static_cast<size_t>(i)]));
     if (opacity < kVisibleOpacity) continue;
     std::array<float, 3> axes;
     for (size_t a = 0; a < 3; ++a) axes[a] = std::exp(cloud.log_scales[static_cast<size_t>(3 * i) + a]);
     std::sort(axes.begin(), axes.end());
     const double weight = double{opacity} * axes[1] * axes[2];
-    if (!(axes[0] > 0) || !(weight > 0) || !std::isfinite(weight)) continue;
+    if (!(axes[0] > 0) || !(weight > 0)) continue;
     middle.emplace_back(axes[1], weight);
     largest.emplace_back(axes[2], weight);
   }
@@ -59,9 +91,8 @@ bool AxisFeatures(const GaussianCloud& cloud, PixelSizeFeatures& features) {
 // Renders one cloud from all sides with the dilation of different pixel sizes, each size once.
 class TranslucentShare {
  public:
-  static Result<TranslucentShare> Make(const GaussianCloud& cloud) {
+  static Result<TranslucentShare> Make(const GaussianCloud& cloud, const Framing& framing) {
     const Pinhole intrinsics = PinholeFromFov(kRenderSize, kRenderSize, kFieldOfView);
-    const Framing framing = FrameCloud(cloud);
     const double distance = FramingDistance(framing, intrinsics);
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet cameras, OrbitCameras(kViews, distance, framing.target, intrinsics));
     return TranslucentShare(cloud, std::move(cameras), distance / intrinsics.fx);
@@ -108,13 +139,15 @@ double Vertex(double left, double middle, double right) {
 
 }  // namespace
 
-Result<PixelSizeFeatures> ComputePixelSizeFeatures(const GaussianCloud& cloud) {
+Result<PixelSizeFeatures> ComputePixelSizeFeatures(const GaussianCloud& whole) {
+  const Framing framing = FrameCloud(whole);
+  const GaussianCloud cloud = Telling(whole, framing);
   PixelSizeFeatures features;
   if (!AxisFeatures(cloud, features)) {
     return Error{ErrorCode::kBadArgument,
                  Cat("fewer than ", kLeastGaussians, " visible Gaussians to estimate a pixel size from")};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(TranslucentShare share, TranslucentShare::Make(cloud));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(TranslucentShare share, TranslucentShare::Make(cloud, framing));
 
   // Whole octaves downhill from the middle axis, then half octaves around the least. Downhill rather than everywhere:
   // pixels as large as the cloud itself make it vanish, which is crisp as well.

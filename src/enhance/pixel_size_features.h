@@ -25,7 +25,8 @@ struct PixelSizeFeatures {
 // The rendered picture itself always has the same resolution; it only samples.
 //
 // Splats without gaps at any pixel size have no minimum; `fall` is 0 then and `crispest` means nothing.
-// kBadArgument: fewer than kLeastGaussians usable Gaussians with an opacity of 10 % or more and three positive scales.
+// Only Gaussians near the middle of the cloud and small beside it are looked at. kBadArgument: fewer than
+// kLeastGaussians of them an opacity of 10 % or more and three positive scales.
 inline constexpr int64_t kLeastGaussians = 16;
 Result<PixelSizeFeatures> ComputePixelSizeFeatures(const GaussianCloud& cloud);
 

@@ -1,7 +1,5 @@
 #include "eval/comparison.h"
 
-#include <filesystem>
-
 #include "core/log.h"
 #include "core/text.h"
 #include "metrics/compare.h"
@@ -25,21 +23,41 @@ Result<std::vector<std::vector<size_t>>> MatchSources(std::span<ViewSource* cons
   return out;
 }
 
+namespace {
+
+// All views whose pictures differ in size, before any of them is made.
+Status CheckSizes(std::span<ViewSource* const> sources, const std::vector<std::vector<size_t>>& partners,
+                  const ViewSource& reference) {
+  constexpr int kShown = 10;
+  std::string list;
+  int different = 0;
+  for (size_t r = 0; r < reference.names().size(); ++r) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize truth, reference.SizeOf(r));
+    for (size_t s = 0; s < sources.size(); ++s) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize size, sources[s]->SizeOf(partners[s][r]));
+      if (size.width == truth.width && size.height == truth.height) continue;
+      if (++different > kShown) continue;
+      list += Cat(list.empty() ? "" : ", ", ViewLabel(reference.names()[r]), " (", size.width, "x", size.height,
+                  " and ", truth.width, "x", truth.height, ")");
+    }
+  }
+  if (different == 0) return {};
+  if (different > kShown) list += Cat(" and ", different - kShown, " more");
+  return Error{ErrorCode::kBadArgument, Cat("pictures of different sizes: ", list, "; --size sets that of renders")};
+}
+
+}  // namespace
+
 Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> sources, ViewSource& reference) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto partners, MatchSources(sources, reference));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckSizes(sources, partners, reference));
   std::vector<Comparison> out(sources.size());
   Progress progress("compare", static_cast<int64_t>(reference.names().size()));
   for (size_t r = 0; r < reference.names().size(); ++r) {
-    const std::string name = std::filesystem::path(reference.names()[r]).stem().string();
+    const std::string name = ViewLabel(reference.names()[r]);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Image truth, reference.Load(r));
     for (size_t s = 0; s < sources.size(); ++s) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const Image image, sources[s]->Load(partners[s][r]));
-      if (image.width != truth.width || image.height != truth.height) {
-        return Error{ErrorCode::kBadArgument,
-                     Cat("view ", name, ": ", sources[s]->names()[partners[s][r]], " is ", image.width, "x",
-                         image.height, " and ", reference.names()[r], " is ", truth.width, "x", truth.height,
-                         "; sizes must agree (--size sets that of renders)")};
-      }
       ViewScore score{name, 0, 0};
       ANCHORSPLAT_ASSIGN_OR_RETURN(score.psnr, Psnr(image, truth));
       ANCHORSPLAT_ASSIGN_OR_RETURN(score.ssim, Ssim(image, truth));

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/text.h"
+#include "formats/camera_checks.h"
 #include "formats/image_io.h"
 #include "metrics/compare.h"
 #include "metrics/image_metrics.h"
@@ -23,6 +24,9 @@ class SplatViews : public ViewSource {
   }
   const std::vector<std::string>& names() const override { return names_; }
   bool is_pictures() const override { return false; }
+  Result<ImageSize> SizeOf(size_t view) const override {
+    return ImageSize{cameras_.cameras[view].intrinsics.width, cameras_.cameras[view].intrinsics.height};
+  }
   Result<Image> Load(size_t view) override {
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud_, cameras_.cameras[view], options_, output_));
     Image image = output_.color;
@@ -51,6 +55,7 @@ class ImageViews : public ViewSource {
   }
   const std::vector<std::string>& names() const override { return names_; }
   bool is_pictures() const override { return true; }
+  Result<ImageSize> SizeOf(size_t view) const override { return ReadImageSize(files_[view]); }
   Result<Image> Load(size_t view) override {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Image image, ReadImage(files_[view]));
     return CompositeOver(image, background_);
@@ -68,11 +73,12 @@ class ImageViews : public ViewSource {
 
 }  // namespace
 
+std::string ViewLabel(const std::string& name) { return fs::path(ViewName(name)).filename().string(); }
+
 Result<size_t> FindView(const std::vector<std::string>& names, const std::string& name) {
   std::vector<size_t> found;
   for (size_t i = 0; i < names.size(); ++i) {
-    const fs::path path = names[i];
-    if (path == name || path.filename() == name || path.stem() == name) found.push_back(i);
+    if (names[i] == name || ViewLabel(names[i]) == ViewLabel(name)) found.push_back(i);
   }
   if (found.size() == 1) return found[0];
   return Error{ErrorCode::kBadArgument,
@@ -100,9 +106,7 @@ bool LooksLikeImages(const fs::path& path) {
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (extension == ".png" || extension == ".jpg" || extension == ".jpeg") return true;
   std::error_code code;
-  if (!fs::is_directory(path, code)) return false;
-  const auto files = ListPictures(path);
-  return files.ok() && !files->empty();
+  return fs::is_directory(path, code);
 }
 
 }  // namespace anchorsplat

@@ -9,6 +9,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/image.h"
 #include "core/result.h"
+#include "formats/image_io.h"
 #include "render/rasterizer.h"
 
 namespace anchorsplat {
@@ -18,14 +19,18 @@ namespace anchorsplat {
 class ViewSource {
  public:
   virtual ~ViewSource() = default;
-  // Of the views, in the order of the cameras or sorted by file name; as the camera file or the folder has them.
+  // Of the views, in the order of the cameras or sorted by file name: camera names or paths of pictures.
   virtual const std::vector<std::string>& names() const = 0;
-  virtual bool is_pictures() const = 0;  // files, not renders
+  virtual bool is_pictures() const = 0;                     // files, not renders
+  virtual Result<ImageSize> SizeOf(size_t view) const = 0;  // without rendering or decoding
   // Three channels in 0–1: renders are clamped and not quantised, files are byte/255 over the background.
   virtual Result<Image> Load(size_t view) = 0;
   // Forgets all views but this one.
   virtual void KeepOnly(size_t view) = 0;
 };
+
+// A view's name for people: without folder and without a picture's extension.
+std::string ViewLabel(const std::string& name);
 
 // The view called `name`, with its folder and extension or without. kBadArgument when there is none, or several.
 Result<size_t> FindView(const std::vector<std::string>& names, const std::string& name);

@@ -33,6 +33,21 @@ std::string TemporaryName() {
   return Cat(".anchorsplat-", ::getpid(), "-", counter.fetch_add(1), ".partial");
 }
 
+// A file without a name, which the system removes by itself however the process ends; −1 where the file system or the
+// absence of /proc, through which it will be named, does not allow it.
+int OpenNameless([[maybe_unused]] const std::filesystem::path& folder) {
+#ifdef O_TMPFILE
+  if (::access("/proc/self/fd", X_OK) == 0) return ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
+#endif
+  return -1;
+}
+
+// Gives a nameless file its first name; refuses to replace. An errno.
+int NameTheNameless(int descriptor, const std::filesystem::path& name) {
+  const std::string link = Cat("/proc/self/fd/", descriptor);
+  return ::linkat(AT_FDCWD, link.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0 ? 0 : errno;
+}
+
 // rename() that refuses to replace. The flag is not known to every file system; there, look and rename.
 int RenameToNewName(const char* from, const char* to) {
 #ifdef RENAME_NOREPLACE
@@ -72,14 +87,17 @@ Result<OutputFile> OutputFile::Create(const std::filesystem::path& path, bool ov
 
   std::filesystem::path folder = file.target_.parent_path();
   if (folder.empty()) folder = ".";
-  do {  // a name left over by a killed process with our number is skipped
+  file.descriptor_ = OpenNameless(folder);
+  while (file.descriptor_ < 0) {  // a name left over by a killed process with our number is skipped
     file.temporary_ = folder / TemporaryName();
     file.descriptor_ = ::open(file.temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  } while (file.descriptor_ < 0 && (errno == EEXIST || errno == EINTR));
+    if (file.descriptor_ < 0 && errno != EEXIST && errno != EINTR) break;
+  }
   if (file.descriptor_ < 0) {
     const int error = errno;
     file.temporary_.clear();
-    if (error == ENOENT || error == ENOTDIR) {
+    std::error_code unknown;
+    if ((error == ENOENT || error == ENOTDIR) && !std::filesystem::is_directory(folder, unknown)) {
       return Error{ErrorCode::kNotFound, Cat(path.string(), ": its folder ", folder.string(), " does not exist")};
     }
     return WriteError(path, "create a file in its folder", error);
@@ -143,6 +161,24 @@ Status OutputFile::WriteAt(uint64_t offset, const void* data, size_t size) const
 }
 
 Status OutputFile::Commit() {
+  if (temporary_.empty()) {  // nameless so far
+    int error = 0;
+    if (overwrite_) {  // a name for an instant: only rename() replaces
+      const std::filesystem::path name = target_.parent_path() / TemporaryName();
+      error = NameTheNameless(descriptor_, name);
+      if (error == 0) temporary_ = name;
+    } else {
+      error = NameTheNameless(descriptor_, target_);
+    }
+    if (error != 0) {
+      Discard();
+      return error == EEXIST ? Exists(path_) : WriteError(path_, "give the file its name", error);
+    }
+    if (!overwrite_) {
+      const int closed = ::close(std::exchange(descriptor_, -1));
+      return closed == 0 || errno == EINTR ? Status() : Status(WriteError(path_, "write", errno));
+    }
+  }
   // close() is where network file systems report what they could not write.
   const int closed = ::close(std::exchange(descriptor_, -1));
   if (closed != 0 && errno != EINTR) {

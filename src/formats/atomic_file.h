@@ -9,10 +9,10 @@
 
 namespace anchorsplat {
 
-// A file that appears under its name whole or not at all: bytes go to a hidden temporary in the same folder, Commit()
-// renames it. Without Commit() the destructor removes the temporary; a killed process leaves at most a hidden
-// ".anchorsplat-*.partial", never half a file under the final name. Nothing is fsynced: this protects against crashes
-// of the program, not of the machine, and costs no disk flush.
+// A file that appears under its name whole or not at all: bytes go to a file without a name in the same folder,
+// Commit() names it. Without Commit() nothing is left, however the process ends. Where the system has no nameless files
+// (O_TMPFILE), a hidden ".anchorsplat-*.partial" stands in, which only a kill leaves behind. Nothing is fsynced: this
+// protects against crashes of the program, not of the machine, and costs no disk flush.
 //
 //   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
 //   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(bytes));

@@ -32,7 +32,7 @@ TEST(AtomicFile, AppearsOnCommitOnly) {
     ASSERT_TRUE(file->Write("hello ").ok());
     ASSERT_TRUE(file->Write("world").ok());
     EXPECT_FALSE(fs::exists(path));
-    EXPECT_EQ(folder.Entries(), 1);
+    EXPECT_LE(folder.Entries(), 1);  // none where the system has files without names
     ASSERT_TRUE(file->Commit().ok());
   }
   EXPECT_EQ(Content(path), "hello world");

@@ -91,6 +91,7 @@ Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder) {
   }
   const bool binary = Exists(folder / "cameras.bin") && Exists(folder / "images.bin");
   CameraSet set;
+  set.source = CameraSource::kColmap;
   if (binary) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto cameras, ReadColmapCamerasBinary(folder / "cameras.bin"));
     ANCHORSPLAT_ASSIGN_OR_RETURN(set.cameras, ReadColmapImagesBinary(folder / "images.bin", cameras, picture_folders));

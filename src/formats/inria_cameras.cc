@@ -55,6 +55,7 @@ Result<CameraSet> CamerasFromInria(const JsonValue& root, const std::filesystem:
   if (entries.empty()) return root.Complain("expected at least one camera");
   const std::filesystem::path picture_folders[] = {folder, folder / "images"};
   CameraSet set;
+  set.source = CameraSource::kInria;
   for (const JsonValue& entry : entries) {
     auto camera = ReadCamera(entry, picture_folders);
     if (!camera.ok()) return entry.Named(camera.error(), "img_name");

@@ -132,6 +132,7 @@ Result<Camera> ReadFrame(const JsonValue& frame, const JsonValue& root, const st
 
 Result<CameraSet> CamerasFromTransforms(const JsonValue& root, const std::filesystem::path& folder) {
   CameraSet set;
+  set.source = CameraSource::kTransforms;
   if (const auto background = root.Find("background")) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> rgb, background->Numbers(3));
     for (const double x : rgb) {

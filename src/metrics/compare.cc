@@ -89,17 +89,4 @@ Result<std::vector<std::filesystem::path>> ListPictures(const std::filesystem::p
   return pictures;
 }
 
-Status CheckSameSizes(std::span<const ViewPair> pairs, std::span<const std::filesystem::path> a,
-                      std::span<const std::filesystem::path> b) {
-  std::vector<std::string> different;
-  for (const ViewPair& pair : pairs) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize x, ReadImageSize(a[pair.a]));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize y, ReadImageSize(b[pair.b]));
-    if (x.width == y.width && x.height == y.height) continue;
-    different.push_back(Cat(pair.name, " (", x.width, " x ", x.height, " and ", y.width, " x ", y.height, ")"));
-  }
-  if (different.empty()) return {};
-  return Bad(Cat("pictures of different sizes cannot be compared: ", Listed(different)));
-}
-
 }  // namespace anchorsplat

@@ -25,9 +25,4 @@ Result<std::vector<ViewPair>> MatchViews(std::span<const std::string> a, std::sp
 // Errors: kNotFound (no folder, none in it), kIo.
 Result<std::vector<std::filesystem::path>> ListPictures(const std::filesystem::path& folder);
 
-// kBadArgument, listing them, when the pictures of a pair differ in size; only headers are read. Errors of
-// ReadImageSize.
-Status CheckSameSizes(std::span<const ViewPair> pairs, std::span<const std::filesystem::path> a,
-                      std::span<const std::filesystem::path> b);
-
 }  // namespace anchorsplat

@@ -60,16 +60,5 @@ TEST(ListPictures, SortsAndSkipsTheRest) {
   EXPECT_EQ(ListPictures(folder / "d").error().code, ErrorCode::kNotFound);
 }
 
-TEST(CheckSameSizes, ListsTheOnesThatDiffer) {
-  const TestFolder folder;
-  ASSERT_TRUE(WritePng(folder / "a.png", Image(4, 3, 3)).ok());
-  ASSERT_TRUE(WritePng(folder / "b.png", Image(3, 4, 3)).ok());
-  const std::vector<std::filesystem::path> a = {folder / "a.png", folder / "b.png"}, b = {folder / "a.png"};
-  EXPECT_TRUE(CheckSameSizes(std::vector<ViewPair>{{"a", 0, 0}}, a, b).ok());
-  const Status status = CheckSameSizes(std::vector<ViewPair>{{"a", 0, 0}, {"b", 1, 0}}, a, b);
-  ASSERT_FALSE(status.ok());
-  EXPECT_NE(status.error().message.find(": b (3 x 4 and 4 x 3)"), std::string::npos) << status.error().message;
-}
-
 }  // namespace
 }  // namespace anchorsplat

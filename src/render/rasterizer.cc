@@ -255,8 +255,8 @@ Status Rasterizer::Render(const GaussianCloud& cloud, const Camera& camera, cons
     state_->statistics.sort = watch.Lap();
     state_->BinAndBlend(total, camera, options, output, watch);
   } catch (const std::bad_alloc&) {
-    return BadArgument(Cat("not enough memory for a picture of ", width, " x ", height, " pixels of ",
-                           WithThousands(cloud.size()), " Gaussians"));
+    return Error{ErrorCode::kIo, Cat("not enough memory for a picture of ", width, " x ", height, " pixels of ",
+                                     WithThousands(cloud.size()), " Gaussians")};
   }
   return {};
 }

@@ -45,7 +45,7 @@ silent() {
 expect 0 "version" "$program" --version
 says stdout "anchorsplat 0."
 expect 0 "help" "$program" --help
-for verb in enhance info render compare view bench; do
+for verb in enhance convert info render compare view bench; do
   says stdout "$verb"
   expect 0 "help of $verb" "$program" $verb --help
   says stdout "Example:"
@@ -54,6 +54,23 @@ done
 expect 2 "no verb" "$program"
 expect 2 "unknown verb" "$program" polish
 expect 2 "unknown flag" "$program" info "$input" --colour
+
+# convert.
+for to in compressed.ply spz sog splat glb csv npz; do
+  expect 0 "convert to $to" "$program" convert "$input" "$work/scan.$to" --max-gaussians 500 --sh-degree 1
+  says stdout "500 of degree 1 out"
+done
+for from in compressed.ply spz sog splat glb; do
+  expect 0 "info of $from" "$program" info "$work/scan.$from"
+  says stdout "500"
+done
+expect 0 "convert with a report" "$program" convert "$work/scan.compressed.ply" "$work/again.spz" --report --spz-version 3
+says stdout "PSNR"
+expect 0 "convert a batch" "$program" convert "$work/scan.spz" "$work/scan.glb" --out-dir "$work/batch" --to .x.ply --json
+says stdout '"gaussians"'
+expect 5 "convert over a file" "$program" convert "$input" "$work/scan.spz"
+expect 2 "convert without a place to write" "$program" convert "$input"
+expect 2 "convert with axes that are none" "$program" convert "$input" "$work/b.ply" --coords XYZ
 
 # enhance.
 expect 0 "enhance" "$program" enhance "$input" -o "$work/out.ply" --pixel-size 0.0055

@@ -90,6 +90,7 @@ int RunProgram(int argc, const char* const* argv) {
   AddEnhance(app, program);
   AddInfo(app, program);
   AddRender(app, program);
+  AddConvert(app, program);
   AddCompare(app, program);
   AddView(app, program);
   AddBench(app, program);

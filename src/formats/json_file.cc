@@ -93,8 +93,12 @@ Result<std::string> JsonValue::Text() const {
 
 Result<JsonFile> JsonFile::Read(const std::filesystem::path& path) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(path, kMaxBytes));
+  return Parse(path.string(), bytes);
+}
+
+Result<JsonFile> JsonFile::Parse(std::string name, std::string_view bytes) {
   JsonFile file;
-  file.name_ = path.string();
+  file.name_ = std::move(name);
   size_t values = 0;
   const auto bounded = [&values](int depth, nlohmann::json::parse_event_t event, nlohmann::json&) {
     using Event = nlohmann::json::parse_event_t;

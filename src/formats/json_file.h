@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/result.h"
@@ -45,6 +46,8 @@ class JsonValue {
 class JsonFile {
  public:
   static Result<JsonFile> Read(const std::filesystem::path& path);
+  // The same for bytes that are in memory; `name` is what messages call them.
+  static Result<JsonFile> Parse(std::string name, std::string_view bytes);
   JsonValue root() const { return {name_, value_, ""}; }
 
  private:

@@ -6,13 +6,19 @@
 
 #include "formats/compressed_ply_reader.h"
 #include "formats/compressed_ply_writer.h"
+#include "formats/gltf_reader.h"
+#include "formats/gltf_writer.h"
 #include "formats/gsplat_checkpoint.h"
+#include "formats/ksplat_reader.h"
 #include "formats/ply_reader.h"
 #include "formats/ply_writer.h"
+#include "formats/sog_reader.h"
+#include "formats/sog_writer.h"
 #include "formats/splat_reader.h"
 #include "formats/splat_writer.h"
 #include "formats/spz_reader.h"
 #include "formats/spz_writer.h"
+#include "formats/table_writers.h"
 
 namespace anchorsplat {
 
@@ -26,26 +32,40 @@ bool IsCompressedPly(std::string_view head) { return IsPly(head) && head.find("\
 // Version 4 begins with its own mark, earlier ones are gzip streams.
 bool IsSpz(std::string_view head) { return head.starts_with("NGSP") || head.starts_with("\x1f\x8b"); }
 
-bool IsZip(std::string_view head) { return head.starts_with("PK\x03\x04"); }
+// A ZIP archive, or the JSON file of a folder: the only one of our formats that speaks of means.
+bool IsSog(std::string_view head) {
+  return head.starts_with("PK\x03\x04") ||
+         (head.starts_with("{") && head.find("\"means\"") != head.npos && head.find("\"quats\"") != head.npos);
+}
+
+bool IsGltf(std::string_view head) { return head.starts_with("glTF"); }
 
 constexpr std::string_view kCompressedPlyExtensions[] = {".compressed.ply"};
 constexpr std::string_view kPlyExtensions[] = {".ply"};
 constexpr std::string_view kSpzExtensions[] = {".spz"};
 constexpr std::string_view kGsplatExtensions[] = {".pt", ".pth"};
-constexpr std::string_view kSogExtensions[] = {".sog"};
+constexpr std::string_view kSogExtensions[] = {".sog", "meta.json"};
 constexpr std::string_view kSplatExtensions[] = {".splat"};
 constexpr std::string_view kKsplatExtensions[] = {".ksplat"};
+constexpr std::string_view kGltfExtensions[] = {".glb"};
+constexpr std::string_view kGltfJsonExtensions[] = {".gltf"};
+constexpr std::string_view kCsvExtensions[] = {".csv"};
+constexpr std::string_view kNpzExtensions[] = {".npz"};
 
 constexpr SplatFormat kFormats[] = {
     {"compressed PLY", kCompressedPlyExtensions, IsCompressedPly, ReadCompressedPly, WriteCompressedPly,
      PredictedCompressedPlySize, SplatOrder::kMorton},
     {"PLY", kPlyExtensions, IsPly, ReadPly, WritePly,
      [](int64_t count, int sh_degree) { return PredictedPlySize(count, sh_degree); }},
-    {"SPZ", kSpzExtensions, IsSpz, ReadSpz, WriteSpz, nullptr},
+    {"SPZ", kSpzExtensions, IsSpz, ReadSpz, WriteSpz, nullptr, SplatOrder::kKeep, kRub},
     {"gsplat checkpoint", kGsplatExtensions, IsTorchCheckpoint, ReadGsplatCheckpoint, nullptr, nullptr},
-    {"SOG", kSogExtensions, IsZip, nullptr, nullptr, nullptr},
+    {"SOG", kSogExtensions, IsSog, ReadSog, WriteSog, nullptr, SplatOrder::kMorton},
     {"splat", kSplatExtensions, nullptr, ReadSplat, WriteSplat, PredictedSplatSize, SplatOrder::kImportance},
-    {"ksplat", kKsplatExtensions, nullptr, nullptr, nullptr, nullptr},
+    {"ksplat", kKsplatExtensions, nullptr, ReadKsplat, nullptr, nullptr},
+    {"glTF", kGltfExtensions, IsGltf, ReadGltf, WriteGlb, nullptr, SplatOrder::kKeep, kLuf},
+    {"glTF as JSON", kGltfJsonExtensions, nullptr, ReadGltf, nullptr, nullptr, SplatOrder::kKeep, kLuf},
+    {"CSV", kCsvExtensions, nullptr, nullptr, WriteCsv, nullptr},
+    {"NPZ", kNpzExtensions, nullptr, nullptr, WriteNpz, PredictedNpzSize},
 };
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
+#include "formats/axes.h"
 #include "formats/cloud_io.h"
 #include "formats/input_file.h"
 
@@ -28,6 +29,8 @@ struct SplatFormat {
   uint64_t (*predicted_size)(int64_t count, int sh_degree);
   // The order in which `write` puts Gaussians by default.
   SplatOrder order = SplatOrder::kKeep;
+  // What the axes of its files are by its own convention.
+  Axes axes = kRdf;
 };
 
 inline constexpr size_t kSniffBytes = 4096;

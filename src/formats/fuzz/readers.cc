@@ -90,6 +90,8 @@ void AddSplatFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
       reader.seeds = GsplatSeeds();
       reader.words = TorchWords();
     }
+    if (format.name == "ksplat") reader.seeds = KsplatSeeds();
+    if (format.name == "SOG" || format.name == "glTF") reader.words = JsonWords();
     if (!reader.seeds.empty()) readers.push_back(std::move(reader));
   }
 }
@@ -101,6 +103,28 @@ void AddSpzContent(const fs::path& folder, std::vector<FuzzReader>& readers) {
       "SPZ in gzip", {}, {}, [](const std::string& bytes) { return ReadAsCloud("fuzz.spz", Gzip(bytes)); }};
   for (int degree = 0; degree <= kMaxShDegree; ++degree) reader.seeds.push_back(SpzContentSeed(folder, degree));
   readers.push_back(std::move(reader));
+}
+
+// The members of a ZIP archive have checksums too, so a SOG folder: once its meta.json is damaged, once a picture.
+void AddSogFolder(const fs::path& folder, std::vector<FuzzReader>& readers) {
+  for (const char* damaged : {"meta.json", "means_u.webp", "shN_centroids.webp"}) {
+    const fs::path sog = folder / Cat("sog_", damaged);
+    fs::create_directories(sog);
+    (void)WriteCloud(sog / "meta.json", SeedCloud(5, 1), {.overwrite = true});
+    std::ifstream in(sog / damaged, std::ios::binary);
+    FuzzReader reader{Cat("SOG folder, ", damaged),
+                      {{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}},
+                      {},
+                      [sog, damaged](const std::string& bytes) -> Status {
+                        Put(sog / damaged, bytes);
+                        const auto cloud = ReadCloud(sog / "meta.json");
+                        if (!cloud.ok()) return CheckError(cloud.error(), sog.filename().string());
+                        Require(Validate(*cloud).ok(), "a cloud whose arrays disagree");
+                        return {};
+                      }};
+    if (std::string_view(damaged) == "meta.json") reader.words = JsonWords();
+    readers.push_back(std::move(reader));
+  }
 }
 
 Status ReadAsTensors(const std::string& file, const std::string& bytes) {
@@ -169,6 +193,7 @@ std::vector<FuzzReader> FuzzReaders(const fs::path& folder) {
   std::vector<FuzzReader> readers;
   AddSplatFormats(folder, readers);
   AddSpzContent(folder, readers);
+  AddSogFolder(folder, readers);
   AddTensorFormats(folder, readers);
   AddCameraFormats(folder, readers);
   AddImageFormats(folder, readers);

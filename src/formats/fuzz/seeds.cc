@@ -195,6 +195,35 @@ std::vector<std::string_view> PlyWords() {
           "\r\n"};
 }
 
+std::vector<std::string> KsplatSeeds() {
+  std::vector<std::string> seeds;
+  for (uint16_t level = 0; level < 3; ++level) {
+    std::string header(4096 + 1024, '\0');
+    const auto put = [&header](size_t at, auto value) { std::memcpy(header.data() + at, &value, sizeof value); };
+    put(1, uint8_t{1});
+    put(4, uint32_t{1});
+    put(16, uint32_t{3});
+    put(20, level);
+    put(4096, uint32_t{3});
+    put(4096 + 4, uint32_t{3});
+    put(4096 + 40, uint16_t{1});
+    std::string buckets;
+    if (level > 0) {
+      put(4096 + 8, uint32_t{2});
+      put(4096 + 12, uint32_t{2});
+      put(4096 + 16, 5.0f);
+      put(4096 + 20, uint16_t{12});
+      put(4096 + 32, uint32_t{1});
+      put(4096 + 36, uint32_t{1});
+      buckets.assign(4 + 2 * 12, '\0');
+      buckets[0] = 1;
+    }
+    const size_t record = level == 0 ? 44 + 36 : level == 1 ? 24 + 18 : 24 + 9;
+    seeds.push_back(header + buckets + std::string(3 * record, '\x35'));
+  }
+  return seeds;
+}
+
 std::string SpzContentSeed(const std::filesystem::path& folder, int sh_degree) {
   (void)WriteSpz(folder / "seed.spz", SeedCloud(5, sh_degree), {.overwrite = true, .spz_version = 3});
   const std::string packed = Content(folder / "seed.spz");

@@ -22,6 +22,10 @@ std::string Gzip(const std::string& content);
 std::vector<std::string> TorchSeeds();       // the checkpoints of testdata/ that are good ones
 std::vector<std::string> GsplatSeeds();      // those with Gaussians
 std::vector<std::string_view> TorchWords();  // what pickles mention, and opcodes
+
+// KSPLAT of every compression level, which we do not write: a section of three Gaussians in two buckets.
+std::vector<std::string> KsplatSeeds();
+
 std::vector<std::string> SafetensorsSeeds(const std::filesystem::path& folder);
 
 std::vector<std::string> TransformsSeeds();

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "formats/attribute_error.h"
+#include "formats/axes.h"
+#include "formats/cloud_io.h"
+
+namespace anchorsplat {
+
+struct ConvertOptions {
+  std::optional<int> sh_degree = {};          // higher coefficients are dropped, missing ones become zero
+  float min_opacity = 0;                      // Gaussians below are dropped; 0–1
+  std::optional<int64_t> max_gaussians = {};  // the ones of the largest size × opacity stay
+  // What the axes of the files really are, where a program did not follow the format's own convention.
+  std::optional<Axes> input_axes = {}, output_axes = {};
+  WriteOptions write = {};
+  bool measure = false;  // read the output back and compare
+};
+
+// "IN:OUT", "IN:" or ":OUT", or "IN" alone, each three letters as in AxesFromName: sets the axes of `options`.
+// kBadArgument for anything else.
+Status ParseAxes(std::string_view text, ConvertOptions& options);
+
+struct ConvertReport {
+  std::string input_format, output_format;
+  int64_t gaussians_read = 0, gaussians_written = 0;
+  int sh_degree_read = 0, sh_degree_written = 0;
+  uint64_t input_bytes = 0, output_bytes = 0;
+  std::optional<uint64_t> predicted_bytes;  // where the size does not depend on the values
+  double read_seconds = 0, write_seconds = 0;
+  std::optional<AttributeError> error;  // when measured
+};
+
+// Reads, changes and writes. In one copy of the cloud, changed in place. Errors: those of ReadCloud and WriteCloud;
+// kBadArgument when nothing is left to write. `kept` takes the cloud as it was written, for comparisons, if not null.
+Result<ConvertReport> ConvertFile(const std::filesystem::path& input, const std::filesystem::path& output,
+                                  const ConvertOptions& options, GaussianCloud* kept = nullptr);
+
+// The parts of it that change a cloud, in the order in which they are done. In place.
+void DropFaint(GaussianCloud& cloud, float min_opacity);
+void KeepMostImportant(GaussianCloud& cloud, int64_t most);  // their order stays
+void SetShDegree(GaussianCloud& cloud, int degree);
+void Reorder(GaussianCloud& cloud, Buffer<uint32_t> rows);  // row i becomes the old row rows[i]; a permutation
+
+}  // namespace anchorsplat

@@ -1,0 +1,22 @@
+#pragma once
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "formats/cloud_io.h"
+#include "formats/input_file.h"
+
+namespace anchorsplat {
+
+// Reads the splats of a glTF 2.0 file, binary (.glb) or JSON (.gltf) with buffers beside it or inside as base64: all
+// point primitives with KHR_gaussian_splatting that the scene's nodes show, one after the other, in the axes that glTF
+// gives them (LUF, which become RDF), moved and scaled as their nodes say. Attributes are floats or, where the
+// extension allows it, normalised integers. SCALE holds lengths; files from drafts of the extension that kept
+// logarithms are known by negative values.
+//
+// Errors (kBadFile): no glTF, no such primitive, a kernel other than "ellipse", compressed attributes, attributes
+// missing or of a type or count that is not allowed, accessors that lead out of their view, buffer or file, nodes in a
+// circle, nodes that rotate or stretch (that needs SH to be rotated, which is not done), names that lead to another
+// folder, more than `limits.max_gaussians`.
+Result<GaussianCloud> ReadGltf(const InputFile& file, const ReadLimits& limits = {});
+
+}  // namespace anchorsplat

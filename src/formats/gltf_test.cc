@@ -1,0 +1,199 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "formats/atomic_file.h"
+#include "formats/attribute_error.h"
+#include "formats/gltf_reader.h"
+#include "formats/gltf_writer.h"
+#include "formats/test_cloud.h"
+#include "formats/test_folder.h"
+
+namespace anchorsplat {
+namespace {
+
+using Json = nlohmann::json;
+
+std::string Bytes(const std::filesystem::path& path) { return *InputFile::Open(path)->ReadAll(1 << 30); }
+
+Result<GaussianCloud> Read(std::string bytes, const ReadLimits& limits = {}) {
+  return ReadGltf(InputFile::FromBytes("a.glb", std::move(bytes)), limits);
+}
+
+struct Glb {
+  Json json;
+  std::string binary;
+
+  static Glb Of(const std::string& bytes) {
+    uint32_t size;
+    std::memcpy(&size, bytes.data() + 12, 4);
+    return {Json::parse(bytes.substr(20, size)), bytes.substr(20 + size + 8)};
+  }
+  std::string bytes() const {
+    std::string text = json.dump();
+    text.append((4 - text.size() % 4) % 4, ' ');
+    const uint32_t head[5] = {0x46546c67, 2, static_cast<uint32_t>(28 + text.size() + binary.size()),
+                              static_cast<uint32_t>(text.size()), 0x4e4f534a};
+    const uint32_t chunk[2] = {static_cast<uint32_t>(binary.size()), 0x004e4942};
+    return std::string(reinterpret_cast<const char*>(head), sizeof head) + text +
+           std::string(reinterpret_cast<const char*>(chunk), sizeof chunk) + binary;
+  }
+};
+
+Glb Example(int64_t n, int degree) {
+  const TestFolder folder;
+  EXPECT_TRUE(WriteGlb(folder / "a.glb", RandomCloud(n, degree, 3)).ok());
+  return Glb::Of(Bytes(folder / "a.glb"));
+}
+
+TEST(Gltf, RoundTripOfEveryDegree) {
+  const TestFolder folder;
+  for (int degree = 0; degree <= kMaxShDegree; ++degree) {
+    const GaussianCloud cloud = RandomCloud(20'001, degree, 3);
+    ASSERT_TRUE(WriteGlb(folder / "a.glb", cloud, {.overwrite = true}).ok());
+    const auto read = Read(Bytes(folder / "a.glb"));
+    ASSERT_TRUE(read.ok()) << read.error().message;
+    const auto error = CompareAttributes(*read, cloud);
+    EXPECT_EQ(error->compared, 20'001);
+    EXPECT_EQ(error->means.max, 0);
+    EXPECT_EQ(error->harmonics.max, 0);
+    EXPECT_EQ(error->colors.max, 0);
+    EXPECT_LT(error->log_scales.max, 1e-5);
+    EXPECT_LT(error->rotations.max, 1e-5);
+    EXPECT_LT(error->opacities.max, 1e-6);
+  }
+}
+
+TEST(Gltf, WhatItsReadersExpect) {
+  const TestFolder folder;
+  GaussianCloud cloud = RandomCloud(1, 0, 1);
+  cloud.means = {1, 2, 3};
+  cloud.quats = {0, 0, 0, 2};
+  cloud.sh = {0, 5, -5};
+  cloud.opacity_logits = {0};
+  ASSERT_TRUE(WriteGlb(folder / "a.glb", cloud).ok());
+  const std::string bytes = Bytes(folder / "a.glb");
+  const Glb glb = Glb::Of(bytes);
+  EXPECT_EQ(bytes.size() % 4, 0u);
+  uint32_t length;
+  std::memcpy(&length, bytes.data() + 8, 4);
+  EXPECT_EQ(length, bytes.size());
+  EXPECT_EQ(glb.json["buffers"][0]["byteLength"], glb.binary.size());
+  EXPECT_EQ(glb.json["accessors"][0]["min"], Json({-1, -2, 3}));
+  const Json& primitive = glb.json["meshes"][0]["primitives"][0];
+  EXPECT_EQ(primitive["mode"], 0);
+  EXPECT_EQ(primitive["extensions"]["KHR_gaussian_splatting"]["kernel"], "ellipse");
+  float mean[3];
+  std::memcpy(mean, glb.binary.data(), 12);
+  EXPECT_THAT(mean, testing::ElementsAre(-1, -2, 3));
+  uint16_t color[4];
+  std::memcpy(color, glb.binary.data() + 12, 8);
+  EXPECT_THAT(color, testing::ElementsAre(14027, 65535, 0, 32768));  // sRGB ½ is 0.2140 of the light
+}
+
+TEST(Gltf, NodesMoveAndScale) {
+  Glb glb = Example(10, 1);
+  const GaussianCloud plain = *Read(glb.bytes());
+  glb.json["nodes"] = Json::parse(R"([{"children":[1,2],"translation":[1,0,0],"scale":[2,2,2]},{"mesh":0},
+                                      {"mesh":0,"matrix":[3,0,0,0, 0,3,0,0, 0,0,3,0, 0,1,0,1]}])");
+  const auto moved = Read(glb.bytes());
+  ASSERT_TRUE(moved.ok()) << moved.error().message;
+  ASSERT_EQ(moved->size(), 20);
+  for (size_t i = 0; i < 10; ++i) {
+    EXPECT_NEAR(moved->means[3 * i], 2 * plain.means[3 * i] - 1, 1e-5);
+    EXPECT_NEAR(moved->means[30 + 3 * i + 1], 6 * plain.means[3 * i + 1] - 2, 1e-5);
+    EXPECT_NEAR(moved->log_scales[30 + 3 * i], plain.log_scales[3 * i] + std::log(6), 1e-5);
+  }
+}
+
+TEST(Gltf, SmallIntegersBesideAndInside) {
+  const TestFolder folder;
+  Glb glb = Example(2, 0);
+  // ROTATION as normalised shorts with a stride of 12, in a buffer of its own.
+  const int16_t quats[2][6] = {{32767, 0, 0, 0, 0, 0}, {0, 0, 0, -32768, 0, 0}};
+  const std::string buffer(reinterpret_cast<const char*>(quats), 20);
+  ASSERT_TRUE(WriteWholeFile(folder / "quats.bin", buffer, false).ok());
+  ASSERT_TRUE(WriteWholeFile(folder / "rest.bin", glb.binary, false).ok());
+  const int rotation = glb.json["meshes"][0]["primitives"][0]["attributes"]["KHR_gaussian_splatting:ROTATION"];
+  glb.json["accessors"][rotation]["componentType"] = 5122;
+  glb.json["accessors"][rotation]["normalized"] = true;
+  glb.json["bufferViews"][rotation] = {{"buffer", 1}, {"byteLength", 20}, {"byteStride", 12}};
+  for (const char* uri : {"quats.bin", "data:application/octet-stream;base64,/38AAAAAAAAAAAAAAAAAAAAAAIA="}) {
+    glb.json["buffers"] = {{{"byteLength", glb.binary.size()}, {"uri", "rest.bin"}},
+                           {{"byteLength", 20}, {"uri", uri}}};
+    ASSERT_TRUE(WriteWholeFile(folder / "a.gltf", glb.json.dump(), true).ok());
+    const InputFile file = *InputFile::Open(folder / "a.gltf");
+    const auto cloud = ReadGltf(file);
+    ASSERT_TRUE(cloud.ok()) << cloud.error().message;
+    EXPECT_THAT(cloud->quats, testing::ElementsAre(0, -1, 0, 0, -1, 0, 0, 0));
+  }
+  for (const char* uri : {"../rest.bin", "/etc/passwd", "a%2fb", "", "data:nothing", "data:;base64,%%"}) {
+    glb.json["buffers"][1]["uri"] = uri;
+    ASSERT_TRUE(WriteWholeFile(folder / "a.gltf", glb.json.dump(), true).ok());
+    const InputFile file = *InputFile::Open(folder / "a.gltf");
+    EXPECT_EQ(ReadGltf(file).error().code, ErrorCode::kBadFile) << uri;
+  }
+}
+
+TEST(Gltf, LogarithmsOfDraftsAreKnownByTheirSign) {
+  Glb glb = Example(1, 0);
+  const int scale = glb.json["meshes"][0]["primitives"][0]["attributes"]["KHR_gaussian_splatting:SCALE"];
+  const float logarithms[3] = {-3, 0.5f, -2};
+  std::memcpy(glb.binary.data() + glb.json["bufferViews"][scale]["byteOffset"].get<size_t>(), logarithms, 12);
+  EXPECT_THAT(Read(glb.bytes())->log_scales, testing::ElementsAre(-3, 0.5f, -2));
+}
+
+TEST(Gltf, RefusesLiesAndCircles) {
+  const Glb good = Example(100, 1);
+  EXPECT_TRUE(Read(good.bytes()).ok());
+  const auto error_with = [&good](const char* pointer, const Json& value) {
+    Glb changed = good;
+    changed.json[Json::json_pointer(pointer)] = value;
+    const auto cloud = Read(changed.bytes());
+    return cloud.ok() ? std::string("accepted") : cloud.error().message;
+  };
+  const auto expect = [](const std::string& message, const char* part) {
+    EXPECT_NE(message.find(part), std::string::npos) << message;
+  };
+  const std::string extension = "/meshes/0/primitives/0/extensions/KHR_gaussian_splatting";
+  expect(error_with((extension + "/kernel").c_str(), "box"), "expected \"ellipse\"");
+  expect(error_with((extension + "/extensions").c_str(), {{"KHR_spz", Json::object()}}), "KHR_spz");
+  expect(error_with("/meshes/0/primitives/0/extensions", Json::object()), "without splats");
+  expect(error_with("/nodes", Json::parse(R"([{"children":[1]},{"children":[0]}])")), "their own ancestors");
+  expect(error_with("/nodes", Json::parse(R"([{"children":[2]},{"children":[2]},{"mesh":0}])")), "shares a child");
+  expect(error_with("/nodes", Json::parse(R"([{"children":[7]}])")), "no node");
+  expect(error_with("/nodes/0/rotation", {0, 1, 0, 0}), "rotates");
+  expect(error_with("/nodes/0/scale", {1, 2, 1}), "stretches");
+  expect(error_with("/nodes/0/mesh", 1), "there are 1 meshes");
+  expect(error_with("/accessors/0/count", 101), "needs");
+  expect(error_with("/accessors/2/count", 99), "accessors of 99 and 100");
+  expect(error_with("/accessors/0/count", 2'000'000'000), "needs");
+  expect(error_with("/accessors/0/byteOffset", 9e15), "needs");
+  expect(error_with("/accessors/0/type", "MAT4"), "VEC3");
+  expect(error_with("/accessors/0/type", "SCALAR"), "not of 3 floats");
+  expect(error_with("/accessors/0/bufferView", 99), "bufferViews");
+  expect(error_with("/bufferViews/0/buffer", 1), "there are 1 buffers");
+  expect(error_with("/bufferViews/0/byteOffset", 1e9), "needs");
+  expect(error_with("/bufferViews/0/byteOffset", -4), "whole number");
+  expect(error_with("/bufferViews/0/byteStride", 4), "byteStride");
+  expect(error_with("/buffers/0/byteLength", 1e9), "there are");
+  expect(error_with("/accessors/0/sparse", Json::object()), "sparse");
+  EXPECT_FALSE(Read(good.bytes(), {.max_gaussians = 99}).ok());
+  const std::string bytes = good.bytes();
+  for (const size_t size : {size_t{4}, size_t{19}, size_t{100}, bytes.size() - 1}) {
+    EXPECT_FALSE(Read(bytes.substr(0, size)).ok()) << size;
+  }
+  // One mesh, shown by two thousand nodes.
+  Glb crowd = good;
+  crowd.json["nodes"] = Json::array();
+  for (int k = 0; k < 2000; ++k) crowd.json["nodes"].push_back({{"mesh", 0}});
+  expect(Read(crowd.bytes()).error().message, "more than 1024");
+}
+
+}  // namespace
+}  // namespace anchorsplat

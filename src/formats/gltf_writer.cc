@@ -1,0 +1,175 @@
+#include "formats/gltf_writer.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "core/spherical_harmonics.h"
+#include "core/text.h"
+#include "formats/axes.h"
+#include "formats/cloud_checks.h"
+#include "formats/quantize.h"
+#include "formats/record_blocks.h"
+#include "formats/splat_order.h"
+
+namespace anchorsplat {
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "numbers are written as they lie in memory");
+
+constexpr int kFloat = 5126, kUnsignedShort = 5123, kArrayBuffer = 34962;
+
+// One accessor and how its values come about.
+struct Attribute {
+  std::string name;
+  const char* type;
+  int component_type;
+  size_t record;                                          // bytes
+  std::function<void(int64_t row, uint8_t* bytes)> pack;  // of one Gaussian
+};
+
+// glTF's COLOR_0 is linear; what splats show is sRGB (IEC 61966-2-1).
+float LinearFromSrgb(float x) {
+  return x <= 0.04045f ? std::max(0.0f, x) / 12.92f : std::pow((std::min(x, 1.0f) + 0.055f) / 1.055f, 2.4f);
+}
+
+void PutFloats(const float* values, size_t count, uint8_t* bytes) { std::memcpy(bytes, values, count * sizeof(float)); }
+
+std::vector<Attribute> Attributes(const GaussianCloud& cloud, const AxisFlip& flip) {
+  std::vector<Attribute> out;
+  out.push_back({"POSITION", "VEC3", kFloat, 12, [&](int64_t row, uint8_t* bytes) {
+                   float mean[3];
+                   for (size_t k = 0; k < 3; ++k)
+                     mean[k] = flip.mean[k] * cloud.means[static_cast<size_t>(3 * row) + k];
+                   PutFloats(mean, 3, bytes);
+                 }});
+  out.push_back({"COLOR_0", "VEC4", kUnsignedShort, 8, [&](int64_t row, uint8_t* bytes) {
+                   const float* dc = cloud.sh.data() + row * cloud.sh_stride();
+                   uint16_t color[4];
+                   for (size_t k = 0; k < 3; ++k) {
+                     color[k] = static_cast<uint16_t>(QuantizeUnit(LinearFromSrgb(ColorFromDc(dc[k])), 65535));
+                   }
+                   const float opacity = Sigmoid(cloud.opacity_logits[static_cast<size_t>(row)]);
+                   color[3] = static_cast<uint16_t>(QuantizeUnit(opacity, 65535));
+                   std::memcpy(bytes, color, sizeof color);
+                 }});
+  out.push_back({"KHR_gaussian_splatting:ROTATION", "VEC4", kFloat, 16, [&](int64_t row, uint8_t* bytes) {
+                   const float* q = cloud.quats.data() + 4 * row;
+                   const float norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+                   const bool has_direction = norm > 0 && std::isfinite(norm);
+                   float xyzw[4] = {0, 0, 0, has_direction ? q[0] / norm : 1.0f};
+                   for (size_t k = 0; has_direction && k < 3; ++k) xyzw[k] = flip.quat[k + 1] * q[k + 1] / norm;
+                   PutFloats(xyzw, 4, bytes);
+                 }});
+  out.push_back({"KHR_gaussian_splatting:SCALE", "VEC3", kFloat, 12, [&](int64_t row, uint8_t* bytes) {
+                   float scale[3];
+                   for (size_t k = 0; k < 3; ++k)
+                     scale[k] = std::exp(cloud.log_scales[static_cast<size_t>(3 * row) + k]);
+                   PutFloats(scale, 3, bytes);
+                 }});
+  out.push_back({"KHR_gaussian_splatting:OPACITY", "SCALAR", kFloat, 4, [&](int64_t row, uint8_t* bytes) {
+                   const float opacity = Sigmoid(cloud.opacity_logits[static_cast<size_t>(row)]);
+                   PutFloats(&opacity, 1, bytes);
+                 }});
+  for (int degree = 0; degree <= cloud.sh_degree; ++degree) {
+    for (int n = 0; n <= 2 * degree; ++n) {
+      const auto coefficient = static_cast<size_t>(degree * degree + n);
+      out.push_back({Cat("KHR_gaussian_splatting:SH_DEGREE_", degree, "_COEF_", n), "VEC3", kFloat, 12,
+                     [&, coefficient](int64_t row, uint8_t* bytes) {
+                       const float* sh = cloud.sh.data() + row * cloud.sh_stride() + 3 * coefficient;
+                       const float sign = flip.sh[coefficient];
+                       const float rgb[3] = {sign * sh[0], sign * sh[1], sign * sh[2]};
+                       PutFloats(rgb, 3, bytes);
+                     }});
+    }
+  }
+  return out;
+}
+
+std::string JsonOf(const GaussianCloud& cloud, const std::vector<Attribute>& attributes, const AxisFlip& flip) {
+  nlohmann::json views = nlohmann::json::array(), accessors = nlohmann::json::array(), names;
+  uint64_t offset = 0;
+  for (const Attribute& attribute : attributes) {
+    const uint64_t size = attribute.record * static_cast<uint64_t>(cloud.size());
+    names[attribute.name] = accessors.size();
+    nlohmann::json accessor = {{"bufferView", views.size()},
+                               {"componentType", attribute.component_type},
+                               {"count", cloud.size()},
+                               {"type", attribute.type}};
+    if (attribute.component_type == kUnsignedShort) accessor["normalized"] = true;
+    if (const auto bounds = ComputeBounds(cloud); attribute.name == "POSITION" && bounds) {
+      nlohmann::json min, max;
+      for (size_t k = 0; k < 3; ++k) {
+        min.push_back(std::min(flip.mean[k] * bounds->min[k], flip.mean[k] * bounds->max[k]));
+        max.push_back(std::max(flip.mean[k] * bounds->min[k], flip.mean[k] * bounds->max[k]));
+      }
+      accessor["min"] = min;
+      accessor["max"] = max;
+    }
+    views.push_back({{"buffer", 0}, {"byteOffset", offset}, {"byteLength", size}, {"target", kArrayBuffer}});
+    accessors.push_back(std::move(accessor));
+    offset += size;
+  }
+  const nlohmann::json extension = {{"kernel", "ellipse"},
+                                    {"colorSpace", "srgb_rec709_display"},
+                                    {"projection", "perspective"},
+                                    {"sortingMethod", "cameraDistance"}};
+  const nlohmann::json primitive = {
+      {"attributes", names}, {"mode", 0}, {"extensions", {{"KHR_gaussian_splatting", extension}}}};
+  const nlohmann::json document = {{"asset", {{"version", "2.0"}, {"generator", "anchorsplat " ANCHORSPLAT_VERSION}}},
+                                   {"extensionsUsed", {"KHR_gaussian_splatting"}},
+                                   {"scene", 0},
+                                   {"scenes", {{{"nodes", {0}}}}},
+                                   {"nodes", {{{"mesh", 0}}}},
+                                   {"meshes", {{{"primitives", {primitive}}}}},
+                                   {"buffers", {{{"byteLength", offset}}}},
+                                   {"bufferViews", views},
+                                   {"accessors", accessors}};
+  std::string text = document.dump();
+  text.append((4 - text.size() % 4) % 4, ' ');
+  return text;
+}
+
+}  // namespace
+
+Status WriteGlb(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
+  const AxisFlip flip = FlipBetween(kRdf, kLuf);
+  const std::vector<Attribute> attributes = Attributes(cloud, flip);
+  const std::string json = JsonOf(cloud, attributes, flip);
+  uint64_t binary = 0;
+  for (const Attribute& attribute : attributes) binary += attribute.record * static_cast<uint64_t>(cloud.size());
+  const uint64_t begin = 12 + 8 + json.size() + 8;
+  if (begin + binary > 0xffffffffu) {
+    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", WithThousands(cloud.size()), " Gaussians take ",
+                                              HumanBytes(binary), ", a GLB file ends at 4.3 GB")};
+  }
+  const Buffer<uint32_t> order = WriteOrder(cloud, options.order, SplatOrder::kKeep);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  ANCHORSPLAT_RETURN_IF_ERROR(file.Reserve(begin + binary));
+  const uint32_t head[5] = {0x46546c67, 2, static_cast<uint32_t>(begin + binary), static_cast<uint32_t>(json.size()),
+                            0x4e4f534a};                                  // "glTF", version, length; length, "JSON"
+  const uint32_t chunk[2] = {static_cast<uint32_t>(binary), 0x004e4942};  // length, "BIN"
+  ANCHORSPLAT_RETURN_IF_ERROR(file.Write(head, sizeof head));
+  ANCHORSPLAT_RETURN_IF_ERROR(file.Write(json));
+  ANCHORSPLAT_RETURN_IF_ERROR(file.Write(chunk, sizeof chunk));
+  uint64_t at = begin;
+  for (const Attribute& attribute : attributes) {
+    ANCHORSPLAT_RETURN_IF_ERROR(
+        WriteRecords(file, at, cloud.size(), attribute.record, [&](int64_t first, int64_t last, uint8_t* bytes) {
+          for (int64_t i = first; i < last; ++i, bytes += attribute.record) {
+            attribute.pack(order.empty() ? i : int64_t{order[static_cast<size_t>(i)]}, bytes);
+          }
+        }));
+    at += attribute.record * static_cast<uint64_t>(cloud.size());
+  }
+  return file.Commit();
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,301 @@
+#include "formats/sog_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/parallel.h"
+#include "core/text.h"
+#include "formats/cloud_checks.h"
+#include "formats/json_file.h"
+#include "formats/quantize.h"
+#include "formats/webp_image.h"
+#include "formats/zip_archive.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr uint64_t kMaxArchive = uint64_t{8} << 30;
+constexpr uint64_t kMaxMeta = uint64_t{4} << 20;
+constexpr uint64_t kMaxPicture = uint64_t{1} << 30;
+constexpr int64_t kGrain = 1 << 14;
+constexpr int64_t kEntriesPerRow = 64;  // of the palette
+
+// Where the members are: in an archive, or beside meta.json.
+class Members {
+ public:
+  static Result<Members> Of(const InputFile& file, const std::string& head) {
+    Members members;
+    members.name_ = file.name();
+    if (head.starts_with("PK")) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(std::string bytes, file.ReadAll(kMaxArchive));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(ZipReader archive, ZipReader::Open(file.name(), std::move(bytes)));
+      members.archive_.emplace(std::move(archive));
+    } else {
+      members.folder_ = file.path().parent_path();
+    }
+    return members;
+  }
+
+  Result<std::string> Meta(const InputFile& file) const {
+    return archive_ ? archive_->Read("meta.json", kMaxMeta) : file.ReadAll(kMaxMeta);
+  }
+  std::string meta_name() const { return archive_ ? name_ + ": meta.json" : name_; }
+
+  // The picture called `name`.
+  Result<ByteImage> Picture(const JsonValue& name, int64_t min_pixels, int64_t max_pixels) const {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string member, name.Text());
+    // Beside meta.json there is nothing to look for in other folders.
+    if (member.empty() || member.find_first_of("/\\:") != member.npos || member.starts_with(".") ||
+        member.find('\0') != member.npos) {
+      return name.Complain(Cat("expected the name of a file beside it, found \"", Printable(member), "\""));
+    }
+    std::string bytes;
+    if (archive_) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(bytes, archive_->Read(member, kMaxPicture));
+    } else {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(folder_ / member));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(bytes, file.ReadAll(kMaxPicture));
+    }
+    const std::string where = archive_ ? Cat(name_, ": ", member) : (folder_ / member).string();
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(where, bytes.size(), static_cast<uint64_t>(min_pixels) * 2));
+    return DecodeWebp(where, bytes, min_pixels, max_pixels);
+  }
+
+ private:
+  std::string name_;
+  std::optional<ZipReader> archive_;
+  std::filesystem::path folder_;
+};
+
+// 256 values per channel that bytes stand for.
+using Channel = std::array<float, 256>;
+
+Result<Channel> Codebook(const JsonValue& part) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue list, part.Get("codebook"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> values, list.Numbers(256));
+  Channel channel;
+  std::ranges::transform(values, channel.begin(), [](double x) { return static_cast<float>(x); });
+  return channel;
+}
+
+Channel Range(double min, double max) {
+  Channel channel;
+  for (size_t k = 0; k < channel.size(); ++k) {
+    channel[k] = static_cast<float>(min + (max - min) * static_cast<double>(k) / 255);
+  }
+  return channel;
+}
+
+// Version 2: one codebook for all channels; version 1: a range for each.
+Result<std::vector<Channel>> Channels(const JsonValue& part, int version, size_t count) {
+  if (version == 2) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Channel channel, Codebook(part));
+    return std::vector<Channel>(count, channel);
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue mins, part.Get("mins"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue maxs, part.Get("maxs"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> min, mins.Numbers(count));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> max, maxs.Numbers(count));
+  std::vector<Channel> channels;
+  for (size_t k = 0; k < count; ++k) channels.push_back(Range(min[k], max[k]));
+  return channels;
+}
+
+struct Sog {
+  const Members& members;
+  JsonValue meta;
+  int version;
+  int64_t count;
+
+  // Picture k of the part's "files". Pictures have a pixel per Gaussian and at most some rows more.
+  Result<ByteImage> Picture(const JsonValue& part, size_t k, size_t files) const {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue list, part.Get("files"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> names, list.Elements());
+    if (names.size() < files) return list.Complain(Cat("expected ", files, " names, found ", names.size()));
+    return members.Picture(names[k], count, 4 * count + 65536);
+  }
+  template <typename Body>
+  void ForAll(Body&& body) const {
+    ParallelFor(0, count, kGrain, [&](int64_t first, int64_t last) {
+      for (int64_t i = first; i < last; ++i) body(i);
+    });
+  }
+};
+
+Status ReadMeans(const Sog& sog, GaussianCloud& cloud) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue part, sog.meta.Get("means"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue mins, part.Get("mins"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue maxs, part.Get("maxs"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> min, mins.Numbers(3));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> max, maxs.Numbers(3));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ByteImage low, sog.Picture(part, 0, 2));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ByteImage high, sog.Picture(part, 1, 2));
+  sog.ForAll([&](int64_t i) {
+    for (size_t k = 0; k < 3; ++k) {
+      const size_t at = 4 * static_cast<size_t>(i) + k;
+      const double t = (low.rgba[at] + 256 * high.rgba[at]) / 65535.0;
+      const double logarithm = min[k] + (max[k] - min[k]) * t;
+      cloud.means[static_cast<size_t>(3 * i) + k] =
+          static_cast<float>(std::copysign(std::expm1(std::fabs(logarithm)), logarithm));
+    }
+  });
+  return {};
+}
+
+void UnpackQuats(const Sog& sog, const ByteImage& picture, GaussianCloud& cloud) {
+  sog.ForAll([&](int64_t i) {
+    const uint8_t* pixel = picture.rgba.data() + 4 * i;
+    SmallestThree three;  // the identity where the mark is none
+    if (pixel[3] >= 252) {
+      three.largest = pixel[3] - 252u;
+      for (size_t k = 0; k < 3; ++k) three.rest[k] = (static_cast<float>(pixel[k]) / 127.5f - 1) * kSqrtHalf;
+    }
+    RestoreLargest(three, cloud.quats.data() + 4 * i);
+  });
+}
+
+Status ReadScales(const Sog& sog, GaussianCloud& cloud) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue part, sog.meta.Get("scales"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<Channel> channels, Channels(part, sog.version, 3));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ByteImage picture, sog.Picture(part, 0, 1));
+  sog.ForAll([&](int64_t i) {
+    for (size_t k = 0; k < 3; ++k) {
+      cloud.log_scales[static_cast<size_t>(3 * i) + k] = channels[k][picture.rgba[4 * static_cast<size_t>(i) + k]];
+    }
+  });
+  return {};
+}
+
+Status ReadColors(const Sog& sog, GaussianCloud& cloud) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue part, sog.meta.Get("sh0"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Channel> channels, Channels(part, sog.version, sog.version == 2 ? 3 : 4));
+  if (sog.version == 2) {
+    channels.emplace_back();
+    for (size_t k = 0; k < 256; ++k) channels[3][k] = LogitFromOpacity(static_cast<float>(k) / 255);
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ByteImage picture, sog.Picture(part, 0, 1));
+  sog.ForAll([&](int64_t i) {
+    const uint8_t* pixel = picture.rgba.data() + 4 * i;
+    float* dc = cloud.sh.data() + i * cloud.sh_stride();
+    for (size_t k = 0; k < 3; ++k) dc[k] = channels[k][pixel[k]];
+    cloud.opacity_logits[static_cast<size_t>(i)] = channels[3][pixel[3]];
+  });
+  return {};
+}
+
+// The palette's picture, which also tells the degree in version 1: 64 entries of 3, 8 or 15 pixels in a row.
+struct Palette {
+  int degree = 0;
+  ByteImage picture;
+  int64_t entries = 0;
+};
+
+Result<Palette> ReadPalette(const Sog& sog, const JsonValue& part) {
+  Palette palette;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue list, part.Get("files"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> names, list.Elements());
+  if (names.size() < 2) return list.Complain(Cat("expected 2 names, found ", names.size()));
+  constexpr int64_t kMost = int64_t{65536} * (ShCoefficients(kMaxShDegree) - 1);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(palette.picture, sog.members.Picture(names[0], 1, kMost + 65536));
+  for (int degree = 1; degree <= kMaxShDegree; ++degree) {
+    if (palette.picture.width == kEntriesPerRow * (ShCoefficients(degree) - 1)) palette.degree = degree;
+  }
+  if (palette.degree == 0) {
+    return names[0].Complain(Cat("has a width of ", palette.picture.width, ", expected 192, 512 or 960"));
+  }
+  palette.entries = kEntriesPerRow * palette.picture.height;
+  if (sog.version == 2) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue bands, part.Get("bands"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const int degree, bands.WholeNumber(1, kMaxShDegree));
+    if (degree != palette.degree) {
+      return bands.Complain(Cat("is ", degree, ", but the palette has a width of ", palette.picture.width));
+    }
+  }
+  return palette;
+}
+
+Status ReadHarmonics(const Sog& sog, const JsonValue& part, const Palette& palette, GaussianCloud& cloud) {
+  Channel values;
+  if (sog.version == 2) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(values, Codebook(part));
+  } else {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue mins, part.Get("mins"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue maxs, part.Get("maxs"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double min, mins.Number());
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double max, maxs.Number());
+    values = Range(min, max);
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ByteImage labels, sog.Picture(part, 1, 2));
+  const int64_t coefficients = cloud.coefficients() - 1;
+  std::vector<char> bad(static_cast<size_t>((sog.count + kGrain - 1) / kGrain), 0);
+  ParallelFor(0, sog.count, kGrain, [&](int64_t first, int64_t last) {
+    for (int64_t i = first; i < last; ++i) {
+      const uint8_t* pixel = labels.rgba.data() + 4 * i;
+      const int64_t label = pixel[0] + 256 * pixel[1];
+      if (label >= palette.entries) {
+        bad[static_cast<size_t>(first / kGrain)] = 1;
+        return;
+      }
+      const int64_t row = label / kEntriesPerRow, column = label % kEntriesPerRow * coefficients;
+      const uint8_t* entry = palette.picture.rgba.data() + 4 * (row * palette.picture.width + column);
+      float* sh = cloud.sh.data() + i * cloud.sh_stride() + 3;
+      for (int64_t k = 0; k < coefficients; ++k) {
+        for (int64_t channel = 0; channel < 3; ++channel) sh[3 * k + channel] = values[entry[4 * k + channel]];
+      }
+    }
+  });
+  if (std::ranges::find(bad, 1) != bad.end()) {
+    return part.Complain(Cat("has labels beyond its palette of ", palette.entries, " entries"));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<GaussianCloud> ReadSog(const InputFile& file, const ReadLimits& limits) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Members members, Members::Of(file, head));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, members.Meta(file));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile json, JsonFile::Parse(members.meta_name(), text));
+  const JsonValue meta = json.root();
+  const int most = static_cast<int>(std::min<int64_t>(limits.max_gaussians, int64_t{1} << 28));
+  int version = 1, count = 0;
+  if (const std::optional<JsonValue> value = meta.Find("version")) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(version, value->WholeNumber(2, 2));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue number, meta.Get("count"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(count, number.WholeNumber(1, most));
+  } else {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue means, meta.Get("means"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue shape, means.Get("shape"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> sizes, shape.Elements());
+    if (sizes.empty()) return shape.Complain("is empty, expected the number of Gaussians");
+    ANCHORSPLAT_ASSIGN_OR_RETURN(count, sizes[0].WholeNumber(1, most));
+  }
+  const Sog sog{members, meta, version, count};
+  // Pictures of the right size come before the cloud: a count alone allocates nothing.
+  const std::optional<JsonValue> harmonics = meta.Find("shN");
+  Palette palette;
+  if (harmonics && !harmonics->raw().is_null()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(palette, ReadPalette(sog, *harmonics));
+  }
+  GaussianCloud cloud;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue quats, meta.Get("quats"));
+  {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const ByteImage picture, sog.Picture(quats, 0, 1));
+    cloud.Resize(count, palette.degree);
+    UnpackQuats(sog, picture, cloud);
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(ReadMeans(sog, cloud));
+  ANCHORSPLAT_RETURN_IF_ERROR(ReadScales(sog, cloud));
+  ANCHORSPLAT_RETURN_IF_ERROR(ReadColors(sog, cloud));
+  if (palette.degree > 0) ANCHORSPLAT_RETURN_IF_ERROR(ReadHarmonics(sog, *harmonics, palette, cloud));
+  return cloud;
+}
+
+}  // namespace anchorsplat

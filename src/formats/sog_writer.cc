@@ -1,0 +1,204 @@
+#include "formats/sog_writer.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "core/parallel.h"
+#include "core/text.h"
+#include "formats/atomic_file.h"
+#include "formats/cloud_checks.h"
+#include "formats/quantize.h"
+#include "formats/scalar_codebook.h"
+#include "formats/sh_palette.h"
+#include "formats/splat_order.h"
+#include "formats/webp_image.h"
+#include "formats/zip_archive.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr int64_t kGrain = 1 << 14;
+constexpr int64_t kEntriesPerRow = 64;
+constexpr int64_t kMaxSide = 16383;  // of a WebP picture
+constexpr int kPaletteRounds = 8;    // further ones gain less than half a percent of the error
+constexpr float kMaxLogScale = 20;
+
+struct Picture {
+  std::string name;
+  ByteImage image;
+};
+
+struct Pictures {
+  const GaussianCloud& cloud;
+  Buffer<uint32_t> order;
+  int width, height;
+
+  int64_t row(int64_t i) const { return order.empty() ? i : int64_t{order[static_cast<size_t>(i)]}; }
+
+  // A picture with a pixel per Gaussian, of which pixel(row, rgba) sets what is not 0 0 0 255.
+  template <typename Pixel>
+  ByteImage Draw(Pixel&& pixel) const {
+    ByteImage image{width, height, {}};
+    image.rgba.resize(static_cast<size_t>(4 * image.pixels()));
+    ParallelFor(0, image.pixels(), kGrain, [&](int64_t first, int64_t last) {
+      for (int64_t i = first; i < last; ++i) {
+        uint8_t* rgba = image.rgba.data() + 4 * i;
+        rgba[0] = rgba[1] = rgba[2] = 0;
+        rgba[3] = 255;
+        if (i < cloud.size()) pixel(row(i), rgba);
+      }
+    });
+    return image;
+  }
+};
+
+double LogOfMean(float x) { return std::copysign(std::log1p(std::fabs(double{x})), double{x}); }
+
+nlohmann::json DrawMeans(const Pictures& pictures, std::vector<Picture>& out) {
+  const GaussianCloud& cloud = pictures.cloud;
+  const std::optional<Bounds> bounds = ComputeBounds(cloud);
+  std::array<double, 3> min{}, max{};
+  for (size_t k = 0; bounds && k < 3; ++k) {
+    min[k] = LogOfMean(bounds->min[k]);
+    max[k] = LogOfMean(bounds->max[k]);
+  }
+  const auto bits = [&](int64_t row, size_t k) -> uint32_t {
+    if (!(max[k] > min[k])) return 0;
+    const double t = (LogOfMean(cloud.means[static_cast<size_t>(3 * row) + k]) - min[k]) / (max[k] - min[k]);
+    return t > 0 ? static_cast<uint32_t>(std::lrint(65535 * std::min(t, 1.0))) : 0;  // NaN: 0
+  };
+  for (const auto& [name, shift] : {std::pair("means_l.webp", 0), std::pair("means_u.webp", 8)}) {
+    out.push_back({name, pictures.Draw([&, by = shift](int64_t row, uint8_t* rgba) {
+                     for (size_t k = 0; k < 3; ++k) rgba[k] = static_cast<uint8_t>(bits(row, k) >> by & 255);
+                   })});
+  }
+  return {{"mins", min}, {"maxs", max}, {"files", {"means_l.webp", "means_u.webp"}}};
+}
+
+nlohmann::json DrawQuats(const Pictures& pictures, std::vector<Picture>& out) {
+  out.push_back({"quats.webp", pictures.Draw([&](int64_t row, uint8_t* rgba) {
+                   const SmallestThree three = DropLargest(pictures.cloud.quats.data() + 4 * row, 0);
+                   for (size_t k = 0; k < 3; ++k) rgba[k] = QuantizeByte(127.5f * (three.rest[k] / kSqrtHalf + 1));
+                   rgba[3] = static_cast<uint8_t>(252 + three.largest);
+                 })});
+  return {{"files", {"quats.webp"}}};
+}
+
+nlohmann::json DrawScales(const Pictures& pictures, std::vector<Picture>& out) {
+  const GaussianCloud& cloud = pictures.cloud;
+  Buffer<float> scales(cloud.log_scales.size());
+  ParallelFor(0, static_cast<int64_t>(scales.size()), kGrain, [&](int64_t first, int64_t last) {
+    for (auto i = static_cast<size_t>(first); i < static_cast<size_t>(last); ++i) {
+      scales[i] = std::clamp(cloud.log_scales[i], -kMaxLogScale, kMaxLogScale);
+    }
+  });
+  const ScalarCodebook codebook = BuildScalarCodebook(scales.data(), cloud.size(), 3, 3);
+  out.push_back({"scales.webp", pictures.Draw([&](int64_t row, uint8_t* rgba) {
+                   for (size_t k = 0; k < 3; ++k) rgba[k] = codebook.IndexOf(scales[static_cast<size_t>(3 * row) + k]);
+                 })});
+  return {{"codebook", codebook.values}, {"files", {"scales.webp"}}};
+}
+
+nlohmann::json DrawColors(const Pictures& pictures, std::vector<Picture>& out) {
+  const GaussianCloud& cloud = pictures.cloud;
+  const ScalarCodebook codebook = BuildScalarCodebook(cloud.sh.data(), cloud.size(), 3, cloud.sh_stride());
+  out.push_back({"sh0.webp", pictures.Draw([&](int64_t row, uint8_t* rgba) {
+                   const float* dc = cloud.sh.data() + row * cloud.sh_stride();
+                   for (size_t k = 0; k < 3; ++k) rgba[k] = codebook.IndexOf(dc[k]);
+                   rgba[3] = QuantizeByte(255 * Sigmoid(cloud.opacity_logits[static_cast<size_t>(row)]));
+                 })});
+  return {{"codebook", codebook.values}, {"files", {"sh0.webp"}}};
+}
+
+nlohmann::json DrawHarmonics(const Pictures& pictures, std::vector<Picture>& out) {
+  const GaussianCloud& cloud = pictures.cloud;
+  const auto thousands = static_cast<uint64_t>(std::max<int64_t>(1, cloud.size() / 1024));
+  const auto most = static_cast<int64_t>(1024 * std::min<uint64_t>(64, std::bit_floor(thousands)));
+  const ShPalette palette = BuildShPalette(cloud, most, kPaletteRounds);
+  const int64_t coefficients = cloud.coefficients() - 1;
+  const ScalarCodebook codebook =
+      BuildScalarCodebook(palette.centroids.data(), palette.entries, 3 * coefficients, 3 * coefficients);
+  ByteImage image{static_cast<int>(kEntriesPerRow * coefficients),
+                  static_cast<int>((palette.entries + kEntriesPerRow - 1) / kEntriesPerRow),
+                  {}};
+  image.rgba.assign(static_cast<size_t>(4 * image.pixels()), 255);
+  // The pixels of an entry follow each other, and rows hold 64 entries: one run of pixels.
+  ParallelFor(0, palette.entries * coefficients, kGrain, [&](int64_t first, int64_t last) {
+    for (int64_t i = first; i < last; ++i) {
+      for (int64_t k = 0; k < 3; ++k) {
+        image.rgba[static_cast<size_t>(4 * i + k)] =
+            codebook.IndexOf(palette.centroids[static_cast<size_t>(3 * i + k)]);
+      }
+    }
+  });
+  out.push_back({"shN_centroids.webp", std::move(image)});
+  out.push_back({"shN_labels.webp", pictures.Draw([&](int64_t row, uint8_t* rgba) {
+                   const uint16_t label = palette.labels[static_cast<size_t>(row)];
+                   rgba[0] = static_cast<uint8_t>(label & 255);
+                   rgba[1] = static_cast<uint8_t>(label >> 8);
+                 })});
+  return {{"count", palette.entries},
+          {"bands", cloud.sh_degree},
+          {"codebook", codebook.values},
+          {"files", {"shN_centroids.webp", "shN_labels.webp"}}};
+}
+
+}  // namespace
+
+Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
+  // Multiples of four, as other programs make them.
+  const int64_t width = static_cast<int64_t>(std::ceil(std::sqrt(static_cast<double>(cloud.size())) / 4)) * 4;
+  const int64_t height = (cloud.size() + 4 * width - 1) / (4 * width) * 4;
+  if (width > kMaxSide || height > kMaxSide) {
+    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", WithThousands(cloud.size()),
+                                              " Gaussians are more than a WebP picture has room for")};
+  }
+  const bool bundled = path.filename() != "meta.json";
+  // Before the work, so that a file in the way is not found out minutes later.
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+
+  const Pictures pictures{cloud, WriteOrder(cloud, options.order, SplatOrder::kMorton), static_cast<int>(width),
+                          static_cast<int>(height)};
+  nlohmann::json meta = {
+      {"version", 2}, {"asset", {{"generator", "anchorsplat " ANCHORSPLAT_VERSION}}}, {"count", cloud.size()}};
+  std::vector<Picture> drawn;
+  if (cloud.sh_degree > 0) meta["shN"] = DrawHarmonics(pictures, drawn);
+  meta["means"] = DrawMeans(pictures, drawn);
+  meta["quats"] = DrawQuats(pictures, drawn);
+  meta["scales"] = DrawScales(pictures, drawn);
+  meta["sh0"] = DrawColors(pictures, drawn);
+
+  std::vector<Result<std::string>> encoded(drawn.size(), std::string());
+  ParallelFor(0, static_cast<int64_t>(drawn.size()), 1, [&](int64_t first, int64_t last) {
+    for (auto k = static_cast<size_t>(first); k < static_cast<size_t>(last); ++k) {
+      encoded[k] = EncodeWebp(drawn[k].image);
+      drawn[k].image = {};
+    }
+  });
+  for (const Result<std::string>& bytes : encoded) {
+    if (!bytes.ok()) return Error{bytes.error().code, Cat(path.string(), ": ", bytes.error().message)};
+  }
+  const std::string text = meta.dump();
+  if (!bundled) {
+    for (size_t k = 0; k < drawn.size(); ++k) {
+      ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(path.parent_path() / drawn[k].name, *encoded[k], options.overwrite));
+    }
+    ANCHORSPLAT_RETURN_IF_ERROR(file.Write(text));
+    return file.Commit();
+  }
+  ZipWriter archive(file);
+  ANCHORSPLAT_RETURN_IF_ERROR(archive.Add("meta.json", text));
+  for (size_t k = 0; k < drawn.size(); ++k) ANCHORSPLAT_RETURN_IF_ERROR(archive.Add(drawn[k].name, *encoded[k]));
+  ANCHORSPLAT_RETURN_IF_ERROR(archive.Finish());
+  return file.Commit();
+}
+
+}  // namespace anchorsplat

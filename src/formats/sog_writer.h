@@ -1,0 +1,22 @@
+#pragma once
+
+#include <filesystem>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "formats/cloud_io.h"
+
+namespace anchorsplat {
+
+// Writes PlayCanvas's SOG version 2 (layout: sog_reader.h): a ZIP archive for names that end in .sog, and for a
+// meta.json that file with the pictures beside it. By default in Morton order, which the pictures need to shrink.
+// The codebooks of scales and colours are optimal (scalar_codebook.h), the SH palette has at most 65,536 entries
+// (sh_palette.h), as many as other programs give: 1,024·2^⌊log₂(N/1024)⌋, at least 1,024.
+// Lost: means are rounded to 1/65535 of the range of sign(x)·ln(|x| + 1), quaternion components to 1/360, log-scales
+// and f_dc to one of 256 values, opacities to 1/255, SH to the palette; scales are clamped to e^±20. Render mode and
+// comments have no place. Needs 96 bytes per Gaussian at degree 3, beside the cloud, for the palette.
+// Errors: kExists (each file of a folder), kIo, kBadArgument (arrays that disagree, no Gaussians, more than fit a
+// picture).
+Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options = {});
+
+}  // namespace anchorsplat

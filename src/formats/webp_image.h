@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "core/buffer.h"
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// Four bytes per pixel that mean numbers, not colours.
+struct ByteImage {
+  int width = 0, height = 0;
+  Buffer<uint8_t> rgba;  // [height, width, 4]
+
+  int64_t pixels() const { return int64_t{width} * height; }
+};
+
+// Lossless WebP; colours of pixels with alpha 0 are kept. Sides of 1–16,383.
+Result<std::string> EncodeWebp(const ByteImage& image);
+
+// `where` begins messages. Errors (kBadFile): no WebP, damaged, fewer than `min_pixels` or more than `max_pixels`
+// (checked before anything is allocated).
+Result<ByteImage> DecodeWebp(const std::string& where, std::string_view bytes, int64_t min_pixels, int64_t max_pixels);
+
+}  // namespace anchorsplat

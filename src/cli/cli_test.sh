@@ -66,7 +66,7 @@ for from in compressed.ply spz sog splat glb; do
 done
 expect 0 "convert with a report" "$program" convert "$work/scan.compressed.ply" "$work/again.spz" --report --spz-version 3
 says stdout "PSNR"
-expect 0 "convert a batch" "$program" convert "$work/scan.spz" "$work/scan.glb" --out-dir "$work/batch" --to .x.ply --json
+expect 0 "convert a batch" "$program" convert "$work/scan.glb" "$work/again.spz" --out-dir "$work/batch" --to .x.ply --json
 says stdout '"gaussians"'
 expect 5 "convert over a file" "$program" convert "$input" "$work/scan.spz"
 expect 2 "convert without a place to write" "$program" convert "$input"

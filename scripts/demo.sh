@@ -16,8 +16,11 @@ for object in biplane stone_lantern; do
   echo
   "$program" compare "$example/input.ply" "$out/$object-4x.ply" --truth "$example/hr" \
     --cameras "$example/transforms_hr.json" --side-by-side "$out/$object.png" -w
+  "$program" view "$out/$object-4x.ply" --before "$example/input.ply" --truth "$example/hr" \
+    --cameras "$example/transforms_hr.json" -o "$out/$object.html" -w
 done
 
 echo
 echo "Look at   $out/biplane.png and $out/stone_lantern.png  (before, after, ground truth)"
+echo "Open      $out/biplane.html in a browser: turn it, zoom in, pull the slider"
 echo "Enhanced  $out/biplane-4x.ply and $out/stone_lantern-4x.ply"

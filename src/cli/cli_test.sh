@@ -87,6 +87,14 @@ says stderr "estimated"
 expect 0 "upscale 1 changes nothing" "$program" enhance "$input" -o "$work/same.ply" --upscale 1 --pixel-size 1
 expect 0 "upscale 1 against its input" "$program" compare "$input" "$work/same.ply" --orbit 2 --size 64x64 --json
 says stdout '"psnr": null'
+expect 0 "enhance with a page" "$program" enhance "$input" -o "$work/viewed.ply" --pixel-size 0.0055 --view
+checks=$((checks + 1))
+grep -q '<html' "$work/viewed.html" || { failures=$((failures + 1)); echo "FAILED: --view wrote no page"; }
+expect 5 "the page is not overwritten" "$program" enhance "$input" -o "$work/viewed.splat" --pixel-size 0.0055 --view
+expect 3 "a model that is not there" "$program" enhance "$input" -o "$work/bad.ply" --model "$work/none.pth"
+expect 4 "a splat as a model" "$program" enhance "$input" -o "$work/bad.ply" --model "$input"
+expect 2 "model options without a model" "$program" enhance "$input" -o "$work/bad.ply" --prune-opacity 0.1
+expect 4 "a splat as weights" "$program" convert "$input" "$work/weights.safetensors"
 expect 2 "upscale below 1" "$program" enhance "$input" -o "$work/bad.ply" --upscale 0.5
 expect 2 "nonsense pixel size" "$program" enhance "$input" -o "$work/bad.ply" --pixel-size big
 says stderr "pixel-size"

@@ -6,10 +6,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "cli/choice.h"
 #include "cli/verb.h"
 #include "core/text.h"
 #include "formats/registry.h"
 #include "metrics/conversion_loss.h"
+#include "model/checkpoint_writer.h"
 
 namespace anchorsplat {
 
@@ -105,7 +107,27 @@ void Print(const fs::path& input, const fs::path& output, const ConvertReport& r
   }
 }
 
+// A network's weights, which only become .safetensors.
+Status ConvertModel(const ConvertFlags& flags, const SharedFlags& shared) {
+  const fs::path from = flags.paths[0], to = flags.paths[1];
+  if (!shared.overwrite && fs::exists(to))
+    return Error{ErrorCode::kExists, Cat(to.string(), " exists; -w replaces it")};
+  ANCHORSPLAT_RETURN_IF_ERROR(ConvertCheckpoint(from, to, {.overwrite = shared.overwrite}));
+  std::error_code unknown;
+  const uint64_t bytes = fs::file_size(to, unknown);
+  if (shared.json) {
+    PrintJson(
+        nlohmann::json::array({{{"input", from.string()}, {"output", to.string()}, {"bytes", {{"out", bytes}}}}}));
+  } else if (!shared.quiet) {
+    std::cout << from.string() << " -> " << to.string() << " (" << HumanBytes(bytes) << ")\n";
+  }
+  return {};
+}
+
 Status RunConvert(const ConvertFlags& flags, const SharedFlags& shared) {
+  if (flags.out_dir.empty() && flags.paths.size() == 2 && fs::path(flags.paths[1]).extension() == ".safetensors") {
+    return ConvertModel(flags, shared);
+  }
   ConvertOptions options = flags.options;
   options.write.overwrite = shared.overwrite;
   options.measure = flags.report;
@@ -143,7 +165,9 @@ void AddConvert(CLI::App& app, Program& program) {
                            "anchorsplat convert scan.ply scan.spz --report");
   const auto flags = std::make_shared<ConvertFlags>();
   ConvertOptions& options = flags->options;
-  verb.add_option("paths", flags->paths, Cat("IN OUT, or inputs for --out-dir. Written: ", WrittenFormats()))
+  verb.add_option("paths", flags->paths,
+                  Cat("IN OUT, or inputs for --out-dir. Written: ", WrittenFormats(),
+                      ", and .safetensors of a network's weights"))
       ->required();
   auto* out_dir = verb.add_option("--out-dir", flags->out_dir, "Folder to write to, under the inputs' names");
   verb.add_option("--to", flags->to, "Extension of the files in --out-dir")->capture_default_str()->needs(out_dir);
@@ -156,12 +180,12 @@ void AddConvert(CLI::App& app, Program& program) {
   verb.add_option("--coords", flags->axes,
                   "What the files' axes really are where they do not follow their format, as IN:OUT, for example RUB: "
                   "for a PLY with y up, :RDF for an SPZ as careless programs expect it");
-  verb.add_option("--sort", options.write.order, "Order of the Gaussians in the file")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, SplatOrder>{{"format", SplatOrder::kFormat},
-                                                                            {"keep", SplatOrder::kKeep},
-                                                                            {"morton", SplatOrder::kMorton},
-                                                                            {"importance", SplatOrder::kImportance}}))
-      ->default_str("format");
+  AddChoice(verb, "--sort", options.write.order,
+            {{"format", SplatOrder::kFormat},
+             {"keep", SplatOrder::kKeep},
+             {"morton", SplatOrder::kMorton},
+             {"importance", SplatOrder::kImportance}},
+            "Order of the Gaussians in the file");
   verb.add_option("--spz-version", options.write.spz_version, "4, or 3 for programs that only know gzip")
       ->check(CLI::IsMember({3, 4}))
       ->capture_default_str();

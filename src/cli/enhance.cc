@@ -15,6 +15,7 @@
 #include "formats/camera_io.h"
 #include "formats/registry.h"
 #include "model/model_method.h"
+#include "viewer/page_writer.h"
 
 namespace anchorsplat {
 
@@ -33,6 +34,7 @@ struct EnhanceFlags {
   std::string model_file;
   std::string shuffles = "identity";
   std::string compat;
+  bool view = false;
 };
 
 // What can be known to fail before anything is read.
@@ -134,6 +136,18 @@ std::string Details(const EnhanceReport& r) {
              r.pixel_size_source, ")");
 }
 
+// The page beside the output: scan-4x.ply and scan-4x.html.
+fs::path ViewPath(const fs::path& output) { return fs::path(output).replace_extension(".html"); }
+
+Status WriteView(const std::string& input, const GaussianCloud& before, const fs::path& output,
+                 const Enhanced& enhanced, const WriteOptions& options) {
+  ViewerPage page;
+  page.before = ViewerSplat{&before, fs::path(input).filename().string(), {}};
+  page.after = {&enhanced.cloud, output.filename().string(), {}};
+  if (enhanced.report.pixel_size > 0) page.pixel_size = static_cast<float>(enhanced.report.pixel_size);
+  return WriteViewerPage(ViewPath(output), page, options);
+}
+
 Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared) {
   ANCHORSPLAT_RETURN_IF_ERROR(FinishModelOptions(flags));
   EnhanceOptions options = flags.options;
@@ -144,12 +158,23 @@ Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared) {
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto outputs, OutputPaths(flags, shared.overwrite));
 
+  for (const fs::path& output : outputs) {
+    if (flags.view && !shared.overwrite && fs::exists(ViewPath(output))) {
+      return Error{ErrorCode::kExists, Cat(ViewPath(output).string(), " exists; -w replaces it")};
+    }
+  }
+
   nlohmann::json results = nlohmann::json::array();
   for (size_t i = 0; i < flags.inputs.size(); ++i) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, ReadCloud(flags.inputs[i]));
+    GaussianCloud before;
+    if (flags.view) before = cloud;
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Enhanced enhanced, Enhance(std::move(cloud), options));
     ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(outputs[i], enhanced.cloud, WriteOptionsFrom(shared)));
     const EnhanceReport& r = enhanced.report;
+    if (flags.view) {
+      ANCHORSPLAT_RETURN_IF_ERROR(WriteView(flags.inputs[i], before, outputs[i], enhanced, WriteOptionsFrom(shared)));
+    }
     results.push_back(ToJson(flags.inputs[i], outputs[i], r));
     if (!shared.json && !shared.quiet) {
       std::cout << flags.inputs[i] << " -> " << outputs[i].string() << "\n  " << WithThousands(r.gaussians_in)
@@ -197,6 +222,8 @@ void AddEnhance(CLI::App& app, Program& program) {
       ->needs(cameras);
   verb.add_option("--filter-strength", options.filter_strength,
                   "Share of the absorbed 0.3 px² to give back (default: 1 - (1 - 1/upscale²)/3.6)");
+
+  verb.add_flag("--view", flags->view, "Also write an HTML page beside the output that shows before and after");
 
   const std::string group = "Model";
   ModelOptions& model = flags->model->options;

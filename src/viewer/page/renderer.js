@@ -118,6 +118,7 @@ class Renderer {
       target.width = width;
       target.height = height;
     }
+    target.clip = [region.x, region.y, region.x + region.width, region.y + region.height];
     gl.viewport(0, 0, width, height);
     gl.disable(gl.SCISSOR_TEST);
     gl.clearColor(0, 0, 0, 0);
@@ -150,6 +151,7 @@ class Renderer {
     gl.uniform3fv(u.uEye, fromCenter);
     gl.uniform4f(u.uIntrinsics, intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy);
     gl.uniform2f(u.uSize, target.width, target.height);
+    gl.uniform4fv(u.uClip, target.clip);
     gl.uniform4fv(u.uTangents, tangents);
     gl.uniform2fv(u.uLogScale, d.logScale);
     gl.uniform2fv(u.uDc, d.dc);

@@ -42,6 +42,7 @@ uniform vec3 uTranslation;    // camera position of the splat's centre
 uniform vec3 uEye;            // camera centre, relative to the splat's centre
 uniform vec4 uIntrinsics;     // fx, fy, cx, cy in pixels
 uniform vec2 uSize;           // of the target, pixels
+uniform vec4 uClip;           // left, top, right, bottom of what is drawn, pixels
 uniform vec4 uTangents;       // limits of x/z (min, max) and y/z (min, max) in the Jacobian
 uniform vec2 uLogScale;       // min, max
 uniform vec2 uDc;             // min, max
@@ -121,6 +122,9 @@ void main() {
   vec2 sigma = sqrt(vec2(middle + radius, max(middle - radius, uDilation)));
   float reach = sqrt(max(0.0, 2.0 * log(opacity / uMinAlpha)));
   vec2 center = uIntrinsics.xy * p.xy / p.z + uIntrinsics.zw;
+  // Colours are most of the work: not for what is beside the picture.
+  float extent = reach * sigma.x;
+  if (any(lessThan(center + extent, uClip.xy)) || any(greaterThan(center - extent, uClip.zw))) return;
   vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0;
   vOffset = corner * reach;
   vec2 pixel = center + vOffset.x * sigma.x * axis + vOffset.y * sigma.y * vec2(-axis.y, axis.x);

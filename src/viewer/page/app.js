@@ -338,7 +338,8 @@ class Viewer {
       blink: side === 0 ? [2 * width, -1] : [-1, -1]};
     renderer.show({
       width, height, split: splits[mode], difference: mode === 'difference', differenceTop: DIFFERENCE_TOP,
-      background: this.backgrounds[this.backgroundIndex], lenses: [...lenses, nowhere, nowhere].slice(0, 2), lensSize,
+      // A true picture brings its own background.
+      background: this.backgrounds[pair.includes('truth') ? 0 : this.backgroundIndex], lenses: [...lenses, nowhere, nowhere].slice(0, 2), lensSize,
     });
     this.overlay(mode, places);
     this.settle();
@@ -372,7 +373,10 @@ class Viewer {
     divider.setAttribute('aria-valuenow', String(Math.round(at)));
 
     const tags = [byId('tag-first'), byId('tag-second')];
-    const top = innerWidth < 680 ? byId('card').getBoundingClientRect().bottom + 10 : 16;
+    const card = byId('card').getBoundingClientRect();
+    const line = at / 100 * innerWidth;
+    const crowded = line - 90 < card.right || line + 90 > byId('tools').getBoundingClientRect().left;
+    const top = crowded && mode !== 'difference' ? card.bottom + 10 : 16;
     tags.forEach((tag, k) => {
       tag.textContent = NAMES[this.pairs[this.pair][k]];
       show(tag, this.comparing && (mode === 'slider' || mode === 'side' || (mode === 'blink' && this.side === k)));

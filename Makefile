@@ -7,6 +7,7 @@
 #   make fuzz     mutated files against all readers, SECONDS=60 by default
 #   make realdata DATA=DIR   checks on splats of your own
 #   make viewer-test   the page of `anchorsplat view` in headless Chromium (installs a browser)
+#   make interop  files of ours read by other programs and theirs by us (scripts/interop.py says what it needs)
 #   make bench    measured ratios and figures
 
 JOBS ?= $(shell nproc)
@@ -77,6 +78,10 @@ fuzz: debug
 
 realdata: program
 	@scripts/realdata.sh "$(DATA)"
+
+interop: build
+	@scripts/interop.py build/anchorsplat examples/biplane/input.ply
+.PHONY: interop
 
 clean:
 	@rm -rf build

@@ -135,26 +135,34 @@ def main():
                 file, back = path(f"{name}.{kind}"), path("back.ply")
                 row = f"{kind:16}{writer:18}{name if writer == 'anchorsplat' else 'anchorsplat':18}"
                 axes = ["--coords", ":RDF"] if kind == "spz" and name in AXES_IGNORED else []
+                version = ["--spz-version", "3"] if kind == "spz" and name == "gsply" else []  # 4 needs more packages
                 try:
                     if writer == "anchorsplat":
-                        ours(path("in.ply"), file, *axes)
+                        ours(path("in.ply"), file, *axes, *version)
                         convert(file, back)
                     else:
                         convert(path("in.ply"), file)
                         ours(file, back, *(["--coords", "RDF"] if axes else []))
-                    got = differences(truth, read_ply(back), STEPS[kind]["means"])
+                    expected = dict(truth)
+                    if kind == "splat":  # keeps colours from 0 to 1
+                        expected["dc"] = expected["dc"].clip(-0.5 / SH0, 0.5 / SH0)
+                    got = differences(expected, read_ply(back), STEPS[kind]["means"])
                 except Exception as error:  # a row of the table, whatever went wrong in the other program
                     print(row + f"  failed: {str(error)[:90]}")
                     bad += 1
                     continue
                 worst = [key for key, limit in STEPS[kind].items() if got[key] > limit]
                 print(row + "".join(f"{got[key]:10.2g}" for key in STEPS[kind]) +
-                      (f"  beyond the format's step: {', '.join(worst)}" if worst else ""))
-                bad += bool(worst)
+                      (f"  beyond the format's step: {', '.join(worst)}" if worst else "") +
+                      (f" ({KNOWN[writer, kind]})" if (writer, kind) in KNOWN else ""))
+                bad += bool(worst) and (writer, kind) not in KNOWN
     shutil.rmtree(work)
     sys.exit(f"{bad} rows do not agree" if bad else 0)
 
 
+SH0 = 0.28209479177387814
+# Files that splat-transform reads as we do, and which differ from their source: their writers' business.
+KNOWN = {("gaussforge", "compressed.ply"): "SH with a step of its own", ("gaussforge", "sog"): "some rotations wrong"}
 # Programs that write and read SPZ files in the axes of the PLY they come from.
 AXES_IGNORED = {"gsply", "gaussforge"}
 

@@ -24,12 +24,12 @@ struct NetworkBenchStep {
 
 struct NetworkBenchReport {
   int threads = 0;
-  int64_t gaussians = 0;       // N anchors
-  int64_t copies = 0;          // K
-  double seconds = 0;          // one forward pass, levels and heads included, without reading, cleaning and restoring
-  double multiply_adds = 0;    // of the pass
-  double gemm_flops = 0;       // 2·multiply-adds per second of a plain fp32 product 17020×512×2048 on reused buffers
-  double ratio = 0;            // seconds over the time that product's rate would need for the same multiply-adds
+  int64_t gaussians = 0;     // N anchors
+  int64_t copies = 0;        // K
+  double seconds = 0;        // one forward pass, levels and heads included, without reading, cleaning and restoring
+  double multiply_adds = 0;  // of the pass
+  double gemm_flops = 0;  // 2·multiply-adds per second of a plain product 17020×512×2048 in the network's precision
+  double ratio = 0;       // seconds over the time that product's rate would need for the same multiply-adds
   double enhance_seconds = 0;  // EnhanceWithModel as a whole, fastest repeat
   std::vector<NetworkBenchStep> steps;
 };

@@ -268,6 +268,7 @@ void PackedNetwork::RunBlock(const Block& block, const Level& level, int slot, c
 
 Buffer<float> PackedNetwork::Context(const float* features, std::span<const Level> levels, Rounding rounding,
                                      NetworkProfile* profile) const {
+  if (rounding == Rounding::kNone && precision_ == WeightPrecision::kBFloat16) rounding = Rounding::kBFloat16;
   Workspace workspace;
   const auto run_blocks = [&](const Stage& stage, const Level& level, const float* first_conv_in, Buffer<float>& x) {
     for (size_t i = 0; i < stage.blocks.size(); ++i) {

@@ -23,8 +23,9 @@ class PackedNetwork {
  public:
   // Errors: of Validate(config) and of `source`; kBadFile naming the tensor when a weight is NaN or infinite.
   //
-  // kBFloat16 rounds weights and inputs of the blocks' matrices and convolutions; sums, the residual stream, norms and
-  // softmax stay in fp32, and so do the embedding and the last layers of the heads, which cost little and show most.
+  // kBFloat16 rounds weights and inputs of the blocks' matrices and convolutions, and the attention as
+  // Rounding::kBFloat16 does; sums, the residual stream, norms and softmax stay in fp32, and so do the embedding and
+  // the last layers of the heads, which cost little and show most.
   static Result<PackedNetwork> Load(const NetworkConfig& config, const WeightSource& source,
                                     WeightPrecision precision = WeightPrecision::kFloat);
 
@@ -32,8 +33,9 @@ class PackedNetwork {
   WeightPrecision precision() const { return precision_; }
 
   // features [N,59] of the normalised cloud (kAttributes) → context [N, config().context_channels()]. `levels`: of
-  // these N points (BuildHierarchy with HierarchyOptionsFor). `rounding`: of the attention's arithmetic. The same bits
-  // for any number of threads. Needs about 40 · decoder width · N bytes besides.
+  // these N points (BuildHierarchy with HierarchyOptionsFor). `rounding`: of the attention's arithmetic; kNone leaves
+  // it to the precision of the weights. The same bits for any number of threads. Needs about 40 · decoder width · N
+  // bytes besides.
   Buffer<float> Context(const float* features, std::span<const Level> levels, Rounding rounding = Rounding::kNone,
                         NetworkProfile* profile = nullptr) const;
 

@@ -74,11 +74,24 @@ TEST(PackedNetwork, BFloat16StaysWithinItsRoundings) {
   const GoldenRun golden;
   const auto network = PackedNetwork::Load(golden.config, HashWeights(), WeightPrecision::kBFloat16);
   ASSERT_TRUE(network.ok());
-  const double error = LargestDifference(RunNetwork(golden, Rounding::kNone, &*network), golden.expected);
+  const Buffer<float> out = RunNetwork(golden, Rounding::kNone, &*network);
+  const double error = LargestDifference(out, golden.expected);
   // Eight bits of mantissa through 22 blocks; the attributes' changes are of size 1.
   EXPECT_LT(error, 0.1);
   EXPECT_GT(error, 1e-3) << "nothing was rounded";
   RecordProperty("max_abs_error", std::to_string(error));
+  double difference = 0, change = 0;  // sums of squares
+  for (size_t i = 0; i < out.size(); ++i) {
+    const double expected = golden.expected[i];
+    difference += (out[i] - expected) * (out[i] - expected);
+    const double anchor = golden.features[i % golden.features.size()];  // copy after copy
+    change += (expected - anchor) * (expected - anchor);
+  }
+  const double relative = std::sqrt(difference / change);
+  EXPECT_LT(relative, 0.03);
+  RecordProperty("rms_of_change", std::to_string(relative));
+  EXPECT_TRUE(out == RunNetwork(golden, Rounding::kBFloat16, &*network))
+      << "the attention is of the weights' precision";
 }
 
 TEST(PackedNetwork, SameBitsForAnyNumberOfThreads) {

@@ -5,6 +5,9 @@
 
 #include "core/buffer.h"
 #include "core/parallel.h"
+#include "model/kernels/bfloat16_attention.h"
+#include "model/kernels/bfloat16_tile.h"
+#include "model/kernels/score_range.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "model/kernels/attention.cc"
@@ -18,9 +21,6 @@
 #define ANCHORSPLAT_ATTENTION_ONCE
 namespace anchorsplat {
 
-// Patches are split at multiples of this, which every SIMD target's group of queries divides.
-constexpr int64_t kLargestGroup = 64;
-
 // Reused by the tasks of a thread.
 struct AttentionScratch {
   Buffer<float> keys;           // [keys, depth], padded with zeros to whole tiles
@@ -28,15 +28,6 @@ struct AttentionScratch {
   Buffer<float> queries;        // [depth][group] of the queries at hand, scaled
   Buffer<float> probabilities;  // [keys of a block][group], not normalised
   Buffer<float> sums;           // [depth][group] Σ probability · value
-};
-
-// Queries [first, last) of a patch, one head.
-struct AttentionTask {
-  int64_t patch_begin;  // first slot
-  int64_t keys;         // slots of the patch
-  int64_t first;        // slots of the queries, within the patch
-  int64_t last;
-  int64_t head;
 };
 
 }  // namespace anchorsplat
@@ -114,37 +105,6 @@ HWY_NOINLINE void LargestScores(const float* keys, int64_t key_count, int64_t st
   }
   ANCHORSPLAT_UNROLL
   for (int v = 0; v < kVectors; ++v) hn::StoreU(best[v], d, largest + v * kLanes);
-}
-
-enum class ScoreRange : uint8_t {
-  kBounded,  // −125 … 125 after the shift
-  kAny,      // at most 125 after the shift, but perhaps far below
-};
-
-// What is subtracted from the scores of each query of a group. Softmax does not change with it, so it only has to keep
-// the exponentials in range: of floats, and of fp16 where they are rounded to that. `bounds` hold |q||k| ≥ |q·k| for
-// the longest key; often that is small and nothing needs to be subtracted, or the largest score of a few keys is close
-// enough to the bound to serve for all. Only the rest pays for finding the largest score of all keys.
-ScoreRange ChooseShifts(Rounding rounding, const float* keys, int64_t key_count, const float* queries, int64_t depth,
-                        const float* bounds, float* HWY_RESTRICT shifts) {
-  const float unshifted = rounding == Rounding::kHalf ? 10.0f : 60.0f;  // 2^-10 is still a normal fp16
-  const float highest = rounding == Rounding::kHalf ? 15.0f : 60.0f;    // 2^15 is below its largest
-  constexpr float kLowest = 120.0f;
-  constexpr int64_t kProbes = 10;  // tiles
-  const auto all_within = [&](float limit, float sign, bool magnitudes) {
-    bool within = true;  // of NaN: false
-    for (int i = 0; i < kGroup; ++i) {
-      const float shift = magnitudes ? std::abs(shifts[i]) : shifts[i];
-      within = (bounds[i] + sign * shift <= limit) && within;
-    }
-    return within;
-  };
-  std::fill(shifts, shifts + kGroup, 0.0f);
-  if (all_within(unshifted, 0, false)) return ScoreRange::kBounded;
-  const int64_t tiles = (key_count + kKeyTile - 1) / kKeyTile;
-  LargestScores(keys, key_count, std::max<int64_t>(1, tiles / kProbes), queries, depth, shifts);
-  if (!all_within(highest, -1, false)) LargestScores(keys, key_count, 1, queries, depth, shifts);
-  return all_within(kLowest, 1, true) ? ScoreRange::kBounded : ScoreRange::kAny;
 }
 
 // Probabilities exp2(score − shift) of a block of keys, and their sums over the keys added to `total`.
@@ -254,7 +214,12 @@ void AttendGroup(const AttentionParams& p, const AttentionTask& task, int64_t de
   }
   alignas(64) float shifts[kGroup];
   alignas(64) float totals[kGroup] = {};
-  const ScoreRange range = ChooseShifts(kRounding, s.keys.data(), task.keys, s.queries.data(), depth, bounds, shifts);
+  const int64_t tiles = (task.keys + kKeyTile - 1) / kKeyTile;
+  constexpr int64_t kProbes = 10;  // tiles
+  const ScoreRange range = ChooseShifts(kRounding, kGroup, bounds, shifts, [&](bool all) HWY_ATTR {
+    LargestScores(s.keys.data(), task.keys, all ? 1 : std::max<int64_t>(1, tiles / kProbes), s.queries.data(), depth,
+                  shifts);
+  });
   std::fill(s.sums.begin(), s.sums.end(), 0.0f);
   for (int64_t j = 0; j < task.keys; j += kKeyBlock) {
     const int64_t keys = std::min(kKeyBlock, task.keys - j);
@@ -344,6 +309,7 @@ HWY_EXPORT(Attend);
 void AttentionCpu(const AttentionParams& p) {
   if (p.count <= 0) return;
   const auto attend = HWY_DYNAMIC_DISPATCH(Attend);
+  const bool dot = p.rounding == Rounding::kBFloat16 && UsesBFloat16Dot();
   const int64_t padded = PaddedCount(p.count, p.patch_size);
   const int64_t patch = std::min(padded, p.patch_size);
   const int64_t patches = padded / patch;
@@ -361,13 +327,16 @@ void AttentionCpu(const AttentionParams& p) {
       const int64_t own = std::min(patch, p.count - slot);  // the rest of a last patch is borrowed
       const int64_t first = index % chunks * chunk;
       if (first >= own) continue;
-      attend(p,
-             {.patch_begin = slot,
-              .keys = patch,
-              .first = first,
-              .last = std::min(own, first + chunk),
-              .head = index / chunks % p.heads},
-             scratch);
+      const AttentionTask task = {.patch_begin = slot,
+                                  .keys = patch,
+                                  .first = first,
+                                  .last = std::min(own, first + chunk),
+                                  .head = index / chunks % p.heads};
+      if (dot) {
+        AttendBFloat16Dot(p, task);
+      } else {
+        attend(p, task, scratch);
+      }
     }
   });
 }

@@ -110,9 +110,13 @@ HWY_EXPORT(MultiplyWidened);
 HWY_EXPORT(WidenedRows);
 HWY_EXPORT(RoundToPairs);
 
-BFloat16Product ChooseBFloat16Product() {
+bool UsesBFloat16Dot() {
   // Tests that ask for a narrow SIMD target shall not get the widest instructions there are.
-  if ((hwy::SupportedTargets() & HWY_AVX3) != 0 && HasBFloat16Dot()) {
+  return (hwy::SupportedTargets() & HWY_AVX3) != 0 && HasBFloat16Dot();
+}
+
+BFloat16Product ChooseBFloat16Product() {
+  if (UsesBFloat16Dot()) {
     return {.rows = kBFloat16DotRows, .columns = kBFloat16DotColumns, .multiply = MultiplyBFloat16Dot};
   }
   return {.rows = HWY_DYNAMIC_DISPATCH(WidenedRows)(),

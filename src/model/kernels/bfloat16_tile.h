@@ -15,6 +15,7 @@ struct BFloat16Product {
   void (*multiply)(int64_t rows, int64_t columns, const Tile<BFloat16Pair>& tile);
 };
 BFloat16Product ChooseBFloat16Product();
+bool UsesBFloat16Dot();  // whether it is the former
 
 // `count` floats as (count + 1) / 2 pairs, each rounded to nearest even; NaN stays NaN.
 void RoundToPairs(const float* values, int64_t count, BFloat16Pair* pairs);

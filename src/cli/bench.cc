@@ -180,7 +180,7 @@ void AddBench(CLI::App& app, Program& program) {
                      "Checkpoint (default: made-up weights of the published size, K = 20)");
   AddChoice(network, "--precision", network_flags->precision,
             {{"fp32", WeightPrecision::kFloat}, {"bf16", WeightPrecision::kBFloat16}},
-            "Of matrix products and convolutions");
+            "Of matrix products, convolutions and attention");
   AddChoice(network, "--attention-rounding", network_flags->options.rounding,
             {{"none", Rounding::kNone}, {"fp16", Rounding::kHalf}, {"bf16", Rounding::kBFloat16}},
             "Of the attention's arithmetic");

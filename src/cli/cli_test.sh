@@ -93,6 +93,7 @@ grep -q '<html' "$work/viewed.html" || { failures=$((failures + 1)); echo "FAILE
 expect 5 "the page is not overwritten" "$program" enhance "$input" -o "$work/viewed.splat" --pixel-size 0.0055 --view
 expect 3 "a model that is not there" "$program" enhance "$input" -o "$work/bad.ply" --model "$work/none.pth"
 expect 4 "a splat as a model" "$program" enhance "$input" -o "$work/bad.ply" --model "$input"
+expect 2 "an empty model" "$program" enhance "$input" -o "$work/bad.ply" --model ""
 expect 2 "model options without a model" "$program" enhance "$input" -o "$work/bad.ply" --prune-opacity 0.1
 expect 4 "a splat as weights" "$program" convert "$input" "$work/weights.safetensors"
 expect 2 "upscale below 1" "$program" enhance "$input" -o "$work/bad.ply" --upscale 0.5

@@ -89,10 +89,11 @@ nlohmann::json ToJson(const std::string& input, const fs::path& output, const En
   nlohmann::json json = {{"input", input},
                          {"output", output.string()},
                          {"method", r.method},
-                         {"upscale", r.upscale},
                          {"gaussians", {{"in", r.gaussians_in}, {"dropped", r.dropped}, {"out", r.gaussians_out}}},
                          {"seconds", r.seconds}};
+  for (const auto& [name, value] : r.facts) json[r.method][name] = value;
   if (!r.pixel_size_source.empty()) {
+    json["upscale"] = r.upscale;
     json["filter_strength"] = r.filter_strength;
     json["pixel_size"] = {{"value", r.pixel_size}, {"source", r.pixel_size_source}};
     if (r.train_width) json["train_width"] = *r.train_width;
@@ -123,6 +124,9 @@ Result<Shuffles> ParseShuffles(const std::string& text) {
 }
 
 Status FinishModelOptions(const EnhanceFlags& flags) {
+  if (!flags.model_file.empty() && flags.options.method == "filter") {
+    return Error{ErrorCode::kBadArgument, "--model and --method filter: the filter uses no model"};
+  }
   flags.model->file = flags.model_file;
   flags.model->options.upstream = flags.compat == "upstream";
   ANCHORSPLAT_ASSIGN_OR_RETURN(flags.model->options.shuffles, ParseShuffles(flags.shuffles));
@@ -229,10 +233,12 @@ void AddEnhance(CLI::App& app, Program& program) {
   ModelOptions& model = flags->model->options;
   auto* file =
       verb.add_option("--model", flags->model_file, "Checkpoint of an AnchorSplat network, .pth or .safetensors")
+          ->check(NotEmpty())
           ->group(group);
   const auto model_option = [&](CLI::Option* option) { return option->needs(file)->group(group); };
-  model_option(
-      verb.add_option("--compat", flags->compat, "upstream: do what the published script does, quirks included"))
+  model_option(verb.add_option("--compat", flags->compat,
+                               "upstream: do what the published script does, quirks included (its fp16 attention by "
+                               "--attention-rounding fp16)"))
       ->check(CLI::IsMember({"upstream"}));
   model_option(AddChoice(verb, "--normalisation", model.normalisation,
                          {{"auto", NormalisationMode::kAuto},

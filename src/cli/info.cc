@@ -1,9 +1,12 @@
+#include <array>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "cli/table.h"
 #include "cli/verb.h"
@@ -146,12 +149,16 @@ nlohmann::json ToJson(const Findings& f) {
   return json;
 }
 
-// Weights have their own extensions, one of which gsplat uses for splats too.
+// By content: gsplat keeps splats in files of the same kind, and other formats are zip archives too.
 bool LooksLikeModel(const std::filesystem::path& path) {
-  const std::string extension = path.extension().string();
-  if (extension != ".pth" && extension != ".pt" && extension != ".safetensors") return false;
+  std::array<char, 16> beginning{};
+  std::ifstream in(path, std::ios::binary);
+  in.read(beginning.data(), beginning.size());
+  if (!LooksLikeTensorFile(std::as_bytes(std::span(beginning).first(static_cast<size_t>(in.gcount()))))) return false;
   const auto file = TensorFile::Open(path);
-  return !file.ok() || file->Find("splats.means") == nullptr;
+  if (file.ok()) return file->Find("splats.means") == nullptr;
+  const std::filesystem::path extension = path.extension();
+  return extension == ".pth" || extension == ".safetensors";  // a broken one
 }
 
 // A network's weights instead of a splat.

@@ -26,7 +26,7 @@ std::vector<EnhanceMethod>& Registry() {
        .summary = "give the width back that the fit absorbed; instant, no weights",
        .rank = 0,
        .ready = [](const EnhanceOptions&) { return Status(); },
-       .run = [](EnhanceInput input, const EnhanceOptions& options) -> Result<GaussianCloud> {
+       .run = [](EnhanceInput input, const EnhanceOptions& options, EnhanceReport&) -> Result<GaussianCloud> {
          ANCHORSPLAT_RETURN_IF_ERROR([&]() -> Status {
            const auto grown = ApplyFilter(input.cloud, input.pixel_sizes,
                                           {.upscale = options.upscale, .strength = input.filter_strength});
@@ -174,6 +174,11 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(DropUnusable(input.cloud));
   report.dropped = report.gaussians_in - input.cloud.size();
 
+  if (!method->needs_pixel_size && (options.pixel_size || options.cameras || options.filter_strength)) {
+    LogWarning(Cat("the method '", method->name,
+                   "' knows no pixel size and no filter strength: --pixel-size, --cameras and ",
+                   "--filter-strength change nothing"));
+  }
   if (method->needs_pixel_size) {
     input.filter_strength = ChooseStrength(options, input.cloud);
     report.filter_strength = input.filter_strength;
@@ -187,7 +192,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   }
 
   const auto begin = std::chrono::steady_clock::now();
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, method->run(std::move(input), options));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, method->run(std::move(input), options, report));
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   report.gaussians_out = out.size();
   return Enhanced{std::move(out), std::move(report)};

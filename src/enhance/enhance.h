@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/camera.h"
@@ -37,7 +38,9 @@ struct EnhanceReport {
   double pixel_size = 0;           // p_LR, the median when there is one per Gaussian
   std::string pixel_size_source;   // "given", "cameras" or "estimated"; empty for methods that need none
   std::optional<int> train_width;  // pixels, given or assumed; nothing when the cameras' own size was taken
-  double seconds = 0;              // of the method itself, without reading and writing
+  // What else the method has to tell, by name: counts of the model, for example.
+  std::vector<std::pair<std::string, double>> facts;
+  double seconds = 0;  // of the method itself, without reading and writing
 };
 
 // The cloud as methods get it: rows that are not finite are gone; p_LR is known to those that need it.
@@ -55,7 +58,7 @@ struct EnhanceMethod {
   int rank = 0;
   bool needs_pixel_size = true;  // else EnhanceInput::pixel_sizes is empty and nothing is estimated
   std::function<Status(const EnhanceOptions&)> ready;
-  std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&)> run;
+  std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&, EnhanceReport&)> run;
 };
 
 // The filter is always there; higher rooms add theirs at start-up (before threads), from main, by name.

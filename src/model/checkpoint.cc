@@ -12,6 +12,8 @@ namespace anchorsplat {
 
 namespace {
 
+constexpr const char* kArchitecture = "architecture";  // for people
+
 // The first few of them and how many there are more.
 std::string SomeOf(const std::vector<std::string>& names) {
   constexpr size_t kShown = 3;
@@ -23,7 +25,27 @@ std::string SomeOf(const std::vector<std::string>& names) {
   return text;
 }
 
+std::string List(const std::vector<int64_t>& values) {
+  std::string out;
+  for (const int64_t value : values) out += (out.empty() ? "" : ",") + std::to_string(value);
+  return out;
+}
+
 }  // namespace
+
+std::map<std::string, std::string> ArchitectureMetadata(const NetworkConfig& config) {
+  return {{kArchitecture, "AnchorSplat: Point Transformer V3 U-Net and six residual heads"},
+          {"K", std::to_string(config.copies)},
+          {"epsilon", Cat(kAnchorOffsetScale)},
+          {"grid_resolution", std::to_string(kGridResolution)},
+          {"patch_size", std::to_string(config.patch_size)},
+          {"encoder_channels", List(config.encoder_channels)},
+          {"encoder_blocks", List(config.encoder_blocks)},
+          {"encoder_heads", List(config.encoder_heads)},
+          {"decoder_channels", List(config.decoder_channels)},
+          {"decoder_blocks", List(config.decoder_blocks)},
+          {"decoder_heads", List(config.decoder_heads)}};
+}
 
 Result<Checkpoint> Checkpoint::Open(const std::filesystem::path& path) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(TensorFile file, TensorFile::Open(path));
@@ -35,6 +57,14 @@ Result<Checkpoint> Checkpoint::Open(const std::filesystem::path& path) {
   for (const TensorEntry& entry : file.tensors()) found.push_back({entry.name, entry.shape});
   const auto config = ConfigOfTensors(found);
   if (!config.ok()) return bad(config.error().message);
+
+  for (const auto& [key, value] : ArchitectureMetadata(*config)) {
+    const auto said = file.metadata().find(key);
+    if (key != kArchitecture && said != file.metadata().end() && said->second != value) {
+      return bad(
+          Cat("its metadata says ", key, " ", Printable(said->second), ", and only ", value, " is implemented here"));
+    }
+  }
 
   // Missing ones first: a wrong shape often follows from them.
   std::vector<std::string> missing, unknown;

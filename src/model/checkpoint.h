@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
+#include <string>
 
 #include "core/result.h"
 #include "formats/tensor_file.h"
@@ -10,13 +12,18 @@
 
 namespace anchorsplat {
 
+// What the metadata of a checkpoint says about its architecture, read off its tensors: architecture, K, epsilon,
+// grid_resolution, patch_size, encoder and decoder widths, blocks and heads.
+std::map<std::string, std::string> ArchitectureMetadata(const NetworkConfig& config);
+
 // A file of the network's weights (.pth of torch.save, .safetensors), checked against the network it describes.
 class Checkpoint {
  public:
   // K, widths, stages and blocks are read from the tensors' shapes. Errors: those of TensorFile::Open; kBadFile with
   // the path when the file is no AnchorSplat checkpoint, when tensors are missing or belong to nothing (named), or when
   // one has another shape than its neighbours ask for (named, with both shapes). Tensors called num_batches_tracked may
-  // be absent: inference does not need them. Values are looked at when they are loaded.
+  // be absent: inference does not need them. Metadata that says another architecture is kBadFile too: heads, patch size
+  // and ε are in no shape. Values are looked at when they are loaded.
   static Result<Checkpoint> Open(const std::filesystem::path& path);
 
   const NetworkConfig& config() const { return config_; }

@@ -93,9 +93,11 @@ void Finish(float anchor_log_scale, bool upstream, int64_t row, GaussianCloud& o
   for (int64_t c = 0; c < 48; ++c) clamp(out.sh.data()[48 * row + c], -kLargestSh, kLargestSh);
   if (upstream) return;
   float* quat = out.quats.data() + 4 * row;
-  const float norm = std::sqrt(quat[0] * quat[0] + quat[1] * quat[1] + quat[2] * quat[2] + quat[3] * quat[3]);
+  double square = 0;  // in double: squares of large floats are infinite, of small ones zero
+  for (int c = 0; c < 4; ++c) square += double{quat[c]} * quat[c];
+  const double norm = std::sqrt(square);
   if (norm > 0) {
-    for (int c = 0; c < 4; ++c) quat[c] /= norm;
+    for (int c = 0; c < 4; ++c) quat[c] = static_cast<float>(quat[c] / norm);
   } else if (norm == 0) {
     quat[0] = 1;  // no rotation, as viewers show the zero quaternion
   }
@@ -305,6 +307,10 @@ Result<ModelResult> Run(const GaussianCloud& cloud, const PackedNetwork& network
 
 Result<ModelResult> EnhanceWithModel(const GaussianCloud& cloud, const PackedNetwork& network,
                                      const ModelOptions& options) {
+  if (!(options.prune_opacity >= 0 && options.prune_opacity <= 1)) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("pruning: an opacity of ", options.prune_opacity, " is not between 0 and 1")};
+  }
   try {
     return Run(cloud, network, options);
   } catch (const std::bad_alloc&) {

@@ -66,6 +66,7 @@ viewer-test: build
 bench: program
 	@build/anchorsplat bench render
 	@build/anchorsplat bench io
+	@build/anchorsplat bench network
 
 lint:
 	@scripts/lint.sh

@@ -24,6 +24,7 @@ namespace {
 // Everything `info` found, once for the table and once for JSON.
 struct Findings {
   std::string file;
+  std::string format;  // by content; empty for what can be read only once
   uint64_t file_bytes = 0;
   GaussianCloud cloud;
   CloudStatistics statistics;
@@ -68,7 +69,7 @@ void PrintTable(const Findings& f) {
   const CloudStatistics& s = f.statistics;
   std::cout << f.file << "\n"
             << "  Gaussians    " << WithThousands(s.gaussians) << ", SH degree " << s.sh_degree << "\n"
-            << "  file         " << HumanBytes(f.file_bytes) << "\n"
+            << "  file         " << HumanBytes(f.file_bytes) << (f.format.empty() ? "" : ", " + f.format) << "\n"
             << "  render mode  " << ModeName(f.cloud) << "\n";
   if (s.bounds) {
     std::cout << "  bounds      ";
@@ -115,6 +116,7 @@ nlohmann::json ToJson(const Findings& f) {
     return out;
   };
   nlohmann::json json = {{"file", f.file},
+                         {"format", f.format},
                          {"bytes", f.file_bytes},
                          {"gaussians", s.gaussians},
                          {"sh_degree", s.sh_degree},
@@ -151,6 +153,8 @@ nlohmann::json ToJson(const Findings& f) {
 
 // By content: gsplat keeps splats in files of the same kind, and other formats are zip archives too.
 bool LooksLikeModel(const std::filesystem::path& path) {
+  std::error_code code;
+  if (!std::filesystem::is_regular_file(path, code)) return false;  // a pipe can be read only once
   std::array<char, 16> beginning{};
   std::ifstream in(path, std::ios::binary);
   in.read(beginning.data(), beginning.size());
@@ -185,10 +189,22 @@ Status RunModelInfo(const std::string& file, const SharedFlags& shared) {
   return {};
 }
 
+std::string FormatName(const std::filesystem::path& path) {
+  std::error_code code;
+  if (!std::filesystem::is_regular_file(path, code)) return "";
+  std::string head(kSniffBytes, '\0');
+  std::ifstream in(path, std::ios::binary);
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<size_t>(in.gcount()));
+  const SplatFormat* format = FormatOfFile(head, path);
+  return format == nullptr ? "" : std::string(format->name);
+}
+
 Status RunInfo(const std::string& file, const SharedFlags& shared) {
   if (LooksLikeModel(file)) return RunModelInfo(file, shared);
   Findings findings;
   findings.file = file;
+  findings.format = FormatName(file);
   ANCHORSPLAT_ASSIGN_OR_RETURN(findings.cloud, ReadCloud(file));
   std::error_code code;
   findings.file_bytes = std::filesystem::file_size(file, code);

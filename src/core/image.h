@@ -33,4 +33,12 @@ struct Image {
   float at(int c, int y, int x) const { return pixels[static_cast<size_t>((int64_t{c} * height + y) * width + x)]; }
 };
 
+// Pixels [x0, x1) × [y0, y1); empty where x0 ≥ x1 or y0 ≥ y1.
+struct PixelBox {
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+
+  bool empty() const { return x0 >= x1 || y0 >= y1; }
+  friend bool operator==(const PixelBox&, const PixelBox&) = default;
+};
+
 }  // namespace anchorsplat

@@ -28,6 +28,7 @@ struct RenderOptions {
   // (tile, Gaussian) pairs listed at once, 4 bytes each, 1 to 2^31; when there are more, the picture is made in several
   // runs of tiles, without a difference in its pixels. Every run holds at least one tile, that is at most N pairs.
   int64_t max_pairs = kMaxPairs;
+  bool gradient = false;  // keep what Backward needs of this picture: 8 bytes per pixel more
 };
 
 struct RenderOutput {
@@ -36,9 +37,34 @@ struct RenderOutput {
   Image depth;  // [1,H,W] expected camera z: Σ α·T·z / alpha; 0 where alpha is 0. Empty unless asked for
 };
 
-// What the last picture took.
+// ∂L/∂ of what Render put out; L is any number made of it.
+struct RenderGradient {
+  Image color;   // [3,H,W]
+  Image alpha;   // [1,H,W]; empty = 0
+  PixelBox box;  // nothing outside is read and it counts as 0. A loss that compares an object on a plain background
+                 // is flat on most of the picture
+};
+
+// ∂L/∂ of every stored value of the cloud: exp, sigmoid and the quaternion's normalisation are included. Gaussians that
+// were culled or skipped have 0. Row i belongs to Gaussian i.
+struct CloudGradient {
+  Buffer<float> means;           // [N,3] per world unit
+  Buffer<float> log_scales;      // [N,3]
+  Buffer<float> quats;           // [N,4] of the quaternion as stored: orthogonal to it; 0 for the zero quaternion
+  Buffer<float> opacity_logits;  // [N]
+  Buffer<float> sh;              // [N,K,3] as the cloud's; 0 for coefficients above the degree in use
+
+  // What densification asks for.
+  Buffer<float> means2d;  // [N,2] ∂L/∂(mean in the picture), per pixel
+  Buffer<int32_t> radii;  // [N,2] pixels, as the profile defines them; 0 = culled by its rules
+
+  std::array<float, 3> background{};
+};
+
+// What the last picture took; the backward stages are those of the last Backward.
 struct RenderStatistics {
   double project = 0, spherical_harmonics = 0, sort = 0, bin = 0, blend = 0;  // seconds on the clock, per stage
+  double blend_backward = 0, project_backward = 0;                            // the latter with the spherical harmonics
   int64_t visible = 0;                                                        // Gaussians that were not culled
   int64_t pairs = 0;                                                          // (tile, Gaussian)
   int64_t evaluations = 0;  // (4×4-pixel block, Gaussian); fewer than would be possible where pixels are opaque
@@ -65,6 +91,17 @@ class Rasterizer {
   // value that is not finite are skipped, as far as the picture needs the value: SH coefficients of a degree that is
   // not used are not looked at. −Inf is legal as a log-scale (scale 0) and as an opacity logit (invisible).
   Status Render(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options, RenderOutput& output);
+
+  // The gradient of the last Render, which must have been asked to keep what this needs (RenderOptions::gradient), with
+  // the same values in `cloud`. Exact for what Render calculates: cut-offs and the order of depths count as constant,
+  // as do radii and tiles; where α is capped at 0.999 nothing flows to it, where a colour is clamped at 0 nothing flows
+  // to its coefficients, and where the Jacobian's x/z (y/z) is clamped it does not depend on x (y). `depth` has no
+  // gradient. A gradient that is not finite spoils the Gaussians under its pixel, no others. The result is
+  // bit-identical for every number of threads.
+  //
+  // Errors (kBadArgument): no such Render before; a cloud of another size or degree; gradients of another size than the
+  // picture; a box that reaches outside of it; not enough memory (kIo).
+  Status Backward(const GaussianCloud& cloud, const RenderGradient& output_gradient, CloudGradient& gradient);
 
   const RenderStatistics& statistics() const;  // of the last Render that succeeded
 

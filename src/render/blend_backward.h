@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+
+#include "core/image.h"
+#include "render/constants.h"
+#include "render/projected_gaussian.h"
+
+namespace anchorsplat {
+
+// Sums over all pixels of one Gaussian, in the coordinates where its ellipse is a circle: (u, v) as in
+// ProjectedGaussian. There every sum has the size of its terms; about the mean in pixels, a needle's covariance
+// gradient would be a small difference of large numbers.
+//
+// With q = α·∂L/∂α of a pixel, 0 where α is capped:
+struct BlendGradient {
+  float q;       // Σ q, which is ∂L/∂ln(opacity)
+  float qu, qv;  // Σ q·u, Σ q·v
+  float quu, quv, qvv;
+  float rgb[3];  // Σ α·T·∂L/∂C, which is ∂L/∂rgb
+};
+
+// The gradient of BlendCpu (Kerbl et al. 2023, appendix), tile by tile from the farthest Gaussian that was added to the
+// nearest: T is recovered by dividing by 1 − α, and everything behind is a single number per pixel,
+//   S = Σ_behind α·T·(rgb·∂L/∂C) + T_end·(background·∂L/∂C − ∂L/∂A),   α·∂L/∂α = α·T·(rgb·∂L/∂C) − S·α/(1 − α).
+// Which Gaussians a pixel adds is decided by the same arithmetic as in BlendCpu.
+//
+// The sums of a Gaussian are made per tile and added in the order of the tiles, so that the number of threads does not
+// change them.
+struct BlendBackwardParams {
+  int width, height;                   // pixels
+  int tiles_x;                         // T = tiles_x·⌈height/16⌉ tiles, row-major
+  int64_t count;                       // N Gaussians
+  const ProjectedGaussian* projected;  // [N]
+  const int64_t* tile_offsets;         // [T+1] of the whole image
+  const int32_t* pairs;                // [tile_offsets[last_tile] − tile_offsets[first_tile]] rows, by tile and depth
+  int64_t first_tile, last_tile;       // the run of tiles whose gradient to add
+  float background[3];                 // rgb
+  float min_alpha = kMinAlpha;
+  float max_alpha = kMaxAlpha;
+  const float* transmittance;   // [H,W] of BlendCpu
+  const int32_t* contributors;  // [H,W] of BlendCpu
+  PixelBox box;                 // within the image; gradients outside count as 0 and are not read
+  const float* color_gradient;  // [3,H,W] ∂L/∂C
+  const float* alpha_gradient;  // [H,W] ∂L/∂A; may be null
+  BlendGradient* partial;       // [tile_offsets[last_tile] − tile_offsets[first_tile]] scratch, per pair
+  // in and out
+  BlendGradient* gradients;     // [N] the run's sums are added to it
+  double* background_gradient;  // [3] Σ T_end·∂L/∂C is added to it
+};
+
+void BlendBackwardCpu(const BlendBackwardParams& p);
+
+}  // namespace anchorsplat

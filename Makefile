@@ -8,6 +8,7 @@
 #   make realdata DATA=DIR   checks on splats of your own
 #   make viewer-test   the page of `anchorsplat view` in headless Chromium (installs a browser)
 #   make interop  files of ours read by other programs and theirs by us (scripts/interop.py says what it needs)
+#   make lpips-check  LPIPS with its trained weights (fetched once, 64 MB) against the published values
 #   make bench    measured ratios and figures
 
 JOBS ?= $(shell nproc)
@@ -83,6 +84,12 @@ realdata: program
 interop: build
 	@scripts/interop.py build/anchorsplat examples/biplane/input.ply
 .PHONY: interop
+
+lpips-check: torch
+	@$(MAKE) --no-print-directory build
+	@scripts/fetch-lpips.sh
+	@scripts/lpips_check.sh build/anchorsplat
+.PHONY: lpips-check
 
 clean:
 	@rm -rf build

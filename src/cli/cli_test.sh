@@ -193,6 +193,15 @@ expect 5 "side by side does not overwrite" "$program" compare "$work/views/000.p
 expect 0 "both against truth" "$program" compare "$input" "$work/out.ply" --truth "$work/views" --cameras "$cameras" --size 128x128 --side-by-side "$work/truth.png"
 says stdout "gain"
 
+# LPIPS is missing without its weights; the other metrics are there all the same.
+expect 0 "no weights" "$program" compare "$source/testdata/lpips/ex_p0.png" "$source/testdata/lpips/ex_ref.png" --lpips alex --lpips-weights "$work/empty" --json
+says stderr "LPIPS missing"
+says stdout '"ssim"'
+mkdir "$work/weights" && echo "no tensors" >"$work/weights/alex.safetensors"
+expect 4 "broken weights" "$program" compare "$source/testdata/lpips/ex_p0.png" "$source/testdata/lpips/ex_ref.png" --lpips alex --lpips-weights "$work/weights"
+expect 2 "unknown network" "$program" compare "$input" "$input" --orbit 1 --lpips resnet
+expect 2 "weights of nothing" "$program" compare "$input" "$input" --orbit 1 --lpips-weights "$work/weights"
+
 # Same bits for any number of threads.
 expect 0 "one thread" "$program" render "$input" -o "$work/t1.png" --orbit 1 --size 200x150 --threads 1
 expect 0 "three threads" "$program" render "$input" -o "$work/t3.png" --orbit 1 --size 200x150 --threads 3

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "cli/choice.h"
+#include "cli/lpips_flags.h"
 #include "cli/parse.h"
 #include "cli/table.h"
 #include "cli/verb.h"
@@ -30,6 +31,8 @@ struct CompareFlags {
   std::string b;
   std::string truth;
   std::string side_by_side;
+  std::string lpips;
+  std::string lpips_weights;
   ViewFlags views;
 };
 
@@ -86,8 +89,10 @@ nlohmann::json ToJson(const Comparison& comparison) {
   const auto psnr = [](double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); };
   nlohmann::json json = {{"mean", {{"psnr", psnr(comparison.mean_psnr)}, {"ssim", comparison.mean_ssim}}},
                          {"views", nlohmann::json::array()}};
+  if (comparison.mean_lpips) json["mean"]["lpips"] = *comparison.mean_lpips;
   for (const ViewScore& view : comparison.views) {
     json["views"].push_back({{"name", view.name}, {"psnr", psnr(view.psnr)}, {"ssim", view.ssim}});
+    if (view.lpips) json["views"].back()["lpips"] = *view.lpips;
   }
   return json;
 }
@@ -95,29 +100,35 @@ nlohmann::json ToJson(const Comparison& comparison) {
 std::string Signed(double gain) { return (gain >= 0 ? "+" : "") + Fixed(gain, 2); }
 
 void PrintTable(const CompareFlags& flags, const std::vector<Comparison>& results) {
-  std::vector<std::vector<std::string>> rows;
-  const auto add = [&](const std::string& name, auto&& psnr, auto&& ssim) {
-    std::vector<std::string> row = {name};
-    for (const Comparison& result : results) {
-      row.push_back(Fixed(psnr(result), 2));
-      row.push_back(Fixed(ssim(result), 4));
+  const bool lpips = results[0].mean_lpips.has_value();
+  std::vector<std::vector<std::string>> rows = {{"view"}};
+  for (size_t k = 0; k < results.size(); ++k) {
+    const std::string side = results.size() == 1 ? "" : k == 0 ? "A " : "B ";
+    for (const char* metric : {"PSNR", "SSIM", "LPIPS"}) {
+      if (lpips || metric != std::string("LPIPS")) rows[0].push_back(side + metric);
     }
-    if (results.size() == 2) row.push_back(Signed(psnr(results[1]) - psnr(results[0])));
-    rows.push_back(row);
-  };
-  if (results.size() == 1) {
-    rows.push_back({"view", "PSNR", "SSIM"});
-  } else {
-    rows.push_back({"view", "A PSNR", "A SSIM", "B PSNR", "B SSIM", "gain dB"});
+  }
+  if (results.size() == 2) {
+    rows[0].push_back("gain dB");
     std::cout << "A  " << flags.a << "\nB  " << flags.b << "\nboth against  " << flags.truth << "\n\n";
   }
+  const auto add = [&](const std::string& name, const auto& score_of) {
+    std::vector<std::string> row = {name};
+    std::vector<double> psnr;
+    for (const Comparison& result : results) {
+      const ViewScore score = score_of(result);
+      psnr.push_back(score.psnr);
+      row.push_back(Fixed(score.psnr, 2));
+      row.push_back(Fixed(score.ssim, 4));
+      if (lpips) row.push_back(Fixed(score.lpips.value_or(0), 4));
+    }
+    if (results.size() == 2) row.push_back(Signed(psnr[1] - psnr[0]));
+    rows.push_back(row);
+  };
   for (size_t v = 0; v < results[0].views.size(); ++v) {
-    add(
-        results[0].views[v].name, [v](const Comparison& c) { return c.views[v].psnr; },
-        [v](const Comparison& c) { return c.views[v].ssim; });
+    add(results[0].views[v].name, [v](const Comparison& c) { return c.views[v]; });
   }
-  add(
-      "mean", [](const Comparison& c) { return c.mean_psnr; }, [](const Comparison& c) { return c.mean_ssim; });
+  add("mean", [](const Comparison& c) { return ViewScore{"mean", c.mean_psnr, c.mean_ssim, c.mean_lpips}; });
   std::cout << FormatTable(rows);
 }
 
@@ -176,7 +187,9 @@ Status RunCompare(const CompareFlags& flags, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(Sides sides, OpenSides(flags));
   std::vector<ViewSource*> sources = {sides.a.get()};
   if (sides.truth) sources.push_back(sides.b.get());
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto results, CompareToReference(sources, sides.truth ? *sides.truth : *sides.b));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Lpips> lpips, OpenLpipsOrWarn(flags.lpips, flags.lpips_weights));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto results, CompareToReference(sources, sides.truth ? *sides.truth : *sides.b,
+                                                                      lpips ? &*lpips : nullptr));
   if (!flags.side_by_side.empty()) {
     ANCHORSPLAT_RETURN_IF_ERROR(WriteSideBySide(flags, sides, results, shared));
   }
@@ -192,8 +205,9 @@ Status RunCompare(const CompareFlags& flags, const SharedFlags& shared) {
 }  // namespace
 
 void AddCompare(CLI::App& app, Program& program) {
-  CLI::App& verb = AddVerb(app, program, "compare", "PSNR and SSIM of two splats, folders of pictures or pictures",
-                           "anchorsplat compare before.ply after.ply --truth photos/ --cameras transforms.json");
+  CLI::App& verb =
+      AddVerb(app, program, "compare", "PSNR, SSIM and LPIPS of two splats, folders of pictures or pictures",
+              "anchorsplat compare before.ply after.ply --truth photos/ --cameras transforms.json");
   const auto flags = std::make_shared<CompareFlags>();
   verb.add_option("a", flags->a, "Splat, folder of pictures or picture")->required()->check(NotEmpty());
   verb.add_option("b", flags->b, "The same; what A is compared with, unless there is a --truth")
@@ -204,6 +218,7 @@ void AddCompare(CLI::App& app, Program& program) {
   verb.add_option("--side-by-side", flags->side_by_side,
                   "Write a PNG of the view with the median score: pictures, zoomed crop, difference")
       ->check(NotEmpty());
+  AddLpipsFlags(verb, flags->lpips, flags->lpips_weights);
   flags->views.AddTo(verb);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunCompare(*flags, program.flags); }; });
 }

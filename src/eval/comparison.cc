@@ -48,7 +48,8 @@ Status CheckSizes(std::span<ViewSource* const> sources, const std::vector<std::v
 
 }  // namespace
 
-Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> sources, ViewSource& reference) {
+Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> sources, ViewSource& reference,
+                                                   const Lpips* lpips) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto partners, MatchSources(sources, reference));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckSizes(sources, partners, reference));
   std::vector<Comparison> out(sources.size());
@@ -58,15 +59,20 @@ Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> 
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Image truth, reference.Load(r));
     for (size_t s = 0; s < sources.size(); ++s) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const Image image, sources[s]->Load(partners[s][r]));
-      ViewScore score{name, 0, 0};
+      ViewScore score{name, 0, 0, std::nullopt};
       ANCHORSPLAT_ASSIGN_OR_RETURN(score.psnr, Psnr(image, truth));
       ANCHORSPLAT_ASSIGN_OR_RETURN(score.ssim, Ssim(image, truth));
+      if (lpips != nullptr) {
+        ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, lpips->Distance(image, truth));
+      }
       out[s].views.push_back(score);
     }
     progress.Advance();
   }
   for (Comparison& comparison : out) {
+    if (lpips != nullptr) comparison.mean_lpips = 0;
     for (const ViewScore& view : comparison.views) {
+      if (view.lpips) *comparison.mean_lpips += *view.lpips / static_cast<double>(comparison.views.size());
       comparison.mean_psnr += view.psnr / static_cast<double>(comparison.views.size());
       comparison.mean_ssim += view.ssim / static_cast<double>(comparison.views.size());
     }

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+
+#include "core/camera.h"
+#include "core/result.h"
+#include "formats/cloud_io.h"
+
+namespace anchorsplat {
+
+// A point of a sparse model. Tracks and feature points are not written: known poses have none.
+struct ColmapPoint {
+  std::array<double, 3> position = {0, 0, 0};
+  std::array<uint8_t, 3> color = {0, 0, 0};
+};
+
+enum class ColmapForm { kBinary, kText };
+
+// Writes cameras.bin and images.bin (or .txt) into `folder`, which must exist. Cameras with the same intrinsics share
+// one entry; all are of model PINHOLE. Ids count from 1 in the order of `cameras`; an image's name is the camera's with
+// its picture's extension (.png where it has none). ReadColmapModel gives back the same numbers: text has all digits.
+//
+// Errors: kExists, kNotFound, kIo; kBadArgument: no cameras, a name that is empty or has a line break or zero byte,
+// numbers that are not finite.
+Status WriteColmapCameras(const std::filesystem::path& folder, const CameraSet& cameras, ColmapForm form,
+                          const WriteOptions& options = {});
+
+// points3D.bin or .txt. kBadArgument: a position that is not finite.
+Status WriteColmapPoints(const std::filesystem::path& folder, std::span<const ColmapPoint> points, ColmapForm form,
+                         const WriteOptions& options = {});
+
+}  // namespace anchorsplat

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/camera.h"
+#include "scene/mesh.h"
+
+namespace anchorsplat {
+
+// Which square tiles of a view the mesh may touch: every tile that the box around some projected triangle meets, so
+// that rays need not be sent where they cannot hit. Never too few.
+class TileCoverage {
+ public:
+  TileCoverage(const Mesh& mesh, const Camera& camera, int tile_size);
+
+  int columns() const { return columns_; }
+  int rows() const { return rows_; }
+  bool touched(int column, int row) const {
+    return marks_[static_cast<size_t>(row) * static_cast<size_t>(columns_) + static_cast<size_t>(column)] != 0;
+  }
+
+ private:
+  int columns_ = 0;
+  int rows_ = 0;
+  std::vector<uint8_t> marks_;
+};
+
+}  // namespace anchorsplat

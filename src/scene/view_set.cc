@@ -1,0 +1,152 @@
+#include "scene/view_set.h"
+
+#include <chrono>
+#include <cmath>
+#include <mutex>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "core/log.h"
+#include "core/parallel.h"
+#include "core/text.h"
+#include "formats/camera_io.h"
+#include "formats/colmap_writer.h"
+#include "formats/image_io.h"
+#include "scene/surface_samples.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+double Since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+Status MakeFolder(const fs::path& folder) {
+  std::error_code code;
+  fs::create_directories(folder, code);
+  if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot make this folder: ", code.message())};
+  return {};
+}
+
+// Names of the pictures as seen from `prefix`.
+CameraSet WithPrefix(CameraSet cameras, const std::string& prefix) {
+  for (Camera& camera : cameras.cameras) camera.name = prefix + camera.name;
+  return cameras;
+}
+
+Status WriteCameras(const fs::path& folder, const CameraSet& cameras, int size, const WriteOptions& write) {
+  const fs::path level = folder / std::to_string(size);
+  ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(level));
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteColmapCameras(level, cameras, ColmapForm::kText, write));
+  return WriteTransforms(folder / Cat("transforms_", size, ".json"), WithPrefix(cameras, Cat(size, "/images/")), write);
+}
+
+Status WritePoints(const RayTracer& tracer, const fs::path& folder, const CameraSet& cameras,
+                   const ViewSetOptions& options, const WriteOptions& write) {
+  std::vector<ColmapPoint> points;
+  for (const SurfaceSample& sample : SampleSurface(tracer, cameras, options.points, options.seed)) {
+    ColmapPoint& point = points.emplace_back();
+    for (size_t k = 0; k < 3; ++k) {
+      point.position[k] = double{sample.position[k]};
+      point.color[k] = static_cast<uint8_t>(std::lround(255 * sample.color[k]));
+    }
+  }
+  return WriteColmapPoints(folder, points, ColmapForm::kBinary, write);
+}
+
+Status CheckSizes(const ViewSetOptions& options) {
+  for (const int size : {options.low_size, options.high_size}) {
+    if (size < 1 || size > 16384) {
+      return Error{ErrorCode::kBadArgument, Cat("views have 1 to 16384 pixels a side, not ", size)};
+    }
+  }
+  if (options.low_size == options.high_size) {
+    return Error{ErrorCode::kBadArgument, Cat("low and high views have the same size, ", options.low_size)};
+  }
+  if (options.points < 0 || options.points > 10'000'000) {
+    return Error{ErrorCode::kBadArgument, Cat("surface samples must be 0 to 10,000,000, not ", options.points)};
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<ViewSetCameras> MakeViewSetCameras(const ViewSetOptions& options) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckSizes(options));
+  ViewSetCameras cameras;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(cameras.low, MakeRig(options.rig, options.low_size, options.low_size));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(cameras.high, MakeRig(options.rig, options.high_size, options.high_size));
+  cameras.low.background = cameras.high.background = options.background;
+  return cameras;
+}
+
+namespace {
+
+Result<Image> RenderView(const RayTracer& tracer, const Camera& camera, const ViewSetOptions& options,
+                         TraceCost* cost) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, tracer.Render(camera, options.trace, cost));
+  return options.opaque ? CompositeOver(image, options.background) : image;
+}
+
+}  // namespace
+
+Result<Image> RenderStoredView(const RayTracer& tracer, const Camera& camera, const ViewSetOptions& options,
+                               TraceCost* cost) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, RenderView(tracer, camera, options, cost));
+  for (float& x : image.pixels) x = std::floor(x * 255.0f + 0.5f) / 255.0f;  // as PNGs are written and read
+  return image;
+}
+
+Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const fs::path& folder, const ViewSetOptions& options) {
+  const auto begin = Clock::now();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewSetCameras cameras, MakeViewSetCameras(options));
+  const WriteOptions write{.overwrite = options.overwrite};
+  const fs::path low = folder / std::to_string(options.low_size), high = folder / std::to_string(options.high_size);
+  const fs::path sparse = low / "sparse" / "0";
+  ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(sparse));
+  ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(low / "images"));
+  if (options.store_high) ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(high / "images"));
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteCameras(folder, cameras.low, options.low_size, write));
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteCameras(folder, cameras.high, options.high_size, write));
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteColmapCameras(sparse, cameras.low, ColmapForm::kBinary, write));
+
+  ViewSetCost cost;
+  const auto points_begin = Clock::now();
+  ANCHORSPLAT_RETURN_IF_ERROR(WritePoints(tracer, sparse, cameras.low, options, write));
+  cost.point_seconds = Since(points_begin);
+
+  // Whole views side by side: nothing waits for anything, and each view is the same whoever makes it.
+  const int64_t views = std::ssize(cameras.low.cameras);
+  const int64_t pictures = options.store_high ? 2 * views : views;
+  Progress progress("views", pictures);
+  std::mutex mutex;
+  Status failed;
+  ParallelFor(0, pictures, 1, [&](int64_t i, int64_t) {
+    // The large ones first, so that no thread is left with a large one at the end.
+    const bool is_high = options.store_high && i < views;
+    const Camera& camera = (is_high ? cameras.high : cameras.low).cameras[static_cast<size_t>(i % views)];
+    {
+      const std::lock_guard<std::mutex> lock(mutex);
+      if (!failed.ok()) return;
+    }
+    TraceCost mine;
+    auto image = RenderView(tracer, camera, options, &mine);
+    const auto picture_begin = Clock::now();
+    const Status written = image.ok()
+                               ? WritePng((is_high ? high : low) / "images" / (camera.name + ".png"), *image, write)
+                               : Status(image.error());
+    const std::lock_guard<std::mutex> lock(mutex);
+    (is_high ? cost.high : cost.low) += mine;
+    cost.picture_seconds += Since(picture_begin);
+    if (!written.ok() && failed.ok()) failed = written;
+    progress.Advance();
+  });
+  ANCHORSPLAT_RETURN_IF_ERROR(failed);
+  cost.seconds = Since(begin);
+  return cost;
+}
+
+}  // namespace anchorsplat

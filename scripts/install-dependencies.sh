@@ -5,7 +5,7 @@ set -euo pipefail
 
 packages=(g++ cmake ninja-build pkg-config
   libhwy-dev libtbb-dev libcli11-dev nlohmann-json3-dev libpng-dev libjpeg-dev zlib1g-dev libzstd-dev libwebp-dev libzip-dev
-  libassimp-dev libembree-dev libtomlplusplus-dev libgtest-dev libgmock-dev libbenchmark-dev)
+  libassimp-dev libstb-dev libembree-dev libtomlplusplus-dev libgtest-dev libgmock-dev libbenchmark-dev)
 
 # LibTorch comes in a Python wheel (scripts/install-torch.sh).
 [ "${1:-}" = --with-torch ] && packages+=(python3-venv python3-pip)

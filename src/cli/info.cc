@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "cli/mesh_info.h"
 #include "cli/table.h"
 #include "cli/verb.h"
 #include "core/statistics.h"
@@ -202,6 +203,7 @@ std::string FormatName(const std::filesystem::path& path) {
 
 Status RunInfo(const std::string& file, const SharedFlags& shared) {
   if (LooksLikeModel(file)) return RunModelInfo(file, shared);
+  if (LooksLikeMesh(file)) return RunMeshInfo(file, shared);
   Findings findings;
   findings.file = file;
   findings.format = FormatName(file);
@@ -223,10 +225,11 @@ Status RunInfo(const std::string& file, const SharedFlags& shared) {
 }  // namespace
 
 void AddInfo(CLI::App& app, Program& program) {
-  CLI::App& verb = AddVerb(app, program, "info", "What is in a splat file or a model, and what is wrong with it",
-                           "anchorsplat info scan.ply --json");
+  CLI::App& verb =
+      AddVerb(app, program, "info", "What is in a splat file, a model or a mesh, and what is wrong with it",
+              "anchorsplat info scan.ply --json");
   const auto file = std::make_shared<std::string>();
-  verb.add_option("file", *file, "Splat file, or checkpoint of a network")->required();
+  verb.add_option("file", *file, "Splat file, checkpoint of a network, mesh, or library.sh3f[#object]")->required();
   verb.callback([file, &program] { program.run = [file, &program] { return RunInfo(*file, program.flags); }; });
 }
 

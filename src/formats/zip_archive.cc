@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <mutex>
 #include <utility>
 
 #include "core/text.h"
@@ -44,6 +45,7 @@ constexpr uint32_t kFirstOf1980 = 0x210000;  // date 1980-01-01, time 0:00
 struct ZipReader::State {
   std::string name, bytes;
   zip_t* archive = nullptr;
+  std::mutex reading;  // libzip's archives are for one thread
 
   ~State() {
     if (archive != nullptr) zip_discard(archive);
@@ -77,6 +79,7 @@ Result<ZipReader> ZipReader::Open(std::string name, std::string bytes) {
 
 Result<std::string> ZipReader::Read(const std::string& member, uint64_t max_size) const {
   const std::string where = Cat(state_->name, ": ", Printable(member));
+  const std::lock_guard lock(state_->reading);
   zip_stat_t stat;
   zip_stat_init(&stat);
   if (zip_stat(state_->archive, member.c_str(), ZIP_FL_ENC_RAW, &stat) != 0) {
@@ -99,6 +102,17 @@ Result<std::string> ZipReader::Read(const std::string& member, uint64_t max_size
   zip_fclose(file);
   if (!complete) return Error{ErrorCode::kBadFile, Cat(where, ": is damaged or cut off")};
   return contents;
+}
+
+std::vector<std::string> ZipReader::Members() const {
+  std::vector<std::string> names;
+  const std::lock_guard lock(state_->reading);
+  const zip_int64_t count = zip_get_num_entries(state_->archive, 0);
+  for (zip_int64_t i = 0; i < count; ++i) {
+    const char* name = zip_get_name(state_->archive, static_cast<zip_uint64_t>(i), ZIP_FL_ENC_RAW);
+    if (name != nullptr) names.emplace_back(name);
+  }
+  return names;
 }
 
 Status ZipWriter::Add(const std::string& name, std::span<const std::string_view> parts) {

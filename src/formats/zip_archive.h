@@ -13,7 +13,7 @@
 namespace anchorsplat {
 
 // Reads members of a ZIP archive that is in memory. Only the member's name is ever looked up: nothing is written
-// anywhere, so names with ".." or "/" lead nowhere.
+// anywhere, so names with ".." or "/" lead nowhere. May be read from several threads.
 class ZipReader {
  public:
   // kBadFile: no ZIP archive, or a damaged one. `name` is what messages call it.
@@ -25,6 +25,9 @@ class ZipReader {
   // kBadFile: no such member, longer than `max_size`, damaged, encrypted, or more than 200 times as long as it is
   // compressed.
   Result<std::string> Read(const std::string& member, uint64_t max_size) const;
+
+  // The names of all members as the archive keeps them, in its order; folders end with a slash.
+  std::vector<std::string> Members() const;
 
  private:
   struct State;

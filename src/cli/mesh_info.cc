@@ -1,0 +1,189 @@
+#include "cli/mesh_info.h"
+
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
+
+#include "cli/table.h"
+#include "core/log.h"
+#include "core/parallel.h"
+#include "core/text.h"
+#include "scene/furniture_catalog.h"
+#include "scene/mesh_reader.h"
+#include "scene/mesh_summary.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// A mesh and what was found, without its triangles: a library's meshes together are gigabytes.
+struct Findings {
+  std::string address;
+  MeshOrigin origin;
+  std::vector<std::string> warnings;
+  int64_t degenerate = 0;
+  int64_t lines_and_points = 0;
+  bool has_normals = false;
+  bool has_vertex_colors = false;
+  MeshSummary summary;
+  std::vector<std::string> pictures;  // "wood.png, 512 x 512"
+};
+
+Findings Find(const std::string& address, ImportedMesh imported) {
+  Findings f{address,
+             std::move(imported.origin),
+             std::move(imported.warnings),
+             imported.degenerate,
+             imported.lines_and_points,
+             imported.has_normals,
+             !imported.mesh.colors.empty(),
+             {},
+             {}};
+  for (const Texture& texture : imported.mesh.textures) {
+    f.pictures.push_back(Cat(Printable(texture.name), ", ", texture.width, " x ", texture.height,
+                             texture.has_alpha ? ", with transparent parts" : ""));
+  }
+  f.summary = Summarize(std::move(imported.mesh));
+  return f;
+}
+
+nlohmann::json ToJson(const MeshOrigin& origin) {
+  return {{"name", origin.name},
+          {"category", origin.category},
+          {"creator", origin.creator},
+          {"licence", origin.licence},
+          {"licence_source", origin.licence_source}};
+}
+
+nlohmann::json ToJson(const Findings& f) {
+  nlohmann::json json = ToJson(f.origin);
+  const MeshSummary& s = f.summary;
+  json.update({{"file", f.address},
+               {"kind", "mesh"},
+               {"triangles", s.triangles},
+               {"vertices", s.vertices},
+               {"materials", s.materials},
+               {"textures", s.textures},
+               {"pictures", f.pictures},
+               {"colours", s.colors},
+               {"bounds", {{"min", s.low}, {"max", s.high}}},
+               {"shape", s.shape},
+               {"has_normals", f.has_normals},
+               {"has_vertex_colours", f.has_vertex_colors},
+               {"degenerate", f.degenerate},
+               {"lines_and_points", f.lines_and_points},
+               {"warnings", f.warnings}});
+  return json;
+}
+
+void PrintTable(const Findings& f) {
+  const MeshSummary& s = f.summary;
+  const auto line = [](const char* name, const std::string& value) {
+    if (!value.empty()) std::cout << "  " << name << "  " << value << "\n";
+  };
+  std::cout << f.address << "\n";
+  line("object    ", Printable(f.origin.name, 200));
+  line("category  ", Printable(f.origin.category, 200));
+  line("creator   ", Printable(f.origin.creator, 200));
+  line("licence   ", f.origin.licence.empty() ? "not said" : Printable(f.origin.licence, 200));
+  line("triangles ", Cat(WithThousands(s.triangles), ", vertices ", WithThousands(s.vertices), ", normals ",
+                         f.has_normals ? "of the file" : "made from the triangles"));
+  line("materials ", Cat(s.materials, ", textures ", s.textures, ", colours without texture ", s.colors));
+  for (const std::string& picture : f.pictures) line("picture   ", picture);
+  line("size      ", Cat(s.high[0] - s.low[0], " x ", s.high[1] - s.low[1], " x ", s.high[2] - s.low[2]));
+  std::cout << "\n" << (f.warnings.empty() ? "no problems found" : "found:") << "\n";
+  for (const std::string& warning : f.warnings) std::cout << "  - " << warning << "\n";
+}
+
+Status RunLibraryInfo(const std::string& path, const SharedFlags& shared) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const FurnitureCatalog catalog, FurnitureCatalog::Open(path));
+  const std::vector<CatalogEntry>& entries = catalog.entries();
+  std::vector<Result<Findings>> all(entries.size(), Error{});
+  {
+    Progress progress("objects", static_cast<int64_t>(entries.size()));
+    ParallelFor(0, static_cast<int64_t>(entries.size()), 1, [&](int64_t begin, int64_t) {
+      const CatalogEntry& entry = entries[static_cast<size_t>(begin)];
+      const bool unique = catalog.Find(entry.key) == &entry;
+      const std::string address = unique ? Cat(path, "#", entry.key) : Cat(path, "##", entry.number);
+      auto imported = catalog.Read(entry);
+      if (imported.ok()) {
+        all[static_cast<size_t>(begin)] = Find(address, *std::move(imported));
+      } else {
+        all[static_cast<size_t>(begin)] = imported.error();
+      }
+      progress.Advance();
+    });
+  }
+  if (shared.json) {
+    nlohmann::json objects = nlohmann::json::array();
+    for (size_t i = 0; i < all.size(); ++i) {
+      nlohmann::json object = all[i].ok() ? ToJson(*all[i]) : ToJson(entries[i].origin);
+      if (!all[i].ok()) object["error"] = all[i].error().message;
+      object["key"] = entries[i].key;
+      object["number"] = entries[i].number;
+      object["model"] = entries[i].model;
+      objects.push_back(std::move(object));
+    }
+    PrintJson({{"file", path}, {"kind", "library"}, {"name", catalog.name()}, {"objects", objects}});
+    return {};
+  }
+  std::vector<std::vector<std::string>> rows = {
+      {"object", "name", "category", "creator", "licence", "triangles", "textures", "colours"}};
+  for (size_t i = 0; i < all.size(); ++i) {
+    const MeshOrigin& o = entries[i].origin;
+    std::vector<std::string> row = {Printable(entries[i].key, 40), Printable(o.name, 40), Printable(o.category, 30),
+                                    Printable(o.creator, 30), Printable(o.licence, 30)};
+    if (all[i].ok()) {
+      const MeshSummary& s = all[i]->summary;
+      row.insert(row.end(), {WithThousands(s.triangles), Cat(s.textures), Cat(s.colors)});
+    } else {
+      row.insert(row.end(), {"unreadable", "", ""});
+    }
+    rows.push_back(std::move(row));
+  }
+  std::cout << path << ": " << Printable(catalog.name(), 200) << ", " << entries.size() << " objects\n\n"
+            << FormatTable(rows);
+  for (const auto& result : all) {
+    if (!result.ok()) LogWarning(result.error().message);
+  }
+  return {};
+}
+
+// The beginning of a file, where a PLY has its header and a glTF its list of extensions, as a rule.
+std::string Beginning(const std::string& path) {
+  std::error_code code;
+  if (!std::filesystem::is_regular_file(path, code)) return {};
+  std::string head(size_t{1} << 16, '\0');
+  std::ifstream in(path, std::ios::binary);
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<size_t>(in.gcount()));
+  return head;
+}
+
+}  // namespace
+
+bool LooksLikeMesh(const std::string& address) {
+  if (!IsMeshAddress(address)) return false;
+  const std::string ending = std::filesystem::path(address).extension().string();
+  const auto contains = [&](const char* words) { return Beginning(address).find(words) != std::string::npos; };
+  if (ending == ".ply") return contains("element face");
+  if (ending == ".glb" || ending == ".gltf") return !contains("KHR_gaussian_splatting");
+  return true;
+}
+
+Status RunMeshInfo(const std::string& address, const SharedFlags& shared) {
+  if (IsMeshLibrary(address)) return RunLibraryInfo(address, shared);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ImportedMesh imported, ReadMesh(address));
+  const Findings findings = Find(address, std::move(imported));
+  if (shared.json) {
+    PrintJson(ToJson(findings));
+  } else {
+    PrintTable(findings);
+  }
+  return {};
+}
+
+}  // namespace anchorsplat

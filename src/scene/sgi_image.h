@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// A picture of Silicon Graphics' format (.rgb, .rgba, .sgi, .bw), the usual texture beside AC3D models: big-endian,
+// plain or run-length encoded, 8 bits (16 bits are cut to the upper 8), 1–4 channels: grey, grey + alpha, rgb, rgba.
+struct SgiImage {
+  int width = 0;
+  int height = 0;
+  std::vector<uint8_t> rgba;  // [H,W,4], rows from top to bottom
+};
+
+bool IsSgi(std::string_view bytes);
+
+// Errors (kBadFile, beginning with `where` and the byte): not the format, more than `max_pixels`, rows that lie outside
+// the file or do not fill their line.
+Result<SgiImage> DecodeSgi(const std::string& where, std::string_view bytes, int64_t max_pixels);
+
+}  // namespace anchorsplat

@@ -16,13 +16,13 @@ if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
   have_header() { echo "#include <$1>" | ${CXX:-c++} -std=c++20 -E -x c++ - >/dev/null 2>&1; }
   for program in "${CXX:-c++}" cmake ninja; do command -v "$program" >/dev/null || missing+=("$program"); done
   for header in hwy/highway.h tbb/parallel_for.h CLI/CLI.hpp nlohmann/json.hpp png.h jpeglib.h zlib.h zstd.h webp/decode.h zip.h \
-                assimp/scene.h embree3/rtcore.h toml++/toml.h gtest/gtest.h gmock/gmock.h benchmark/benchmark.h; do
+                assimp/scene.h stb/stb_image.h embree3/rtcore.h toml++/toml.h gtest/gtest.h gmock/gmock.h benchmark/benchmark.h; do
     have_header "$header" || missing+=("<$header>")
   done
   [ ${#missing[@]} -eq 0 ] && exit 0
   echo "anchorsplat: this is not a Debian system, so nothing was installed. Missing: ${missing[*]}" >&2
   echo "Install a C++20 compiler, CMake >= 3.22, Ninja and the development packages of Highway (>= 1.0.3), oneTBB," >&2
-  echo "CLI11, nlohmann-json, libpng, libjpeg, zlib, zstd, libwebp, libzip, assimp (5.2), Embree (3.13), toml++, GoogleTest and Google Benchmark, then call make again." >&2
+  echo "CLI11, nlohmann-json, libpng, libjpeg, zlib, zstd, libwebp, libzip, assimp (5.2), stb, Embree (3.13), toml++, GoogleTest and Google Benchmark, then call make again." >&2
   exit 1
 fi
 

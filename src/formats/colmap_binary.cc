@@ -1,4 +1,5 @@
 #include <bit>
+#include <cmath>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -21,6 +22,7 @@ class ByteStream {
 
   uint64_t left() const { return file_.size - position_; }
 
+  Status Read(uint8_t& out, const char* what) { return ReadInteger(out, what); }
   Status Read(uint32_t& out, const char* what) { return ReadInteger(out, what); }
   Status Read(uint64_t& out, const char* what) { return ReadInteger(out, what); }
   Status Read(double& out, const char* what) {
@@ -55,6 +57,7 @@ class ByteStream {
   }
 
   Status Skip(uint64_t bytes) {
+    if (bytes == 0) return {};  // seeking throws the read-ahead away
     position_ += bytes;
     if (fseeko(file_.handle.get(), static_cast<off_t>(position_), SEEK_SET) != 0) return Complain("cannot be read");
     return {};
@@ -144,6 +147,30 @@ Result<std::vector<Camera>> ReadColmapImagesBinary(const std::filesystem::path& 
   }
   ANCHORSPLAT_RETURN_IF_ERROR(ExpectEnd(stream));
   return views;
+}
+
+Result<std::vector<ColmapPoint>> ReadColmapPointsBinary(const std::filesystem::path& path) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ByteStream stream, ByteStream::Open(path));
+  constexpr uint64_t kSmallestPoint = 8 + 3 * 8 + 3 + 8 + 8;  // seen in no image
+  constexpr uint64_t kTrackElement = 4 + 4;
+  uint64_t count = 0;
+  ANCHORSPLAT_RETURN_IF_ERROR(stream.ReadCount(count, kSmallestPoint, "the number of points"));
+  std::vector<ColmapPoint> points(count);
+  for (ColmapPoint& point : points) {
+    uint64_t id = 0, track = 0;
+    double error = 0;
+    ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(id, "a point's id"));
+    for (double& x : point.position) ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(x, "a point's position"));
+    for (uint8_t& c : point.color) ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(c, "a point's colour"));
+    ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(error, "a point's error"));
+    for (const double x : point.position) {
+      if (!std::isfinite(x)) return stream.Complain(Cat("point ", id, " has no finite position"));
+    }
+    ANCHORSPLAT_RETURN_IF_ERROR(stream.ReadCount(track, kTrackElement, "a point's number of images"));
+    ANCHORSPLAT_RETURN_IF_ERROR(stream.Skip(track * kTrackElement));
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(ExpectEnd(stream));
+  return points;
 }
 
 }  // namespace anchorsplat

@@ -103,4 +103,10 @@ Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder) {
   return set;
 }
 
+Result<std::vector<ColmapPoint>> ReadColmapPoints(const std::filesystem::path& folder) {
+  if (Exists(folder / "points3D.bin")) return ReadColmapPointsBinary(folder / "points3D.bin");
+  if (Exists(folder / "points3D.txt")) return ReadColmapPointsText(folder / "points3D.txt");
+  return Error{ErrorCode::kNotFound, Cat(folder.string(), ": neither points3D.bin nor points3D.txt is here")};
+}
+
 }  // namespace anchorsplat

@@ -50,7 +50,17 @@ bool IsColmapModel(const std::filesystem::path& folder);
 // Errors: kNotFound, kIo; kBadFile with byte or line.
 Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder);
 
-// Parts of ReadColmapModel, a file per kind.
+// A point of a sparse model. Tracks and feature points are neither read nor written: known poses have none.
+struct ColmapPoint {
+  std::array<double, 3> position = {0, 0, 0};  // world, finite
+  std::array<uint8_t, 3> color = {0, 0, 0};
+};
+
+// points3D.bin of a sparse model's folder, else its points3D.txt. A model may have no points: both missing is
+// kNotFound, an empty file is not an error. Errors otherwise as above; a position that is not finite is kBadFile.
+Result<std::vector<ColmapPoint>> ReadColmapPoints(const std::filesystem::path& folder);
+
+// Parts of ReadColmapModel and ReadColmapPoints, a file per kind.
 using PictureFolders = std::span<const std::filesystem::path>;
 Result<ColmapCameras> ReadColmapCamerasText(const std::filesystem::path& path);
 Result<std::vector<Camera>> ReadColmapImagesText(const std::filesystem::path& path, const ColmapCameras& cameras,
@@ -58,5 +68,7 @@ Result<std::vector<Camera>> ReadColmapImagesText(const std::filesystem::path& pa
 Result<ColmapCameras> ReadColmapCamerasBinary(const std::filesystem::path& path);
 Result<std::vector<Camera>> ReadColmapImagesBinary(const std::filesystem::path& path, const ColmapCameras& cameras,
                                                    PictureFolders picture_folders);
+Result<std::vector<ColmapPoint>> ReadColmapPointsText(const std::filesystem::path& path);
+Result<std::vector<ColmapPoint>> ReadColmapPointsBinary(const std::filesystem::path& path);
 
 }  // namespace anchorsplat

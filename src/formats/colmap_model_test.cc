@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "formats/camera_io.h"
+#include "formats/colmap_writer.h"
 #include "formats/image_io.h"
 #include "formats/test_folder.h"
 
@@ -278,6 +279,84 @@ TEST(Colmap, HalfAModelIsAnError) {
   EXPECT_EQ(ReadCameras(folder.path()).error().code, ErrorCode::kNotFound);
   EXPECT_EQ(ReadCameras(folder / "images.bin").error().code, ErrorCode::kNotFound);
   EXPECT_EQ(ReadCameras(folder / "cameras.bin").error().code, ErrorCode::kNotFound);
+}
+
+// Two points, the first of which is seen in two images.
+std::string PointsBin() {
+  Bytes bytes;
+  bytes.U64(2).U64(11).F64(0.5).F64(-1).F64(2);
+  bytes.append("\xff\x00\x33", 3);
+  bytes.F64(0.25).U64(2).U32(1).U32(0).U32(2).U32(5);
+  bytes.U64(12).F64(1e-3).F64(4).F64(5);
+  bytes.append("\x01\x02\x03", 3);
+  bytes.F64(-1).U64(0);
+  return bytes;
+}
+
+TEST(ColmapPoints, BinaryAndTextAreTheSamePoints) {
+  const TestFolder folder;
+  EXPECT_EQ(ReadColmapPoints(folder.path()).error().code, ErrorCode::kNotFound);
+  Write(folder / "points3D.txt", "# X Y Z R G B\n11 0.5 -1 2 255 0 51 0.25 1 0 2 5\r\n\n12 1e-3 4 5 1 2 3 -1");
+  const auto text = ReadColmapPoints(folder.path());
+  Write(folder / "points3D.bin", PointsBin());
+  const auto binary = ReadColmapPoints(folder.path());
+  for (const auto* points : {&text, &binary}) {
+    ASSERT_TRUE(points->ok()) << points->error().message;
+    ASSERT_EQ((*points)->size(), 2u);
+    const ColmapPoint &a = (**points)[0], &b = (**points)[1];
+    EXPECT_EQ(a.position, (std::array<double, 3>{0.5, -1, 2}));
+    EXPECT_EQ(b.position, (std::array<double, 3>{1e-3, 4, 5}));
+    EXPECT_EQ(a.color, (std::array<uint8_t, 3>{255, 0, 51}));
+    EXPECT_EQ(b.color, (std::array<uint8_t, 3>{1, 2, 3}));
+  }
+  Write(folder / "points3D.bin", Bytes().U64(0));
+  EXPECT_EQ(ReadColmapPoints(folder.path())->size(), 0u);
+}
+
+TEST(ColmapPoints, ComeBackFromTheWriter) {
+  const std::vector<ColmapPoint> points = {{{0.1, -2, 3e7}, {1, 2, 3}}, {{1.0 / 3, 0, 5}, {255, 254, 0}}};
+  for (const ColmapForm form : {ColmapForm::kBinary, ColmapForm::kText}) {
+    const TestFolder folder;
+    ASSERT_TRUE(WriteColmapPoints(folder.path(), points, form).ok());
+    const auto read = ReadColmapPoints(folder.path());
+    ASSERT_TRUE(read.ok()) << read.error().message;
+    ASSERT_EQ(read->size(), 2u);
+    for (size_t i = 0; i < 2; ++i) {
+      EXPECT_EQ((*read)[i].position, points[i].position);
+      EXPECT_EQ((*read)[i].color, points[i].color);
+    }
+  }
+}
+
+TEST(ColmapPoints, EveryTruncationIsAnError) {
+  const TestFolder folder;
+  const std::string points = PointsBin();
+  for (size_t n = 0; n < points.size(); ++n) {
+    Write(folder / "points3D.bin", points.substr(0, n));
+    EXPECT_FALSE(ReadColmapPoints(folder.path()).ok()) << n;
+  }
+  Write(folder / "points3D.bin", points + "x");
+  EXPECT_NE(ReadColmapPoints(folder.path()).error().message.find("found 1 more bytes"), std::string::npos);
+  Write(folder / "points3D.bin", Bytes().U64(uint64_t{1} << 60) + points);
+  EXPECT_NE(ReadColmapPoints(folder.path()).error().message.find("number of points is"), std::string::npos);
+}
+
+TEST(ColmapPoints, MessagesNameTheLine) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"11 0.5 -1 2 255 0 256 0.25\n", "line 1: expected the colour R G B, 0 to 255, found \"256\""},
+      {"#\n11 0.5 -1\n", "line 2: ends before the position X Y Z"},
+      {"x 0 0 0 0 0 0 0\n", "line 1: expected the point's id, found \"x\""},
+      {"3 0 nan 0 0 0 0 0\n", "line 1: point 3 has no finite position"},
+      {"3 0 1e400 0 0 0 0 0\n", "line 1: expected the position X Y Z, found \"1e400\""},
+  };
+  for (const auto& [text, expected] : cases) {
+    const TestFolder folder;
+    Write(folder / "points3D.txt", text);
+    const auto points = ReadColmapPoints(folder.path());
+    ASSERT_FALSE(points.ok()) << expected;
+    EXPECT_EQ(points.error().code, ErrorCode::kBadFile);
+    EXPECT_NE(points.error().message.find(expected), std::string::npos) << points.error().message;
+  }
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 #include <charconv>
+#include <cmath>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -145,6 +146,28 @@ Result<std::vector<Camera>> ReadColmapImagesText(const std::filesystem::path& pa
     if (lines.Next(line)) ANCHORSPLAT_RETURN_IF_ERROR(CheckPoints(lines, line));
   }
   return views;
+}
+
+Result<std::vector<ColmapPoint>> ReadColmapPointsText(const std::filesystem::path& path) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, ReadFileBytes(path, kMaxTextBytes));
+  Lines lines(path.string(), text);
+  std::vector<ColmapPoint> points;
+  std::string_view line;
+  while (lines.NextStatement(line)) {
+    uint64_t id = 0;
+    ColmapPoint point;
+    ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(lines, line, "the point's id", id));
+    for (double& x : point.position) ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(lines, line, "the position X Y Z", x));
+    for (uint8_t& c : point.color) {
+      ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(lines, line, "the colour R G B, 0 to 255", c));
+    }
+    for (const double x : point.position) {
+      if (!std::isfinite(x)) return lines.Complain(Cat("point ", id, " has no finite position"));
+    }
+    points.push_back(point);
+    // What follows, the error and the images that see the point, is not needed.
+  }
+  return points;
 }
 
 }  // namespace anchorsplat

@@ -1,21 +1,14 @@
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <filesystem>
 #include <span>
 
 #include "core/camera.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
+#include "formats/colmap_model.h"
 
 namespace anchorsplat {
-
-// A point of a sparse model. Tracks and feature points are not written: known poses have none.
-struct ColmapPoint {
-  std::array<double, 3> position = {0, 0, 0};
-  std::array<uint8_t, 3> color = {0, 0, 0};
-};
 
 enum class ColmapForm { kBinary, kText };
 

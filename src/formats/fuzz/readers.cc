@@ -11,6 +11,7 @@
 #include "core/random.h"
 #include "core/text.h"
 #include "formats/camera_io.h"
+#include "formats/colmap_model.h"
 #include "formats/fuzz/seeds.h"
 #include "formats/image_io.h"
 #include "formats/registry.h"
@@ -176,6 +177,18 @@ void AddCameraFormats(const fs::path& folder, std::vector<FuzzReader>& readers) 
   add_colmap("bin", "images.bin", ColmapBinarySeeds(), false);
   add_colmap("txt", "cameras.txt", ColmapTextSeeds(), true);
   add_colmap("txt", "images.txt", ColmapTextSeeds(), false);
+
+  const auto add_points = [&](const char* kind, const std::string& good) {
+    const fs::path model = folder / Cat("colmap_", kind, "_points");
+    fs::create_directories(model);
+    readers.push_back({Cat("colmap points3D.", kind), {good}, {}, [model, kind](const std::string& bytes) {
+                         Put(model / Cat("points3D.", kind), bytes);
+                         const auto points = ReadColmapPoints(model);
+                         return points.ok() ? Status() : CheckError(points.error(), "points3D");
+                       }});
+  };
+  add_points("bin", ColmapBinarySeeds().points);
+  add_points("txt", ColmapTextSeeds().points);
 }
 
 void AddImageFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {

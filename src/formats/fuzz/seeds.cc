@@ -365,12 +365,23 @@ ColmapSeeds ColmapBinarySeeds() {
       images.Put(~uint64_t{0});
     }
   }
-  return {cameras.bytes(), images.bytes()};
+  Binary points(false);
+  points.Put(uint64_t{2});
+  for (const uint64_t id : {3, 4}) {
+    points.Put(id);
+    for (const double x : {0.5, -1.0, 2.0}) points.Put(x);
+    points.Text("\x01\x80\xff");
+    points.Put(0.25);
+    points.Put(uint64_t{2});
+    for (int k = 0; k < 4; ++k) points.Put(uint32_t{7});
+  }
+  return {cameras.bytes(), images.bytes(), points.bytes()};
 }
 
 ColmapSeeds ColmapTextSeeds() {
   return {"# Camera list\n7 PINHOLE 40 30 50 60 21 14\n9 SIMPLE_PINHOLE 40 30 50 21 14\n",
-          "# Image list\n1 1 0 0 0 0.5 -1 2 7 a.png\n1.5 2.5 -1 3 4 12\n2 0.6 0 0 -0.8 0.5 -1 2 9 b c.png\n\n"};
+          "# Image list\n1 1 0 0 0 0.5 -1 2 7 a.png\n1.5 2.5 -1 3 4 12\n2 0.6 0 0 -0.8 0.5 -1 2 9 b c.png\n\n",
+          "# Points\n3 0.5 -1 2 1 128 255 0.25 7 7 7 7\n4 0.5 -1 2 1 128 255 0.25\n"};
 }
 
 std::vector<std::string> PngSeeds(const std::filesystem::path& folder) {

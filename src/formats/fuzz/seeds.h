@@ -35,6 +35,7 @@ std::vector<std::string_view> JsonWords();
 struct ColmapSeeds {
   std::string cameras;
   std::string images;
+  std::string points;
 };
 ColmapSeeds ColmapBinarySeeds();
 ColmapSeeds ColmapTextSeeds();

@@ -26,13 +26,13 @@ struct BlendGradient {
 // Which Gaussians a pixel adds is decided by the same arithmetic as in BlendCpu.
 //
 // The sums of a Gaussian are made per tile and added in the order of the tiles, so that the number of threads does not
-// change them.
+// change them. With one thread they need not be kept apart until then.
 struct BlendBackwardParams {
   int width, height;                   // pixels
   int tiles_x;                         // T = tiles_x·⌈height/16⌉ tiles, row-major
   int64_t count;                       // N Gaussians
   const ProjectedGaussian* projected;  // [N]
-  const int64_t* tile_offsets;         // [T+1] of the whole image
+  const int64_t* tile_offsets;         // [T+1] of the whole image; fewer than 2^31 pairs per tile
   const int32_t* pairs;                // [tile_offsets[last_tile] − tile_offsets[first_tile]] rows, by tile and depth
   int64_t first_tile, last_tile;       // the run of tiles whose gradient to add
   float background[3];                 // rgb
@@ -43,7 +43,10 @@ struct BlendBackwardParams {
   PixelBox box;                 // within the image; gradients outside count as 0 and are not read
   const float* color_gradient;  // [3,H,W] ∂L/∂C
   const float* alpha_gradient;  // [H,W] ∂L/∂A; may be null
-  BlendGradient* partial;       // [tile_offsets[last_tile] − tile_offsets[first_tile]] scratch, per pair
+  // scratch
+  BlendGradient*
+      partial;  // [tile_offsets[last_tile] − tile_offsets[first_tile]] per pair; null = one tile after another
+  double* tile_backgrounds;  // [last_tile − first_tile, 3]
   // in and out
   BlendGradient* gradients;     // [N] the run's sums are added to it
   double* background_gradient;  // [3] Σ T_end·∂L/∂C is added to it

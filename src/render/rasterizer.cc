@@ -1,19 +1,16 @@
-#include "render/rasterizer.h"
-
 #include <algorithm>
 #include <bit>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <new>
 #include <numeric>
 
-#include "core/buffer.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "render/bin.h"
 #include "render/blend.h"
 #include "render/project.h"
+#include "render/rasterizer_state.h"
 #include "render/sort.h"
 #include "render/spherical_harmonics.h"
 
@@ -63,43 +60,7 @@ void Shape(int width, int height, int channels, Image& image) {
   image.pixels.resize(static_cast<size_t>(channels) * static_cast<size_t>(image.plane()));
 }
 
-// Only ever grows, so that a warm rasterizer does not allocate; the old contents are not kept.
-template <typename T>
-T* Room(Buffer<T>& buffer, int64_t size) {
-  const size_t needed = static_cast<size_t>(size);
-  if (buffer.size() < needed) {
-    buffer.clear();  // nothing to copy to the new place
-    buffer.resize(needed + needed / 8);
-  }
-  return buffer.data();
-}
-
-class Stopwatch {
- public:
-  double Lap() {  // seconds since the last one
-    const auto now = std::chrono::steady_clock::now();
-    return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
-
 }  // namespace
-
-struct Rasterizer::State {
-  Buffer<ProjectedGaussian> projected;
-  Buffer<TileRect> tiles, tiles_by_depth;
-  Buffer<int32_t> visible, visible_counts, rows, spare_rows, pairs;
-  Buffer<uint32_t> keys, spare_keys, histograms, chunk_counts;
-  Buffer<int64_t> visible_starts, tile_offsets, evaluations;
-  RenderStatistics statistics;
-
-  int64_t Project(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options, Stopwatch& watch);
-  void Sort(int64_t count, int64_t total);
-  void BinAndBlend(int64_t visible_total, const Camera& camera, const RenderOptions& options, RenderOutput& output,
-                   Stopwatch& watch);
-};
 
 // Projection and colours. Returns how many Gaussians are visible.
 int64_t Rasterizer::State::Project(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options,
@@ -122,6 +83,7 @@ int64_t Rasterizer::State::Project(const GaussianCloud& cloud, const Camera& cam
   project.min_alpha = options.min_alpha;
   project.projected = Room(projected, n);
   project.tiles = Room(tiles, n);
+  project.radii = options.gradient ? Room(radii, 2 * n) : nullptr;
   project.visible = Room(visible, n);
   project.visible_counts = Room(visible_counts, chunks);
   ProjectCpu(project);
@@ -176,21 +138,27 @@ void Rasterizer::State::Sort(int64_t count, int64_t total) {
   SortCpu(sort);
 }
 
-void Rasterizer::State::BinAndBlend(int64_t visible_total, const Camera& camera, const RenderOptions& options,
-                                    RenderOutput& output, Stopwatch& watch) {
+BinParams Rasterizer::State::MakeBinParams(int64_t visible_total, const Pinhole& intrinsics, float min_alpha) {
   BinParams bin{};
   bin.count = visible_total;
   bin.order = rows.data();
   bin.tiles = tiles.data();
   bin.projected = projected.data();
-  bin.min_alpha = options.min_alpha;
-  bin.tiles_x = TilesAcross(camera.intrinsics.width);
-  bin.tiles_y = TilesAcross(camera.intrinsics.height);
+  bin.min_alpha = min_alpha;
+  bin.tiles_x = TilesAcross(intrinsics.width);
+  bin.tiles_y = TilesAcross(intrinsics.height);
   bin.chunks = PieceCount(visible_total);
   const int64_t tile_count = int64_t{bin.tiles_x} * bin.tiles_y;
   bin.tiles_by_depth = Room(tiles_by_depth, visible_total);
   bin.chunk_counts = Room(chunk_counts, bin.chunks * tile_count);
   bin.tile_offsets = Room(tile_offsets, tile_count + 1);
+  return bin;
+}
+
+void Rasterizer::State::BinAndBlend(int64_t visible_total, const Camera& camera, const RenderOptions& options,
+                                    RenderOutput& output, Stopwatch& watch) {
+  const BinParams bin = MakeBinParams(visible_total, camera.intrinsics, options.min_alpha);
+  const int64_t tile_count = int64_t{bin.tiles_x} * bin.tiles_y;
   CountPairs(bin);
   statistics.pairs = bin.tile_offsets[tile_count];
 
@@ -202,10 +170,15 @@ void Rasterizer::State::BinAndBlend(int64_t visible_total, const Camera& camera,
   blend.tile_offsets = bin.tile_offsets;
   std::copy(options.background.begin(), options.background.end(), blend.background);
   blend.min_alpha = options.min_alpha;
-  blend.min_transmittance = options.min_transmittance;
+  // Below, T would lose its digits, from which the backward pass recovers what it was in front.
+  constexpr float kFewestDigits = 1e-30f;
+  blend.min_transmittance = std::max(options.min_transmittance, kFewestDigits);
   blend.color = output.color.pixels.data();
   blend.alpha = output.alpha.pixels.data();
   blend.depth = options.depth ? output.depth.pixels.data() : nullptr;
+  const int64_t pixels = int64_t{blend.width} * blend.height;
+  blend.transmittance = options.gradient ? Room(transmittance, pixels) : nullptr;
+  blend.contributors = options.gradient ? Room(contributors, pixels) : nullptr;
   blend.evaluations = Room(evaluations, tile_count);
   statistics.bin = watch.Lap();
   statistics.blend = 0;
@@ -233,6 +206,7 @@ const RenderStatistics& Rasterizer::statistics() const { return state_->statisti
 
 Status Rasterizer::Render(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options,
                           RenderOutput& output) {
+  state_->kept.reset();
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckCamera(camera));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
@@ -254,6 +228,10 @@ Status Rasterizer::Render(const GaussianCloud& cloud, const Camera& camera, cons
     state_->Sort(cloud.size(), total);
     state_->statistics.sort = watch.Lap();
     state_->BinAndBlend(total, camera, options, output, watch);
+    if (options.gradient) {
+      state_->kept = {camera.intrinsics, camera.world_to_camera, camera.Center(),
+                      options,           cloud.size(),           cloud.sh_degree};
+    }
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kIo, Cat("not enough memory for a picture of ", width, " x ", height, " pixels of ",
                                      WithThousands(cloud.size()), " Gaussians")};

@@ -15,6 +15,7 @@
 // clang-format off
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include "render/spherical_harmonics_basis-inl.h"
 // clang-format on
 
 HWY_BEFORE_NAMESPACE();
@@ -22,56 +23,10 @@ namespace anchorsplat {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using D = hn::CappedTag<float, 16>;
-using V = hn::Vec<D>;
-
-constexpr size_t kBatch = 64;
-constexpr size_t kCoefficients = 16;
-
-struct Basis {
-  alignas(64) float direction[3][kBatch];          // not normalised
-  alignas(64) float value[kCoefficients][kBatch];  // Y_k
-};
-
-HWY_INLINE V Constant(float x) { return hn::Set(D(), x); }
-
-// Y_0 … Y_15 at one register of directions.
-HWY_INLINE void EvaluateBasis(int degree, size_t j, Basis& b) {
-  const D d;
-  V x = hn::Load(d, b.direction[0] + j), y = hn::Load(d, b.direction[1] + j), z = hn::Load(d, b.direction[2] + j);
-  const V norm2 = hn::MulAdd(x, x, hn::MulAdd(y, y, hn::Mul(z, z)));
-  const V inverse = hn::Div(Constant(1.0f), hn::Sqrt(norm2));
-  x = hn::Mul(x, inverse), y = hn::Mul(y, inverse), z = hn::Mul(z, inverse);
-  const auto put = [&b, j](size_t k, V value) HWY_ATTR { hn::Store(value, D(), b.value[k] + j); };
-  put(0, Constant(kSh0));
-  if (degree < 1) return;
-  put(1, hn::Mul(Constant(-kSh1), y));
-  put(2, hn::Mul(Constant(kSh1), z));
-  put(3, hn::Mul(Constant(-kSh1), x));
-  if (degree < 2) return;
-  const V xx = hn::Mul(x, x), yy = hn::Mul(y, y), zz = hn::Mul(z, z), xy = hn::Mul(x, y);
-  const V difference = hn::Sub(xx, yy);
-  put(4, hn::Mul(Constant(kSh2[0]), xy));
-  put(5, hn::Mul(Constant(-kSh2[0]), hn::Mul(y, z)));
-  put(6, hn::MulSub(Constant(kSh2[1]), zz, Constant(kSh2[2])));
-  put(7, hn::Mul(Constant(-kSh2[0]), hn::Mul(x, z)));
-  put(8, hn::Mul(Constant(kSh2Diagonal), difference));
-  if (degree < 3) return;
-  const V ring = hn::NegMulAdd(Constant(kSh3[3]), zz, Constant(kSh3[2]));
-  const V three = Constant(3.0f);
-  put(9, hn::Mul(hn::Mul(Constant(-kSh3[0]), y), hn::MulSub(three, xx, yy)));
-  put(10, hn::Mul(Constant(kSh3[1]), hn::Mul(xy, z)));
-  put(11, hn::Mul(y, ring));
-  put(12, hn::Mul(z, hn::MulSub(Constant(kSh3[4]), zz, Constant(kSh3[5]))));
-  put(13, hn::Mul(x, ring));
-  put(14, hn::Mul(hn::Mul(Constant(kSh3[6]), z), difference));
-  put(15, hn::Mul(hn::Mul(Constant(-kSh3[0]), x), hn::NegMulAdd(three, yy, xx)));
-}
-
 // Σ_k Y_k·sh[k], the three channels side by side in one 128-bit register (whose fourth lane is the next coefficient's
 // red and ignored). The last coefficient is added apart: a fourth float behind it may not exist.
-HWY_INLINE void Sum(const Basis& b, size_t j, int coefficients, const float* HWY_RESTRICT sh, float* HWY_RESTRICT rgb) {
+HWY_INLINE void Sum(const ShBasisBatch& b, size_t j, int coefficients, const float* HWY_RESTRICT sh,
+                    float* HWY_RESTRICT rgb) {
   const int last = coefficients - 1;
 #if HWY_TARGET == HWY_SCALAR
   rgb[0] = rgb[1] = rgb[2] = 0.0f;
@@ -95,22 +50,16 @@ HWY_INLINE void Sum(const Basis& b, size_t j, int coefficients, const float* HWY
 }
 
 void EvaluateChunk(const SphericalHarmonicsParams& p, int64_t chunk) {
-  Basis b;
-  const size_t lanes = hn::Lanes(D());
+  ShBasisBatch b;
+  const size_t lanes = hn::Lanes(ShTag());
   const int coefficients = ShCoefficients(p.degree);
   int32_t* visible = p.visible + chunk * kProjectChunk;
   const size_t count = static_cast<size_t>(p.visible_counts[chunk]);
   size_t kept = 0;
-  for (size_t begin = 0; begin < count; begin += kBatch) {
-    const size_t n = std::min(kBatch, count - begin);
-    for (size_t j = 0; j < n; ++j) {
-      const float* mean = p.means + 3 * int64_t{visible[begin + j]};
-      // The difference in double: far from the world's origin floats have no digits left for it.
-      for (size_t a = 0; a < 3; ++a) b.direction[a][j] = static_cast<float>(mean[a] - p.center[a]);
-    }
-    for (size_t j = n; j < (n + 15) / 16 * 16; ++j) {  // lanes that nobody reads
-      for (size_t a = 0; a < 3; ++a) b.direction[a][j] = 1.0f;
-    }
+  for (size_t begin = 0; begin < count; begin += kShBatch) {
+    const size_t n = std::min(kShBatch, count - begin);
+    LoadDirections(
+        n, [&](size_t j) { return p.means + 3 * int64_t{visible[begin + j]}; }, p.center, b);
     for (size_t j = 0; j < n; j += lanes) EvaluateBasis(p.degree, j, b);
     for (size_t j = 0; j < n; ++j) {
       const int32_t i = visible[begin + j];

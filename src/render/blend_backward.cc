@@ -1,0 +1,392 @@
+#include "render/blend_backward.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "core/parallel.h"
+#include "render/piece.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "render/blend_backward.cc"
+// foreach_target compiles this file once per instruction set, so it must come first.
+// clang-format off
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+#include "render/tile_batch-inl.h"
+// clang-format on
+
+HWY_BEFORE_NAMESPACE();
+namespace anchorsplat {
+namespace HWY_NAMESPACE {
+namespace {
+
+constexpr size_t kBatch = 128;
+constexpr size_t kGroup = 32;  // Gaussians of a block between the two steps of AddBlock
+constexpr size_t kSums = 16;   // floats per Gaussian of a batch: one sum per feature
+
+// The sums over a block's pixels are a small matrix product: per Gaussian and pixel there are two numbers, q and the
+// weight w = α·T, and every pixel has features that do not depend on the Gaussian. Even ones are multiplied by q: 1, x,
+// y, x², xy, y² about the middle of the tile; odd ones by w: ∂L/∂C. As q and w lie side by side in memory, one
+// instruction fills a register with both.
+enum Feature : size_t { kOne = 0, kX = 2, kY = 4, kXX = 6, kXY = 8, kYY = 10, kRed = 1, kGreen = 3, kBlue = 5 };
+
+// A tile at work: the batch, its sums, and its pixels, block by block.
+struct Tile : TileBatch<kBatch> {
+  bool finished[kBlocks];  // nothing is left to do: no gradient, or all Gaussians of the batch lie behind
+
+  alignas(64) float features[kBlocks][kPixels][kSums];
+  alignas(64) float sums[kBatch + 3][kSums];
+  bool touched[kBatch];  // the Gaussian has sums
+
+  alignas(64) float color_gradient[3][kBlocks][kPixels];
+  alignas(64) float transmittance[kBlocks][kPixels];  // T behind the Gaussian that is next
+  alignas(64) float behind[kBlocks][kPixels];         // S of BlendBackwardParams
+  alignas(64) int32_t contributors[kBlocks][kPixels];
+  int32_t last[kBlocks];  // the largest of its contributors
+  bool flat[kBlocks];     // no pixel has a gradient
+
+  // Of a group: q and w of every pixel in turn, whose they are and whether they are not all 0. Behind the group, three
+  // Gaussians with sums of their own that nobody reads.
+  alignas(64) float factors[kGroup + 3][2 * kPixels];
+  size_t members[kGroup + 3];
+  bool added[kGroup];
+};
+
+constexpr float kMiddle = 0.5f * kTile;
+
+// What is the same for all tiles.
+void Prepare(Tile& t) {
+  for (size_t k = 0; k < 3; ++k) {
+    std::fill_n(t.factors[kGroup + k], 2 * kPixels, 0.0f);
+    std::fill_n(t.sums[kBatch + k], kSums, 0.0f);
+    t.members[kGroup + k] = kBatch + k;
+  }
+  for (size_t block = 0; block < kBlocks; ++block) {
+    for (size_t i = 0; i < kPixels; ++i) {
+      const float x = kPixelOffsets.x[i] + static_cast<float>(block % kBlocksPerSide * kBlock) - kMiddle;
+      const float y = kPixelOffsets.y[i] + static_cast<float>(block / kBlocksPerSide * kBlock) - kMiddle;
+      float* f = t.features[block][i];
+      std::fill_n(f, kSums, 0.0f);
+      f[kOne] = 1;
+      f[kX] = x;
+      f[kY] = y;
+      f[kXX] = x * x;
+      f[kXY] = x * y;
+      f[kYY] = y * y;
+    }
+  }
+}
+
+// A register of a pair of floats again and again.
+HWY_INLINE V RepeatPair(const float* pair) {
+  const D d;
+#if HWY_TARGET == HWY_SCALAR
+  return hn::Set(d, *pair);
+#else
+  double both;
+  std::memcpy(&both, pair, sizeof(both));
+  return hn::BitCast(d, hn::Set(hn::Repartition<double, D>(), both));
+#endif
+}
+
+// sums += features · factors for four Gaussians of the group.
+HWY_INLINE void AddSums(size_t block, const uint8_t* four, Tile& t) {
+  const D d;
+  const size_t lanes = hn::Lanes(d);
+  const size_t k0 = four[0], k1 = four[1], k2 = four[2], k3 = four[3];
+  for (size_t f = 0; f < kSums; f += lanes) {
+    const size_t odd = lanes == 1 ? f % 2 : 0;  // a register of one lane takes its half of the pair only
+    const float *factors0 = t.factors[k0] + odd, *factors1 = t.factors[k1] + odd, *factors2 = t.factors[k2] + odd,
+                *factors3 = t.factors[k3] + odd;
+    V sum0 = hn::Zero(d), sum1 = hn::Zero(d), sum2 = hn::Zero(d), sum3 = hn::Zero(d);
+    for (size_t i = 0; i < kPixels; ++i) {
+      const V feature = hn::Load(d, t.features[block][i] + f);
+      sum0 = hn::MulAdd(RepeatPair(factors0 + 2 * i), feature, sum0);
+      sum1 = hn::MulAdd(RepeatPair(factors1 + 2 * i), feature, sum1);
+      sum2 = hn::MulAdd(RepeatPair(factors2 + 2 * i), feature, sum2);
+      sum3 = hn::MulAdd(RepeatPair(factors3 + 2 * i), feature, sum3);
+    }
+    float *to0 = t.sums[t.members[k0]] + f, *to1 = t.sums[t.members[k1]] + f, *to2 = t.sums[t.members[k2]] + f,
+          *to3 = t.sums[t.members[k3]] + f;
+    hn::Store(hn::Add(hn::Load(d, to0), sum0), d, to0);
+    hn::Store(hn::Add(hn::Load(d, to1), sum1), d, to1);
+    hn::Store(hn::Add(hn::Load(d, to2), sum2), d, to2);
+    hn::Store(hn::Add(hn::Load(d, to3), sum3), d, to3);
+  }
+}
+
+struct Limits {
+  float log2_min_alpha, max_alpha;
+};
+
+// The factors of the group's `count` Gaussians, from the farthest on, at as many of the block's pixels as a register
+// holds, from pixel `first` on. Says for each one whether a pixel added it.
+HWY_INLINE void EvaluateLanes(const Limits& limits, size_t block, size_t first, size_t count, int32_t place, Tile& t) {
+  const D d;
+  const DI di;
+  const V pixel_x =
+      hn::Add(hn::Load(d, kPixelOffsets.x + first), hn::Set(d, static_cast<float>(block % kBlocksPerSide * kBlock)));
+  const V pixel_y =
+      hn::Add(hn::Load(d, kPixelOffsets.y + first), hn::Set(d, static_cast<float>(block / kBlocksPerSide * kBlock)));
+  const V one = hn::Set(d, 1.0f), log2_min_alpha = hn::Set(d, limits.log2_min_alpha);
+  const V max_alpha = hn::Set(d, limits.max_alpha);
+  const V red = hn::Load(d, t.color_gradient[0][block] + first);
+  const V green = hn::Load(d, t.color_gradient[1][block] + first);
+  const V blue = hn::Load(d, t.color_gradient[2][block] + first);
+  const VI contributors = hn::Load(di, t.contributors[block] + first);
+  V transmittance = hn::Load(d, t.transmittance[block] + first);
+  V behind = hn::Load(d, t.behind[block] + first);
+  for (size_t k = 0; k < count; ++k) {
+    const size_t j = t.members[k];
+    const V log2_alpha = Log2Alpha(t, j, hn::Sub(pixel_x, hn::Set(d, t.x[j])), hn::Sub(pixel_y, hn::Set(d, t.y[j])));
+    const VI own_place = hn::Set(di, place + static_cast<int32_t>(j));
+    const M added = hn::And(hn::Ge(log2_alpha, log2_min_alpha), hn::RebindMask(d, hn::Gt(contributors, own_place)));
+    float* factors = t.factors[k] + 2 * first;
+    if (hn::AllFalse(d, added)) {
+      if (hn::Lanes(d) < kPixels) std::fill_n(factors, 2 * hn::Lanes(d), 0.0f);  // the other pixels may have added it
+      continue;
+    }
+    t.added[k] = true;
+    const V uncapped = Exp2(log2_alpha);
+    const V alpha = hn::IfThenElseZero(added, hn::Min(uncapped, max_alpha));
+    const V inverse = hn::Div(one, hn::Sub(one, alpha));  // 1 where nothing was added
+    transmittance = hn::Mul(transmittance, inverse);
+    const V weight = hn::Mul(alpha, transmittance);
+    const V along = hn::MulAdd(red, hn::Set(d, t.red[j]),
+                               hn::MulAdd(green, hn::Set(d, t.green[j]), hn::Mul(blue, hn::Set(d, t.blue[j]))));
+    const V own = hn::Mul(weight, along);
+    const V q = hn::NegMulAdd(behind, hn::Mul(alpha, inverse), own);
+    behind = hn::Add(behind, own);
+    const V free_q = hn::IfThenElseZero(hn::Le(uncapped, max_alpha), q);  // and 0 where nothing was added
+    hn::StoreInterleaved2(free_q, weight, d, factors);
+  }
+  hn::Store(transmittance, d, t.transmittance[block] + first);
+  hn::Store(behind, d, t.behind[block] + first);
+}
+
+// Goes through a block's list from behind, in groups: first what every pixel contributes, then the sums over the
+// pixels.
+void AddBlock(const Limits& limits, size_t block, int32_t place, Tile& t) {
+  const int32_t* list = t.lists[block];
+  size_t left = t.list_sizes[block];
+  while (left > 0 && place + list[left - 1] >= t.last[block]) --left;
+  while (left > 0) {
+    const size_t count = std::min(left, kGroup);
+    for (size_t k = 0; k < count; ++k) t.members[k] = static_cast<size_t>(list[left - 1 - k]);
+    std::fill_n(t.added, count, false);
+    for (size_t first = 0; first < kPixels; first += hn::Lanes(D())) {
+      EvaluateLanes(limits, block, first, count, place, t);
+    }
+    uint8_t group[kGroup + 3];
+    size_t found = 0;
+    for (size_t k = 0; k < count; ++k) {
+      group[found] = static_cast<uint8_t>(k);
+      found += t.added[k];
+      t.touched[t.members[k]] |= t.added[k];
+    }
+    if (found > 0) {
+      // The three behind the group fill the last four up.
+      for (size_t k = 0; k < 3; ++k) group[found + k] = static_cast<uint8_t>(kGroup + k);
+      for (size_t k = 0; k < found; k += 4) AddSums(block, group + k, t);
+    }
+    left -= count;
+  }
+}
+
+// Rows of the image to blocks; what lies outside of [x0, x1) × [y0, y1) of the tile becomes `outside`.
+template <typename T>
+void LoadPlane(const T* plane, int width, int x0, int y0, int x1, int y1, T outside, T (*blocks)[kPixels]) {
+  if (x0 > 0 || y0 > 0 || x1 < kTile || y1 < kTile) std::fill_n(&blocks[0][0], kBlocks * kPixels, outside);
+  for (int y = y0; y < y1; ++y) {
+    const T* from = plane + int64_t{y} * width;
+    T(*to)[kPixels] = blocks + static_cast<size_t>(y / kBlock) * kBlocksPerSide;
+    const int offset = y % kBlock * kBlock;
+    if (x0 == 0 && x1 == kTile) {
+      for (size_t b = 0; b < kBlocksPerSide; ++b) {
+        std::memcpy(to[b] + offset, from + b * kBlock, kBlock * sizeof(T));
+      }
+    } else {
+      for (int x = x0; x < x1; ++x) to[x / kBlock][offset + x % kBlock] = from[x];
+    }
+  }
+}
+
+// Loads the pixels and adds the background's gradient. Returns 1 + the last place of the tile's list that matters.
+int32_t StartTile(const BlendBackwardParams& p, int tile_x, int tile_y, double* background_gradient, Tile& t) {
+  // Pixels outside of the image or the box have no gradient, which makes everything 0.
+  const int x0 = std::max(0, p.box.x0 - tile_x), x1 = std::min(kTile, p.box.x1 - tile_x);
+  const int y0 = std::max(0, p.box.y0 - tile_y), y1 = std::min(kTile, p.box.y1 - tile_y);
+  const int64_t plane = int64_t{p.width} * p.height;
+  const int64_t corner = int64_t{tile_y} * p.width + tile_x;
+  for (int c = 0; c < 3; ++c) {
+    LoadPlane(p.color_gradient + c * plane + corner, p.width, x0, y0, x1, y1, 0.0f, t.color_gradient[c]);
+  }
+  LoadPlane(p.transmittance + corner, p.width, x0, y0, x1, y1, 1.0f, t.transmittance);
+  LoadPlane(p.contributors + corner, p.width, x0, y0, x1, y1, 0, t.contributors);
+  if (p.alpha_gradient != nullptr) {
+    LoadPlane(p.alpha_gradient + corner, p.width, x0, y0, x1, y1, 0.0f, t.behind);
+  } else {
+    std::fill_n(&t.behind[0][0], kBlocks * kPixels, 0.0f);
+  }
+  int32_t last_of_tile = 0;
+  for (size_t block = 0; block < kBlocks; ++block) {
+    float background[3] = {0, 0, 0};
+    int32_t last = 0;
+    bool flat = true;
+    for (size_t i = 0; i < kPixels; ++i) {
+      const float red = t.color_gradient[0][block][i], green = t.color_gradient[1][block][i],
+                  blue = t.color_gradient[2][block][i];
+      const float transmittance = t.transmittance[block][i];
+      // Written so that NaN is not flat.
+      flat = flat && red == 0 && green == 0 && blue == 0 && t.behind[block][i] == 0;
+      last = std::max(last, t.contributors[block][i]);
+      background[0] += transmittance * red;
+      background[1] += transmittance * green;
+      background[2] += transmittance * blue;
+      t.behind[block][i] = transmittance * (p.background[0] * red + p.background[1] * green + p.background[2] * blue -
+                                            t.behind[block][i]);
+      t.features[block][i][kRed] = red;
+      t.features[block][i][kGreen] = green;
+      t.features[block][i][kBlue] = blue;
+    }
+    for (int c = 0; c < 3; ++c) background_gradient[c] += static_cast<double>(background[c]);
+    t.flat[block] = flat;
+    t.last[block] = flat ? 0 : last;
+    last_of_tile = std::max(last_of_tile, t.last[block]);
+  }
+  return last_of_tile;
+}
+
+// From the sums about the middle of the tile to those of BlendGradient.
+BlendGradient Whiten(const Tile& t, size_t j) {
+  const float* s = t.sums[j];
+  const float xx = t.u_xx[j], xy = t.u_xy[j], yy = t.u_yy[j];
+  const float dx = kMiddle - t.x[j], dy = kMiddle - t.y[j];
+  // The middle's own u and v. Where a pixel adds the Gaussian, u and v are at most 2.9; a tile is 16 px wide and the
+  // factors at most 1.6 per pixel: all terms are small numbers, even if the mean is far away.
+  const float u = xx * dx + xy * dy, v = yy * dy;
+  // Sums of q times the offset from the middle, in u and v.
+  const float ou = xx * s[kX] + xy * s[kY], ov = yy * s[kY];
+  const float ouu = xx * xx * s[kXX] + 2 * xx * xy * s[kXY] + xy * xy * s[kYY];
+  const float ouv = yy * (xx * s[kXY] + xy * s[kYY]);
+  const float ovv = yy * yy * s[kYY];
+  BlendGradient g;
+  g.q = s[kOne];
+  g.qu = ou + u * s[kOne];
+  g.qv = ov + v * s[kOne];
+  g.quu = ouu + u * (2 * ou + u * s[kOne]);
+  g.quv = ouv + v * ou + u * (ov + v * s[kOne]);
+  g.qvv = ovv + v * (2 * ov + v * s[kOne]);
+  g.rgb[0] = s[kRed];
+  g.rgb[1] = s[kGreen];
+  g.rgb[2] = s[kBlue];
+  return g;
+}
+
+void Add(const BlendGradient& from, BlendGradient& to) {
+  to.q += from.q;
+  to.qu += from.qu;
+  to.qv += from.qv;
+  to.quu += from.quu;
+  to.quv += from.quv;
+  to.qvv += from.qvv;
+  for (int c = 0; c < 3; ++c) to.rgb[c] += from.rgb[c];
+}
+
+void BackwardTile(const BlendBackwardParams& p, int64_t tile, Tile& t) {
+  const int tile_x = static_cast<int>(tile % p.tiles_x) * kTile, tile_y = static_cast<int>(tile / p.tiles_x) * kTile;
+  const int64_t list_begin = p.tile_offsets[tile] - p.tile_offsets[p.first_tile];
+  const int64_t count = p.tile_offsets[tile + 1] - p.tile_offsets[tile];
+  double* background_gradient = p.tile_backgrounds + 3 * (tile - p.first_tile);
+  std::fill_n(background_gradient, 3, 0.0);
+  const bool outside = p.box.empty() || p.box.x0 >= tile_x + kTile || p.box.x1 <= tile_x ||
+                       p.box.y0 >= tile_y + kTile || p.box.y1 <= tile_y;
+  const int32_t last = outside ? 0 : StartTile(p, tile_x, tile_y, background_gradient, t);
+  if (p.partial != nullptr) {
+    std::fill_n(p.partial + list_begin + last, count - last, BlendGradient{});
+  }
+  const Limits limits = {std::log2(p.min_alpha), p.max_alpha};
+  constexpr int32_t kStep = static_cast<int32_t>(kBatch);
+  for (int32_t place = (last - 1) / kStep * kStep; last > 0 && place >= 0; place -= kStep) {
+    const size_t n = static_cast<size_t>(std::min(kStep, last - place));
+    const int32_t* rows = p.pairs + list_begin + place;
+    ReadBatch(p.projected, rows, n, tile_x, tile_y, t);
+    for (size_t block = 0; block < kBlocks; ++block) t.finished[block] = t.last[block] <= place;
+    ListBlocks(limits.log2_min_alpha, n, t.finished, t);
+    std::fill_n(&t.sums[0][0], n * kSums, 0.0f);
+    std::fill_n(t.touched, n, false);
+    for (size_t block = 0; block < kBlocks; ++block) {
+      if (t.list_sizes[block] > 0) AddBlock(limits, block, place, t);
+    }
+    if (p.partial != nullptr) {
+      for (size_t j = 0; j < n; ++j) {
+        p.partial[list_begin + place + static_cast<int64_t>(j)] = t.touched[j] ? Whiten(t, j) : BlendGradient{};
+      }
+    } else {
+      for (size_t j = 0; j < n; ++j) {
+        if (t.touched[j]) Add(Whiten(t, j), p.gradients[rows[j]]);
+      }
+    }
+  }
+}
+
+void BackwardRange(const BlendBackwardParams& p, int64_t first, int64_t last) {
+  Tile t;
+  Prepare(t);
+  for (int64_t tile = first; tile < last; ++tile) BackwardTile(p, tile, t);
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace anchorsplat
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace anchorsplat {
+
+HWY_EXPORT(BackwardRange);
+
+namespace {
+
+// gradients += partial, every Gaussian's in the order of the tiles. Each task has rows of its own.
+void AddPartial(const BlendBackwardParams& p) {
+  const int64_t pairs = p.tile_offsets[p.last_tile] - p.tile_offsets[p.first_tile];
+  const int64_t tasks = std::clamp<int64_t>(pairs / 4096, 1, ThreadCount());
+  ParallelFor(0, tasks, 1, [&](int64_t task, int64_t) {
+    const auto [first, last] = PieceOf(p.count, tasks, task);
+    for (int64_t k = 0; k < pairs; ++k) {
+      const int32_t row = p.pairs[k];
+      if (row < first || row >= last) continue;
+      const BlendGradient& from = p.partial[k];
+      BlendGradient& to = p.gradients[row];
+      to.q += from.q;
+      to.qu += from.qu;
+      to.qv += from.qv;
+      to.quu += from.quu;
+      to.quv += from.quv;
+      to.qvv += from.qvv;
+      for (int c = 0; c < 3; ++c) to.rgb[c] += from.rgb[c];
+    }
+  });
+}
+
+}  // namespace
+
+void BlendBackwardCpu(const BlendBackwardParams& p) {
+  if (p.partial == nullptr) {
+    HWY_DYNAMIC_DISPATCH(BackwardRange)(p, p.first_tile, p.last_tile);
+  } else {
+    constexpr int64_t kTilesPerTask = 4;
+    ParallelFor(p.first_tile, p.last_tile, kTilesPerTask, [&p](int64_t first, int64_t last) {
+      HWY_DYNAMIC_DISPATCH(BackwardRange)(p, first, last);
+    });
+    AddPartial(p);
+  }
+  for (int64_t tile = 0; tile < p.last_tile - p.first_tile; ++tile) {
+    for (int c = 0; c < 3; ++c) p.background_gradient[c] += p.tile_backgrounds[3 * tile + c];
+  }
+}
+
+}  // namespace anchorsplat
+#endif

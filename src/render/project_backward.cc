@@ -1,0 +1,295 @@
+#include "render/project_backward.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "core/parallel.h"
+#include "render/project.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "render/project_backward.cc"
+// foreach_target compiles this file once per instruction set, so it must come first.
+// clang-format off
+#include <hwy/foreach_target.h>
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+// clang-format on
+
+HWY_BEFORE_NAMESPACE();
+namespace anchorsplat {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using D = hn::CappedTag<double, 8>;
+using V = hn::Vec<D>;
+using M = hn::Mask<D>;
+
+constexpr size_t kBatch = 64;
+
+struct Columns {
+  alignas(64) double means[3][kBatch];
+  alignas(64) double log_scales[3][kBatch];
+  alignas(64) double quats[4][kBatch];
+  alignas(64) double logits[kBatch];
+  alignas(64) double u_xx[kBatch], u_xy[kBatch], u_yy[kBatch];
+  alignas(64) double q[kBatch], qu[kBatch], qv[kBatch], quu[kBatch], quv[kBatch], qvv[kBatch];
+};
+
+struct Gradients {
+  alignas(64) double means[3][kBatch];
+  alignas(64) double log_scales[3][kBatch];
+  alignas(64) double quats[4][kBatch];
+  alignas(64) double logits[kBatch];
+  alignas(64) double means2d[2][kBatch];
+};
+
+// What does not depend on the Gaussian.
+struct View {
+  double r[9], t[3];
+  double fx, fy;
+  double left, right, up, down;  // limits of x/z and y/z in the Jacobian, as in ProjectCpu
+  double dilation;
+  bool antialiased;
+};
+
+View MakeView(const ProjectBackwardParams& p) {
+  View v;
+  std::copy(p.world_to_camera.rotation.begin(), p.world_to_camera.rotation.end(), v.r);
+  std::copy(p.world_to_camera.translation.begin(), p.world_to_camera.translation.end(), v.t);
+  const Pinhole& k = p.intrinsics;
+  v.fx = k.fx, v.fy = k.fy;
+  const double margin_x = double{kFrustumMargin} * 0.5 * k.width / k.fx;
+  const double margin_y = double{kFrustumMargin} * 0.5 * k.height / k.fy;
+  v.left = -(k.cx / k.fx + margin_x);
+  v.right = (k.width - k.cx) / k.fx + margin_x;
+  v.up = -(k.cy / k.fy + margin_y);
+  v.down = (k.height - k.cy) / k.fy + margin_y;
+  v.dilation = p.dilation;
+  v.antialiased = p.mode == RenderMode::kAntialiased;
+  return v;
+}
+
+void ReadColumns(const ProjectBackwardParams& p, const int32_t* rows, size_t n, Columns& c) {
+  const size_t end = std::min(kBatch, (n + 7) / 8 * 8);
+  for (size_t j = 0; j < end; ++j) {
+    const int64_t i = rows[std::min(j, n - 1)];  // the last register is filled up with one that is not written
+    for (int a = 0; a < 3; ++a) c.means[a][j] = p.means[3 * i + a];
+    for (int a = 0; a < 3; ++a) c.log_scales[a][j] = p.log_scales[3 * i + a];
+    for (int a = 0; a < 4; ++a) c.quats[a][j] = p.quats[4 * i + a];
+    c.logits[j] = p.opacity_logits[i];
+    const ProjectedGaussian& g = p.projected[i];
+    c.u_xx[j] = g.u_xx;
+    c.u_xy[j] = g.u_xy;
+    c.u_yy[j] = g.u_yy;
+    const BlendGradient& b = p.gradients[i];
+    c.q[j] = b.q;
+    c.qu[j] = b.qu;
+    c.qv[j] = b.qv;
+    c.quu[j] = b.quu;
+    c.quv[j] = b.quv;
+    c.qvv[j] = b.qvv;
+  }
+}
+
+HWY_INLINE V Dot3(V a0, V a1, V a2, V b0, V b1, V b2) {
+  return hn::MulAdd(a0, b0, hn::MulAdd(a1, b1, hn::Mul(a2, b2)));
+}
+
+// One register of Gaussians, columns j … j + lanes − 1. First again what ProjectCpu calculates, under the same names,
+// then its gradients in the opposite order; g_x is ∂L/∂x.
+HWY_INLINE void BackwardLanes(const View& view, const Columns& in, size_t j, Gradients& out) {
+  const D d;
+  const V zero = hn::Zero(d), one = hn::Set(d, 1.0), two = hn::Set(d, 2.0);
+  const V mx = hn::Load(d, in.means[0] + j), my = hn::Load(d, in.means[1] + j), mz = hn::Load(d, in.means[2] + j);
+  const double* r = view.r;
+  const V z = hn::Add(Dot3(hn::Set(d, r[6]), hn::Set(d, r[7]), hn::Set(d, r[8]), mx, my, mz), hn::Set(d, view.t[2]));
+  const V x = hn::Add(Dot3(hn::Set(d, r[0]), hn::Set(d, r[1]), hn::Set(d, r[2]), mx, my, mz), hn::Set(d, view.t[0]));
+  const V y = hn::Add(Dot3(hn::Set(d, r[3]), hn::Set(d, r[4]), hn::Set(d, r[5]), mx, my, mz), hn::Set(d, view.t[1]));
+  const V inverse_z = hn::Div(one, z);
+  const V ratio_x = hn::Mul(x, inverse_z), ratio_y = hn::Mul(y, inverse_z);
+
+  V qw = hn::Load(d, in.quats[0] + j), qx = hn::Load(d, in.quats[1] + j), qy = hn::Load(d, in.quats[2] + j),
+    qz = hn::Load(d, in.quats[3] + j);
+  const V norm2 = hn::Add(Dot3(qw, qx, qy, qw, qx, qy), hn::Mul(qz, qz));
+  const M zero_quat = hn::Eq(norm2, zero);
+  const V inverse_norm = hn::IfThenElse(zero_quat, one, hn::Div(one, hn::Sqrt(norm2)));
+  qw = hn::IfThenElse(zero_quat, one, hn::Mul(qw, inverse_norm));
+  qx = hn::Mul(qx, inverse_norm), qy = hn::Mul(qy, inverse_norm), qz = hn::Mul(qz, inverse_norm);
+  const V x2 = hn::Mul(two, qx), y2 = hn::Mul(two, qy), z2 = hn::Mul(two, qz);
+  const V r00 = hn::NegMulAdd(y2, qy, hn::NegMulAdd(z2, qz, one)), r01 = hn::MulSub(x2, qy, hn::Mul(z2, qw)),
+          r02 = hn::MulAdd(x2, qz, hn::Mul(y2, qw));
+  const V r10 = hn::MulAdd(x2, qy, hn::Mul(z2, qw)), r11 = hn::NegMulAdd(x2, qx, hn::NegMulAdd(z2, qz, one)),
+          r12 = hn::MulSub(y2, qz, hn::Mul(x2, qw));
+  const V r20 = hn::MulSub(x2, qz, hn::Mul(y2, qw)), r21 = hn::MulAdd(y2, qz, hn::Mul(x2, qw)),
+          r22 = hn::NegMulAdd(x2, qx, hn::NegMulAdd(y2, qy, one));
+  const V top = hn::Set(d, 690.0);  // only keeps exp inside its domain: such Gaussians are culled
+  const V s0 = hn::Exp(d, hn::Min(hn::Load(d, in.log_scales[0] + j), top)),
+          s1 = hn::Exp(d, hn::Min(hn::Load(d, in.log_scales[1] + j), top)),
+          s2 = hn::Exp(d, hn::Min(hn::Load(d, in.log_scales[2] + j), top));
+
+  // A = J·R (rows for image x and y), E = A·R_q, B = E·S, Σ₂ = B·Bᵀ.
+  const V u = hn::Min(hn::Max(ratio_x, hn::Set(d, view.left)), hn::Set(d, view.right));
+  const V v = hn::Min(hn::Max(ratio_y, hn::Set(d, view.up)), hn::Set(d, view.down));
+  const V focal_x = hn::Mul(hn::Set(d, view.fx), inverse_z), focal_y = hn::Mul(hn::Set(d, view.fy), inverse_z);
+  const V a0 = hn::Mul(focal_x, hn::NegMulAdd(u, hn::Set(d, r[6]), hn::Set(d, r[0]))),
+          a1 = hn::Mul(focal_x, hn::NegMulAdd(u, hn::Set(d, r[7]), hn::Set(d, r[1]))),
+          a2 = hn::Mul(focal_x, hn::NegMulAdd(u, hn::Set(d, r[8]), hn::Set(d, r[2])));
+  const V a3 = hn::Mul(focal_y, hn::NegMulAdd(v, hn::Set(d, r[6]), hn::Set(d, r[3]))),
+          a4 = hn::Mul(focal_y, hn::NegMulAdd(v, hn::Set(d, r[7]), hn::Set(d, r[4]))),
+          a5 = hn::Mul(focal_y, hn::NegMulAdd(v, hn::Set(d, r[8]), hn::Set(d, r[5])));
+  const V b0 = hn::Mul(s0, Dot3(a0, a1, a2, r00, r10, r20)), b1 = hn::Mul(s1, Dot3(a0, a1, a2, r01, r11, r21)),
+          b2 = hn::Mul(s2, Dot3(a0, a1, a2, r02, r12, r22));
+  const V b3 = hn::Mul(s0, Dot3(a3, a4, a5, r00, r10, r20)), b4 = hn::Mul(s1, Dot3(a3, a4, a5, r01, r11, r21)),
+          b5 = hn::Mul(s2, Dot3(a3, a4, a5, r02, r12, r22));
+
+  // ln α = ln o − ½ dᵀΣ₂⁻¹d, and with W the factor that gives (u, v) = W·d, Σ₂⁻¹ = 2 ln 2·WᵀW. So
+  //   ∂L/∂mean2d = Σ q·Σ₂⁻¹d = 2 ln 2·Wᵀ Σ q·(u, v),   ∂L/∂Σ₂ = ½ Σ q·Σ₂⁻¹d dᵀΣ₂⁻¹ = 2 ln²2·Wᵀ(Σ q·(u, v)(u, v)ᵀ)W.
+  constexpr double kTwoLn2 = 2 * std::numbers::ln2, kTwoLn2Squared = 2 * std::numbers::ln2 * std::numbers::ln2;
+  const V w_xx = hn::Load(d, in.u_xx + j), w_xy = hn::Load(d, in.u_xy + j), w_yy = hn::Load(d, in.u_yy + j);
+  const V q = hn::Load(d, in.q + j), qu = hn::Load(d, in.qu + j), qv = hn::Load(d, in.qv + j);
+  const V g_px = hn::Mul(hn::Set(d, kTwoLn2), hn::Mul(w_xx, qu));
+  const V g_py = hn::Mul(hn::Set(d, kTwoLn2), hn::MulAdd(w_xy, qu, hn::Mul(w_yy, qv)));
+  hn::Store(g_px, d, out.means2d[0] + j);
+  hn::Store(g_py, d, out.means2d[1] + j);
+  const V quu = hn::Load(d, in.quu + j), quv = hn::Load(d, in.quv + j), qvv = hn::Load(d, in.qvv + j);
+  const V left_x = hn::MulAdd(w_xy, quu, hn::Mul(w_yy, quv)), left_y = hn::MulAdd(w_xy, quv, hn::Mul(w_yy, qvv));
+  const V scale = hn::Set(d, kTwoLn2Squared);
+  V g_xx = hn::Mul(scale, hn::Mul(w_xx, hn::Mul(w_xx, quu)));
+  V g_xy = hn::Mul(scale, hn::Mul(w_xx, left_x));  // of each of the two equal entries
+  V g_yy = hn::Mul(scale, hn::MulAdd(w_xy, left_x, hn::Mul(w_yy, left_y)));
+  if (view.antialiased) {
+    // o = sigmoid·sqrt(det Σ / det Σ₂), Σ without the dilation:  ∂ln o/∂Σ = ½ (Σ⁻¹ − Σ₂⁻¹).
+    const V sharp_xx = Dot3(b0, b1, b2, b0, b1, b2), sharp_xy = Dot3(b0, b1, b2, b3, b4, b5),
+            sharp_yy = Dot3(b3, b4, b5, b3, b4, b5);
+    const V dilation = hn::Set(d, view.dilation);
+    const V xx = hn::Add(sharp_xx, dilation), yy = hn::Add(sharp_yy, dilation);
+    const V sharp_det = hn::MulSub(sharp_xx, sharp_yy, hn::Mul(sharp_xy, sharp_xy));
+    const V det = hn::MulSub(xx, yy, hn::Mul(sharp_xy, sharp_xy));
+    // Where the determinant is 0, so was the opacity, and the Gaussian is not here.
+    const V half_q = hn::Mul(hn::Set(d, 0.5), q);
+    const V by_sharp = hn::IfThenElseZero(hn::Gt(sharp_det, zero), hn::Div(half_q, sharp_det));
+    const V by_det = hn::Div(half_q, det);
+    g_xx = hn::Add(g_xx, hn::MulSub(by_sharp, sharp_yy, hn::Mul(by_det, yy)));
+    g_yy = hn::Add(g_yy, hn::MulSub(by_sharp, sharp_xx, hn::Mul(by_det, xx)));
+    g_xy = hn::NegMulAdd(hn::Sub(by_sharp, by_det), sharp_xy, g_xy);
+  }
+
+  // ∂L/∂B = 2·G·B; scales; ∂L/∂E.
+  V g_b0 = hn::Mul(two, hn::MulAdd(g_xx, b0, hn::Mul(g_xy, b3))),
+    g_b3 = hn::Mul(two, hn::MulAdd(g_xy, b0, hn::Mul(g_yy, b3)));
+  V g_b1 = hn::Mul(two, hn::MulAdd(g_xx, b1, hn::Mul(g_xy, b4))),
+    g_b4 = hn::Mul(two, hn::MulAdd(g_xy, b1, hn::Mul(g_yy, b4)));
+  V g_b2 = hn::Mul(two, hn::MulAdd(g_xx, b2, hn::Mul(g_xy, b5))),
+    g_b5 = hn::Mul(two, hn::MulAdd(g_xy, b2, hn::Mul(g_yy, b5)));
+  hn::Store(hn::MulAdd(g_b0, b0, hn::Mul(g_b3, b3)), d, out.log_scales[0] + j);
+  hn::Store(hn::MulAdd(g_b1, b1, hn::Mul(g_b4, b4)), d, out.log_scales[1] + j);
+  hn::Store(hn::MulAdd(g_b2, b2, hn::Mul(g_b5, b5)), d, out.log_scales[2] + j);
+  const V e0 = hn::Mul(g_b0, s0), e1 = hn::Mul(g_b1, s1), e2 = hn::Mul(g_b2, s2);
+  const V e3 = hn::Mul(g_b3, s0), e4 = hn::Mul(g_b4, s1), e5 = hn::Mul(g_b5, s2);
+
+  // ∂L/∂R_q = Aᵀ·∂L/∂E, then the quaternion: first as if its norm were 1, then along the sphere.
+  const V g00 = hn::MulAdd(a0, e0, hn::Mul(a3, e3)), g01 = hn::MulAdd(a0, e1, hn::Mul(a3, e4)),
+          g02 = hn::MulAdd(a0, e2, hn::Mul(a3, e5));
+  const V g10 = hn::MulAdd(a1, e0, hn::Mul(a4, e3)), g11 = hn::MulAdd(a1, e1, hn::Mul(a4, e4)),
+          g12 = hn::MulAdd(a1, e2, hn::Mul(a4, e5));
+  const V g20 = hn::MulAdd(a2, e0, hn::Mul(a5, e3)), g21 = hn::MulAdd(a2, e1, hn::Mul(a5, e4)),
+          g22 = hn::MulAdd(a2, e2, hn::Mul(a5, e5));
+  const V turn_x = hn::Sub(g21, g12), turn_y = hn::Sub(g02, g20), turn_z = hn::Sub(g10, g01);
+  const V sum_xy = hn::Add(g01, g10), sum_xz = hn::Add(g02, g20), sum_yz = hn::Add(g12, g21);
+  const V g_w = hn::Mul(two, Dot3(qx, qy, qz, turn_x, turn_y, turn_z));
+  const V g_x = hn::Mul(
+      two, hn::MulAdd(qw, turn_x,
+                      hn::NegMulAdd(hn::Mul(two, qx), hn::Add(g11, g22), hn::MulAdd(qy, sum_xy, hn::Mul(qz, sum_xz)))));
+  const V g_y = hn::Mul(
+      two, hn::MulAdd(qw, turn_y,
+                      hn::NegMulAdd(hn::Mul(two, qy), hn::Add(g00, g22), hn::MulAdd(qx, sum_xy, hn::Mul(qz, sum_yz)))));
+  const V g_z = hn::Mul(
+      two, hn::MulAdd(qw, turn_z,
+                      hn::NegMulAdd(hn::Mul(two, qz), hn::Add(g00, g11), hn::MulAdd(qx, sum_xz, hn::Mul(qy, sum_yz)))));
+  const V radial = hn::MulAdd(qw, g_w, Dot3(qx, qy, qz, g_x, g_y, g_z));
+  const V along = hn::IfThenZeroElse(zero_quat, inverse_norm);
+  hn::Store(hn::Mul(along, hn::NegMulAdd(radial, qw, g_w)), d, out.quats[0] + j);
+  hn::Store(hn::Mul(along, hn::NegMulAdd(radial, qx, g_x)), d, out.quats[1] + j);
+  hn::Store(hn::Mul(along, hn::NegMulAdd(radial, qy, g_y)), d, out.quats[2] + j);
+  hn::Store(hn::Mul(along, hn::NegMulAdd(radial, qz, g_z)), d, out.quats[3] + j);
+
+  // ∂L/∂A = ∂L/∂E·R_qᵀ. A is f/z·(R_x − u·R_z): through z, and through u where it is not clamped.
+  const V g_a0 = Dot3(e0, e1, e2, r00, r01, r02), g_a1 = Dot3(e0, e1, e2, r10, r11, r12),
+          g_a2 = Dot3(e0, e1, e2, r20, r21, r22);
+  const V g_a3 = Dot3(e3, e4, e5, r00, r01, r02), g_a4 = Dot3(e3, e4, e5, r10, r11, r12),
+          g_a5 = Dot3(e3, e4, e5, r20, r21, r22);
+  const V r6 = hn::Set(d, r[6]), r7 = hn::Set(d, r[7]), r8 = hn::Set(d, r[8]);
+  const V g_u = hn::IfThenElseZero(hn::Eq(u, ratio_x), hn::Neg(Dot3(g_a0, g_a1, g_a2, r6, r7, r8)));
+  const V g_v = hn::IfThenElseZero(hn::Eq(v, ratio_y), hn::Neg(Dot3(g_a3, g_a4, g_a5, r6, r7, r8)));
+  // mean2d = f·(x/z, y/z) + c.
+  const V g_cx = hn::Mul(focal_x, hn::MulAdd(g_u, inverse_z, g_px)),
+          g_cy = hn::Mul(focal_y, hn::MulAdd(g_v, inverse_z, g_py));
+  const V through_a = hn::Add(Dot3(g_a0, g_a1, g_a2, a0, a1, a2), Dot3(g_a3, g_a4, g_a5, a3, a4, a5));
+  const V g_cz = hn::Neg(hn::MulAdd(through_a, inverse_z, hn::MulAdd(g_cx, ratio_x, hn::Mul(g_cy, ratio_y))));
+  for (size_t a = 0; a < 3; ++a) {
+    hn::Store(Dot3(hn::Set(d, r[a]), hn::Set(d, r[3 + a]), hn::Set(d, r[6 + a]), g_cx, g_cy, g_cz), d,
+              out.means[a] + j);
+  }
+  // ∂ln sigmoid(x)/∂x = 1/(1 + e^x).
+  hn::Store(hn::Div(q, hn::Add(one, hn::Exp(d, hn::Min(hn::Load(d, in.logits + j), top)))), d, out.logits + j);
+}
+
+// Gaussians of one chunk.
+void BackwardChunk(const ProjectBackwardParams& p, int64_t chunk) {
+  const int64_t first = chunk * kProjectChunk, n_all = std::min(kProjectChunk, p.count - first);
+  std::fill_n(p.mean_gradients + 3 * first, 3 * n_all, 0.0f);
+  std::fill_n(p.log_scale_gradients + 3 * first, 3 * n_all, 0.0f);
+  std::fill_n(p.quat_gradients + 4 * first, 4 * n_all, 0.0f);
+  std::fill_n(p.opacity_logit_gradients + first, n_all, 0.0f);
+  std::fill_n(p.means2d + 2 * first, 2 * n_all, 0.0f);
+
+  const View view = MakeView(p);
+  const size_t lanes = hn::Lanes(D());
+  Columns in;
+  Gradients out;
+  int32_t rows[kBatch];
+  const int32_t* visible = p.visible + first;
+  const int32_t* end = visible + p.visible_counts[chunk];
+  while (visible != end) {
+    size_t n = 0;
+    for (; visible != end && n < kBatch; ++visible) {
+      const BlendGradient& b = p.gradients[*visible];
+      rows[n] = *visible;
+      // Hidden ones have no gradient, and they are many.
+      n += !(b.q == 0 && b.qu == 0 && b.qv == 0 && b.quu == 0 && b.quv == 0 && b.qvv == 0);
+    }
+    if (n == 0) break;
+    ReadColumns(p, rows, n, in);
+    for (size_t j = 0; j < n; j += lanes) BackwardLanes(view, in, j, out);
+    for (size_t j = 0; j < n; ++j) {
+      const int64_t i = rows[j];
+      for (int a = 0; a < 3; ++a) p.mean_gradients[3 * i + a] = static_cast<float>(out.means[a][j]);
+      for (int a = 0; a < 3; ++a) p.log_scale_gradients[3 * i + a] = static_cast<float>(out.log_scales[a][j]);
+      for (int a = 0; a < 4; ++a) p.quat_gradients[4 * i + a] = static_cast<float>(out.quats[a][j]);
+      p.opacity_logit_gradients[i] = static_cast<float>(out.logits[j]);
+      for (int a = 0; a < 2; ++a) p.means2d[2 * i + a] = static_cast<float>(out.means2d[a][j]);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace anchorsplat
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace anchorsplat {
+
+HWY_EXPORT(BackwardChunk);
+
+void ProjectBackwardCpu(const ProjectBackwardParams& p) {
+  ParallelFor(0, ProjectChunks(p.count), 1, [&p](int64_t first, int64_t last) {
+    for (int64_t chunk = first; chunk < last; ++chunk) HWY_DYNAMIC_DISPATCH(BackwardChunk)(p, chunk);
+  });
+}
+
+}  // namespace anchorsplat
+#endif

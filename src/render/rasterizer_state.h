@@ -1,0 +1,73 @@
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "core/buffer.h"
+#include "core/camera.h"
+#include "render/bin.h"
+#include "render/blend_backward.h"
+#include "render/projected_gaussian.h"
+#include "render/rasterizer.h"
+
+namespace anchorsplat {
+
+// Only ever grows, so that a warm rasterizer does not allocate; the old contents are not kept.
+template <typename T>
+T* Room(Buffer<T>& buffer, int64_t size) {
+  const size_t needed = static_cast<size_t>(size);
+  if (buffer.size() < needed) {
+    buffer.clear();  // nothing to copy to the new place
+    buffer.resize(needed + needed / 8);
+  }
+  return buffer.data();
+}
+
+class Stopwatch {
+ public:
+  double Lap() {  // seconds since the last one
+    const auto now = std::chrono::steady_clock::now();
+    return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+// The buffers of a Rasterizer.
+struct Rasterizer::State {
+  Buffer<ProjectedGaussian> projected;
+  Buffer<TileRect> tiles, tiles_by_depth;
+  Buffer<int32_t> visible, visible_counts, rows, spare_rows, pairs;
+  Buffer<uint32_t> keys, spare_keys, histograms, chunk_counts;
+  Buffer<int64_t> visible_starts, tile_offsets, evaluations;
+  RenderStatistics statistics;
+
+  // For the backward pass, which also needs most of the above.
+  struct Kept {
+    Pinhole intrinsics;
+    Pose world_to_camera;
+    std::array<double, 3> center;
+    RenderOptions options;
+    int64_t count;
+    int sh_degree;
+  };
+  std::optional<Kept> kept;  // where the last Render was asked to keep it
+  Buffer<float> transmittance;
+  Buffer<int32_t> contributors, radii;
+  Buffer<BlendGradient> gradients, partial;
+  Buffer<double> tile_backgrounds;
+
+  int64_t Project(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options, Stopwatch& watch);
+  void Sort(int64_t count, int64_t total);
+  BinParams MakeBinParams(int64_t visible_total, const Pinhole& intrinsics, float min_alpha);
+  void BinAndBlend(int64_t visible_total, const Camera& camera, const RenderOptions& options, RenderOutput& output,
+                   Stopwatch& watch);
+  void BlendBackward(const RenderGradient& output_gradient, std::array<float, 3>& background);
+  void ProjectBackward(const GaussianCloud& cloud, CloudGradient& gradient);
+};
+
+}  // namespace anchorsplat

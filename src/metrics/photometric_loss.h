@@ -1,7 +1,5 @@
 #pragma once
 
-#include <memory>
-
 #include "core/image.h"
 #include "core/result.h"
 
@@ -25,28 +23,17 @@ struct PhotometricLossValue {
   double ssim = 1;
 };
 
-// The loss of 3DGS fits and its gradient in one call. Keeps its buffers: one object per thread of control.
+// The loss of 3DGS fits and, in the same call, its gradient: `gradient` becomes ∂loss/∂rendered [3,H,W] within `box`
+// and is 0 outside of it, where it is not written.
 //
 // Where all pixels under a window are equal in both pictures, SSIM is 1 and its gradient 0. So the work is confined to
 // a box around the pixels that differ, which leaves out the background around an object; no approximation.
-class PhotometricLoss {
- public:
-  PhotometricLoss();
-  ~PhotometricLoss();
-  PhotometricLoss(PhotometricLoss&&) noexcept;
-  PhotometricLoss& operator=(PhotometricLoss&&) noexcept;
-
-  // `gradient` becomes ∂loss/∂rendered [3,H,W], written within `box` only: it is 0 outside (0 at equal pixels for L1).
-  // The same bits for any number of threads.
-  //
-  // Errors (kBadArgument): images that are not of three channels and one size; an SSIM weight outside of [0, 1]; with
-  // kValid and a weight above 0, a side below 11 pixels.
-  Result<PhotometricLossValue> Evaluate(const Image& rendered, const Image& target,
-                                        const PhotometricLossOptions& options, Image& gradient, PixelBox& box);
-
- private:
-  struct State;
-  std::unique_ptr<State> state_;
-};
+//
+// The result is the same for any number of threads. A pixel that is not a number makes the loss one, too.
+//
+// Errors (kBadArgument): images that are not of three channels and one size; an SSIM weight outside of [0, 1]; with
+// kValid and a weight above 0, a side below 11 pixels.
+Result<PhotometricLossValue> PhotometricLoss(const Image& rendered, const Image& target,
+                                             const PhotometricLossOptions& options, Image& gradient, PixelBox& box);
 
 }  // namespace anchorsplat

@@ -132,9 +132,13 @@ std::array<float, kSsimTaps> Window() {
 
 }  // namespace
 
+const std::array<float, kSsimTaps>& SsimWindow() {
+  static const std::array<float, kSsimTaps> window = Window();
+  return window;
+}
+
 double SumOfDissimilarity(const SsimRows& rows) {
-  static const std::array<float, kSsimTaps> weights = Window();
-  return HWY_DYNAMIC_DISPATCH(SumOfDissimilarityImpl)(rows, weights.data());
+  return HWY_DYNAMIC_DISPATCH(SumOfDissimilarityImpl)(rows, SsimWindow().data());
 }
 
 }  // namespace anchorsplat

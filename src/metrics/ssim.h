@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 namespace anchorsplat {
 
 // The window of Wang et al. 2004: 11 samples of a Gaussian with σ 1.5, sum 1.
@@ -8,6 +10,8 @@ inline constexpr int kSsimTaps = 2 * kSsimRadius + 1;
 inline constexpr double kSsimSigma = 1.5;
 inline constexpr float kSsimC1 = 0.01f * 0.01f;
 inline constexpr float kSsimC2 = 0.03f * 0.03f;
+
+const std::array<float, kSsimTaps>& SsimWindow();
 
 // Some rows of one channel of two pictures.
 struct SsimRows {

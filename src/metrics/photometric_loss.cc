@@ -1,0 +1,137 @@
+#include "metrics/photometric_loss.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "core/parallel.h"
+#include "core/text.h"
+#include "metrics/ssim.h"
+#include "metrics/ssim_gradient.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr int kChannels = 3;
+constexpr int kRowsPerTask = 64;
+
+Error BadArgument(std::string message) { return {ErrorCode::kBadArgument, std::move(message)}; }
+
+Status Check(const Image& rendered, const Image& target, const PhotometricLossOptions& options) {
+  if (rendered.width != target.width || rendered.height != target.height || rendered.channels != kChannels ||
+      target.channels != kChannels) {
+    return BadArgument(Cat("images of ", rendered.width, " x ", rendered.height, " x ", rendered.channels, " and ",
+                           target.width, " x ", target.height, " x ", target.channels,
+                           "; the photometric loss compares two of the same size and three channels"));
+  }
+  if (rendered.width < 1 || rendered.height < 1) return BadArgument("empty images cannot be compared");
+  if (!(options.ssim_weight >= 0 && options.ssim_weight <= 1)) {
+    return BadArgument(Cat("SSIM weight ", options.ssim_weight, " is not in [0, 1]"));
+  }
+  if (options.padding == SsimPadding::kValid && options.ssim_weight > 0 &&
+      std::min(rendered.width, rendered.height) < kSsimTaps) {
+    return BadArgument(Cat("images of ", rendered.width, " x ", rendered.height,
+                           " have no pixel whose SSIM window of 11 x 11 lies inside"));
+  }
+  return {};
+}
+
+// The smallest box that holds all pixels of rows [first, last) that differ. NaN differs.
+PixelBox BoxOfDifference(const Image& a, const Image& b, int first, int last) {
+  PixelBox box = {a.width, last, 0, first};
+  for (int c = 0; c < kChannels; ++c) {
+    for (int y = first; y < last; ++y) {
+      const float* p = a.channel(c) + int64_t{y} * a.width;
+      const float* q = b.channel(c) + int64_t{y} * b.width;
+      // Only what is not known to be inside is looked at.
+      int from = 0;
+      while (from < a.width && p[from] == q[from]) ++from;
+      if (from == a.width) continue;
+      int to = a.width;
+      while (to > box.x1 && p[to - 1] == q[to - 1]) --to;
+      box.x0 = std::min(box.x0, from);
+      box.x1 = std::max(box.x1, to);
+      box.y0 = std::min(box.y0, y);
+      box.y1 = std::max(box.y1, y + 1);
+    }
+  }
+  return box;
+}
+
+PixelBox Grown(const PixelBox& box, int by) { return {box.x0 - by, box.y0 - by, box.x1 + by, box.y1 + by}; }
+PixelBox Common(const PixelBox& a, const PixelBox& b) {
+  return {std::max(a.x0, b.x0), std::max(a.y0, b.y0), std::min(a.x1, b.x1), std::min(a.y1, b.y1)};
+}
+
+}  // namespace
+
+Result<PhotometricLossValue> PhotometricLoss(const Image& rendered, const Image& target,
+                                             const PhotometricLossOptions& options, Image& gradient, PixelBox& box) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Check(rendered, target, options));
+  const int width = rendered.width, height = rendered.height;
+  const PixelBox picture = {0, 0, width, height};
+  if (gradient.width != width || gradient.height != height || gradient.channels != kChannels) {
+    gradient = Image(width, height, kChannels);
+  }
+
+  const int bands = (height + kRowsPerTask - 1) / kRowsPerTask;
+  std::vector<PixelBox> boxes(static_cast<size_t>(bands));
+  ParallelFor(0, height, kRowsPerTask, [&](int64_t first, int64_t last) {
+    boxes[static_cast<size_t>(first / kRowsPerTask)] =
+        BoxOfDifference(rendered, target, static_cast<int>(first), static_cast<int>(last));
+  });
+  PixelBox different = {width, height, 0, 0};
+  for (const PixelBox& b : boxes) {
+    if (b.empty()) continue;
+    different = {std::min(different.x0, b.x0), std::min(different.y0, b.y0), std::max(different.x1, b.x1),
+                 std::max(different.y1, b.y1)};
+  }
+  if (different.empty()) {
+    box = {};
+    return PhotometricLossValue{};
+  }
+
+  // A pixel's SSIM is not 1 where its window sees a difference; and a pixel's gradient comes from all windows that it
+  // is in.
+  const bool valid = options.padding == SsimPadding::kValid;
+  const PixelBox counted = valid ? Grown(picture, -kSsimRadius) : picture;
+  const PixelBox map = options.ssim_weight > 0 ? Common(Grown(different, kSsimRadius), counted) : PixelBox{};
+  box = options.ssim_weight > 0 ? Common(Grown(different, 2 * kSsimRadius), picture) : different;
+  const double values = kChannels * static_cast<double>(rendered.plane());
+  const double windows = kChannels * static_cast<double>(counted.x1 - counted.x0) * (counted.y1 - counted.y0);
+
+  const int strips = (box.x1 - box.x0 + kSsimStrip - 1) / kSsimStrip;
+  const int rows = (box.y1 - box.y0 + kRowsPerTask - 1) / kRowsPerTask;
+  const int64_t tasks = int64_t{kChannels} * rows * strips;
+  std::vector<SsimGradientSums> parts(static_cast<size_t>(tasks));
+  ParallelFor(0, tasks, 1, [&](int64_t k, int64_t) {
+    const int channel = static_cast<int>(k % kChannels);
+    const int strip = static_cast<int>(k / kChannels % strips), row = static_cast<int>(k / kChannels / strips);
+    SsimGradientTask task{};
+    task.a = rendered.channel(channel);
+    task.b = target.channel(channel);
+    task.width = width;
+    task.height = height;
+    task.map = map;
+    task.out.x0 = box.x0 + strip * kSsimStrip;
+    task.out.x1 = std::min(box.x1, task.out.x0 + kSsimStrip);
+    task.out.y0 = box.y0 + row * kRowsPerTask;
+    task.out.y1 = std::min(box.y1, task.out.y0 + kRowsPerTask);
+    task.ssim_weight = options.ssim_weight > 0 ? static_cast<float>(-options.ssim_weight / windows) : 0.0f;
+    task.difference_weight = static_cast<float>((1 - options.ssim_weight) / values);
+    task.gradient = gradient.channel(channel);
+    parts[static_cast<size_t>(k)] = SsimGradient(task);
+  });
+  SsimGradientSums sums;
+  for (const SsimGradientSums& part : parts) {
+    sums.dissimilarity += part.dissimilarity;
+    sums.difference += part.difference;
+  }
+  PhotometricLossValue value;
+  value.l1 = sums.difference / values;
+  value.ssim = options.ssim_weight > 0 ? 1 - sums.dissimilarity / windows : 1;
+  value.loss = (1 - options.ssim_weight) * value.l1 + options.ssim_weight * (1 - value.ssim);
+  return value;
+}
+
+}  // namespace anchorsplat

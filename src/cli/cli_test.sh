@@ -45,7 +45,7 @@ silent() {
 expect 0 "version" "$program" --version
 says stdout "anchorsplat 0."
 expect 0 "help" "$program" --help
-for verb in enhance convert info render compare view bench; do
+for verb in enhance convert info render compare view views bench; do
   says stdout "$verb"
   expect 0 "help of $verb" "$program" $verb --help
   says stdout "Example:"
@@ -201,6 +201,23 @@ mkdir "$work/weights" && echo "no tensors" >"$work/weights/alex.safetensors"
 expect 4 "broken weights" "$program" compare "$source/testdata/lpips/ex_p0.png" "$source/testdata/lpips/ex_ref.png" --lpips alex --lpips-weights "$work/weights"
 expect 2 "unknown network" "$program" compare "$input" "$input" --orbit 1 --lpips resnet
 expect 2 "weights of nothing" "$program" compare "$input" "$input" --orbit 1 --lpips-weights "$work/weights"
+
+# views: a textured square becomes the benchmark's layout.
+mkdir "$work/mesh"
+printf 'mtllib quad.mtl\nv -1 0 0\nv 1 0 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3 4/4\n' >"$work/mesh/quad.obj"
+printf 'newmtl m\nKd 0.2 0.8 0.4\n' >"$work/mesh/quad.mtl"
+expect 0 "views of a mesh" "$program" views "$work/mesh/quad.obj" -o "$work/quad" --views 3 --size 32 --low-size 8 --points 100 --json
+says stdout '"triangles": 2'
+for file in 8/images/002.png 8/sparse/0/points3D.bin 8/images.txt 32/images/002.png 32/cameras.txt transforms_32.json; do
+  expect 0 "views writes $file" test -s "$work/quad/$file"
+done
+expect 0 "our own cameras" "$program" render "$input" -o "$work/quadview" --cameras "$work/quad/32"
+expect 5 "views do not overwrite" "$program" views "$work/mesh/quad.obj" -o "$work/quad" --views 3 --size 32 --low-size 8
+expect 2 "views of one size" "$program" views "$work/mesh/quad.obj" -o "$work/quad2" --size 32 --low-size 32
+expect 2 "unknown rig" "$program" views "$work/mesh/quad.obj" -o "$work/quad2" --rig spiral
+expect 3 "no mesh" "$program" views "$work/mesh/none.obj" -o "$work/quad2"
+printf 'v 0 0 0\n' >"$work/mesh/point.obj"
+expect 4 "a mesh without triangles" "$program" views "$work/mesh/point.obj" -o "$work/quad2"
 
 # Same bits for any number of threads.
 expect 0 "one thread" "$program" render "$input" -o "$work/t1.png" --orbit 1 --size 200x150 --threads 1

@@ -93,6 +93,7 @@ int RunProgram(int argc, const char* const* argv) {
   AddConvert(app, program);
   AddCompare(app, program);
   AddView(app, program);
+  AddViews(app, program);
   AddBench(app, program);
   try {
     app.parse(argc, argv);

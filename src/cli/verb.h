@@ -36,6 +36,7 @@ void AddInfo(CLI::App& app, Program& program);
 void AddRender(CLI::App& app, Program& program);
 void AddCompare(CLI::App& app, Program& program);
 void AddView(CLI::App& app, Program& program);
+void AddViews(CLI::App& app, Program& program);
 void AddConvert(CLI::App& app, Program& program);
 void AddBench(CLI::App& app, Program& program);
 

@@ -2,10 +2,9 @@
 
 #include <embree3/rtcore.h>
 #include <tbb/global_control.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <atomic>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -13,6 +12,7 @@
 
 #include "core/parallel.h"
 #include "core/text.h"
+#include "core/thread_clock.h"
 #include "scene/surface_shader.h"
 #include "scene/tile_coverage.h"
 
@@ -23,10 +23,6 @@ namespace {
 constexpr int kTile = 8;    // pixels per side: what is traced, then shaded, while its hits are in the cache
 constexpr int kPacket = 8;  // rays Embree takes at once with AVX2
 constexpr uint32_t kMiss = RTC_INVALID_GEOMETRY_ID;
-
-double Seconds(std::chrono::steady_clock::time_point since) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - since).count();
-}
 
 struct DeviceRelease {
   void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
@@ -188,7 +184,8 @@ Result<RayTracer> RayTracer::Create(Mesh mesh) {
   if (scene->device == nullptr) return embree_error("does not start");
   scene->embree.reset(rtcNewScene(scene->device.get()));
   if (scene->embree == nullptr) return embree_error("makes no scene");
-  rtcSetSceneFlags(scene->embree.get(), RTC_SCENE_FLAG_ROBUST);  // no rays slip through between two triangles
+  rtcSetSceneBuildQuality(scene->embree.get(), RTC_BUILD_QUALITY_HIGH);  // every tree is asked a billion times
+  rtcSetSceneFlags(scene->embree.get(), RTC_SCENE_FLAG_ROBUST);          // no rays slip through between two triangles
   for (const bool with_holes : {false, true}) {
     Part& part = scene->parts[with_holes ? 1 : 0];
     if (!part.triangles.empty() && !scene->Attach(part, with_holes)) return embree_error("does not take the triangles");
@@ -207,40 +204,47 @@ namespace {
 class TileTracer {
  public:
   TileTracer(RTCScene embree, const Part* const* parts, const SurfaceShader& shader, const Camera& camera, int samples)
-      : embree_(embree), parts_(parts), shader_(shader), fan_(camera), samples_(samples), step_(1.0f / samples) {
+      : embree_(embree), parts_(parts), shader_(shader), fan_(camera), per_pixel_(samples * samples) {
     rtcInitIntersectContext(&context_.base);
     context_.base.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     const Pinhole& k = camera.intrinsics;
-    context_.sample_area = static_cast<float>(1 / (k.fx * k.fy * samples * samples));
-    hits_.resize(static_cast<size_t>(kTile * kTile * samples * samples));
+    context_.sample_area = static_cast<float>(1 / (k.fx * k.fy * per_pixel_));
+    for (int pixel = 0; pixel < kTile * kTile; ++pixel) {
+      for (int sample = 0; sample < per_pixel_; ++sample) {
+        const float x = (static_cast<float>(sample % samples) + 0.5f) / static_cast<float>(samples);
+        const float y = (static_cast<float>(sample / samples) + 0.5f) / static_cast<float>(samples);
+        places_x_.push_back(static_cast<float>(pixel % kTile) + x);
+        places_y_.push_back(static_cast<float>(pixel / kTile) + y);
+      }
+    }
+    hits_.resize(places_x_.size());
   }
 
-  // Pixels [x0,x1) × [y0,y1) of `image`.
-  void Trace(int x0, int y0, int x1, int y1, Image& image, TraceCost& cost) {
-    const auto begin = std::chrono::steady_clock::now();
-    const int64_t rays = CastRays(x0, y0, x1, y1);
-    const auto middle = std::chrono::steady_clock::now();
-    ShadePixels(x0, y0, x1, y1, image);
-    cost.rays += rays;
-    cost.ray_seconds += std::chrono::duration<double>(middle - begin).count();
-    cost.shade_seconds += Seconds(middle);
+  // The pixels of the tile at (x0, y0) that lie in `image`.
+  void Trace(int x0, int y0, Image& image, TraceCost& cost) {
+    const int columns = std::min(kTile, image.width - x0), rows = std::min(kTile, image.height - y0);
+    const double begin = ThreadSeconds();
+    CastRays(x0, y0, columns, rows);
+    const double middle = ThreadSeconds();
+    ShadePixels(x0, y0, columns, rows, image);
+    cost.rays += int64_t{columns} * rows * per_pixel_;
+    cost.ray_seconds += middle - begin;
+    cost.shade_seconds += ThreadSeconds() - middle;
   }
 
  private:
-  // Hits in the order of pixels, then of samples, row by row.
-  int64_t CastRays(int x0, int y0, int x1, int y1) {
-    const int width = x1 - x0, per_pixel = samples_ * samples_;
-    const int count = width * (y1 - y0) * per_pixel;
+  // Hits in the order of the tile's pixels, then of samples, row by row. Rays outside the image are not sent.
+  void CastRays(int x0, int y0, int columns, int rows) {
     RTCRayHit8 packet;
     Clear(packet, fan_.origin);
     alignas(32) int valid[kPacket];
-    for (int first = 0; first < count; first += kPacket) {
-      for (int i = 0; i < kPacket; ++i) {
-        const int ray = std::min(first + i, count - 1);
-        valid[i] = first + i < count ? -1 : 0;
-        const int pixel = ray / per_pixel, sample = ray % per_pixel;
-        const float x = static_cast<float>(x0 + pixel % width) + (static_cast<float>(sample % samples_) + 0.5f) * step_;
-        const float y = static_cast<float>(y0 + pixel / width) + (static_cast<float>(sample / samples_) + 0.5f) * step_;
+    const float left = static_cast<float>(x0), top = static_cast<float>(y0);
+    const size_t count = static_cast<size_t>(kTile * rows * per_pixel_);  // a multiple of the packet
+    for (size_t first = 0; first < count; first += kPacket) {
+      for (size_t i = 0; i < kPacket; ++i) {
+        const float px = places_x_[first + i], py = places_y_[first + i];
+        valid[i] = px < static_cast<float>(columns) ? -1 : 0;
+        const float x = left + px, y = top + py;
         packet.ray.dir_x[i] = fan_.corner[0] + x * fan_.right[0] + y * fan_.down[0];
         packet.ray.dir_y[i] = fan_.corner[1] + x * fan_.right[1] + y * fan_.down[1];
         packet.ray.dir_z[i] = fan_.corner[2] + x * fan_.right[2] + y * fan_.down[2];
@@ -249,8 +253,8 @@ class TileTracer {
         packet.hit.instID[0][i] = kMiss;
       }
       rtcIntersect8(valid, embree_, &context_.base, &packet);
-      for (int i = 0; i < kPacket && first + i < count; ++i) {
-        Hit& hit = hits_[static_cast<size_t>(first + i)];
+      for (size_t i = 0; i < kPacket; ++i) {
+        Hit& hit = hits_[first + i];
         if (packet.hit.geomID[i] == kMiss) {
           hit.point.triangle = kMiss;
           continue;
@@ -259,28 +263,27 @@ class TileTracer {
         hit.depth = packet.ray.tfar[i];
       }
     }
-    return count;
   }
 
-  void ShadePixels(int x0, int y0, int x1, int y1, Image& image) const {
-    const int per_pixel = samples_ * samples_;
-    const Hit* hit = hits_.data();
-    for (int y = y0; y < y1; ++y) {
-      for (int x = x0; x < x1; ++x) {
+  void ShadePixels(int x0, int y0, int columns, int rows, Image& image) const {
+    const float left = static_cast<float>(x0), top = static_cast<float>(y0);
+    for (int row = 0; row < rows; ++row) {
+      for (int column = 0; column < columns; ++column) {
+        const size_t first = static_cast<size_t>((row * kTile + column) * per_pixel_);
         float sum[3] = {};
         int met = 0;
-        for (int s = 0; s < per_pixel; ++s, ++hit) {
-          if (hit->point.triangle == kMiss) continue;
-          const float px = static_cast<float>(x) + (static_cast<float>(s % samples_) + 0.5f) * step_;
-          const float py = static_cast<float>(y) + (static_cast<float>(s / samples_) + 0.5f) * step_;
+        for (size_t ray = first; ray < first + static_cast<size_t>(per_pixel_); ++ray) {
+          const Hit& hit = hits_[ray];
+          if (hit.point.triangle == kMiss) continue;
+          const float x = left + places_x_[ray], y = top + places_y_[ray];
           std::array<float, 3> direction;
-          for (size_t k = 0; k < 3; ++k) direction[k] = fan_.corner[k] + px * fan_.right[k] + py * fan_.down[k];
-          const auto color = shader_.Color(hit->point, direction, SampleFootprint(context_.sample_area, hit->depth));
+          for (size_t k = 0; k < 3; ++k) direction[k] = fan_.corner[k] + x * fan_.right[k] + y * fan_.down[k];
+          const auto color = shader_.Color(hit.point, direction, SampleFootprint(context_.sample_area, hit.depth));
           for (size_t k = 0; k < 3; ++k) sum[k] += color[k];
           ++met;
         }
-        for (int c = 0; c < 3; ++c) image.at(c, y, x) = met > 0 ? sum[c] / static_cast<float>(met) : 0.0f;
-        image.at(3, y, x) = static_cast<float>(met) / static_cast<float>(per_pixel);
+        for (int c = 0; c < 3; ++c) image.at(c, y0 + row, x0 + column) = met > 0 ? sum[c] / static_cast<float>(met) : 0;
+        image.at(3, y0 + row, x0 + column) = static_cast<float>(met) / static_cast<float>(per_pixel_);
       }
     }
   }
@@ -289,15 +292,17 @@ class TileTracer {
   const Part* const* parts_;
   const SurfaceShader& shader_;
   RayFan fan_;
-  int samples_;
-  float step_;
+  int per_pixel_;
   TraceContext context_;
+  std::vector<float> places_x_;  // of the tile's rays, pixels from its corner
+  std::vector<float> places_y_;
   std::vector<Hit> hits_;
 };
 
-void ClearPixels(int x0, int y0, int x1, int y1, Image& image) {
+void ClearTile(int x0, int y0, Image& image) {
+  const int columns = std::min(kTile, image.width - x0), rows = std::min(kTile, image.height - y0);
   for (int c = 0; c < 4; ++c) {
-    for (int y = y0; y < y1; ++y) std::fill(&image.at(c, y, x0), &image.at(c, y, x0) + (x1 - x0), 0.0f);
+    for (int y = y0; y < y0 + rows; ++y) std::fill_n(&image.at(c, y, x0), columns, 0.0f);
   }
 }
 
@@ -317,23 +322,24 @@ Result<Image> RayTracer::Render(const Camera& camera, const TraceOptions& option
   Image image(k.width, k.height, 4);
   const TileCoverage coverage(scene_->mesh, camera, kTile);
   std::mutex mutex;
-  ParallelFor(0, coverage.rows(), 4, [&](int64_t first, int64_t last) {
+  const auto trace_rows = [&](int64_t first, int64_t last) {
     TileTracer tracer(scene_->embree.get(), scene_->part_of, *scene_->shader, camera, options.samples);
     TraceCost mine;
     for (int row = static_cast<int>(first); row < static_cast<int>(last); ++row) {
-      const int y0 = row * kTile, y1 = std::min(k.height, y0 + kTile);
       for (int column = 0; column < coverage.columns(); ++column) {
-        const int x0 = column * kTile, x1 = std::min(k.width, x0 + kTile);
         if (coverage.touched(column, row)) {
-          tracer.Trace(x0, y0, x1, y1, image, mine);
+          tracer.Trace(column * kTile, row * kTile, image, mine);
         } else {
-          ClearPixels(x0, y0, x1, y1, image);
+          ClearTile(column * kTile, row * kTile, image);
         }
       }
     }
     const std::lock_guard<std::mutex> lock(mutex);
     if (cost != nullptr) *cost += mine;
-  });
+  };
+  // Isolated: a thread that waits for the last rows must not begin another view meanwhile, of a caller that makes
+  // several at once, or pictures would pile up.
+  tbb::this_task_arena::isolate([&] { ParallelFor(0, coverage.rows(), 4, trace_rows); });
   return image;
 }
 

@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "core/thread_clock.h"
 #include "formats/camera_io.h"
 #include "formats/colmap_writer.h"
 #include "formats/image_io.h"
@@ -134,13 +135,14 @@ Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const fs::path& folder
     }
     TraceCost mine;
     auto image = RenderView(tracer, camera, options, &mine);
-    const auto picture_begin = Clock::now();
+    const double picture_begin = ThreadSeconds();
     const Status written = image.ok()
                                ? WritePng((is_high ? high : low) / "images" / (camera.name + ".png"), *image, write)
                                : Status(image.error());
+    const double picture_seconds = ThreadSeconds() - picture_begin;
     const std::lock_guard<std::mutex> lock(mutex);
     (is_high ? cost.high : cost.low) += mine;
-    cost.picture_seconds += Since(picture_begin);
+    cost.picture_seconds += picture_seconds;
     if (!written.ok() && failed.ok()) failed = written;
     progress.Advance();
   });

@@ -1,0 +1,90 @@
+#include "fit/cloud_optimizer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/parallel.h"
+#include "fit/adam.h"
+
+namespace anchorsplat {
+
+namespace {
+
+enum Attribute : size_t { kMeans, kScales, kQuats, kOpacities, kSh };
+
+}  // namespace
+
+double MeansRate(const LearningRates& rates, double scene_scale, int64_t step, int64_t steps) {
+  const double done = static_cast<double>(step) / static_cast<double>(std::max<int64_t>(1, steps));
+  return rates.means * scene_scale * std::pow(rates.means_decay, done);
+}
+
+CloudOptimizer::CloudOptimizer(const GaussianCloud& cloud) {
+  moments_ = {{{"means", 3, {}, {}},
+               {"log_scales", 3, {}, {}},
+               {"quats", 4, {}, {}},
+               {"opacity_logits", 1, {}, {}},
+               {"sh", cloud.sh_stride(), {}, {}}}};
+  for (Moments& m : moments_) {
+    m.first.assign(static_cast<size_t>(cloud.size() * m.width), 0.0f);
+    m.second.assign(static_cast<size_t>(cloud.size() * m.width), 0.0f);
+  }
+}
+
+void CloudOptimizer::Step(const LearningRates& rates, double means_rate, int sh_degree, const CloudGradient& gradient,
+                          GaussianCloud& cloud) {
+  ++steps_;
+  const int64_t used = 3 * ShCoefficients(std::min(sh_degree, cloud.sh_degree));
+  const auto step = [&](Attribute attribute, int64_t columns, int64_t first_columns, double first_rate, double rate,
+                        const Buffer<float>& g, Buffer<float>& values) {
+    Moments& m = moments_[attribute];
+    AdamStep({.rows = cloud.size(),
+              .stride = m.width,
+              .columns = columns,
+              .first_columns = first_columns,
+              .first_rate = static_cast<float>(first_rate),
+              .rate = static_cast<float>(rate),
+              .beta1 = rates.beta1,
+              .beta2 = rates.beta2,
+              .epsilon = static_cast<float>(rates.epsilon),
+              .step = steps_,
+              .gradient = g.data(),
+              .first_moment = m.first.data(),
+              .second_moment = m.second.data(),
+              .values = values.data()});
+  };
+  step(kMeans, 3, 0, 0, means_rate, gradient.means, cloud.means);
+  step(kScales, 3, 0, 0, rates.scales, gradient.log_scales, cloud.log_scales);
+  step(kQuats, 4, 0, 0, rates.quats, gradient.quats, cloud.quats);
+  step(kOpacities, 1, 0, 0, rates.opacities, gradient.opacity_logits, cloud.opacity_logits);
+  step(kSh, used, 3, rates.sh0, rates.sh_rest, gradient.sh, cloud.sh);
+}
+
+Buffer<float> ChangeRows(const Buffer<float>& values, int64_t width, const RowChange& change) {
+  const auto kept = static_cast<int64_t>(change.kept.size());
+  Buffer<float> out(static_cast<size_t>((kept + change.fresh) * width));
+  ParallelFor(0, kept, 4096, [&](int64_t begin, int64_t end) {
+    for (int64_t row = begin; row < end; ++row) {
+      std::copy_n(values.data() + change.kept[static_cast<size_t>(row)] * width, width, out.data() + row * width);
+    }
+  });
+  return out;
+}
+
+void CloudOptimizer::Apply(const RowChange& change) {
+  if (!change.any) return;
+  for (Moments& m : moments_) {
+    for (Buffer<float>* moment : {&m.first, &m.second}) {
+      *moment = ChangeRows(*moment, m.width, change);
+      std::fill(moment->end() - static_cast<ptrdiff_t>(change.fresh * m.width), moment->end(), 0.0f);
+    }
+  }
+}
+
+void CloudOptimizer::ForgetOpacities() {
+  Moments& m = moments_[kOpacities];
+  std::fill(m.first.begin(), m.first.end(), 0.0f);
+  std::fill(m.second.begin(), m.second.end(), 0.0f);
+}
+
+}  // namespace anchorsplat

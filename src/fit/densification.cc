@@ -1,0 +1,250 @@
+#include "fit/densification.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "core/parallel.h"
+#include "core/rotation.h"
+#include "fit/random_streams.h"
+#include "formats/quantize.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr float kSplitShrink = 1.6f;  // of Kerbl et al. 2023: halves of a split are this much smaller
+constexpr int kSplitSamples = 2;
+
+float LargestLogScale(const GaussianCloud& cloud, int64_t i) {
+  const float* s = cloud.log_scales.data() + 3 * i;
+  return std::max({s[0], s[1], s[2]});
+}
+
+float RevisedLogit(float logit) {
+  const float opacity = Sigmoid(logit);
+  return LogitFromOpacity(1 - std::sqrt(1 - opacity));
+}
+
+// Who grows.
+struct Growth {
+  std::vector<int64_t> duplicate, split;  // rows, ascending
+};
+
+// What is the same for all rows in one refinement.
+struct Rules {
+  const DensificationOptions* options;
+  float log_grow_scale, log_prune_scale;  // ln of world units
+  bool prune_large;                       // after the first reset
+  bool by_radius;                         // the 2-D rules apply
+};
+
+Rules MakeRules(const DensificationOptions& options, int64_t step, double scene_scale) {
+  return {&options, static_cast<float>(std::log(options.grow_scale3d * scene_scale)),
+          static_cast<float>(std::log(options.prune_scale3d * scene_scale)), step > options.reset_every,
+          step < options.refine_scale2d_stop_iter};
+}
+
+Growth ChooseGrowth(const Rules& rules, const Densification::Gathered& gathered, const GaussianCloud& cloud) {
+  const DensificationOptions& options = *rules.options;
+  Growth growth;
+  std::vector<float> gradients(static_cast<size_t>(cloud.size()));
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    const auto k = static_cast<size_t>(i);
+    gradients[k] = gathered.grad2d[k] / std::max(gathered.count[k], 1.0f);
+    const bool high = gradients[k] > static_cast<float>(options.grow_grad2d);
+    const bool small = LargestLogScale(cloud, i) <= rules.log_grow_scale;
+    const bool wide = rules.by_radius && gathered.radii[k] > static_cast<float>(options.grow_scale2d);
+    // Both may be true: then it is split, and its duplicate, which has no history, stays whole.
+    if (high && small) growth.duplicate.push_back(i);
+    if ((high && !small) || wide) growth.split.push_back(i);
+  }
+
+  const auto wanted = static_cast<int64_t>(growth.duplicate.size() + growth.split.size());
+  const int64_t room = std::max<int64_t>(0, options.max_gaussians - cloud.size());
+  if (options.max_gaussians <= 0 || wanted <= room) return growth;
+  struct Candidate {
+    float gradient;
+    int64_t row;
+    bool split;
+  };
+  std::vector<Candidate> candidates;
+  for (const int64_t i : growth.duplicate) candidates.push_back({gradients[static_cast<size_t>(i)], i, false});
+  for (const int64_t i : growth.split) candidates.push_back({gradients[static_cast<size_t>(i)], i, true});
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
+    if (a.gradient != b.gradient) return a.gradient > b.gradient;
+    return a.row != b.row ? a.row < b.row : a.split < b.split;
+  });
+  candidates.resize(static_cast<size_t>(room));
+  growth = {};
+  for (const Candidate& c : candidates) (c.split ? growth.split : growth.duplicate).push_back(c.row);
+  std::sort(growth.duplicate.begin(), growth.duplicate.end());
+  std::sort(growth.split.begin(), growth.split.end());
+  return growth;
+}
+
+// A row to come: a copy of `source`, or one of its halves.
+struct Newcomer {
+  int64_t source;
+  bool half;
+  float offset[3];  // from the source's mean, world
+};
+
+std::vector<Newcomer> MakeNewcomers(const Growth& growth, const GaussianCloud& cloud, Random random) {
+  std::vector<Newcomer> newcomers;
+  newcomers.reserve(growth.duplicate.size() + kSplitSamples * growth.split.size());
+  for (const int64_t i : growth.duplicate) newcomers.push_back({i, false, {0, 0, 0}});
+  for (int sample = 0; sample < kSplitSamples; ++sample) {
+    for (const int64_t i : growth.split) {
+      const float* q = cloud.quats.data() + 4 * i;
+      const float* s = cloud.log_scales.data() + 3 * i;
+      const auto r = RotationFromQuaternion(q[0], q[1], q[2], q[3]);
+      float along[3];
+      for (size_t a = 0; a < 3; ++a) along[a] = std::exp(s[a]) * static_cast<float>(random.Normal());
+      Newcomer half{i, true, {}};
+      for (size_t a = 0; a < 3; ++a) {
+        half.offset[a] = r[3 * a] * along[0] + r[3 * a + 1] * along[1] + r[3 * a + 2] * along[2];
+      }
+      newcomers.push_back(half);
+    }
+  }
+  return newcomers;
+}
+
+// Whether a Gaussian with the attributes of row i, but perhaps another opacity and size, goes.
+bool IsPruned(const Rules& rules, const GaussianCloud& cloud, int64_t i, float logit, float largest_log_scale,
+              float radius) {
+  const DensificationOptions& options = *rules.options;
+  if (!IsUsable(cloud, i)) return true;
+  if (Sigmoid(logit) < static_cast<float>(options.prune_opa)) return true;
+  if (!rules.prune_large) return false;
+  return largest_log_scale > rules.log_prune_scale ||
+         (rules.by_radius && radius > static_cast<float>(options.prune_scale2d));
+}
+
+void ChangeCloud(const DensificationOptions& options, const RowChange& change, const std::vector<Newcomer>& newcomers,
+                 GaussianCloud& cloud) {
+  const GaussianCloud old = std::exchange(cloud, GaussianCloud{});
+  cloud.sh_degree = old.sh_degree;
+  cloud.render_mode = old.render_mode;
+  cloud.comments = old.comments;
+  const int64_t stride = old.sh_stride();
+  cloud.means = ChangeRows(old.means, 3, change);
+  cloud.log_scales = ChangeRows(old.log_scales, 3, change);
+  cloud.quats = ChangeRows(old.quats, 4, change);
+  cloud.opacity_logits = ChangeRows(old.opacity_logits, 1, change);
+  cloud.sh = ChangeRows(old.sh, stride, change);
+  auto to = static_cast<int64_t>(change.kept.size());
+  for (const Newcomer& newcomer : newcomers) {
+    const int64_t from = newcomer.source;
+    for (int64_t a = 0; a < 3; ++a) {
+      const auto out = static_cast<size_t>(3 * to + a), in = static_cast<size_t>(3 * from + a);
+      cloud.means[out] = old.means[in] + newcomer.offset[a];
+      cloud.log_scales[out] = newcomer.half ? old.log_scales[in] - std::log(kSplitShrink) : old.log_scales[in];
+    }
+    std::copy_n(old.quats.data() + 4 * from, 4, cloud.quats.data() + 4 * to);
+    const float logit = old.opacity_logits[static_cast<size_t>(from)];
+    cloud.opacity_logits[static_cast<size_t>(to)] =
+        newcomer.half && options.revised_opacity ? RevisedLogit(logit) : logit;
+    std::copy_n(old.sh.data() + stride * from, stride, cloud.sh.data() + stride * to);
+    ++to;
+  }
+}
+
+}  // namespace
+
+DensificationOptions ScaledTo(const DensificationOptions& options, int64_t steps) {
+  const auto scaled = [&](int64_t count) { return count * steps / kStandardSteps; };
+  DensificationOptions out = options;
+  out.refine_scale2d_stop_iter = scaled(options.refine_scale2d_stop_iter);
+  out.refine_start_iter = scaled(options.refine_start_iter);
+  out.refine_stop_iter = scaled(options.refine_stop_iter);
+  out.refine_every = std::max<int64_t>(1, scaled(options.refine_every));
+  out.reset_every = std::max<int64_t>(1, scaled(options.reset_every));
+  out.pause_refine_after_reset = scaled(options.pause_refine_after_reset);
+  return out;
+}
+
+void CapOpacities(GaussianCloud& cloud, double opacity) {
+  const auto cap = static_cast<float>(std::log(opacity / (1 - opacity)));
+  for (float& logit : cloud.opacity_logits) logit = std::min(logit, cap);
+}
+
+void Densification::Clear(int64_t gaussians) {
+  for (Buffer<float>* array : {&gathered_.grad2d, &gathered_.count, &gathered_.radii}) {
+    array->assign(static_cast<size_t>(gaussians), 0.0f);
+  }
+}
+
+void Densification::Gather(int width, int height, const CloudGradient& gradient) {
+  const float half_width = 0.5f * static_cast<float>(width), half_height = 0.5f * static_cast<float>(height);
+  const float side = static_cast<float>(std::max(width, height));
+  ParallelFor(0, static_cast<int64_t>(gathered_.count.size()), 8192, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      const auto k = static_cast<size_t>(i);
+      const int32_t rx = gradient.radii[2 * k], ry = gradient.radii[2 * k + 1];
+      if (rx <= 0 || ry <= 0) continue;
+      const float gx = gradient.means2d[2 * k] * half_width, gy = gradient.means2d[2 * k + 1] * half_height;
+      gathered_.grad2d[k] += std::sqrt(gx * gx + gy * gy);
+      gathered_.count[k] += 1;
+      gathered_.radii[k] = std::max(gathered_.radii[k], static_cast<float>(std::max(rx, ry)) / side);
+    }
+  });
+}
+
+void Densification::Refine(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed,
+                           GaussianCloud& cloud, DensificationChange& change) {
+  const Rules rules = MakeRules(options, step, scene_scale);
+  const Growth growth = ChooseGrowth(rules, gathered_, cloud);
+  std::vector<Newcomer> newcomers = MakeNewcomers(growth, cloud, RandomStream(seed, RandomPurpose::kSplit, step));
+
+  // Pruning looks at the grown cloud, newcomers included.
+  std::erase_if(newcomers, [&](const Newcomer& newcomer) {
+    const auto k = static_cast<size_t>(newcomer.source);
+    const float logit = cloud.opacity_logits[k], size = LargestLogScale(cloud, newcomer.source);
+    return IsPruned(rules, cloud, newcomer.source,
+                    newcomer.half && options.revised_opacity ? RevisedLogit(logit) : logit,
+                    newcomer.half ? size - std::log(kSplitShrink) : size, gathered_.radii[k]);
+  });
+  RowChange& rows = change.rows;
+  rows.kept.reserve(static_cast<size_t>(cloud.size()));
+  auto next_split = growth.split.begin();
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    if (next_split != growth.split.end() && *next_split == i) {
+      ++next_split;
+      continue;
+    }
+    const auto k = static_cast<size_t>(i);
+    if (IsPruned(rules, cloud, i, cloud.opacity_logits[k], LargestLogScale(cloud, i), gathered_.radii[k])) continue;
+    rows.kept.push_back(i);
+  }
+  rows.fresh = static_cast<int64_t>(newcomers.size());
+  change.duplicated = static_cast<int64_t>(growth.duplicate.size());
+  change.split = static_cast<int64_t>(growth.split.size());
+  const auto left = static_cast<int64_t>(rows.kept.size()) + rows.fresh;
+  change.pruned = cloud.size() + change.duplicated + change.split - left;
+  rows.any = rows.fresh > 0 || static_cast<int64_t>(rows.kept.size()) < cloud.size();
+  if (rows.any) ChangeCloud(options, rows, newcomers, cloud);
+  Clear(cloud.size());
+}
+
+DensificationChange Densification::AfterStep(const DensificationOptions& options, int64_t step, double scene_scale,
+                                             uint64_t seed, int width, int height, const CloudGradient& gradient,
+                                             GaussianCloud& cloud) {
+  DensificationChange change;
+  if (step >= options.refine_stop_iter) return change;
+  Gather(width, height, gradient);
+  if (step > options.refine_start_iter && step % options.refine_every == 0 &&
+      step % options.reset_every >= options.pause_refine_after_reset) {
+    Refine(options, step, scene_scale, seed, cloud, change);
+  }
+  if (options.opacity_reset != OpacityReset::kNever && step % options.reset_every == 0 &&
+      (step > 0 || options.opacity_reset == OpacityReset::kFromZero)) {
+    CapOpacities(cloud, 2 * options.prune_opa);
+    change.opacities_reset = true;
+  }
+  return change;
+}
+
+}  // namespace anchorsplat

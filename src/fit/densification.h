@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+
+#include "core/buffer.h"
+#include "core/gaussian_cloud.h"
+#include "fit/cloud_optimizer.h"
+#include "render/rasterizer.h"
+
+namespace anchorsplat {
+
+inline constexpr int64_t kStandardSteps = 30000;  // of a fit, for which all published schedules are given
+
+// When all opacities are taken down. gsplat's versions differ here without saying so.
+enum class OpacityReset {
+  kPositive,  // at every positive multiple of reset_every: gsplat's main branch since August 2025, and Kerbl et al.
+  kFromZero,  // at step 0 too, so that Gaussians begin at 0.01 and not at 0.1: gsplat up to 1.5.2
+  kNever,     // gsplat 1.5.3, where the condition cannot become true
+};
+
+// Adaptive density control of Kerbl et al. 2023 as gsplat's DefaultStrategy does it, under its names. Counts of steps
+// are for 30,000 of them (ScaledTo).
+struct DensificationOptions {
+  double prune_opa = 0.005;     // opacity below which a Gaussian goes; a reset takes opacities down to twice this
+  double grow_grad2d = 0.0002;  // mean gradient of the centre in the picture, in half pictures, above which it grows
+  double grow_scale3d = 0.01;   // × scene scale: the largest axis up to which it is duplicated, beyond it is split
+  double grow_scale2d = 0.05;   // of the larger picture side: radius above which it is split whatever its gradient
+  double prune_scale3d = 0.1;   // × scene scale: the largest axis above which it goes, after the first reset
+  double prune_scale2d = 0.15;  // of the larger picture side: radius above which it goes, after the first reset
+  int64_t refine_scale2d_stop_iter = 0;  // both 2-D rules apply before this step: by default never
+  int64_t refine_start_iter = 500;       // growth and pruning in steps after this …
+  int64_t refine_stop_iter = 15000;      // … and before this, which ends resets too
+  int64_t refine_every = 100;
+  int64_t reset_every = 3000;
+  int64_t pause_refine_after_reset = 0;
+  bool revised_opacity = false;  // halves of a split get 1 − √(1 − o) (Rota Bulò et al. 2024)
+  OpacityReset opacity_reset = OpacityReset::kPositive;
+  int64_t max_gaussians = 0;  // growth stops there, Gaussians with the largest gradients first; 0 = no bound. Ours
+};
+
+// The same schedule for another number of steps: what gsplat's steps_scaler = steps/30000 does, but never below 1
+// where a count divides.
+DensificationOptions ScaledTo(const DensificationOptions& options, int64_t steps);
+
+// What happened after a step. The caller changes the rows of everything else it keeps per Gaussian.
+struct DensificationChange {
+  RowChange rows;
+  bool opacities_reset = false;
+  int64_t duplicated = 0, split = 0, pruned = 0;
+};
+
+class Densification {
+ public:
+  Densification() = default;
+  explicit Densification(int64_t gaussians) { Clear(gaussians); }
+
+  // What DefaultStrategy does after the optimizer's step `step` (0, 1, …): gathers the gradients of the centres and,
+  // at its times, duplicates, splits and prunes `cloud` and takes opacities down. `gradient` is that of the step, for a
+  // picture of width × height pixels. Rows that are not finite (IsUsable) are pruned with the others. The noise of
+  // splits follows from seed and step.
+  DensificationChange AfterStep(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed,
+                                int width, int height, const CloudGradient& gradient, GaussianCloud& cloud);
+
+  // For checkpoints: what was gathered since the last change. [N] each.
+  struct Gathered {
+    Buffer<float> grad2d;  // Σ ‖∂L/∂mean2d‖ in half pictures
+    Buffer<float> count;   // of the steps in which the Gaussian was visible
+    Buffer<float> radii;   // largest radius in parts of the larger picture side
+  };
+  const Gathered& gathered() const { return gathered_; }
+  Gathered& gathered() { return gathered_; }
+
+ private:
+  void Clear(int64_t gaussians);
+  void Gather(int width, int height, const CloudGradient& gradient);
+  void Refine(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed,
+              GaussianCloud& cloud, DensificationChange& change);
+
+  Gathered gathered_;
+};
+
+// Takes opacities down to at most `opacity`. Exposed for other loops.
+void CapOpacities(GaussianCloud& cloud, double opacity);
+
+}  // namespace anchorsplat

@@ -1,0 +1,103 @@
+#include <charconv>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "core/text.h"
+#include "fit/fitter.h"
+#include "formats/safetensors.h"
+#include "formats/tensor_file.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr const char* kFormat = "anchorsplat fit 1";
+
+// An array of the state and what it is called in the file.
+template <typename Array>
+struct Named {
+  std::string name;
+  std::vector<int64_t> shape;
+  Array* values;
+};
+
+// Every array of a state, in one order for writing and reading. `State` may be const.
+template <typename State, typename Array>
+std::vector<Named<Array>> ArraysOf(State& state, int64_t n, int64_t coefficients) {
+  std::vector<Named<Array>> arrays = {{"cloud.means", {n, 3}, &state.cloud.means},
+                                      {"cloud.log_scales", {n, 3}, &state.cloud.log_scales},
+                                      {"cloud.quats", {n, 4}, &state.cloud.quats},
+                                      {"cloud.opacity_logits", {n}, &state.cloud.opacity_logits},
+                                      {"cloud.sh", {n, coefficients, 3}, &state.cloud.sh}};
+  for (auto& moments : state.optimizer.moments()) {
+    arrays.push_back({Cat("adam.", moments.attribute, ".first"), {n, moments.width}, &moments.first});
+    arrays.push_back({Cat("adam.", moments.attribute, ".second"), {n, moments.width}, &moments.second});
+  }
+  auto& gathered = state.densification.gathered();
+  arrays.push_back({"densification.grad2d", {n}, &gathered.grad2d});
+  arrays.push_back({"densification.count", {n}, &gathered.count});
+  arrays.push_back({"densification.radii", {n}, &gathered.radii});
+  return arrays;
+}
+
+Status CompareSettings(const std::string& file, const std::string& theirs, const std::string& ours) {
+  if (theirs == ours) return {};
+  const auto a = nlohmann::json::parse(theirs, nullptr, false), b = nlohmann::json::parse(ours, nullptr, false);
+  if (a.is_object() && b.is_object()) {
+    for (const auto& [key, value] : b.items()) {
+      const auto found = a.find(key);
+      if (found != a.end() && *found == value) continue;
+      return Error{ErrorCode::kBadArgument,
+                   Cat(file, ": is a checkpoint of another fit: its ", key, " is ",
+                       found == a.end() ? "not there" : Printable(found->dump()), ", this one's is ", value.dump())};
+    }
+  }
+  return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another fit")};
+}
+
+}  // namespace
+
+Status WriteFitCheckpoint(const std::filesystem::path& path, const FitState& state, const std::string& settings) {
+  std::vector<TensorEntry> entries;
+  for (const auto& array :
+       ArraysOf<const FitState, const Buffer<float>>(state, state.cloud.size(), state.cloud.coefficients())) {
+    entries.push_back(MakeEntry(array.name, array.shape, *array.values));
+  }
+  return WriteSafetensors(path, entries, {{"format", kFormat}, {"step", Cat(state.step)}, {"settings", settings}},
+                          {.overwrite = true});
+}
+
+Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std::string& settings) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorFile file, TensorFile::Open(path));
+  const auto bad = [&](const std::string& sentence) {
+    return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", sentence)};
+  };
+  const auto text = [&](const char* key) {
+    const auto found = file.metadata().find(key);
+    return found == file.metadata().end() ? std::string() : found->second;
+  };
+  if (text("format") != kFormat) return bad("is not a checkpoint of a fit (metadata \"format\")");
+  ANCHORSPLAT_RETURN_IF_ERROR(CompareSettings(path.string(), text("settings"), settings));
+
+  FitState state;
+  const std::string step = text("step");
+  const auto [end, code] = std::from_chars(step.data(), step.data() + step.size(), state.step);
+  if (code != std::errc() || end != step.data() + step.size() || state.step < 0) {
+    return bad(Cat("expected a number of steps in its metadata, found \"", Printable(step), "\""));
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorEntry* sh, file.Require("cloud.sh"));
+  int degree = 0;
+  while (degree <= kMaxShDegree && (sh->shape.size() != 3 || sh->shape[1] != ShCoefficients(degree))) ++degree;
+  if (degree > kMaxShDegree) return bad(Cat("tensor \"cloud.sh\" has shape ", sh->ShapeText()));
+  state.cloud.sh_degree = degree;
+  state.optimizer = CloudOptimizer(state.cloud);
+  state.optimizer.set_steps(state.step);
+  // Each array is as large as the file says only once the file has shown that it holds it.
+  for (const auto& array : ArraysOf<FitState, Buffer<float>>(state, sh->shape[0], state.cloud.coefficients())) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values values, file.ReadFloat32(array.name, array.shape));
+    array.values->assign(values.values().begin(), values.values().end());
+  }
+  return state;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,99 @@
+#include "fit/fit_options.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "core/text.h"
+
+namespace anchorsplat {
+
+FitOptions FitOptionsFor(int64_t steps) {
+  FitOptions options;
+  options.steps = steps;
+  options.sh_degree_interval = std::max<int64_t>(1, options.sh_degree_interval * steps / kStandardSteps);
+  options.densification = ScaledTo(options.densification, steps);
+  return options;
+}
+
+int ShDegreeAt(const FitOptions& options, int64_t step) {
+  const int64_t degree = step / std::max<int64_t>(1, options.sh_degree_interval);
+  return static_cast<int>(std::min<int64_t>(degree, options.objective.render.sh_degree));
+}
+
+Status Validate(const FitOptions& options) {
+  const auto bad = [](const std::string& sentence) { return Error{ErrorCode::kBadArgument, "fit: " + sentence}; };
+  if (options.steps < 1) return bad("there must be at least one step");
+  const LearningRates& r = options.rates;
+  for (const auto& [name, rate] : {std::pair{"means", r.means},
+                                   {"scales", r.scales},
+                                   {"opacities", r.opacities},
+                                   {"quats", r.quats},
+                                   {"sh0", r.sh0},
+                                   {"sh_rest", r.sh_rest}}) {
+    if (!(rate >= 0 && std::isfinite(rate))) return bad(Cat("learning rate of ", name, " must not be negative"));
+  }
+  if (!(r.means_decay > 0 && r.means_decay <= 1)) return bad("the decay of the means' rate must lie in (0, 1]");
+  if (!(r.beta1 >= 0 && r.beta1 < 1 && r.beta2 >= 0 && r.beta2 < 1)) return bad("Adam's betas must lie in [0, 1)");
+  if (!(static_cast<float>(r.epsilon) > 0)) return bad("Adam's epsilon must be positive");
+  const DensificationOptions& d = options.densification;
+  if (d.refine_every < 1 || d.reset_every < 1) return bad("refine_every and reset_every must be at least 1");
+  if (!(d.prune_opa > 0 && d.prune_opa < 0.5)) return bad("prune_opa must lie between 0 and 0.5");
+  if (!(d.grow_scale3d > 0 && d.prune_scale3d > 0)) return bad("grow_scale3d and prune_scale3d must be positive");
+  if (d.max_gaussians < 0) return bad("max_gaussians must not be negative");
+  const int degree = options.objective.render.sh_degree;
+  if (degree < 0 || degree > kMaxShDegree) return bad("SH degree must be 0 to 3");
+  return {};
+}
+
+std::string ToJsonText(const FitOptions& o) {
+  const DensificationOptions& d = o.densification;
+  const LearningRates& r = o.rates;
+  const RenderOptions& render = o.objective.render;
+  // One level, so that what differs can be named by one word.
+  const nlohmann::json json = {
+      {"steps", o.steps},
+      {"seed", o.seed},
+      {"sh_degree_interval", o.sh_degree_interval},
+      {"rate_means", r.means},
+      {"rate_means_decay", r.means_decay},
+      {"rate_scales", r.scales},
+      {"rate_opacities", r.opacities},
+      {"rate_quats", r.quats},
+      {"rate_sh0", r.sh0},
+      {"rate_sh_rest", r.sh_rest},
+      {"beta1", r.beta1},
+      {"beta2", r.beta2},
+      {"epsilon", r.epsilon},
+      {"prune_opa", d.prune_opa},
+      {"grow_grad2d", d.grow_grad2d},
+      {"grow_scale3d", d.grow_scale3d},
+      {"grow_scale2d", d.grow_scale2d},
+      {"prune_scale3d", d.prune_scale3d},
+      {"prune_scale2d", d.prune_scale2d},
+      {"refine_scale2d_stop_iter", d.refine_scale2d_stop_iter},
+      {"refine_start_iter", d.refine_start_iter},
+      {"refine_stop_iter", d.refine_stop_iter},
+      {"refine_every", d.refine_every},
+      {"reset_every", d.reset_every},
+      {"pause_refine_after_reset", d.pause_refine_after_reset},
+      {"revised_opacity", d.revised_opacity},
+      {"opacity_reset", static_cast<int>(d.opacity_reset)},
+      {"max_gaussians", d.max_gaussians},
+      {"sh_degree", render.sh_degree},
+      {"profile", static_cast<int>(render.profile)},
+      {"mode", static_cast<int>(render.mode)},
+      {"background", render.background},
+      {"near_plane", render.near_plane},
+      {"far_plane", render.far_plane},
+      {"dilation", render.dilation},
+      {"min_alpha", render.min_alpha},
+      {"min_transmittance", render.min_transmittance},
+      {"ssim_weight", o.objective.loss.ssim_weight},
+      {"ssim_padding", static_cast<int>(o.objective.loss.padding)},
+  };
+  return json.dump();
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "core/gaussian_cloud.h"
+#include "core/image.h"
+#include "core/result.h"
+#include "fit/cloud_optimizer.h"
+#include "fit/densification.h"
+#include "fit/fit_options.h"
+#include "fit/picture_cache.h"
+#include "fit/view_objective.h"
+#include "fit/view_order.h"
+
+namespace anchorsplat {
+
+// All that changes during a fit.
+struct FitState {
+  int64_t step = 0;  // steps done
+  GaussianCloud cloud;
+  CloudOptimizer optimizer;
+  Densification densification;
+};
+
+// What one step saw.
+struct FitStep {
+  PhotometricLossValue loss;
+  int64_t view = 0;
+  DensificationChange change;
+};
+
+// Seconds on the clock, of all steps so far.
+struct FitTimes {
+  double load = 0;  // pictures from the cache
+  ObjectiveTimes objective;
+  double adam = 0, densify = 0;
+};
+
+// The iterations of a fit, one at a time: view, objective, optimizer, densification. The state after k steps is the
+// same bits for any number of threads, and whether they were made in one go or from a checkpoint.
+class Fitter {
+ public:
+  // `pictures` are the training views (at least one). Begins at `state.step`.
+  // Errors (kBadArgument): options that cannot be run, no views, no Gaussians, an invalid cloud.
+  static Result<Fitter> Begin(const FitOptions& options, PictureCache pictures, double scene_scale, FitState state);
+  // A state at step 0.
+  static FitState Fresh(GaussianCloud cloud);
+
+  // Errors: those of PictureCache and ViewObjective; kBadArgument when pruning has left no Gaussian.
+  Result<FitStep> Step();
+
+  bool done() const { return state_.step >= options_.steps; }
+  const FitState& state() const { return state_; }
+  const FitOptions& options() const { return options_; }
+  PictureCache& pictures() { return pictures_; }
+  FitTimes times() const;
+  // Peak signal-to-noise ratio of the last step's picture, before the step.
+  double LastPsnr() const;
+  // The cloud, without rows that are not finite. Ends the fitter.
+  GaussianCloud TakeCloud();
+
+ private:
+  Fitter(const FitOptions& options, PictureCache pictures, double scene_scale, FitState state);
+
+  FitOptions options_;
+  PictureCache pictures_;
+  double scene_scale_;
+  FitState state_;
+  ViewOrder order_;
+  ViewObjective objective_;
+  CloudGradient gradient_;
+  Image picture_;
+  FitTimes times_;
+};
+
+// A state as a safetensors file: the cloud, Adam's moments and what densification gathered, exactly; in the metadata
+// the step and `settings`, a JSON object of what the fit depends on. Whole or not at all; replaces an older one.
+Status WriteFitCheckpoint(const std::filesystem::path& path, const FitState& state, const std::string& settings);
+
+// Errors: those of TensorFile; kBadFile when it is no such checkpoint; kBadArgument when its settings are others than
+// `settings`, naming the first that differs.
+Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std::string& settings);
+
+}  // namespace anchorsplat

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/buffer.h"
+#include "core/camera.h"
+#include "core/gaussian_cloud.h"
+#include "formats/colmap_model.h"
+
+namespace anchorsplat {
+
+// Where a fit's first Gaussians stand.
+struct InitialPoints {
+  Buffer<float> positions;  // [M,3] world
+  Buffer<float> colors;     // [M,3] rgb 0–1
+
+  int64_t size() const { return static_cast<int64_t>(positions.size() / 3); }
+};
+
+// Points of structure from motion. Positions beyond the range of floats are left out.
+InitialPoints PointsOf(std::span<const ColmapPoint> points);
+
+// `count` points of random colours, uniform within ±3 scene scales of the origin: gsplat's `init_type = "random"`,
+// which has 100,000 of them.
+inline constexpr int64_t kRandomPoints = 100000;
+InitialPoints RandomPoints(int64_t count, double scene_scale, uint64_t seed);
+
+// `count` points of random colours, uniform in the part of such a cube, around the cameras' mean centre, that many
+// cameras see: at least half as many as see the best-seen place. For views without points around something this is a
+// better start than the whole cube, most of which nobody looks at. Falls back to RandomPoints where no camera sees any
+// of it.
+InitialPoints RandomPointsInView(int64_t count, const std::vector<Camera>& cameras, double scene_scale, uint64_t seed);
+
+// Centres and constant colours of a splat, to begin another fit from; of rows that are finite.
+InitialPoints PointsOf(const GaussianCloud& cloud);
+
+// `count` of the points, evenly spread over their order; all of them when there are not as many.
+InitialPoints Thinned(const InitialPoints& points, int64_t count);
+
+}  // namespace anchorsplat

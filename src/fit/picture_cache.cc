@@ -1,0 +1,67 @@
+#include "fit/picture_cache.h"
+
+#include <utility>
+
+#include "core/parallel.h"
+#include "core/text.h"
+#include "formats/image_io.h"
+#include "formats/quantize.h"
+
+namespace anchorsplat {
+
+namespace {
+constexpr int64_t kGrain = 1 << 16;  // pixels per task
+constexpr float kByte = 1.0f / 255;
+}  // namespace
+
+PictureCache::PictureCache(std::vector<Camera> views, const std::array<float, 3>& background, int64_t budget)
+    : views_(std::move(views)), background_(background), left_(budget), stored_(views_.size()) {}
+
+Status PictureCache::Load(int64_t view, Image& picture) {
+  Stored& kept = stored_[static_cast<size_t>(view)];
+  const Camera& camera = views_[static_cast<size_t>(view)];
+  const Pinhole& size = camera.intrinsics;
+  if (kept.channels == 0) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Image image, ReadImage(camera.image));
+    if (image.width != size.width || image.height != size.height) {
+      return Error{ErrorCode::kBadFile, Cat(camera.image.string(), ": ", image.width, "x", image.height,
+                                            " pixels, expected ", size.width, "x", size.height)};
+    }
+    Stored fresh{image.channels, Buffer<uint8_t>(image.pixels.size())};
+    for (size_t i = 0; i < image.pixels.size(); ++i) fresh.pixels[i] = QuantizeByte(image.pixels[i] * 255);
+    Unpack(fresh, size, picture);
+    const auto bytes = static_cast<int64_t>(fresh.pixels.size());
+    if (bytes <= left_) {
+      left_ -= bytes;
+      kept = std::move(fresh);
+    }
+    return {};
+  }
+  Unpack(kept, size, picture);
+  return {};
+}
+
+void PictureCache::Unpack(const Stored& stored, const Pinhole& size, Image& picture) const {
+  if (picture.width != size.width || picture.height != size.height || picture.channels != 3) {
+    picture = Image(size.width, size.height, 3);
+  }
+  const int64_t plane = picture.plane();
+  ParallelFor(0, plane, kGrain, [&](int64_t begin, int64_t end) {
+    const uint8_t* alpha = stored.channels == 4 ? stored.pixels.data() + 3 * plane : nullptr;
+    for (int c = 0; c < 3; ++c) {
+      const uint8_t* in = stored.pixels.data() + c * plane;
+      float* out = picture.channel(c);
+      if (alpha == nullptr) {
+        for (int64_t i = begin; i < end; ++i) out[i] = static_cast<float>(in[i]) * kByte;
+        continue;
+      }
+      const float behind = background_[static_cast<size_t>(c)];
+      for (int64_t i = begin; i < end; ++i) {
+        const float a = static_cast<float>(alpha[i]) * kByte;
+        out[i] = static_cast<float>(in[i]) * kByte * a + behind * (1 - a);
+      }
+    }
+  });
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/buffer.h"
+#include "core/camera.h"
+#include "core/image.h"
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// The pictures of views, decoded when first asked for and kept as bytes while they fit into `budget`. What does not fit
+// is decoded each time: with views in random order no other choice of what to keep would be asked for more often. One
+// object per thread of control.
+class PictureCache {
+ public:
+  static constexpr int64_t kDefaultBudget = int64_t{4} << 30;  // bytes: 20,000 pictures of 256², 1,300 of 1024²
+
+  // Pixels with alpha are laid over `background`, before rounding: 8 bits are kept of colour and alpha each.
+  PictureCache(std::vector<Camera> views, const std::array<float, 3>& background, int64_t budget = kDefaultBudget);
+
+  const std::vector<Camera>& views() const { return views_; }
+
+  // The picture of views()[view] as [3,H,W] in 0–1. Errors: those of ReadImage; kBadFile when the picture has not its
+  // camera's size.
+  Status Load(int64_t view, Image& picture);
+
+ private:
+  struct Stored {
+    int channels = 0;        // 3, or 4 with alpha; 0: not kept
+    Buffer<uint8_t> pixels;  // [C,H,W]
+  };
+  void Unpack(const Stored& stored, const Pinhole& size, Image& picture) const;
+
+  std::vector<Camera> views_;
+  std::array<float, 3> background_;
+  int64_t left_;  // bytes of the budget
+  std::vector<Stored> stored_;
+};
+
+}  // namespace anchorsplat

@@ -1,0 +1,72 @@
+#include "fit/picture_cache.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "core/random.h"
+#include "formats/image_io.h"
+#include "formats/test_folder.h"
+
+namespace anchorsplat {
+namespace {
+
+Image RandomBytes(int width, int height, int channels, uint64_t seed) {
+  Image image(width, height, channels);
+  Random random(seed);
+  for (float& x : image.pixels) x = static_cast<float>(random.Below(256)) / 255;
+  return image;
+}
+
+Camera ViewOf(const std::filesystem::path& path, int width, int height) {
+  Camera camera;
+  camera.image = path;
+  camera.intrinsics = {width, height, 10, 10, 1, 1};
+  return camera;
+}
+
+void ExpectSamePicture(const Image& got, const Image& expected) {
+  ASSERT_EQ(got.width, expected.width);
+  ASSERT_EQ(got.height, expected.height);
+  ASSERT_EQ(got.channels, 3);
+  for (size_t i = 0; i < got.pixels.size(); ++i) ASSERT_NEAR(got.pixels[i], expected.pixels[i], 2e-7) << i;
+}
+
+TEST(PictureCache, KeepsWhatFitsAndGivesTheSameEitherWay) {
+  const TestFolder folder;
+  const std::array<float, 3> background = {0.2f, 0.5f, 1};
+  const Image plain = RandomBytes(17, 9, 3, 1), covered = RandomBytes(13, 11, 4, 2);
+  ASSERT_TRUE(WritePng(folder / "a.png", plain).ok());
+  ASSERT_TRUE(WritePng(folder / "b.png", covered).ok());
+  const std::vector<Camera> views = {ViewOf(folder / "a.png", 17, 9), ViewOf(folder / "b.png", 13, 11)};
+  PictureCache all(views, background), one(views, background, 17 * 9 * 3 + 100), none(views, background, 0);
+  Image picture;
+  for (PictureCache* cache : {&all, &one, &none}) {
+    for (int round = 0; round < 2; ++round) {
+      ASSERT_TRUE(cache->Load(0, picture).ok());
+      ExpectSamePicture(picture, plain);
+      ASSERT_TRUE(cache->Load(1, picture).ok());
+      ExpectSamePicture(picture, CompositeOver(covered, background));
+    }
+  }
+  // Without their files, only those can be had that are kept.
+  std::filesystem::remove(folder / "a.png");
+  std::filesystem::remove(folder / "b.png");
+  EXPECT_TRUE(all.Load(0, picture).ok() && all.Load(1, picture).ok());
+  EXPECT_TRUE(one.Load(0, picture).ok());
+  EXPECT_EQ(one.Load(1, picture).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(none.Load(0, picture).error().code, ErrorCode::kNotFound);
+}
+
+TEST(PictureCache, APictureOfAnotherSizeIsAnError) {
+  const TestFolder folder;
+  ASSERT_TRUE(WritePng(folder / "a.png", RandomBytes(5, 4, 3, 1)).ok());
+  PictureCache cache({ViewOf(folder / "a.png", 4, 5)}, {0, 0, 0});
+  Image picture;
+  const Status status = cache.Load(0, picture);
+  EXPECT_EQ(status.error().code, ErrorCode::kBadFile);
+  EXPECT_NE(status.error().message.find("5x4 pixels, expected 4x5"), std::string::npos) << status.error().message;
+}
+
+}  // namespace
+}  // namespace anchorsplat

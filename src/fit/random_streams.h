@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstdint>
+
+#include "core/random.h"
+
+namespace anchorsplat {
+
+// What a fit draws random numbers for. Each purpose and index (a step, an epoch) has a stream of its own that follows
+// from the seed alone: a fit that goes on from a checkpoint needs no generator's state to draw the same numbers.
+enum class RandomPurpose : uint64_t { kInitialQuats = 1, kInitialPoints = 2, kViewOrder = 3, kSplit = 4 };
+
+inline Random RandomStream(uint64_t seed, RandomPurpose purpose, int64_t index = 0) {
+  const uint64_t stream = (static_cast<uint64_t>(purpose) << 56) ^ static_cast<uint64_t>(index);
+  return Random(Random(seed).Next() ^ Random(~stream).Next());
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,158 @@
+#include "fit/training_views.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <system_error>
+#include <utility>
+
+#include "core/log.h"
+#include "core/text.h"
+#include "formats/camera_io.h"
+#include "formats/image_io.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool Exists(const fs::path& path) {
+  std::error_code ignored;
+  return fs::exists(path, ignored);
+}
+
+// Whether a folder is a project by itself, not only a folder of them.
+bool HasCameras(const fs::path& folder) {
+  for (const char* name : {"transforms.json", "transforms_train.json", "cameras.json"}) {
+    if (Exists(folder / name)) return true;
+  }
+  return IsColmapModel(folder / "sparse" / "0") || IsColmapModel(folder / "sparse") || IsColmapModel(folder);
+}
+
+// The smallest of the folders in it that are named by a number and are projects; `folder` itself if there is none.
+fs::path SmallestResolution(const fs::path& folder) {
+  fs::path found = folder;
+  int smallest = 0;
+  std::error_code code;
+  for (fs::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
+    const std::string name = it->path().filename().string();
+    int resolution = 0;
+    const auto [last, wrong] = std::from_chars(name.data(), name.data() + name.size(), resolution);
+    if (wrong != std::errc() || last != name.data() + name.size() || resolution < 1) continue;
+    if ((smallest > 0 && resolution >= smallest) || !HasCameras(it->path())) continue;
+    smallest = resolution;
+    found = it->path();
+  }
+  return found;
+}
+
+// A camera for the picture as it is.
+Status MatchPicture(Camera& camera) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize size, ReadImageSize(camera.image));
+  Pinhole& k = camera.intrinsics;
+  if (size.width == k.width && size.height == k.height) return {};
+  const double x = static_cast<double>(size.width) / k.width, y = static_cast<double>(size.height) / k.height;
+  if (std::abs(k.width * y - size.width) >= 1 && std::abs(k.height * x - size.height) >= 1) {
+    return Error{ErrorCode::kBadFile, Cat(camera.image.string(), ": the picture has ", size.width, "x", size.height,
+                                          " pixels, its camera ", k.width, "x", k.height, ", which is another shape")};
+  }
+  k = {size.width, size.height, k.fx * x, k.fy * y, k.cx * x, k.cy * y};
+  return {};
+}
+
+// The set's cameras with pictures, by name.
+Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source) {
+  std::vector<Camera> views;
+  for (Camera& camera : set.cameras) {
+    if (!camera.image.empty()) views.push_back(std::move(camera));
+  }
+  if (views.empty()) {
+    return Error{ErrorCode::kNotFound, Cat(source.string(), ": none of the ", set.cameras.size(),
+                                           " views has its picture where the file says")};
+  }
+  if (views.size() < set.cameras.size()) {
+    LogWarning(Cat(source.string(), ": ", set.cameras.size() - views.size(), " of ", set.cameras.size(),
+                   " views have no picture and are left out"));
+  }
+  std::stable_sort(views.begin(), views.end(), [](const Camera& a, const Camera& b) { return a.name < b.name; });
+  for (Camera& view : views) ANCHORSPLAT_RETURN_IF_ERROR(MatchPicture(view));
+  return views;
+}
+
+// The sparse model that ReadCameras takes for a project, if it takes one; else nothing.
+fs::path ModelFolder(const fs::path& project) {
+  std::error_code ignored;
+  if (!fs::is_directory(project, ignored)) return project.parent_path();
+  for (const auto& model : {project / "sparse" / "0", project / "sparse", project}) {
+    if (IsColmapModel(model)) return model;
+  }
+  return {};
+}
+
+void HoldOut(int every, std::vector<Camera> views, TrainingViews& out) {
+  for (size_t i = 0; i < views.size(); ++i) {
+    const bool held_out = every > 0 && i % static_cast<size_t>(every) == 0;
+    (held_out ? out.held_out : out.train).push_back(std::move(views[i]));
+  }
+}
+
+}  // namespace
+
+double SceneScale(const std::vector<Camera>& cameras) {
+  std::array<double, 3> mean{};
+  for (const Camera& camera : cameras) {
+    const auto center = camera.Center();
+    for (size_t k = 0; k < 3; ++k) mean[k] += center[k] / static_cast<double>(cameras.size());
+  }
+  double largest = 0;
+  for (const Camera& camera : cameras) {
+    const auto center = camera.Center();
+    largest = std::max(largest, std::hypot(center[0] - mean[0], center[1] - mean[1], center[2] - mean[2]));
+  }
+  return largest > 0 ? 1.1 * largest : 1.0;
+}
+
+Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions& options) {
+  std::error_code ignored;
+  fs::path source = project;
+  if (fs::is_directory(project, ignored) && !HasCameras(project)) source = SmallestResolution(project);
+
+  TrainingViews out;
+  const fs::path train_file = source / "transforms_train.json", test_file = source / "transforms_test.json";
+  if (Exists(train_file)) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(train_file));
+    out.background = set.background;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views, WithPictures(std::move(set), train_file));
+    out.scene_scale = SceneScale(views);
+    if (Exists(test_file)) {
+      out.train = std::move(views);
+      ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet test, ReadCameras(test_file));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(out.held_out, WithPictures(std::move(test), test_file));
+    } else {
+      HoldOut(options.hold_out, std::move(views), out);
+    }
+  } else {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(source));
+    out.background = set.background;
+    const bool colmap = set.source == CameraSource::kColmap;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views, WithPictures(std::move(set), source));
+    out.scene_scale = SceneScale(views);
+    HoldOut(options.hold_out, std::move(views), out);
+    if (colmap) {
+      const auto points = ReadColmapPoints(ModelFolder(source));
+      if (points.ok()) {
+        out.points = PointsOf(*points);
+      } else if (points.error().code != ErrorCode::kNotFound) {
+        return points.error();
+      }
+    }
+  }
+  if (out.train.empty()) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat(source.string(), ": holding out one view in ", options.hold_out, " leaves none to train on")};
+  }
+  return out;
+}
+
+}  // namespace anchorsplat

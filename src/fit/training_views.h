@@ -1,0 +1,46 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/camera.h"
+#include "core/result.h"
+#include "fit/initial_points.h"
+
+namespace anchorsplat {
+
+// What a fit starts from: views with pictures, and points where the project has them. World coordinates are the
+// project's own; nothing is centred, turned or scaled.
+struct TrainingViews {
+  std::vector<Camera> train;     // sorted by name; every one has a picture, and intrinsics for the picture's size
+  std::vector<Camera> held_out;  // the same, never trained on
+  std::optional<std::array<float, 3>> background;  // where the project says which one its pictures have
+  InitialPoints points;                            // may be none
+  double scene_scale = 1;  // 1.1 × the largest distance of a camera's centre from their mean; world units
+};
+
+struct ProjectOptions {
+  // Views whose place in the order of names is a multiple of this are held out; 0: none are. Projects with a
+  // transforms_test.json hold out those instead.
+  int hold_out = 8;
+};
+
+// Opens a project: a folder with transforms_train.json and perhaps transforms_test.json (NeRF-synthetic), a COLMAP
+// project (sparse/0, images), a transforms.json or cameras.json or its folder, or a folder of such folders named by
+// resolution (256/ and 1024/, or 200/ and 800/), of which the smallest is taken. Views of the camera file without a
+// picture are left out with a warning.
+//
+// Pictures of another size than the camera file says are taken as scaled ones when the shape agrees.
+//
+// Errors: those of ReadCameras and ReadColmapPoints; kNotFound when no view has a picture; kBadFile for a picture of
+// another shape than its camera; kBadArgument when hold_out leaves nothing to train on.
+Result<TrainingViews> OpenProject(const std::filesystem::path& project, const ProjectOptions& options = {});
+
+// 1.1 × the largest distance of a centre from their mean; 1 when all are in one place.
+double SceneScale(const std::vector<Camera>& cameras);
+
+}  // namespace anchorsplat

@@ -1,0 +1,114 @@
+#include "fit/training_views.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <fstream>
+
+#include "fit/orbit_scene_test.h"
+#include "formats/test_folder.h"
+
+namespace anchorsplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+void Put(const fs::path& path, const std::string& bytes) {
+  fs::create_directories(path.parent_path());
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+// A COLMAP project in text form with `views` views of 8×6 pixels on the x axis, names in falling order.
+void WriteColmap(const fs::path& project, int views, const std::string& model = "sparse/0") {
+  Put(project / model / "cameras.txt", "1 PINHOLE 8 6 10 11 4 3\n");
+  std::string images;
+  for (int i = views; i-- > 0;) {
+    const std::string name = "v" + std::to_string(10 + i) + ".png";
+    images += std::to_string(i + 1) + " 1 0 0 0 " + std::to_string(-i) + " 0 0 1 " + name + "\n\n";
+    fs::create_directories(project / "images");
+    ASSERT_TRUE(WritePng(project / "images" / name, Image(8, 6, 3)).ok());
+  }
+  Put(project / model / "images.txt", images);
+}
+
+TEST(TrainingViews, ColmapProject) {
+  const TestFolder folder;
+  WriteColmap(folder.path(), 10);
+  Put(folder / "sparse/0/points3D.txt", "1 0.5 1 2 255 0 0 0.1\n2 3 4 5 0 0 0 0.1\n");
+  for (const fs::path& path : {folder.path(), folder / "sparse/0", folder / "sparse/0/images.txt"}) {
+    const auto views = OpenProject(path);
+    ASSERT_TRUE(views.ok()) << views.error().message;
+    ASSERT_EQ(views->train.size(), 8u);
+    ASSERT_EQ(views->held_out.size(), 2u);
+    EXPECT_EQ(views->held_out[0].name, "v10");
+    EXPECT_EQ(views->held_out[1].name, "v18");
+    EXPECT_EQ(views->train[0].name, "v11");
+    EXPECT_EQ(views->train[0].intrinsics.width, 8);
+    EXPECT_EQ(views->points.size(), 2);
+    EXPECT_NEAR(views->scene_scale, 1.1 * 4.5, 1e-12) << "of all views, held out or not";
+  }
+  EXPECT_EQ(OpenProject(folder.path(), {.hold_out = 0})->train.size(), 10u);
+  EXPECT_EQ(OpenProject(folder.path(), {.hold_out = 1}).error().code, ErrorCode::kBadArgument);
+  Put(folder / "sparse/0/points3D.txt", "1 0.5 1\n");
+  EXPECT_EQ(OpenProject(folder.path()).error().code, ErrorCode::kBadFile);
+  fs::remove(folder / "sparse/0/points3D.txt");
+  EXPECT_EQ(OpenProject(folder.path())->points.size(), 0);
+}
+
+TEST(TrainingViews, SmallestResolutionOfADataset) {
+  const TestFolder folder;
+  WriteColmap(folder / "scene/1024", 3, "");
+  WriteColmap(folder / "scene/256", 4);
+  fs::create_directories(folder / "scene/64");
+  fs::create_directories(folder / "scene/notes");
+  const auto views = OpenProject(folder / "scene");
+  ASSERT_TRUE(views.ok()) << views.error().message;
+  EXPECT_EQ(views->train.size() + views->held_out.size(), 4u);
+  EXPECT_EQ(OpenProject(folder / "scene/1024")->train.size(), 2u);
+  EXPECT_EQ(OpenProject(folder / "scene/64").error().code, ErrorCode::kNotFound);
+}
+
+TEST(TrainingViews, NerfSyntheticHasItsOwnTestViews) {
+  const TestFolder folder;
+  orbit_scene::Write(folder.path(), orbit_scene::Ball(5, 1), 9, 12);
+  fs::rename(folder / "transforms.json", folder / "transforms_train.json");
+  auto views = OpenProject(folder.path());
+  ASSERT_TRUE(views.ok()) << views.error().message;
+  EXPECT_EQ(views->train.size(), 7u) << "no test views: every eighth is held out";
+  EXPECT_NEAR(views->scene_scale, 1.1 * 1.7, 0.1);
+  fs::copy(folder / "transforms_train.json", folder / "transforms_test.json");
+  fs::copy(folder / "transforms_train.json", folder / "transforms_val.json");
+  views = OpenProject(folder.path());
+  EXPECT_EQ(views->train.size(), 9u);
+  EXPECT_EQ(views->held_out.size(), 9u);
+}
+
+TEST(TrainingViews, PicturesOfAnotherSize) {
+  const TestFolder folder;
+  WriteColmap(folder.path(), 3);
+  const fs::path picture = folder / "images/v11.png";
+  ASSERT_TRUE(WritePng(picture, Image(4, 3, 3), {.overwrite = true}).ok());
+  const auto views = OpenProject(folder.path());
+  ASSERT_TRUE(views.ok()) << views.error().message;
+  const Pinhole k = views->train[0].intrinsics;
+  EXPECT_EQ(k.width, 4);
+  EXPECT_EQ(k.height, 3);
+  EXPECT_EQ(k.fx, 5);
+  EXPECT_EQ(k.cy, 1.5);
+  ASSERT_TRUE(WritePng(picture, Image(6, 8, 3), {.overwrite = true}).ok());
+  EXPECT_EQ(OpenProject(folder.path()).error().code, ErrorCode::kBadFile);
+  EXPECT_NE(OpenProject(folder.path()).error().message.find("v11.png"), std::string::npos);
+  fs::remove(picture);
+  EXPECT_EQ(OpenProject(folder.path())->train.size(), 1u) << "views without a picture are left out";
+  fs::remove_all(folder / "images");
+  EXPECT_EQ(OpenProject(folder.path()).error().code, ErrorCode::kNotFound);
+}
+
+TEST(TrainingViews, SceneScaleOfOnePlaceIsOne) {
+  Camera camera;
+  EXPECT_EQ(SceneScale({camera, camera}), 1);
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "fit/picture_cache.h"
+#include "render/rasterizer.h"
+
+namespace anchorsplat {
+
+// How alike renders and pictures are, as means over views; renders clamped to 0–1, not quantised.
+struct ViewQuality {
+  int64_t views = 0;
+  double psnr = 0;  // dB; 0 without views
+  double ssim = 0;  // of metrics/image_metrics.h
+};
+
+// Over all views of `pictures`. Errors: those of Rasterizer and PictureCache.
+Result<ViewQuality> MeasureQuality(const GaussianCloud& cloud, const RenderOptions& options, PictureCache& pictures);
+
+}  // namespace anchorsplat

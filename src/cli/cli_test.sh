@@ -45,7 +45,7 @@ silent() {
 expect 0 "version" "$program" --version
 says stdout "anchorsplat 0."
 expect 0 "help" "$program" --help
-for verb in enhance convert info render compare view views bench; do
+for verb in enhance convert info render compare view views fit bench; do
   says stdout "$verb"
   expect 0 "help of $verb" "$program" $verb --help
   says stdout "Example:"
@@ -218,6 +218,53 @@ expect 2 "unknown rig" "$program" views "$work/mesh/quad.obj" -o "$work/quad2" -
 expect 3 "no mesh" "$program" views "$work/mesh/none.obj" -o "$work/quad2"
 printf 'v 0 0 0\n' >"$work/mesh/point.obj"
 expect 4 "a mesh without triangles" "$program" views "$work/mesh/point.obj" -o "$work/quad2"
+
+# fit: a tiny project made by the program itself.
+mkdir "$work/project"
+expect 0 "pictures to fit" "$program" render "$input" -o "$work/project/hr" --cameras "$cameras" --size 64x64
+sed -e 's/"w": 1024/"w": 64/; s/"h": 1024/"h": 64/' "$cameras" >"$work/project/transforms.json"
+fit() { "$program" fit "$work/project" --init-points 500 --hold-out 5 "$@"; }
+expect 0 "fit" fit --steps 60 -o "$work/fit.ply" --gsplat-checkpoint "$work/ckpt_59_rank0.pt" --json
+says stderr "training views"
+says stdout '"initial_points": "view"'
+says stdout '"held_out"'
+checks=$((checks + 1))
+[ ! -e "$work/fit.ply.checkpoint" ] || { failures=$((failures + 1)); echo "FAILED: a finished fit left its checkpoint"; }
+expect 0 "fit made the same splat twice" "$program" compare "$work/fit.ply" "$work/ckpt_59_rank0.pt" --orbit 1 --size 64x64 --json
+says stdout '"psnr": null'
+expect 0 "the fit shows what was fitted" "$program" compare "$work/fit.ply" "$work/project/hr" --cameras "$work/project/transforms.json"
+expect 5 "fit does not overwrite" fit --steps 60 -o "$work/fit.ply"
+expect 2 "fit to an unknown format" fit --steps 60 -o "$work/fit.xyz"
+expect 2 "fit from points that are not there" fit --steps 60 -o "$work/x.ply" --init points
+says stderr "has none"
+expect 2 "fit with everything held out" "$program" fit "$work/project" -o "$work/x.ply" --hold-out 1
+expect 2 "no steps" fit -o "$work/x.ply" --steps 0
+expect 2 "refinement never" fit --steps 60 -o "$work/x.ply" --refine-every 0
+expect 3 "no project" "$program" fit "$work/none" -o "$work/x.ply"
+expect 3 "a project without pictures" "$program" fit "$work/empty" -o "$work/x.ply"
+expect 0 "views to fit" "$program" views "$work/mesh/quad.obj" -o "$work/object" --views 9 --size 32 --low-size 16 --points 100
+expect 0 "fit of our own layout" "$program" fit "$work/object" --steps 30 -o "$work/object.ply" --json
+says stdout '"initial_points": "points"'
+# Ctrl-C while it runs, then on from there: the same file as in one go.
+expect 0 "fit in one go" fit -o "$work/whole.ply" --steps 400 --seed 7 -q
+interrupted() {
+  "$program" fit "$work/project" --init-points 500 --hold-out 5 -o "$work/halves.ply" --steps 400 --seed 7 \
+    --checkpoint-every 1 --checkpoint "$work/state" -q &
+  local child=$!
+  while kill -0 $child 2>/dev/null && [ ! -e "$work/state" ]; do :; done
+  kill -INT $child
+  wait $child
+}
+expect 130 "an interrupted fit" interrupted
+says stderr "--resume"
+expect 0 "what an interrupted fit leaves" "$program" info "$work/halves.ply"
+expect 5 "an interrupted fit is not forgotten" fit -o "$work/halves.ply" --steps 400 --seed 7 --checkpoint "$work/state"
+expect 2 "an interrupted fit is not mistaken for another" fit -o "$work/halves.ply" --steps 400 --seed 8 --checkpoint "$work/state" --resume
+says stderr "seed"
+expect 0 "an interrupted fit goes on" fit -o "$work/halves.ply" --steps 400 --seed 7 --checkpoint "$work/state" --resume
+says stderr "going on"
+checks=$((checks + 1))
+cmp -s "$work/whole.ply" "$work/halves.ply" || { failures=$((failures + 1)); echo "FAILED: an interruption changes the splat"; }
 
 # Same bits for any number of threads.
 expect 0 "one thread" "$program" render "$input" -o "$work/t1.png" --orbit 1 --size 200x150 --threads 1

@@ -94,6 +94,7 @@ int RunProgram(int argc, const char* const* argv) {
   AddCompare(app, program);
   AddView(app, program);
   AddViews(app, program);
+  AddFit(app, program);
   AddBench(app, program);
   try {
     app.parse(argc, argv);

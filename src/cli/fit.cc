@@ -1,0 +1,185 @@
+#include "fit/fit.h"
+
+#include <csignal>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/choice.h"
+#include "cli/fit_flags.h"
+#include "cli/parse.h"
+#include "cli/verb.h"
+#include "core/log.h"
+#include "core/text.h"
+#include "fit/initial_cloud.h"
+#include "formats/cloud_io.h"
+#include "formats/gsplat_checkpoint_writer.h"
+#include "formats/registry.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// Ctrl-C asks for an orderly end; the second one ends at once.
+std::atomic<bool> stop_requested{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may not lock");
+
+void RequestStop(int signal) {
+  stop_requested = true;
+  std::signal(signal, SIG_DFL);
+}
+
+// What can be known to fail before hours of work.
+Status CheckOutputs(const FitFlags& flags, const fs::path& checkpoint, bool overwrite) {
+  const SplatFormat* format = FormatOfExtension(flags.output);
+  if (format == nullptr || format->write == nullptr) {
+    return Error{ErrorCode::kBadArgument, Cat("-o ", flags.output, ": not a format that is written (.ply is)")};
+  }
+  const bool continued = flags.resume && fs::exists(checkpoint);
+  if (fs::exists(checkpoint) && !flags.resume && !overwrite) {
+    return Error{ErrorCode::kExists, Cat(checkpoint.string(),
+                                         " is left from a fit that was interrupted: --resume goes on from it, "
+                                         "-w begins anew")};
+  }
+  for (const std::string& path : {flags.output, flags.gsplat_checkpoint}) {
+    if (path.empty()) continue;
+    // A continued fit replaces what its interruption left.
+    if (fs::exists(path) && !overwrite && !continued) {
+      return Error{ErrorCode::kExists, Cat(path, " exists; -w replaces it")};
+    }
+    const fs::path folder = fs::path(path).parent_path();
+    if (!folder.empty() && !fs::is_directory(folder)) {
+      return Error{ErrorCode::kNotFound, Cat(path, ": there is no folder ", folder.string())};
+    }
+  }
+  return {};
+}
+
+// Where the Gaussians begin, and in words.
+struct Start {
+  InitialPoints points;
+  std::string origin;
+};
+
+Result<Start> ChooseStart(const FitFlags& flags, const TrainingViews& views, uint64_t seed) {
+  const auto thinned = [&](const InitialPoints& points) {
+    return flags.init_points ? Thinned(points, *flags.init_points) : points;
+  };
+  if (!flags.init_splat.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(flags.init_splat));
+    return Start{thinned(PointsOf(cloud)), "splat"};
+  }
+  if (flags.init == FitInit::kPoints && views.points.size() == 0) {
+    return Error{ErrorCode::kBadArgument, Cat(flags.project, ": --init points, but the project has none")};
+  }
+  if (flags.init == FitInit::kPoints || (flags.init == FitInit::kAuto && views.points.size() > 0)) {
+    return Start{thinned(views.points), "points"};
+  }
+  const int64_t count = flags.init_points.value_or(kRandomPoints);
+  if (flags.init == FitInit::kRandom) return Start{RandomPoints(count, views.scene_scale, seed), "random"};
+  return Start{RandomPointsInView(count, views.train, views.scene_scale, seed), "view"};
+}
+
+nlohmann::json ToJson(const ViewQuality& quality) {
+  return {{"views", quality.views}, {"psnr", quality.psnr}, {"ssim", quality.ssim}};
+}
+
+nlohmann::json ToJson(const FitFlags& flags, const std::string& origin, const FitReport& r) {
+  const auto& t = r.times;
+  nlohmann::json json = {
+      {"project", flags.project},
+      {"output", flags.output},
+      {"steps", r.steps},
+      {"resumed_at", r.resumed_at},
+      {"initial_points", origin},
+      {"scene_scale", r.scene_scale},
+      {"gaussians",
+       {{"in", r.gaussians_in},
+        {"out", r.gaussians_out},
+        {"duplicated", r.duplicated},
+        {"split", r.split},
+        {"pruned", r.pruned}}},
+      {"loss", r.loss},
+      {"seconds", r.seconds},
+      {"stages",
+       {{"load", t.load},
+        {"render", t.objective.render},
+        {"loss", t.objective.loss},
+        {"backward", t.objective.backward},
+        {"adam", t.adam},
+        {"densify", t.densify}}},
+  };
+  json["train"] = ToJson(r.train);
+  json["held_out"] = r.held_out.views > 0 ? ToJson(r.held_out) : nlohmann::json();
+  return json;
+}
+
+void PrintReport(const FitFlags& flags, const FitReport& r) {
+  std::cout << flags.output << ": " << WithThousands(r.gaussians_out) << " Gaussians after " << WithThousands(r.steps)
+            << " steps in " << HumanSeconds(r.seconds) << "\n  training views: " << r.train.views << ", "
+            << Fixed(r.train.psnr, 2) << " dB, SSIM " << Fixed(r.train.ssim, 4) << "\n";
+  if (r.held_out.views > 0) {
+    std::cout << "  held-out views: " << r.held_out.views << ", " << Fixed(r.held_out.psnr, 2) << " dB, SSIM "
+              << Fixed(r.held_out.ssim, 4) << "\n";
+  }
+}
+
+Status WriteResults(const FitFlags& flags, const Fitted& fitted) {
+  // Whether files may be replaced was decided at the start.
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(flags.output, fitted.cloud, {.overwrite = true}));
+  if (flags.gsplat_checkpoint.empty()) return {};
+  return WriteGsplatCheckpoint(flags.gsplat_checkpoint, fitted.cloud, std::max<int64_t>(0, fitted.report.steps - 1),
+                               {.overwrite = true});
+}
+
+Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
+  FitControl control;
+  control.checkpoint = flags.checkpoint.empty() ? flags.output + ".checkpoint" : flags.checkpoint;
+  control.checkpoint_every = flags.checkpoint_every;
+  control.resume = flags.resume;
+  control.stop = &stop_requested;
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckOutputs(flags, control.checkpoint, shared.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(flags.project, {.hold_out = flags.hold_out}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const FitOptions options, MakeFitOptions(flags, views.background, shared.seed));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Start start, ChooseStart(flags, views, shared.seed));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial,
+                               InitialCloud(start.points, views.scene_scale,
+                                            {.sh_degree = options.objective.render.sh_degree, .seed = shared.seed}));
+  LogInfo(Cat(views.train.size(), " training views, ", views.held_out.size(), " held out, scene scale ",
+              Fixed(views.scene_scale, 3), ", ", WithThousands(initial.size()), " initial Gaussians"));
+
+  std::signal(SIGINT, RequestStop);
+  std::signal(SIGTERM, RequestStop);
+  auto fitted = Fit(views, std::move(initial), options, control);
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+  if (!fitted.ok()) return fitted.error();
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteResults(flags, *fitted));
+  if (fitted->report.interrupted) {
+    return Error{
+        ErrorCode::kInterrupted,
+        Cat("stopped after ", WithThousands(fitted->report.steps), " of ", WithThousands(options.steps), " steps; ",
+            flags.output, " is what there was, --resume goes on from ", control.checkpoint.string())};
+  }
+  if (shared.json) {
+    PrintJson(ToJson(flags, start.origin, fitted->report));
+  } else if (!shared.quiet) {
+    PrintReport(flags, fitted->report);
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddFit(CLI::App& app, Program& program) {
+  CLI::App& verb = AddVerb(app, program, "fit", "Optimise a splat from pictures (standard 3DGS)",
+                           "anchorsplat fit scan/ -o scan.ply --max-gaussians 200000");
+  const auto flags = std::make_shared<FitFlags>();
+  flags->AddTo(verb);
+  verb.callback([flags, &program] { program.run = [flags, &program] { return RunFit(*flags, program.flags); }; });
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,123 @@
+#include "cli/fit_flags.h"
+
+#include "cli/choice.h"
+#include "cli/parse.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr int64_t kMostSteps = int64_t{1} << 40;
+
+void AddScheduleFlags(CLI::App& verb, FitFlags& f) {
+  const std::string group = "Densification (names of gsplat's DefaultStrategy; steps default to its schedule, scaled)";
+  DensificationOptions& d = f.standard.densification;
+  const auto steps = [&](const char* name, std::optional<int64_t>& value, const char* help) {
+    verb.add_option(name, value, help)->check(CLI::Range(int64_t{1}, kMostSteps))->group(group);
+  };
+  const auto number = [&](const char* name, double& value, const char* help) {
+    verb.add_option(name, value, help)->check(CLI::NonNegativeNumber)->capture_default_str()->group(group);
+  };
+  steps("--refine-start", f.refine_start, "First growth after this step");
+  steps("--refine-stop", f.refine_stop, "No growth from this step on");
+  steps("--refine-every", f.refine_every, "Steps between growths");
+  steps("--reset-every", f.reset_every, "Steps between resets of opacity");
+  steps("--sh-degree-interval", f.sh_degree_interval, "Steps per degree of spherical harmonics");
+  AddChoice(
+      verb, "--opacity-reset", d.opacity_reset,
+      {{"positive", OpacityReset::kPositive}, {"from-zero", OpacityReset::kFromZero}, {"never", OpacityReset::kNever}},
+      "positive: gsplat's main branch; from-zero: up to 1.5.2, at step 0 too; never: 1.5.3")
+      ->group(group);
+  number("--grow-grad2d", d.grow_grad2d, "Gradient in the picture above which a Gaussian grows");
+  number("--grow-scale3d", d.grow_scale3d, "Size, in scene scales, above which it is split, not duplicated");
+  number("--prune-opa", d.prune_opa, "Opacity below which it goes");
+  number("--prune-scale3d", d.prune_scale3d, "Size, in scene scales, above which it goes");
+  verb.add_flag("--revised-opacity", d.revised_opacity, "Halves of a split share its opacity")->group(group);
+}
+
+void AddRateFlags(CLI::App& verb, FitFlags& f) {
+  const std::string group = "Learning rates";
+  LearningRates& r = f.standard.rates;
+  const auto rate = [&](const char* name, double& value, const char* help) {
+    verb.add_option(name, value, help)->check(CLI::NonNegativeNumber)->capture_default_str()->group(group);
+  };
+  rate("--rate-means", r.means, "Of centres, in scene scales");
+  rate("--rate-means-decay", r.means_decay, "What is left of it at the last step");
+  rate("--rate-scales", r.scales, "Of log-scales");
+  rate("--rate-quats", r.quats, "Of quaternions");
+  rate("--rate-opacities", r.opacities, "Of opacity logits");
+  rate("--rate-sh0", r.sh0, "Of the constant colour");
+  rate("--rate-sh-rest", r.sh_rest, "Of higher spherical harmonics");
+}
+
+}  // namespace
+
+void FitFlags::AddTo(CLI::App& verb) {
+  verb.add_option("project", project,
+                  "Folder with pictures and cameras: COLMAP, NeRF-synthetic, transforms.json, our data sets")
+      ->required()
+      ->check(NotEmpty());
+  verb.add_option("-o,--output", output, "Splat to write")->required()->check(NotEmpty());
+  verb.add_option("--steps", steps, "Optimisation steps; all schedules follow")
+      ->check(CLI::Range(int64_t{1}, kMostSteps))
+      ->capture_default_str();
+  verb.add_option("--max-gaussians", standard.densification.max_gaussians, "Growth stops there; 0: no bound")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  verb.add_option("--hold-out", hold_out, "Hold out every so-manieth view, by name; 0: none")
+      ->check(CLI::Range(0, 1 << 30))
+      ->capture_default_str();
+  auto* init_option = AddChoice(
+      verb, "--init", init,
+      {{"auto", FitInit::kAuto}, {"points", FitInit::kPoints}, {"view", FitInit::kView}, {"random", FitInit::kRandom}},
+      "First Gaussians: the project's points, random where many cameras look, random in "
+      "gsplat's cube; auto: points, else view");
+  verb.add_option("--init-splat", init_splat, "First Gaussians at the centres of this splat")
+      ->check(NotEmpty())
+      ->excludes(init_option);
+  verb.add_option("--init-points", init_points, "How many (default: all points; 100000 random ones)")
+      ->check(CLI::Range(int64_t{1}, int64_t{1} << 28));
+  verb.add_option("--background", background, "R,G,B from 0 to 1 (default: what the project says, else black)");
+  verb.add_option("--sh-degree", standard.objective.render.sh_degree, "Highest degree of spherical harmonics")
+      ->check(CLI::Range(0, kMaxShDegree))
+      ->capture_default_str();
+  verb.add_option("--ssim-weight", standard.objective.loss.ssim_weight, "w of the loss (1 - w) L1 + w (1 - SSIM)")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  AddChoice(verb, "--mode", standard.objective.render.mode,
+            {{"classic", RenderMode::kClassic}, {"antialiased", RenderMode::kAntialiased}}, "Rasterization");
+  AddChoice(verb, "--profile", standard.objective.render.profile,
+            {{"gsplat14", RasterProfile::kGsplat14}, {"gsplat15", RasterProfile::kGsplat15}},
+            "Extent of a Gaussian: 3 sigma as gsplat 1.0-1.4, or opacity-aware as 1.5");
+  verb.add_option("--gsplat-checkpoint", gsplat_checkpoint, "Also write a checkpoint as gsplat's trainer does (.pt)")
+      ->check(NotEmpty());
+  verb.add_option("--checkpoint", checkpoint, "State to resume from (default: OUTPUT.checkpoint)")->check(NotEmpty());
+  verb.add_option("--checkpoint-every", checkpoint_every, "Steps between checkpoints; 0: only when interrupted")
+      ->check(CLI::Range(int64_t{0}, kMostSteps))
+      ->capture_default_str();
+  verb.add_flag("--resume", resume, "Go on from the checkpoint if there is one");
+  AddScheduleFlags(verb, *this);
+  AddRateFlags(verb, *this);
+}
+
+Result<FitOptions> MakeFitOptions(const FitFlags& flags, const std::optional<std::array<float, 3>>& background,
+                                  uint64_t seed) {
+  FitOptions options = flags.standard;
+  const FitOptions scaled = FitOptionsFor(flags.steps);
+  options.steps = flags.steps;
+  options.seed = seed;
+  options.sh_degree_interval = flags.sh_degree_interval.value_or(scaled.sh_degree_interval);
+  DensificationOptions& d = options.densification;
+  d.refine_start_iter = flags.refine_start.value_or(scaled.densification.refine_start_iter);
+  d.refine_stop_iter = flags.refine_stop.value_or(scaled.densification.refine_stop_iter);
+  d.refine_every = flags.refine_every.value_or(scaled.densification.refine_every);
+  d.reset_every = flags.reset_every.value_or(scaled.densification.reset_every);
+  options.objective.render.background = background.value_or(options.objective.render.background);
+  if (!flags.background.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(options.objective.render.background, ParseColor("--background", flags.background));
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(options));
+  return options;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "core/result.h"
+#include "fit/fit_options.h"
+
+namespace anchorsplat {
+
+// Where a fit's Gaussians begin.
+enum class FitInit {
+  kAuto,    // the project's points, else kView
+  kPoints,  // the project's points
+  kView,    // random points where many cameras look
+  kRandom,  // random points in gsplat's cube
+};
+
+// The options of `fit`.
+struct FitFlags {
+  std::string project;
+  std::string output;
+  std::string gsplat_checkpoint;
+  std::string checkpoint;
+  int64_t checkpoint_every = 0;
+  bool resume = false;
+  int hold_out = 8;
+  FitInit init = FitInit::kAuto;
+  std::string init_splat;
+  std::optional<int64_t> init_points;
+  std::string background;
+
+  // What becomes FitOptions. Those without a value keep what follows from the number of steps.
+  int64_t steps = kDefaultFitSteps;
+  FitOptions standard = FitOptionsFor(kDefaultFitSteps);  // values whose default does not depend on the steps
+  std::optional<int64_t> sh_degree_interval, refine_start, refine_stop, refine_every, reset_every;
+
+  void AddTo(CLI::App& verb);
+};
+
+// The options for a project whose pictures have `background`, where it says so. Errors (kBadArgument) name the option.
+Result<FitOptions> MakeFitOptions(const FitFlags& flags, const std::optional<std::array<float, 3>>& background,
+                                  uint64_t seed);
+
+}  // namespace anchorsplat

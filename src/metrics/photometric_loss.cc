@@ -36,21 +36,42 @@ Status Check(const Image& rendered, const Image& target, const PhotometricLossOp
   return {};
 }
 
-// The smallest box that holds all pixels of rows [first, last) that differ. NaN differs.
+// The first of n numbers that differ, n if none does. NaN differs.
+int FirstDifference(const float* p, const float* q, int n) {
+  constexpr int kRun = 32;  // compared without asking in between
+  int i = 0;
+  for (; i + kRun <= n; i += kRun) {
+    unsigned differ = 0;
+    for (int k = 0; k < kRun; ++k) differ |= static_cast<unsigned>(p[i + k] != q[i + k]);
+    if (differ != 0) break;
+  }
+  while (i < n && p[i] == q[i]) ++i;
+  return i;
+}
+
+// 1 + the last of [from, n) that differs, `from` if none does.
+int EndOfDifference(const float* p, const float* q, int from, int n) {
+  constexpr int kRun = 32;
+  for (; n - kRun >= from; n -= kRun) {
+    unsigned differ = 0;
+    for (int k = 1; k <= kRun; ++k) differ |= static_cast<unsigned>(p[n - k] != q[n - k]);
+    if (differ != 0) break;
+  }
+  while (n > from && p[n - 1] == q[n - 1]) --n;
+  return n;
+}
+
+// The smallest box that holds all pixels of rows [first, last) that differ.
 PixelBox BoxOfDifference(const Image& a, const Image& b, int first, int last) {
   PixelBox box = {a.width, last, 0, first};
   for (int c = 0; c < kChannels; ++c) {
     for (int y = first; y < last; ++y) {
       const float* p = a.channel(c) + int64_t{y} * a.width;
       const float* q = b.channel(c) + int64_t{y} * b.width;
-      // Only what is not known to be inside is looked at.
-      int from = 0;
-      while (from < a.width && p[from] == q[from]) ++from;
+      const int from = FirstDifference(p, q, a.width);
       if (from == a.width) continue;
-      int to = a.width;
-      while (to > box.x1 && p[to - 1] == q[to - 1]) --to;
       box.x0 = std::min(box.x0, from);
-      box.x1 = std::max(box.x1, to);
+      box.x1 = EndOfDifference(p, q, std::max(box.x1, from + 1), a.width);  // what lies before is known to be inside
       box.y0 = std::min(box.y0, y);
       box.y1 = std::max(box.y1, y + 1);
     }
@@ -100,7 +121,9 @@ Result<PhotometricLossValue> PhotometricLoss(const Image& rendered, const Image&
   const double values = kChannels * static_cast<double>(rendered.plane());
   const double windows = kChannels * static_cast<double>(counted.x1 - counted.x0) * (counted.y1 - counted.y0);
 
+  // Strips of nearly the same width, in whole registers.
   const int strips = (box.x1 - box.x0 + kSsimStrip - 1) / kSsimStrip;
+  const int strip_width = ((box.x1 - box.x0 + strips - 1) / strips + 15) / 16 * 16;
   const int rows = (box.y1 - box.y0 + kRowsPerTask - 1) / kRowsPerTask;
   const int64_t tasks = int64_t{kChannels} * rows * strips;
   std::vector<SsimGradientSums> parts(static_cast<size_t>(tasks));
@@ -113,8 +136,8 @@ Result<PhotometricLossValue> PhotometricLoss(const Image& rendered, const Image&
     task.width = width;
     task.height = height;
     task.map = map;
-    task.out.x0 = box.x0 + strip * kSsimStrip;
-    task.out.x1 = std::min(box.x1, task.out.x0 + kSsimStrip);
+    task.out.x0 = std::min(box.x1, box.x0 + strip * strip_width);
+    task.out.x1 = std::min(box.x1, task.out.x0 + strip_width);
     task.out.y0 = box.y0 + row * kRowsPerTask;
     task.out.y1 = std::min(box.y1, task.out.y0 + kRowsPerTask);
     task.ssim_weight = options.ssim_weight > 0 ? static_cast<float>(-options.ssim_weight / windows) : 0.0f;

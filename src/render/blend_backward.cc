@@ -35,7 +35,8 @@ enum Feature : size_t { kOne = 0, kX = 2, kY = 4, kXX = 6, kXY = 8, kYY = 10, kR
 struct Tile : TileBatch<kBatch> {
   bool finished[kBlocks];  // nothing is left to do: no gradient, or all Gaussians of the batch lie behind
 
-  alignas(64) float features[kBlocks][kPixels][kSums];
+  alignas(64) float features[kBlocks][kPixels][kSums];  // of the pixels in the order of StorePairs
+  size_t order[kPixels];
   alignas(64) float sums[kBatch + 3][kSums];
   bool touched[kBatch];  // the Gaussian has sums
 
@@ -55,18 +56,45 @@ struct Tile : TileBatch<kBatch> {
 
 constexpr float kMiddle = 0.5f * kTile;
 
+// Two numbers per pixel, side by side. The pixels of a register come out in another order, see PixelOrder; which one
+// does not matter, and to restore theirs would cost more shuffles.
+HWY_INLINE void StorePairs(V first, V second, float* to) {
+  const D d;
+#if HWY_TARGET == HWY_SCALAR
+  hn::StoreU(first, d, to);
+  hn::StoreU(second, d, to + 1);
+#else
+  hn::StoreU(hn::InterleaveLower(d, first, second), d, to);
+  hn::StoreU(hn::InterleaveUpper(d, first, second), d, to + hn::Lanes(d));
+#endif
+}
+
+// order[k] is the pixel whose numbers StorePairs puts at place k.
+void PixelOrder(size_t* order) {
+  const D d;
+  const size_t lanes = hn::Lanes(d);
+  alignas(64) float pixels[2 * kLanesAtMost];
+  for (size_t first = 0; first < kPixels; first += lanes) {
+    const V pixel = hn::Iota(d, static_cast<float>(first));
+    StorePairs(pixel, pixel, pixels);
+    for (size_t k = 0; k < lanes; ++k) order[first + k] = static_cast<size_t>(pixels[2 * k]);
+  }
+}
+
 // What is the same for all tiles.
 void Prepare(Tile& t) {
+  PixelOrder(t.order);
   for (size_t k = 0; k < 3; ++k) {
     std::fill_n(t.factors[kGroup + k], 2 * kPixels, 0.0f);
     std::fill_n(t.sums[kBatch + k], kSums, 0.0f);
     t.members[kGroup + k] = kBatch + k;
   }
   for (size_t block = 0; block < kBlocks; ++block) {
-    for (size_t i = 0; i < kPixels; ++i) {
+    for (size_t k = 0; k < kPixels; ++k) {
+      const size_t i = t.order[k];
       const float x = kPixelOffsets.x[i] + static_cast<float>(block % kBlocksPerSide * kBlock) - kMiddle;
       const float y = kPixelOffsets.y[i] + static_cast<float>(block / kBlocksPerSide * kBlock) - kMiddle;
-      float* f = t.features[block][i];
+      float* f = t.features[block][k];
       std::fill_n(f, kSums, 0.0f);
       f[kOne] = 1;
       f[kX] = x;
@@ -159,7 +187,7 @@ HWY_INLINE void EvaluateLanes(const Limits& limits, size_t block, size_t first, 
     const V q = hn::NegMulAdd(behind, hn::Mul(alpha, inverse), own);
     behind = hn::Add(behind, own);
     const V free_q = hn::IfThenElseZero(hn::Le(uncapped, max_alpha), q);  // and 0 where nothing was added
-    hn::StoreInterleaved2(free_q, weight, d, factors);
+    StorePairs(free_q, weight, factors);
   }
   hn::Store(transmittance, d, t.transmittance[block] + first);
   hn::Store(behind, d, t.behind[block] + first);
@@ -246,9 +274,12 @@ int32_t StartTile(const BlendBackwardParams& p, int tile_x, int tile_y, double* 
       background[2] += transmittance * blue;
       t.behind[block][i] = transmittance * (p.background[0] * red + p.background[1] * green + p.background[2] * blue -
                                             t.behind[block][i]);
-      t.features[block][i][kRed] = red;
-      t.features[block][i][kGreen] = green;
-      t.features[block][i][kBlue] = blue;
+    }
+    for (size_t k = 0; k < kPixels; ++k) {
+      const size_t i = t.order[k];
+      t.features[block][k][kRed] = t.color_gradient[0][block][i];
+      t.features[block][k][kGreen] = t.color_gradient[1][block][i];
+      t.features[block][k][kBlue] = t.color_gradient[2][block][i];
     }
     for (int c = 0; c < 3; ++c) background_gradient[c] += static_cast<double>(background[c]);
     t.flat[block] = flat;
@@ -258,8 +289,8 @@ int32_t StartTile(const BlendBackwardParams& p, int tile_x, int tile_y, double* 
   return last_of_tile;
 }
 
-// From the sums about the middle of the tile to those of BlendGradient.
-BlendGradient Whiten(const Tile& t, size_t j) {
+// From the sums about the middle of the tile to those of BlendGradient, which are added to `to`.
+HWY_INLINE void AddWhitened(const Tile& t, size_t j, BlendGradient& to) {
   const float* s = t.sums[j];
   const float xx = t.u_xx[j], xy = t.u_xy[j], yy = t.u_yy[j];
   const float dx = kMiddle - t.x[j], dy = kMiddle - t.y[j];
@@ -271,27 +302,15 @@ BlendGradient Whiten(const Tile& t, size_t j) {
   const float ouu = xx * xx * s[kXX] + 2 * xx * xy * s[kXY] + xy * xy * s[kYY];
   const float ouv = yy * (xx * s[kXY] + xy * s[kYY]);
   const float ovv = yy * yy * s[kYY];
-  BlendGradient g;
-  g.q = s[kOne];
-  g.qu = ou + u * s[kOne];
-  g.qv = ov + v * s[kOne];
-  g.quu = ouu + u * (2 * ou + u * s[kOne]);
-  g.quv = ouv + v * ou + u * (ov + v * s[kOne]);
-  g.qvv = ovv + v * (2 * ov + v * s[kOne]);
-  g.rgb[0] = s[kRed];
-  g.rgb[1] = s[kGreen];
-  g.rgb[2] = s[kBlue];
-  return g;
-}
-
-void Add(const BlendGradient& from, BlendGradient& to) {
-  to.q += from.q;
-  to.qu += from.qu;
-  to.qv += from.qv;
-  to.quu += from.quu;
-  to.quv += from.quv;
-  to.qvv += from.qvv;
-  for (int c = 0; c < 3; ++c) to.rgb[c] += from.rgb[c];
+  to.q += s[kOne];
+  to.qu += ou + u * s[kOne];
+  to.qv += ov + v * s[kOne];
+  to.quu += ouu + u * (2 * ou + u * s[kOne]);
+  to.quv += ouv + v * ou + u * (ov + v * s[kOne]);
+  to.qvv += ovv + v * (2 * ov + v * s[kOne]);
+  to.rgb[0] += s[kRed];
+  to.rgb[1] += s[kGreen];
+  to.rgb[2] += s[kBlue];
 }
 
 void BackwardTile(const BlendBackwardParams& p, int64_t tile, Tile& t) {
@@ -312,6 +331,9 @@ void BackwardTile(const BlendBackwardParams& p, int64_t tile, Tile& t) {
     const size_t n = static_cast<size_t>(std::min(kStep, last - place));
     const int32_t* rows = p.pairs + list_begin + place;
     ReadBatch(p.projected, rows, n, tile_x, tile_y, t);
+    if (p.partial == nullptr) {
+      for (size_t j = 0; j < n; ++j) hwy::Prefetch(p.gradients + rows[j]);
+    }
     for (size_t block = 0; block < kBlocks; ++block) t.finished[block] = t.last[block] <= place;
     ListBlocks(limits.log2_min_alpha, n, t.finished, t);
     std::fill_n(&t.sums[0][0], n * kSums, 0.0f);
@@ -320,12 +342,14 @@ void BackwardTile(const BlendBackwardParams& p, int64_t tile, Tile& t) {
       if (t.list_sizes[block] > 0) AddBlock(limits, block, place, t);
     }
     if (p.partial != nullptr) {
+      BlendGradient* partial = p.partial + list_begin + place;
+      std::fill_n(partial, n, BlendGradient{});
       for (size_t j = 0; j < n; ++j) {
-        p.partial[list_begin + place + static_cast<int64_t>(j)] = t.touched[j] ? Whiten(t, j) : BlendGradient{};
+        if (t.touched[j]) AddWhitened(t, j, partial[j]);
       }
     } else {
       for (size_t j = 0; j < n; ++j) {
-        if (t.touched[j]) Add(Whiten(t, j), p.gradients[rows[j]]);
+        if (t.touched[j]) AddWhitened(t, j, p.gradients[rows[j]]);
       }
     }
   }

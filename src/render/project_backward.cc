@@ -1,8 +1,10 @@
 #include "render/project_backward.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <cstddef>
 #include <numbers>
 
 #include "core/parallel.h"
@@ -28,6 +30,7 @@ using V = hn::Vec<D>;
 using M = hn::Mask<D>;
 
 constexpr size_t kBatch = 64;
+constexpr ptrdiff_t kAhead = 24;  // Gaussians that are fetched ahead: rows are large and not all of them are needed
 
 struct Columns {
   alignas(64) double means[3][kBatch];
@@ -256,6 +259,10 @@ void BackwardChunk(const ProjectBackwardParams& p, int64_t chunk) {
   while (visible != end) {
     size_t n = 0;
     for (; visible != end && n < kBatch; ++visible) {
+      if (visible + kAhead < end) {
+        hwy::Prefetch(p.gradients + visible[kAhead]);
+        hwy::Prefetch(p.projected + visible[kAhead]);
+      }
       const BlendGradient& b = p.gradients[*visible];
       rows[n] = *visible;
       // Hidden ones have no gradient, and they are many.

@@ -1,8 +1,9 @@
 #include "render/spherical_harmonics_backward.h"
 
+#include <hwy/cache_control.h>
+
 #include <algorithm>
-#include <cmath>
-#include <limits>
+#include <cstddef>
 
 #include "core/gaussian_cloud.h"
 #include "core/parallel.h"
@@ -22,6 +23,9 @@ HWY_BEFORE_NAMESPACE();
 namespace anchorsplat {
 namespace HWY_NAMESPACE {
 namespace {
+
+constexpr ptrdiff_t kAhead = 24;  // Gaussians that are fetched ahead: rows are large and not all of them are needed
+constexpr int kFloatsPerLine = 16;
 
 // ∂Y_k/∂(x, y, z) of the formulas as they stand, at unit directions.
 struct BasisSlopes {
@@ -123,6 +127,10 @@ void BackwardChunk(const SphericalHarmonicsBackwardParams& p, int64_t chunk) {
   while (visible != end) {
     size_t n = 0;
     for (; visible != end && n < kShBatch; ++visible) {
+      if (visible + kAhead < end) {
+        hwy::Prefetch(p.gradients + visible[kAhead]);
+        hwy::Prefetch(p.projected + visible[kAhead]);
+      }
       const ProjectedGaussian& projected = p.projected[*visible];
       Row& row = batch[n];
       row.row = *visible;
@@ -132,6 +140,10 @@ void BackwardChunk(const SphericalHarmonicsBackwardParams& p, int64_t chunk) {
       n += !(row.g[0] == 0 && row.g[1] == 0 && row.g[2] == 0);
     }
     if (n == 0) break;
+    for (size_t j = 0; j < n; ++j) {
+      const float* sh = p.sh + batch[j].row * p.stride;
+      for (int k = 0; k < 3 * coefficients; k += kFloatsPerLine) hwy::Prefetch(sh + k);
+    }
     LoadDirections(
         n, [&](size_t j) { return p.means + 3 * batch[j].row; }, p.center, b);
     for (size_t j = 0; j < n; j += lanes) {

@@ -81,7 +81,8 @@ HWY_INLINE V Exp2(V x) {
 template <size_t kSize>
 void ReadBatch(const ProjectedGaussian* projected, const int32_t* rows, size_t n, double tile_x, double tile_y,
                TileBatch<kSize>& t) {
-  constexpr size_t kAhead = 8;
+  constexpr size_t kAhead = 32;  // far enough for the L3 cache: the rows of a tile lie anywhere
+  for (size_t j = 0; j < std::min(n, kAhead); ++j) hwy::Prefetch(projected + rows[j]);
   for (size_t j = 0; j < n; ++j) {
     if (j + kAhead < n) hwy::Prefetch(projected + rows[j + kAhead]);
     const ProjectedGaussian& g = projected[rows[j]];

@@ -3,6 +3,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "bench/fit_bench.h"
 #include "bench/io_bench.h"
 #include "bench/network_bench.h"
 #include "bench/render_bench.h"
@@ -98,6 +99,63 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
   return {};
 }
 
+struct FitFlags {
+  std::vector<std::string> files = {"examples/biplane/input.ply", "examples/stone_lantern/input.ply"};
+  FitBenchOptions options;
+};
+
+Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
+  FitBenchOptions options = flags.options;
+  options.seed = shared.seed;
+  std::vector<FitBenchRow> rows;
+  for (const std::string& file : flags.files) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(file));
+    // The folder's name: all examples are called input.ply.
+    const std::filesystem::path path(file);
+    const std::string name = path.has_parent_path() ? path.parent_path().filename().string() : path.stem().string();
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<FitBenchRow> some, BenchFit(cloud, name, options));
+    rows.insert(rows.end(), some.begin(), some.end());
+  }
+  if (shared.json) {
+    nlohmann::json json = nlohmann::json::array();
+    for (const FitBenchRow& row : rows) {
+      json.push_back({{"scene", row.scene},
+                      {"gaussians", row.gaussians},
+                      {"width", row.width},
+                      {"ms", row.ms},
+                      {"stages_ms",
+                       {{"project", row.project_ms},
+                        {"spherical_harmonics", row.spherical_harmonics_ms},
+                        {"sort", row.sort_ms},
+                        {"bin", row.bin_ms},
+                        {"blend", row.blend_ms},
+                        {"loss", row.loss_ms},
+                        {"blend_backward", row.blend_backward_ms},
+                        {"project_backward", row.project_backward_ms},
+                        {"adam", row.adam_ms},
+                        {"densify", row.densify_ms}}},
+                      {"visible", row.visible},
+                      {"pairs", row.pairs},
+                      {"evaluations", row.evaluations}});
+    }
+    PrintJson({{"bench", "fit"}, {"threads", ThreadCount()}, {"rows", json}});
+    return {};
+  }
+  std::vector<std::vector<std::string>> table = {{"scene", "Gaussians", "size", "ms", "project", "SH", "sort", "bin",
+                                                  "blend", "loss", "blend'", "project'", "Adam", "densify"}};
+  for (const FitBenchRow& row : rows) {
+    table.push_back({row.scene, WithThousands(row.gaussians), Cat(row.width, "²"), Fixed(row.ms, 2),
+                     Fixed(row.project_ms, 2), Fixed(row.spherical_harmonics_ms, 2), Fixed(row.sort_ms, 2),
+                     Fixed(row.bin_ms, 2), Fixed(row.blend_ms, 2), Fixed(row.loss_ms, 2),
+                     Fixed(row.blend_backward_ms, 2), Fixed(row.project_backward_ms, 2), Fixed(row.adam_ms, 2),
+                     Fixed(row.densify_ms, 2)});
+  }
+  std::cout << "milliseconds per iteration of a fit, mean over " << options.poses << " poses, fastest of "
+            << options.repeats << " repeats, " << ThreadCount() << " threads; ' is the backward pass\n\n"
+            << FormatTable(table);
+  return {};
+}
+
 struct NetworkFlags {
   std::string file = "examples/biplane/input.ply";
   std::string model;
@@ -171,6 +229,26 @@ void AddBench(CLI::App& app, Program& program) {
   render.callback([render_flags, &program] {
     program.run = [render_flags, &program] { return RunRender(*render_flags, program.flags); };
   });
+
+  CLI::App& fit = AddVerb(verb, program, "fit", "One iteration of a fit at 256² and at 1024², stage by stage",
+                          "anchorsplat bench fit --threads 1");
+  const auto fit_flags = std::make_shared<FitFlags>();
+  fit.add_option("files", fit_flags->files, "Splat files, objects near the origin about one unit in size")
+      ->capture_default_str();
+  fit.add_option("--poses", fit_flags->options.poses, "On the orbit")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  fit.add_option("--radius", fit_flags->options.radius, "Of the orbit, world units")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  fit.add_option("--width", fit_flags->options.widths, "Pixels per side, one or more")
+      ->check(CLI::Range(11, 8192))
+      ->capture_default_str();
+  fit.add_option("--repeats", fit_flags->options.repeats, "The fastest counts")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  fit.callback(
+      [fit_flags, &program] { program.run = [fit_flags, &program] { return RunFit(*fit_flags, program.flags); }; });
 
   CLI::App& network = AddVerb(verb, program, "network", "The AnchorSplat network against a plain matrix product",
                               "anchorsplat bench network scan.ply --model anchorsplat_20x.pth");

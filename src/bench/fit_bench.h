@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+
+namespace anchorsplat {
+
+struct FitBenchOptions {
+  std::vector<int> widths = {256, 1024};  // pixels per side
+  int poses = 8;                          // on an orbit around the origin
+  double radius = 1.7;                    // world units
+  double fov_degrees = 45;                // horizontal; square pictures
+  int repeats = 10;                       // over all poses, after one that warms up; per pose the fastest counts
+  uint64_t seed = 1;                      // of what has to be learnt
+};
+
+// One iteration of a fit: picture, loss, gradient, a step of Adam and what densification gathers. Means over the poses.
+struct FitBenchRow {
+  std::string scene;
+  int64_t gaussians = 0;
+  int width = 0;
+  double ms = 0;  // all stages and what lies between
+  double project_ms = 0, spherical_harmonics_ms = 0, sort_ms = 0, bin_ms = 0, blend_ms = 0;
+  double loss_ms = 0;
+  double blend_backward_ms = 0, project_backward_ms = 0;
+  double adam_ms = 0, densify_ms = 0;
+  int64_t visible = 0, pairs = 0, evaluations = 0;  // see RenderStatistics
+};
+
+// Iterations on `cloud` towards pictures of the same cloud with every mean and colour disturbed a little, so that
+// gradients are everywhere as they are in a fit that is under way. The rates are 0: all work is done, but every
+// iteration is the same.
+//
+// Errors (kBadArgument): an invalid or empty cloud, options that are not positive.
+Result<std::vector<FitBenchRow>> BenchFit(const GaussianCloud& cloud, const std::string& scene,
+                                          const FitBenchOptions& options = {});
+
+}  // namespace anchorsplat

@@ -1,5 +1,7 @@
 #include "cli/mesh_info.h"
 
+#include <zlib.h>
+
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -29,7 +31,13 @@ struct Findings {
   bool has_normals = false;
   bool has_vertex_colors = false;
   MeshSummary summary;
-  std::vector<std::string> pictures;  // "wood.png, 512 x 512"
+  struct Picture {
+    std::string name;
+    int width = 0, height = 0;
+    bool has_alpha = false;
+    uint32_t crc32 = 0;  // of the decoded pixels: the same picture under another name
+  };
+  std::vector<Picture> pictures;
 };
 
 Findings Find(const std::string& address, ImportedMesh imported) {
@@ -43,8 +51,8 @@ Findings Find(const std::string& address, ImportedMesh imported) {
              {},
              {}};
   for (const Texture& texture : imported.mesh.textures) {
-    f.pictures.push_back(Cat(Printable(texture.name), ", ", texture.width, " x ", texture.height,
-                             texture.has_alpha ? ", with transparent parts" : ""));
+    f.pictures.push_back({texture.name, texture.width, texture.height, texture.has_alpha,
+                          static_cast<uint32_t>(crc32_z(0, texture.rgba.data(), texture.rgba.size()))});
   }
   f.summary = Summarize(std::move(imported.mesh));
   return f;
@@ -67,7 +75,6 @@ nlohmann::json ToJson(const Findings& f) {
                {"vertices", s.vertices},
                {"materials", s.materials},
                {"textures", s.textures},
-               {"pictures", f.pictures},
                {"colours", s.colors},
                {"bounds", {{"min", s.low}, {"max", s.high}}},
                {"shape", s.shape},
@@ -75,7 +82,15 @@ nlohmann::json ToJson(const Findings& f) {
                {"has_vertex_colours", f.has_vertex_colors},
                {"degenerate", f.degenerate},
                {"lines_and_points", f.lines_and_points},
-               {"warnings", f.warnings}});
+               {"warnings", f.warnings},
+               {"pictures", nlohmann::json::array()}});
+  for (const Findings::Picture& picture : f.pictures) {
+    json["pictures"].push_back({{"name", picture.name},
+                                {"width", picture.width},
+                                {"height", picture.height},
+                                {"has_alpha", picture.has_alpha},
+                                {"crc32", picture.crc32}});
+  }
   return json;
 }
 
@@ -92,7 +107,10 @@ void PrintTable(const Findings& f) {
   line("triangles ", Cat(WithThousands(s.triangles), ", vertices ", WithThousands(s.vertices), ", normals ",
                          f.has_normals ? "of the file" : "made from the triangles"));
   line("materials ", Cat(s.materials, ", textures ", s.textures, ", colours without texture ", s.colors));
-  for (const std::string& picture : f.pictures) line("picture   ", picture);
+  for (const Findings::Picture& picture : f.pictures) {
+    line("picture   ", Cat(Printable(picture.name), ", ", picture.width, " x ", picture.height,
+                           picture.has_alpha ? ", with transparent parts" : ""));
+  }
   line("size      ", Cat(s.high[0] - s.low[0], " x ", s.high[1] - s.low[1], " x ", s.high[2] - s.low[2]));
   std::cout << "\n" << (f.warnings.empty() ? "no problems found" : "found:") << "\n";
   for (const std::string& warning : f.warnings) std::cout << "  - " << warning << "\n";

@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "formats/test_folder.h"
-#include "scene/mesh_bytes_test.h"
+#include "scene/assets_for_test.h"
 #include "scene/mesh_reader.h"
 
 namespace anchorsplat {

@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <tuple>
+#include <set>
+#include <string_view>
 #include <utility>
 
 #include "core/text.h"
@@ -139,13 +140,16 @@ ImportedMaterials ImportMaterials(const aiScene& scene, const AssetSource& sourc
   ImportedMaterials out;
   out.linear = ending == ".gltf" || ending == ".glb";
   PictureCollector pictures(scene, source, limits);
+  std::set<std::string> said;
   for (unsigned m = 0; m < scene.mNumMaterials; ++m) {
     const aiMaterial& from = *scene.mMaterials[m];
     Material material;
     aiString text;
     if (from.Get(AI_MATKEY_NAME, text) == aiReturn_SUCCESS) material.name = text.C_Str();
+    // AC3D makes a material of every pair of colour and picture, all of one name.
     const auto warn = [&](const auto&... words) {
-      warnings.push_back(Cat("material \"", Printable(material.name), "\": ", words...));
+      std::string warning = Cat("material \"", Printable(material.name), "\": ", words...);
+      if (said.insert(warning).second) warnings.push_back(std::move(warning));
     };
     aiColor4D color;
     const bool has_color = from.Get(AI_MATKEY_BASE_COLOR, color) == aiReturn_SUCCESS ||

@@ -25,8 +25,8 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr std::array<std::string_view, 9> kEndings = {".obj", ".gltf", ".glb", ".ply", ".dae",
-                                                      ".ac",  ".stl",  ".off", ".3ds"};
+constexpr std::array<std::string_view, 8> kEndings = {".obj", ".gltf", ".glb", ".ply",
+                                                      ".dae", ".ac",   ".stl", ".off"};
 
 std::string Ending(const std::string& name) {
   std::string ending = std::filesystem::path(name).extension().string();
@@ -160,7 +160,7 @@ Result<ImportedMesh> Import(const AssetSource& source, const std::string& name, 
                             const MeshReadOptions& options) {
   if (!IsMeshName(name)) {
     return Error{ErrorCode::kBadFile,
-                 Cat(where, ": not a mesh by its ending (obj, gltf, glb, ply, dae, ac, stl, off, 3ds)")};
+                 Cat(where, ": not a mesh by its ending (obj, gltf, glb, ply, dae, ac, stl, off)")};
   }
   // Read here first: assimp could not say whether the file is missing, too long or refused.
   auto bytes = source.Read(name, options.limits.max_file_bytes);

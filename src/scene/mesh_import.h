@@ -45,10 +45,10 @@ struct ImportedMesh {
 };
 
 // Reads `name` and what it refers to from `source`. The format is found by the name's ending: OBJ, glTF and GLB
-// (embedded pictures included), PLY, COLLADA, AC3D, STL, OFF and 3DS, through assimp.
+// (embedded pictures included), PLY, COLLADA, AC3D, STL and OFF, through assimp.
 //
 // Colours and pictures: as sRGB values; glTF's linear factors are converted. Where a material has a picture, that is
-// its colour: the diffuse colour beside it in OBJ, COLLADA and 3DS files is an exporter's default more often than
+// its colour: the diffuse colour beside it in OBJ and COLLADA files is an exporter's default more often than
 // meant. glTF and AC3D define the product, which is then baked into the picture. glTF's opaque materials lose the
 // picture's alpha. A separate opacity picture (`map_d`) that is not the colour picture is left out with a warning.
 //

@@ -4,14 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
-#include <map>
 
 #include "core/text.h"
-#include "formats/image_io.h"
-#include "formats/test_folder.h"
+#include "scene/assets_for_test.h"
 #include "scene/assimp_files.h"
-#include "scene/mesh_bytes_test.h"
 
 namespace anchorsplat {
 namespace {
@@ -19,26 +15,6 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-// Files that exist only in a test.
-class MapAssets : public AssetSource {
- public:
-  std::map<std::string, std::string> files;
-
- protected:
-  std::string Find(const std::string& relative) const override { return files.count(relative) ? relative : ""; }
-  Result<std::string> ReadFound(const std::string& found, uint64_t max_bytes) const override {
-    const std::string& bytes = files.at(found);
-    if (bytes.size() > max_bytes) return Error{ErrorCode::kBadFile, found + ": too long"};
-    return bytes;
-  }
-};
-
-std::string Grey(float value) {
-  Image image(1, 1, 3);
-  for (float& v : image.pixels) v = value;
-  return PngBytes(image);
-}
 
 ImportedMesh Import(const AssetSource& assets, const std::string& name, const MeshReadOptions& options = {}) {
   auto mesh = ImportMesh(assets, name, name, options);
@@ -135,7 +111,7 @@ TEST(MeshImport, FindsPicturesBesideTheMeshWhateverTheirPathSays) {
   MapAssets assets;
   assets.files = {{"square.obj", kSquare},
                   {"square.mtl", "newmtl painted\nmap_Kd C:\\Users\\me\\my wood.png\n"},
-                  {"my wood.png", Grey(0.5f)}};
+                  {"my wood.png", GreyPng(0.5f)}};
   EXPECT_THAT(Import(assets, "square.obj").warnings, IsEmpty());
 }
 
@@ -157,29 +133,9 @@ TEST(MeshImport, KeepsTheNormalsOfTheFile) {
   EXPECT_THAT(imported.mesh.normals[1], ElementsAre(0, 0, 1));
 }
 
-// A triangle as glTF, its buffer and its picture inside.
-std::string Gltf(const std::string& material) {
-  std::string buffer;
-  const auto put = [&](std::initializer_list<float> values) {
-    for (const float v : values) buffer.append(reinterpret_cast<const char*>(&v), 4);
-  };
-  put({0, 0, 0, 1, 0, 0, 0, 1, 0});  // positions
-  put({0, 1, 1, 1, 0, 0});           // texture coordinates, from the top
-  return Cat(R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
-    "nodes":[{"mesh":0,"translation":[10,0,0],"scale":[-2,2,2]}],
-    "meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1},"material":0}]}],
-    "materials":[)",
-             material, R"(],"textures":[{"source":0}],"images":[{"uri":"data:image/png;base64,)", Base64(Grey(0.8f)),
-             R"("}],"buffers":[{"byteLength":60,"uri":"data:application/octet-stream;base64,)", Base64(buffer),
-             R"("}],"bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":36},
-    {"buffer":0,"byteOffset":36,"byteLength":24}],
-    "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},
-    {"bufferView":1,"componentType":5126,"count":3,"type":"VEC2"}]})");
-}
-
 TEST(MeshImport, ReadsGltfWithEmbeddedPicture) {
   MapAssets assets;
-  assets.files = {{"a.gltf", Gltf(R"({"name":"m","pbrMetallicRoughness":{"baseColorTexture":{"index":0},
+  assets.files = {{"a.gltf", TriangleGltf(R"({"name":"m","pbrMetallicRoughness":{"baseColorTexture":{"index":0},
     "baseColorFactor":[1,0.214041,0,1]}})")}};
   const ImportedMesh imported = Import(assets, "a.gltf");
   EXPECT_THAT(imported.warnings, IsEmpty());
@@ -260,7 +216,7 @@ TEST(MeshImport, KeepsToItsLimits) {
 // A tree in which every node shows the same mesh: few bytes, many triangles.
 TEST(MeshImport, InstancesCountAgainstTheLimit) {
   MapAssets assets;
-  std::string gltf = Gltf("{}");
+  std::string gltf = TriangleGltf("{}");
   std::string nodes = "\"nodes\":[{\"mesh\":0}";
   std::string roots = "0";
   for (int k = 1; k < 50; ++k) {

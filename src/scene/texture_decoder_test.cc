@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "scene/mesh_bytes_test.h"
+#include "scene/assets_for_test.h"
 #include "scene/sgi_image.h"
 
 namespace anchorsplat {

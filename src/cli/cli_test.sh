@@ -266,6 +266,38 @@ says stderr "going on"
 checks=$((checks + 1))
 cmp -s "$work/whole.ply" "$work/halves.ply" || { failures=$((failures + 1)); echo "FAILED: an interruption changes the splat"; }
 
+# dataset: three meshes, one of them none, become two objects; a kill in between costs nothing.
+sed 's/^v 1 1 0/v 1 1 1/' "$work/mesh/quad.obj" >"$work/mesh/ramp.obj"
+small=(--views 8 --size 24 --low-size 12 --points 60 --steps 60 --max-gaussians 500 --min-psnr 5)
+expect 0 "a data set" "$program" dataset build "$work/mesh/quad.obj" "$work/mesh/point.obj" "$work/mesh/ramp.obj" -o "$work/set" "${small[@]}" --jobs 2 --json
+says stdout '"built": 2'
+says stdout '"failed": 1'
+expect 0 "the failure has its reason" grep -q '"name":"point".*"stage":"mesh"' "$work/set/failures.jsonl"
+for file in manifest.jsonl quad/record.json quad/splat.ply quad/12/gaussian_splatting/ckpts/ckpt_59_rank0.pt quad/24/images/007.png ramp/splat.ply; do
+  expect 0 "data set has $file" test -s "$work/set/$file"
+done
+expect 0 "build again" "$program" dataset build "$work/mesh/quad.obj" "$work/mesh/point.obj" -o "$work/set" "${small[@]}" --json
+says stdout '"there_already": 1'
+says stdout '"failed": 1'
+expect 0 "the checkpoint is a splat" "$program" info "$work/set/quad/12/gaussian_splatting/ckpts/ckpt_59_rank0.pt"
+expect 2 "no meshes" "$program" dataset build -o "$work/set2"
+expect 2 "low not smaller" "$program" dataset build "$work/mesh/quad.obj" -o "$work/set2" --size 12 --low-size 12
+mkdir "$work/mesh/copy" && cp "$work/mesh/quad.obj" "$work/mesh/copy/"
+expect 2 "two of one name" "$program" dataset build "$work/mesh/quad.obj" "$work/mesh/copy/quad.obj" -o "$work/set2" "${small[@]}"
+printf 'steps = 60\n[[mix]]\nlow_size = 12\n[[mix]]\nlow_siize = 10\n' >"$work/bad.toml"
+expect 4 "a recipe with a slip" "$program" dataset build "$work/mesh/quad.obj" -o "$work/set2" --recipe "$work/bad.toml"
+says stderr "line 5: low_siize"
+# The same from the beginning, killed as soon as the views are there and gone on with in one process.
+"$program" dataset build "$work/mesh/quad.obj" "$work/mesh/ramp.obj" -o "$work/killed" "${small[@]}" --quiet >/dev/null 2>&1 &
+victim=$!
+until [ -e "$work/killed/.building/quad/views.json" ] || [ -e "$work/killed/quad" ] || ! kill -0 $victim 2>/dev/null; do :; done
+kill -9 $victim 2>/dev/null
+wait $victim 2>/dev/null
+expect 0 "after a kill" "$program" dataset build "$work/mesh/quad.obj" "$work/mesh/ramp.obj" -o "$work/killed" "${small[@]}" --jobs 1
+for file in quad/splat.ply quad/12/images/003.png quad/24/images/003.png ramp/splat.ply quad/12/sparse/0/points3D.bin; do
+  expect 0 "the same $file after a kill" cmp "$work/set/$file" "$work/killed/$file"
+done
+
 # Same bits for any number of threads.
 expect 0 "one thread" "$program" render "$input" -o "$work/t1.png" --orbit 1 --size 200x150 --threads 1
 expect 0 "three threads" "$program" render "$input" -o "$work/t3.png" --orbit 1 --size 200x150 --threads 3

@@ -95,6 +95,7 @@ int RunProgram(int argc, const char* const* argv) {
   AddView(app, program);
   AddViews(app, program);
   AddFit(app, program);
+  AddDataset(app, program);
   AddBench(app, program);
   try {
     app.parse(argc, argv);

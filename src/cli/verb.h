@@ -39,6 +39,7 @@ void AddView(CLI::App& app, Program& program);
 void AddViews(CLI::App& app, Program& program);
 void AddConvert(CLI::App& app, Program& program);
 void AddFit(CLI::App& app, Program& program);
+void AddDataset(CLI::App& app, Program& program);
 void AddBench(CLI::App& app, Program& program);
 
 // 0 on success; each kind of failure has a number of its own (docs/cli.md).

@@ -101,7 +101,8 @@ Result<Image> RenderStoredView(const RayTracer& tracer, const Camera& camera, co
   return image;
 }
 
-Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const fs::path& folder, const ViewSetOptions& options) {
+Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const fs::path& folder, const ViewSetOptions& options,
+                                 const std::atomic<bool>* stop) {
   const auto begin = Clock::now();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewSetCameras cameras, MakeViewSetCameras(options));
   const WriteOptions write{.overwrite = options.overwrite};
@@ -131,6 +132,9 @@ Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const fs::path& folder
     const Camera& camera = (is_high ? cameras.high : cameras.low).cameras[static_cast<size_t>(i % views)];
     {
       const std::lock_guard<std::mutex> lock(mutex);
+      if (failed.ok() && stop != nullptr && stop->load()) {
+        failed = Error{ErrorCode::kInterrupted, Cat(folder.string(), ": stopped while the views were made")};
+      }
       if (!failed.ok()) return;
     }
     TraceCost mine;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -52,8 +53,9 @@ Result<ViewSetCameras> MakeViewSetCameras(const ViewSetOptions& options);
 Result<Image> RenderStoredView(const RayTracer& tracer, const Camera& camera, const ViewSetOptions& options,
                                TraceCost* cost = nullptr);
 
-// Makes `folder` and fills it. Errors: kExists unless options.overwrite; kIo; as MakeViewSetCameras.
+// Makes `folder` and fills it. When `stop` becomes true it ends between two views (kInterrupted).
+// Errors: kExists unless options.overwrite; kIo; as MakeViewSetCameras.
 Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const std::filesystem::path& folder,
-                                 const ViewSetOptions& options);
+                                 const ViewSetOptions& options, const std::atomic<bool>* stop = nullptr);
 
 }  // namespace anchorsplat

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+#include "dataset/object_record.h"
+#include "dataset/recipe.h"
+
+namespace anchorsplat {
+
+struct DatasetBuildOptions {
+  Recipe recipe;
+  int jobs = 1;                             // objects at the same time, a process each
+  int threads = 1;                          // of each
+  double timeout_seconds = 0;               // of one object; 0: none
+  bool overwrite = false;                   // objects that are there are made again
+  bool retry = false;                       // objects that failed earlier are tried again
+  std::filesystem::path program;            // ours: runs `dataset object JOB -o DATASET`
+  const std::atomic<bool>* stop = nullptr;  // ends the build in order
+};
+
+struct DatasetBuildReport {
+  int64_t objects = 0;  // asked for
+  int64_t built = 0;    // in this run
+  int64_t there_already = 0;
+  int64_t other_settings = 0;  // of those: made by another recipe, and left as they are
+  int64_t failed = 0;          // in this run or, without `retry`, in an earlier one
+  int64_t rejected = 0;        // of those there now: too unlike their own training views
+  bool interrupted = false;
+  double seconds = 0;
+};
+
+// Makes DATASET/NAME for every mesh (address of a file, of an object of a furniture library, or of a whole library) and
+// every entry its recipe draws, and DATASET/manifest.jsonl and failures.jsonl, which are right after every object. Each
+// object is made by a process of its own (object_builder.h): one that fails, crashes or hangs does not stop the others.
+// Called again after whatever kind of end, it goes on where it was.
+//
+// Errors: kBadArgument: no meshes, two that get the same name; kExists: another build works on the folder; kIo.
+Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, const std::filesystem::path& dataset,
+                                        const DatasetBuildOptions& options);
+
+}  // namespace anchorsplat

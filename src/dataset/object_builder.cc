@@ -1,0 +1,237 @@
+#include "dataset/object_builder.h"
+
+#include <algorithm>
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <system_error>
+
+#include "core/log.h"
+#include "core/text.h"
+#include "dataset/file_lock.h"
+#include "dataset/object_name.h"
+#include "fit/fit.h"
+#include "fit/initial_cloud.h"
+#include "formats/atomic_file.h"
+#include "formats/cloud_io.h"
+#include "formats/gsplat_checkpoint_writer.h"
+#include "scene/mesh_reader.h"
+#include "scene/ray_tracer.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+constexpr const char* kJobName = "job.json";
+constexpr const char* kViewsDone = "views.json";
+constexpr const char* kFitCheckpoint = "fit.checkpoint";
+constexpr int64_t kCheckpointEvery = 1000;  // steps: a few seconds of work
+
+double Since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+bool IsFile(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+
+Status Remove(const fs::path& path) {
+  std::error_code code;
+  fs::remove_all(path, code);
+  if (code) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot remove: ", code.message())};
+  return {};
+}
+
+Status MakeFolder(const fs::path& path) {
+  std::error_code code;
+  fs::create_directories(path, code);
+  if (code) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot make this folder: ", code.message())};
+  return {};
+}
+
+// An earlier attempt's folder if it was this very job, else a fresh one.
+Status OpenFolder(const ObjectJob& job, const fs::path& folder) {
+  const std::string text = ToJsonText(job);
+  if (IsFile(folder / kJobName)) {
+    auto earlier = ReadObjectJob(folder / kJobName);
+    if (earlier.ok() && ToJsonText(*earlier) == text) return {};
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(Remove(folder));
+  ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(folder));
+  return WriteWholeFile(folder / kJobName, text, true);
+}
+
+Status EnterStage(const fs::path& folder, const std::string& stage) {
+  return WriteWholeFile(folder / kStageName, stage, true);
+}
+
+// The mesh as it is seen, and what there is to say about it.
+Result<RayTracer> PrepareMesh(const ObjectJob& job, ObjectRecord& record) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ImportedMesh imported, ReadMesh(job.source));
+  for (const std::string& warning : imported.warnings) LogWarning(Cat(job.source, ": ", warning));
+  record.origin = imported.origin;
+  record.transparent_triangles = DropInvisibleTriangles(imported.mesh).transparent;
+  record.triangles = std::ssize(imported.mesh.triangles);
+  record.textures = std::ssize(imported.mesh.textures);
+  auto mesh = NormalizedToUnitCube(std::move(imported.mesh));
+  if (!mesh.ok()) return Error{ErrorCode::kBadFile, Cat(job.source, ": ", mesh.error().message)};
+  record.fingerprint = Fingerprint(*mesh);
+  return RayTracer::Create(*std::move(mesh));
+}
+
+Status MakeViews(const ObjectJob& job, const fs::path& folder, const std::atomic<bool>* stop, ObjectRecord& record) {
+  ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "mesh"));
+  const auto begin = Clock::now();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const RayTracer tracer, PrepareMesh(job, record));
+  record.read_seconds = Since(begin);
+  ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "views"));
+  for (const int size : {job.settings.views.low_size, job.settings.views.high_size}) {
+    ANCHORSPLAT_RETURN_IF_ERROR(Remove(folder / std::to_string(size)));  // of an attempt that was cut off
+  }
+  ViewSetOptions options = job.settings.views;
+  options.overwrite = true;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewSetCost cost, WriteViewSet(tracer, folder, options, stop));
+  record.view_seconds = cost.seconds;
+  return {};
+}
+
+Status FitSplat(const ObjectJob& job, const fs::path& folder, const std::atomic<bool>* stop, ObjectRecord& record) {
+  ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "fit"));
+  const fs::path low = folder / std::to_string(job.settings.views.low_size);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(low, {.hold_out = job.settings.hold_out}));
+  FitOptions options = FitOptionsFor(job.settings.fit_steps);
+  options.seed = job.settings.seed;
+  options.densification.max_gaussians = job.settings.max_gaussians;
+  options.objective.render.background = job.settings.views.background;
+  record.initial_points = views.points.size();
+  if (views.points.size() == 0) {
+    return Error{ErrorCode::kBadFile, Cat(job.source, ": no camera sees any of its surface")};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial, InitialCloud(views.points, views.scene_scale,
+                                                                   {.sh_degree = options.objective.render.sh_degree,
+                                                                    .seed = job.settings.seed}));
+  FitControl control;
+  control.checkpoint = folder / kFitCheckpoint;
+  control.checkpoint_every = kCheckpointEvery;
+  control.resume = true;
+  control.stop = stop;
+  auto fitted = Fit(views, std::move(initial), options, control);
+  if (!fitted.ok() && fitted.error().code == ErrorCode::kBadFile && IsFile(control.checkpoint)) {
+    // A checkpoint of another version of the program is no reason to give the object up.
+    LogWarning(Cat("the fit begins anew: ", fitted.error().message));
+    ANCHORSPLAT_RETURN_IF_ERROR(Remove(control.checkpoint));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(
+        initial, InitialCloud(views.points, views.scene_scale,
+                              {.sh_degree = options.objective.render.sh_degree, .seed = job.settings.seed}));
+    fitted = Fit(views, std::move(initial), options, control);
+  }
+  if (!fitted.ok()) return fitted.error();
+  const FitReport& report = fitted->report;
+  if (report.interrupted) {
+    return Error{ErrorCode::kInterrupted,
+                 Cat(job.name, ": stopped after ", report.steps, " of ", options.steps, " steps")};
+  }
+  record.gaussians = fitted->cloud.size();
+  record.train_psnr = report.train.psnr;
+  record.train_ssim = report.train.ssim;
+  record.held_out_psnr = report.held_out.psnr;
+  record.held_out_ssim = report.held_out.ssim;
+  record.fit_seconds = report.seconds;
+
+  ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "files"));
+  const fs::path checkpoint = CheckpointPath(low, job.settings.fit_steps);
+  ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(checkpoint.parent_path()));
+  ANCHORSPLAT_RETURN_IF_ERROR(
+      WriteGsplatCheckpoint(checkpoint, fitted->cloud, job.settings.fit_steps - 1, {.overwrite = true}));
+  return WriteCloud(folder / kSplatName, fitted->cloud, {.overwrite = true});
+}
+
+// What a stage found out, kept beside its files: the record so far.
+Status Keep(const fs::path& path, const ObjectRecord& record) {
+  return WriteWholeFile(path, ToJson(record).dump(1, ' ', false, Json::error_handler_t::replace) + "\n", true);
+}
+
+Status Recall(const fs::path& path, ObjectRecord& record) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile json, JsonFile::Read(path));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(record, ObjectRecordFrom(json.root()));
+  return {};
+}
+
+// Everything is in the folder: gives it its name, in place of an older object. The job goes last, because a folder
+// without it is begun anew.
+Status Publish(const fs::path& folder, const fs::path& target) {
+  for (const char* name : {kViewsDone, kFitCheckpoint, kStageName}) ANCHORSPLAT_RETURN_IF_ERROR(Remove(folder / name));
+  fs::path replaced = folder;
+  replaced += ".replaced";
+  ANCHORSPLAT_RETURN_IF_ERROR(Remove(replaced));
+  std::error_code code;
+  if (fs::exists(target, code)) fs::rename(target, replaced, code);
+  if (!code) fs::rename(folder, target, code);
+  if (code) return Error{ErrorCode::kIo, Cat(target.string(), ": cannot give the object its name: ", code.message())};
+  ANCHORSPLAT_RETURN_IF_ERROR(Remove(replaced));
+  return Remove(target / kJobName);
+}
+
+}  // namespace
+
+fs::path BuildingFolder(const fs::path& dataset, const std::string& name) { return dataset / kBuildingName / name; }
+
+fs::path CheckpointPath(const fs::path& low_folder, int64_t steps) {
+  return low_folder / "gaussian_splatting" / "ckpts" / Cat("ckpt_", steps - 1, "_rank0.pt");
+}
+
+std::string ToJsonText(const ObjectJob& job) {
+  const Json json = {
+      {"name", job.name}, {"source", job.source}, {"recipe", job.recipe}, {"settings", ToJson(job.settings)}};
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+Result<ObjectJob> ReadObjectJob(const fs::path& path) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile json, JsonFile::Read(path));
+  ObjectJob job;
+  for (const auto& [key, text] : std::initializer_list<std::pair<const char*, std::string*>>{
+           {"name", &job.name}, {"source", &job.source}, {"recipe", &job.recipe}}) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, json.root().Get(key));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(*text, value.Text());
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue settings, json.root().Get("settings"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(job.settings, ObjectSettingsFrom(settings));
+  return job;
+}
+
+Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset, const std::atomic<bool>* stop) {
+  const fs::path folder = BuildingFolder(dataset, job.name);
+  ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(folder.parent_path()));
+  // A process whose parent was killed may still be on its way out.
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const FileLock lock, FileLock::Take(folder.string() + ".lock", true));
+  ANCHORSPLAT_RETURN_IF_ERROR(OpenFolder(job, folder));
+  ObjectRecord record;
+  record.name = job.name;
+  record.source = job.source;
+  record.recipe = job.recipe;
+  record.stem = VariantStem(job.name);
+  record.settings = job.settings;
+  if (IsFile(folder / kViewsDone)) {
+    ANCHORSPLAT_RETURN_IF_ERROR(Recall(folder / kViewsDone, record));
+  } else {
+    ANCHORSPLAT_RETURN_IF_ERROR(MakeViews(job, folder, stop, record));
+    ANCHORSPLAT_RETURN_IF_ERROR(Keep(folder / kViewsDone, record));
+  }
+  if (IsFile(folder / kRecordName)) {  // cut off while it got its name
+    ANCHORSPLAT_RETURN_IF_ERROR(Recall(folder / kRecordName, record));
+  } else {
+    ANCHORSPLAT_RETURN_IF_ERROR(FitSplat(job, folder, stop, record));
+    record.rejected = record.train_psnr < job.settings.min_train_psnr;
+    if (record.rejected) {
+      record.reason = Cat("PSNR on the fit's own training views is ", Fixed(record.train_psnr, 2), " dB, below ",
+                          Fixed(job.settings.min_train_psnr, 2));
+    }
+    ANCHORSPLAT_RETURN_IF_ERROR(Keep(folder / kRecordName, record));
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(Publish(folder, dataset / job.name));
+  return record;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <string>
+
+#include "core/result.h"
+#include "dataset/object_record.h"
+#include "dataset/object_settings.h"
+
+namespace anchorsplat {
+
+// One object to make.
+struct ObjectJob {
+  std::string name;    // its folder's
+  std::string source;  // address of the mesh
+  std::string recipe;  // name of the recipe's entry
+  ObjectSettings settings;
+};
+
+std::string ToJsonText(const ObjectJob& job);
+Result<ObjectJob> ReadObjectJob(const std::filesystem::path& path);
+
+// Where an object is made before it becomes DATASET/NAME: DATASET/.building/NAME.
+std::filesystem::path BuildingFolder(const std::filesystem::path& dataset, const std::string& name);
+inline constexpr const char* kBuildingName = ".building";
+inline constexpr const char* kStageName = "stage";  // a file in there: what is going on
+
+// Files of a finished object that are not view_set.h's.
+inline constexpr const char* kSplatName = "splat.ply";
+std::filesystem::path CheckpointPath(const std::filesystem::path& low_folder, int64_t steps);  // as gsplat's trainer
+
+// Makes the object: mesh → views → low-quality splat → files, in BuildingFolder, which then becomes DATASET/NAME in one
+// step. Whatever an earlier attempt has finished there is kept if it was made by the same job: views as a whole, the
+// fit up to its last checkpoint. Deterministic but for the seconds in the record.
+//
+// `stop` ends the fit in order (kInterrupted): the next attempt goes on from there. Other errors: of the mesh, the
+// views and the fit; the file `stage` says which.
+Result<ObjectRecord> BuildObject(const ObjectJob& job, const std::filesystem::path& dataset,
+                                 const std::atomic<bool>* stop);
+
+}  // namespace anchorsplat

@@ -1,0 +1,141 @@
+#include "dataset/object_settings.h"
+
+#include <cstring>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "core/text.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr double kMostWhole = 9007199254740992.0;  // 2⁵³: JSON's numbers are doubles
+
+Status TakeWhole(const JsonValue& json, const char* key, int64_t& out) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, json.Get(key));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const double number, value.Number());
+  if (!(number >= 0 && number <= kMostWhole) || number != static_cast<double>(static_cast<int64_t>(number))) {
+    return value.Complain(Cat("expected a whole number from 0, found ", number));
+  }
+  out = static_cast<int64_t>(number);
+  return {};
+}
+
+Status TakeInt(const JsonValue& json, const char* key, int low, int high, int& out) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, json.Get(key));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(out, value.WholeNumber(low, high));
+  return {};
+}
+
+Status TakeNumber(const JsonValue& json, const char* key, double& out) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, json.Get(key));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(out, value.Number());
+  return {};
+}
+
+Status TakeFlag(const JsonValue& json, const char* key, bool& out) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, json.Get(key));
+  if (!value.raw().is_boolean()) return value.Complain("expected true or false");
+  out = value.raw().get<bool>();
+  return {};
+}
+
+// 64 bits do not fit into JSON's numbers.
+Status TakeSeed(const JsonValue& json, const char* key, uint64_t& out) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, json.Get(key));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, value.Text());
+  if (text.empty() || text.size() > 20 || text.find_first_not_of("0123456789") != std::string::npos) {
+    return value.Complain("expected a number of up to 20 digits as a string");
+  }
+  out = 0;
+  for (const char digit : text) out = out * 10 + static_cast<uint64_t>(digit - '0');
+  return {};
+}
+
+Status TakeRig(const JsonValue& json, CameraRig& rig) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue kind, json.Get("rig"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string name, kind.Text());
+  for (int k = 0; k <= std::ssize(kRigNames); ++k) {
+    if (k == std::ssize(kRigNames)) return kind.Complain(Cat("unknown rig \"", Printable(name), "\""));
+    if (name == kRigNames[k]) {
+      rig.kind = static_cast<RigKind>(k);
+      break;
+    }
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeInt(json, "views", 1, 100000, rig.views));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(json, "radius", rig.radius));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(json, "fov_degrees", rig.fov_degrees));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue elevations, json.Get("elevations"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto elements, elevations.Elements());
+  rig.elevations.clear();
+  for (const JsonValue& element : elements) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double degrees, element.Number());
+    rig.elevations.push_back(degrees);
+  }
+  return {};
+}
+
+}  // namespace
+
+nlohmann::json ToJson(const ObjectSettings& s) {
+  const ViewSetOptions& v = s.views;
+  return {{"rig", kRigNames[static_cast<size_t>(v.rig.kind)]},
+          {"views", v.rig.views},
+          {"radius", v.rig.radius},
+          {"fov_degrees", v.rig.fov_degrees},
+          {"elevations", v.rig.elevations},
+          {"high_size", v.high_size},
+          {"low_size", v.low_size},
+          {"samples", v.trace.samples},
+          {"background", v.background},
+          {"opaque", v.opaque},
+          {"points", v.points},
+          {"store_high", v.store_high},
+          {"fit_steps", s.fit_steps},
+          {"hold_out", s.hold_out},
+          {"max_gaussians", s.max_gaussians},
+          {"min_train_psnr", s.min_train_psnr},
+          {"seed", std::to_string(s.seed)}};
+}
+
+Result<ObjectSettings> ObjectSettingsFrom(const JsonValue& json) {
+  ObjectSettings s;
+  ViewSetOptions& v = s.views;
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeRig(json, v.rig));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeInt(json, "high_size", 1, 16384, v.high_size));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeInt(json, "low_size", 1, 16384, v.low_size));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeInt(json, "samples", 1, kMaxTraceSamples, v.trace.samples));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue background, json.Get("background"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto rgb, background.Numbers(3));
+  for (size_t k = 0; k < 3; ++k) v.background[k] = static_cast<float>(rgb[k]);
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeFlag(json, "opaque", v.opaque));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeWhole(json, "points", v.points));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeFlag(json, "store_high", v.store_high));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeWhole(json, "fit_steps", s.fit_steps));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeInt(json, "hold_out", 0, 100000, s.hold_out));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeWhole(json, "max_gaussians", s.max_gaussians));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(json, "min_train_psnr", s.min_train_psnr));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeSeed(json, "seed", s.seed));
+  v.seed = v.rig.seed = s.seed;
+  if (const Status status = Validate(s); !status.ok()) return json.Complain(status.error().message);
+  return s;
+}
+
+Status Validate(const ObjectSettings& s) {
+  const auto bad = [](std::string sentence) { return Error{ErrorCode::kBadArgument, std::move(sentence)}; };
+  if (const auto cameras = MakeViewSetCameras(s.views); !cameras.ok()) return cameras.error();
+  if (s.views.low_size >= s.views.high_size) {
+    return bad(Cat("low views of ", s.views.low_size, " pixels must be smaller than high ones of ", s.views.high_size));
+  }
+  if (s.views.points < 1) return bad("a fit needs surface samples to begin with");
+  if (s.fit_steps < 1 || s.fit_steps > 10'000'000)
+    return bad(Cat("a fit has 1 to 10,000,000 steps, not ", s.fit_steps));
+  if (s.hold_out == 1) return bad("holding out every view leaves none to train on");
+  for (const float x : s.views.background) {
+    if (!(x >= 0 && x <= 1)) return bad(Cat("background ", x, " is not in 0 to 1"));
+  }
+  return {};
+}
+
+}  // namespace anchorsplat

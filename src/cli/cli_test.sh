@@ -287,6 +287,21 @@ expect 2 "two of one name" "$program" dataset build "$work/mesh/quad.obj" "$work
 printf 'steps = 60\n[[mix]]\nlow_size = 12\n[[mix]]\nlow_siize = 10\n' >"$work/bad.toml"
 expect 4 "a recipe with a slip" "$program" dataset build "$work/mesh/quad.obj" -o "$work/set2" --recipe "$work/bad.toml"
 says stderr "line 5: low_siize"
+expect 0 "check" "$program" dataset check "$work/set" --decode
+says stdout "everything is there"
+expect 0 "info of a data set" "$program" dataset info "$work/set" --json
+says stdout '"objects": 2'
+expect 0 "split" "$program" dataset split "$work/set" --test 1 --validation 0 --json
+says stdout '"test": 2'
+expect 5 "split does not overwrite" "$program" dataset split "$work/set"
+rm "$work/set/ramp/24/images/004.png"
+expect 4 "check finds a gap" "$program" dataset check "$work/set"
+says stdout "picture 004 is missing"
+printf '# one object\nquad.obj\n' >"$work/list.txt"
+expect 0 "a list of objects" "$program" dataset build --list "$work/list.txt" --objects "$work/mesh" -o "$work/demand" "${small[@]}" --hr on-demand --json
+says stdout '"built": 1'
+expect 0 "check of views on demand" "$program" dataset check "$work/demand" --decode
+expect 2 "a list without a folder" "$program" dataset build --list "$work/list.txt" -o "$work/demand"
 # The same from the beginning, killed as soon as the views are there and gone on with in one process.
 "$program" dataset build "$work/mesh/quad.obj" "$work/mesh/ramp.obj" -o "$work/killed" "${small[@]}" --quiet >/dev/null 2>&1 &
 victim=$!

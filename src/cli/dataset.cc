@@ -1,147 +1,162 @@
-#include <csignal>
+#include "cli/dataset.h"
+
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "cli/choice.h"
-#include "cli/mesh_views.h"
+#include "cli/table.h"
 #include "cli/verb.h"
-#include "core/parallel.h"
 #include "core/text.h"
-#include "dataset/dataset_builder.h"
-#include "dataset/object_builder.h"
-#include "dataset/process_pool.h"
-#include "dataset/recipe.h"
+#include "dataset/dataset_check.h"
+#include "dataset/dataset_split.h"
 
 namespace anchorsplat {
 
 namespace {
 
-// Ctrl-C asks for an orderly end; the second one ends at once.
-std::atomic<bool> stop_requested{false};
-static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may not lock");
-
-void RequestStop(int signal) {
-  stop_requested = true;
-  std::signal(signal, SIG_DFL);
-}
-
-struct BuildFlags {
-  std::vector<std::string> meshes;
-  std::string output;
-  std::string recipe;
-  ViewSetFlags views;
-  ObjectSettings settings;
-  int jobs = 0;
-  double timeout = 4 * 3600;
-  bool retry = false;
+struct SplitFlags {
+  std::string dataset;
+  SplitFractions fractions;
+  std::map<std::string, std::string> lists;  // file by split
 };
 
-Result<Recipe> MakeRecipe(const BuildFlags& flags, const SharedFlags& shared) {
-  ObjectSettings settings = flags.settings;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(settings.views, flags.views.Options(shared));
-  settings.views.overwrite = false;
-  settings.seed = shared.seed;
-  if (!flags.recipe.empty()) return ReadRecipe(flags.recipe, settings);
-  ANCHORSPLAT_RETURN_IF_ERROR(Validate(settings));
-  return SingleRecipe(settings);
-}
-
-Status RunBuild(const BuildFlags& flags, const SharedFlags& shared) {
-  DatasetBuildOptions options;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(options.recipe, MakeRecipe(flags, shared));
-  // Fits of small pictures use one core each better than several together.
-  const int cores = ThreadCount();
-  options.jobs = flags.jobs > 0 ? flags.jobs : cores;
-  options.threads = std::max(1, cores / options.jobs);
-  options.timeout_seconds = flags.timeout;
-  options.overwrite = shared.overwrite;
-  options.retry = flags.retry;
-  options.program = OwnProgram();
-  options.stop = &stop_requested;
-  std::signal(SIGINT, RequestStop);
-  std::signal(SIGTERM, RequestStop);
-  auto built = BuildDataset(flags.meshes, flags.output, options);
-  std::signal(SIGINT, SIG_DFL);
-  std::signal(SIGTERM, SIG_DFL);
-  if (!built.ok()) return built.error();
-  const DatasetBuildReport& r = *built;
-  if (shared.json) {
-    PrintJson({{"dataset", flags.output},
-               {"objects", r.objects},
-               {"built", r.built},
-               {"there_already", r.there_already},
-               {"other_settings", r.other_settings},
-               {"failed", r.failed},
-               {"rejected", r.rejected},
-               {"interrupted", r.interrupted},
-               {"seconds", r.seconds}});
-  } else if (!shared.quiet) {
-    std::cout << flags.output << ": " << r.objects << " objects: " << r.built << " built in " << HumanSeconds(r.seconds)
-              << ", " << r.there_already << " there already, " << r.failed << " failed, " << r.rejected
-              << " rejected for their training PSNR\n";
-    if (r.other_settings > 0) {
-      std::cout << r.other_settings << " of those there were made with other settings; -w makes them again\n";
-    }
-    if (r.failed > 0) std::cout << "why: " << flags.output << "/failures.jsonl; --retry tries them again\n";
+Status RunSplit(const SplitFlags& flags, const SharedFlags& shared) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Manifest manifest, ReadManifest(flags.dataset));
+  const std::filesystem::path path = std::filesystem::path(flags.dataset) / kSplitsName;
+  if (!shared.overwrite && std::filesystem::exists(path)) {
+    return Error{ErrorCode::kExists, Cat(path.string(), " exists; -w replaces it")};
   }
-  if (r.interrupted) {
-    return Error{ErrorCode::kInterrupted, Cat(flags.output, ": stopped; the same command goes on from here")};
+  Splits splits;
+  if (flags.lists.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(splits, SplitByModel(manifest, flags.fractions, shared.seed));
+  } else {
+    std::map<std::string, std::vector<std::string>> lists;
+    for (const auto& [split, file] : flags.lists) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(lists[split], ReadAddressList(file));
+    }
+    ANCHORSPLAT_ASSIGN_OR_RETURN(splits, SplitByLists(manifest, lists));
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteSplits(flags.dataset, splits));
+  std::map<std::string, int64_t> counts;
+  for (const auto& [name, split] : splits) ++counts[split];
+  if (shared.json) {
+    PrintJson({{"dataset", flags.dataset}, {"objects", manifest.size()}, {"splits", counts}});
+  } else if (!shared.quiet) {
+    std::cout << path.string() << ": " << manifest.size() << " objects";
+    for (const auto& [split, count] : counts) std::cout << ", " << count << " for " << split;
+    std::cout << '\n';
   }
   return {};
 }
 
-void AddBuild(CLI::App& parent, Program& program) {
-  CLI::App& verb = AddVerb(parent, program, "build", "Make a low-/high-quality pair of every mesh",
-                           "anchorsplat dataset build models/*.obj furniture.sh3f -o data/ --recipe mix.toml");
-  const auto flags = std::make_shared<BuildFlags>();
-  verb.add_option("meshes", flags->meshes, "Mesh files, furniture libraries, or catalog.sh3f#object")->required();
-  verb.add_option("-o,--output", flags->output, "Folder of the data set")->required()->check(NotEmpty());
-  verb.add_option("--recipe", flags->recipe, "TOML file that mixes fit schedules and resolutions")->check(NotEmpty());
-  verb.add_option("--steps", flags->settings.fit_steps, "Iterations of the low-quality fits")
-      ->check(CLI::Range(1, 10'000'000))
+void AddDatasetSplit(CLI::App& parent, Program& program) {
+  CLI::App& verb = AddVerb(parent, program, "split", "Divide a data set into training, validation and test objects",
+                           "anchorsplat dataset split data/ --validation 0.1 --test 0.1");
+  const auto flags = std::make_shared<SplitFlags>();
+  verb.add_option("dataset", flags->dataset, "Folder of the data set")->required()->check(NotEmpty());
+  verb.add_option("--validation", flags->fractions.validation, "Fraction of the models")
+      ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  verb.add_option("--hold-out", flags->settings.hold_out, "Every n-th view is not trained on; 0: none")
-      ->check(CLI::Range(0, 100000))
+  verb.add_option("--test", flags->fractions.test, "Fraction of the models")
+      ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
-  verb.add_option("--max-gaussians", flags->settings.max_gaussians, "Bound on a fit's size; 0: none")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  verb.add_option("--min-psnr", flags->settings.min_train_psnr,
-                  "Objects whose fit is further from its own training views are rejected, dB")
-      ->capture_default_str();
-  verb.add_option("--jobs", flags->jobs, "Objects at the same time (default: one per core)")
-      ->check(CLI::Range(1, 1024));
-  verb.add_option("--timeout", flags->timeout, "Seconds an object may take; 0: any")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  verb.add_flag("--retry", flags->retry, "Try again what failed in an earlier run");
-  flags->views.AddTo(verb);
-  verb.callback([flags, &program] { program.run = [flags, &program] { return RunBuild(*flags, program.flags); }; });
+  for (const std::string split : {"train", "validation", "test"}) {
+    verb.add_option_function<std::string>(
+            "--" + split + "-list", [flags, split](const std::string& file) { flags->lists[split] = file; },
+            "Text file of the meshes for " + split + ", instead of fractions")
+        ->check(NotEmpty());
+  }
+  verb.callback([flags, &program] { program.run = [flags, &program] { return RunSplit(*flags, program.flags); }; });
 }
 
-struct ObjectFlags {
-  std::string job;
-  std::string output;
+struct CheckFlags {
+  std::string dataset;
+  DatasetCheckOptions options;
 };
 
-// What `build` starts for every object; not for people.
-Status RunObject(const ObjectFlags& flags) {
-  DieWithParent();
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const ObjectJob job, ReadObjectJob(flags.job));
-  std::signal(SIGTERM, RequestStop);
-  const auto record = BuildObject(job, flags.output, &stop_requested);
-  return record.ok() ? Status() : Status(record.error());
+Status RunCheck(const CheckFlags& flags, const SharedFlags& shared) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto problems, CheckDataset(flags.dataset, flags.options));
+  if (shared.json) {
+    nlohmann::json list = nlohmann::json::array();
+    for (const DatasetProblem& p : problems) list.push_back({{"object", p.object}, {"problem", p.sentence}});
+    PrintJson({{"dataset", flags.dataset}, {"problems", list}});
+  } else {
+    for (const DatasetProblem& p : problems) std::cout << p.sentence << '\n';
+  }
+  if (!problems.empty()) {
+    return Error{ErrorCode::kBadFile,
+                 Cat(flags.dataset, ": ", problems.size(), problems.size() == 1 ? " problem" : " problems")};
+  }
+  if (!shared.json && !shared.quiet) std::cout << flags.dataset << ": everything is there and fits together\n";
+  return {};
 }
 
-void AddObject(CLI::App& parent, Program& program) {
-  CLI::App& verb = AddVerb(parent, program, "object", "Make one object of a data set (started by build)",
-                           "anchorsplat dataset object data/.building/chair.job -o data/");
-  const auto flags = std::make_shared<ObjectFlags>();
-  verb.add_option("job", flags->job, "File that says what to make")->required();
-  verb.add_option("-o,--output", flags->output, "Folder of the data set")->required()->check(NotEmpty());
-  verb.group("");  // not listed
-  verb.callback([flags, &program] { program.run = [flags] { return RunObject(*flags); }; });
+void AddDatasetCheck(CLI::App& parent, Program& program) {
+  CLI::App& verb = AddVerb(parent, program, "check", "See whether a data set is whole and consistent",
+                           "anchorsplat dataset check data/ --decode");
+  const auto flags = std::make_shared<CheckFlags>();
+  verb.add_option("dataset", flags->dataset, "Folder of the data set")->required()->check(NotEmpty());
+  verb.add_flag("--decode", flags->options.decode, "Read every picture, not only its size");
+  verb.callback([flags, &program] { program.run = [flags, &program] { return RunCheck(*flags, program.flags); }; });
+}
+
+nlohmann::json PartToJson(const DatasetSummary::Part& part) {
+  return {{"objects", part.objects},
+          {"train_psnr", part.train_psnr},
+          {"held_out_psnr", part.held_out_psnr},
+          {"gaussians", part.gaussians}};
+}
+
+nlohmann::json ToJson(const std::string& dataset, const DatasetSummary& s) {
+  nlohmann::json recipes = nlohmann::json::object();
+  for (const auto& [name, part] : s.recipes) recipes[name] = PartToJson(part);
+  return {{"dataset", dataset},
+          {"objects", s.objects},
+          {"rejected", s.rejected},
+          {"failed", s.failed},
+          {"failures", s.failures},
+          {"unfinished", s.unfinished},
+          {"all", PartToJson(s.all)},
+          {"recipes", recipes},
+          {"splits", s.splits},
+          {"licences", s.licences},
+          {"seconds", {{"read", s.read_seconds}, {"views", s.view_seconds}, {"fit", s.fit_seconds}}},
+          {"bytes", s.bytes}};
+}
+
+Status RunInfo(const std::string& dataset, const SharedFlags& shared) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const DatasetSummary s, SummarizeDataset(dataset));
+  if (shared.json) {
+    PrintJson(ToJson(dataset, s));
+    return {};
+  }
+  std::cout << dataset << ": " << s.objects << " objects, " << HumanBytes(s.bytes) << '\n'
+            << "left out: " << s.rejected << " rejected for their training PSNR, " << s.failed << " failed";
+  for (const auto& [stage, count] : s.failures) std::cout << " (" << stage << ' ' << count << ')';
+  std::cout << ", " << s.unfinished << " unfinished\n";
+  std::vector<std::vector<std::string>> rows = {{"recipe", "objects", "training PSNR", "held-out PSNR", "Gaussians"}};
+  const auto add = [&](const std::string& name, const DatasetSummary::Part& part) {
+    rows.push_back({name, std::to_string(part.objects), Fixed(part.train_psnr, 2), Fixed(part.held_out_psnr, 2),
+                    WithThousands(static_cast<int64_t>(part.gaussians))});
+  };
+  for (const auto& [name, part] : s.recipes) add(name, part);
+  if (s.recipes.size() > 1) add("all", s.all);
+  std::cout << FormatTable(rows);
+  for (const auto& [split, count] : s.splits) std::cout << split << ": " << count << " objects\n";
+  std::cout << "licences:";
+  for (const auto& [licence, count] : s.licences) std::cout << ' ' << licence << " (" << count << ')';
+  std::cout << "\ntime: meshes " << HumanSeconds(s.read_seconds) << ", views " << HumanSeconds(s.view_seconds)
+            << ", fits " << HumanSeconds(s.fit_seconds) << '\n';
+  return {};
+}
+
+void AddDatasetInfo(CLI::App& parent, Program& program) {
+  CLI::App& verb = AddVerb(parent, program, "info", "What a data set holds", "anchorsplat dataset info data/ --json");
+  const auto dataset = std::make_shared<std::string>();
+  verb.add_option("dataset", *dataset, "Folder of the data set")->required()->check(NotEmpty());
+  verb.callback(
+      [dataset, &program] { program.run = [dataset, &program] { return RunInfo(*dataset, program.flags); }; });
 }
 
 }  // namespace
@@ -150,8 +165,11 @@ void AddDataset(CLI::App& app, Program& program) {
   CLI::App& verb = *app.add_subcommand("dataset", "Build and inspect paired low-/high-quality data sets");
   verb.footer("Example:\n  anchorsplat dataset build models/*.obj -o data/");
   verb.require_subcommand(1);
-  AddBuild(verb, program);
-  AddObject(verb, program);
+  AddDatasetBuild(verb, program);
+  AddDatasetObject(verb, program);
+  AddDatasetSplit(verb, program);
+  AddDatasetCheck(verb, program);
+  AddDatasetInfo(verb, program);
 }
 
 }  // namespace anchorsplat

@@ -9,11 +9,13 @@
 #include "core/text.h"
 #include "dataset/file_lock.h"
 #include "dataset/object_name.h"
+#include "dataset/scene_reader.h"
 #include "fit/fit.h"
 #include "fit/initial_cloud.h"
 #include "formats/atomic_file.h"
 #include "formats/cloud_io.h"
 #include "formats/gsplat_checkpoint_writer.h"
+#include "scene/mesh_file.h"
 #include "scene/mesh_reader.h"
 #include "scene/ray_tracer.h"
 
@@ -94,6 +96,9 @@ Status MakeViews(const ObjectJob& job, const fs::path& folder, const std::atomic
   options.overwrite = true;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewSetCost cost, WriteViewSet(tracer, folder, options, stop));
   record.view_seconds = cost.seconds;
+  if (!options.store_high) {
+    ANCHORSPLAT_RETURN_IF_ERROR(WriteMeshFile(folder / kMeshName, tracer.mesh(), {.overwrite = true}));
+  }
   return {};
 }
 

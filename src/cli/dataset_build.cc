@@ -1,0 +1,168 @@
+#include <csignal>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/choice.h"
+#include "cli/dataset.h"
+#include "cli/mesh_views.h"
+#include "cli/verb.h"
+#include "core/parallel.h"
+#include "core/text.h"
+#include "dataset/dataset_builder.h"
+#include "dataset/dataset_split.h"
+#include "dataset/object_builder.h"
+#include "dataset/process_pool.h"
+#include "dataset/recipe.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// Ctrl-C asks for an orderly end; the second one ends at once.
+std::atomic<bool> stop_requested{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may not lock");
+
+void RequestStop(int signal) {
+  stop_requested = true;
+  std::signal(signal, SIG_DFL);
+}
+
+struct BuildFlags {
+  std::vector<std::string> meshes;
+  std::string list;
+  std::string objects;
+  std::string output;
+  std::string recipe;
+  ViewSetFlags views;
+  ObjectSettings settings;
+  int jobs = 0;
+  double timeout = 4 * 3600;
+  bool retry = false;
+};
+
+Result<Recipe> MakeRecipe(const BuildFlags& flags, const SharedFlags& shared) {
+  ObjectSettings settings = flags.settings;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(settings.views, flags.views.Options(shared));
+  settings.views.overwrite = false;
+  settings.seed = shared.seed;
+  if (!flags.recipe.empty()) return ReadRecipe(flags.recipe, settings);
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(settings));
+  return SingleRecipe(settings);
+}
+
+Status RunBuild(const BuildFlags& flags, const SharedFlags& shared) {
+  DatasetBuildOptions options;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(options.recipe, MakeRecipe(flags, shared));
+  // Fits of small pictures use one core each better than several together.
+  const int cores = ThreadCount();
+  options.jobs = flags.jobs > 0 ? flags.jobs : cores;
+  options.threads = std::max(1, cores / options.jobs);
+  options.timeout_seconds = flags.timeout;
+  options.overwrite = shared.overwrite;
+  options.retry = flags.retry;
+  options.program = OwnProgram();
+  std::vector<std::string> meshes = flags.meshes;
+  if (!flags.list.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto listed, ReadAddressList(flags.list));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto resolved, ResolveAddresses(listed, flags.objects));
+    meshes.insert(meshes.end(), resolved.begin(), resolved.end());
+  }
+  options.stop = &stop_requested;
+  std::signal(SIGINT, RequestStop);
+  std::signal(SIGTERM, RequestStop);
+  auto built = BuildDataset(meshes, flags.output, options);
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+  if (!built.ok()) return built.error();
+  const DatasetBuildReport& r = *built;
+  if (shared.json) {
+    PrintJson({{"dataset", flags.output},
+               {"objects", r.objects},
+               {"built", r.built},
+               {"there_already", r.there_already},
+               {"other_settings", r.other_settings},
+               {"failed", r.failed},
+               {"rejected", r.rejected},
+               {"interrupted", r.interrupted},
+               {"seconds", r.seconds}});
+  } else if (!shared.quiet) {
+    std::cout << flags.output << ": " << r.objects << " objects: " << r.built << " built in " << HumanSeconds(r.seconds)
+              << ", " << r.there_already << " there already, " << r.failed << " failed, " << r.rejected
+              << " rejected for their training PSNR\n";
+    if (r.other_settings > 0) {
+      std::cout << r.other_settings << " of those there were made with other settings; -w makes them again\n";
+    }
+    if (r.failed > 0) std::cout << "why: " << flags.output << "/failures.jsonl; --retry tries them again\n";
+  }
+  if (r.interrupted) {
+    return Error{ErrorCode::kInterrupted, Cat(flags.output, ": stopped; the same command goes on from here")};
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddDatasetBuild(CLI::App& parent, Program& program) {
+  CLI::App& verb = AddVerb(parent, program, "build", "Make a low-/high-quality pair of every mesh",
+                           "anchorsplat dataset build models/*.obj furniture.sh3f -o data/ --recipe mix.toml");
+  const auto flags = std::make_shared<BuildFlags>();
+  verb.add_option("meshes", flags->meshes, "Mesh files, furniture libraries, or catalog.sh3f#object");
+  auto* objects =
+      verb.add_option("--objects", flags->objects, "Folder in which --list's meshes are")->check(NotEmpty());
+  verb.add_option("--list", flags->list, "Text file of meshes, one a line, such as data/test-30.txt")
+      ->check(NotEmpty())
+      ->needs(objects);
+  verb.add_option("-o,--output", flags->output, "Folder of the data set")->required()->check(NotEmpty());
+  verb.add_option("--recipe", flags->recipe, "TOML file that mixes fit schedules and resolutions")->check(NotEmpty());
+  verb.add_option("--steps", flags->settings.fit_steps, "Iterations of the low-quality fits")
+      ->check(CLI::Range(1, 10'000'000))
+      ->capture_default_str();
+  verb.add_option("--hold-out", flags->settings.hold_out, "Every n-th view is not trained on; 0: none")
+      ->check(CLI::Range(0, 100000))
+      ->capture_default_str();
+  verb.add_option("--max-gaussians", flags->settings.max_gaussians, "Bound on a fit's size; 0: none")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  verb.add_option("--min-psnr", flags->settings.min_train_psnr,
+                  "Objects whose fit is further from its own training views are rejected, dB")
+      ->capture_default_str();
+  verb.add_option("--jobs", flags->jobs, "Objects at the same time (default: one per core)")
+      ->check(CLI::Range(1, 1024));
+  verb.add_option("--timeout", flags->timeout, "Seconds an object may take; 0: any")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  verb.add_flag("--retry", flags->retry, "Try again what failed in an earlier run");
+  flags->views.AddTo(verb);
+  verb.callback([flags, &program] { program.run = [flags, &program] { return RunBuild(*flags, program.flags); }; });
+}
+
+namespace {
+
+struct ObjectFlags {
+  std::string job;
+  std::string output;
+};
+
+// What `build` starts for every object; not for people.
+Status RunObject(const ObjectFlags& flags) {
+  DieWithParent();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ObjectJob job, ReadObjectJob(flags.job));
+  std::signal(SIGTERM, RequestStop);
+  const auto record = BuildObject(job, flags.output, &stop_requested);
+  return record.ok() ? Status() : Status(record.error());
+}
+
+}  // namespace
+
+void AddDatasetObject(CLI::App& parent, Program& program) {
+  CLI::App& verb = AddVerb(parent, program, "object", "Make one object of a data set (started by build)",
+                           "anchorsplat dataset object data/.building/chair.job -o data/");
+  const auto flags = std::make_shared<ObjectFlags>();
+  verb.add_option("job", flags->job, "File that says what to make")->required();
+  verb.add_option("-o,--output", flags->output, "Folder of the data set")->required()->check(NotEmpty());
+  verb.group("");  // not listed
+  verb.callback([flags, &program] { program.run = [flags] { return RunObject(*flags); }; });
+}
+
+}  // namespace anchorsplat

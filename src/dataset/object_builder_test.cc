@@ -1,0 +1,113 @@
+#include "dataset/object_builder.h"
+
+#include <gtest/gtest.h>
+
+#include <iterator>
+
+#include "dataset/scene_reader.h"
+#include "dataset/small_dataset_test.h"
+#include "formats/test_folder.h"
+
+namespace anchorsplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string Bytes(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(ObjectBuilder, MakesTheBenchmarksFiles) {
+  const TestFolder folder;
+  const ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
+  const auto record = BuildObject(job, folder / "set", nullptr);
+  ASSERT_TRUE(record.ok()) << record.error().message;
+  EXPECT_EQ(record->triangles, 4);
+  EXPECT_EQ(record->initial_points, 60);
+  EXPECT_GT(record->gaussians, 0);
+  EXPECT_GT(record->train_psnr, 10);
+  EXPECT_FALSE(record->rejected);
+  for (const char* name : {"record.json", "splat.ply", "12/images/008.png", "12/sparse/0/points3D.bin",
+                           "12/gaussian_splatting/ckpts/ckpt_59_rank0.pt", "24/cameras.txt", "24/images/000.png"}) {
+    EXPECT_TRUE(fs::exists(folder / "set/tetra" / name)) << name;
+  }
+  for (const char* name : {"job.json", "views.json", "fit.checkpoint", "stage"}) {
+    EXPECT_FALSE(fs::exists(folder / "set/tetra" / name)) << name;
+  }
+  EXPECT_FALSE(fs::exists(BuildingFolder(folder / "set", "tetra")));
+}
+
+TEST(ObjectBuilder, GoesOnWhereItWasStoppedAndGetsTheSame) {
+  const TestFolder folder;
+  const ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
+  ASSERT_TRUE(BuildObject(job, folder / "whole", nullptr).ok());
+
+  const std::atomic<bool> stop = true;
+  EXPECT_EQ(BuildObject(job, folder / "cut", &stop).error().code, ErrorCode::kInterrupted);
+  EXPECT_FALSE(fs::exists(folder / "cut/tetra"));
+  // Views that were cut off are made anew, views that are done are not touched again.
+  ASSERT_TRUE(BuildObject(job, folder / "cut", nullptr).ok());
+  for (const char* name : {"splat.ply", "12/images/003.png", "24/images/003.png", "12/sparse/0/points3D.bin",
+                           "12/gaussian_splatting/ckpts/ckpt_59_rank0.pt"}) {
+    EXPECT_TRUE(Bytes(folder / "whole/tetra" / name) == Bytes(folder / "cut/tetra" / name)) << name;
+  }
+}
+
+TEST(ObjectBuilder, KeepsFinishedViewsOfTheSameJobOnly) {
+  const TestFolder folder;
+  ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
+  job.settings.fit_steps = 200000;
+  // Stopped by a fit that cannot begin: the project's pictures are gone.
+  const fs::path building = BuildingFolder(folder.path(), "tetra");
+  ASSERT_TRUE(BuildObject(SmallJob(job.source, "other"), folder.path(), nullptr).ok());
+  fs::create_directories(building);
+  fs::copy(folder / "other", building, fs::copy_options::recursive);
+  std::ofstream(building / "views.json") << Bytes(folder / "other/record.json");
+  // Another job's work: begun anew, so that the stop finds no views.
+  const std::atomic<bool> stop = true;
+  EXPECT_EQ(BuildObject(job, folder.path(), &stop).error().code, ErrorCode::kInterrupted);
+  EXPECT_FALSE(fs::exists(building / "views.json"));
+}
+
+TEST(ObjectBuilder, ReplacesAnOlderObject) {
+  const TestFolder folder;
+  ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
+  ASSERT_TRUE(BuildObject(job, folder / "set", nullptr).ok());
+  job.settings.views.rig.views = 3;
+  ASSERT_TRUE(BuildObject(job, folder / "set", nullptr).ok());
+  EXPECT_FALSE(fs::exists(folder / "set/tetra/12/images/008.png"));
+  EXPECT_FALSE(fs::exists(BuildingFolder(folder / "set", "tetra.replaced")));
+}
+
+TEST(ObjectBuilder, RejectsFitsFarFromTheirOwnViews) {
+  const TestFolder folder;
+  ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
+  job.settings.min_train_psnr = 90;
+  const auto record = BuildObject(job, folder / "set", nullptr);
+  ASSERT_TRUE(record.ok());
+  EXPECT_TRUE(record->rejected);
+  EXPECT_NE(record->reason.find("90"), std::string::npos);
+  EXPECT_TRUE(fs::exists(folder / "set/tetra/splat.ply"));  // kept, but marked
+}
+
+TEST(ObjectBuilder, BadMeshesAreErrorsWithTheirStage) {
+  const TestFolder folder;
+  std::ofstream(folder / "empty.obj") << "v 0 0 0\n";
+  EXPECT_FALSE(BuildObject(SmallJob((folder / "empty.obj").string(), "empty"), folder / "set", nullptr).ok());
+  EXPECT_EQ(Bytes(BuildingFolder(folder / "set", "empty") / kStageName), "mesh");
+  EXPECT_EQ(BuildObject(SmallJob((folder / "none.obj").string(), "none"), folder / "set", nullptr).error().code,
+            ErrorCode::kNotFound);
+}
+
+TEST(ObjectBuilder, JobsComeBack) {
+  const TestFolder folder;
+  const ObjectJob job = SmallJob("a \"mesh\".obj", "a");
+  std::ofstream(folder / "a.job") << ToJsonText(job);
+  const auto back = ReadObjectJob(folder / "a.job");
+  ASSERT_TRUE(back.ok()) << back.error().message;
+  EXPECT_EQ(ToJsonText(*back), ToJsonText(job));
+}
+
+}  // namespace
+}  // namespace anchorsplat

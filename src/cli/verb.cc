@@ -92,6 +92,7 @@ int RunProgram(int argc, const char* const* argv) {
   AddRender(app, program);
   AddConvert(app, program);
   AddCompare(app, program);
+  AddEval(app, program);
   AddView(app, program);
   AddViews(app, program);
   AddFit(app, program);
@@ -116,7 +117,7 @@ int RunProgram(int argc, const char* const* argv) {
     if (!status.ok()) return Fail(flags, status.error());
     std::cout.flush();
     if (!std::cout) return Fail(flags, {ErrorCode::kIo, "standard output could not be written"});
-    return 0;
+    return program.exit_code;
   } catch (const std::bad_alloc&) {
     return Fail(flags, {ErrorCode::kIo, "out of memory"});
   } catch (const std::exception& error) {

@@ -24,6 +24,8 @@ struct SharedFlags {
 struct Program {
   SharedFlags flags;
   std::function<Status()> run;
+  // Of a run that succeeds: set to kPartialExitCode by verbs that go on when one of many inputs fails.
+  int exit_code = 0;
 };
 
 // A subcommand with the shared flags, its description and an example for --help.
@@ -35,6 +37,7 @@ void AddEnhance(CLI::App& app, Program& program);
 void AddInfo(CLI::App& app, Program& program);
 void AddRender(CLI::App& app, Program& program);
 void AddCompare(CLI::App& app, Program& program);
+void AddEval(CLI::App& app, Program& program);
 void AddView(CLI::App& app, Program& program);
 void AddViews(CLI::App& app, Program& program);
 void AddConvert(CLI::App& app, Program& program);
@@ -45,6 +48,7 @@ void AddBench(CLI::App& app, Program& program);
 // 0 on success; each kind of failure has a number of its own (docs/cli.md).
 int ExitCode(ErrorCode code);
 inline constexpr int kUsageExitCode = 2;
+inline constexpr int kPartialExitCode = 1;  // done, but not for all inputs; messages and results say for which
 
 inline WriteOptions WriteOptionsFrom(const SharedFlags& flags) { return {.overwrite = flags.overwrite}; }
 

@@ -1,0 +1,139 @@
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "cli/choice.h"
+#include "cli/lpips_flags.h"
+#include "cli/verb.h"
+#include "core/log.h"
+#include "core/text.h"
+#include "enhance/filter.h"
+#include "eval/evaluation.h"
+#include "eval/filter_sweep.h"
+#include "eval/report.h"
+#include "eval/summary.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct EvalFlags {
+  std::string benchmark;
+  std::string out;
+  std::vector<std::string> methods = {"raw", "upsample", "filter"};
+  Protocol protocol = Protocol::kHeldOut;
+  MethodOptions method_options;
+  std::vector<std::string> objects;
+  size_t max_views = 0;
+  std::string lpips;
+  std::string lpips_weights;
+  bool choose_f = false;
+};
+
+Result<std::vector<EvalMethod>> MakeMethods(const EvalFlags& flags) {
+  std::vector<EvalMethod> methods;
+  if (flags.choose_f) {
+    for (const double f : FilterStrengths()) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(EvalMethod method, MakeEvalMethod(Cat("filter@", f), flags.method_options));
+      methods.push_back(std::move(method));
+    }
+    return methods;
+  }
+  for (const std::string& word : flags.methods) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(EvalMethod method, MakeEvalMethod(word, flags.method_options));
+    methods.push_back(std::move(method));
+  }
+  return methods;
+}
+
+// The f for all objects alike, from the mean PSNR at each of the tried ones. Rows stand in the order of the strengths.
+Result<double> ChooseStrength(const std::vector<MethodSummary>& summaries) {
+  const std::span<const double> strengths = FilterStrengths();
+  std::vector<double> psnr;
+  for (const MethodSummary& summary : summaries) psnr.push_back(summary.psnr.mean);
+  if (psnr.size() != strengths.size()) {
+    return Error{ErrorCode::kBadFile, "no f can be chosen: not every strength was measured"};
+  }
+  return TopOfParabola(strengths, psnr);
+}
+
+Status RunEval(const EvalFlags& flags, Program& program) {
+  const SharedFlags& shared = program.flags;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<EvalMethod> methods, MakeMethods(flags));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Lpips> lpips, OpenLpipsOrWarn(flags.lpips, flags.lpips_weights));
+  EvaluationOptions options;
+  options.protocol = flags.protocol;
+  options.objects = flags.objects;
+  options.max_views = flags.max_views;
+  options.lpips = lpips ? &*lpips : nullptr;
+  options.seed = shared.seed;
+  options.again = shared.overwrite;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Evaluation evaluation, Evaluate(flags.benchmark, methods, flags.out, options));
+  if (!evaluation.failures.empty()) program.exit_code = kPartialExitCode;
+  if (evaluation.results.empty()) {
+    return Error{ErrorCode::kBadFile, Cat("nothing could be measured; ", evaluation.failures.size(), " failures")};
+  }
+  const std::vector<MethodSummary> summaries = Summarise(evaluation, shared.seed);
+  const fs::path folder(flags.benchmark);
+  const std::string title =
+      Cat("Evaluation of ", (folder.has_filename() ? folder : folder.parent_path()).filename().string());
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteReports(flags.out, evaluation, summaries, title));
+  nlohmann::json json = ToJson(evaluation, summaries);
+  std::string chosen;
+  if (flags.choose_f) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double f, ChooseStrength(summaries));
+    json["chosen_f"] = f;
+    chosen = Cat("\nBest f for all objects alike: ", Fixed(f, 3), "   (--filter-f ", Fixed(f, 3), ")\n");
+  }
+  if (shared.json) {
+    PrintJson(json);
+  } else {
+    std::cout << ToMarkdown(evaluation, summaries, title) << chosen;
+    if (!shared.quiet) {
+      std::cout << "\nWritten: " << (fs::path(flags.out) / "table.md").string()
+                << ", table.csv, results.json, contact_sheet.png\n";
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddEval(CLI::App& app, Program& program) {
+  CLI::App& verb = AddVerb(app, program, "eval", "Tables of quality over a benchmark: methods against ground truth",
+                           "anchorsplat eval test-30 -o results --methods raw,upsample,filter,model.safetensors");
+  const auto flags = std::make_shared<EvalFlags>();
+  verb.add_option("benchmark", flags->benchmark, "Folder with a folder per object (docs/eval.md)")
+      ->required()
+      ->check(NotEmpty());
+  verb.add_option("-o,--output", flags->out,
+                  "Folder for tables and results; what is there already is not measured again "
+                  "(-w measures it again)")
+      ->required()
+      ->check(NotEmpty());
+  auto* methods = verb.add_option("--methods", flags->methods,
+                                  "raw, filter, filter@F, filter-auto, filter-best, upsample, checkpoints of networks, "
+                                  "methods of enhance; separated by commas")
+                      ->delimiter(',')
+                      ->capture_default_str();
+  AddChoice(verb, "--protocol", flags->protocol, {{"heldout", Protocol::kHeldOut}, {"upstream", Protocol::kUpstream}},
+            "heldout: views no fit has seen; upstream: as the published evaluation");
+  auto* strength = verb.add_option("--filter-f", flags->method_options.filter_strength,
+                                   "Strength of 'filter', the same for all objects (default: 1 - (1 - 1/upscale²)/3.6)")
+                       ->check(CLI::Range(0.0, kMaxFilterStrength));
+  verb.add_flag("--choose-f", flags->choose_f,
+                "Measure the filter at several strengths and say which is best; for a validation split")
+      ->excludes(methods)
+      ->excludes(strength);
+  verb.add_option("--objects", flags->objects, "Only these, by name; separated by commas")->delimiter(',');
+  verb.add_option("--max-views", flags->max_views, "At most so many views per object, for a quick look; 0: all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  AddLpipsFlags(verb, flags->lpips, flags->lpips_weights);
+  verb.callback([flags, &program] { program.run = [flags, &program] { return RunEval(*flags, program); }; });
+}
+
+}  // namespace anchorsplat

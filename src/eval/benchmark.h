@@ -1,0 +1,51 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/camera.h"
+#include "core/gaussian_cloud.h"
+#include "core/image.h"
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// An object of a benchmark as its folder is found, before anything in it is read.
+struct BenchmarkEntry {
+  std::string name;  // of the folder
+  std::filesystem::path folder;
+};
+
+// The objects of a benchmark, in order of their names. DIR holds a folder per object, of one of two layouts:
+//  * the published data set's: two folders named after their resolution, such as 256/{images,sparse/0,
+//    gaussian_splatting/ckpts/ckpt_*_rank0.pt} and 1024/{images,cameras.txt};
+//  * that of the repository's examples: a splat, transforms_lr.json and transforms_hr.json with their pictures.
+// Where there is a manifest.jsonl its objects are taken, without those it marks as rejected.
+//
+// Errors: kNotFound: no folder, no objects in it; kBadFile: of the manifest.
+Result<std::vector<BenchmarkEntry>> ListBenchmark(const std::filesystem::path& folder);
+
+// What an object gives methods to work with and what their results are measured with.
+struct BenchmarkObject {
+  std::string name;
+  std::filesystem::path splat;   // file of `low`
+  GaussianCloud low;             // the low-quality splat
+  CameraSet low_cameras;         // of all low-resolution views, in order of their names
+  std::vector<Camera> views;     // of all high-resolution views, in order of their names; `image` is the truth
+  std::vector<size_t> held_out;  // views the low-quality fit was not trained on
+  std::array<float, 3> background{};
+  std::filesystem::path low_images;  // folder of a project to fit (fit/training_views.h): that of the LR views
+
+  double upscale() const;                  // pixels of a high view per pixel of a low one, along a side
+  Camera LowCamera(size_t view) const;     // the place of view `view` with the intrinsics of the low ones
+  Result<Image> Truth(size_t view) const;  // [3,H,W] over the background
+};
+
+// Errors: kNotFound, kBadFile, kIo, naming the file: no splat, cameras that cannot be read, no high view with a
+// picture, more than one set of high intrinsics, low views that are not smaller.
+Result<BenchmarkObject> OpenObject(const BenchmarkEntry& entry);
+
+}  // namespace anchorsplat

@@ -1,0 +1,287 @@
+#include "eval/evaluation.h"
+
+#include <algorithm>
+#include <cctype>
+#include <chrono>
+#include <new>
+#include <set>
+#include <utility>
+
+#include "core/log.h"
+#include "core/text.h"
+#include "formats/image_io.h"
+#include "metrics/image_metrics.h"
+#include "metrics/side_by_side.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr double kCrop = 0.125;  // width of the part that is shown, of the view's
+
+// Adds the time of its life to a sum.
+class Timed {
+ public:
+  explicit Timed(double& sum) : sum_(sum) {}
+  ~Timed() { sum_ += std::chrono::duration<double>(Clock::now() - begin_).count(); }
+  Timed(const Timed&) = delete;
+  Timed& operator=(const Timed&) = delete;
+
+ private:
+  double& sum_;
+  Clock::time_point begin_ = Clock::now();
+};
+
+// All that a result depends on. What the program itself computes changes with its version.
+std::string Key(const BenchmarkObject& object, const EvalMethod& method, const std::vector<size_t>& views,
+                const EvaluationOptions& options) {
+  std::error_code code;
+  return Cat("anchorsplat ", ANCHORSPLAT_VERSION, "; ", ProtocolName(options.protocol), ", ", views.size(), " views; ",
+             method.name, " ", method.settings, "; seed ", options.seed, "; lpips ",
+             options.lpips == nullptr ? "none" : LpipsNetName(options.lpips->net()), "; ",
+             object.splat.filename().string(), " ", fs::file_size(object.splat, code), " ",
+             fs::last_write_time(object.splat, code).time_since_epoch().count());
+}
+
+Image Crop(const Image& image, const ViewRegion& region) {
+  Image out(region.width, region.height, 3);
+  for (int c = 0; c < 3; ++c) {
+    for (int y = 0; y < region.height; ++y) {
+      const float* row = image.channel(c) + int64_t{region.y + y} * image.width + region.x;
+      std::copy(row, row + region.width, out.channel(c) + int64_t{y} * region.width);
+    }
+  }
+  return out;
+}
+
+// The part that the contact sheet shows: of the middle view, where the low-quality splat is farthest off.
+struct Excerpt {
+  size_t view = 0;
+  ViewRegion region;
+};
+
+Result<Excerpt> ChooseExcerpt(const BenchmarkObject& object, const std::vector<size_t>& views, Protocol protocol) {
+  Excerpt excerpt;
+  excerpt.view = views[views.size() / 2];
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Image truth, object.Truth(excerpt.view));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Image low, SplatViews(object, object.low).render(excerpt.view));
+  TreatRender(protocol, low);
+  const int side = std::max(1, static_cast<int>(kCrop * std::min(truth.width, truth.height)));
+  excerpt.region = MostDifferentRegion(low, truth, side, side);
+  return excerpt;
+}
+
+// A method at work on an object.
+struct Pending {
+  const EvalMethod* method = nullptr;
+  std::string key;
+  MethodViews views;
+  MethodResult result;
+  std::optional<std::string> failure;
+};
+
+// Measures one view of every pending method.
+Status MeasureView(const BenchmarkObject& object, size_t view, const std::optional<Excerpt>& excerpt,
+                   const fs::path& folder, const EvaluationOptions& options, std::vector<Pending>& pending,
+                   EvaluationTimes& times) {
+  Result<Image> truth = [&] {
+    const Timed timed(times.truth);
+    return object.Truth(view);
+  }();
+  if (!truth.ok()) return truth.error();
+  const bool shown = excerpt && excerpt->view == view;
+  if (shown) {
+    ANCHORSPLAT_RETURN_IF_ERROR(
+        WritePng(folder / Cat(kTruthStem, ".png"), Crop(*truth, excerpt->region), {.overwrite = true}));
+  }
+  for (Pending& p : pending) {
+    if (p.failure) continue;
+    const auto measure = [&]() -> Status {
+      double seconds = 0;
+      Result<Image> image = [&] {
+        const Timed timed(seconds);
+        return p.views.render(view);
+      }();
+      if (!image.ok()) return image.error();
+      times.render += seconds;
+      p.result.render_seconds += seconds;
+      ViewScore score{fs::path(object.views[view].name).filename().string(), 0, 0, std::nullopt};
+      {
+        const Timed timed(times.metrics);
+        TreatRender(options.protocol, *image);
+        ANCHORSPLAT_ASSIGN_OR_RETURN(score.psnr, Psnr(*image, *truth));
+        ANCHORSPLAT_ASSIGN_OR_RETURN(score.ssim, Ssim(*image, *truth));
+      }
+      if (options.lpips != nullptr) {
+        const Timed timed(times.lpips);
+        ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, options.lpips->Distance(*image, *truth));
+      }
+      ++times.pictures;
+      p.result.views.push_back(std::move(score));
+      if (!shown) return {};
+      return WritePng(folder / (FileStem(p.method->name) + ".png"), Crop(*image, excerpt->region), {.overwrite = true});
+    };
+    if (const Status status = measure(); !status.ok()) p.failure = status.error().message;
+  }
+  return {};
+}
+
+// All that is still to be measured on one object. An error is one of the object itself.
+Status EvaluateObject(const BenchmarkEntry& entry, const std::string& place, const std::vector<EvalMethod>& methods,
+                      const fs::path& out, const EvaluationOptions& options, Evaluation& evaluation) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const BenchmarkObject object, OpenObject(entry));
+  const std::vector<size_t> views =
+      Thinned(options.protocol == Protocol::kUpstream ? UpstreamViews(object.views.size()) : object.held_out,
+              options.max_views);
+  if (views.empty()) return Error{ErrorCode::kBadFile, "every high-resolution view was trained on: none is held out"};
+  const fs::path folder = ObjectFolder(out, entry.name);
+  std::error_code code;
+  fs::create_directories(folder, code);
+  if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": ", code.message())};
+
+  std::vector<MethodResult> done;
+  std::vector<Pending> pending;
+  for (const EvalMethod& method : methods) {
+    Pending p;
+    p.method = &method;
+    p.key = Key(object, method, views, options);
+    std::optional<MethodResult> known;
+    const bool shown = fs::exists(folder / (FileStem(method.name) + ".png"), code) &&
+                       fs::exists(folder / Cat(kTruthStem, ".png"), code);
+    if (!options.again && shown) known = ReadMethodResult(folder / (FileStem(method.name) + ".json"), p.key);
+    if (known) {
+      ++evaluation.resumed;
+      done.push_back(*std::move(known));
+      continue;
+    }
+    auto prepared = method.prepare({object, views, options.protocol, folder / FileStem(method.name), options.seed});
+    if (!prepared.ok()) {
+      p.failure = prepared.error().message;
+    } else {
+      p.views = *std::move(prepared);
+      p.result.object = entry.name;
+      p.result.method = method.name;
+      p.result.seconds = p.views.seconds;
+      p.result.gaussians = p.views.gaussians;
+      p.result.facts = {p.views.facts.begin(), p.views.facts.end()};
+    }
+    pending.push_back(std::move(p));
+  }
+
+  Status measured;
+  if (std::any_of(pending.begin(), pending.end(), [](const Pending& p) { return !p.failure; })) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Excerpt excerpt, ChooseExcerpt(object, views, options.protocol));
+    Progress progress(place, static_cast<int64_t>(views.size()));
+    for (const size_t view : views) {
+      measured = MeasureView(object, view, excerpt, folder, options, pending, evaluation.times);
+      if (!measured.ok()) break;
+      progress.Advance();
+    }
+  }
+  // Results that are known stay so when the truth of a view turns out to be broken.
+  for (Pending& p : pending) {
+    if (!p.failure && measured.ok()) {
+      ANCHORSPLAT_RETURN_IF_ERROR(WriteMethodResult(folder / (FileStem(p.method->name) + ".json"), p.key, p.result));
+      done.push_back(std::move(p.result));
+    } else if (p.failure) {
+      evaluation.failures.push_back({entry.name, p.method->name, *p.failure});
+    }
+  }
+  for (const EvalMethod& method : methods) {
+    for (MethodResult& result : done) {
+      if (result.method == method.name) evaluation.results.push_back(std::move(result));
+    }
+  }
+  return measured;
+}
+
+Status CheckMethods(const std::vector<EvalMethod>& methods) {
+  std::set<std::string> names = {kTruthStem};
+  for (const EvalMethod& method : methods) {
+    if (!names.insert(FileStem(method.name)).second) {
+      return Error{ErrorCode::kBadArgument,
+                   Cat("--methods: two of them would be called ", method.name, "; rename the file of one")};
+    }
+  }
+  if (methods.empty()) return Error{ErrorCode::kBadArgument, "no methods to evaluate"};
+  return {};
+}
+
+Result<std::vector<BenchmarkEntry>> ChooseObjects(std::vector<BenchmarkEntry> entries,
+                                                  const std::vector<std::string>& names) {
+  if (names.empty()) return entries;
+  std::vector<BenchmarkEntry> chosen;
+  for (const BenchmarkEntry& entry : entries) {
+    if (std::find(names.begin(), names.end(), entry.name) != names.end()) chosen.push_back(entry);
+  }
+  for (const std::string& name : names) {
+    if (std::none_of(chosen.begin(), chosen.end(), [&](const BenchmarkEntry& e) { return e.name == name; })) {
+      return Error{ErrorCode::kBadArgument, Cat("--objects: there is no object '", Printable(name), "'")};
+    }
+  }
+  return chosen;
+}
+
+}  // namespace
+
+const MethodResult* Evaluation::Find(const std::string& object, const std::string& method) const {
+  for (const MethodResult& result : results) {
+    if (result.object == object && result.method == method) return &result;
+  }
+  return nullptr;
+}
+
+fs::path ObjectFolder(const fs::path& out, const std::string& object) { return out / "objects" / object; }
+
+std::string FileStem(const std::string& method) {
+  std::string stem = method;
+  for (char& c : stem) {
+    const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_' || c == '.' || c == '@';
+    if (!plain) c = '_';
+  }
+  return stem;
+}
+
+Result<Evaluation> Evaluate(const fs::path& benchmark, const std::vector<EvalMethod>& methods, const fs::path& out,
+                            const EvaluationOptions& options) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckMethods(methods));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<BenchmarkEntry> entries, ListBenchmark(benchmark));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(entries, ChooseObjects(std::move(entries), options.objects));
+  std::error_code code;
+  fs::create_directories(out / "objects", code);
+  if (code) return Error{ErrorCode::kIo, Cat(out.string(), ": cannot make this folder: ", code.message())};
+
+  Evaluation evaluation;
+  evaluation.protocol = options.protocol;
+  evaluation.max_views = options.max_views;
+  if (options.lpips != nullptr) evaluation.lpips = options.lpips->net();
+  for (const EvalMethod& method : methods) evaluation.methods.push_back(method.name);
+  for (size_t i = 0; i < entries.size(); ++i) {
+    evaluation.objects.push_back(entries[i].name);
+    const std::string place = Cat(entries[i].name, " (", i + 1, " of ", entries.size(), ")");
+    const size_t before = evaluation.failures.size(), measured = evaluation.results.size();
+    Status status;
+    try {
+      status = EvaluateObject(entries[i], place, methods, out, options, evaluation);
+    } catch (const std::bad_alloc&) {
+      status = Error{ErrorCode::kIo, "out of memory"};
+    }
+    if (!status.ok()) evaluation.failures.push_back({entries[i].name, "", status.error().message});
+    for (size_t k = before; k < evaluation.failures.size(); ++k) {
+      const EvaluationFailure& failure = evaluation.failures[k];
+      LogError(Cat(failure.object, failure.method.empty() ? "" : ", ", failure.method, ": ", failure.message));
+    }
+    std::string scores;
+    for (size_t k = measured; k < evaluation.results.size(); ++k) {
+      scores += Cat(scores.empty() ? "" : ", ", evaluation.results[k].method, " ",
+                    Fixed(evaluation.results[k].MeanPsnr(), 2));
+    }
+    if (!scores.empty()) LogInfo(Cat(place, ": ", scores, " dB"));
+  }
+  return evaluation;
+}
+
+}  // namespace anchorsplat

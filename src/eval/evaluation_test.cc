@@ -1,0 +1,294 @@
+#include "eval/evaluation.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include "core/text.h"
+#include "enhance/enhance.h"
+#include "eval/contact_sheet.h"
+#include "formats/camera_io.h"
+#include "formats/image_io.h"
+#include "formats/test_cloud.h"
+#include "formats/test_folder.h"
+
+namespace anchorsplat {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+void Write(const fs::path& path, const std::string& text) {
+  fs::create_directories(path.parent_path());
+  std::ofstream(path) << text;
+}
+
+// A cloud around the origin that renders to something.
+GaussianCloud Ball() {
+  GaussianCloud cloud = RandomCloud(200, 1, 4);
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const size_t k = static_cast<size_t>(3 * i + axis);
+      cloud.means[k] = 0.4f * std::sin(1.7f * static_cast<float>(i) + 2.0f * static_cast<float>(axis));
+      cloud.log_scales[k] = -3.2f + 0.3f * std::cos(static_cast<float>(i));
+    }
+    cloud.opacity_logits[static_cast<size_t>(i)] = 1;
+  }
+  return cloud;
+}
+
+// Cameras named 000, 001, … with pictures of `cloud` in folder/pictures.
+CameraSet Photograph(const GaussianCloud& cloud, int count, int size, const fs::path& folder,
+                     const std::string& pictures) {
+  CameraSet cameras = *OrbitCameras(count, 1.7, {0, 0, 0}, PinholeFromFov(size, size, 0.8));
+  fs::create_directories(folder / pictures);
+  Rasterizer rasterizer;
+  for (Camera& camera : cameras.cameras) {
+    RenderOutput output;
+    EXPECT_TRUE(rasterizer.Render(cloud, camera, {}, output).ok());
+    const std::string file = Cat(pictures, "/", camera.name, ".png");
+    EXPECT_TRUE(WritePng(folder / file, output.color).ok());
+    camera.image = folder / file;
+  }
+  return cameras;
+}
+
+// The published layout, as text, with 9 views of 16² and 48².
+void MakePublishedObject(const fs::path& folder, const GaussianCloud& low, const GaussianCloud& truth) {
+  const CameraSet cameras = Photograph(truth, 9, 48, folder / "48", "images");
+  std::string images;
+  for (size_t i = 0; i < cameras.cameras.size(); ++i) {
+    // A rotation matrix as quaternion; none of these poses is a half turn.
+    const auto& r = cameras.cameras[i].world_to_camera.rotation;
+    const auto& t = cameras.cameras[i].world_to_camera.translation;
+    const double w = std::sqrt(std::max(1e-12, 1 + r[0] + r[4] + r[8])) / 2;
+    std::ostringstream line;
+    line.precision(17);
+    line << i + 1 << " " << w << " " << (r[7] - r[5]) / (4 * w) << " " << (r[2] - r[6]) / (4 * w) << " "
+         << (r[3] - r[1]) / (4 * w) << " " << t[0] << " " << t[1] << " " << t[2] << " 1 " << cameras.cameras[i].name
+         << ".png\n\n";
+    images = line.str() + images;  // in another order than that of the names
+  }
+  const auto camera_text = [](const Pinhole& k) {
+    return Cat("1 PINHOLE ", k.width, " ", k.height, " ", k.fx, " ", k.fy, " ", k.cx, " ", k.cy, "\n");
+  };
+  const Pinhole high = cameras.cameras[0].intrinsics;
+  Write(folder / "48" / "cameras.txt", camera_text(high));
+  Write(folder / "48" / "images.txt", images);
+  Write(folder / "16" / "sparse" / "0" / "cameras.txt", camera_text(Scaled(high, 1.0 / 3)));
+  Write(folder / "16" / "sparse" / "0" / "images.txt", images);
+  fs::create_directories(folder / "16" / "gaussian_splatting" / "ckpts");
+  // Splat files are recognised by their content.
+  ASSERT_TRUE(WriteCloud(folder / "low.ply", low).ok());
+  fs::rename(folder / "low.ply", folder / "16" / "gaussian_splatting" / "ckpts" / "ckpt_14999_rank0.pt");
+  Write(folder / "16" / "gaussian_splatting" / "ckpts" / "ckpt_3499_rank0.pt", "an earlier one, which is not read");
+}
+
+// The layout of the examples: 4 high views, of which 002 was trained on.
+void MakeExampleObject(const fs::path& folder, const GaussianCloud& low, const GaussianCloud& truth) {
+  const CameraSet high = Photograph(truth, 4, 48, folder, "hr");
+  const auto named = [](CameraSet set, const std::string& folder_name) {
+    for (Camera& camera : set.cameras) camera.name = folder_name + "/" + camera.name;
+    return set;
+  };
+  CameraSet trained;
+  trained.cameras = {high.cameras[2]};
+  trained.cameras[0].intrinsics = Scaled(trained.cameras[0].intrinsics, 1.0 / 3);
+  ASSERT_TRUE(WriteTransforms(folder / "transforms_hr.json", named(high, "hr")).ok());
+  ASSERT_TRUE(WriteTransforms(folder / "transforms_lr.json", named(trained, "lr")).ok());
+  ASSERT_TRUE(WriteCloud(folder / "input.ply", low).ok());
+}
+
+// The truth is the ball, the low-quality splat a thinner one.
+GaussianCloud ThinBall() {
+  GaussianCloud cloud = Ball();
+  for (float& value : cloud.log_scales) value -= 0.4f;
+  return cloud;
+}
+
+std::vector<EvalMethod> Methods(const std::vector<std::string>& words) {
+  std::vector<EvalMethod> methods;
+  for (const std::string& word : words) {
+    auto method = MakeEvalMethod(word, {});
+    EXPECT_TRUE(method.ok()) << word << ": " << method.error().message;
+    methods.push_back(*std::move(method));
+  }
+  return methods;
+}
+
+TEST(Benchmark, ReadsThePublishedLayout) {
+  const TestFolder folder;
+  MakePublishedObject(folder / "ball", ThinBall(), Ball());
+  const auto entries = ListBenchmark(folder.path());
+  ASSERT_TRUE(entries.ok()) << entries.error().message;
+  ASSERT_EQ(entries->size(), 1u);
+  EXPECT_EQ(entries->front().name, "ball");
+  const auto object = OpenObject(entries->front());
+  ASSERT_TRUE(object.ok()) << object.error().message;
+  EXPECT_DOUBLE_EQ(object->upscale(), 3);
+  EXPECT_EQ(object->low.size(), 200);
+  EXPECT_THAT(object->held_out, ElementsAre(0, 8));
+  ASSERT_EQ(object->views.size(), 9u);
+  EXPECT_EQ(object->views[0].name, "000");  // sorted
+  EXPECT_EQ(object->views[8].name, "008");
+  EXPECT_EQ(object->LowCamera(3).intrinsics.width, 16);
+  EXPECT_EQ(object->LowCamera(3).name, "003");
+  // The pictures belong to the cameras: the truth rendered again differs by rounding only.
+  Rasterizer rasterizer;
+  RenderOutput output;
+  ASSERT_TRUE(rasterizer.Render(Ball(), object->views[5], {}, output).ok());
+  const Image truth = *object->Truth(5);
+  for (size_t i = 0; i < truth.pixels.size(); ++i) {
+    ASSERT_NEAR(std::min(1.0f, output.color.pixels[i]), truth.pixels[i], 0.003);
+  }
+  // A folder that is itself an object is a benchmark of one.
+  EXPECT_EQ(ListBenchmark(folder / "ball")->front().name, "ball");
+}
+
+TEST(Benchmark, ReadsTheExamplesLayout) {
+  const TestFolder folder;
+  MakeExampleObject(folder / "ball", ThinBall(), Ball());
+  const auto object = OpenObject(ListBenchmark(folder.path())->front());
+  ASSERT_TRUE(object.ok()) << object.error().message;
+  EXPECT_THAT(object->held_out, ElementsAre(0, 1, 3));
+  EXPECT_DOUBLE_EQ(object->upscale(), 3);
+}
+
+TEST(Benchmark, NamesWhatIsMissing) {
+  const TestFolder folder;
+  EXPECT_EQ(ListBenchmark(folder / "nothing").error().code, ErrorCode::kNotFound);
+  EXPECT_THAT(ListBenchmark(folder.path()).error().message, HasSubstr("transforms_hr.json"));
+  MakePublishedObject(folder / "ball", ThinBall(), Ball());
+  const BenchmarkEntry entry = ListBenchmark(folder.path())->front();
+  fs::rename(entry.folder / "48" / "images" / "004.png", entry.folder / "other.png");
+  EXPECT_THAT(OpenObject(entry).error().message, HasSubstr("view 004 has no high-resolution picture"));
+  fs::rename(entry.folder / "other.png", entry.folder / "48" / "images" / "004.png");
+  fs::remove_all(entry.folder / "16" / "gaussian_splatting");
+  EXPECT_THAT(OpenObject(entry).error().message, HasSubstr("ckpt_*_rank0.pt"));
+}
+
+TEST(Evaluate, MeasuresResumesAndGoesOnAfterFailures) {
+  const TestFolder folder, out;
+  MakePublishedObject(folder / "a_published", ThinBall(), Ball());
+  MakeExampleObject(folder / "b_example", Ball(), Ball());
+  MakeExampleObject(folder / "c_broken", Ball(), Ball());
+  std::ofstream(folder / "c_broken/hr/000.png") << "no picture";
+  MakeExampleObject(folder / "d_empty", Ball(), Ball());
+  std::ofstream(folder / "d_empty/input.ply") << "no splat";
+
+  int calls = 0;
+  std::vector<EvalMethod> methods = Methods({"raw", "filter", "upsample", "filter-best"});
+  methods.push_back({"picky", "", [&](const MethodTask& task) -> Result<MethodViews> {
+                       ++calls;
+                       if (task.object.name == "b_example") return Error{ErrorCode::kBadArgument, "not this one"};
+                       return SplatViews(task.object, task.object.low);
+                     }});
+  const auto evaluation = Evaluate(folder.path(), methods, out.path(), {});
+  ASSERT_TRUE(evaluation.ok()) << evaluation.error().message;
+  EXPECT_THAT(evaluation->objects, ElementsAre("a_published", "b_example", "c_broken", "d_empty"));
+  ASSERT_EQ(evaluation->results.size(), 5u + 4u);
+  ASSERT_EQ(evaluation->failures.size(), 3u);
+  EXPECT_EQ(evaluation->failures[0].object, "b_example");
+  EXPECT_EQ(evaluation->failures[0].method, "picky");
+  EXPECT_EQ(evaluation->failures[0].message, "not this one");
+  EXPECT_EQ(evaluation->failures[1].object, "c_broken");
+  EXPECT_THAT(evaluation->failures[1].message, HasSubstr("000.png"));
+  EXPECT_EQ(evaluation->failures[2].object, "d_empty");
+  EXPECT_EQ(calls, 3);
+
+  // The same splat measures only the rounding of the pictures; the thin one is worse, and the filter helps it.
+  EXPECT_GT(evaluation->Find("b_example", "raw")->MeanPsnr(), 50);
+  const double raw = evaluation->Find("a_published", "raw")->MeanPsnr();
+  EXPECT_LT(raw, 40);
+  EXPECT_GT(evaluation->Find("a_published", "filter")->MeanPsnr(), raw);
+  EXPECT_GE(evaluation->Find("a_published", "filter-best")->MeanPsnr(),
+            evaluation->Find("a_published", "filter")->MeanPsnr() - 0.01);
+  EXPECT_EQ(evaluation->Find("a_published", "picky")->MeanPsnr(), raw);
+  EXPECT_LT(evaluation->Find("b_example", "upsample")->MeanPsnr(), 40);
+  EXPECT_EQ(evaluation->Find("a_published", "raw")->views.size(), 2u);
+  EXPECT_EQ(evaluation->Find("a_published", "raw")->views[1].name, "008");
+
+  const auto sheet = ContactSheet(out.path(), *evaluation);
+  ASSERT_TRUE(sheet.ok()) << sheet.error().message;
+  EXPECT_GT(sheet->width, 6 * 256);
+
+  // Once more: all that succeeded is there already, with the same numbers.
+  const auto again = Evaluate(folder.path(), methods, out.path(), {});
+  ASSERT_TRUE(again.ok());
+  EXPECT_EQ(again->resumed, 9);
+  EXPECT_EQ(again->times.pictures, 0);
+  EXPECT_EQ(again->failures.size(), 3u);
+  EXPECT_EQ(again->Find("a_published", "raw")->MeanPsnr(), raw);
+  // Another protocol, a splat that changed and a damaged result are measured again.
+  const auto upstream = Evaluate(folder.path(), Methods({"raw"}), out.path(), {.protocol = Protocol::kUpstream});
+  EXPECT_EQ(upstream->resumed, 0);
+  EXPECT_EQ(upstream->Find("a_published", "raw")->views.size(), 3u);  // 9 − 6
+  std::ofstream(out / "objects/a_published/filter.json") << "{\"key\": 1}";
+  ASSERT_TRUE(WriteCloud(folder / "b_example/input.ply", ThinBall(), {.overwrite = true}).ok());
+  const auto changed = Evaluate(folder.path(), Methods({"raw", "filter"}), out.path(), {.objects = {"b_example"}});
+  EXPECT_EQ(changed->resumed, 0);
+  EXPECT_LT(changed->Find("b_example", "raw")->MeanPsnr(), 40);
+  EXPECT_EQ(Evaluate(folder.path(), Methods({"filter"}), out.path(), {.objects = {"a_published"}})->resumed, 0);
+}
+
+TEST(Evaluate, RefusesWhatCannotBeMeant) {
+  const TestFolder folder, out;
+  MakeExampleObject(folder / "ball", Ball(), Ball());
+  EXPECT_EQ(Evaluate(folder.path(), {}, out.path(), {}).error().code, ErrorCode::kBadArgument);
+  EXPECT_EQ(Evaluate(folder.path(), Methods({"raw", "raw"}), out.path(), {}).error().code, ErrorCode::kBadArgument);
+  EXPECT_THAT(Evaluate(folder.path(), Methods({"raw"}), out.path(), {.objects = {"bell"}}).error().message,
+              HasSubstr("bell"));
+  EXPECT_FALSE(MakeEvalMethod("no-such-method", {}).ok());
+  EXPECT_FALSE(MakeEvalMethod("filter@x", {}).ok());
+  EXPECT_FALSE(MakeEvalMethod("filter@-1", {}).ok());
+  EXPECT_EQ(MakeEvalMethod("no-such-file.safetensors", {}).error().code, ErrorCode::kNotFound);
+}
+
+TEST(Evaluate, MethodsOfEnhanceComeByThemselves) {
+  RegisterEnhanceMethod(
+      {.name = "thicken",
+       .summary = "for this test",
+       .ready = [](const EnhanceOptions&) { return Status(); },
+       .run = [](EnhanceInput input, const EnhanceOptions& options, EnhanceReport& report) -> Result<GaussianCloud> {
+         EXPECT_TRUE(options.cameras);
+         for (float& value : input.cloud.log_scales) value += 0.4f;
+         report.facts = {{"by", 0.4}};
+         return std::move(input.cloud);
+       }});
+  const TestFolder folder, out;
+  MakeExampleObject(folder / "ball", ThinBall(), Ball());
+  const auto evaluation = Evaluate(folder.path(), Methods({"thicken"}), out.path(), {});
+  ASSERT_TRUE(evaluation.ok()) << evaluation.error().message;
+  ASSERT_EQ(evaluation->results.size(), 1u);
+  EXPECT_GT(evaluation->results[0].MeanPsnr(), 50);
+  EXPECT_EQ(evaluation->results[0].facts.at("by"), 0.4);
+}
+
+TEST(MethodResult, RoundTrip) {
+  const TestFolder folder;
+  MethodResult result;
+  result.object = "o";
+  result.method = "m";
+  result.views = {{"a", 31.25, 0.5, 0.125}, {"b", std::numeric_limits<double>::infinity(), 1, std::nullopt}};
+  result.seconds = 1.5;
+  result.gaussians = 12;
+  result.facts = {{"f", 0.74}};
+  ASSERT_TRUE(WriteMethodResult(folder / "m.json", "key", result).ok());
+  EXPECT_FALSE(ReadMethodResult(folder / "m.json", "another key"));
+  EXPECT_FALSE(ReadMethodResult(folder / "none.json", "key"));
+  const auto read = ReadMethodResult(folder / "m.json", "key");
+  ASSERT_TRUE(read);
+  ASSERT_EQ(read->views.size(), 2u);
+  EXPECT_EQ(read->views[0].lpips, 0.125);
+  EXPECT_TRUE(std::isinf(read->views[1].psnr));
+  EXPECT_EQ(read->MeanLpips(), std::nullopt);
+  EXPECT_EQ(read->gaussians, 12);
+  EXPECT_EQ(read->facts, result.facts);
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -1,0 +1,188 @@
+#include "eval/method.h"
+
+#include <charconv>
+#include <chrono>
+#include <memory>
+
+#include "core/text.h"
+#include "enhance/enhance.h"
+#include "enhance/filter.h"
+#include "enhance/pixel_size_estimate.h"
+#include "eval/filter_sweep.h"
+#include "metrics/bicubic.h"
+#include "metrics/image_metrics.h"
+#include "model/checkpoint.h"
+#include "model/enhance_with_model.h"
+#include "render/rasterizer.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+double Since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+
+// A splat whose fit did not absorb the dilation has nothing to get back.
+double DefaultStrength(const BenchmarkObject& object) {
+  return object.low.render_mode == RenderMode::kAntialiased ? 0 : DefaultFilterStrength(object.upscale());
+}
+
+EvalMethod Raw() {
+  return {"raw", "",
+          [](const MethodTask& task) -> Result<MethodViews> { return SplatViews(task.object, task.object.low); }};
+}
+
+EvalMethod Filter(const std::string& name, std::optional<double> strength) {
+  return {name, strength ? Cat("f ", *strength) : "default f",
+          [strength](const MethodTask& task) -> Result<MethodViews> {
+            const auto begin = Clock::now();
+            ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraPixelSizes sizes, TruePixelSizes(task.object));
+            GaussianCloud cloud = task.object.low;
+            const double f = strength.value_or(DefaultStrength(task.object));
+            const auto grown = ApplyFilter(cloud, sizes.sizes, {.upscale = task.object.upscale(), .strength = f});
+            if (!grown.ok()) return grown.error();
+            const double seconds = Since(begin);
+            MethodViews views = SplatViews(task.object, std::move(cloud));
+            views.seconds = seconds;
+            views.facts = {{"f", f}, {"pixel_size", static_cast<double>(sizes.median)}};
+            return views;
+          }};
+}
+
+EvalMethod FilterAuto() {
+  return {"filter-auto", "", [](const MethodTask& task) -> Result<MethodViews> {
+            const auto begin = Clock::now();
+            ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEstimate estimate, EstimatePixelSize(task.object.low));
+            GaussianCloud cloud = task.object.low;
+            const float size = static_cast<float>(estimate.size);
+            const auto grown = ApplyFilter(
+                cloud, {&size, 1}, {.upscale = task.object.upscale(), .strength = DefaultStrength(task.object)});
+            if (!grown.ok()) return grown.error();
+            const double seconds = Since(begin);
+            ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraPixelSizes truth, TruePixelSizes(task.object));
+            MethodViews views = SplatViews(task.object, std::move(cloud));
+            views.seconds = seconds;
+            views.facts = {{"pixel_size", estimate.size},
+                           {"pixel_size_ratio", estimate.size / static_cast<double>(truth.median)}};
+            return views;
+          }};
+}
+
+EvalMethod FilterBest() {
+  return {"filter-best", "", [](const MethodTask& task) -> Result<MethodViews> {
+            ANCHORSPLAT_ASSIGN_OR_RETURN(const double best, BestFilterStrength(task));
+            return Filter("filter-best", best).prepare(task);
+          }};
+}
+
+EvalMethod Upsample() {
+  return {"upsample", "", [](const MethodTask& task) -> Result<MethodViews> {
+            const BenchmarkObject& object = task.object;
+            const auto rasterizer = std::make_shared<Rasterizer>();
+            MethodViews views;
+            views.render = [&object, rasterizer](size_t view) -> Result<Image> {
+              RenderOptions options;
+              options.mode = object.low.render_mode.value_or(RenderMode::kClassic);
+              options.background = object.background;
+              RenderOutput output;
+              ANCHORSPLAT_RETURN_IF_ERROR(rasterizer->Render(object.low, object.LowCamera(view), options, output));
+              Clamp01(output.color);
+              const Pinhole& high = object.views[view].intrinsics;
+              return EnlargeBicubic(output.color, high.width, high.height);
+            };
+            return views;
+          }};
+}
+
+// Two states of a file that compare equal are taken for the same file.
+Result<std::string> Identity(const fs::path& path) {
+  std::error_code code;
+  const auto size = fs::file_size(path, code);
+  if (code) return Error{ErrorCode::kNotFound, Cat(path.string(), ": there is no such file")};
+  return Cat(path.string(), " ", size, " ", fs::last_write_time(path, code).time_since_epoch().count());
+}
+
+Result<EvalMethod> Model(const fs::path& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string identity, Identity(file));
+  const auto network = std::make_shared<std::optional<PackedNetwork>>();  // loaded for the first object
+  return EvalMethod{file.stem().string(), identity, [file, network](const MethodTask& task) -> Result<MethodViews> {
+                      if (!*network) {
+                        ANCHORSPLAT_ASSIGN_OR_RETURN(*network, LoadNetwork(file));
+                      }
+                      const auto begin = Clock::now();
+                      ANCHORSPLAT_ASSIGN_OR_RETURN(ModelResult result, EnhanceWithModel(task.object.low, **network));
+                      const double seconds = Since(begin);
+                      MethodViews views = SplatViews(task.object, std::move(result.cloud));
+                      views.seconds = seconds;
+                      return views;
+                    }};
+}
+
+EvalMethod Registered(const std::string& name) {
+  return {name, "", [name](const MethodTask& task) -> Result<MethodViews> {
+            EnhanceOptions options;
+            options.method = name;
+            options.upscale = task.object.upscale();
+            options.cameras = task.object.low_cameras;
+            options.camera_rule = CameraPixelRule::kMedian;
+            options.seed = task.seed;
+            ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, Enhance(task.object.low, options));
+            MethodViews views = SplatViews(task.object, std::move(enhanced.cloud));
+            views.seconds = enhanced.report.seconds;
+            views.facts = enhanced.report.facts;
+            return views;
+          }};
+}
+
+}  // namespace
+
+MethodViews SplatViews(const BenchmarkObject& object, GaussianCloud cloud) {
+  struct State {
+    GaussianCloud cloud;
+    Rasterizer rasterizer;
+    RenderOptions options;
+  };
+  const auto state = std::make_shared<State>();
+  state->options.mode = cloud.render_mode.value_or(RenderMode::kClassic);
+  state->options.background = object.background;
+  state->cloud = std::move(cloud);
+  MethodViews views;
+  views.gaussians = state->cloud.size();
+  views.render = [&object, state](size_t view) -> Result<Image> {
+    RenderOutput output;
+    ANCHORSPLAT_RETURN_IF_ERROR(state->rasterizer.Render(state->cloud, object.views[view], state->options, output));
+    return std::move(output.color);
+  };
+  return views;
+}
+
+Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& options) {
+  if (word == "raw") return Raw();
+  if (word == "filter") return Filter(word, options.filter_strength);
+  if (word == "filter-auto") return FilterAuto();
+  if (word == "filter-best") return FilterBest();
+  if (word == "upsample") return Upsample();
+  const std::string at = "filter@";
+  if (word.starts_with(at)) {
+    double f = 0;
+    const char* end = word.data() + word.size();
+    const auto [stop, code] = std::from_chars(word.data() + at.size(), end, f);
+    if (code == std::errc() && stop == end && f >= 0 && f <= kMaxFilterStrength) return Filter(word, f);
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--methods ", Printable(word), ": f is a number from 0 to ", kMaxFilterStrength)};
+  }
+  const std::string extension = fs::path(word).extension().string();
+  if (extension == ".safetensors" || extension == ".pth" || extension == ".pt") return Model(word);
+  for (const EnhanceMethod& method : EnhanceMethods()) {
+    if (method.name == word) return Registered(word);
+  }
+  return Error{
+      ErrorCode::kBadArgument,
+      Cat("--methods: '", Printable(word),
+          "' is none of raw, filter, filter@F, filter-auto, filter-best, upsample, a checkpoint of a network or "
+          "a method of enhance")};
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,232 @@
+#include "eval/report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "core/text.h"
+#include "eval/contact_sheet.h"
+#include "formats/atomic_file.h"
+#include "formats/image_io.h"
+
+namespace anchorsplat {
+
+namespace {
+
+std::string Signed(double value, int digits) { return (value >= 0 ? "+" : "") + Fixed(value, digits); }
+
+std::string Range(const Interval& interval, int digits) {
+  return Cat(Fixed(interval.mean, digits), " (", Fixed(interval.low, digits), "–", Fixed(interval.high, digits), ")");
+}
+
+std::string SignedRange(const Interval& interval) {
+  return Cat(Signed(interval.mean, 2), " (", Signed(interval.low, 2), " to ", Signed(interval.high, 2), ")");
+}
+
+std::string Row(const std::vector<std::string>& cells) {
+  std::string row = "|";
+  for (const std::string& cell : cells) row += " " + cell + " |";
+  return row + "\n";
+}
+
+std::string Rule(size_t columns) {
+  std::string rule = "|---|";
+  for (size_t i = 1; i < columns; ++i) rule += "---:|";
+  return rule + "\n";
+}
+
+// A bar or a line break in a name would end the cell.
+std::string Cell(std::string text) {
+  for (char& c : text) {
+    if (c == '|' || c == '\n' || c == '\r') c = ' ';
+  }
+  return text;
+}
+
+std::string ProtocolSentence(const Evaluation& evaluation) {
+  size_t fewest = SIZE_MAX, most = 0;
+  for (const MethodResult& result : evaluation.results) {
+    fewest = std::min(fewest, result.views.size());
+    most = std::max(most, result.views.size());
+  }
+  const std::string views = most == 0        ? "no views"
+                            : fewest == most ? Cat(most, " views")
+                                             : Cat(fewest, " to ", most, " views");
+  std::string text =
+      evaluation.protocol == Protocol::kUpstream
+          ? "Protocol upstream: views 1 to n − 6 by name, most of which the low-quality fits were trained "
+            "on; values cut down to 8 bits; mean over all pictures"
+          : "Protocol heldout: views that the low-quality fits never saw; renders clamped, not quantised; "
+            "mean over views, then over objects";
+  text +=
+      Cat(". ", evaluation.objects.size(), evaluation.objects.size() == 1 ? " object, " : " objects, ", views, " each");
+  if (evaluation.max_views > 0) text += Cat(" (--max-views ", evaluation.max_views, ": not the whole protocol)");
+  return text + ".";
+}
+
+void AddSummaryTable(const Evaluation& evaluation, const std::vector<MethodSummary>& summaries, std::string& text) {
+  std::vector<std::string> heading = {"method", "objects", "PSNR dB", "SSIM"};
+  if (evaluation.lpips) heading.push_back(Cat("LPIPS (", LpipsNetName(*evaluation.lpips), ")"));
+  for (const char* name :
+       {"gain over raw, dB", "gain over filter, dB", "wins over filter", "Gaussians", "time per object"}) {
+    heading.emplace_back(name);
+  }
+  text += Row(heading) + Rule(heading.size());
+  for (const MethodSummary& s : summaries) {
+    std::vector<std::string> row = {Cell(s.method), std::to_string(s.objects), Range(s.psnr, 2), Range(s.ssim, 4)};
+    if (evaluation.lpips) row.push_back(s.lpips ? Range(*s.lpips, 4) : "");
+    row.push_back(s.gain_over_raw ? SignedRange(*s.gain_over_raw) : "");
+    row.push_back(s.gain_over_filter ? SignedRange(*s.gain_over_filter) : "");
+    row.push_back(s.compared_with_filter > 0 ? Cat(s.wins_over_filter, " of ", s.compared_with_filter) : "");
+    row.push_back(s.gaussians > 0 ? WithThousands(std::llround(s.gaussians)) : "");
+    row.push_back(s.seconds > 0 ? HumanSeconds(s.seconds) : "");
+    text += Row(row);
+  }
+}
+
+void AddObjectTable(const Evaluation& evaluation, const std::vector<MethodSummary>& summaries, std::string& text) {
+  const bool sizes = SummarisePixelSizes(evaluation).has_value();
+  std::vector<std::string> heading = {"object"};
+  for (const MethodSummary& s : summaries) heading.push_back(Cell(s.method));
+  if (sizes) heading.emplace_back("pixel size, estimated / true");
+  text += Row(heading) + Rule(heading.size());
+  for (const std::string& object : evaluation.objects) {
+    std::vector<std::string> row = {Cell(object)};
+    std::string ratio;
+    for (const MethodSummary& s : summaries) {
+      const MethodResult* result = evaluation.Find(object, s.method);
+      row.push_back(result == nullptr ? "failed"
+                                      : Cat(Fixed(result->MeanPsnr(), 2), " / ", Fixed(result->MeanSsim(), 4)));
+      if (result != nullptr && result->facts.contains("pixel_size_ratio")) {
+        ratio = Fixed(result->facts.at("pixel_size_ratio"), 2);
+      }
+    }
+    if (sizes) row.push_back(ratio);
+    text += Row(row);
+  }
+}
+
+// Quoted where it has to be.
+std::string CsvCell(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
+
+nlohmann::json ToJson(const Interval& interval) {
+  return {{"mean", Number(interval.mean)}, {"low", Number(interval.low)}, {"high", Number(interval.high)}};
+}
+
+nlohmann::json ToJson(const MethodSummary& s) {
+  nlohmann::json json = {{"method", s.method},     {"objects", s.objects}, {"psnr", ToJson(s.psnr)},
+                         {"ssim", ToJson(s.ssim)}, {"seconds", s.seconds}, {"gaussians", s.gaussians}};
+  if (s.lpips) json["lpips"] = ToJson(*s.lpips);
+  if (s.gain_over_raw) json["gain_over_raw"] = ToJson(*s.gain_over_raw);
+  if (s.gain_over_filter) {
+    json["gain_over_filter"] = ToJson(*s.gain_over_filter);
+    json["wins_over_filter"] = {{"wins", s.wins_over_filter}, {"objects", s.compared_with_filter}};
+  }
+  return json;
+}
+
+nlohmann::json ToJson(const MethodResult& result) {
+  nlohmann::json json = {
+      {"object", result.object},       {"method", result.method},           {"psnr", Number(result.MeanPsnr())},
+      {"ssim", result.MeanSsim()},     {"seconds", result.seconds},         {"render_seconds", result.render_seconds},
+      {"gaussians", result.gaussians}, {"facts", nlohmann::json::object()}, {"views", nlohmann::json::array()}};
+  if (const auto lpips = result.MeanLpips()) json["lpips"] = *lpips;
+  for (const auto& [name, value] : result.facts) json["facts"][name] = value;
+  for (const ViewScore& view : result.views) {
+    json["views"].push_back({{"name", view.name}, {"psnr", Number(view.psnr)}, {"ssim", view.ssim}});
+    if (view.lpips) json["views"].back()["lpips"] = *view.lpips;
+  }
+  return json;
+}
+
+}  // namespace
+
+std::string ToMarkdown(const Evaluation& evaluation, const std::vector<MethodSummary>& summaries,
+                       const std::string& title) {
+  std::string text = Cat("# ", Cell(title), "\n\n", ProtocolSentence(evaluation),
+                         " In parentheses: 95 % confidence by bootstrap over the objects.\n\n");
+  AddSummaryTable(evaluation, summaries, text);
+  if (const auto error = SummarisePixelSizes(evaluation)) {
+    text += Cat("\nPixel size estimated from the splat alone (`filter-auto`): off by ", Fixed(100 * error->median, 1),
+                " % in the median, ", Fixed(100 * error->percentile95, 1), " % at the 95th percentile.\n");
+  }
+  text += "\nPSNR / SSIM per object:\n\n";
+  AddObjectTable(evaluation, summaries, text);
+  if (!evaluation.failures.empty()) {
+    text += "\nNot measured:\n\n";
+    for (const EvaluationFailure& failure : evaluation.failures) {
+      text += Cat("* ", Cell(failure.object), failure.method.empty() ? "" : ", ", Cell(failure.method), ": ",
+                  Cell(failure.message), "\n");
+    }
+  }
+  return text;
+}
+
+std::string ToCsv(const Evaluation& evaluation) {
+  std::set<std::string> facts;
+  for (const MethodResult& result : evaluation.results) {
+    for (const auto& [name, value] : result.facts) facts.insert(name);
+  }
+  std::string text = "object,method,views,psnr,ssim,lpips,seconds,render_seconds,gaussians";
+  for (const std::string& fact : facts) text += "," + CsvCell(fact);
+  text += "\n";
+  for (const MethodResult& result : evaluation.results) {
+    const auto lpips = result.MeanLpips();
+    text += Cat(CsvCell(result.object), ",", CsvCell(result.method), ",", result.views.size(), ",",
+                Fixed(result.MeanPsnr(), 4), ",", Fixed(result.MeanSsim(), 6), ",", lpips ? Fixed(*lpips, 6) : "", ",",
+                Fixed(result.seconds, 3), ",", Fixed(result.render_seconds, 3), ",", result.gaussians);
+    for (const std::string& fact : facts) {
+      const auto found = result.facts.find(fact);
+      text += found == result.facts.end() ? std::string(",") : Cat(",", found->second);
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+nlohmann::json ToJson(const Evaluation& evaluation, const std::vector<MethodSummary>& summaries) {
+  nlohmann::json json = {{"protocol", ProtocolName(evaluation.protocol)},
+                         {"objects", evaluation.objects},
+                         {"methods", nlohmann::json::array()},
+                         {"results", nlohmann::json::array()},
+                         {"failures", nlohmann::json::array()},
+                         {"resumed", evaluation.resumed}};
+  if (evaluation.max_views > 0) json["max_views"] = evaluation.max_views;
+  if (evaluation.lpips) json["lpips"] = LpipsNetName(*evaluation.lpips);
+  for (const MethodSummary& summary : summaries) json["methods"].push_back(ToJson(summary));
+  for (const MethodResult& result : evaluation.results) json["results"].push_back(ToJson(result));
+  for (const EvaluationFailure& failure : evaluation.failures) {
+    json["failures"].push_back({{"object", failure.object}, {"method", failure.method}, {"message", failure.message}});
+  }
+  if (const auto error = SummarisePixelSizes(evaluation)) {
+    json["pixel_size_error"] = {
+        {"objects", error->objects}, {"median", error->median}, {"percentile95", error->percentile95}};
+  }
+  const EvaluationTimes& t = evaluation.times;
+  if (t.pictures > 0) {
+    json["seconds"] = {
+        {"truth", t.truth}, {"render", t.render}, {"metrics", t.metrics}, {"lpips", t.lpips}, {"pictures", t.pictures}};
+  }
+  return json;
+}
+
+Status WriteReports(const std::filesystem::path& out, const Evaluation& evaluation,
+                    const std::vector<MethodSummary>& summaries, const std::string& title) {
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(out / "table.md", ToMarkdown(evaluation, summaries, title), true));
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(out / "table.csv", ToCsv(evaluation), true));
+  const std::string json = ToJson(evaluation, summaries).dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(out / "results.json", json + "\n", true));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Image sheet, ContactSheet(out, evaluation));
+  if (sheet.plane() == 0) return {};
+  return WritePng(out / "contact_sheet.png", sheet, {.overwrite = true});
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+#include "eval/evaluation.h"
+#include "eval/summary.h"
+
+namespace anchorsplat {
+
+// The tables of an evaluation. `title` stands above the Markdown.
+std::string ToMarkdown(const Evaluation& evaluation, const std::vector<MethodSummary>& summaries,
+                       const std::string& title);
+// A line per object and method.
+std::string ToCsv(const Evaluation& evaluation);
+// Everything, views included. Infinite PSNR is null.
+nlohmann::json ToJson(const Evaluation& evaluation, const std::vector<MethodSummary>& summaries);
+
+// out/table.md, table.csv, results.json and contact_sheet.png; earlier ones are replaced.
+Status WriteReports(const std::filesystem::path& out, const Evaluation& evaluation,
+                    const std::vector<MethodSummary>& summaries, const std::string& title);
+
+}  // namespace anchorsplat

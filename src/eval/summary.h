@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "eval/evaluation.h"
+
+namespace anchorsplat {
+
+// A mean over objects with the middle 95 % of what it would have been with other objects of the same kind: percentiles
+// of 10,000 bootstrap samples, objects drawn with replacement.
+struct Interval {
+  double mean = 0;
+  double low = 0;
+  double high = 0;
+};
+
+// A method's row. Gains and wins compare with another method on the objects that both have results for.
+struct MethodSummary {
+  std::string method;
+  int64_t objects = 0;
+  Interval psnr;  // dB; infinite when a picture was identical with the truth
+  Interval ssim;
+  std::optional<Interval> lpips;          // where all of its results have it
+  std::optional<Interval> gain_over_raw;  // dB
+  std::optional<Interval> gain_over_filter;
+  int64_t compared_with_filter = 0;  // objects
+  int64_t wins_over_filter = 0;      // of them, with a higher PSNR
+  double seconds = 0;                // of the method, mean per object
+  double gaussians = 0;              // mean per object; 0: there is no splat
+};
+
+// One row per method that has results, in the evaluation's order. The protocol decides how pictures are weighed: all
+// alike, or every object alike. The same seed gives the same intervals.
+std::vector<MethodSummary> Summarise(const Evaluation& evaluation, uint64_t seed);
+
+// Mean of values with weights, and its bootstrap interval. At least one value, weights positive.
+Interval BootstrapMean(const std::vector<double>& values, const std::vector<double>& weights, uint64_t seed);
+
+// The share of objects whose estimated pixel size was off by less, as |estimated/true − 1|: median and 95th percentile
+// over the results of "filter-auto".
+struct PixelSizeError {
+  int64_t objects = 0;
+  double median = 0;
+  double percentile95 = 0;
+};
+std::optional<PixelSizeError> SummarisePixelSizes(const Evaluation& evaluation);
+
+}  // namespace anchorsplat

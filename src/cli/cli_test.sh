@@ -313,6 +313,26 @@ for file in quad/splat.ply quad/12/images/003.png quad/24/images/003.png ramp/sp
   expect 0 "the same $file after a kill" cmp "$work/set/$file" "$work/killed/$file"
 done
 
+# eval.
+expect 0 "evaluation of an example" "$program" eval "$source/examples" -o "$work/eval" --objects biplane --max-views 2 --methods raw,upsample,filter --json
+says stdout '"gain_over_raw"'
+[ -s "$work/eval/table.md" ] && [ -s "$work/eval/table.csv" ] && [ -s "$work/eval/contact_sheet.png" ] || { failures=$((failures + 1)); echo "FAILED: tables of eval"; }
+expect 0 "evaluation goes on" "$program" eval "$source/examples" -o "$work/eval" --objects biplane --max-views 2 --methods raw,filter --json
+says stdout '"resumed": 2'
+expect 0 "choosing f" "$program" eval "$source/examples" -o "$work/eval" --objects biplane --max-views 1 --choose-f
+says stdout "Best f"
+expect 2 "unknown method" "$program" eval "$source/examples" -o "$work/eval" --methods magic
+says stderr "filter-auto"
+expect 2 "unknown object" "$program" eval "$source/examples" -o "$work/eval" --objects triplane
+expect 3 "no benchmark" "$program" eval "$work/empty" -o "$work/eval"
+expect 3 "no such checkpoint" "$program" eval "$source/examples" -o "$work/eval" --methods none.safetensors
+mkdir -p "$work/bench/good" "$work/bench/bad" && cp -r "$source/examples/biplane/." "$work/bench/good/" && cp "$source/examples/biplane/transforms_hr.json" "$work/bench/bad/"
+expect 1 "a bad object does not stop the others" "$program" eval "$work/bench" -o "$work/eval2" --max-views 1 --methods raw --json
+says stdout '"failures"'
+says stderr "bad"
+expect 0 "evaluation of a data set" "$program" eval "$work/set" -o "$work/eval3" --protocol upstream --methods raw,filter,bicubic --fit-steps 20 --json
+says stdout '"objects": 2'
+
 # Same bits for any number of threads.
 expect 0 "one thread" "$program" render "$input" -o "$work/t1.png" --orbit 1 --size 200x150 --threads 1
 expect 0 "three threads" "$program" render "$input" -o "$work/t3.png" --orbit 1 --size 200x150 --threads 3

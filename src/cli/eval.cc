@@ -114,11 +114,12 @@ void AddEval(CLI::App& app, Program& program) {
                   "(-w measures it again)")
       ->required()
       ->check(NotEmpty());
-  auto* methods = verb.add_option("--methods", flags->methods,
-                                  "raw, filter, filter@F, filter-auto, filter-best, upsample, checkpoints of networks, "
-                                  "methods of enhance; separated by commas")
-                      ->delimiter(',')
-                      ->capture_default_str();
+  auto* methods =
+      verb.add_option("--methods", flags->methods,
+                      "raw, filter, filter@F, filter-auto, filter-best, upsample, bicubic, checkpoints of networks, "
+                      "methods of enhance; separated by commas")
+          ->delimiter(',')
+          ->capture_default_str();
   AddChoice(verb, "--protocol", flags->protocol, {{"heldout", Protocol::kHeldOut}, {"upstream", Protocol::kUpstream}},
             "heldout: views no fit has seen; upstream: as the published evaluation");
   auto* strength = verb.add_option("--filter-f", flags->method_options.filter_strength,
@@ -128,6 +129,9 @@ void AddEval(CLI::App& app, Program& program) {
                 "Measure the filter at several strengths and say which is best; for a validation split")
       ->excludes(methods)
       ->excludes(strength);
+  verb.add_option("--fit-steps", flags->method_options.fit_steps, "Of 'bicubic'")
+      ->check(CLI::Range(int64_t{1}, int64_t{1'000'000}))
+      ->capture_default_str();
   verb.add_option("--objects", flags->objects, "Only these, by name; separated by commas")->delimiter(',');
   verb.add_option("--max-views", flags->max_views, "At most so many views per object, for a quick look; 0: all")
       ->check(CLI::NonNegativeNumber)

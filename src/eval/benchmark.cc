@@ -111,7 +111,8 @@ Result<fs::path> LastCheckpoint(const fs::path& low) {
 // Poses of the low views with the only intrinsics of the high ones, and the high pictures of the same names.
 Status ReadPublishedLayout(const fs::path& low, const fs::path& high, BenchmarkObject& object) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(object.splat, LastCheckpoint(low));
-  object.low_images = low;
+  object.low_project = low;
+  object.hold_out = kHeldOutEvery;
   const fs::path model = low / "sparse" / "0";
   ANCHORSPLAT_ASSIGN_OR_RETURN(object.low_cameras, ReadColmapModel(model));
   SortByName(object.low_cameras.cameras);
@@ -133,7 +134,7 @@ Status ReadPublishedLayout(const fs::path& low, const fs::path& high, BenchmarkO
 // High views whose names are not among the low ones were not trained on.
 Status ReadExampleLayout(const fs::path& folder, BenchmarkObject& object) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(object.splat, OnlySplat(folder));
-  object.low_images = folder / kLowTransforms;
+  object.low_project = folder / kLowTransforms;
   ANCHORSPLAT_ASSIGN_OR_RETURN(object.low_cameras, ReadCameras(folder / kLowTransforms));
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet high, ReadCameras(folder / kHighTransforms));
   SortByName(object.low_cameras.cameras);

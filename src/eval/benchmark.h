@@ -23,9 +23,7 @@ struct BenchmarkEntry {
 //  * the published data set's: two folders named after their resolution, such as 256/{images,sparse/0,
 //    gaussian_splatting/ckpts/ckpt_*_rank0.pt} and 1024/{images,cameras.txt};
 //  * that of the repository's examples: a splat, transforms_lr.json and transforms_hr.json with their pictures.
-// Where there is a manifest.jsonl its objects are taken, without those it marks as rejected.
-//
-// Errors: kNotFound: no folder, no objects in it; kBadFile: of the manifest.
+// Errors: kNotFound: no folder, no objects in it.
 Result<std::vector<BenchmarkEntry>> ListBenchmark(const std::filesystem::path& folder);
 
 // What an object gives methods to work with and what their results are measured with.
@@ -37,7 +35,8 @@ struct BenchmarkObject {
   std::vector<Camera> views;     // of all high-resolution views, in order of their names; `image` is the truth
   std::vector<size_t> held_out;  // views the low-quality fit was not trained on
   std::array<float, 3> background{};
-  std::filesystem::path low_images;  // folder of a project to fit (fit/training_views.h): that of the LR views
+  std::filesystem::path low_project;  // what the low-quality splat was fitted to: fit/training_views.h opens it …
+  int hold_out = 0;                   // … with this, and holds out the same views
 
   double upscale() const;                  // pixels of a high view per pixel of a low one, along a side
   Camera LowCamera(size_t view) const;     // the place of view `view` with the intrinsics of the low ones

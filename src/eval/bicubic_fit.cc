@@ -30,7 +30,8 @@ constexpr int64_t kCheckpointEvery = 500;  // steps: about half a minute at 1024
 double Since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 // Of one training picture; nothing to do when an earlier attempt wrote it.
-Status Enlarge(const Camera& camera, const Pinhole& high, const std::array<float, 3>& background, const fs::path& file) {
+Status Enlarge(const Camera& camera, const Pinhole& high, const std::array<float, 3>& background,
+               const fs::path& file) {
   if (fs::exists(file)) return {};
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Image image, ReadImage(camera.image));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Image large,

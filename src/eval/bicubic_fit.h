@@ -11,7 +11,7 @@ namespace anchorsplat {
 
 struct BicubicFit {
   GaussianCloud cloud;
-  double seconds = 0;  // enlarging and fitting, all attempts together
+  double seconds = 0;     // enlarging and fitting, all attempts together
   double train_psnr = 0;  // dB, against the enlarged pictures
 };
 

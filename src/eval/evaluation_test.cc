@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -11,6 +12,8 @@
 #include "enhance/enhance.h"
 #include "eval/contact_sheet.h"
 #include "formats/camera_io.h"
+#include "formats/colmap_writer.h"
+#include "formats/gsplat_checkpoint_writer.h"
 #include "formats/image_io.h"
 #include "formats/test_cloud.h"
 #include "formats/test_folder.h"
@@ -21,11 +24,6 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-void Write(const fs::path& path, const std::string& text) {
-  fs::create_directories(path.parent_path());
-  std::ofstream(path) << text;
-}
 
 // A cloud around the origin that renders to something.
 GaussianCloud Ball() {
@@ -57,35 +55,25 @@ CameraSet Photograph(const GaussianCloud& cloud, int count, int size, const fs::
   return cameras;
 }
 
-// The published layout, as text, with 9 views of 16² and 48².
+// The published layout with 9 views of 16² and 48².
 void MakePublishedObject(const fs::path& folder, const GaussianCloud& low, const GaussianCloud& truth) {
-  const CameraSet cameras = Photograph(truth, 9, 48, folder / "48", "images");
-  std::string images;
-  for (size_t i = 0; i < cameras.cameras.size(); ++i) {
-    // A rotation matrix as quaternion; none of these poses is a half turn.
-    const auto& r = cameras.cameras[i].world_to_camera.rotation;
-    const auto& t = cameras.cameras[i].world_to_camera.translation;
-    const double w = std::sqrt(std::max(1e-12, 1 + r[0] + r[4] + r[8])) / 2;
-    std::ostringstream line;
-    line.precision(17);
-    line << i + 1 << " " << w << " " << (r[7] - r[5]) / (4 * w) << " " << (r[2] - r[6]) / (4 * w) << " "
-         << (r[3] - r[1]) / (4 * w) << " " << t[0] << " " << t[1] << " " << t[2] << " 1 " << cameras.cameras[i].name
-         << ".png\n\n";
-    images = line.str() + images;  // in another order than that of the names
-  }
-  const auto camera_text = [](const Pinhole& k) {
-    return Cat("1 PINHOLE ", k.width, " ", k.height, " ", k.fx, " ", k.fy, " ", k.cx, " ", k.cy, "\n");
-  };
-  const Pinhole high = cameras.cameras[0].intrinsics;
-  Write(folder / "48" / "cameras.txt", camera_text(high));
-  Write(folder / "48" / "images.txt", images);
-  Write(folder / "16" / "sparse" / "0" / "cameras.txt", camera_text(Scaled(high, 1.0 / 3)));
-  Write(folder / "16" / "sparse" / "0" / "images.txt", images);
+  CameraSet high = Photograph(truth, 9, 48, folder / "48", "images");
+  CameraSet small = Photograph(low, 9, 16, folder / "16", "images");
+  std::reverse(high.cameras.begin(), high.cameras.end());  // in another order than that of the names
+  std::reverse(small.cameras.begin(), small.cameras.end());
+  fs::create_directories(folder / "16" / "sparse" / "0");
   fs::create_directories(folder / "16" / "gaussian_splatting" / "ckpts");
-  // Splat files are recognised by their content.
-  ASSERT_TRUE(WriteCloud(folder / "low.ply", low).ok());
-  fs::rename(folder / "low.ply", folder / "16" / "gaussian_splatting" / "ckpts" / "ckpt_14999_rank0.pt");
-  Write(folder / "16" / "gaussian_splatting" / "ckpts" / "ckpt_3499_rank0.pt", "an earlier one, which is not read");
+  ASSERT_TRUE(WriteColmapCameras(folder / "48", high, ColmapForm::kText).ok());
+  ASSERT_TRUE(WriteColmapCameras(folder / "16" / "sparse" / "0", small, ColmapForm::kBinary).ok());
+  std::vector<ColmapPoint> points(50);
+  for (size_t i = 0; i < points.size(); ++i) {
+    const double at = static_cast<double>(i);
+    points[i] = {{0.4 * std::sin(at), 0.4 * std::cos(2 * at), 0.4 * std::sin(3 * at)}, {200, 150, 100}};
+  }
+  ASSERT_TRUE(WriteColmapPoints(folder / "16" / "sparse" / "0", points, ColmapForm::kBinary).ok());
+  const fs::path checkpoints = folder / "16" / "gaussian_splatting" / "ckpts";
+  ASSERT_TRUE(WriteGsplatCheckpoint(checkpoints / "ckpt_14999_rank0.pt", low, 14999).ok());
+  std::ofstream(checkpoints / "ckpt_3499_rank0.pt") << "an earlier one, which is not read";
 }
 
 // The layout of the examples: 4 high views, of which 002 was trained on.
@@ -191,13 +179,16 @@ TEST(Evaluate, MeasuresResumesAndGoesOnAfterFailures) {
   ASSERT_TRUE(evaluation.ok()) << evaluation.error().message;
   EXPECT_THAT(evaluation->objects, ElementsAre("a_published", "b_example", "c_broken", "d_empty"));
   ASSERT_EQ(evaluation->results.size(), 5u + 4u);
-  ASSERT_EQ(evaluation->failures.size(), 3u);
+  ASSERT_EQ(evaluation->failures.size(), 4u);
   EXPECT_EQ(evaluation->failures[0].object, "b_example");
   EXPECT_EQ(evaluation->failures[0].method, "picky");
   EXPECT_EQ(evaluation->failures[0].message, "not this one");
-  EXPECT_EQ(evaluation->failures[1].object, "c_broken");
-  EXPECT_THAT(evaluation->failures[1].message, HasSubstr("000.png"));
-  EXPECT_EQ(evaluation->failures[2].object, "d_empty");
+  // "filter-best" looks at the truth by itself, the object fails for all.
+  EXPECT_EQ(evaluation->failures[1].method, "filter-best");
+  EXPECT_EQ(evaluation->failures[2].object, "c_broken");
+  EXPECT_EQ(evaluation->failures[2].method, "");
+  EXPECT_THAT(evaluation->failures[2].message, HasSubstr("000.png"));
+  EXPECT_EQ(evaluation->failures[3].object, "d_empty");
   EXPECT_EQ(calls, 3);
 
   // The same splat measures only the rounding of the pictures; the thin one is worse, and the filter helps it.
@@ -221,7 +212,7 @@ TEST(Evaluate, MeasuresResumesAndGoesOnAfterFailures) {
   ASSERT_TRUE(again.ok());
   EXPECT_EQ(again->resumed, 9);
   EXPECT_EQ(again->times.pictures, 0);
-  EXPECT_EQ(again->failures.size(), 3u);
+  EXPECT_EQ(again->failures.size(), 4u);
   EXPECT_EQ(again->Find("a_published", "raw")->MeanPsnr(), raw);
   // Another protocol, a splat that changed and a damaged result are measured again.
   const auto upstream = Evaluate(folder.path(), Methods({"raw"}), out.path(), {.protocol = Protocol::kUpstream});
@@ -233,6 +224,34 @@ TEST(Evaluate, MeasuresResumesAndGoesOnAfterFailures) {
   EXPECT_EQ(changed->resumed, 0);
   EXPECT_LT(changed->Find("b_example", "raw")->MeanPsnr(), 40);
   EXPECT_EQ(Evaluate(folder.path(), Methods({"filter"}), out.path(), {.objects = {"a_published"}})->resumed, 0);
+}
+
+TEST(Evaluate, BicubicFitsAnewAndGoesOnWhereItWasStopped) {
+  const TestFolder folder, out;
+  MakePublishedObject(folder / "ball", Ball(), Ball());
+  const auto method = MakeEvalMethod("bicubic", {.filter_strength = std::nullopt, .fit_steps = 12});
+  ASSERT_TRUE(method.ok());
+  const auto fitted = Evaluate(folder.path(), {*method}, out.path(), {});
+  ASSERT_TRUE(fitted.ok()) << fitted.error().message;
+  ASSERT_TRUE(fitted->failures.empty()) << fitted->failures[0].message;
+  ASSERT_EQ(fitted->results.size(), 1u);
+  EXPECT_GT(fitted->results[0].gaussians, 0);
+  EXPECT_GT(fitted->results[0].facts.at("train_psnr"), 5);
+  // The result is measured again, the fit only read.
+  const fs::path cache = out / "objects/ball/bicubic";
+  const auto written = fs::last_write_time(cache / "splat.ply");
+  EXPECT_FALSE(fs::exists(cache / "pictures"));
+  const auto again = Evaluate(folder.path(), {*method}, out.path(), {.again = true});
+  EXPECT_EQ(again->resumed, 0);
+  EXPECT_EQ(again->results[0].MeanPsnr(), fitted->results[0].MeanPsnr());
+  EXPECT_EQ(again->results[0].seconds, fitted->results[0].seconds);
+  EXPECT_EQ(fs::last_write_time(cache / "splat.ply"), written);
+  // Another number of steps is another fit; a damaged note begins anew.
+  std::ofstream(cache / "fit.json") << "{}";
+  const auto anew = Evaluate(folder.path(), {*method}, out.path(), {.again = true});
+  ASSERT_EQ(anew->results.size(), 1u);
+  EXPECT_NE(fs::last_write_time(cache / "splat.ply"), written);
+  EXPECT_EQ(anew->results[0].MeanPsnr(), fitted->results[0].MeanPsnr());
 }
 
 TEST(Evaluate, RefusesWhatCannotBeMeant) {

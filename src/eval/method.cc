@@ -8,6 +8,7 @@
 #include "enhance/enhance.h"
 #include "enhance/filter.h"
 #include "enhance/pixel_size_estimate.h"
+#include "eval/bicubic_fit.h"
 #include "eval/filter_sweep.h"
 #include "metrics/bicubic.h"
 #include "metrics/image_metrics.h"
@@ -96,6 +97,16 @@ EvalMethod Upsample() {
           }};
 }
 
+EvalMethod Bicubic(int64_t steps) {
+  return {"bicubic", Cat(steps, " steps"), [steps](const MethodTask& task) -> Result<MethodViews> {
+            ANCHORSPLAT_ASSIGN_OR_RETURN(BicubicFit fit, FitEnlargedPictures(task, steps));
+            MethodViews views = SplatViews(task.object, std::move(fit.cloud));
+            views.seconds = fit.seconds;
+            views.facts = {{"train_psnr", fit.train_psnr}};
+            return views;
+          }};
+}
+
 // Two states of a file that compare equal are taken for the same file.
 Result<std::string> Identity(const fs::path& path) {
   std::error_code code;
@@ -164,6 +175,7 @@ Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& 
   if (word == "filter-auto") return FilterAuto();
   if (word == "filter-best") return FilterBest();
   if (word == "upsample") return Upsample();
+  if (word == "bicubic") return Bicubic(options.fit_steps);
   const std::string at = "filter@";
   if (word.starts_with(at)) {
     double f = 0;
@@ -178,11 +190,10 @@ Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& 
   for (const EnhanceMethod& method : EnhanceMethods()) {
     if (method.name == word) return Registered(word);
   }
-  return Error{
-      ErrorCode::kBadArgument,
-      Cat("--methods: '", Printable(word),
-          "' is none of raw, filter, filter@F, filter-auto, filter-best, upsample, a checkpoint of a network or "
-          "a method of enhance")};
+  return Error{ErrorCode::kBadArgument, Cat("--methods: '", Printable(word),
+                                            "' is none of raw, filter, filter@F, filter-auto, filter-best, upsample, "
+                                            "bicubic, a checkpoint of a network or "
+                                            "a method of enhance")};
 }
 
 }  // namespace anchorsplat

@@ -53,6 +53,7 @@ struct MethodOptions {
 //                 estimated / true)
 //   filter-best   the f that measures best on this very object (fact "f"): not a method, the most a filter could do
 //   upsample      the low-resolution picture enlarged by cubic convolution, no 3-D at all
+//   bicubic       a splat fitted anew to the enlarged low-resolution pictures (eval/bicubic_fit.h): minutes per object
 //   FILE          the network of a checkpoint, .safetensors or .pth
 //   NAME          whatever else is registered with enhance/enhance.h, given the training cameras
 // Errors: kBadArgument for other words; kNotFound for files that are not there.

@@ -12,7 +12,6 @@ namespace {
 
 constexpr size_t kUpstreamFirst = 1;  // dropped at the beginning of the names
 constexpr size_t kUpstreamLast = 5;   // dropped at their end
-constexpr size_t kHeldOutEvery = 8;   // gsplat's trainer, test_every
 constexpr int64_t kPixels = 1 << 16;  // per task
 
 }  // namespace

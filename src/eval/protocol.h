@@ -24,6 +24,8 @@ enum class Protocol {
 const char* ProtocolName(Protocol protocol);  // "upstream", "heldout"
 std::optional<Protocol> FindProtocol(std::string_view name);
 
+inline constexpr int kHeldOutEvery = 8;  // gsplat's trainer, test_every
+
 // Indices into `count` views in order of their names.
 std::vector<size_t> UpstreamViews(size_t count);
 std::vector<size_t> HeldOutViews(size_t count);
@@ -31,7 +33,7 @@ std::vector<size_t> HeldOutViews(size_t count);
 // `most` of `views`, evenly spread; all of them when there are not as many, or when `most` is 0.
 std::vector<size_t> Thinned(const std::vector<size_t>& views, size_t most);
 
-// A render as the protocol measures it; NaN becomes 0.
+// A render as the protocol measures it.
 void TreatRender(Protocol protocol, Image& render);
 
 // ⌊255·x⌋ / 255 of values in 0–1. Pictures of 8 bits stay as they are.

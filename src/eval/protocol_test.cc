@@ -3,9 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <limits>
-
 namespace anchorsplat {
 namespace {
 
@@ -47,13 +44,13 @@ TEST(Protocol, TruncationKeepsPicturesAndDarkensRenders) {
   TruncateTo8Bits(bytes);
   EXPECT_EQ(bytes.pixels, before);
 
-  Image render(6, 1, 1);
-  render.pixels = {-0.5f, 0.0039f, 0.5f, 0.999f, 7.0f, std::numeric_limits<float>::quiet_NaN()};
+  Image render(5, 1, 1);
+  render.pixels = {-0.5f, 0.0039f, 0.5f, 0.999f, 7.0f};
   Image exact = render;
   TreatRender(Protocol::kUpstream, render);
-  EXPECT_THAT(render.pixels, ElementsAre(0.0f, 0.0f, 127 / 255.0f, 254 / 255.0f, 1.0f, 0.0f));
+  EXPECT_THAT(render.pixels, ElementsAre(0.0f, 0.0f, 127 / 255.0f, 254 / 255.0f, 1.0f));
   TreatRender(Protocol::kHeldOut, exact);
-  EXPECT_THAT(exact.pixels, ElementsAre(0.0f, 0.0039f, 0.5f, 0.999f, 1.0f, 0.0f));
+  EXPECT_THAT(exact.pixels, ElementsAre(0.0f, 0.0039f, 0.5f, 0.999f, 1.0f));
 }
 
 TEST(Protocol, Names) {

@@ -330,7 +330,7 @@ mkdir -p "$work/bench/good" "$work/bench/bad" && cp -r "$source/examples/biplane
 expect 1 "a bad object does not stop the others" "$program" eval "$work/bench" -o "$work/eval2" --max-views 1 --methods raw --json
 says stdout '"failures"'
 says stderr "bad"
-expect 0 "evaluation of a data set" "$program" eval "$work/set" -o "$work/eval3" --protocol upstream --methods raw,filter,bicubic --fit-steps 20 --json
+expect 0 "evaluation of a data set" "$program" eval "$work/killed" -o "$work/eval3" --protocol upstream --methods raw,filter,bicubic --fit-steps 20 --json
 says stdout '"objects": 2'
 
 # Same bits for any number of threads.

@@ -64,13 +64,13 @@ uint32_t PackRotation(const float xyzw[4]) {
   return bits;
 }
 
-// To a multiple of `step`, a power of two: the lower bits become zero, which is what the compressor feeds on.
+// To the nearest multiple of `step`, a power of two: the lower bits become zero, which is what the compressor feeds on.
+// Rounded once: rounding to whole numbers first would put values into the wrong multiple.
 uint8_t QuantizeHarmonic(float value, int step) {
-  const float scaled = std::isnan(value) ? 0.0f : value * 128;
-  const float bounded = scaled > -128 ? (scaled < 127 ? scaled : 127.0f) : -128.0f;
-  const auto rounded = static_cast<int32_t>(bounded + (bounded < 0 ? -0.5f : 0.5f)) + 128;
-  const int32_t stepped = (rounded + step / 2) & -step;
-  return static_cast<uint8_t>(std::min(stepped, 255));
+  const float shifted = std::isnan(value) ? 128.0f : value * 128 + 128;
+  const float bounded = shifted > 0 ? (shifted < 255 ? shifted : 255.0f) : 0.0f;
+  const auto nearest = static_cast<int32_t>(bounded / static_cast<float>(step) + 0.5f) * step;
+  return static_cast<uint8_t>(std::min(nearest, 255));
 }
 
 }  // namespace

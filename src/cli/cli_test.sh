@@ -332,6 +332,11 @@ says stdout '"failures"'
 says stderr "bad"
 expect 0 "evaluation of a data set" "$program" eval "$work/killed" -o "$work/eval3" --protocol upstream --methods raw,filter,bicubic --fit-steps 20 --json
 says stdout '"objects": 2'
+rm "$work/set/ramp/24/images/000.png"
+expect 1 "evaluation of a data set with a gap" "$program" eval "$work/set" -o "$work/eval4" --methods raw
+says stderr "no high-resolution picture 000"
+expect 0 "evaluation of views on demand" "$program" eval "$work/demand" -o "$work/eval5" --methods raw
+expect 3 "no split" "$program" eval "$work/demand" -o "$work/eval5" --split test
 
 # Same bits for any number of threads.
 expect 0 "one thread" "$program" render "$input" -o "$work/t1.png" --orbit 1 --size 200x150 --threads 1

@@ -26,6 +26,7 @@ struct EvalFlags {
   std::vector<std::string> methods = {"raw", "upsample", "filter"};
   Protocol protocol = Protocol::kHeldOut;
   MethodOptions method_options;
+  std::string split;
   std::vector<std::string> objects;
   size_t max_views = 0;
   std::string lpips;
@@ -66,6 +67,7 @@ Status RunEval(const EvalFlags& flags, Program& program) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Lpips> lpips, OpenLpipsOrWarn(flags.lpips, flags.lpips_weights));
   EvaluationOptions options;
   options.protocol = flags.protocol;
+  options.split = flags.split;
   options.objects = flags.objects;
   options.max_views = flags.max_views;
   options.lpips = lpips ? &*lpips : nullptr;
@@ -132,6 +134,7 @@ void AddEval(CLI::App& app, Program& program) {
   verb.add_option("--fit-steps", flags->method_options.fit_steps, "Of 'bicubic'")
       ->check(CLI::Range(int64_t{1}, int64_t{1'000'000}))
       ->capture_default_str();
+  verb.add_option("--split", flags->split, "Only the objects of this split of the data set: train, validation or test");
   verb.add_option("--objects", flags->objects, "Only these, by name; separated by commas")->delimiter(',');
   verb.add_option("--max-views", flags->max_views, "At most so many views per object, for a quick look; 0: all")
       ->check(CLI::NonNegativeNumber)

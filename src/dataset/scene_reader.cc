@@ -154,7 +154,7 @@ Result<Scene> Scene::Open(const SceneEntry& entry) {
   return scene;
 }
 
-Result<GaussianCloud> Scene::LowSplat() const {
+Result<fs::path> Scene::LowSplatPath() const {
   const fs::path folder = low_folder_ / "gaussian_splatting" / "ckpts";
   fs::path last;
   int64_t most = -1;
@@ -166,7 +166,12 @@ Result<GaussianCloud> Scene::LowSplat() const {
   }
   if (most < 0)
     return NotFound(Cat(folder.string(), ": there is no ckpt_*_rank0.pt: the low-quality splat is missing"));
-  return ReadCloud(last);
+  return last;
+}
+
+Result<GaussianCloud> Scene::LowSplat() const {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const fs::path path, LowSplatPath());
+  return ReadCloud(path);
 }
 
 Result<Image> Scene::LowPicture(size_t view) const {

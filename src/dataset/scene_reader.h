@@ -54,6 +54,7 @@ class Scene {
 
   // The low-quality splat: the checkpoint of gsplat's trainer with the most steps.
   Result<GaussianCloud> LowSplat() const;
+  Result<std::filesystem::path> LowSplatPath() const;  // its file
 
   // Pictures as they are stored, rgb or rgba; high views that are not stored are rendered, which gives the same bits.
   // Errors: those of ReadImage; kNotFound: no picture and no mesh to make it from; kBadFile: another size.

@@ -1,19 +1,15 @@
 #include "eval/benchmark.h"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
-#include <map>
-#include <optional>
+#include <memory>
 #include <set>
 #include <utility>
 
 #include "core/text.h"
+#include "dataset/scene_reader.h"
 #include "eval/protocol.h"
-#include "formats/camera_checks.h"
 #include "formats/camera_io.h"
 #include "formats/cloud_io.h"
-#include "formats/colmap_model.h"
 #include "formats/image_io.h"
 #include "formats/registry.h"
 
@@ -28,13 +24,6 @@ constexpr const char* kHighTransforms = "transforms_hr.json";
 
 Error NotFound(std::string sentence) { return Error{ErrorCode::kNotFound, std::move(sentence)}; }
 Error Bad(std::string sentence) { return Error{ErrorCode::kBadFile, std::move(sentence)}; }
-
-std::optional<int> WholeNumber(const std::string& text) {
-  int value = 0;
-  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (code != std::errc() || end != text.data() + text.size() || value < 1) return std::nullopt;
-  return value;
-}
 
 bool IsFile(const fs::path& path) {
   std::error_code ignored;
@@ -52,23 +41,9 @@ std::vector<fs::path> Entries(const fs::path& folder) {
   return entries;
 }
 
-// The folders named by a resolution: smallest and largest.
-std::optional<std::pair<fs::path, fs::path>> ResolutionFolders(const fs::path& folder) {
-  std::map<int, fs::path> sizes;
-  for (const fs::path& entry : Entries(folder)) {
-    std::error_code ignored;
-    const auto size = WholeNumber(entry.filename().string());
-    if (size && fs::is_directory(entry, ignored)) sizes.emplace(*size, entry);
-  }
-  if (sizes.size() < 2) return std::nullopt;
-  return std::pair(sizes.begin()->second, sizes.rbegin()->second);
-}
+bool HasExampleLayout(const fs::path& folder) { return IsFile(folder / kHighTransforms); }
 
-bool LooksLikeObject(const fs::path& folder) {
-  return IsFile(folder / kHighTransforms) || ResolutionFolders(folder).has_value();
-}
-
-// Upstream sorts the names of pictures, extension included.
+// By the names of pictures, extension included, as data sets have them.
 void SortByName(std::vector<Camera>& cameras) {
   const auto key = [](const Camera& camera) { return camera.name + (camera.image.extension().string()); };
   std::stable_sort(cameras.begin(), cameras.end(), [&](const Camera& a, const Camera& b) { return key(a) < key(b); });
@@ -88,51 +63,22 @@ Result<fs::path> OnlySplat(const fs::path& folder) {
       Cat(folder.string(), found.empty() ? ": there is no splat" : ": there are several splats, none input.*"));
 }
 
-// The checkpoint of gsplat's trainer with the most steps.
-Result<fs::path> LastCheckpoint(const fs::path& low) {
-  const fs::path folder = low / "gaussian_splatting" / "ckpts";
-  std::optional<fs::path> last;
-  int most = -1;
-  for (const fs::path& entry : Entries(folder)) {
-    const std::string stem = entry.stem().string();  // ckpt_14999_rank0
-    const std::string prefix = "ckpt_", suffix = "_rank0";
-    if (entry.extension() != ".pt" || !stem.starts_with(prefix) || !stem.ends_with(suffix)) continue;
-    if (stem.size() <= prefix.size() + suffix.size()) continue;
-    const auto steps = WholeNumber(stem.substr(prefix.size(), stem.size() - prefix.size() - suffix.size()));
-    if (steps && *steps > most) {
-      most = *steps;
-      last = entry;
-    }
-  }
-  if (last) return *last;
-  return NotFound(Cat(folder.string(), ": there is no ckpt_*_rank0.pt: the low-quality splat is missing"));
-}
-
-// Poses of the low views with the only intrinsics of the high ones, and the high pictures of the same names.
-Status ReadPublishedLayout(const fs::path& low, const fs::path& high, BenchmarkObject& object) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(object.splat, LastCheckpoint(low));
-  object.low_project = low;
-  object.hold_out = kHeldOutEvery;
-  const fs::path model = low / "sparse" / "0";
-  ANCHORSPLAT_ASSIGN_OR_RETURN(object.low_cameras, ReadColmapModel(model));
-  SortByName(object.low_cameras.cameras);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const ColmapCameras intrinsics, ReadColmapCamerasText(high / "cameras.txt"));
-  if (intrinsics.size() != 1) {
-    return Bad(Cat((high / "cameras.txt").string(), ": ", intrinsics.size(), " cameras; the layout has exactly one"));
-  }
-  const std::vector<fs::path> folders = {high / "images"};
-  for (const Camera& camera : object.low_cameras.cameras) {
-    Camera view = camera;
-    view.intrinsics = intrinsics.begin()->second;
-    view.image = FindPicture(folders, camera.name);
-    object.views.push_back(std::move(view));
-  }
-  object.held_out = HeldOutViews(object.views.size());
+Status ReadScene(const BenchmarkEntry& entry, BenchmarkObject& object) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Scene opened, Scene::Open({entry.name, entry.folder}));
+  const auto scene = std::make_shared<const Scene>(std::move(opened));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(object.splat, scene->LowSplatPath());
+  object.low_cameras.cameras = scene->low_views();
+  object.views = scene->high_views();
+  object.held_out = scene->held_out();
+  object.background = scene->background();
+  object.low_project = scene->low_folder();
+  object.hold_out = scene->record() ? scene->record()->settings.hold_out : kHeldOutEvery;
+  object.picture = [scene](size_t view) { return scene->HighPicture(view); };
   return {};
 }
 
 // High views whose names are not among the low ones were not trained on.
-Status ReadExampleLayout(const fs::path& folder, BenchmarkObject& object) {
+Status ReadExample(const fs::path& folder, BenchmarkObject& object) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(object.splat, OnlySplat(folder));
   object.low_project = folder / kLowTransforms;
   ANCHORSPLAT_ASSIGN_OR_RETURN(object.low_cameras, ReadCameras(folder / kLowTransforms));
@@ -143,18 +89,21 @@ Status ReadExampleLayout(const fs::path& folder, BenchmarkObject& object) {
   const auto label = [](const Camera& camera) { return fs::path(camera.name).filename().string(); };
   std::set<std::string> trained;
   for (const Camera& camera : object.low_cameras.cameras) trained.insert(label(camera));
-  object.views = std::move(high.cameras);
-  for (size_t i = 0; i < object.views.size(); ++i) {
-    if (!trained.contains(label(object.views[i]))) object.held_out.push_back(i);
+  for (size_t i = 0; i < high.cameras.size(); ++i) {
+    const Camera& camera = high.cameras[i];
+    if (camera.image.empty()) {
+      return NotFound(Cat((folder / kHighTransforms).string(), ": view ", camera.name, " has no picture"));
+    }
+    if (!trained.contains(label(camera))) object.held_out.push_back(i);
   }
+  object.views = std::move(high.cameras);
+  object.picture = [views = object.views](size_t view) { return ReadImage(views.at(view).image); };
   return {};
 }
 
 Status CheckObject(const fs::path& folder, const BenchmarkObject& object) {
   if (object.low_cameras.cameras.empty() || object.views.empty()) return Bad(Cat(folder.string(), ": no views"));
   for (const Camera& view : object.views) {
-    if (view.image.empty())
-      return NotFound(Cat(folder.string(), ": view ", view.name, " has no high-resolution picture"));
     const Pinhole &a = view.intrinsics, &b = object.views[0].intrinsics;
     if (a.width != b.width || a.height != b.height) {
       return Bad(Cat(folder.string(), ": the high-resolution views are of different sizes"));
@@ -180,7 +129,7 @@ Camera BenchmarkObject::LowCamera(size_t view) const {
 
 Result<Image> BenchmarkObject::Truth(size_t view) const {
   const Camera& camera = views[view];
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, ReadImage(camera.image));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, picture(view));
   if (image.width != camera.intrinsics.width || image.height != camera.intrinsics.height) {
     return Bad(Cat(camera.image.string(), ": ", image.width, " x ", image.height, " pixels, the camera has ",
                    camera.intrinsics.width, " x ", camera.intrinsics.height));
@@ -189,34 +138,36 @@ Result<Image> BenchmarkObject::Truth(size_t view) const {
   return image;
 }
 
-Result<std::vector<BenchmarkEntry>> ListBenchmark(const fs::path& folder) {
-  std::error_code ignored;
-  if (!fs::is_directory(folder, ignored)) return NotFound(Cat(folder.string(), ": no such folder"));
+Result<std::vector<BenchmarkEntry>> ListBenchmark(const fs::path& folder, const std::string& split) {
   std::vector<BenchmarkEntry> entries;
-  for (const fs::path& entry : Entries(folder)) {
-    if (fs::is_directory(entry, ignored) && LooksLikeObject(entry)) {
-      entries.push_back({entry.filename().string(), entry});
+  auto scenes = ListScenes(folder, {.split = split});
+  if (scenes.ok()) {
+    for (SceneEntry& scene : *scenes) entries.push_back({std::move(scene.name), std::move(scene.folder)});
+  } else if (scenes.error().code != ErrorCode::kNotFound || !split.empty()) {
+    return scenes.error();
+  }
+  if (split.empty()) {
+    for (const fs::path& entry : Entries(folder)) {
+      const bool known = std::any_of(entries.begin(), entries.end(), [&](const auto& e) { return e.folder == entry; });
+      if (HasExampleLayout(entry) && !known) entries.push_back({entry.filename().string(), entry});
     }
   }
-  if (entries.empty() && LooksLikeObject(folder)) {
-    const fs::path whole = fs::absolute(folder, ignored).lexically_normal();
-    entries.push_back({(whole.has_filename() ? whole : whole.parent_path()).filename().string(), folder});
+  if (entries.empty() && HasExampleLayout(folder)) {
+    std::error_code ignored;
+    entries.push_back({fs::weakly_canonical(folder, ignored).filename().string(), folder});
   }
   if (entries.empty()) {
-    return NotFound(Cat(folder.string(), ": no objects in it: folders with 256/ and 1024/ (any two sizes), or with ",
-                        kLowTransforms, " and ", kHighTransforms));
+    return Error{scenes.error().code, Cat(scenes.error().message, ", and no folders with ", kHighTransforms)};
   }
+  std::sort(entries.begin(), entries.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
   return entries;
 }
 
 Result<BenchmarkObject> OpenObject(const BenchmarkEntry& entry) {
   BenchmarkObject object;
   object.name = entry.name;
-  if (const auto folders = ResolutionFolders(entry.folder)) {
-    ANCHORSPLAT_RETURN_IF_ERROR(ReadPublishedLayout(folders->first, folders->second, object));
-  } else {
-    ANCHORSPLAT_RETURN_IF_ERROR(ReadExampleLayout(entry.folder, object));
-  }
+  ANCHORSPLAT_RETURN_IF_ERROR(HasExampleLayout(entry.folder) ? ReadExample(entry.folder, object)
+                                                             : ReadScene(entry, object));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckObject(entry.folder, object));
   ANCHORSPLAT_ASSIGN_OR_RETURN(object.low, ReadCloud(object.splat));
   return object;

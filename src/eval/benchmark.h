@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -19,12 +20,13 @@ struct BenchmarkEntry {
   std::filesystem::path folder;
 };
 
-// The objects of a benchmark, in order of their names. DIR holds a folder per object, of one of two layouts:
-//  * the published data set's: two folders named after their resolution, such as 256/{images,sparse/0,
-//    gaussian_splatting/ckpts/ckpt_*_rank0.pt} and 1024/{images,cameras.txt};
-//  * that of the repository's examples: a splat, transforms_lr.json and transforms_hr.json with their pictures.
-// Errors: kNotFound: no folder, no objects in it.
-Result<std::vector<BenchmarkEntry>> ListBenchmark(const std::filesystem::path& folder);
+// The objects of a benchmark, in order of their names. The folder holds data sets as dataset/scene_reader.h reads them
+// (without the objects that a manifest rejects), or folders of the layout of the repository's examples: a splat,
+// transforms_lr.json and transforms_hr.json with their pictures; or it is one such object itself. `split` takes those
+// of one split of the data set; empty: all.
+//
+// Errors: kNotFound: no folder, no objects in it; kBadFile: of the manifest or the splits.
+Result<std::vector<BenchmarkEntry>> ListBenchmark(const std::filesystem::path& folder, const std::string& split = {});
 
 // What an object gives methods to work with and what their results are measured with.
 struct BenchmarkObject {
@@ -32,19 +34,21 @@ struct BenchmarkObject {
   std::filesystem::path splat;   // file of `low`
   GaussianCloud low;             // the low-quality splat
   CameraSet low_cameras;         // of all low-resolution views, in order of their names
-  std::vector<Camera> views;     // of all high-resolution views, in order of their names; `image` is the truth
+  std::vector<Camera> views;     // of all high-resolution views, in order of their names
   std::vector<size_t> held_out;  // views the low-quality fit was not trained on
   std::array<float, 3> background{};
   std::filesystem::path low_project;  // what the low-quality splat was fitted to: fit/training_views.h opens it …
   int hold_out = 0;                   // … with this, and holds out the same views
+  // The high-resolution picture of a view, rgb or rgba, of its camera's size.
+  std::function<Result<Image>(size_t view)> picture;
 
   double upscale() const;                  // pixels of a high view per pixel of a low one, along a side
   Camera LowCamera(size_t view) const;     // the place of view `view` with the intrinsics of the low ones
-  Result<Image> Truth(size_t view) const;  // [3,H,W] over the background
+  Result<Image> Truth(size_t view) const;  // [3,H,W]: the picture over the background
 };
 
-// Errors: kNotFound, kBadFile, kIo, naming the file: no splat, cameras that cannot be read, no high view with a
-// picture, more than one set of high intrinsics, low views that are not smaller.
+// Errors: kNotFound, kBadFile, kIo, naming the file: no splat, cameras that cannot be read, high views of different
+// sizes or smaller than the low ones.
 Result<BenchmarkObject> OpenObject(const BenchmarkEntry& entry);
 
 }  // namespace anchorsplat

@@ -107,10 +107,10 @@ Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
   const InitialPoints points = views.points.size() > 0
                                    ? std::move(views.points)
                                    : RandomPointsInView(kRandomPoints, views.train, views.scene_scale, task.seed);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(
-      GaussianCloud initial,
-      InitialCloud(points, views.scene_scale, {.sh_degree = options.objective.render.sh_degree, .seed = task.seed}));
-
+  const auto initial = [&] {
+    return InitialCloud(points, views.scene_scale,
+                        {.sh_degree = options.objective.render.sh_degree, .seed = task.seed});
+  };
   FitControl control;
   control.checkpoint = checkpoint;
   control.checkpoint_every = kCheckpointEvery;
@@ -124,7 +124,15 @@ Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
     noted = WriteProgress(note, progress);
   };
   LogInfo(Cat(object.name, ": fitting ", WithThousands(steps), " steps at ", high.width, " x ", high.height));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Fitted fitted, Fit(views, std::move(initial), options, control));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud start, initial());
+  auto fit = Fit(views, std::move(start), options, control);
+  if (!fit.ok() && fit.error().code == ErrorCode::kBadFile && fs::exists(checkpoint, code)) {
+    LogWarning(Cat("the fit begins anew: ", fit.error().message));  // a checkpoint of another version
+    fs::remove(checkpoint, code);
+    ANCHORSPLAT_ASSIGN_OR_RETURN(start, initial());
+    fit = Fit(views, std::move(start), options, control);
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Fitted fitted, std::move(fit));
   ANCHORSPLAT_RETURN_IF_ERROR(noted);
   ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(splat, fitted.cloud, {.overwrite = true}));
   progress = {key, before + Since(begin), fitted.report.train.psnr, true};

@@ -248,7 +248,7 @@ std::string FileStem(const std::string& method) {
 Result<Evaluation> Evaluate(const fs::path& benchmark, const std::vector<EvalMethod>& methods, const fs::path& out,
                             const EvaluationOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckMethods(methods));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<BenchmarkEntry> entries, ListBenchmark(benchmark));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<BenchmarkEntry> entries, ListBenchmark(benchmark, options.split));
   ANCHORSPLAT_ASSIGN_OR_RETURN(entries, ChooseObjects(std::move(entries), options.objects));
   std::error_code code;
   fs::create_directories(out / "objects", code);

@@ -15,6 +15,7 @@ namespace anchorsplat {
 
 struct EvaluationOptions {
   Protocol protocol = Protocol::kHeldOut;
+  std::string split = {};                 // of the data set; empty: all objects
   std::vector<std::string> objects = {};  // names; empty: all
   size_t max_views = 0;  // per object, evenly spread over the protocol's; 0: all, which the protocol means
   const Lpips* lpips = nullptr;

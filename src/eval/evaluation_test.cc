@@ -153,7 +153,8 @@ TEST(Benchmark, NamesWhatIsMissing) {
   MakePublishedObject(folder / "ball", ThinBall(), Ball());
   const BenchmarkEntry entry = ListBenchmark(folder.path())->front();
   fs::rename(entry.folder / "48" / "images" / "004.png", entry.folder / "other.png");
-  EXPECT_THAT(OpenObject(entry).error().message, HasSubstr("view 004 has no high-resolution picture"));
+  EXPECT_THAT(OpenObject(entry)->Truth(4).error().message, HasSubstr("no high-resolution picture 004"));
+  EXPECT_TRUE(OpenObject(entry)->Truth(3).ok());
   fs::rename(entry.folder / "other.png", entry.folder / "48" / "images" / "004.png");
   fs::remove_all(entry.folder / "16" / "gaussian_splatting");
   EXPECT_THAT(OpenObject(entry).error().message, HasSubstr("ckpt_*_rank0.pt"));

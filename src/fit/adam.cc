@@ -45,63 +45,41 @@ namespace HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-using D = hn::CappedTag<float, 16>;
-using V = hn::Vec<D>;
-
-struct Constants {
-  V take1, keep2, take2, inverse_root, epsilon;
-};
-
-HWY_INLINE void Update(const Constants& c, V rate, V gradient, V& m, V& v, V& x) {
-  m = hn::MulAdd(c.take1, hn::Sub(gradient, m), m);
-  v = hn::MulAdd(hn::Mul(c.take2, gradient), gradient, hn::Mul(c.keep2, v));
-  const V denominator = hn::MulAdd(hn::Sqrt(v), c.inverse_root, c.epsilon);
-  x = hn::NegMulAdd(rate, hn::Div(m, denominator), x);
-}
-
-// The end of a run goes through padded vectors, so that a number's result does not depend on where the run ends.
-void UpdateEnd(D d, const Constants& c, const float* rates, const float* gradient, float* first_moment,
-               float* second_moment, float* values, int64_t count) {
-  alignas(64) float padded[4][16] = {};
-  std::copy_n(gradient, count, padded[0]);
-  std::copy_n(first_moment, count, padded[1]);
-  std::copy_n(second_moment, count, padded[2]);
-  std::copy_n(values, count, padded[3]);
-  V m = hn::Load(d, padded[1]), v = hn::Load(d, padded[2]), x = hn::Load(d, padded[3]);
-  Update(c, hn::LoadU(d, rates), hn::Load(d, padded[0]), m, v, x);
-  hn::Store(m, d, padded[1]);
-  hn::Store(v, d, padded[2]);
-  hn::Store(x, d, padded[3]);
-  std::copy_n(padded[1], count, first_moment);
-  std::copy_n(padded[2], count, second_moment);
-  std::copy_n(padded[3], count, values);
+// Numbers [i, …) of a run, as many whole registers as there are before `count`. Returns where it stopped. A number's
+// result does not depend on the register's length.
+template <class D>
+HWY_INLINE int64_t UpdateSpan(D d, const AdamRuns& runs, int64_t offset, int64_t i, int64_t& phase) {
+  const auto lanes = static_cast<int64_t>(hn::Lanes(d));
+  const auto take1 = hn::Set(d, runs.take1), keep2 = hn::Set(d, runs.keep2), take2 = hn::Set(d, runs.take2),
+             inverse_root = hn::Set(d, runs.inverse_root), epsilon = hn::Set(d, runs.epsilon);
+  const float* gradient = runs.gradient + offset;
+  float* first_moment = runs.first_moment + offset;
+  float* second_moment = runs.second_moment + offset;
+  float* values = runs.values + offset;
+  for (; i + lanes <= runs.count; i += lanes) {
+    const auto g = hn::LoadU(d, gradient + i);
+    auto m = hn::LoadU(d, first_moment + i), v = hn::LoadU(d, second_moment + i), x = hn::LoadU(d, values + i);
+    m = hn::MulAdd(take1, hn::Sub(g, m), m);
+    v = hn::MulAdd(hn::Mul(take2, g), g, hn::Mul(keep2, v));
+    const auto denominator = hn::MulAdd(hn::Sqrt(v), inverse_root, epsilon);
+    x = hn::NegMulAdd(hn::LoadU(d, runs.rates + phase), hn::Div(m, denominator), x);
+    hn::StoreU(m, d, first_moment + i);
+    hn::StoreU(v, d, second_moment + i);
+    hn::StoreU(x, d, values + i);
+    phase += lanes;
+    if (phase == runs.period) phase = 0;
+  }
+  return i;
 }
 
 void UpdateRuns(const AdamRuns& runs) {
-  const D d;
-  const auto lanes = static_cast<int64_t>(hn::Lanes(d));
-  const Constants c{hn::Set(d, runs.take1), hn::Set(d, runs.keep2), hn::Set(d, runs.take2),
-                    hn::Set(d, runs.inverse_root), hn::Set(d, runs.epsilon)};
   for (int64_t run = 0; run < runs.runs; ++run) {
     const int64_t offset = run * runs.stride;
-    const float* gradient = runs.gradient + offset;
-    float* first_moment = runs.first_moment + offset;
-    float* second_moment = runs.second_moment + offset;
-    float* values = runs.values + offset;
-    int64_t i = 0, phase = 0;
-    for (; i + lanes <= runs.count; i += lanes) {
-      V m = hn::LoadU(d, first_moment + i), v = hn::LoadU(d, second_moment + i), x = hn::LoadU(d, values + i);
-      Update(c, hn::LoadU(d, runs.rates + phase), hn::LoadU(d, gradient + i), m, v, x);
-      hn::StoreU(m, d, first_moment + i);
-      hn::StoreU(v, d, second_moment + i);
-      hn::StoreU(x, d, values + i);
-      phase += lanes;
-      if (phase == runs.period) phase = 0;
-    }
-    if (i < runs.count) {
-      UpdateEnd(d, c, runs.rates + phase, gradient + i, first_moment + i, second_moment + i, values + i,
-                runs.count - i);
-    }
+    int64_t phase = 0;
+    int64_t i = UpdateSpan(hn::CappedTag<float, 16>(), runs, offset, 0, phase);
+    // Parts of rows are short (3, 12 or 27 numbers): what is left goes by shorter registers.
+    i = UpdateSpan(hn::CappedTag<float, 4>(), runs, offset, i, phase);
+    UpdateSpan(hn::CappedTag<float, 1>(), runs, offset, i, phase);
   }
 }
 

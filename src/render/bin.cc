@@ -72,6 +72,14 @@ void VisitRows(const BinParams& p, double log2_min_alpha, int64_t k, int first_r
   }
 }
 
+// Most Gaussians of a splat seen as a whole lie on at most 2 × 2 tiles. Those take one way without branches, which a
+// processor cannot guess: the four tiles of a square, of which some are the first one again and do not count.
+struct UpToFour {
+  explicit UpToFour(const TileRect& rect) : two_x(rect.x1 - rect.x0 - 1u), two_y(rect.y1 - rect.y0 - 1u) {}
+  bool fits() const { return (two_x | two_y) <= 1; }
+  uint32_t two_x, two_y;  // 1 where there is a second column (row)
+};
+
 }  // namespace
 
 void CountPairs(const BinParams& p) {
@@ -84,6 +92,16 @@ void CountPairs(const BinParams& p) {
     // Fetched in a loop of its own, which waits for many cache misses at a time.
     for (int64_t k = first; k < last; ++k) p.tiles_by_depth[k] = p.tiles[p.order[k]];
     for (int64_t k = first; k < last; ++k) {
+      const TileRect rect = p.tiles_by_depth[k];
+      if (const UpToFour four(rect); four.fits()) {
+        uint32_t* corner = counts + int64_t{rect.y0} * p.tiles_x + rect.x0;
+        const int64_t below = four.two_y * p.tiles_x;
+        corner[0] += 1;
+        corner[four.two_x] += four.two_x;
+        corner[below] += four.two_y;
+        corner[below + four.two_x] += four.two_x & four.two_y;
+        continue;
+      }
       VisitRows(p, log2_min_alpha, k, 0, p.tiles_y, [&](int y, int x0, int x1) {
         uint32_t* row = counts + int64_t{y} * p.tiles_x;
         for (int x = x0; x < x1; ++x) ++row[x];
@@ -111,8 +129,27 @@ void ListPairs(const BinParams& p, int64_t first_tile, int64_t last_tile, int32_
     uint32_t* next = p.chunk_counts + c * tiles;  // within the tile; from here on, within the run
     for (int64_t t = first_tile; t < last_tile; ++t) next[t] += static_cast<uint32_t>(p.tile_offsets[t] - base);
     const auto [first, last] = PieceOf(p.count, p.chunks, c);
+    const bool all_tiles = first_tile == 0 && last_tile == tiles;
+    // Where a tile that does not count is written to, again and again.
+    uint32_t spare = static_cast<uint32_t>(p.tile_offsets[last_tile] - base + c);
     for (int64_t k = first; k < last; ++k) {
       const int32_t i = p.order[k];
+      const TileRect rect = p.tiles_by_depth[k];
+      if (const UpToFour four(rect); all_tiles && four.fits()) {
+        uint32_t* corner = next + int64_t{rect.y0} * p.tiles_x + rect.x0;
+        const int64_t below = four.two_y * p.tiles_x;
+        const uint32_t both = four.two_x & four.two_y;
+        const auto put = [&](uint32_t* place, uint32_t counts) {
+          place = counts != 0 ? place : &spare;
+          pairs[*place] = i;
+          *place += counts;
+        };
+        pairs[(*corner)++] = i;
+        put(corner + four.two_x, four.two_x);
+        put(corner + below, four.two_y);
+        put(corner + below + four.two_x, both);
+        continue;
+      }
       VisitRows(p, log2_min_alpha, k, first_row, last_row, [&](int y, int x0, int x1) {
         const int64_t row = int64_t{y} * p.tiles_x;
         const int64_t begin = std::max(row + x0, first_tile), end = std::min(row + x1, last_tile);

@@ -30,8 +30,9 @@ void CountPairs(const BinParams& p);
 
 // Writes the lists of tiles [first_tile, last_tile): row numbers, tile after tile, each by depth. Runs must follow one
 // another from tile 0 on.
-void ListPairs(const BinParams& p, int64_t first_tile, int64_t last_tile,
-               int32_t* pairs);  // [tile_offsets[last_tile] − tile_offsets[first_tile]]
+void ListPairs(
+    const BinParams& p, int64_t first_tile, int64_t last_tile,
+    int32_t* pairs);  // [tile_offsets[last_tile] − tile_offsets[first_tile] + chunks], the last ones as scratch
 
 // The longest run of tiles from `first_tile` on whose lists hold `max_pairs` pairs, at least one tile.
 int64_t EndOfRun(const BinParams& p, int64_t first_tile, int64_t max_pairs);

@@ -186,7 +186,7 @@ void Rasterizer::State::BinAndBlend(int64_t visible_total, const Camera& camera,
   for (int64_t first = 0; first < tile_count; first = blend.last_tile) {
     blend.first_tile = first;
     blend.last_tile = EndOfRun(bin, first, options.max_pairs);
-    int32_t* list = Room(pairs, bin.tile_offsets[blend.last_tile] - bin.tile_offsets[first]);
+    int32_t* list = Room(pairs, bin.tile_offsets[blend.last_tile] - bin.tile_offsets[first] + bin.chunks);
     ListPairs(bin, first, blend.last_tile, list);
     statistics.bin += watch.Lap();
     blend.pairs = list;

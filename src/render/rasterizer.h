@@ -28,7 +28,7 @@ struct RenderOptions {
   // (tile, Gaussian) pairs listed at once, 4 bytes each, 1 to 2^31; when there are more, the picture is made in several
   // runs of tiles, without a difference in its pixels. Every run holds at least one tile, that is at most N pairs.
   int64_t max_pairs = kMaxPairs;
-  bool gradient = false;  // keep what Backward needs of this picture: 8 bytes per pixel more
+  bool gradient = false;  // keep what Backward needs of this picture: 8 bytes per pixel and Gaussian more
 };
 
 struct RenderOutput {

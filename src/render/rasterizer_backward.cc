@@ -74,7 +74,7 @@ void Rasterizer::State::BlendBackward(const RenderGradient& output_gradient, std
     const int64_t listed_from = listed_to;
     listed_to = listed ? tile_count : EndOfRun(bin, listed_from, options.max_pairs);
     const auto pairs_before = [&](int64_t tile) { return bin.tile_offsets[tile] - bin.tile_offsets[listed_from]; };
-    if (!listed) ListPairs(bin, listed_from, listed_to, Room(pairs, pairs_before(listed_to)));
+    if (!listed) ListPairs(bin, listed_from, listed_to, Room(pairs, pairs_before(listed_to) + bin.chunks));
     for (p.first_tile = listed_from; p.first_tile < listed_to; p.first_tile = p.last_tile) {
       p.last_tile = std::min(listed_to, EndOfRun(bin, p.first_tile, kMaxPartial));
       p.pairs = pairs.data() + pairs_before(p.first_tile);

@@ -63,7 +63,7 @@ Result<Image> ContactSheet(const fs::path& out, const Evaluation& evaluation) {
   const std::vector<size_t> rows = Thinned(with_results, kMostSheetObjects);
   const int columns = static_cast<int>(evaluation.methods.size()) + 1;
   const int row_height = kTileSide + 2 * kLine + kGap;
-  const int64_t height = kGap + kLine + int64_t{row_height} * static_cast<int64_t>(rows.size());
+  const int64_t height = 2 * kGap + kLine + int64_t{row_height} * static_cast<int64_t>(rows.size());
   Image canvas(kGap + columns * (kTileSide + kGap), static_cast<int>(height), 3);
   Fill(canvas);
   const auto left = [](int column) { return kGap + column * (kTileSide + kGap); };
@@ -71,7 +71,7 @@ Result<Image> ContactSheet(const fs::path& out, const Evaluation& evaluation) {
     const std::string heading = column + 1 == columns ? "truth" : evaluation.methods[static_cast<size_t>(column)];
     DrawText(canvas, left(column), kGap, Fitting(heading), kTextScale, kInk);
   }
-  int top = kGap + kLine;
+  int top = 2 * kGap + kLine;
   for (const size_t row : rows) {
     const std::string& object = evaluation.objects[row];
     const fs::path folder = ObjectFolder(out, object);

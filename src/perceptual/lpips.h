@@ -23,7 +23,8 @@ class Lpips {
   // build; kBadArgument for weights that are not those of their network.
   static Result<Lpips> Open(const LpipsWeights& weights, const std::filesystem::path& plugin = PluginPath());
 
-  // Distance of two pictures with values 0–1 (used as given). Uses ThreadCount() threads.
+  // Distance of two pictures with values 0–1 (used as given). Half of the work is saved when `b` is the same picture as
+  // the time before, so the truth goes there. Uses ThreadCount() threads.
   // kBadArgument: sizes differ, fewer than three channels, pictures too small for the network; kIo: LibTorch failed.
   Result<double> Distance(const Image& a, const Image& b) const;
 

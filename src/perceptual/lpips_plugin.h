@@ -17,8 +17,8 @@ struct LpipsPlugin {
   void* (*open)(int net, const float* const* tensors, const int64_t* sizes, size_t count, char* error,
                 size_t error_size);
   void (*close)(void* network);
-  // `a`, `b`: [3,height,width], 0–1.
-  double (*distance)(const void* network, const float* a, const float* b, int64_t height, int64_t width, int threads,
+  // `a`, `b`: [3,height,width], 0–1. What was calculated of `b` is kept for the next call. One call at a time runs.
+  double (*distance)(void* network, const float* a, const float* b, int64_t height, int64_t width, int threads,
                      char* error, size_t error_size);
 };
 

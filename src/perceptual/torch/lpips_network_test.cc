@@ -263,7 +263,9 @@ TEST(LpipsPlugin, SaysWhatTheNetworkSays) {
     ASSERT_TRUE(distance.ok()) << distance.error().message;
     const double direct = MakeNetwork(weights).Distance(Tensor(a), Tensor(b)).item<double>();
     EXPECT_NEAR(*distance, direct, 1e-5 * direct);
+    EXPECT_EQ(lpips->Distance(a, b).value(), *distance);  // `b` is known now
     EXPECT_EQ(lpips->Distance(a, a).value(), 0);
+    EXPECT_EQ(lpips->Distance(a, b).value(), *distance);
     // The smallest pictures still work, smaller ones and others are refused.
     const int side = SmallestLpipsSide(net);
     EXPECT_TRUE(lpips->Distance(Picture(side, side, false), Picture(side, side, true)).ok());

@@ -7,8 +7,10 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <mutex>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "perceptual/torch/lpips_network.h"
@@ -16,6 +18,16 @@
 namespace anchorsplat {
 
 namespace {
+
+// A network and the picture it saw last: evaluations compare many pictures with the same truth.
+struct Loaded {
+  explicit Loaded(LpipsNetwork n) : network(std::move(n)) {}
+
+  LpipsNetwork network;
+  std::mutex mutex;
+  at::Tensor truth;  // [1,3,H,W]
+  std::vector<at::Tensor> features;
+};
 
 void SetError(std::string_view text, char* error, size_t size) {
   const size_t length = std::min(text.size(), size - 1);
@@ -28,7 +40,7 @@ void* Open(int net, const float* const* tensors, const int64_t* sizes, size_t co
     std::vector<std::span<const float>> values;
     for (size_t i = 0; i < count; ++i) values.emplace_back(tensors[i], static_cast<size_t>(sizes[i]));
     auto network = LpipsNetwork::Make(static_cast<LpipsNet>(net), values);
-    if (network.ok()) return new LpipsNetwork(*std::move(network));
+    if (network.ok()) return new Loaded(*std::move(network));
     SetError(network.error().message, error, error_size);
   } catch (const std::exception& failure) {
     SetError(failure.what(), error, error_size);
@@ -36,17 +48,24 @@ void* Open(int net, const float* const* tensors, const int64_t* sizes, size_t co
   return nullptr;
 }
 
-void Close(void* network) { delete static_cast<LpipsNetwork*>(network); }
+void Close(void* network) { delete static_cast<Loaded*>(network); }
 
-double Distance(const void* network, const float* a, const float* b, int64_t height, int64_t width, int threads,
-                char* error, size_t error_size) {
+double Distance(void* network, const float* a, const float* b, int64_t height, int64_t width, int threads, char* error,
+                size_t error_size) {
   try {
     const c10::NoGradGuard no_gradients;
     if (at::get_num_threads() != threads) at::set_num_threads(threads);
     const auto picture = [&](const float* pixels) {
       return at::from_blob(const_cast<float*>(pixels), {1, 3, height, width}, at::kFloat);
     };
-    return static_cast<const LpipsNetwork*>(network)->Distance(picture(a), picture(b)).item<double>();
+    Loaded& loaded = *static_cast<Loaded*>(network);
+    const std::lock_guard<std::mutex> lock(loaded.mutex);
+    const at::Tensor truth = picture(b);
+    if (!loaded.truth.defined() || !at::equal(loaded.truth, truth)) {
+      loaded.truth = truth.clone();
+      loaded.features = loaded.network.Features(truth);
+    }
+    return loaded.network.Distance(loaded.network.Features(picture(a)), loaded.features).item<double>();
   } catch (const std::exception& failure) {
     SetError(failure.what(), error, error_size);
   }

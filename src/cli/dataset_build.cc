@@ -107,7 +107,8 @@ void AddDatasetBuild(CLI::App& parent, Program& program) {
   CLI::App& verb = AddVerb(parent, program, "build", "Make a low-/high-quality pair of every mesh",
                            "anchorsplat dataset build models/*.obj furniture.sh3f -o data/ --recipe mix.toml");
   const auto flags = std::make_shared<BuildFlags>();
-  verb.add_option("meshes", flags->meshes, "Mesh files, furniture libraries, or catalog.sh3f#object");
+  verb.add_option("meshes", flags->meshes,
+                  "Mesh files, furniture libraries, catalog.sh3f#object, or folders of pictures with cameras");
   auto* objects =
       verb.add_option("--objects", flags->objects, "Folder in which --list's meshes are")->check(NotEmpty());
   verb.add_option("--list", flags->list, "Text file of meshes, one a line, such as data/test-30.txt")
@@ -120,6 +121,9 @@ void AddDatasetBuild(CLI::App& parent, Program& program) {
       ->capture_default_str();
   verb.add_option("--hold-out", flags->settings.hold_out, "Every n-th view is not trained on; 0: none")
       ->check(CLI::Range(0, 100000))
+      ->capture_default_str();
+  verb.add_option("--downscale", flags->settings.downscale, "Folders of pictures: how much smaller the low views are")
+      ->check(CLI::Range(2, 64))
       ->capture_default_str();
   verb.add_option("--max-gaussians", flags->settings.max_gaussians, "Bound on a fit's size; 0: none")
       ->check(CLI::NonNegativeNumber)

@@ -26,7 +26,8 @@ using Clock = std::chrono::steady_clock;
 // All jobs, in the order of their names.
 Result<std::vector<ObjectJob>> MakeJobs(const std::vector<std::string>& meshes, const Recipe& recipe) {
   std::map<std::string, ObjectJob> jobs;
-  for (const std::string& mesh : meshes) {
+  for (std::string mesh : meshes) {
+    while (mesh.size() > 1 && mesh.back() == '/') mesh.pop_back();  // a folder of pictures
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto addresses, ExpandMeshAddress(mesh));
     for (const std::string& address : addresses) {
       const std::string name = ObjectName(address);

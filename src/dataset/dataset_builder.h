@@ -34,10 +34,10 @@ struct DatasetBuildReport {
   double seconds = 0;
 };
 
-// Makes DATASET/NAME for every mesh (address of a file, of an object of a furniture library, or of a whole library) and
-// every entry its recipe draws, and DATASET/manifest.jsonl and failures.jsonl, which are right after every object. Each
-// object is made by a process of its own (object_builder.h): one that fails, crashes or hangs does not stop the others.
-// Called again after whatever kind of end, it goes on where it was.
+// Makes DATASET/NAME for every mesh (address of a file, of an object of a furniture library, or of a whole library; or
+// a folder of pictures with cameras) and every entry its recipe draws, and DATASET/manifest.jsonl and failures.jsonl,
+// which are right after every object. Each object is made by a process of its own (object_builder.h): one that fails,
+// crashes or hangs does not stop the others. Called again after whatever kind of end, it goes on where it was.
 //
 // Errors: kBadArgument: no meshes, two that get the same name; kExists: another build works on the folder; kIo.
 Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, const std::filesystem::path& dataset,

@@ -75,13 +75,13 @@ class ObjectCheck {
 
   void CheckViews(const Scene& scene) {
     const ViewSetOptions& views = record_.settings.views;
-    if (std::ssize(scene.low_views()) != views.rig.views) {
-      Complain(Cat(folder_.string(), ": has ", scene.low_views().size(), " views, not ", views.rig.views));
+    if (std::ssize(scene.low_views()) != record_.views) {
+      Complain(Cat(folder_.string(), ": has ", scene.low_views().size(), " views, not ", record_.views));
     }
     for (const Camera& camera : scene.low_views()) CheckPicture(camera, scene.low_folder() / "images");
     if (views.store_high) {
       for (const Camera& camera : scene.high_views()) {
-        CheckPicture(camera, folder_ / std::to_string(views.high_size) / "images");
+        CheckPicture(camera, folder_ / std::to_string(record_.high_size) / "images");
       }
     } else if (decode_) {
       for (size_t i = 0; i < scene.high_views().size(); ++i) {

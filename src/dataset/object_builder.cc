@@ -9,6 +9,7 @@
 #include "core/text.h"
 #include "dataset/file_lock.h"
 #include "dataset/object_name.h"
+#include "dataset/picture_project.h"
 #include "dataset/scene_reader.h"
 #include "fit/fit.h"
 #include "fit/initial_cloud.h"
@@ -94,6 +95,10 @@ Status MakeViews(const ObjectJob& job, const fs::path& folder, const std::atomic
   }
   ViewSetOptions options = job.settings.views;
   options.overwrite = true;
+  record.views = options.rig.views;
+  record.low_size = options.low_size;
+  record.high_size = options.high_size;
+  record.background = options.background;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewSetCost cost, WriteViewSet(tracer, folder, options, stop));
   record.view_seconds = cost.seconds;
   if (!options.store_high) {
@@ -102,14 +107,33 @@ Status MakeViews(const ObjectJob& job, const fs::path& folder, const std::atomic
   return {};
 }
 
+// The views of an object that comes as pictures.
+Status CopyViews(const ObjectJob& job, const fs::path& folder, const std::atomic<bool>* stop, ObjectRecord& record) {
+  ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "views"));
+  PictureProjectOptions options;
+  options.downscale = job.settings.downscale;
+  options.background = job.settings.views.background;
+  options.seed = job.settings.seed;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureProjectReport report,
+                               WritePictureProject(job.source, folder, options, stop));
+  record.origin.name = job.name;
+  record.fingerprint = Cat("pictures-", StableHash(job.source));
+  record.views = report.views;
+  record.low_size = report.low_size;
+  record.high_size = report.high_size;
+  record.background = report.background;
+  record.view_seconds = report.seconds;
+  return {};
+}
+
 Status FitSplat(const ObjectJob& job, const fs::path& folder, const std::atomic<bool>* stop, ObjectRecord& record) {
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "fit"));
-  const fs::path low = folder / std::to_string(job.settings.views.low_size);
+  const fs::path low = folder / std::to_string(record.low_size);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(low, {.hold_out = job.settings.hold_out}));
   FitOptions options = FitOptionsFor(job.settings.fit_steps);
   options.seed = job.settings.seed;
   options.densification.max_gaussians = job.settings.max_gaussians;
-  options.objective.render.background = job.settings.views.background;
+  options.objective.render.background = record.background;
   record.initial_points = views.points.size();
   if (views.points.size() == 0) {
     return Error{ErrorCode::kBadFile, Cat(job.source, ": no camera sees any of its surface")};
@@ -221,7 +245,9 @@ Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset, 
   if (IsFile(folder / kViewsDone)) {
     ANCHORSPLAT_RETURN_IF_ERROR(Recall(folder / kViewsDone, record));
   } else {
-    ANCHORSPLAT_RETURN_IF_ERROR(MakeViews(job, folder, stop, record));
+    std::error_code ignored;
+    const bool pictures = fs::is_directory(job.source, ignored);
+    ANCHORSPLAT_RETURN_IF_ERROR((pictures ? CopyViews : MakeViews)(job, folder, stop, record));
     ANCHORSPLAT_RETURN_IF_ERROR(Keep(folder / kViewsDone, record));
   }
   if (IsFile(folder / kRecordName)) {  // cut off while it got its name

@@ -13,7 +13,7 @@ namespace anchorsplat {
 // One object to make.
 struct ObjectJob {
   std::string name;    // its folder's
-  std::string source;  // address of the mesh
+  std::string source;  // address of the mesh, or folder of a project of pictures (picture_project.h)
   std::string recipe;  // name of the recipe's entry
   ObjectSettings settings;
 };

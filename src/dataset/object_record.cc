@@ -77,6 +77,10 @@ Json ToJson(const ObjectRecord& r) {
           {"stem", r.stem},
           {"fingerprint", r.fingerprint},
           {"settings", ToJson(r.settings)},
+          {"views", r.views},
+          {"low_size", r.low_size},
+          {"high_size", r.high_size},
+          {"background", r.background},
           {"triangles", r.triangles},
           {"textures", r.textures},
           {"transparent_triangles", r.transparent_triangles},
@@ -129,6 +133,22 @@ Result<ObjectRecord> ObjectRecordFrom(const JsonValue& json) {
   r.rejected = rejected.raw().get<bool>();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue settings, json.Get("settings"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(r.settings, ObjectSettingsFrom(settings));
+  // Records of the first builds say these only in the settings.
+  const ViewSetOptions& views = r.settings.views;
+  r.views = views.rig.views;
+  r.low_size = views.low_size;
+  r.high_size = views.high_size;
+  r.background = views.background;
+  for (const auto& [key, number] : std::initializer_list<std::pair<const char*, int*>>{
+           {"views", &r.views}, {"low_size", &r.low_size}, {"high_size", &r.high_size}}) {
+    const auto value = json.Find(key);
+    if (!value) continue;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(*number, value->WholeNumber(1, 1 << 24));
+  }
+  if (const auto background = json.Find("background")) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto rgb, background->Numbers(3));
+    for (size_t k = 0; k < 3; ++k) r.background[k] = static_cast<float>(rgb[k]);
+  }
   return r;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json_fwd.hpp>
@@ -15,13 +16,17 @@ namespace anchorsplat {
 // What a data set says about one of its objects: a line of manifest.jsonl, and record.json in the object's folder.
 struct ObjectRecord {
   std::string name;    // of its folder
-  std::string source;  // the mesh's address as it was given
+  std::string source;  // the mesh's address, or the folder of pictures, as it was given
   std::string recipe;  // the entry of the recipe it was made by; empty: none
   MeshOrigin origin;   // name, category, creator, licence and which file says so
   std::string stem;    // VariantStem
   std::string fingerprint;
   ObjectSettings settings;
 
+  int views = 0;  // of each resolution; these four are the settings' for meshes, the pictures' own for others
+  int low_size = 0;
+  int high_size = 0;
+  std::array<float, 3> background = {0, 0, 0};
   int64_t triangles = 0;
   int64_t textures = 0;
   int64_t transparent_triangles = 0;  // left out

@@ -18,6 +18,10 @@ ObjectRecord Example(const std::string& name) {
   r.origin = {"Chair", "Living room", "somebody", "CC0-1.0", "LICENSE.TXT"};
   r.stem = "chair";
   r.fingerprint = "t12";
+  r.views = 146;
+  r.low_size = 256;
+  r.high_size = 1024;
+  r.background = {1, 0.1f, 0};
   r.triangles = 12;
   r.gaussians = 20000;
   r.train_psnr = 33.5;
@@ -39,6 +43,8 @@ TEST(ObjectRecord, ManifestComesBack) {
   EXPECT_EQ(a.origin.creator, "somebody");
   EXPECT_EQ(a.origin.licence_source, "LICENSE.TXT");
   EXPECT_EQ(a.gaussians, 20000);
+  EXPECT_EQ(a.high_size, 1024);
+  EXPECT_EQ(a.background, (std::array<float, 3>{1, 0.1f, 0}));
   EXPECT_EQ(a.train_psnr, 33.5);
   EXPECT_TRUE(a.rejected);
   EXPECT_EQ(a.fit_seconds, 60.5);

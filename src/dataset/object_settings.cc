@@ -93,6 +93,7 @@ nlohmann::json ToJson(const ObjectSettings& s) {
           {"points", v.points},
           {"store_high", v.store_high},
           {"fit_steps", s.fit_steps},
+          {"downscale", s.downscale},
           {"hold_out", s.hold_out},
           {"max_gaussians", s.max_gaussians},
           {"min_train_psnr", s.min_train_psnr},
@@ -113,6 +114,7 @@ Result<ObjectSettings> ObjectSettingsFrom(const JsonValue& json) {
   ANCHORSPLAT_RETURN_IF_ERROR(TakeWhole(json, "points", v.points));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeFlag(json, "store_high", v.store_high));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeWhole(json, "fit_steps", s.fit_steps));
+  if (json.has("downscale")) ANCHORSPLAT_RETURN_IF_ERROR(TakeInt(json, "downscale", 2, 64, s.downscale));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeInt(json, "hold_out", 0, 100000, s.hold_out));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeWhole(json, "max_gaussians", s.max_gaussians));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(json, "min_train_psnr", s.min_train_psnr));
@@ -131,6 +133,8 @@ Status Validate(const ObjectSettings& s) {
   if (s.views.points < 1) return bad("a fit needs surface samples to begin with");
   if (s.fit_steps < 1 || s.fit_steps > 10'000'000)
     return bad(Cat("a fit has 1 to 10,000,000 steps, not ", s.fit_steps));
+  if (s.downscale < 2 || s.downscale > 64)
+    return bad(Cat("pictures are made 2 to 64 times smaller, not ", s.downscale));
   if (s.hold_out == 1) return bad("holding out every view leaves none to train on");
   for (const float x : s.views.background) {
     if (!(x >= 0 && x <= 1)) return bad(Cat("background ", x, " is not in 0 to 1"));

@@ -14,6 +14,7 @@ namespace anchorsplat {
 struct ObjectSettings {
   ViewSetOptions views;
   int64_t fit_steps = kDefaultFitSteps;
+  int downscale = 4;           // of objects that are pictures: high pixels per low one, along a side
   int hold_out = 8;            // every n-th low view is not trained on; 0: none
   int64_t max_gaussians = 0;   // of the fit; 0: no bound
   double min_train_psnr = 34;  // dB on the fit's own training views, below which an object is rejected; 0: never

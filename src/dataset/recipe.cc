@@ -123,6 +123,7 @@ const std::map<std::string, Take, std::less<>>& Keys() {
       {"opaque", TakeOpaque},
       {"hr", TakeHigh},
       {"steps", TakeWhole<[](ObjectSettings& s) -> int64_t& { return s.fit_steps; }>},
+      {"downscale", TakeWhole<[](ObjectSettings& s) -> int& { return s.downscale; }>},
       {"hold_out", TakeWhole<[](ObjectSettings& s) -> int& { return s.hold_out; }>},
       {"max_gaussians", TakeWhole<[](ObjectSettings& s) -> int64_t& { return s.max_gaussians; }>},
       {"min_train_psnr", TakeNumber<[](ObjectSettings& s) -> double& { return s.min_train_psnr; }>},

@@ -129,7 +129,7 @@ Result<Scene> Scene::Open(const SceneEntry& entry) {
   if (IsFile(entry.folder / kRecordName)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile json, JsonFile::Read(entry.folder / kRecordName));
     ANCHORSPLAT_ASSIGN_OR_RETURN(scene.record_, ObjectRecordFrom(json.root()));
-    scene.background_ = scene.record_->settings.views.background;
+    scene.background_ = scene.record_->background;
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet cameras, ReadColmapModel(low / "sparse" / "0"));
   const auto by_name = [](const Camera& a, const Camera& b) {

@@ -141,7 +141,7 @@ std::filesystem::path OwnProgram() {
 void DieWithParent() {
   const pid_t parent = ::getppid();
   ::prctl(PR_SET_PDEATHSIG, SIGTERM);
-  if (parent == 1 || ::getppid() != parent) ::raise(SIGTERM);  // it went before we could say so
+  if (::getppid() != parent) ::raise(SIGTERM);  // it went before we could say so
 }
 
 }  // namespace anchorsplat

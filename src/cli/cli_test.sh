@@ -336,6 +336,17 @@ rm "$work/set/ramp/24/images/000.png"
 expect 1 "evaluation of a data set with a gap" "$program" eval "$work/set" -o "$work/eval4" --methods raw
 says stderr "no high-resolution picture 000"
 expect 0 "evaluation of views on demand" "$program" eval "$work/demand" -o "$work/eval5" --methods raw
+# The fit of "bicubic", killed after its first checkpoint, goes on and comes to the same splat.
+fit=(--objects quad --methods bicubic --fit-steps 2000)
+expect 0 "a fit in one go" "$program" eval "$work/killed" -o "$work/whole" "${fit[@]}"
+"$program" eval "$work/killed" -o "$work/parts" "${fit[@]}" --quiet >/dev/null 2>&1 &
+victim=$!
+until [ -e "$work/parts/objects/quad/bicubic/fit.checkpoint" ] || ! kill -0 $victim 2>/dev/null; do :; done
+kill -9 $victim 2>/dev/null
+wait $victim 2>/dev/null
+expect 0 "a fit that was killed" "$program" eval "$work/killed" -o "$work/parts" "${fit[@]}"
+says stderr "going on at step"
+expect 0 "comes to the same splat" cmp "$work/whole/objects/quad/bicubic/splat.ply" "$work/parts/objects/quad/bicubic/splat.ply"
 expect 3 "no split" "$program" eval "$work/demand" -o "$work/eval5" --split test
 
 # Same bits for any number of threads.

@@ -54,6 +54,7 @@ Result<std::vector<EvalMethod>> MakeMethods(const EvalFlags& flags) {
 Result<double> ChooseStrength(const std::vector<MethodSummary>& summaries) {
   const std::span<const double> strengths = FilterStrengths();
   std::vector<double> psnr;
+  psnr.reserve(summaries.size());
   for (const MethodSummary& summary : summaries) psnr.push_back(summary.psnr.mean);
   if (psnr.size() != strengths.size()) {
     return Error{ErrorCode::kBadFile, "no f can be chosen: not every strength was measured"};

@@ -133,7 +133,7 @@ Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
     fit = Fit(views, std::move(start), options, control);
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(Fitted fitted, std::move(fit));
-  ANCHORSPLAT_RETURN_IF_ERROR(noted);
+  if (!noted.ok()) return noted.error();
   ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(splat, fitted.cloud, {.overwrite = true}));
   progress = {key, before + Since(begin), fitted.report.train.psnr, true};
   ANCHORSPLAT_RETURN_IF_ERROR(WriteProgress(note, progress));

@@ -104,6 +104,7 @@ TEST(FilterSweep, TopOfParabola) {
   const std::vector<double> x = {0, 0.25, 0.4, 0.5};
   const auto y = [&](double top) {
     std::vector<double> values;
+    values.reserve(x.size());
     for (const double at : x) values.push_back(30 - (at - top) * (at - top));
     return values;
   };

@@ -38,6 +38,7 @@ std::vector<NamedTensor> Named(LpipsNet net) {
 
 void Write(const std::filesystem::path& path, const std::vector<NamedTensor>& tensors) {
   std::vector<TensorEntry> entries;
+  entries.reserve(tensors.size());
   for (const NamedTensor& tensor : tensors) entries.push_back(MakeEntry(tensor.name, tensor.shape, tensor.values));
   const Status written = WriteSafetensors(path, entries, {});
   ASSERT_TRUE(written.ok()) << written.error().message;

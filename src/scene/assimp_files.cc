@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <assimp/IOStream.hpp>
 #include <cstring>
-#include <string_view>
 #include <utility>
 
 namespace anchorsplat {
@@ -38,12 +37,6 @@ class MemoryStream : public Assimp::IOStream {
   size_t at_ = 0;
 };
 
-bool HasExtension(std::string_view name, std::string_view extension) {
-  if (name.size() < extension.size()) return false;
-  return std::equal(extension.begin(), extension.end(), name.end() - static_cast<std::ptrdiff_t>(extension.size()),
-                    [](char a, char b) { return a == (b >= 'A' && b <= 'Z' ? b - 'A' + 'a' : b); });
-}
-
 }  // namespace
 
 int64_t BlankLinesAndPoints(std::string& obj) {
@@ -73,16 +66,13 @@ int64_t BlankLinesAndPoints(std::string& obj) {
   return elements;
 }
 
-bool AssimpFiles::Exists(const char* name) const { return source_->Has(name); }
-
 Assimp::IOStream* AssimpFiles::Open(const char* name, const char* mode) {
   if (std::strpbrk(mode, "wa+") != nullptr) return nullptr;
-  auto bytes = source_->Read(name, max_bytes_);
-  if (!bytes.ok()) {
+  auto bytes = read_(name);
+  if (!bytes) {
     if (std::find(missing_->begin(), missing_->end(), name) == missing_->end()) missing_->emplace_back(name);
     return nullptr;
   }
-  if (HasExtension(name, ".obj")) BlankLinesAndPoints(*bytes);
   return new MemoryStream(*std::move(bytes));
 }
 

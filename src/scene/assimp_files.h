@@ -1,32 +1,29 @@
 #pragma once
 
 #include <assimp/IOSystem.hpp>
-#include <memory>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "scene/asset_source.h"
-
 namespace anchorsplat {
 
-// The files of an AssetSource as assimp opens them, read-only and in memory, so that the same code reads folders and
-// archives. Every file is at most `max_bytes` long; what is longer does not exist.
-//
-// Wavefront OBJ files are cleaned on the way (BlankLinesAndPoints).
+// The bytes of the file of that name; nothing when there is none.
+using AssimpFileReader = std::function<std::optional<std::string>(const std::string& name)>;
+
+// Files as assimp opens them, read-only and in memory, so that the same code reads folders and archives.
 class AssimpFiles : public Assimp::IOSystem {
  public:
-  // Names that were asked for in vain go to `missing`, each once.
-  AssimpFiles(const AssetSource* source, uint64_t max_bytes, std::vector<std::string>* missing)
-      : source_(source), max_bytes_(max_bytes), missing_(missing) {}
+  // Names that were opened in vain go to `missing`, each once.
+  AssimpFiles(AssimpFileReader read, std::vector<std::string>* missing) : read_(std::move(read)), missing_(missing) {}
 
-  bool Exists(const char* name) const override;
+  bool Exists(const char* name) const override { return read_(name).has_value(); }
   char getOsSeparator() const override { return '/'; }
   Assimp::IOStream* Open(const char* name, const char* mode) override;
   void Close(Assimp::IOStream* stream) override;
 
  private:
-  const AssetSource* source_;
-  uint64_t max_bytes_;
+  AssimpFileReader read_;
   std::vector<std::string>* missing_;
 };
 

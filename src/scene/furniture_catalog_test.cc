@@ -37,7 +37,7 @@ class Library : public ::testing::Test {
  protected:
   void SetUp() override {
     Image picture(1, 1, 3);
-    picture.pixels[0] = 1;
+    for (int c = 0; c < 3; ++c) picture.at(c, 0, 0) = c == 0 ? 1.0f : 0.0f;
     WriteLibrary(path_, {{"PluginFurnitureCatalog.properties", kList},
                          {"lib/table/t.obj", kTriangle},
                          {"lib/table/t.mtl", "newmtl m\nmap_Kd Red.PNG\n"},

@@ -17,11 +17,14 @@ struct MeshLimits {
   int64_t max_vertices = int64_t{1} << 25;         // as the file has them, after instancing
   int64_t max_polygon = 10'000;                    // corners of one face: cutting it up takes time quadratic in them
   int64_t max_texture_pixels = int64_t{1} << 26;   // of one picture
+  uint64_t max_memory = uint64_t{8} << 30;         // bytes that reading the file may take
+  int max_cpu_seconds = 120;                       // and processor time
   int64_t max_textures_pixels = int64_t{1} << 28;  // of all pictures together
 };
 
 struct MeshReadOptions {
   MeshLimits limits;
+  bool isolated = true;        // read in a process of its own, as the library falls over damaged files; false for tests
   float smoothing_angle = 45;  // degrees; edges that are sharper stay sharp where a file gives no normals
 };
 
@@ -45,7 +48,7 @@ struct ImportedMesh {
 };
 
 // Reads `name` and what it refers to from `source`. The format is found by the name's ending: OBJ, glTF and GLB
-// (embedded pictures included), PLY, COLLADA, AC3D, STL and OFF, through assimp.
+// (embedded pictures included), PLY, COLLADA, AC3D, STL and OFF, through assimp, which runs in a process of its own.
 //
 // Colours and pictures: as sRGB values; glTF's linear factors are converted. Where a material has a picture, that is
 // its colour: the diffuse colour beside it in OBJ and COLLADA files is an exporter's default more often than

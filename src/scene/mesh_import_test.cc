@@ -182,6 +182,34 @@ TEST(MeshImport, ReadsAc3d) {
   EXPECT_THAT(imported.mesh.textures[0].rgba, ElementsAre(10, 20, 30, 255));
 }
 
+TEST(MeshImport, TheProcessOfItsOwnChangesNothing) {
+  MapAssets assets;
+  assets.files = {{"a.gltf", TriangleGltf(R"({"pbrMetallicRoughness":{"baseColorTexture":{"index":0}}})")},
+                  {"square.obj", kSquare}};
+  MeshReadOptions here;
+  here.isolated = false;
+  for (const char* name : {"a.gltf", "square.obj"}) {
+    const ImportedMesh a = Import(assets, name), b = Import(assets, name, here);
+    EXPECT_EQ(a.mesh.positions, b.mesh.positions);
+    EXPECT_EQ(a.mesh.normals, b.mesh.normals);
+    EXPECT_EQ(a.mesh.uvs, b.mesh.uvs);
+    EXPECT_EQ(a.mesh.triangles, b.mesh.triangles);
+    EXPECT_EQ(a.mesh.textures.size(), b.mesh.textures.size());
+    EXPECT_EQ(a.warnings, b.warnings);
+  }
+}
+
+// A face count that assimp's PLY reader believes: it never comes back, or fails an assertion.
+TEST(MeshImport, WhatAssimpCannotTakeIsAnError) {
+  MapAssets assets;
+  assets.files = {{"a.ply",
+                   "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty flo y\nproperty float z\n"
+                   "element face 1e308\nproperty list uchar int vertex_indices\nEnd_header\n0 0 0\n"}};
+  MeshReadOptions options;
+  options.limits.max_cpu_seconds = 1;
+  EXPECT_THAT(ImportError(assets, "a.ply", options).message, HasSubstr("a.ply: "));
+}
+
 TEST(MeshImport, RefusesWithASentence) {
   MapAssets assets;
   assets.files = {{"empty.obj", ""},

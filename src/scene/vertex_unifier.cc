@@ -32,15 +32,15 @@ Mesh UnifyVertices(const MeshCorners& corners) {
   known.reserve(corners.positions.size() / 2);
   mesh.triangles.resize(corners.materials.size());
   for (size_t i = 0; i < corners.positions.size(); ++i) {
-    Key key;
+    Key key{};
     size_t at = 0;
     const auto put = [&](const auto& values) {
       for (const float v : values) key[at++] = std::bit_cast<uint32_t>(v);
     };
     put(corners.positions[i]);
     put(corners.normals[i]);
-    put(corners.uvs[i]);
-    put(corners.colors[i]);
+    if (corners.has_uvs) put(corners.uvs[i]);
+    if (corners.has_colors) put(corners.colors[i]);
     const auto [entry, is_new] = known.try_emplace(key, static_cast<uint32_t>(mesh.positions.size()));
     if (is_new) {
       mesh.positions.push_back(corners.positions[i]);

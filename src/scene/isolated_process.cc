@@ -1,6 +1,9 @@
 #include "scene/isolated_process.h"
 
 #include <fcntl.h>
+#ifdef __linux__
+#include <sys/prctl.h>
+#endif
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/time.h>
@@ -105,7 +108,13 @@ void PrepareChild(const IsolationLimits& limits, uint64_t address_space) {
     ::signal(signal, SIG_DFL);
   }
   const int silence = ::open("/dev/null", O_WRONLY);
-  if (silence >= 0) (void)::dup2(silence, STDERR_FILENO);
+  if (silence >= 0) {
+    (void)::dup2(silence, STDOUT_FILENO);
+    (void)::dup2(silence, STDERR_FILENO);
+  }
+#ifdef __linux__
+  (void)::prctl(PR_SET_PDEATHSIG, SIGKILL);  // nobody would take the result
+#endif
   Limit(RLIMIT_CORE, 0);
   Limit(RLIMIT_CPU, static_cast<uint64_t>(limits.max_cpu_seconds));
 #ifdef __SANITIZE_ADDRESS__

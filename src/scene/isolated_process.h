@@ -21,8 +21,8 @@ using AskParent = std::function<std::string(const std::string& request)>;
 // Runs `work` in a child process and gives what it returns. Meant for libraries that fall over damaged files: whatever
 // happens there – a crash, a failed assertion, endless work, all memory eaten – is an error here and nothing more. The
 // child sees memory as it was, but starts with one thread, so `work` must not wait for locks that other threads may
-// have held, and reads files by asking: `answer` runs in this process, on the calling thread. Its standard error is
-// silent.
+// have held, and reads files by asking: `answer` runs in this process, on the calling thread. The child writes nothing
+// to the standard streams and ends with this process.
 //
 // Errors (kBadFile, a sentence without a beginning): `work` threw (its words), crashed, or went over the limits; kIo:
 // the system makes no process.

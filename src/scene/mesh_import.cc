@@ -10,6 +10,8 @@
 #include <utility>
 
 #include "core/text.h"
+#include "formats/input_file.h"
+#include "formats/ply_header.h"
 #include "scene/assimp_import.h"
 #include "scene/imported_materials.h"
 #include "scene/isolated_process.h"
@@ -29,6 +31,24 @@ std::string Ending(const std::string& name) {
   return ending;
 }
 
+// assimp believes a PLY header and loops over the rows it announces, which may be 10^308.
+Status CheckPly(const std::string& bytes) {
+  const InputFile head = InputFile::FromBytes("header", bytes.substr(0, kMaxPlyHeader));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyHeader header, ReadPlyHeader(head));
+  uint64_t left = bytes.size() - std::min<uint64_t>(bytes.size(), header.body);
+  for (const PlyElement& element : header.elements) {
+    // In text every value takes a digit and what parts it from the next.
+    const uint64_t row = header.encoding == PlyEncoding::kAscii ? 2 * element.properties.size() : element.row_size();
+    const auto count = static_cast<uint64_t>(element.count);
+    if (count > 0 && (row == 0 || count > (left + 1) / row)) {
+      return Error{ErrorCode::kBadFile, Cat("header: line ", element.line, ": ", element.count, " of element \"",
+                                            Printable(element.name), "\" do not fit into the file")};
+    }
+    left -= std::min(left, count * row);
+  }
+  return {};
+}
+
 // Reads the files that assimp asks for. The mesh itself is read once, when it is known that it is there.
 class FileDesk {
  public:
@@ -38,6 +58,7 @@ class FileDesk {
     ANCHORSPLAT_ASSIGN_OR_RETURN(bytes_, source_.Read(name, limits_.max_file_bytes));
     name_ = name;
     if (Ending(name) == ".obj") lines_and_points_ = BlankLinesAndPoints(bytes_);
+    if (Ending(name) == ".ply") return CheckPly(bytes_);
     return {};
   }
   std::optional<std::string> Read(const std::string& name) const {

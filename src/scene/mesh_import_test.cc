@@ -199,15 +199,20 @@ TEST(MeshImport, TheProcessOfItsOwnChangesNothing) {
   }
 }
 
-// A face count that assimp's PLY reader believes: it never comes back, or fails an assertion.
-TEST(MeshImport, WhatAssimpCannotTakeIsAnError) {
+// What assimp's readers believe, never to come back or to fail an assertion.
+TEST(MeshImport, PlyHeadersThatPromiseTooMuchAreErrors) {
+  const auto ply = [](const char* vertices, const char* faces) {
+    return Cat("ply\nformat ascii 1.0\nelement vertex ", vertices,
+               "\nproperty float x\nproperty float y\nproperty float z\nelement face ", faces,
+               "\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+  };
   MapAssets assets;
-  assets.files = {{"a.ply",
-                   "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty flo y\nproperty float z\n"
-                   "element face 1e308\nproperty list uchar int vertex_indices\nEnd_header\n0 0 0\n"}};
-  MeshReadOptions options;
-  options.limits.max_cpu_seconds = 1;
-  EXPECT_THAT(ImportError(assets, "a.ply", options).message, HasSubstr("a.ply: "));
+  assets.files = {{"a.ply", ply("3", "1")}};
+  EXPECT_EQ(Import(assets, "a.ply").mesh.triangles.size(), 1u);
+  for (const auto& [vertices, faces] : {std::pair("4294967295", "1"), {"3", "100"}, {"3", "1e308"}, {"3", "-1"}}) {
+    assets.files["a.ply"] = ply(vertices, faces);
+    EXPECT_THAT(ImportError(assets, "a.ply").message, HasSubstr("a.ply: header: "));
+  }
 }
 
 TEST(MeshImport, RefusesWithASentence) {

@@ -32,6 +32,7 @@ MeshReadOptions SmallLimits() {
   options.limits.max_polygon = 1000;
   options.limits.max_texture_pixels = 1 << 20;
   options.limits.max_textures_pixels = 1 << 22;
+  options.limits.max_cpu_seconds = 1;  // the supervisor takes 20 s for a hang
   return options;
 }
 

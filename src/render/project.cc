@@ -52,7 +52,7 @@ struct View {
   double left, right, up, down;  // limits of x/z and y/z in the Jacobian
   double width, height;          // px
   double tiles_x, tiles_y;
-  double near_plane, far_plane, dilation;
+  double near_plane, far_plane, dilation, compensated_from;
   double log2_min_alpha;
 };
 
@@ -72,6 +72,7 @@ View MakeView(const ProjectParams& p) {
   v.tiles_x = TilesAcross(k.width);
   v.tiles_y = TilesAcross(k.height);
   v.near_plane = p.near_plane, v.far_plane = p.far_plane, v.dilation = p.dilation;
+  v.compensated_from = p.compensated_from;
   v.log2_min_alpha = std::log2(double{p.min_alpha});
   return v;
 }
@@ -180,8 +181,9 @@ HWY_INLINE void ProjectLanes(const View& view, RasterProfile profile, RenderMode
   // Opacity.
   V compensation = one;
   if (mode == RenderMode::kAntialiased) {
-    const V sharp_det = hn::Max(zero, hn::MulSub(sharp_xx, sharp_yy, hn::Mul(xy, xy)));
-    compensation = hn::Sqrt(hn::Div(sharp_det, safe_det));
+    const V from = hn::Set(d, view.compensated_from);
+    const V kept_det = hn::Max(zero, hn::MulSub(hn::Add(sharp_xx, from), hn::Add(sharp_yy, from), hn::Mul(xy, xy)));
+    compensation = hn::Sqrt(hn::Div(kept_det, safe_det));
   }
   const V opacity = hn::Div(compensation, hn::Add(one, hn::Exp(d, hn::Min(hn::Neg(logit), top))));
   const V log2_opacity =  // the bound keeps log inside its domain; such an opacity is culled

@@ -54,7 +54,7 @@ struct View {
   double r[9], t[3];
   double fx, fy;
   double left, right, up, down;  // limits of x/z and y/z in the Jacobian, as in ProjectCpu
-  double dilation;
+  double dilation, compensated_from;
   bool antialiased;
 };
 
@@ -71,6 +71,7 @@ View MakeView(const ProjectBackwardParams& p) {
   v.up = -(k.cy / k.fy + margin_y);
   v.down = (k.height - k.cy) / k.fy + margin_y;
   v.dilation = p.dilation;
+  v.compensated_from = p.compensated_from;
   v.antialiased = p.mode == RenderMode::kAntialiased;
   return v;
 }
@@ -164,20 +165,21 @@ HWY_INLINE void BackwardLanes(const View& view, const Columns& in, size_t j, Gra
   V g_xy = hn::Mul(scale, hn::Mul(w_xx, left_x));  // of each of the two equal entries
   V g_yy = hn::Mul(scale, hn::MulAdd(w_xy, left_x, hn::Mul(w_yy, left_y)));
   if (view.antialiased) {
-    // o = sigmoid·sqrt(det Σ / det Σ₂), Σ without the dilation:  ∂ln o/∂Σ = ½ (Σ⁻¹ − Σ₂⁻¹).
-    const V sharp_xx = Dot3(b0, b1, b2, b0, b1, b2), sharp_xy = Dot3(b0, b1, b2, b3, b4, b5),
+    // o = sigmoid·sqrt(det Σ_from / det Σ₂), Σ_from with the lesser dilation:  ∂ln o/∂Σ = ½ (Σ_from⁻¹ − Σ₂⁻¹).
+    const V sharp_xx = Dot3(b0, b1, b2, b0, b1, b2), xy = Dot3(b0, b1, b2, b3, b4, b5),
             sharp_yy = Dot3(b3, b4, b5, b3, b4, b5);
-    const V dilation = hn::Set(d, view.dilation);
+    const V dilation = hn::Set(d, view.dilation), from = hn::Set(d, view.compensated_from);
     const V xx = hn::Add(sharp_xx, dilation), yy = hn::Add(sharp_yy, dilation);
-    const V sharp_det = hn::MulSub(sharp_xx, sharp_yy, hn::Mul(sharp_xy, sharp_xy));
-    const V det = hn::MulSub(xx, yy, hn::Mul(sharp_xy, sharp_xy));
+    const V from_xx = hn::Add(sharp_xx, from), from_yy = hn::Add(sharp_yy, from);
+    const V from_det = hn::MulSub(from_xx, from_yy, hn::Mul(xy, xy));
+    const V det = hn::MulSub(xx, yy, hn::Mul(xy, xy));
     // Where the determinant is 0, so was the opacity, and the Gaussian is not here.
     const V half_q = hn::Mul(hn::Set(d, 0.5), q);
-    const V by_sharp = hn::IfThenElseZero(hn::Gt(sharp_det, zero), hn::Div(half_q, sharp_det));
+    const V by_from = hn::IfThenElseZero(hn::Gt(from_det, zero), hn::Div(half_q, from_det));
     const V by_det = hn::Div(half_q, det);
-    g_xx = hn::Add(g_xx, hn::MulSub(by_sharp, sharp_yy, hn::Mul(by_det, yy)));
-    g_yy = hn::Add(g_yy, hn::MulSub(by_sharp, sharp_xx, hn::Mul(by_det, xx)));
-    g_xy = hn::NegMulAdd(hn::Sub(by_sharp, by_det), sharp_xy, g_xy);
+    g_xx = hn::Add(g_xx, hn::MulSub(by_from, from_yy, hn::Mul(by_det, yy)));
+    g_yy = hn::Add(g_yy, hn::MulSub(by_from, from_xx, hn::Mul(by_det, xx)));
+    g_xy = hn::NegMulAdd(hn::Sub(by_from, by_det), xy, g_xy);
   }
 
   // ∂L/∂B = 2·G·B; scales; ∂L/∂E.

@@ -23,6 +23,7 @@ struct ProjectBackwardParams {
   Pose world_to_camera;         // OpenCV axes
   RenderMode mode = RenderMode::kClassic;
   float dilation = kDilation;          // px²
+  float compensated_from = 0;          // px²
   const ProjectedGaussian* projected;  // [N] of ProjectCpu
   const BlendGradient* gradients;      // [N] of BlendBackwardCpu; read where visible
   const int32_t* visible;              // [N] rows that are not culled, ascending, each chunk's from c·kProjectChunk on

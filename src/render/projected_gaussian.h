@@ -18,7 +18,8 @@ struct alignas(64) ProjectedGaussian {
   float log2_opacity;  // ≤ 0; includes the compensation of RenderMode::kAntialiased
   float rgb[3];        // ≥ 0; written by the spherical harmonics stage
   float depth;         // camera z, world units
-  float compensation;  // sqrt(det Σ₂ / det(Σ₂ + dilation)), 1 in RenderMode::kClassic; for the backward pass
+  float compensation;  // of the opacity (RenderOptions::compensated_from), 1 in RenderMode::kClassic; for the backward
+                       // pass
 };
 static_assert(sizeof(ProjectedGaussian) == 64);
 

@@ -42,6 +42,9 @@ Status CheckOptions(const RenderOptions& o) {
   if (!(o.dilation >= 0) || !std::isfinite(o.dilation)) {
     return BadArgument(Cat("dilation ", o.dilation, " must not be negative"));
   }
+  if (!(o.compensated_from >= 0 && o.compensated_from <= o.dilation)) {
+    return BadArgument(Cat("compensated_from ", o.compensated_from, " is not between 0 and the dilation ", o.dilation));
+  }
   if (o.sh_degree < 0) return BadArgument(Cat("SH degree ", o.sh_degree, " must not be negative"));
   if (!(o.min_alpha > 0 && o.min_alpha < 1)) return BadArgument(Cat("min_alpha ", o.min_alpha, " is not in (0, 1)"));
   if (!(o.min_transmittance >= 0 && o.min_transmittance < 1)) {
@@ -80,6 +83,7 @@ int64_t Rasterizer::State::Project(const GaussianCloud& cloud, const Camera& cam
   project.near_plane = options.near_plane;
   project.far_plane = options.far_plane;
   project.dilation = options.dilation;
+  project.compensated_from = options.compensated_from;
   project.min_alpha = options.min_alpha;
   project.projected = Room(projected, n);
   project.tiles = Room(tiles, n);

@@ -19,7 +19,12 @@ struct RenderOptions {
   std::array<float, 3> background = {0, 0, 0};
   float near_plane = kNear;
   float far_plane = kFar;
-  float dilation = kDilation;    // px²
+  float dilation = kDilation;  // px²
+  // RenderMode::kAntialiased keeps the integral that a Gaussian has with this much dilation instead of `dilation`: its
+  // opacity becomes o·sqrt(det(Σ₂ + compensated_from·I) / det(Σ₂ + dilation·I)). 0 is Mip-Splatting's rule. Otherwise
+  // the picture shows what larger pixels would average of one with the smaller dilation, as far as every Gaussian for
+  // itself is concerned.
+  float compensated_from = 0;    // px², 0 to `dilation`
   int sh_degree = kMaxShDegree;  // highest degree used; the cloud's own if that is lower
   bool depth = false;            // fill RenderOutput::depth too
   // Cut-offs of blending. Other values than the defaults are for tests: no cut-offs make the picture smooth.

@@ -105,6 +105,7 @@ void Rasterizer::State::ProjectBackward(const GaussianCloud& cloud, CloudGradien
   project.world_to_camera = kept->world_to_camera;
   project.mode = kept->options.mode;
   project.dilation = kept->options.dilation;
+  project.compensated_from = kept->options.compensated_from;
   project.projected = projected.data();
   project.gradients = gradients.data();
   project.visible = visible.data();

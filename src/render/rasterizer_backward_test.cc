@@ -36,6 +36,7 @@ TEST(RasterizerBackward, MatchesDifferenceQuotientsWithoutCutOffs) {
     RenderOptions options = Smooth();
     options.profile = seed % 2 == 0 ? RasterProfile::kGsplat14 : RasterProfile::kGsplat15;
     options.mode = seed / 2 % 2 == 0 ? RenderMode::kClassic : RenderMode::kAntialiased;
+    options.compensated_from = seed % 4 == 3 ? 0.05f : 0.0f;
     options.background = {0.3f, static_cast<float>(seed % 3) * 0.5f, 1.0f};
     const GaussianCloud cloud = RandomCloud(seed, {.gaussians = 12, .degree = static_cast<int>(seed % 4)});
     const Camera camera = RandomCamera(seed, 23, 19);
@@ -49,6 +50,7 @@ TEST(RasterizerBackward, MatchesDifferenceQuotientsBetweenTheCutOffs) {
     RenderOptions options;
     options.profile = seed % 2 == 0 ? RasterProfile::kGsplat14 : RasterProfile::kGsplat15;
     options.mode = seed / 2 % 2 == 0 ? RenderMode::kClassic : RenderMode::kAntialiased;
+    options.compensated_from = seed % 4 == 3 ? 0.05f : 0.0f;
     options.background = {0.3f, 0.0f, 1.0f};
     const GaussianCloud cloud = RandomCloud(seed, {.gaussians = 150, .degree = 1, .largest = 0.5});
     const Camera camera = RandomCamera(seed, 35, 18);

@@ -65,7 +65,8 @@ inline bool Project(const GaussianCloud& cloud, int64_t i, const Camera& camera,
   const double ty = z * std::clamp(p[1] / z, -(k.cy / k.fy + 0.3f * tan_y), (k.height - k.cy) / k.fy + 0.3f * tan_y);
   const Matrix3 jacobian = {k.fx / z, 0, -k.fx * tx / (z * z), 0, k.fy / z, -k.fy * ty / (z * z), 0, 0, 0};
   const Matrix3 image = Multiply(Multiply(jacobian, covariance), Transpose(jacobian));
-  const double sharp = image[0] * image[4] - image[1] * image[1];
+  const double from = options.compensated_from;
+  const double kept = (image[0] + from) * (image[4] + from) - image[1] * image[1];
   out.xx = image[0] + options.dilation;
   out.xy = image[1];
   out.yy = image[4] + options.dilation;
@@ -75,7 +76,7 @@ inline bool Project(const GaussianCloud& cloud, int64_t i, const Camera& camera,
   out.b = -out.xy / det;
   out.c = out.xx / det;
   out.opacity = 1 / (1 + std::exp(-double{cloud.opacity_logits[row]}));
-  if (options.mode == RenderMode::kAntialiased) out.opacity *= std::sqrt(std::max(0.0, sharp / det));
+  if (options.mode == RenderMode::kAntialiased) out.opacity *= std::sqrt(std::max(0.0, kept / det));
 
   if (options.profile == RasterProfile::kGsplat14) {
     const double half_trace = 0.5 * (out.xx + out.yy);

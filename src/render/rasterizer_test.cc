@@ -77,6 +77,7 @@ TEST(Rasterizer, MatchesReferenceOnRandomClouds) {
     RenderOptions options;
     options.profile = seed % 2 == 0 ? RasterProfile::kGsplat14 : RasterProfile::kGsplat15;
     options.mode = seed / 2 % 2 == 0 ? RenderMode::kClassic : RenderMode::kAntialiased;
+    options.compensated_from = seed % 4 == 3 ? 0.05f : 0.0f;
     options.background = {0.3f, static_cast<float>(seed % 3) * 0.5f, 1.0f};
     options.sh_degree = static_cast<int>(seed / 3 % 4);
     options.depth = seed % 4 != 3;
@@ -247,6 +248,10 @@ TEST(Rasterizer, AntialiasedDimsWhatTheDilationWidened) {
   options.mode = RenderMode::kAntialiased;
   const RenderOutput output = Render(cloud, FrontCamera(16, 16, 100), options);
   EXPECT_NEAR(output.alpha.at(0, 8, 8), 0.6 * 0.25 / 0.55, 1e-5);  // the Jacobian is 1 + 1e-5 so near the axis
+  // What a closer view with a dilation of its own shows of it, averaged.
+  options.dilation = 0.4f;
+  options.compensated_from = 0.1f;
+  EXPECT_NEAR(Render(cloud, FrontCamera(16, 16, 100), options).alpha.at(0, 8, 8), 0.6 * 0.35 / 0.65, 1e-5);
 }
 
 TEST(Rasterizer, ProfilesDifferOnlyInTheTilesBeyondThreeSigma) {
@@ -426,6 +431,8 @@ TEST(Rasterizer, RefusesWhatItCannotDraw) {
   EXPECT_TRUE(with([](Camera& c) { c.world_to_camera.translation[1] = std::nan(""); }));
   EXPECT_TRUE(refused(good, camera, {.near_plane = 0}));
   EXPECT_TRUE(refused(good, camera, {.dilation = -1}));
+  EXPECT_TRUE(refused(good, camera, {.compensated_from = -0.1f}));
+  EXPECT_TRUE(refused(good, camera, {.compensated_from = 0.4f}));
   EXPECT_TRUE(refused(good, camera, {.sh_degree = -1}));
   EXPECT_TRUE(refused(good, camera, {.min_alpha = 0}));
   EXPECT_TRUE(refused(good, camera, {.min_transmittance = 1}));

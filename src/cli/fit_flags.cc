@@ -86,6 +86,14 @@ void FitFlags::AddTo(CLI::App& verb) {
       ->capture_default_str();
   AddChoice(verb, "--mode", standard.objective.render.mode,
             {{"classic", RenderMode::kClassic}, {"antialiased", RenderMode::kAntialiased}}, "Rasterization");
+  auto* pixel_option = AddChoice(
+      verb, "--pixel", pixel, {{"point", FitPixel::kPoint}, {"area", FitPixel::kArea}},
+      "point: what the ray through its centre meets, as 3DGS has it; area: the mean over the pixel, for splats that "
+      "will be seen --upscale times closer");
+  verb.add_option("--upscale", upscale, "How many times closer, with --pixel area")
+      ->check(CLI::Range(1.0, double{kMostSamples}))
+      ->needs(pixel_option)
+      ->capture_default_str();
   AddChoice(verb, "--profile", standard.objective.render.profile,
             {{"gsplat14", RasterProfile::kGsplat14}, {"gsplat15", RasterProfile::kGsplat15}},
             "Extent of a Gaussian: 3 sigma as gsplat 1.0-1.4, or opacity-aware as 1.5");
@@ -116,6 +124,7 @@ Result<FitOptions> MakeFitOptions(const FitFlags& flags, const std::optional<std
   if (!flags.background.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(options.objective.render.background, ParseColor("--background", flags.background));
   }
+  options.pixel.upscale = flags.pixel == FitPixel::kArea ? flags.upscale : 1;
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options));
   return options;
 }

@@ -19,6 +19,9 @@ enum class FitInit {
   kRandom,  // random points in gsplat's cube
 };
 
+// What a pixel of the pictures is taken to be.
+enum class FitPixel { kPoint, kArea };
+
 // The options of `fit`.
 struct FitFlags {
   std::string project;
@@ -32,6 +35,8 @@ struct FitFlags {
   std::string init_splat;
   std::optional<int64_t> init_points;
   std::string background;
+  FitPixel pixel = FitPixel::kPoint;
+  double upscale = 4;  // of FitPixel::kArea
 
   // What becomes FitOptions. Those without a value keep what follows from the number of steps.
   int64_t steps = kDefaultFitSteps;

@@ -100,10 +100,12 @@ Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitO
   out.cloud.render_mode = options.objective.render.mode;
   out.report.gaussians_out = out.cloud.size();
   if (out.report.interrupted) return out;
+  const PixelModel pixel = PixelModelAt(options, options.steps);
   ANCHORSPLAT_ASSIGN_OR_RETURN(out.report.train,
-                               MeasureQuality(out.cloud, options.objective.render, fitter.pictures()));
+                               MeasureQuality(out.cloud, options.objective.render, fitter.pictures(), pixel));
   PictureCache held_out(views.held_out, background, 0);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(out.report.held_out, MeasureQuality(out.cloud, options.objective.render, held_out));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(out.report.held_out,
+                               MeasureQuality(out.cloud, options.objective.render, held_out, pixel));
   std::error_code ignored;
   if (Exists(control.checkpoint)) std::filesystem::remove(control.checkpoint, ignored);
   return out;

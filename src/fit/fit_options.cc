@@ -22,6 +22,10 @@ int ShDegreeAt(const FitOptions& options, int64_t step) {
   return static_cast<int>(std::min<int64_t>(degree, options.objective.render.sh_degree));
 }
 
+PixelModel PixelModelAt(const FitOptions& options, int64_t step) {
+  return PixelModelAt(options.pixel, static_cast<double>(step) / static_cast<double>(options.steps));
+}
+
 Status Validate(const FitOptions& options) {
   const auto bad = [](const std::string& sentence) { return Error{ErrorCode::kBadArgument, "fit: " + sentence}; };
   if (options.steps < 1) return bad("there must be at least one step");
@@ -37,6 +41,7 @@ Status Validate(const FitOptions& options) {
   if (!(r.means_decay > 0 && r.means_decay <= 1)) return bad("the decay of the means' rate must lie in (0, 1]");
   if (!(r.beta1 >= 0 && r.beta1 < 1 && r.beta2 >= 0 && r.beta2 < 1)) return bad("Adam's betas must lie in [0, 1)");
   if (!(static_cast<float>(r.epsilon) > 0)) return bad("Adam's epsilon must be positive");
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(options.pixel));
   const DensificationOptions& d = options.densification;
   if (d.refine_every < 1 || d.reset_every < 1) return bad("refine_every and reset_every must be at least 1");
   if (!(d.prune_opa > 0 && d.prune_opa < 0.5)) return bad("prune_opa must lie between 0 and 0.5");
@@ -90,6 +95,9 @@ std::string ToJsonText(const FitOptions& o) {
       {"dilation", render.dilation},
       {"min_alpha", render.min_alpha},
       {"min_transmittance", render.min_transmittance},
+      {"pixel_upscale", o.pixel.upscale},
+      {"pixel_half_from", o.pixel.half_from},
+      {"pixel_all_from", o.pixel.all_from},
       {"ssim_weight", o.objective.loss.ssim_weight},
       {"ssim_padding", static_cast<int>(o.objective.loss.padding)},
   };

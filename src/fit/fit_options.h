@@ -18,7 +18,8 @@ struct FitOptions {
   int64_t sh_degree_interval = 1000;  // steps per degree: min(step / interval, 3) is in use
   LearningRates rates;
   DensificationOptions densification;
-  ObjectiveOptions objective;
+  ObjectiveOptions objective;  // its `pixel` follows from the schedule
+  PixelSchedule pixel;
 };
 
 inline constexpr int64_t kDefaultFitSteps = 15000;  // what the low-quality splats of the paper's data set had
@@ -27,6 +28,9 @@ FitOptions FitOptionsFor(int64_t steps = kDefaultFitSteps);
 
 // Spherical harmonics in use at a step.
 int ShDegreeAt(const FitOptions& options, int64_t step);
+
+// How the pixels of a step get their values.
+PixelModel PixelModelAt(const FitOptions& options, int64_t step);
 
 // kBadArgument for what cannot be run: steps below 1, rates that are negative, …
 Status Validate(const FitOptions& options);

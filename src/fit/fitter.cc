@@ -43,15 +43,16 @@ Result<FitStep> Fitter::Step() {
 
   ObjectiveOptions objective = options_.objective;
   objective.render.sh_degree = degree;
+  objective.pixel = PixelModelAt(options_, step);
   ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Evaluate(objective, state_.cloud, camera, picture_, gradient_));
   watch.Lap();
   const double means_rate = MeansRate(options_.rates, scene_scale_, step, options_.steps);
   state_.optimizer.Step(options_.rates, means_rate, degree, gradient_, state_.cloud);
   times_.adam += watch.Lap();
 
-  out.change =
-      state_.densification.AfterStep(options_.densification, step, scene_scale_, options_.seed, camera.intrinsics.width,
-                                     camera.intrinsics.height, gradient_, state_.cloud);
+  const Pinhole rays = RaysOf(objective.pixel, camera).intrinsics;
+  out.change = state_.densification.AfterStep(options_.densification, step, scene_scale_, options_.seed, rays.width,
+                                              rays.height, gradient_, state_.cloud);
   state_.optimizer.Apply(out.change.rows);
   if (out.change.opacities_reset) state_.optimizer.ForgetOpacities();
   times_.densify += watch.Lap();

@@ -8,7 +8,15 @@ namespace anchorsplat {
 
 // What a fit draws random numbers for. Each purpose and index (a step, an epoch) has a stream of its own that follows
 // from the seed alone: a fit that goes on from a checkpoint needs no generator's state to draw the same numbers.
-enum class RandomPurpose : uint64_t { kInitialQuats = 1, kInitialPoints = 2, kViewOrder = 3, kSplit = 4 };
+enum class RandomPurpose : uint64_t {
+  kInitialQuats = 1,
+  kInitialPoints = 2,
+  kViewOrder = 3,
+  kSplit = 4,
+  kCopies = 5,
+  kPoses = 6,
+  kCrop = 7,
+};
 
 inline Random RandomStream(uint64_t seed, RandomPurpose purpose, int64_t index = 0) {
   const uint64_t stream = (static_cast<uint64_t>(purpose) << 56) ^ static_cast<uint64_t>(index);

@@ -4,20 +4,41 @@
 
 namespace anchorsplat {
 
-Result<PhotometricLossValue> ViewObjective::Evaluate(const ObjectiveOptions& options, const GaussianCloud& cloud,
-                                                     const Camera& camera, const Image& picture,
-                                                     CloudGradient& gradient) {
+Status ViewObjective::Show(const ObjectiveOptions& options, const GaussianCloud& cloud, const Camera& camera) {
   Stopwatch watch;
-  RenderOptions render = options.render;
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(options.pixel));
+  RenderOptions render = RaysOf(options.pixel, options.render);
   render.gradient = true;
-  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud, camera, render, output_));
+  averaged_ = options.pixel.samples > 1;
+  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud, RaysOf(options.pixel, camera), render, output_));
+  if (averaged_) AverageRays(output_.color, options.pixel.samples, average_);
   times_.render += watch.Lap();
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PhotometricLossValue value,
-                               PhotometricLoss(output_.color, picture, options.loss, gradient_.color, gradient_.box));
+  return {};
+}
+
+Result<PhotometricLossValue> ViewObjective::Compare(const ObjectiveOptions& options, const GaussianCloud& cloud,
+                                                    const Image& picture, CloudGradient& gradient) {
+  Stopwatch watch;
+  PhotometricLossValue value;
+  if (averaged_) {
+    PixelBox box;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(value, PhotometricLoss(average_, picture, options.loss, average_gradient_, box));
+    gradient_.box = SpreadToRays(average_gradient_, box, options.pixel.samples, gradient_.color);
+  } else {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(value,
+                                 PhotometricLoss(output_.color, picture, options.loss, gradient_.color, gradient_.box));
+  }
   times_.loss += watch.Lap();
   ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Backward(cloud, gradient_, gradient));
   times_.backward += watch.Lap();
   return value;
+}
+
+Result<PhotometricLossValue> ViewObjective::Evaluate(const ObjectiveOptions& options, const GaussianCloud& cloud,
+                                                     const Camera& camera, const Image& picture,
+                                                     CloudGradient& gradient) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Show(options, cloud, camera));
+  return Compare(options, cloud, picture, gradient);
 }
 
 }  // namespace anchorsplat

@@ -4,6 +4,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/image.h"
 #include "core/result.h"
+#include "fit/pixel_model.h"
 #include "metrics/photometric_loss.h"
 #include "render/rasterizer.h"
 
@@ -12,9 +13,11 @@ namespace anchorsplat {
 struct ObjectiveOptions {
   RenderOptions render;  // `gradient` is set by the objective
   PhotometricLossOptions loss;
+  PixelModel pixel;
 };
 
-// Where the time of iterations goes, seconds on the clock.
+// Where the time of iterations goes, seconds on the clock; averaging of rays counts as rendering and its gradient as
+// loss.
 struct ObjectiveTimes {
   double render = 0, loss = 0, backward = 0;
 };
@@ -24,16 +27,26 @@ struct ObjectiveTimes {
 class ViewObjective {
  public:
   // Renders `cloud` through `camera` and compares with `picture` [3,H,W], which has the camera's size.
-  // Errors: those of Rasterizer and PhotometricLoss.
+  // Errors: those of Rasterizer, PhotometricLoss and PixelModel.
   Result<PhotometricLossValue> Evaluate(const ObjectiveOptions& options, const GaussianCloud& cloud,
                                         const Camera& camera, const Image& picture, CloudGradient& gradient);
 
-  const Image& rendered() const { return output_.color; }  // of the last Evaluate
-  const ObjectiveTimes& times() const { return times_; }   // of all calls
+  // The two halves of it, for those who look at rendered() before they decide what to compare it with. Compare takes
+  // the options and the cloud of the last Show.
+  Status Show(const ObjectiveOptions& options, const GaussianCloud& cloud, const Camera& camera);
+  Result<PhotometricLossValue> Compare(const ObjectiveOptions& options, const GaussianCloud& cloud,
+                                       const Image& picture, CloudGradient& gradient);
+
+  // What the camera sees of the cloud, of the last Evaluate or Show: [3,H,W].
+  const Image& rendered() const { return averaged_ ? average_ : output_.color; }
+  const ObjectiveTimes& times() const { return times_; }  // of all calls
 
  private:
   Rasterizer rasterizer_;
-  RenderOutput output_;
+  RenderOutput output_;  // of rays
+  Image average_;        // of them, where a pixel has several
+  bool averaged_ = false;
+  Image average_gradient_;
   RenderGradient gradient_;
   ObjectiveTimes times_;
 };

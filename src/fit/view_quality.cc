@@ -4,19 +4,23 @@
 
 namespace anchorsplat {
 
-Result<ViewQuality> MeasureQuality(const GaussianCloud& cloud, const RenderOptions& options, PictureCache& pictures) {
+Result<ViewQuality> MeasureQuality(const GaussianCloud& cloud, const RenderOptions& options, PictureCache& pictures,
+                                   const PixelModel& pixel) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(pixel));
   Rasterizer rasterizer;
   RenderOutput output;
-  Image picture;
+  Image picture, average;
   ViewQuality sum;
   sum.views = static_cast<int64_t>(pictures.views().size());
   for (int64_t view = 0; view < sum.views; ++view) {
     const Camera& camera = pictures.views()[static_cast<size_t>(view)];
     ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(view, picture));
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, camera, options, output));
-    Clamp01(output.color);
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, Psnr(output.color, picture));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double ssim, Ssim(output.color, picture));
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, RaysOf(pixel, camera), RaysOf(pixel, options), output));
+    if (pixel.samples > 1) AverageRays(output.color, pixel.samples, average);
+    Image& shown = pixel.samples > 1 ? average : output.color;
+    Clamp01(shown);
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, Psnr(shown, picture));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double ssim, Ssim(shown, picture));
     sum.psnr += psnr / static_cast<double>(sum.views);
     sum.ssim += ssim / static_cast<double>(sum.views);
   }

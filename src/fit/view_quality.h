@@ -5,6 +5,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "fit/picture_cache.h"
+#include "fit/pixel_model.h"
 #include "render/rasterizer.h"
 
 namespace anchorsplat {
@@ -16,7 +17,8 @@ struct ViewQuality {
   double ssim = 0;  // of metrics/image_metrics.h
 };
 
-// Over all views of `pictures`. Errors: those of Rasterizer and PictureCache.
-Result<ViewQuality> MeasureQuality(const GaussianCloud& cloud, const RenderOptions& options, PictureCache& pictures);
+// Over all views of `pictures`, pixels as `pixel` says. Errors: those of Rasterizer and PictureCache.
+Result<ViewQuality> MeasureQuality(const GaussianCloud& cloud, const RenderOptions& options, PictureCache& pictures,
+                                   const PixelModel& pixel = {});
 
 }  // namespace anchorsplat

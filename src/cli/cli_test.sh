@@ -266,6 +266,36 @@ says stderr "going on"
 checks=$((checks + 1))
 cmp -s "$work/whole.ply" "$work/halves.ply" || { failures=$((failures + 1)); echo "FAILED: an interruption changes the splat"; }
 
+# refine: on the project of the fits above.
+refine() { "$program" enhance "$work/whole.ply" --method refine --upscale 2 --pixel-size 0.02 "$@"; }
+expect 0 "refine" refine -o "$work/refined.ply" --steps 8 --poses 10 --k 2 --json
+says stdout '"consistency_after"'
+expect 0 "what refine wrote" "$program" info "$work/refined.ply"
+expect 0 "refine with pictures" refine -o "$work/refined2.ply" --images "$work/project" --hold-out 5 --steps 8
+says stderr "views with pictures"
+expect 2 "refine with pictures of something else" "$program" enhance "$source/examples/stone_lantern/input.ply" -o "$work/x.ply" --method refine --pixel-size 0.0055 --images "$work/project" --steps 8
+says stderr "order of their cameras"
+expect 3 "refine with pictures that are not there" refine -o "$work/x.ply" --images "$work/none"
+expect 2 "refine for steps and seconds" refine -o "$work/x.ply" --steps 8 --seconds 1
+expect 2 "exposure without pictures" refine -o "$work/x.ply" --exposure
+expect 2 "pictures that were not given" "$program" enhance "$work/whole.ply" -o "$work/x.ply" --method refine-images --pixel-size 0.02
+says stderr "--images"
+refine_interrupted() {
+  "$program" enhance "$work/whole.ply" --method refine --upscale 2 --pixel-size 0.02 -o "$work/refined3.ply" \
+    --images "$work/project" --hold-out 5 --steps 1000000 2>"$work/refine.log" &
+  local child=$!
+  while kill -0 $child 2>/dev/null && ! grep -q "views with pictures" "$work/refine.log"; do :; done
+  kill -INT $child
+  wait $child
+  local code=$?
+  cat "$work/refine.log" >&2
+  return $code
+}
+expect 130 "an interrupted refinement" refine_interrupted
+says stderr "--resume"
+expect 0 "what an interrupted refinement leaves" "$program" info "$work/refined3.ply"
+expect 0 "fit with area pixels" fit -o "$work/area.ply" --steps 40 --pixel area --upscale 2 -q
+expect 2 "upscale without area pixels" fit -o "$work/x.ply" --steps 40 --upscale 2
 # dataset: three meshes, one of them none, become two objects; a kill in between costs nothing.
 sed 's/^v 1 1 0/v 1 1 1/' "$work/mesh/quad.obj" >"$work/mesh/ramp.obj"
 small=(--views 8 --size 24 --low-size 12 --points 60 --steps 60 --max-gaussians 500 --min-psnr 5)

@@ -9,6 +9,8 @@
 
 #include "cli/choice.h"
 #include "cli/parse.h"
+#include "cli/refine_flags.h"
+#include "cli/stop_signal.h"
 #include "cli/verb.h"
 #include "core/log.h"
 #include "core/text.h"
@@ -156,6 +158,7 @@ Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared) {
   ANCHORSPLAT_RETURN_IF_ERROR(FinishModelOptions(flags));
   EnhanceOptions options = flags.options;
   options.seed = shared.seed;
+  options.control.stop = &StopSignal::requested();
   ANCHORSPLAT_ASSIGN_OR_RETURN(options.pixel_size, ParsePixelSize("--pixel-size", flags.pixel_size));
   if (!flags.cameras.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(options.cameras, ReadCameras(flags.cameras));
@@ -173,11 +176,22 @@ Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, ReadCloud(flags.inputs[i]));
     GaussianCloud before;
     if (flags.view) before = cloud;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const Enhanced enhanced, Enhance(std::move(cloud), options));
+    if (flags.options.control.checkpoint.empty()) options.control.checkpoint = outputs[i].string() + ".checkpoint";
+    std::optional<StopSignal> stop_signal(std::in_place);
+    auto result = Enhance(std::move(cloud), options);
+    stop_signal.reset();
+    if (!result.ok()) return result.error();
+    const Enhanced enhanced = *std::move(result);
     ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(outputs[i], enhanced.cloud, WriteOptionsFrom(shared)));
     const EnhanceReport& r = enhanced.report;
     if (flags.view) {
       ANCHORSPLAT_RETURN_IF_ERROR(WriteView(flags.inputs[i], before, outputs[i], enhanced, WriteOptionsFrom(shared)));
+    }
+    if (r.interrupted) {
+      return Error{
+          ErrorCode::kInterrupted,
+          Cat("stopped; ", outputs[i].string(), " is as far as it came",
+              options.refine.seconds ? "" : Cat(", --resume goes on from ", options.control.checkpoint.string()))};
     }
     results.push_back(ToJson(flags.inputs[i], outputs[i], r));
     if (!shared.json && !shared.quiet) {
@@ -271,6 +285,7 @@ void AddEnhance(CLI::App& app, Program& program) {
                                "Larger splats are enhanced in overlapping blocks of this many"))
       ->check(CLI::Range(int64_t{1000}, int64_t{100'000'000}))
       ->capture_default_str();
+  AddRefineFlags(verb, options.refine, options.control);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunEnhance(*flags, program.flags); }; });
 }
 

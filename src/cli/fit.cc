@@ -1,6 +1,5 @@
 #include "fit/fit.h"
 
-#include <csignal>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -9,6 +8,7 @@
 #include "cli/choice.h"
 #include "cli/fit_flags.h"
 #include "cli/parse.h"
+#include "cli/stop_signal.h"
 #include "cli/verb.h"
 #include "core/log.h"
 #include "core/text.h"
@@ -22,15 +22,6 @@ namespace anchorsplat {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Ctrl-C asks for an orderly end; the second one ends at once.
-std::atomic<bool> stop_requested{false};
-static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may not lock");
-
-void RequestStop(int signal) {
-  stop_requested = true;
-  std::signal(signal, SIG_DFL);
-}
 
 // What can be known to fail before hours of work.
 Status CheckOutputs(const FitFlags& flags, const fs::path& checkpoint, bool overwrite) {
@@ -140,7 +131,7 @@ Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
   control.checkpoint = flags.checkpoint.empty() ? flags.output + ".checkpoint" : flags.checkpoint;
   control.checkpoint_every = flags.checkpoint_every;
   control.resume = flags.resume;
-  control.stop = &stop_requested;
+  control.stop = &StopSignal::requested();
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOutputs(flags, control.checkpoint, shared.overwrite));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(flags.project, {.hold_out = flags.hold_out}));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const FitOptions options, MakeFitOptions(flags, views.background, shared.seed));
@@ -151,11 +142,9 @@ Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
   LogInfo(Cat(views.train.size(), " training views, ", views.held_out.size(), " held out, scene scale ",
               Fixed(views.scene_scale, 3), ", ", WithThousands(initial.size()), " initial Gaussians"));
 
-  std::signal(SIGINT, RequestStop);
-  std::signal(SIGTERM, RequestStop);
+  std::optional<StopSignal> stop_signal(std::in_place);
   auto fitted = Fit(views, std::move(initial), options, control);
-  std::signal(SIGINT, SIG_DFL);
-  std::signal(SIGTERM, SIG_DFL);
+  stop_signal.reset();
   if (!fitted.ok()) return fitted.error();
   ANCHORSPLAT_RETURN_IF_ERROR(WriteResults(flags, *fitted));
   if (fitted->report.interrupted) {

@@ -10,6 +10,7 @@
 #include "core/text.h"
 #include "enhance/filter.h"
 #include "enhance/pixel_size_estimate.h"
+#include "enhance/refine_method.h"
 
 namespace anchorsplat {
 
@@ -33,23 +34,47 @@ std::vector<EnhanceMethod>& Registry() {
            return grown.ok() ? Status() : Status(grown.error());
          }());
          return std::move(input.cloud);
-       }}};
+       }},
+      RefineMethod(),
+      RefineImagesMethod()};
   return methods;
 }
 
-Result<const EnhanceMethod*> ChooseMethod(const EnhanceOptions& options) {
+Result<const EnhanceMethod*> FindMethod(const EnhanceOptions& options, const std::string& name) {
   const EnhanceMethod* best = nullptr;
   std::string names;
   for (const EnhanceMethod& method : Registry()) {
     names += ", " + method.name;
-    if (method.name == options.method) {
+    if (method.name == name) {
       ANCHORSPLAT_RETURN_IF_ERROR(method.ready(options));
       return &method;
     }
     if ((best == nullptr || method.rank > best->rank) && method.ready(options).ok()) best = &method;
   }
-  if (options.method == "auto") return best;  // never null: the filter is always ready
-  return Error{ErrorCode::kBadArgument, Cat("there is no method '", options.method, "' (known: auto", names, ")")};
+  if (name == "auto") return best;  // never null: the filter is always ready
+  return Error{ErrorCode::kBadArgument, Cat("there is no method '", name, "' (known: auto", names, ")")};
+}
+
+// The method, and the one whose result it begins with, if there is one.
+struct Chosen {
+  const EnhanceMethod* method = nullptr;
+  const EnhanceMethod* first = nullptr;
+};
+
+Result<Chosen> ChooseMethod(const EnhanceOptions& options) {
+  Chosen chosen;
+  const size_t plus = options.method.find('+');
+  if (plus == std::string::npos) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(chosen.method, FindMethod(options, options.method));
+    return chosen;
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(chosen.first, FindMethod(options, options.method.substr(0, plus)));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(chosen.method, FindMethod(options, options.method.substr(plus + 1)));
+  if (!chosen.method->takes_start) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("the method '", chosen.method->name, "' cannot go on from the result of another")};
+  }
+  return chosen;
 }
 
 // Drops the rows no method and no viewer can use; says how many.
@@ -163,10 +188,11 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--filter-strength ", *options.filter_strength, " is not between 0 and ", kMaxFilterStrength)};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const EnhanceMethod* method, ChooseMethod(options));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Chosen chosen, ChooseMethod(options));
+  const EnhanceMethod* method = chosen.method;
 
   EnhanceReport report;
-  report.method = method->name;
+  report.method = chosen.first == nullptr ? method->name : Cat(chosen.first->name, "+", method->name);
   report.upscale = options.upscale;
   report.gaussians_in = cloud.size();
   EnhanceInput input;
@@ -192,6 +218,11 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   }
 
   const auto begin = std::chrono::steady_clock::now();
+  if (chosen.first != nullptr) {
+    EnhanceInput first = input;
+    if (!chosen.first->needs_pixel_size) first.pixel_sizes.clear();
+    ANCHORSPLAT_ASSIGN_OR_RETURN(input.start, chosen.first->run(std::move(first), options, report));
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, method->run(std::move(input), options, report));
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   report.gaussians_out = out.size();

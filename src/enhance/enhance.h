@@ -12,18 +12,23 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "enhance/pixel_size.h"
+#include "enhance/refine_options.h"
 
 namespace anchorsplat {
 
 // What every method is told. Spaces: the cloud in stored space, lengths in world units.
 struct EnhanceOptions {
-  std::string method = "auto";            // a registered name, or "auto": the best that is ready without further input
+  // A registered name, or "auto": the best that is ready without further input. Or two, "A+B": B begins where A ended,
+  // if it can (EnhanceMethod::takes_start).
+  std::string method = "auto";
   double upscale = 4;                     // u ≥ 1: how many times closer the splat will be seen
   std::optional<double> filter_strength;  // f of the filter; its default otherwise, 0 for antialiased splats
   std::optional<double> pixel_size;       // p_LR for all Gaussians; from `cameras` or estimated otherwise
   std::optional<CameraSet> cameras;       // the training cameras
   std::optional<int> train_width;         // pixels; see AssumedTrainWidth
   CameraPixelRule camera_rule = CameraPixelRule::kSmallest;
+  RefineOptions refine;
+  RefineControl control;  // of methods that take long
   uint64_t seed = 0;
 };
 
@@ -40,7 +45,8 @@ struct EnhanceReport {
   std::optional<int> train_width;  // pixels, given or assumed; nothing when the cameras' own size was taken
   // What else the method has to tell, by name: counts of the model, for example.
   std::vector<std::pair<std::string, double>> facts;
-  double seconds = 0;  // of the method itself, without reading and writing
+  bool interrupted = false;  // stopped by the user; the cloud is valid all the same
+  double seconds = 0;        // of the method itself, without reading and writing
 };
 
 // The cloud as methods get it: rows that are not finite are gone; p_LR is known to those that need it.
@@ -48,6 +54,7 @@ struct EnhanceInput {
   GaussianCloud cloud;
   Buffer<float> pixel_sizes;  // one for all, or one per Gaussian
   double filter_strength = 0;
+  GaussianCloud start;  // what the method before it made, of "A+B"; else empty
 };
 
 // A way to enhance. `ready` says whether it can run with these options alone (weights there, images given, …) and is
@@ -57,11 +64,12 @@ struct EnhanceMethod {
   std::string summary;  // one line for --help
   int rank = 0;
   bool needs_pixel_size = true;  // else EnhanceInput::pixel_sizes is empty and nothing is estimated
+  bool takes_start = false;      // looks at EnhanceInput::start
   std::function<Status(const EnhanceOptions&)> ready;
   std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&, EnhanceReport&)> run;
 };
 
-// The filter is always there; higher rooms add theirs at start-up (before threads), from main, by name.
+// The filter and refinement are always there; higher rooms add theirs at start-up (before threads), from main, by name.
 void RegisterEnhanceMethod(EnhanceMethod method);
 std::span<const EnhanceMethod> EnhanceMethods();
 

@@ -3,6 +3,7 @@
 #include <charconv>
 #include <chrono>
 #include <memory>
+#include <set>
 
 #include "core/text.h"
 #include "enhance/enhance.h"
@@ -131,12 +132,30 @@ Result<EvalMethod> Model(const fs::path& file) {
                     }};
 }
 
+// The low-resolution cameras without those of views that the fit did not see.
+CameraSet TrainingCameras(const BenchmarkObject& object) {
+  const auto label = [](const Camera& camera) { return fs::path(camera.name).filename(); };
+  std::set<fs::path> held_out;
+  for (const size_t view : object.held_out) held_out.insert(label(object.views[view]));
+  CameraSet cameras = object.low_cameras;
+  std::erase_if(cameras.cameras, [&](const Camera& camera) { return held_out.contains(label(camera)); });
+  cameras.background = object.background;
+  return cameras;
+}
+
 EvalMethod Registered(const std::string& name) {
-  return {name, "", [name](const MethodTask& task) -> Result<MethodViews> {
+  EnhanceOptions defaults;
+  // What it depends on besides the object; nothing of it for other methods than refinement.
+  const bool refines = name.starts_with("refine");
+  return {name, refines ? ToJsonText(defaults.refine) : "", [name](const MethodTask& task) -> Result<MethodViews> {
             EnhanceOptions options;
             options.method = name;
             options.upscale = task.object.upscale();
-            options.cameras = task.object.low_cameras;
+            options.cameras = TrainingCameras(task.object);
+            if (name == "refine-images") {
+              options.refine.images = task.object.low_project;
+              options.refine.hold_out = task.object.hold_out;
+            }
             options.camera_rule = CameraPixelRule::kMedian;
             options.seed = task.seed;
             ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, Enhance(task.object.low, options));

@@ -1,0 +1,77 @@
+#include "cli/refine_flags.h"
+
+#include "cli/choice.h"
+
+namespace anchorsplat {
+
+void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& control) {
+  const std::string group = "Refinement";
+  const auto path = [](std::filesystem::path& value) { return [&value](const std::string& text) { value = text; }; };
+  auto* images =
+      verb.add_option_function<std::string>(
+              "--images", path(options.images),
+              "Project with the pictures it was fitted to (as of `fit`): the best there is to refine against")
+          ->check(NotEmpty())
+          ->group(group);
+  verb.add_option("--hold-out", options.hold_out, "Of --images: every so-manieth view is not trained on; 0: all are")
+      ->check(CLI::Range(0, 1 << 30))
+      ->needs(images)
+      ->capture_default_str()
+      ->group(group);
+  auto* steps = verb.add_option("--steps", options.steps, "Steps (default: 1500 with --images, 600 without)")
+                    ->check(CLI::Range(int64_t{1}, int64_t{1} << 40))
+                    ->group(group);
+  verb.add_option("--seconds", options.seconds,
+                  "As many steps as there are in that time; then the result is not the same each time")
+      ->check(CLI::PositiveNumber)
+      ->excludes(steps)
+      ->group(group);
+  verb.add_option("--k", options.copies, "Gaussians that each becomes at first (default: 8 with --images, 4 without)")
+      ->check(CLI::Range(1, kMostCopies))
+      ->group(group);
+  verb.add_option("--most-gaussians", options.max_gaussians, "Bound for --k; 0: none")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--poses", options.poses, "Without --images and --cameras: places around the object to look from")
+      ->check(CLI::Range(1, 1 << 20))
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--between", options.between, "With --cameras, without --images: poses towards so many neighbours")
+      ->check(CLI::Range(0, 64))
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--half-from", options.half_from, "Part of the run from which on half of the rays are rendered")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--all-from", options.all_from, "Part of the run from which on all rays are rendered")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--rate", options.rate, "Learning rates, as a part of those of `fit`")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--rate-decay", options.rate_decay, "What is left of them at the end")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--ssim-weight", options.ssim_weight, "w of the loss (1 - w) L1 + w (1 - SSIM)")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str()
+      ->group(group);
+  verb.add_flag("--exposure", options.exposure, "Pictures of --images differ in brightness and tint")
+      ->needs(images)
+      ->group(group);
+  verb.add_flag("--robust", options.robust, "Ignore what differs grossly from --images: passers-by, flares")
+      ->needs(images)
+      ->group(group);
+  verb.add_option_function<std::string>("--checkpoint", path(control.checkpoint),
+                                        "State to resume from (default: OUTPUT.checkpoint)")
+      ->check(NotEmpty())
+      ->group(group);
+  verb.add_flag("--resume", control.resume, "Go on from the checkpoint if there is one")->group(group);
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,230 @@
+#include "enhance/refine.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "core/log.h"
+#include "core/text.h"
+#include "enhance/refine_pictures.h"
+#include "enhance/refine_poses.h"
+#include "enhance/refiner.h"
+#include "enhance/split_gaussians.h"
+#include "fit/training_views.h"
+#include "metrics/image_metrics.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr int64_t kStepsWithPictures = 1500, kStepsWithout = 600;
+constexpr int kCopiesWithPictures = 8, kCopiesWithout = 4;
+constexpr int64_t kCheckViews = 8;
+constexpr int64_t kNoteEvery = 10;        // steps
+constexpr int64_t kShownSteps = 1000;     // of a progress bar over seconds
+constexpr double kPerfect = 100;          // dB that stand for identical pictures in means
+constexpr float kInvisible = 1.0f / 255;  // opacity below which a Gaussian can be left out
+
+// The views to compare with, and others to see whether it helped.
+struct Views {
+  RefineTargets train, check;
+  std::optional<double> input_psnr;
+  double scene_scale = 1;
+  RenderOptions render;
+};
+
+std::vector<Camera> Thinned(const std::vector<Camera>& cameras, int64_t most) {
+  const auto count = static_cast<int64_t>(cameras.size());
+  std::vector<Camera> some;
+  for (int64_t i = 0; i < std::min(most, count); ++i) {
+    some.push_back(cameras[static_cast<size_t>(i * count / std::min(most, count))]);
+  }
+  return some;
+}
+
+Result<Views> OpenPictures(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.images, {.hold_out = options.hold_out}));
+  if (project.background) render.background = *project.background;
+  PictureCache pictures(project.train, render.background);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement agreement, MeasureAgreement(input.cloud, render, pictures));
+  LogInfo(Cat(project.train.size(), " views with pictures, ", project.held_out.size(),
+              " held out; the splat's own renders agree with them to ", Fixed(agreement.psnr, 2), " dB"));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckAgreement(agreement, kLeastInputPsnr));
+  const auto& check = project.held_out.empty() ? project.train : project.held_out;
+  return Views{RefineTargets(std::move(pictures)),
+               RefineTargets(PictureCache(Thinned(check, kCheckViews), render.background)), agreement.psnr,
+               project.scene_scale, render};
+}
+
+Result<Views> OpenSplat(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
+  std::vector<Camera> train, check;
+  if (input.cameras && !input.cameras->cameras.empty()) {
+    if (input.cameras->background) render.background = *input.cameras->background;
+    train = PosesAlong(input.cameras->cameras, options.between);
+    // Half-way to the third neighbours: none of those trained on, unless `between` is 3 or more.
+    check = PosesAlong(Thinned(input.cameras->cameras, 2 * kCheckViews), 1);
+    check =
+        Thinned({check.begin() + std::min<ptrdiff_t>(std::ssize(check), 2 * kCheckViews), check.end()}, kCheckViews);
+    if (check.empty()) check = Thinned(train, kCheckViews);
+  } else {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(train, PosesAround(input.cloud, input.pixel_size, options.poses, input.seed));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(check, PosesAround(input.cloud, input.pixel_size, kCheckViews, input.seed + 1));
+  }
+  const double scale = SceneScale(train);
+  const auto splat = std::make_shared<const GaussianCloud>(input.cloud);
+  return Views{RefineTargets(splat, render, std::move(train)), RefineTargets(splat, render, std::move(check)),
+               std::nullopt, scale, render};
+}
+
+// How well `cloud`, seen closer and averaged down, agrees with the views: mean PSNR.
+Result<double> MeasureConsistency(const GaussianCloud& cloud, const RenderOptions& render, double upscale,
+                                  const GaussianCloud& input, RefineTargets& targets) {
+  ViewObjective objective;
+  RefineTarget target;
+  double sum = 0;
+  const auto views = static_cast<int64_t>(targets.views().size());
+  for (int64_t view = 0; view < views; ++view) {
+    const Camera& camera = targets.views()[static_cast<size_t>(view)];
+    const PixelBox window = ChooseWindow(camera, input, 0, view);  // the same for whatever is measured
+    ANCHORSPLAT_RETURN_IF_ERROR(targets.Load(view, window, target));
+    ANCHORSPLAT_RETURN_IF_ERROR(
+        objective.Show({.render = render, .loss = {}, .pixel = AreaModel(upscale)}, cloud, Cropped(camera, window)));
+    Image shown = objective.rendered();
+    Clamp01(shown);
+    for (size_t i = 0; i < target.ignored.size(); ++i) {
+      if (target.ignored[i] == 0) continue;
+      for (int c = 0; c < 3; ++c) shown.channel(c)[i] = target.picture.channel(c)[i];
+    }
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, Psnr(shown, target.picture));
+    sum += std::min(psnr, kPerfect);
+  }
+  return views > 0 ? sum / static_cast<double>(views) : 0;
+}
+
+// What a continuation must have in common with what it continues.
+std::string Settings(const RefineInput& input, const RefineOptions& options, const Views& views) {
+  nlohmann::json json = nlohmann::json::parse(ToJsonText(options));
+  json["upscale"] = input.upscale;
+  json["seed"] = input.seed;
+  json["input_gaussians"] = input.cloud.size();
+  json["start_gaussians"] = input.start.size();
+  json["views"] = views.train.views().size();
+  return json.dump();
+}
+
+bool Exists(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return !path.empty() && std::filesystem::exists(path, ignored);
+}
+
+// Steps until they are done, the time is over or the user stops it.
+Status MakeSteps(Refiner& refiner, const RefineOptions& options, const RefineControl& control, RefineReport& report) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto done = [&] {
+    if (!options.seconds) return static_cast<double>(refiner.state().step) / static_cast<double>(*options.steps);
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / *options.seconds;
+  };
+  const int64_t total = options.seconds ? kShownSteps : *options.steps;
+  Progress progress("refine", total);
+  int64_t shown = 0;
+  double psnr = 0;
+  for (double part = done(); part < 1; part = done()) {
+    ANCHORSPLAT_RETURN_IF_ERROR(refiner.Step(part));
+    if (refiner.state().step % kNoteEvery == 0) {
+      const double last = refiner.LastPsnr();
+      psnr = psnr == 0 ? last : 0.9 * psnr + 0.1 * last;  // single views differ by several dB
+      const auto now = static_cast<int64_t>(std::min(1.0, done()) * static_cast<double>(total));
+      progress.Advance(now - shown, Cat(Fixed(psnr, 2), " dB at low resolution, ",
+                                        WithThousands(refiner.state().cloud.size()), " Gaussians"));
+      shown = now;
+    }
+    report.interrupted = control.stop != nullptr && control.stop->load() && done() < 1;
+    if (report.interrupted) break;
+  }
+  return {};
+}
+
+// Without what nobody sees and what is not finite.
+GaussianCloud Pruned(GaussianCloud cloud, RefineReport& report) {
+  const auto least = static_cast<float>(std::log(kInvisible / (1 - kInvisible)));
+  std::vector<int64_t> kept;
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    if (IsUsable(cloud, i) && cloud.opacity_logits[static_cast<size_t>(i)] >= least) kept.push_back(i);
+  }
+  const int64_t pruned = cloud.size() - static_cast<int64_t>(kept.size());
+  if (pruned == 0 || kept.empty()) return cloud;
+  report.pruned = pruned;
+  return Subset(cloud, kept).value();
+}
+
+}  // namespace
+
+Result<Refined> Refine(RefineInput input, const RefineOptions& given, const RefineControl& control) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(given));
+  const auto begin = std::chrono::steady_clock::now();
+  const bool pictures = !given.images.empty();
+  if (!pictures && (given.exposure || given.robust)) {
+    return Error{ErrorCode::kBadArgument, "exposure and robust are about photographs; they need --images"};
+  }
+  RefineOptions options = given;
+  if (!options.seconds) options.steps = given.steps.value_or(pictures ? kStepsWithPictures : kStepsWithout);
+  options.copies = given.copies.value_or(pictures ? kCopiesWithPictures : kCopiesWithout);
+  if (options.max_gaussians > 0) {
+    options.copies = static_cast<int>(
+        std::clamp<int64_t>(options.max_gaussians / std::max<int64_t>(1, input.start.size()), 1, *options.copies));
+  }
+
+  RenderOptions render;
+  render.mode = input.cloud.render_mode.value_or(RenderMode::kClassic);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Views views,
+                               pictures ? OpenPictures(input, options, render) : OpenSplat(input, options, render));
+  RefineReport report;
+  report.views = static_cast<int64_t>(views.train.views().size());
+  report.input_psnr = views.input_psnr;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(report.before,
+                               MeasureConsistency(input.start, views.render, input.upscale, input.cloud, views.check));
+
+  const std::string settings = Settings(input, options, views);
+  FitState state;
+  if (control.resume && Exists(control.checkpoint)) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(state, ReadFitCheckpoint(control.checkpoint, settings));
+    report.resumed_at = state.step;
+    LogInfo(Cat("going on at step ", WithThousands(state.step), " of ", control.checkpoint.string()));
+  } else {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud split,
+                                 SplitGaussians(input.start, {.copies = *options.copies, .seed = input.seed}));
+    state = Fitter::Fresh(std::move(split));
+  }
+  const RefineProblem problem{views.render, input.upscale, views.scene_scale, input.seed};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Refiner refiner,
+                               Refiner::Begin(options, problem, std::move(views.train), std::move(state)));
+  ANCHORSPLAT_RETURN_IF_ERROR(MakeSteps(refiner, options, control, report));
+  report.steps = refiner.state().step;
+  report.times = refiner.times();
+  std::error_code ignored;
+  if (report.interrupted && !control.checkpoint.empty() && !options.seconds) {
+    ANCHORSPLAT_RETURN_IF_ERROR(WriteFitCheckpoint(control.checkpoint, refiner.state(), settings));
+  } else if (Exists(control.checkpoint)) {
+    std::filesystem::remove(control.checkpoint, ignored);
+  }
+
+  GaussianCloud result = Pruned(std::move(refiner.state().cloud), report);
+  result.render_mode = input.cloud.render_mode;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(report.after,
+                               MeasureConsistency(result, views.render, input.upscale, input.cloud, views.check));
+  if (!(report.after > report.before)) {
+    report.kept_start = true;
+    report.after = report.before;
+    result = std::move(input.start);
+    LogInfo("the start agreed with the views as well as the result does, and is kept");
+  }
+  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return Refined{std::move(result), report};
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// What a refinement does (enhance/refine.h). Values that are not given depend on whether there are pictures.
+struct RefineOptions {
+  std::filesystem::path images;  // project with the training pictures (fit/training_views.h); empty: without any
+  int hold_out = 8;              // every so-manieth view is not trained on, as in fits; 0: all are
+  std::optional<int64_t> steps;
+  std::optional<double> seconds;           // instead of steps: as many as there are in that time. Not reproducible
+  std::optional<int> copies;               // K that every Gaussian is split into at the beginning
+  int64_t max_gaussians = 0;               // that splitting may reach; 0: no bound
+  int poses = 128;                         // without pictures and cameras: places to look from
+  int between = 1;                         // without pictures: poses between each camera and its neighbours
+  double half_from = 0.3, all_from = 0.7;  // see PixelSchedule
+  double rate = 1;                         // of fits' learning rates, at the beginning …
+  double rate_decay = 0.1;                 // … and what is left of it at the end
+  double ssim_weight = 0.2;
+  bool exposure = false;  // pictures may differ in brightness and tint
+  bool robust = false;    // what differs grossly is not in the scene
+};
+
+// How it is run.
+struct RefineControl {
+  std::filesystem::path checkpoint;         // empty: none is written or read
+  bool resume = false;                      // go on from `checkpoint` if it is there
+  const std::atomic<bool>* stop = nullptr;  // becomes true when the user wants to stop
+};
+
+inline constexpr int kMostCopies = 64;
+
+// kBadArgument for what cannot be run; names the option.
+Status Validate(const RefineOptions& options);
+
+// All options as one JSON object, defaults filled in: for checkpoints.
+std::string ToJsonText(const RefineOptions& options);
+
+}  // namespace anchorsplat

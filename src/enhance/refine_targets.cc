@@ -1,0 +1,105 @@
+#include "enhance/refine_targets.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/parallel.h"
+#include "metrics/image_metrics.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr int kRowsPerTask = 32;
+constexpr float kNothing = 1.0f / 255;  // alpha that 8 bits do not show
+
+void Crop(const Image& from, const PixelBox& window, Image& to) {
+  const int width = window.x1 - window.x0, height = window.y1 - window.y0;
+  if (to.width != width || to.height != height || to.channels != from.channels)
+    to = Image(width, height, from.channels);
+  for (int c = 0; c < from.channels; ++c) {
+    for (int y = 0; y < height; ++y) {
+      std::copy_n(from.channel(c) + int64_t{window.y0 + y} * from.width + window.x0, width,
+                  to.channel(c) + int64_t{y} * width);
+    }
+  }
+}
+
+bool IsWhole(const PixelBox& window, const Pinhole& size) { return window == PixelBox{0, 0, size.width, size.height}; }
+
+}  // namespace
+
+Camera Cropped(const Camera& camera, const PixelBox& window) {
+  Camera cropped = camera;
+  cropped.intrinsics.width = window.x1 - window.x0;
+  cropped.intrinsics.height = window.y1 - window.y0;
+  cropped.intrinsics.cx -= window.x0;
+  cropped.intrinsics.cy -= window.y0;
+  return cropped;
+}
+
+Buffer<uint8_t> FaintPixels(const Image& alpha) {
+  const int width = alpha.width, height = alpha.height;
+  Buffer<uint8_t> faint(static_cast<size_t>(alpha.plane()));
+  // Rows first: is there something solid within reach along the row?
+  Buffer<uint8_t> solid(faint.size());
+  ParallelFor(0, height, kRowsPerTask, [&](int64_t first, int64_t last) {
+    for (int64_t y = first; y < last; ++y) {
+      const float* row = alpha.pixels.data() + y * width;
+      for (int x = 0; x < width; ++x) {
+        const int from = std::max(0, x - kFaintReach), to = std::min(width, x + kFaintReach + 1);
+        solid[static_cast<size_t>(y * width + x)] = *std::max_element(row + from, row + to) >= kFaint;
+      }
+    }
+  });
+  ParallelFor(0, height, kRowsPerTask, [&](int64_t first, int64_t last) {
+    for (int64_t y = first; y < last; ++y) {
+      const int64_t from = std::max<int64_t>(0, y - kFaintReach), to = std::min<int64_t>(height, y + kFaintReach + 1);
+      for (int x = 0; x < width; ++x) {
+        bool near_solid = false;
+        for (int64_t k = from; k < to; ++k) near_solid |= solid[static_cast<size_t>(k * width + x)] != 0;
+        const auto at = static_cast<size_t>(y * width + x);
+        faint[at] = alpha.pixels[at] > kNothing && !near_solid;
+      }
+    }
+  });
+  if (std::none_of(faint.begin(), faint.end(), [](uint8_t f) { return f != 0; })) return {};
+  return faint;
+}
+
+RefineTargets::RefineTargets(PictureCache pictures) : pictures_(std::move(pictures)) {}
+
+RefineTargets::RefineTargets(std::shared_ptr<const GaussianCloud> splat, const RenderOptions& render,
+                             std::vector<Camera> views)
+    : splat_(std::move(splat)), render_(render), views_(std::move(views)), kept_(views_.size()) {}
+
+const std::vector<Camera>& RefineTargets::views() const { return pictures_ ? pictures_->views() : views_; }
+
+Status RefineTargets::Load(int64_t view, const PixelBox& window, RefineTarget& target) {
+  const Camera& camera = views()[static_cast<size_t>(view)];
+  const bool whole = IsWhole(window, camera.intrinsics);
+  if (pictures_) {
+    target.ignored.clear();
+    if (whole) return pictures_->Load(view, target.picture);
+    ANCHORSPLAT_RETURN_IF_ERROR(pictures_->Load(view, whole_));
+    Crop(whole_, window, target.picture);
+    return {};
+  }
+  RefineTarget& kept = kept_[static_cast<size_t>(view)];
+  if (whole && kept.picture.width > 0) {
+    target = kept;
+    return {};
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(*splat_, Cropped(camera, window), render_, output_));
+  target.picture = output_.color;
+  Clamp01(target.picture);
+  target.ignored = FaintPixels(output_.alpha);
+  const auto bytes = static_cast<int64_t>(sizeof(float) * target.picture.pixels.size() + target.ignored.size());
+  if (whole && bytes <= left_) {
+    left_ -= bytes;
+    kept = target;
+  }
+  return {};
+}
+
+}  // namespace anchorsplat

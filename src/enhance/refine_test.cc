@@ -1,0 +1,288 @@
+#include "enhance/refine.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+
+#include "core/log.h"
+#include "core/parallel.h"
+#include "enhance/enhance.h"
+#include "enhance/filter.h"
+#include "enhance/refiner.h"
+#include "fit/orbit_scene_test.h"
+#include "fit/pixel_model.h"
+#include "formats/test_cloud.h"
+#include "formats/test_folder.h"
+#include "metrics/image_metrics.h"
+
+namespace anchorsplat {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr int kSide = 28, kUpscale = 3;
+constexpr double kPixel = 1.7 / (0.5 * kSide / 0.41421356);  // at the middle of the scene
+
+// A splat that is right when seen three times closer; a project with what a camera sees of it; and what a fit makes of
+// those pictures: eroded, a little wrong.
+class Refinement : public testing::Test {
+ protected:
+  void SetUp() override {
+    log_ = SetLogSink(MakeTerminalSink(true));
+    truth_ = orbit_scene::Ball(150, 1);
+    for (float& s : truth_.log_scales) s -= 0.7f;
+    cameras_ = orbit_scene::Cameras(12, kSide, kSide);
+    std::filesystem::create_directories(project() / "views");
+    Rasterizer rasterizer;
+    RenderOutput rays;
+    Image seen;
+    for (const Camera& camera : cameras_.cameras) {
+      ASSERT_TRUE(rasterizer.Render(truth_, RaysOf(AreaModel(kUpscale), camera), {}, rays).ok());
+      AverageRays(rays.color, kUpscale, seen);
+      ASSERT_TRUE(WritePng(project() / (camera.name + ".png"), seen).ok());
+    }
+    ASSERT_TRUE(WriteTransforms(project() / "transforms.json", cameras_).ok());
+
+    input_.cloud = truth_;
+    Random random(4);
+    const double eroded = 0.3 * kPixel * kPixel;
+    for (size_t i = 0; i < input_.cloud.means.size(); ++i) {
+      input_.cloud.means[i] += static_cast<float>(0.15 * kPixel * random.Normal());
+      float& s = input_.cloud.log_scales[i];
+      const double square = std::exp(2.0 * s) - 0.7 * eroded;
+      s = static_cast<float>(0.5 * std::log(std::max(square, 0.1 * eroded)));
+    }
+    input_.upscale = kUpscale;
+    input_.pixel_size = kPixel;
+    input_.start = input_.cloud;
+    ASSERT_TRUE(
+        ApplyFilter(input_.start, std::vector<float>{static_cast<float>(kPixel)}, {.upscale = kUpscale, .strength = {}})
+            .ok());
+    options_.images = project();
+    options_.hold_out = 4;
+    options_.steps = 90;
+    options_.copies = 1;
+  }
+  void TearDown() override { SetLogSink(log_); }
+
+  std::filesystem::path project() const { return folder_ / "project"; }
+
+  // How far from the truth a cloud is when seen closer, from where nobody was.
+  double PsnrCloser(const GaussianCloud& cloud) const {
+    Rasterizer rasterizer;
+    RenderOutput a, b;
+    double sum = 0;
+    for (const Camera& camera : orbit_scene::Cameras(5, kSide * kUpscale, kSide * kUpscale).cameras) {
+      EXPECT_TRUE(rasterizer.Render(cloud, camera, {}, a).ok());
+      EXPECT_TRUE(rasterizer.Render(truth_, camera, {}, b).ok());
+      sum += Psnr(a.color, b.color).value() / 5;
+    }
+    return sum;
+  }
+
+  std::shared_ptr<LogSink> log_;
+  TestFolder folder_;
+  GaussianCloud truth_;
+  CameraSet cameras_;
+  RefineInput input_;
+  RefineOptions options_;
+};
+
+TEST_F(Refinement, WithPicturesComesNearerToTheTruth) {
+  const auto refined = Refine(input_, options_, {});
+  ASSERT_TRUE(refined.ok()) << refined.error().message;
+  const RefineReport& r = refined->report;
+  EXPECT_EQ(r.steps, 90);
+  EXPECT_EQ(r.views, 9);
+  EXPECT_FALSE(r.kept_start);
+  EXPECT_FALSE(r.interrupted);
+  EXPECT_GT(r.after, r.before + 2);
+  EXPECT_GT(PsnrCloser(refined->cloud), PsnrCloser(input_.start) + 2);
+  EXPECT_GT(r.input_psnr.value(), kLeastInputPsnr);
+}
+
+TEST_F(Refinement, WithoutPicturesComesNearerToTheViewsItSees) {
+  options_.images.clear();
+  for (const bool cameras : {false, true}) {
+    if (cameras) input_.cameras = cameras_;
+    const auto refined = Refine(input_, options_, {});
+    ASSERT_TRUE(refined.ok()) << refined.error().message;
+    EXPECT_FALSE(refined->report.kept_start);
+    EXPECT_GT(refined->report.after, refined->report.before + 1);
+    EXPECT_FALSE(refined->report.input_psnr.has_value());
+    EXPECT_EQ(refined->report.views, cameras ? 12 : 128);
+  }
+}
+
+TEST_F(Refinement, SameBitsForAnyNumberOfThreads) {
+  options_.steps = 20;
+  GaussianCloud expected;
+  for (const int threads : {1, 2, 5}) {
+    SetThreadCount(threads);
+    const auto refined = Refine(input_, options_, {});
+    ASSERT_TRUE(refined.ok());
+    if (threads == 1) expected = refined->cloud;
+    ExpectSameCloud(refined->cloud, expected);
+  }
+  SetThreadCount(0);
+  input_.seed = 9;
+  EXPECT_FALSE(SameBits(Refine(input_, options_, {})->cloud.means, expected.means));
+}
+
+TEST_F(Refinement, MoreGaussiansHaveABound) {
+  options_.steps = 20;
+  const GaussianCloud one = Refine(input_, options_, {})->cloud;
+  options_.copies = 5;
+  options_.max_gaussians = 299;  // no room for two each
+  ExpectSameCloud(Refine(input_, options_, {})->cloud, one);
+}
+
+TEST_F(Refinement, GoesOnWhereItWasStopped) {
+  const auto whole = Refine(input_, options_, {});
+  ASSERT_TRUE(whole.ok());
+  std::atomic<bool> stop{true};  // after the first step
+  RefineControl control{folder_ / "state", false, &stop};
+  const auto first = Refine(input_, options_, control);
+  ASSERT_TRUE(first.ok());
+  EXPECT_TRUE(first->report.interrupted);
+  EXPECT_EQ(first->report.steps, 1);
+  EXPECT_TRUE(Validate(first->cloud).ok());
+  EXPECT_GE(first->report.after, first->report.before) << "valid, and no worse than the start";
+  ASSERT_TRUE(std::filesystem::exists(control.checkpoint));
+  control.resume = true;
+  stop = false;
+  RefineOptions others = options_;
+  others.rate = 0.3;
+  EXPECT_THAT(Refine(input_, others, control).error().message, HasSubstr("its rate is"));
+  const auto second = Refine(input_, options_, control);
+  ASSERT_TRUE(second.ok()) << second.error().message;
+  EXPECT_EQ(second->report.resumed_at, 1);
+  ExpectSameCloud(second->cloud, whole->cloud);
+  EXPECT_FALSE(std::filesystem::exists(control.checkpoint));
+}
+
+TEST_F(Refinement, TimeCanBeTheBound) {
+  options_.steps.reset();
+  options_.seconds = 0.2;
+  const auto refined = Refine(input_, options_, {});
+  ASSERT_TRUE(refined.ok());
+  EXPECT_GT(refined->report.steps, 0);
+}
+
+TEST_F(Refinement, WhatIsRightAlreadyStays) {
+  options_.images.clear();
+  options_.steps = 10;
+  options_.rate = 50;  // does harm
+  const auto refined = Refine(input_, options_, {});
+  ASSERT_TRUE(refined.ok());
+  EXPECT_TRUE(refined->report.kept_start);
+  ExpectSameCloud(refined->cloud, input_.start);
+}
+
+TEST_F(Refinement, PicturesOfSomethingElseAreRefused) {
+  const auto message = [&] {
+    const auto refined = Refine(input_, options_, {});
+    return refined.ok() ? std::string() : refined.error().message;
+  };
+  // Another order.
+  CameraSet turned = cameras_;
+  for (size_t i = 0; i < turned.cameras.size(); ++i) {
+    turned.cameras[i].world_to_camera = cameras_.cameras[(i + 1) % cameras_.cameras.size()].world_to_camera;
+  }
+  ASSERT_TRUE(WriteTransforms(project() / "transforms.json", turned, {.overwrite = true}).ok());
+  EXPECT_THAT(message(), HasSubstr("order"));
+  // Another splat.
+  input_.cloud = orbit_scene::Ball(400, 99);
+  for (float& c : input_.cloud.sh) c += 2;
+  EXPECT_THAT(message(), HasSubstr("dB only"));
+  options_.images = folder_ / "nothing";
+  EXPECT_FALSE(message().empty());
+}
+
+TEST_F(Refinement, PhotographsMayDifferInExposure) {
+  Random random(8);
+  for (const Camera& camera : cameras_.cameras) {
+    const auto path = project() / (camera.name + ".png");
+    Image picture = ReadImage(path).value();
+    const auto gain = static_cast<float>(random.Uniform(0.7, 1.0));
+    for (float& x : picture.pixels) x *= gain;
+    ASSERT_TRUE(WritePng(path, picture, {.overwrite = true}).ok());
+  }
+  const auto plain = Refine(input_, options_, {});
+  options_.exposure = true;
+  options_.robust = true;
+  const auto exposed = Refine(input_, options_, {});
+  ASSERT_TRUE(plain.ok() && exposed.ok());
+  EXPECT_GT(PsnrCloser(exposed->cloud), PsnrCloser(plain->cloud) + 1);
+  options_.images.clear();
+  EXPECT_FALSE(Refine(input_, options_, {}).ok());
+}
+
+TEST_F(Refinement, ThroughTheDoor) {
+  EnhanceOptions options;
+  options.pixel_size = kPixel;
+  options.upscale = kUpscale;
+  options.refine = options_;
+  options.refine.steps = 5;
+  options.method = "auto";
+  EXPECT_EQ(Enhance(input_.cloud, options)->report.method, "refine-images") << "there are pictures";
+  options.method = "filter+refine";
+  EXPECT_EQ(Enhance(input_.cloud, options)->report.method, "filter+refine");
+  options.method = "refine+filter";
+  EXPECT_FALSE(Enhance(input_.cloud, options).ok());
+  options.refine.images.clear();
+  options.method = "auto";
+  EXPECT_EQ(Enhance(input_.cloud, options)->report.method, "filter");
+  options.method = "refine-images";
+  EXPECT_FALSE(Enhance(input_.cloud, options).ok());
+  options.method = "refine";
+  const auto refined = Enhance(input_.cloud, options);
+  ASSERT_TRUE(refined.ok()) << refined.error().message;
+  EXPECT_EQ(refined->report.method, "refine");
+  options.upscale = 1;  // nothing was absorbed that a closer view would miss
+  ExpectSameCloud(Enhance(input_.cloud, options)->cloud, input_.cloud);
+  options.upscale = 4;
+  GaussianCloud antialiased = input_.cloud;
+  antialiased.render_mode = RenderMode::kAntialiased;
+  ExpectSameCloud(Enhance(antialiased, options)->cloud, antialiased);
+}
+
+TEST(ChooseWindow, IsTheWholeOfSmallViews) {
+  const GaussianCloud ball = orbit_scene::Ball(20, 1);
+  const auto cameras = orbit_scene::Cameras(2, 300, 200).cameras;
+  EXPECT_EQ(ChooseWindow(cameras[0], ball, 1, 5), (PixelBox{0, 0, 300, 200}));
+  const auto large = orbit_scene::Cameras(2, 2000, 300).cameras;
+  for (int64_t step = 0; step < 20; ++step) {
+    const PixelBox box = ChooseWindow(large[0], ball, 1, step);
+    EXPECT_EQ(box.x1 - box.x0, kWindow);
+    EXPECT_EQ(box.y1 - box.y0, 300);
+    EXPECT_GE(box.x0, 0);
+    EXPECT_LE(box.x1, 2000);
+    EXPECT_EQ(ChooseWindow(large[0], ball, 1, step), box);
+  }
+  EXPECT_NE(ChooseWindow(large[0], ball, 1, 0), ChooseWindow(large[0], ball, 1, 1));
+}
+
+TEST(RefineOptions, RefusesNonsense) {
+  const auto bad = [](auto&& change) {
+    RefineOptions options;
+    change(options);
+    return !Validate(options).ok();
+  };
+  EXPECT_TRUE(Validate(RefineOptions{}).ok());
+  EXPECT_TRUE(bad([](RefineOptions& o) { o.steps = 0; }));
+  EXPECT_TRUE(bad([](RefineOptions& o) { o.seconds = -1; }));
+  EXPECT_TRUE(bad([](RefineOptions& o) { o.steps = 1, o.seconds = 1; }));
+  EXPECT_TRUE(bad([](RefineOptions& o) { o.copies = 0; }));
+  EXPECT_TRUE(bad([](RefineOptions& o) { o.rate = 0; }));
+  EXPECT_TRUE(bad([](RefineOptions& o) { o.rate_decay = 0; }));
+  EXPECT_TRUE(bad([](RefineOptions& o) { o.half_from = 0.9; }));
+  EXPECT_TRUE(bad([](RefineOptions& o) { o.ssim_weight = 2; }));
+  EXPECT_TRUE(bad([](RefineOptions& o) { o.poses = 0; }));
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "enhance/refine_options.h"
+#include "enhance/refine_targets.h"
+#include "fit/fitter.h"
+#include "fit/view_objective.h"
+#include "fit/view_order.h"
+
+namespace anchorsplat {
+
+// What the iterations of a refinement depend on, besides the options.
+struct RefineProblem {
+  RenderOptions render;    // of the splat: mode, background
+  double upscale = 4;      // u
+  double scene_scale = 1;  // world units; as in fits
+  uint64_t seed = 0;
+};
+
+// The iterations of a refinement, one at a time: a view and a window of it, what the candidate shows there when seen
+// `upscale` times closer and averaged down to the view's pixels, how far that is from the target, a step of Adam.
+// Learning rates are those of fits times options.rate, and fall to options.rate_decay of that.
+//
+// The state is that of a fit (fit/fitter.h) and is written and read like one. Same bits for any number of threads.
+class Refiner {
+ public:
+  // Errors (kBadArgument): options that cannot be run, no views, no Gaussians.
+  static Result<Refiner> Begin(const RefineOptions& options, const RefineProblem& problem, RefineTargets targets,
+                               FitState state);
+
+  // The next step, when the part `done`, 0 to 1, of the run is over. Errors: those of RefineTargets and ViewObjective.
+  Result<FitStep> Step(double done);
+
+  const FitState& state() const { return state_; }
+  FitState& state() { return state_; }
+  RefineTargets& targets() { return targets_; }
+  FitTimes times() const;
+  double LastPsnr() const;  // of what the last step saw against its target, before the step
+
+ private:
+  Refiner(const RefineOptions& options, const RefineProblem& problem, RefineTargets targets, FitState state);
+  void AdjustTarget();
+
+  RefineOptions options_;
+  RefineProblem problem_;
+  RefineTargets targets_;
+  FitState state_;
+  ViewOrder order_;
+  ViewObjective objective_;
+  CloudGradient gradient_;
+  RefineTarget target_;
+  FitTimes times_;
+};
+
+// The part of a view that a step looks at: all of it, or, where a side is longer than kWindow, a window of that size
+// around a Gaussian drawn from seed and step.
+inline constexpr int kWindow = 512;
+PixelBox ChooseWindow(const Camera& camera, const GaussianCloud& cloud, uint64_t seed, int64_t step);
+
+}  // namespace anchorsplat

@@ -4,7 +4,7 @@
 set -euo pipefail
 
 packages=(g++ cmake ninja-build pkg-config
-  libhwy-dev libtbb-dev libcli11-dev nlohmann-json3-dev libpng-dev libjpeg-dev zlib1g-dev libzstd-dev libwebp-dev libzip-dev
+  libhwy-dev libtbb-dev libcli11-dev nlohmann-json3-dev libpng-dev libjpeg-dev zlib1g-dev libzstd-dev libwebp-dev
   libassimp-dev libstb-dev libembree-dev libtomlplusplus-dev libgtest-dev libgmock-dev libbenchmark-dev)
 
 # LibTorch comes in a Python wheel (scripts/install-torch.sh).
@@ -22,7 +22,7 @@ if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
   [ ${#missing[@]} -eq 0 ] && exit 0
   echo "anchorsplat: this is not a Debian system, so nothing was installed. Missing: ${missing[*]}" >&2
   echo "Install a C++20 compiler, CMake >= 3.22, Ninja and the development packages of Highway (>= 1.0.3), oneTBB," >&2
-  echo "CLI11, nlohmann-json, libpng, libjpeg, zlib, zstd, libwebp, libzip, assimp (5.2), stb, Embree (3.13), toml++, GoogleTest and Google Benchmark, then call make again." >&2
+  echo "CLI11, nlohmann-json, libpng, libjpeg, zlib, zstd, libwebp, assimp (5.2), stb, Embree (3.13), toml++, GoogleTest and Google Benchmark, then call make again." >&2
   exit 1
 fi
 

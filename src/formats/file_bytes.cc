@@ -5,6 +5,7 @@
 #include <system_error>
 
 #include "core/text.h"
+#include "formats/input_file.h"
 
 namespace anchorsplat {
 
@@ -28,16 +29,8 @@ Result<OpenedFile> OpenForReading(const std::filesystem::path& path) {
 }
 
 Result<std::string> ReadFileBytes(const std::filesystem::path& path, uint64_t max_bytes) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedFile file, OpenForReading(path));
-  if (file.size > max_bytes) {
-    return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", HumanBytes(file.size), ", more than the ",
-                                          HumanBytes(max_bytes), " allowed")};
-  }
-  std::string bytes(file.size, '\0');
-  if (std::fread(bytes.data(), 1, bytes.size(), file.handle.get()) != bytes.size()) {
-    return Error{ErrorCode::kIo, Cat(path.string(), ": could not be read to its end")};
-  }
-  return bytes;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
+  return file.ReadAll(max_bytes);
 }
 
 }  // namespace anchorsplat

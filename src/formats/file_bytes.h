@@ -25,7 +25,7 @@ struct OpenedFile {
 // Errors: kNotFound, kIo.
 Result<OpenedFile> OpenForReading(const std::filesystem::path& path);
 
-// The whole file. Errors as above; kBadFile when it is longer than `max_bytes`.
+// The whole file, or pipe. Errors of InputFile::Open; kBadFile when it is longer than `max_bytes`.
 Result<std::string> ReadFileBytes(const std::filesystem::path& path, uint64_t max_bytes);
 
 }  // namespace anchorsplat

@@ -189,7 +189,13 @@ bool LooksLikeTorchLegacy(std::span<const std::byte> beginning) {
 
 Result<TensorFileContents> ReadTorchZip(std::span<const std::byte> bytes, const std::string& file) {
   const auto bad = [&](const std::string& what) { return Error{ErrorCode::kBadFile, Cat(file, ": ", what)}; };
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<ZipEntry> entries, ReadStoredZip(bytes, file));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<ZipEntry> entries, ReadZipDirectory(bytes, file));
+  for (const ZipEntry& entry : entries) {  // tensors are used where they lie
+    if (entry.method != 0) {
+      return Error{ErrorCode::kBadFile, Cat(file, ": zip entry \"", Printable(std::string(entry.name)),
+                                            "\" is compressed (method ", entry.method, "), torch.save only stores")};
+    }
+  }
 
   // The root folder has the file's name as it was when it was saved.
   std::string_view root;

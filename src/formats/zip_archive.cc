@@ -36,97 +36,93 @@ class Record {
   std::string bytes_;
 };
 
+uint32_t Crc(uint32_t crc, std::string_view bytes) {
+  while (!bytes.empty()) {  // zlib counts in 32 bits
+    const size_t chunk = std::min(bytes.size(), size_t{1} << 30);
+    crc = static_cast<uint32_t>(crc32(crc, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(chunk)));
+    bytes.remove_prefix(chunk);
+  }
+  return crc;
+}
+
+// The whole of a raw deflate stream, which must make exactly contents.size() bytes.
+bool Inflate(std::span<const std::byte> packed, std::string& contents) {
+  z_stream stream{};
+  if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw std::bad_alloc();
+  constexpr size_t kMost = size_t{1} << 30;
+  size_t in = 0, out = 0;
+  int code = Z_OK;
+  char beyond = 0;  // room for the end of the stream to be seen, and for a byte too many to be noticed
+  while (code == Z_OK) {
+    const auto in_chunk = static_cast<uInt>(std::min(kMost, packed.size() - in));
+    const auto out_chunk = static_cast<uInt>(std::min(kMost, contents.size() - out));
+    stream.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(packed.data() + in));
+    stream.avail_in = in_chunk;
+    stream.next_out = reinterpret_cast<Bytef*>(out_chunk > 0 ? contents.data() + out : &beyond);
+    stream.avail_out = out_chunk > 0 ? out_chunk : 1;
+    code = inflate(&stream, Z_NO_FLUSH);
+    in += in_chunk - stream.avail_in;
+    if (out_chunk > 0) {
+      out += out_chunk - stream.avail_out;
+    } else if (stream.avail_out == 0) {
+      break;
+    }
+  }
+  inflateEnd(&stream);
+  return code == Z_STREAM_END && out == contents.size();
+}
+
 constexpr uint16_t kVersion = 45;            // that knows the 64-bit extensions
 constexpr uint16_t kUtf8 = 0x0800;           // names are UTF-8
 constexpr uint32_t kFirstOf1980 = 0x210000;  // date 1980-01-01, time 0:00
 
 }  // namespace
 
-struct ZipReader::State {
-  std::string name, bytes;
-  zip_t* archive = nullptr;
-  std::mutex reading;  // libzip's archives are for one thread
-
-  ~State() {
-    if (archive != nullptr) zip_discard(archive);
-  }
-};
-
-ZipReader::ZipReader() : state_(std::make_unique<State>()) {}
-ZipReader::ZipReader(ZipReader&&) noexcept = default;
-ZipReader& ZipReader::operator=(ZipReader&&) noexcept = default;
-ZipReader::~ZipReader() = default;
-
 Result<ZipReader> ZipReader::Open(std::string name, std::string bytes) {
   ZipReader reader;
-  State& state = *reader.state_;
-  state.name = std::move(name);
-  state.bytes = std::move(bytes);
-  zip_error_t error;
-  zip_error_init(&error);
-  zip_source_t* source = zip_source_buffer_create(state.bytes.data(), state.bytes.size(), 0, &error);
-  if (source != nullptr) {
-    state.archive = zip_open_from_source(source, ZIP_RDONLY, &error);
-    if (state.archive == nullptr) zip_source_free(source);
-  }
-  const std::string reason = zip_error_strerror(&error);
-  zip_error_fini(&error);
-  if (state.archive == nullptr) {
-    return Error{ErrorCode::kBadFile, Cat(state.name, ": is no readable ZIP archive (", reason, ")")};
-  }
+  reader.name_ = std::move(name);
+  reader.bytes_ = std::make_unique<const std::string>(std::move(bytes));
+  const auto archive = std::as_bytes(std::span(*reader.bytes_));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(reader.entries_, ReadZipDirectory(archive, reader.name_));
   return reader;
-}
-
-Result<std::string> ZipReader::Read(const std::string& member, uint64_t max_size) const {
-  const std::string where = Cat(state_->name, ": ", Printable(member));
-  const std::lock_guard lock(state_->reading);
-  zip_stat_t stat;
-  zip_stat_init(&stat);
-  if (zip_stat(state_->archive, member.c_str(), ZIP_FL_ENC_RAW, &stat) != 0) {
-    return Error{ErrorCode::kBadFile, Cat(where, ": is not in the archive")};
-  }
-  if ((stat.valid & ZIP_STAT_SIZE) == 0 || (stat.valid & ZIP_STAT_COMP_SIZE) == 0 || stat.size > max_size) {
-    return Error{ErrorCode::kBadFile,
-                 Cat(where, ": has ", HumanBytes(stat.size), ", at most ", HumanBytes(max_size), " expected")};
-  }
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(where, std::min<uint64_t>(stat.comp_size, state_->bytes.size()), stat.size));
-  zip_file_t* file = zip_fopen_index(state_->archive, stat.index, 0);
-  if (file == nullptr) {
-    return Error{ErrorCode::kBadFile, Cat(where, ": cannot be read (", zip_strerror(state_->archive), ")")};
-  }
-  std::string contents(static_cast<size_t>(stat.size), '\0');
-  const zip_int64_t size = zip_fread(file, contents.data(), contents.size());
-  // One byte more: the check sum is only looked at where the member ends.
-  char end = 0;
-  const bool complete = size == static_cast<zip_int64_t>(stat.size) && zip_fread(file, &end, 1) == 0;
-  zip_fclose(file);
-  if (!complete) return Error{ErrorCode::kBadFile, Cat(where, ": is damaged or cut off")};
-  return contents;
 }
 
 std::vector<std::string> ZipReader::Members() const {
   std::vector<std::string> names;
-  const std::lock_guard lock(state_->reading);
-  const zip_int64_t count = zip_get_num_entries(state_->archive, 0);
-  for (zip_int64_t i = 0; i < count; ++i) {
-    const char* name = zip_get_name(state_->archive, static_cast<zip_uint64_t>(i), ZIP_FL_ENC_RAW);
-    if (name != nullptr) names.emplace_back(name);
-  }
+  for (const ZipEntry& entry : entries_) names.emplace_back(entry.name);
   return names;
+}
+
+Result<std::string> ZipReader::Read(const std::string& member, uint64_t max_size) const {
+  const std::string where = Cat(name_, ": ", Printable(member));
+  const auto entry = std::ranges::find(entries_, member, &ZipEntry::name);
+  if (entry == entries_.end()) return Error{ErrorCode::kBadFile, Cat(where, ": is not in the archive")};
+  if (entry->size > max_size) {
+    return Error{ErrorCode::kBadFile,
+                 Cat(where, ": has ", HumanBytes(entry->size), ", at most ", HumanBytes(max_size), " expected")};
+  }
+  std::string contents;
+  if (entry->method == 0) {
+    contents.assign(reinterpret_cast<const char*>(entry->data.data()), entry->data.size());
+  } else if (entry->method == 8) {
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(where, entry->data.size(), entry->size));
+    contents.resize(static_cast<size_t>(entry->size));
+    if (!Inflate(entry->data, contents)) return Error{ErrorCode::kBadFile, Cat(where, ": is damaged or cut off")};
+  } else {
+    return Error{ErrorCode::kBadFile, Cat(where, ": is compressed by method ", entry->method, ", expected 0 or 8")};
+  }
+  if (Crc(0, contents) != entry->crc) {
+    return Error{ErrorCode::kBadFile, Cat(where, ": is damaged: its check sum is another")};
+  }
+  return contents;
 }
 
 Status ZipWriter::Add(const std::string& name, std::span<const std::string_view> parts) {
   Member member{name, 0, 0, written_};
-  uLong crc = crc32(0, nullptr, 0);
-  for (std::string_view part : parts) {
+  for (const std::string_view part : parts) {
     member.size += part.size();
-    while (!part.empty()) {
-      const size_t chunk = std::min(part.size(), size_t{1} << 30);
-      crc = crc32(crc, reinterpret_cast<const Bytef*>(part.data()), static_cast<uInt>(chunk));
-      part.remove_prefix(chunk);
-    }
+    member.crc = Crc(member.crc, part);
   }
-  member.crc = static_cast<uint32_t>(crc);
   const bool large = member.size >= kLimit32;
   Record header;
   header.U32(0x04034b50).U16(kVersion).U16(kUtf8).U16(0).U32(kFirstOf1980).U32(member.crc);

@@ -9,30 +9,29 @@
 
 #include "core/result.h"
 #include "formats/atomic_file.h"
+#include "formats/zip_directory.h"
 
 namespace anchorsplat {
 
-// Reads members of a ZIP archive that is in memory. Only the member's name is ever looked up: nothing is written
-// anywhere, so names with ".." or "/" lead nowhere. May be read from several threads.
+// Reads members of a ZIP archive that is in memory, stored or deflated. Only the member's name is ever looked up:
+// nothing is written anywhere, so names with ".." or "/" lead nowhere.
 class ZipReader {
  public:
-  // kBadFile: no ZIP archive, or a damaged one. `name` is what messages call it.
+  // kBadFile: no ZIP archive, or a damaged one (zip_directory.h). `name` is what messages call it.
   static Result<ZipReader> Open(std::string name, std::string bytes);
-  ZipReader(ZipReader&&) noexcept;
-  ZipReader& operator=(ZipReader&&) noexcept;
-  ~ZipReader();
 
-  // kBadFile: no such member, longer than `max_size`, damaged, encrypted, or more than 200 times as long as it is
-  // compressed.
+  // Names of all members, in the order of the directory; those that end in a slash are folders.
+  std::vector<std::string> Members() const;
+  // kBadFile: no such member, longer than `max_size`, damaged, packed in another way, or more than 200 times as long as
+  // it is compressed.
   Result<std::string> Read(const std::string& member, uint64_t max_size) const;
 
-  // The names of all members as the archive keeps them, in its order; folders end with a slash.
-  std::vector<std::string> Members() const;
-
  private:
-  struct State;
-  ZipReader();
-  std::unique_ptr<State> state_;
+  ZipReader() = default;
+
+  std::string name_;
+  std::unique_ptr<const std::string> bytes_;  // what the entries point into, wherever the reader moves
+  std::vector<ZipEntry> entries_;
 };
 
 // Writes a ZIP archive of members that are stored as they are (what comes in is compressed already, or meant to be read

@@ -37,9 +37,9 @@ struct Extent {
   std::string_view name;
 };
 
-class ZipReader {
+class DirectoryReader {
  public:
-  ZipReader(std::span<const std::byte> archive, const std::string& file) : archive_(archive), file_(file) {}
+  DirectoryReader(std::span<const std::byte> archive, const std::string& file) : archive_(archive), file_(file) {}
 
   Result<std::vector<ZipEntry>> Read() {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Directory directory, FindDirectory());
@@ -156,22 +156,21 @@ class ZipReader {
     }
     const std::string_view name = Text(at + kCentralSize, name_length);
     if ((flags & 1) != 0) return Bad(at, name, "is encrypted");
-    if (method != 0) return Bad(at, name, Cat("is compressed (method ", method, "), torch.save only stores"));
     if (!ApplyZip64(at + kCentralSize + name_length, extra_length, stored, packed, header)) {
       return Bad(at, name, "has a damaged zip64 field");
     }
-    if (packed != stored) return Bad(at, name, "is not compressed but has two different sizes");
+    if (method == 0 && packed != stored) return Bad(at, name, "is not compressed but has two different sizes");
     if (header > data_end || data_end - header < kLocalSize || U32(header) != kLocalMagic) {
       return Bad(at, name, "has no local header where the directory says");
     }
     // The lengths of name and extra field differ from the central ones: torch pads the local ones for alignment.
     const uint64_t data = header + kLocalSize + U16(header + 26) + U16(header + 28);
-    if (data > data_end || stored > data_end - data)
+    if (data > data_end || packed > data_end - data)
       return Bad(at, name, "reaches past the end of the data: the file is cut off or damaged");
     if (Text(header + kLocalSize, U16(header + 26)) != name)
       return Bad(header, name, "has another name in its local header");
-    entries.push_back({name, archive_.subspan(data, stored)});
-    extents.push_back({header, data + stored, name});
+    entries.push_back({name, archive_.subspan(data, packed), method, stored, U32(at + 16)});
+    extents.push_back({header, data + packed, name});
     at += kCentralSize + name_length + extra_length + comment_length;
     return {};
   }
@@ -182,8 +181,8 @@ class ZipReader {
 
 }  // namespace
 
-Result<std::vector<ZipEntry>> ReadStoredZip(std::span<const std::byte> archive, const std::string& file) {
-  return ZipReader(archive, file).Read();
+Result<std::vector<ZipEntry>> ReadZipDirectory(std::span<const std::byte> archive, const std::string& file) {
+  return DirectoryReader(archive, file).Read();
 }
 
 }  // namespace anchorsplat

@@ -112,6 +112,21 @@ void PackHarmonics(const float* sh, size_t rest, uint8_t* out) {
   }
 }
 
+// Asks for the memory of a Gaussian. In Morton order rows lie anywhere, and waiting for one after the other takes
+// longer than all the arithmetic.
+void Prefetch(const GaussianCloud& cloud, int64_t row) {
+  const auto fetch = [](const float* values, int64_t count) {
+    constexpr int64_t kLine = 64 / sizeof(float);
+    for (int64_t k = 0; k < count; k += kLine) __builtin_prefetch(values + k);
+    __builtin_prefetch(values + count - 1);  // of a row that begins within a line
+  };
+  fetch(cloud.means.data() + 3 * row, 3);
+  fetch(cloud.log_scales.data() + 3 * row, 3);
+  fetch(cloud.quats.data() + 4 * row, 4);
+  fetch(cloud.opacity_logits.data() + row, 1);
+  fetch(cloud.sh.data() + row * cloud.sh_stride(), cloud.sh_stride());
+}
+
 // The three parts of the file that one chunk fills.
 struct PackedChunk {
   uint8_t* ranges;     // [18] floats
@@ -124,8 +139,11 @@ void PackChunk(const GaussianCloud& cloud, const Buffer<uint32_t>& order, int64_
   RangedValues means, scales, colors;
   std::array<int64_t, kChunk> rows{};
   for (int64_t i = 0; i < count; ++i) {
-    const int64_t row = order.empty() ? first + i : int64_t{order[static_cast<size_t>(first + i)]};
-    rows[static_cast<size_t>(i)] = row;
+    rows[static_cast<size_t>(i)] = order.empty() ? first + i : int64_t{order[static_cast<size_t>(first + i)]};
+    Prefetch(cloud, rows[static_cast<size_t>(i)]);
+  }
+  for (int64_t i = 0; i < count; ++i) {
+    const int64_t row = rows[static_cast<size_t>(i)];
     const float* dc = cloud.sh.data() + row * cloud.sh_stride();
     for (int k = 0; k < 3; ++k) {
       means.values[i][k] = cloud.means[static_cast<size_t>(3 * row + k)];

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <numeric>
 #include <queue>
 #include <vector>
@@ -24,12 +23,24 @@ constexpr int32_t kSteps = 2047;
 // Centroids a vector can choose from: more in small sets, where comparing with many costs nothing.
 int64_t GroupEntries(int64_t count) { return std::clamp((int64_t{1} << 24) / count, int64_t{256}, int64_t{4096}); }
 
-// Rows of `width` int16, zero beyond `values`.
+// The SH vectors of a cloud as rows of `width` int16, zero beyond `values`. Made from the cloud whenever they are
+// looked at, as a copy of all of them would be 40 % of it.
 struct Vectors {
+  const GaussianCloud* cloud = nullptr;
+  float scale = 0;  // to 12 bits
   int64_t count = 0, width = 0, values = 0;
-  Buffer<int16_t> rows;
 
-  const int16_t* row(int64_t i) const { return rows.data() + i * width; }
+  void Copy(int64_t row, int16_t* out) const {
+    const float* sh = cloud->sh.data() + row * cloud->sh_stride() + 3;
+    constexpr float kMost = kSteps;
+    for (int64_t k = 0; k < values; ++k) {  // written so that compilers make vectors of it
+      const float number = sh[k] == sh[k] ? sh[k] * scale : 0.0f;
+      const float below = number < kMost ? number : kMost;
+      const float bounded = below > -kMost ? below : -kMost;
+      out[k] = static_cast<int16_t>(static_cast<int32_t>(bounded + (bounded < 0 ? -0.5f : 0.5f)));
+    }
+    for (int64_t k = values; k < width; ++k) out[k] = 0;
+  }
 };
 
 float SpreadOf(const GaussianCloud& cloud) {
@@ -55,24 +66,13 @@ float SpreadOf(const GaussianCloud& cloud) {
   return static_cast<float>(std::min(largest, 64 * std::sqrt(squares / values)));
 }
 
-Vectors Quantized(const GaussianCloud& cloud, float spread) {
+Vectors VectorsOf(const GaussianCloud& cloud, float spread) {
   Vectors out;
+  out.cloud = &cloud;
+  out.scale = spread > 0 ? static_cast<float>(kSteps) / spread : 0;
   out.count = cloud.size();
   out.values = cloud.sh_stride() - 3;
   out.width = (out.values + 15) / 16 * 16;
-  out.rows.resize(static_cast<size_t>(out.count * out.width));
-  const float scale = spread > 0 ? static_cast<float>(kSteps) / spread : 0;
-  ParallelFor(0, out.count, kGrain, [&](int64_t first, int64_t last) {
-    for (int64_t i = first; i < last; ++i) {
-      const float* sh = cloud.sh.data() + i * cloud.sh_stride() + 3;
-      int16_t* row = out.rows.data() + i * out.width;
-      for (int64_t k = 0; k < out.width; ++k) {
-        const float scaled = k < out.values && !std::isnan(sh[k]) ? sh[k] * scale : 0;
-        const float bounded = scaled > -kSteps ? (scaled < kSteps ? scaled : kSteps) : -kSteps;
-        row[k] = static_cast<int16_t>(std::lrint(bounded));
-      }
-    }
-  });
   return out;
 }
 
@@ -83,10 +83,12 @@ struct Part {
   int64_t left = -1;   // part that its first half became; the second half follows it
 };
 
-// Splits parts of one set of vectors, in place of their indices.
+// Splits parts of one set of vectors, in place of their indices. `Rows` gives row(index), a pointer to `width` numbers
+// that is valid until the next call.
+template <typename Rows>
 class Splitter {
  public:
-  Splitter(const int16_t* rows, int64_t width) : rows_(rows), width_(width) {}
+  Splitter(const Rows& rows, int64_t width) : rows_(rows), width_(width) {}
 
   // Sum of squared distances to the mean, and the mean and main direction for Split().
   double Measure(const uint32_t* indices, int64_t count) {
@@ -94,7 +96,7 @@ class Splitter {
     for (int64_t begin = 0; begin < count; begin += kBlock) {
       std::array<int32_t, kMaxWidth> sum{}, square{};  // 256 · 2047² fits
       for (int64_t i = begin; i < std::min(begin + kBlock, count); ++i) {
-        const int16_t* x = rows_ + int64_t{indices[i]} * width_;
+        const int16_t* x = rows_(indices[i]);
         for (int64_t k = 0; k < width_; ++k) {
           sum[static_cast<size_t>(k)] += x[k];
           square[static_cast<size_t>(k)] += int32_t{x[k]} * x[k];
@@ -128,7 +130,7 @@ class Splitter {
     for (int64_t begin = 0; begin < count; begin += kBlock) {
       std::array<float, kMaxWidth> sum{};
       for (int64_t i = begin; i < std::min(begin + kBlock, count); ++i) {
-        const int16_t* x = rows_ + int64_t{indices[i]} * width_;
+        const int16_t* x = rows_(indices[i]);
         const float factor = static_cast<float>(x[widest_]) - mean_[widest_];
         for (size_t k = 0; k < static_cast<size_t>(width_); ++k) {
           sum[k] += factor * (static_cast<float>(x[k]) - mean_[k]);
@@ -141,7 +143,7 @@ class Splitter {
     std::array<float, kMaxWidth> unit{};
     for (size_t k = 0; k < kMaxWidth; ++k) unit[k] = static_cast<float>(direction[k] / std::sqrt(norm));
     const auto is_first = [&](uint32_t index) {
-      const int16_t* x = rows_ + int64_t{index} * width_;
+      const int16_t* x = rows_(index);
       float dot = 0;
       for (size_t k = 0; k < static_cast<size_t>(width_); ++k) dot += unit[k] * (static_cast<float>(x[k]) - mean_[k]);
       return dot > 0;
@@ -151,10 +153,7 @@ class Splitter {
       // Rounding, or a direction that is none: the widest coordinate always separates something.
       size = std::stable_partition(
                  indices, indices + count,
-                 [&](uint32_t index) {
-                   return static_cast<float>(rows_[int64_t{index} * width_ + static_cast<int64_t>(widest_)]) >
-                          mean_[widest_];
-                 }) -
+                 [&](uint32_t index) { return static_cast<float>(rows_(index)[widest_]) > mean_[widest_]; }) -
              indices;
     }
     return size;
@@ -163,16 +162,36 @@ class Splitter {
  private:
   static constexpr int64_t kBlock = 256;
 
-  const int16_t* rows_;
+  Rows rows_;
   int64_t width_;
   std::array<float, kMaxWidth> mean_{};
   size_t widest_ = 0;
 };
 
-// A set of vectors on its own: a copy of their rows, the tree of its splits in the order in which they were made.
+// Rows of the cloud.
+class CloudRows {
+ public:
+  explicit CloudRows(const Vectors& all) : all_(&all) {}
+  const int16_t* operator()(uint32_t index) {
+    all_->Copy(index, row_.data());
+    return row_.data();
+  }
+
+ private:
+  const Vectors* all_;
+  std::array<int16_t, kMaxWidth> row_{};
+};
+
+// Rows that have been copied, for as long as much is done with them.
+struct CopiedRows {
+  const int16_t* first;
+  int64_t width;
+  const int16_t* operator()(uint32_t index) const { return first + int64_t{index} * width; }
+};
+
+// A set of vectors on its own: the tree of its splits in the order in which they were made.
 struct Branch {
   std::vector<uint32_t> rows;     // of the whole set
-  Buffer<int16_t> vectors;        // [rows, width]
   std::vector<uint32_t> indices;  // into `rows`
   std::vector<Part> parts;
   std::vector<double> gains;   // what was split 1st, 2nd, …: non-increasing
@@ -182,14 +201,11 @@ struct Branch {
 
   void Grow(const Vectors& all, int64_t max_leaves) {
     const auto count = static_cast<int64_t>(rows.size());
-    vectors.resize(static_cast<size_t>(count * all.width));
-    for (int64_t i = 0; i < count; ++i) {
-      std::memcpy(vectors.data() + i * all.width, all.row(rows[static_cast<size_t>(i)]),
-                  static_cast<size_t>(all.width) * sizeof(int16_t));
-    }
+    Buffer<int16_t> vectors(static_cast<size_t>(count * all.width));
+    for (int64_t i = 0; i < count; ++i) all.Copy(rows[static_cast<size_t>(i)], vectors.data() + i * all.width);
     indices.resize(rows.size());
     std::iota(indices.begin(), indices.end(), 0u);
-    Splitter splitter(vectors.data(), all.width);
+    Splitter splitter(CopiedRows{vectors.data(), all.width}, all.width);
     parts.push_back({0, count, splitter.Measure(indices.data(), count)});
     const auto smaller = [this](int64_t a, int64_t b) {
       const double x = parts[static_cast<size_t>(a)].squares, y = parts[static_cast<size_t>(b)].squares;
@@ -272,7 +288,7 @@ std::vector<Branch> Branches(const Vectors& all) {
     ParallelFor(0, static_cast<int64_t>(waiting.size()), 1, [&](int64_t first, int64_t last) {
       for (int64_t k = first; k < last; ++k) {
         const Part part = waiting[static_cast<size_t>(k)];
-        Splitter splitter(all.rows.data(), all.width);
+        Splitter splitter(CloudRows(all), all.width);
         uint32_t* begin = indices.data() + part.begin;
         const int64_t count = part.end - part.begin;
         const int64_t middle =
@@ -327,9 +343,7 @@ void Refine(const Branch& branch, const Branch::Group& group, int64_t first_entr
   const auto entries = static_cast<int64_t>(group.leaves.size());
   Buffer<int16_t> points(static_cast<size_t>(count * all.width));
   for (int64_t i = 0; i < count; ++i) {
-    std::memcpy(points.data() + i * all.width,
-                branch.vectors.data() + int64_t{branch.indices[static_cast<size_t>(group.begin + i)]} * all.width,
-                static_cast<size_t>(all.width) * sizeof(int16_t));
+    all.Copy(branch.rows[branch.indices[static_cast<size_t>(group.begin + i)]], points.data() + i * all.width);
   }
   Buffer<uint16_t> nearest(static_cast<size_t>(count));
   for (int64_t c = 0; c < entries; ++c) {
@@ -372,7 +386,7 @@ void Refine(const Branch& branch, const Branch::Group& group, int64_t first_entr
 
 ShPalette BuildShPalette(const GaussianCloud& cloud, int64_t entries, int iterations) {
   const float spread = SpreadOf(cloud);
-  const Vectors all = Quantized(cloud, spread);
+  const Vectors all = VectorsOf(cloud, spread);
   std::vector<Branch> branches = Branches(all);
   ParallelFor(0, static_cast<int64_t>(branches.size()), 1, [&](int64_t first, int64_t last) {
     for (int64_t b = first; b < last; ++b) {

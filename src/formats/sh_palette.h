@@ -19,7 +19,7 @@ struct ShPalette {
 // largest sum of squares next (Linde, Buzo & Gray 1980, with the greedy order of Wu 1992); then `iterations` rounds of
 // k-means improve the result, in which a vector may choose among the 256 centroids of its branch of the tree (4,096 in small sets).
 // Vectors are compared in 12-bit integers over ±64 standard deviations at most, so the result is the same everywhere;
-// NaN counts as 0. Takes 96 bytes per Gaussian at degree 3. The cloud has degree 1–3 and at least one Gaussian.
+// NaN counts as 0. Takes about 16 bytes per Gaussian. The cloud has degree 1–3 and at least one Gaussian.
 ShPalette BuildShPalette(const GaussianCloud& cloud, int64_t entries, int iterations);
 
 }  // namespace anchorsplat

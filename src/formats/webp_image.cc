@@ -15,7 +15,7 @@ constexpr int kMethod = 1;
 
 }  // namespace
 
-Result<std::string> EncodeWebp(const ByteImage& image) {
+Result<std::string> EncodeWebp(ByteImage image) {
   WebPConfig config;
   WebPPicture picture;
   if (WebPConfigInit(&config) == 0 || WebPPictureInit(&picture) == 0) {
@@ -32,8 +32,9 @@ Result<std::string> EncodeWebp(const ByteImage& image) {
   WebPMemoryWriterInit(&writer);
   picture.writer = WebPMemoryWrite;
   picture.custom_ptr = &writer;
-  const bool encoded =
-      WebPPictureImportRGBA(&picture, image.rgba.data(), 4 * image.width) != 0 && WebPEncode(&config, &picture) != 0;
+  const bool imported = WebPPictureImportRGBA(&picture, image.rgba.data(), 4 * image.width) != 0;
+  image.rgba = Buffer<uint8_t>();
+  const bool encoded = imported && WebPEncode(&config, &picture) != 0;
   const int code = static_cast<int>(picture.error_code);
   WebPPictureFree(&picture);
   std::string bytes(reinterpret_cast<const char*>(writer.mem), encoded ? writer.size : 0);

@@ -18,7 +18,8 @@ struct ByteImage {
 };
 
 // Lossless WebP; colours of pixels with alpha 0 are kept. Sides of 1–16,383.
-Result<std::string> EncodeWebp(const ByteImage& image);
+// The image is let go as soon as the encoder has its own copy.
+Result<std::string> EncodeWebp(ByteImage image);
 
 // `where` begins messages. Errors (kBadFile): no WebP, damaged, fewer than `min_pixels` or more than `max_pixels`
 // (checked before anything is allocated).

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +11,17 @@ namespace anchorsplat {
 // For paths: an empty one is a variable that was not set, not a wish for the default.
 inline CLI::Validator NotEmpty() {
   return CLI::Validator([](const std::string& text) { return text.empty() ? "must not be empty" : ""; }, "");
+}
+
+// For counts of things to do or to keep.
+inline CLI::Validator AtLeastOne() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        int64_t value = 0;
+        const bool number = CLI::detail::lexical_cast(text, value);
+        return number && value >= 1 ? "" : "must be 1 or more, found '" + text + "'";
+      },
+      "");
 }
 
 // An option that takes one of several words for the values of an enumeration. Help shows the words and the default;

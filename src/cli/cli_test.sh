@@ -58,12 +58,19 @@ expect 2 "unknown flag" "$program" info "$input" --colour
 # convert.
 for to in compressed.ply spz sog splat glb csv npz; do
   expect 0 "convert to $to" "$program" convert "$input" "$work/scan.$to" --max-gaussians 500 --sh-degree 1
-  says stdout "500 of degree 1 out"
+  says stdout "500 of degree $([ $to = splat ] && echo 0 || echo 1) out"
 done
 for from in compressed.ply spz sog splat glb; do
   expect 0 "info of $from" "$program" info "$work/scan.$from"
   says stdout "500"
 done
+expect 0 "info of an SPZ" "$program" info "$work/scan.spz" --json
+says stdout '"positions": "1'
+says stdout '"version": "4, a zstd stream per attribute"'
+expect 0 "info of a GLB" "$program" info "$work/scan.glb"
+says stdout "kernel  ellipse"
+expect 0 "info of a SOG" "$program" info "$work/scan.sog"
+says stdout "a ZIP archive"
 expect 0 "convert with a report" "$program" convert "$work/scan.compressed.ply" "$work/again.spz" --report --spz-version 3
 says stdout "PSNR"
 expect 0 "convert a batch" "$program" convert "$work/scan.glb" "$work/again.spz" --out-dir "$work/batch" --to .x.ply --json
@@ -71,6 +78,32 @@ says stdout '"gaussians"'
 expect 5 "convert over a file" "$program" convert "$input" "$work/scan.spz"
 expect 2 "convert without a place to write" "$program" convert "$input"
 expect 2 "convert with axes that are none" "$program" convert "$input" "$work/b.ply" --coords XYZ
+expect 2 "convert with empty axes" "$program" convert "$input" "$work/b.ply" --coords ""
+says stderr "--coords"
+expect 2 "convert to no Gaussians" "$program" convert "$input" "$work/b.ply" --max-gaussians 0
+says stderr "1 or more"
+expect 1 "one bad file does not stop the others" "$program" convert "$work/scan.glb" "$work/none.ply" "$work/again.spz" --out-dir "$work/some" --to ply -w --json
+says stderr "1 of 3 files"
+says stdout '"failure"'
+says stdout '"not_found"'
+checks=$((checks + 1))
+[ "$(grep -c '"gaussians"' "$work/stdout")" -eq 2 ] || { failures=$((failures + 1)); echo "FAILED: both good files should be reported"; }
+expect 2 "a batch to no format" "$program" convert "$work/scan.glb" --out-dir "$work/some" --to obj
+says stderr "--to"
+expect 0 "a batch of folders" "$program" convert "$work/scan.glb" --out-dir "$work/folders" --to meta.json
+expect 0 "info of a folder" "$program" info "$work/folders/scan/meta.json"
+expect 0 "a folder by its name" "$program" convert "$work/folders/scan/meta.json" --out-dir "$work/folders" --to spz
+expect 5 "folder and name" "$program" convert "$work/folders/scan/meta.json" "$work/folders/scan.spz"
+expect 2 "half a meta.json" "$program" convert "$work/scan.glb" "$work/scan-meta.json"
+expect 0 "harmonics without a place are said" "$program" convert "$work/scan.glb" "$work/dull.splat"
+says stderr "harmonics beyond degree 0"
+says stdout "of degree 0 out"
+expect 0 "a report of what is not read" "$program" convert "$work/scan.glb" "$work/report.csv" --report
+says stderr "nothing to compare"
+checks=$((checks + 1))
+"$program" convert - "$work/piped.ply" -q <"$work/scan.spz" && cat "$work/scan.spz" | "$program" convert /dev/stdin "$work/piped.ply" -w -q ||
+  { failures=$((failures + 1)); echo "FAILED: convert from standard input"; }
+expect 2 "convert to standard output" "$program" convert "$input" -
 
 # enhance.
 expect 0 "enhance" "$program" enhance "$input" -o "$work/out.ply" --pixel-size 0.0055
@@ -168,6 +201,11 @@ says_page '"degree":0'
 says_page 'a\u003c/script\u003eb'
 expect 2 "truth without cameras" "$program" view "$input" -o "$work/x.html" --truth "$work"
 expect 3 "truth of other names" "$program" view "$input" -o "$work/x.html" --truth "$source/src" --cameras "$cameras"
+says stderr "no PNG or JPEG"
+expect 3 "truth that is not there" "$program" view "$input" -o "$work/x.html" --truth "$work/nowhere" --cameras "$cameras"
+says stderr "no such folder"
+expect 2 "a page over a splat" "$program" view "$input" -o "$work/scan.spz" -w
+says stderr ".html"
 expect 2 "SH degree 4" "$program" view "$input" -o "$work/x.html" --sh-degree 4
 
 # compare.

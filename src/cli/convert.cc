@@ -8,6 +8,7 @@
 
 #include "cli/choice.h"
 #include "cli/verb.h"
+#include "core/log.h"
 #include "core/text.h"
 #include "formats/registry.h"
 #include "metrics/conversion_loss.h"
@@ -23,14 +24,15 @@ struct ConvertFlags {
   std::vector<std::string> paths;  // inputs, and the output as the last one without --out-dir
   std::string out_dir;
   std::string to = ".ply";
-  std::string axes;
+  std::optional<std::string> axes;
   int views = 8;
   bool report = false;
   ConvertOptions options;
 };
 
-// "scan.compressed.ply" without the extension of its format.
+// "scan.compressed.ply" without the extension of its format; "scan/meta.json" is the folder's name.
 std::string Stem(const fs::path& input) {
+  if (input.filename() == "meta.json" && input.has_parent_path()) return input.parent_path().filename().string();
   const std::string name = input.filename().string();
   const SplatFormat* format = FormatOfExtension(input);
   size_t longest = input.extension().string().size();
@@ -41,18 +43,38 @@ std::string Stem(const fs::path& input) {
   return name.substr(0, name.size() - longest);
 }
 
-Result<std::vector<std::pair<fs::path, fs::path>>> Jobs(const ConvertFlags& flags, bool overwrite) {
-  std::vector<std::pair<fs::path, fs::path>> jobs;
+std::string WrittenFormats() {
+  std::string text;
+  for (const SplatFormat& format : Formats()) {
+    if (format.write != nullptr) text += Cat(text.empty() ? "" : " ", format.extensions.front());
+  }
+  return text;
+}
+
+struct Job {
+  fs::path input, output;
+};
+
+Result<std::vector<Job>> Jobs(const ConvertFlags& flags, bool overwrite) {
+  std::vector<Job> jobs;
   if (flags.out_dir.empty()) {
     if (flags.paths.size() != 2) {
       return Error{ErrorCode::kBadArgument, "say IN OUT, or several inputs with --out-dir DIR"};
     }
-    jobs.emplace_back(flags.paths[0], flags.paths[1]);
+    jobs.push_back({flags.paths[0], flags.paths[1]});
     return jobs;
+  }
+  // Folders of pictures get one folder each; ".spz" may be said without its dot.
+  const bool folders = flags.to == "meta.json";
+  const std::string extension = folders ? "/meta.json" : flags.to.starts_with('.') ? flags.to : "." + flags.to;
+  const SplatFormat* const format = FormatOfExtension(fs::path("x" + extension));
+  if (format == nullptr || format->write == nullptr) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--to: '", Printable(flags.to), "' is no format that is written; written are ", WrittenFormats())};
   }
   std::map<fs::path, std::string> taken;
   for (const std::string& input : flags.paths) {
-    const fs::path output = fs::path(flags.out_dir) / (Stem(input) + flags.to);
+    const fs::path output = fs::path(flags.out_dir) / (Stem(input) + extension);
     const auto [other, fresh] = taken.emplace(output, input);
     if (!fresh) {
       return Error{ErrorCode::kBadArgument,
@@ -62,26 +84,33 @@ Result<std::vector<std::pair<fs::path, fs::path>>> Jobs(const ConvertFlags& flag
     if (!overwrite && fs::exists(output)) {
       return Error{ErrorCode::kExists, Cat(output.string(), " exists; -w replaces it")};
     }
-    jobs.emplace_back(input, output);
+    jobs.push_back({input, output});
   }
-  std::error_code code;
-  fs::create_directories(flags.out_dir, code);
-  if (code) return Error{ErrorCode::kIo, Cat(flags.out_dir, ": cannot make this folder: ", code.message())};
+  for (const Job& job : jobs) {
+    std::error_code code;
+    fs::create_directories(job.output.parent_path(), code);
+    if (code) {
+      return Error{ErrorCode::kIo,
+                   Cat(job.output.parent_path().string(), ": cannot make this folder: ", code.message())};
+    }
+  }
   return jobs;
 }
 
 nlohmann::json ToJson(const Deviation& deviation) { return {{"rms", deviation.rms}, {"max", deviation.max}}; }
 
-nlohmann::json ToJson(const fs::path& input, const fs::path& output, const ConvertReport& r,
-                      const std::optional<ConversionLoss>& loss) {
-  nlohmann::json json = {{"input", input.string()},
-                         {"output", output.string()},
+nlohmann::json ToJson(const Job& job, const ConvertReport& r, const std::optional<ConversionLoss>& loss) {
+  nlohmann::json json = {{"input", job.input.string()},
+                         {"output", job.output.string()},
                          {"formats", {r.input_format, r.output_format}},
                          {"gaussians", {{"in", r.gaussians_read}, {"out", r.gaussians_written}}},
                          {"sh_degree", {{"in", r.sh_degree_read}, {"out", r.sh_degree_written}}},
                          {"bytes", {{"in", r.input_bytes}, {"out", r.output_bytes}}},
                          {"seconds", {{"read", r.read_seconds}, {"write", r.write_seconds}}}};
-  if (r.predicted_bytes) json["bytes"]["predicted"] = *r.predicted_bytes;
+  if (r.predicted_bytes) {
+    json["bytes"]["predicted"] = *r.predicted_bytes;
+    json["bytes"]["predicted_roughly"] = r.predicted_roughly;
+  }
   if (r.error) {
     json["error"] = {{"compared", r.error->compared},           {"left_out", r.error->left_out},
                      {"means", ToJson(r.error->means)},         {"log_scales", ToJson(r.error->log_scales)},
@@ -92,11 +121,12 @@ nlohmann::json ToJson(const fs::path& input, const fs::path& output, const Conve
   return json;
 }
 
-void Print(const fs::path& input, const fs::path& output, const ConvertReport& r,
-           const std::optional<ConversionLoss>& loss) {
-  std::cout << input.string() << " (" << r.input_format << ", " << HumanBytes(r.input_bytes) << ") -> "
-            << output.string() << " (" << r.output_format << ", " << HumanBytes(r.output_bytes);
-  if (r.predicted_bytes) std::cout << ", predicted " << HumanBytes(*r.predicted_bytes);
+void Print(const Job& job, const ConvertReport& r, const std::optional<ConversionLoss>& loss) {
+  std::cout << job.input.string() << " (" << r.input_format << ", " << HumanBytes(r.input_bytes) << ") -> "
+            << job.output.string() << " (" << r.output_format << ", " << HumanBytes(r.output_bytes);
+  if (r.predicted_bytes) {
+    std::cout << ", predicted " << (r.predicted_roughly ? "about " : "") << HumanBytes(*r.predicted_bytes);
+  }
   std::cout << ")\n  " << WithThousands(r.gaussians_read) << " Gaussians of SH degree " << r.sh_degree_read << " in, "
             << WithThousands(r.gaussians_written) << " of degree " << r.sh_degree_written << " out; read in "
             << HumanSeconds(r.read_seconds) << ", written in " << HumanSeconds(r.write_seconds) << '\n';
@@ -124,38 +154,59 @@ Status ConvertModel(const ConvertFlags& flags, const SharedFlags& shared) {
   return {};
 }
 
-Status RunConvert(const ConvertFlags& flags, const SharedFlags& shared) {
+// One file: converted, measured where asked for, told. A row of the JSON document.
+Result<nlohmann::json> RunJob(const Job& job, const ConvertOptions& options, int views, const SharedFlags& shared) {
+  GaussianCloud cloud;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ConvertReport report,
+                               ConvertFile(job.input, job.output, options, options.measure ? &cloud : nullptr));
+  std::optional<ConversionLoss> loss;
+  if (report.error) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadCloud(job.output));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(loss, MeasureConversionLoss(cloud, back, views));
+  } else if (options.measure) {
+    LogWarning(Cat(job.output.string(), ": ", report.output_format,
+                   " is only written, not read: --report has nothing to compare"));
+  }
+  if (!shared.json && !shared.quiet) Print(job, report, loss);
+  return ToJson(job, report, loss);
+}
+
+Status RunConvert(const ConvertFlags& flags, Program& program) {
+  const SharedFlags& shared = program.flags;
   if (flags.out_dir.empty() && flags.paths.size() == 2 && fs::path(flags.paths[1]).extension() == ".safetensors") {
     return ConvertModel(flags, shared);
   }
   ConvertOptions options = flags.options;
   options.write.overwrite = shared.overwrite;
   options.measure = flags.report;
-  if (!flags.axes.empty()) ANCHORSPLAT_RETURN_IF_ERROR(ParseAxes(flags.axes, options));
+  if (flags.axes) {
+    const Status axes = ParseAxes(*flags.axes, options);
+    if (!axes.ok()) return Error{axes.error().code, Cat("--coords: ", axes.error().message)};
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto jobs, Jobs(flags, shared.overwrite));
   nlohmann::json results = nlohmann::json::array();
-  for (const auto& [input, output] : jobs) {
-    GaussianCloud cloud;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const ConvertReport report,
-                                 ConvertFile(input, output, options, flags.report ? &cloud : nullptr));
-    std::optional<ConversionLoss> loss;
-    if (report.error) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadCloud(output));
-      ANCHORSPLAT_ASSIGN_OR_RETURN(loss, MeasureConversionLoss(cloud, back, flags.views));
+  size_t failed = 0;
+  for (const Job& job : jobs) {
+    const Result<nlohmann::json> row = RunJob(job, options, flags.views, shared);
+    if (row.ok()) {
+      results.push_back(*row);
+      continue;
     }
-    results.push_back(ToJson(input, output, report, loss));
-    if (!shared.json && !shared.quiet) Print(input, output, report, loss);
+    const Error& error = row.error();
+    if (jobs.size() == 1 || error.code == ErrorCode::kInterrupted) return error;
+    // One bad file of many is no reason to leave the others undone.
+    ++failed;
+    LogError(error.message);
+    results.push_back({{"input", job.input.string()},
+                       {"output", job.output.string()},
+                       {"failure", {{"code", CodeName(error.code)}, {"message", error.message}}}});
   }
   if (shared.json) PrintJson(results);
-  return {};
-}
-
-std::string WrittenFormats() {
-  std::string text;
-  for (const SplatFormat& format : Formats()) {
-    if (format.write != nullptr) text += Cat(text.empty() ? "" : " ", format.extensions.front());
+  if (failed > 0) {
+    LogError(Cat(failed, " of ", jobs.size(), " files could not be converted"));
+    program.exit_code = kPartialExitCode;
   }
-  return text;
+  return {};
 }
 
 }  // namespace
@@ -166,20 +217,23 @@ void AddConvert(CLI::App& app, Program& program) {
   const auto flags = std::make_shared<ConvertFlags>();
   ConvertOptions& options = flags->options;
   verb.add_option("paths", flags->paths,
-                  Cat("IN OUT, or inputs for --out-dir. Written: ", WrittenFormats(),
+                  Cat("IN OUT, or inputs for --out-dir; - is standard input. Written: ", WrittenFormats(),
                       ", and .safetensors of a network's weights"))
       ->required();
   auto* out_dir = verb.add_option("--out-dir", flags->out_dir, "Folder to write to, under the inputs' names");
-  verb.add_option("--to", flags->to, "Extension of the files in --out-dir")->capture_default_str()->needs(out_dir);
+  verb.add_option("--to", flags->to, "Extension of the files in --out-dir; meta.json makes a folder of each")
+      ->capture_default_str()
+      ->needs(out_dir);
   verb.add_option("--sh-degree", options.sh_degree, "Spherical harmonics to keep, 0 to 3")->check(CLI::Range(0, 3));
   verb.add_option("--min-opacity", options.min_opacity, "Drop Gaussians that are fainter, 0 to 1")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   verb.add_option("--max-gaussians", options.max_gaussians, "Keep at most so many, those of the largest size x opacity")
-      ->check(CLI::PositiveNumber);
+      ->check(AtLeastOne());
   verb.add_option("--coords", flags->axes,
                   "What the files' axes really are where they do not follow their format, as IN:OUT, for example RUB: "
-                  "for a PLY with y up, :RDF for an SPZ as careless programs expect it");
+                  "for a PLY with y up, :RDF for an SPZ as careless programs expect it")
+      ->check(NotEmpty());
   AddChoice(verb, "--sort", options.write.order,
             {{"format", SplatOrder::kFormat},
              {"keep", SplatOrder::kKeep},
@@ -193,7 +247,7 @@ void AddConvert(CLI::App& app, Program& program) {
   verb.add_option("--report-views", flags->views, "Views around the splat for the PSNR")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  verb.callback([flags, &program] { program.run = [flags, &program] { return RunConvert(*flags, program.flags); }; });
+  verb.callback([flags, &program] { program.run = [flags, &program] { return RunConvert(*flags, program); }; });
 }
 
 }  // namespace anchorsplat

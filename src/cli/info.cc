@@ -14,6 +14,7 @@
 #include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/pixel_size_estimate.h"
+#include "formats/input_file.h"
 #include "formats/registry.h"
 #include "formats/tensor_file.h"
 #include "model/checkpoint_writer.h"
@@ -25,7 +26,8 @@ namespace {
 // Everything `info` found, once for the table and once for JSON.
 struct Findings {
   std::string file;
-  std::string format;  // by content; empty for what can be read only once
+  std::string format;  // by content
+  FormatFacts facts;
   uint64_t file_bytes = 0;
   GaussianCloud cloud;
   CloudStatistics statistics;
@@ -72,6 +74,7 @@ void PrintTable(const Findings& f) {
             << "  Gaussians    " << WithThousands(s.gaussians) << ", SH degree " << s.sh_degree << "\n"
             << "  file         " << HumanBytes(f.file_bytes) << (f.format.empty() ? "" : ", " + f.format) << "\n"
             << "  render mode  " << ModeName(f.cloud) << "\n";
+  for (const auto& [name, value] : f.facts.all()) std::cout << "  " << name << "  " << value << "\n";
   if (s.bounds) {
     std::cout << "  bounds      ";
     for (size_t a = 0; a < 3; ++a) {
@@ -103,7 +106,8 @@ void PrintTable(const Findings& f) {
   std::cout << "\nwritten as:";
   for (const SplatFormat& format : Formats()) {
     if (format.write == nullptr || format.predicted_size == nullptr) continue;
-    std::cout << "  " << format.name << " " << HumanBytes(format.predicted_size(s.gaussians, s.sh_degree));
+    std::cout << "  " << format.name << (format.size_is_estimate ? " about " : " ")
+              << HumanBytes(format.predicted_size(s.gaussians, s.sh_degree));
   }
   std::cout << "\n\n" << (f.problems.empty() ? "no problems found" : "found:") << "\n";
   for (const std::string& problem : f.problems) std::cout << "  - " << problem << "\n";
@@ -118,6 +122,7 @@ nlohmann::json ToJson(const Findings& f) {
   };
   nlohmann::json json = {{"file", f.file},
                          {"format", f.format},
+                         {"facts", nlohmann::json::object()},
                          {"bytes", f.file_bytes},
                          {"gaussians", s.gaussians},
                          {"sh_degree", s.sh_degree},
@@ -139,7 +144,9 @@ nlohmann::json ToJson(const Findings& f) {
                          {"linear_looking_scales", s.linear_looking_scales},
                          {"linear_looking_opacities", s.linear_looking_opacities},
                          {"problems", f.problems},
-                         {"predicted_bytes", nlohmann::json::object()}};
+                         {"predicted_bytes", nlohmann::json::object()},
+                         {"predicted_roughly", nlohmann::json::array()}};
+  for (const auto& [name, value] : f.facts.all()) json["facts"][name] = value;
   if (s.bounds) json["bounds"] = {{"min", s.bounds->min}, {"max", s.bounds->max}};
   if (f.cloud.render_mode) json["render_mode"] = ModeName(f.cloud);
   if (f.pixel_size.ok()) {
@@ -148,6 +155,7 @@ nlohmann::json ToJson(const Findings& f) {
   for (const SplatFormat& format : Formats()) {
     if (format.write == nullptr || format.predicted_size == nullptr) continue;
     json["predicted_bytes"][std::string(format.name)] = format.predicted_size(s.gaussians, s.sh_degree);
+    if (format.size_is_estimate) json["predicted_roughly"].push_back(format.name);
   }
   return json;
 }
@@ -190,27 +198,22 @@ Status RunModelInfo(const std::string& file, const SharedFlags& shared) {
   return {};
 }
 
-std::string FormatName(const std::filesystem::path& path) {
-  std::error_code code;
-  if (!std::filesystem::is_regular_file(path, code)) return "";
-  std::string head(kSniffBytes, '\0');
-  std::ifstream in(path, std::ios::binary);
-  in.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<size_t>(in.gcount()));
-  const SplatFormat* format = FormatOfFile(head, path);
-  return format == nullptr ? "" : std::string(format->name);
-}
-
-Status RunInfo(const std::string& file, const SharedFlags& shared) {
-  if (LooksLikeModel(file)) return RunModelInfo(file, shared);
-  if (LooksLikeMesh(file)) return RunMeshInfo(file, shared);
+Status RunInfo(const std::string& path, const SharedFlags& shared) {
+  if (LooksLikeModel(path)) return RunModelInfo(path, shared);
+  if (LooksLikeMesh(path)) return RunMeshInfo(path, shared);
+  // Opened once: a pipe can be read only once.
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
   Findings findings;
-  findings.file = file;
-  findings.format = FormatName(file);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(findings.cloud, ReadCloud(file));
-  std::error_code code;
-  findings.file_bytes = std::filesystem::file_size(file, code);
-  if (code) findings.file_bytes = 0;  // a pipe has no size
+  findings.file = path;
+  findings.file_bytes = file.size();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(findings.cloud, ReadOpenCloud(file));
+  if (const SplatFormat* format = FormatOfFile(head, path)) {
+    findings.format = format->name;
+    if (format->describe != nullptr) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(findings.facts, format->describe(file));
+    }
+  }
   findings.statistics = ComputeStatistics(findings.cloud);
   findings.pixel_size = EstimatePixelSize(findings.cloud);
   findings.problems = Problems(findings.statistics);

@@ -13,24 +13,6 @@ namespace anchorsplat {
 
 namespace {
 
-const char* CodeName(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::kBadArgument:
-      return "bad_argument";
-    case ErrorCode::kNotFound:
-      return "not_found";
-    case ErrorCode::kBadFile:
-      return "bad_file";
-    case ErrorCode::kExists:
-      return "exists";
-    case ErrorCode::kIo:
-      return "io";
-    case ErrorCode::kInterrupted:
-      return "interrupted";
-  }
-  return "unknown";
-}
-
 int Fail(const SharedFlags& flags, const Error& error) {
   LogError(error.message);
   if (flags.json) PrintJson({{"error", {{"code", CodeName(error.code)}, {"message", error.message}}}});
@@ -57,6 +39,24 @@ CLI::App& AddVerb(CLI::App& app, Program& program, const std::string& name, cons
       ->capture_default_str()
       ->group(group);
   return verb;
+}
+
+const char* CodeName(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kBadArgument:
+      return "bad_argument";
+    case ErrorCode::kNotFound:
+      return "not_found";
+    case ErrorCode::kBadFile:
+      return "bad_file";
+    case ErrorCode::kExists:
+      return "exists";
+    case ErrorCode::kIo:
+      return "io";
+    case ErrorCode::kInterrupted:
+      return "interrupted";
+  }
+  return "unknown";
 }
 
 int ExitCode(ErrorCode code) {

@@ -45,6 +45,8 @@ void AddFit(CLI::App& app, Program& program);
 void AddDataset(CLI::App& app, Program& program);
 void AddBench(CLI::App& app, Program& program);
 
+const char* CodeName(ErrorCode code);  // in JSON: "not_found"
+
 // 0 on success; each kind of failure has a number of its own (docs/cli.md).
 int ExitCode(ErrorCode code);
 inline constexpr int kUsageExitCode = 2;

@@ -1,9 +1,11 @@
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "cli/choice.h"
 #include "cli/parse.h"
 #include "cli/verb.h"
 #include "core/text.h"
@@ -73,7 +75,21 @@ std::optional<uint64_t> FileBytes(const std::string& path) {
   return bytes;
 }
 
+// A page written over a splat by a slip of the keyboard would be a loss.
+bool IsPageName(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return std::tolower(c); });
+  return extension == ".html" || extension == ".htm";
+}
+
 Status RunView(const PageFlags& flags, const SharedFlags& shared) {
+  if (!IsPageName(flags.output)) {
+    return Error{ErrorCode::kBadArgument, Cat("--output: ", flags.output, " is no name for a page, expected .html")};
+  }
+  std::error_code unknown;
+  if (!flags.truth.empty() && !fs::is_directory(flags.truth, unknown)) {
+    return Error{ErrorCode::kNotFound, Cat("--truth: ", flags.truth, ": no such folder")};
+  }
   if (!shared.overwrite && fs::exists(flags.output)) {
     return Error{ErrorCode::kExists, Cat(flags.output, " exists; -w replaces it")};
   }
@@ -132,7 +148,7 @@ void AddView(CLI::App& app, Program& program) {
   auto* cameras = verb.add_option("--cameras", flags->cameras, "Views to jump to; the first one opens the page");
   verb.add_option("--truth", flags->truth, "Folder of true pictures with the cameras' names")->needs(cameras);
   verb.add_option("--views", flags->views, "How many of the cameras at most, evenly chosen")
-      ->check(CLI::PositiveNumber)
+      ->check(AtLeastOne())
       ->capture_default_str();
   verb.add_option("--pixel-size", flags->pixel_size,
                   "World size of one training pixel, for the scale bar; auto: estimated from BEFORE")

@@ -27,6 +27,8 @@ class OutputFile {
   OutputFile& operator=(OutputFile&& other) noexcept;
   ~OutputFile();
 
+  const std::filesystem::path& path() const { return path_; }
+
   // Claims disk space, so that a full disk is an error now and not at the last byte. The final size is still decided by
   // what is written; file systems that cannot reserve are no error.
   Status Reserve(uint64_t bytes);

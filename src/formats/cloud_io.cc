@@ -3,9 +3,11 @@
 #include <new>
 #include <string>
 
+#include "core/log.h"
 #include "core/text.h"
 #include "formats/input_file.h"
 #include "formats/registry.h"
+#include "formats/write_losses.h"
 
 namespace anchorsplat {
 
@@ -60,7 +62,9 @@ Status WriteCloud(const std::filesystem::path& path, const GaussianCloud& cloud,
                                                : Cat("is a ", format->name, " file, which this version does not write");
     return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", what, "; it writes ", Known(&SplatFormat::write))};
   }
-  return format->write(path, cloud, options);
+  ANCHORSPLAT_RETURN_IF_ERROR(format->write(path, cloud, options));
+  for (const std::string& loss : WriteLosses(*format, cloud)) LogWarning(Cat(path.string(), ": ", loss));
+  return {};
 } catch (const std::bad_alloc&) {
   return OutOfMemory(path);
 }

@@ -200,12 +200,13 @@ TEST(Registry, RowsAreConsistent) {
     EXPECT_FALSE(format.name.empty());
     ASSERT_FALSE(format.extensions.empty());
     for (const std::string_view extension : format.extensions) {
-      EXPECT_EQ(FormatOfExtension("A File" + std::string(extension)), &format);
+      EXPECT_EQ(FormatOfExtension((extension.starts_with('.') ? "A File" : "a/") + std::string(extension)), &format);
     }
   }
   EXPECT_EQ(FormatOfExtension("A.COMPRESSED.PLY")->name, "compressed PLY");
   EXPECT_EQ(FormatOfExtension("compressed.ply")->name, "PLY");
   EXPECT_EQ(FormatOfExtension("plain"), nullptr);
+  EXPECT_EQ(FormatOfExtension("not-meta.json"), nullptr);
   EXPECT_EQ(FormatOfFile("ply\nformat binary_little_endian 1.0\nelement chunk 3\n", "a.ply")->name, "compressed PLY");
   EXPECT_EQ(FormatOfFile("NGSP", "a.ply")->name, "SPZ");
 }

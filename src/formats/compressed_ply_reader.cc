@@ -214,4 +214,16 @@ Result<GaussianCloud> ReadCompressedPly(const InputFile& file, const ReadLimits&
   return cloud;
 }
 
+Result<FormatFacts> DescribeCompressedPly(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyHeader header, ReadPlyHeader(file));
+  FormatFacts facts;
+  if (const PlyElement* chunks = header.Find("chunk")) {
+    facts.Add("chunks", WithThousands(chunks->count), " of up to ", kCompressedPlyChunk);
+    facts.Add("colours", chunks->Find("min_r") != nullptr ? "in a range per chunk" : "from 0 to 1");
+  }
+  const PlyElement* harmonics = header.Find("sh");
+  facts.Add("harmonics", harmonics == nullptr ? "none" : Cat(harmonics->properties.size(), " bytes per Gaussian"));
+  return facts;
+}
+
 }  // namespace anchorsplat

@@ -5,6 +5,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
+#include "formats/format_facts.h"
 #include "formats/input_file.h"
 
 namespace anchorsplat {
@@ -22,5 +23,8 @@ inline constexpr int64_t kCompressedPlyChunk = 256;
 // Errors (kBadFile): elements or properties missing or of another type, not binary little-endian, counts that do not
 // belong together, fewer bytes than the header promises, more than `limits.max_gaussians`.
 Result<GaussianCloud> ReadCompressedPly(const InputFile& file, const ReadLimits& limits = {});
+
+// Chunks, their colour ranges and the element for SH. Errors as ReadCompressedPly.
+Result<FormatFacts> DescribeCompressedPly(const InputFile& file);
 
 }  // namespace anchorsplat

@@ -14,6 +14,7 @@
 #include "formats/input_file.h"
 #include "formats/quantize.h"
 #include "formats/registry.h"
+#include "formats/sog_writer.h"
 #include "formats/splat_order.h"
 
 namespace anchorsplat {
@@ -55,20 +56,11 @@ uint64_t SizeOf(const fs::path& path) {
 }
 
 // A SOG folder is its meta.json and the pictures beside it; other files are themselves.
-uint64_t OutputSize(const fs::path& path) {
-  if (path.filename() != "meta.json") return SizeOf(path);
+uint64_t OutputSize(const fs::path& path, int sh_degree) {
   uint64_t sum = SizeOf(path);
-  std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(path.parent_path().empty() ? "." : path.parent_path(), ignored)) {
-    if (entry.path().extension() == ".webp") sum += SizeOf(entry.path());
-  }
+  if (path.filename() != "meta.json") return sum;
+  for (const char* picture : SogPictures(sh_degree)) sum += SizeOf(path.parent_path() / picture);
   return sum;
-}
-
-Result<const SplatFormat*> FormatOfInput(const fs::path& path) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
-  return FormatOfFile(head, path);
 }
 
 }  // namespace
@@ -150,16 +142,19 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   ConvertReport report;
   const SplatFormat* const to = FormatOfExtension(output);
   if (to == nullptr || to->write == nullptr) return WriteCloud(output, GaussianCloud{}, options.write).error();
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatFormat* const from, FormatOfInput(input));
+  // Opened once: a pipe can be read only once.
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(input));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
+  const SplatFormat* const from = FormatOfFile(head, input);
 
   const double begin = Now();
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, ReadCloud(input));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, ReadOpenCloud(file));
   report.read_seconds = Now() - begin;
   report.input_format = from != nullptr ? from->name : "";
   report.output_format = to->name;
   report.gaussians_read = cloud.size();
   report.sh_degree_read = cloud.sh_degree;
-  report.input_bytes = SizeOf(input);
+  report.input_bytes = file.size();
 
   if (options.sh_degree) SetShDegree(cloud, *options.sh_degree);
   DropFaint(cloud, options.min_opacity);
@@ -183,9 +178,10 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(output, cloud, write));
   report.write_seconds = Now() - written;
   report.gaussians_written = cloud.size();
-  report.sh_degree_written = cloud.sh_degree;
-  report.output_bytes = OutputSize(output);
+  report.sh_degree_written = std::min(cloud.sh_degree, to->range.sh_degree);
+  report.output_bytes = OutputSize(output, cloud.sh_degree);
   if (to->predicted_size != nullptr) report.predicted_bytes = to->predicted_size(cloud.size(), cloud.sh_degree);
+  report.predicted_roughly = to->size_is_estimate;
   if (options.measure && to->read != nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadCloud(output));
     ANCHORSPLAT_ASSIGN_OR_RETURN(report.error,

@@ -31,9 +31,10 @@ Status ParseAxes(std::string_view text, ConvertOptions& options);
 struct ConvertReport {
   std::string input_format, output_format;
   int64_t gaussians_read = 0, gaussians_written = 0;
-  int sh_degree_read = 0, sh_degree_written = 0;
+  int sh_degree_read = 0, sh_degree_written = 0;  // what the output really has
   uint64_t input_bytes = 0, output_bytes = 0;
-  std::optional<uint64_t> predicted_bytes;  // where the size does not depend on the values
+  std::optional<uint64_t> predicted_bytes;
+  bool predicted_roughly = false;  // from what real splats take
   double read_seconds = 0, write_seconds = 0;
   std::optional<AttributeError> error;  // when measured
 };

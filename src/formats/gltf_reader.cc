@@ -168,7 +168,45 @@ Status ReadPrimitive(const Primitive& primitive, int64_t begin, GaussianCloud& c
   return {};
 }
 
+// What makes a primitive a splat.
+std::optional<JsonValue> SplatExtension(const JsonValue& primitive) {
+  const std::optional<JsonValue> extensions = primitive.Find("extensions");
+  return extensions ? extensions->Find(kExtension) : std::nullopt;
+}
+
 }  // namespace
+
+Result<FormatFacts> DescribeGltf(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GltfDocument document, GltfDocument::Open(file));
+  FormatFacts facts;
+  const auto add_text = [&facts](const char* name, const JsonValue& object, const char* key) {
+    const std::optional<JsonValue> value = object.Find(key);
+    if (value && value->raw().is_string()) facts.Add(name, Printable(value->raw().get<std::string>()));
+  };
+  if (const std::optional<JsonValue> asset = document.root().Find("asset")) add_text("made by", *asset, "generator");
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<GltfDocument::Placed> meshes, document.PlacedMeshes());
+  int64_t splats = 0, others = 0;
+  for (const GltfDocument::Placed& placed : meshes) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue mesh, document.Element("meshes", placed.mesh));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue list, mesh.Get("primitives"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> values, list.Elements());
+    for (const JsonValue& value : values) {
+      const std::optional<JsonValue> extension = SplatExtension(value);
+      if (!extension) {
+        ++others;
+      } else if (splats++ == 0) {
+        add_text("kernel", *extension, "kernel");
+        add_text("colour space", *extension, "colorSpace");
+        add_text("projection", *extension, "projection");
+        const std::optional<JsonValue> attributes = value.Find("attributes");
+        const bool points = attributes && attributes->has("COLOR_0");
+        facts.Add("colours for point viewers", points ? "yes (COLOR_0)" : "no");
+      }
+    }
+  }
+  facts.Add("primitives", splats, " of Gaussians", others > 0 ? Cat(", ", others, " others that are not read") : "");
+  return facts;
+}
 
 Result<GaussianCloud> ReadGltf(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GltfDocument document, GltfDocument::Open(file));
@@ -181,8 +219,7 @@ Result<GaussianCloud> ReadGltf(const InputFile& file, const ReadLimits& limits) 
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue list, mesh.Get("primitives"));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> values, list.Elements());
     for (const JsonValue& value : values) {
-      const std::optional<JsonValue> extensions = value.Find("extensions");
-      const std::optional<JsonValue> extension = extensions ? extensions->Find(kExtension) : std::nullopt;
+      const std::optional<JsonValue> extension = SplatExtension(value);
       if (!extension) continue;
       ANCHORSPLAT_ASSIGN_OR_RETURN(Primitive primitive, OpenPrimitive(document, value, *extension));
       primitive.scale = placed.scale;

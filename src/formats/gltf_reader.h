@@ -3,6 +3,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
+#include "formats/format_facts.h"
 #include "formats/input_file.h"
 
 namespace anchorsplat {
@@ -18,5 +19,8 @@ namespace anchorsplat {
 // circle, nodes that rotate or stretch (that needs SH to be rotated, which is not done), names that lead to another
 // folder, more than `limits.max_gaussians`.
 Result<GaussianCloud> ReadGltf(const InputFile& file, const ReadLimits& limits = {});
+
+// Who wrote it and what the extension says about each kind of primitive. Errors as ReadGltf.
+Result<FormatFacts> DescribeGltf(const InputFile& file);
 
 }  // namespace anchorsplat

@@ -23,6 +23,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "numbers are written as they lie in memory");
 
+constexpr const char* kPosition = "POSITION";
 constexpr int kFloat = 5126, kUnsignedShort = 5123, kArrayBuffer = 34962;
 
 // One accessor and how its values come about.
@@ -43,7 +44,7 @@ void PutFloats(const float* values, size_t count, uint8_t* bytes) { std::memcpy(
 
 std::vector<Attribute> Attributes(const GaussianCloud& cloud, const AxisFlip& flip) {
   std::vector<Attribute> out;
-  out.push_back({"POSITION", "VEC3", kFloat, 12, [&](int64_t row, uint8_t* bytes) {
+  out.push_back({kPosition, "VEC3", kFloat, 12, [&](int64_t row, uint8_t* bytes) {
                    float mean[3];
                    for (size_t k = 0; k < 3; ++k)
                      mean[k] = flip.mean[k] * cloud.means[static_cast<size_t>(3 * row) + k];
@@ -92,26 +93,25 @@ std::vector<Attribute> Attributes(const GaussianCloud& cloud, const AxisFlip& fl
   return out;
 }
 
-std::string JsonOf(const GaussianCloud& cloud, const std::vector<Attribute>& attributes, const AxisFlip& flip) {
+// Of the attributes, each with its values one after the other.
+uint64_t BytesOf(const std::vector<Attribute>& attributes, int64_t count) {
+  uint64_t size = 0;
+  for (const Attribute& attribute : attributes) size += attribute.record * static_cast<uint64_t>(count);
+  return size;
+}
+
+std::string JsonOf(int64_t count, const std::vector<Attribute>& attributes, const nlohmann::json& bounds) {
   nlohmann::json views = nlohmann::json::array(), accessors = nlohmann::json::array(), names;
   uint64_t offset = 0;
   for (const Attribute& attribute : attributes) {
-    const uint64_t size = attribute.record * static_cast<uint64_t>(cloud.size());
+    const uint64_t size = attribute.record * static_cast<uint64_t>(count);
     names[attribute.name] = accessors.size();
     nlohmann::json accessor = {{"bufferView", views.size()},
                                {"componentType", attribute.component_type},
-                               {"count", cloud.size()},
+                               {"count", count},
                                {"type", attribute.type}};
     if (attribute.component_type == kUnsignedShort) accessor["normalized"] = true;
-    if (const auto bounds = ComputeBounds(cloud); attribute.name == "POSITION" && bounds) {
-      nlohmann::json min, max;
-      for (size_t k = 0; k < 3; ++k) {
-        min.push_back(std::min(flip.mean[k] * bounds->min[k], flip.mean[k] * bounds->max[k]));
-        max.push_back(std::max(flip.mean[k] * bounds->min[k], flip.mean[k] * bounds->max[k]));
-      }
-      accessor["min"] = min;
-      accessor["max"] = max;
-    }
+    if (attribute.name == kPosition) accessor.update(bounds);
     views.push_back({{"buffer", 0}, {"byteOffset", offset}, {"byteLength", size}, {"target", kArrayBuffer}});
     accessors.push_back(std::move(accessor));
     offset += size;
@@ -131,21 +131,46 @@ std::string JsonOf(const GaussianCloud& cloud, const std::vector<Attribute>& att
                                    {"buffers", {{{"byteLength", offset}}}},
                                    {"bufferViews", views},
                                    {"accessors", accessors}};
-  std::string text = document.dump();
-  text.append((4 - text.size() % 4) % 4, ' ');
-  return text;
+  return document.dump();
 }
 
+nlohmann::json BoundsOf(const GaussianCloud& cloud, const AxisFlip& flip) {
+  const std::optional<Bounds> bounds = ComputeBounds(cloud);
+  if (!bounds) return nlohmann::json::object();
+  nlohmann::json min, max;
+  for (size_t k = 0; k < 3; ++k) {
+    min.push_back(std::min(flip.mean[k] * bounds->min[k], flip.mean[k] * bounds->max[k]));
+    max.push_back(std::max(flip.mean[k] * bounds->min[k], flip.mean[k] * bounds->max[k]));
+  }
+  return {{"min", min}, {"max", max}};
+}
+
+// Of the JSON chunk: the same for all clouds of that size and degree, however many digits their bounds have.
+size_t JsonSize(int64_t count, const std::vector<Attribute>& attributes) {
+  constexpr size_t kRoomForBounds = 2 * sizeof "\"min\":[,,]," + 6 * sizeof "-1.2345678901234567e-300";
+  return (JsonOf(count, attributes, nlohmann::json::object()).size() + kRoomForBounds + 3) / 4 * 4;
+}
+
+constexpr uint64_t kHeads = 12 + 8 + 8;  // of the file and its two chunks
+
 }  // namespace
+
+uint64_t PredictedGlbSize(int64_t count, int sh_degree) {
+  GaussianCloud none;
+  none.sh_degree = sh_degree;
+  const AxisFlip flip = FlipBetween(kRdf, kLuf);
+  const std::vector<Attribute> attributes = Attributes(none, flip);
+  return kHeads + JsonSize(count, attributes) + BytesOf(attributes, count);
+}
 
 Status WriteGlb(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
   const std::vector<Attribute> attributes = Attributes(cloud, flip);
-  const std::string json = JsonOf(cloud, attributes, flip);
-  uint64_t binary = 0;
-  for (const Attribute& attribute : attributes) binary += attribute.record * static_cast<uint64_t>(cloud.size());
-  const uint64_t begin = 12 + 8 + json.size() + 8;
+  std::string json = JsonOf(cloud.size(), attributes, BoundsOf(cloud, flip));
+  json.resize(JsonSize(cloud.size(), attributes), ' ');
+  const uint64_t binary = BytesOf(attributes, cloud.size());
+  const uint64_t begin = kHeads + json.size();
   if (begin + binary > 0xffffffffu) {
     return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", WithThousands(cloud.size()), " Gaussians take ",
                                               HumanBytes(binary), ", a GLB file ends at 4.3 GB")};

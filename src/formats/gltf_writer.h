@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 
 #include "core/gaussian_cloud.h"
@@ -17,5 +18,7 @@ namespace anchorsplat {
 // word shows a classic splat thinner and dimmer than it was fitted.
 // Errors: kExists, kIo, kBadArgument (arrays that disagree, no Gaussians, more than the format's 4 GiB).
 Status WriteGlb(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options = {});
+
+uint64_t PredictedGlbSize(int64_t count, int sh_degree);
 
 }  // namespace anchorsplat

@@ -49,7 +49,8 @@ Result<InputFile> InputFile::Open(const std::filesystem::path& path) {
   const std::string name = path.string();
   // Opening a pipe without a writer would wait for one, so look before (O_NONBLOCK would then break its reading).
   do {
-    file.descriptor_ = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY);
+    file.descriptor_ =
+        path == "-" ? ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0) : ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY);
   } while (file.descriptor_ < 0 && errno == EINTR);
   if (file.descriptor_ < 0) {
     const int error = errno;

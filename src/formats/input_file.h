@@ -14,7 +14,7 @@ namespace anchorsplat {
 // A file opened for reading: a byte range of known size that any thread may read anywhere. Regular files are read with
 // pread, not mapped: a mapped file that someone truncates while we read kills the process (SIGBUS), and copying from
 // the page cache into a buffer that stays in the processor's cache is as fast. Pipes (`… | anchorsplat /dev/stdin`)
-// are taken into memory first.
+// are taken into memory first. "-" is standard input.
 class InputFile {
  public:
   // Errors: kNotFound; kIo for folders, devices, files we may not read and pipes with more than 4 GiB.

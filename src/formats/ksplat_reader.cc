@@ -236,6 +236,18 @@ Status ReadSection(const InputFile& file, const Ksplat& ksplat, const Section& s
 
 }  // namespace
 
+Result<FormatFacts> DescribeKsplat(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Ksplat ksplat, ReadHeaders(file, {}));
+  FormatFacts facts;
+  facts.Add("version", "0.1");
+  facts.Add("compression", "level ", ksplat.level,
+            ksplat.level == 0   ? ": floats"
+            : ksplat.level == 1 ? ": 16 bits"
+                                : ": 16 bits, harmonics of 8 bits");
+  facts.Add("sections", ksplat.sections.size());
+  return facts;
+}
+
 Result<GaussianCloud> ReadKsplat(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Ksplat ksplat, ReadHeaders(file, limits));
   GaussianCloud cloud;

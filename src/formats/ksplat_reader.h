@@ -3,6 +3,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
+#include "formats/format_facts.h"
 #include "formats/input_file.h"
 
 namespace anchorsplat {
@@ -16,5 +17,8 @@ namespace anchorsplat {
 // Errors (kBadFile): another version or level, fewer bytes than the headers promise, counts that do not belong
 // together, more than `limits.max_gaussians`.
 Result<GaussianCloud> ReadKsplat(const InputFile& file, const ReadLimits& limits = {});
+
+// Version, compression level, sections. Errors as ReadKsplat.
+Result<FormatFacts> DescribeKsplat(const InputFile& file);
 
 }  // namespace anchorsplat

@@ -69,4 +69,22 @@ Result<GaussianCloud> ReadPly(const InputFile& file, const ReadLimits& limits) {
   return cloud;
 }
 
+Result<FormatFacts> DescribePly(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyHeader header, ReadPlyHeader(file));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyLayout layout, PlanPly(file, header));
+  FormatFacts facts;
+  facts.Add("encoding", header.encoding == PlyEncoding::kAscii          ? "text"
+                        : header.encoding == PlyEncoding::kLittleEndian ? "binary, little-endian"
+                                                                        : "binary, big-endian");
+  std::string passed_over;
+  for (size_t k = 0; k < layout.targets.size(); ++k) {
+    if (!layout.targets[k]) passed_over += (passed_over.empty() ? "" : " ") + layout.vertex->properties[k].name;
+  }
+  for (const PlyElement& element : header.elements) {
+    if (&element != layout.vertex) passed_over += Cat(passed_over.empty() ? "" : " ", "(element ", element.name, ")");
+  }
+  if (!passed_over.empty()) facts.Add("not read", Printable(passed_over, 200));
+  return facts;
+}
+
 }  // namespace anchorsplat

@@ -5,6 +5,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
+#include "formats/format_facts.h"
 #include "formats/input_file.h"
 
 namespace anchorsplat {
@@ -18,5 +19,8 @@ namespace anchorsplat {
 // Gaussians, fewer bytes than the header promises (checked before anything is allocated), more than
 // `limits.max_gaussians`, in ASCII a value that is no number (the message gives the line).
 Result<GaussianCloud> ReadPly(const InputFile& file, const ReadLimits& limits = {});
+
+// The encoding and what is not read of a file. Errors as ReadPly.
+Result<FormatFacts> DescribePly(const InputFile& file);
 
 }  // namespace anchorsplat

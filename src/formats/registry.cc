@@ -52,20 +52,79 @@ constexpr std::string_view kGltfJsonExtensions[] = {".gltf"};
 constexpr std::string_view kCsvExtensions[] = {".csv"};
 constexpr std::string_view kNpzExtensions[] = {".npz"};
 
+// Log-scales below −20 are lengths of a billionth: no rasterizer tells them from nothing, so they are no loss.
+constexpr float kAnyLow = -std::numeric_limits<float>::infinity();
+constexpr FormatRange kCompressedPlyRange = {.log_scale_min = kAnyLow, .log_scale_max = 20, .harmonics = 4};
+constexpr FormatRange kSpzRange = {.log_scale_min = -10.03f, .log_scale_max = 5.97f, .dc = 3.346f, .harmonics = 1.03f};
+constexpr FormatRange kSogRange = {.log_scale_min = kAnyLow, .log_scale_max = 20};
+constexpr FormatRange kSplatRange = {.sh_degree = 0, .dc = 1.779f};
+
 constexpr SplatFormat kFormats[] = {
-    {"compressed PLY", kCompressedPlyExtensions, IsCompressedPly, ReadCompressedPly, WriteCompressedPly,
-     PredictedCompressedPlySize, SplatOrder::kMorton},
-    {"PLY", kPlyExtensions, IsPly, ReadPly, WritePly,
-     [](int64_t count, int sh_degree) { return PredictedPlySize(count, sh_degree); }},
-    {"SPZ", kSpzExtensions, IsSpz, ReadSpz, WriteSpz, nullptr, SplatOrder::kKeep, kRub},
-    {"gsplat checkpoint", kGsplatExtensions, IsTorchCheckpoint, ReadGsplatCheckpoint, nullptr, nullptr},
-    {"SOG", kSogExtensions, IsSog, ReadSog, WriteSog, nullptr, SplatOrder::kMorton},
-    {"splat", kSplatExtensions, nullptr, ReadSplat, WriteSplat, PredictedSplatSize, SplatOrder::kImportance},
-    {"ksplat", kKsplatExtensions, nullptr, ReadKsplat, nullptr, nullptr},
-    {"glTF", kGltfExtensions, IsGltf, ReadGltf, WriteGlb, nullptr, SplatOrder::kKeep, kLuf},
-    {"glTF as JSON", kGltfJsonExtensions, nullptr, ReadGltf, nullptr, nullptr, SplatOrder::kKeep, kLuf},
-    {"CSV", kCsvExtensions, nullptr, nullptr, WriteCsv, nullptr},
-    {"NPZ", kNpzExtensions, nullptr, nullptr, WriteNpz, PredictedNpzSize},
+    {.name = "compressed PLY",
+     .extensions = kCompressedPlyExtensions,
+     .sniff = IsCompressedPly,
+     .describe = DescribeCompressedPly,
+     .read = ReadCompressedPly,
+     .write = WriteCompressedPly,
+     .predicted_size = PredictedCompressedPlySize,
+     .order = SplatOrder::kMorton,
+     .range = kCompressedPlyRange},
+    {.name = "PLY",
+     .extensions = kPlyExtensions,
+     .sniff = IsPly,
+     .describe = DescribePly,
+     .read = ReadPly,
+     .write = WritePly,
+     .predicted_size = [](int64_t count, int sh_degree) { return PredictedPlySize(count, sh_degree); }},
+    {.name = "SPZ",
+     .extensions = kSpzExtensions,
+     .sniff = IsSpz,
+     .describe = DescribeSpz,
+     .read = ReadSpz,
+     .write = WriteSpz,
+     .predicted_size = EstimatedSpzSize,
+     .size_is_estimate = true,
+     .axes = kRub,
+     .range = kSpzRange,
+     .mean_loss = SpzMeanLoss},
+    {.name = "gsplat checkpoint",
+     .extensions = kGsplatExtensions,
+     .sniff = IsTorchCheckpoint,
+     .read = ReadGsplatCheckpoint},
+    {.name = "SOG",
+     .extensions = kSogExtensions,
+     .sniff = IsSog,
+     .describe = DescribeSog,
+     .read = ReadSog,
+     .write = WriteSog,
+     .predicted_size = EstimatedSogSize,
+     .size_is_estimate = true,
+     .order = SplatOrder::kMorton,
+     .range = kSogRange,
+     .mean_loss = SogMeanLoss},
+    {.name = "splat",
+     .extensions = kSplatExtensions,
+     .read = ReadSplat,
+     .write = WriteSplat,
+     .predicted_size = PredictedSplatSize,
+     .order = SplatOrder::kImportance,
+     .range = kSplatRange},
+    {.name = "ksplat", .extensions = kKsplatExtensions, .describe = DescribeKsplat, .read = ReadKsplat},
+    {.name = "glTF",
+     .extensions = kGltfExtensions,
+     .sniff = IsGltf,
+     .describe = DescribeGltf,
+     .read = ReadGltf,
+     .write = WriteGlb,
+     .predicted_size = PredictedGlbSize,
+     .axes = kLuf},
+    {.name = "glTF as JSON",
+     .extensions = kGltfJsonExtensions,
+     .describe = DescribeGltf,
+     .read = ReadGltf,
+     .axes = kLuf},
+    {.name = "CSV", .extensions = kCsvExtensions, .write = WriteCsv},
+    {.name = "NPZ", .extensions = kNpzExtensions, .write = WriteNpz, .predicted_size = PredictedNpzSize},
 };
 
 }  // namespace
@@ -79,7 +138,8 @@ const SplatFormat* FormatOfExtension(const std::filesystem::path& path) {
   size_t longest = 0;
   for (const SplatFormat& format : Formats()) {
     for (const std::string_view extension : format.extensions) {
-      if (extension.size() > longest && name.ends_with(extension)) {
+      const bool fits = extension.starts_with('.') ? name.ends_with(extension) : name == extension;
+      if (fits && extension.size() > longest) {
         best = &format;
         longest = extension.size();
       }

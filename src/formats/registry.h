@@ -2,35 +2,55 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/axes.h"
 #include "formats/cloud_io.h"
+#include "formats/format_facts.h"
 #include "formats/input_file.h"
 
 namespace anchorsplat {
+
+// What a format can hold; writers clamp what is beyond. Half a step of the format wider than its last values.
+struct FormatRange {
+  int sh_degree = kMaxShDegree;
+  float log_scale_min = -std::numeric_limits<float>::infinity();
+  float log_scale_max = std::numeric_limits<float>::infinity();
+  float dc = std::numeric_limits<float>::infinity();         // largest |f_dc|
+  float harmonics = std::numeric_limits<float>::infinity();  // largest |coefficient| of degree 1–3
+};
 
 // A splat format: how it is recognised, and a function for each direction that this version knows. A new format is one
 // file per direction and one row in registry.cc.
 struct SplatFormat {
   std::string_view name;  // "PLY", in messages: "is a … file"
-  // Lower case, with the dot; the longest match wins, so ".compressed.ply" goes before ".ply".
+  // Lower case; the longest match wins, so ".compressed.ply" goes before ".ply". Those without a dot in front are whole
+  // names.
   std::span<const std::string_view> extensions;
   // Whether a file that begins with `head` (its first kSniffBytes bytes, or all) is of this format. Null where the
   // format has no mark of its own: then the extension decides.
-  bool (*sniff)(std::string_view head);
+  bool (*sniff)(std::string_view head) = nullptr;
+  // What the file says about itself beside its Gaussians. Null where there is nothing.
+  Result<FormatFacts> (*describe)(const InputFile& file) = nullptr;
   // Null: recognised, but not read or not written by this version.
-  Result<GaussianCloud> (*read)(const InputFile& file, const ReadLimits& limits);
-  Status (*write)(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options);
-  // Bytes of the file `write` makes of a cloud without comments. Null where it depends on the values.
-  uint64_t (*predicted_size)(int64_t count, int sh_degree);
+  Result<GaussianCloud> (*read)(const InputFile& file, const ReadLimits& limits) = nullptr;
+  Status (*write)(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) = nullptr;
+  // Bytes of the file `write` makes of a cloud without comments. Null where nothing can be said.
+  uint64_t (*predicted_size)(int64_t count, int sh_degree) = nullptr;
+  // The prediction is what real splats take; values that compress better or worse take less or more.
+  bool size_is_estimate = false;
   // The order in which `write` puts Gaussians by default.
   SplatOrder order = SplatOrder::kKeep;
   // What the axes of its files are by its own convention.
   Axes axes = kRdf;
+  FormatRange range = {};
+  // A sentence where `write` must round the means of this cloud more coarsely than is usual, else nothing. May be null.
+  std::string (*mean_loss)(const GaussianCloud& cloud) = nullptr;
 };
 
 inline constexpr size_t kSniffBytes = 4096;

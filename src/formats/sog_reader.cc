@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -45,6 +46,7 @@ class Members {
   Result<std::string> Meta(const InputFile& file) const {
     return archive_ ? archive_->Read("meta.json", kMaxMeta) : file.ReadAll(kMaxMeta);
   }
+  bool is_archive() const { return archive_.has_value(); }
   std::string meta_name() const { return archive_ ? name_ + ": meta.json" : name_; }
 
   // The picture called `name`.
@@ -76,9 +78,19 @@ class Members {
 // 256 values per channel that bytes stand for.
 using Channel = std::array<float, 256>;
 
+// `count` numbers of an array. A double that no float can hold would become infinite.
+Result<std::vector<double>> FloatNumbers(const JsonValue& list, size_t count) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<double> values, list.Numbers(count));
+  for (const double x : values) {
+    if (std::fabs(x) > double{std::numeric_limits<float>::max()})
+      return list.Complain(Cat("holds ", x, ", which is out of range"));
+  }
+  return values;
+}
+
 Result<Channel> Codebook(const JsonValue& part) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue list, part.Get("codebook"));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> values, list.Numbers(256));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> values, FloatNumbers(list, 256));
   Channel channel;
   std::ranges::transform(values, channel.begin(), [](double x) { return static_cast<float>(x); });
   return channel;
@@ -100,8 +112,8 @@ Result<std::vector<Channel>> Channels(const JsonValue& part, int version, size_t
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue mins, part.Get("mins"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue maxs, part.Get("maxs"));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> min, mins.Numbers(count));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> max, maxs.Numbers(count));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> min, FloatNumbers(mins, count));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> max, FloatNumbers(maxs, count));
   std::vector<Channel> channels;
   for (size_t k = 0; k < count; ++k) channels.push_back(Range(min[k], max[k]));
   return channels;
@@ -112,13 +124,32 @@ struct Sog {
   JsonValue meta;
   int version;
   int64_t count;
+  int width = 0, height = 0;  // of all pictures with a pixel per Gaussian, once one is known
 
-  // Picture k of the part's "files". Pictures have a pixel per Gaussian and at most some rows more.
-  Result<ByteImage> Picture(const JsonValue& part, size_t k, size_t files) const {
+  // Picture k of the part's "files". Pictures have a pixel per Gaussian and at most some rows more, all of them alike:
+  // where they are not, the files do not belong together.
+  Result<ByteImage> Picture(const JsonValue& part, size_t k, size_t files) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue list, part.Get("files"));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> names, list.Elements());
     if (names.size() < files) return list.Complain(Cat("expected ", files, " names, found ", names.size()));
-    return members.Picture(names[k], count, 4 * count + 65536);
+    ANCHORSPLAT_ASSIGN_OR_RETURN(ByteImage picture, members.Picture(names[k], count, 4 * count + 65536));
+    if (width > 0 && (picture.width != width || picture.height != height)) {
+      return names[k].Complain(
+          Cat("has ", picture.width, " x ", picture.height, " pixels, other pictures have ", width, " x ", height));
+    }
+    width = picture.width;
+    height = picture.height;
+    return picture;
+  }
+  // Version 1 says the number of Gaussians for every attribute.
+  Status CheckShape(const JsonValue& part) const {
+    const std::optional<JsonValue> shape = part.Find("shape");
+    if (!shape) return {};
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> sizes, shape->Elements());
+    if (sizes.empty()) return shape->Complain("is empty, expected the number of Gaussians");
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const int said, sizes[0].WholeNumber(1, std::numeric_limits<int>::max()));
+    if (said != count) return shape->Complain(Cat("says ", said, " Gaussians, the means say ", count));
+    return {};
   }
   template <typename Body>
   void ForAll(Body&& body) const {
@@ -128,12 +159,18 @@ struct Sog {
   }
 };
 
-Status ReadMeans(const Sog& sog, GaussianCloud& cloud) {
+Status ReadMeans(Sog& sog, GaussianCloud& cloud) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue part, sog.meta.Get("means"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue mins, part.Get("mins"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue maxs, part.Get("maxs"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> min, mins.Numbers(3));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> max, maxs.Numbers(3));
+  // They are logarithms: e⁸⁸ is the end of what floats can hold.
+  constexpr double kMaxLogarithm = 88;
+  for (size_t k = 0; k < 3; ++k) {
+    if (std::fabs(min[k]) > kMaxLogarithm) return mins.Complain(Cat("holds ", min[k], ", expected -88 to 88"));
+    if (std::fabs(max[k]) > kMaxLogarithm) return maxs.Complain(Cat("holds ", max[k], ", expected -88 to 88"));
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ByteImage low, sog.Picture(part, 0, 2));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ByteImage high, sog.Picture(part, 1, 2));
   sog.ForAll([&](int64_t i) {
@@ -160,8 +197,9 @@ void UnpackQuats(const Sog& sog, const ByteImage& picture, GaussianCloud& cloud)
   });
 }
 
-Status ReadScales(const Sog& sog, GaussianCloud& cloud) {
+Status ReadScales(Sog& sog, GaussianCloud& cloud) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue part, sog.meta.Get("scales"));
+  ANCHORSPLAT_RETURN_IF_ERROR(sog.CheckShape(part));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<Channel> channels, Channels(part, sog.version, 3));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ByteImage picture, sog.Picture(part, 0, 1));
   sog.ForAll([&](int64_t i) {
@@ -172,8 +210,9 @@ Status ReadScales(const Sog& sog, GaussianCloud& cloud) {
   return {};
 }
 
-Status ReadColors(const Sog& sog, GaussianCloud& cloud) {
+Status ReadColors(Sog& sog, GaussianCloud& cloud) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue part, sog.meta.Get("sh0"));
+  ANCHORSPLAT_RETURN_IF_ERROR(sog.CheckShape(part));
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Channel> channels, Channels(part, sog.version, sog.version == 2 ? 3 : 4));
   if (sog.version == 2) {
     channels.emplace_back();
@@ -216,11 +255,18 @@ Result<Palette> ReadPalette(const Sog& sog, const JsonValue& part) {
     if (degree != palette.degree) {
       return bands.Complain(Cat("is ", degree, ", but the palette has a width of ", palette.picture.width));
     }
+    if (const std::optional<JsonValue> said = part.Find("count")) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const int entries, said->WholeNumber(1, 65536));
+      if (entries > palette.entries) {
+        return said->Complain(Cat("is ", entries, ", but the palette's picture has room for ", palette.entries));
+      }
+      palette.entries = entries;
+    }
   }
   return palette;
 }
 
-Status ReadHarmonics(const Sog& sog, const JsonValue& part, const Palette& palette, GaussianCloud& cloud) {
+Status ReadHarmonics(Sog& sog, const JsonValue& part, const Palette& palette, GaussianCloud& cloud) {
   Channel values;
   if (sog.version == 2) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(values, Codebook(part));
@@ -230,6 +276,9 @@ Status ReadHarmonics(const Sog& sog, const JsonValue& part, const Palette& palet
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double min, mins.Number());
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double max, maxs.Number());
     values = Range(min, max);
+    for (const float x : values) {
+      if (!std::isfinite(x)) return part.Complain(Cat("has a range of ", min, " to ", max));
+    }
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ByteImage labels, sog.Picture(part, 1, 2));
   const int64_t coefficients = cloud.coefficients() - 1;
@@ -256,14 +305,45 @@ Status ReadHarmonics(const Sog& sog, const JsonValue& part, const Palette& palet
   return {};
 }
 
+// The members, with meta.json parsed.
+struct OpenedSog {
+  Members members;
+  JsonFile json;
+};
+
+Result<OpenedSog> OpenSog(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Members members, Members::Of(file, head));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, members.Meta(file));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(JsonFile json, JsonFile::Parse(members.meta_name(), text));
+  return OpenedSog{std::move(members), std::move(json)};
+}
+
 }  // namespace
 
+Result<FormatFacts> DescribeSog(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSog opened, OpenSog(file));
+  const JsonValue meta = opened.json.root();
+  FormatFacts facts;
+  const bool second = meta.has("version");
+  facts.Add("version", second ? 2 : 1, opened.members.is_archive() ? ", a ZIP archive" : ", a folder of pictures");
+  if (const std::optional<JsonValue> asset = meta.Find("asset"); asset && asset->has("generator")) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue generator, asset->Get("generator"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string name, generator.Text());
+    facts.Add("made by", Printable(name));
+  }
+  const std::optional<JsonValue> harmonics = meta.Find("shN");
+  if (harmonics && harmonics->has("count")) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue count, harmonics->Get("count"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const int entries, count.WholeNumber(1, 65536));
+    facts.Add("palette of harmonics", WithThousands(entries), " entries");
+  }
+  return facts;
+}
+
 Result<GaussianCloud> ReadSog(const InputFile& file, const ReadLimits& limits) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Members members, Members::Of(file, head));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, members.Meta(file));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile json, JsonFile::Parse(members.meta_name(), text));
-  const JsonValue meta = json.root();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSog opened, OpenSog(file));
+  const JsonValue meta = opened.json.root();
   const int most = static_cast<int>(std::min<int64_t>(limits.max_gaussians, int64_t{1} << 28));
   int version = 1, count = 0;
   if (const std::optional<JsonValue> value = meta.Find("version")) {
@@ -277,7 +357,7 @@ Result<GaussianCloud> ReadSog(const InputFile& file, const ReadLimits& limits) {
     if (sizes.empty()) return shape.Complain("is empty, expected the number of Gaussians");
     ANCHORSPLAT_ASSIGN_OR_RETURN(count, sizes[0].WholeNumber(1, most));
   }
-  const Sog sog{members, meta, version, count};
+  Sog sog{opened.members, meta, version, count};
   // Pictures of the right size come before the cloud: a count alone allocates nothing.
   const std::optional<JsonValue> harmonics = meta.Find("shN");
   Palette palette;
@@ -287,6 +367,7 @@ Result<GaussianCloud> ReadSog(const InputFile& file, const ReadLimits& limits) {
   GaussianCloud cloud;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue quats, meta.Get("quats"));
   {
+    ANCHORSPLAT_RETURN_IF_ERROR(sog.CheckShape(quats));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const ByteImage picture, sog.Picture(quats, 0, 1));
     cloud.Resize(count, palette.degree);
     UnpackQuats(sog, picture, cloud);

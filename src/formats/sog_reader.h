@@ -3,6 +3,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
+#include "formats/format_facts.h"
 #include "formats/input_file.h"
 
 namespace anchorsplat {
@@ -21,5 +22,8 @@ namespace anchorsplat {
 // names that lead to another folder, pictures too small or far too large for the count, labels beyond the palette, more
 // than `limits.max_gaussians`, sizes that only a decompression bomb has.
 Result<GaussianCloud> ReadSog(const InputFile& file, const ReadLimits& limits = {});
+
+// Version, where the members are, who wrote them, how large the palette is. Errors as ReadSog.
+Result<FormatFacts> DescribeSog(const InputFile& file);
 
 }  // namespace anchorsplat

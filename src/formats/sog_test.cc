@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <cmath>
 #include <limits>
@@ -316,6 +317,10 @@ TEST(Sog, ReadsVersionOne) {
   EXPECT_NEAR(cloud->sh[2], 0.2, 1e-6);
   EXPECT_EQ(cloud->sh[3], -1);
   EXPECT_EQ(cloud->sh[4], 1);
+  std::string mismatched = meta;
+  mismatched.replace(mismatched.find("\"sh0\":{"), 7, "\"sh0\":{\"shape\":[3,1,4],");
+  ASSERT_TRUE(WriteWholeFile(folder / "meta.json", mismatched, true).ok());
+  EXPECT_CONTAINS(Read(folder / "meta.json").error().message, "says 3 Gaussians");
 }
 
 TEST(Sog, RefusesLiesAndOtherFolders) {
@@ -348,6 +353,16 @@ TEST(Sog, RefusesLiesAndOtherFolders) {
   EXPECT_CONTAINS(error_of(with("/quats/files", nlohmann::json::array())), "expected 1 names");
   EXPECT_CONTAINS(error_of(with("/scales/codebook", {1, 2})), "codebook");
   EXPECT_CONTAINS(error_of(with("/shN/bands", 2)), "bands");
+  EXPECT_CONTAINS(error_of(with("/shN/count", 70'000)), "count");
+  EXPECT_CONTAINS(error_of(with("/shN/count", 2000)), "room for");
+  EXPECT_CONTAINS(error_of(with("/shN/count", 5)), "labels beyond");
+  EXPECT_CONTAINS(error_of(with("/means/mins", {-1, 1e308, 0})), "expected -88 to 88");
+  EXPECT_CONTAINS(error_of(with("/means/maxs", {100, 1, 1})), "expected -88 to 88");
+  EXPECT_CONTAINS(error_of(with("/scales/codebook/7", 1e300)), "out of range");
+  ByteImage other{64, 64, {}};
+  other.rgba.assign(4 * 64 * 64, 255);
+  ASSERT_TRUE(WriteWholeFile(folder / "other.webp", *EncodeWebp(other), false).ok());
+  EXPECT_CONTAINS(error_of(with("/sh0/files/0", "other.webp")), "other pictures have");
   EXPECT_CONTAINS(error_of(with("/shN/files/0", "quats.webp")), "expected 192, 512 or 960");
   EXPECT_CONTAINS(error_of(with("/shN/files/1", "quats.webp")), "labels beyond");
   const std::string zip = Bytes(folder / "a.sog");
@@ -376,6 +391,33 @@ TEST(WebpImage, KeepsEveryByte) {
   EXPECT_FALSE(EncodeWebp(ByteImage{16384, 1, Buffer<uint8_t>(4 * 16384)}).ok());
 }
 
+// An archive with one deflated member "a" that claims `size` bytes.
+std::string DeflatedZip(const std::string& text, size_t size) {
+  z_stream stream{};
+  EXPECT_EQ(deflateInit2(&stream, 6, Z_DEFLATED, -MAX_WBITS, 8, Z_DEFAULT_STRATEGY), Z_OK);
+  std::string packed(deflateBound(&stream, text.size()), '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
+  stream.avail_in = static_cast<uInt>(text.size());
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = static_cast<uInt>(packed.size());
+  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  const auto number = [](uint64_t value, int bytes) {
+    std::string out;
+    for (int k = 0; k < bytes; ++k) out += static_cast<char>(value >> (8 * k) & 255);
+    return out;
+  };
+  const uint64_t crc = crc32(0, reinterpret_cast<const Bytef*>(text.data()), static_cast<uInt>(text.size()));
+  const std::string sizes = number(crc, 4) + number(packed.size(), 4) + number(size, 4) + number(1, 2) + number(0, 2);
+  const std::string local =
+      "PK\x03\x04" + number(20, 2) + number(0, 2) + number(8, 2) + number(0, 4) + sizes + "a" + packed;
+  const std::string central = "PK\x01\x02" + number(20, 2) + number(20, 2) + number(0, 2) + number(8, 2) +
+                              number(0, 4) + sizes + number(0, 14) + "a";
+  return local + central + "PK\x05\x06" + number(0, 4) + number(1, 2) + number(1, 2) + number(central.size(), 4) +
+         number(local.size(), 4) + number(0, 2);
+}
+
 TEST(ZipArchive, MembersComeBack) {
   const TestFolder folder;
   {
@@ -395,6 +437,39 @@ TEST(ZipArchive, MembersComeBack) {
   EXPECT_CONTAINS(zip->Read("a.txt", 5).error().message, "at most");
   EXPECT_CONTAINS(zip->Read("c", 5).error().message, "not in the archive");
   EXPECT_FALSE(ZipReader::Open("a.zip", "PK\x03\x04 and nothing more").ok());
+}
+
+TEST(ZipArchive, DeflatedMembers) {
+  const std::string text = [] {
+    std::string repeated;
+    for (int k = 0; k < 300; ++k) repeated += "hello ";
+    return repeated;
+  }();
+  const std::string good = DeflatedZip(text, text.size());
+  const auto error_of = [](const std::string& archive) {
+    const auto zip = ZipReader::Open("a.zip", archive);
+    if (!zip.ok()) return zip.error().message;
+    const auto contents = zip->Read("a", 1 << 20);
+    return contents.ok() ? *contents : contents.error().message;
+  };
+  EXPECT_EQ(error_of(good), text);
+  EXPECT_CONTAINS(error_of(DeflatedZip(text, text.size() - 1)), "damaged");
+  EXPECT_CONTAINS(error_of(DeflatedZip(text, text.size() + 1)), "damaged");
+  std::string other = text;
+  other[7] = 'x';
+  std::string wrong = DeflatedZip(other, text.size());
+  wrong.replace(wrong.find("PK\x01\x02") + 16, 4, good.substr(good.find("PK\x01\x02") + 16, 4));
+  EXPECT_CONTAINS(error_of(wrong), "check sum");
+  std::string method = good;
+  method[good.find("PK\x01\x02") + 10] = 12;
+  EXPECT_CONTAINS(error_of(method), "method 12");
+}
+
+TEST(ZipArchive, BombsAreRefused) {
+  const std::string archive = DeflatedZip(std::string(100 << 20, 'x'), 100 << 20);
+  const auto zip = ZipReader::Open("a.zip", archive);
+  ASSERT_TRUE(zip.ok());
+  EXPECT_CONTAINS(zip->Read("a", 1 << 30).error().message, "bomb");
 }
 
 }  // namespace

@@ -4,9 +4,11 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <map>
+#include <functional>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/parallel.h"
@@ -18,6 +20,7 @@
 #include "formats/sh_palette.h"
 #include "formats/splat_order.h"
 #include "formats/webp_image.h"
+#include "formats/write_losses.h"
 #include "formats/zip_archive.h"
 
 namespace anchorsplat {
@@ -30,9 +33,10 @@ constexpr int64_t kMaxSide = 16383;  // of a WebP picture
 constexpr int kPaletteRounds = 8;    // further ones gain less than half a percent of the error
 constexpr float kMaxLogScale = 20;
 
+// A picture that is drawn when its turn comes: all of them at once would be a fifth of the cloud.
 struct Picture {
   std::string name;
-  ByteImage image;
+  std::function<ByteImage()> draw;
 };
 
 struct Pictures {
@@ -59,98 +63,151 @@ struct Pictures {
   }
 };
 
+constexpr std::array<const char*, 7> kPictures = {
+    "shN_centroids.webp", "shN_labels.webp", "means_l.webp", "means_u.webp", "quats.webp", "scales.webp", "sh0.webp"};
+
 double LogOfMean(float x) { return std::copysign(std::log1p(std::fabs(double{x})), double{x}); }
+
+// Of the means' logarithms, per axis.
+struct MeanRange {
+  std::array<double, 3> min{}, max{};
+};
+
+MeanRange RangeOfMeans(const GaussianCloud& cloud) {
+  MeanRange range;
+  const std::optional<Bounds> bounds = ComputeBounds(cloud);
+  for (size_t k = 0; bounds && k < 3; ++k) {
+    range.min[k] = LogOfMean(bounds->min[k]);
+    range.max[k] = LogOfMean(bounds->max[k]);
+  }
+  return range;
+}
+
+constexpr double kMeanSteps = 65535;
 
 nlohmann::json DrawMeans(const Pictures& pictures, std::vector<Picture>& out) {
   const GaussianCloud& cloud = pictures.cloud;
-  const std::optional<Bounds> bounds = ComputeBounds(cloud);
-  std::array<double, 3> min{}, max{};
-  for (size_t k = 0; bounds && k < 3; ++k) {
-    min[k] = LogOfMean(bounds->min[k]);
-    max[k] = LogOfMean(bounds->max[k]);
-  }
-  const auto bits = [&](int64_t row, size_t k) -> uint32_t {
+  const auto [min, max] = RangeOfMeans(cloud);
+  const auto bits = [&cloud, min = min, max = max](int64_t row, size_t k) -> uint32_t {
     if (!(max[k] > min[k])) return 0;
     const double t = (LogOfMean(cloud.means[static_cast<size_t>(3 * row) + k]) - min[k]) / (max[k] - min[k]);
-    return t > 0 ? static_cast<uint32_t>(std::lrint(65535 * std::min(t, 1.0))) : 0;  // NaN: 0
+    return t > 0 ? static_cast<uint32_t>(std::lrint(kMeanSteps * std::min(t, 1.0))) : 0;  // NaN: 0
   };
   for (const auto& [name, shift] : {std::pair("means_l.webp", 0), std::pair("means_u.webp", 8)}) {
-    out.push_back({name, pictures.Draw([&, by = shift](int64_t row, uint8_t* rgba) {
-                     for (size_t k = 0; k < 3; ++k) rgba[k] = static_cast<uint8_t>(bits(row, k) >> by & 255);
-                   })});
+    out.push_back({name, [&pictures, bits, by = shift] {
+                     return pictures.Draw([&](int64_t row, uint8_t* rgba) {
+                       for (size_t k = 0; k < 3; ++k) rgba[k] = static_cast<uint8_t>(bits(row, k) >> by & 255);
+                     });
+                   }});
   }
   return {{"mins", min}, {"maxs", max}, {"files", {"means_l.webp", "means_u.webp"}}};
 }
 
 nlohmann::json DrawQuats(const Pictures& pictures, std::vector<Picture>& out) {
-  out.push_back({"quats.webp", pictures.Draw([&](int64_t row, uint8_t* rgba) {
-                   const SmallestThree three = DropLargest(pictures.cloud.quats.data() + 4 * row, 0);
-                   for (size_t k = 0; k < 3; ++k) rgba[k] = QuantizeByte(127.5f * (three.rest[k] / kSqrtHalf + 1));
-                   rgba[3] = static_cast<uint8_t>(252 + three.largest);
-                 })});
+  out.push_back({"quats.webp", [&pictures] {
+                   return pictures.Draw([&](int64_t row, uint8_t* rgba) {
+                     const SmallestThree three = DropLargest(pictures.cloud.quats.data() + 4 * row, 0);
+                     for (size_t k = 0; k < 3; ++k) rgba[k] = QuantizeByte(127.5f * (three.rest[k] / kSqrtHalf + 1));
+                     rgba[3] = static_cast<uint8_t>(252 + three.largest);
+                   });
+                 }});
   return {{"files", {"quats.webp"}}};
 }
+
+float BoundedLogScale(float x) { return std::clamp(x, -kMaxLogScale, kMaxLogScale); }  // NaN stays
 
 nlohmann::json DrawScales(const Pictures& pictures, std::vector<Picture>& out) {
   const GaussianCloud& cloud = pictures.cloud;
   Buffer<float> scales(cloud.log_scales.size());
   ParallelFor(0, static_cast<int64_t>(scales.size()), kGrain, [&](int64_t first, int64_t last) {
     for (auto i = static_cast<size_t>(first); i < static_cast<size_t>(last); ++i) {
-      scales[i] = std::clamp(cloud.log_scales[i], -kMaxLogScale, kMaxLogScale);
+      scales[i] = BoundedLogScale(cloud.log_scales[i]);
     }
   });
   const ScalarCodebook codebook = BuildScalarCodebook(scales.data(), cloud.size(), 3, 3);
-  out.push_back({"scales.webp", pictures.Draw([&](int64_t row, uint8_t* rgba) {
-                   for (size_t k = 0; k < 3; ++k) rgba[k] = codebook.IndexOf(scales[static_cast<size_t>(3 * row) + k]);
-                 })});
+  out.push_back({"scales.webp", [&pictures, codebook] {
+                   return pictures.Draw([&](int64_t row, uint8_t* rgba) {
+                     const float* log_scales = pictures.cloud.log_scales.data() + 3 * row;
+                     for (size_t k = 0; k < 3; ++k) rgba[k] = codebook.IndexOf(BoundedLogScale(log_scales[k]));
+                   });
+                 }});
   return {{"codebook", codebook.values}, {"files", {"scales.webp"}}};
 }
 
 nlohmann::json DrawColors(const Pictures& pictures, std::vector<Picture>& out) {
   const GaussianCloud& cloud = pictures.cloud;
   const ScalarCodebook codebook = BuildScalarCodebook(cloud.sh.data(), cloud.size(), 3, cloud.sh_stride());
-  out.push_back({"sh0.webp", pictures.Draw([&](int64_t row, uint8_t* rgba) {
-                   const float* dc = cloud.sh.data() + row * cloud.sh_stride();
-                   for (size_t k = 0; k < 3; ++k) rgba[k] = codebook.IndexOf(dc[k]);
-                   rgba[3] = QuantizeByte(255 * Sigmoid(cloud.opacity_logits[static_cast<size_t>(row)]));
-                 })});
+  out.push_back({"sh0.webp", [&pictures, &cloud, codebook] {
+                   return pictures.Draw([&](int64_t row, uint8_t* rgba) {
+                     const float* dc = cloud.sh.data() + row * cloud.sh_stride();
+                     for (size_t k = 0; k < 3; ++k) rgba[k] = codebook.IndexOf(dc[k]);
+                     rgba[3] = QuantizeByte(255 * Sigmoid(cloud.opacity_logits[static_cast<size_t>(row)]));
+                   });
+                 }});
   return {{"codebook", codebook.values}, {"files", {"sh0.webp"}}};
+}
+
+// As many as other programs give.
+int64_t PaletteEntries(int64_t count) {
+  const auto thousands = static_cast<uint64_t>(std::max<int64_t>(1, count / 1024));
+  return static_cast<int64_t>(1024 * std::min<uint64_t>(64, std::bit_floor(thousands)));
 }
 
 nlohmann::json DrawHarmonics(const Pictures& pictures, std::vector<Picture>& out) {
   const GaussianCloud& cloud = pictures.cloud;
-  const auto thousands = static_cast<uint64_t>(std::max<int64_t>(1, cloud.size() / 1024));
-  const auto most = static_cast<int64_t>(1024 * std::min<uint64_t>(64, std::bit_floor(thousands)));
-  const ShPalette palette = BuildShPalette(cloud, most, kPaletteRounds);
+  ShPalette palette = BuildShPalette(cloud, PaletteEntries(cloud.size()), kPaletteRounds);
   const int64_t coefficients = cloud.coefficients() - 1;
   const ScalarCodebook codebook =
       BuildScalarCodebook(palette.centroids.data(), palette.entries, 3 * coefficients, 3 * coefficients);
-  ByteImage image{static_cast<int>(kEntriesPerRow * coefficients),
-                  static_cast<int>((palette.entries + kEntriesPerRow - 1) / kEntriesPerRow),
-                  {}};
-  image.rgba.assign(static_cast<size_t>(4 * image.pixels()), 255);
-  // The pixels of an entry follow each other, and rows hold 64 entries: one run of pixels.
-  ParallelFor(0, palette.entries * coefficients, kGrain, [&](int64_t first, int64_t last) {
-    for (int64_t i = first; i < last; ++i) {
-      for (int64_t k = 0; k < 3; ++k) {
-        image.rgba[static_cast<size_t>(4 * i + k)] =
-            codebook.IndexOf(palette.centroids[static_cast<size_t>(3 * i + k)]);
-      }
-    }
-  });
-  out.push_back({"shN_centroids.webp", std::move(image)});
-  out.push_back({"shN_labels.webp", pictures.Draw([&](int64_t row, uint8_t* rgba) {
-                   const uint16_t label = palette.labels[static_cast<size_t>(row)];
-                   rgba[0] = static_cast<uint8_t>(label & 255);
-                   rgba[1] = static_cast<uint8_t>(label >> 8);
-                 })});
-  return {{"count", palette.entries},
-          {"bands", cloud.sh_degree},
-          {"codebook", codebook.values},
-          {"files", {"shN_centroids.webp", "shN_labels.webp"}}};
+  const nlohmann::json meta = {{"count", palette.entries},
+                               {"bands", cloud.sh_degree},
+                               {"codebook", codebook.values},
+                               {"files", {"shN_centroids.webp", "shN_labels.webp"}}};
+  const auto shared = std::make_shared<const ShPalette>(std::move(palette));
+  out.push_back({"shN_centroids.webp", [shared, codebook, coefficients] {
+                   ByteImage image{static_cast<int>(kEntriesPerRow * coefficients),
+                                   static_cast<int>((shared->entries + kEntriesPerRow - 1) / kEntriesPerRow),
+                                   {}};
+                   image.rgba.assign(static_cast<size_t>(4 * image.pixels()), 255);
+                   // The pixels of an entry follow each other, and rows hold 64 entries: one run of pixels.
+                   for (int64_t i = 0; i < shared->entries * coefficients; ++i) {
+                     for (int64_t k = 0; k < 3; ++k) {
+                       image.rgba[static_cast<size_t>(4 * i + k)] =
+                           codebook.IndexOf(shared->centroids[static_cast<size_t>(3 * i + k)]);
+                     }
+                   }
+                   return image;
+                 }});
+  out.push_back({"shN_labels.webp", [&pictures, shared] {
+                   return pictures.Draw([&](int64_t row, uint8_t* rgba) {
+                     const uint16_t label = shared->labels[static_cast<size_t>(row)];
+                     rgba[0] = static_cast<uint8_t>(label & 255);
+                     rgba[1] = static_cast<uint8_t>(label >> 8);
+                   });
+                 }});
+  return meta;
+}
+
+// meta.json last: pictures without it are no splat. Where one of the names has been taken meanwhile, those given before
+// are taken back.
+Status CommitAll(std::vector<OutputFile>& pictures, OutputFile& meta) {
+  Status status;
+  std::vector<std::filesystem::path> named;
+  for (OutputFile& picture : pictures) {
+    status = picture.Commit();
+    if (!status.ok()) break;
+    named.push_back(picture.path());
+  }
+  if (status.ok()) status = meta.Commit();
+  if (status.ok()) return {};
+  std::error_code ignored;
+  for (const std::filesystem::path& name : named) std::filesystem::remove(name, ignored);
+  return status;
 }
 
 }  // namespace
+
+std::span<const char* const> SogPictures(int sh_degree) { return std::span(kPictures).subspan(sh_degree > 0 ? 0 : 2); }
 
 Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
@@ -164,6 +221,14 @@ Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, c
   const bool bundled = path.filename() != "meta.json";
   // Before the work, so that a file in the way is not found out minutes later.
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  std::vector<OutputFile> beside;
+  if (!bundled) {
+    for (const char* name : SogPictures(cloud.sh_degree)) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile picture,
+                                   OutputFile::Create(path.parent_path() / name, options.overwrite));
+      beside.push_back(std::move(picture));
+    }
+  }
 
   const Pictures pictures{cloud, WriteOrder(cloud, options.order, SplatOrder::kMorton), static_cast<int>(width),
                           static_cast<int>(height)};
@@ -179,8 +244,7 @@ Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, c
   std::vector<Result<std::string>> encoded(drawn.size(), std::string());
   ParallelFor(0, static_cast<int64_t>(drawn.size()), 1, [&](int64_t first, int64_t last) {
     for (auto k = static_cast<size_t>(first); k < static_cast<size_t>(last); ++k) {
-      encoded[k] = EncodeWebp(drawn[k].image);
-      drawn[k].image = {};
+      encoded[k] = EncodeWebp(drawn[k].draw());
     }
   });
   for (const Result<std::string>& bytes : encoded) {
@@ -188,17 +252,39 @@ Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, c
   }
   const std::string text = meta.dump();
   if (!bundled) {
-    for (size_t k = 0; k < drawn.size(); ++k) {
-      ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(path.parent_path() / drawn[k].name, *encoded[k], options.overwrite));
-    }
+    for (size_t k = 0; k < drawn.size(); ++k) ANCHORSPLAT_RETURN_IF_ERROR(beside[k].Write(*encoded[k]));
     ANCHORSPLAT_RETURN_IF_ERROR(file.Write(text));
-    return file.Commit();
+    return CommitAll(beside, file);
   }
   ZipWriter archive(file);
   ANCHORSPLAT_RETURN_IF_ERROR(archive.Add("meta.json", text));
   for (size_t k = 0; k < drawn.size(); ++k) ANCHORSPLAT_RETURN_IF_ERROR(archive.Add(drawn[k].name, *encoded[k]));
   ANCHORSPLAT_RETURN_IF_ERROR(archive.Finish());
   return file.Commit();
+}
+
+uint64_t EstimatedSogSize(int64_t count, int sh_degree) {
+  constexpr double kMetaBytes = 15'000, kBytes = 12.9, kLabelBytes = 1.95, kBytesPerCentroidValue = 0.79;
+  const auto n = static_cast<double>(count);
+  double size = kMetaBytes + kBytes * n;
+  if (sh_degree > 0) {
+    const double values = 3.0 * (ShCoefficients(sh_degree) - 1);
+    size +=
+        kLabelBytes * n + kBytesPerCentroidValue * values * static_cast<double>(std::min(count, PaletteEntries(count)));
+  }
+  return static_cast<uint64_t>(size);
+}
+
+std::string SogMeanLoss(const GaussianCloud& cloud) {
+  const MeanRange range = RangeOfMeans(cloud);
+  double widest = 0;
+  for (size_t k = 0; k < 3; ++k) widest = std::max(widest, range.max[k] - range.min[k]);
+  const MiddleOfMeans middle = FindMiddleOfMeans(cloud);
+  const double step = widest / kMeanSteps * (1 + double{middle.farthest});  // where the middle is coarsest
+  constexpr double kFine = 1 << 12;
+  if (step * kFine <= double{middle.extent}) return {};
+  return Cat("positions are rounded to steps of up to ", step, ", while 98 % of the Gaussians lie within a box of ",
+             middle.extent, "; move the splat nearer to zero or remove what is far out");
 }
 
 }  // namespace anchorsplat

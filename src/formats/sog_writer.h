@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <span>
+#include <string>
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
@@ -14,9 +17,19 @@ namespace anchorsplat {
 // (sh_palette.h), as many as other programs give: 1,024·2^⌊log₂(N/1024)⌋, at least 1,024.
 // Lost: means are rounded to 1/65535 of the range of sign(x)·ln(|x| + 1), quaternion components to 1/360, log-scales
 // and f_dc to one of 256 values, opacities to 1/255, SH to the palette; scales are clamped to e^±20. Render mode and
-// comments have no place. Needs 96 bytes per Gaussian at degree 3, beside the cloud, for the palette.
+// comments have no place.
+// The files of a folder appear when all of them are complete, meta.json last.
 // Errors: kExists (each file of a folder), kIo, kBadArgument (arrays that disagree, no Gaussians, more than fit a
 // picture).
 Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options = {});
+
+// The pictures of a splat of that degree by name, in the order in which they are drawn.
+std::span<const char* const> SogPictures(int sh_degree);
+
+// From what splats of real scenes take per Gaussian, and the palette (docs/formats.md has the deviations).
+uint64_t EstimatedSogSize(int64_t count, int sh_degree);
+
+// A sentence when Gaussians far out stretch the range of the means so much that it is coarse for most of them.
+std::string SogMeanLoss(const GaussianCloud& cloud);
 
 }  // namespace anchorsplat

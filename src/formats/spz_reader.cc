@@ -58,11 +58,11 @@ Result<SpzLayout> CheckHeader(const InputFile& file, const Header& header, const
   layout.sh_degree = header.sh_degree;
   layout.fractional_bits = header.fractional_bits;
   ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), file.size(), header.count * uint64_t{layout.record_size()}));
-  if (layout.sh_degree > kMaxShDegree) LogWarning(Cat(file.name(), ": SH degree 4 is read as 3"));
   return layout;
 }
 
-GaussianCloud MakeCloud(const Header& header) {
+GaussianCloud MakeCloud(const InputFile& file, const Header& header) {
+  if (header.sh_degree > kMaxShDegree) LogWarning(Cat(file.name(), ": SH degree 4 is read as 3"));
   GaussianCloud cloud;
   cloud.Resize(header.count, std::min<int>(header.sh_degree, kMaxShDegree));
   if ((header.flags & kSpzAntialiased) != 0) cloud.render_mode = RenderMode::kAntialiased;
@@ -89,7 +89,7 @@ Result<GaussianCloud> ReadGzipped(const InputFile& file, const ReadLimits& limit
   ANCHORSPLAT_RETURN_IF_ERROR(reader->Read(&header, sizeof header));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzLayout layout, CheckHeader(file, header, limits));
   if (layout.version > 3) return Error{ErrorCode::kBadFile, Cat(At(file, 0), ": version 4 in a gzip stream")};
-  GaussianCloud cloud = MakeCloud(header);
+  GaussianCloud cloud = MakeCloud(file, header);
   for (const SpzSection section : kSpzSections) {
     if (layout.record_size(section) == 0) continue;
     ANCHORSPLAT_RETURN_IF_ERROR(ReadSection(layout, section, *reader, cloud));
@@ -125,7 +125,7 @@ Result<GaussianCloud> ReadStreams(const InputFile& file, const ReadLimits& limit
     }
     begins[k + 1] = begins[k] + sizes[k].compressed;
   }
-  GaussianCloud cloud = MakeCloud(header);
+  GaussianCloud cloud = MakeCloud(file, header);
   std::array<Status, 6> statuses;
   ParallelFor(0, static_cast<int64_t>(streams), 1, [&](int64_t first, int64_t last) {
     for (auto k = static_cast<size_t>(first); k < static_cast<size_t>(last); ++k) {
@@ -139,11 +139,35 @@ Result<GaussianCloud> ReadStreams(const InputFile& file, const ReadLimits& limit
   return cloud;
 }
 
+bool IsGzip(const std::string& head) { return head == "\x1f\x8b"; }
+
 }  // namespace
+
+Result<FormatFacts> DescribeSpz(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
+  Header header;
+  if (IsGzip(head)) {
+    ANCHORSPLAT_RETURN_IF_ERROR(OpenGzip(file, 0)->Read(&header, sizeof header));
+  } else {
+    ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(0, &header, sizeof header));
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzLayout layout, CheckHeader(file, header, {}));
+  FormatFacts facts;
+  facts.Add("version", layout.version, layout.version < 4 ? ", one gzip stream" : ", a zstd stream per attribute");
+  if (layout.version == 1) {
+    facts.Add("positions", "half floats");
+  } else {
+    facts.Add("positions", layout.fractional_bits, " fractional bits: steps of 1/",
+              uint32_t{1} << layout.fractional_bits);
+  }
+  facts.Add("antialiased", (header.flags & kSpzAntialiased) != 0 ? "yes" : "no, or not said");
+  if (layout.sh_degree > kMaxShDegree) facts.Add("harmonics", "degree ", layout.sh_degree, ", read as ", kMaxShDegree);
+  return facts;
+}
 
 Result<GaussianCloud> ReadSpz(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
-  return head == "\x1f\x8b" ? ReadGzipped(file, limits) : ReadStreams(file, limits);
+  return IsGzip(head) ? ReadGzipped(file, limits) : ReadStreams(file, limits);
 }
 
 }  // namespace anchorsplat

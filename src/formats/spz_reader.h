@@ -3,6 +3,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
+#include "formats/format_facts.h"
 #include "formats/input_file.h"
 
 namespace anchorsplat {
@@ -15,5 +16,8 @@ namespace anchorsplat {
 // Errors (kBadFile): damaged or shorter than the header promises, another version, a fractional part of more than 24
 // bits, more than `limits.max_gaussians`, sizes that only a decompression bomb has.
 Result<GaussianCloud> ReadSpz(const InputFile& file, const ReadLimits& limits = {});
+
+// What the header says: version, fractional bits, flags. Errors as ReadSpz.
+Result<FormatFacts> DescribeSpz(const InputFile& file);
 
 }  // namespace anchorsplat

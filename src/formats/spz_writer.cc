@@ -21,6 +21,7 @@
 #include "formats/cloud_checks.h"
 #include "formats/splat_order.h"
 #include "formats/spz_sections.h"
+#include "formats/write_losses.h"
 
 namespace anchorsplat {
 
@@ -34,17 +35,27 @@ constexpr int kDeflateLevel = 6;
 constexpr size_t kBlockBytes = size_t{1} << 20;  // that are packed, and for version 3 deflated, by one task
 constexpr int64_t kBlocksAtOnce = 16;
 
-int FractionalBits(const GaussianCloud& cloud) {
-  float largest = 0;
-  for (const float value : cloud.means) {
-    if (std::isfinite(value)) largest = std::max(largest, std::fabs(value));
-  }
-  const std::optional<Bounds> bounds = ComputeBounds(cloud);
+constexpr int kUsualBits = 12;  // of other programs
+constexpr float kMaxFixed = (1 << 23) - 1;
+
+struct MeansInSpz {
+  float largest = 0;  // |coordinate|
+  int fractional_bits = kUsualBits;
+};
+
+MeansInSpz LookAtMeans(const GaussianCloud& cloud) {
+  MeansInSpz out;
   float extent = 0;
-  for (size_t a = 0; bounds && a < 3; ++a) extent = std::max(extent, bounds->max[a] - bounds->min[a]);
-  const int fine = extent > 0 ? 16 - std::ilogb(extent) : 12;
-  const int fits = largest > 0 ? 22 - std::ilogb(largest) : 24;
-  return std::clamp(std::min(std::max(12, fine), fits), 0, 24);
+  if (const std::optional<Bounds> bounds = ComputeBounds(cloud)) {
+    for (size_t a = 0; a < 3; ++a) {
+      extent = std::max(extent, bounds->max[a] - bounds->min[a]);
+      out.largest = std::max({out.largest, std::fabs(bounds->min[a]), std::fabs(bounds->max[a])});
+    }
+  }
+  const int fine = extent > 0 ? 16 - std::ilogb(extent) : kUsualBits;
+  const int fits = out.largest > 0 ? 22 - std::ilogb(out.largest) : 24;
+  out.fractional_bits = std::clamp(std::min(std::max(kUsualBits, fine), fits), 0, 24);
+  return out;
 }
 
 struct Packer {
@@ -208,11 +219,33 @@ Status WriteSpz(const std::filesystem::path& path, const GaussianCloud& cloud, c
                                               " Gaussians are more than an SPZ file can count")};
   }
   const Packer packer{.cloud = cloud,
-                      .layout = {options.spz_version, cloud.sh_degree, FractionalBits(cloud)},
+                      .layout = {options.spz_version, cloud.sh_degree, LookAtMeans(cloud).fractional_bits},
                       .order = WriteOrder(cloud, options.order, SplatOrder::kKeep)};
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
   ANCHORSPLAT_RETURN_IF_ERROR(options.spz_version == 3 ? WriteGzip(packer, file) : WriteStreams(packer, file));
   return file.Commit();
+}
+
+uint64_t EstimatedSpzSize(int64_t count, int sh_degree) {
+  constexpr std::array<double, 4> kBytes = {16.6, 18.8, 21.0, 23.2};
+  return 128 + static_cast<uint64_t>(kBytes[static_cast<size_t>(sh_degree)] * static_cast<double>(count));
+}
+
+std::string SpzMeanLoss(const GaussianCloud& cloud) {
+  const MeansInSpz means = LookAtMeans(cloud);
+  if (means.largest > kMaxFixed) {
+    return Cat("coordinates reach ", means.largest, ", SPZ ends at ", kMaxFixed,
+               ": they are clamped, and all others rounded to ",
+               "whole numbers; move the splat nearer to zero or remove what is so far out");
+  }
+  const double step = std::ldexp(1.0, -means.fractional_bits);
+  if (means.fractional_bits >= kUsualBits) return {};
+  const MiddleOfMeans middle = FindMiddleOfMeans(cloud);
+  constexpr double kFine = 1 << 14;  // steps across a scene that nobody sees
+  if (step * kFine <= double{middle.extent}) return {};
+  return Cat("positions are rounded to 1/", 1 << means.fractional_bits, " instead of 1/4096, as coordinates reach ",
+             means.largest, " while 98 % of the Gaussians lie within a box of ", middle.extent,
+             "; move the splat nearer to zero or remove what is so far out");
 }
 
 }  // namespace anchorsplat

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <string>
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
@@ -17,5 +19,12 @@ namespace anchorsplat {
 // (degree 1) and 1/8 within ±1. Comments have no place.
 // Errors: kExists, kIo, kBadArgument (arrays that disagree, no Gaussians, another version).
 Status WriteSpz(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options = {});
+
+// From what splats of real scenes take per Gaussian (docs/formats.md has the deviations).
+uint64_t EstimatedSpzSize(int64_t count, int sh_degree);
+
+// A sentence when this cloud has fewer than 12 fractional bits because of coordinates far from zero, and that is coarse
+// for most of it; or when a coordinate does not fit at all. Nothing otherwise.
+std::string SpzMeanLoss(const GaussianCloud& cloud);
 
 }  // namespace anchorsplat

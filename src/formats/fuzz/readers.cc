@@ -36,7 +36,14 @@ Status CheckError(const Error& error, std::string_view file) {
 }
 
 Status ReadAsCloud(const std::string& file, const std::string& bytes) {
-  const auto cloud = ReadOpenCloud(InputFile::FromBytes(file, bytes));
+  const InputFile input = InputFile::FromBytes(file, bytes);
+  const auto head = input.Head(kSniffBytes);
+  const SplatFormat* format = head.ok() ? FormatOfFile(*head, file) : nullptr;
+  if (format != nullptr && format->describe != nullptr) {
+    const auto facts = format->describe(input);
+    if (!facts.ok()) (void)CheckError(facts.error(), file);
+  }
+  const auto cloud = ReadOpenCloud(input);
   if (!cloud.ok()) return CheckError(cloud.error(), file);
   Require(!cloud->empty(), "an empty cloud");
   Require(Validate(*cloud).ok(), "a cloud whose arrays disagree");

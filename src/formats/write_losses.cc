@@ -1,0 +1,98 @@
+#include "formats/write_losses.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "core/parallel.h"
+#include "core/statistics.h"
+#include "core/text.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr int64_t kGrain = 1 << 14;
+
+// Gaussians with a value that the format clamps.
+struct Clamped {
+  int64_t log_scales = 0, colors = 0, harmonics = 0;
+};
+
+bool AnyBeyond(const float* values, int64_t count, float min, float max) {
+  return std::any_of(values, values + count, [&](float x) { return x < min || x > max; });
+}
+
+Clamped CountClamped(const FormatRange& range, const GaussianCloud& cloud, int sh_degree) {
+  const int64_t harmonics = 3 * (ShCoefficients(sh_degree) - 1);
+  std::vector<Clamped> parts(static_cast<size_t>((cloud.size() + kGrain - 1) / kGrain));
+  ParallelFor(0, cloud.size(), kGrain, [&](int64_t first, int64_t last) {
+    Clamped& part = parts[static_cast<size_t>(first / kGrain)];
+    for (int64_t i = first; i < last; ++i) {
+      const float* sh = cloud.sh.data() + i * cloud.sh_stride();
+      part.log_scales +=
+          AnyBeyond(cloud.log_scales.data() + 3 * i, 3, range.log_scale_min, range.log_scale_max) ? 1 : 0;
+      part.colors += AnyBeyond(sh, 3, -range.dc, range.dc) ? 1 : 0;
+      if (std::isfinite(range.harmonics)) {
+        part.harmonics += AnyBeyond(sh + 3, harmonics, -range.harmonics, range.harmonics) ? 1 : 0;
+      }
+    }
+  });
+  Clamped sum;
+  for (const Clamped& part : parts) {
+    sum.log_scales += part.log_scales;
+    sum.colors += part.colors;
+    sum.harmonics += part.harmonics;
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::vector<std::string> WriteLosses(const SplatFormat& format, const GaussianCloud& cloud) {
+  const FormatRange& range = format.range;
+  std::vector<std::string> losses;
+  if (cloud.sh_degree > range.sh_degree) {
+    losses.push_back(Cat("a ", format.name, " file has no place for spherical harmonics beyond degree ",
+                         range.sh_degree, ": those of degree ", range.sh_degree + 1, " to ", cloud.sh_degree,
+                         " are dropped, so colours no longer change with the view"));
+  }
+  const Clamped clamped = CountClamped(range, cloud, std::min(cloud.sh_degree, range.sh_degree));
+  const auto add = [&](int64_t count, const std::string& what) {
+    if (count == 0) return;
+    losses.push_back(Cat(WithThousands(count), " of ", WithThousands(cloud.size()), " Gaussians have ", what,
+                         ", the range of ", format.name, ": clamped to it"));
+  };
+  if (std::isinf(range.log_scale_min)) {
+    add(clamped.log_scales, Cat("log-scales above ", range.log_scale_max));
+  } else {
+    add(clamped.log_scales, Cat("log-scales beyond ", range.log_scale_min, " to ", range.log_scale_max, " (lengths of ",
+                                std::exp(range.log_scale_min), " to ", std::exp(range.log_scale_max), ")"));
+  }
+  add(clamped.colors, Cat("f_dc beyond ±", range.dc));
+  add(clamped.harmonics, Cat("spherical harmonics beyond ±", range.harmonics));
+  if (format.mean_loss != nullptr) {
+    if (std::string loss = format.mean_loss(cloud); !loss.empty()) losses.push_back(std::move(loss));
+  }
+  return losses;
+}
+
+MiddleOfMeans FindMiddleOfMeans(const GaussianCloud& cloud) {
+  constexpr int64_t kSamples = 1 << 16;
+  const int64_t step = (cloud.size() + kSamples - 1) / kSamples;
+  MiddleOfMeans middle;
+  for (size_t axis = 0; axis < 3 && step > 0; ++axis) {
+    std::vector<float> values;
+    for (int64_t i = 0; i < cloud.size(); i += step) {
+      const float x = cloud.means[static_cast<size_t>(3 * i) + axis];
+      if (std::isfinite(x)) values.push_back(x);
+    }
+    if (values.empty()) continue;
+    const float low = Quantile(values, 0.01), high = Quantile(values, 0.99);
+    middle.extent = std::max(middle.extent, high - low);
+    middle.farthest = std::max({middle.farthest, std::fabs(low), std::fabs(high)});
+  }
+  return middle;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/gaussian_cloud.h"
+#include "formats/registry.h"
+
+namespace anchorsplat {
+
+// What of this cloud a format has no place for, beyond the rounding that every cloud gets (docs/formats.md): harmonics
+// that are dropped, values that are clamped to the format's range, means that one stray Gaussian makes coarse. A
+// sentence each, for people; nothing when all is well. WriteCloud says them as warnings. Values that are not numbers
+// are not counted.
+std::vector<std::string> WriteLosses(const SplatFormat& format, const GaussianCloud& cloud);
+
+// Largest side of a box that holds the middle 98 % of the means on every axis, and its farthest coordinate from zero;
+// estimated from at most 65,536 of them. Zeros when none is finite.
+struct MiddleOfMeans {
+  float extent = 0, farthest = 0;  // world units
+};
+MiddleOfMeans FindMiddleOfMeans(const GaussianCloud& cloud);
+
+}  // namespace anchorsplat

@@ -1,23 +1,9 @@
 #include "bench/io_bench.h"
 
-#include <fcntl.h>
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
-#include <sys/mman.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <atomic>
-#include <chrono>
-#include <cstdlib>
-#include <cstring>
-#include <fstream>
 #include <functional>
-#include <limits>
 #include <system_error>
-#include <thread>
 
+#include "bench/bare_costs.h"
 #include "core/gaussian_cloud.h"
 #include "core/parallel.h"
 #include "core/random.h"
@@ -30,96 +16,6 @@ namespace anchorsplat {
 namespace {
 
 namespace fs = std::filesystem;
-
-double Seconds(const std::function<void()>& work) {
-  const auto begin = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
-
-class ScratchFolder {
- public:
-  explicit ScratchFolder(const fs::path& parent) {
-    std::string name = (parent / "anchorsplat-bench-XXXXXX").string();
-    if (mkdtemp(name.data()) != nullptr) path_ = name;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
-// Anonymous memory of this process in bytes; 0 where the system does not say.
-uint64_t AnonymousBytes() {
-  std::ifstream status("/proc/self/status");
-  for (std::string word; status >> word;) {
-    if (word != "RssAnon:") continue;
-    uint64_t kibibytes = 0;
-    status >> kibibytes;
-    return kibibytes * 1024;
-  }
-  return 0;
-}
-
-// Highest anonymous memory while `work` runs, less what there was before. Sampled: arrays of a cloud take many samples
-// to be touched.
-uint64_t PeakGrowth(const std::function<void()>& work) {
-#ifdef __GLIBC__
-  malloc_trim(0);  // memory kept from before would be used again without showing as growth
-#endif
-  const uint64_t before = AnonymousBytes();
-  std::atomic<bool> done{false};
-  std::atomic<uint64_t> peak{before};
-  std::thread sampler([&] {
-    while (!done) {
-      peak = std::max(peak.load(), AnonymousBytes());
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-  });
-  work();
-  const uint64_t after = AnonymousBytes();
-  done = true;
-  sampler.join();
-  return std::max(peak.load(), after) - before;
-}
-
-Status ReadToNowhere(const fs::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot open")};
-  std::vector<char> block(size_t{128} << 10);  // as cat does
-  while (::read(descriptor, block.data(), block.size()) > 0) {
-  }
-  ::close(descriptor);
-  return {};
-}
-
-Status WriteBare(const fs::path& path, const char* bytes, uint64_t size) {
-  const int descriptor = ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-  bool ok = descriptor >= 0;
-  for (uint64_t at = 0; ok && at < size;) {
-    const ssize_t n = ::write(descriptor, bytes + at, std::min<uint64_t>(size - at, uint64_t{1} << 20));
-    ok = n > 0;
-    at += static_cast<uint64_t>(std::max<ssize_t>(n, 0));
-  }
-  if (descriptor >= 0) ok = ::close(descriptor) == 0 && ok;
-  if (!ok) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot write")};
-  return {};
-}
-
-// Plain pages, as any program gets them.
-Status CopyToFreshPages(const char* bytes, uint64_t size) {
-  void* pages = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-  if (pages == MAP_FAILED) return Error{ErrorCode::kIo, Cat("no memory for a copy of ", HumanBytes(size))};
-  std::memcpy(pages, bytes, size);
-  ::munmap(pages, size);
-  return {};
-}
 
 GaussianCloud RandomCloud(int64_t count, int sh_degree) {
   GaussianCloud cloud;
@@ -155,20 +51,12 @@ Result<IoBenchReport> RunIoBench(const IoBenchOptions& options) {
   report.sh_degree = options.sh_degree;
   report.file_bytes = PredictedPlySize(options.gaussians, options.sh_degree);
 
-  std::error_code failed;
-  const fs::path parent = options.folder.empty() ? fs::temp_directory_path(failed) : options.folder;
-  const fs::space_info space = fs::space(parent, failed);
-  const uint64_t needed = 2 * report.file_bytes;
-  if (failed || space.available < needed) {
-    return Error{ErrorCode::kIo,
-                 Cat(parent.string(), ": bench io needs ", HumanBytes(needed), " of free space, there is ",
-                     failed ? std::string("no such folder") : HumanBytes(space.available))};
-  }
-  const ScratchFolder folder(parent);
-  if (folder.path().empty()) return Error{ErrorCode::kIo, Cat(parent.string(), ": cannot make a folder in it")};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ScratchFolder folder,
+                               ScratchFolder::Make(options.folder, 2 * report.file_bytes, "bench io"));
   const fs::path file = folder.path() / "cloud.ply";
   const fs::path bare = folder.path() / "bare.bin";
 
+  std::error_code failed;
   Status status;
   const auto best = [&](double& seconds, const std::function<Status()>& work) {
     double now = 0;

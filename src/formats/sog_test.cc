@@ -405,7 +405,7 @@ std::string DeflatedZip(const std::string& text, size_t size) {
   deflateEnd(&stream);
   const auto number = [](uint64_t value, int bytes) {
     std::string out;
-    for (int k = 0; k < bytes; ++k) out += static_cast<char>(value >> (8 * k) & 255);
+    for (int k = 0; k < bytes; ++k, value >>= 8) out += static_cast<char>(value & 255);
     return out;
   };
   const uint64_t crc = crc32(0, reinterpret_cast<const Bytef*>(text.data()), static_cast<uInt>(text.size()));

@@ -315,6 +315,7 @@ expect 2 "refine with pictures of something else" "$program" enhance "$source/ex
 says stderr "order of their cameras"
 expect 3 "refine with pictures that are not there" refine -o "$work/x.ply" --images "$work/none"
 expect 2 "refine for steps and seconds" refine -o "$work/x.ply" --steps 8 --seconds 1
+expect 2 "pictures for the filter" "$program" enhance "$work/whole.ply" --method filter --pixel-size 0.02 -o "$work/x.ply" --images "$work/project"
 expect 2 "exposure without pictures" refine -o "$work/x.ply" --exposure
 expect 2 "pictures that were not given" "$program" enhance "$work/whole.ply" -o "$work/x.ply" --method refine-images --pixel-size 0.02
 says stderr "--images"

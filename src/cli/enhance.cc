@@ -129,6 +129,10 @@ Status FinishModelOptions(const EnhanceFlags& flags) {
   if (!flags.model_file.empty() && flags.options.method == "filter") {
     return Error{ErrorCode::kBadArgument, "--model and --method filter: the filter uses no model"};
   }
+  const std::string& method = flags.options.method;
+  if (!flags.options.refine.images.empty() && method != "auto" && method.find("refine") == std::string::npos) {
+    return Error{ErrorCode::kBadArgument, Cat("--images and --method ", method, ": it uses no pictures, refine does")};
+  }
   flags.model->file = flags.model_file;
   flags.model->options.upstream = flags.compat == "upstream";
   ANCHORSPLAT_ASSIGN_OR_RETURN(flags.model->options.shuffles, ParseShuffles(flags.shuffles));

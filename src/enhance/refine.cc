@@ -65,12 +65,17 @@ Result<Views> OpenSplat(const RefineInput& input, const RefineOptions& options, 
   std::vector<Camera> train, check;
   if (input.cameras && !input.cameras->cameras.empty()) {
     if (input.cameras->background) render.background = *input.cameras->background;
-    train = PosesAlong(input.cameras->cameras, options.between);
-    // Half-way to the third neighbours: none of those trained on, unless `between` is 3 or more.
-    check = PosesAlong(Thinned(input.cameras->cameras, 2 * kCheckViews), 1);
-    check =
-        Thinned({check.begin() + std::min<ptrdiff_t>(std::ssize(check), 2 * kCheckViews), check.end()}, kCheckViews);
-    if (check.empty()) check = Thinned(train, kCheckViews);
+    const std::vector<Camera>& cameras = input.cameras->cameras;
+    const std::vector<Camera> poses = PosesAlong(cameras, options.between);
+    const std::vector<Camera> between(poses.begin() + std::ssize(cameras), poses.end());
+    // Some of the places between cameras are kept for seeing whether it helped, as long as enough are left.
+    const bool enough = std::ssize(between) > 2 * kCheckViews;
+    check = enough ? Thinned(between, kCheckViews) : Thinned(cameras, kCheckViews);
+    train = cameras;
+    for (const Camera& camera : between) {
+      const auto same = [&](const Camera& other) { return enough && other.name == camera.name; };
+      if (std::none_of(check.begin(), check.end(), same)) train.push_back(camera);
+    }
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(train, PosesAround(input.cloud, input.pixel_size, options.poses, input.seed));
     ANCHORSPLAT_ASSIGN_OR_RETURN(check, PosesAround(input.cloud, input.pixel_size, kCheckViews, input.seed + 1));

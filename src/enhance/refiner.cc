@@ -13,8 +13,10 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr float kLeastOutlier = 0.1f;  // of full scale: detail that is still missing may differ by this much
-constexpr int kTries = 16;             // for a Gaussian that the camera sees
+// Of full scale, what detail that is still missing may differ by; in the beginning, when everything may be wrong,
+// nothing is an outlier.
+constexpr double kLeastOutlier = 0.1, kTrustFrom = 0.3;
+constexpr int kTries = 16;  // for a Gaussian that the camera sees
 
 LearningRates Scaled(LearningRates rates, double factor) {
   for (double* rate : {&rates.means, &rates.scales, &rates.opacities, &rates.quats, &rates.sh0, &rates.sh_rest}) {
@@ -63,14 +65,17 @@ Refiner::Refiner(const RefineOptions& options, const RefineProblem& problem, Ref
       order_(static_cast<int64_t>(targets_.views().size()), problem.seed) {}
 
 // Where nothing is to be learned the target becomes what is there.
-void Refiner::AdjustTarget() {
+void Refiner::AdjustTarget(double done) {
   const Image& rendered = objective_.rendered();
   Image& picture = target_.picture;
   if (options_.exposure) {
     const auto exposure = EstimateExposure(rendered, picture);
     if (exposure.ok()) RemoveExposure(*exposure, picture);
   }
-  if (options_.robust) (void)IgnoreOutliers(rendered, kLeastOutlier, picture);
+  if (options_.robust) {
+    const double least = std::max(kLeastOutlier, 1 - done / kTrustFrom);
+    (void)IgnoreOutliers(rendered, static_cast<float>(least), picture);
+  }
   for (size_t i = 0; i < target_.ignored.size(); ++i) {
     if (target_.ignored[i] == 0) continue;
     for (int c = 0; c < 3; ++c) picture.channel(c)[i] = rendered.channel(c)[i];
@@ -93,7 +98,7 @@ Result<FitStep> Refiner::Step(double done) {
   objective.pixel = PixelModelAt({problem_.upscale, options_.half_from, options_.all_from}, done);
   const Camera camera = Cropped(view, window);
   ANCHORSPLAT_RETURN_IF_ERROR(objective_.Show(objective, state_.cloud, camera));
-  AdjustTarget();
+  AdjustTarget(done);
   ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Compare(objective, state_.cloud, target_.picture, gradient_));
 
   watch.Lap();

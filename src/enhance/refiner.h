@@ -42,7 +42,7 @@ class Refiner {
 
  private:
   Refiner(const RefineOptions& options, const RefineProblem& problem, RefineTargets targets, FitState state);
-  void AdjustTarget();
+  void AdjustTarget(double done);
 
   RefineOptions options_;
   RefineProblem problem_;

@@ -1,0 +1,16 @@
+#include "model/modules/trainable_network.h"
+
+#include "core/text.h"
+
+namespace anchorsplat {
+
+// One function per kind, each in the file of its network.
+Result<std::shared_ptr<TrainableNetwork>> MakeAnchorSplatTrainable(const NetworkOptions& options);
+
+Result<std::shared_ptr<TrainableNetwork>> MakeTrainableNetwork(const std::string& kind, const NetworkOptions& options) {
+  if (kind == "anchorsplat") return MakeAnchorSplatTrainable(options);
+  return Error{ErrorCode::kBadArgument,
+               Cat("kind: there is no network \"", Printable(kind), "\" (anchorsplat is one)")};
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <torch/torch.h>
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/result.h"
+#include "model/modules/network_options.h"
+
+namespace anchorsplat {
+
+// A splat as tensors in stored space (log-scales, opacity logits, raw quaternions wxyz, SH coefficient-major), float32,
+// world units.
+struct GaussianTensors {
+  torch::Tensor means;           // [N,3]
+  torch::Tensor log_scales;      // [N,3]
+  torch::Tensor quats;           // [N,4]
+  torch::Tensor opacity_logits;  // [N]
+  torch::Tensor sh;              // [N,C,3], C = 1, 4, 9 or 16
+};
+
+struct NetworkInput {
+  GaussianTensors gaussians;  // the low-quality splat
+  torch::Tensor pixel_sizes;  // [N] world units: what a low-resolution pixel covers at each Gaussian, p_LR
+  double upscale = 4;         // u: high-resolution pixels per low-resolution pixel along a side
+  // What a network wants computed once per splat and kept between steps (neighbours, serialization, frames). Made by
+  // Prepare.
+  std::shared_ptr<void> prepared;
+};
+
+// What the training loop knows of a network: K Gaussians out for every Gaussian in.
+class TrainableNetwork : public torch::nn::Module {
+ public:
+  // Everything of an input that does not depend on parameters; no gradient. Called once per (augmented) splat, possibly
+  // from another thread than Forward, so it must not touch what Forward changes.
+  // Errors (kBadArgument): a splat that the network cannot work with.
+  virtual Result<std::shared_ptr<void>> Prepare(const NetworkInput& input) = 0;
+
+  // K·N Gaussians, differentiable with respect to the parameters. Row order k·N + i.
+  virtual GaussianTensors Forward(const NetworkInput& input) = 0;
+
+  virtual int copies() const = 0;  // K
+
+  // All parameters that are trained, by group name for learning rates ("backbone", "means", "scales", …).
+  virtual std::vector<std::pair<std::string, std::vector<torch::Tensor>>> Groups() = 0;
+
+  // Everything `enhance --model` needs to open the network again. Replaces an older file.
+  virtual Status Save(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata) = 0;
+};
+
+// A network of the given kind with fresh parameters (torch's generator): "anchorsplat".
+// Errors (kBadArgument): an unknown kind; an option that the kind does not have (UnknownOption) or of another type.
+Result<std::shared_ptr<TrainableNetwork>> MakeTrainableNetwork(const std::string& kind, const NetworkOptions& options);
+
+}  // namespace anchorsplat

@@ -10,19 +10,10 @@
 #include <vector>
 
 #include "core/result.h"
+#include "model/modules/gaussian_tensors.h"
 #include "model/modules/network_options.h"
 
 namespace anchorsplat {
-
-// A splat as tensors in stored space (log-scales, opacity logits, raw quaternions wxyz, SH coefficient-major), float32,
-// world units.
-struct GaussianTensors {
-  torch::Tensor means;           // [N,3]
-  torch::Tensor log_scales;      // [N,3]
-  torch::Tensor quats;           // [N,4]
-  torch::Tensor opacity_logits;  // [N]
-  torch::Tensor sh;              // [N,C,3], C = 1, 4, 9 or 16
-};
 
 struct NetworkInput {
   GaussianTensors gaussians;  // the low-quality splat

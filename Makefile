@@ -67,6 +67,7 @@ viewer-test: build
 bench: program
 	@build/anchorsplat bench render
 	@build/anchorsplat bench io
+	@build/anchorsplat bench convert
 	@build/anchorsplat bench network
 
 lint:

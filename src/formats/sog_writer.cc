@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -32,6 +33,9 @@ constexpr int64_t kEntriesPerRow = 64;
 constexpr int64_t kMaxSide = 16383;  // of a WebP picture
 constexpr int kPaletteRounds = 8;    // further ones gain less than half a percent of the error
 constexpr float kMaxLogScale = 20;
+// The encoder works with some 50 bytes a pixel. Pictures larger than this are compressed and written one after the
+// other, so that a conversion stays within 1.3 × the cloud.
+constexpr int64_t kLargePicture = 1 << 20;
 
 // A picture that is drawn when its turn comes: all of them at once would be a fifth of the cloud.
 struct Picture {
@@ -241,25 +245,33 @@ Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, c
   meta["scales"] = DrawScales(pictures, drawn);
   meta["sh0"] = DrawColors(pictures, drawn);
 
-  std::vector<Result<std::string>> encoded(drawn.size(), std::string());
-  ParallelFor(0, static_cast<int64_t>(drawn.size()), 1, [&](int64_t first, int64_t last) {
-    for (auto k = static_cast<size_t>(first); k < static_cast<size_t>(last); ++k) {
-      encoded[k] = EncodeWebp(drawn[k].draw());
-    }
-  });
-  for (const Result<std::string>& bytes : encoded) {
-    if (!bytes.ok()) return Error{bytes.error().code, Cat(path.string(), ": ", bytes.error().message)};
-  }
   const std::string text = meta.dump();
-  if (!bundled) {
-    for (size_t k = 0; k < drawn.size(); ++k) ANCHORSPLAT_RETURN_IF_ERROR(beside[k].Write(*encoded[k]));
+  std::optional<ZipWriter> archive;
+  if (bundled) {
+    archive.emplace(file);
+    ANCHORSPLAT_RETURN_IF_ERROR(archive->Add("meta.json", text));
+  } else {
     ANCHORSPLAT_RETURN_IF_ERROR(file.Write(text));
-    return CommitAll(beside, file);
   }
-  ZipWriter archive(file);
-  ANCHORSPLAT_RETURN_IF_ERROR(archive.Add("meta.json", text));
-  for (size_t k = 0; k < drawn.size(); ++k) ANCHORSPLAT_RETURN_IF_ERROR(archive.Add(drawn[k].name, *encoded[k]));
-  ANCHORSPLAT_RETURN_IF_ERROR(archive.Finish());
+  const size_t at_once = width * height > kLargePicture ? 1 : drawn.size();
+  for (size_t next = 0; next < drawn.size(); next += at_once) {
+    std::vector<Result<std::string>> encoded(std::min(at_once, drawn.size() - next), std::string());
+    ParallelFor(0, static_cast<int64_t>(encoded.size()), 1, [&](int64_t first, int64_t last) {
+      for (auto k = static_cast<size_t>(first); k < static_cast<size_t>(last); ++k) {
+        encoded[k] = EncodeWebp(drawn[next + k].draw());
+        drawn[next + k].draw = {};  // with what it holds
+      }
+    });
+    for (size_t k = 0; k < encoded.size(); ++k) {
+      if (!encoded[k].ok()) {
+        return Error{encoded[k].error().code, Cat(path.string(), ": ", encoded[k].error().message)};
+      }
+      ANCHORSPLAT_RETURN_IF_ERROR(bundled ? archive->Add(drawn[next + k].name, *encoded[k])
+                                          : beside[next + k].Write(*encoded[k]));
+    }
+  }
+  if (!bundled) return CommitAll(beside, file);
+  ANCHORSPLAT_RETURN_IF_ERROR(archive->Finish());
   return file.Commit();
 }
 

@@ -6,11 +6,13 @@ namespace anchorsplat {
 
 // One function per kind, each in the file of its network.
 Result<std::shared_ptr<TrainableNetwork>> MakeAnchorSplatTrainable(const NetworkOptions& options);
+Result<std::shared_ptr<TrainableNetwork>> MakeCompactTrainable(NetworkOptions options);
 
 Result<std::shared_ptr<TrainableNetwork>> MakeTrainableNetwork(const std::string& kind, const NetworkOptions& options) {
   if (kind == "anchorsplat") return MakeAnchorSplatTrainable(options);
+  if (kind == "compact") return MakeCompactTrainable(options);
   return Error{ErrorCode::kBadArgument,
-               Cat("kind: there is no network \"", Printable(kind), "\" (anchorsplat is one)")};
+               Cat("kind: there is no network \"", Printable(kind), "\" (anchorsplat and compact are)")};
 }
 
 }  // namespace anchorsplat

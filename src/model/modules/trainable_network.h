@@ -44,7 +44,7 @@ class TrainableNetwork : public torch::nn::Module {
   virtual Status Save(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata) = 0;
 };
 
-// A network of the given kind with fresh parameters (torch's generator): "anchorsplat".
+// A network of the given kind with fresh parameters (torch's generator): "anchorsplat" or "compact".
 // Errors (kBadArgument): an unknown kind; an option that the kind does not have (UnknownOption) or of another type.
 Result<std::shared_ptr<TrainableNetwork>> MakeTrainableNetwork(const std::string& kind, const NetworkOptions& options);
 

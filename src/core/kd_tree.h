@@ -1,0 +1,45 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace anchorsplat {
+
+// Exact nearest neighbours of points in space by a balanced k-d tree. A tree and not a grid: structure-from-motion and
+// fits leave lone points far away, where a grid would walk through empty cells.
+class KdTree {
+ public:
+  struct Neighbour {
+    double squared_distance;
+    int64_t index;
+  };
+
+  // Positions [N,3], all finite.
+  explicit KdTree(std::span<const float> positions);
+
+  int64_t size() const { return static_cast<int64_t>(index_.size()); }
+
+  // The point at a place of the tree, 0 ≤ place < size(). Points whose places are close lie close together, so that
+  // searches in this order find what they need in the cache.
+  int64_t PointAt(int64_t place) const { return index_[static_cast<size_t>(place)]; }
+
+  // The points nearest to that at `place`, without itself, by rising distance, as many as fit into `nearest`. Returns
+  // how many there are: fewer than asked for when the tree has no more. Which of several equally far ones are taken
+  // depends on the order of the positions alone, and many points at one place cost no more than others.
+  int64_t Nearest(int64_t place, std::span<Neighbour> nearest) const;
+
+ private:
+  using Point = std::array<double, 3>;
+  struct Search;
+
+  void Build(std::span<const Point> points, int64_t begin, int64_t end);
+
+  // In the order of the tree: the middle of every range divides it along its widest side, which `axis_` keeps there.
+  std::vector<Point> points_;
+  std::vector<int64_t> index_;
+  std::vector<uint8_t> axis_;
+};
+
+}  // namespace anchorsplat

@@ -1,0 +1,79 @@
+#include "core/kd_tree.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "core/random.h"
+
+namespace anchorsplat {
+namespace {
+
+double SquaredDistance(const std::vector<float>& x, int64_t i, int64_t j) {
+  double sum = 0;
+  for (size_t k = 0; k < 3; ++k) {
+    const double d = double{x[static_cast<size_t>(3 * i) + k]} - x[static_cast<size_t>(3 * j) + k];
+    sum += d * d;
+  }
+  return sum;
+}
+
+// Against sorting all distances.
+void ExpectNearest(const std::vector<float>& x, size_t count) {
+  const KdTree tree(x);
+  const auto n = static_cast<int64_t>(x.size() / 3);
+  ASSERT_EQ(tree.size(), n);
+  std::vector<bool> met(static_cast<size_t>(n), false);
+  for (int64_t place = 0; place < n; ++place) {
+    const int64_t i = tree.PointAt(place);
+    met[static_cast<size_t>(i)] = true;
+    std::vector<double> expected;
+    for (int64_t j = 0; j < n; ++j) {
+      if (j != i) expected.push_back(SquaredDistance(x, i, j));
+    }
+    std::sort(expected.begin(), expected.end());
+    std::vector<KdTree::Neighbour> nearest(count);
+    const int64_t found = tree.Nearest(place, nearest);
+    ASSERT_EQ(found, std::min<int64_t>(static_cast<int64_t>(count), n - 1));
+    for (size_t k = 0; k < static_cast<size_t>(found); ++k) {
+      EXPECT_EQ(nearest[k].squared_distance, expected[k]) << "point " << i << ", neighbour " << k;
+      EXPECT_NE(nearest[k].index, i);
+      EXPECT_EQ(nearest[k].squared_distance, SquaredDistance(x, i, nearest[k].index));
+      for (size_t l = 0; l < k; ++l) EXPECT_NE(nearest[k].index, nearest[l].index);
+    }
+  }
+  EXPECT_TRUE(std::all_of(met.begin(), met.end(), [](bool b) { return b; }));
+}
+
+TEST(KdTree, MatchesSortingAllDistances) {
+  Random random(1);
+  for (const size_t n : {1u, 2u, 5u, 9u, 100u, 700u}) {
+    std::vector<float> x(3 * n);
+    for (float& v : x) v = static_cast<float>(random.Normal());
+    ExpectNearest(x, 8);
+  }
+}
+
+TEST(KdTree, FarOutliersAndSharedPlaces) {
+  Random random(2);
+  std::vector<float> x;
+  for (int i = 0; i < 300; ++i) {
+    for (int k = 0; k < 3; ++k) x.push_back(static_cast<float>(random.Below(3)));  // 27 places
+  }
+  for (const float far : {1e6f, -3e18f, 1e-30f}) x.insert(x.end(), {far, 0, far});
+  ExpectNearest(x, 12);
+}
+
+TEST(KdTree, ManyPointsAtOnePlaceAreNotAllVisited) {
+  constexpr int64_t kPoints = 200'000;  // squared, this would take minutes
+  const KdTree tree(std::vector<float>(3 * kPoints, 0.5f));
+  std::vector<KdTree::Neighbour> nearest(8);
+  for (int64_t place = 0; place < kPoints; ++place) ASSERT_EQ(tree.Nearest(place, nearest), 8);
+  EXPECT_EQ(nearest.back().squared_distance, 0);
+}
+
+TEST(KdTree, Empty) { EXPECT_EQ(KdTree({}).size(), 0); }
+
+}  // namespace
+}  // namespace anchorsplat

@@ -1,0 +1,75 @@
+#include "model/compact_graph.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/kd_tree.h"
+#include "core/parallel.h"
+#include "core/rotation.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// Of Gaussian i, whose neighbours are known.
+void FindFrame(const GaussianCloud& cloud, int64_t i, CompactGraph& graph) {
+  const float* q = cloud.quats.data() + 4 * i;
+  const float* scales = cloud.log_scales.data() + 3 * i;
+  const auto rotation = RotationFromQuaternion<double>(q[0], q[1], q[2], q[3]);
+  uint8_t* stored = graph.stored_axis.data() + 3 * i;
+  for (uint8_t a = 0; a < 3; ++a) stored[a] = a;
+  std::stable_sort(stored, stored + 3, [&](uint8_t a, uint8_t b) { return scales[a] > scales[b]; });
+
+  std::array<double, 3> sum = {0, 0, 0};  // of unit vectors to the neighbours
+  for (int64_t k = 0; k < graph.neighbours; ++k) {
+    const float* from = cloud.means.data() + 3 * i;
+    const float* to = cloud.means.data() + int64_t{3} * graph.index[static_cast<size_t>(i * graph.neighbours + k)];
+    std::array<double, 3> d;
+    double square = 0;
+    for (size_t c = 0; c < 3; ++c) {
+      d[c] = double{to[c]} - from[c];
+      square += d[c] * d[c];
+    }
+    if (!(square > 0)) continue;
+    for (size_t c = 0; c < 3; ++c) sum[c] += d[c] / std::sqrt(square);
+  }
+  for (size_t a = 0; a < 3; ++a) {
+    double along = 0;
+    for (size_t c = 0; c < 3; ++c) along += rotation[3 * c + stored[a]] * sum[c];
+    const double sign = along < 0 ? -1 : 1;
+    for (size_t c = 0; c < 3; ++c) {
+      graph.axes[static_cast<size_t>(9 * i) + 3 * a + c] = static_cast<float>(sign * rotation[3 * c + stored[a]]);
+    }
+    graph.sidedness[static_cast<size_t>(3 * i) + a] =
+        static_cast<float>(std::abs(along) / static_cast<double>(std::max<int64_t>(1, graph.neighbours)));
+  }
+}
+
+}  // namespace
+
+CompactGraph BuildCompactGraph(const GaussianCloud& cloud, int64_t neighbours) {
+  CompactGraph graph;
+  const int64_t n = cloud.size();
+  graph.count = n;
+  graph.neighbours = std::clamp<int64_t>(n - 1, 0, neighbours);
+  graph.index.resize(static_cast<size_t>(n * graph.neighbours));
+  graph.axes.resize(static_cast<size_t>(9 * n));
+  graph.stored_axis.resize(static_cast<size_t>(3 * n));
+  graph.sidedness.resize(static_cast<size_t>(3 * n));
+  const KdTree tree(cloud.means);
+  ParallelFor(0, n, 512, [&](int64_t begin, int64_t end) {
+    std::vector<KdTree::Neighbour> nearest(static_cast<size_t>(graph.neighbours));
+    for (int64_t place = begin; place < end; ++place) {
+      const int64_t i = tree.PointAt(place);
+      tree.Nearest(place, nearest);
+      for (size_t k = 0; k < nearest.size(); ++k) {
+        graph.index[static_cast<size_t>(i * graph.neighbours) + k] = static_cast<int32_t>(nearest[k].index);
+      }
+      FindFrame(cloud, i, graph);
+    }
+  });
+  return graph;
+}
+
+}  // namespace anchorsplat

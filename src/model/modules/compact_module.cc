@@ -53,18 +53,6 @@ void CopyTo(const Tensor& tensor, Buffer<float>& out) {
   out.assign(own.const_data_ptr<float>(), own.const_data_ptr<float>() + own.numel());
 }
 
-GaussianCloud ToCloud(const GaussianTensors& g) {
-  GaussianCloud cloud;
-  cloud.sh_degree = 0;
-  while (ShCoefficients(cloud.sh_degree) < g.sh.size(1)) ++cloud.sh_degree;
-  CopyTo(g.means, cloud.means);
-  CopyTo(g.log_scales, cloud.log_scales);
-  CopyTo(g.quats, cloud.quats);
-  CopyTo(g.opacity_logits, cloud.opacity_logits);
-  CopyTo(g.sh, cloud.sh);
-  return cloud;
-}
-
 Tensor Bounded(const CompactAttribute& attribute, const Tensor& y) {
   return attribute.bound * torch::tanh(y * (attribute.gain / attribute.bound));
 }

@@ -30,11 +30,9 @@ Tensor Table(const Buffer<float>& values, std::vector<int64_t> shape) {
 }
 
 NetworkInput InputOf(const GaussianCloud& cloud, double pixel_size = kSheetPixel) {
-  const int64_t n = cloud.size();
   NetworkInput input;
-  input.gaussians = {Table(cloud.means, {n, 3}), Table(cloud.log_scales, {n, 3}), Table(cloud.quats, {n, 4}),
-                     Table(cloud.opacity_logits, {n}), Table(cloud.sh, {n, cloud.coefficients(), 3})};
-  input.pixel_sizes = torch::full({n}, pixel_size);
+  input.gaussians = ToTensors(cloud);
+  input.pixel_sizes = torch::full({cloud.size()}, pixel_size);
   return input;
 }
 
@@ -43,22 +41,6 @@ GaussianTensors Copies(CompactTrainable& network, NetworkInput input) {
   EXPECT_TRUE(prepared.ok()) << prepared.error().message;
   input.prepared = *prepared;
   return network.Forward(input);
-}
-
-GaussianCloud CloudOf(const GaussianTensors& g, int sh_degree) {
-  GaussianCloud cloud;
-  cloud.Resize(g.means.size(0), sh_degree);
-  const auto copy = [](const Tensor& from, Buffer<float>& to) {
-    const Tensor own = from.detach().contiguous();
-    ASSERT_EQ(own.numel(), static_cast<int64_t>(to.size()));
-    std::copy_n(own.const_data_ptr<float>(), to.size(), to.begin());
-  };
-  copy(g.means, cloud.means);
-  copy(g.log_scales, cloud.log_scales);
-  copy(g.quats, cloud.quats);
-  copy(g.opacity_logits, cloud.opacity_logits);
-  copy(g.sh, cloud.sh);
-  return cloud;
 }
 
 void ExpectNear(const Buffer<float>& a, const Buffer<float>& b, double tolerance, const char* what) {
@@ -104,7 +86,7 @@ TEST(CompactModule, InferenceIsTheSameFunction) {
       network.eval();
       ASSERT_TRUE(network.SetWeights(OpenDomain()).ok());
       const torch::NoGradGuard no_gradient;
-      const GaussianCloud expected = CloudOf(Copies(network, InputOf(cloud)), degree);
+      const GaussianCloud expected = ToCloud(Copies(network, InputOf(cloud)));
 
       const auto packed = CompactNetwork::Load(config, network.Weights());
       ASSERT_TRUE(packed.ok()) << packed.error().message;
@@ -150,7 +132,7 @@ TEST(CompactModule, BeginsAtTheFilter) {
     config.spread = spread;
     CompactTrainable network(config);
     const torch::NoGradGuard no_gradient;
-    const GaussianCloud start = CloudOf(Copies(network, InputOf(cloud)), 3);
+    const GaussianCloud start = ToCloud(Copies(network, InputOf(cloud)));
     const auto measured = Psnr(Render(start), expected);
     ASSERT_TRUE(measured.ok());
     EXPECT_GT(*measured, psnr) << copies << " copies, spread " << spread;
@@ -219,8 +201,8 @@ TEST(CompactModule, TurnsMovesAndScalesWithTheSplat) {
     if (config.offset_unit == OffsetUnit::kCube) continue;  // the cube's axes are the world's
     CompactTrainable network(config);
     ASSERT_TRUE(network.SetWeights(OpenDomain()).ok());
-    const GaussianCloud expected = Moved(CloudOf(Copies(network, InputOf(cloud)), 3), unit, 2.5, shift);
-    const GaussianCloud moved = CloudOf(Copies(network, InputOf(Moved(cloud, unit, 2.5, shift), 2.5 * kSheetPixel)), 3);
+    const GaussianCloud expected = Moved(ToCloud(Copies(network, InputOf(cloud))), unit, 2.5, shift);
+    const GaussianCloud moved = ToCloud(Copies(network, InputOf(Moved(cloud, unit, 2.5, shift), 2.5 * kSheetPixel)));
     ExpectNear(moved, expected, 1e-3);
   }
 }

@@ -106,7 +106,7 @@ checks=$((checks + 1))
 expect 2 "convert to standard output" "$program" convert "$input" -
 
 # enhance.
-expect 0 "enhance" "$program" enhance "$input" -o "$work/out.ply" --pixel-size 0.0055
+expect 0 "enhance" "$program" enhance "$input" -o "$work/out.ply" --pixel-size 0.0055 --method filter
 says stdout "19,984 Gaussians in, 19,984 out"
 expect 5 "enhance does not overwrite" "$program" enhance "$input" -o "$work/out.ply" --pixel-size 0.0055
 says stderr "exists"
@@ -128,6 +128,15 @@ expect 3 "a model that is not there" "$program" enhance "$input" -o "$work/bad.p
 expect 4 "a splat as a model" "$program" enhance "$input" -o "$work/bad.ply" --model "$input"
 expect 2 "an empty model" "$program" enhance "$input" -o "$work/bad.ply" --model ""
 expect 2 "model options without a model" "$program" enhance "$input" -o "$work/bad.ply" --prune-opacity 0.1
+compact=$source/testdata/compact/small.safetensors
+expect 0 "a compact network" "$program" enhance "$input" -o "$work/compact.ply" --model "$compact" --cameras "$source/examples/biplane/transforms_lr.json"
+says stdout "19,984 Gaussians in, 39,968 out; model"
+expect 0 "a compact network, then refinement" "$program" enhance "$input" -o "$work/compact.ply" -w --model "$compact" --pixel-size 0.0055 --method model+refine --steps 1 --poses 8 --json
+says stdout '"method": "model+refine"'
+expect 2 "options of the other architecture" "$program" enhance "$input" -o "$work/bad.ply" --model "$compact" --pixel-size 0.0055 --normalisation bbox
+says stderr "normalisation is for the published architecture"
+head -c 9000 "$compact" >"$work/cut.safetensors"
+expect 4 "a compact network cut short" "$program" enhance "$input" -o "$work/bad.ply" --model "$work/cut.safetensors"
 expect 4 "a splat as weights" "$program" convert "$input" "$work/weights.safetensors"
 expect 2 "upscale below 1" "$program" enhance "$input" -o "$work/bad.ply" --upscale 0.5
 expect 2 "nonsense pixel size" "$program" enhance "$input" -o "$work/bad.ply" --pixel-size big

@@ -249,10 +249,10 @@ void AddEnhance(CLI::App& app, Program& program) {
 
   const std::string group = "Model";
   ModelOptions& model = flags->model->options;
-  auto* file =
-      verb.add_option("--model", flags->model_file, "Checkpoint of an AnchorSplat network, .pth or .safetensors")
-          ->check(NotEmpty())
-          ->group(group);
+  auto* file = verb.add_option("--model", flags->model_file,
+                               "Weights of an AnchorSplat network or of a compact one, .pth or .safetensors")
+                   ->check(NotEmpty())
+                   ->group(group);
   const auto model_option = [&](CLI::Option* option) { return option->needs(file)->group(group); };
   model_option(verb.add_option("--compat", flags->compat,
                                "upstream: do what the published script does, quirks included (its fp16 attention by "

@@ -166,8 +166,7 @@ double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud)
   if (cloud.render_mode == RenderMode::kAntialiased) {
     LogWarning(
         "the file is tagged antialiased: its fit did not absorb the 0.3 px² dilation, so there is no lost width to "
-        "give "
-        "back and the filter leaves it as it is (--filter-strength F to filter it all the same)");
+        "give back and it stays as it is (--filter-strength F to enhance it all the same)");
     return 0;
   }
   return DefaultFilterStrength(options.upscale);
@@ -200,12 +199,13 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(DropUnusable(input.cloud));
   report.dropped = report.gaussians_in - input.cloud.size();
 
-  if (!method->needs_pixel_size && (options.pixel_size || options.cameras || options.filter_strength)) {
+  const bool sized = method->needs_pixel_size() || (chosen.first != nullptr && chosen.first->needs_pixel_size());
+  if (!sized && (options.pixel_size || options.cameras || options.filter_strength)) {
     LogWarning(Cat("the method '", method->name,
                    "' knows no pixel size and no filter strength: --pixel-size, --cameras and ",
                    "--filter-strength change nothing"));
   }
-  if (method->needs_pixel_size) {
+  if (sized) {
     input.filter_strength = ChooseStrength(options, input.cloud);
     report.filter_strength = input.filter_strength;
     if (input.filter_strength > 0 && input.filter_strength * options.upscale * options.upscale <= 1 &&
@@ -220,7 +220,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   if (chosen.first != nullptr) {
     EnhanceInput first = input;
-    if (!chosen.first->needs_pixel_size) first.pixel_sizes.clear();
+    if (!chosen.first->needs_pixel_size()) first.pixel_sizes.clear();
     ANCHORSPLAT_ASSIGN_OR_RETURN(input.start, chosen.first->run(std::move(first), options, report));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, method->run(std::move(input), options, report));

@@ -63,8 +63,9 @@ struct EnhanceMethod {
   std::string name;
   std::string summary;  // one line for --help
   int rank = 0;
-  bool needs_pixel_size = true;  // else EnhanceInput::pixel_sizes is empty and nothing is estimated
-  bool takes_start = false;      // looks at EnhanceInput::start
+  bool takes_start = false;  // looks at EnhanceInput::start
+  // False: EnhanceInput::pixel_sizes may be empty, nothing is estimated. Asked once the method is ready.
+  std::function<bool()> needs_pixel_size = [] { return true; };
   std::function<Status(const EnhanceOptions&)> ready;
   std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&, EnhanceReport&)> run;
 };

@@ -1,5 +1,6 @@
 #include "eval/method.h"
 
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <memory>
@@ -13,8 +14,10 @@
 #include "eval/filter_sweep.h"
 #include "metrics/bicubic.h"
 #include "metrics/image_metrics.h"
-#include "model/checkpoint.h"
 #include "model/enhance_with_model.h"
+#include "model/model_method.h"
+#include "model/network_file.h"
+#include "model/shipped_network.h"
 #include "render/rasterizer.h"
 
 namespace anchorsplat {
@@ -118,16 +121,33 @@ Result<std::string> Identity(const fs::path& path) {
 
 Result<EvalMethod> Model(const fs::path& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string identity, Identity(file));
-  const auto network = std::make_shared<std::optional<PackedNetwork>>();  // loaded for the first object
+  const auto network = std::make_shared<std::optional<AnyNetwork>>();  // loaded for the first object
   return EvalMethod{file.stem().string(), identity, [file, network](const MethodTask& task) -> Result<MethodViews> {
                       if (!*network) {
-                        ANCHORSPLAT_ASSIGN_OR_RETURN(*network, LoadNetwork(file));
+                        ANCHORSPLAT_ASSIGN_OR_RETURN(*network, LoadAnyNetwork(file));
                       }
                       const auto begin = Clock::now();
-                      ANCHORSPLAT_ASSIGN_OR_RETURN(ModelResult result, EnhanceWithModel(task.object.low, **network));
+                      GaussianCloud cloud;
+                      std::vector<std::pair<std::string, double>> facts;
+                      if (const auto* packed = std::get_if<PackedNetwork>(&**network)) {
+                        ANCHORSPLAT_ASSIGN_OR_RETURN(ModelResult result, EnhanceWithModel(task.object.low, *packed));
+                        cloud = std::move(result.cloud);
+                      } else {
+                        ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes, TruePixelSizes(task.object));
+                        EnhanceInput input;
+                        input.cloud = task.object.low;
+                        input.pixel_sizes = std::move(sizes.sizes);
+                        input.filter_strength = DefaultStrength(task.object);
+                        EnhanceReport report;
+                        ANCHORSPLAT_ASSIGN_OR_RETURN(
+                            cloud, EnhanceWithCompactNetwork(std::move(input), task.object.upscale(),
+                                                             std::get<CompactNetwork>(**network), 0, report));
+                        facts = std::move(report.facts);
+                      }
                       const double seconds = Since(begin);
-                      MethodViews views = SplatViews(task.object, std::move(result.cloud));
+                      MethodViews views = SplatViews(task.object, std::move(cloud));
                       views.seconds = seconds;
+                      views.facts = std::move(facts);
                       return views;
                     }};
 }
@@ -146,13 +166,14 @@ CameraSet TrainingCameras(const BenchmarkObject& object) {
 EvalMethod Registered(const std::string& name) {
   EnhanceOptions defaults;
   // What it depends on besides the object; nothing of it for other methods than refinement.
-  const bool refines = name.starts_with("refine");
-  return {name, refines ? ToJsonText(defaults.refine) : "", [name](const MethodTask& task) -> Result<MethodViews> {
+  std::string settings = name.find("refine") != std::string::npos ? ToJsonText(defaults.refine) : "";
+  if (name.starts_with("model")) settings += ShippedNetworkIdentity();
+  return {name, settings, [name](const MethodTask& task) -> Result<MethodViews> {
             EnhanceOptions options;
             options.method = name;
             options.upscale = task.object.upscale();
             options.cameras = TrainingCameras(task.object);
-            if (name == "refine-images") {
+            if (name.ends_with("refine-images")) {
               options.refine.images = task.object.low_project;
               options.refine.hold_out = task.object.hold_out;
             }
@@ -206,8 +227,14 @@ Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& 
   }
   const std::string extension = fs::path(word).extension().string();
   if (extension == ".safetensors" || extension == ".pth" || extension == ".pt") return Model(word);
-  for (const EnhanceMethod& method : EnhanceMethods()) {
-    if (method.name == word) return Registered(word);
+  // One, or two with a plus between them.
+  const auto registered = [](const std::string& name) {
+    const auto methods = EnhanceMethods();
+    return std::any_of(methods.begin(), methods.end(), [&](const EnhanceMethod& m) { return m.name == name; });
+  };
+  const size_t plus = word.find('+');
+  if (registered(word.substr(0, plus)) && (plus == std::string::npos || registered(word.substr(plus + 1)))) {
+    return Registered(word);
   }
   return Error{ErrorCode::kBadArgument, Cat("--methods: '", Printable(word),
                                             "' is none of raw, filter, filter@F, filter-auto, filter-best, upsample, "

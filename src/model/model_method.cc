@@ -1,39 +1,130 @@
 #include "model/model_method.h"
 
+#include <cmath>
 #include <optional>
 #include <utility>
+#include <vector>
 
-#include "enhance/enhance.h"
-#include "model/checkpoint.h"
+#include "core/log.h"
+#include "core/text.h"
+#include "model/network_file.h"
+#include "model/shipped_network.h"
 
 namespace anchorsplat {
 
+namespace {
+
+// Shares worth a word.
+constexpr double kNotable = 0.01, kMost = 0.5;
+
+// Options that only the published architecture has.
+Status CheckCompactOptions(const ModelMethod& method) {
+  const ModelOptions& given = method.options;
+  const ModelOptions defaults;
+  const char* option = given.upstream                                  ? "--compat"
+                       : given.normalisation != defaults.normalisation ? "--normalisation"
+                       : given.shuffles != defaults.shuffles           ? "--shuffles"
+                       : given.depth_rule != defaults.depth_rule       ? "--curve-depth"
+                       : given.rounding != defaults.rounding           ? "--attention-rounding"
+                       : given.max_gaussians != defaults.max_gaussians ? "--max-gaussians"
+                       : method.precision != WeightPrecision::kFloat   ? "--precision"
+                                                                       : nullptr;
+  if (option == nullptr) return {};
+  return Error{ErrorCode::kBadArgument,
+               Cat(method.file.string(), " is a compact network; ", option, " is for the published architecture")};
+}
+
+Result<GaussianCloud> EnhanceWithPackedNetwork(const EnhanceInput& input, const PackedNetwork& network,
+                                               const ModelOptions& options, EnhanceReport& report) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ModelResult result, EnhanceWithModel(input.cloud, network, options));
+  const ModelReport& r = result.report;
+  report.dropped += r.not_finite + r.outside;
+  report.facts = {{"over_limit", static_cast<double>(r.over_limit)},
+                  {"anchors", static_cast<double>(r.anchors)},
+                  {"output_not_finite", static_cast<double>(r.output_not_finite)},
+                  {"pruned", static_cast<double>(r.pruned)},
+                  {"blocks", static_cast<double>(r.blocks)}};
+  return std::move(result.cloud);
+}
+
+Result<AnyNetwork> Load(const ModelMethod& method) {
+  if (!method.file.empty()) return LoadAnyNetwork(method.file, method.precision);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CompactNetwork network, LoadShippedNetwork());
+  return AnyNetwork(std::move(network));
+}
+
+}  // namespace
+
+Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
+                                                float prune_opacity, EnhanceReport& report) {
+  if (input.filter_strength * upscale * upscale <= 1) {
+    LogInfo(
+        "the network's residuals are on top of the filter, and there is no lost width to give back: the splat stays");
+    report.facts = {{"copies", 1.0}};
+    return std::move(input.cloud);
+  }
+  const auto n = static_cast<double>(input.cloud.size());
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CompactResult result, network.Apply(input.cloud, {.pixel_sizes = input.pixel_sizes,
+                                                                                 .upscale = upscale,
+                                                                                 .strength = input.filter_strength}));
+  const auto outside = static_cast<double>(result.outside), partly = static_cast<double>(result.partly);
+  if (outside + partly > kNotable * n) {
+    const std::string text =
+        Cat(Fixed(100 * (outside + partly) / n, 1),
+            " % of the Gaussians are unlike those the network was trained on: ", Fixed(100 * outside / n, 1),
+            " % are filtered only, ", Fixed(100 * partly / n, 1), " % get a part of what it says");
+    outside + partly > kMost* n ? LogWarning(text) : LogInfo(text);
+  }
+  const int64_t before = result.cloud.size();
+  if (prune_opacity > 0) {
+    std::vector<int64_t> kept;
+    for (int64_t i = 0; i < before; ++i) {
+      if (1 / (1 + std::exp(-result.cloud.opacity_logits[static_cast<size_t>(i)])) >= prune_opacity) kept.push_back(i);
+    }
+    ANCHORSPLAT_ASSIGN_OR_RETURN(result.cloud, Subset(result.cloud, kept));
+  }
+  report.facts = {{"copies", static_cast<double>(network.config().copies)},
+                  {"unlike_training", outside},
+                  {"partly_unlike_training", partly},
+                  {"pruned", static_cast<double>(before - result.cloud.size())}};
+  return std::move(result.cloud);
+}
+
 void RegisterModelMethod(const std::shared_ptr<const ModelMethod>& method) {
-  const auto network = std::make_shared<std::optional<PackedNetwork>>();
-  RegisterEnhanceMethod({.name = "model",
-                         .summary = "one pass of the AnchorSplat network of --model",
-                         .rank = 1,
-                         .needs_pixel_size = false,
-                         .ready = [method](const EnhanceOptions&) -> Status {
-                           if (!method->file.empty()) return {};
-                           return Error{ErrorCode::kBadArgument, "the method 'model' needs a checkpoint: --model FILE"};
-                         },
-                         .run = [method, network](const EnhanceInput& input, const EnhanceOptions&,
-                                                  EnhanceReport& report) -> Result<GaussianCloud> {
-                           if (!*network) {
-                             ANCHORSPLAT_ASSIGN_OR_RETURN(*network, LoadNetwork(method->file, method->precision));
-                           }
-                           ANCHORSPLAT_ASSIGN_OR_RETURN(ModelResult result,
-                                                        EnhanceWithModel(input.cloud, **network, method->options));
-                           const ModelReport& r = result.report;
-                           report.dropped += r.not_finite + r.outside;
-                           report.facts = {{"over_limit", static_cast<double>(r.over_limit)},
-                                           {"anchors", static_cast<double>(r.anchors)},
-                                           {"output_not_finite", static_cast<double>(r.output_not_finite)},
-                                           {"pruned", static_cast<double>(r.pruned)},
-                                           {"blocks", static_cast<double>(r.blocks)}};
-                           return std::move(result.cloud);
-                         }});
+  struct Loaded {
+    std::filesystem::path file;
+    AnyNetwork network;
+  };
+  const auto loaded = std::make_shared<std::optional<Loaded>>();
+  RegisterEnhanceMethod(
+      {.name = "model",
+       .summary = HasShippedNetwork() ? "one pass of the network of --model, or of the one that is part of this program"
+                                      : "one pass of the network of --model",
+       .rank = 1,
+       .needs_pixel_size =
+           [method] {
+             if (method->file.empty()) return true;
+             const auto compact = HoldsCompactNetwork(method->file);  // what is wrong with it, running says
+             return compact.ok() && *compact;
+           },
+       .ready = [method](const EnhanceOptions&) -> Status {
+         if (!method->file.empty() || HasShippedNetwork()) return {};
+         return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};
+       },
+       .run = [method, loaded](EnhanceInput input, const EnhanceOptions& options,
+                               EnhanceReport& report) -> Result<GaussianCloud> {
+         if (!*loaded || (*loaded)->file != method->file) {
+           ANCHORSPLAT_ASSIGN_OR_RETURN(AnyNetwork network, Load(*method));
+           *loaded = Loaded{method->file, std::move(network)};
+         }
+         if (const auto* packed = std::get_if<PackedNetwork>(&(*loaded)->network)) {
+           return EnhanceWithPackedNetwork(input, *packed, method->options, report);
+         }
+         ANCHORSPLAT_RETURN_IF_ERROR(CheckCompactOptions(*method));
+         return EnhanceWithCompactNetwork(std::move(input), options.upscale,
+                                          std::get<CompactNetwork>((*loaded)->network), method->options.prune_opacity,
+                                          report);
+       }});
 }
 
 }  // namespace anchorsplat

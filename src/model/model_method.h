@@ -4,19 +4,30 @@
 #include <memory>
 
 #include "core/result.h"
+#include "enhance/enhance.h"
+#include "model/compact_network.h"
 #include "model/enhance_with_model.h"
 
 namespace anchorsplat {
 
 // What the method "model" of enhance/enhance.h works with. Filled in (by the command line) before Enhance is called.
 struct ModelMethod {
-  std::filesystem::path file;  // checkpoint, .pth or .safetensors; the method is ready when it is given
+  // Weights of either kind of network (model/network_file.h). Empty: the network that is part of the program; the
+  // method is not ready when there is none.
+  std::filesystem::path file;
   WeightPrecision precision = WeightPrecision::kFloat;
+  // Of the published architecture; of these, compact networks know `prune_opacity` only and refuse the others.
   ModelOptions options;
 };
 
-// Adds the method "model", which "auto" prefers to the filter once there is a file. The checkpoint is loaded at the
-// first cloud and kept for the next.
+// Adds the method "model", which "auto" prefers to the filter once there is a network. It is loaded at the first cloud
+// and kept for the next.
 void RegisterModelMethod(const std::shared_ptr<const ModelMethod>& method);
+
+// Enhances by a compact network, with a word in the log and in report.facts ("copies", "unlike_training",
+// "partly_unlike_training", "pruned"). A strength of no more than 1/u² means that there is no lost width to build on
+// (an antialiased splat, or one that is seen no closer): it stays as it is.
+Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
+                                                float prune_opacity, EnhanceReport& report);
 
 }  // namespace anchorsplat

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -11,6 +13,8 @@
 #include "enhance/enhance.h"
 #include "formats/safetensors.h"
 #include "model/checkpoint_writer.h"
+#include "model/compact_cloud_test.h"
+#include "model/shipped_network.h"
 
 namespace anchorsplat {
 namespace {
@@ -78,12 +82,14 @@ TEST_F(SmallModel, AutoPrefersTheModelOnceThereIsAFile) {
   options.pixel_size = 0.01;
   auto enhanced = Enhance(RandomCloud(300), options);
   ASSERT_TRUE(enhanced.ok());
-  EXPECT_EQ(enhanced->report.method, "filter");
+  EXPECT_EQ(enhanced->report.method, HasShippedNetwork() ? "model" : "filter");
 
   options.method = "model";
   enhanced = Enhance(RandomCloud(300), options);
-  ASSERT_FALSE(enhanced.ok());
-  EXPECT_THAT(enhanced.error().message, testing::HasSubstr("--model"));
+  ASSERT_EQ(enhanced.ok(), HasShippedNetwork());
+  if (!enhanced.ok()) {
+    EXPECT_THAT(enhanced.error().message, testing::HasSubstr("--model"));
+  }
 
   method->file = file();
   options.method = "auto";
@@ -93,6 +99,78 @@ TEST_F(SmallModel, AutoPrefersTheModelOnceThereIsAFile) {
     EXPECT_EQ(enhanced->report.method, "model");
     EXPECT_EQ(enhanced->report.gaussians_out, 600);
     EXPECT_TRUE(enhanced->report.pixel_size_source.empty());
+  }
+}
+
+// Writes a compact network of made-up weights.
+void WriteCompact(const fs::path& path, const CompactConfig& config) {
+  std::vector<std::vector<float>> values;
+  std::vector<TensorEntry> entries;
+  const auto specs = CompactTensors(config);
+  values.reserve(specs.size());
+  for (const TensorSpec& spec : specs) {
+    int64_t count = 1;
+    for (const int64_t side : spec.shape) count *= side;
+    ASSERT_TRUE(OpenDomain()(spec, values.emplace_back(static_cast<size_t>(count))).ok());
+    entries.push_back(MakeEntry(spec.name, spec.shape, values.back()));
+  }
+  ASSERT_TRUE(WriteSafetensors(path, entries, ToMetadata(config)).ok());
+}
+
+TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
+  const auto method = std::make_shared<ModelMethod>();
+  method->file = folder_ / "compact.safetensors";
+  WriteCompact(method->file, {.copies = 3, .hidden = 16, .head_hidden = 16});
+  ASSERT_FALSE(HasFatalFailure());
+  RegisterModelMethod(method);
+  const EnhanceMethod registered = EnhanceMethods().back();
+  EXPECT_TRUE(registered.needs_pixel_size());
+  EnhanceOptions options;
+  EnhanceReport report;
+  EnhanceInput input;
+  input.cloud = SheetCloud(200);
+  input.pixel_sizes = {kSheetPixel};
+  input.filter_strength = 0.7;
+  auto enhanced = registered.run(input, options, report);
+  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+  EXPECT_EQ(enhanced->size(), 600);
+  const std::map<std::string, double> facts(report.facts.begin(), report.facts.end());
+  EXPECT_EQ(facts.at("copies"), 3);
+  EXPECT_EQ(facts.at("unlike_training"), 0);
+
+  // No lost width, nothing to build on: fitted with antialiasing, or seen no closer.
+  EnhanceInput without = input;
+  without.filter_strength = 0;
+  enhanced = registered.run(without, options, report);
+  ASSERT_TRUE(enhanced.ok());
+  EXPECT_EQ(enhanced->log_scales, input.cloud.log_scales);
+  options.upscale = 1;
+  without.filter_strength = 1;
+  enhanced = registered.run(without, options, report);
+  ASSERT_TRUE(enhanced.ok());
+  EXPECT_EQ(enhanced->means, input.cloud.means);
+  options.upscale = 4;
+
+  method->options.prune_opacity = 0.3f;
+  enhanced = registered.run(input, options, report);
+  ASSERT_TRUE(enhanced.ok());
+  EXPECT_LT(enhanced->size(), 600);
+  for (const float logit : enhanced->opacity_logits) EXPECT_GE(1 / (1 + std::exp(-logit)), 0.3f);
+  method->options.normalisation = NormalisationMode::kBbox;
+  enhanced = registered.run(input, options, report);
+  ASSERT_FALSE(enhanced.ok());
+  EXPECT_THAT(enhanced.error().message, testing::HasSubstr("--normalisation"));
+
+  method->file = file();
+  EXPECT_FALSE(registered.needs_pixel_size());
+}
+
+TEST_F(SmallModel, TheShippedNetworkOpens) {
+  const auto shipped = LoadShippedNetwork();
+  EXPECT_EQ(shipped.ok(), HasShippedNetwork());
+  EXPECT_EQ(ShippedNetworkIdentity().empty(), !HasShippedNetwork());
+  if (!shipped.ok()) {
+    EXPECT_EQ(shipped.error().code, ErrorCode::kNotFound);
   }
 }
 

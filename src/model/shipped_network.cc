@@ -1,0 +1,62 @@
+#include "model/shipped_network.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/buffer.h"
+#include "core/text.h"
+#include "formats/tensor_file.h"
+
+#ifdef ANCHORSPLAT_SHIPPED_NETWORK
+// The assembler copies the file into the constants of the program: both compilers know this, C++20 has nothing for it.
+asm(".section .rodata\n"
+    ".balign 64\n"
+    ".hidden anchorsplat_shipped_network\n"
+    ".hidden anchorsplat_shipped_network_end\n"
+    ".globl anchorsplat_shipped_network\n"
+    ".globl anchorsplat_shipped_network_end\n"
+    "anchorsplat_shipped_network:\n"
+    ".incbin \"" ANCHORSPLAT_SHIPPED_NETWORK
+    "\"\n"
+    "anchorsplat_shipped_network_end:\n"
+    ".byte 0\n"
+    ".text\n");
+extern "C" {
+extern const std::byte anchorsplat_shipped_network[];
+extern const std::byte anchorsplat_shipped_network_end[];
+}
+#endif
+
+namespace anchorsplat {
+
+namespace {
+
+std::span<const std::byte> ShippedBytes() {
+#ifdef ANCHORSPLAT_SHIPPED_NETWORK
+  return {anchorsplat_shipped_network, anchorsplat_shipped_network_end};
+#else
+  return {};
+#endif
+}
+
+}  // namespace
+
+bool HasShippedNetwork() { return !ShippedBytes().empty(); }
+
+std::string ShippedNetworkIdentity() {
+  if (!HasShippedNetwork()) return "";
+  uint64_t hash = 0xcbf29ce484222325ull;  // FNV-1a
+  for (const std::byte b : ShippedBytes()) hash = (hash ^ static_cast<uint64_t>(b)) * 0x100000001b3ull;
+  return Cat(ShippedBytes().size(), " ", hash);
+}
+
+Result<CompactNetwork> LoadShippedNetwork() {
+  if (!HasShippedNetwork()) return Error{ErrorCode::kNotFound, "this program was built without weights of its own"};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      const TensorFile file,
+      TensorFile::FromBytes(Buffer<std::byte>(ShippedBytes().begin(), ShippedBytes().end()), "the built-in network"));
+  return LoadCompactNetwork(file);
+}
+
+}  // namespace anchorsplat

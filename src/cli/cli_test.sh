@@ -415,7 +415,7 @@ expect 1 "evaluation of a data set with a gap" "$program" eval "$work/set" -o "$
 says stderr "no high-resolution picture 000"
 expect 0 "evaluation of views on demand" "$program" eval "$work/demand" -o "$work/eval5" --methods raw
 # The fit of "bicubic", killed after its first checkpoint, goes on and comes to the same splat.
-fit=(--objects quad --methods bicubic --fit-steps 2000)
+fit=(--objects quad --methods bicubic --fit-steps 800)
 expect 0 "a fit in one go" "$program" eval "$work/killed" -o "$work/whole" "${fit[@]}"
 "$program" eval "$work/killed" -o "$work/parts" "${fit[@]}" --quiet >/dev/null 2>&1 &
 victim=$!

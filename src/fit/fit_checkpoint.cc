@@ -47,9 +47,11 @@ Status CompareSettings(const std::string& file, const std::string& theirs, const
     for (const auto& [key, value] : b.items()) {
       const auto found = a.find(key);
       if (found != a.end() && *found == value) continue;
-      return Error{ErrorCode::kBadArgument,
-                   Cat(file, ": is a checkpoint of another fit: its ", key, " is ",
-                       found == a.end() ? "not there" : Printable(found->dump()), ", this one's is ", value.dump())};
+      if (found == a.end()) {
+        return Error{ErrorCode::kBadFile, Cat(file, ": is a checkpoint of another version, which knew no ", key)};
+      }
+      return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another fit: its ", key, " is ",
+                                                Printable(found->dump()), ", this one's is ", value.dump())};
     }
   }
   return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another fit")};

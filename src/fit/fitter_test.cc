@@ -176,6 +176,16 @@ TEST_F(Fits, ACheckpointOfAnotherFitIsRefused) {
   EXPECT_THAT(Fit(views_, Initial(), options_, control).error().message, HasSubstr("another fit: its view"));
 }
 
+TEST_F(Fits, ACheckpointOfAVersionWithFewerSettingsIsABadFile) {
+  const auto path = folder_ / "state";
+  FitState state = Fitter::Fresh(Initial());
+  ASSERT_TRUE(WriteFitCheckpoint(path, state, R"({"steps":7})").ok());
+  const auto read = ReadFitCheckpoint(path, R"({"steps":7,"temperature":1})");
+  ASSERT_FALSE(read.ok());
+  EXPECT_EQ(read.error().code, ErrorCode::kBadFile);  // which builders take as a reason to begin anew
+  EXPECT_THAT(read.error().message, HasSubstr("another version, which knew no temperature"));
+}
+
 TEST_F(Fits, DamagedCheckpointsAreRefused) {
   const auto path = folder_ / "state";
   FitState state = Fitter::Fresh(Initial());

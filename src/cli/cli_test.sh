@@ -107,7 +107,7 @@ expect 2 "convert to standard output" "$program" convert "$input" -
 
 # enhance.
 expect 0 "enhance" "$program" enhance "$input" -o "$work/out.ply" --pixel-size 0.0055 --method filter
-says stdout "19,984 Gaussians in, 19,984 out"
+says stdout "20,000 Gaussians in, 20,000 out"
 expect 5 "enhance does not overwrite" "$program" enhance "$input" -o "$work/out.ply" --pixel-size 0.0055
 says stderr "exists"
 expect 0 "enhance overwrites when told" "$program" enhance "$input" -o "$work/out.ply" --pixel-size 0.0055 -w -q
@@ -130,7 +130,7 @@ expect 2 "an empty model" "$program" enhance "$input" -o "$work/bad.ply" --model
 expect 2 "model options without a model" "$program" enhance "$input" -o "$work/bad.ply" --prune-opacity 0.1
 compact=$source/testdata/compact/small.safetensors
 expect 0 "a compact network" "$program" enhance "$input" -o "$work/compact.ply" --model "$compact" --cameras "$source/examples/biplane/transforms_lr.json"
-says stdout "19,984 Gaussians in, 39,968 out; model"
+says stdout "20,000 Gaussians in, 40,000 out; model"
 expect 0 "a compact network, then refinement" "$program" enhance "$input" -o "$work/compact.ply" -w --model "$compact" --pixel-size 0.0055 --method model+refine --steps 1 --poses 8 --json
 says stdout '"method": "model+refine"'
 expect 2 "options of the other architecture" "$program" enhance "$input" -o "$work/bad.ply" --model "$compact" --pixel-size 0.0055 --normalisation bbox
@@ -170,10 +170,10 @@ says stdout '"train_width": 1600'
 
 # info.
 expect 0 "info" "$program" info "$input"
-says stdout "19,984, SH degree 3"
+says stdout "20,000, SH degree 3"
 expect 0 "info as JSON" "$program" info "$input" --json
 silent stderr
-says stdout '"gaussians": 19984'
+says stdout '"gaussians": 20000'
 printf 'ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n' >"$work/points.ply"
 expect 4 "info of a point cloud" "$program" info "$work/points.ply"
 says stderr "points.ply"

@@ -90,7 +90,7 @@ TEST(Rasterizer, MatchesReferenceOnRandomClouds) {
 TEST(Rasterizer, MatchesReferenceOnTheExamples) {
   for (const char* name : {"biplane", "stone_lantern"}) {
     const GaussianCloud cloud = test::ReadExample(name);
-    ASSERT_EQ(cloud.size(), 19984) << name;
+    ASSERT_GE(cloud.size(), 19999) << name;
     const auto set = OrbitCameras(3, 1.7, {0, 0, 0}, PinholeFromFov(1024, 1024, std::numbers::pi / 4));
     ASSERT_TRUE(set.ok());
     RenderOptions options;

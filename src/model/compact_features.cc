@@ -24,6 +24,9 @@ void Difference(const float* from, const float* to, float* d) {
   for (int c = 0; c < 3; ++c) d[c] = to[c] - from[c];
 }
 
+// asinh, whose library function takes a third of an inference.
+float Asinh(float x) { return std::copysign(std::log(std::abs(x) + std::sqrt(x * x + 1)), x); }
+
 // Far beyond anything the logarithms keep, and small enough that squares are finite.
 constexpr float kFarthest = 1e15f;
 // Quotients by these stay away from what float cannot hold.
@@ -99,8 +102,8 @@ void CompactFeatures::Edges(int64_t begin, int64_t end, float* out) const {
       for (float& x : d) x = std::clamp(x, -kFarthest, kFarthest);
       for (int64_t a = 0; a < 3; ++a) {
         const float along = Dot(graph_.axis(i, a), d);
-        out[a] = std::clamp(0.5f * std::asinh(along / p), -4.0f, 4.0f);
-        out[4 + a] = std::clamp(0.5f * std::asinh(along / width[a]), -4.0f, 4.0f);
+        out[a] = std::clamp(0.5f * Asinh(along / p), -4.0f, 4.0f);
+        out[4 + a] = std::clamp(0.5f * Asinh(along / width[a]), -4.0f, 4.0f);
       }
       out[3] = HalfLog(0.5f * std::log(Dot(d, d)), log_p, -3, 4);
 

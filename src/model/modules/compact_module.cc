@@ -12,6 +12,7 @@
 #include "model/compact_graph.h"
 #include "model/compact_network.h"
 #include "model/compact_residual.h"
+#include "model/modules/edge_messages.h"
 #include "render/constants.h"
 
 namespace anchorsplat {
@@ -29,9 +30,9 @@ constexpr float kNoLimit = 1e30f;
 
 // What Prepare makes of a splat.
 struct Prepared {
-  Tensor nodes;        // [N,kNodeFeatures]
-  Tensor edges;        // [N·m,kEdgeFeatures]
-  Tensor index;        // [N·m] int64
+  Tensor nodes;  // [N,kNodeFeatures]
+  Tensor edges;  // [N·m,kEdgeFeatures]
+  EdgeIndex index;
   Tensor axes;         // [N,3,3] axis a is row a
   Tensor handedness;   // [N,1] ±1
   Tensor stored_axis;  // [N,3] int64
@@ -136,8 +137,8 @@ Result<std::shared_ptr<void>> CompactTrainable::Prepare(const NetworkInput& inpu
   prepared->edges = torch::empty({n * graph.neighbours, kEdgeFeatures});
   features.Nodes(0, n, prepared->nodes.data_ptr<float>());
   features.Edges(0, n, prepared->edges.data_ptr<float>());
-  prepared->index = torch::from_blob(const_cast<int32_t*>(graph.index.data()), {n * graph.neighbours}, torch::kInt32)
-                        .to(torch::kInt64);
+  prepared->index = MakeEdgeIndex(
+      torch::from_blob(const_cast<int32_t*>(graph.index.data()), {n * graph.neighbours}, torch::kInt32), n);
   prepared->axes = FromBuffer(graph.axes, {n, 3, 3});
   prepared->handedness = torch::linalg_det(prepared->axes).sign().unsqueeze(1);
   prepared->stored_axis =
@@ -161,9 +162,10 @@ Result<std::shared_ptr<void>> CompactTrainable::Prepare(const NetworkInput& inpu
   prepared->high = sorted[n - 1 - rank].clone();
   if (config_.offset_unit == OffsetUnit::kCube) prepared->offset_side = CubeSide(cloud.means);
 
-  for (Tensor* tensor : {&prepared->nodes, &prepared->edges, &prepared->index, &prepared->axes, &prepared->handedness,
-                         &prepared->stored_axis, &prepared->log_scales, &prepared->quats, &prepared->log_pixel,
-                         &prepared->start_logit, &prepared->log_shorter, &prepared->low, &prepared->high}) {
+  for (Tensor* tensor :
+       {&prepared->nodes, &prepared->edges, &prepared->index.index, &prepared->axes, &prepared->handedness,
+        &prepared->stored_axis, &prepared->log_scales, &prepared->quats, &prepared->log_pixel, &prepared->start_logit,
+        &prepared->log_shorter, &prepared->low, &prepared->high}) {
     *tensor = tensor->to(input.gaussians.means.device());
   }
   return std::static_pointer_cast<void>(prepared);
@@ -171,19 +173,12 @@ Result<std::shared_ptr<void>> CompactTrainable::Prepare(const NetworkInput& inpu
 
 Tensor CompactTrainable::Outputs(const NetworkInput& input) {
   const Prepared& prepared = *std::static_pointer_cast<Prepared>(input.prepared);
-  const int64_t n = prepared.nodes.size(0), h = config_.hidden;
-  const int64_t m = n > 0 ? prepared.index.size(0) / n : 0;
+  const int64_t n = prepared.nodes.size(0);
   Tensor state = embed_norm_(embed_second_(torch::gelu(embed_first_(prepared.nodes))));
   for (Round& round : rounds_) {
-    Tensor maximum = torch::zeros_like(state), mean = maximum;
-    if (m > 0) {
-      const Tensor sum = round.edge(prepared.edges) + round.other(state).index_select(0, prepared.index) +
-                         round.own(state).unsqueeze(1).expand({n, m, h}).reshape({n * m, h});
-      const Tensor messages = round.message(torch::gelu(sum)).view({n, m, h});
-      maximum = std::get<0>(messages.max(1));
-      mean = messages.mean(1);
-    }
-    const Tensor update = round.update_second(torch::gelu(round.update_first(torch::cat({state, maximum, mean}, 1))));
+    const Tensor pooled = PooledMessages(round.own(state), round.other(state), prepared.edges, prepared.index,
+                                         round.edge->weight, round.message->weight, round.message->bias);
+    const Tensor update = round.update_second(torch::gelu(round.update_first(torch::cat({state, pooled}, 1))));
     state = round.norm(state + update);
   }
   const Tensor hidden = torch::gelu(head_second_(torch::gelu(head_first_(torch::cat({state, prepared.nodes}, 1)))));

@@ -82,11 +82,13 @@ void PrintJson(const nlohmann::json& json) {
   std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
 }
 
-int RunProgram(int argc, const char* const* argv) {
+int RunProgram(int argc, const char* const* argv, Trainer trainer) {
   CLI::App app{"anchorsplat: makes a low-quality 3D Gaussian splat hold up when seen closer", "anchorsplat"};
   app.set_version_flag("--version", std::string("anchorsplat ") + ANCHORSPLAT_VERSION);
   app.require_subcommand(1);
   Program program;
+  program.words.assign(argv, argv + argc);
+  program.trainer = trainer;
   AddEnhance(app, program);
   AddInfo(app, program);
   AddRender(app, program);
@@ -97,6 +99,7 @@ int RunProgram(int argc, const char* const* argv) {
   AddViews(app, program);
   AddFit(app, program);
   AddDataset(app, program);
+  AddTrain(app, program);
   AddBench(app, program);
   try {
     app.parse(argc, argv);

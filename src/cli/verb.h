@@ -5,9 +5,11 @@
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "core/result.h"
 #include "formats/cloud_io.h"
+#include "train/train_request.h"
 
 namespace anchorsplat {
 
@@ -20,12 +22,17 @@ struct SharedFlags {
   uint64_t seed = 0;
 };
 
+// The training, in the program that has it (train/trainer.h).
+using Trainer = Result<TrainReport> (*)(const TrainRequest&);
+
 // What the command line asked for; main runs it once parsing is over.
 struct Program {
   SharedFlags flags;
   std::function<Status()> run;
   // Of a run that succeeds: set to kPartialExitCode by verbs that go on when one of many inputs fails.
   int exit_code = 0;
+  std::vector<std::string> words;  // argv
+  Trainer trainer = nullptr;
 };
 
 // A subcommand with the shared flags, its description and an example for --help.
@@ -43,6 +50,7 @@ void AddViews(CLI::App& app, Program& program);
 void AddConvert(CLI::App& app, Program& program);
 void AddFit(CLI::App& app, Program& program);
 void AddDataset(CLI::App& app, Program& program);
+void AddTrain(CLI::App& app, Program& program);
 void AddBench(CLI::App& app, Program& program);
 
 const char* CodeName(ErrorCode code);  // in JSON: "not_found"
@@ -58,6 +66,6 @@ inline WriteOptions WriteOptionsFrom(const SharedFlags& flags) { return {.overwr
 void PrintJson(const nlohmann::json& json);
 
 // Runs the program. Never throws.
-int RunProgram(int argc, const char* const* argv);
+int RunProgram(int argc, const char* const* argv, Trainer trainer = nullptr);
 
 }  // namespace anchorsplat

@@ -198,6 +198,7 @@ class RenderFunction : public torch::autograd::Function<RenderFunction> {
 RenderOp::RenderOp() : pool_(std::make_shared<Pool>()) {}
 
 double RenderOp::backward_seconds() const { return pool_->backward_seconds; }
+void RenderOp::ResetBackwardSeconds() { pool_->backward_seconds = 0; }
 
 Result<std::vector<RenderedView>> RenderOp::operator()(const GaussianTensors& gaussians,
                                                        std::span<const Camera> cameras, const RenderOptions& options) {

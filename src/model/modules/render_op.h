@@ -36,8 +36,9 @@ class RenderOp {
   Result<std::vector<RenderedView>> operator()(const GaussianTensors& gaussians, std::span<const Camera> cameras,
                                                const RenderOptions& options);
 
-  // Seconds on the clock that backward passes have taken so far.
+  // Seconds on the clock that backward passes have taken since they were last set to 0.
   double backward_seconds() const;
+  void ResetBackwardSeconds();
 
   struct Pool;
 

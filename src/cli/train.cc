@@ -1,0 +1,140 @@
+#include <unistd.h>
+
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "cli/choice.h"
+#include "cli/stop_signal.h"
+#include "cli/table.h"
+#include "cli/verb.h"
+#include "core/text.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct TrainFlags {
+  TrainRequest request;
+  std::vector<std::string> datasets, validation;
+  std::string config, out, cache, start;
+};
+
+// The program that brings LibTorch along: loading it takes half a second, so the others do without. It is this program
+// with the training in it, and takes the same words.
+Status RunInTrainingProgram(const std::vector<std::string>& words) {
+  std::error_code code;
+  const fs::path program = fs::read_symlink("/proc/self/exe", code).parent_path() / "anchorsplat-train";
+  if (!fs::exists(program, code)) {
+    return Error{ErrorCode::kNotFound,
+                 "training is missing: this program was built without LibTorch (make torch build)"};
+  }
+  std::vector<char*> arguments;
+  for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
+  arguments.push_back(nullptr);
+  execv(program.c_str(), arguments.data());
+  return Error{ErrorCode::kIo, Cat(program.string(), ": cannot be run")};
+}
+
+nlohmann::json ToJson(const std::optional<TrainQuality>& quality) {
+  if (!quality) return nullptr;
+  nlohmann::json json = {{"psnr", quality->psnr}, {"ssim", quality->ssim}};
+  json["lpips"] = quality->lpips ? nlohmann::json(*quality->lpips) : nlohmann::json();
+  return json;
+}
+
+nlohmann::json ToJson(const TrainReport& r) {
+  return {{"output", r.file.string()},
+          {"steps", r.steps},
+          {"resumed_at", r.resumed_at},
+          {"skipped", r.skipped},
+          {"objects", r.objects},
+          {"validation_objects", r.validation_objects},
+          {"parameters", r.parameters},
+          {"loss", r.loss},
+          {"seconds", r.seconds},
+          {"validation", {{"raw", ToJson(r.raw)}, {"filter", ToJson(r.filter)}, {"model", ToJson(r.model)}}}};
+}
+
+void PrintReport(const TrainReport& r) {
+  std::cout << r.file.string() << ": " << WithThousands(r.parameters) << " parameters after " << WithThousands(r.steps)
+            << " steps on " << r.objects << " objects, " << HumanSeconds(r.seconds) << "\n";
+  if (!r.model) return;
+  std::vector<std::vector<std::string>> rows = {{"validation", "PSNR", "SSIM", "LPIPS"}};
+  const auto add = [&](const char* name, const TrainQuality& q) {
+    rows.push_back({name, Fixed(q.psnr, 3), Fixed(q.ssim, 4), q.lpips ? Fixed(*q.lpips, 4) : "-"});
+  };
+  add("raw", *r.raw);
+  add("filter", *r.filter);
+  add("model", *r.model);
+  std::cout << FormatTable(rows);
+}
+
+Status RunTrain(TrainFlags& flags, const Program& program) {
+  if (program.trainer == nullptr) return RunInTrainingProgram(program.words);
+  TrainRequest& request = flags.request;
+  request.datasets.assign(flags.datasets.begin(), flags.datasets.end());
+  request.validation.assign(flags.validation.begin(), flags.validation.end());
+  request.config = flags.config;
+  request.out = flags.out;
+  request.cache = flags.cache;
+  request.start = flags.start;
+  request.overwrite = program.flags.overwrite;
+  request.stop = &StopSignal::requested();
+  std::optional<StopSignal> stop_signal(std::in_place);
+  const auto report = program.trainer(request);
+  stop_signal.reset();
+  if (!report.ok()) return report.error();
+  if (report->interrupted) {
+    return Error{ErrorCode::kInterrupted, Cat("stopped after step ", WithThousands(report->steps), "; ",
+                                              report->file.string(), " is what there was, --resume goes on")};
+  }
+  if (program.flags.json) {
+    PrintJson(ToJson(*report));
+  } else if (!program.flags.quiet) {
+    PrintReport(*report);
+  }
+  return {};
+}
+
+}  // namespace
+
+void AddTrain(CLI::App& app, Program& program) {
+  CLI::App& verb = AddVerb(app, program, "train", "Train a network on data sets",
+                           "anchorsplat train data/ --config configs/compact-k4.toml -o run");
+  const auto flags = std::make_shared<TrainFlags>();
+  TrainRequest& request = flags->request;
+  verb.add_option("datasets", flags->datasets, "Folders that `dataset build` made, or in the published layout")
+      ->required()
+      ->check(NotEmpty());
+  verb.add_option("--config", flags->config, "The recipe, a TOML file (docs/training.md)")
+      ->required()
+      ->check(CLI::ExistingFile);
+  verb.add_option("-o,--output,--out", flags->out, "Folder for the network, its log and what --resume needs")
+      ->required()
+      ->check(NotEmpty());
+  verb.add_option("--validation", flags->validation,
+                  "Data sets to measure with (their split \"validation\", if they have splits); default: that split of "
+                  "the data sets");
+  verb.add_option("--split", request.split,
+                  "Objects of this split; default: \"train\" where there are splits, else all");
+  verb.add_option("--cache", flags->cache, "Folder for true pictures of views, for several trainings [OUT/cache]");
+  verb.add_option("--start", flags->start, "Begin with the weights of another training's checkpoint.safetensors")
+      ->check(CLI::ExistingFile);
+  verb.add_flag("--resume", request.resume, "Go on where the training in the folder stopped");
+  verb.add_option("--steps", request.steps, "Steps in all, instead of the recipe's")
+      ->check(CLI::Range(int64_t{1}, int64_t{1'000'000'000}));
+  verb.add_option("--minutes", request.minutes,
+                  "Stop after so many minutes of training, with the schedule fitted to them")
+      ->check(CLI::PositiveNumber);
+  verb.callback([flags, &program, &verb] {
+    if (verb.get_option("--seed")->count() > 0) flags->request.seed = program.flags.seed;
+    program.run = [flags, &program] { return RunTrain(*flags, program); };
+  });
+}
+
+}  // namespace anchorsplat

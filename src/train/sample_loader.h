@@ -1,0 +1,81 @@
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/camera.h"
+#include "model/modules/render_op.h"
+#include "model/modules/trainable_network.h"
+#include "render/rasterizer.h"
+#include "train/photometric_objective.h"
+#include "train/train_config.h"
+#include "train/training_object.h"
+
+namespace anchorsplat {
+
+// One splat with the views that a step looks at.
+struct TrainingSample {
+  std::string object;
+  NetworkInput input;           // prepared, on the network's device
+  std::vector<Camera> cameras;  // crops where the configuration says so
+  std::vector<TrueView> truth;
+  RenderOptions render;
+  double seconds = 0;  // it took to make
+};
+
+// Which object and which of its views the sample with number `index` of a training is made of. Follows from seed and
+// index alone: a resumed training draws the same. Objects come in random order, all of them before any comes again.
+struct SamplePlan {
+  size_t object = 0;
+  std::vector<size_t> views;  // of TrainingObject::views, all different
+  uint64_t seed = 0;          // of augmentation and crops
+};
+size_t PlannedObject(uint64_t seed, int64_t index, size_t objects);
+SamplePlan PlanSample(const TrainConfig& config, int64_t index, size_t objects, const TrainingObject& object);
+
+// The network's input for a splat. `prepared` is left empty.
+NetworkInput MakeInput(const GaussianCloud& cloud, const Buffer<float>& pixel_sizes, double upscale,
+                       torch::Device device);
+
+// The sample itself.
+Result<TrainingSample> MakeSample(const TrainConfig& config, int64_t index, ObjectStore& objects,
+                                  TrainableNetwork& network, torch::Device device);
+
+// Makes samples ahead of time in a thread of its own: first, first + 1, … but of each `group` numbers (all processes'
+// samples of a step) only [offset, offset + count).
+class SampleLoader {
+ public:
+  struct Order {
+    int64_t first = 0;
+    int64_t group = 1, offset = 0, count = 1;
+  };
+  SampleLoader(const TrainConfig& config, Order order, ObjectStore& objects, TrainableNetwork& network,
+               torch::Device device);
+  ~SampleLoader();
+  SampleLoader(const SampleLoader&) = delete;
+  SampleLoader& operator=(const SampleLoader&) = delete;
+
+  // The next one; waits for it if it must. After an error there are no more.
+  Result<TrainingSample> Next();
+
+ private:
+  void Run();
+
+  const TrainConfig& config_;
+  Order order_;
+  ObjectStore& objects_;
+  TrainableNetwork& network_;
+  torch::Device device_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Result<TrainingSample>> ready_;
+  bool stop_ = false;
+  std::thread thread_;
+};
+
+}  // namespace anchorsplat

@@ -1,0 +1,72 @@
+#include "train/training_data.h"
+
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "core/log.h"
+#include "core/text.h"
+#include "dataset/dataset_split.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool HasSplits(const fs::path& dataset) {
+  std::error_code ignored;
+  return fs::exists(dataset / kSplitsName, ignored);
+}
+
+Status AppendScenes(const fs::path& dataset, const std::string& split, std::vector<SceneEntry>& scenes) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto found, ListScenes(dataset, {.split = split}));
+  for (const SceneEntry& entry : found) {
+    const auto scene = Scene::Open(entry);
+    const Status whole = !scene.ok()                   ? Status(scene.error())
+                         : !scene->LowSplatPath().ok() ? Status(scene->LowSplatPath().error())
+                                                       : Status();
+    if (whole.ok()) {
+      scenes.push_back(entry);
+    } else {
+      LogWarning(Cat(entry.name, " is left out: ", whole.error().message));
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<TrainingData> FindTrainingData(const TrainRequest& request) {
+  TrainingData data;
+  for (const fs::path& dataset : request.validation) {
+    // A whole data set is meant when it has no splits.
+    ANCHORSPLAT_RETURN_IF_ERROR(AppendScenes(dataset, HasSplits(dataset) ? "validation" : "", data.validation));
+  }
+  for (const fs::path& dataset : request.datasets) {
+    // Splits are there to be kept: without a word about it, only the objects for training are taken.
+    const std::string split = request.split.empty() && HasSplits(dataset) ? "train" : request.split;
+    ANCHORSPLAT_RETURN_IF_ERROR(AppendScenes(dataset, split, data.training));
+    if (request.validation.empty() && HasSplits(dataset)) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const Splits splits, ReadSplits(dataset));
+      bool any = false;
+      for (const auto& [name, which] : splits) any = any || which == "validation";
+      if (any) ANCHORSPLAT_RETURN_IF_ERROR(AppendScenes(dataset, "validation", data.validation));
+    }
+  }
+  std::set<std::string> held_out;
+  for (const SceneEntry& entry : data.validation) held_out.insert(entry.name);
+  const size_t before = data.training.size();
+  std::erase_if(data.training, [&](const SceneEntry& entry) { return held_out.contains(entry.name); });
+  if (data.training.size() != before) {
+    LogWarning(Cat(before - data.training.size(), " objects are for validation, too, and not trained on"));
+  }
+  if (data.training.empty()) {
+    return Error{ErrorCode::kNotFound, "no objects to train on: none of the data sets has one with a splat"};
+  }
+  nlohmann::json names = nlohmann::json::array();
+  for (const SceneEntry& entry : data.training) names.push_back(entry.name);
+  data.names = names.dump();
+  return data;
+}
+
+}  // namespace anchorsplat

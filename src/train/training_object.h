@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "core/buffer.h"
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "dataset/scene_reader.h"
+#include "train/true_views.h"
+
+namespace anchorsplat {
+
+// An object of a data set, ready to be trained on or measured with.
+struct TrainingObject {
+  std::string name;
+  GaussianCloud cloud;             // the low-quality splat, without rows that are not finite
+  Buffer<float> pixel_sizes;       // [N] p_LR: the median over the low cameras that see a Gaussian, as eval's filter
+  double upscale = 4;              // u: high pixels per low pixel
+  std::vector<Camera> views;       // high resolution
+  std::vector<size_t> training;    // which of them training may see
+  std::vector<size_t> validation;  // and those that the splat was not fitted to
+  std::shared_ptr<const TrueViews> truth;
+  std::array<float, 3> background{};
+  std::shared_ptr<void> prepared;  // a network's tables for the cloud as it is; set by whoever makes them
+};
+
+// `views_per_object`: so many of the views that were fitted to are for training, chosen by the object's name alone (so
+// that trainings can share pictures); 0: all of them. Errors: those of Scene; kBadFile: a splat without finite
+// Gaussians, no views, high views smaller than the low ones.
+Result<std::shared_ptr<TrainingObject>> OpenTrainingObject(const SceneEntry& entry, int views_per_object,
+                                                           const std::filesystem::path& cache);
+
+// `most` of `values`, evenly spread; all when there are not as many or `most` is 0.
+std::vector<size_t> EvenlySpread(const std::vector<size_t>& values, size_t most);
+
+// The objects used last, by number. May be used by several threads.
+class ObjectStore {
+ public:
+  ObjectStore(std::vector<SceneEntry> entries, int views_per_object, std::filesystem::path cache, size_t capacity)
+      : entries_(std::move(entries)),
+        views_per_object_(views_per_object),
+        cache_(std::move(cache)),
+        capacity_(capacity) {}
+
+  size_t size() const { return entries_.size(); }
+  const std::vector<SceneEntry>& entries() const { return entries_; }
+  Result<std::shared_ptr<TrainingObject>> Get(size_t index);
+
+ private:
+  const std::vector<SceneEntry> entries_;
+  const int views_per_object_;
+  const std::filesystem::path cache_;
+  const size_t capacity_;
+  std::mutex mutex_;
+  std::list<std::pair<size_t, std::shared_ptr<TrainingObject>>> used_;  // latest first
+};
+
+}  // namespace anchorsplat

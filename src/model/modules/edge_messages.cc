@@ -42,6 +42,31 @@ Tensor Sums(const Block& block, const Tensor& own, const Tensor& other, const Te
   return sums;
 }
 
+// Maximum and where it is (the first of several), and mean, of the messages [points·m,H]. By hand: torch's maximum with
+// its place takes longer than the matrix products.
+void Pool(const Tensor& messages, const Tensor& pooled, const Tensor& where) {
+  const int64_t points = pooled.size(0), h = messages.size(1), m = messages.size(0) / points;
+  const float* message = messages.const_data_ptr<float>();
+  float* maximum = pooled.data_ptr<float>();
+  uint8_t* at = where.data_ptr<uint8_t>();
+  for (int64_t i = 0; i < points; ++i, maximum += 2 * h, at += h) {
+    float* mean = maximum + h;
+    std::copy_n(message, h, maximum);
+    std::copy_n(message, h, mean);
+    std::fill_n(at, h, uint8_t{0});
+    message += h;
+    for (int64_t k = 1; k < m; ++k, message += h) {
+      for (int64_t c = 0; c < h; ++c) {
+        const bool larger = message[c] > maximum[c];
+        maximum[c] = larger ? message[c] : maximum[c];
+        at[c] = larger ? static_cast<uint8_t>(k) : at[c];
+        mean[c] += message[c];
+      }
+    }
+    for (int64_t c = 0; c < h; ++c) mean[c] /= static_cast<float>(m);
+  }
+}
+
 class PooledMessagesFunction : public torch::autograd::Function<PooledMessagesFunction> {
  public:
   static Tensor forward(torch::autograd::AutogradContext* context, const Tensor& own, const Tensor& other,
@@ -53,13 +78,8 @@ class PooledMessagesFunction : public torch::autograd::Function<PooledMessagesFu
     const Tensor where = torch::empty({n, h}, torch::kUInt8);
     ForEachBlock(n, m, [&](int64_t, const Block& block) {
       const Tensor sums = Sums(block, own, other, edges, index, edge_weight);
-      const Tensor messages =
-          torch::addmm(message_bias, torch::gelu(sums), message_weight.t()).view({block.points, m, h});
-      const auto [maximum, at] = messages.max(1);
-      const Tensor out = block.Points(pooled);
-      out.narrow(1, 0, h).copy_(maximum);
-      out.narrow(1, h, h).copy_(messages.mean(1));
-      block.Points(where).copy_(at);
+      const Tensor messages = torch::addmm(message_bias, torch::gelu(sums), message_weight.t());
+      Pool(messages, block.Points(pooled), block.Points(where));
     });
     context->save_for_backward(
         {own, other, edges, index, incoming, incoming_begin, edge_weight, message_weight, where});

@@ -4,6 +4,7 @@
 #include <map>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "core/result.h"
@@ -18,6 +19,13 @@ enum class OffsetUnit {
   kCube,   // the side of the cube that the published network sees (model/normalisation.h): the same for all Gaussians
 };
 
+// Whom a Gaussian hears from.
+enum class CompactContext {
+  kNearest,  // the M nearest
+  kPatches,  // the M others of its patch: M + 1 consecutive Gaussians along a Hilbert curve, as PTv3 groups points. The
+             // curve runs along the world's axes, so the output no longer turns with the splat
+};
+
 // Shape of a compact network: a few rounds of messages between neighbours instead of a backbone, residuals on top of
 // the filter. docs/network.md has the formulas.
 struct CompactConfig {
@@ -29,6 +37,7 @@ struct CompactConfig {
   bool prior = true;    // residuals are on top of the filter, with a learned f per Gaussian; else on the splat as it is
   bool anchors = true;  // offsets are bounded by ε
   bool sh = true;       // spherical harmonics of degree 1 to 3 change too
+  CompactContext context = CompactContext::kNearest;
   OffsetUnit offset_unit = OffsetUnit::kScale;
   double epsilon = 1;   // ε, in offset units
   double spread = 0.5;  // of the copies at the start, in standard deviations along the two longest axes
@@ -46,12 +55,15 @@ void VisitCompactOptions(CompactConfig& config, Visitor& visitor) {
   visitor.Flag("prior", config.prior);
   visitor.Flag("anchors", config.anchors);
   visitor.Flag("sh", config.sh);
-  const std::vector<std::string> units = {"scale", "pixel", "cube"};
-  std::string unit = units[static_cast<size_t>(config.offset_unit)];
-  visitor.Text("offset_unit", units, unit);
-  for (size_t i = 0; i < units.size(); ++i) {
-    if (units[i] == unit) config.offset_unit = static_cast<OffsetUnit>(i);
-  }
+  const auto choose = [&](const std::string& key, const std::vector<std::string>& names, auto& value) {
+    std::string name = names[static_cast<size_t>(value)];
+    visitor.Text(key, names, name);
+    for (size_t i = 0; i < names.size(); ++i) {
+      if (names[i] == name) value = static_cast<std::remove_reference_t<decltype(value)>>(i);
+    }
+  };
+  choose("context", {"neighbours", "patches"}, config.context);
+  choose("offset_unit", {"scale", "pixel", "cube"}, config.offset_unit);
   visitor.Number("epsilon", 1e-6, 1e3, config.epsilon);
   visitor.Number("spread", 0, 1, config.spread);
 }

@@ -44,6 +44,26 @@ TEST(CompactGraph, FramesAreOrderedAndLookAtTheNeighbours) {
   }
 }
 
+TEST(CompactGraph, PatchesHoldEachOther) {
+  for (const int64_t n : {1, 3, 8, 90, 97}) {
+    const CompactGraph graph = BuildCompactGraph(SheetCloud(n), 7, CompactContext::kPatches);
+    ASSERT_EQ(graph.neighbours, std::min<int64_t>(7, n - 1));
+    const int64_t m = graph.neighbours;
+    int64_t mutual = 0;
+    for (int64_t i = 0; i < n; ++i) {
+      const int32_t* of = graph.index.data() + i * m;
+      EXPECT_EQ(std::count(of, of + m, i), 0);
+      for (int64_t k = 0; k < m; ++k) {
+        EXPECT_EQ(std::count(of, of + m, of[k]), 1);
+        const int32_t* back = graph.index.data() + of[k] * m;
+        mutual += std::count(back, back + m, i);
+      }
+    }
+    // Only those that a last patch borrows do not hear from it.
+    EXPECT_GE(mutual, (n - n % 8) * m);
+  }
+}
+
 // What features mean, on a pair of Gaussians whose numbers are easily made by hand.
 TEST(CompactFeatures, OfTwoGaussians) {
   GaussianCloud cloud;

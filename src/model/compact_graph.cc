@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "core/kd_tree.h"
 #include "core/parallel.h"
 #include "core/rotation.h"
+#include "model/kernels/serialization.h"
 
 namespace anchorsplat {
 
@@ -46,9 +48,62 @@ void FindFrame(const GaussianCloud& cloud, int64_t i, CompactGraph& graph) {
   }
 }
 
+void FindNearest(const GaussianCloud& cloud, CompactGraph& graph) {
+  const KdTree tree(cloud.means);
+  ParallelFor(0, graph.count, 512, [&](int64_t begin, int64_t end) {
+    std::vector<KdTree::Neighbour> nearest(static_cast<size_t>(graph.neighbours));
+    for (int64_t place = begin; place < end; ++place) {
+      tree.Nearest(place, nearest);
+      int32_t* out = graph.index.data() + tree.PointAt(place) * graph.neighbours;
+      for (const KdTree::Neighbour& neighbour : nearest) *out++ = static_cast<int32_t>(neighbour.index);
+    }
+  });
+}
+
+// Along the Hilbert curve through the cloud's box; a last patch that is not full borrows the Gaussians before it.
+void FindPatches(const GaussianCloud& cloud, CompactGraph& graph) {
+  const int64_t n = graph.count, m = graph.neighbours;
+  if (n == 0) return;
+  const Bounds box = *ComputeBounds(cloud);
+  double side = 0;
+  for (size_t c = 0; c < 3; ++c) side = std::max(side, double{box.max[c]} - box.min[c]);
+  std::vector<int32_t> voxels(static_cast<size_t>(3 * n), 0);
+  if (side > 0) {
+    constexpr double kLargest = (1 << kMaxCurveDepth) - 1;
+    for (size_t k = 0; k < voxels.size(); ++k) {
+      voxels[k] = static_cast<int32_t>((double{cloud.means[k]} - box.min[k % 3]) / side * kLargest);
+    }
+  }
+  std::vector<int64_t> codes(static_cast<size_t>(n));
+  CurveCodes(Curve::kHilbert, kMaxCurveDepth, voxels, codes);
+  const Buffer<int32_t> order = OrderOfCodes(codes);
+  ParallelFor(0, n, 512, [&](int64_t begin, int64_t end) {
+    std::vector<std::pair<double, int32_t>> others;
+    for (int64_t place = begin; place < end; ++place) {
+      const int64_t first = std::min(place / (m + 1) * (m + 1), n - (m + 1));
+      const int32_t i = order[static_cast<size_t>(place)];
+      others.clear();
+      for (int64_t other = first; other <= first + m; ++other) {
+        if (other == place) continue;
+        const int32_t j = order[static_cast<size_t>(other)];
+        double square = 0;
+        for (int64_t c = 0; c < 3; ++c) {
+          const double d = double{cloud.means[static_cast<size_t>(3 * int64_t{j} + c)]} -
+                           cloud.means[static_cast<size_t>(3 * int64_t{i} + c)];
+          square += d * d;
+        }
+        others.emplace_back(square, j);
+      }
+      std::sort(others.begin(), others.end());
+      for (int64_t k = 0; k < m; ++k)
+        graph.index[static_cast<size_t>(i * m + k)] = others[static_cast<size_t>(k)].second;
+    }
+  });
+}
+
 }  // namespace
 
-CompactGraph BuildCompactGraph(const GaussianCloud& cloud, int64_t neighbours) {
+CompactGraph BuildCompactGraph(const GaussianCloud& cloud, int64_t neighbours, CompactContext context) {
   CompactGraph graph;
   const int64_t n = cloud.size();
   graph.count = n;
@@ -57,17 +112,9 @@ CompactGraph BuildCompactGraph(const GaussianCloud& cloud, int64_t neighbours) {
   graph.axes.resize(static_cast<size_t>(9 * n));
   graph.stored_axis.resize(static_cast<size_t>(3 * n));
   graph.sidedness.resize(static_cast<size_t>(3 * n));
-  const KdTree tree(cloud.means);
+  context == CompactContext::kPatches ? FindPatches(cloud, graph) : FindNearest(cloud, graph);
   ParallelFor(0, n, 512, [&](int64_t begin, int64_t end) {
-    std::vector<KdTree::Neighbour> nearest(static_cast<size_t>(graph.neighbours));
-    for (int64_t place = begin; place < end; ++place) {
-      const int64_t i = tree.PointAt(place);
-      tree.Nearest(place, nearest);
-      for (size_t k = 0; k < nearest.size(); ++k) {
-        graph.index[static_cast<size_t>(i * graph.neighbours) + k] = static_cast<int32_t>(nearest[k].index);
-      }
-      FindFrame(cloud, i, graph);
-    }
+    for (int64_t i = begin; i < end; ++i) FindFrame(cloud, i, graph);
   });
   return graph;
 }

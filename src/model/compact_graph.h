@@ -6,6 +6,7 @@
 
 #include "core/buffer.h"
 #include "core/gaussian_cloud.h"
+#include "model/compact_config.h"
 
 namespace anchorsplat {
 
@@ -28,6 +29,7 @@ struct CompactGraph {
 
 // The cloud's values must be finite but for log-scales of −Inf; fewer than 2^31 Gaussians. The same bits for any number
 // of threads.
-CompactGraph BuildCompactGraph(const GaussianCloud& cloud, int64_t neighbours);
+CompactGraph BuildCompactGraph(const GaussianCloud& cloud, int64_t neighbours,
+                               CompactContext context = CompactContext::kNearest);
 
 }  // namespace anchorsplat

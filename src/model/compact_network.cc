@@ -234,7 +234,7 @@ Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const Co
     return Error{ErrorCode::kBadArgument, Cat("upscale ", task.upscale, " must be at least 1 and the filter strength ",
                                               task.strength, " not negative")};
   }
-  const CompactGraph graph = BuildCompactGraph(cloud, config_.neighbours);
+  const CompactGraph graph = BuildCompactGraph(cloud, config_.neighbours, config_.context);
   const CompactFeatures features(cloud, graph, task.pixel_sizes, task.upscale);
 
   // Where the copies of each go: those that are alone stand behind all others.

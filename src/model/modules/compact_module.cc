@@ -129,7 +129,7 @@ Result<std::shared_ptr<void>> CompactTrainable::Prepare(const NetworkInput& inpu
   if (!std::all_of(pixel_sizes.begin(), pixel_sizes.end(), [](float p) { return p > 0 && std::isfinite(p); })) {
     return Error{ErrorCode::kBadArgument, "a pixel size is not a positive length"};
   }
-  const CompactGraph graph = BuildCompactGraph(cloud, config_.neighbours);
+  const CompactGraph graph = BuildCompactGraph(cloud, config_.neighbours, config_.context);
   const CompactFeatures features(cloud, graph, pixel_sizes, input.upscale);
 
   const auto prepared = std::make_shared<Prepared>();

@@ -8,6 +8,7 @@
 #include "bench/io_bench.h"
 #include "bench/network_bench.h"
 #include "bench/render_bench.h"
+#include "cli/bench_pixel_size.h"
 #include "cli/choice.h"
 #include "cli/table.h"
 #include "cli/verb.h"
@@ -344,6 +345,8 @@ void AddBench(CLI::App& app, Program& program) {
   io.add_option("--repeats", options->repeats, "The fastest counts")->check(CLI::Range(1, 1000))->capture_default_str();
   io.add_option("--folder", options->folder, "Where to make the file (default: the system's temporary folder)");
   io.callback([options, &program] { program.run = [options, &program] { return RunIo(*options, program.flags); }; });
+
+  AddPixelSizeBench(verb, program);
 }
 
 }  // namespace anchorsplat

@@ -402,6 +402,9 @@ says stdout "Best f"
 expect 2 "unknown method" "$program" eval "$source/examples" -o "$work/eval" --methods magic
 says stderr "filter-auto"
 expect 2 "unknown object" "$program" eval "$source/examples" -o "$work/eval" --objects triplane
+expect 0 "bench pixel-size" "$program" bench pixel-size "$source/examples/biplane" --features --json
+says stdout '"error_median"'
+says stdout '"features"'
 expect 3 "no benchmark" "$program" eval "$work/empty" -o "$work/eval"
 expect 3 "no such checkpoint" "$program" eval "$source/examples" -o "$work/eval" --methods none.safetensors
 mkdir -p "$work/bench/good" "$work/bench/bad" && cp -r "$source/examples/biplane/." "$work/bench/good/" && cp "$source/examples/biplane/transforms_hr.json" "$work/bench/bad/"

@@ -3,39 +3,57 @@
 #include <algorithm>
 #include <cmath>
 
+#include "enhance/pixel_size_coefficients.h"
 #include "enhance/pixel_size_features.h"
 
 namespace anchorsplat {
 
 namespace {
 
-// All of these come from 3DGS fits whose pixel size is known (docs/method.md lists them).
+// Features this many deviations from what the regression has seen count as that far: beyond, a straight line means
+// nothing.
+constexpr double kMostDeviations = 3;
+constexpr double kMostOctaves = 1;  // per round
+constexpr int kMostRounds = 12;
+constexpr double kSettled = 0.005;  // ln
+// The interval holds the true value for 95 % of splats like those of the regression.
+constexpr double kInterval = 2;
+// Root mean square of the features' deviations from which on a splat counts as unlike those of the regression (they
+// have 1 on average), and how much wider the interval becomes for each one more.
+constexpr double kFamiliar = 1.4, kWidening = 0.25;
 
-// The minimum is believed from this fall on (ln of translucent shares, an octave apart), and below it in proportion,
-// down to none at 0, where the splat has no gaps that could tell.
-constexpr double kSureFall = 0.08;
-// Up to this translucent share it is believed, and not at all from the second on: there most of the splat is
-// translucent whatever the pixels, as dark parts fitted over a black background are.
-constexpr double kSureShare = 0.04, kUnsureShare = 0.08;
-// Pixel size in units of √(largest × middle axis), of their 10 % quantiles: a poor guess, since the size of Gaussians
-// follows the schedule and caps as much as the pixels, but the best there is where the minimum says nothing.
-constexpr double kOfAxes = 0.65;
-// Towards smaller pixels, which can only give back too little.
-constexpr double kLean = 0.95;
-// The true value lies within these factors of the estimate: where the minimum is believed, and where it is not.
-constexpr double kSureSpread = 1.5, kUnsureSpread = 2.2;
+struct Guess {
+  double step = 0;         // ln(pixel size / d)
+  double strangeness = 0;  // root mean square of the deviations
+};
+
+Guess Regress(const PixelSizeFeatures& features) {
+  const PixelSizeCoefficients& c = kPixelSizeCoefficients;
+  Guess guess{c.intercept, 0};
+  for (size_t k = 0; k < features.size(); ++k) {
+    const double z = (features[k] - c.mean[k]) / c.deviation[k];
+    guess.step += c.weight[k] * std::clamp(z, -kMostDeviations, kMostDeviations);
+    guess.strangeness += z * z;
+  }
+  guess.strangeness = std::sqrt(guess.strangeness / static_cast<double>(features.size()));
+  return guess;
+}
 
 }  // namespace
 
 Result<PixelSizeEstimate> EstimatePixelSize(const GaussianCloud& cloud) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeFeatures features, ComputePixelSizeFeatures(cloud));
-  const double trust = std::clamp(features.fall / kSureFall, 0.0, 1.0) *
-                       std::clamp((kUnsureShare - features.share) / (kUnsureShare - kSureShare), 0.0, 1.0);
-  const auto mix = [trust](double sure, double unsure) {
-    return std::exp(trust * std::log(sure) + (1 - trust) * std::log(unsure));
-  };
-  const double size = kLean * mix(features.crispest, kOfAxes * std::sqrt(features.middle_axis * features.largest_axis));
-  const double spread = mix(kSureSpread, kUnsureSpread);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(PixelSizeProbe probe, PixelSizeProbe::Make(cloud));
+  double size = probe.start();
+  Guess guess;
+  for (int round = 0; round < kMostRounds; ++round) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeFeatures features, probe.At(size));
+    guess = Regress(features);
+    const double most = kMostOctaves * std::log(2.0);
+    size *= std::exp(std::clamp(guess.step, -most, most));
+    if (std::abs(guess.step) < kSettled) break;
+  }
+  const double spread = std::exp(kInterval * kPixelSizeCoefficients.error + std::abs(guess.step) +
+                                 kWidening * std::max(0.0, guess.strangeness - kFamiliar));
   return PixelSizeEstimate{size, size / spread, size * spread};
 }
 

@@ -5,16 +5,17 @@
 
 namespace anchorsplat {
 
-// An estimate of p_LR, the world size of a training pixel, from the cloud alone. The true value lies between `low` and
-// `high` for nearly all fits it was checked on (docs/method.md); they are far apart when the splat has little to say.
-// `size` already leans to the small side of the middle: too small a pixel only gives back too little width, too large a
-// one blurs.
+// An estimate of p_LR, the world size of a training pixel, from the cloud alone: pixels of the size are looked for with
+// which the cloud's outlines are as soft as those of fits are with theirs (pixel_size_features.h), by a regression on
+// fits whose pixel size is known (docs/method.md says how good it is). The true value lies between `low` and `high` for
+// about 95 % of splats like those; they are further apart where outlines are unlike theirs.
 struct PixelSizeEstimate {
   double size = 0;  // world units
   double low = 0;
   double high = 0;
 };
 
+// Scales with the cloud. Takes up to a second, for large clouds too, as only a part of them is looked at.
 // kBadArgument: fewer than 16 usable Gaussians with visible opacity and finite scales: nothing to estimate from.
 Result<PixelSizeEstimate> EstimatePixelSize(const GaussianCloud& cloud);
 

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numbers>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "core/framing.h"
 #include "core/text.h"
-#include "render/rasterizer.h"
 
 namespace anchorsplat {
 
@@ -19,8 +18,13 @@ constexpr float kVisibleOpacity = 0.1f;
 constexpr int kViews = 6;         // all sides
 constexpr int kRenderSize = 512;  // px; enough samples of the outline, and quick
 constexpr double kFieldOfView = std::numbers::pi / 4;
-constexpr float kTranslucentFrom = 0.7f, kTranslucentTo = 0.95f;
-constexpr int kSearchOctaves = 3;  // either way from the middle axis
+constexpr double kNearPlane = 0.01;  // of the distance; everything lies behind
+constexpr double kSamples = 2;       // at least, per pixel of the size that is tried, along a side
+constexpr double kOctavesPerStep = 0.5;
+constexpr double kMostSteps = 12;  // either way from the start
+// Larger clouds are cut down to those nearest to the middle, so that the time is bounded: a part of a scene has
+// outlines enough, while every so many Gaussians of it would have gaps.
+constexpr size_t kMostGaussians = 200'000;
 // Sky shells, floaters and giants say nothing about pixels and would drown what does: only Gaussians this close to the
 // middle and this small count, in units of the radius that frames the cloud.
 constexpr double kFarthest = 1.5;
@@ -39,9 +43,9 @@ double WeightedQuantile(std::vector<std::pair<float, double>>& items, double sha
   return items.back().first;
 }
 
-// The part of the cloud that says something, without its colours.
-GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing) {
-  std::vector<int64_t> rows;
+// The part of the cloud that says something, without its colours. `radius` becomes that of the part where it is cut.
+GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing, double& radius) {
+  std::vector<std::pair<double, int64_t>> near;  // distance², row
   for (int64_t i = 0; i < cloud.size(); ++i) {
     if (!IsUsable(cloud, i)) continue;
     double distance = 0;
@@ -52,9 +56,18 @@ GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing) {
     const float* scales = cloud.log_scales.data() + 3 * i;
     const float longest = std::max({scales[0], scales[1], scales[2]});
     if (std::sqrt(distance) <= kFarthest * framing.radius && longest <= std::log(kLargestAxis * framing.radius)) {
-      rows.push_back(i);
+      near.emplace_back(distance, i);
     }
   }
+  if (near.size() > kMostGaussians) {
+    const auto last = near.begin() + static_cast<std::ptrdiff_t>(kMostGaussians);
+    std::nth_element(near.begin(), last, near.end());
+    radius = std::min(radius, std::sqrt(last->first));
+    near.erase(last, near.end());
+  }
+  std::vector<int64_t> rows;
+  for (const auto& item : near) rows.push_back(item.second);
+  std::sort(rows.begin(), rows.end());
   GaussianCloud out;
   out.Resize(static_cast<int64_t>(rows.size()), 0);
   std::fill(out.sh.begin(), out.sh.end(), 0.0f);
@@ -68,8 +81,9 @@ GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing) {
   return out;
 }
 
-// Fills the axis features; false when there are too few Gaussians to say anything.
-bool AxisFeatures(const GaussianCloud& cloud, PixelSizeFeatures& features) {
+// √(largest × middle axis) of their 10 % quantiles over the visible Gaussians, weighted by opacity × area (product of
+// the two): within a factor of three of the pixel size for most fits. Nothing when there are too few Gaussians.
+std::optional<double> AxisOfSmallGaussians(const GaussianCloud& cloud) {
   std::vector<std::pair<float, double>> largest, middle;
   for (int64_t i = 0; i < cloud.size(); ++i) {
     const float opacity = 1 / (1 + std::exp(-cloud.opacity_logits[static_cast<size_t>(i)]));
@@ -82,107 +96,69 @@ bool AxisFeatures(const GaussianCloud& cloud, PixelSizeFeatures& features) {
     middle.emplace_back(axes[1], weight);
     largest.emplace_back(axes[2], weight);
   }
-  if (static_cast<int64_t>(middle.size()) < kLeastGaussians) return false;
-  features.middle_axis = WeightedQuantile(middle, 0.1);
-  features.largest_axis = WeightedQuantile(largest, 0.1);
-  return true;
-}
-
-// Renders one cloud from all sides with the dilation of different pixel sizes, each size once.
-class TranslucentShare {
- public:
-  static Result<TranslucentShare> Make(const GaussianCloud& cloud, const Framing& framing) {
-    const Pinhole intrinsics = PinholeFromFov(kRenderSize, kRenderSize, kFieldOfView);
-    const double distance = FramingDistance(framing, intrinsics);
-    ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet cameras, OrbitCameras(kViews, distance, framing.target, intrinsics));
-    return TranslucentShare(cloud, std::move(cameras), distance / intrinsics.fx);
-  }
-
-  Result<double> At(double pixel_size) {
-    if (const auto known = known_.find(pixel_size); known != known_.end()) return known->second;
-    const double in_pixels = pixel_size / render_pixel_;
-    RenderOptions options;
-    options.dilation = static_cast<float>(kDilation * in_pixels * in_pixels);
-    options.sh_degree = 0;  // only alpha is looked at
-    double covered = 0;
-    int64_t translucent = 0;
-    for (const Camera& camera : cameras_.cameras) {
-      ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(*cloud_, camera, options, output_));
-      for (const float alpha : output_.alpha.pixels) {
-        covered += alpha;
-        translucent += alpha > kTranslucentFrom && alpha < kTranslucentTo ? 1 : 0;
-      }
-    }
-    // One more pixel keeps the logarithms finite for pictures without any.
-    const double share = static_cast<double>(translucent + 1) / (covered + 1);
-    known_[pixel_size] = share;
-    return share;
-  }
-
- private:
-  TranslucentShare(const GaussianCloud& cloud, CameraSet cameras, double render_pixel)
-      : cloud_(&cloud), cameras_(std::move(cameras)), render_pixel_(render_pixel) {}
-
-  const GaussianCloud* cloud_;
-  CameraSet cameras_;
-  double render_pixel_;  // world size of a rendered pixel at the target
-  Rasterizer rasterizer_;
-  RenderOutput output_;
-  std::map<double, double> known_;
-};
-
-// Offset, in steps, of the vertex of the parabola through three equally spaced values with the least in the middle.
-double Vertex(double left, double middle, double right) {
-  const double bend = left - 2 * middle + right;
-  return bend > 0 ? std::clamp(0.5 * (left - right) / bend, -0.5, 0.5) : 0;
+  if (static_cast<int64_t>(middle.size()) < kLeastGaussians) return std::nullopt;
+  return std::sqrt(double{WeightedQuantile(middle, 0.1)} * double{WeightedQuantile(largest, 0.1)});
 }
 
 }  // namespace
 
-Result<PixelSizeFeatures> ComputePixelSizeFeatures(const GaussianCloud& whole) {
+Result<PixelSizeProbe> PixelSizeProbe::Make(const GaussianCloud& whole) {
   const Framing framing = FrameCloud(whole);
-  const GaussianCloud cloud = Telling(whole, framing);
-  PixelSizeFeatures features;
-  if (!AxisFeatures(cloud, features)) {
+  PixelSizeProbe probe;
+  double radius = framing.radius;
+  probe.cloud_ = Telling(whole, framing, radius);
+  const std::optional<double> start = AxisOfSmallGaussians(probe.cloud_);
+  if (!start) {
     return Error{ErrorCode::kBadArgument,
                  Cat("fewer than ", kLeastGaussians, " visible Gaussians to estimate a pixel size from")};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(TranslucentShare share, TranslucentShare::Make(cloud, framing));
+  probe.start_ = *start;
+  const Pinhole intrinsics = PinholeFromFov(kRenderSize, kRenderSize, kFieldOfView);
+  probe.distance_ = FramingDistance({framing.target, radius}, intrinsics);
+  probe.farthest_pixel_ = probe.distance_ / intrinsics.fx;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(probe.cameras_, OrbitCameras(kViews, probe.distance_, framing.target, intrinsics));
+  return probe;
+}
 
-  // Whole octaves downhill from the middle axis, then half octaves around the least. Downhill rather than everywhere:
-  // pixels as large as the cloud itself make it vanish, which is crisp as well.
-  const auto size_at = [&](double octave) { return features.middle_axis * std::exp2(octave); };
-  double best = 0;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(double least, share.At(size_at(best)));
-  for (const double step : {-1.0, 1.0}) {
-    for (double next = best + step; std::abs(next) <= kSearchOctaves; next += step) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const double value, share.At(size_at(next)));
-      if (value >= least) break;
-      least = value;
-      best = next;
-    }
+Result<PixelSizeProbe::OutlineValues> PixelSizeProbe::AtStep(int step) {
+  if (const auto known = known_.find(step); known != known_.end()) return known->second;
+  const double size = start_ * std::exp2(step * kOctavesPerStep);
+  const double pixel = std::min(farthest_pixel_, size / kSamples);
+  RenderOptions options;
+  const double in_pixels = size / pixel;
+  options.dilation = static_cast<float>(kDilation * in_pixels * in_pixels);
+  options.sh_degree = 0;                                            // only alpha is looked at
+  options.near_plane = static_cast<float>(kNearPlane * distance_);  // scales with the cloud, as all does
+  options.far_plane = static_cast<float>(distance_ / kNearPlane);
+  OutlineProfile profile;
+  for (Camera& camera : cameras_.cameras) {
+    camera.intrinsics.fx = camera.intrinsics.fy = distance_ / pixel;
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud_, camera, options, output_));
+    profile.Add(output_.alpha, pixel / size);
   }
-  if (std::abs(best) >= kSearchOctaves) {  // ran off: nothing opens and nothing closes within reason
-    features.crispest = features.middle_axis;
-    features.share = least;
-    return features;
+  return known_[step] = profile.Values();
+}
+
+Result<PixelSizeProbe::OutlineValues> PixelSizeProbe::ProfileAt(double size) {
+  const double at = std::clamp(std::log2(size / start_) / kOctavesPerStep, -kMostSteps, kMostSteps);
+  const double below = std::floor(at), part = at - below;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutlineValues values, AtStep(static_cast<int>(below)));
+  if (part == 0) return values;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OutlineValues above, AtStep(static_cast<int>(below) + 1));
+  for (size_t k = 0; k < kOutlineValues; ++k) values[k] += part * (above[k] - values[k]);
+  return values;
+}
+
+Result<PixelSizeFeatures> PixelSizeProbe::At(double size) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OutlineValues smaller, ProfileAt(size / std::numbers::sqrt2));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OutlineValues middle, ProfileAt(size));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OutlineValues larger, ProfileAt(size * std::numbers::sqrt2));
+  PixelSizeFeatures features{};
+  for (size_t k = 0; k < kOutlineValues; ++k) {
+    features[k] = middle[k];
+    features[kOutlineValues + k] = larger[k] - smaller[k];
+    features[2 * kOutlineValues + k] = larger[k] + smaller[k] - 2 * middle[k];
   }
-  for (const double half : {best - 0.5, best + 0.5}) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double value, share.At(size_at(half)));
-    if (value < least) {
-      least = value;
-      best = half;
-    }
-  }
-  std::array<double, 5> around;  // ln share at −1, −½, 0, ½, 1 octaves
-  for (int k = 0; k < 5; ++k) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double value, share.At(size_at(best + 0.5 * (k - 2))));
-    around[static_cast<size_t>(k)] = std::log(value);
-  }
-  features.crispest = size_at(best + 0.5 * Vertex(around[1], around[2], around[3]));
-  features.share = least;
-  features.fall = around[0] - around[2];
-  features.rise = around[4] - around[2];
   return features;
 }
 

@@ -1,33 +1,57 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <map>
+
+#include "core/camera.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
+#include "enhance/outline_profile.h"
+#include "render/rasterizer.h"
 
 namespace anchorsplat {
 
-// What a cloud alone says about p_LR, the size of the pixels it was trained at. All lengths are in world units and all
-// of them scale with the cloud, so that any combination of degree one does too.
-struct PixelSizeFeatures {
-  // The pixel size at which the cloud's own alpha is crispest: the smallest translucent share (below). Rendered with
-  // 0.3 px² of smaller pixels a fit shows gaps between its eroded Gaussians, with those of larger ones its outlines
-  // blur; both make pixels translucent. The size it was optimised for lies near the minimum.
-  double crispest = 0;
-  double share = 0;  // translucent share there
-  double fall = 0;   // ln of the share at half of `crispest` over that at `crispest`: how many gaps there are to close
-  double rise = 0;   // ln of the share at twice `crispest` over that at `crispest`: how much outline there is to blur
-  // 10 % quantiles over the visible Gaussians, weighted by opacity × area (product of the two larger axes).
-  double largest_axis = 0;
-  double middle_axis = 0;
-};
-
-// Share of the covered area that is translucent when the cloud is rendered with the dilation of pixels of `pixel_size`
-// (world units at the middle of the cloud), seen from all sides: pixels with 0.7 < alpha < 0.95 over the sum of alpha.
-// The rendered picture itself always has the same resolution; it only samples.
+// What a cloud's own outlines say about a pixel size d that is tried: the outline profile (outline_profile.h) of the
+// cloud's alpha with the dilation of pixels of d, in units of d, seen from all sides; how it changes from pixels of
+// d/√2 to those of d·√2; and how that change changes.
 //
-// Splats without gaps at any pixel size have no minimum; `fall` is 0 then and `crispest` means nothing.
-// Only Gaussians near the middle of the cloud and small beside it are looked at. kBadArgument: fewer than
-// kLeastGaussians of them an opacity of 10 % or more and three positive scales.
+// A fit reproduces outlines as its training pixels saw them, where alpha rises over about one pixel. Rendered with the
+// dilation of the pixels it was fitted with it shows them so; with smaller ones they are sharper, but by less than the
+// pixel is smaller, as a fit cannot take back more than all of the dilation. In units of d the width thus falls while d
+// grows, and says where d equals the pixel.
+inline constexpr size_t kPixelSizeFeatures = 3 * kOutlineValues;
+using PixelSizeFeatures = std::array<double, kPixelSizeFeatures>;  // natural logarithms
+
 inline constexpr int64_t kLeastGaussians = 16;
-Result<PixelSizeFeatures> ComputePixelSizeFeatures(const GaussianCloud& cloud);
+
+class PixelSizeProbe {
+ public:
+  // Only Gaussians near the middle of the cloud and small beside it are looked at, and at most 200,000 of them.
+  // kBadArgument: fewer than kLeastGaussians of them have an opacity of 10 % or more and three positive scales.
+  static Result<PixelSizeProbe> Make(const GaussianCloud& cloud);
+
+  // A first guess from the sizes of the Gaussians, within a factor of three or so; world units.
+  double start() const { return start_; }
+
+  // The features of pixels of `size` (world units at the middle of the cloud). Pictures are made at half octaves from
+  // start(), within six octaves, and only once; between them the logarithms are linear. Lengths scale with the cloud:
+  // a cloud made c times as large has the same features at c times the size.
+  Result<PixelSizeFeatures> At(double size);
+
+ private:
+  using OutlineValues = std::array<double, kOutlineValues>;
+  PixelSizeProbe() = default;
+  Result<OutlineValues> AtStep(int step);
+  Result<OutlineValues> ProfileAt(double size);
+
+  GaussianCloud cloud_;
+  CameraSet cameras_;
+  double start_ = 0, distance_ = 0;
+  double farthest_pixel_ = 0;  // world size of a picture's pixel where the whole cloud is in it; none is larger
+  Rasterizer rasterizer_;
+  RenderOutput output_;
+  std::map<int, OutlineValues> known_;
+};
 
 }  // namespace anchorsplat

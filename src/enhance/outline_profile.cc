@@ -1,0 +1,85 @@
+#include "enhance/outline_profile.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/parallel.h"
+
+namespace anchorsplat {
+
+namespace {
+constexpr int kRowsPerTask = 32;
+constexpr float kLeastGradient = 1e-4f;  // per pixel; flatter crossings are noise of a plateau
+}  // namespace
+
+void OutlineProfile::AddRows(const Image& alpha, double pixel, int first, int last, Sums& sums) {
+  const int width = alpha.width;
+  for (int y = first; y < last; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const float* at = alpha.pixels.data() + int64_t{y} * width + x;
+      for (size_t b = 0; b + 1 < kOutlineBands.size(); ++b) {
+        if (*at >= kOutlineBands[b] && *at < kOutlineBands[b + 1]) ++sums.pixels[b];
+      }
+      if (x < 1 || y < 1 || x + 2 >= width || y + 2 >= alpha.height) continue;
+      const auto [low, high] = std::minmax({at[0], at[1], at[width]});
+      if (high < kOutlineLevels.front() || low >= kOutlineLevels.back() || low == high) continue;
+      for (size_t level = 0; level < kOutlineLevels.size(); ++level) {
+        const float value = kOutlineLevels[level];
+        for (const auto& [along, across] : {std::pair(1, width), std::pair(width, 1)}) {
+          const float begin = at[0], end = at[along];
+          if ((begin < value) == (end < value)) continue;
+          if (value == 0.5f) ++sums.crossings;
+          const float t = (value - begin) / (end - begin);
+          const float rise = 0.5f * ((1 - t) * (end - at[-along]) + t * (at[2 * along] - begin));
+          const float aside =
+              0.5f * ((1 - t) * (at[across] - at[-across]) + t * (at[along + across] - at[along - across]));
+          const float gradient = std::max(kLeastGradient, std::sqrt(rise * rise + aside * aside));
+          const double bin = (std::log(pixel / double{gradient}) - kFirst) / kStep;
+          sums.widths[level][static_cast<size_t>(std::clamp(bin, 0.0, double{kBins - 1}))] +=
+              std::fabs(double{rise}) / double{gradient};
+        }
+      }
+    }
+  }
+}
+
+void OutlineProfile::Add(const Image& alpha, double pixel) {
+  std::vector<Sums> parts(static_cast<size_t>((alpha.height + kRowsPerTask - 1) / kRowsPerTask));
+  ParallelFor(0, alpha.height, kRowsPerTask, [&](int64_t first, int64_t last) {
+    AddRows(alpha, pixel, static_cast<int>(first), static_cast<int>(last),
+            parts[static_cast<size_t>(first / kRowsPerTask)]);
+  });
+  for (const Sums& part : parts) {
+    for (size_t level = 0; level < widths_.size(); ++level) {
+      for (size_t k = 0; k < kBins; ++k) widths_[level][k] += part.widths[level][k];
+    }
+    for (size_t b = 0; b < areas_.size(); ++b) areas_[b] += static_cast<double>(part.pixels[b]) * pixel * pixel;
+    length_ += static_cast<double>(part.crossings) * pixel;
+  }
+  last_pixel_ = pixel;
+}
+
+std::array<double, kOutlineValues> OutlineProfile::Values() const {
+  std::array<double, kOutlineValues> out{};
+  size_t next = 0;
+  for (const auto& weights : widths_) {
+    double total = 0;
+    for (const double weight : weights) total += weight;
+    for (const double quantile : kOutlineQuantiles) {
+      double below = 0;
+      size_t bin = 0;
+      while (bin + 1 < kBins && below + weights[bin] < quantile * total) below += weights[bin++];
+      const double inside = weights[bin] > 0 ? (quantile * total - below) / weights[bin] : 0.5;
+      out[next++] = total > 0 ? kFirst + kStep * (static_cast<double>(bin) + inside) : 0;
+    }
+  }
+  const double length = length_ + last_pixel_;
+  for (size_t b = 0; b < areas_.size(); ++b) {
+    const double area = areas_[b] + last_pixel_ * last_pixel_;
+    out[next++] = std::log(area / (length * double{kOutlineBands[b + 1] - kOutlineBands[b]}));
+  }
+  return out;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+#include "enhance/pixel_size_estimate.h"
+#include "enhance/pixel_size_features.h"
+#include "eval/benchmark.h"
+
+namespace anchorsplat {
+
+// The estimate of an object's pixel size beside the true one, and what the estimate is made from.
+struct PixelSizeCheck {
+  std::string object;
+  double truth = 0;  // median over the Gaussians (eval/filter_sweep.h), world units
+  double start = 0;  // what the search begins with
+  PixelSizeEstimate estimate;
+  double seconds = 0;  // of the estimate
+  struct Sample {
+    double size = 0;
+    PixelSizeFeatures features{};
+  };
+  std::vector<Sample> samples;  // at truth · 2^(k/4), |k| ≤ 5, in order; empty unless asked for
+};
+
+Result<PixelSizeCheck> CheckPixelSize(const BenchmarkObject& object, bool with_samples);
+
+}  // namespace anchorsplat

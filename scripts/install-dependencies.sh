@@ -7,8 +7,11 @@ packages=(g++ cmake ninja-build pkg-config
   libhwy-dev libtbb-dev libcli11-dev nlohmann-json3-dev libpng-dev libjpeg-dev zlib1g-dev libzstd-dev libwebp-dev
   libassimp-dev libstb-dev libembree-dev libtomlplusplus-dev libgtest-dev libgmock-dev libbenchmark-dev)
 
-# LibTorch comes in a Python wheel (scripts/install-torch.sh).
-[ "${1:-}" = --with-torch ] && packages+=(python3-venv python3-pip)
+# LibTorch comes in a Python wheel (scripts/install-torch.sh) without the headers of Gloo, which training on several
+# machines needs.
+if [ "${1:-}" = --with-torch ] || [ -e "$(dirname "$0")/../.venv/anchorsplat-torch" ]; then
+  packages+=(python3-venv python3-pip libgloo-dev)
+fi
 
 if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
   # Not a Debian system: look for one header or program of each package.

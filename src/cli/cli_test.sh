@@ -45,7 +45,7 @@ silent() {
 expect 0 "version" "$program" --version
 says stdout "anchorsplat 0."
 expect 0 "help" "$program" --help
-for verb in enhance convert info render compare view views fit bench; do
+for verb in enhance convert info render compare view views fit train bench; do
   says stdout "$verb"
   expect 0 "help of $verb" "$program" $verb --help
   says stdout "Example:"
@@ -429,6 +429,18 @@ expect 0 "a fit that was killed" "$program" eval "$work/killed" -o "$work/parts"
 says stderr "going on at step"
 expect 0 "comes to the same splat" cmp "$work/whole/objects/quad/bicubic/splat.ply" "$work/parts/objects/quad/bicubic/splat.ply"
 expect 3 "no split" "$program" eval "$work/demand" -o "$work/eval5" --split test
+
+# train: in a program of its own where there is LibTorch.
+printf '[optimizer]\nclip = -1\n' >"$work/recipe.toml"
+if [ -x "$(dirname "$program")/anchorsplat-train" ]; then
+  expect 4 "a bad recipe" "$program" train "$work" --config "$work/recipe.toml" -o "$work/run"
+  says stderr "recipe.toml: line 2: optimizer.clip: expected a number from 0"
+  expect 0 "help of the training program" "$(dirname "$program")/anchorsplat-train" train --help
+else
+  expect 3 "no LibTorch" "$program" train "$work" --config "$work/recipe.toml" -o "$work/run" --json
+  says stderr "training is missing: this program was built without LibTorch"
+fi
+expect 2 "no recipe" "$program" train "$work" -o "$work/run"
 
 # Same bits for any number of threads.
 expect 0 "one thread" "$program" render "$input" -o "$work/t1.png" --orbit 1 --size 200x150 --threads 1

@@ -14,10 +14,12 @@
 #include "dataset/object_name.h"
 #include "fit/stopwatch.h"
 #include "formats/file_bytes.h"
+#include "model/modules/point_batch_norm.h"
 #include "model/modules/trainable_network.h"
 #include "train/optimizer.h"
 #include "train/perceptual_objective.h"
 #include "train/photometric_objective.h"
+#include "train/process_group.h"
 #include "train/sample_loader.h"
 #include "train/train_checkpoint.h"
 #include "train/train_log.h"
@@ -87,11 +89,17 @@ class Trainer {
   double Elapsed() const { return progress_.seconds + clock_seconds_; }
   bool Over() const;
   double PartDone() const;
+  bool Leads() const { return !group_ || group_->rank() == 0; }
+  bool Asked() const { return request_.stop != nullptr && request_.stop->load(); }
+  // With others, only what all of them know of counts: else one would wait for another that has gone.
+  bool Stopping() const { return group_ ? agreed_stop_ : Asked(); }
+  void Agree();
 
   const TrainRequest& request_;
   TrainConfig config_;
   std::string config_text_;
   torch::Device device_ = torch::kCPU;
+  std::unique_ptr<ProcessGroup> group_;  // null: this process is alone
   TrainingData data_;
   std::unique_ptr<ObjectStore> objects_;
   std::shared_ptr<TrainableNetwork> network_;
@@ -106,6 +114,9 @@ class Trainer {
   double clock_seconds_ = 0;  // of this run
   Sums sums_;
   int bad_steps_ = 0;
+  // What all processes go by: a clock that all of them read alike, and whether one of them was asked to stop.
+  double agreed_elapsed_ = 0;
+  bool agreed_stop_ = false;
   double last_norm_ = 0, last_factor_ = 0, last_loss_ = 0, last_psnr_ = 0;
 };
 
@@ -128,6 +139,7 @@ Status Trainer::Begin() {
     return Error{ErrorCode::kBadArgument, Cat(config_.file, ": device: this LibTorch sees no CUDA device")};
   }
   if (config_.device == "cuda" || (config_.device == "auto" && torch::cuda::is_available())) device_ = torch::kCUDA;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(group_, ProcessGroup::FromEnvironment());
   at::set_num_threads(ThreadCount());
   // Sums over gathered rows in one order; without filling fresh memory, which deterministic mode does besides.
   at::globalContext().setDeterministicAlgorithms(true, /*warn_only=*/true);
@@ -140,7 +152,7 @@ Status Trainer::Begin() {
   if (config_.loss.lpips > 0) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(perceptual_, PerceptualObjective::Open(config_.loss.lpips_net));
   }
-  if (!data_.validation.empty()) {
+  if (!data_.validation.empty() && Leads()) {
     std::shared_ptr<const PerceptualObjective> measure;
     if (config_.validation.lpips) {
       auto opened = PerceptualObjective::Open(LpipsNet::kAlex);
@@ -158,6 +170,13 @@ Status Trainer::Begin() {
   if (!network.ok()) return InNetworkTable(config_, network.error());
   network_ = *std::move(network);
   network_->to(device_);
+  if (group_) {
+    network_->apply([this](torch::nn::Module& module) {
+      if (auto* norm = module.as<PointBatchNormImpl>()) {
+        norm->SynchroniseOver([this](torch::Tensor& tensor) { group_->Sum(tensor); });
+      }
+    });
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(optimizer_, Optimizer::Make(*network_, config_));
   progress_.settings = Settings(config_).dump();
   progress_.objects = data_.names;
@@ -168,26 +187,30 @@ Status Trainer::Begin() {
   } else if (!request_.start.empty()) {
     ANCHORSPLAT_RETURN_IF_ERROR(StartFromCheckpoint(request_.start, *optimizer_));
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(log_, TrainLog::Open(request_.out, progress_.step));
+  if (Leads()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(log_, TrainLog::Open(request_.out, progress_.step));
+  }
+  agreed_elapsed_ = progress_.seconds;
 
   report_.resumed_at = progress_.step;
   report_.objects = static_cast<int64_t>(data_.training.size());
   report_.validation_objects = validation_ ? static_cast<int64_t>(validation_->objects()) : 0;
   report_.parameters = optimizer_->parameters();
   report_.file = request_.out / "model.safetensors";
+  if (!Leads()) return {};
   LogInfo(Cat(WithThousands(report_.parameters), " parameters, ", report_.objects, " objects, ",
-              report_.validation_objects, " for validation",
+              report_.validation_objects, " for validation", group_ ? Cat(", ", group_->size(), " processes") : "",
               progress_.step > 0 ? Cat(", going on after step ", WithThousands(progress_.step)) : ""));
   return {};
 }
 
 bool Trainer::Over() const {
-  return progress_.step >= config_.steps || (request_.minutes && Elapsed() >= 60 * *request_.minutes);
+  return progress_.step >= config_.steps || (request_.minutes && agreed_elapsed_ >= 60 * *request_.minutes);
 }
 
 double Trainer::PartDone() const {
   const double steps = static_cast<double>(progress_.step) / static_cast<double>(config_.steps);
-  return request_.minutes ? std::max(steps, Elapsed() / (60 * *request_.minutes)) : steps;
+  return request_.minutes ? std::max(steps, agreed_elapsed_ / (60 * *request_.minutes)) : steps;
 }
 
 // One sample's share of the gradient.
@@ -230,8 +253,33 @@ Status Trainer::Look(SampleLoader& loader) {
   return {};
 }
 
+// Gradients, losses, clocks and wishes of all processes, in one sum.
+void Trainer::Agree() {
+  if (!group_) {
+    agreed_elapsed_ = Elapsed();
+    return;
+  }
+  const torch::NoGradGuard no_gradient;
+  const std::vector<torch::Tensor> gradients = optimizer_->Gradients();
+  std::vector<torch::Tensor> flat;
+  for (const torch::Tensor& gradient : gradients) flat.push_back(gradient.to(torch::kCPU).flatten());
+  flat.push_back(torch::tensor({last_loss_, Elapsed(), Asked() ? 1.0 : 0.0}).to(torch::kFloat32));
+  torch::Tensor sum = torch::cat(flat);
+  group_->Sum(sum);
+  sum.div_(group_->size());
+  int64_t at = 0;
+  for (const torch::Tensor& gradient : gradients) {
+    gradient.copy_(sum.narrow(0, at, gradient.numel()).view(gradient.sizes()));
+    at += gradient.numel();
+  }
+  last_loss_ = sum[at].item<double>();
+  agreed_elapsed_ = sum[at + 1].item<double>();
+  agreed_stop_ = sum[at + 2].item<double>() > 0;
+}
+
 // Applies the gradient, if it is one.
 Status Trainer::Update() {
+  Agree();
   last_norm_ = optimizer_->GradientNorm() / progress_.loss_scale;
   if (!std::isfinite(last_loss_) || !std::isfinite(last_norm_)) {
     ++progress_.skipped;
@@ -282,6 +330,10 @@ nlohmann::json ToJson(const TrainQuality& quality) {
 }
 
 Status Trainer::WriteLogLine() {
+  if (!Leads()) {
+    sums_ = {};
+    return {};
+  }
   const auto steps = static_cast<double>(std::max<int64_t>(1, sums_.steps));
   const auto views = static_cast<double>(std::max<int64_t>(1, sums_.views));
   nlohmann::json line = {{"step", progress_.step},
@@ -329,7 +381,7 @@ Status Trainer::SaveNetwork(const char* name) {
 }
 
 Status Trainer::Validate() {
-  if (!validation_) return {};
+  if (!validation_) return {};  // nothing to measure with, or not the leading process
   Stopwatch watch;
   ANCHORSPLAT_ASSIGN_OR_RETURN(report_.raw, validation_->Raw());
   ANCHORSPLAT_ASSIGN_OR_RETURN(report_.filter, validation_->Filter());
@@ -355,6 +407,7 @@ Status Trainer::Validate() {
 }
 
 Status Trainer::WriteAll() {
+  if (!Leads()) return {};
   TrainProgress progress = progress_;
   progress.seconds = Elapsed();
   ANCHORSPLAT_RETURN_IF_ERROR(WriteTrainCheckpoint(request_.out / "checkpoint.safetensors", *optimizer_, progress));
@@ -367,13 +420,18 @@ Status Trainer::Run() {
   if (text.ok()) config_text_ = *text;
   if (progress_.step == 0) ANCHORSPLAT_RETURN_IF_ERROR(Validate());
   const int64_t scenes = config_.data.scenes_per_step;
-  const auto interrupted = [&] { return request_.stop != nullptr && request_.stop->load(); };
-  if (!Over() && !interrupted()) {
-    SampleLoader loader(config_, {.first = progress_.step * scenes}, *objects_, *network_, device_);
+  const int64_t together = scenes * (group_ ? group_->size() : 1);
+  if (!Over()) {
+    SampleLoader loader(config_,
+                        {.first = progress_.step * together,
+                         .group = together,
+                         .offset = scenes * (group_ ? group_->rank() : 0),
+                         .count = scenes},
+                        *objects_, *network_, device_);
     Progress bar("training", config_.steps);
     bar.Advance(progress_.step);
     clock_.Lap();
-    while (!Over() && !interrupted()) {
+    while (!Over() && !Stopping()) {
       const Status stepped = Step(loader);
       clock_seconds_ += clock_.Lap();
       if (!stepped.ok()) return stepped;
@@ -385,7 +443,7 @@ Status Trainer::Run() {
     }
   }
   if (sums_.steps > 0) report_.loss = sums_.loss / static_cast<double>(sums_.steps);
-  report_.interrupted = interrupted() && !Over();
+  report_.interrupted = Stopping() && !Over();
   if (!report_.interrupted) ANCHORSPLAT_RETURN_IF_ERROR(Validate());
   report_.steps = progress_.step;
   report_.skipped = progress_.skipped;

@@ -23,10 +23,10 @@ class PointTransformerV3Impl : public torch::nn::Module {
     SerializedUnpooling up{nullptr};  // decoder stages only
     std::vector<Block> blocks;
   };
-  torch::nn::Linear embedding{nullptr};            // embedding.0
-  torch::nn::BatchNorm1d embedding_norm{nullptr};  // embedding.1
-  std::vector<Stage> encoder;                      // finest first
-  std::vector<Stage> decoder;                      // finest first
+  torch::nn::Linear embedding{nullptr};    // embedding.0
+  PointBatchNorm embedding_norm{nullptr};  // embedding.1
+  std::vector<Stage> encoder;              // finest first
+  std::vector<Stage> decoder;              // finest first
 };
 TORCH_MODULE(PointTransformerV3);
 

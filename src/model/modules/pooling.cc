@@ -2,14 +2,7 @@
 
 #include <limits>
 
-#include "model/network_config.h"
-
 namespace anchorsplat {
-
-torch::nn::BatchNorm1d PointBatchNorm(int64_t channels) {
-  return torch::nn::BatchNorm1d(
-      torch::nn::BatchNorm1dOptions(channels).eps(kBatchNormEpsilon).momentum(kBatchNormMomentum));
-}
 
 SerializedPoolingImpl::SerializedPoolingImpl(int64_t in, int64_t out) : norm(PointBatchNorm(out)) {
   proj = register_module("proj", torch::nn::Linear(in, out));

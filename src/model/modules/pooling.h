@@ -3,11 +3,9 @@
 #include <torch/torch.h>
 
 #include "model/modules/level_tensors.h"
+#include "model/modules/point_batch_norm.h"
 
 namespace anchorsplat {
-
-// PTv3's BatchNorm over points: eps 1e-3, momentum 0.01.
-torch::nn::BatchNorm1d PointBatchNorm(int64_t channels);
 
 // Fine to coarse: Linear on every point, maximum over each cluster, then BatchNorm and GELU.
 class SerializedPoolingImpl : public torch::nn::Module {
@@ -16,7 +14,7 @@ class SerializedPoolingImpl : public torch::nn::Module {
   torch::Tensor forward(const torch::Tensor& x, const LevelTensors& fine, int64_t coarse_count);
 
   torch::nn::Linear proj{nullptr};
-  torch::nn::BatchNorm1d norm{nullptr};  // norm.0
+  PointBatchNorm norm{nullptr};  // norm.0
 };
 TORCH_MODULE(SerializedPooling);
 
@@ -35,10 +33,10 @@ class SerializedUnpoolingImpl : public torch::nn::Module {
   };
   Output forward(const torch::Tensor& coarse, const torch::Tensor& skip, const LevelTensors& fine);
 
-  torch::nn::Linear proj{nullptr};            // proj.0
-  torch::nn::BatchNorm1d norm{nullptr};       // proj.1
-  torch::nn::Linear proj_skip{nullptr};       // proj_skip.0
-  torch::nn::BatchNorm1d norm_skip{nullptr};  // proj_skip.1
+  torch::nn::Linear proj{nullptr};       // proj.0
+  PointBatchNorm norm{nullptr};          // proj.1
+  torch::nn::Linear proj_skip{nullptr};  // proj_skip.0
+  PointBatchNorm norm_skip{nullptr};     // proj_skip.1
 };
 TORCH_MODULE(SerializedUnpooling);
 

@@ -20,7 +20,8 @@ SAME_MESH = {"biplane": "BlendSwap-CC-0-cartoon_biplane", "stone_lantern": "Blen
 SAMPLE_WIDTH = 0.35  # ln: samples count by exp(-½ (ln(size / true) / SAMPLE_WIDTH)²)
 
 
-def load(files):
+def load(files, weights=()):
+    weights = dict(weights)
     objects = []
     for name in files:
         with open(name, encoding="utf-8") as file:
@@ -30,6 +31,7 @@ def load(files):
                 objects.append({
                     "name": item["object"],
                     "mesh": SAME_MESH.get(mesh, mesh),
+                    "weight": float(weights.get(item["object"], 1)),
                     "offsets": np.log([s["size"] / item["pixel_size"] for s in samples]),
                     "features": np.array([s["features"] for s in samples]),
                     "start": np.log(item["start"] / item["pixel_size"]),
@@ -41,6 +43,7 @@ def fit(objects, ridge):
     x = np.concatenate([o["features"] for o in objects])
     offsets = np.concatenate([o["offsets"] for o in objects])
     weights = np.exp(-0.5 * (offsets / SAMPLE_WIDTH) ** 2)
+    weights *= np.concatenate([np.full(len(o["offsets"]), o["weight"]) for o in objects])
     weights /= weights.sum()
     mean = weights @ x
     deviation = np.sqrt(weights @ (x - mean) ** 2) + 1e-6
@@ -120,10 +123,11 @@ def main():
     parser.add_argument("features", nargs="+")
     parser.add_argument("-o", "--output")
     parser.add_argument("--ridge", type=float, nargs="+", default=[0.1])
+    parser.add_argument("--weight", nargs="+", default=[], metavar="OBJECT=W", help="objects that count more than once")
     parser.add_argument("--lean", type=float, default=0.0, help="ln, added to the estimate: negative is cautious")
     parser.add_argument("--list", action="store_true", help="the cross-validated error of every object")
     arguments = parser.parse_args()
-    objects = load(arguments.features)
+    objects = load(arguments.features, (w.split("=") for w in arguments.weight))
     print(f"{len(objects)} fits of {len({o['mesh'] for o in objects})} meshes")
     results = {}
     for ridge in arguments.ridge:

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <limits>
 #include <mutex>
 #include <utility>
 
@@ -24,7 +25,8 @@ class TerminalSink : public LogSink {
     if (level == LogLevel::kInfo && quiet_) return;
     Erase();
     const char* prefix = level == LogLevel::kWarning ? "warning: " : level == LogLevel::kError ? "error: " : "";
-    std::fprintf(stderr, "%s%s\n", prefix, text.c_str());
+    // Messages name files and quote what is in them: bytes that could command the terminal or break its line are shown.
+    std::fprintf(stderr, "%s%s\n", prefix, Printable(text, std::numeric_limits<size_t>::max()).c_str());
   }
 
   void TaskBegin(const std::string& name, int64_t total) override {

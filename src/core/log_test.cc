@@ -115,6 +115,13 @@ TEST(TerminalSink, DrawsABarWhateverTheNumbers) {
   }
 }
 
+TEST(TerminalSink, ShowsBytesThatCouldCommandATerminal) {
+  const Terminal terminal;
+  ASSERT_TRUE(terminal.ok());
+  MakeTerminalSink(false)->Message(LogLevel::kError, "a\x1b[2J\xff\nb ä");
+  EXPECT_NE(terminal.Shown().find("error: a\\x1b[2J\\xff\\x0ab ä"), std::string::npos);
+}
+
 TEST(TerminalSink, QuietKeepsWarningsAndErrors) {
   const Terminal terminal;
   ASSERT_TRUE(terminal.ok());

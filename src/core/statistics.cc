@@ -14,6 +14,14 @@ Percentiles ComputePercentiles(std::span<float> values) {
   return out;
 }
 
+bool IsPlausible(const GaussianCloud& cloud, int64_t i) {
+  static const float kLongest = std::log(kPlausibleExtent);
+  const float* mean = cloud.means.data() + 3 * i;
+  const float* scale = cloud.log_scales.data() + 3 * i;
+  return std::all_of(mean, mean + 3, [](float x) { return std::fabs(x) <= kPlausibleExtent; }) &&
+         std::all_of(scale, scale + 3, [](float x) { return x <= kLongest; });
+}
+
 // Rows whose mean leaves the box of the middle 98 %, grown tenfold about its centre, along any axis.
 int64_t CountOutliers(const GaussianCloud& cloud) {
   std::array<float, 3> low, high;
@@ -50,6 +58,7 @@ float Quantile(std::span<float> values, double q) {
   const double fraction = at - static_cast<double>(below);
   if (fraction == 0) return low;
   const float high = *std::min_element(nth + 1, values.end());
+  if (low == high) return low;  // infinite ones have no difference
   return static_cast<float>(low + fraction * (static_cast<double>(high) - low));
 }
 
@@ -67,6 +76,7 @@ CloudStatistics ComputeStatistics(const GaussianCloud& cloud) {
       continue;
     }
     ++usable;
+    if (!IsPlausible(cloud, i)) ++out.implausible;
     const float* q = cloud.quats.data() + 4 * i;
     const double norm =
         std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] + double{q[2]} * q[2] + double{q[3]} * q[3]);

@@ -17,6 +17,10 @@ float Quantile(std::span<float> values, double q);
 inline constexpr std::array<double, 5> kPercentiles = {0.01, 0.10, 0.50, 0.90, 0.99};
 using Percentiles = std::array<float, kPercentiles.size()>;
 
+// No splat of a real scene reaches farther, in world units, from zero, or has a Gaussian as long: a file that says so
+// is damaged, of another kind, or in coordinates (of the Earth, say) that floats are too coarse for.
+inline constexpr float kPlausibleExtent = 1e6f;
+
 // What a person wants to know about a cloud before trusting it. Percentiles are over usable rows with three finite
 // scales; all are NaN when there are none.
 struct CloudStatistics {
@@ -35,6 +39,7 @@ struct CloudStatistics {
   int64_t zero_scales = 0;                // a log-scale of −Inf
   int64_t invisible = 0;                  // opacity below 1/255: no rasterizer draws them
   int64_t outliers = 0;                   // farther out than ten times the box that holds the middle 98 % of the means
+  int64_t implausible = 0;                // a mean or an axis beyond kPlausibleExtent
   bool linear_looking_scales = false;     // stored scales look like lengths, not logarithms
   bool linear_looking_opacities = false;  // stored opacities look like 0–1, not logits
 };

@@ -31,6 +31,9 @@ TEST(Quantile, InterpolatesBetweenNeighbours) {
   EXPECT_FLOAT_EQ(Quantile(values, 1), 4);
   EXPECT_FLOAT_EQ(Quantile(values, 0.1), 1.3f);
   EXPECT_TRUE(std::isnan(Quantile({}, 0.5)));
+  const float inf = std::numeric_limits<float>::infinity();
+  std::vector<float> endless = {inf, 1, inf};
+  EXPECT_EQ(Quantile(endless, 0.75), inf);  // not inf − inf
 }
 
 TEST(Statistics, HealthyCloudHasNoProblems) {
@@ -60,6 +63,11 @@ TEST(Statistics, CountsEachProblemOnce) {
   EXPECT_EQ(s.zero_scales, 1);
   EXPECT_EQ(s.outliers, 1);
   EXPECT_EQ(s.invisible, invisible_before + 1);
+  EXPECT_EQ(s.implausible, 0);
+  cloud.means[16] = -2e6f;
+  cloud.log_scales[20] = 14;  // 1.2 million
+  cloud.log_scales[26] = 13.8f;
+  EXPECT_EQ(ComputeStatistics(cloud).implausible, 2);
 }
 
 TEST(Statistics, RecognisesLinearScalesAndOpacities) {

@@ -1,7 +1,11 @@
 #include "core/text.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <string_view>
+
+#include "core/utf8.h"
 
 namespace anchorsplat {
 
@@ -46,16 +50,25 @@ std::string HumanSeconds(double seconds) {
 
 std::string Printable(const std::string& bytes, size_t longest) {
   std::string out;
-  for (const char c : bytes) {
+  std::string_view rest = bytes;
+  while (!rest.empty()) {
     if (out.size() >= longest) return out + "…";
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte >= 0x20 && byte != 0x7f) {
-      out += c;
-    } else {
-      char escaped[8];
-      std::snprintf(escaped, sizeof escaped, "\\x%02x", byte);
-      out += escaped;
+    const size_t size = Utf8CharacterSize(rest);
+    const auto byte = static_cast<unsigned char>(rest[0]);
+    // U+0080 to U+009F are control characters too: terminals take U+009B for the beginning of a command.
+    const bool control =
+        byte < 0x20 || byte == 0x7f || (size == 2 && byte == 0xc2 && static_cast<unsigned char>(rest[1]) < 0xa0);
+    const size_t shown = std::max<size_t>(1, size);
+    for (const char c : rest.substr(0, shown)) {
+      if (size > 0 && !control) {
+        out += c;
+      } else {
+        char escaped[8];
+        std::snprintf(escaped, sizeof escaped, "\\x%02x", static_cast<unsigned char>(c));
+        out += escaped;
+      }
     }
+    rest.remove_prefix(shown);
   }
   return out;
 }

@@ -53,6 +53,11 @@ TEST(Text, HostileBytesBecomePrintable) {
   EXPECT_EQ(Printable("plain ä"), "plain ä");
   EXPECT_EQ(Printable(std::string("a\0b\n\x1b[2J\x7f", 9)), "a\\x00b\\x0a\\x1b[2J\\x7f");
   EXPECT_LT(Printable(std::string(100'000, 'x')).size(), 70u);
+  EXPECT_EQ(Printable("a\xff\xc3(\xe2\x82"), "a\\xff\\xc3(\\xe2\\x82");
+  EXPECT_EQ(Printable("\xc2\x9b\xc2\xa0€"), "\\xc2\\x9b\xc2\xa0€");  // a control character of two bytes, and none
+  EXPECT_EQ(Printable("\xc2"), "\\xc2");
+  const std::string long_text = Printable("x" + std::string(30, '\xc3') + std::string(100, 'a'));
+  EXPECT_LT(long_text.size(), 70u);
 }
 
 }  // namespace

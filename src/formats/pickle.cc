@@ -5,9 +5,9 @@
 #include <utility>
 
 #include "core/text.h"
+#include "core/utf8.h"
 #include "formats/little_endian.h"
 #include "formats/pickle_globals.h"
-#include "formats/utf8.h"
 
 namespace anchorsplat {
 

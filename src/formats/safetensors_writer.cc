@@ -4,9 +4,9 @@
 #include <unordered_set>
 
 #include "core/text.h"
+#include "core/utf8.h"
 #include "formats/atomic_file.h"
 #include "formats/safetensors.h"
-#include "formats/utf8.h"
 
 namespace anchorsplat {
 

@@ -24,6 +24,17 @@ inline CLI::Validator AtLeastOne() {
       "");
 }
 
+// For shares of a whole. The library's own range lets "nan" through.
+inline CLI::Validator Fraction() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        double value = 0;
+        const bool number = CLI::detail::lexical_cast(text, value);
+        return number && value >= 0 && value <= 1 ? "" : "must be a number from 0 to 1, found '" + text + "'";
+      },
+      "");
+}
+
 // An option that takes one of several words for the values of an enumeration. Help shows the words and the default;
 // numbers are not accepted.
 template <typename Enum>

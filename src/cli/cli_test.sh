@@ -56,11 +56,11 @@ expect 2 "unknown verb" "$program" polish
 expect 2 "unknown flag" "$program" info "$input" --colour
 
 # convert.
-for to in compressed.ply spz sog splat glb csv npz; do
+for to in compressed.ply spz sog splat glb gltf csv npz; do
   expect 0 "convert to $to" "$program" convert "$input" "$work/scan.$to" --max-gaussians 500 --sh-degree 1
   says stdout "500 of degree $([ $to = splat ] && echo 0 || echo 1) out"
 done
-for from in compressed.ply spz sog splat glb; do
+for from in compressed.ply spz sog splat glb gltf; do
   expect 0 "info of $from" "$program" info "$work/scan.$from"
   says stdout "500"
 done
@@ -104,6 +104,59 @@ checks=$((checks + 1))
 "$program" convert - "$work/piped.ply" -q <"$work/scan.spz" && cat "$work/scan.spz" | "$program" convert /dev/stdin "$work/piped.ply" -w -q ||
   { failures=$((failures + 1)); echo "FAILED: convert from standard input"; }
 expect 2 "convert to standard output" "$program" convert "$input" -
+# What it is where neither content nor name tells.
+from_pipe() { cat "$work/scan.splat" | "$program" "$@"; }
+expect 4 "a pipe of unknown kind" from_pipe convert - "$work/told.ply"
+expect 0 "a pipe of a kind that is said" from_pipe convert - "$work/told.ply" --from .splat
+says stdout "(splat, 16.0 kB)"
+expect 0 "info of a pipe" from_pipe info - --from splat
+expect 2 "from no format" from_pipe info - --from csv
+says stderr "--from: 'csv' is no format that is read"
+# Folders.
+expect 0 "info of a folder by its name" "$program" info "$work/folders/scan"
+says stdout "SOG"
+expect 0 "a folder by its name alone" "$program" convert "$work/folders/scan/" --out-dir "$work/named" --to glb
+expect 0 "it is called like the folder" test -s "$work/named/scan.glb"
+expect 0 "a page of a folder" "$program" view "$work/folders/scan/" -o "$work/folder.html"
+expect 4 "a folder that is no splat" "$program" info "$work"
+says stderr "without a meta.json"
+# The input is not lost.
+cp "$work/scan.spz" "$work/own.spz"
+ln -s own.spz "$work/link.spz"
+for output in own.spz link.spz; do
+  expect 2 "convert over its own input, $output" "$program" convert "$work/own.spz" "$work/$output" -w
+  says stderr "write to another name"
+done
+expect 2 "a batch over its own input" "$program" convert "$work/scan.glb" "$work/own.spz" --out-dir "$work" --to spz -w
+expect 2 "enhance over its own input" "$program" enhance "$work/own.spz" -o "$work/link.spz" -w --pixel-size 0.0055
+says stderr "write to another name"
+expect 2 "enhance over its own input, by folder" "$program" enhance "$work/own.spz" --out-dir "$work" -w --pixel-size 0.0055
+expect 0 "the input is as it was" cmp "$work/scan.spz" "$work/own.spz"
+# Values that are none.
+expect 2 "an opacity that is no number" "$program" convert "$input" "$work/b.ply" --min-opacity nan
+says stderr "from 0 to 1"
+head -c 3200 "$source/src/cli/cli_test.sh" >"$work/text.splat"
+expect 4 "text is no splat" "$program" info "$work/text.splat"
+says stderr "is no .splat file"
+: >"$work/empty.splat"
+expect 4 "an empty file" "$program" info "$work/empty.splat"
+says stderr "empty.splat: is empty"
+{
+  printf 'ply\nformat ascii 1.0\nelement vertex 2\n'
+  for name in x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3; do echo "property float $name"; done
+  printf 'end_header\n'
+  for _ in 1 2; do echo 0 nan 0 0 0 0 0 -5 -5 -5 1 0 0 0; done
+} >"$work/nan.ply"
+expect 0 "info of NaN" "$program" info "$work/nan.ply"
+says stdout "2 of 2 Gaussians with NaN"
+checks=$((checks + 1))
+! tail -n +2 "$work/stdout" | grep -v "with NaN" | grep -i "nan" || { failures=$((failures + 1)); echo "FAILED: info shows NaN"; }
+expect 4 "a page of NaN" "$program" view "$work/nan.ply" -o "$work/nan.html"
+says stderr "nan.ply: there is nothing to show"
+expect 0 "convert of NaN says so" "$program" convert "$work/nan.ply" "$work/nan.csv"
+says stderr "2 of 2 Gaussians have"
+expect 3 "bytes of a name that could command a terminal" "$program" info "$work/"$'\x1b[2J\xff.ply'
+says stderr '\x1b[2J\xff.ply: no such file'
 
 # enhance.
 expect 0 "enhance" "$program" enhance "$input" -o "$work/out.ply" --pixel-size 0.0055 --method filter
@@ -121,6 +174,7 @@ expect 0 "upscale 1 changes nothing" "$program" enhance "$input" -o "$work/same.
 expect 0 "upscale 1 against its input" "$program" compare "$input" "$work/same.ply" --orbit 2 --size 64x64 --json
 says stdout '"psnr": null'
 expect 0 "enhance with a page" "$program" enhance "$input" -o "$work/viewed.ply" --pixel-size 0.0055 --view
+says stdout "viewed.html: "
 checks=$((checks + 1))
 grep -q '<html' "$work/viewed.html" || { failures=$((failures + 1)); echo "FAILED: --view wrote no page"; }
 expect 5 "the page is not overwritten" "$program" enhance "$input" -o "$work/viewed.splat" --pixel-size 0.0055 --view

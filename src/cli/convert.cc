@@ -7,9 +7,11 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/choice.h"
+#include "cli/parse.h"
 #include "cli/verb.h"
 #include "core/log.h"
 #include "core/text.h"
+#include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "metrics/conversion_loss.h"
 #include "model/checkpoint_writer.h"
@@ -24,15 +26,22 @@ struct ConvertFlags {
   std::vector<std::string> paths;  // inputs, and the output as the last one without --out-dir
   std::string out_dir;
   std::string to = ".ply";
+  std::string from;
   std::optional<std::string> axes;
   int views = 8;
   bool report = false;
   ConvertOptions options;
 };
 
-// "scan.compressed.ply" without the extension of its format; "scan/meta.json" is the folder's name.
+// "scan.compressed.ply" without the extension of its format; "scan/meta.json", or "scan" where that is in it, is the
+// folder's name.
 std::string Stem(const fs::path& input) {
-  if (input.filename() == "meta.json" && input.has_parent_path()) return input.parent_path().filename().string();
+  const fs::path found = SplatPath(input);
+  if (found.filename() == "meta.json" && found.has_parent_path()) {
+    std::error_code ignored;
+    const std::string folder = fs::weakly_canonical(found.parent_path(), ignored).filename().string();
+    return folder.empty() ? "meta" : folder;
+  }
   const std::string name = input.filename().string();
   const SplatFormat* format = FormatOfExtension(input);
   size_t longest = input.extension().string().size();
@@ -62,6 +71,7 @@ Result<std::vector<Job>> Jobs(const ConvertFlags& flags, bool overwrite) {
       return Error{ErrorCode::kBadArgument, "say IN OUT, or several inputs with --out-dir DIR"};
     }
     jobs.push_back({flags.paths[0], flags.paths[1]});
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay({&jobs[0].input, 1}, {&jobs[0].output, 1}));
     return jobs;
   }
   // Folders of pictures get one folder each; ".spz" may be said without its dot.
@@ -72,9 +82,16 @@ Result<std::vector<Job>> Jobs(const ConvertFlags& flags, bool overwrite) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--to: '", Printable(flags.to), "' is no format that is written; written are ", WrittenFormats())};
   }
-  std::map<fs::path, std::string> taken;
+  std::vector<fs::path> inputs, outputs;
   for (const std::string& input : flags.paths) {
-    const fs::path output = fs::path(flags.out_dir) / (Stem(input) + extension);
+    inputs.emplace_back(input);
+    outputs.push_back(fs::path(flags.out_dir) / (Stem(input) + extension));
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay(inputs, outputs));
+  std::map<fs::path, std::string> taken;
+  for (size_t k = 0; k < inputs.size(); ++k) {
+    const std::string& input = flags.paths[k];
+    const fs::path& output = outputs[k];
     const auto [other, fresh] = taken.emplace(output, input);
     if (!fresh) {
       return Error{ErrorCode::kBadArgument,
@@ -140,6 +157,7 @@ void Print(const Job& job, const ConvertReport& r, const std::optional<Conversio
 // A network's weights, which only become .safetensors.
 Status ConvertModel(const ConvertFlags& flags, const SharedFlags& shared) {
   const fs::path from = flags.paths[0], to = flags.paths[1];
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay({&from, 1}, {&to, 1}));
   if (!shared.overwrite && fs::exists(to))
     return Error{ErrorCode::kExists, Cat(to.string(), " exists; -w replaces it")};
   ANCHORSPLAT_RETURN_IF_ERROR(ConvertCheckpoint(from, to, {.overwrite = shared.overwrite}));
@@ -179,6 +197,7 @@ Status RunConvert(const ConvertFlags& flags, Program& program) {
   ConvertOptions options = flags.options;
   options.write.overwrite = shared.overwrite;
   options.measure = flags.report;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(options.input_format, ParseInputFormat("--from", flags.from));
   if (flags.axes) {
     const Status axes = ParseAxes(*flags.axes, options);
     if (!axes.ok()) return Error{axes.error().code, Cat("--coords: ", axes.error().message)};
@@ -224,9 +243,10 @@ void AddConvert(CLI::App& app, Program& program) {
   verb.add_option("--to", flags->to, "Extension of the files in --out-dir; meta.json makes a folder of each")
       ->capture_default_str()
       ->needs(out_dir);
+  verb.add_option("--from", flags->from, kInputFormatHelp)->check(NotEmpty());
   verb.add_option("--sh-degree", options.sh_degree, "Spherical harmonics to keep, 0 to 3")->check(CLI::Range(0, 3));
   verb.add_option("--min-opacity", options.min_opacity, "Drop Gaussians that are fainter, 0 to 1")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(Fraction())
       ->capture_default_str();
   verb.add_option("--max-gaussians", options.max_gaussians, "Keep at most so many, those of the largest size x opacity")
       ->check(AtLeastOne());

@@ -15,6 +15,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "formats/camera_io.h"
+#include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "model/model_method.h"
 #include "viewer/page_writer.h"
@@ -61,12 +62,15 @@ Result<std::vector<fs::path>> OutputPaths(const EnhanceFlags& flags, bool overwr
   if (flags.output.empty() == flags.out_dir.empty()) {
     return Error{ErrorCode::kBadArgument, "say where to write: -o FILE for one input, --out-dir DIR for several"};
   }
+  const std::vector<fs::path> inputs(flags.inputs.begin(), flags.inputs.end());
   if (!flags.output.empty()) {
     if (flags.inputs.size() > 1) {
       return Error{ErrorCode::kBadArgument, Cat(flags.inputs.size(), " inputs and one -o file: use --out-dir DIR")};
     }
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(flags.output, overwrite));
-    return std::vector<fs::path>{flags.output};
+    const fs::path output = flags.output;
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay(inputs, {&output, 1}));
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(output, overwrite));
+    return std::vector<fs::path>{output};
   }
   std::vector<fs::path> outputs;
   std::map<fs::path, std::string> taken;
@@ -79,6 +83,7 @@ Result<std::vector<fs::path>> OutputPaths(const EnhanceFlags& flags, bool overwr
     }
     outputs.push_back(output);
   }
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay(inputs, outputs));
   std::error_code code;
   fs::create_directories(flags.out_dir, code);
   if (code) return Error{ErrorCode::kIo, Cat(flags.out_dir, ": cannot make this folder: ", code.message())};
@@ -198,10 +203,16 @@ Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared) {
               options.refine.seconds ? "" : Cat(", --resume goes on from ", options.control.checkpoint.string()))};
     }
     results.push_back(ToJson(flags.inputs[i], outputs[i], r));
+    if (flags.view) results.back()["view"] = ViewPath(outputs[i]).string();
     if (!shared.json && !shared.quiet) {
       std::cout << flags.inputs[i] << " -> " << outputs[i].string() << "\n  " << WithThousands(r.gaussians_in)
                 << " Gaussians in, " << WithThousands(r.gaussians_out) << " out; " << r.method << Details(r) << ", "
                 << HumanSeconds(r.seconds) << '\n';
+      if (flags.view) {
+        std::error_code unknown;
+        std::cout << "  " << ViewPath(outputs[i]).string() << ": "
+                  << HumanBytes(fs::file_size(ViewPath(outputs[i]), unknown)) << ", open it in any browser\n";
+      }
     }
   }
   if (shared.json) PrintJson(results);
@@ -283,7 +294,7 @@ void AddEnhance(CLI::App& app, Program& program) {
       ->capture_default_str();
   model_option(verb.add_option("--prune-opacity", model.prune_opacity,
                                "Leave output Gaussians of less opacity out; 1/255 = 0.0039 is invisible"))
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(Fraction())
       ->capture_default_str();
   model_option(verb.add_option("--block-gaussians", model.block_gaussians,
                                "Larger splats are enhanced in overlapping blocks of this many"))

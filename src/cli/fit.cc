@@ -15,6 +15,7 @@
 #include "fit/initial_cloud.h"
 #include "formats/cloud_io.h"
 #include "formats/gsplat_checkpoint_writer.h"
+#include "formats/opened_splat.h"
 #include "formats/registry.h"
 
 namespace anchorsplat {
@@ -28,6 +29,10 @@ Status CheckOutputs(const FitFlags& flags, const fs::path& checkpoint, bool over
   const SplatFormat* format = FormatOfExtension(flags.output);
   if (format == nullptr || format->write == nullptr) {
     return Error{ErrorCode::kBadArgument, Cat("-o ", flags.output, ": not a format that is written (.ply is)")};
+  }
+  if (!flags.init_splat.empty()) {
+    const fs::path inputs[] = {flags.init_splat}, outputs[] = {flags.output, flags.gsplat_checkpoint};
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay(inputs, outputs));
   }
   const bool continued = flags.resume && fs::exists(checkpoint);
   if (fs::exists(checkpoint) && !flags.resume && !overwrite) {

@@ -8,13 +8,15 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "cli/choice.h"
 #include "cli/mesh_info.h"
+#include "cli/parse.h"
 #include "cli/table.h"
 #include "cli/verb.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/pixel_size_estimate.h"
-#include "formats/input_file.h"
+#include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "formats/tensor_file.h"
 #include "model/checkpoint_writer.h"
@@ -49,6 +51,7 @@ std::vector<std::string> Problems(const CloudStatistics& s) {
   add(s.zero_scales, "with a scale of zero (log-scale -Inf) on some axis");
   add(s.outliers, "more than ten times farther out than the middle 98 %");
   add(s.unnormalised_quaternions, "with quaternions that are not normalised; legal, as trainers leave them so");
+  add(s.implausible, "farther out or longer than a million units: is the file damaged, or of another kind?");
   add(s.invisible, "with an opacity below 1/255; never drawn");
   if (s.linear_looking_scales)
     out.push_back("scales look like lengths, not logarithms: was the file converted wrongly?");
@@ -63,6 +66,7 @@ const char* ModeName(const GaussianCloud& cloud) {
 }
 
 std::string Number(double value) {
+  if (std::isnan(value)) return "-";  // of no Gaussian at all
   char text[32];
   std::snprintf(text, sizeof text, "%.4g", value);
   return text;
@@ -140,6 +144,7 @@ nlohmann::json ToJson(const Findings& f) {
                            {"unnormalised_quaternions", s.unnormalised_quaternions},
                            {"zero_scales", s.zero_scales},
                            {"invisible", s.invisible},
+                           {"implausible", s.implausible},
                            {"outliers", s.outliers}}},
                          {"linear_looking_scales", s.linear_looking_scales},
                          {"linear_looking_opacities", s.linear_looking_opacities},
@@ -198,21 +203,24 @@ Status RunModelInfo(const std::string& file, const SharedFlags& shared) {
   return {};
 }
 
-Status RunInfo(const std::string& path, const SharedFlags& shared) {
-  if (LooksLikeModel(path)) return RunModelInfo(path, shared);
-  if (LooksLikeMesh(path)) return RunMeshInfo(path, shared);
-  // Opened once: a pipe can be read only once.
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
+struct InfoFlags {
+  std::string file;
+  std::string from;  // name of a format; empty: found out
+};
+
+Status RunInfo(const InfoFlags& flags, const SharedFlags& shared) {
+  const std::string& path = flags.file;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatFormat* const from, ParseInputFormat("--from", flags.from));
+  if (from == nullptr && LooksLikeModel(path)) return RunModelInfo(path, shared);
+  if (from == nullptr && LooksLikeMesh(path)) return RunMeshInfo(path, shared);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(path, from));
   Findings findings;
   findings.file = path;
-  findings.file_bytes = file.size();
-  ANCHORSPLAT_ASSIGN_OR_RETURN(findings.cloud, ReadOpenCloud(file));
-  if (const SplatFormat* format = FormatOfFile(head, path)) {
-    findings.format = format->name;
-    if (format->describe != nullptr) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(findings.facts, format->describe(file));
-    }
+  findings.file_bytes = file.bytes();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(findings.cloud, file.Read());
+  findings.format = file.format()->name;
+  if (file.format()->describe != nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(findings.facts, file.format()->describe(file.input()));
   }
   findings.statistics = ComputeStatistics(findings.cloud);
   findings.pixel_size = EstimatePixelSize(findings.cloud);
@@ -231,9 +239,11 @@ void AddInfo(CLI::App& app, Program& program) {
   CLI::App& verb =
       AddVerb(app, program, "info", "What is in a splat file, a model or a mesh, and what is wrong with it",
               "anchorsplat info scan.ply --json");
-  const auto file = std::make_shared<std::string>();
-  verb.add_option("file", *file, "Splat file, checkpoint of a network, mesh, or library.sh3f[#object]")->required();
-  verb.callback([file, &program] { program.run = [file, &program] { return RunInfo(*file, program.flags); }; });
+  const auto flags = std::make_shared<InfoFlags>();
+  verb.add_option("file", flags->file, "Splat file, checkpoint of a network, mesh, or library.sh3f[#object]")
+      ->required();
+  verb.add_option("--from", flags->from, kInputFormatHelp)->check(NotEmpty());
+  verb.callback([flags, &program] { program.run = [flags, &program] { return RunInfo(*flags, program.flags); }; });
 }
 
 }  // namespace anchorsplat

@@ -96,4 +96,17 @@ Result<std::optional<double>> ParsePixelSize(const std::string& option, const st
   return number;
 }
 
+Result<const SplatFormat*> ParseInputFormat(const std::string& option, const std::string& text) {
+  const SplatFormat* const none = nullptr;
+  if (text.empty()) return none;
+  const SplatFormat* const format = FormatOfName(text);
+  if (format != nullptr && format->read != nullptr) return format;
+  std::string known;
+  for (const SplatFormat& f : Formats()) {
+    if (f.read != nullptr) known += Cat(" ", f.extensions.front());
+  }
+  return Error{ErrorCode::kBadArgument,
+               Cat(option, ": '", Printable(text), "' is no format that is read; read are", known)};
+}
+
 }  // namespace anchorsplat

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/result.h"
+#include "formats/registry.h"
 
 namespace anchorsplat {
 
@@ -18,6 +19,10 @@ struct SizeOption {
 Result<SizeOption> ParseSize(const std::string& option, const std::string& text);              // "1024x768"
 Result<std::array<float, 3>> ParseColor(const std::string& option, const std::string& text);   // "R,G,B", each 0–1
 Result<std::array<double, 3>> ParsePoint(const std::string& option, const std::string& text);  // "X,Y,Z"
+// A format that is read, by an extension of it with or without its dot; null for "".
+Result<const SplatFormat*> ParseInputFormat(const std::string& option, const std::string& text);
+inline constexpr const char* kInputFormatHelp =
+    "Format of the input by its extension, for what neither content nor name tells: .splat from a pipe";
 // A positive number, or nothing for "auto".
 Result<std::optional<double>> ParsePixelSize(const std::string& option, const std::string& text);
 

@@ -11,6 +11,7 @@
 #include "core/text.h"
 #include "enhance/pixel_size_estimate.h"
 #include "formats/camera_io.h"
+#include "formats/opened_splat.h"
 #include "viewer/page_writer.h"
 
 namespace anchorsplat {
@@ -75,6 +76,26 @@ std::optional<uint64_t> FileBytes(const std::string& path) {
   return bytes;
 }
 
+struct Shown {
+  GaussianCloud cloud;
+  std::string name;
+  uint64_t bytes = 0;
+};
+
+// A splat to show: a file with nothing to see in it is a bad one.
+Result<Shown> ReadShown(const fs::path& path) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(path));
+  // "scan/" is called scan.
+  const fs::path named = path.has_filename() ? path : path.parent_path();
+  Shown shown{{}, named.filename().string(), file.bytes()};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(shown.cloud, file.Read());
+  for (int64_t i = 0; i < shown.cloud.size(); ++i) {
+    if (IsUsable(shown.cloud, i)) return shown;
+  }
+  return Error{ErrorCode::kBadFile, Cat(path.string(), ": there is nothing to show: all of its ",
+                                        WithThousands(shown.cloud.size()), " Gaussians have NaN or infinite values")};
+}
+
 // A page written over a splat by a slip of the keyboard would be a loss.
 bool IsPageName(const fs::path& path) {
   std::string extension = path.extension().string();
@@ -107,18 +128,18 @@ Status RunView(const PageFlags& flags, const SharedFlags& shared) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(page.background, ParseColor("--background", flags.background));
   }
 
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud after, ReadCloud(flags.after));
-  page.after = {&after, fs::path(flags.after).filename().string(), FileBytes(flags.after)};
-  GaussianCloud before;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown after, ReadShown(flags.after));
+  page.after = {&after.cloud, after.name, after.bytes};
+  Shown before;
   if (!flags.before.empty()) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(before, ReadCloud(flags.before));
-    page.before = ViewerSplat{&before, fs::path(flags.before).filename().string(), FileBytes(flags.before)};
+    ANCHORSPLAT_ASSIGN_OR_RETURN(before, ReadShown(flags.before));
+    page.before = ViewerSplat{&before.cloud, before.name, before.bytes};
   }
   if (pixel_size) {
     page.pixel_size = static_cast<float>(*pixel_size);
   } else if (page.before) {
     // Of what was trained; what came out of it says less. A splat with too little to say gets no scale bar.
-    if (const auto estimate = EstimatePixelSize(before); estimate.ok()) {
+    if (const auto estimate = EstimatePixelSize(before.cloud); estimate.ok()) {
       page.pixel_size = static_cast<float>(estimate->size);
     }
   }

@@ -197,6 +197,17 @@ Status OutputFile::Commit() {
   return WriteError(path_, "give the file its name", error);
 }
 
+Status CommitTogether(std::span<OutputFile> files) {
+  for (size_t k = 0; k < files.size(); ++k) {
+    const Status status = files[k].Commit();
+    if (status.ok()) continue;
+    std::error_code ignored;
+    for (size_t named = 0; named < k; ++named) std::filesystem::remove(files[named].path(), ignored);
+    return status;
+  }
+  return {};
+}
+
 Status WriteWholeFile(const std::filesystem::path& path, std::string_view bytes, bool overwrite) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, overwrite));
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(bytes));

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string_view>
 
 #include "core/result.h"
@@ -52,6 +53,10 @@ class OutputFile {
   bool overwrite_ = false;
   uint64_t written_ = 0;
 };
+
+// Commits files that belong together, in their order: the last one is the one that names the others. Where one of the
+// names has been taken meanwhile, those given before are taken back.
+Status CommitTogether(std::span<OutputFile> files);
 
 // The whole of `bytes` as a file: Create, Write, Commit.
 Status WriteWholeFile(const std::filesystem::path& path, std::string_view bytes, bool overwrite);

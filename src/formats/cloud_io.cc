@@ -5,7 +5,7 @@
 
 #include "core/log.h"
 #include "core/text.h"
-#include "formats/input_file.h"
+#include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "formats/write_losses.h"
 
@@ -13,12 +13,11 @@ namespace anchorsplat {
 
 namespace {
 
-// "PLY (.ply), SPZ (.spz)": the formats that have the given direction.
-template <typename Direction>
-std::string Known(Direction SplatFormat::*direction) {
+// "PLY (.ply), SPZ (.spz)".
+std::string WrittenFormats() {
   std::string list;
   for (const SplatFormat& format : Formats()) {
-    if (format.*direction == nullptr) continue;
+    if (format.write == nullptr) continue;
     if (!list.empty()) list += ", ";
     list += Cat(format.name, " (", format.extensions.front(), ")");
   }
@@ -31,26 +30,9 @@ Error OutOfMemory(const std::filesystem::path& path) {
 
 }  // namespace
 
-Result<GaussianCloud> ReadOpenCloud(const InputFile& file, const ReadLimits& limits) try {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
-  const SplatFormat* format = FormatOfFile(head, file.path());
-  if (format == nullptr) {
-    return Error{ErrorCode::kBadFile, Cat(file.name(), ": byte 0: is no splat file of a known format: found \"",
-                                          Printable(head.substr(0, 8)), "\", expected ", Known(&SplatFormat::read))};
-  }
-  if (format->read == nullptr) {
-    return Error{ErrorCode::kBadFile,
-                 Cat(file.name(), ": is a ", format->name, " file, which this version does not read; it reads ",
-                     Known(&SplatFormat::read))};
-  }
-  return format->read(file, limits);
-} catch (const std::bad_alloc&) {
-  return OutOfMemory(file.path());
-}
-
 Result<GaussianCloud> ReadCloud(const std::filesystem::path& path, const ReadLimits& limits) try {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
-  return ReadOpenCloud(file, limits);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(path));
+  return file.Read(limits);
 } catch (const std::bad_alloc&) {
   return OutOfMemory(path);
 }
@@ -60,7 +42,7 @@ Status WriteCloud(const std::filesystem::path& path, const GaussianCloud& cloud,
   if (format == nullptr || format->write == nullptr) {
     const std::string what = format == nullptr ? Cat("has no extension of a splat format")
                                                : Cat("is a ", format->name, " file, which this version does not write");
-    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", what, "; it writes ", Known(&SplatFormat::write))};
+    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", what, "; it writes ", WrittenFormats())};
   }
   ANCHORSPLAT_RETURN_IF_ERROR(format->write(path, cloud, options));
   for (const std::string& loss : WriteLosses(*format, cloud)) LogWarning(Cat(path.string(), ": ", loss));

@@ -149,8 +149,8 @@ TEST(CloudIo, NamesWhatIsNotAReadableFile) {
   EXPECT_EQ(missing.error().code, ErrorCode::kNotFound);
   const auto directory = ReadCloud(folder.path());
   ASSERT_FALSE(directory.ok());
-  EXPECT_EQ(directory.error().code, ErrorCode::kIo);
-  EXPECT_CONTAINS(directory.error().message, "is a folder");
+  EXPECT_EQ(directory.error().code, ErrorCode::kBadFile);
+  EXPECT_CONTAINS(directory.error().message, "is a folder without a meta.json");
   EXPECT_CONTAINS(ReadError("/dev/zero"), "is a device");
 }
 

@@ -14,7 +14,10 @@
 
 namespace anchorsplat {
 
+struct SplatFormat;
+
 struct ConvertOptions {
+  const SplatFormat* input_format = nullptr;  // what the input is, whatever it looks like; null: found out
   std::optional<int> sh_degree = {};          // higher coefficients are dropped, missing ones become zero
   float min_opacity = 0;                      // Gaussians below are dropped; 0–1
   std::optional<int64_t> max_gaussians = {};  // the ones of the largest size × opacity stay
@@ -40,7 +43,8 @@ struct ConvertReport {
 };
 
 // Reads, changes and writes. In one copy of the cloud, changed in place. Errors: those of ReadCloud and WriteCloud;
-// kBadArgument when nothing is left to write. `kept` takes the cloud as it was written, for comparisons, if not null.
+// kBadArgument when nothing is left to write or the output is the input. Gaussians without usable numbers are told in a
+// warning. `kept` takes the cloud as it was written, for comparisons, if not null.
 Result<ConvertReport> ConvertFile(const std::filesystem::path& input, const std::filesystem::path& output,
                                   const ConvertOptions& options, GaussianCloud* kept = nullptr);
 

@@ -14,6 +14,7 @@
 
 #include "core/log.h"
 #include "formats/atomic_file.h"
+#include "formats/opened_splat.h"
 #include "formats/ply_writer.h"
 #include "formats/registry.h"
 #include "formats/splat_order.h"
@@ -43,7 +44,9 @@ TEST(Convert, ToEveryFormatAndBack) {
     ++written;
     EXPECT_EQ(report->output_format, format.name);
     EXPECT_EQ(report->gaussians_written, 2000);
-    EXPECT_EQ(report->output_bytes, std::filesystem::file_size(output));
+    const bool two_files = format.extensions[0] == ".gltf";
+    EXPECT_EQ(report->output_bytes,
+              std::filesystem::file_size(output) + (two_files ? std::filesystem::file_size(folder / "out.bin") : 0));
     EXPECT_EQ(report->sh_degree_written, format.range.sh_degree == 0 ? 0 : 2) << format.name;
     if (report->predicted_roughly) {
       EXPECT_NEAR(static_cast<double>(*report->predicted_bytes), static_cast<double>(report->output_bytes),
@@ -237,12 +240,100 @@ TEST(Convert, FolderOfPicturesAppearsWholeOrNotAtAll) {
   EXPECT_EQ(report->output_bytes, bytes - std::filesystem::file_size(input));
 }
 
+TEST(Convert, TheInputStaysWhatItIs) {
+  const TestFolder folder;
+  const auto input = Ply(folder, RandomCloud(5, 0, 3));
+  const std::string before = *InputFile::Open(input)->ReadAll(1 << 20);
+  std::filesystem::create_symlink("in.ply", folder / "soft.ply");
+  std::filesystem::create_hard_link(input, folder / "hard.ply");
+  ConvertOptions options;
+  options.write.overwrite = true;
+  for (const char* output : {"in.ply", "soft.ply", "hard.ply", "./in.ply"}) {
+    const auto report = ConvertFile(input, folder / output, options);
+    ASSERT_FALSE(report.ok()) << output;
+    EXPECT_EQ(report.error().code, ErrorCode::kBadArgument);
+    EXPECT_THAT(report.error().message, testing::HasSubstr("write to another name"));
+  }
+  EXPECT_FALSE(ConvertFile(folder / "soft.ply", input, options).ok());
+  EXPECT_EQ(*InputFile::Open(input)->ReadAll(1 << 20), before);
+  // One of many: no output may be any of the inputs.
+  const std::filesystem::path inputs[] = {folder / "gone.ply", folder / "hard.ply"};
+  const std::filesystem::path free[] = {folder / "a.ply"}, taken[] = {folder / "a.ply", input};
+  EXPECT_TRUE(CheckInputsStay(inputs, free).ok());
+  EXPECT_FALSE(CheckInputsStay(inputs, taken).ok());
+}
+
+TEST(Convert, AFolderOfPicturesIsASplat) {
+  const TestFolder folder;
+  const auto input = Ply(folder, RandomCloud(50, 1, 3));
+  std::filesystem::create_directory(folder / "scan");
+  ASSERT_TRUE(ConvertFile(input, folder / "scan" / "meta.json", {}).ok());
+  uint64_t bytes = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "scan")) bytes += entry.file_size();
+  const auto report = ConvertFile(folder / "scan", folder / "back.ply", {});
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_EQ(report->input_format, "SOG");
+  EXPECT_EQ(report->input_bytes, bytes);
+  EXPECT_EQ(ReadCloud(folder / "scan")->size(), 50);
+  ConvertOptions options;
+  options.write.overwrite = true;
+  EXPECT_EQ(ConvertFile(folder / "scan", folder / "scan" / "meta.json", options).error().code, ErrorCode::kBadArgument);
+  std::filesystem::create_directory(folder / "empty");
+  const auto none = ReadCloud(folder / "empty");
+  EXPECT_EQ(none.error().code, ErrorCode::kBadFile);
+  EXPECT_THAT(none.error().message, testing::HasSubstr("without a meta.json"));
+}
+
+TEST(Convert, TheFormatOfTheInputCanBeSaid) {
+  const TestFolder folder;
+  const auto input = Ply(folder, RandomCloud(50, 0, 3));
+  ASSERT_TRUE(ConvertFile(input, folder / "a.splat", {}).ok());
+  std::filesystem::rename(folder / "a.splat", folder / "unknown");
+  EXPECT_EQ(ConvertFile(folder / "unknown", folder / "b.ply", {}).error().code, ErrorCode::kBadFile);
+  ConvertOptions options;
+  options.input_format = FormatOfName("splat");
+  const auto report = ConvertFile(folder / "unknown", folder / "b.ply", options);
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_EQ(report->input_format, "splat");
+  EXPECT_EQ(report->gaussians_written, 50);
+  EXPECT_EQ(FormatOfName(".compressed.ply")->name, "compressed PLY");
+  EXPECT_EQ(FormatOfName(".SPZ")->name, "SPZ");
+  EXPECT_EQ(FormatOfName(""), nullptr);
+  EXPECT_EQ(FormatOfName("obj"), nullptr);
+}
+
+TEST(Convert, SaysWhatIsNoNumber) {
+  const TestFolder folder;
+  Warnings warnings;
+  GaussianCloud cloud = RandomCloud(300, 0, 3);
+  cloud.log_scales[7] = -INFINITY;  // a length of zero
+  const auto warn = [&] {
+    EXPECT_TRUE(ConvertFile(Ply(folder, cloud), folder / "out.csv", {.write = {.overwrite = true}}).ok());
+    return warnings.Take();
+  };
+  EXPECT_THAT(warn(), testing::IsEmpty());
+  cloud.opacity_logits[9] = INFINITY;
+  cloud.means[30] = cloud.quats[41] = NAN;  // of one Gaussian
+  EXPECT_THAT(warn(), testing::ElementsAre(testing::HasSubstr("2 of 300 Gaussians")));
+  // A compressed PLY whose ranges are no numbers.
+  ASSERT_TRUE(WriteCloud(folder / "a.compressed.ply", RandomCloud(300, 0, 3)).ok());
+  std::string bytes = *InputFile::Open(folder / "a.compressed.ply")->ReadAll(1 << 20);
+  const size_t begin = bytes.find("end_header\n") + 11;
+  std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(begin), 2 * 18 * 4, '\xff');
+  ASSERT_TRUE(WriteWholeFile(folder / "a.compressed.ply", bytes, true).ok());
+  warnings.Take();
+  ASSERT_TRUE(ConvertFile(folder / "a.compressed.ply", folder / "b.ply", {}).ok());
+  EXPECT_THAT(warnings.Take(), testing::ElementsAre(testing::HasSubstr("300 of 300 Gaussians")));
+}
+
 TEST(Convert, ErrorsOfBothSides) {
   const TestFolder folder;
   const auto input = Ply(folder, RandomCloud(5, 0, 3));
   EXPECT_EQ(ConvertFile(folder / "gone.ply", folder / "a.spz", {}).error().code, ErrorCode::kNotFound);
   EXPECT_EQ(ConvertFile(input, folder / "a.obj", {}).error().code, ErrorCode::kBadArgument);
-  EXPECT_EQ(ConvertFile(input, input, {}).error().code, ErrorCode::kExists);
+  ASSERT_TRUE(WriteWholeFile(folder / "b.ply", "there", false).ok());
+  EXPECT_EQ(ConvertFile(input, folder / "b.ply", {}).error().code, ErrorCode::kExists);
+  std::filesystem::remove(folder / "b.ply");
   EXPECT_EQ(folder.Entries(), 1);
 }
 

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <system_error>
 #include <utility>
 
 #include "core/text.h"
@@ -37,6 +39,26 @@ std::optional<std::string> FromBase64(std::string_view text) {
   return bytes;
 }
 
+// The file that a relative URI means, "%20" and the like decoded. Nothing where it leads to another folder or has a
+// scheme: what lies elsewhere is none of the document's business.
+std::optional<std::string> FileBeside(std::string_view uri) {
+  if (uri.find(':') != uri.npos) return std::nullopt;
+  std::string name;
+  for (size_t k = 0; k < uri.size(); ++k) {
+    unsigned char byte = static_cast<unsigned char>(uri[k]);
+    if (uri[k] == '%') {
+      const std::string_view digits = uri.substr(k + 1, 2);
+      const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), byte, 16);
+      if (digits.size() != 2 || code != std::errc() || end != digits.data() + 2) return std::nullopt;
+      k += 2;
+    }
+    if (byte == '/' || byte == '\\' || byte == 0) return std::nullopt;
+    name += static_cast<char>(byte);
+  }
+  if (name.empty() || name == "." || name == "..") return std::nullopt;
+  return name;
+}
+
 // Whole numbers of glTF may be larger than an int: offsets and lengths.
 Result<uint64_t> Offset(const JsonValue& object, const char* key, std::optional<uint64_t> otherwise) {
   const std::optional<JsonValue> value = object.Find(key);
@@ -67,13 +89,22 @@ Result<GltfDocument> GltfDocument::Open(const InputFile& file) {
       return Error{ErrorCode::kBadFile,
                    Cat(file.name(), ": byte 4: is no GLB file of version 2 with a JSON chunk of ", words[3], " bytes")};
     }
+    if (words[2] != file.size()) {
+      return Error{ErrorCode::kBadFile,
+                   Cat(file.name(), ": byte 8: says that the file has ", words[2], " bytes, it has ", file.size(),
+                       ": was it cut, or something put behind it?")};
+    }
     const uint64_t chunk = json_begin + json_size;
     if (file.size() - chunk >= 8) {
       uint32_t binary[2];
       ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(chunk, binary, sizeof binary));
       if (binary[1] == 0x004e4942) {
         binary_begin = chunk + 8;
-        binary_size = std::min<uint64_t>(binary[0], file.size() - binary_begin);
+        binary_size = binary[0];
+        if (binary_size > file.size() - binary_begin) {
+          return Error{ErrorCode::kBadFile, Cat(file.name(), ": byte ", chunk, ": a binary chunk of ", binary[0],
+                                                " bytes, but there are ", file.size() - binary_begin)};
+        }
       }
     }
   }
@@ -105,12 +136,14 @@ Status GltfDocument::OpenBuffers(uint64_t binary_begin, uint64_t binary_size) {
         if (!bytes) return uri->Complain("expected data in base64");
         buffer.own = InputFile::FromBytes(Cat(file_->name(), ": a buffer inside"), std::move(*bytes));
       } else {
-        // A file beside the document; what lies in other folders is none of its business.
-        if (name.empty() || name.find_first_of("/\\:%") != name.npos || name.starts_with(".") ||
-            name.find('\0') != name.npos) {
+        const std::optional<std::string> beside = FileBeside(name);
+        if (!beside) {
           return uri->Complain(Cat("expected the name of a file beside it, found \"", Printable(name), "\""));
         }
-        ANCHORSPLAT_ASSIGN_OR_RETURN(buffer.own, InputFile::Open(file_->path().parent_path() / name));
+        Result<InputFile> opened = InputFile::Open(file_->path().parent_path() / *beside);
+        if (!opened.ok()) return Error{opened.error().code, uri->Complain(opened.error().message).message};
+        buffer.own = *std::move(opened);
+        bytes_beside_ += buffer.own->size();
       }
       buffer.size = buffer.own->size();
     } else {
@@ -133,8 +166,7 @@ Result<JsonValue> GltfDocument::Element(const char* key, const JsonValue& index)
   if (static_cast<size_t>(at) >= list.raw().size()) {
     return index.Complain(Cat("is ", at, ", but there are ", list.raw().size(), " ", key));
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> elements, list.Elements());
-  return elements[static_cast<size_t>(at)];
+  return list.Element(static_cast<size_t>(at));
 }
 
 Result<GltfDocument::Accessor> GltfDocument::FindAccessor(const JsonValue& index) const {

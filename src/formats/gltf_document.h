@@ -19,6 +19,8 @@ class GltfDocument {
   static Result<GltfDocument> Open(const InputFile& file);
 
   JsonValue root() const { return json_.root(); }
+  // Of the document and the files beside it that its buffers are.
+  uint64_t bytes() const { return file_->size() + bytes_beside_; }
 
   // Where the values of an accessor lie. Its bytes have been checked to be there.
   struct Accessor {
@@ -53,6 +55,7 @@ class GltfDocument {
   const InputFile* file_;
   JsonFile json_;
   std::vector<Buffer> buffers_;
+  uint64_t bytes_beside_ = 0;
 };
 
 }  // namespace anchorsplat

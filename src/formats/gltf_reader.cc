@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -174,6 +175,39 @@ std::optional<JsonValue> SplatExtension(const JsonValue& primitive) {
   return extensions ? extensions->Find(kExtension) : std::nullopt;
 }
 
+// The primitives of meshes. Each mesh is looked through once: a hostile file shows one with a hundred thousand
+// primitives by as many nodes.
+class MeshSplats {
+ public:
+  struct Mesh {
+    std::vector<JsonValue> splats;
+    int64_t others = 0;  // primitives that are none
+  };
+  explicit MeshSplats(const GltfDocument& document) : document_(&document) {}
+
+  // Valid as long as this lives.
+  Result<const Mesh*> Find(const JsonValue& index) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, document_->Element("meshes", index));
+    const auto [place, fresh] = meshes_.try_emplace(&value.raw());
+    Mesh& mesh = place->second;
+    if (!fresh) return &mesh;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue list, value.Get("primitives"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> primitives, list.Elements());
+    for (const JsonValue& primitive : primitives) {
+      if (SplatExtension(primitive)) {
+        mesh.splats.push_back(primitive);
+      } else {
+        ++mesh.others;
+      }
+    }
+    return &mesh;
+  }
+
+ private:
+  const GltfDocument* document_;
+  std::map<const nlohmann::json*, Mesh> meshes_;
+};
+
 }  // namespace
 
 Result<FormatFacts> DescribeGltf(const InputFile& file) {
@@ -185,43 +219,43 @@ Result<FormatFacts> DescribeGltf(const InputFile& file) {
   };
   if (const std::optional<JsonValue> asset = document.root().Find("asset")) add_text("made by", *asset, "generator");
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<GltfDocument::Placed> meshes, document.PlacedMeshes());
+  MeshSplats splats_of(document);
   int64_t splats = 0, others = 0;
   for (const GltfDocument::Placed& placed : meshes) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue mesh, document.Element("meshes", placed.mesh));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue list, mesh.Get("primitives"));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> values, list.Elements());
-    for (const JsonValue& value : values) {
-      const std::optional<JsonValue> extension = SplatExtension(value);
-      if (!extension) {
-        ++others;
-      } else if (splats++ == 0) {
-        add_text("kernel", *extension, "kernel");
-        add_text("colour space", *extension, "colorSpace");
-        add_text("projection", *extension, "projection");
-        const std::optional<JsonValue> attributes = value.Find("attributes");
-        const bool points = attributes && attributes->has("COLOR_0");
-        facts.Add("colours for point viewers", points ? "yes (COLOR_0)" : "no");
-      }
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const MeshSplats::Mesh* mesh, splats_of.Find(placed.mesh));
+    others += mesh->others;
+    if (splats == 0 && !mesh->splats.empty()) {
+      const JsonValue& first = mesh->splats.front();
+      const JsonValue extension = *SplatExtension(first);
+      add_text("kernel", extension, "kernel");
+      add_text("colour space", extension, "colorSpace");
+      add_text("projection", extension, "projection");
+      const std::optional<JsonValue> attributes = first.Find("attributes");
+      const bool points = attributes && attributes->has("COLOR_0");
+      facts.Add("colours for point viewers", points ? "yes (COLOR_0)" : "no");
     }
+    splats += static_cast<int64_t>(mesh->splats.size());
   }
   facts.Add("primitives", splats, " of Gaussians", others > 0 ? Cat(", ", others, " others that are not read") : "");
   return facts;
 }
 
+uint64_t GltfSize(const InputFile& file) {
+  const Result<GltfDocument> document = GltfDocument::Open(file);
+  return document.ok() ? document->bytes() : file.size();
+}
+
 Result<GaussianCloud> ReadGltf(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GltfDocument document, GltfDocument::Open(file));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<GltfDocument::Placed> meshes, document.PlacedMeshes());
+  MeshSplats splats_of(document);
   std::vector<Primitive> primitives;
   int64_t count = 0;
   int degree = 0;
   for (const GltfDocument::Placed& placed : meshes) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue mesh, document.Element("meshes", placed.mesh));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue list, mesh.Get("primitives"));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> values, list.Elements());
-    for (const JsonValue& value : values) {
-      const std::optional<JsonValue> extension = SplatExtension(value);
-      if (!extension) continue;
-      ANCHORSPLAT_ASSIGN_OR_RETURN(Primitive primitive, OpenPrimitive(document, value, *extension));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const MeshSplats::Mesh* mesh, splats_of.Find(placed.mesh));
+    for (const JsonValue& value : mesh->splats) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(Primitive primitive, OpenPrimitive(document, value, *SplatExtension(value)));
       primitive.scale = placed.scale;
       primitive.translation = placed.translation;
       count += primitive.means.count;
@@ -230,7 +264,7 @@ Result<GaussianCloud> ReadGltf(const InputFile& file, const ReadLimits& limits) 
       ANCHORSPLAT_RETURN_IF_ERROR(CheckCount(file.name(), static_cast<uint64_t>(count), limits));
       primitives.push_back(std::move(primitive));
       if (primitives.size() > kMaxPrimitives) {
-        return mesh.Complain(Cat("is one of more than ", kMaxPrimitives, " primitives of splats"));
+        return placed.mesh.Complain(Cat("shows one of more than ", kMaxPrimitives, " primitives of splats"));
       }
     }
   }
@@ -238,8 +272,7 @@ Result<GaussianCloud> ReadGltf(const InputFile& file, const ReadLimits& limits) 
     return Error{ErrorCode::kBadFile,
                  Cat(file.name(), ": is a glTF file without splats: no node shows a primitive with ", kExtension)};
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), std::max<uint64_t>(file.size(), primitives[0].means.file->size()),
-                                         static_cast<uint64_t>(count) * 4));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), document.bytes(), static_cast<uint64_t>(count) * 4));
   GaussianCloud cloud;
   cloud.Resize(count, degree);
   int64_t begin = 0;

@@ -16,9 +16,12 @@ namespace anchorsplat {
 //
 // Errors (kBadFile): no glTF, no such primitive, a kernel other than "ellipse", compressed attributes, attributes
 // missing or of a type or count that is not allowed, accessors that lead out of their view, buffer or file, nodes in a
-// circle, nodes that rotate or stretch (that needs SH to be rotated, which is not done), names that lead to another
-// folder, more than `limits.max_gaussians`.
+// circle, a length of a GLB that is not the file's, nodes that rotate or stretch (that needs SH to be rotated, which is
+// not done), names that lead to another folder, more than `limits.max_gaussians`.
 Result<GaussianCloud> ReadGltf(const InputFile& file, const ReadLimits& limits = {});
+
+// Bytes of the file and of those beside it that its buffers are.
+uint64_t GltfSize(const InputFile& file);
 
 // Who wrote it and what the extension says about each kind of primitive. Errors as ReadGltf.
 Result<FormatFacts> DescribeGltf(const InputFile& file);

@@ -132,12 +132,76 @@ TEST(Gltf, SmallIntegersBesideAndInside) {
     ASSERT_TRUE(cloud.ok()) << cloud.error().message;
     EXPECT_THAT(cloud->quats, testing::ElementsAre(0, -1, 0, 0, -1, 0, 0, 0));
   }
-  for (const char* uri : {"../rest.bin", "/etc/passwd", "a%2fb", "", "data:nothing", "data:;base64,%%"}) {
+  for (const char* uri : {"../rest.bin", "/etc/passwd", "a%2fb", "", "data:nothing", "data:;base64,%%", "..", "%2e%2e",
+                          "a%", "a%2", "a%zz", "a%00", "http:quats.bin"}) {
     glb.json["buffers"][1]["uri"] = uri;
     ASSERT_TRUE(WriteWholeFile(folder / "a.gltf", glb.json.dump(), true).ok());
     const InputFile file = *InputFile::Open(folder / "a.gltf");
     EXPECT_EQ(ReadGltf(file).error().code, ErrorCode::kBadFile) << uri;
   }
+}
+
+TEST(Gltf, JsonWithItsNumbersBesideIt) {
+  const TestFolder folder;
+  const GaussianCloud cloud = RandomCloud(2'001, 2, 3);
+  for (const char* name : {"scan.gltf", "a scan %2f é.GLTF", ".hidden.gltf", "a:b.gltf"}) {
+    ASSERT_TRUE(WriteGltf(folder / name, cloud).ok()) << name;
+    const InputFile file = *InputFile::Open(folder / name);
+    const auto read = ReadGltf(file);
+    ASSERT_TRUE(read.ok()) << read.error().message;
+    const auto error = CompareAttributes(*read, cloud);
+    EXPECT_EQ(error->compared, 2'001);
+    EXPECT_EQ(error->means.max, 0);
+    EXPECT_EQ(error->harmonics.max, 0);
+    EXPECT_LT(error->rotations.max, 1e-5);
+    const auto binary = std::filesystem::path(folder / name).replace_extension(".bin");
+    EXPECT_EQ(GltfSize(file), file.size() + std::filesystem::file_size(binary));
+    EXPECT_NEAR(static_cast<double>(EstimatedGltfSize(2'001, 2)), static_cast<double>(GltfSize(file)), 300.0);
+    // Either of them is in the way of another.
+    EXPECT_EQ(WriteGltf(folder / name, cloud).error().code, ErrorCode::kExists);
+    std::filesystem::remove(folder / name);
+    EXPECT_EQ(WriteGltf(folder / name, cloud).error().code, ErrorCode::kExists);
+    EXPECT_FALSE(std::filesystem::exists(folder / name));
+    ASSERT_TRUE(WriteGltf(folder / name, cloud, {.overwrite = true}).ok());
+    std::filesystem::remove(binary);
+    EXPECT_EQ(WriteGltf(folder / name, cloud).error().code, ErrorCode::kExists);
+    const InputFile alone = *InputFile::Open(folder / name);
+    EXPECT_NE(ReadGltf(alone).error().message.find("buffers[0].uri"), std::string::npos);
+    std::filesystem::remove(folder / name);
+  }
+  EXPECT_EQ(folder.Entries(), 0);
+}
+
+// 200,000 nodes, one below the other and side by side, and meshes with as many primitives: a fraction of a second, not
+// the minutes of anything that looks at all of them for each.
+TEST(Gltf, CrowdsOfNodes) {
+  constexpr size_t kMany = 200'000;
+  Glb glb = Example(10, 0);
+  const GaussianCloud plain = *Read(glb.bytes());
+  const auto nodes = [&](auto&& node) {
+    Json list = Json::array();
+    for (size_t k = 0; k < kMany; ++k) list.push_back(node(k));
+    list.push_back({{"mesh", 0}});
+    glb.json["nodes"] = std::move(list);
+  };
+  nodes([](size_t k) { return Json{{"children", {k + 1}}, {"translation", {0, 0, 1}}}; });
+  const auto chain = Read(glb.bytes());
+  ASSERT_TRUE(chain.ok()) << chain.error().message;
+  EXPECT_NEAR(chain->means[2] - plain.means[2], float{kMany}, 0.1f);
+  nodes([](size_t) { return Json{{"translation", {0, 0, 1}}}; });
+  ASSERT_TRUE(Read(glb.bytes()).ok());
+  // Every node shows another mesh, none of them a splat.
+  Json meshes = Json::array({glb.json["meshes"][0]});
+  for (size_t k = 0; k < kMany; ++k) meshes.push_back({{"primitives", {Json::object()}}});
+  Json own = glb.json["meshes"];
+  glb.json["meshes"] = std::move(meshes);
+  nodes([](size_t k) { return Json{{"mesh", k + 1}}; });
+  ASSERT_TRUE(Read(glb.bytes()).ok());
+  // All nodes show one mesh with as many primitives.
+  own.push_back({{"primitives", Json(kMany, Json::object())}});
+  glb.json["meshes"] = std::move(own);
+  nodes([](size_t) { return Json{{"mesh", 1}}; });
+  ASSERT_TRUE(Read(glb.bytes()).ok());
 }
 
 TEST(Gltf, LogarithmsOfDraftsAreKnownByTheirSign) {
@@ -185,6 +249,17 @@ TEST(Gltf, RefusesLiesAndCircles) {
   expect(error_with("/accessors/0/sparse", Json::object()), "sparse");
   EXPECT_FALSE(Read(good.bytes(), {.max_gaussians = 99}).ok());
   const std::string bytes = good.bytes();
+  const auto with_word = [&bytes](size_t at, uint32_t value) {
+    std::string changed = bytes;
+    std::memcpy(changed.data() + at, &value, sizeof value);
+    const auto cloud = Read(changed);
+    return cloud.ok() ? std::string("accepted") : cloud.error().message;
+  };
+  expect(with_word(8, 0xffffffff), "says that the file has 4294967295 bytes");
+  expect(with_word(8, 100), "says that the file has 100 bytes");
+  expect(Read(bytes + "tail").error().message, "put behind it");
+  expect(with_word(bytes.size() - good.binary.size() - 8, static_cast<uint32_t>(good.binary.size() + 1)),
+         "a binary chunk of");
   for (const size_t size : {size_t{4}, size_t{19}, size_t{100}, bytes.size() - 1}) {
     EXPECT_FALSE(Read(bytes.substr(0, size)).ok()) << size;
   }

@@ -7,6 +7,8 @@
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/spherical_harmonics.h"
@@ -100,7 +102,7 @@ uint64_t BytesOf(const std::vector<Attribute>& attributes, int64_t count) {
   return size;
 }
 
-std::string JsonOf(int64_t count, const std::vector<Attribute>& attributes, const nlohmann::json& bounds) {
+nlohmann::json JsonOf(int64_t count, const std::vector<Attribute>& attributes, const nlohmann::json& bounds) {
   nlohmann::json views = nlohmann::json::array(), accessors = nlohmann::json::array(), names;
   uint64_t offset = 0;
   for (const Attribute& attribute : attributes) {
@@ -122,16 +124,15 @@ std::string JsonOf(int64_t count, const std::vector<Attribute>& attributes, cons
                                     {"sortingMethod", "cameraDistance"}};
   const nlohmann::json primitive = {
       {"attributes", names}, {"mode", 0}, {"extensions", {{"KHR_gaussian_splatting", extension}}}};
-  const nlohmann::json document = {{"asset", {{"version", "2.0"}, {"generator", "anchorsplat " ANCHORSPLAT_VERSION}}},
-                                   {"extensionsUsed", {"KHR_gaussian_splatting"}},
-                                   {"scene", 0},
-                                   {"scenes", {{{"nodes", {0}}}}},
-                                   {"nodes", {{{"mesh", 0}}}},
-                                   {"meshes", {{{"primitives", {primitive}}}}},
-                                   {"buffers", {{{"byteLength", offset}}}},
-                                   {"bufferViews", views},
-                                   {"accessors", accessors}};
-  return document.dump();
+  return {{"asset", {{"version", "2.0"}, {"generator", "anchorsplat " ANCHORSPLAT_VERSION}}},
+          {"extensionsUsed", {"KHR_gaussian_splatting"}},
+          {"scene", 0},
+          {"scenes", {{{"nodes", {0}}}}},
+          {"nodes", {{{"mesh", 0}}}},
+          {"meshes", {{{"primitives", {primitive}}}}},
+          {"buffers", {{{"byteLength", offset}}}},
+          {"bufferViews", views},
+          {"accessors", accessors}};
 }
 
 nlohmann::json BoundsOf(const GaussianCloud& cloud, const AxisFlip& flip) {
@@ -148,7 +149,39 @@ nlohmann::json BoundsOf(const GaussianCloud& cloud, const AxisFlip& flip) {
 // Of the JSON chunk: the same for all clouds of that size and degree, however many digits their bounds have.
 size_t JsonSize(int64_t count, const std::vector<Attribute>& attributes) {
   constexpr size_t kRoomForBounds = 2 * sizeof "\"min\":[,,]," + 6 * sizeof "-1.2345678901234567e-300";
-  return (JsonOf(count, attributes, nlohmann::json::object()).size() + kRoomForBounds + 3) / 4 * 4;
+  return (JsonOf(count, attributes, nlohmann::json::object()).dump().size() + kRoomForBounds + 3) / 4 * 4;
+}
+
+// The values of all attributes, one attribute after the other, from byte `at` on.
+Status WriteValues(OutputFile& file, uint64_t at, const GaussianCloud& cloud, const WriteOptions& options,
+                   const std::vector<Attribute>& attributes) {
+  const Buffer<uint32_t> order = WriteOrder(cloud, options.order, SplatOrder::kKeep);
+  for (const Attribute& attribute : attributes) {
+    ANCHORSPLAT_RETURN_IF_ERROR(
+        WriteRecords(file, at, cloud.size(), attribute.record, [&](int64_t first, int64_t last, uint8_t* bytes) {
+          for (int64_t i = first; i < last; ++i, bytes += attribute.record) {
+            attribute.pack(order.empty() ? i : int64_t{order[static_cast<size_t>(i)]}, bytes);
+          }
+        }));
+    at += attribute.record * static_cast<uint64_t>(cloud.size());
+  }
+  return {};
+}
+
+// A name as a relative URI (RFC 3986): what is neither letter, digit nor one of "-._~" as %XX, byte by byte.
+std::string UriOf(const std::string& name) {
+  constexpr std::string_view kDigits = "0123456789ABCDEF";
+  std::string uri;
+  for (const char c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool plain = (byte >= 'a' && byte <= 'z') || (byte >= 'A' && byte <= 'Z') || (byte >= '0' && byte <= '9');
+    if (plain || std::string_view("-._~").find(c) != std::string_view::npos) {
+      uri += c;
+    } else {
+      uri += {'%', kDigits[byte >> 4], kDigits[byte & 15]};
+    }
+  }
+  return uri;
 }
 
 constexpr uint64_t kHeads = 12 + 8 + 8;  // of the file and its two chunks
@@ -167,7 +200,7 @@ Status WriteGlb(const std::filesystem::path& path, const GaussianCloud& cloud, c
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
   const std::vector<Attribute> attributes = Attributes(cloud, flip);
-  std::string json = JsonOf(cloud.size(), attributes, BoundsOf(cloud, flip));
+  std::string json = JsonOf(cloud.size(), attributes, BoundsOf(cloud, flip)).dump();
   json.resize(JsonSize(cloud.size(), attributes), ' ');
   const uint64_t binary = BytesOf(attributes, cloud.size());
   const uint64_t begin = kHeads + json.size();
@@ -175,7 +208,6 @@ Status WriteGlb(const std::filesystem::path& path, const GaussianCloud& cloud, c
     return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", WithThousands(cloud.size()), " Gaussians take ",
                                               HumanBytes(binary), ", a GLB file ends at 4.3 GB")};
   }
-  const Buffer<uint32_t> order = WriteOrder(cloud, options.order, SplatOrder::kKeep);
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
   ANCHORSPLAT_RETURN_IF_ERROR(file.Reserve(begin + binary));
   const uint32_t head[5] = {0x46546c67, 2, static_cast<uint32_t>(begin + binary), static_cast<uint32_t>(json.size()),
@@ -184,17 +216,36 @@ Status WriteGlb(const std::filesystem::path& path, const GaussianCloud& cloud, c
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(head, sizeof head));
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(json));
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(chunk, sizeof chunk));
-  uint64_t at = begin;
-  for (const Attribute& attribute : attributes) {
-    ANCHORSPLAT_RETURN_IF_ERROR(
-        WriteRecords(file, at, cloud.size(), attribute.record, [&](int64_t first, int64_t last, uint8_t* bytes) {
-          for (int64_t i = first; i < last; ++i, bytes += attribute.record) {
-            attribute.pack(order.empty() ? i : int64_t{order[static_cast<size_t>(i)]}, bytes);
-          }
-        }));
-    at += attribute.record * static_cast<uint64_t>(cloud.size());
-  }
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteValues(file, begin, cloud, options, attributes));
   return file.Commit();
+}
+
+uint64_t EstimatedGltfSize(int64_t count, int sh_degree) {
+  GaussianCloud none;
+  none.sh_degree = sh_degree;
+  const AxisFlip flip = FlipBetween(kRdf, kLuf);
+  const std::vector<Attribute> attributes = Attributes(none, flip);
+  constexpr uint64_t kBoundsAndName = 250;
+  return JsonOf(count, attributes, nlohmann::json::object()).dump(2).size() + kBoundsAndName +
+         BytesOf(attributes, count);
+}
+
+Status WriteGltf(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
+  const std::filesystem::path beside = std::filesystem::path(path).replace_extension(".bin");
+  const AxisFlip flip = FlipBetween(kRdf, kLuf);
+  const std::vector<Attribute> attributes = Attributes(cloud, flip);
+  nlohmann::json json = JsonOf(cloud.size(), attributes, BoundsOf(cloud, flip));
+  json["buffers"][0]["uri"] = UriOf(beside.filename().string());
+  std::vector<OutputFile> files;
+  for (const std::filesystem::path& name : {beside, path}) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(name, options.overwrite));
+    files.push_back(std::move(file));
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(files[0].Reserve(BytesOf(attributes, cloud.size())));
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteValues(files[0], 0, cloud, options, attributes));
+  ANCHORSPLAT_RETURN_IF_ERROR(files[1].Write(json.dump(2)));
+  return CommitTogether(files);
 }
 
 }  // namespace anchorsplat

@@ -68,15 +68,41 @@ class GzipReader : public InflatingReader {
         return input_.Bad(stream_.avail_in, "the gzip stream ends before its data does");
       }
       ended_ = code == Z_STREAM_END;
-      if (code != Z_OK && code != Z_STREAM_END && code != Z_BUF_ERROR) {
-        return input_.Bad(stream_.avail_in, Cat("the gzip stream is damaged",
-                                                stream_.msg != nullptr ? Cat(" (", stream_.msg, ")") : std::string()));
-      }
+      if (code != Z_OK && code != Z_STREAM_END && code != Z_BUF_ERROR) return Damaged();
     }
     return {};
   }
 
+  Status ExpectEnd() override {
+    Bytef beyond = 0;
+    while (!ended_) {
+      if (stream_.avail_in == 0) {
+        ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t filled, input_.Fill());
+        if (filled == 0) return input_.Bad(0, "the file ends before its gzip stream does");
+        stream_.next_in = const_cast<Bytef*>(input_.block());
+        stream_.avail_in = static_cast<uInt>(filled);
+      }
+      stream_.next_out = &beyond;
+      stream_.avail_out = 1;
+      const int code = inflate(&stream_, Z_NO_FLUSH);
+      if (code != Z_OK && code != Z_STREAM_END && code != Z_BUF_ERROR) return Damaged();
+      if (stream_.avail_out == 0) return input_.Bad(stream_.avail_in, "the gzip stream goes on behind its data");
+      ended_ = code == Z_STREAM_END;
+    }
+    if (stream_.avail_in == 0) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t filled, input_.Fill());
+      stream_.avail_in = static_cast<uInt>(filled);
+    }
+    if (stream_.avail_in > 0) return input_.Bad(stream_.avail_in, "there are bytes behind the gzip stream");
+    return {};
+  }
+
  private:
+  Error Damaged() const {
+    return input_.Bad(stream_.avail_in, Cat("the gzip stream is damaged",
+                                            stream_.msg != nullptr ? Cat(" (", stream_.msg, ")") : std::string()));
+  }
+
   Input input_;
   z_stream stream_{};
   bool ended_ = false;
@@ -97,9 +123,7 @@ class ZstdReader : public InflatingReader {
     while (to.pos < to.size) {
       const size_t before = to.pos;
       const size_t code = ZSTD_decompressStream(context_, &to, &from_);
-      if (ZSTD_isError(code) != 0) {
-        return input_.Bad(from_.size - from_.pos, Cat("the zstd stream is damaged (", ZSTD_getErrorName(code), ")"));
-      }
+      if (ZSTD_isError(code) != 0) return Damaged(code);
       if (to.pos == to.size) break;
       if (from_.pos < from_.size || to.pos > before) continue;
       ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t filled, input_.Fill());
@@ -109,7 +133,26 @@ class ZstdReader : public InflatingReader {
     return {};
   }
 
+  Status ExpectEnd() override {
+    uint8_t beyond = 0;
+    for (;;) {
+      if (from_.pos == from_.size) {
+        ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t filled, input_.Fill());
+        if (filled == 0) return {};
+        from_ = {input_.block(), filled, 0};
+      }
+      ZSTD_outBuffer to{&beyond, 1, 0};
+      const size_t code = ZSTD_decompressStream(context_, &to, &from_);
+      if (ZSTD_isError(code) != 0) return Damaged(code);
+      if (to.pos > 0) return input_.Bad(from_.size - from_.pos, "the zstd stream goes on behind its data");
+    }
+  }
+
  private:
+  Error Damaged(size_t code) const {
+    return input_.Bad(from_.size - from_.pos, Cat("the zstd stream is damaged (", ZSTD_getErrorName(code), ")"));
+  }
+
   Input input_;
   ZSTD_DCtx* context_;
   ZSTD_inBuffer from_{nullptr, 0, 0};

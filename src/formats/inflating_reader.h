@@ -16,6 +16,8 @@ class InflatingReader {
   virtual ~InflatingReader() = default;
   // Exactly the next `size` bytes; kBadFile when the data is damaged or ends before (the message gives the byte).
   virtual Status Read(void* out, size_t size) = 0;
+  // That nothing is left: neither data (its checksum is looked at) nor bytes of the file. kBadFile otherwise.
+  virtual Status ExpectEnd() = 0;
 };
 
 // The one gzip stream from `begin` on, or the zstd frames in bytes [begin, end).

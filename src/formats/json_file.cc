@@ -1,8 +1,8 @@
 #include "formats/json_file.h"
 
 #include <cmath>
-#include <exception>
 #include <new>
+#include <utility>
 
 #include "core/text.h"
 #include "formats/file_bytes.h"
@@ -12,14 +12,8 @@ namespace anchorsplat {
 namespace {
 
 constexpr uint64_t kMaxBytes = uint64_t{256} << 20;
-constexpr int kMaxDepth = 64;
+constexpr size_t kMaxDepth = 64;
 constexpr size_t kMaxValues = size_t{1} << 24;
-
-struct TooMuch : std::exception {
-  explicit TooMuch(std::string text) : sentence(std::move(text)) {}
-  const char* what() const noexcept override { return sentence.c_str(); }
-  std::string sentence;
-};
 
 // The library's sentence without its own tags. It quotes the text it stumbled over, which may be long.
 std::string SyntaxSentence(const std::string& what) {
@@ -28,6 +22,70 @@ std::string SyntaxSentence(const std::string& what) {
   if (sentence.size() > 200) sentence = sentence.substr(0, 200) + "…";
   return sentence;
 }
+
+// Builds the document as the library reads it and stops at the bounds. The library has a parser with a callback for
+// that, but it looks through all elements of the array around every object that ends: a minute for 200,000 of them.
+class BoundedBuilder : public nlohmann::json_sax<nlohmann::json> {
+ public:
+  explicit BoundedBuilder(nlohmann::json& root) : root_(&root) {}
+
+  const std::string& problem() const { return problem_; }
+
+  bool null() override { return Put(nullptr) != nullptr; }
+  bool boolean(bool value) override { return Put(value) != nullptr; }
+  bool number_integer(number_integer_t value) override { return Put(value) != nullptr; }
+  bool number_unsigned(number_unsigned_t value) override { return Put(value) != nullptr; }
+  bool number_float(number_float_t value, const string_t&) override { return Put(value) != nullptr; }
+  bool string(string_t& value) override { return Put(std::move(value)) != nullptr; }
+  bool binary(binary_t& value) override { return Put(std::move(value)) != nullptr; }
+  bool start_object(size_t) override { return Begin(nlohmann::json::object()); }
+  bool start_array(size_t) override { return Begin(nlohmann::json::array()); }
+  bool end_object() override { return End(); }
+  bool end_array() override { return End(); }
+  bool key(string_t& name) override {
+    key_ = std::move(name);
+    return true;
+  }
+  bool parse_error(size_t, const std::string&, const nlohmann::json::exception& error) override {
+    problem_ = "not valid JSON: " + SyntaxSentence(error.what());
+    return false;
+  }
+
+ private:
+  // Where the value is now; null when there are too many.
+  nlohmann::json* Put(nlohmann::json value) {
+    if (++values_ > kMaxValues) {
+      problem_ = Cat("more than ", WithThousands(kMaxValues), " values");
+      return nullptr;
+    }
+    if (open_.empty()) {
+      *root_ = std::move(value);
+      return root_;
+    }
+    nlohmann::json& parent = *open_.back();
+    if (parent.is_array()) return &parent.emplace_back(std::move(value));
+    return &(parent[key_] = std::move(value));  // of two members of one name the last one counts
+  }
+  bool Begin(nlohmann::json value) {
+    if (open_.size() >= kMaxDepth) {
+      problem_ = Cat("nested deeper than ", kMaxDepth);
+      return false;
+    }
+    nlohmann::json* const place = Put(std::move(value));
+    if (place != nullptr) open_.push_back(place);
+    return place != nullptr;
+  }
+  bool End() {
+    open_.pop_back();
+    return true;
+  }
+
+  nlohmann::json* root_;
+  std::vector<nlohmann::json*> open_;  // from the outermost inwards; only the innermost grows, so all stay in place
+  std::string key_;                    // of the next member
+  std::string problem_;
+  size_t values_ = 0;
+};
 
 }  // namespace
 
@@ -61,6 +119,8 @@ Result<std::vector<JsonValue>> JsonValue::Elements() const {
   for (size_t i = 0; i < value_->size(); ++i) elements.emplace_back(*file_, (*value_)[i], Cat(path_, "[", i, "]"));
   return elements;
 }
+
+JsonValue JsonValue::Element(size_t index) const { return {*file_, (*value_)[index], Cat(path_, "[", index, "]")}; }
 
 Result<double> JsonValue::Number() const {
   if (!value_->is_number()) return Complain(Cat("expected a number, found ", value_->type_name()));
@@ -99,20 +159,11 @@ Result<JsonFile> JsonFile::Read(const std::filesystem::path& path) {
 Result<JsonFile> JsonFile::Parse(std::string name, std::string_view bytes) {
   JsonFile file;
   file.name_ = std::move(name);
-  size_t values = 0;
-  const auto bounded = [&values](int depth, nlohmann::json::parse_event_t event, nlohmann::json&) {
-    using Event = nlohmann::json::parse_event_t;
-    if (depth > kMaxDepth) throw TooMuch(Cat("nested deeper than ", kMaxDepth));
-    const bool begins = event == Event::value || event == Event::array_start || event == Event::object_start;
-    if (begins && ++values > kMaxValues) throw TooMuch(Cat("more than ", WithThousands(kMaxValues), " values"));
-    return true;
-  };
   try {
-    file.value_ = nlohmann::json::parse(bytes, bounded);
-  } catch (const nlohmann::json::exception& e) {
-    return Error{ErrorCode::kBadFile, Cat(file.name_, ": not valid JSON: ", SyntaxSentence(e.what()))};
-  } catch (const TooMuch& e) {
-    return Error{ErrorCode::kBadFile, Cat(file.name_, ": ", e.sentence)};
+    BoundedBuilder builder(file.value_);
+    if (!nlohmann::json::sax_parse(bytes, &builder)) {
+      return Error{ErrorCode::kBadFile, Cat(file.name_, ": ", builder.problem())};
+    }
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kBadFile, Cat(file.name_, ": does not fit into memory")};
   }

@@ -25,6 +25,7 @@ class JsonValue {
   std::optional<JsonValue> Find(const char* key) const;  // member of an object; empty when it has none
   Result<JsonValue> Get(const char* key) const;          // the same, or an error
   Result<std::vector<JsonValue>> Elements() const;       // of an array
+  JsonValue Element(size_t index) const;                 // of an array that is known to be so long
   Result<double> Number() const;                         // always finite: JSON has no others
   Result<std::vector<double>> Numbers(size_t count) const;
   Result<int> WholeNumber(int min, int max) const;  // 800 and 800.0 alike

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <string>
 
+#include "core/text.h"
 #include "formats/compressed_ply_reader.h"
 #include "formats/compressed_ply_writer.h"
 #include "formats/gltf_reader.h"
@@ -95,6 +96,7 @@ constexpr SplatFormat kFormats[] = {
      .extensions = kSogExtensions,
      .sniff = IsSog,
      .describe = DescribeSog,
+     .size = SogSize,
      .read = ReadSog,
      .write = WriteSog,
      .predicted_size = EstimatedSogSize,
@@ -114,6 +116,7 @@ constexpr SplatFormat kFormats[] = {
      .extensions = kGltfExtensions,
      .sniff = IsGltf,
      .describe = DescribeGltf,
+     .size = GltfSize,
      .read = ReadGltf,
      .write = WriteGlb,
      .predicted_size = PredictedGlbSize,
@@ -121,7 +124,11 @@ constexpr SplatFormat kFormats[] = {
     {.name = "glTF as JSON",
      .extensions = kGltfJsonExtensions,
      .describe = DescribeGltf,
+     .size = GltfSize,
      .read = ReadGltf,
+     .write = WriteGltf,
+     .predicted_size = EstimatedGltfSize,
+     .size_is_estimate = true,
      .axes = kLuf},
     {.name = "CSV", .extensions = kCsvExtensions, .write = WriteCsv},
     {.name = "NPZ", .extensions = kNpzExtensions, .write = WriteNpz, .predicted_size = PredictedNpzSize},
@@ -146,6 +153,10 @@ const SplatFormat* FormatOfExtension(const std::filesystem::path& path) {
     }
   }
   return best;
+}
+
+const SplatFormat* FormatOfName(std::string_view name) {
+  return name.empty() ? nullptr : FormatOfExtension(Cat("x", name.starts_with('.') ? "" : ".", name));
 }
 
 const SplatFormat* FormatOfFile(std::string_view head, const std::filesystem::path& path) {

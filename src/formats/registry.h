@@ -37,6 +37,8 @@ struct SplatFormat {
   bool (*sniff)(std::string_view head) = nullptr;
   // What the file says about itself beside its Gaussians. Null where there is nothing.
   Result<FormatFacts> (*describe)(const InputFile& file) = nullptr;
+  // Bytes of the file and of those beside it that belong to it. Null: its own.
+  uint64_t (*size)(const InputFile& file) = nullptr;
   // Null: recognised, but not read or not written by this version.
   Result<GaussianCloud> (*read)(const InputFile& file, const ReadLimits& limits) = nullptr;
   Status (*write)(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) = nullptr;
@@ -61,8 +63,7 @@ std::span<const SplatFormat> Formats();
 // By content first and extension second; null when neither is known.
 const SplatFormat* FormatOfFile(std::string_view head, const std::filesystem::path& path);
 const SplatFormat* FormatOfExtension(const std::filesystem::path& path);
-
-// ReadCloud of a file that is open already.
-Result<GaussianCloud> ReadOpenCloud(const InputFile& file, const ReadLimits& limits = {});
+// By what people write for one: "spz", ".spz", ".compressed.ply"; null for what is none.
+const SplatFormat* FormatOfName(std::string_view name);
 
 }  // namespace anchorsplat

@@ -6,7 +6,9 @@
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "core/parallel.h"
@@ -26,6 +28,12 @@ constexpr uint64_t kMaxMeta = uint64_t{4} << 20;
 constexpr uint64_t kMaxPicture = uint64_t{1} << 30;
 constexpr int64_t kGrain = 1 << 14;
 constexpr int64_t kEntriesPerRow = 64;  // of the palette
+
+// Beside meta.json there is nothing to look for in other folders.
+bool IsPlainName(const std::string& member) {
+  return !member.empty() && member.find_first_of("/\\:") == member.npos && !member.starts_with(".") &&
+         member.find('\0') == member.npos;
+}
 
 // Where the members are: in an archive, or beside meta.json.
 class Members {
@@ -47,14 +55,18 @@ class Members {
     return archive_ ? archive_->Read("meta.json", kMaxMeta) : file.ReadAll(kMaxMeta);
   }
   bool is_archive() const { return archive_.has_value(); }
+  // Bytes of a file of the folder; 0 where it is none.
+  uint64_t SizeBeside(const std::string& name) const {
+    std::error_code failed;
+    const uint64_t size = IsPlainName(name) ? std::filesystem::file_size(folder_ / name, failed) : 0;
+    return failed ? 0 : size;
+  }
   std::string meta_name() const { return archive_ ? name_ + ": meta.json" : name_; }
 
   // The picture called `name`.
   Result<ByteImage> Picture(const JsonValue& name, int64_t min_pixels, int64_t max_pixels) const {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string member, name.Text());
-    // Beside meta.json there is nothing to look for in other folders.
-    if (member.empty() || member.find_first_of("/\\:") != member.npos || member.starts_with(".") ||
-        member.find('\0') != member.npos) {
+    if (!IsPlainName(member)) {
       return name.Complain(Cat("expected the name of a file beside it, found \"", Printable(member), "\""));
     }
     std::string bytes;
@@ -325,8 +337,10 @@ Result<FormatFacts> DescribeSog(const InputFile& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSog opened, OpenSog(file));
   const JsonValue meta = opened.json.root();
   FormatFacts facts;
-  const bool second = meta.has("version");
-  facts.Add("version", second ? 2 : 1, opened.members.is_archive() ? ", a ZIP archive" : ", a folder of pictures");
+  // Version 1 does not say its number.
+  const std::optional<JsonValue> version = meta.Find("version");
+  facts.Add("version", version ? Printable(version->raw().dump()) : "1",
+            opened.members.is_archive() ? ", a ZIP archive" : ", a folder of pictures");
   if (const std::optional<JsonValue> asset = meta.Find("asset"); asset && asset->has("generator")) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue generator, asset->Get("generator"));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string name, generator.Text());
@@ -341,13 +355,32 @@ Result<FormatFacts> DescribeSog(const InputFile& file) {
   return facts;
 }
 
+uint64_t SogSize(const InputFile& file) {
+  const Result<OpenedSog> opened = OpenSog(file);
+  uint64_t sum = file.size();
+  if (!opened.ok() || opened->members.is_archive()) return sum;
+  std::set<std::string> seen;
+  for (const char* part : {"means", "quats", "scales", "sh0", "shN"}) {
+    const std::optional<JsonValue> value = opened->json.root().Find(part);
+    const std::optional<JsonValue> list = value ? value->Find("files") : std::nullopt;
+    if (!list || !list->raw().is_array()) continue;
+    for (const nlohmann::json& name : list->raw()) {
+      if (!name.is_string() || !seen.insert(name.get<std::string>()).second) continue;
+      sum += opened->members.SizeBeside(name.get<std::string>());
+    }
+  }
+  return sum;
+}
+
 Result<GaussianCloud> ReadSog(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSog opened, OpenSog(file));
   const JsonValue meta = opened.json.root();
   const int most = static_cast<int>(std::min<int64_t>(limits.max_gaussians, int64_t{1} << 28));
   int version = 1, count = 0;
   if (const std::optional<JsonValue> value = meta.Find("version")) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(version, value->WholeNumber(2, 2));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(version, value->WholeNumber(1, 2));
+  }
+  if (version == 2) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue number, meta.Get("count"));
     ANCHORSPLAT_ASSIGN_OR_RETURN(count, number.WholeNumber(1, most));
   } else {

@@ -23,6 +23,9 @@ namespace anchorsplat {
 // than `limits.max_gaussians`, sizes that only a decompression bomb has.
 Result<GaussianCloud> ReadSog(const InputFile& file, const ReadLimits& limits = {});
 
+// Bytes of the file, and of the pictures beside it where it is the meta.json of a folder.
+uint64_t SogSize(const InputFile& file);
+
 // Version, where the members are, who wrote them, how large the palette is. Errors as ReadSog.
 Result<FormatFacts> DescribeSog(const InputFile& file);
 

@@ -341,7 +341,7 @@ TEST(Sog, RefusesLiesAndOtherFolders) {
     changed[nlohmann::json::json_pointer(pointer)] = value;
     return changed;
   };
-  EXPECT_CONTAINS(error_of(with("/version", 3)), "version");
+  EXPECT_CONTAINS(error_of(with("/version", 3)), "expected a whole number from 1 to 2");
   EXPECT_CONTAINS(error_of(with("/count", 0)), "count");
   EXPECT_CONTAINS(error_of(with("/count", 300'000'000)), "count");
   EXPECT_CONTAINS(error_of(with("/count", 200'000'000)), "bomb");

@@ -192,23 +192,6 @@ nlohmann::json DrawHarmonics(const Pictures& pictures, std::vector<Picture>& out
   return meta;
 }
 
-// meta.json last: pictures without it are no splat. Where one of the names has been taken meanwhile, those given before
-// are taken back.
-Status CommitAll(std::vector<OutputFile>& pictures, OutputFile& meta) {
-  Status status;
-  std::vector<std::filesystem::path> named;
-  for (OutputFile& picture : pictures) {
-    status = picture.Commit();
-    if (!status.ok()) break;
-    named.push_back(picture.path());
-  }
-  if (status.ok()) status = meta.Commit();
-  if (status.ok()) return {};
-  std::error_code ignored;
-  for (const std::filesystem::path& name : named) std::filesystem::remove(name, ignored);
-  return status;
-}
-
 }  // namespace
 
 std::span<const char* const> SogPictures(int sh_degree) { return std::span(kPictures).subspan(sh_degree > 0 ? 0 : 2); }
@@ -270,7 +253,10 @@ Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, c
                                           : beside[next + k].Write(*encoded[k]));
     }
   }
-  if (!bundled) return CommitAll(beside, file);
+  if (!bundled) {
+    beside.push_back(std::move(file));  // last: pictures without it are no splat
+    return CommitTogether(beside);
+  }
   ANCHORSPLAT_RETURN_IF_ERROR(archive->Finish());
   return file.Commit();
 }

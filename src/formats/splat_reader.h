@@ -9,9 +9,11 @@ namespace anchorsplat {
 
 // Reads a .splat file as antimatter15's viewer keeps them: 32 bytes per Gaussian without any header: mean 3 × float,
 // scale (a length, not its logarithm) 3 × float, colour and opacity 4 × byte (value·255), quaternion wxyz 4 × byte
-// (value·128 + 128). SH degree 0. As the format has no mark, only the size tells that it is one.
+// (value·128 + 128). SH degree 0. As the format has no mark, its size and values tell that it is one.
 //
-// Errors (kBadFile): the size is no multiple of 32 bytes or zero, more than `limits.max_gaussians`.
+// Errors (kBadFile): the size is no multiple of 32 bytes or zero, more than `limits.max_gaussians`, or more than half
+// of the rows have a position or scale that is not finite, beyond kPlausibleExtent (core/statistics.h) or, for scales,
+// negative: that is text or another format under this name.
 Result<GaussianCloud> ReadSplat(const InputFile& file, const ReadLimits& limits = {});
 
 inline constexpr size_t kSplatRecord = 32;  // bytes

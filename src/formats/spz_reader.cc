@@ -94,6 +94,8 @@ Result<GaussianCloud> ReadGzipped(const InputFile& file, const ReadLimits& limit
     if (layout.record_size(section) == 0) continue;
     ANCHORSPLAT_RETURN_IF_ERROR(ReadSection(layout, section, *reader, cloud));
   }
+  // A stream that is longer than its header says is another splat than the header's.
+  ANCHORSPLAT_RETURN_IF_ERROR(reader->ExpectEnd());
   return cloud;
 }
 
@@ -133,6 +135,7 @@ Result<GaussianCloud> ReadStreams(const InputFile& file, const ReadLimits& limit
       const size_t stream = streams - 1 - k;
       const std::unique_ptr<InflatingReader> reader = OpenZstd(file, begins[stream], begins[stream + 1]);
       statuses[stream] = ReadSection(layout, kSpzSections[stream], *reader, cloud);
+      if (statuses[stream].ok()) statuses[stream] = reader->ExpectEnd();
     }
   });
   for (const Status& status : statuses) ANCHORSPLAT_RETURN_IF_ERROR(status);

@@ -241,6 +241,12 @@ TEST(Spz, RefusesDamageLiesAndBombs) {
   expect(ErrorOf(bomb), "bomb");
   expect(ErrorOf(Gzip(RawHeader(4, 1, 0, 12, 0) + std::string(20, '\0'))), "version 4 in a gzip stream");
   expect(ErrorOf(Gzip(RawHeader(3, 2, 0, 12, 0) + std::string(39, '\0'))), "ends before");
+  // A splat of one Gaussian is 20 bytes of values and not one more, and nothing follows it.
+  expect(ErrorOf(Gzip(RawHeader(3, 1, 0, 12, 0) + std::string(20, '\0'))), "accepted");
+  expect(ErrorOf(Gzip(RawHeader(3, 1, 0, 12, 0) + std::string(21, '\0'))), "goes on behind its data");
+  expect(ErrorOf(v3 + "x"), "bytes behind the gzip stream");
+  expect(ErrorOf(v3.substr(0, v3.size() - 1)), "ends before its gzip stream");
+  expect(ErrorOf(changed(v3, v3.size() - 6, static_cast<char>(v3[v3.size() - 6] ^ 1))), "damaged");  // the checksum
   EXPECT_EQ(Read(folder / "4.spz", {.max_gaussians = 2999}).error().code, ErrorCode::kBadFile);
   EXPECT_EQ(WriteSpz(folder / "b.spz", cloud, {.spz_version = 2}).error().code, ErrorCode::kBadArgument);
   EXPECT_EQ(folder.Entries(), 2);

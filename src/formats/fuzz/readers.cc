@@ -43,7 +43,8 @@ Status ReadAsCloud(const std::string& file, const std::string& bytes) {
     const auto facts = format->describe(input);
     if (!facts.ok()) (void)CheckError(facts.error(), file);
   }
-  const auto cloud = ReadOpenCloud(input);
+  if (format == nullptr || format->read == nullptr) return Error{ErrorCode::kBadFile, "no format that is read"};
+  const auto cloud = format->read(input, {});
   if (!cloud.ok()) return CheckError(cloud.error(), file);
   Require(!cloud->empty(), "an empty cloud");
   Require(Validate(*cloud).ok(), "a cloud whose arrays disagree");

@@ -1,0 +1,91 @@
+#include "formats/opened_splat.h"
+
+#include <sys/stat.h>
+
+#include <map>
+#include <new>
+#include <string>
+#include <system_error>
+
+#include "core/text.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string ReadFormats() {
+  std::string list;
+  for (const SplatFormat& format : Formats()) {
+    if (format.read == nullptr) continue;
+    list += Cat(list.empty() ? "" : ", ", format.name, " (", format.extensions.front(), ")");
+  }
+  return list;
+}
+
+}  // namespace
+
+fs::path SplatPath(const fs::path& path) {
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) return path;
+  fs::path meta = path / "meta.json";
+  return fs::exists(meta, ignored) ? meta : path;
+}
+
+Result<OpenedSplat> OpenedSplat::Open(const fs::path& path, const SplatFormat* format) {
+  const fs::path found = SplatPath(path);
+  std::error_code ignored;
+  if (fs::is_directory(found, ignored)) {
+    return Error{ErrorCode::kBadFile,
+                 Cat(path.string(), ": is a folder without a meta.json: expected a splat file or the folder of a SOG")};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(InputFile input, InputFile::Open(found));
+  if (format == nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, input.Head(kSniffBytes));
+    format = FormatOfFile(head, found);
+  }
+  return OpenedSplat(std::move(input), format);
+}
+
+uint64_t OpenedSplat::bytes() const {
+  return format_ != nullptr && format_->size != nullptr ? format_->size(input_) : input_.size();
+}
+
+Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits) const try {
+  if (format_ == nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, input_.Head(8));
+    return Error{ErrorCode::kBadFile, Cat(input_.name(), ": byte 0: is no splat file of a known format: found \"",
+                                          Printable(head), "\", expected ", ReadFormats())};
+  }
+  if (format_->read == nullptr) {
+    return Error{ErrorCode::kBadFile, Cat(input_.name(), ": is a ", format_->name,
+                                          " file, which this version does not read; it reads ", ReadFormats())};
+  }
+  return format_->read(input_, limits);
+} catch (const std::bad_alloc&) {
+  return Error{ErrorCode::kIo, Cat(input_.name(), ": there is not enough memory for its Gaussians")};
+}
+
+Status CheckInputsStay(std::span<const fs::path> inputs, std::span<const fs::path> outputs) {
+  std::map<std::pair<dev_t, ino_t>, const fs::path*> files;
+  for (const fs::path& input : inputs) {
+    struct stat info {};
+    // "-" may be a file too: `convert - scan.ply < scan.ply`.
+    const fs::path path = input == "-" ? fs::path("/dev/stdin") : SplatPath(input);
+    if (::stat(path.c_str(), &info) != 0 || !S_ISREG(info.st_mode)) continue;
+    files.emplace(std::pair(info.st_dev, info.st_ino), &input);
+  }
+  for (const fs::path& output : outputs) {
+    struct stat info {};
+    if (::stat(output.c_str(), &info) != 0) continue;
+    const auto same = files.find({info.st_dev, info.st_ino});
+    if (same == files.end()) continue;
+    return Error{ErrorCode::kBadArgument,
+                 Cat(output.string(), ": is the input ", same->second->string(),
+                     " itself, which would be lost; write to another name and rename it when you are content")};
+  }
+  return {};
+}
+
+}  // namespace anchorsplat

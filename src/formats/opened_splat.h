@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <utility>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "formats/cloud_io.h"
+#include "formats/input_file.h"
+#include "formats/registry.h"
+
+namespace anchorsplat {
+
+// A splat file that is open: opened once, as a pipe can be read only once. A folder with a meta.json in it stands for
+// that file (SOG); "-" is standard input.
+class OpenedSplat {
+ public:
+  // `format`: what the file is, whatever its content and name say; null: by content first and extension second.
+  // Errors: of InputFile::Open; kBadFile for a folder that is no splat.
+  static Result<OpenedSplat> Open(const std::filesystem::path& path, const SplatFormat* format = nullptr);
+
+  const InputFile& input() const { return input_; }
+  const SplatFormat* format() const { return format_; }             // null: not known, Read() will fail
+  uint64_t bytes() const;                                           // with the files beside it that belong to it
+  Result<GaussianCloud> Read(const ReadLimits& limits = {}) const;  // errors: see ReadCloud
+
+ private:
+  OpenedSplat(InputFile input, const SplatFormat* format) : input_(std::move(input)), format_(format) {}
+
+  InputFile input_;
+  const SplatFormat* format_;
+};
+
+// What OpenedSplat opens for a path: the meta.json of a folder, other paths as they are.
+std::filesystem::path SplatPath(const std::filesystem::path& path);
+
+// That no output replaces one of the inputs, under whatever name: the same path, a symbolic or a hard link. What an
+// output was made from should outlive it. Errors: kBadArgument.
+Status CheckInputsStay(std::span<const std::filesystem::path> inputs, std::span<const std::filesystem::path> outputs);
+
+}  // namespace anchorsplat

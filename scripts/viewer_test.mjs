@@ -260,6 +260,12 @@ await expectMessage('damaged data', broken('damaged', `${whole.slice(0, at)}AAAA
 await expectMessage('no base64', broken('garbage', `${whole.slice(0, at)}????????${whole.slice(at + 8)}`),
   /cannot be shown/);
 await expectMessage('missing part', broken('missing', whole.replace('id="after-0"', 'id="gone"')), /after-0/);
+// Cut anywhere: in the head, the style, the page, the data, the code, right before the end.
+const guardEnd = whole.indexOf('</script>') + '</script>'.length;
+for (const size of [guardEnd, whole.indexOf('<style>') + 500, whole.indexOf('<main') + 20, at,
+  whole.indexOf('id="worker-source"') + 100, whole.lastIndexOf('<script>') - 1000, whole.lastIndexOf('</script>')]) {
+  await expectMessage(`cut after ${size} bytes`, broken('cut', whole.slice(0, size)), /incomplete/);
+}
 await expectMessage('an old browser', page, /Safari 16/, () => { delete globalThis.DecompressionStream; });
 await expectMessage('no WebGL 2', page, /WebGL 2/,
   () => { HTMLCanvasElement.prototype.getContext = () => null; });
@@ -273,6 +279,6 @@ await expectMessage('no WebGL 2', page, /WebGL 2/,
 }
 
 await browser.close();
-for (const name of ['damaged', 'garbage', 'missing']) fs.rmSync(path.join(out, `${name}.html`));
+for (const name of ['damaged', 'garbage', 'missing', 'cut']) fs.rmSync(path.join(out, `${name}.html`));
 console.log(`${checks} checks, ${failures} failed`);
 process.exit(failures === 0 ? 0 : 1);

@@ -148,6 +148,34 @@ TEST(PageWriter, NothingIsFetchedAndNoCodeIsMade) {
   }
 }
 
+// Of a file that was cut browsers run the scripts that are whole: one of them, before all else that takes room, says
+// what is wrong unless the very last one has run.
+TEST(PageWriter, TheGuardComesFirstAndTheStartLast) {
+  TestFolder folder;
+  const GaussianCloud cloud = FittedLookingCloud(10, 0, 1);
+  ViewerPage page;
+  page.title = std::string(5000, 't');
+  page.after = {&cloud, "x", {}};
+  ASSERT_TRUE(WriteViewerPage(folder / "page.html", page).ok());
+  const std::string text = FileText(folder / "page.html");
+  const size_t guard = text.find("DOMContentLoaded"), guard_end = text.find("</script>");
+  EXPECT_LT(text.find("<script>"), guard);
+  EXPECT_LT(guard, guard_end);
+  EXPECT_LT(guard_end, 2000u);
+  for (const char* later : {"<title>", "<style>", "<body>", "id=\"after-0\""}) {
+    EXPECT_LT(guard_end, text.find(later)) << later;
+  }
+  EXPECT_EQ(Count(text, "dataset.whole"), 2u);
+  const size_t start = text.rfind("<script>"), said = text.rfind("dataset.whole");
+  EXPECT_LT(start, said);
+  EXPECT_EQ(text.find("<script", said), std::string::npos);
+  EXPECT_LT(text.find("id=\"description\""), start);
+  EXPECT_EQ(Count(text, "\nmain();"), 1u);
+  EXPECT_GT(text.find("\nmain();"), said);
+  // What follows it is nothing that a cut could take away.
+  EXPECT_EQ(text.substr(text.find("</script>", said)), "</script>\n</body>\n</html>\n");
+}
+
 TEST(PageWriter, ItsOwnFilesStayInsideTheirElements) {
   for (const char* name :
        {"page.css", "payload.js", "camera.js", "shaders.js", "renderer.js", "interface.js", "app.js", "worker.js"}) {

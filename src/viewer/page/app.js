@@ -455,5 +455,3 @@ async function main() {
     fail(error);
   }
 }
-
-main();

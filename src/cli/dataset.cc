@@ -56,10 +56,10 @@ void AddDatasetSplit(CLI::App& parent, Program& program) {
   const auto flags = std::make_shared<SplitFlags>();
   verb.add_option("dataset", flags->dataset, "Folder of the data set")->required()->check(NotEmpty());
   verb.add_option("--validation", flags->fractions.validation, "Fraction of the models")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(Fraction())
       ->capture_default_str();
   verb.add_option("--test", flags->fractions.test, "Fraction of the models")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(Fraction())
       ->capture_default_str();
   for (const std::string split : {"train", "validation", "test"}) {
     verb.add_option_function<std::string>(

@@ -82,7 +82,7 @@ void FitFlags::AddTo(CLI::App& verb) {
       ->check(CLI::Range(0, kMaxShDegree))
       ->capture_default_str();
   verb.add_option("--ssim-weight", standard.objective.loss.ssim_weight, "w of the loss (1 - w) L1 + w (1 - SSIM)")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(Fraction())
       ->capture_default_str();
   AddChoice(verb, "--mode", standard.objective.render.mode,
             {{"classic", RenderMode::kClassic}, {"antialiased", RenderMode::kAntialiased}}, "Rasterization");

@@ -42,11 +42,11 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
       ->capture_default_str()
       ->group(group);
   verb.add_option("--half-from", options.half_from, "Part of the run from which on half of the rays are rendered")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(Fraction())
       ->capture_default_str()
       ->group(group);
   verb.add_option("--all-from", options.all_from, "Part of the run from which on all rays are rendered")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(Fraction())
       ->capture_default_str()
       ->group(group);
   verb.add_option("--rate", options.rate, "Learning rates, as a part of those of `fit`")
@@ -54,11 +54,11 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
       ->capture_default_str()
       ->group(group);
   verb.add_option("--rate-decay", options.rate_decay, "What is left of them at the end")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(Fraction())
       ->capture_default_str()
       ->group(group);
   verb.add_option("--ssim-weight", options.ssim_weight, "w of the loss (1 - w) L1 + w (1 - SSIM)")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(Fraction())
       ->capture_default_str()
       ->group(group);
   verb.add_flag("--exposure", options.exposure, "Pictures of --images differ in brightness and tint")

@@ -19,6 +19,6 @@ std::string Fixed(double value, int digits);  // Fixed(3.14159, 2) = "3.14"; "in
 std::string HumanBytes(uint64_t bytes);       // "4.7 MB" (powers of 1000, as file managers show)
 std::string HumanSeconds(double seconds);     // "850 ms", "12.3 s", "4 min 05 s"
 std::string Printable(const std::string& bytes,
-                      size_t longest = 60);  // for messages about hostile input: control bytes escaped
+                      size_t longest = 60);  // for messages: control characters and what is no UTF-8 escaped
 
 }  // namespace anchorsplat

@@ -27,7 +27,8 @@ struct WriteOptions {
   int spz_version = 4;  // 3: one gzip stream, which older programs read; 4: zstd streams
 };
 
-// Reads a splat file of any known format, found by its content first and its extension second.
+// Reads a splat file of any known format, found by its content first and its extension second; a folder with a
+// meta.json is a SOG. More control over that: opened_splat.h.
 // Errors: kNotFound, kIo, kBadFile (file, byte or line, property, what was expected).
 Result<GaussianCloud> ReadCloud(const std::filesystem::path& path, const ReadLimits& limits = {});
 

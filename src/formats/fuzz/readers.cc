@@ -80,7 +80,7 @@ Status ReadAsImage(const fs::path& file, const std::string& bytes) {
 // one, besides those made by hand.
 void AddSplatFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
   for (const SplatFormat& format : Formats()) {
-    if (format.read == nullptr) continue;
+    if (format.read == nullptr || format.name == "glTF as JSON") continue;  // that one is of two files
     const std::string file = "fuzz" + std::string(format.extensions.front());
     FuzzReader reader{
         std::string(format.name), {}, {}, [file](const std::string& bytes) { return ReadAsCloud(file, bytes); }};
@@ -114,24 +114,33 @@ void AddSpzContent(const fs::path& folder, std::vector<FuzzReader>& readers) {
   readers.push_back(std::move(reader));
 }
 
-// The members of a ZIP archive have checksums too, so a SOG folder: once its meta.json is damaged, once a picture.
-void AddSogFolder(const fs::path& folder, std::vector<FuzzReader>& readers) {
-  for (const char* damaged : {"meta.json", "means_u.webp", "shN_centroids.webp"}) {
-    const fs::path sog = folder / Cat("sog_", damaged);
-    fs::create_directories(sog);
-    (void)WriteCloud(sog / "meta.json", SeedCloud(5, 1), {.overwrite = true});
-    std::ifstream in(sog / damaged, std::ios::binary);
-    FuzzReader reader{Cat("SOG folder, ", damaged),
+// Splats of several files, of which one is damaged: SOG folders, as the members of a ZIP archive have checksums, and
+// the JSON of a glTF with its numbers beside it.
+void AddSplatsOfSeveralFiles(const fs::path& folder, std::vector<FuzzReader>& readers) {
+  struct Part {
+    const char *format, *main, *damaged;
+  };
+  constexpr Part kParts[] = {{"SOG folder", "meta.json", "meta.json"},
+                             {"SOG folder", "meta.json", "means_u.webp"},
+                             {"SOG folder", "meta.json", "shN_centroids.webp"},
+                             {"glTF as JSON", "fuzz.gltf", "fuzz.gltf"},
+                             {"glTF as JSON", "fuzz.gltf", "fuzz.bin"}};
+  for (const Part& part : kParts) {
+    const fs::path own = folder / Cat("of_", part.damaged);
+    fs::create_directories(own);
+    (void)WriteCloud(own / part.main, SeedCloud(5, 1), {.overwrite = true});
+    std::ifstream in(own / part.damaged, std::ios::binary);
+    FuzzReader reader{Cat(part.format, ", ", part.damaged),
                       {{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}},
                       {},
-                      [sog, damaged](const std::string& bytes) -> Status {
-                        Put(sog / damaged, bytes);
-                        const auto cloud = ReadCloud(sog / "meta.json");
-                        if (!cloud.ok()) return CheckError(cloud.error(), sog.filename().string());
+                      [own, part](const std::string& bytes) -> Status {
+                        Put(own / part.damaged, bytes);
+                        const auto cloud = ReadCloud(own / part.main);
+                        if (!cloud.ok()) return CheckError(cloud.error(), own.filename().string());
                         Require(Validate(*cloud).ok(), "a cloud whose arrays disagree");
                         return {};
                       }};
-    if (std::string_view(damaged) == "meta.json") reader.words = JsonWords();
+    if (std::string_view(part.damaged) == part.main) reader.words = JsonWords();
     readers.push_back(std::move(reader));
   }
 }
@@ -214,7 +223,7 @@ std::vector<FuzzReader> FuzzReaders(const fs::path& folder) {
   std::vector<FuzzReader> readers;
   AddSplatFormats(folder, readers);
   AddSpzContent(folder, readers);
-  AddSogFolder(folder, readers);
+  AddSplatsOfSeveralFiles(folder, readers);
   AddTensorFormats(folder, readers);
   AddCameraFormats(folder, readers);
   AddImageFormats(folder, readers);

@@ -23,6 +23,7 @@ function(anchorsplat_room name)
     add_executable(${name}_test ${tests})
     target_link_libraries(${name}_test PRIVATE anchorsplat_${name} GTest::gmock GTest::gtest GTest::gtest_main)
     target_compile_definitions(${name}_test PRIVATE ANCHORSPLAT_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
-    gtest_discover_tests(${name}_test TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST)
+    # A busy machine needs its time to load LibTorch.
+    gtest_discover_tests(${name}_test TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 120)
   endif()
 endfunction()

@@ -68,6 +68,7 @@ bench: program
 	@build/anchorsplat bench render
 	@build/anchorsplat bench io
 	@build/anchorsplat bench convert
+	@build/anchorsplat bench fit
 	@build/anchorsplat bench network
 
 lint:

@@ -401,21 +401,31 @@ expect 2 "upscale without area pixels" fit -o "$work/x.ply" --steps 40 --upscale
 # dataset: three meshes, one of them none, become two objects; a kill in between costs nothing.
 sed 's/^v 1 1 0/v 1 1 1/' "$work/mesh/quad.obj" >"$work/mesh/ramp.obj"
 small=(--views 8 --size 24 --low-size 12 --points 60 --steps 60 --max-gaussians 500 --min-psnr 5)
-expect 0 "a data set" "$program" dataset build "$work/mesh/quad.obj" "$work/mesh/point.obj" "$work/mesh/ramp.obj" -o "$work/set" "${small[@]}" --jobs 2 --json
+expect 1 "a data set" "$program" dataset build "$work/mesh/quad.obj" "$work/mesh/point.obj" "$work/mesh/ramp.obj" -o "$work/set" "${small[@]}" --jobs 2 --json
 says stdout '"built": 2'
 says stdout '"failed": 1'
 expect 0 "the failure has its reason" grep -q '"name":"point".*"stage":"mesh"' "$work/set/failures.jsonl"
 for file in manifest.jsonl quad/record.json quad/splat.ply quad/12/gaussian_splatting/ckpts/ckpt_59_rank0.pt quad/24/images/007.png ramp/splat.ply; do
   expect 0 "data set has $file" test -s "$work/set/$file"
 done
-expect 0 "build again" "$program" dataset build "$work/mesh/quad.obj" "$work/mesh/point.obj" -o "$work/set" "${small[@]}" --json
+expect 1 "build again" "$program" dataset build "$work/mesh/quad.obj" "$work/mesh/point.obj" -o "$work/set" "${small[@]}" --json
 says stdout '"there_already": 1'
 says stdout '"failed": 1'
 expect 0 "the checkpoint is a splat" "$program" info "$work/set/quad/12/gaussian_splatting/ckpts/ckpt_59_rank0.pt"
 expect 2 "no meshes" "$program" dataset build -o "$work/set2"
 expect 2 "low not smaller" "$program" dataset build "$work/mesh/quad.obj" -o "$work/set2" --size 12 --low-size 12
 mkdir "$work/mesh/copy" && cp "$work/mesh/quad.obj" "$work/mesh/copy/"
-expect 2 "two of one name" "$program" dataset build "$work/mesh/quad.obj" "$work/mesh/copy/quad.obj" -o "$work/set2" "${small[@]}"
+echo "no archive" >"$work/mesh/bad.sh3f"
+cp "$work/mesh/quad.obj" "$work/mesh/manifest.jsonl.obj"
+expect 1 "two of one name, a bad library and a name of the builder's own" "$program" dataset build "$work/mesh/quad.obj" "$work/mesh/copy/quad.obj" "$work/mesh/bad.sh3f" "$work/mesh/manifest.jsonl.obj" -o "$work/set3" "${small[@]}" --licence GPL-2.0-or-later --creator somebody --json
+says stdout '"built": 3'
+says stdout '"failed": 1'
+expect 0 "the library has its reason" grep -q '"name":"bad.sh3f".*"stage":"read"' "$work/set3/failures.jsonl"
+for name in mesh-quad copy-quad manifest.jsonl-object; do
+  expect 0 "the manifest has $name" grep -q "\"licence\":\"GPL-2.0-or-later\".*\"name\":\"$name\"" "$work/set3/manifest.jsonl"
+done
+expect 0 "failures are no problem of what is there" "$program" dataset check "$work/set3"
+says stdout "1 object failed"
 printf 'steps = 60\n[[mix]]\nlow_size = 12\n[[mix]]\nlow_siize = 10\n' >"$work/bad.toml"
 expect 4 "a recipe with a slip" "$program" dataset build "$work/mesh/quad.obj" -o "$work/set2" --recipe "$work/bad.toml"
 says stderr "line 5: low_siize"
@@ -423,6 +433,8 @@ expect 0 "check" "$program" dataset check "$work/set" --decode
 says stdout "everything is there"
 expect 0 "info of a data set" "$program" dataset info "$work/set" --json
 says stdout '"objects": 2'
+says stdout '"failed": 1'
+says stdout '"unfinished": 0'
 expect 0 "split" "$program" dataset split "$work/set" --test 1 --validation 0 --json
 says stdout '"test": 2'
 expect 5 "split does not overwrite" "$program" dataset split "$work/set"

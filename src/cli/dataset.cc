@@ -15,6 +15,8 @@ namespace anchorsplat {
 
 namespace {
 
+std::string Objects(int64_t count) { return Cat(count, count == 1 ? " object" : " objects"); }
+
 struct SplitFlags {
   std::string dataset;
   SplitFractions fractions;
@@ -43,7 +45,7 @@ Status RunSplit(const SplitFlags& flags, const SharedFlags& shared) {
   if (shared.json) {
     PrintJson({{"dataset", flags.dataset}, {"objects", manifest.size()}, {"splits", counts}});
   } else if (!shared.quiet) {
-    std::cout << path.string() << ": " << manifest.size() << " objects";
+    std::cout << path.string() << ": " << Objects(std::ssize(manifest));
     for (const auto& [split, count] : counts) std::cout << ", " << count << " for " << split;
     std::cout << '\n';
   }
@@ -77,12 +79,17 @@ struct CheckFlags {
 
 Status RunCheck(const CheckFlags& flags, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto problems, CheckDataset(flags.dataset, flags.options));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto failed, ReadFailures(flags.dataset));
   if (shared.json) {
     nlohmann::json list = nlohmann::json::array();
     for (const DatasetProblem& p : problems) list.push_back({{"object", p.object}, {"problem", p.sentence}});
-    PrintJson({{"dataset", flags.dataset}, {"problems", list}});
+    PrintJson({{"dataset", flags.dataset}, {"problems", list}, {"failed", failed.size()}});
   } else {
     for (const DatasetProblem& p : problems) std::cout << p.sentence << '\n';
+    if (!failed.empty() && !shared.quiet) {
+      std::cout << Objects(std::ssize(failed)) << " failed and " << (failed.size() == 1 ? "is" : "are")
+                << " no part of it: " << (std::filesystem::path(flags.dataset) / kFailuresName).string() << '\n';
+    }
   }
   if (!problems.empty()) {
     return Error{ErrorCode::kBadFile,
@@ -131,7 +138,7 @@ Status RunInfo(const std::string& dataset, const SharedFlags& shared) {
     PrintJson(ToJson(dataset, s));
     return {};
   }
-  std::cout << dataset << ": " << s.objects << " objects, " << HumanBytes(s.bytes) << '\n'
+  std::cout << dataset << ": " << Objects(s.objects) << ", " << HumanBytes(s.bytes) << '\n'
             << "left out: " << s.rejected << " rejected for their training PSNR, " << s.failed << " failed";
   for (const auto& [stage, count] : s.failures) std::cout << " (" << stage << ' ' << count << ')';
   std::cout << ", " << s.unfinished << " unfinished\n";
@@ -143,7 +150,7 @@ Status RunInfo(const std::string& dataset, const SharedFlags& shared) {
   for (const auto& [name, part] : s.recipes) add(name, part);
   if (s.recipes.size() > 1) add("all", s.all);
   std::cout << FormatTable(rows);
-  for (const auto& [split, count] : s.splits) std::cout << split << ": " << count << " objects\n";
+  for (const auto& [split, count] : s.splits) std::cout << split << ": " << Objects(count) << '\n';
   std::cout << "licences:";
   for (const auto& [licence, count] : s.licences) std::cout << ' ' << licence << " (" << count << ')';
   std::cout << "\ntime: meshes " << HumanSeconds(s.read_seconds) << ", views " << HumanSeconds(s.view_seconds)

@@ -39,6 +39,8 @@ struct BuildFlags {
   int jobs = 0;
   double timeout = 4 * 3600;
   bool retry = false;
+  std::string licence;
+  std::string creator;
 };
 
 Result<Recipe> MakeRecipe(const BuildFlags& flags, const SharedFlags& shared) {
@@ -51,7 +53,8 @@ Result<Recipe> MakeRecipe(const BuildFlags& flags, const SharedFlags& shared) {
   return SingleRecipe(settings);
 }
 
-Status RunBuild(const BuildFlags& flags, const SharedFlags& shared) {
+Status RunBuild(const BuildFlags& flags, Program& program) {
+  const SharedFlags& shared = program.flags;
   DatasetBuildOptions options;
   ANCHORSPLAT_ASSIGN_OR_RETURN(options.recipe, MakeRecipe(flags, shared));
   // Fits of small pictures use one core each better than several together.
@@ -61,6 +64,8 @@ Status RunBuild(const BuildFlags& flags, const SharedFlags& shared) {
   options.timeout_seconds = flags.timeout;
   options.overwrite = shared.overwrite;
   options.retry = flags.retry;
+  options.licence = flags.licence;
+  options.creator = flags.creator;
   options.program = OwnProgram();
   std::vector<std::string> meshes = flags.meshes;
   if (!flags.list.empty()) {
@@ -87,17 +92,19 @@ Status RunBuild(const BuildFlags& flags, const SharedFlags& shared) {
                {"interrupted", r.interrupted},
                {"seconds", r.seconds}});
   } else if (!shared.quiet) {
-    std::cout << flags.output << ": " << r.objects << " objects: " << r.built << " built in " << HumanSeconds(r.seconds)
-              << ", " << r.there_already << " there already, " << r.failed << " failed, " << r.rejected
-              << " rejected for their training PSNR\n";
+    std::cout << flags.output << ": " << r.objects << (r.objects == 1 ? " object: " : " objects: ") << r.built
+              << " built in " << HumanSeconds(r.seconds) << ", " << r.there_already << " there already, " << r.failed
+              << " failed, " << r.rejected << " rejected for their training PSNR\n";
     if (r.other_settings > 0) {
-      std::cout << r.other_settings << " of those there were made with other settings; -w makes them again\n";
+      std::cout << r.other_settings << " of those there " << (r.other_settings == 1 ? "was" : "were")
+                << " made with other settings; -w makes them again\n";
     }
     if (r.failed > 0) std::cout << "why: " << flags.output << "/failures.jsonl; --retry tries them again\n";
   }
   if (r.interrupted) {
     return Error{ErrorCode::kInterrupted, Cat(flags.output, ": stopped; the same command goes on from here")};
   }
+  if (r.failed > 0) program.exit_code = kPartialExitCode;
   return {};
 }
 
@@ -136,9 +143,12 @@ void AddDatasetBuild(CLI::App& parent, Program& program) {
   verb.add_option("--timeout", flags->timeout, "Seconds an object may take; 0: any")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  verb.add_option("--licence", flags->licence, "Licence of meshes that name none, such as GPL-2.0-or-later")
+      ->check(NotEmpty());
+  verb.add_option("--creator", flags->creator, "Creator of meshes that name none")->check(NotEmpty());
   verb.add_flag("--retry", flags->retry, "Try again what failed in an earlier run");
   flags->views.AddTo(verb);
-  verb.callback([flags, &program] { program.run = [flags, &program] { return RunBuild(*flags, program.flags); }; });
+  verb.callback([flags, &program] { program.run = [flags, &program] { return RunBuild(*flags, program); }; });
 }
 
 namespace {

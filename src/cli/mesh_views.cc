@@ -58,9 +58,9 @@ Status RunViews(const ViewsFlags& flags, const SharedFlags& shared) {
   } else if (!shared.quiet) {
     const double rays = static_cast<double>(cost.low.rays + cost.high.rays);
     const double seconds = cost.low.ray_seconds + cost.high.ray_seconds;
-    std::cout << options.rig.views << " views of " << WithThousands(std::ssize(mesh.triangles)) << " triangles at "
-              << options.low_size << " and " << options.high_size << " pixels in " << HumanSeconds(cost.seconds)
-              << " to " << flags.output << '\n'
+    std::cout << options.rig.views << (options.rig.views == 1 ? " view of " : " views of ")
+              << WithThousands(std::ssize(mesh.triangles)) << " triangles at " << options.low_size << " and "
+              << options.high_size << " pixels in " << HumanSeconds(cost.seconds) << " to " << flags.output << '\n'
               << "processor time: rays " << HumanSeconds(seconds) << " (" << Fixed(rays / 1e6, 0) << " million, "
               << Fixed(seconds > 0 ? rays / seconds / 1e6 : 0, 0) << " million a second and thread), shading "
               << HumanSeconds(cost.low.shade_seconds + cost.high.shade_seconds) << ", PNG "

@@ -9,12 +9,11 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "dataset/file_lock.h"
+#include "dataset/job_list.h"
 #include "dataset/object_builder.h"
-#include "dataset/object_name.h"
 #include "dataset/process_pool.h"
 #include "formats/atomic_file.h"
 #include "formats/file_bytes.h"
-#include "scene/mesh_reader.h"
 
 namespace anchorsplat {
 
@@ -22,35 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
-
-// All jobs, in the order of their names.
-Result<std::vector<ObjectJob>> MakeJobs(const std::vector<std::string>& meshes, const Recipe& recipe) {
-  std::map<std::string, ObjectJob> jobs;
-  for (std::string mesh : meshes) {
-    while (mesh.size() > 1 && mesh.back() == '/') mesh.pop_back();  // a folder of pictures
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto addresses, ExpandMeshAddress(mesh));
-    for (const std::string& address : addresses) {
-      const std::string name = ObjectName(address);
-      for (const size_t drawn : DrawEntries(recipe, name)) {
-        const RecipeEntry& entry = recipe.entries[drawn];
-        ObjectJob job;
-        job.name = recipe.draws > 1 ? Cat(name, "--", entry.name) : name;
-        job.source = address;
-        job.recipe = entry.name;
-        job.settings = entry.settings;
-        const auto [there, fresh] = jobs.emplace(job.name, job);
-        if (!fresh && there->second.source != address) {
-          return Error{ErrorCode::kBadArgument, Cat(there->second.source, " and ", address, " would both become ",
-                                                    job.name, ": rename one of the files")};
-        }
-      }
-    }
-  }
-  if (jobs.empty()) return Error{ErrorCode::kBadArgument, "no meshes to build a data set of"};
-  std::vector<ObjectJob> out;
-  for (auto& [name, job] : jobs) out.push_back(std::move(job));
-  return out;
-}
 
 // The last line of the process's log that says something: its error message.
 std::string LastWords(const fs::path& log) {
@@ -97,7 +67,7 @@ Result<ObjectRecord> ReadRecord(const fs::path& folder) {
 Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, const fs::path& dataset,
                                         const DatasetBuildOptions& options) {
   const auto begin = Clock::now();
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<ObjectJob> jobs, MakeJobs(meshes, options.recipe));
+  if (meshes.empty()) return Error{ErrorCode::kBadArgument, "no meshes to build a data set of"};
   const fs::path building = dataset / kBuildingName;
   std::error_code code;
   fs::create_directories(building, code);
@@ -111,8 +81,26 @@ Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, 
   ANCHORSPLAT_ASSIGN_OR_RETURN(Manifest manifest, CollectRecords(dataset));
   std::map<std::string, ObjectFailure> failures;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto earlier, ReadFailures(dataset));
+  JobList todo = ListJobs(meshes, options.recipe, manifest, earlier);
+  std::vector<ObjectJob>& jobs = todo.jobs;
+  if (jobs.empty() && todo.failures.empty()) {
+    return Error{ErrorCode::kBadArgument, "the libraries have no object to build a data set of"};
+  }
+  for (ObjectJob& job : jobs) {
+    job.licence = options.licence;
+    job.creator = options.creator;
+  }
+  const auto asked_for = [&](const std::string& library) {
+    return std::find(meshes.begin(), meshes.end(), library) != meshes.end();
+  };
   for (const ObjectFailure& failure : earlier) {
+    // Libraries are looked into on every build.
+    if (failure.stage == kReadStage && asked_for(failure.source)) continue;
     if (!options.retry && manifest.count(failure.name) == 0) failures.emplace(failure.name, failure);
+  }
+  for (const ObjectFailure& failure : todo.failures) {
+    LogWarning(Cat(failure.name, " failed (", failure.stage, "): ", failure.message));
+    failures.insert_or_assign(failure.name, failure);
   }
   const auto write_lists = [&]() -> Status {
     std::vector<ObjectFailure> list;
@@ -123,7 +111,8 @@ Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, 
   ANCHORSPLAT_RETURN_IF_ERROR(write_lists());
 
   DatasetBuildReport report;
-  report.objects = std::ssize(jobs);
+  report.objects = std::ssize(jobs) + std::ssize(todo.failures);
+  report.failed = std::ssize(todo.failures);
   std::vector<const ObjectJob*> wanted;
   for (const ObjectJob& job : jobs) {
     const auto there = manifest.find(job.name);

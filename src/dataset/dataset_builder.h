@@ -19,6 +19,8 @@ struct DatasetBuildOptions {
   double timeout_seconds = 0;               // of one object; 0: none
   bool overwrite = false;                   // objects that are there are made again
   bool retry = false;                       // objects that failed earlier are tried again
+  std::string licence;                      // of meshes that name none
+  std::string creator;                      // likewise
   std::filesystem::path program;            // ours: runs `dataset object JOB -o DATASET`
   const std::atomic<bool>* stop = nullptr;  // ends the build in order
 };
@@ -37,9 +39,10 @@ struct DatasetBuildReport {
 // Makes DATASET/NAME for every mesh (address of a file, of an object of a furniture library, or of a whole library; or
 // a folder of pictures with cameras) and every entry its recipe draws, and DATASET/manifest.jsonl and failures.jsonl,
 // which are right after every object. Each object is made by a process of its own (object_builder.h): one that fails,
-// crashes or hangs does not stop the others. Called again after whatever kind of end, it goes on where it was.
+// crashes or hangs does not stop the others, nor does a library that cannot be read. Called again after whatever kind
+// of end, it goes on where it was. job_list.h says how objects get their names.
 //
-// Errors: kBadArgument: no meshes, two that get the same name; kExists: another build works on the folder; kIo.
+// Errors: kBadArgument: no meshes; kExists: another build works on the folder; kIo.
 Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, const std::filesystem::path& dataset,
                                         const DatasetBuildOptions& options);
 

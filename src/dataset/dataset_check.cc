@@ -76,7 +76,8 @@ class ObjectCheck {
   void CheckViews(const Scene& scene) {
     const ViewSetOptions& views = record_.settings.views;
     if (std::ssize(scene.low_views()) != record_.views) {
-      Complain(Cat(folder_.string(), ": has ", scene.low_views().size(), " views, not ", record_.views));
+      Complain(Cat(folder_.string(), ": has ", scene.low_views().size(),
+                   scene.low_views().size() == 1 ? " view, not " : " views, not ", record_.views));
     }
     for (const Camera& camera : scene.low_views()) CheckPicture(camera, scene.low_folder() / "images");
     if (views.store_high) {
@@ -214,7 +215,10 @@ Result<DatasetSummary> SummarizeDataset(const fs::path& dataset) {
   std::error_code code;
   for (fs::directory_iterator it(dataset / kBuildingName, code), end; !code && it != end; it.increment(code)) {
     std::error_code ignored;
-    summary.unfinished += it->is_directory(ignored) ? 1 : 0;
+    const bool failed = std::any_of(failures.begin(), failures.end(), [&](const ObjectFailure& failure) {
+      return failure.name == it->path().filename().string();
+    });
+    summary.unfinished += it->is_directory(ignored) && !failed ? 1 : 0;
   }
   code.clear();
   for (fs::recursive_directory_iterator it(dataset, code), end; !code && it != end; it.increment(code)) {

@@ -39,7 +39,7 @@ struct DatasetSummary {
   int64_t objects = 0;  // that are no rejects
   int64_t rejected = 0;
   int64_t failed = 0;
-  int64_t unfinished = 0;                 // begun and not done
+  int64_t unfinished = 0;                 // begun, neither done nor failed
   Part all;                               // without rejects
   std::map<std::string, Part> recipes;    // by entry
   std::map<std::string, int64_t> splits;  // objects; empty without splits.json

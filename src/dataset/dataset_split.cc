@@ -64,7 +64,10 @@ Result<Splits> SplitByModel(const Manifest& manifest, const SplitFractions& frac
   }
   Splits splits;
   for (const auto& group : VariantGroups(manifest, true)) {
-    const double u = static_cast<double>(StableHash(group[0], seed) >> 11) * 0x1.0p-53;
+    // Not the first name: a variant that comes later may sort before it.
+    std::string stem = manifest.at(group[0]).stem;
+    for (const std::string& name : group) stem = std::min(stem, manifest.at(name).stem);
+    const double u = static_cast<double>(StableHash(stem, seed) >> 11) * 0x1.0p-53;
     const int split = u < fractions.test ? 2 : u < fractions.test + fractions.validation ? 1 : 0;
     for (const std::string& name : group) splits[name] = kSplitNames[split];
   }

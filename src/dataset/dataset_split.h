@@ -25,8 +25,9 @@ struct SplitFractions {
   double test = 0.1;
 };
 
-// Splits by hash of each group's first mesh and the seed: adding objects moves none of the others, unless it joins two
-// groups. Fractions are met on average. kBadArgument: fractions out of 0–1 or above 1 together.
+// Splits by hash of each group's stem (the first of them where equal fingerprints join several) and the seed: adding
+// objects moves none of the others, unless a copy under a smaller stem joins their group. Fractions are met on average.
+// kBadArgument: fractions out of 0–1 or above 1 together.
 Result<Splits> SplitByModel(const Manifest& manifest, const SplitFractions& fractions, uint64_t seed);
 
 // Splits as lists of mesh addresses say: objects made from an address in `lists[split]`. Addresses are compared by

@@ -66,6 +66,20 @@ TEST(DatasetSplit, AddedObjectsMoveNoOthers) {
   for (const auto& [name, split] : *before) EXPECT_EQ(after->at(name), split);
 }
 
+TEST(DatasetSplit, VariantsThatSortBeforeTheOthersMoveNothing) {
+  for (int i = 0; i < 100; ++i) {
+    const std::string n = std::to_string(i);
+    Manifest manifest;
+    Add(manifest, "chair" + n + "_red", "chair" + n, "t1");
+    const auto before = SplitByModel(manifest, {.validation = 0.3, .test = 0.3}, 1);
+    Add(manifest, "chair" + n + "_blue", "chair" + n, "t2");
+    Add(manifest, "stool" + n, "stool" + n, "t2");  // a copy of the blue one by shape
+    const auto after = SplitByModel(manifest, {.validation = 0.3, .test = 0.3}, 1);
+    EXPECT_EQ(after->at("chair" + n + "_red"), before->at("chair" + n + "_red"));
+    EXPECT_EQ(after->at("stool" + n), before->at("chair" + n + "_red"));
+  }
+}
+
 TEST(DatasetSplit, ImpossibleFractionsAreRefused) {
   EXPECT_FALSE(SplitByModel({}, {.validation = 0.6, .test = 0.6}, 0).ok());
   EXPECT_FALSE(SplitByModel({}, {.validation = -0.1, .test = 0}, 0).ok());

@@ -196,7 +196,12 @@ Status Publish(const fs::path& folder, const fs::path& target) {
   replaced += ".replaced";
   ANCHORSPLAT_RETURN_IF_ERROR(Remove(replaced));
   std::error_code code;
-  if (fs::exists(target, code)) fs::rename(target, replaced, code);
+  const fs::file_status there = fs::symlink_status(target, code);
+  if (fs::exists(there) && !fs::is_directory(there)) {
+    return Error{ErrorCode::kExists, Cat(target.string(), ": is in the way of the object's folder and is no folder")};
+  }
+  code.clear();
+  if (fs::exists(there)) fs::rename(target, replaced, code);
   if (!code) fs::rename(folder, target, code);
   if (code) return Error{ErrorCode::kIo, Cat(target.string(), ": cannot give the object its name: ", code.message())};
   ANCHORSPLAT_RETURN_IF_ERROR(Remove(replaced));
@@ -212,8 +217,9 @@ fs::path CheckpointPath(const fs::path& low_folder, int64_t steps) {
 }
 
 std::string ToJsonText(const ObjectJob& job) {
-  const Json json = {
-      {"name", job.name}, {"source", job.source}, {"recipe", job.recipe}, {"settings", ToJson(job.settings)}};
+  const Json json = {{"name", job.name},       {"source", job.source},
+                     {"recipe", job.recipe},   {"settings", ToJson(job.settings)},
+                     {"licence", job.licence}, {"creator", job.creator}};
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -227,6 +233,12 @@ Result<ObjectJob> ReadObjectJob(const fs::path& path) {
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue settings, json.root().Get("settings"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(job.settings, ObjectSettingsFrom(settings));
+  for (const auto& [key, text] : std::initializer_list<std::pair<const char*, std::string*>>{
+           {"licence", &job.licence}, {"creator", &job.creator}}) {
+    if (const auto value = json.root().Find(key)) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(*text, value->Text());
+    }
+  }
   return job;
 }
 
@@ -248,6 +260,11 @@ Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset, 
     std::error_code ignored;
     const bool pictures = fs::is_directory(job.source, ignored);
     ANCHORSPLAT_RETURN_IF_ERROR((pictures ? CopyViews : MakeViews)(job, folder, stop, record));
+    if (record.origin.licence.empty() && !job.licence.empty()) {
+      record.origin.licence = job.licence;
+      record.origin.licence_source = "--licence";
+    }
+    if (record.origin.creator.empty()) record.origin.creator = job.creator;
     ANCHORSPLAT_RETURN_IF_ERROR(Keep(folder / kViewsDone, record));
   }
   if (IsFile(folder / kRecordName)) {  // cut off while it got its name

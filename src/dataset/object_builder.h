@@ -16,6 +16,8 @@ struct ObjectJob {
   std::string source;  // address of the mesh, or folder of a project of pictures (picture_project.h)
   std::string recipe;  // name of the recipe's entry
   ObjectSettings settings;
+  std::string licence;  // the record's where the mesh names none
+  std::string creator;  // likewise
 };
 
 std::string ToJsonText(const ObjectJob& job);
@@ -34,8 +36,8 @@ std::filesystem::path CheckpointPath(const std::filesystem::path& low_folder, in
 // step. Whatever an earlier attempt has finished there is kept if it was made by the same job: views as a whole, the
 // fit up to its last checkpoint. Deterministic but for the seconds in the record.
 //
-// `stop` ends the fit in order (kInterrupted): the next attempt goes on from there. Other errors: of the mesh, the
-// views and the fit; the file `stage` says which.
+// `stop` ends the fit in order (kInterrupted): the next attempt goes on from there. Other errors: kExists: a file, not
+// a folder, has the object's name; those of the mesh, the views and the fit; the file `stage` says which.
 Result<ObjectRecord> BuildObject(const ObjectJob& job, const std::filesystem::path& dataset,
                                  const std::atomic<bool>* stop);
 

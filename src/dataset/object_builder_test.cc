@@ -80,6 +80,38 @@ TEST(ObjectBuilder, ReplacesAnOlderObject) {
   EXPECT_FALSE(fs::exists(BuildingFolder(folder / "set", "tetra.replaced")));
 }
 
+TEST(ObjectBuilder, ReplacesNothingThatIsNoFolder) {
+  const TestFolder folder;
+  ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
+  fs::create_directories(folder / "set");
+  std::ofstream(folder / "set/tetra") << "mine";
+  const auto record = BuildObject(job, folder / "set", nullptr);
+  ASSERT_FALSE(record.ok());
+  EXPECT_EQ(record.error().code, ErrorCode::kExists);
+  EXPECT_NE(record.error().message.find("is no folder"), std::string::npos);
+  EXPECT_EQ(Bytes(folder / "set/tetra"), "mine");
+  // What was made waits for its place.
+  fs::remove(folder / "set/tetra");
+  EXPECT_TRUE(BuildObject(job, folder / "set", nullptr).ok());
+}
+
+TEST(ObjectBuilder, LicencesOfTheBuildAreForMeshesThatNameNone) {
+  const TestFolder folder;
+  ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
+  job.licence = "GPL-2.0-or-later";
+  job.creator = "somebody";
+  const auto record = BuildObject(job, folder / "set", nullptr);
+  ASSERT_TRUE(record.ok()) << record.error().message;
+  EXPECT_EQ(record->origin.licence, "GPL-2.0-or-later");
+  EXPECT_EQ(record->origin.licence_source, "--licence");
+  EXPECT_EQ(record->origin.creator, "somebody");
+  std::ofstream(folder / "LICENSE.txt") << "CC0";
+  const auto own = BuildObject(job, folder / "set2", nullptr);
+  ASSERT_TRUE(own.ok());
+  EXPECT_EQ(own->origin.licence, "CC0-1.0");
+  EXPECT_EQ(own->origin.licence_source, "LICENSE.txt");
+}
+
 TEST(ObjectBuilder, RejectsFitsFarFromTheirOwnViews) {
   const TestFolder folder;
   ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");

@@ -16,11 +16,15 @@ namespace {
 bool IsLetterOrDigit(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); }
 char Lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
-std::string Sanitized(const std::string& text) {
-  std::string out;
-  for (const char c : text) out += IsLetterOrDigit(c) || c == '.' || c == '_' || c == '-' ? c : '_';
-  while (!out.empty() && out.front() == '.') out.erase(0, 1);  // hidden, "." and ".."
-  return out;
+// What a data set's folder and its .building have besides objects. Compared in small letters, as some file systems do.
+bool IsReserved(const std::string& name) {
+  std::string small;
+  for (const char c : name) small += Lower(c);
+  constexpr std::array<std::string_view, 4> kNames = {"manifest.jsonl", "failures.jsonl", "splits.json", "lock"};
+  constexpr std::array<std::string_view, 4> kEndings = {".job", ".log", ".lock", ".replaced"};
+  return std::find(kNames.begin(), kNames.end(), small) != kNames.end() ||
+         std::any_of(kEndings.begin(), kEndings.end(),
+                     [&](std::string_view ending) { return small.ends_with(ending); });
 }
 
 constexpr std::array<std::string_view, 38> kVariantWords = {
@@ -41,6 +45,13 @@ std::string_view LastWord(std::string_view name) {
 
 }  // namespace
 
+std::string SafeName(const std::string& text) {
+  std::string out;
+  for (const char c : text) out += IsLetterOrDigit(c) || c == '.' || c == '_' || c == '-' ? c : '_';
+  while (!out.empty() && out.front() == '.') out.erase(0, 1);  // hidden, "." and ".."
+  return IsReserved(out) ? out + "-object" : out;
+}
+
 uint64_t StableHash(std::string_view text, uint64_t seed) {
   uint64_t hash = 0xCBF29CE484222325u ^ (seed * 0x9E3779B97F4A7C15u);
   for (const char c : text) hash = (hash ^ static_cast<uint8_t>(c)) * 0x100000001B3u;
@@ -52,10 +63,10 @@ uint64_t StableHash(std::string_view text, uint64_t seed) {
 
 std::string ObjectName(const std::string& mesh_address) {
   const size_t mark = mesh_address.rfind(".sh3f#");
-  std::string name = Sanitized(MeshShortName(mesh_address));
+  std::string name = SafeName(MeshShortName(mesh_address));
   if (mark != std::string::npos) {
     const std::string library = std::filesystem::path(mesh_address.substr(0, mark)).filename().string();
-    name = Sanitized(library) + "-" + name;
+    name = SafeName(library) + "-" + name;
   }
   return name.empty() ? Cat("object-", StableHash(mesh_address) % 1000000) : name;
 }

@@ -8,8 +8,13 @@
 
 namespace anchorsplat {
 
-// The name of an object's folder, from where its mesh is: letters, digits, '.', '_' and '-'. Objects of a furniture
-// library begin with the library's name. Depends on the address alone, so that a list can be continued in any order.
+// A text as the name of an object's folder: letters, digits, '.', '_' and '-', no '.' in front. Names that a data set
+// needs for itself (manifest.jsonl, splits.json; those of its files on the way, such as "chair.log") end in "-object".
+// Empty where nothing is left.
+std::string SafeName(const std::string& text);
+
+// The name of an object's folder, from where its mesh is, as SafeName. Objects of a furniture library begin with the
+// library's name. Depends on the address alone.
 std::string ObjectName(const std::string& mesh_address);
 
 // What variants of one model have in common: the name in lower case without numbers, sizes, sides and colours at its

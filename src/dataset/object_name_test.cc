@@ -15,6 +15,22 @@ TEST(ObjectName, IsASafeFolderName) {
   EXPECT_NE(ObjectName("x/.hidden.obj").front(), '.');
 }
 
+TEST(ObjectName, LeavesTheDataSetsOwnFilesAlone) {
+  for (const std::string name : {"manifest.jsonl", "failures.jsonl", "splits.json", "lock", "chair.job", "chair.log",
+                                 "chair.lock", "chair.replaced", "Manifest.JSONL"}) {
+    EXPECT_EQ(ObjectName("models/" + name + ".obj"), name + "-object");
+  }
+  EXPECT_EQ(ObjectName("models/.building.obj"), "building");
+  EXPECT_EQ(ObjectName("models/manifest.obj"), "manifest");
+}
+
+TEST(ObjectName, KeepsTheDotsOfALibrarysKeys) {
+  EXPECT_EQ(ObjectName("lib.sh3f#chair.v1"), "lib-chair.v1");
+  EXPECT_NE(ObjectName("lib.sh3f#chair.v1"), ObjectName("lib.sh3f#chair.v2"));
+  EXPECT_EQ(ObjectName("lib.sh3f#parts/chair.obj"), "lib-chair");
+  EXPECT_EQ(ObjectName("scans/room.v1"), "room.v1");  // a folder of pictures
+}
+
 TEST(ObjectName, VariantsShareAStem) {
   for (const char* name :
        {"sofa", "sofa2", "Sofa_red", "sofa-left", "sofaBlack", "SOFA 03", "sofa_large_2", "sofa.10"}) {

@@ -202,8 +202,13 @@ Result<Recipe> RecipeFrom(const std::string& file, const toml::table& root, Obje
     recipe.entries = SingleRecipe(settings).entries;
   }
   if (const toml::node* node = root.get("draws")) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t draws,
-                                 (Item{file, "draws", *node}.Whole(1, std::ssize(recipe.entries))));
+    const Item item{file, "draws", *node};
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t draws, item.Whole(1, INT64_MAX));
+    if (draws > std::ssize(recipe.entries)) {
+      return item.Complain(Cat("an object cannot be drawn ", draws, " times: the recipe has ", recipe.entries.size(),
+                               recipe.entries.size() == 1 ? " entry" : " entries",
+                               " ([[mix]]), and each is drawn once at most"));
+    }
     recipe.draws = static_cast<int>(draws);
   }
   return recipe;

@@ -77,7 +77,8 @@ TEST(Recipe, MistakesNameTheirLine) {
   EXPECT_TRUE(complains("background = [1, 2]", "three"));
   EXPECT_TRUE(complains("hr = true", "string"));
   EXPECT_TRUE(complains("mix = 3", "[[mix]]"));
-  EXPECT_TRUE(complains("draws = 2\n[[mix]]\n", "draws"));
+  EXPECT_TRUE(complains("draws = 2\n[[mix]]\n", "the recipe has 1 entry ([[mix]])"));
+  EXPECT_TRUE(complains("draws = 0\n[[mix]]\n", "draws"));
   EXPECT_TRUE(complains("[[mix]]\nweight = 0", "weight"));
   EXPECT_TRUE(complains("[[mix]]\nname = \"../x\"", "name"));
   EXPECT_TRUE(complains("[[mix]]\nname = \"a\"\n[[mix]]\nname = \"a\"", "twice"));

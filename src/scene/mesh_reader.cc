@@ -77,7 +77,9 @@ bool IsMeshLibrary(const std::string& address) {
 std::string MeshShortName(const std::string& address) {
   const Address parsed = Parse(address);
   const std::string& name = parsed.object.empty() ? parsed.file : parsed.object;
-  return fs::path(name.substr(name.find_last_of('/') + 1)).stem().string();
+  const fs::path last = name.substr(name.find_last_of('/') + 1);
+  // Keys of libraries and folders of pictures have dots that begin no ending.
+  return (IsMeshName(name) || IsMeshLibrary(name) ? last.stem() : last).string();
 }
 
 Result<std::vector<std::string>> ExpandMeshAddress(const std::string& address) {

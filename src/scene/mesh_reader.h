@@ -25,7 +25,8 @@ bool IsMeshAddress(const std::string& address);
 // True for a whole library.
 bool IsMeshLibrary(const std::string& address);
 
-// A short name for files made from the mesh: "barrel" of "models/barrel.obj" and of "catalog.sh3f#barrel".
+// A short name for files made from the mesh: "barrel" of "models/barrel.obj" and of "catalog.sh3f#barrel". Only
+// the ending of a mesh's or a library's file goes: "catalog.sh3f#chair.v2" is "chair.v2".
 std::string MeshShortName(const std::string& address);
 
 }  // namespace anchorsplat

@@ -217,6 +217,12 @@ def main():
     arguments = parser.parse_args()
 
     items = furniture(arguments.program, arguments.objects)
+    planes = aircraft(arguments.program, arguments.objects)
+    fit = [p for p in planes if "error" not in p and 1000 <= p["triangles"] <= 50000 and p["textures"] > 0
+           and not has_missing_picture(p)]
+    for plane in fit:  # the largest of each folder
+        plane["largest"] = plane["triangles"] == max(p["triangles"] for p in fit if p["group"] == plane["group"])
+    drawn = draw([p for p in fit if p["largest"]], DOMAIN, "category")
     columns = ["object", "name", "category", "creator", "licence", "triangles", "textures", "colours", "split",
                "variant_of"]
     with open(arguments.out / "objects.csv", "w", newline="") as file:
@@ -228,17 +234,14 @@ def main():
                 item["address"], item["name"], item["category"], item["creator"], item["licence"],
                 item.get("triangles", ""), item.get("textures", ""), item.get("colours", ""),
                 item["why_not"] or item["split"], "" if variant == item["address"] else variant])
+        for plane in drawn:
+            writer.writerow([
+                plane["address"], plane["name"], plane["category"], plane["creator"], plane["licence"],
+                plane["triangles"], plane["textures"], plane["colours"], f"domain-{DOMAIN}", ""])
     for split, what in [("train", "Objects for training"), ("validation", "Objects for choosing between settings"),
                         ("test-30", "Objects no training may ever see")]:
         write_list(arguments.out / f"{split}.txt", f"{what}: library#object of sweethome3d-furniture.",
                    [item for item in items if item.get("split") == split])
-
-    planes = aircraft(arguments.program, arguments.objects)
-    fit = [p for p in planes if "error" not in p and 1000 <= p["triangles"] <= 50000 and p["textures"] > 0
-           and not has_missing_picture(p)]
-    for plane in fit:  # the largest of each folder
-        plane["largest"] = plane["triangles"] == max(p["triangles"] for p in fit if p["group"] == plane["group"])
-    drawn = draw([p for p in fit if p["largest"]], DOMAIN, "category")
     write_list(arguments.out / "domain-10.txt", "Objects of another world, for tests only: files of flightgear-data-ai.",
                drawn)
     for split in ["train", "validation", "test-30", "variant"]:

@@ -40,6 +40,20 @@ std::string PercentDecoded(const std::string& text) {
   return out;
 }
 
+// How many folders up from where it starts a relative path leads, at its end ("a/../../b": 1).
+int FoldersUp(const std::string& relative) {
+  int up = 0;
+  for (const fs::path& part : fs::path(relative).lexically_normal()) up += part == ".." ? 1 : 0;
+  return up;
+}
+
+bool LeadsAway(const std::string& relative) { return FoldersUp(relative) > 1; }
+
+std::string WithSlashes(std::string name) {
+  std::replace(name.begin(), name.end(), '\\', '/');
+  return name;
+}
+
 // Refuses names no file has, so that nothing below has to think about them.
 constexpr size_t kLongestName = 4096;
 
@@ -47,8 +61,7 @@ constexpr size_t kLongestName = 4096;
 
 std::string AssetSource::Resolve(const std::string& name) const {
   if (name.empty() || name.size() > kLongestName || name.find('\0') != std::string::npos) return {};
-  std::string path = name;
-  std::replace(path.begin(), path.end(), '\\', '/');
+  std::string path = WithSlashes(name);
   // Material libraries edited by hand have blanks behind names.
   while (!path.empty() && (path.back() == ' ' || path.back() == '\t' || path.back() == '\r')) path.pop_back();
   const std::string decoded = PercentDecoded(path);
@@ -56,13 +69,20 @@ std::string AssetSource::Resolve(const std::string& name) const {
   const auto absolute = [](const std::string& p) { return p[0] == '/' || (p.size() > 1 && p[1] == ':'); };
   for (const std::string& candidate : std::array{path, decoded, last(path), last(decoded)}) {
     if (candidate.empty() || absolute(candidate) || candidate.find('\0') != std::string::npos) continue;
+    if (LeadsAway(candidate)) continue;
     if (std::string found = Find(candidate); !found.empty()) return found;
   }
   return {};
 }
 
+bool AssetSource::Refuses(const std::string& name) const {
+  const std::string path = WithSlashes(name);
+  return (LeadsAway(path) || LeadsAway(PercentDecoded(path))) && !Has(name);
+}
+
 Result<std::string> AssetSource::Read(const std::string& name, uint64_t max_bytes) const {
   const std::string found = Resolve(name);
+  if (found.empty() && Refuses(name)) return Error{ErrorCode::kBadFile, Cat(Printable(name), " is ", kRefusal)};
   if (found.empty()) return Error{ErrorCode::kNotFound, Cat(Printable(name), ": no such file")};
   return ReadFound(found, max_bytes);
 }

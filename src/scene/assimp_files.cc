@@ -69,10 +69,7 @@ int64_t BlankLinesAndPoints(std::string& obj) {
 Assimp::IOStream* AssimpFiles::Open(const char* name, const char* mode) {
   if (std::strpbrk(mode, "wa+") != nullptr) return nullptr;
   auto bytes = read_(name);
-  if (!bytes) {
-    if (std::find(missing_->begin(), missing_->end(), name) == missing_->end()) missing_->emplace_back(name);
-    return nullptr;
-  }
+  if (!bytes) return nullptr;
   return new MemoryStream(*std::move(bytes));
 }
 

@@ -4,7 +4,7 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <vector>
+#include <utility>
 
 namespace anchorsplat {
 
@@ -14,8 +14,7 @@ using AssimpFileReader = std::function<std::optional<std::string>(const std::str
 // Files as assimp opens them, read-only and in memory, so that the same code reads folders and archives.
 class AssimpFiles : public Assimp::IOSystem {
  public:
-  // Names that were opened in vain go to `missing`, each once.
-  AssimpFiles(AssimpFileReader read, std::vector<std::string>* missing) : read_(std::move(read)), missing_(missing) {}
+  explicit AssimpFiles(AssimpFileReader read) : read_(std::move(read)) {}
 
   bool Exists(const char* name) const override { return read_(name).has_value(); }
   char getOsSeparator() const override { return '/'; }
@@ -24,7 +23,6 @@ class AssimpFiles : public Assimp::IOSystem {
 
  private:
   AssimpFileReader read_;
-  std::vector<std::string>* missing_;
 };
 
 // Makes blank what is no face in an OBJ file: line elements (`l`), points (`p`), and the statements whose names begin

@@ -226,8 +226,7 @@ void AppendInstance(const Instance& instance, const Materials& materials, RawSce
 RawScene ImportWithAssimp(const AssimpFileReader& read, const std::string& name, const std::string& ending,
                           const MeshLimits& limits) {
   Assimp::Importer importer;
-  std::vector<std::string> missing;
-  importer.SetIOHandler(new AssimpFiles(read, &missing));  // owned by the importer
+  importer.SetIOHandler(new AssimpFiles(read));  // owned by the importer
   // Subdivision surfaces grow with a power of a number in the file; splitting by back faces changes nothing for us.
   importer.SetPropertyBool(AI_CONFIG_IMPORT_AC_EVAL_SUBDIVISION, false);
   importer.SetPropertyBool(AI_CONFIG_IMPORT_AC_SEPARATE_BFCULL, false);
@@ -257,10 +256,6 @@ RawScene ImportWithAssimp(const AssimpFileReader& read, const std::string& name,
   if (out.corners.positions.empty()) throw std::runtime_error("has no triangle");
   if (!out.corners.has_uvs) out.corners.uvs.clear();
   if (!out.corners.has_colors) out.corners.colors.clear();
-  // Whatever else assimp tries is a guess of its own.
-  for (std::string& file : missing) {
-    if (file.ends_with(".mtl")) out.missing_libraries.push_back(std::move(file));
-  }
   return out;
 }
 

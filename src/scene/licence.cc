@@ -71,6 +71,62 @@ std::string FromName(std::string_view rest) {
   return id + "-" + version + (rest.starts_with(" united states") ? "-US" : "");
 }
 
+// What follows "cc by".
+std::string FromShortName(std::string_view rest) {
+  std::string id = "CC-BY";
+  if (Eat(rest, " nc")) id += "-NC";
+  if (Eat(rest, " nd")) id += "-ND";
+  if (Eat(rest, " sa")) id += "-SA";
+  if (!Eat(rest, " ")) return {};
+  const std::string version = EatVersion(rest);
+  return version.empty() ? std::string() : id + "-" + version;
+}
+
+// What follows "gnu general public license" or "gpl": a version nearby and whether later ones will do.
+std::string FromGnu(std::string_view rest, std::string_view family) {
+  // "… as published by the Free Software Foundation; either version 2 of the License, or (at your option) any later".
+  constexpr size_t kReach = 160;
+  std::string_view beside = rest;
+  (void)Eat(beside, " ");
+  (void)Eat(beside, "v");
+  if (!beside.empty() && beside[0] >= '1' && beside[0] <= '3') {
+    rest = beside;
+  } else if (const size_t word = rest.substr(0, kReach).find("version "); word != std::string_view::npos) {
+    rest.remove_prefix(word + 8);
+  }
+  if (rest.empty() || rest[0] < '1' || rest[0] > '3' || (rest.size() > 1 && rest[1] >= '0' && rest[1] <= '9'))
+    return {};
+  std::string version{rest[0]};
+  rest.remove_prefix(1);
+  if (rest.size() >= 2 && rest[0] == '.' && rest[1] >= '0' && rest[1] <= '9') {
+    version += rest.substr(0, 2);
+    rest.remove_prefix(2);
+  } else {
+    version += ".0";
+  }
+  const std::string id = std::string(family) + "-" + version;
+  const std::string_view near = rest.substr(0, 80);
+  if (rest.starts_with("+") || rest.starts_with(" or later") || rest.starts_with(" or newer") ||
+      near.find("any later version") != std::string_view::npos) {
+    return id + "-or-later";
+  }
+  return id + (rest.starts_with(" only") || rest.starts_with(" of the license") ? "-only" : "");
+}
+
+std::string FromGpl(std::string_view rest) { return FromGnu(rest, "GPL"); }
+std::string FromLgpl(std::string_view rest) { return FromGnu(rest, "LGPL"); }
+std::string FromAgpl(std::string_view rest) { return FromGnu(rest, "AGPL"); }
+
+// What follows "apache license".
+std::string FromApache(std::string_view rest) {
+  return rest.substr(0, 20).find("2.0") != std::string_view::npos ? "Apache-2.0" : "";
+}
+
+// What follows the first words of the BSD licences.
+std::string FromBsd(std::string_view rest) {
+  return rest.substr(0, 2000).find("neither the name") != std::string_view::npos ? "BSD-3-Clause" : "BSD-2-Clause";
+}
+
 }  // namespace
 
 std::string SpdxIdentifier(std::string_view text) {
@@ -87,13 +143,29 @@ std::string SpdxIdentifier(std::string_view text) {
                                                                       "creative commons zero", "cc0", "cc 0"}) {
     found(FindWords(normal, words), "CC0-1.0");
   }
+  for (const std::string_view words : std::array<std::string_view, 4>{
+           "mit license", "license: mit", "license: expat",
+           "permission is hereby granted, free of charge, to any person obtaining a copy of this software"}) {
+    found(FindWords(normal, words), "MIT");
+  }
   const auto search = [&](std::string_view prefix, std::string (*read)(std::string_view)) {
     for (size_t at = normal.find(prefix); at < first; at = normal.find(prefix, at + 1)) {
+      if (at > 0 && IsWordCharacter(normal[at - 1])) continue;  // "lgpl" is no "gpl"
       found(at, read(std::string_view(normal).substr(at + prefix.size())));
     }
   };
   search("creativecommons.org/licenses/by", FromAddress);
   search("creative commons attribution", FromName);
+  search("cc by", FromShortName);
+  search("gnu general public license", FromGpl);
+  search("gpl", FromGpl);
+  search("gnu lesser general public license", FromLgpl);
+  search("lgpl", FromLgpl);
+  search("gnu affero general public license", FromAgpl);
+  search("agpl", FromAgpl);
+  search("apache license", FromApache);
+  search("apache 2.0", [](std::string_view) { return std::string("Apache-2.0"); });
+  search("redistribution and use in source and binary forms", FromBsd);
   return id;
 }
 

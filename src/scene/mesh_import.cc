@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <new>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -15,6 +16,7 @@
 #include "scene/assimp_import.h"
 #include "scene/imported_materials.h"
 #include "scene/isolated_process.h"
+#include "scene/obj_materials.h"
 #include "scene/raw_scene.h"
 #include "scene/smooth_normals.h"
 #include "scene/vertex_unifier.h"
@@ -57,26 +59,53 @@ class FileDesk {
   Status ReadMesh(const std::string& name) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(bytes_, source_.Read(name, limits_.max_file_bytes));
     name_ = name;
-    if (Ending(name) == ".obj") lines_and_points_ = BlankLinesAndPoints(bytes_);
+    if (Ending(name) == ".obj") {
+      lines_and_points_ = BlankLinesAndPoints(bytes_);
+      material_names_ = ReadObjMaterialNames(bytes_);
+    }
     if (Ending(name) == ".ply") return CheckPly(bytes_);
     return {};
   }
-  std::optional<std::string> Read(const std::string& name) const {
+  std::optional<std::string> Read(const std::string& name) {
     if (name == name_) return bytes_;
     auto bytes = source_.Read(name, limits_.max_file_bytes);
+    if (bytes.ok() && Ending(name) == ".mtl") AddDefinedMaterials(*bytes, defined_);
     return bytes.ok() ? std::optional(*std::move(bytes)) : std::nullopt;
   }
   int64_t lines_and_points() const { return lines_and_points_; }
+
+  // What an OBJ file names in vain. assimp makes a grey material of a name it does not know and says nothing, and for a
+  // library that is missing it tries a name of its own, which is nobody's mistake.
+  void WarnOfMaterials(std::vector<std::string>& warnings) const {
+    for (const std::string& library : material_names_.libraries) {
+      if (source_.Has(library)) continue;
+      warnings.push_back(
+          Cat("material library \"", Printable(library), "\" is ", source_.Refuses(library) ? kRefusal : "missing"));
+    }
+    int64_t unknown = 0;
+    std::string list;
+    constexpr int64_t kMostNames = 10;  // a file may have thousands
+    for (const std::string& name : material_names_.used) {
+      if (defined_.count(name) == 0 && ++unknown <= kMostNames)
+        list += Cat(unknown > 1 ? ", " : "", '"', Printable(name), '"');
+    }
+    if (unknown == 0) return;
+    if (unknown > kMostNames) list += Cat(" and ", unknown - kMostNames, " more");
+    warnings.push_back(Cat(unknown == 1 ? "material " : "materials ", list, unknown == 1 ? " is" : " are",
+                           " in no material library: grey"));
+  }
 
  private:
   const AssetSource& source_;
   const MeshLimits& limits_;
   std::string name_, bytes_;
+  ObjMaterialNames material_names_;
+  std::set<std::string> defined_;
   int64_t lines_and_points_ = 0;
 };
 
 // assimp in a process of its own: 5.2 crashes, asserts or never ends on damaged files of every format but STL.
-Result<RawScene> ReadScene(const FileDesk& desk, const std::string& name, const MeshReadOptions& options) {
+Result<RawScene> ReadScene(FileDesk& desk, const std::string& name, const MeshReadOptions& options) {
   const std::string ending = Ending(name);
   if (!options.isolated) {
     return ImportWithAssimp([&](const std::string& file) { return desk.Read(file); }, name, ending, options.limits);
@@ -114,9 +143,7 @@ Result<ImportedMesh> Import(const AssetSource& source, const std::string& name, 
   ImportedMesh out;
   FillSmoothNormals(scene.corners.positions, options.smoothing_angle, scene.corners.normals);
   out.mesh = UnifyVertices(scene.corners);
-  for (const std::string& library : scene.missing_libraries) {
-    out.warnings.push_back(Cat("material library \"", Printable(library), "\" is missing"));
-  }
+  desk.WarnOfMaterials(out.warnings);
   LoadMaterials(scene, source, Ending(name), options.limits, out.mesh, out.warnings);
   RemoveUnusedMaterials(out.mesh);
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(out.mesh));

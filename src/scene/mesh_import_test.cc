@@ -104,7 +104,22 @@ TEST(MeshImport, NamesWhatIsMissing) {
 
   assets.files.erase("square.mtl");
   EXPECT_EQ(Import(assets, "square.obj").mesh.triangles.size(), 2u);
-  EXPECT_THAT(Import(assets, "square.obj").warnings, ElementsAre(HasSubstr("square.mtl")));
+  EXPECT_THAT(Import(assets, "square.obj").warnings, ElementsAre(HasSubstr("square.mtl"), HasSubstr("painted")));
+}
+
+TEST(MeshImport, NamesMaterialsThatNoLibraryDefines) {
+  const std::string face = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\nusemtl dark green\nf 1 2 3\n";
+  MapAssets assets;
+  assets.files = {{"a.obj", face}};  // and names no library, so that none is missing
+  EXPECT_THAT(Import(assets, "a.obj").warnings,
+              ElementsAre("materials \"red\", \"dark green\" are in no material library: grey"));
+  assets.files = {
+      {"a.obj", "mtllib a.mtl\nmtllib b.mtl\n" + face}, {"a.mtl", "newmtl red\n"}, {"b.mtl", "newmtl blue\n"}};
+  EXPECT_THAT(Import(assets, "a.obj").warnings, ElementsAre("material \"dark green\" is in no material library: grey"));
+  std::string many;
+  for (int i = 0; i < 30; ++i) many += "usemtl m" + std::to_string(i) + "\nf 1 2 3\n";
+  assets.files["a.obj"] += many;
+  EXPECT_THAT(Import(assets, "a.obj").warnings, ElementsAre(HasSubstr("and 21 more")));
 }
 
 TEST(MeshImport, FindsPicturesBesideTheMeshWhateverTheirPathSays) {

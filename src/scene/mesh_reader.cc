@@ -50,7 +50,10 @@ void FindLicenceBeside(const fs::path& path, MeshOrigin& origin) {
        it.increment(error)) {
     const std::string name = SmallLetters(it->path().filename().string());
     const std::string ending = fs::path(name).extension().string();
-    if (name.find("licen") != std::string::npos && (ending == ".txt" || ending == ".html" || ending == ".md")) {
+    const bool named = name.find("licen") != std::string::npos || name.find("copying") != std::string::npos;
+    const bool text = ending.empty() || ending == ".txt" || ending == ".html" || ending == ".md";
+    std::error_code ignored;
+    if (named && text && it->is_regular_file(ignored)) {
       candidates.push_back(it->path());
     }
   }
@@ -63,6 +66,10 @@ void FindLicenceBeside(const fs::path& path, MeshOrigin& origin) {
     origin.licence_source = candidate.filename().string();
     return;
   }
+  if (candidates.empty()) return;
+  // Something is said, though not to us.
+  origin.licence_source = candidates.front().filename().string();
+  origin.licence = Cat("licence not recognised, see ", Printable(origin.licence_source));
 }
 
 }  // namespace

@@ -9,8 +9,9 @@
 namespace anchorsplat {
 
 // Reads a mesh by its address: a file's path (mesh_import.h lists the formats), or an object of a furniture library,
-// "catalog.sh3f#barrel" (furniture_catalog.h). A file's licence is that of a licence file beside it, if it names one
-// (a name with "licen" in it, .txt, .html or .md); its name is the file's.
+// "catalog.sh3f#barrel" (furniture_catalog.h). A file's licence is that of a licence file beside it (a name with
+// "licen" or "copying" in it, without ending or .txt, .html, .md), the first that names one (licence.h); where none
+// does, the licence says so and which file to read. The object's name is the file's.
 //
 // Errors: kNotFound: no such file or object; otherwise as ImportMesh and FurnitureCatalog::Open.
 Result<ImportedMesh> ReadMesh(const std::string& address, const MeshReadOptions& options = {});

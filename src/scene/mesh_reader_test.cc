@@ -32,6 +32,38 @@ TEST(MeshReader, ReadsAFileWithWhatLiesAroundIt) {
   EXPECT_EQ(mesh->origin.licence_source, "LICENSE.txt");
 }
 
+TEST(MeshReader, LicenceFilesNeedNoEnding) {
+  TestFolder folder;
+  std::ofstream(folder / "box.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  const std::string box = (folder / "box.obj").string();
+  EXPECT_EQ(ReadMesh(box)->origin.licence, "");
+  std::filesystem::create_directories(folder / "licences");
+  std::ofstream(folder / "LICENSE") << "Do what the author would have liked.";
+  EXPECT_EQ(ReadMesh(box)->origin.licence, "licence not recognised, see LICENSE");
+  EXPECT_EQ(ReadMesh(box)->origin.licence_source, "LICENSE");
+  std::ofstream(folder / "COPYING") << "GNU GENERAL PUBLIC LICENSE\n   Version 2, June 1991\n";
+  EXPECT_EQ(ReadMesh(box)->origin.licence, "GPL-2.0");
+  EXPECT_EQ(ReadMesh(box)->origin.licence_source, "COPYING");
+}
+
+TEST(MeshReader, FilesFarFromTheMeshAreNotRead) {
+  TestFolder folder;
+  std::filesystem::create_directories(folder / "a/b/models");
+  std::ofstream(folder / "secret.mtl") << "newmtl m\nKd 1 0 0\nmap_Kd ../../secret.png\n";
+  std::ofstream(folder / "a/b/near.mtl") << "newmtl n\nKd 0 1 0\nmap_Kd x/../../../far.png\n";
+  ASSERT_TRUE(WritePng(folder / "a/far.png", Image(2, 2, 3)).ok());
+  std::ofstream(folder / "a/b/models/box.obj") << "mtllib ../../../secret.mtl\nmtllib ../near.mtl\nv 0 0 0\nv 1 0 0\n"
+                                                  "v 0 1 0\nv 1 1 0\nusemtl m\nf 1 2 3\nusemtl n\nf 2 4 3\n";
+  const auto mesh = ReadMesh((folder / "a/b/models/box.obj").string());
+  ASSERT_TRUE(mesh.ok()) << mesh.error().message;
+  const std::string all = ::testing::PrintToString(mesh->warnings);
+  EXPECT_EQ(mesh->warnings.size(), 3u) << all;
+  EXPECT_NE(all.find("material library \\\"../../../secret.mtl\\\" is not looked for"), std::string::npos) << all;
+  EXPECT_NE(all.find("material \\\"m\\\" is in no material library"), std::string::npos) << all;
+  EXPECT_NE(all.find("x/../../../far.png is not looked for"), std::string::npos) << all;
+  EXPECT_TRUE(mesh->mesh.textures.empty());
+}
+
 TEST(MeshReader, NoFileNoMesh) {
   TestFolder folder;
   EXPECT_EQ(ReadMesh((folder / "a.obj").string()).error().code, ErrorCode::kNotFound);
@@ -43,6 +75,8 @@ TEST(MeshReader, ShortNames) {
   EXPECT_EQ(MeshShortName("models/barrel.obj"), "barrel");
   EXPECT_EQ(MeshShortName("a.sh3f#barrel"), "barrel");
   EXPECT_EQ(MeshShortName("a.sh3f#lib/barrel/barrel.obj"), "barrel");
+  EXPECT_EQ(MeshShortName("a.sh3f#chair.v2"), "chair.v2");
+  EXPECT_EQ(MeshShortName("lib/a.b.SH3F"), "a.b");
   EXPECT_TRUE(IsMeshAddress("A.SH3F#x"));
   EXPECT_TRUE(IsMeshAddress("a.GLB"));
   EXPECT_FALSE(IsMeshAddress("a.splat"));

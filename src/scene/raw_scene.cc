@@ -134,8 +134,6 @@ std::string Pack(const RawScene& scene) {
     out.Number(p.height);
     out.Text(p.bytes);
   }
-  out.Number(uint64_t{scene.missing_libraries.size()});
-  for (const std::string& name : scene.missing_libraries) out.Text(name);
   out.Number(scene.degenerate);
   out.Number(scene.not_finite);
   out.Number(scene.not_triangles);
@@ -172,7 +170,6 @@ Result<RawScene> Unpack(std::string_view bytes) {
     in.Number(p.height);
     in.Text(p.bytes);
   }
-  for (uint64_t left = in.Count(); left > 0 && in.ok(); --left) in.Text(scene.missing_libraries.emplace_back());
   in.Number(scene.degenerate);
   in.Number(scene.not_finite);
   in.Number(scene.not_triangles);

@@ -35,7 +35,6 @@ struct RawScene {
   MeshCorners corners;                 // finite; no triangle without area; zero normals where the file gives none
   std::vector<RawMaterial> materials;  // at least one
   std::vector<EmbeddedPicture> pictures;
-  std::vector<std::string> missing_libraries;  // names of .mtl files
   int64_t degenerate = 0;
   int64_t not_finite = 0;
   int64_t not_triangles = 0;

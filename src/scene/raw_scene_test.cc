@@ -17,7 +17,6 @@ RawScene Example() {
   scene.materials.resize(2);
   scene.materials[1] = {"paint", true, {1, 0.5f, 0}, 0.75f, false, true, "a.png", "b.png"};
   scene.pictures = {{"inside", 1, 2, std::string(8, 'x')}, {"file", 9, 0, "bytes"}};
-  scene.missing_libraries = {"a.mtl"};
   scene.degenerate = 3;
   scene.not_triangles = 5;
   scene.has_normals = true;

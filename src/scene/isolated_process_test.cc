@@ -12,6 +12,7 @@
 namespace anchorsplat {
 namespace {
 
+using ::testing::AnyOf;
 using ::testing::HasSubstr;
 
 std::string NoAnswer(std::string_view) { return {}; }
@@ -62,6 +63,7 @@ TEST(IsolatedProcess, WhateverHappensThereIsAnErrorHere) {
 TEST(IsolatedProcess, EndlessWorkEnds) {
   IsolationLimits limits;
   limits.max_cpu_seconds = 1;
+  // Of processor time; on a machine so busy that it gets less in ten seconds it is ended for its silence.
   EXPECT_THAT(Failure(
                   [](const AskParent&) -> std::string {
                     volatile bool forever = true;
@@ -70,7 +72,7 @@ TEST(IsolatedProcess, EndlessWorkEnds) {
                     return "";
                   },
                   limits),
-              HasSubstr("took more than 1 s"));
+              AnyOf(HasSubstr("took more than 1 s"), HasSubstr("no sign of life")));
 }
 
 TEST(IsolatedProcess, LongMessagesAreNotTaken) {

@@ -2,8 +2,6 @@
 
 #include <vector>
 
-#include "perceptual/lpips_weights.h"
-
 namespace anchorsplat {
 
 namespace {
@@ -22,9 +20,13 @@ torch::Tensor Part(const torch::Tensor& picture, const PixelBox& box) {
 
 Result<PerceptualObjective> PerceptualObjective::Open(LpipsNet net) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const LpipsWeights weights, ReadLpipsWeights(net, LpipsFolder()));
+  return Make(weights);
+}
+
+Result<PerceptualObjective> PerceptualObjective::Make(const LpipsWeights& weights) {
   std::vector<std::span<const float>> tensors;
   for (const Buffer<float>& tensor : weights.tensors) tensors.emplace_back(tensor.data(), tensor.size());
-  ANCHORSPLAT_ASSIGN_OR_RETURN(LpipsNetwork network, LpipsNetwork::Make(net, tensors));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(LpipsNetwork network, LpipsNetwork::Make(weights.net, tensors));
   return PerceptualObjective(std::move(network));
 }
 

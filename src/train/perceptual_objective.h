@@ -5,6 +5,7 @@
 #include <span>
 
 #include "core/result.h"
+#include "perceptual/lpips_weights.h"
 #include "perceptual/torch/lpips_network.h"
 #include "train/photometric_objective.h"
 
@@ -15,6 +16,7 @@ class PerceptualObjective {
  public:
   // Errors: those of ReadLpipsWeights, looked for in LpipsFolder(): kNotFound says what to run.
   static Result<PerceptualObjective> Open(LpipsNet net);
+  static Result<PerceptualObjective> Make(const LpipsWeights& weights);
 
   // Differentiable in `rendered`; 0 when no view has a part to look at. Values above 1 count as 1.
   torch::Tensor operator()(std::span<const torch::Tensor> rendered, std::span<const TrueView> truth) const;

@@ -1,0 +1,101 @@
+#include "train/true_views.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "dataset/small_dataset_test.h"
+#include "formats/test_folder.h"
+#include "train/training_object.h"
+
+namespace anchorsplat {
+namespace {
+
+namespace fs = std::filesystem;
+
+void ExpectSame(const TrueView& a, const TrueView& b) {
+  EXPECT_EQ(a.picture.pixels, b.picture.pixels);
+  EXPECT_EQ(a.object, b.object);
+  EXPECT_EQ(a.background, b.background);
+}
+
+TEST(TrueViews, RenderedOnceTheyAreThoseThatWouldHaveBeenStored) {
+  const TestFolder folder;
+  ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
+  job.settings.views.background = {0.25f, 0, 1};
+  ASSERT_TRUE(BuildObject(job, folder / "stored", nullptr).ok());
+  job.settings.views.store_high = false;
+  ASSERT_TRUE(BuildObject(job, folder / "demand", nullptr).ok());
+  const SceneEntry stored_entry{"tetra", folder / "stored/tetra"}, entry{"tetra", folder / "demand/tetra"};
+  const auto stored_scene = Scene::Open(stored_entry), scene = Scene::Open(entry);
+  ASSERT_TRUE(stored_scene.ok() && scene.ok());
+  const TrueViews stored(stored_entry, *stored_scene, folder / "cache"), demand(entry, *scene, folder / "cache");
+  const auto expected = stored.Load(3), first = demand.Load(3);
+  ASSERT_TRUE(expected.ok() && first.ok()) << (first.ok() ? "" : first.error().message);
+  ExpectSame(*expected, *first);
+  EXPECT_EQ(first->background[2], 1);
+  EXPECT_EQ(first->picture.at(2, 0, 0), 1);
+  bool cut = false;
+  for (size_t view = 0; view < 9; ++view) {
+    const auto a = stored.Load(view), b = demand.Load(view), c = demand.Load(view);
+    ASSERT_TRUE(a.ok() && b.ok() && c.ok());
+    ExpectSame(*a, *b);
+    ExpectSame(*a, *c);
+    cut = cut || a->object.x0 > 0 || a->object.y0 > 0;
+  }
+  EXPECT_TRUE(cut) << "no view shows whether the parts lie where they should";
+
+  // From the folder now: the mesh is not needed any more.
+  fs::remove(entry.folder / kMeshName);
+  const TrueViews again(entry, *scene, folder / "cache");
+  EXPECT_FALSE(again.Load(3).ok()) << "another mesh, or none: another object";
+  const auto second = demand.Load(3);
+  ASSERT_TRUE(second.ok()) << second.error().message;
+  ExpectSame(*expected, *second);
+
+  // A damaged file is an error that names it.
+  for (const auto& file : fs::recursive_directory_iterator(folder / "cache")) {
+    if (file.is_regular_file()) std::ofstream(file.path()) << "PNG";
+  }
+  const auto damaged = demand.Load(3);
+  ASSERT_FALSE(damaged.ok());
+  EXPECT_NE(damaged.error().message.find("003_"), std::string::npos) << damaged.error().message;
+}
+
+TEST(TrueViews, TheObjectsBoxOfPicturesWithAndWithoutAlpha) {
+  Image opaque(8, 6, 3);
+  std::fill(opaque.pixels.begin(), opaque.pixels.end(), 0.5f);
+  EXPECT_TRUE(ObjectBox(opaque, {0.5f, 0.5f, 0.5f}).empty());
+  opaque.at(1, 2, 3) = 0;
+  opaque.at(0, 4, 5) = 1;
+  EXPECT_EQ(ObjectBox(opaque, {0.5f, 0.5f, 0.5f}), (PixelBox{3, 2, 6, 5}));
+  Image clear(8, 6, 4);
+  std::fill(clear.pixels.begin(), clear.pixels.end(), 0.0f);
+  clear.at(3, 5, 0) = 0.1f;  // black, but there
+  EXPECT_EQ(ObjectBox(clear, {0, 0, 0}), (PixelBox{0, 5, 1, 6}));
+}
+
+TEST(TrainingObject, HeldOutViewsAreNeverTrainedOn) {
+  const TestFolder folder;
+  ASSERT_TRUE(BuildObject(SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra"), folder / "set", nullptr).ok());
+  const SceneEntry entry{"tetra", folder / "set/tetra"};
+  const auto all = OpenTrainingObject(entry, 0, folder / "cache"),
+             some = OpenTrainingObject(entry, 3, folder / "cache");
+  ASSERT_TRUE(all.ok() && some.ok());
+  EXPECT_EQ((*all)->validation, (std::vector<size_t>{0, 8}));
+  EXPECT_EQ((*all)->training, (std::vector<size_t>{1, 2, 3, 4, 5, 6, 7}));
+  EXPECT_EQ((*some)->training.size(), 3u);
+  for (const size_t view : (*some)->training) EXPECT_EQ(view % 8 == 0, false);
+  EXPECT_EQ((*all)->upscale, 2);
+  EXPECT_EQ((*all)->pixel_sizes.size(), static_cast<size_t>((*all)->cloud.size()));
+
+  ObjectStore store({entry, entry, entry}, 2, folder / "cache", 2);
+  const auto kept = store.Get(0);
+  ASSERT_TRUE(kept.ok());
+  EXPECT_EQ(*store.Get(0), *kept);
+  ASSERT_TRUE(store.Get(1).ok() && store.Get(2).ok());
+  EXPECT_NE(*store.Get(0), *kept) << "only two are kept";
+}
+
+}  // namespace
+}  // namespace anchorsplat

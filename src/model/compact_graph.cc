@@ -48,6 +48,15 @@ void FindFrame(const GaussianCloud& cloud, int64_t i, CompactGraph& graph) {
   }
 }
 
+void FindFrames(const GaussianCloud& cloud, CompactGraph& graph) {
+  graph.axes.resize(static_cast<size_t>(9 * graph.count));
+  graph.stored_axis.resize(static_cast<size_t>(3 * graph.count));
+  graph.sidedness.resize(static_cast<size_t>(3 * graph.count));
+  ParallelFor(0, graph.count, 512, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) FindFrame(cloud, i, graph);
+  });
+}
+
 void FindNearest(const GaussianCloud& cloud, CompactGraph& graph) {
   const KdTree tree(cloud.means);
   ParallelFor(0, graph.count, 512, [&](int64_t begin, int64_t end) {
@@ -109,13 +118,17 @@ CompactGraph BuildCompactGraph(const GaussianCloud& cloud, int64_t neighbours, C
   graph.count = n;
   graph.neighbours = std::clamp<int64_t>(n - 1, 0, neighbours);
   graph.index.resize(static_cast<size_t>(n * graph.neighbours));
-  graph.axes.resize(static_cast<size_t>(9 * n));
-  graph.stored_axis.resize(static_cast<size_t>(3 * n));
-  graph.sidedness.resize(static_cast<size_t>(3 * n));
   context == CompactContext::kPatches ? FindPatches(cloud, graph) : FindNearest(cloud, graph);
-  ParallelFor(0, n, 512, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) FindFrame(cloud, i, graph);
-  });
+  FindFrames(cloud, graph);
+  return graph;
+}
+
+CompactGraph GraphOfNeighbours(const GaussianCloud& cloud, int64_t neighbours, Buffer<int32_t> index) {
+  CompactGraph graph;
+  graph.count = cloud.size();
+  graph.neighbours = neighbours;
+  graph.index = std::move(index);
+  FindFrames(cloud, graph);
   return graph;
 }
 

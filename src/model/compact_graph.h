@@ -32,4 +32,8 @@ struct CompactGraph {
 CompactGraph BuildCompactGraph(const GaussianCloud& cloud, int64_t neighbours,
                                CompactContext context = CompactContext::kNearest);
 
+// The same where the neighbours are known: `index` [N,m]. A neighbour in a Gaussian's own place counts as none for its
+// frame.
+CompactGraph GraphOfNeighbours(const GaussianCloud& cloud, int64_t neighbours, Buffer<int32_t> index);
+
 }  // namespace anchorsplat

@@ -7,8 +7,10 @@
 #include "core/random.h"
 #include "core/text.h"
 #include "dataset/object_name.h"
+#include "enhance/filter.h"
 #include "fit/stopwatch.h"
 #include "train/augmentation.h"
+#include "train/object_part.h"
 
 namespace anchorsplat {
 
@@ -28,32 +30,84 @@ void PartialShuffle(std::vector<Value>& values, size_t count, Random& random) {
   }
 }
 
-// A window of at most `side` pixels a side inside of a picture, around a random pixel of the object.
-PixelBox RandomWindow(int width, int height, const PixelBox& object, int side, Random& random) {
-  const int w = std::min(side, width), h = std::min(side, height);
-  const PixelBox where = object.empty() ? PixelBox{0, 0, width, height} : object;
-  const auto place = [&](int begin, int end, int extent, int limit) {
-    const int center = begin + static_cast<int>(random.Below(end - begin));
-    return std::clamp(center - extent / 2, 0, limit - extent);
-  };
-  const int x = place(where.x0, where.x1, w, width), y = place(where.y0, where.y1, h, height);
-  return {x, y, x + w, y + h};
+// Splat and views of a sample before they are changed.
+struct Chosen {
+  AugmentedScene scene;
+  std::shared_ptr<const SplatPart> part;  // null: the whole splat
+};
+
+// Whole views or random windows of them, and the whole splat.
+Result<Chosen> ChooseWhole(const TrainConfig& config, const SamplePlan& plan, const TrainingObject& object,
+                           Random& random) {
+  Chosen chosen;
+  AugmentedScene& scene = chosen.scene;
+  for (const size_t view : plan.views) {
+    const Camera& camera = object.views[view];
+    if (config.data.crop == 0) {
+      scene.cameras.push_back(camera);
+      ANCHORSPLAT_ASSIGN_OR_RETURN(scene.truth.emplace_back(), object.truth->Load(view));
+      continue;
+    }
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelBox box, object.truth->Box(view));
+    const PixelBox window =
+        RandomWindow(camera.intrinsics.width, camera.intrinsics.height, box, config.data.crop, random);
+    scene.cameras.push_back(Crop(camera, window));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(scene.truth.emplace_back(), object.truth->LoadWindow(view, window));
+  }
+  scene.cloud = object.cloud;
+  scene.pixel_sizes = object.pixel_sizes;
+  return chosen;
 }
 
-void CropView(const PixelBox& window, Camera& camera, TrueView& view) {
-  camera = Crop(camera, window);
-  Image part(window.x1 - window.x0, window.y1 - window.y0, 3);
-  for (int c = 0; c < 3; ++c) {
-    for (int y = 0; y < part.height; ++y) {
-      const float* row = view.picture.channel(c) + int64_t{y + window.y0} * view.picture.width;
-      std::copy(row + window.x0, row + window.x1, part.channel(c) + int64_t{y} * part.width);
-    }
+// Windows around a spot, and the splat there: first the rows that the network sees, then those that are drawn as they
+// are, which are filtered already: what changes the scene afterwards changes them alike.
+Result<Chosen> ChoosePartOf(const TrainConfig& config, const SamplePlan& plan, TrainingObject& object,
+                            TrainableNetwork& network, Random& random) {
+  if (!object.survey) {
+    auto survey = network.Survey(MakeInput(object.cloud, object.pixel_sizes, object.upscale, torch::kCPU));
+    if (!survey.ok()) return Error{survey.error().code, Cat("data.part: ", survey.error().message)};
+    object.survey = *std::move(survey);
   }
-  PixelBox& o = view.object;
-  o = {std::max(0, o.x0 - window.x0), std::max(0, o.y0 - window.y0), std::min(part.width, o.x1 - window.x0),
-       std::min(part.height, o.y1 - window.y0)};
-  if (o.empty()) o = {};
-  view.picture = std::move(part);
+  if (!object.seen) {
+    ANCHORSPLAT_RETURN_IF_ERROR(object.truth->Make(object.training));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(SeenGaussians seen,
+                                 SeenGaussians::Look(object.cloud, object.low_views, object.training));
+    object.seen = std::make_shared<const SeenGaussians>(std::move(seen));
+  }
+  const ObjectPart where = ChoosePart(
+      object.cloud, object.views, plan.views, *object.seen,
+      {.views = static_cast<size_t>(config.data.views_per_step), .side = config.data.crop, .most = config.data.part},
+      random);
+  Chosen chosen;
+  AugmentedScene& scene = chosen.scene;
+  for (size_t v = 0; v < where.views.size(); ++v) {
+    scene.cameras.push_back(Crop(object.views[where.views[v]], where.windows[v]));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(scene.truth.emplace_back(),
+                                 object.truth->LoadWindow(where.views[v], where.windows[v]));
+  }
+  const auto part = std::make_shared<const SplatPart>(network.PartOf(object.survey, where.wanted));
+  const auto sizes_of = [&](const std::vector<int64_t>& rows) {
+    Buffer<float> sizes;
+    for (const int64_t row : rows) sizes.push_back(object.pixel_sizes[static_cast<size_t>(row)]);
+    return sizes;
+  };
+  ANCHORSPLAT_ASSIGN_OR_RETURN(scene.cloud, Subset(object.cloud, part->rows));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud others, Subset(object.cloud, where.others));
+  scene.pixel_sizes = sizes_of(part->rows);
+  const Buffer<float> sizes = sizes_of(where.others);
+  if (!others.empty() && object.cloud.render_mode != RenderMode::kAntialiased) {
+    const auto grown = ApplyFilter(others, sizes, {.upscale = object.upscale, .strength = {}});
+    if (!grown.ok()) return grown.error();
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(Append(scene.cloud, others));
+  scene.pixel_sizes.insert(scene.pixel_sizes.end(), sizes.begin(), sizes.end());
+  chosen.part = part;
+  return chosen;
+}
+
+GaussianTensors Rows(const GaussianTensors& g, int64_t begin, int64_t end) {
+  const auto rows = [&](const torch::Tensor& t) { return t.narrow(0, begin, end - begin); };
+  return {rows(g.means), rows(g.log_scales), rows(g.quats), rows(g.opacity_logits), rows(g.sh)};
 }
 
 }  // namespace
@@ -72,7 +126,10 @@ SamplePlan PlanSample(const TrainConfig& config, int64_t index, size_t objects, 
   plan.object = PlannedObject(config.seed, index, objects);
   plan.seed = Stream(config.seed, "sample", index);
   plan.views = object.training;
-  const size_t count = std::min(plan.views.size(), static_cast<size_t>(config.data.views_per_step));
+  // Of a part's views only the first is certain: the others are those that show the same spot.
+  const size_t count = config.data.part > 0
+                           ? plan.views.size()
+                           : std::min(plan.views.size(), static_cast<size_t>(config.data.views_per_step));
   if (!config.data.fixed_views) {
     Random random(Stream(config.seed, "views", index));
     PartialShuffle(plan.views, count, random);
@@ -97,15 +154,11 @@ Result<TrainingSample> MakeSample(const TrainConfig& config, int64_t index, Obje
   Stopwatch watch;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto object, objects.Get(PlannedObject(config.seed, index, objects.size())));
   const SamplePlan plan = PlanSample(config, index, objects.size(), *object);
-  AugmentedScene scene;
-  for (const size_t view : plan.views) {
-    scene.cameras.push_back(object->views[view]);
-    ANCHORSPLAT_ASSIGN_OR_RETURN(TrueView truth, object->truth->Load(view));
-    scene.truth.push_back(std::move(truth));
-  }
-  scene.cloud = object->cloud;
-  scene.pixel_sizes = object->pixel_sizes;
   Random random(plan.seed);
+  auto made = config.data.part > 0 ? ChoosePartOf(config, plan, *object, network, random)
+                                   : ChooseWhole(config, plan, *object, random);
+  if (!made.ok()) return Error{made.error().code, Cat(object->name, ": ", made.error().message)};
+  AugmentedScene& scene = made->scene;
   Augment(config.augmentation, random, scene);
 
   TrainingSample sample;
@@ -113,8 +166,15 @@ Result<TrainingSample> MakeSample(const TrainConfig& config, int64_t index, Obje
   sample.render.mode = object->cloud.render_mode.value_or(RenderMode::kClassic);
   sample.render.background = scene.truth.empty() ? object->background : scene.truth[0].background;
   sample.input = MakeInput(scene.cloud, scene.pixel_sizes, object->upscale, device);
+  if (made->part) {
+    const auto seen = static_cast<int64_t>(made->part->rows.size());
+    sample.others = Rows(sample.input.gaussians, seen, scene.cloud.size()).To(torch::kCPU);
+    sample.input.gaussians = Rows(sample.input.gaussians, 0, seen);
+    sample.input.pixel_sizes = sample.input.pixel_sizes.narrow(0, 0, seen);
+    sample.input.part = made->part;
+  }
   // Tables of the splat as it is serve every step, unless p_LR, which they may depend on, moves.
-  const bool reusable = !config.augmentation.geometry() && config.augmentation.pixel_size_noise == 0 &&
+  const bool reusable = !made->part && !config.augmentation.geometry() && config.augmentation.pixel_size_noise == 0 &&
                         !config.augmentation.permute_colors && config.augmentation.gain == 0;
   if (reusable && object->prepared) {
     sample.input.prepared = object->prepared;
@@ -126,14 +186,8 @@ Result<TrainingSample> MakeSample(const TrainConfig& config, int64_t index, Obje
     sample.input.prepared = *std::move(prepared);
     if (reusable) object->prepared = sample.input.prepared;
   }
-  for (size_t v = 0; v < scene.cameras.size(); ++v) {
-    Camera& camera = scene.cameras[v];
-    TrueView& truth = scene.truth[v];
-    if (config.data.crop > 0) {
-      CropView(RandomWindow(camera.intrinsics.width, camera.intrinsics.height, truth.object, config.data.crop, random),
-               camera, truth);
-    }
-    if (config.loss.lpips > 0) {
+  if (config.loss.lpips > 0) {
+    for (TrueView& truth : scene.truth) {
       const int width = truth.picture.width, height = truth.picture.height;
       truth.perceptual = config.loss.lpips_crop == 0
                              ? PixelBox{0, 0, width, height}

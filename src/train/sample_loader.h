@@ -24,6 +24,9 @@ struct TrainingSample {
   NetworkInput input;           // prepared, on the network's device
   std::vector<Camera> cameras;  // crops where the configuration says so
   std::vector<TrueView> truth;
+  // Of a part: what shows in the views besides, as the filter makes it. Drawn after the network's Gaussians. Undefined
+  // tensors when there is nothing.
+  GaussianTensors others;
   RenderOptions render;
   double seconds = 0;  // it took to make
 };
@@ -32,7 +35,7 @@ struct TrainingSample {
 // index alone: a resumed training draws the same. Objects come in random order, all of them before any comes again.
 struct SamplePlan {
   size_t object = 0;
-  std::vector<size_t> views;  // of TrainingObject::views, all different
+  std::vector<size_t> views;  // of TrainingObject::views, all different; of a part all that training may see, shuffled
   uint64_t seed = 0;          // of augmentation and crops
 };
 size_t PlannedObject(uint64_t seed, int64_t index, size_t objects);

@@ -191,6 +191,7 @@ Status TakeData(TableReader table, DataConfig& data) {
   table.Int("scenes_per_step", 1, 1024, data.scenes_per_step);
   table.Int("views_per_step", 1, 1024, data.views_per_step);
   table.Int("crop", 0, 1 << 14, data.crop);
+  table.Int("part", 0, 1'000'000'000, data.part);
   table.Flag("fixed_views", data.fixed_views);
   table.Int("objects_in_memory", 1, 1'000'000, data.objects_in_memory);
   return table.Finish();
@@ -235,6 +236,10 @@ Result<TrainConfig> ConfigFrom(const std::string& file, const toml::table& root)
   ANCHORSPLAT_RETURN_IF_ERROR(TakeAugmentation(table.Table("augmentation"), config.augmentation));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeValidation(table.Table("validation"), config.validation));
   ANCHORSPLAT_RETURN_IF_ERROR(table.Finish());
+  if (config.data.part > 0 && config.augmentation.drop > 0) {
+    return Error{ErrorCode::kBadFile,
+                 Cat(file, ": data.part: not together with augmentation.drop, which changes who is whose neighbour")};
+  }
   return config;
 }
 
@@ -283,6 +288,7 @@ nlohmann::json Settings(const TrainConfig& c) {
                          {"data.scenes_per_step", c.data.scenes_per_step},
                          {"data.views_per_step", c.data.views_per_step},
                          {"data.crop", c.data.crop},
+                         {"data.part", c.data.part},
                          {"data.fixed_views", c.data.fixed_views},
                          {"augmentation.rotate", c.augmentation.rotate},
                          {"augmentation.mirror", c.augmentation.mirror},

@@ -44,7 +44,10 @@ struct DataConfig {
   int scenes_per_step = 1;    // per process
   int views_per_step = 2;     // of each scene
   int crop = 0;               // pixels a side of a random part of each view; 0: whole views
-  bool fixed_views = false;   // always the first of an object's views instead of random ones
+  // Most Gaussians of which a step makes copies; 0: all. Crops then show one spot from several sides, the network
+  // works on the Gaussians seen there and the rest is drawn filtered.
+  int64_t part = 0;
+  bool fixed_views = false;  // always the first of an object's views instead of random ones
   int objects_in_memory = 64;
 };
 

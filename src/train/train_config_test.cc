@@ -69,6 +69,8 @@ TEST(TrainConfig, ComplaintsNameFileLineAndKey) {
             "x.toml: line 2: loss.lpips_net: expected one of \"alex\", \"vgg\", \"squeeze\", not \"resnet\"");
   EXPECT_EQ(complaint("[optimizer.groups]\nmeans = \"fast\"\n"),
             "x.toml: line 2: optimizer.groups.means: expected a number from 0 to 10");
+  EXPECT_THAT(complaint("[data]\npart = 100\n[augmentation]\ndrop = 0.1\n"),
+              HasSubstr("x.toml: data.part: not together with augmentation.drop"));
   EXPECT_EQ(complaint("loss = 3\n"), "x.toml: line 1: loss: expected a table [loss]");
   EXPECT_THAT(complaint("steps = \n"), HasSubstr("x.toml: line 1: not TOML"));
   EXPECT_THAT(complaint("[network]\nwidths = [1, \"two\"]\n"), HasSubstr("line 2: network.widths: expected numbers"));

@@ -62,6 +62,13 @@ GaussianTensors InFloat(const GaussianTensors& g) {
   return {host(g.means), host(g.log_scales), host(g.quats), host(g.opacity_logits), host(g.sh)};
 }
 
+GaussianTensors Together(const GaussianTensors& a, const GaussianTensors& b) {
+  if (!b.means.defined() || b.size() == 0) return a;
+  const auto both = [](const torch::Tensor& x, const torch::Tensor& y) { return torch::cat({x, y}); };
+  return {both(a.means, b.means), both(a.log_scales, b.log_scales), both(a.quats, b.quats),
+          both(a.opacity_logits, b.opacity_logits), both(a.sh, b.sh)};
+}
+
 // Seconds by part of a step, and the loss's terms, added up between two lines of the log.
 struct Sums {
   int64_t steps = 0, views = 0;
@@ -223,7 +230,7 @@ Status Trainer::Look(SampleLoader& loader) {
     const Autocast autocast(config_.precision, device_);
     gaussians = network_->Forward(sample.input);
   }
-  gaussians = InFloat(gaussians);
+  gaussians = Together(InFloat(gaussians), sample.others);
   sums_.network += watch.Lap();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<RenderedView> views,
                                render_(gaussians, sample.cameras, sample.render));

@@ -178,6 +178,59 @@ views = 2
   EXPECT_EQ(report->skipped, 0);
 }
 
+constexpr const char* kParts = R"(
+log_every = 1
+checkpoint_every = 0
+[network]
+kind = "compact"
+copies = 2
+hidden = 16
+head_hidden = 16
+[loss]
+l1 = 1
+ssim = 0.2
+[optimizer]
+learning_rate = 1e-2
+clip = 1
+ema = 0.9
+[data]
+views_per_object = 6
+views_per_step = 3
+crop = 48
+part = 100
+[augmentation]
+mirror = true
+[validation]
+every = 0
+views = 2
+)";
+
+TEST(Trainer, PartsTeachTheWholeAndAreResumedExactly) {
+  const fs::path config = Set() / "parts.toml";
+  std::ofstream(config) << kParts;
+  TrainRequest whole = Request("part_whole", config), parts = Request("part_parts", config);
+  whole.steps = parts.steps = 80;
+  const auto report = Train(whole);
+  ASSERT_TRUE(report.ok()) << report.error().message;
+  EXPECT_EQ(report->skipped, 0);
+  const double before = Log(whole.out).front()["validation"]["model"]["psnr"].get<double>();
+  EXPECT_GT(report->model->psnr, before + 0.1);
+
+  std::atomic<bool> stop = false;
+  parts.stop = &stop;
+  const auto sink = SetLogSink(std::make_shared<StopAfter>(33, stop));
+  const auto first = Train(parts);
+  SetLogSink(sink);
+  ASSERT_TRUE(first.ok()) << first.error().message;
+  EXPECT_EQ(first->steps, 33);
+  stop = false;
+  parts.resume = true;
+  const auto second = Train(parts);
+  ASSERT_TRUE(second.ok()) << second.error().message;
+  ExpectSameTensors(whole.out / "checkpoint.safetensors", parts.out / "checkpoint.safetensors");
+  EXPECT_EQ(Timeless(Log(whole.out)), Timeless(Log(parts.out)));
+}
+
 TEST(Trainer, ResumedIsTheSameAsUninterrupted) {
   const fs::path config = Set().Config("resume.toml", kPlain);
   TrainRequest whole = Request("whole", config), parts = Request("parts", config);
@@ -234,6 +287,7 @@ TEST(Trainer, SaysWhatIsWrong) {
   EXPECT_THAT(error("[optimizer.groups]\nbackbon = 1e-3\n"),
               HasSubstr("bad.toml: optimizer.groups.backbon: the network \"anchorsplat\" has no such group; it has "
                         "backbone, features_dc"));
+  EXPECT_THAT(error("part = 100\n"), HasSubstr("data.part: this network sees a splat as a whole"));
   TrainRequest request = Request("bad", Set() / "bad.toml");
   std::ofstream(request.config) << "[network]\nkind = \"anchorsplat\"\ncopies = 0\n";
   EXPECT_THAT(Train(request).error().message,

@@ -55,6 +55,7 @@ Result<std::shared_ptr<TrainingObject>> OpenTrainingObject(const SceneEntry& ent
   object->name = scene.name();
   object->background = scene.background();
   object->views = scene.high_views();
+  object->low_views = scene.low_views();
   std::vector<int64_t> rows;
   for (int64_t i = 0; i < all.size(); ++i) {
     if (IsFinite(all, i)) rows.push_back(i);

@@ -11,6 +11,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "dataset/scene_reader.h"
+#include "train/seen_gaussians.h"
 #include "train/true_views.h"
 
 namespace anchorsplat {
@@ -22,11 +23,15 @@ struct TrainingObject {
   Buffer<float> pixel_sizes;       // [N] p_LR: the median over the low cameras that see a Gaussian, as eval's filter
   double upscale = 4;              // u: high pixels per low pixel
   std::vector<Camera> views;       // high resolution
+  std::vector<Camera> low_views;   // that the splat was fitted to, seen from the same places
   std::vector<size_t> training;    // which of them training may see
   std::vector<size_t> validation;  // and those that the splat was not fitted to
   std::shared_ptr<const TrueViews> truth;
   std::array<float, 3> background{};
   std::shared_ptr<void> prepared;  // a network's tables for the cloud as it is; set by whoever makes them
+  // For parts of it: a network's survey, and what training views see; set by whoever makes them.
+  std::shared_ptr<const void> survey;
+  std::shared_ptr<const SeenGaussians> seen;
 };
 
 // `views_per_object`: so many of the views that were fitted to are for training, chosen by the object's name alone (so

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
+#include <cstdint>
 #include <system_error>
 
 #include "core/text.h"
@@ -27,7 +29,7 @@ std::string FolderName(const SceneEntry& entry, const Scene& scene) {
   return entry.name + "-" + digits;
 }
 
-Image Part(const Image& image, const PixelBox& box) {
+Image CutOut(const Image& image, const PixelBox& box) {
   Image part(box.x1 - box.x0, box.y1 - box.y0, image.channels);
   for (int c = 0; c < image.channels; ++c) {
     for (int y = box.y0; y < box.y1; ++y) {
@@ -74,65 +76,149 @@ TrueViews::TrueViews(SceneEntry entry, const Scene& scene, const fs::path& cache
     width_ = camera.intrinsics.width;
     height_ = camera.intrinsics.height;
   }
+  kept_.resize(names_.size());
 }
 
-Result<TrueView> TrueViews::Unpack(const Image& part, int x0, int y0) const {
+// 8 bits a channel, [y][x][c].
+struct TrueViews::Kept {
+  PixelBox box;
+  int channels = 0;
+  std::vector<uint8_t> values;
+};
+
+namespace {
+
+// Over the background; `window` and the part's box are pixels of the view. value(c, y, x) is of the part.
+template <typename Value>
+TrueView Compose(const PixelBox& window, const PixelBox& box, int channels, const std::array<float, 3>& background,
+                 Value&& value) {
   TrueView view;
-  view.background = background_;
-  view.object = {x0, y0, x0 + part.width, y0 + part.height};
-  view.picture = Image(width_, height_, 3);
+  view.background = background;
+  view.picture = Image(window.x1 - window.x0, window.y1 - window.y0, 3);
+  PixelBox inside = {std::max(box.x0, window.x0), std::max(box.y0, window.y0), std::min(box.x1, window.x1),
+                     std::min(box.y1, window.y1)};
+  if (inside.empty()) inside = {};
   for (int c = 0; c < 3; ++c) {
-    const float behind = background_[static_cast<size_t>(c)];
+    const float behind = background[static_cast<size_t>(c)];
     std::fill(view.picture.channel(c), view.picture.channel(c) + view.picture.plane(), behind);
-    for (int y = 0; y < part.height; ++y) {
-      const float* in = part.channel(c) + int64_t{y} * part.width;
-      const float* alpha = part.channels == 4 ? part.channel(3) + int64_t{y} * part.width : nullptr;
-      float* out = view.picture.channel(c) + int64_t{y0 + y} * width_ + x0;
-      for (int x = 0; x < part.width; ++x) {
-        out[x] = alpha == nullptr ? in[x] : in[x] * alpha[x] + behind * (1 - alpha[x]);
+    for (int y = inside.y0; y < inside.y1; ++y) {
+      float* out = view.picture.channel(c) + int64_t{y - window.y0} * view.picture.width - window.x0;
+      for (int x = inside.x0; x < inside.x1; ++x) {
+        const float shown = value(c, y - box.y0, x - box.x0);
+        if (channels == 4) {
+          const float alpha = value(3, y - box.y0, x - box.x0);
+          out[x] = shown * alpha + behind * (1 - alpha);
+        } else {
+          out[x] = shown;
+        }
       }
     }
+  }
+  if (!inside.empty()) {
+    view.object = {inside.x0 - window.x0, inside.y0 - window.y0, inside.x1 - window.x0, inside.y1 - window.y0};
   }
   return view;
 }
 
-Result<TrueView> TrueViews::Load(size_t view) const {
-  const auto whole = [&](const Image& picture) -> Result<TrueView> {
-    PixelBox box = ObjectBox(picture, background_);
-    ANCHORSPLAT_ASSIGN_OR_RETURN(TrueView result, Unpack(picture, 0, 0));
-    result.object = box;
-    return result;
-  };
+}  // namespace
+
+Result<TrueViews::Part> TrueViews::Read(size_t view) const {
   if (!stored_.at(view).empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Image picture, ReadImage(stored_[view]));
     if (picture.width != width_ || picture.height != height_) {
       return Error{ErrorCode::kBadFile, Cat(stored_[view].string(), ": has ", picture.width, " x ", picture.height,
                                             " pixels, its camera ", width_, " x ", height_)};
     }
-    return whole(picture);
+    const PixelBox box = ObjectBox(picture, background_);
+    return Part{CutOut(picture, box), box};
   }
+  ANCHORSPLAT_RETURN_IF_ERROR(Make({&view, 1}));
+  const auto file = Find(view);
+  if (!file) return Error{ErrorCode::kIo, Cat(folder_.string(), ": view ", names_[view], " is gone again")};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Image part, ReadImage(file->path));
+  if (part.width > width_ - file->x || part.height > height_ - file->y) {
+    return Error{ErrorCode::kBadFile, Cat(file->path.string(), ": reaches out of its view; remove the folder ",
+                                          folder_.string(), " to have it made again")};
+  }
+  const PixelBox box = {file->x, file->y, file->x + part.width, file->y + part.height};
+  return Part{std::move(part), box};
+}
+
+std::optional<TrueViews::File> TrueViews::Find(size_t view) const {
   const std::string prefix = names_[view] + "_";
   std::error_code code;
   for (fs::directory_iterator it(folder_, code), end; !code && it != end; it.increment(code)) {
     const std::string name = it->path().stem().string();
-    int x = 0, y = 0;
-    if (!name.starts_with(prefix) || !ParseCorner(std::string_view(name).substr(prefix.size()), x, y)) continue;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const Image part, ReadImage(it->path()));
-    if (part.width > width_ - x || part.height > height_ - y) {
-      return Error{ErrorCode::kBadFile, Cat(it->path().string(), ": reaches out of its view; remove the folder ",
-                                            folder_.string(), " to have it made again")};
+    File file{it->path(), 0, 0};
+    if (name.starts_with(prefix) && ParseCorner(std::string_view(name).substr(prefix.size()), file.x, file.y)) {
+      return file;
     }
-    return Unpack(part, x, y);
   }
+  return std::nullopt;
+}
+
+Status TrueViews::Make(std::span<const size_t> views) const {
   // The mesh and what is made of it for rays leave the memory again: with many objects it would not hold them all.
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Scene scene, Scene::Open(entry_));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Image picture, scene.HighPicture(view));
-  PixelBox box = ObjectBox(picture, background_);
-  if (box.empty()) box = {0, 0, 1, 1};
-  fs::create_directories(folder_, code);
-  ANCHORSPLAT_RETURN_IF_ERROR(
-      WritePng(folder_ / Cat(prefix, box.x0, "_", box.y0, ".png"), Part(picture, box), {.overwrite = true}));
-  return whole(picture);
+  std::optional<Scene> scene;
+  for (const size_t view : views) {
+    if (!stored_.at(view).empty() || Find(view)) continue;
+    if (!scene) {
+      auto opened = Scene::Open(entry_);
+      if (!opened.ok()) return opened.error();
+      scene = *std::move(opened);
+    }
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Image picture, scene->HighPicture(view));
+    PixelBox box = ObjectBox(picture, background_);
+    if (box.empty()) box = {0, 0, 1, 1};
+    std::error_code code;
+    fs::create_directories(folder_, code);
+    ANCHORSPLAT_RETURN_IF_ERROR(WritePng(folder_ / Cat(names_[view], "_", box.x0, "_", box.y0, ".png"),
+                                         CutOut(picture, box), {.overwrite = true}));
+  }
+  return {};
+}
+
+Result<TrueView> TrueViews::Load(size_t view) const {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Part part, Read(view));
+  const Image& picture = part.picture;
+  return Compose({0, 0, width_, height_}, part.box, picture.channels, background_,
+                 [&](int c, int y, int x) { return picture.at(c, y, x); });
+}
+
+Result<std::shared_ptr<const TrueViews::Kept>> TrueViews::Keep(size_t view) const {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (kept_[view]) return kept_[view];
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Part part, Read(view));
+  const auto kept = std::make_shared<Kept>();
+  kept->box = part.box;
+  kept->channels = part.picture.channels;
+  kept->values.reserve(part.picture.pixels.size());
+  for (int y = 0; y < part.picture.height; ++y) {
+    for (int x = 0; x < part.picture.width; ++x) {
+      for (int c = 0; c < kept->channels; ++c) {
+        kept->values.push_back(
+            static_cast<uint8_t>(std::lround(std::clamp(part.picture.at(c, y, x), 0.0f, 1.0f) * 255)));
+      }
+    }
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  kept_[view] = kept;
+  return std::shared_ptr<const Kept>(kept);
+}
+
+Result<TrueView> TrueViews::LoadWindow(size_t view, const PixelBox& window) const {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const Kept> kept, Keep(view));
+  const int64_t width = kept->box.x1 - kept->box.x0, channels = kept->channels;
+  return Compose(window, kept->box, kept->channels, background_, [&](int c, int y, int x) {
+    return static_cast<float>(kept->values[static_cast<size_t>((y * width + x) * channels + c)]) / 255.0f;
+  });
+}
+
+Result<PixelBox> TrueViews::Box(size_t view) const {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const Kept> kept, Keep(view));
+  return kept->box;
 }
 
 }  // namespace anchorsplat

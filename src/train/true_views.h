@@ -3,6 +3,12 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "core/result.h"
 #include "dataset/scene_reader.h"
@@ -22,8 +28,31 @@ class TrueViews {
   // Pixels over the object's background. Errors: those of Scene::HighPicture, ReadImage and WritePng.
   Result<TrueView> Load(size_t view) const;
 
+  // Renders those of the views that are neither stored nor in the folder. Faster than one after the other as they are
+  // asked for: the mesh is opened once.
+  Status Make(std::span<const size_t> views) const;
+
+  // The pixels inside of a window of the view, which must not reach out of it. Views of which windows were asked for
+  // stay in memory, cut to the object, at 8 bits: opening a file takes longer than the window.
+  Result<TrueView> LoadWindow(size_t view, const PixelBox& window) const;
+  // What Load has as the view's `object`.
+  Result<PixelBox> Box(size_t view) const;
+
  private:
-  Result<TrueView> Unpack(const Image& part, int x0, int y0) const;
+  // The pixels that show something, 3 or 4 channels.
+  struct Part {
+    Image picture;
+    PixelBox box;  // where in the view; as large as the picture
+  };
+  struct Kept;
+  struct File {
+    std::filesystem::path path;
+    int x = 0, y = 0;  // of its left upper corner in the view
+  };
+
+  std::optional<File> Find(size_t view) const;
+  Result<Part> Read(size_t view) const;
+  Result<std::shared_ptr<const Kept>> Keep(size_t view) const;
 
   SceneEntry entry_;
   std::filesystem::path folder_;
@@ -31,6 +60,8 @@ class TrueViews {
   std::vector<std::string> names_;
   int width_ = 0, height_ = 0;
   std::array<float, 3> background_{};
+  mutable std::mutex mutex_;
+  mutable std::vector<std::shared_ptr<const Kept>> kept_;  // by view
 };
 
 // The smallest box of the pixels of a picture with 3 or 4 channels that are not the background: alpha above 0, or for

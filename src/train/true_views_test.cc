@@ -45,6 +45,30 @@ TEST(TrueViews, RenderedOnceTheyAreThoseThatWouldHaveBeenStored) {
   }
   EXPECT_TRUE(cut) << "no view shows whether the parts lie where they should";
 
+  // Windows, of which one may hold nothing of the object.
+  const Image& picture = expected->picture;
+  for (const PixelBox& window : {PixelBox{0, 0, picture.width, picture.height}, PixelBox{3, 5, 10, 9},
+                                 PixelBox{0, 0, 2, 2}, PixelBox{picture.width - 9, 1, picture.width, 12}}) {
+    const auto a = stored.LoadWindow(3, window), b = demand.LoadWindow(3, window);
+    ASSERT_TRUE(a.ok() && b.ok());
+    ExpectSame(*a, *b);
+    EXPECT_EQ(a->background, expected->background);
+    const PixelBox& all = expected->object;
+    PixelBox object = {std::max(all.x0, window.x0) - window.x0, std::max(all.y0, window.y0) - window.y0,
+                       std::min(all.x1, window.x1) - window.x0, std::min(all.y1, window.y1) - window.y0};
+    EXPECT_EQ(a->object, object.empty() ? PixelBox{} : object);
+    ASSERT_EQ(a->picture.width, window.x1 - window.x0);
+    ASSERT_EQ(a->picture.height, window.y1 - window.y0);
+    for (int c = 0; c < 3; ++c) {
+      for (int y = 0; y < a->picture.height; ++y) {
+        for (int x = 0; x < a->picture.width; ++x) {
+          ASSERT_EQ(a->picture.at(c, y, x), picture.at(c, y + window.y0, x + window.x0));
+        }
+      }
+    }
+  }
+  EXPECT_EQ(*stored.Box(3), expected->object);
+
   // From the folder now: the mesh is not needed any more.
   fs::remove(entry.folder / kMeshName);
   const TrueViews again(entry, *scene, folder / "cache");
@@ -60,6 +84,7 @@ TEST(TrueViews, RenderedOnceTheyAreThoseThatWouldHaveBeenStored) {
   const auto damaged = demand.Load(3);
   ASSERT_FALSE(damaged.ok());
   EXPECT_NE(damaged.error().message.find("003_"), std::string::npos) << damaged.error().message;
+  EXPECT_TRUE(demand.LoadWindow(3, {0, 0, 4, 4}).ok()) << "in memory since a window was asked for";
 }
 
 TEST(TrueViews, TheObjectsBoxOfPicturesWithAndWithoutAlpha) {

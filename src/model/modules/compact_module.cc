@@ -9,9 +9,9 @@
 #include "enhance/filter.h"
 #include "formats/safetensors.h"
 #include "model/compact_features.h"
-#include "model/compact_graph.h"
 #include "model/compact_network.h"
 #include "model/compact_residual.h"
+#include "model/modules/compact_tables.h"
 #include "model/modules/edge_messages.h"
 #include "render/constants.h"
 
@@ -25,33 +25,10 @@ using torch::Tensor;
 class GroupImpl : public torch::nn::Module {};
 TORCH_MODULE(Group);
 
-constexpr double kDomainQuantile = 0.005;
 constexpr float kNoLimit = 1e30f;
-
-// What Prepare makes of a splat.
-struct Prepared {
-  Tensor nodes;  // [N,kNodeFeatures]
-  Tensor edges;  // [N·m,kEdgeFeatures]
-  EdgeIndex index;
-  Tensor axes;         // [N,3,3] axis a is row a
-  Tensor handedness;   // [N,1] ±1
-  Tensor stored_axis;  // [N,3] int64
-  Tensor log_scales;   // [N,3] longest first
-  Tensor quats;        // [N,4] unit
-  Tensor log_pixel;    // [N,1]
-  Tensor start_logit;  // [N]
-  Tensor log_shorter;  // [N,3] longest first
-  Tensor low, high;    // [kNodeFeatures] quantiles of the nodes
-  double offset_side = 0;
-};
 
 Tensor FromBuffer(const Buffer<float>& values, std::vector<int64_t> shape) {
   return torch::from_blob(const_cast<float*>(values.data()), shape, torch::kFloat32).clone();
-}
-
-void CopyTo(const Tensor& tensor, Buffer<float>& out) {
-  const Tensor own = tensor.detach().to(torch::kCPU, torch::kFloat32).contiguous();
-  out.assign(own.const_data_ptr<float>(), own.const_data_ptr<float>() + own.numel());
 }
 
 Tensor Bounded(const CompactAttribute& attribute, const Tensor& y) {
@@ -66,13 +43,13 @@ torch::nn::LayerNorm LayerNormOf(int64_t channels) {
   return torch::nn::LayerNorm(torch::nn::LayerNormOptions({channels}).eps(kLayerNormEpsilon));
 }
 
-// a ⊗ b of quaternions [N,4]; a's first component is 1.
+// a ⊗ b of quaternions [K,N,4], [N,4]; a's first component is 1, `vector` [K,N,3] the others.
 Tensor Turn(const Tensor& vector, const Tensor& q) {
-  const Tensor x = vector.select(1, 0), y = vector.select(1, 1), z = vector.select(1, 2);
+  const Tensor x = vector.select(2, 0), y = vector.select(2, 1), z = vector.select(2, 2);
   const Tensor w = q.select(1, 0), a = q.select(1, 1), b = q.select(1, 2), c = q.select(1, 3);
   const Tensor product = torch::stack(
-      {w - x * a - y * b - z * c, a + x * w + y * c - z * b, b - x * c + y * w + z * a, c + x * b - y * a + z * w}, 1);
-  return product * torch::rsqrt(1 + vector.square().sum(1, true));
+      {w - x * a - y * b - z * c, a + x * w + y * c - z * b, b - x * c + y * w + z * a, c + x * b - y * a + z * w}, 2);
+  return product * torch::rsqrt(1 + vector.square().sum(2, true));
 }
 
 }  // namespace
@@ -115,73 +92,34 @@ CompactTrainable::CompactTrainable(const CompactConfig& config)
 }
 
 Result<std::shared_ptr<void>> CompactTrainable::Prepare(const NetworkInput& input) {
-  const torch::NoGradGuard no_gradient;
-  const GaussianCloud cloud = ToCloud(input.gaussians);
-  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
-  const int64_t n = cloud.size();
-  if (n == 0) return Error{ErrorCode::kBadArgument, "the splat has no Gaussians"};
-  for (int64_t i = 0; i < n; ++i) {
-    if (!IsUsable(cloud, i))
-      return Error{ErrorCode::kBadArgument, Cat("Gaussian ", i, " has values that are not finite")};
-  }
-  Buffer<float> pixel_sizes;
-  CopyTo(input.pixel_sizes.expand({n}), pixel_sizes);
-  if (!std::all_of(pixel_sizes.begin(), pixel_sizes.end(), [](float p) { return p > 0 && std::isfinite(p); })) {
-    return Error{ErrorCode::kBadArgument, "a pixel size is not a positive length"};
-  }
-  const CompactGraph graph = BuildCompactGraph(cloud, config_.neighbours, config_.context);
-  const CompactFeatures features(cloud, graph, pixel_sizes, input.upscale);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(auto tables, MakeCompactTables(config_, start_, input));
+  return std::static_pointer_cast<void>(std::move(tables));
+}
 
-  const auto prepared = std::make_shared<Prepared>();
-  prepared->nodes = torch::empty({n, kNodeFeatures});
-  prepared->edges = torch::empty({n * graph.neighbours, kEdgeFeatures});
-  features.Nodes(0, n, prepared->nodes.data_ptr<float>());
-  features.Edges(0, n, prepared->edges.data_ptr<float>());
-  prepared->index = MakeEdgeIndex(
-      torch::from_blob(const_cast<int32_t*>(graph.index.data()), {n * graph.neighbours}, torch::kInt32), n);
-  prepared->axes = FromBuffer(graph.axes, {n, 3, 3});
-  prepared->handedness = torch::linalg_det(prepared->axes).sign().unsqueeze(1);
-  prepared->stored_axis =
-      torch::from_blob(const_cast<uint8_t*>(graph.stored_axis.data()), {n, 3}, torch::kUInt8).to(torch::kInt64);
-  prepared->log_scales = FromBuffer(cloud.log_scales, {n, 3}).gather(1, prepared->stored_axis);
-  const Tensor quats = FromBuffer(cloud.quats, {n, 4}).to(torch::kFloat64), norms = quats.norm(2, 1, true);
-  const Tensor identity = torch::tensor({1.0, 0.0, 0.0, 0.0}, torch::kFloat64).expand({n, 4});
-  prepared->quats = torch::where(norms > 0, quats / norms.clamp_min(1e-300), identity).to(torch::kFloat32);
-  prepared->log_pixel = FromBuffer(pixel_sizes, {n, 1}).log();
-  Buffer<float> logits(static_cast<size_t>(n)), shorter(static_cast<size_t>(3 * n));
-  for (size_t i = 0; i < static_cast<size_t>(n); ++i) {
-    const CopyStart::Shape shape = start_.ShapeOf(cloud.opacity_logits[i]);
-    logits[i] = static_cast<float>(shape.opacity_logit);
-    for (size_t a = 0; a < 3; ++a) shorter[3 * i + a] = static_cast<float>(shape.log_shorter[a]);
-  }
-  prepared->start_logit = FromBuffer(logits, {n});
-  prepared->log_shorter = FromBuffer(shorter, {n, 3});
-  const Tensor sorted = std::get<0>(prepared->nodes.sort(0));
-  const auto rank = static_cast<int64_t>(kDomainQuantile * static_cast<double>(n - 1));
-  prepared->low = sorted[rank].clone();
-  prepared->high = sorted[n - 1 - rank].clone();
-  if (config_.offset_unit == OffsetUnit::kCube) prepared->offset_side = CubeSide(cloud.means);
+Result<std::shared_ptr<const void>> CompactTrainable::Survey(const NetworkInput& whole) {
+  return SurveySplat(config_, whole);
+}
 
-  for (Tensor* tensor :
-       {&prepared->nodes, &prepared->edges, &prepared->index.index, &prepared->axes, &prepared->handedness,
-        &prepared->stored_axis, &prepared->log_scales, &prepared->quats, &prepared->log_pixel, &prepared->start_logit,
-        &prepared->log_shorter, &prepared->low, &prepared->high}) {
-    *tensor = tensor->to(input.gaussians.means.device());
-  }
-  return std::static_pointer_cast<void>(prepared);
+SplatPart CompactTrainable::PartOf(const std::shared_ptr<const void>& survey, std::span<const int64_t> wanted) {
+  return PartOfSplat(config_, survey, wanted);
 }
 
 Tensor CompactTrainable::Outputs(const NetworkInput& input) {
-  const Prepared& prepared = *std::static_pointer_cast<Prepared>(input.prepared);
-  const int64_t n = prepared.nodes.size(0);
-  Tensor state = embed_norm_(embed_second_(torch::gelu(embed_first_(prepared.nodes))));
-  for (Round& round : rounds_) {
-    const Tensor pooled = PooledMessages(round.own(state), round.other(state), prepared.edges, prepared.index,
-                                         round.edge->weight, round.message->weight, round.message->bias);
-    const Tensor update = round.update_second(torch::gelu(round.update_first(torch::cat({state, pooled}, 1))));
-    state = round.norm(state + update);
+  const CompactTables& tables = *std::static_pointer_cast<CompactTables>(input.prepared);
+  const int64_t n = tables.rings[0];
+  Tensor state = embed_norm_(embed_second_(torch::gelu(embed_first_(tables.nodes))));
+  for (size_t r = 0; r < rounds_.size(); ++r) {
+    Round& round = rounds_[r];
+    const EdgeIndex& index = tables.rounds[r];
+    const int64_t left = tables.rings[rounds_.size() - 1 - r];
+    const Tensor own = state.narrow(0, 0, left), edges = tables.edges.narrow(0, 0, left * index.neighbours);
+    const Tensor pooled = PooledMessages(round.own(own), round.other(state), edges, index, round.edge->weight,
+                                         round.message->weight, round.message->bias);
+    const Tensor update = round.update_second(torch::gelu(round.update_first(torch::cat({own, pooled}, 1))));
+    state = round.norm(own + update);
   }
-  const Tensor hidden = torch::gelu(head_second_(torch::gelu(head_first_(torch::cat({state, prepared.nodes}, 1)))));
+  const Tensor told = tables.nodes.narrow(0, 0, n);
+  const Tensor hidden = torch::gelu(head_second_(torch::gelu(head_first_(torch::cat({state, told}, 1)))));
   std::vector<Tensor> of_copies;
   const auto attributes = CopyAttributes(config_);
   for (size_t a = 0; a < out_.size(); ++a) {
@@ -191,68 +129,70 @@ Tensor CompactTrainable::Outputs(const NetworkInput& input) {
 }
 
 GaussianTensors CompactTrainable::Forward(const NetworkInput& input) {
-  const Prepared& prepared = *std::static_pointer_cast<Prepared>(input.prepared);
+  const CompactTables& tables = *std::static_pointer_cast<CompactTables>(input.prepared);
   if (is_training()) {
     const torch::NoGradGuard no_gradient;
-    low_.copy_(torch::minimum(low_, prepared.low.to(low_.device())));
-    high_.copy_(torch::maximum(high_, prepared.high.to(high_.device())));
+    low_.copy_(torch::minimum(low_, tables.range.low.to(low_.device())));
+    high_.copy_(torch::maximum(high_, tables.range.high.to(high_.device())));
   }
-  const int64_t n = prepared.nodes.size(0), copies = config_.copies, per_copy = ChannelsPerCopy(config_);
+  const int64_t n = tables.rings[0], copies = config_.copies, per_copy = ChannelsPerCopy(config_);
   const Tensor raw = Outputs(input).to(torch::kFloat32);
 
-  Tensor log_scale = prepared.log_scales;
+  Tensor log_scale = tables.log_scales;
   if (config_.prior) {
     const Tensor f = DefaultFilterStrength(input.upscale) + Bounded(kStrengthAttribute, raw.narrow(1, 0, 1));
     const Tensor gain = (f - 1 / (input.upscale * input.upscale)).clamp_min(kLeastGain);
-    log_scale = 0.5 * torch::logaddexp(2 * log_scale, torch::log(kDilation * gain) + 2 * prepared.log_pixel);
+    log_scale = 0.5 * torch::logaddexp(2 * log_scale, torch::log(kDilation * gain) + 2 * tables.log_pixel);
   }
   const Tensor scale = log_scale.exp();
   const Tensor unit =
       config_.epsilon * (config_.offset_unit == OffsetUnit::kScale   ? scale
-                         : config_.offset_unit == OffsetUnit::kPixel ? prepared.log_pixel.exp()
-                                                                     : torch::full_like(scale, prepared.offset_side));
-  const auto to_world = [&](const Tensor& v) { return (v.unsqueeze(2) * prepared.axes).sum(1); };  // [N,3] → [N,3]
+                         : config_.offset_unit == OffsetUnit::kPixel ? tables.log_pixel.exp()
+                                                                     : torch::full_like(scale, tables.offset_side));
+  // From the frames to the world, [K,N,3].
+  const auto to_world = [&](const Tensor& v) { return (v.unsqueeze(3) * tables.axes).sum(2); };
 
-  const GaussianTensors& g = input.gaussians;
-  const int64_t coefficients = g.sh.size(1);
-  const Tensor y = raw.narrow(1, 1, copies * per_copy).view({n, copies, per_copy});
-  std::vector<Tensor> means, log_scales, quats, logits, sh;
-  for (int64_t k = 0; k < copies; ++k) {
-    int64_t column = 0;
-    const auto next = [&](size_t attribute) {
-      const int64_t channels = kCopyAttributes[attribute].channels;
-      column += channels;
-      return y.select(1, k).narrow(1, column - channels, channels);
-    };
-    const Tensor moved = next(0);
-    const auto& place = start_.offset(k);
-    const Tensor begin = scale * torch::tensor({place[0], place[1], 0.0}, scale.options());
-    means.push_back(g.means + to_world(begin + unit * (config_.anchors ? Bounded(kCopyAttributes[0], moved) : moved)));
-    const Tensor sized = log_scale + prepared.log_shorter + Bounded(kCopyAttributes[1], next(1));
-    log_scales.push_back(torch::zeros_like(sized).scatter(1, prepared.stored_axis, sized));
-    const Tensor turn = prepared.handedness * Bounded(kCopyAttributes[2], next(2));
-    quats.push_back(Turn(0.5 * to_world(turn), prepared.quats));
-    logits.push_back(prepared.start_logit + Bounded(kCopyAttributes[3], next(3)).squeeze(1));
-    std::vector<Tensor> degrees;
-    degrees.push_back(g.sh.narrow(1, 0, 1) + Bounded(kCopyAttributes[4], next(4)).unsqueeze(1));
-    if (!config_.sh) {
-      degrees.push_back(g.sh.narrow(1, 1, coefficients - 1));
-    } else {
-      const Tensor factors = 1 + Bounded(kCopyAttributes[5], next(5));
-      const Tensor linear = Bounded(kCopyAttributes[6], next(6)).view({n, 3, 3});  // axis, colour
-      for (int64_t degree = 1, first = 1; first < coefficients; ++degree, first = degree * degree) {
-        Tensor values = g.sh.narrow(1, first, 2 * degree + 1) * factors.select(1, degree - 1).view({n, 1, 1});
-        if (degree == 1) {
-          const Tensor world = prepared.axes.transpose(1, 2).matmul(linear);  // x, y or z; colour
-          // The basis is (−y, z, −x), see ShBasis.
-          values = values + torch::stack({-world.select(1, 1), world.select(1, 2), -world.select(1, 0)}, 1);
-        }
-        degrees.push_back(values);
+  // All copies at once: tables are [K,N,·], which is the order of the rows.
+  const GaussianTensors& all = input.gaussians;
+  const Tensor anchor_means = all.means.narrow(0, 0, n), anchor_sh = all.sh.narrow(0, 0, n);
+  const int64_t coefficients = anchor_sh.size(1);
+  const Tensor y = raw.narrow(1, 1, copies * per_copy).view({n, copies, per_copy}).transpose(0, 1);
+  int64_t column = 0;
+  const auto next = [&](size_t attribute) {
+    const int64_t channels = kCopyAttributes[attribute].channels;
+    column += channels;
+    return y.narrow(2, column - channels, channels);
+  };
+  const auto bounded = [&](size_t attribute) { return Bounded(kCopyAttributes[attribute], next(attribute)); };
+
+  const Tensor moved = config_.anchors ? bounded(0) : next(0);
+  std::vector<double> places;
+  for (int64_t k = 0; k < copies; ++k) places.insert(places.end(), {start_.offset(k)[0], start_.offset(k)[1], 0.0});
+  const Tensor begin = scale * torch::tensor(places, scale.options()).view({copies, 1, 3});
+  const Tensor means = anchor_means + to_world(begin + unit * moved);
+  const Tensor sized = log_scale + tables.log_shorter + bounded(1);
+  const Tensor log_scales = torch::zeros_like(sized).scatter(2, tables.stored_axis.expand({copies, n, 3}), sized);
+  const Tensor quats = Turn(0.5 * to_world(tables.handedness * bounded(2)), tables.quats);
+  const Tensor logits = tables.start_logit + bounded(3).squeeze(2);
+  std::vector<Tensor> degrees = {anchor_sh.narrow(1, 0, 1) + bounded(4).unsqueeze(2)};
+  if (!config_.sh) {
+    degrees.push_back(anchor_sh.narrow(1, 1, coefficients - 1).expand({copies, n, coefficients - 1, 3}));
+  } else {
+    const Tensor factors = 1 + bounded(5);
+    const Tensor linear = bounded(6).reshape({copies, n, 3, 3});  // axis, colour
+    for (int64_t degree = 1, first = 1; first < coefficients; ++degree, first = degree * degree) {
+      Tensor values =
+          anchor_sh.narrow(1, first, 2 * degree + 1) * factors.select(2, degree - 1).view({copies, n, 1, 1});
+      if (degree == 1) {
+        const Tensor world = tables.axes.transpose(1, 2).matmul(linear);  // x, y or z; colour
+        // The basis is (−y, z, −x), see ShBasis.
+        values = values + torch::stack({-world.select(2, 1), world.select(2, 2), -world.select(2, 0)}, 2);
       }
+      degrees.push_back(values);
     }
-    sh.push_back(torch::cat(degrees, 1));
   }
-  return {torch::cat(means), torch::cat(log_scales), torch::cat(quats), torch::cat(logits), torch::cat(sh)};
+  const Tensor sh = torch::cat(degrees, 2);
+  return {means.flatten(0, 1), log_scales.flatten(0, 1), quats.flatten(0, 1), logits.flatten(0, 1), sh.flatten(0, 1)};
 }
 
 std::vector<std::pair<std::string, std::vector<Tensor>>> CompactTrainable::Groups() {

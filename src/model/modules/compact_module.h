@@ -26,6 +26,11 @@ class CompactTrainable : public TrainableNetwork {
   // that are not finite (log-scales and opacity logits of −Inf are fine); pixel sizes that are not positive.
   Result<std::shared_ptr<void>> Prepare(const NetworkInput& input) override;
 
+  // Parts know the neighbours that Gaussians have in the whole splat; what is remembered of the range of features is
+  // that of the splat as it was surveyed. Errors, besides those of Prepare: offsets in units of the whole splat's cube.
+  Result<std::shared_ptr<const void>> Survey(const NetworkInput& whole) override;
+  SplatPart PartOf(const std::shared_ptr<const void>& survey, std::span<const int64_t> wanted) override;
+
   // While training, the range of the features is remembered with every splat (buffers "domain.low" and "domain.high"):
   // of each feature the 0.5 % and 99.5 % quantiles of the splat that went farthest.
   GaussianTensors Forward(const NetworkInput& input) override;
@@ -36,7 +41,8 @@ class CompactTrainable : public TrainableNetwork {
 
   const CompactConfig& config() const { return config_; }
 
-  // Raw outputs [N, CompactOutputs(config())] in the order of CompactNetwork::Outputs.
+  // Raw outputs [N, CompactOutputs(config())], or of a part's wanted Gaussians, in the order of
+  // CompactNetwork::Outputs.
   torch::Tensor Outputs(const NetworkInput& input);
 
   // Fills parameters and buffers. Errors are those of `source`.

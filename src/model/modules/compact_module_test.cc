@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <numeric>
 #include <span>
 
 #include "core/rotation.h"
@@ -206,6 +207,73 @@ TEST(CompactModule, TurnsMovesAndScalesWithTheSplat) {
     const GaussianCloud expected = Moved(ToCloud(Copies(network, InputOf(cloud))), unit, 2.5, shift);
     const GaussianCloud moved = ToCloud(Copies(network, InputOf(Moved(cloud, unit, 2.5, shift), 2.5 * kSheetPixel)));
     ExpectNear(moved, expected, 1e-3);
+  }
+}
+
+// Means, log-scales and so on of the copies of some of `n` Gaussians, all in one row each.
+Tensor CopiesOf(const GaussianTensors& g, const std::vector<int64_t>& rows, int64_t n) {
+  const Tensor all = torch::cat({g.means, g.log_scales, g.quats, g.opacity_logits.unsqueeze(1), g.sh.flatten(1)}, 1);
+  return all.view({-1, n, all.size(1)}).index_select(1, torch::tensor(rows));
+}
+
+TEST(CompactModule, APartsCopiesAndGradientsAreThoseOfTheWhole) {
+  const std::vector<int64_t> wanted = {411, 3, 4, 5, 6, 7, 8, 60, 599};
+  std::vector<int64_t> every(wanted.size());
+  std::iota(every.begin(), every.end(), int64_t{0});
+  for (CompactConfig config : Configs()) {
+    SCOPED_TRACE(config.copies);
+    CompactTrainable network(config);
+    ASSERT_TRUE(network.SetWeights(OpenDomain()).ok());
+    const NetworkInput whole = InputOf(SheetCloud(600));
+    const auto survey = network.Survey(whole);
+    if (config.offset_unit == OffsetUnit::kCube) {
+      EXPECT_FALSE(survey.ok()) << "a part does not know the cube";
+      continue;
+    }
+    ASSERT_TRUE(survey.ok()) << survey.error().message;
+    const auto part = std::make_shared<SplatPart>(network.PartOf(*survey, wanted));
+    ASSERT_EQ(std::vector<int64_t>(part->rows.begin(), part->rows.begin() + part->wanted), wanted);
+    EXPECT_LT(part->rows.size(), 600u);
+    NetworkInput few;
+    const auto rows = [&](const Tensor& t) { return t.index_select(0, torch::tensor(part->rows)); };
+    const GaussianTensors& g = whole.gaussians;
+    few.gaussians = {rows(g.means), rows(g.log_scales), rows(g.quats), rows(g.opacity_logits), rows(g.sh)};
+    few.pixel_sizes = rows(whole.pixel_sizes);
+    few.part = part;
+    const Tensor expected = CopiesOf(Copies(network, whole), wanted, 600);
+    const Tensor copies = CopiesOf(Copies(network, few), every, part->wanted);
+    EXPECT_LT((copies - expected).abs().max().item<double>(), 1e-5);
+
+    torch::manual_seed(2);
+    const Tensor direction = torch::randn_like(expected);
+    const auto gradients = [&](const Tensor& values) {
+      return torch::autograd::grad({(values * direction).sum()}, network.parameters(), {}, std::nullopt, false, true);
+    };
+    const auto a = gradients(expected), b = gradients(copies);
+    for (size_t i = 0; i < a.size(); ++i) {
+      ASSERT_EQ(a[i].defined(), b[i].defined());
+      if (!a[i].defined()) continue;
+      EXPECT_LT((a[i] - b[i]).abs().max().item<double>(), 1e-4 * (1e-3 + a[i].abs().max().item<double>())) << i;
+    }
+  }
+}
+
+TEST(CompactModule, PartsLeaveTheRangeOfTheWholeBehind) {
+  CompactTrainable whole({}), parts({});
+  const NetworkInput input = InputOf(SheetCloud(400));
+  Copies(whole, input);
+  const auto survey = parts.Survey(input);
+  ASSERT_TRUE(survey.ok());
+  const std::vector<int64_t> wanted = {7};
+  NetworkInput few;
+  few.part = std::make_shared<SplatPart>(parts.PartOf(*survey, wanted));
+  const auto cloud = Subset(SheetCloud(400), few.part->rows);
+  ASSERT_TRUE(cloud.ok());
+  few.gaussians = ToTensors(*cloud);
+  few.pixel_sizes = torch::full({cloud->size()}, kSheetPixel);
+  EXPECT_EQ(Copies(parts, few).size(), 4);
+  for (const char* name : {"domain.low", "domain.high"}) {
+    EXPECT_TRUE(torch::equal(whole.named_buffers()[name], parts.named_buffers()[name])) << name;
   }
 }
 

@@ -48,22 +48,37 @@ void Pool(const Tensor& messages, const Tensor& pooled, const Tensor& where) {
   const int64_t points = pooled.size(0), h = messages.size(1), m = messages.size(0) / points;
   const float* message = messages.const_data_ptr<float>();
   float* maximum = pooled.data_ptr<float>();
-  uint8_t* at = where.data_ptr<uint8_t>();
+  int32_t* at = where.data_ptr<int32_t>();
   for (int64_t i = 0; i < points; ++i, maximum += 2 * h, at += h) {
     float* mean = maximum + h;
     std::copy_n(message, h, maximum);
     std::copy_n(message, h, mean);
-    std::fill_n(at, h, uint8_t{0});
+    std::fill_n(at, h, 0);
     message += h;
-    for (int64_t k = 1; k < m; ++k, message += h) {
+    for (int32_t k = 1; k < m; ++k, message += h) {
       for (int64_t c = 0; c < h; ++c) {
         const bool larger = message[c] > maximum[c];
         maximum[c] = larger ? message[c] : maximum[c];
-        at[c] = larger ? static_cast<uint8_t>(k) : at[c];
+        at[c] = larger ? k : at[c];
         mean[c] += message[c];
       }
     }
     for (int64_t c = 0; c < h; ++c) mean[c] /= static_cast<float>(m);
+  }
+}
+
+// The way back: ∂/∂pooled to ∂/∂messages.
+void Unpool(const Tensor& of_pooled, const Tensor& where, const Tensor& of_messages) {
+  const int64_t points = of_pooled.size(0), h = where.size(1), m = of_messages.size(0) / points;
+  const float* maximum = of_pooled.const_data_ptr<float>();
+  const int32_t* at = where.const_data_ptr<int32_t>();
+  float* out = of_messages.data_ptr<float>();
+  const float share = 1 / static_cast<float>(m);
+  for (int64_t i = 0; i < points; ++i, maximum += 2 * h, at += h) {
+    const float* mean = maximum + h;
+    for (int32_t k = 0; k < m; ++k, out += h) {
+      for (int64_t c = 0; c < h; ++c) out[c] = share * mean[c] + (at[c] == k ? maximum[c] : 0.0f);
+    }
   }
 }
 
@@ -75,7 +90,7 @@ class PooledMessagesFunction : public torch::autograd::Function<PooledMessagesFu
                         const Tensor& message_bias) {
     const int64_t n = own.size(0), h = own.size(1);
     const Tensor pooled = torch::empty({n, 2 * h}, own.options());
-    const Tensor where = torch::empty({n, h}, torch::kUInt8);
+    const Tensor where = torch::empty({n, h}, torch::kInt32);
     ForEachBlock(n, m, [&](int64_t, const Block& block) {
       const Tensor sums = Sums(block, own, other, edges, index, edge_weight);
       const Tensor messages = torch::addmm(message_bias, torch::gelu(sums), message_weight.t());
@@ -99,12 +114,8 @@ class PooledMessagesFunction : public torch::autograd::Function<PooledMessagesFu
     std::vector<Tensor> to_edge_weight(blocks), to_message_weight(blocks), to_bias(blocks);  // summed in order
     ForEachBlock(n, m, [&](int64_t b, const Block& block) {
       const Tensor sums = Sums(block, own, other, edges, index, edge_weight);
-      const Tensor of_pooled = block.Points(gradient);
-      Tensor to_messages =
-          (of_pooled.narrow(1, h, h) / static_cast<double>(m)).unsqueeze(1).expand({block.points, m, h}).contiguous();
-      to_messages.scatter_add_(1, block.Points(where).to(torch::kInt64).unsqueeze(1),
-                               of_pooled.narrow(1, 0, h).unsqueeze(1));
-      to_messages = to_messages.view({block.points * m, h});
+      const Tensor to_messages = torch::empty_like(sums);
+      Unpool(block.Points(gradient), block.Points(where), to_messages);
       const auto place = static_cast<size_t>(b);
       to_message_weight[place] = to_messages.t().mm(torch::gelu(sums));
       to_bias[place] = to_messages.sum(0);
@@ -120,7 +131,7 @@ class PooledMessagesFunction : public torch::autograd::Function<PooledMessagesFu
     const int64_t* edge = incoming.const_data_ptr<int64_t>();
     const int64_t* begin = incoming_begin.const_data_ptr<int64_t>();
     float* to = to_other.data_ptr<float>();
-    at::parallel_for(0, n, 512, [&](int64_t first, int64_t last) {
+    at::parallel_for(0, other.size(0), 512, [&](int64_t first, int64_t last) {
       for (int64_t j = first; j < last; ++j) {
         for (int64_t e = begin[j]; e < begin[j + 1]; ++e) {
           const float* row = from + edge[e] * h;
@@ -148,19 +159,19 @@ class PooledMessagesFunction : public torch::autograd::Function<PooledMessagesFu
 
 }  // namespace
 
-EdgeIndex MakeEdgeIndex(const Tensor& index, int64_t points) {
+EdgeIndex MakeEdgeIndex(const Tensor& index, int64_t points, int64_t others) {
   const int64_t count = index.size(0);
   EdgeIndex out;
   out.index = index.to(torch::kInt64).contiguous();
   out.neighbours = points > 0 ? count / points : 0;
   out.incoming = torch::empty({count}, torch::kInt64);
-  out.incoming_begin = torch::zeros({points + 1}, torch::kInt64);
+  out.incoming_begin = torch::zeros({others + 1}, torch::kInt64);
   const int64_t* far = out.index.const_data_ptr<int64_t>();
   int64_t* begin = out.incoming_begin.data_ptr<int64_t>();
   int64_t* edge = out.incoming.data_ptr<int64_t>();
   for (int64_t e = 0; e < count; ++e) ++begin[far[e] + 1];
-  for (int64_t j = 0; j < points; ++j) begin[j + 1] += begin[j];
-  std::vector<int64_t> next(begin, begin + points);
+  for (int64_t j = 0; j < others; ++j) begin[j + 1] += begin[j];
+  std::vector<int64_t> next(begin, begin + others);
   for (int64_t e = 0; e < count; ++e) edge[next[static_cast<size_t>(far[e])]++] = e;
   return out;
 }

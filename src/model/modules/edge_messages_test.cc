@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <vector>
 
 namespace anchorsplat {
@@ -14,12 +15,13 @@ struct Case {
   Tensor edges;
   EdgeIndex index;
 
-  Case(int64_t n, int64_t m, int64_t h) {
+  // n points that read themselves and `more` others.
+  Case(int64_t n, int64_t m, int64_t h, int64_t more = 0) {
     torch::manual_seed(n + m);
-    const Tensor far = m > 0 ? torch::randint(n, {n * m}, torch::kInt64) : torch::empty({0}, torch::kInt64);
-    index = MakeEdgeIndex(far, n);
+    const Tensor far = m > 0 ? torch::randint(n + more, {n * m}, torch::kInt64) : torch::empty({0}, torch::kInt64);
+    index = MakeEdgeIndex(far, n, n + more);
     edges = torch::randn({n * m, 5});
-    for (const std::vector<int64_t>& shape : {std::vector<int64_t>{n, h}, {n, h}, {h, 5}, {h, h}, {h}}) {
+    for (const std::vector<int64_t>& shape : {std::vector<int64_t>{n, h}, {n + more, h}, {h, 5}, {h, h}, {h}}) {
       inputs.push_back(torch::randn(shape).requires_grad_());
     }
   }
@@ -40,12 +42,14 @@ struct Case {
 };
 
 TEST(EdgeMessages, BlocksEqualThePlainForm) {
-  for (const auto& [n, m] : {std::pair<int64_t, int64_t>{1, 1}, {7, 3}, {600, 8}, {256, 2}}) {
-    Case both(n, m, 32);
+  for (const auto& [n, m, more] :
+       {std::array<int64_t, 3>{1, 1, 0}, {7, 3, 0}, {600, 8, 0}, {256, 2, 0}, {300, 8, 170}, {1, 4, 9}}) {
+    Case both(n, m, 32, more);
     const auto plain = both.Run(PooledMessagesPlain), blocks = both.Run(PooledMessages);
     for (size_t i = 0; i < plain.size(); ++i) {
       const double most = plain[i].abs().max().item<double>();
-      EXPECT_LT((blocks[i] - plain[i]).abs().max().item<double>(), 1e-5 * most) << n << " points, output " << i;
+      EXPECT_LT((blocks[i] - plain[i]).abs().max().item<double>(), 1e-5 * most)
+          << n << " + " << more << " points, output " << i;
     }
   }
 }

@@ -8,6 +8,12 @@ namespace anchorsplat {
 Result<std::shared_ptr<TrainableNetwork>> MakeAnchorSplatTrainable(const NetworkOptions& options);
 Result<std::shared_ptr<TrainableNetwork>> MakeCompactTrainable(NetworkOptions options);
 
+Result<std::shared_ptr<const void>> TrainableNetwork::Survey(const NetworkInput&) {
+  return Error{ErrorCode::kBadArgument, "this network sees a splat as a whole: it cannot work on parts"};
+}
+
+SplatPart TrainableNetwork::PartOf(const std::shared_ptr<const void>&, std::span<const int64_t>) { return {}; }
+
 Result<std::shared_ptr<TrainableNetwork>> MakeTrainableNetwork(const std::string& kind, const NetworkOptions& options) {
   if (kind == "anchorsplat") return MakeAnchorSplatTrainable(options);
   if (kind == "compact") return MakeCompactTrainable(options);

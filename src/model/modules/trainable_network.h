@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +16,13 @@
 
 namespace anchorsplat {
 
+// A part of a splat, and around it what a network has to see of the rest to make the part's copies as if it saw all.
+struct SplatPart {
+  std::vector<int64_t> rows;           // of the splat: first those whose copies are wanted, then those these depend on
+  int64_t wanted = 0;                  // how many of them are wanted
+  std::shared_ptr<const void> tables;  // the network's own
+};
+
 struct NetworkInput {
   GaussianTensors gaussians;  // the low-quality splat
   torch::Tensor pixel_sizes;  // [N] world units: what a low-resolution pixel covers at each Gaussian, p_LR
@@ -22,6 +30,8 @@ struct NetworkInput {
   // What a network wants computed once per splat and kept between steps (neighbours, serialization, frames). Made by
   // Prepare.
   std::shared_ptr<void> prepared;
+  // Not null: the tensors are the rows of this part, and copies of the wanted ones come out, row k·wanted + i.
+  std::shared_ptr<const SplatPart> part;
 };
 
 // What the training loop knows of a network: K Gaussians out for every Gaussian in.
@@ -31,6 +41,14 @@ class TrainableNetwork : public torch::nn::Module {
   // from another thread than Forward, so it must not touch what Forward changes.
   // Errors (kBadArgument): a splat that the network cannot work with.
   virtual Result<std::shared_ptr<void>> Prepare(const NetworkInput& input) = 0;
+
+  // For networks that look no farther than a few neighbours: what is needed of a whole splat to work on parts of it,
+  // once per splat as it is in its file. It stays true when the splat is turned, mirrored, moved, scaled and coloured,
+  // but not when Gaussians are left out. Errors (kBadArgument): those of Prepare; a network that has to see a splat as
+  // a whole.
+  virtual Result<std::shared_ptr<const void>> Survey(const NetworkInput& whole);
+  // The part of a splat that makes the copies of `wanted`, which are rows of it, all different.
+  virtual SplatPart PartOf(const std::shared_ptr<const void>& survey, std::span<const int64_t> wanted);
 
   // K·N Gaussians, differentiable with respect to the parameters. Row order k·N + i.
   virtual GaussianTensors Forward(const NetworkInput& input) = 0;

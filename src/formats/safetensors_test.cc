@@ -5,6 +5,7 @@
 
 #include "core/text.h"
 #include "formats/tensor_bytes_test.h"
+#include "formats/test_folder.h"
 
 namespace anchorsplat {
 namespace {
@@ -28,8 +29,6 @@ std::string HeaderError(const std::string& header, size_t data_bytes = 16) {
 std::string One(const std::string& dtype, const std::string& shape, const std::string& offsets) {
   return Cat(R"({"w":{"dtype":")", dtype, R"(","shape":)", shape, R"(,"data_offsets":)", offsets, "}}");
 }
-
-std::filesystem::path Scratch(const std::string& name) { return std::filesystem::path(TempDir()) / name; }
 
 TEST(Safetensors, ReadsHandMadeFile) {
   const std::string header = R"({"__metadata__":{"k":"20"},"b":{"dtype":"F32","shape":[2],"data_offsets":[8,16]},)"
@@ -94,7 +93,8 @@ TEST(Safetensors, EveryCutOfAFileIsAnError) {
 }
 
 TEST(Safetensors, WrittenFilesReadBackBitForBit) {
-  const auto path = Scratch("anchorsplat_write.safetensors");
+  const TestFolder folder;
+  const auto path = folder / "written.safetensors";
   const std::vector<float> weight = {1, -2, 3e-40f, std::numeric_limits<float>::quiet_NaN(), -0.0f, 6};
   const std::vector<int64_t> counter = {41};
   const std::vector<float> nothing;
@@ -126,11 +126,11 @@ TEST(Safetensors, WrittenFilesReadBackBitForBit) {
     EXPECT_EQ(reinterpret_cast<uintptr_t>(read.data) % static_cast<uintptr_t>(ItemSize(read.type)), 0u) << read.name;
   }
   EXPECT_EQ(WriteSafetensors(path, tensors, metadata).error().code, ErrorCode::kExists);
-  std::filesystem::remove(path);
 }
 
 TEST(Safetensors, ConvertsACheckpoint) {
-  const auto path = Scratch("anchorsplat_convert.safetensors");
+  const TestFolder folder;
+  const auto path = folder / "converted.safetensors";
   const Result<TensorFile> source = TensorFile::FromBytes(ToBuffer(ReadTestFile("views.pth")), "views.pth");
   ASSERT_TRUE(source.ok());
   ASSERT_TRUE(WriteSafetensors(path, source->tensors(), {}, {.overwrite = true}).ok());
@@ -140,13 +140,13 @@ TEST(Safetensors, ConvertsACheckpoint) {
   for (const TensorEntry& tensor : source->tensors()) {
     EXPECT_EQ(*CopyFloat32(*file->Find(tensor.name)), *CopyFloat32(tensor)) << tensor.name;
   }
-  std::filesystem::remove(path);
 }
 
 TEST(Safetensors, WriterRefusesWhatCannotBeReadBack) {
+  const TestFolder folder;
   const std::vector<float> values = {1, 2};
   const auto error = [&](const std::vector<TensorEntry>& tensors, const std::map<std::string, std::string>& metadata) {
-    const Status status = WriteSafetensors(Scratch("anchorsplat_refused.safetensors"), tensors, metadata);
+    const Status status = WriteSafetensors(folder / "refused.safetensors", tensors, metadata);
     EXPECT_EQ(status.error().code, ErrorCode::kBadArgument);
     return status.error().message;
   };
@@ -155,7 +155,7 @@ TEST(Safetensors, WriterRefusesWhatCannotBeReadBack) {
   EXPECT_THAT(error({MakeEntry("\xc3", {2}, values)}, {}), HasSubstr("not UTF-8"));
   EXPECT_THAT(error({MakeEntry("a", {-2}, values)}, {}), HasSubstr("impossible shape"));
   EXPECT_THAT(error({}, {{"k", "\x80"}}), HasSubstr("metadata \"k\" is not UTF-8"));
-  EXPECT_FALSE(std::filesystem::exists(Scratch("anchorsplat_refused.safetensors")));
+  EXPECT_FALSE(std::filesystem::exists(folder / "refused.safetensors"));
 }
 
 }  // namespace

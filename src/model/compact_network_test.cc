@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "enhance/filter.h"
 #include "formats/safetensors.h"
+#include "formats/test_folder.h"
 #include "model/compact_cloud_test.h"
 #include "model/compact_residual.h"
 
@@ -153,7 +154,8 @@ class CompactFile {
   }
   // The message of opening it; empty when that worked.
   std::string Open() const {
-    const auto path = std::filesystem::path(testing::TempDir()) / "anchorsplat_compact.safetensors";
+    const TestFolder folder;
+    const auto path = folder / "anchorsplat_compact.safetensors";
     std::vector<TensorEntry> entries;
     for (const auto& [name, array] : values) entries.push_back(MakeEntry(name, shapes.at(name), array));
     EXPECT_TRUE(WriteSafetensors(path, entries, metadata, {.overwrite = true}).ok());
@@ -161,7 +163,6 @@ class CompactFile {
     EXPECT_TRUE(file.ok());
     EXPECT_EQ(IsCompactNetwork(*file), metadata.contains("format"));
     const auto network = LoadCompactNetwork(*file);
-    std::filesystem::remove(path);
     if (network.ok()) return "";
     EXPECT_EQ(network.error().code, ErrorCode::kBadFile);
     EXPECT_THAT(network.error().message, testing::HasSubstr("anchorsplat_compact.safetensors: "));

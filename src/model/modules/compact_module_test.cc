@@ -11,6 +11,7 @@
 #include "core/rotation.h"
 #include "core/spherical_harmonics.h"
 #include "enhance/filter.h"
+#include "formats/test_folder.h"
 #include "metrics/image_metrics.h"
 #include "model/compact_cloud_test.h"
 #include "model/compact_network.h"
@@ -320,8 +321,7 @@ TEST(CompactModule, GradientsMatchDifferences) {
 }
 
 TEST(CompactModule, SavesWhatInferenceOpens) {
-  const auto folder = std::filesystem::path(testing::TempDir()) / "anchorsplat_compact_module";
-  std::filesystem::create_directories(folder);
+  const TestFolder folder;
   const auto made = MakeTrainableNetwork("compact", {{"copies", 2.0}, {"hidden", 32.0}, {"offset_unit", "pixel"}});
   ASSERT_TRUE(made.ok()) << made.error().message;
   auto& network = static_cast<CompactTrainable&>(**made);
@@ -352,7 +352,6 @@ TEST(CompactModule, SavesWhatInferenceOpens) {
   EXPECT_FALSE(MakeTrainableNetwork("compact", {{"init", (folder / "none").string()}}).ok());
   EXPECT_FALSE(MakeTrainableNetwork("compact", {{"hidden", 40.0}}).ok());
   EXPECT_FALSE(MakeTrainableNetwork("compact", {{"wings", 2.0}}).ok());
-  std::filesystem::remove_all(folder);
 }
 
 TEST(CompactModule, RefusesWhatItCannotWorkWith) {

@@ -73,6 +73,7 @@ Status ReadScene(const BenchmarkEntry& entry, BenchmarkObject& object) {
   object.background = scene->background();
   object.low_project = scene->low_folder();
   object.hold_out = scene->record() ? scene->record()->settings.hold_out : kHeldOutEvery;
+  if (const fs::path mesh = entry.folder / kMeshName; IsFile(mesh)) object.mesh = mesh;
   object.picture = [scene](size_t view) { return scene->HighPicture(view); };
   return {};
 }

@@ -39,6 +39,7 @@ struct BenchmarkObject {
   std::array<float, 3> background{};
   std::filesystem::path low_project;  // what the low-quality splat was fitted to: fit/training_views.h opens it …
   int hold_out = 0;                   // … with this, and holds out the same views
+  std::filesystem::path mesh;         // what high views without a picture are rendered from; may be empty
   // The high-resolution picture of a view, rgb or rgba, of its camera's size.
   std::function<Result<Image>(size_t view)> picture;
 

@@ -9,6 +9,7 @@
 
 #include "core/log.h"
 #include "core/text.h"
+#include "eval/object_state.h"
 #include "formats/image_io.h"
 #include "metrics/image_metrics.h"
 #include "metrics/side_by_side.h"
@@ -38,12 +39,9 @@ class Timed {
 // All that a result depends on. What the program itself computes changes with its version.
 std::string Key(const BenchmarkObject& object, const EvalMethod& method, const std::vector<size_t>& views,
                 const EvaluationOptions& options) {
-  std::error_code code;
   return Cat("anchorsplat ", ANCHORSPLAT_VERSION, "; ", ProtocolName(options.protocol), ", ", views.size(), " views; ",
              method.name, " ", method.settings, "; seed ", options.seed, "; lpips ",
-             options.lpips == nullptr ? "none" : LpipsNetName(options.lpips->net()), "; ",
-             object.splat.filename().string(), " ", fs::file_size(object.splat, code), " ",
-             fs::last_write_time(object.splat, code).time_since_epoch().count());
+             options.lpips == nullptr ? "none" : LpipsNetName(options.lpips->net()), "; ", ObjectState(object, views));
 }
 
 Image Crop(const Image& image, const ViewRegion& region) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -225,6 +226,39 @@ TEST(Evaluate, MeasuresResumesAndGoesOnAfterFailures) {
   EXPECT_EQ(changed->resumed, 0);
   EXPECT_LT(changed->Find("b_example", "raw")->MeanPsnr(), 40);
   EXPECT_EQ(Evaluate(folder.path(), Methods({"filter"}), out.path(), {.objects = {"a_published"}})->resumed, 0);
+}
+
+// What was kept counts for the truth, the pictures and the cameras that it was measured with.
+TEST(Evaluate, MeasuresAgainWhatPicturesOrCamerasHaveChangedFor) {
+  const TestFolder folder, out;
+  const fs::path object = folder / "ball";
+  MakePublishedObject(object, Ball(), ThinBall());
+  const auto resumed = [&] {
+    const auto evaluation = Evaluate(folder.path(), Methods({"raw"}), out.path(), {});
+    EXPECT_TRUE(evaluation.ok() && evaluation->failures.empty());
+    return evaluation->resumed;
+  };
+  EXPECT_EQ(resumed(), 0);
+  EXPECT_EQ(resumed(), 1);
+  int changed = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder.path())) {
+    const std::string name = entry.path().filename().string();
+    if (name != "000.png" && name != "images.txt") continue;
+    // A minute later than it was made: another file, for all that anyone knows.
+    fs::last_write_time(entry.path(), entry.last_write_time() + std::chrono::minutes(1));
+    if (name == "images.txt") {
+      std::ifstream in(entry.path());
+      std::string text((std::istreambuf_iterator<char>(in)), {});
+      const size_t at = text.find(" 1 000.png");
+      ASSERT_NE(at, std::string::npos) << text;
+      text.insert(at, "1");  // the last digit of a translation
+      std::ofstream(entry.path()) << text;
+    }
+    EXPECT_EQ(resumed(), 0) << entry.path();
+    EXPECT_EQ(resumed(), 1) << entry.path();
+    ++changed;
+  }
+  EXPECT_EQ(changed, 3);
 }
 
 TEST(Evaluate, BicubicFitsAnewAndGoesOnWhereItWasStopped) {

@@ -1,11 +1,78 @@
 #include "enhance/refine_options.h"
 
+#include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <type_traits>
 
 #include "core/text.h"
 
 namespace anchorsplat {
+
+namespace {
+
+// Whether `number` is one that T can be; then `to` is that.
+template <class T>
+bool Assign(double number, T& to) {
+  if constexpr (std::is_same_v<T, bool>) {
+    if (number != 0 && number != 1) return false;
+  } else if constexpr (std::is_integral_v<T>) {
+    constexpr double most = std::min(1e15, static_cast<double>(std::numeric_limits<T>::max()));
+    if (number != std::floor(number) || !(std::abs(number) <= most)) return false;
+  }
+  to = static_cast<T>(number);
+  return true;
+}
+template <class T>
+bool Assign(double number, std::optional<T>& to) {
+  return Assign(number, to.emplace());
+}
+
+struct NamedOption {
+  std::string_view key;
+  bool (*set)(RefineOptions&, double);
+};
+
+// As on the command line, which declares them with their help.
+constexpr NamedOption kOptions[] = {
+    {"steps", [](RefineOptions& o, double x) { return Assign(x, o.steps); }},
+    {"seconds", [](RefineOptions& o, double x) { return Assign(x, o.seconds); }},
+    {"k", [](RefineOptions& o, double x) { return Assign(x, o.copies); }},
+    {"most-gaussians", [](RefineOptions& o, double x) { return Assign(x, o.max_gaussians); }},
+    {"hold-out", [](RefineOptions& o, double x) { return Assign(x, o.hold_out); }},
+    {"poses", [](RefineOptions& o, double x) { return Assign(x, o.poses); }},
+    {"between", [](RefineOptions& o, double x) { return Assign(x, o.between); }},
+    {"half-from", [](RefineOptions& o, double x) { return Assign(x, o.half_from); }},
+    {"all-from", [](RefineOptions& o, double x) { return Assign(x, o.all_from); }},
+    {"rate", [](RefineOptions& o, double x) { return Assign(x, o.rate); }},
+    {"rate-decay", [](RefineOptions& o, double x) { return Assign(x, o.rate_decay); }},
+    {"ssim-weight", [](RefineOptions& o, double x) { return Assign(x, o.ssim_weight); }},
+    {"exposure", [](RefineOptions& o, double x) { return Assign(x, o.exposure); }},
+    {"robust", [](RefineOptions& o, double x) { return Assign(x, o.robust); }},
+};
+
+}  // namespace
+
+Status SetRefineOption(RefineOptions& options, std::string_view key, std::string_view value) {
+  for (const NamedOption& option : kOptions) {
+    if (option.key != key) continue;
+    double number = 0;
+    const char* end = value.data() + value.size();
+    const auto [stop, code] = std::from_chars(value.data(), end, number);
+    if (code == std::errc() && stop == end && option.set(options, number)) return {};
+    return Error{ErrorCode::kBadArgument, Cat("refine: ", key, " cannot be '", Printable(std::string(value)), "'")};
+  }
+  return Error{ErrorCode::kBadArgument,
+               Cat("refine: there is no option '", Printable(std::string(key)), "' (known: ", RefineOptionKeys(), ")")};
+}
+
+std::string RefineOptionKeys() {
+  std::string keys;
+  for (const NamedOption& option : kOptions) keys += Cat(keys.empty() ? "" : ", ", option.key);
+  return keys;
+}
 
 Status Validate(const RefineOptions& o) {
   const auto bad = [](const std::string& sentence) { return Error{ErrorCode::kBadArgument, "refine: " + sentence}; };

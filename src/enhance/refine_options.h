@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "core/result.h"
 
@@ -39,6 +40,16 @@ inline constexpr int kMostCopies = 64;
 
 // kBadArgument for what cannot be run; names the option.
 Status Validate(const RefineOptions& options);
+
+// Sets the option that is called `key` on the command line (`--k` is "k") to `value`: a number; 0 or 1 for switches.
+// What goes together is for Validate to see when all are set. `images` and the control are not among them.
+//
+// Errors (kBadArgument): a key that is none, with those there are; a value that is no number, or no whole one where a
+// whole one is needed.
+Status SetRefineOption(RefineOptions& options, std::string_view key, std::string_view value);
+
+// The keys of SetRefineOption, separated by commas.
+std::string RefineOptionKeys();
 
 // All options as one JSON object, defaults filled in: for checkpoints.
 std::string ToJsonText(const RefineOptions& options);

@@ -228,6 +228,36 @@ TEST(Evaluate, MeasuresResumesAndGoesOnAfterFailures) {
   EXPECT_EQ(Evaluate(folder.path(), Methods({"filter"}), out.path(), {.objects = {"a_published"}})->resumed, 0);
 }
 
+TEST(EvalMethods, RefinementTakesOptions) {
+  const TestFolder folder, out;
+  MakeExampleObject(folder / "ball", ThinBall(), Ball());
+  const std::string few = "refine@steps=2@k=2@f=0.5", one = "refine-images@steps=2@k=1", longer = "refine@steps=3@k=1";
+  const auto evaluation = Evaluate(folder.path(), Methods({few, one, longer}), out.path(), {});
+  ASSERT_TRUE(evaluation.ok() && evaluation->failures.empty());
+  EXPECT_THAT(evaluation->methods, ElementsAre(few, one, longer)) << "as they were written";
+  EXPECT_EQ(evaluation->Find("ball", few)->facts.at("steps"), 2);
+  EXPECT_EQ(evaluation->Find("ball", longer)->facts.at("steps"), 3);
+  EXPECT_EQ(evaluation->Find("ball", one)->gaussians, 200);
+  EXPECT_GE(evaluation->Find("ball", one)->facts.at("processor_seconds"), 0);
+  EXPECT_TRUE(fs::exists(ObjectFolder(out.path(), "ball") / "refine@steps_2@k_2@f_0.5.json"));
+  EXPECT_EQ(Evaluate(folder.path(), Methods({few, one, longer}), out.path(), {})->resumed, 3);
+
+  const auto error = [](const std::string& word) {
+    const auto method = MakeEvalMethod(word, {});
+    return method.ok() ? std::string() : method.error().message;
+  };
+  EXPECT_EQ(error("refine"), "");
+  EXPECT_EQ(error("filter+refine@rate=0.5"), "");
+  EXPECT_THAT(error("refine@speed=1"), HasSubstr("ssim-weight"));
+  EXPECT_THAT(error("refine@k=x"), HasSubstr("k cannot be 'x'"));
+  EXPECT_THAT(error("refine@k=0"), HasSubstr("K must be"));
+  EXPECT_THAT(error("refine@f=9"), HasSubstr("f is a number"));
+  EXPECT_THAT(error("refine@k=1@k=2"), HasSubstr("each once"));
+  EXPECT_THAT(error("refine@"), HasSubstr("KEY=VALUE"));
+  EXPECT_THAT(error("refine-images@hold-out=0"), HasSubstr("benchmark"));
+  EXPECT_THAT(error("filter+raw@k=1"), HasSubstr("none of raw"));
+}
+
 // What was kept counts for the truth, the pictures and the cameras that it was measured with.
 TEST(Evaluate, MeasuresAgainWhatPicturesOrCamerasHaveChangedFor) {
   const TestFolder folder, out;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <ctime>
 #include <memory>
 #include <set>
 
@@ -163,26 +164,105 @@ CameraSet TrainingCameras(const BenchmarkObject& object) {
   return cameras;
 }
 
-EvalMethod Registered(const std::string& name) {
-  EnhanceOptions defaults;
+// A method of enhance/enhance.h, and what is set for refinement.
+struct RegisteredMethod {
+  std::string word;  // as the user wrote it
+  std::string name;
+  RefineOptions refine;
+  std::optional<double> filter_strength;
+
   // What it depends on besides the object; nothing of it for other methods than refinement.
-  std::string settings = name.find("refine") != std::string::npos ? ToJsonText(defaults.refine) : "";
-  if (name.starts_with("model")) settings += ShippedNetworkIdentity();
-  return {name, settings, [name](const MethodTask& task) -> Result<MethodViews> {
+  std::string Settings() const {
+    std::string settings = name.find("refine") != std::string::npos ? ToJsonText(refine) : "";
+    if (refine.seconds) settings += Cat(" ", *refine.seconds, " s");
+    if (filter_strength) settings += Cat(" f ", *filter_strength);
+    if (name.starts_with("model")) settings += ShippedNetworkIdentity();
+    return settings;
+  }
+};
+
+Status SetOption(RegisteredMethod& method, std::string_view key, std::string_view value) {
+  if (key == "hold-out") {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--methods ", Printable(method.word), ": which views are held out is the benchmark's to say")};
+  }
+  if (key != "f") {
+    const Status set = SetRefineOption(method.refine, key, value);
+    if (set.ok()) return set;
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--methods ", Printable(method.word), ": ", set.error().message, "; f is that of the filter")};
+  }
+  double f = 0;
+  const char* end = value.data() + value.size();
+  const auto [stop, code] = std::from_chars(value.data(), end, f);
+  if (code != std::errc() || stop != end || !(f >= 0 && f <= kMaxFilterStrength)) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--methods ", Printable(method.word), ": f is a number from 0 to ", kMaxFilterStrength)};
+  }
+  method.filter_strength = f;
+  return {};
+}
+
+// NAME or NAME@KEY=VALUE@KEY=VALUE…; nothing when there is no such method.
+Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word) {
+  RegisteredMethod method;
+  method.word = word;
+  method.name = word.substr(0, word.find('@'));
+  // One, or two with a plus between them.
+  const auto known = [](const std::string& name) {
+    const auto methods = EnhanceMethods();
+    return std::any_of(methods.begin(), methods.end(), [&](const EnhanceMethod& m) { return m.name == name; });
+  };
+  const size_t plus = method.name.find('+');
+  if (!known(method.name.substr(0, plus)) || (plus != std::string::npos && !known(method.name.substr(plus + 1)))) {
+    return std::optional<RegisteredMethod>();
+  }
+  if (word.size() > method.name.size() && !method.name.ends_with("refine") && !method.name.ends_with("refine-images")) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--methods ", Printable(word), ": only refine and refine-images have options")};
+  }
+  std::set<std::string> keys;
+  for (size_t at = method.name.size(); at < word.size();) {
+    const size_t end = std::min(word.find('@', at + 1), word.size());
+    const std::string option = word.substr(at + 1, end - at - 1);
+    const size_t equals = option.find('=');
+    if (equals == std::string::npos || !keys.insert(option.substr(0, equals)).second) {
+      return Error{ErrorCode::kBadArgument,
+                   Cat("--methods ", Printable(word), ": options are written @KEY=VALUE, each once; of f, ",
+                       RefineOptionKeys())};
+    }
+    ANCHORSPLAT_RETURN_IF_ERROR(SetOption(method, option.substr(0, equals), option.substr(equals + 1)));
+    at = end;
+  }
+  if (const Status valid = Validate(method.refine); !valid.ok()) {
+    return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(word), ": ", valid.error().message)};
+  }
+  return std::optional<RegisteredMethod>(std::move(method));
+}
+
+// Of all threads, seconds.
+double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+EvalMethod Registered(const RegisteredMethod& method) {
+  return {method.word, method.Settings(), [method](const MethodTask& task) -> Result<MethodViews> {
             EnhanceOptions options;
-            options.method = name;
+            options.method = method.name;
             options.upscale = task.object.upscale();
             options.cameras = TrainingCameras(task.object);
-            if (name.ends_with("refine-images")) {
+            options.refine = method.refine;
+            options.filter_strength = method.filter_strength;
+            if (method.name.ends_with("refine-images")) {
               options.refine.images = task.object.low_project;
               options.refine.hold_out = task.object.hold_out;
             }
             options.camera_rule = CameraPixelRule::kMedian;
             options.seed = task.seed;
+            const double begin = ProcessorSeconds();
             ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, Enhance(task.object.low, options));
             MethodViews views = SplatViews(task.object, std::move(enhanced.cloud));
             views.seconds = enhanced.report.seconds;
             views.facts = enhanced.report.facts;
+            views.facts.emplace_back("processor_seconds", ProcessorSeconds() - begin);
             return views;
           }};
 }
@@ -227,15 +307,8 @@ Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& 
   }
   const std::string extension = fs::path(word).extension().string();
   if (extension == ".safetensors" || extension == ".pth" || extension == ".pt") return Model(word);
-  // One, or two with a plus between them.
-  const auto registered = [](const std::string& name) {
-    const auto methods = EnhanceMethods();
-    return std::any_of(methods.begin(), methods.end(), [&](const EnhanceMethod& m) { return m.name == name; });
-  };
-  const size_t plus = word.find('+');
-  if (registered(word.substr(0, plus)) && (plus == std::string::npos || registered(word.substr(plus + 1)))) {
-    return Registered(word);
-  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<RegisteredMethod> method, ParseRegistered(word));
+  if (method) return Registered(*method);
   return Error{ErrorCode::kBadArgument, Cat("--methods: '", Printable(word),
                                             "' is none of raw, filter, filter@F, filter-auto, filter-best, upsample, "
                                             "bicubic, a checkpoint of a network or "

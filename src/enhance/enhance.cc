@@ -11,6 +11,8 @@
 #include "enhance/filter.h"
 #include "enhance/pixel_size_estimate.h"
 #include "enhance/refine_method.h"
+#include "fit/pixel_model.h"
+#include "fit/training_views.h"
 
 namespace anchorsplat {
 
@@ -126,7 +128,18 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
   return {};
 }
 
-Status ChoosePixelSizes(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
+// Pictures to refine against come with the cameras that took them, and are as large as they were in training.
+Status PixelSizesFromPictures(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.refine.images, {.hold_out = 0}));
+  EnhanceOptions with_cameras = options;
+  with_cameras.cameras.emplace().cameras = std::move(project.train);
+  with_cameras.camera_rule = CameraPixelRule::kMedian;
+  ANCHORSPLAT_RETURN_IF_ERROR(PixelSizesFromTrainingCameras(with_cameras, input, report));
+  report.pixel_size_source = "pictures";
+  return {};
+}
+
+Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, EnhanceInput& input, EnhanceReport& report) {
   if (options.pixel_size && !(*options.pixel_size > 0 && std::isfinite(*options.pixel_size))) {
     return Error{ErrorCode::kBadArgument, Cat("pixel size ", *options.pixel_size, " is not a positive length")};
   }
@@ -141,6 +154,8 @@ Status ChoosePixelSizes(const EnhanceOptions& options, EnhanceInput& input, Enha
   if (options.pixel_size) {
     report.pixel_size = *options.pixel_size;
     report.pixel_size_source = "given";
+  } else if (pictures) {
+    return PixelSizesFromPictures(options, input, report);
   } else {
     const auto estimate = EstimatePixelSize(input.cloud);
     if (!estimate.ok()) {
@@ -167,6 +182,12 @@ double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud)
     LogWarning(
         "the file is tagged antialiased: its fit did not absorb the 0.3 px² dilation, so there is no lost width to "
         "give back and it stays as it is (--filter-strength F to enhance it all the same)");
+    return 0;
+  }
+  if (IsFittedToPixelAreas(cloud)) {
+    LogWarning(
+        "the splat was fitted to the areas of pixels: it has lost no width and none is given back (--filter-strength F "
+        "to enhance it all the same)");
     return 0;
   }
   return DefaultFilterStrength(options.upscale);
@@ -214,7 +235,8 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
                      " is no more than what the closer view's own pixels add (1/", options.upscale,
                      "²): nothing changes"));
     }
-    ANCHORSPLAT_RETURN_IF_ERROR(ChoosePixelSizes(options, input, report));
+    ANCHORSPLAT_RETURN_IF_ERROR(
+        ChoosePixelSizes(options, method->takes_start && !options.refine.images.empty(), input, report));
   }
 
   const auto begin = std::chrono::steady_clock::now();

@@ -23,7 +23,8 @@ struct EnhanceOptions {
   std::string method = "auto";
   double upscale = 4;                     // u ≥ 1: how many times closer the splat will be seen
   std::optional<double> filter_strength;  // f of the filter; its default otherwise, 0 for antialiased splats
-  std::optional<double> pixel_size;       // p_LR for all Gaussians; from `cameras` or estimated otherwise
+  std::optional<double> pixel_size;       // p_LR for all Gaussians; from `cameras`, from the pictures to refine
+                                          // against, or estimated otherwise
   std::optional<CameraSet> cameras;       // the training cameras
   std::optional<int> train_width;         // pixels; see AssumedTrainWidth
   CameraPixelRule camera_rule = CameraPixelRule::kSmallest;
@@ -40,8 +41,10 @@ struct EnhanceReport {
   int64_t gaussians_out = 0;
   double upscale = 1;
   double filter_strength = 0;
-  double pixel_size = 0;           // p_LR, the median when there is one per Gaussian
-  std::string pixel_size_source;   // "given", "cameras" or "estimated"; empty for methods that need none
+  double pixel_size = 0;  // p_LR, the median when there is one per Gaussian
+  // "given", "cameras", "pictures" (the cameras of those to refine against) or "estimated"; empty for methods that need
+  // none.
+  std::string pixel_size_source;
   std::optional<int> train_width;  // pixels, given or assumed; nothing when the cameras' own size was taken
   // What else the method has to tell, by name: counts of the model, for example.
   std::vector<std::pair<std::string, double>> facts;

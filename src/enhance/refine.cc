@@ -25,10 +25,11 @@ namespace {
 constexpr int64_t kStepsWithPictures = 1500, kStepsWithout = 600;
 constexpr int kCopiesWithPictures = 8, kCopiesWithout = 4;
 constexpr int64_t kCheckViews = 8;
-constexpr int64_t kNoteEvery = 10;        // steps
-constexpr int64_t kShownSteps = 1000;     // of a progress bar over seconds
-constexpr double kPerfect = 100;          // dB that stand for identical pictures in means
-constexpr float kInvisible = 1.0f / 255;  // opacity below which a Gaussian can be left out
+constexpr int64_t kNoteEvery = 10;           // steps
+constexpr int64_t kShownSteps = 1000;        // of a progress bar over seconds
+constexpr double kPerfect = 100;             // dB that stand for identical pictures in means
+constexpr double kIndistinguishable = 58.9;  // dB: what rounding to 8 bits makes, 1/√12 of a step
+constexpr float kInvisible = 1.0f / 255;     // opacity below which a Gaussian can be left out
 
 // The views to compare with, and others to see whether it helped.
 struct Views {
@@ -49,6 +50,13 @@ std::vector<Camera> Thinned(const std::vector<Camera>& cameras, int64_t most) {
 
 Result<Views> OpenPictures(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.images, {.hold_out = options.hold_out}));
+  if (!project.without_picture.empty()) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--images ", options.images.string(), ": ", project.without_picture.size(), " of its ",
+                     project.without_picture.size() + project.train.size() + project.held_out.size(),
+                     " cameras have no picture, the first is ", Printable(project.without_picture.front()),
+                     "; are these the pictures of these cameras? If so, take those out that have none")};
+  }
   if (project.background) render.background = *project.background;
   PictureCache pictures(project.train, render.background);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement agreement, MeasureAgreement(input.cloud, render, pictures));
@@ -193,6 +201,23 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
   report.input_psnr = views.input_psnr;
   ANCHORSPLAT_ASSIGN_OR_RETURN(report.before,
                                MeasureConsistency(input.start, views.render, input.upscale, input.cloud, views.check));
+
+  if (pictures) {
+    // A splat that has lost no width is spoiled by what gives it back: the pictures tell.
+    ANCHORSPLAT_ASSIGN_OR_RETURN(
+        const double as_it_is, MeasureConsistency(input.cloud, views.render, input.upscale, input.cloud, views.check));
+    if (as_it_is > report.before) {
+      LogInfo("the splat agrees better with the pictures as it is: the refinement begins with that");
+      report.before = as_it_is;
+      input.start = input.cloud;
+    }
+  }
+  if (!pictures && report.before >= kIndistinguishable) {
+    LogInfo("the start shows what the splat does already, and is kept");
+    report.after = report.before;
+    report.kept_start = true;
+    return Refined{std::move(input.start), report};
+  }
 
   const std::string settings = Settings(input, options, views);
   FitState state;

@@ -48,6 +48,8 @@ struct Refined {
   RefineReport report;
 };
 
+// With pictures it begins with the splat as it was fitted where that agrees better with them than `start`.
+//
 // Logs what it finds; shows progress with the error against the views.
 //
 // Errors: those of OpenProject, PosesAround and Refiner; kBadArgument when the pictures do not show this splat: when

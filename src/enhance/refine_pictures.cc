@@ -5,12 +5,75 @@
 #include <vector>
 
 #include "core/text.h"
+#include "enhance/refine_targets.h"
 #include "metrics/image_metrics.h"
 
 namespace anchorsplat {
 
 namespace {
 constexpr int64_t kMostViews = 16;
+constexpr double kIdentical = 100;  // dB, in means
+// dB by which smaller pictures have to agree better. Noise of the pictures alone, which their halves have less of,
+// makes up to 6, but then a standard splat's own renders are wrong there by more.
+constexpr double kSmallerIsRight = 4;
+
+double Capped(const Result<double>& psnr) { return psnr.ok() ? std::min(*psnr, kIdentical) : 0; }
+
+// The nearest that a picture of one colour comes.
+double PsnrOfPlain(const Image& picture) {
+  Image plain(picture.width, picture.height, 3);
+  for (int c = 0; c < 3; ++c) {
+    double sum = 0;
+    for (int64_t i = 0; i < picture.plane(); ++i) sum += picture.channel(c)[i];
+    std::fill_n(plain.channel(c), picture.plane(), static_cast<float>(sum / static_cast<double>(picture.plane())));
+  }
+  return Capped(Psnr(plain, picture));
+}
+
+// The mean of blocks of 2 × 2 pixels; what is over at the right and at the bottom is left out.
+Image Halved(const Image& image) {
+  Image half(image.width / 2, image.height / 2, image.channels);
+  for (int c = 0; c < image.channels; ++c) {
+    for (int y = 0; y < half.height; ++y) {
+      const float* above = image.channel(c) + int64_t{2} * y * image.width;
+      const float* below = above + image.width;
+      float* out = half.channel(c) + int64_t{y} * half.width;
+      for (int x = 0; x < half.width; ++x) {
+        out[x] = 0.25f * (above[2 * x] + above[2 * x + 1] + below[2 * x] + below[2 * x + 1]);
+      }
+    }
+  }
+  return half;
+}
+
+Camera Halved(const Camera& camera) {
+  const Pinhole& k = camera.intrinsics;
+  Camera half = Cropped(camera, {0, 0, k.width / 2 * 2, k.height / 2 * 2});
+  half.intrinsics = Scaled(half.intrinsics, 0.5);
+  return half;
+}
+
+// Fills in `smaller_psnr` and `smaller`. `cameras` and `pictures` become the last sizes that were looked at.
+Status MeasureSmaller(const GaussianCloud& cloud, const RenderOptions& render, std::vector<Camera>& cameras,
+                      std::vector<Image>& pictures, PictureAgreement& agreement) {
+  Rasterizer rasterizer;
+  RenderOutput output;
+  for (int part = 2;; part *= 2) {
+    double psnr = 0;
+    for (size_t i = 0; i < pictures.size(); ++i) {
+      if (std::min(pictures[i].width, pictures[i].height) < 2 * kLeastSide) return {};
+      pictures[i] = Halved(pictures[i]);
+      cameras[i] = Halved(cameras[i]);
+      ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, cameras[i], render, output));
+      Clamp01(output.color);
+      psnr += Capped(Psnr(output.color, pictures[i])) / static_cast<double>(pictures.size());
+    }
+    if (agreement.smaller > 1 && psnr <= agreement.smaller_psnr) continue;
+    agreement.smaller = part;
+    agreement.smaller_psnr = psnr;
+  }
+}
+
 }  // namespace
 
 Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const RenderOptions& render,
@@ -21,9 +84,10 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
   Rasterizer rasterizer;
   RenderOutput output;
   std::vector<Image> shown(static_cast<size_t>(agreement.views)), truth(shown.size());
+  std::vector<Camera> cameras;
   for (size_t i = 0; i < shown.size(); ++i) {
     const int64_t view = static_cast<int64_t>(i) * count / agreement.views;
-    const Camera& camera = pictures.views()[static_cast<size_t>(view)];
+    const Camera& camera = cameras.emplace_back(pictures.views()[static_cast<size_t>(view)]);
     ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(view, truth[i]));
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, camera, render, output));
     Clamp01(output.color);
@@ -31,12 +95,16 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
   }
   for (size_t i = 0; i < shown.size(); ++i) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double own, Psnr(shown[i], truth[i]));
-    agreement.psnr += std::min(own, 100.0) / static_cast<double>(agreement.views);
+    agreement.psnr += std::min(own, kIdentical) / static_cast<double>(agreement.views);
+    agreement.plain += PsnrOfPlain(truth[i]) >= own;
     const bool mismatched = std::any_of(truth.begin(), truth.end(), [&](const Image& other) {
       const auto psnr = Psnr(shown[i], other);  // fails for another size, which is no rival
       return psnr.ok() && *psnr > own;
     });
     agreement.mismatched += mismatched;
+  }
+  if (render.mode == RenderMode::kClassic) {
+    ANCHORSPLAT_RETURN_IF_ERROR(MeasureSmaller(cloud, render, cameras, truth, agreement));
   }
   return agreement;
 }
@@ -49,6 +117,17 @@ Status CheckAgreement(const PictureAgreement& agreement, double least_psnr) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--images: the splat's own renders agree with the pictures to ", Fixed(agreement.psnr, 1),
                      " dB only, mean of ", agreement.views, " views (at least ", least_psnr, " expected)", suspicions)};
+  }
+  if (2 * agreement.plain > agreement.views) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--images: ", agreement.plain, " of ", agreement.views,
+                     " pictures are as near to a picture of one colour as to what the splat shows there", suspicions)};
+  }
+  if (agreement.smaller > 1 && agreement.smaller_psnr > agreement.psnr + kSmallerIsRight) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--images: the splat's own renders agree with the pictures to ", Fixed(agreement.psnr, 1),
+                     " dB, and to ", Fixed(agreement.smaller_psnr, 1), " dB with the pictures at 1/", agreement.smaller,
+                     " of their size, which must be the size that it was fitted to; give these pictures")};
   }
   if (2 * agreement.mismatched > agreement.views) {
     return Error{ErrorCode::kBadArgument,

@@ -12,7 +12,15 @@ struct PictureAgreement {
   int64_t views = 0;       // looked at
   double psnr = 0;         // dB, mean over them
   int64_t mismatched = 0;  // views whose render is nearer to another view's picture than to their own
+  int64_t plain = 0;       // views whose picture is as near to a picture of one colour as to the render
+  // The same with the pictures at a half, a quarter … of their size, as long as they have kLeastSide pixels, of splats
+  // that standard fits made: these look right at the size of the pictures that they were fitted to, and worse at any
+  // other.
+  double smaller_psnr = 0;
+  int smaller = 1;  // 2, 4, …: where that is highest; 1: it is not measured
 };
+
+inline constexpr int kLeastSide = 24;
 
 // Looks at up to 16 views, evenly spread. Errors: those of PictureCache and Rasterizer.
 Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const RenderOptions& render,

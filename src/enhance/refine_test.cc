@@ -24,6 +24,7 @@ namespace {
 using testing::HasSubstr;
 
 constexpr int kSide = 28, kUpscale = 3;
+constexpr double kGoodFit = 40;                              // dB that a splat that is fine comes to the truth
 constexpr double kPixel = 1.7 / (0.5 * kSide / 0.41421356);  // at the middle of the scene
 
 // A splat that is right when seen three times closer; a project with what a camera sees of it; and what a fit makes of
@@ -182,6 +183,51 @@ TEST_F(Refinement, WhatIsRightAlreadyStays) {
   ExpectSameCloud(refined->cloud, input_.start);
 }
 
+// Whatever is wrong with the pictures is said before the first step.
+TEST_F(Refinement, BadPicturesAreRefusedAtOnce) {
+  options_.steps = 1;
+  const auto message = [&] {
+    const auto refined = Refine(input_, options_, {});
+    return refined.ok() ? std::string() : refined.error().message;
+  };
+  const auto replace = [&](const auto& change) {
+    for (const Camera& camera : cameras_.cameras) {
+      const auto path = project() / (camera.name + ".png");
+      const Image picture = ReadImage(path).value();
+      ASSERT_TRUE(WritePng(path, change(picture), {.overwrite = true}).ok());
+    }
+  };
+  // One picture too few: the camera without one is named.
+  const auto first = project() / (cameras_.cameras[3].name + ".png");
+  std::filesystem::rename(first, folder_ / "elsewhere.png");
+  EXPECT_THAT(message(), testing::AllOf(HasSubstr("1 of its 12 cameras"), HasSubstr(cameras_.cameras[3].name)));
+  std::filesystem::rename(folder_ / "elsewhere.png", first);
+  // Another shape.
+  const Image whole = ReadImage(first).value();
+  ASSERT_TRUE(WritePng(first, Image(kSide, kSide / 2, 3), {.overwrite = true}).ok());
+  EXPECT_THAT(message(), testing::AllOf(HasSubstr("28x14"), HasSubstr("28x28")));
+  ASSERT_TRUE(WritePng(first, whole, {.overwrite = true}).ok());
+  // Larger than those that it was fitted to, of the same shape.
+  replace([](const Image& picture) {
+    Image large;
+    SpreadToRays(picture, {0, 0, picture.width, picture.height}, 4, large);
+    for (float& x : large.pixels) x *= 16;
+    return large;
+  });
+  EXPECT_THAT(message(), HasSubstr("at 1/4 of their size"));
+  replace([](const Image&) {
+    Image black(kSide, kSide, 3);
+    std::fill(black.pixels.begin(), black.pixels.end(), 0.0f);
+    return black;
+  });
+  EXPECT_FALSE(message().empty());
+  // Of a dark splat on black ground, even black pictures are not far off.
+  GaussianCloud dark = input_.cloud;
+  for (size_t i = 0; i < dark.sh.size(); ++i) dark.sh[i] = 0.3f * dark.sh[i] - 1.2f;
+  input_.cloud = dark;
+  EXPECT_THAT(message(), HasSubstr("9 of 9 pictures are as near to a picture of one colour"));
+}
+
 TEST_F(Refinement, PicturesOfSomethingElseAreRefused) {
   const auto message = [&] {
     const auto refined = Refine(input_, options_, {});
@@ -229,6 +275,11 @@ TEST_F(Refinement, ThroughTheDoor) {
   options.refine.steps = 5;
   options.method = "auto";
   EXPECT_EQ(Enhance(input_.cloud, options)->report.method, "refine-images") << "there are pictures";
+  options.pixel_size.reset();
+  const EnhanceReport from_pictures = Enhance(input_.cloud, options)->report;
+  EXPECT_EQ(from_pictures.pixel_size_source, "pictures");
+  EXPECT_NEAR(from_pictures.pixel_size, kPixel, 0.1 * kPixel);
+  options.pixel_size = kPixel;
   options.method = "filter+refine";
   EXPECT_EQ(Enhance(input_.cloud, options)->report.method, "filter+refine");
   options.method = "refine+filter";
@@ -248,6 +299,41 @@ TEST_F(Refinement, ThroughTheDoor) {
   GaussianCloud antialiased = input_.cloud;
   antialiased.render_mode = RenderMode::kAntialiased;
   ExpectSameCloud(Enhance(antialiased, options)->cloud, antialiased);
+}
+
+// What is right when seen closer comes back unharmed: as a fit to the areas of pixels makes it, as an antialiased one
+// makes it, and one of Gaussians that are wide anyway. 0.05 dB is the most that any of them may lose.
+TEST_F(Refinement, WhatIsFineAlreadyIsNotHarmed) {
+  EnhanceOptions options;
+  options.upscale = kUpscale;
+  options.refine = options_;
+  options.refine.copies.reset();
+  options.method = "refine";
+  const auto worse_by = [&](const GaussianCloud& fine, const GaussianCloud& enhanced) {
+    truth_ = fine;
+    const double psnr = PsnrCloser(enhanced);  // infinite when nothing has changed
+    return 10 * std::log10(1 + std::pow(10, (kGoodFit - psnr) / 10));
+  };
+  GaussianCloud area = truth_, wide = truth_, antialiased = truth_;
+  area.comments = {PixelAreaComment(kUpscale)};
+  for (float& s : wide.log_scales) s = std::max(s, static_cast<float>(std::log(6 * kPixel)));
+  antialiased.render_mode = RenderMode::kAntialiased;
+  for (const GaussianCloud& fine : {area, wide, antialiased}) {
+    const bool untold = fine.comments.empty() && !fine.render_mode;
+    options.refine.images.clear();
+    options.cameras = cameras_;
+    auto enhanced = Enhance(fine, options);
+    ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+    EXPECT_LT(worse_by(fine, enhanced->cloud), 0.05) << "without pictures";
+    if (!untold) ExpectSameCloud(enhanced->cloud, fine);
+  }
+  // With the pictures it was fitted to.
+  options.refine.images = project();
+  options.cameras.reset();
+  const GaussianCloud truth = truth_;
+  const auto enhanced = Enhance(area, options);
+  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+  EXPECT_LT(worse_by(truth, enhanced->cloud), 0.05);
 }
 
 TEST(ChooseWindow, IsTheWholeOfSmallViews) {

@@ -230,14 +230,14 @@ TEST(Evaluate, MeasuresResumesAndGoesOnAfterFailures) {
 
 TEST(EvalMethods, RefinementTakesOptions) {
   const TestFolder folder, out;
-  MakeExampleObject(folder / "ball", ThinBall(), Ball());
+  MakePublishedObject(folder / "ball", ThinBall(), Ball());
   const std::string few = "refine@steps=2@k=2@f=0.5", one = "refine-images@steps=2@k=1", longer = "refine@steps=3@k=1";
   const auto evaluation = Evaluate(folder.path(), Methods({few, one, longer}), out.path(), {});
   ASSERT_TRUE(evaluation.ok() && evaluation->failures.empty());
   EXPECT_THAT(evaluation->methods, ElementsAre(few, one, longer)) << "as they were written";
   EXPECT_EQ(evaluation->Find("ball", few)->facts.at("steps"), 2);
   EXPECT_EQ(evaluation->Find("ball", longer)->facts.at("steps"), 3);
-  EXPECT_EQ(evaluation->Find("ball", one)->gaussians, 200);
+  EXPECT_LE(evaluation->Find("ball", one)->gaussians, 200);
   EXPECT_GE(evaluation->Find("ball", one)->facts.at("processor_seconds"), 0);
   EXPECT_TRUE(fs::exists(ObjectFolder(out.path(), "ball") / "refine@steps_2@k_2@f_0.5.json"));
   EXPECT_EQ(Evaluate(folder.path(), Methods({few, one, longer}), out.path(), {})->resumed, 3);

@@ -98,6 +98,7 @@ Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitO
 
   Fitted out{fitter.TakeCloud(), report};
   out.cloud.render_mode = options.objective.render.mode;
+  if (options.pixel.upscale > 1) out.cloud.comments.push_back(PixelAreaComment(options.pixel.upscale));
   out.report.gaussians_out = out.cloud.size();
   if (out.report.interrupted) return out;
   const PixelModel pixel = PixelModelAt(options, options.steps);

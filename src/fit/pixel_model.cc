@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "core/parallel.h"
 #include "core/text.h"
@@ -11,6 +12,7 @@ namespace anchorsplat {
 namespace {
 
 constexpr int kRowsPerTask = 16;
+constexpr std::string_view kPixelAreas = "fitted to pixel areas, seen ";
 
 void Shape(int width, int height, int channels, Image& image) {
   if (image.width == width && image.height == height && image.channels == channels) return;
@@ -47,6 +49,13 @@ Status Validate(const PixelModel& model) {
 }
 
 PixelModel AreaModel(double upscale) { return {static_cast<int>(std::ceil(upscale)), upscale}; }
+
+std::string PixelAreaComment(double upscale) { return Cat(kPixelAreas, upscale, " times closer"); }
+
+bool IsFittedToPixelAreas(const GaussianCloud& cloud) {
+  return std::any_of(cloud.comments.begin(), cloud.comments.end(),
+                     [](const std::string& comment) { return comment.starts_with(kPixelAreas); });
+}
 
 Status Validate(const PixelSchedule& schedule) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(PixelModel{1, schedule.upscale}));

@@ -61,11 +61,15 @@ Status MatchPicture(Camera& camera) {
   return {};
 }
 
-// The set's cameras with pictures, by name.
-Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source) {
+// The set's cameras with pictures, by name; the names of the others are added to `without`.
+Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source, std::vector<std::string>& without) {
   std::vector<Camera> views;
   for (Camera& camera : set.cameras) {
-    if (!camera.image.empty()) views.push_back(std::move(camera));
+    if (!camera.image.empty()) {
+      views.push_back(std::move(camera));
+    } else {
+      without.push_back(camera.name);
+    }
   }
   if (views.empty()) {
     return Error{ErrorCode::kNotFound, Cat(source.string(), ": none of the ", set.cameras.size(),
@@ -123,12 +127,13 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
   if (Exists(train_file)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(train_file));
     out.background = set.background;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views, WithPictures(std::move(set), train_file));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views,
+                                 WithPictures(std::move(set), train_file, out.without_picture));
     out.scene_scale = SceneScale(views);
     if (Exists(test_file)) {
       out.train = std::move(views);
       ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet test, ReadCameras(test_file));
-      ANCHORSPLAT_ASSIGN_OR_RETURN(out.held_out, WithPictures(std::move(test), test_file));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(out.held_out, WithPictures(std::move(test), test_file, out.without_picture));
     } else {
       HoldOut(options.hold_out, std::move(views), out);
     }
@@ -136,7 +141,7 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(source));
     out.background = set.background;
     const bool colmap = set.source == CameraSource::kColmap;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views, WithPictures(std::move(set), source));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views, WithPictures(std::move(set), source, out.without_picture));
     out.scene_scale = SceneScale(views);
     HoldOut(options.hold_out, std::move(views), out);
     if (colmap) {

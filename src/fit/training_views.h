@@ -19,6 +19,7 @@ struct TrainingViews {
   std::vector<Camera> train;     // sorted by name; every one has a picture, and intrinsics for the picture's size
   std::vector<Camera> held_out;  // the same, never trained on
   std::optional<std::array<float, 3>> background;  // where the project says which one its pictures have
+  std::vector<std::string> without_picture;        // names of the camera file's views that are left out for that
   InitialPoints points;                            // may be none
   double scene_scale = 1;  // 1.1 × the largest distance of a camera's centre from their mean; world units
 };

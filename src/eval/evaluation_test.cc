@@ -251,7 +251,7 @@ TEST(EvalMethods, RefinementTakesOptions) {
   EXPECT_THAT(error("refine@speed=1"), HasSubstr("ssim-weight"));
   EXPECT_THAT(error("refine@k=x"), HasSubstr("k cannot be 'x'"));
   EXPECT_THAT(error("refine@k=0"), HasSubstr("K must be"));
-  EXPECT_THAT(error("refine@f=9"), HasSubstr("f is a number"));
+  EXPECT_THAT(error("refine@f=-1"), HasSubstr("f is a number"));
   EXPECT_THAT(error("refine@k=1@k=2"), HasSubstr("each once"));
   EXPECT_THAT(error("refine@"), HasSubstr("KEY=VALUE"));
   EXPECT_THAT(error("refine-images@hold-out=0"), HasSubstr("benchmark"));

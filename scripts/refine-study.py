@@ -1,10 +1,9 @@
 #!/usr/bin/env python3
 """What docs/refine.md says about pictures that are not perfect, splats that are fine already, and fits with area pixels.
 
-    scripts/refine-study.py imperfect|fine|equal-time|synthetic WORK [--program build/anchorsplat] [--objects a,b]
+    scripts/refine-study.py imperfect|fine|equal-time WORK [--program build/anchorsplat] [--objects a,b]
 
-Everything is made from examples/ in the folder WORK; `synthetic` also needs the objects of scripts/fetch-objects.sh
-(--library objects). Each line says what was measured, PSNR and SSIM of the ten high-resolution views that nothing was
+Everything is made from examples/ in the folder WORK. Each line says what was measured, PSNR and SSIM of the ten high-resolution views that nothing was
 trained on, and seconds of processor time of one thread. `imperfect` needs numpy and ImageMagick.
 """
 import argparse

@@ -25,6 +25,7 @@ namespace {
 constexpr int64_t kStepsWithPictures = 1500, kStepsWithout = 600;
 constexpr int kCopiesWithPictures = 8, kCopiesWithout = 4;
 constexpr int64_t kCheckViews = 8;
+constexpr int64_t kResidualViews = 64;
 constexpr int64_t kNoteEvery = 10;           // steps
 constexpr int64_t kShownSteps = 1000;        // of a progress bar over seconds
 constexpr double kPerfect = 100;             // dB that stand for identical pictures in means
@@ -117,6 +118,45 @@ Result<double> MeasureConsistency(const GaussianCloud& cloud, const RenderOption
     sum += std::min(psnr, kPerfect);
   }
   return views > 0 ? sum / static_cast<double>(views) : 0;
+}
+
+// What every Gaussian has to do with what the views find wrong: Σ over up to kResidualViews views and their pixels of
+// its weight in the pixel × how far the picture is off there, 0–1. That weight is how the picture depends on its
+// colour.
+Result<std::vector<double>> Residuals(const GaussianCloud& cloud, double upscale, Views& views) {
+  const PixelModel one_ray{1, upscale};
+  RenderOptions render = RaysOf(one_ray, views.render);
+  render.gradient = true;
+
+  Rasterizer rasterizer;
+  RenderOutput output;
+  RenderGradient off;
+  CloudGradient weighted;
+  RefineTarget target;
+  std::vector<double> residuals(static_cast<size_t>(cloud.size()), 0.0);
+  const auto stride = static_cast<size_t>(cloud.sh_stride());
+  const auto count = static_cast<int64_t>(views.train.views().size());
+  const int64_t looked_at = std::min(count, kResidualViews);
+  for (int64_t i = 0; i < looked_at; ++i) {
+    const int64_t view = i * count / looked_at;
+    const Camera& camera = views.train.views()[static_cast<size_t>(view)];
+    const PixelBox window = ChooseWindow(camera, cloud, 0, view);
+    ANCHORSPLAT_RETURN_IF_ERROR(views.train.Load(view, window, target));
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, Cropped(camera, window), render, output));
+    off.color = output.color;
+    for (size_t k = 0; k < off.color.pixels.size(); ++k) {
+      off.color.pixels[k] = std::abs(off.color.pixels[k] - target.picture.pixels[k]);
+    }
+    for (size_t k = 0; k < target.ignored.size(); ++k) {
+      for (int c = 0; c < 3 && target.ignored[k] != 0; ++c) off.color.channel(c)[k] = 0;
+    }
+    off.box = {0, 0, off.color.width, off.color.height};
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Backward(cloud, off, weighted));
+    for (size_t k = 0; k < residuals.size(); ++k) {
+      for (size_t c = 0; c < 3; ++c) residuals[k] += double{weighted.sh[k * stride + c]};
+    }
+  }
+  return residuals;
 }
 
 // What a continuation must have in common with what it continues.
@@ -226,8 +266,14 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
     report.resumed_at = state.step;
     LogInfo(Cat("going on at step ", WithThousands(state.step), " of ", control.checkpoint.string()));
   } else {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud split,
-                                 SplitGaussians(input.start, {.copies = *options.copies, .seed = input.seed}));
+    std::vector<int> each;
+    if (*options.copies > 1) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> residuals, Residuals(input.start, input.upscale, views));
+      each = CopiesByResidual(residuals, *options.copies);
+    }
+    ANCHORSPLAT_ASSIGN_OR_RETURN(
+        GaussianCloud split,
+        SplitGaussians(input.start, {.copies = *options.copies, .seed = input.seed, .each = each}));
     state = Fitter::Fresh(std::move(split));
   }
   const RefineProblem problem{views.render, input.upscale, views.scene_scale, input.seed};

@@ -100,6 +100,7 @@ std::string ToJsonText(const RefineOptions& o) {
       {"hold_out", o.hold_out},
       {"steps", o.steps.value_or(0)},
       {"copies", o.copies.value_or(0)},
+      {"split", "by residual"},
       {"max_gaussians", o.max_gaussians},
       {"poses", o.poses},
       {"between", o.between},

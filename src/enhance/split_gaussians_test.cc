@@ -59,6 +59,36 @@ TEST(SplitGaussians, FollowsFromTheSeedAlone) {
   EXPECT_FALSE(SameBits(SplitGaussians(cloud, {.copies = 3, .seed = 5})->means, one.means));
 }
 
+TEST(SplitGaussians, EveryGaussianHasItsOwnNumber) {
+  const GaussianCloud cloud = RandomCloud(3, 1, 9);
+  const std::vector<int> each = {2, 1, 4};
+  const auto split = SplitGaussians(cloud, {.copies = 2, .each = each});
+  ASSERT_TRUE(split.ok()) << split.error().message;
+  ASSERT_EQ(split->size(), 7);
+  ExpectSameCloud(*Subset(*split, std::vector<int64_t>{2}), *Subset(cloud, std::vector<int64_t>{1}));
+  EXPECT_NEAR(split->log_scales[0], cloud.log_scales[0] - 0.4 * std::log(2.0), 1e-5);
+  EXPECT_NEAR(split->log_scales[9], cloud.log_scales[6] - 0.4 * std::log(4.0), 1e-5);
+  EXPECT_EQ(split->opacity_logits[6], cloud.opacity_logits[2]);
+  const std::vector<int> few = {2, 1}, none = {1, 0, 1};
+  EXPECT_FALSE(SplitGaussians(cloud, {.copies = 2, .each = few}).ok());
+  EXPECT_FALSE(SplitGaussians(cloud, {.copies = 2, .each = none}).ok());
+}
+
+TEST(CopiesByResidual, FollowItsRoot) {
+  std::vector<double> residuals;
+  for (int i = 0; i < 1000; ++i) residuals.push_back(i % 4 == 0 ? 9e-5 : 1e-5);
+  const std::vector<int> each = CopiesByResidual(residuals, 8);
+  int64_t sum = 0;
+  for (const int copies : each) sum += copies;
+  EXPECT_LE(sum, 8000);
+  EXPECT_GT(sum, 7000);
+  EXPECT_NEAR(each[0], 3.0 * each[1], 2);
+  for (const auto& odd : {std::vector<double>{0, 0}, {NAN, 1}, {1e300, 1e-300}, {-1, 5}, {INFINITY, 1}}) {
+    for (const int copies : CopiesByResidual(odd, 3)) EXPECT_TRUE(copies >= 1 && copies <= 12) << odd[0];
+  }
+  EXPECT_TRUE(CopiesByResidual({}, 3).empty());
+}
+
 TEST(SplitGaussians, Edges) {
   GaussianCloud cloud = RandomCloud(2, 0, 8);
   cloud.log_scales[0] = -INFINITY;  // a scale of zero

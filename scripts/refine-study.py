@@ -62,10 +62,12 @@ def spoil(example, kind, folder):
 
 def imperfect(args, example):
     """Noise of 5/255, JPEG of quality 70, brightness of each picture off by up to 10 %."""
-    for kind in ("as they are", "noise", "jpeg", "exposure"):
+    flags_of = {"as they are": ((), ("--robust",)), "noise": ((), ("--robust",)), "jpeg": ((), ("--robust",)),
+                "exposure": ((), ("--exposure",), ("--exposure", "--robust"))}
+    for kind, tried in flags_of.items():
         folder = args.work / f"{example.name}-{kind.split()[0]}"
         spoil(example, kind, folder)
-        for flags in ((), ("--robust",), ("--exposure",), ("--exposure", "--robust")):
+        for flags in tried:
             enhance(args, f"{example.name}, pictures: {kind} {' '.join(flags)}", example / "input.ply", example, "--method",
                     "refine", "--images", folder, "--hold-out", "0", "--k", args.k, "--steps", args.steps, *flags)
 

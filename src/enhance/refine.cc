@@ -267,7 +267,8 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
     LogInfo(Cat("going on at step ", WithThousands(state.step), " of ", control.checkpoint.string()));
   } else {
     std::vector<int> each;
-    if (*options.copies > 1) {
+    // Without pictures the differences are what the fit itself got wrong; copies do not help there.
+    if (pictures && *options.copies > 1) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> residuals, Residuals(input.start, input.upscale, views));
       each = CopiesByResidual(residuals, *options.copies);
     }

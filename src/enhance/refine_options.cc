@@ -95,12 +95,11 @@ Status Validate(const RefineOptions& o) {
 
 std::string ToJsonText(const RefineOptions& o) {
   // One level, so that what differs can be named by one word.
-  const nlohmann::json json = {
+  nlohmann::json json = {
       {"images", !o.images.empty()},
       {"hold_out", o.hold_out},
       {"steps", o.steps.value_or(0)},
       {"copies", o.copies.value_or(0)},
-      {"split", "by residual"},
       {"max_gaussians", o.max_gaussians},
       {"poses", o.poses},
       {"between", o.between},
@@ -112,6 +111,7 @@ std::string ToJsonText(const RefineOptions& o) {
       {"exposure", o.exposure},
       {"robust", o.robust},
   };
+  if (!o.images.empty()) json["split"] = "by residual";
   return json.dump();
 }
 

@@ -173,7 +173,9 @@ struct RegisteredMethod {
 
   // What it depends on besides the object; nothing of it for other methods than refinement.
   std::string Settings() const {
-    std::string settings = name.find("refine") != std::string::npos ? ToJsonText(refine) : "";
+    RefineOptions with_pictures = refine;
+    if (name.ends_with("refine-images")) with_pictures.images = "the object's";
+    std::string settings = name.find("refine") != std::string::npos ? ToJsonText(with_pictures) : "";
     if (refine.seconds) settings += Cat(" ", *refine.seconds, " s");
     if (filter_strength) settings += Cat(" f ", *filter_strength);
     if (name.starts_with("model")) settings += ShippedNetworkIdentity();

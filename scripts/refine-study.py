@@ -3,8 +3,9 @@
 
     scripts/refine-study.py imperfect|fine|equal-time WORK [--program build/anchorsplat] [--objects a,b]
 
-Everything is made from examples/ in the folder WORK. Each line says what was measured, PSNR and SSIM of the ten high-resolution views that nothing was
-trained on, and seconds of processor time of one thread. `imperfect` needs numpy and ImageMagick.
+Everything is made from examples/ in the folder WORK. Each line says what was measured, PSNR and SSIM of the ten
+high-resolution views that nothing was trained on (but the antialiased fits of `fine`), and seconds of processor
+time of one thread. `imperfect` needs numpy and ImageMagick.
 """
 import argparse
 import json
@@ -107,12 +108,12 @@ def equal_time(args, example):
     gaussians = gaussians[0] if isinstance(gaussians, list) else gaussians
     for most in (20000, gaussians["gaussians"]):
         # Steps are not equally dear: the number is corrected until the time is right.
-        steps = int(args.fit_steps) // 2
+        steps, seconds = int(args.fit_steps) // 2, first + second
         for _ in range(4):
+            steps = int(steps * (first + second) / seconds)
             _, seconds = run(*fit, "-o", area, "--steps", steps, "--pixel", "area", "--max-gaussians", most)
             if abs(seconds / (first + second) - 1) < 0.1:
                 break
-            steps = int(steps * (first + second) / seconds)
         report(f"{example.name}, fit --pixel area, {steps} steps, {most} Gaussians", args.program, area, example / "hr",
                example / "transforms_hr.json", seconds)
 

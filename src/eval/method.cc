@@ -183,6 +183,16 @@ struct RegisteredMethod {
   }
 };
 
+// f of a filter, as in `word`.
+Result<double> ParseStrength(const std::string& word, std::string_view value) {
+  double f = 0;
+  const char* end = value.data() + value.size();
+  const auto [stop, code] = std::from_chars(value.data(), end, f);
+  if (code == std::errc() && stop == end && f >= 0 && f <= kMaxFilterStrength) return f;
+  return Error{ErrorCode::kBadArgument,
+               Cat("--methods ", Printable(word), ": f is a number from 0 to ", kMaxFilterStrength)};
+}
+
 Status SetOption(RegisteredMethod& method, std::string_view key, std::string_view value) {
   if (key == "hold-out") {
     return Error{ErrorCode::kBadArgument,
@@ -194,14 +204,7 @@ Status SetOption(RegisteredMethod& method, std::string_view key, std::string_vie
     return Error{ErrorCode::kBadArgument,
                  Cat("--methods ", Printable(method.word), ": ", set.error().message, "; f is that of the filter")};
   }
-  double f = 0;
-  const char* end = value.data() + value.size();
-  const auto [stop, code] = std::from_chars(value.data(), end, f);
-  if (code != std::errc() || stop != end || !(f >= 0 && f <= kMaxFilterStrength)) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("--methods ", Printable(method.word), ": f is a number from 0 to ", kMaxFilterStrength)};
-  }
-  method.filter_strength = f;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(method.filter_strength, ParseStrength(method.word, value));
   return {};
 }
 
@@ -300,12 +303,8 @@ Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& 
   if (word == "bicubic") return Bicubic(options.fit_steps);
   const std::string at = "filter@";
   if (word.starts_with(at)) {
-    double f = 0;
-    const char* end = word.data() + word.size();
-    const auto [stop, code] = std::from_chars(word.data() + at.size(), end, f);
-    if (code == std::errc() && stop == end && f >= 0 && f <= kMaxFilterStrength) return Filter(word, f);
-    return Error{ErrorCode::kBadArgument,
-                 Cat("--methods ", Printable(word), ": f is a number from 0 to ", kMaxFilterStrength)};
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double f, ParseStrength(word, std::string_view(word).substr(at.size())));
+    return Filter(word, f);
   }
   const std::string extension = fs::path(word).extension().string();
   if (extension == ".safetensors" || extension == ".pth" || extension == ".pt") return Model(word);

@@ -2,13 +2,15 @@
 """What docs/refine.md says about pictures that are not perfect, splats that are fine already, and fits with area pixels.
 
     scripts/refine-study.py imperfect|fine|equal-time WORK [--program build/anchorsplat] [--objects a,b]
+    scripts/refine-study.py trained-high|nerf WORK --objects objects/…/BlendSwap-CC-0.sh3f#chicken,…
 
-Everything is made from examples/ in the folder WORK. Each line says what was measured, PSNR and SSIM of the ten
-high-resolution views that nothing was trained on (but the antialiased fits of `fine`), and seconds of processor
-time of one thread. `imperfect` needs numpy and ImageMagick.
+The first three work on examples/, the others on meshes (scripts/fetch-objects.sh), all in the folder WORK. Each line says
+what was measured, PSNR and SSIM of high-resolution views that nothing was trained on, and seconds of processor time of
+one thread. `imperfect` needs numpy and ImageMagick.
 """
 import argparse
 import json
+import math
 import pathlib
 import resource
 import shutil
@@ -24,8 +26,8 @@ def run(*command):
     return out, resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
 
 
-def report(name, program, splat, truth, cameras, seconds):
-    out, _ = run(program, "compare", splat, truth, "--cameras", cameras, "--threads", "1", "--json")
+def report(name, program, splat, truth, cameras, seconds, *more):
+    out, _ = run(program, "compare", splat, truth, "--cameras", cameras, "--threads", "1", "--json", *more)
     mean = json.loads(out)["mean"]
     print(f"{name:60} {mean['psnr']:6.2f} dB  {mean['ssim']:.4f}  {seconds:4.0f} s", flush=True)
 
@@ -76,21 +78,71 @@ def imperfect(args, example):
 def fine(args, example):
     """Splats that are right when seen closer, through refinement at the low resolution's cameras and pictures."""
     low, init = example / "transforms_lr.json", ("--init-splat", example / "input.ply", "--max-gaussians", "20000")
-    area, sharp = args.work / f"{example.name}-area.ply", args.work / f"{example.name}-antialiased.ply"
+    area = args.work / f"{example.name}-area.ply"
     _, seconds = run(args.program, "fit", low, "-o", area, "-w", "-q", "--threads", "1", "--hold-out", "0", "--pixel", "area",
                      "--steps", args.fit_steps, *init)
     report(f"{example.name}, fitted to pixel areas", args.program, area, example / "hr", example / "transforms_hr.json",
            seconds)
-    # There are ten high-resolution pictures only; its fit is measured where it was trained, which hides no harm.
-    _, seconds = run(args.program, "fit", example / "transforms_hr.json", "-o", sharp, "-w", "-q", "--threads", "1",
-                     "--hold-out", "0", "--mode", "antialiased", "--steps", str(int(args.fit_steps) // 4), *init)
-    report(f"{example.name}, antialiased at high resolution", args.program, sharp, example / "hr",
-           example / "transforms_hr.json", seconds)
-    for splat, name in ((area, "pixel areas"), (sharp, "antialiased")):
-        enhance(args, f"{example.name}, {name}, refined without pictures", splat, example, "--method", "refine", "--cameras",
-                low)
-        enhance(args, f"{example.name}, {name}, refined with pictures", splat, example, "--method", "refine", "--images", low,
-                "--hold-out", "0", "--k", args.k, "--steps", args.steps)
+    enhance(args, f"{example.name}, pixel areas, refined without pictures", area, example, "--method", "refine", "--cameras",
+            low)
+    enhance(args, f"{example.name}, pixel areas, refined with pictures", area, example, "--method", "refine", "--images", low,
+            "--hold-out", "0", "--k", args.k, "--steps", args.steps)
+
+
+def trace(args, mesh, low, high, *more):
+    """Views of a mesh at both sizes; the folder, and every eighth high-resolution view, which fits leave out."""
+    folder = args.work / f"{mesh.split('#')[-1]}-{high}"
+    if not (folder / f"transforms_{high}.json").exists():
+        run(args.program, "views", mesh, "-o", folder, "-w", "-q", "--low-size", low, "--size", high, "--points", "10000", *more)
+    cameras = json.loads((folder / f"transforms_{high}.json").read_text())
+    cameras["frames"] = cameras["frames"][::8]
+    (folder / "held_out.json").write_text(json.dumps(cameras))
+    (folder / "held_out").mkdir(exist_ok=True)
+    for frame in cameras["frames"]:
+        shutil.copy(folder / frame["file_path"], folder / "held_out")
+    return folder
+
+
+def trained_high(args, mesh):
+    """A splat that was fitted to pictures four times as large is refined with the small ones."""
+    folder = trace(args, mesh, 128, 512, "--opaque")
+    for mode in ("antialiased", "classic"):
+        name, splat = f"{mesh.split('#')[-1]}, {mode} fit of 512 x 512", folder / f"{mode}.ply"
+        _, seconds = run(args.program, "fit", folder / "transforms_512.json", "-o", splat, "-w", "-q", "--threads", "1", "--mode",
+                         mode, "--steps", args.fit_steps, "--max-gaussians", "20000")
+        report(name, args.program, splat, folder / "held_out", folder / "held_out.json", seconds)
+        out = folder / f"{mode}-refined.ply"
+        _, seconds = run(args.program, "enhance", splat, "-o", out, "-w", "-q", "--threads", "1", "--method", "refine", "--images",
+                         folder / "transforms_128.json", "--k", args.k, "--steps", args.steps)
+        report(f"{name}, refined with 128 x 128", args.program, out, folder / "held_out", folder / "held_out.json", seconds)
+
+
+def nerf(args, mesh):
+    """A scene in the layout of NeRF-synthetic, 200 to 800 pixels on white: fit, filter, both kinds of refinement."""
+    folder = trace(args, mesh, 200, 800)
+    scene = folder / "scene"
+    (scene / "train").mkdir(parents=True, exist_ok=True)
+    cameras = json.loads((folder / "transforms_200.json").read_text())
+    frames = []
+    for i, frame in enumerate(cameras["frames"]):
+        if i % 8 == 0:
+            continue
+        shutil.copy(folder / frame["file_path"], scene / "train" / f"r_{i}.png")
+        frames.append({"file_path": f"./train/r_{i}", "transform_matrix": frame["transform_matrix"]})
+    angle = 2 * math.atan(cameras["w"] / (2 * cameras["fl_x"]))
+    (scene / "transforms_train.json").write_text(json.dumps({"camera_angle_x": angle, "frames": frames}))
+    truth, name = (folder / "held_out", folder / "held_out.json"), mesh.split("#")[-1]
+    splat = folder / "input.ply"
+    _, seconds = run(args.program, "fit", scene, "-o", splat, "-w", "-q", "--threads", "1", "--hold-out", "0", "--background",
+                     "1,1,1", "--max-gaussians", "50000")
+    report(f"{name}, fit of 200 x 200", args.program, splat, *truth, seconds, "--background", "1,1,1")
+    ways = {"filter": ("--method", "filter", "--cameras", scene / "transforms_train.json", "--camera-rule", "median"),
+            "refined without pictures": ("--method", "refine", "--cameras", scene / "transforms_train.json"),
+            "refined with pictures": ("--method", "refine", "--images", scene, "--hold-out", "0")}
+    for way, options in ways.items():
+        out = folder / f"{way.replace(' ', '-')}.ply"
+        _, seconds = run(args.program, "enhance", splat, "-o", out, "-w", "-q", "--threads", "1", *options)
+        report(f"{name}, {way}", args.program, out, *truth, seconds, "--background", "1,1,1")
 
 
 def equal_time(args, example):
@@ -120,7 +172,7 @@ def equal_time(args, example):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("imperfect", "fine", "equal-time"))
+    parser.add_argument("what", choices=("imperfect", "fine", "equal-time", "trained-high", "nerf"))
     parser.add_argument("work", type=pathlib.Path)
     parser.add_argument("--program", default="build/anchorsplat")
     parser.add_argument("--objects", default="biplane,stone_lantern")
@@ -130,7 +182,10 @@ def main():
     args = parser.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)
     for name in args.objects.split(","):
-        {"imperfect": imperfect, "fine": fine, "equal-time": equal_time}[args.what](args, EXAMPLES / name)
+        if args.what in ("trained-high", "nerf"):
+            {"trained-high": trained_high, "nerf": nerf}[args.what](args, name)
+        else:
+            {"imperfect": imperfect, "fine": fine, "equal-time": equal_time}[args.what](args, EXAMPLES / name)
 
 
 if __name__ == "__main__":

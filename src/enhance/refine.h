@@ -33,7 +33,8 @@ struct RefineReport {
   int64_t steps = 0;         // done in all
   int64_t resumed_at = 0;    // steps that a checkpoint brought
   bool interrupted = false;  // stopped by the user
-  bool kept_start = false;   // the result agreed no better with the views than the start did: that is the result
+  bool kept_start = false;   // the result agreed no better with the views than the start did (or only a little better,
+                             // where the splat knows more than the pictures): the start is the result
   int64_t views = 0;         // compared with
   std::optional<double> input_psnr;  // dB, of the input's ordinary renders against the pictures
   // Against views that were not trained on (where there are any), what they average to at their own resolution, dB.
@@ -48,7 +49,9 @@ struct Refined {
   RefineReport report;
 };
 
-// With pictures it begins with the splat as it was fitted where that agrees better with them than `start`.
+// With pictures it begins with the splat as it was fitted where that agrees better with them than `start`. Such a splat,
+// and an antialiased one, comes back as it is unless it agrees with the pictures better by 2 dB in the end: it was
+// trained on more than they show.
 //
 // Logs what it finds; shows progress with the error against the views.
 //

@@ -336,6 +336,30 @@ TEST_F(Refinement, WhatIsFineAlreadyIsNotHarmed) {
   EXPECT_LT(worse_by(truth, enhanced->cloud), 0.05);
 }
 
+// A splat that was trained on larger pictures agrees with the smaller ones when seen closer, and better than with any
+// width given to it. A little better is no reason to forget what they do not show.
+TEST_F(Refinement, WhatKnowsMoreThanThePicturesStays) {
+  Random random(4);
+  input_.cloud = truth_;
+  for (float& v : input_.cloud.means) v += static_cast<float>(0.01 * kPixel * random.Normal());
+  input_.start = input_.cloud;
+  for (float& s : input_.start.log_scales) s += 0.1f;  // as a filter would
+  options_.rate = 0.2;
+  const auto kept = Refine(input_, options_, {});
+  ASSERT_TRUE(kept.ok()) << kept.error().message;
+  EXPECT_TRUE(kept->report.kept_start);
+  ExpectSameCloud(kept->cloud, input_.cloud);
+  // A bad one has more to learn than to forget.
+  for (float& v : input_.cloud.means) v += static_cast<float>(0.3 * kPixel * random.Normal());
+  input_.start = input_.cloud;
+  for (float& s : input_.start.log_scales) s += 0.3f;
+  options_.rate = 1;
+  const auto refined = Refine(input_, options_, {});
+  ASSERT_TRUE(refined.ok()) << refined.error().message;
+  EXPECT_FALSE(refined->report.kept_start);
+  EXPECT_GT(refined->report.after, refined->report.before + 2);
+}
+
 TEST(ChooseWindow, IsTheWholeOfSmallViews) {
   const GaussianCloud ball = orbit_scene::Ball(20, 1);
   const auto cameras = orbit_scene::Cameras(2, 300, 200).cameras;

@@ -21,11 +21,11 @@ for object in biplane stone_lantern; do
 done
 
 echo
-echo "== Both examples by every training-free method, mean over ten views each that no fit has seen"
-"$program" eval examples -o "$out/eval" --methods raw,upsample,filter,filter-auto -w
+echo "== Both examples by every method that takes less than a second, mean over ten views each that no fit has seen"
+"$program" eval examples -o "$out/eval" --methods raw,upsample,filter,filter-auto,model -w
 
 echo
 echo "Look at   $out/biplane.png and $out/stone_lantern.png  (before, after, ground truth)"
 echo "Open      $out/biplane.html in a browser: turn it, zoom in, pull the slider"
-echo "Tables    $out/eval/table.md, with crops in $out/eval/contact_sheet.png"
+echo "Tables    $out/eval/table.md; raw, filter, model and truth side by side in $out/eval/contact_sheet.png"
 echo "Enhanced  $out/biplane-4x.ply and $out/stone_lantern-4x.ply"

@@ -20,6 +20,7 @@
 #include "formats/registry.h"
 #include "formats/tensor_file.h"
 #include "model/checkpoint_writer.h"
+#include "model/compact_network.h"
 
 namespace anchorsplat {
 
@@ -179,27 +180,53 @@ bool LooksLikeModel(const std::filesystem::path& path) {
   return extension == ".pth" || extension == ".safetensors";  // a broken one
 }
 
+// What is in a network's weights.
+struct ModelFindings {
+  std::map<std::string, std::string> facts;  // the file's metadata and the architecture
+  std::vector<TensorSpec> learned;           // tensors of parameters
+  size_t tensors = 0;                        // all
+};
+
+Result<ModelFindings> LookAtCompactNetwork(const TensorFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const CompactNetwork network, LoadCompactNetwork(file));
+  ModelFindings found{file.metadata(), CompactTensors(network.config()), file.tensors().size()};
+  std::erase_if(found.learned, [](const TensorSpec& tensor) { return tensor.name.starts_with("domain."); });
+  for (const auto& [key, value] : ToMetadata(network.config())) found.facts[key] = value;
+  return found;
+}
+
+Result<ModelFindings> LookAtCheckpoint(const std::string& path) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Checkpoint checkpoint, Checkpoint::Open(path));
+  ModelFindings found{checkpoint.file().metadata(), NetworkTensors(checkpoint.config()),
+                      checkpoint.file().tensors().size()};
+  std::erase_if(found.learned, [](const TensorSpec& tensor) {
+    return tensor.counter || tensor.name.ends_with("running_mean") || tensor.name.ends_with("running_var");
+  });
+  for (const auto& [key, value] : ArchitectureMetadata(checkpoint.config())) found.facts[key] = value;
+  return found;
+}
+
 // A network's weights instead of a splat.
-Status RunModelInfo(const std::string& file, const SharedFlags& shared) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Checkpoint checkpoint, Checkpoint::Open(file));
-  const NetworkConfig& config = checkpoint.config();
+Status RunModelInfo(const std::string& path, const SharedFlags& shared) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorFile file, TensorFile::Open(path));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ModelFindings found,
+                               IsCompactNetwork(file) ? LookAtCompactNetwork(file) : LookAtCheckpoint(path));
   int64_t parameters = 0;
-  for (const TensorSpec& tensor : NetworkTensors(config)) {
-    if (tensor.counter || tensor.name.ends_with("running_mean") || tensor.name.ends_with("running_var")) continue;
+  for (const TensorSpec& tensor : found.learned) {
     int64_t size = 1;
     for (const int64_t side : tensor.shape) size *= side;
     parameters += size;
   }
-  std::map<std::string, std::string> facts = checkpoint.file().metadata();
-  for (const auto& [key, value] : ArchitectureMetadata(config)) facts[key] = value;
-  const size_t tensors = checkpoint.file().tensors().size();
   if (shared.json) {
-    PrintJson(
-        {{"file", file}, {"kind", "model"}, {"tensors", tensors}, {"parameters", parameters}, {"metadata", facts}});
+    PrintJson({{"file", path},
+               {"kind", "model"},
+               {"tensors", found.tensors},
+               {"parameters", parameters},
+               {"metadata", found.facts}});
     return {};
   }
-  std::cout << file << "\n  parameters   " << WithThousands(parameters) << " in " << tensors << " tensors\n";
-  for (const auto& [key, value] : facts) std::cout << "  " << key << "  " << Printable(value, 2000) << "\n";
+  std::cout << path << "\n  parameters   " << WithThousands(parameters) << " in " << found.tensors << " tensors\n";
+  for (const auto& [key, value] : found.facts) std::cout << "  " << key << "  " << Printable(value, 2000) << "\n";
   return {};
 }
 

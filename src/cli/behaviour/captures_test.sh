@@ -163,6 +163,10 @@ says stdout '"gain_over_raw"'
 [ -s "$work/eval/table.md" ] && [ -s "$work/eval/table.csv" ] && [ -s "$work/eval/contact_sheet.png" ] || { failures=$((failures + 1)); echo "FAILED: tables of eval"; }
 expect 0 "evaluation goes on" "$program" eval "$source/examples" -o "$work/eval" --objects biplane --max-views 2 --methods raw,filter --json
 says stdout '"resumed": 2'
+expect 0 "the network that is part of the program" "$program" eval "$source/examples" -o "$work/shipped" --max-views 1 --methods filter,model -q
+checks=$((checks + 1))
+awk -F, '$2 == "filter" { f[$1] = $4; s[$1] = $5 } $2 == "model" { ++n; good += $4 > f[$1] + 0.5 && $5 > s[$1] } END { exit !(n == 2 && good == 2) }' \
+  "$work/shipped/table.csv" || { failures=$((failures + 1)); echo "FAILED: the shipped network beats the filter by 0.5 dB"; cat "$work/shipped/table.csv"; }
 expect 0 "choosing f" "$program" eval "$source/examples" -o "$work/eval" --objects biplane --max-views 1 --choose-f
 says stdout "Best f"
 expect 2 "unknown method" "$program" eval "$source/examples" -o "$work/eval" --methods magic

@@ -146,6 +146,13 @@ expect 2 "model options without a model" "$program" enhance "$input" -o "$work/b
 compact=$source/testdata/compact/small.safetensors
 expect 0 "a compact network" "$program" enhance "$input" -o "$work/compact.ply" --model "$compact" --cameras "$source/examples/biplane/transforms_lr.json"
 says stdout "20,000 Gaussians in, 40,000 out; model"
+expect 0 "what is in a compact network" "$program" info "$compact"
+says stdout "anchorsplat-compact"
+expect 0 "the network that is part of the program" "$program" enhance "$input" -o "$work/shipped.ply" --pixel-size 0.0055
+says stdout "20,000 Gaussians in, 80,000 out; model"
+expect 0 "what is in it" "$program" info "$source/models/anchorsplat-compact.safetensors" --json
+says stdout '"object_names"'
+expect 4 "the same cut short" bash -c "head -c 400000 '$source/models/anchorsplat-compact.safetensors' >'$work/cut2.safetensors' && '$program' info '$work/cut2.safetensors'"
 expect 0 "a compact network, then refinement" "$program" enhance "$input" -o "$work/compact.ply" -w --model "$compact" --pixel-size 0.0055 --method model+refine --steps 1 --poses 8 --json
 says stdout '"method": "model+refine"'
 expect 2 "options of the other architecture" "$program" enhance "$input" -o "$work/bad.ply" --model "$compact" --pixel-size 0.0055 --normalisation bbox

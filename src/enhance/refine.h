@@ -49,9 +49,9 @@ struct Refined {
   RefineReport report;
 };
 
-// With pictures it begins with the splat as it was fitted where that agrees better with them than `start`. Such a splat,
-// and an antialiased one, comes back as it is unless it agrees with the pictures better by 2 dB in the end: it was
-// trained on more than they show.
+// With pictures it begins with the splat as it was fitted where that agrees better with them than `start`. Such a
+// splat, and an antialiased one, comes back as it is unless it agrees with the pictures better by 2 dB in the end: it
+// was trained on more than they show.
 //
 // Logs what it finds; shows progress with the error against the views.
 //

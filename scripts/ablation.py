@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What each choice of the compact network's recipe is worth: one short training per variant, all for the same time.
 
-    scripts/ablation.py TRAIN VALIDATION WORK [--minutes 2.5] [--jobs 2] [--only 0,3,…] [--program build/anchorsplat]
+    scripts/ablation.py TRAIN VALIDATION WORK [--minutes 2] [--jobs 2] [--only 0,3,…] [--program build/anchorsplat]
 
 TRAIN and VALIDATION are data sets of `anchorsplat dataset build`; WORK gets a folder per variant and the true views that
 all of them share, and a variant that is there already is not trained again. Every variant is configs/compact-k4.toml
@@ -27,14 +27,10 @@ VARIANTS = {
     "K = 10": {"network.copies": 10},
     "K = 20": {"network.copies": 20},
     "no messages (R = 0)": {"network.rounds": 0},
-    "R = 1": {"network.rounds": 1},
     "R = 3": {"network.rounds": 3},
     "H = 32, heads 64": {"network.hidden": 32, "network.head_hidden": 64},
     "H = 128, heads 256": {"network.hidden": 128, "network.head_hidden": 256},
-    "M = 16 neighbours": {"network.neighbours": 16},
     "patches of 9 along a Hilbert curve": {"network.context": "patches"},
-    "ε = 0.5 of the scale": {"network.epsilon": 0.5},
-    "ε = 2 scales": {"network.epsilon": 2.0},
     "ε = 1 pixel": {"network.offset_unit": "pixel"},
     "ε = 0.015 of the cube, whole views": {"network.offset_unit": "cube", "network.epsilon": 0.015, "data.part": 0,
                                            "data.crop": 0, "data.views_per_step": 2},
@@ -43,7 +39,6 @@ VARIANTS = {
     "no anchors: offsets without bound": {"network.anchors": False},
     "SH of degree 1 to 3 as they are": {"network.sh": False},
     "L1 alone": {"loss.ssim": 0.0},
-    "PSNR alone": {"loss.l1": 0.0, "loss.ssim": 0.0, "loss.log_mse": 1.0},
     "with LPIPS (AlexNet), 0.5": {"loss.lpips": 0.5, "loss.lpips_net": "alex"},
     "40 objects": {OBJECTS: 40},
     "10 objects": {OBJECTS: 10},
@@ -57,9 +52,10 @@ def toml(value):
 
 
 def write_recipe(path, changes):
-    """The base recipe with the changes, validation with LPIPS at the end only."""
+    """The base recipe with the changes; validation at the start and the end only, LPIPS where the loss changes."""
     recipe = tomllib.loads((ROOT / "configs/compact-k4.toml").read_text(encoding="utf-8"))
-    changes = {"validation.every": 0, "validation.lpips": True, "checkpoint_every": 0} | changes
+    lpips = not changes or any(key.startswith("loss.") for key in changes)
+    changes = {"validation.every": 0, "validation.lpips": lpips, "checkpoint_every": 0} | changes
     for key, value in changes.items():
         *tables, name = key.split(".")
         table = recipe
@@ -115,7 +111,7 @@ def main():
     parser.add_argument("train", type=pathlib.Path)
     parser.add_argument("validation", type=pathlib.Path)
     parser.add_argument("work", type=pathlib.Path)
-    parser.add_argument("--minutes", type=float, default=2.5)
+    parser.add_argument("--minutes", type=float, default=2)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--only", help="variants by their place in the list, separated by commas")
     parser.add_argument("--program", default=ROOT / "build/anchorsplat")

@@ -70,8 +70,9 @@ def write_recipe(path, changes):
 
 
 def subset(train, count, folder):
-    """A data set with the first so many objects of `train`, spread evenly over its manifest."""
+    """A data set with so many objects of `train`, spread evenly over its manifest."""
     lines = (train / "manifest.jsonl").read_text(encoding="utf-8").splitlines()
+    lines = [line for line in lines if not json.loads(line)["rejected"]]
     lines = [lines[i * len(lines) // count] for i in range(min(count, len(lines)))]
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "manifest.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -100,7 +101,8 @@ def train(args, number, name):
     log = [json.loads(line) for line in (folder / "run/log.jsonl").read_text(encoding="utf-8").splitlines()]
     last = [line for line in log if "validation" in line][-1]
     filtered, model = last["validation"]["filter"], last["validation"]["model"]
-    parameters = (folder / "done").read_text(encoding="utf-8").split(" parameters")[0].split()[-1]
+    info = subprocess.run([args.program, "info", folder / "run/model.safetensors", "--json"], stdout=subprocess.PIPE, check=True)
+    parameters = f"{json.loads(info.stdout)['parameters']:,}"
     lpips = f"{model['lpips']:.4f}" if "lpips" in model else ""
     return (f"| {name} | {parameters} | {last['step']:,} | {model['psnr']:.2f} | {model['psnr'] - filtered['psnr']:+.2f} "
             f"| {model['ssim']:.4f} | {lpips} |")

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""What docs/refine.md says about pictures that are not perfect, splats that are fine already, and fits with area pixels.
+"""What docs/refine.md measures beside the benchmarks: imperfect pictures, splats that are fine already, fits with area
+pixels, a scene of NeRF-synthetic's kind.
 
     scripts/refine-study.py imperfect|fine|equal-time WORK [--program build/anchorsplat] [--objects a,b]
     scripts/refine-study.py trained-high|nerf WORK --objects objects/…/BlendSwap-CC-0.sh3f#chicken,…
@@ -170,9 +171,13 @@ def equal_time(args, example):
                example / "transforms_hr.json", seconds)
 
 
+ON_EXAMPLES = {"imperfect": imperfect, "fine": fine, "equal-time": equal_time}
+ON_MESHES = {"trained-high": trained_high, "nerf": nerf}
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("imperfect", "fine", "equal-time", "trained-high", "nerf"))
+    parser.add_argument("what", choices=(*ON_EXAMPLES, *ON_MESHES))
     parser.add_argument("work", type=pathlib.Path)
     parser.add_argument("--program", default="build/anchorsplat")
     parser.add_argument("--objects", default="biplane,stone_lantern")
@@ -182,10 +187,10 @@ def main():
     args = parser.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)
     for name in args.objects.split(","):
-        if args.what in ("trained-high", "nerf"):
-            {"trained-high": trained_high, "nerf": nerf}[args.what](args, name)
+        if args.what in ON_MESHES:
+            ON_MESHES[args.what](args, name)
         else:
-            {"imperfect": imperfect, "fine": fine, "equal-time": equal_time}[args.what](args, EXAMPLES / name)
+            ON_EXAMPLES[args.what](args, EXAMPLES / name)
 
 
 if __name__ == "__main__":

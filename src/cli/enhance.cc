@@ -103,6 +103,7 @@ nlohmann::json ToJson(const std::string& input, const fs::path& output, const En
     json["upscale"] = r.upscale;
     json["filter_strength"] = r.filter_strength;
     json["pixel_size"] = {{"value", r.pixel_size}, {"source", r.pixel_size_source}};
+    if (r.pixel_size_source == kUnknownPixelSize) json["pixel_size"]["value"] = nullptr;
     if (r.train_width) json["train_width"] = *r.train_width;
   }
   return json;
@@ -147,6 +148,7 @@ Status FinishModelOptions(const EnhanceFlags& flags) {
 // What the method worked with, where it is the filter's business.
 std::string Details(const EnhanceReport& r) {
   if (r.pixel_size_source.empty()) return "";
+  if (r.pixel_size_source == kUnknownPixelSize) return " not applied";
   return Cat(" x", r.upscale, ", strength ", Fixed(r.filter_strength, 3), ", pixel size ", r.pixel_size, " (",
              r.pixel_size_source, ")");
 }
@@ -292,9 +294,10 @@ void AddEnhance(CLI::App& app, Program& program) {
                                "Anchors at most, the largest by opacity x size; 0 is all"))
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  model_option(verb.add_option("--prune-opacity", model.prune_opacity,
-                               "Leave output Gaussians of less opacity out; 1/255 = 0.0039 is invisible"))
+  verb.add_option("--prune-opacity", model.prune_opacity,
+                  "Leave Gaussians of less opacity out of what the model makes; 1/255 = 0.0039 is invisible")
       ->check(Fraction())
+      ->group(group)
       ->capture_default_str();
   model_option(verb.add_option("--block-gaussians", model.block_gaussians,
                                "Larger splats are enhanced in overlapping blocks of this many"))

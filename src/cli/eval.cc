@@ -120,7 +120,8 @@ void AddEval(CLI::App& app, Program& program) {
   auto* methods =
       verb.add_option("--methods", flags->methods,
                       "raw, filter, filter@F, filter-auto, filter-best, upsample, bicubic, checkpoints of networks, "
-                      "methods of enhance (refine@k=1@steps=400: with options); separated by commas")
+                      "methods of enhance (refine@k=1@steps=400: with options; model-auto: without cameras); separated "
+                      "by commas")
           ->delimiter(',')
           ->capture_default_str();
   AddChoice(verb, "--protocol", flags->protocol, {{"heldout", Protocol::kHeldOut}, {"upstream", Protocol::kUpstream}},

@@ -8,6 +8,7 @@
 #include "core/log.h"
 #include "core/statistics.h"
 #include "core/text.h"
+#include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
 #include "enhance/pixel_size_estimate.h"
 #include "enhance/refine_method.h"
@@ -159,7 +160,9 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, EnhanceInp
   } else {
     const auto estimate = EstimatePixelSize(input.cloud);
     if (!estimate.ok()) {
-      return Error{estimate.error().code, estimate.error().message + "; give --pixel-size or --cameras"};
+      LogWarning(estimate.error().message + ": the splat stays as it is; --pixel-size or --cameras would tell");
+      report.pixel_size_source = kUnknownPixelSize;
+      return {};
     }
     report.pixel_size = estimate->size;
     report.pixel_size_source = "estimated";
@@ -188,6 +191,12 @@ double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud)
     LogWarning(
         "the splat was fitted to the areas of pixels: it has lost no width and none is given back (--filter-strength F "
         "to enhance it all the same)");
+    return 0;
+  }
+  if (IsMarkedEnhanced(cloud)) {
+    LogWarning(
+        "the splat says that it has been enhanced already: its lost width has been given back and none is given once "
+        "more (--filter-strength F to enhance it all the same)");
     return 0;
   }
   return DefaultFilterStrength(options.upscale);
@@ -220,11 +229,19 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(DropUnusable(input.cloud));
   report.dropped = report.gaussians_in - input.cloud.size();
 
-  const bool sized = method->needs_pixel_size() || (chosen.first != nullptr && chosen.first->needs_pixel_size());
+  ANCHORSPLAT_ASSIGN_OR_RETURN(bool sized, method->needs_pixel_size());
+  bool first_sized = false;
+  if (chosen.first != nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(first_sized, chosen.first->needs_pixel_size());
+    sized |= first_sized;
+  }
   if (!sized && (options.pixel_size || options.cameras || options.filter_strength)) {
     LogWarning(Cat("the method '", method->name,
                    "' knows no pixel size and no filter strength: --pixel-size, --cameras and ",
                    "--filter-strength change nothing"));
+  }
+  if (!sized && IsMarkedEnhanced(input.cloud)) {
+    LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
   }
   if (sized) {
     input.filter_strength = ChooseStrength(options, input.cloud);
@@ -239,15 +256,24 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
         ChoosePixelSizes(options, method->takes_start && !options.refine.images.empty(), input, report));
   }
 
+  if (report.pixel_size_source == kUnknownPixelSize) {
+    report.filter_strength = 0;
+    report.gaussians_out = input.cloud.size();
+    return Enhanced{std::move(input.cloud), std::move(report)};
+  }
+
   const auto begin = std::chrono::steady_clock::now();
   if (chosen.first != nullptr) {
     EnhanceInput first = input;
-    if (!chosen.first->needs_pixel_size()) first.pixel_sizes.clear();
+    if (!first_sized) first.pixel_sizes.clear();
     ANCHORSPLAT_ASSIGN_OR_RETURN(input.start, chosen.first->run(std::move(first), options, report));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, method->run(std::move(input), options, report));
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   report.gaussians_out = out.size();
+  if (!sized || report.filter_strength * options.upscale * options.upscale > 1) {
+    out.comments.push_back(EnhancedComment(report.method, options.upscale));
+  }
   return Enhanced{std::move(out), std::move(report)};
 }
 

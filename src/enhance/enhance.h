@@ -33,6 +33,9 @@ struct EnhanceOptions {
   uint64_t seed = 0;
 };
 
+// The splat says nothing about its pixels, so that no method can know what to do: it has been left as it is.
+inline constexpr const char* kUnknownPixelSize = "unknown";
+
 // What was done, for people and for --json.
 struct EnhanceReport {
   std::string method;
@@ -42,8 +45,8 @@ struct EnhanceReport {
   double upscale = 1;
   double filter_strength = 0;
   double pixel_size = 0;  // p_LR, the median when there is one per Gaussian
-  // "given", "cameras", "pictures" (the cameras of those to refine against) or "estimated"; empty for methods that need
-  // none.
+  // "given", "cameras", "pictures" (the cameras of those to refine against), "estimated" or kUnknownPixelSize; empty
+  // for methods that need none.
   std::string pixel_size_source;
   std::optional<int> train_width;  // pixels, given or assumed; nothing when the cameras' own size was taken
   // What else the method has to tell, by name: counts of the model, for example.
@@ -67,8 +70,9 @@ struct EnhanceMethod {
   std::string summary;  // one line for --help
   int rank = 0;
   bool takes_start = false;  // looks at EnhanceInput::start
-  // False: EnhanceInput::pixel_sizes may be empty, nothing is estimated. Asked once the method is ready.
-  std::function<bool()> needs_pixel_size = [] { return true; };
+  // False: EnhanceInput::pixel_sizes may be empty, nothing is estimated. Asked once the method is ready. An error: it
+  // could not run.
+  std::function<Result<bool>()> needs_pixel_size = [] { return true; };
   std::function<Status(const EnhanceOptions&)> ready;
   std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&, EnhanceReport&)> run;
 };
@@ -83,8 +87,9 @@ struct Enhanced {
 };
 
 // Runs the method. Logs what it assumed: pixel size and how sure it is, training width, why a splat tagged
-// antialiased is left alone, how many rows were dropped. kBadArgument: unknown method, both pixel_size and cameras,
-// upscale < 1, no usable Gaussian; and whatever the method reports.
+// antialiased or enhanced before is left alone, how many rows were dropped. A result that was given width back says so
+// in its comments (enhance/enhanced_mark.h). kBadArgument: unknown method, both pixel_size and cameras, upscale < 1, no
+// usable Gaussian; and whatever the method reports.
 Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options);
 
 }  // namespace anchorsplat

@@ -9,6 +9,7 @@
 
 #include "core/log.h"
 #include "core/random.h"
+#include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
 #include "enhance/pixel_size_estimate.h"
 #include "formats/cloud_io.h"
@@ -128,6 +129,31 @@ TEST_F(EnhanceDoor, LeavesAntialiasedSplatsAlone) {
   EXPECT_NE(enhanced->cloud.log_scales, ball.log_scales);
 }
 
+// Whoever enhances once more by mistake would lose what the first time brought.
+TEST_F(EnhanceDoor, LeavesWhatItMadeAlone) {
+  EnhanceOptions options;
+  options.pixel_size = 0.01;
+  auto once = Enhance(Ball(0.01), options);
+  ASSERT_TRUE(once.ok());
+  EXPECT_TRUE(IsMarkedEnhanced(once->cloud));
+  EXPECT_FALSE(log_->Says("already"));
+  const auto twice = Enhance(once->cloud, options);
+  ASSERT_TRUE(twice.ok());
+  EXPECT_EQ(twice->cloud.log_scales, once->cloud.log_scales);
+  EXPECT_EQ(twice->cloud.comments, once->cloud.comments);
+  EXPECT_EQ(twice->report.filter_strength, 0);
+  EXPECT_TRUE(log_->Says("enhanced already")) << log_->text();
+  options.filter_strength = 0.7;
+  const auto forced = Enhance(once->cloud, options);
+  ASSERT_TRUE(forced.ok());
+  EXPECT_NE(forced->cloud.log_scales, once->cloud.log_scales);
+
+  // Nothing was given, so nothing is said.
+  options.filter_strength.reset();
+  options.upscale = 1;
+  EXPECT_FALSE(IsMarkedEnhanced(Enhance(Ball(0.01), options)->cloud));
+}
+
 TEST_F(EnhanceDoor, PixelSizeFromCameras) {
   EnhanceOptions options;
   options.cameras = CamerasForPixel(0.01);
@@ -242,9 +268,17 @@ TEST_F(EnhanceDoor, EstimateRefusesWhatSaysNothing) {
   GaussianCloud invisible = Ball(0.01);
   for (float& x : invisible.opacity_logits) x = -8;
   EXPECT_FALSE(EstimatePixelSize(invisible).ok());
-  const auto enhanced = Enhance(few, EnhanceOptions{});
-  ASSERT_FALSE(enhanced.ok());
-  EXPECT_NE(enhanced.error().message.find("--pixel-size"), std::string::npos) << enhanced.error().message;
+  // Without one nothing can be known to be better.
+  for (const char* method : {"auto", "refine"}) {
+    EnhanceOptions options;
+    options.method = method;
+    const auto enhanced = Enhance(few, options);
+    ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+    EXPECT_EQ(enhanced->cloud.log_scales, few.log_scales);
+    EXPECT_EQ(enhanced->report.pixel_size_source, kUnknownPixelSize);
+    EXPECT_TRUE(enhanced->cloud.comments.empty());
+    EXPECT_TRUE(log_->Says("--pixel-size")) << log_->text();
+  }
 }
 
 TEST_F(EnhanceDoor, RefusesNonsense) {

@@ -242,6 +242,11 @@ TEST(EvalMethods, RefinementTakesOptions) {
   EXPECT_TRUE(fs::exists(ObjectFolder(out.path(), "ball") / "refine@steps_2@k_2@f_0.5.json"));
   EXPECT_EQ(Evaluate(folder.path(), Methods({few, one, longer}), out.path(), {})->resumed, 3);
 
+  const std::string alone = "refine-auto@steps=2@k=1";
+  const auto estimated = Evaluate(folder.path(), Methods({alone}), out.path(), {});
+  ASSERT_TRUE(estimated.ok() && estimated->failures.empty());
+  EXPECT_GT(estimated->Find("ball", alone)->facts.at("pixel_size_ratio"), 0);
+
   const auto error = [](const std::string& word) {
     const auto method = MakeEvalMethod(word, {});
     return method.ok() ? std::string() : method.error().message;
@@ -256,6 +261,8 @@ TEST(EvalMethods, RefinementTakesOptions) {
   EXPECT_THAT(error("refine@"), HasSubstr("KEY=VALUE"));
   EXPECT_THAT(error("refine-images@hold-out=0"), HasSubstr("benchmark"));
   EXPECT_THAT(error("filter+raw@k=1"), HasSubstr("none of raw"));
+  EXPECT_THAT(error("refine-images-auto"), HasSubstr("nothing is estimated"));
+  EXPECT_THAT(error("raw-auto"), HasSubstr("none of raw"));
 }
 
 // What was kept counts for the truth, the pictures and the cameras that it was measured with.

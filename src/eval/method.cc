@@ -168,6 +168,8 @@ CameraSet TrainingCameras(const BenchmarkObject& object) {
 struct RegisteredMethod {
   std::string word;  // as the user wrote it
   std::string name;
+  bool auto_pixel_size =
+      false;  // NAME-auto: it gets no cameras and estimates p_LR, as for a user who has the splat alone
   RefineOptions refine;
   std::optional<double> filter_strength;
 
@@ -208,11 +210,18 @@ Status SetOption(RegisteredMethod& method, std::string_view key, std::string_vie
   return {};
 }
 
-// NAME or NAME@KEY=VALUE@KEY=VALUE…; nothing when there is no such method.
+constexpr std::string_view kAuto = "-auto";
+
+// NAME, NAME-auto or either with @KEY=VALUE@KEY=VALUE…; nothing when there is no such method.
 Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word) {
   RegisteredMethod method;
   method.word = word;
-  method.name = word.substr(0, word.find('@'));
+  const size_t name_end = std::min(word.find('@'), word.size());
+  method.name = word.substr(0, name_end);
+  if (method.name.ends_with(kAuto)) {
+    method.auto_pixel_size = true;
+    method.name.resize(method.name.size() - kAuto.size());
+  }
   // One, or two with a plus between them.
   const auto known = [](const std::string& name) {
     const auto methods = EnhanceMethods();
@@ -222,12 +231,16 @@ Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word)
   if (!known(method.name.substr(0, plus)) || (plus != std::string::npos && !known(method.name.substr(plus + 1)))) {
     return std::optional<RegisteredMethod>();
   }
-  if (word.size() > method.name.size() && !method.name.ends_with("refine") && !method.name.ends_with("refine-images")) {
+  if (method.auto_pixel_size && method.name.ends_with("refine-images")) {
+    return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(word),
+                                              ": the pictures' cameras say the pixel size, nothing is estimated")};
+  }
+  if (word.size() > name_end && !method.name.ends_with("refine") && !method.name.ends_with("refine-images")) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--methods ", Printable(word), ": only refine and refine-images have options")};
   }
   std::set<std::string> keys;
-  for (size_t at = method.name.size(); at < word.size();) {
+  for (size_t at = name_end; at < word.size();) {
     const size_t end = std::min(word.find('@', at + 1), word.size());
     const std::string option = word.substr(at + 1, end - at - 1);
     const size_t equals = option.find('=');
@@ -253,7 +266,7 @@ EvalMethod Registered(const RegisteredMethod& method) {
             EnhanceOptions options;
             options.method = method.name;
             options.upscale = task.object.upscale();
-            options.cameras = TrainingCameras(task.object);
+            if (!method.auto_pixel_size) options.cameras = TrainingCameras(task.object);
             options.refine = method.refine;
             options.filter_strength = method.filter_strength;
             if (method.name.ends_with("refine-images")) {
@@ -268,6 +281,11 @@ EvalMethod Registered(const RegisteredMethod& method) {
             views.seconds = enhanced.report.seconds;
             views.facts = enhanced.report.facts;
             views.facts.emplace_back("processor_seconds", ProcessorSeconds() - begin);
+            if (method.auto_pixel_size) {
+              ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraPixelSizes truth, TruePixelSizes(task.object));
+              views.facts.emplace_back("pixel_size_ratio",
+                                       enhanced.report.pixel_size / static_cast<double>(truth.median));
+            }
             return views;
           }};
 }
@@ -313,7 +331,7 @@ Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& 
   return Error{ErrorCode::kBadArgument, Cat("--methods: '", Printable(word),
                                             "' is none of raw, filter, filter@F, filter-auto, filter-best, upsample, "
                                             "bicubic, a checkpoint of a network or "
-                                            "a method of enhance")};
+                                            "a method of enhance, NAME or NAME-auto")};
 }
 
 }  // namespace anchorsplat

@@ -57,6 +57,7 @@ struct MethodOptions {
 //   FILE          the network of a file of weights, .safetensors or .pth, of either kind (model/network_file.h)
 //   NAME          whatever else is registered with enhance/enhance.h, given the training cameras: "model" for example
 //                 is the network that is part of the program. NAME+NAME: the second begins where the first ended.
+//                 NAME-auto gets no cameras and estimates the pixel size (fact "pixel_size_ratio").
 //                 Refinement takes options: refine@k=1@steps=400@f=0.6, keys as of SetRefineOption and f of the filter
 // Errors: kBadArgument for other words; kNotFound for files that are not there.
 Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& options);

@@ -41,15 +41,23 @@ CompactFeatures::CompactFeatures(const GaussianCloud& cloud, const CompactGraph&
       pixel_sizes_(pixel_sizes),
       upscale_feature_(static_cast<float>(0.5 * std::log2(upscale))) {}
 
+std::array<float, 3> CompactFeatures::Widths(int64_t i) const {
+  const float log_p = std::log(std::clamp(static_cast<float>(pixel_size(i)), kSmallestPixel, kLargestPixel));
+  std::array<float, 3> widths;
+  for (size_t a = 0; a < 3; ++a) {
+    const size_t axis = 3 * static_cast<size_t>(i);
+    widths[a] = 0.5f * (cloud_.log_scales[axis + graph_.stored_axis[axis + a]] - log_p);
+  }
+  return widths;
+}
+
 void CompactFeatures::Nodes(int64_t begin, int64_t end, float* out) const {
   const int64_t m = graph_.neighbours;
   for (int64_t i = begin; i < end; ++i, out += kNodeFeatures) {
     const float p = std::clamp(static_cast<float>(pixel_size(i)), kSmallestPixel, kLargestPixel);
     const float log_p = std::log(p);
-    const float* scales = cloud_.log_scales.data() + 3 * i;
-    for (int64_t a = 0; a < 3; ++a) {
-      out[a] = HalfLog(scales[graph_.stored_axis[static_cast<size_t>(3 * i + a)]], log_p, -3, 2);
-    }
+    const std::array<float, 3> widths = Widths(i);
+    for (size_t a = 0; a < 3; ++a) out[a] = std::clamp(widths[a], kLowestWidth, kHighestWidth);
     out[3] = std::clamp(0.25f * cloud_.opacity_logits[static_cast<size_t>(i)], -2.0f, 2.0f);
     const float* sh = cloud_.sh.data() + i * cloud_.sh_stride();
     for (int64_t c = 0; c < 3; ++c) out[4 + c] = std::clamp(0.5f * sh[c], -2.0f, 2.0f);
@@ -112,7 +120,8 @@ void CompactFeatures::Edges(int64_t begin, int64_t end, float* out) const {
       const float* other_scales = cloud_.log_scales.data() + 3 * j;
       float cosine[3][3];
       for (int64_t b = 0; b < 3; ++b) {
-        const float log_scale = HalfLog(other_scales[graph_.stored_axis[static_cast<size_t>(3 * j + b)]], log_p, -3, 2);
+        const float log_scale = HalfLog(other_scales[graph_.stored_axis[static_cast<size_t>(3 * j + b)]], log_p,
+                                        kLowestWidth, kHighestWidth);
         float* v = cosine[b];
         for (int64_t a = 0; a < 3; ++a) v[a] = Dot(graph_.axis(i, a), graph_.axis(j, b));
         out[7] += log_scale * v[0] * v[0];

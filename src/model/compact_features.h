@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -14,7 +15,7 @@ namespace anchorsplat {
 // Everything is bounded, and of the order of 1.
 
 // Of a Gaussian, with s its scales longest first, p its p_LR:
-//    0 – 2   ln(s/p)/2, within −3 … 2
+//    0 – 2   ln(s/p)/2, within kLowestWidth … kHighestWidth
 //    3       opacity logit / 4, within ±2
 //    4 – 6   SH DC / 2, within ±2
 //    7 – 15  SH of degree 1 as a vector per colour, along the three axes: axis-major, rgb fastest; twice, within ±2
@@ -23,6 +24,7 @@ namespace anchorsplat {
 //   19, 20   ln(distance/p)/2 of the nearest and of the farthest neighbour, within −3 … 3; 3 without neighbours
 //   21 – 23  CompactGraph::sidedness
 inline constexpr int64_t kNodeFeatures = 24;
+inline constexpr float kLowestWidth = -3, kHighestWidth = 2;
 
 // Of a neighbour j of i, with d = x_j − x_i:
 //    0 – 2   asinh(d/p)/2 along i's axes, within ±4
@@ -43,6 +45,9 @@ class CompactFeatures {
 
   void Nodes(int64_t begin, int64_t end, float* out) const;  // [end − begin, kNodeFeatures]
   void Edges(int64_t begin, int64_t end, float* out) const;  // [(end − begin)·m, kEdgeFeatures]
+
+  // The first three features of Gaussian i without their bounds; −Inf where a scale is 0.
+  std::array<float, 3> Widths(int64_t i) const;
 
   double pixel_size(int64_t i) const { return pixel_sizes_[pixel_sizes_.size() == 1 ? 0 : static_cast<size_t>(i)]; }
 

@@ -1,6 +1,7 @@
 #include "model/compact_network.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <new>
 #include <set>
@@ -129,6 +130,13 @@ Result<CompactNetwork> CompactNetwork::Load(const CompactConfig& config, const W
   return network;
 }
 
+bool CompactNetwork::KnowsItsDomain() const {
+  for (size_t c = 0; c < low_.size(); ++c) {
+    if (low_[c] > high_[c]) return false;
+  }
+  return true;
+}
+
 Buffer<float> CompactNetwork::States(const CompactFeatures& features, const CompactGraph& graph) const {
   const int64_t n = graph.count, h = config_.hidden, m = graph.neighbours;
   Buffer<float> states(static_cast<size_t>(n * h)), others(rounds_.empty() ? 0 : static_cast<size_t>(n * h));
@@ -205,10 +213,15 @@ void CompactNetwork::Outputs(const CompactFeatures& features, const CompactGraph
               [&](int64_t begin, int64_t end) { Head(features, states, begin, end, out + begin * out_.outputs()); });
 }
 
-float CompactNetwork::Fade(const float* node) const {
+float CompactNetwork::Fade(const float* node, const std::array<float, 3>& widths) const {
   float farthest = 0;
   for (size_t c = 0; c < static_cast<size_t>(kNodeFeatures); ++c) {
-    if (low_[c] <= high_[c]) farthest = std::max({farthest, low_[c] - node[c], node[c] - high_[c]});
+    if (low_[c] > high_[c]) continue;
+    float value = node[c];
+    // A feature stops at its bounds, so the network cannot tell how far beyond a width lies. Where training had widths
+    // up to the bound, nobody knows how far they went.
+    if (c < widths.size() && (widths[c] < value ? low_[c] > kLowestWidth : high_[c] < kHighestWidth)) value = widths[c];
+    farthest = std::max({farthest, low_[c] - value, value - high_[c]});
   }
   return std::clamp((kFadeEnd - farthest) / (kFadeEnd - kFadeBegin), 0.0f, 1.0f);
 }
@@ -243,7 +256,7 @@ Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const Co
     Buffer<float> nodes(static_cast<size_t>((end - begin) * kNodeFeatures));
     features.Nodes(begin, end, nodes.data());
     for (int64_t i = begin; i < end; ++i) {
-      fades[static_cast<size_t>(i)] = Fade(nodes.data() + (i - begin) * kNodeFeatures);
+      fades[static_cast<size_t>(i)] = Fade(nodes.data() + (i - begin) * kNodeFeatures, features.Widths(i));
     }
   });
   CompactResult result;
@@ -262,6 +275,7 @@ Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const Co
   const CopyStart start(config_.copies, config_.spread), single_start(1, 0);
   CompactAnchors anchors{&cloud, &graph, task.pixel_sizes, task.upscale, task.strength, 0};
   if (config_.offset_unit == OffsetUnit::kCube) anchors.offset_side = CubeSide(cloud.means);
+  std::atomic<int64_t> not_finite = 0;
   const std::vector<float> nothing(static_cast<size_t>(CompactOutputs(config_)), 0.0f);
   try {
     result.cloud.Resize(copied + result.outside, cloud.sh_degree);
@@ -273,8 +287,12 @@ Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const Co
         const float fade = fades[static_cast<size_t>(i)];
         const int64_t row = rows[static_cast<size_t>(i)];
         if (fade > 0) {
-          WriteCopies(config_, start, anchors, i, raw.data() + (i - begin) * out_.outputs(), fade, row, inside,
-                      result.cloud);
+          const float* said = raw.data() + (i - begin) * out_.outputs();
+          if (!std::all_of(said, said + out_.outputs(), [](float x) { return std::isfinite(x); })) {
+            said = nothing.data();
+            ++not_finite;
+          }
+          WriteCopies(config_, start, anchors, i, said, fade, row, inside, result.cloud);
         } else {
           WriteCopies(single, single_start, anchors, i, nothing.data(), 0, row, 1, result.cloud);
         }
@@ -283,6 +301,7 @@ Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const Co
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kBadArgument, Cat("no memory for ", WithThousands(copied + result.outside), " Gaussians")};
   }
+  result.not_finite = not_finite;
   result.cloud.render_mode = cloud.render_mode;
   result.cloud.comments = cloud.comments;
   return result;
@@ -313,6 +332,10 @@ Result<CompactNetwork> LoadCompactNetwork(const TensorFile& file) {
     return {};
   });
   if (!network.ok()) return bad(network.error().message);
+  if (!network->KnowsItsDomain()) {
+    LogWarning(Cat(file.name(), ": says nothing about the range of its training data (domain.low above domain.high), ",
+                   "so no Gaussian will count as unlike them"));
+  }
   return network;
 }
 

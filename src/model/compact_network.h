@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -29,6 +30,7 @@ struct CompactResult {
   GaussianCloud cloud;  // copy k of all anchors before copy k + 1, then those that stayed alone; the input's metadata
   int64_t outside = 0;  // Gaussians unlike the training data: filtered, and nothing else
   int64_t partly = 0;   // Gaussians somewhat unlike it: a part of the residual
+  int64_t not_finite = 0;  // Gaussians for which the network says something that is not finite: its start
 };
 
 // A compact network for inference on the CPU, as a row of kernel calls on raw arrays. The torch module in model/modules
@@ -36,13 +38,16 @@ struct CompactResult {
 //
 // Where the network comes from knows the range of every feature of the Gaussians it was trained on. A Gaussian outside
 // of it keeps a part of the residual that falls from 1 to 0 with its distance (kFadeBegin to kFadeEnd, in feature units
-// of model/compact_features.h); at 0 it is what the filter makes of it, one Gaussian.
+// of model/compact_features.h; widths count as they are, beyond the bounds of their features too); at 0 it is what the
+// filter makes of it, one Gaussian.
 class CompactNetwork {
  public:
   // Errors: of Validate(config) and of `source`; kBadFile naming the tensor when a weight is NaN or infinite.
   static Result<CompactNetwork> Load(const CompactConfig& config, const WeightSource& source);
 
   const CompactConfig& config() const { return config_; }
+  // False when the range of a feature in training is not known, so that nothing lies outside of it.
+  bool KnowsItsDomain() const;
 
   // Enhances a cloud of finite values (log-scales and opacity logits may be −Inf). The same bits for any number of
   // threads. Needs about 4·(2·H + 60) bytes per Gaussian besides the result.
@@ -66,7 +71,7 @@ class CompactNetwork {
   // States [N,H] of all Gaussians after all rounds.
   Buffer<float> States(const CompactFeatures& features, const CompactGraph& graph) const;
   void Head(const CompactFeatures& features, const Buffer<float>& states, int64_t begin, int64_t end, float* out) const;
-  float Fade(const float* node) const;
+  float Fade(const float* node, const std::array<float, 3>& widths) const;
 
   CompactConfig config_;
   PackedWeights embed_first_, embed_second_;

@@ -118,6 +118,49 @@ TEST(CompactNetwork, GaussiansUnlikeTheTrainingDataAreFilteredAndStayAlone) {
   EXPECT_EQ(result->cloud.opacity_logits[last], cloud.opacity_logits[30]);
 }
 
+// The features of widths end where training data do not reach; what lies beyond must not look like the end.
+TEST(CompactNetwork, WidthsBeyondTheFeaturesBoundsAreUnlikeTheTrainingData) {
+  const auto range = [](float low, float high) {
+    return [=](const TensorSpec& tensor, std::span<float> values) -> Status {
+      const Status status = OpenDomain()(tensor, values);
+      for (size_t a = 0; a < 3; ++a) {
+        if (tensor.name == "domain.low") values[a] = low;
+        if (tensor.name == "domain.high") values[a] = high;
+      }
+      return status;
+    };
+  };
+  const CompactNetwork network = Network({}, range(-2.9f, 1.9f));
+  for (const float width : {std::exp(8.0f), std::exp(-12.0f), 0.0f}) {
+    GaussianCloud cloud = SheetCloud(60);
+    for (float& s : cloud.log_scales) s = std::log(kPixel * width);
+    const auto result = network.Apply(cloud, Task());
+    ASSERT_TRUE(result.ok());
+    EXPECT_EQ(result->outside, 60) << width;
+  }
+  // Trained up to the bounds: nobody knows how far beyond.
+  const CompactNetwork wide = Network({}, range(kLowestWidth, kHighestWidth));
+  GaussianCloud cloud = SheetCloud(60);
+  for (float& s : cloud.log_scales) s = std::log(kPixel) - 12;
+  EXPECT_EQ(wide.Apply(cloud, Task())->outside, 0);
+}
+
+TEST(CompactNetwork, SaysWhenItsOutputIsNotFinite) {
+  const auto damaged = [](const TensorSpec& tensor, std::span<float> values) -> Status {
+    const Status status = OpenDomain()(tensor, values);
+    if (tensor.name.starts_with("head.") && tensor.name.ends_with(".weight")) {
+      std::fill(values.begin(), values.end(), 3e38f);
+    }
+    return status;
+  };
+  const GaussianCloud cloud = SheetCloud(60);
+  const auto result = Network({}, damaged).Apply(cloud, Task());
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(result->not_finite, 60);
+  for (int64_t i = 0; i < result->cloud.size(); ++i) EXPECT_TRUE(IsUsable(result->cloud, i)) << i;
+  EXPECT_EQ(Network().Apply(cloud, Task())->not_finite, 0);
+}
+
 TEST(CompactNetwork, RefusesBadTasks) {
   const CompactNetwork network = Network();
   const GaussianCloud cloud = SheetCloud(5);
@@ -163,15 +206,26 @@ class CompactFile {
     EXPECT_TRUE(file.ok());
     EXPECT_EQ(IsCompactNetwork(*file), metadata.contains("format"));
     const auto network = LoadCompactNetwork(*file);
-    if (network.ok()) return "";
+    if (network.ok()) {
+      knows_its_domain_ = network->KnowsItsDomain();
+      return "";
+    }
     EXPECT_EQ(network.error().code, ErrorCode::kBadFile);
     EXPECT_THAT(network.error().message, testing::HasSubstr("anchorsplat_compact.safetensors: "));
     return network.error().message;
   }
 
+  bool knows_its_domain() const {
+    EXPECT_EQ(Open(), "");
+    return knows_its_domain_;
+  }
+
   std::map<std::string, std::string> metadata;
   std::map<std::string, std::vector<float>> values;
   std::map<std::string, std::vector<int64_t>> shapes;
+
+ private:
+  mutable bool knows_its_domain_ = false;
 };
 
 TEST(CompactNetworkFile, OpensWhatWasWritten) {
@@ -180,6 +234,14 @@ TEST(CompactNetworkFile, OpensWhatWasWritten) {
   CompactFile more;
   more.metadata["licence"] = "Apache-2.0";
   EXPECT_EQ(more.Open(), "");
+}
+
+TEST(CompactNetworkFile, SaysWhenItDoesNotKnowItsDomain) {
+  CompactFile file;
+  EXPECT_TRUE(file.knows_its_domain());
+  file.values["domain.low"][7] = 2;
+  file.values["domain.high"][7] = 1;
+  EXPECT_FALSE(file.knows_its_domain());
 }
 
 TEST(CompactNetworkFile, RefusesDamage) {

@@ -75,6 +75,14 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
             " % are filtered only, ", Fixed(100 * partly / n, 1), " % get a part of what it says");
     outside + partly > kMost* n ? LogWarning(text) : LogInfo(text);
   }
+  if (result.not_finite > 0 && result.not_finite == input.cloud.size() - result.outside) {
+    return Error{ErrorCode::kBadFile,
+                 "the network says NaN or infinite values for every Gaussian: its weights are damaged"};
+  }
+  if (result.not_finite > 0) {
+    LogWarning(Cat("the network says NaN or infinite values for ", WithThousands(result.not_finite),
+                   " Gaussians: filtered only. Are its weights damaged?"));
+  }
   const int64_t before = result.cloud.size();
   if (prune_opacity > 0) {
     std::vector<int64_t> kept;
@@ -86,6 +94,7 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
   report.facts = {{"copies", static_cast<double>(network.config().copies)},
                   {"unlike_training", outside},
                   {"partly_unlike_training", partly},
+                  {"output_not_finite", static_cast<double>(result.not_finite)},
                   {"pruned", static_cast<double>(before - result.cloud.size())}};
   return std::move(result.cloud);
 }
@@ -101,12 +110,10 @@ void RegisterModelMethod(const std::shared_ptr<const ModelMethod>& method) {
        .summary = HasShippedNetwork() ? "one pass of the network of --model, or of the one that is part of this program"
                                       : "one pass of the network of --model",
        .rank = 1,
-       .needs_pixel_size =
-           [method] {
-             if (method->file.empty()) return true;
-             const auto compact = HoldsCompactNetwork(method->file);  // what is wrong with it, running says
-             return compact.ok() && *compact;
-           },
+       .needs_pixel_size = [method]() -> Result<bool> {
+         if (method->file.empty()) return true;
+         return HoldsCompactNetwork(method->file);
+       },
        .ready = [method](const EnhanceOptions&) -> Status {
          if (!method->file.empty() || HasShippedNetwork()) return {};
          return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};

@@ -25,8 +25,9 @@ struct ModelMethod {
 void RegisterModelMethod(const std::shared_ptr<const ModelMethod>& method);
 
 // Enhances by a compact network, with a word in the log and in report.facts ("copies", "unlike_training",
-// "partly_unlike_training", "pruned"). A strength of no more than 1/u² means that there is no lost width to build on
-// (an antialiased splat, or one that is seen no closer): it stays as it is.
+// "partly_unlike_training", "output_not_finite", "pruned"). kBadFile: it says nothing finite about any Gaussian. A
+// strength of no more than 1/u² means that there is no lost width to build on (an antialiased splat, or one that is
+// seen no closer): it stays as it is.
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
                                                 float prune_opacity, EnhanceReport& report);
 

@@ -124,7 +124,7 @@ TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
   ASSERT_FALSE(HasFatalFailure());
   RegisterModelMethod(method);
   const EnhanceMethod registered = EnhanceMethods().back();
-  EXPECT_TRUE(registered.needs_pixel_size());
+  EXPECT_TRUE(*registered.needs_pixel_size());
   EnhanceOptions options;
   EnhanceReport report;
   EnhanceInput input;
@@ -162,7 +162,7 @@ TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
   EXPECT_THAT(enhanced.error().message, testing::HasSubstr("--normalisation"));
 
   method->file = file();
-  EXPECT_FALSE(registered.needs_pixel_size());
+  EXPECT_FALSE(*registered.needs_pixel_size());
 }
 
 TEST_F(SmallModel, TheShippedNetworkOpens) {

@@ -150,7 +150,7 @@ Status TakeNetwork(TableReader table, TrainConfig& config) {
   return table.Finish();
 }
 
-Status TakeLoss(TableReader table, LossConfig& loss) {
+Status TakeLoss(const std::string& file, TableReader table, LossConfig& loss) {
   table.Number("l1", 0, 1e6, loss.l1);
   table.Number("ssim", 0, 1e6, loss.ssim);
   table.Number("mse", 0, 1e6, loss.mse);
@@ -160,7 +160,9 @@ Status TakeLoss(TableReader table, LossConfig& loss) {
                          {{"alex", LpipsNet::kAlex}, {"vgg", LpipsNet::kVgg}, {"squeeze", LpipsNet::kSqueeze}},
                          loss.lpips_net);
   table.Int("lpips_crop", 0, 1 << 14, loss.lpips_crop);
-  return table.Finish();
+  ANCHORSPLAT_RETURN_IF_ERROR(table.Finish());
+  if (loss.l1 + loss.ssim + loss.mse + loss.log_mse + loss.lpips > 0) return {};
+  return Error{ErrorCode::kBadFile, Cat(file, ": loss: all weights are 0, so there is nothing to learn")};
 }
 
 Status TakeOptimizer(const std::string& file, TableReader table, OptimizerConfig& o) {
@@ -230,7 +232,7 @@ Result<TrainConfig> ConfigFrom(const std::string& file, const toml::table& root)
   table.Int("checkpoint_every", 0, kManySteps, config.checkpoint_every);
   table.Int("log_every", 1, kManySteps, config.log_every);
   ANCHORSPLAT_RETURN_IF_ERROR(TakeNetwork(table.Table("network"), config));
-  ANCHORSPLAT_RETURN_IF_ERROR(TakeLoss(table.Table("loss"), config.loss));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeLoss(file, table.Table("loss"), config.loss));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeOptimizer(file, table.Table("optimizer"), config.optimizer));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeData(table.Table("data"), config.data));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeAugmentation(table.Table("augmentation"), config.augmentation));
@@ -307,9 +309,9 @@ Error InNetworkTable(const TrainConfig& config, const Error& error) {
   const std::string key = error.message.substr(0, error.message.find(':'));
   const auto line = config.network_lines.find(key);
   if (line == config.network_lines.end()) {
-    return {error.code, Cat(config.file, ": network: ", error.message)};
+    return {ErrorCode::kBadFile, Cat(config.file, ": network: ", error.message)};
   }
-  return {error.code, Cat(config.file, ": line ", line->second, ": network.", error.message)};
+  return {ErrorCode::kBadFile, Cat(config.file, ": line ", line->second, ": network.", error.message)};
 }
 
 }  // namespace anchorsplat

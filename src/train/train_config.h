@@ -102,7 +102,7 @@ Result<TrainConfig> ParseTrainConfig(const std::string& text, const std::string&
 // What must not change between the parts of one training, as a flat object. Steps, logging and validation may.
 nlohmann::json Settings(const TrainConfig& config);
 
-// The error with the file and the line of the network option that its message begins with.
+// A kBadFile error with the file and the line of the network option that its message begins with.
 Error InNetworkTable(const TrainConfig& config, const Error& error);
 
 }  // namespace anchorsplat

@@ -53,8 +53,9 @@ every = 100
   EXPECT_EQ(config->optimizer.schedule, Schedule::kConstant);
   EXPECT_TRUE(config->augmentation.geometry());
   EXPECT_EQ(Settings(*config)["network.copies"], 4.0);
-  EXPECT_EQ(InNetworkTable(*config, {ErrorCode::kBadArgument, "copies: bad"}).message,
-            "x.toml: line 7: network.copies: bad");
+  const Error located = InNetworkTable(*config, {ErrorCode::kBadArgument, "copies: bad"});
+  EXPECT_EQ(located.message, "x.toml: line 7: network.copies: bad");
+  EXPECT_EQ(located.code, ErrorCode::kBadFile) << "as for the other tables";
 }
 
 TEST(TrainConfig, ComplaintsNameFileLineAndKey) {
@@ -71,6 +72,7 @@ TEST(TrainConfig, ComplaintsNameFileLineAndKey) {
             "x.toml: line 2: optimizer.groups.means: expected a number from 0 to 10");
   EXPECT_THAT(complaint("[data]\npart = 100\n[augmentation]\ndrop = 0.1\n"),
               HasSubstr("x.toml: data.part: not together with augmentation.drop"));
+  EXPECT_EQ(complaint("[loss]\nl1 = 0\n"), "x.toml: loss: all weights are 0, so there is nothing to learn");
   EXPECT_EQ(complaint("loss = 3\n"), "x.toml: line 1: loss: expected a table [loss]");
   EXPECT_THAT(complaint("steps = \n"), HasSubstr("x.toml: line 1: not TOML"));
   EXPECT_THAT(complaint("[network]\nwidths = [1, \"two\"]\n"), HasSubstr("line 2: network.widths: expected numbers"));

@@ -376,6 +376,7 @@ Status Trainer::SaveNetwork(const char* name) {
                                                  {"steps", Cat(progress_.step)},
                                                  {"objects", Cat(report_.objects)},
                                                  {"object_names", data_.names}};
+  if (request_.minutes) metadata["minutes"] = Cat(*request_.minutes);  // which end a training before the recipe's steps
   if (report_.model) {
     const nlohmann::json quality = {
         {"model", ToJson(*report_.model)}, {"raw", ToJson(*report_.raw)}, {"filter", ToJson(*report_.filter)}};

@@ -142,7 +142,13 @@ expect 5 "the page is not overwritten" "$program" enhance "$input" -o "$work/vie
 expect 3 "a model that is not there" "$program" enhance "$input" -o "$work/bad.ply" --model "$work/none.pth"
 expect 4 "a splat as a model" "$program" enhance "$input" -o "$work/bad.ply" --model "$input"
 expect 2 "an empty model" "$program" enhance "$input" -o "$work/bad.ply" --model ""
-expect 2 "model options without a model" "$program" enhance "$input" -o "$work/bad.ply" --prune-opacity 0.1
+expect 2 "model options without a model" "$program" enhance "$input" -o "$work/bad.ply" --precision bf16
+expect 0 "the built-in network without the invisible" "$program" enhance "$input" -o "$work/pruned.ply" --pixel-size 0.0055 --prune-opacity 0.1 --json
+checks=$((checks + 1))
+grep -q '"pruned": [1-9]' "$work/stdout" || { failures=$((failures + 1)); echo "FAILED: --prune-opacity left nothing out"; }
+expect 0 "a splat that has been enhanced" "$program" enhance "$work/pruned.ply" -o "$work/twice.ply" --pixel-size 0.0055
+says stderr "enhanced already"
+expect 0 "it stays as it is" cmp "$work/pruned.ply" "$work/twice.ply"
 compact=$source/testdata/compact/small.safetensors
 expect 0 "a compact network" "$program" enhance "$input" -o "$work/compact.ply" --model "$compact" --cameras "$source/examples/biplane/transforms_lr.json"
 says stdout "20,000 Gaussians in, 40,000 out; model"

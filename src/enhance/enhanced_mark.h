@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+
+#include "core/gaussian_cloud.h"
+
+namespace anchorsplat {
+
+// What an enhanced splat says about itself in its comments (GaussianCloud::comments): enhanced once more, it would be
+// blurred, as the width that its fit lost has been given back already. PLY and compressed PLY keep comments; the other
+// formats have no place for them, so there the word is lost.
+//
+// `method` as in EnhanceReport::method.
+std::string EnhancedComment(const std::string& method, double upscale);
+bool IsMarkedEnhanced(const GaussianCloud& cloud);
+
+}  // namespace anchorsplat

@@ -6,11 +6,13 @@
 
 Every object gives samples: the features of pixels 2^(k/4) times as large as the true ones. Ridge regression says from
 them how far off the tried size is; the estimate is where it says: not at all. Errors are those of cross-validation:
-objects of one mesh are left out together. Needs numpy.
+objects of one mesh are left out together. With `--records DATASET` fits of less than `--long` iterations, as their
+records in the data set say, count `--short-weight` times. Needs numpy.
 """
 
 import argparse
 import json
+import pathlib
 import re
 
 import numpy as np
@@ -37,6 +39,18 @@ def load(files, weights=()):
                     "start": np.log(item["start"] / item["pixel_size"]),
                 })
     return objects
+
+
+def weigh_short_fits(objects, datasets, long, weight):
+    short = 0
+    for o in objects:
+        for dataset in datasets:
+            record = pathlib.Path(dataset) / o["name"] / "record.json"
+            if record.exists() and int(json.loads(record.read_text(encoding="utf-8"))["recipe"].split("-")[0]) < long:
+                o["weight"] *= weight
+                o["short"] = True
+                short += 1
+    print(f"{short} of {len(objects)} fits have less than {long} iterations and count {weight:g} times")
 
 
 def fit(objects, ridge):
@@ -124,16 +138,24 @@ def main():
     parser.add_argument("-o", "--output")
     parser.add_argument("--ridge", type=float, nargs="+", default=[0.1])
     parser.add_argument("--weight", nargs="+", default=[], metavar="OBJECT=W", help="objects that count more than once")
+    parser.add_argument("--records", nargs="+", default=[], metavar="DATASET", help="with the fits' records")
+    parser.add_argument("--long", type=int, default=15000, help="iterations")
+    parser.add_argument("--short-weight", type=float, default=1.0)
     parser.add_argument("--lean", type=float, default=0.0, help="ln, added to the estimate: negative is cautious")
     parser.add_argument("--list", action="store_true", help="the cross-validated error of every object")
     arguments = parser.parse_args()
     objects = load(arguments.features, (w.split("=") for w in arguments.weight))
     print(f"{len(objects)} fits of {len({o['mesh'] for o in objects})} meshes")
+    if arguments.records:
+        weigh_short_fits(objects, arguments.records, arguments.long, arguments.short_weight)
     results = {}
     for ridge in arguments.ridge:
         results[ridge] = cross_validate(objects, ridge)
         print(f"ridge {ridge:g}: {describe(results[ridge])}")
     best = min(results, key=lambda r: np.sqrt(np.mean(results[r] ** 2)))
+    if arguments.records:
+        for name, short in (("long", False), ("short", True)):
+            print(f"{name} fits: {describe(results[best][[o.get('short', False) == short for o in objects]])}")
     if arguments.list:
         for o, e in zip(objects, results[best]):
             print(f"  {np.exp(e):.2f}  {o['name']}")

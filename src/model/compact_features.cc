@@ -74,7 +74,7 @@ void CompactFeatures::Nodes(int64_t begin, int64_t end, float* out) const {
     }
     if (cloud_.sh_degree >= 2) out[16] = std::min(5.0f, 5 * RootMeanSquare(sh + 12, 15));
     if (cloud_.sh_degree >= 3) out[17] = std::min(5.0f, 5 * RootMeanSquare(sh + 27, 21));
-    out[18] = upscale_feature_;
+    out[kUpscaleFeature] = upscale_feature_;
     out[19] = out[20] = 3;
     if (m > 0) {
       const auto distance = [&](int64_t k) {

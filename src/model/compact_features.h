@@ -24,6 +24,7 @@ namespace anchorsplat {
 //   19, 20   ln(distance/p)/2 of the nearest and of the farthest neighbour, within −3 … 3; 3 without neighbours
 //   21 – 23  CompactGraph::sidedness
 inline constexpr int64_t kNodeFeatures = 24;
+inline constexpr int64_t kUpscaleFeature = 18;
 inline constexpr float kLowestWidth = -3, kHighestWidth = 2;
 
 // Of a neighbour j of i, with d = x_j − x_i:

@@ -137,6 +137,11 @@ bool CompactNetwork::KnowsItsDomain() const {
   return true;
 }
 
+std::pair<double, double> CompactNetwork::TrainedUpscales() const {
+  const auto upscale = [](float feature) { return std::exp2(2 * double{feature}); };
+  return {upscale(low_[kUpscaleFeature]), upscale(high_[kUpscaleFeature])};
+}
+
 Buffer<float> CompactNetwork::States(const CompactFeatures& features, const CompactGraph& graph) const {
   const int64_t n = graph.count, h = config_.hidden, m = graph.neighbours;
   Buffer<float> states(static_cast<size_t>(n * h)), others(rounds_.empty() ? 0 : static_cast<size_t>(n * h));

@@ -6,6 +6,7 @@
 #include <map>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/buffer.h"
@@ -48,6 +49,8 @@ class CompactNetwork {
   const CompactConfig& config() const { return config_; }
   // False when the range of a feature in training is not known, so that nothing lies outside of it.
   bool KnowsItsDomain() const;
+  // The least and the greatest upscale it was trained for; least above greatest: not known.
+  std::pair<double, double> TrainedUpscales() const;
 
   // Enhances a cloud of finite values (log-scales and opacity logits may be −Inf). The same bits for any number of
   // threads. Needs about 4·(2·H + 60) bytes per Gaussian besides the result.

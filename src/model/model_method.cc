@@ -69,10 +69,15 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
                                                                                  .strength = input.filter_strength}));
   const auto outside = static_cast<double>(result.outside), partly = static_cast<double>(result.partly);
   if (outside + partly > kNotable * n) {
+    const auto [least, greatest] = network.TrainedUpscales();
+    const bool other_upscale = least <= greatest && (upscale < 0.99 * least || upscale > 1.01 * greatest);
     const std::string text =
         Cat(Fixed(100 * (outside + partly) / n, 1),
             " % of the Gaussians are unlike those the network was trained on: ", Fixed(100 * outside / n, 1),
-            " % are filtered only, ", Fixed(100 * partly / n, 1), " % get a part of what it says");
+            " % are filtered only, ", Fixed(100 * partly / n, 1), " % get a part of what it says",
+            other_upscale ? Cat(". It was trained for views ", Fixed(std::sqrt(least * greatest), 1),
+                                " times closer, this is ", upscale)
+                          : "");
     outside + partly > kMost* n ? LogWarning(text) : LogInfo(text);
   }
   if (result.not_finite > 0 && result.not_finite == input.cloud.size() - result.outside) {

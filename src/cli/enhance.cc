@@ -1,12 +1,14 @@
 #include "enhance/enhance.h"
 
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "cli/checkpoint.h"
 #include "cli/choice.h"
 #include "cli/parse.h"
 #include "cli/refine_flags.h"
@@ -14,6 +16,7 @@
 #include "cli/verb.h"
 #include "core/log.h"
 #include "core/text.h"
+#include "formats/atomic_file.h"
 #include "formats/camera_io.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
@@ -37,6 +40,7 @@ struct EnhanceFlags {
   std::string model_file;
   std::string shuffles = "identity";
   std::string compat;
+  std::string refinement;  // an option of refinement that was given
   bool view = false;
 };
 
@@ -53,8 +57,27 @@ Status CheckOutput(const fs::path& output, bool overwrite) {
   if (!overwrite && fs::exists(output))
     return Error{ErrorCode::kExists, Cat(output.string(), " exists; -w replaces it")};
   const fs::path folder = output.parent_path();
-  if (folder.empty() || fs::is_directory(folder)) return {};
-  return Error{ErrorCode::kNotFound, Cat(output.string(), ": there is no folder ", folder.string())};
+  if (!folder.empty() && !fs::is_directory(folder)) {
+    return Error{ErrorCode::kNotFound, Cat(output.string(), ": there is no folder ", folder.string())};
+  }
+  return CheckWritable(output);
+}
+
+bool Refines(const EnhanceOptions& options) {
+  if (options.method == "auto") return !options.refine.images.empty();
+  return options.method.find("refine") != std::string::npos;
+}
+
+// Where the state of a refinement of this output goes when the user stops it; empty when it is not kept.
+fs::path CheckpointOf(const EnhanceOptions& options, const fs::path& output) {
+  if (!Refines(options) || options.refine.seconds) return {};
+  return options.control.checkpoint.empty() ? fs::path(output.string() + ".checkpoint") : options.control.checkpoint;
+}
+
+// What an interruption left is to be replaced.
+bool Continues(const EnhanceOptions& options, const fs::path& output) {
+  const fs::path checkpoint = CheckpointOf(options, output);
+  return options.control.resume && !checkpoint.empty() && fs::exists(checkpoint);
 }
 
 // Where each input goes. Nothing may be written twice or over its own input by accident.
@@ -69,7 +92,7 @@ Result<std::vector<fs::path>> OutputPaths(const EnhanceFlags& flags, bool overwr
     }
     const fs::path output = flags.output;
     ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay(inputs, {&output, 1}));
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(output, overwrite));
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(output, overwrite || Continues(flags.options, output)));
     return std::vector<fs::path>{output};
   }
   std::vector<fs::path> outputs;
@@ -88,7 +111,9 @@ Result<std::vector<fs::path>> OutputPaths(const EnhanceFlags& flags, bool overwr
   fs::create_directories(flags.out_dir, code);
   if (code) return Error{ErrorCode::kIo, Cat(flags.out_dir, ": cannot make this folder: ", code.message())};
   // For all before the first is computed: a batch should not fail half-way on something known at its start.
-  for (const fs::path& output : outputs) ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(output, overwrite));
+  for (const fs::path& output : outputs) {
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(output, overwrite || Continues(flags.options, output)));
+  }
   return outputs;
 }
 
@@ -98,7 +123,15 @@ nlohmann::json ToJson(const std::string& input, const fs::path& output, const En
                          {"method", r.method},
                          {"gaussians", {{"in", r.gaussians_in}, {"dropped", r.dropped}, {"out", r.gaussians_out}}},
                          {"seconds", r.seconds}};
-  for (const auto& [name, value] : r.facts) json[r.method][name] = value;
+  for (const auto& [name, value] : r.facts) {
+    // Counts are whole numbers in JSON, measurements are not.
+    const bool measured = name.starts_with("seconds") || name.ends_with("psnr") || name.starts_with("consistency");
+    if (measured || value != std::floor(value)) {
+      json[r.method][name] = value;
+    } else {
+      json[r.method][name] = static_cast<int64_t>(value);
+    }
+  }
   if (!r.pixel_size_source.empty()) {
     json["upscale"] = r.upscale;
     json["filter_strength"] = r.filter_strength;
@@ -139,6 +172,20 @@ Status FinishModelOptions(const EnhanceFlags& flags) {
   if (!flags.options.refine.images.empty() && method != "auto" && method.find("refine") == std::string::npos) {
     return Error{ErrorCode::kBadArgument, Cat("--images and --method ", method, ": it uses no pictures, refine does")};
   }
+  if (!Refines(flags.options) && !flags.refinement.empty()) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat(flags.refinement, " belongs to refinement, which takes its time: --method refine or --images")};
+  }
+  if (!flags.options.refine.images.empty() && flags.inputs.size() > 1) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--images are the pictures of one splat, and there are ", flags.inputs.size(), " inputs")};
+  }
+  if (!flags.options.control.checkpoint.empty() && flags.inputs.size() > 1) {
+    return Error{ErrorCode::kBadArgument, Cat("--checkpoint is for one input, and there are ", flags.inputs.size())};
+  }
+  if (flags.options.control.resume && flags.options.refine.seconds) {
+    return Error{ErrorCode::kBadArgument, "--resume: a refinement for --seconds leaves nothing to go on from"};
+  }
   flags.model->file = flags.model_file;
   flags.model->options.upstream = flags.compat == "upstream";
   ANCHORSPLAT_ASSIGN_OR_RETURN(flags.model->options.shuffles, ParseShuffles(flags.shuffles));
@@ -165,7 +212,47 @@ Status WriteView(const std::string& input, const GaussianCloud& before, const fs
   return WriteViewerPage(ViewPath(output), page, options);
 }
 
-Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared) {
+// From one file to another; its entry of the results.
+Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& shared, EnhanceOptions options,
+                                  const std::string& input, const fs::path& output) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, ReadCloud(input));
+  GaussianCloud before;
+  if (flags.view) before = cloud;
+  WriteOptions write = WriteOptionsFrom(shared);
+  write.overwrite |= Continues(options, output);
+  options.control.checkpoint = CheckpointOf(options, output);
+  std::optional<StopSignal> stop_signal(std::in_place);
+  auto result = Enhance(std::move(cloud), options);
+  stop_signal.reset();
+  if (!result.ok()) return result.error();
+  const Enhanced enhanced = *std::move(result);
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(output, enhanced.cloud, write));
+  const EnhanceReport& r = enhanced.report;
+  if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(WriteView(input, before, output, enhanced, write));
+  const fs::path& checkpoint = options.control.checkpoint;
+  if (r.interrupted) {
+    const bool resumable = !checkpoint.empty() && fs::exists(checkpoint);
+    return Error{ErrorCode::kInterrupted,
+                 Cat("stopped; ", output.string(), " is as far as it came",
+                     resumable ? Cat(", the same command with --resume goes on from ", checkpoint.string()) : "")};
+  }
+  if (!checkpoint.empty()) RemoveCheckpoint(checkpoint);
+  nlohmann::json json = ToJson(input, output, r);
+  if (flags.view) json["view"] = ViewPath(output).string();
+  if (!shared.json && !shared.quiet) {
+    std::cout << input << " -> " << output.string() << "\n  " << WithThousands(r.gaussians_in) << " Gaussians in, "
+              << WithThousands(r.gaussians_out) << " out; " << r.method << Details(r) << ", " << HumanSeconds(r.seconds)
+              << '\n';
+    if (flags.view) {
+      std::error_code unknown;
+      std::cout << "  " << ViewPath(output).string() << ": " << HumanBytes(fs::file_size(ViewPath(output), unknown))
+                << ", open it in any browser\n";
+    }
+  }
+  return json;
+}
+
+Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared, int& exit_code) {
   ANCHORSPLAT_RETURN_IF_ERROR(FinishModelOptions(flags));
   EnhanceOptions options = flags.options;
   options.seed = shared.seed;
@@ -177,47 +264,38 @@ Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto outputs, OutputPaths(flags, shared.overwrite));
 
   for (const fs::path& output : outputs) {
-    if (flags.view && !shared.overwrite && fs::exists(ViewPath(output))) {
+    if (flags.view && !shared.overwrite && !Continues(options, output) && fs::exists(ViewPath(output))) {
       return Error{ErrorCode::kExists, Cat(ViewPath(output).string(), " exists; -w replaces it")};
     }
   }
 
+  std::vector<fs::path> used(flags.inputs.begin(), flags.inputs.end());
+  used.insert(used.end(), outputs.begin(), outputs.end());
+  for (const fs::path& output : outputs) {
+    const fs::path checkpoint = CheckpointOf(options, output);
+    if (checkpoint.empty()) continue;
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(checkpoint, used, options.control.resume, shared.overwrite));
+  }
+
   nlohmann::json results = nlohmann::json::array();
+  size_t failures = 0;
   for (size_t i = 0; i < flags.inputs.size(); ++i) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, ReadCloud(flags.inputs[i]));
-    GaussianCloud before;
-    if (flags.view) before = cloud;
-    if (flags.options.control.checkpoint.empty()) options.control.checkpoint = outputs[i].string() + ".checkpoint";
-    std::optional<StopSignal> stop_signal(std::in_place);
-    auto result = Enhance(std::move(cloud), options);
-    stop_signal.reset();
-    if (!result.ok()) return result.error();
-    const Enhanced enhanced = *std::move(result);
-    ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(outputs[i], enhanced.cloud, WriteOptionsFrom(shared)));
-    const EnhanceReport& r = enhanced.report;
-    if (flags.view) {
-      ANCHORSPLAT_RETURN_IF_ERROR(WriteView(flags.inputs[i], before, outputs[i], enhanced, WriteOptionsFrom(shared)));
+    const auto result = EnhanceOne(flags, shared, options, flags.inputs[i], outputs[i]);
+    if (result.ok()) {
+      results.push_back(*result);
+      continue;
     }
-    if (r.interrupted) {
-      return Error{
-          ErrorCode::kInterrupted,
-          Cat("stopped; ", outputs[i].string(), " is as far as it came",
-              options.refine.seconds ? "" : Cat(", --resume goes on from ", options.control.checkpoint.string()))};
-    }
-    results.push_back(ToJson(flags.inputs[i], outputs[i], r));
-    if (flags.view) results.back()["view"] = ViewPath(outputs[i]).string();
-    if (!shared.json && !shared.quiet) {
-      std::cout << flags.inputs[i] << " -> " << outputs[i].string() << "\n  " << WithThousands(r.gaussians_in)
-                << " Gaussians in, " << WithThousands(r.gaussians_out) << " out; " << r.method << Details(r) << ", "
-                << HumanSeconds(r.seconds) << '\n';
-      if (flags.view) {
-        std::error_code unknown;
-        std::cout << "  " << ViewPath(outputs[i]).string() << ": "
-                  << HumanBytes(fs::file_size(ViewPath(outputs[i]), unknown)) << ", open it in any browser\n";
-      }
-    }
+    // What is wrong with one of several is said, and does not keep the others from being enhanced.
+    if (flags.inputs.size() == 1 || result.error().code == ErrorCode::kInterrupted) return result.error();
+    LogError(Cat(flags.inputs[i], ": ", result.error().message));
+    results.push_back({{"input", flags.inputs[i]}, {"error", result.error().message}});
+    ++failures;
   }
   if (shared.json) PrintJson(results);
+  if (failures > 0 && !shared.json && !shared.quiet) {
+    std::cout << failures << " of " << flags.inputs.size() << " failed\n";
+  }
+  if (failures > 0) exit_code = kPartialExitCode;
   return {};
 }
 
@@ -304,7 +382,14 @@ void AddEnhance(CLI::App& app, Program& program) {
       ->check(CLI::Range(int64_t{1000}, int64_t{100'000'000}))
       ->capture_default_str();
   AddRefineFlags(verb, options.refine, options.control);
-  verb.callback([flags, &program] { program.run = [flags, &program] { return RunEnhance(*flags, program.flags); }; });
+  verb.callback([flags, &verb, &program] {
+    for (const CLI::Option* option : verb.get_options()) {
+      if (option->get_group() == kRefineGroup && option->count() > 0 && option->get_single_name() != "images") {
+        flags->refinement = Cat("--", option->get_single_name());
+      }
+    }
+    program.run = [flags, &program] { return RunEnhance(*flags, program.flags, program.exit_code); };
+  });
 }
 
 }  // namespace anchorsplat

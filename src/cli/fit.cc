@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "cli/checkpoint.h"
 #include "cli/choice.h"
 #include "cli/fit_flags.h"
 #include "cli/parse.h"
@@ -13,6 +14,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "fit/initial_cloud.h"
+#include "formats/atomic_file.h"
 #include "formats/cloud_io.h"
 #include "formats/gsplat_checkpoint_writer.h"
 #include "formats/opened_splat.h"
@@ -30,16 +32,11 @@ Status CheckOutputs(const FitFlags& flags, const fs::path& checkpoint, bool over
   if (format == nullptr || format->write == nullptr) {
     return Error{ErrorCode::kBadArgument, Cat("-o ", flags.output, ": not a format that is written (.ply is)")};
   }
-  if (!flags.init_splat.empty()) {
-    const fs::path inputs[] = {flags.init_splat}, outputs[] = {flags.output, flags.gsplat_checkpoint};
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay(inputs, outputs));
-  }
+  const fs::path inputs[] = {flags.init_splat}, outputs[] = {flags.output, flags.gsplat_checkpoint};
+  if (!flags.init_splat.empty()) ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay(inputs, outputs));
+  const fs::path others[] = {flags.init_splat, flags.output, flags.gsplat_checkpoint};
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(checkpoint, others, flags.resume, overwrite));
   const bool continued = flags.resume && fs::exists(checkpoint);
-  if (fs::exists(checkpoint) && !flags.resume && !overwrite) {
-    return Error{ErrorCode::kExists, Cat(checkpoint.string(),
-                                         " is left from a fit that was interrupted: --resume goes on from it, "
-                                         "-w begins anew")};
-  }
   for (const std::string& path : {flags.output, flags.gsplat_checkpoint}) {
     if (path.empty()) continue;
     // A continued fit replaces what its interruption left.
@@ -50,6 +47,7 @@ Status CheckOutputs(const FitFlags& flags, const fs::path& checkpoint, bool over
     if (!folder.empty() && !fs::is_directory(folder)) {
       return Error{ErrorCode::kNotFound, Cat(path, ": there is no folder ", folder.string())};
     }
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path));
   }
   return {};
 }
@@ -136,6 +134,7 @@ Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
   control.checkpoint = flags.checkpoint.empty() ? flags.output + ".checkpoint" : flags.checkpoint;
   control.checkpoint_every = flags.checkpoint_every;
   control.resume = flags.resume;
+  control.keep_checkpoint = true;
   control.stop = &StopSignal::requested();
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOutputs(flags, control.checkpoint, shared.overwrite));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(flags.project, {.hold_out = flags.hold_out}));
@@ -158,6 +157,7 @@ Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
         Cat("stopped after ", WithThousands(fitted->report.steps), " of ", WithThousands(options.steps), " steps; ",
             flags.output, " is what there was, --resume goes on from ", control.checkpoint.string())};
   }
+  RemoveCheckpoint(control.checkpoint);
   if (shared.json) {
     PrintJson(ToJson(flags, start.origin, fitted->report));
   } else if (!shared.quiet) {

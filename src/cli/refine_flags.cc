@@ -5,7 +5,7 @@
 namespace anchorsplat {
 
 void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& control) {
-  const std::string group = "Refinement";
+  const std::string group = kRefineGroup;
   const auto path = [](std::filesystem::path& value) { return [&value](const std::string& text) { value = text; }; };
   auto* images =
       verb.add_option_function<std::string>(
@@ -13,7 +13,7 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
               "Project with the pictures it was fitted to (as of `fit`): the best there is to refine against")
           ->check(NotEmpty())
           ->group(group);
-  verb.add_option("--hold-out", options.hold_out, "Of --images: every so-manieth view is not trained on; 0: all are")
+  verb.add_option("--hold-out", options.hold_out, "Of --images: every Nth view is not trained on; 0: all are")
       ->check(CLI::Range(0, 1 << 30))
       ->needs(images)
       ->capture_default_str()

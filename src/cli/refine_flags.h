@@ -7,7 +7,9 @@
 
 namespace anchorsplat {
 
-// The options of refinement, into `options`; `resume` and `checkpoint` into `control`.
+inline constexpr const char* kRefineGroup = "Refinement";
+
+// The options of refinement, as the group kRefineGroup, into `options`; `resume` and `checkpoint` into `control`.
 void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& control);
 
 }  // namespace anchorsplat

@@ -1,8 +1,10 @@
 #include "enhance/refine.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <system_error>
@@ -160,14 +162,53 @@ Result<std::vector<double>> Residuals(const GaussianCloud& cloud, double upscale
   return residuals;
 }
 
-// What a continuation must have in common with what it continues.
+// Hexadecimal FNV-1a of arrays of numbers: says whether two runs work with the same ones, to no enemy.
+class Fingerprint {
+ public:
+  template <typename Values>
+  void Add(const Values& values) {
+    const auto* bytes = reinterpret_cast<const unsigned char*>(values.data());
+    for (size_t i = 0; i < values.size() * sizeof(values[0]); ++i) hash_ = (hash_ ^ bytes[i]) * 0x100000001b3;
+  }
+  std::string text() const {
+    char digits[17];
+    std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash_));
+    return digits;
+  }
+
+ private:
+  uint64_t hash_ = 0xcbf29ce484222325;
+};
+
+std::string FingerprintOf(const GaussianCloud& cloud) {
+  Fingerprint print;
+  for (const auto* array : {&cloud.means, &cloud.log_scales, &cloud.quats, &cloud.opacity_logits, &cloud.sh}) {
+    print.Add(*array);
+  }
+  return print.text();
+}
+
+std::string FingerprintOf(const std::vector<Camera>& cameras) {
+  Fingerprint print;
+  for (const Camera& c : cameras) {
+    const Pinhole& k = c.intrinsics;
+    print.Add(c.world_to_camera.rotation);
+    print.Add(c.world_to_camera.translation);
+    print.Add(std::array{k.fx, k.fy, k.cx, k.cy, static_cast<double>(k.width), static_cast<double>(k.height)});
+  }
+  return print.text();
+}
+
+// What a continuation must have in common with what it continues. The pictures' part is how the input agrees with them.
 std::string Settings(const RefineInput& input, const RefineOptions& options, const Views& views) {
   nlohmann::json json = nlohmann::json::parse(ToJsonText(options));
   json["upscale"] = input.upscale;
   json["seed"] = input.seed;
-  json["input_gaussians"] = input.cloud.size();
-  json["start_gaussians"] = input.start.size();
+  json["input"] = FingerprintOf(input.cloud);
+  json["start"] = FingerprintOf(input.start);
   json["views"] = views.train.views().size();
+  json["cameras"] = FingerprintOf(views.train.views());
+  json["input_psnr"] = Fixed(views.input_psnr.value_or(0), 6);
   return json.dump();
 }
 
@@ -231,6 +272,10 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
   if (options.max_gaussians > 0) {
     options.copies = static_cast<int>(
         std::clamp<int64_t>(options.max_gaussians / std::max<int64_t>(1, input.start.size()), 1, *options.copies));
+    if (input.start.size() > options.max_gaussians) {
+      LogWarning(Cat("there are ", WithThousands(input.start.size()), " Gaussians before any is split, more than ",
+                     WithThousands(options.max_gaussians), ": none is split, and none is left out"));
+    }
   }
 
   RenderOptions render;
@@ -289,11 +334,9 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
   ANCHORSPLAT_RETURN_IF_ERROR(MakeSteps(refiner, options, control, report));
   report.steps = refiner.state().step;
   report.times = refiner.times();
-  std::error_code ignored;
   if (report.interrupted && !control.checkpoint.empty() && !options.seconds) {
-    ANCHORSPLAT_RETURN_IF_ERROR(WriteFitCheckpoint(control.checkpoint, refiner.state(), settings));
-  } else if (Exists(control.checkpoint)) {
-    std::filesystem::remove(control.checkpoint, ignored);
+    const Status written = WriteFitCheckpoint(control.checkpoint, refiner.state(), settings);
+    if (!written.ok()) LogWarning(Cat("there is nothing to resume from: ", written.error().message));
   }
 
   GaussianCloud result = Pruned(std::move(refiner.state().cloud), report);
@@ -306,6 +349,7 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
                       Fixed(report.after, 2), " dB at their resolution): it knows more than they show, and is kept")
                 : "the start agreed with the views as well as the result does, and is kept");
     report.kept_start = true;
+    report.pruned = 0;
     report.after = report.before;
     result = std::move(input.start);
   }

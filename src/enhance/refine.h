@@ -56,8 +56,8 @@ struct Refined {
 // Logs what it finds; shows progress with the error against the views.
 //
 // Errors: those of OpenProject, PosesAround and Refiner; kBadArgument when the pictures do not show this splat: when
-// its own renders are farther from them than kLeastInputPsnr, or when most of them look more like another view's
-// picture than like their own.
+// its own renders are farther from them than kLeastInputPsnr, when a quarter of them look more like another view's
+// picture than like their own, or when most agree better moved by a pixel (see enhance/refine_pictures.h).
 Result<Refined> Refine(RefineInput input, const RefineOptions& options, const RefineControl& control);
 
 // dB. Fits reach 25 and more; pictures of something else, or in another order, mostly stay below.

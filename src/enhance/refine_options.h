@@ -31,7 +31,8 @@ struct RefineOptions {
 
 // How it is run.
 struct RefineControl {
-  std::filesystem::path checkpoint;         // empty: none is written or read
+  // Empty: none is written or read. Written when the user stops it, unless it runs for seconds; never removed.
+  std::filesystem::path checkpoint;
   bool resume = false;                      // go on from `checkpoint` if it is there
   const std::atomic<bool>* stop = nullptr;  // becomes true when the user wants to stop
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/log.h"
 #include "core/text.h"
 #include "enhance/refine_targets.h"
 #include "metrics/image_metrics.h"
@@ -17,6 +18,12 @@ constexpr double kIdentical = 100;  // dB, in means
 // makes up to 6, but then a standard splat's own renders are wrong there by more.
 constexpr double kSmallerIsRight = 4;
 
+// Of a view that agrees with its picture less than the median of all views does.
+constexpr double kFarBelow = 8;
+// dB by which a picture must agree better elsewhere, and where that is.
+constexpr double kMisplaced = 2;
+constexpr double kZoomPixels = 1.25;  // that a border moves by, seen from the middle
+
 double Capped(const Result<double>& psnr) { return psnr.ok() ? std::min(*psnr, kIdentical) : 0; }
 
 // The nearest that a picture of one colour comes.
@@ -28,6 +35,46 @@ double PsnrOfPlain(const Image& picture) {
     std::fill_n(plain.channel(c), picture.plane(), static_cast<float>(sum / static_cast<double>(picture.plane())));
   }
   return Capped(Psnr(plain, picture));
+}
+
+// PSNR over the pixels that have neighbours on all sides, of `shown` against `truth` moved by (dx, dy).
+double PsnrMoved(const Image& shown, const Image& truth, int dx, int dy) {
+  double sum = 0;
+  for (int c = 0; c < 3; ++c) {
+    for (int y = 1; y + 1 < truth.height; ++y) {
+      const float* a = shown.channel(c) + int64_t{y} * shown.width;
+      const float* b = truth.channel(c) + int64_t{y + dy} * truth.width + dx;
+      float row = 0;
+      for (int x = 1; x + 1 < truth.width; ++x) row += (a[x] - b[x]) * (a[x] - b[x]);
+      sum += static_cast<double>(row);
+    }
+  }
+  const double mean = sum / (3.0 * (truth.width - 2) * (truth.height - 2));
+  return mean > 0 ? std::min(kIdentical, -10 * std::log10(mean)) : kIdentical;
+}
+
+// By how many dB the picture is nearer to the splat when it is moved by a pixel, or when the camera's focal length is
+// another, by so much that borders move as far; 0 at least.
+Result<double> GainElsewhere(const GaussianCloud& cloud, const RenderOptions& render, const Camera& camera,
+                             const Image& shown, const Image& truth) {
+  if (std::min(truth.width, truth.height) < kLeastSide) return 0.0;
+  const double own = PsnrMoved(shown, truth, 0, 0);
+  double best = own;
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) best = std::max(best, PsnrMoved(shown, truth, dx, dy));
+  }
+  Rasterizer rasterizer;
+  RenderOutput output;
+  const double zoom = 2 * kZoomPixels / std::max(truth.width, truth.height);
+  for (const double factor : {1 - zoom, 1 + zoom}) {
+    Camera zoomed = camera;
+    zoomed.intrinsics.fx *= factor;
+    zoomed.intrinsics.fy *= factor;
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, zoomed, render, output));
+    Clamp01(output.color);
+    best = std::max(best, PsnrMoved(output.color, truth, 0, 0));
+  }
+  return best - own;
 }
 
 // The mean of blocks of 2 × 2 pixels; what is over at the right and at the bottom is left out.
@@ -93,8 +140,15 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
     Clamp01(output.color);
     shown[i] = output.color;
   }
+  std::vector<double> each;
   for (size_t i = 0; i < shown.size(); ++i) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double own, Psnr(shown[i], truth[i]));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double gain, GainElsewhere(cloud, render, cameras[i], shown[i], truth[i]));
+    each.push_back(std::min(own, kIdentical));
+    if (gain >= kMisplaced) {
+      ++agreement.misplaced;
+      agreement.misplaced_gain += gain;
+    }
     agreement.psnr += std::min(own, kIdentical) / static_cast<double>(agreement.views);
     agreement.plain += PsnrOfPlain(truth[i]) >= own;
     const bool mismatched = std::any_of(truth.begin(), truth.end(), [&](const Image& other) {
@@ -102,6 +156,12 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
       return psnr.ok() && *psnr > own;
     });
     agreement.mismatched += mismatched;
+  }
+  if (agreement.misplaced > 0) agreement.misplaced_gain /= static_cast<double>(agreement.misplaced);
+  std::vector<double> sorted = each;
+  std::sort(sorted.begin(), sorted.end());
+  for (size_t i = 0; i < each.size(); ++i) {
+    if (each[i] < sorted[sorted.size() / 2] - kFarBelow) agreement.far_below.push_back(cameras[i].name);
   }
   if (render.mode == RenderMode::kClassic) {
     ANCHORSPLAT_RETURN_IF_ERROR(MeasureSmaller(cloud, render, cameras, truth, agreement));
@@ -129,10 +189,22 @@ Status CheckAgreement(const PictureAgreement& agreement, double least_psnr) {
                      " dB, and to ", Fixed(agreement.smaller_psnr, 1), " dB with the pictures at 1/", agreement.smaller,
                      " of their size, which must be the size that it was fitted to; give these pictures")};
   }
-  if (2 * agreement.mismatched > agreement.views) {
+  const std::string mismatched = Cat("--images: ", agreement.mismatched, " of ", agreement.views,
+                                     " views look more like the picture of another view than like their own");
+  if (4 * agreement.mismatched > agreement.views) return Error{ErrorCode::kBadArgument, mismatched + suspicions};
+  if (2 * agreement.misplaced > agreement.views) {
     return Error{ErrorCode::kBadArgument,
-                 Cat("--images: ", agreement.mismatched, " of ", agreement.views,
-                     " views look more like the picture of another view than like their own", suspicions)};
+                 Cat("--images: ", agreement.misplaced, " of ", agreement.views,
+                     " pictures agree better with the splat, by ", Fixed(agreement.misplaced_gain, 1),
+                     " dB, when they are moved or enlarged by a pixel: these are not quite the cameras that it "
+                     "was fitted with (principal point, focal length, positions)")};
+  }
+  if (agreement.mismatched > 0) LogWarning(mismatched + suspicions);
+  if (!agreement.far_below.empty()) {
+    std::string names;
+    for (const std::string& name : agreement.far_below) names += Cat(names.empty() ? "" : ", ", Printable(name));
+    LogWarning(Cat("--images: ", agreement.far_below.size(), " of ", agreement.views,
+                   " pictures that were looked at agree with the splat much less than the others do: ", names));
   }
   return {};
 }

@@ -11,9 +11,11 @@
 #include "core/parallel.h"
 #include "enhance/enhance.h"
 #include "enhance/filter.h"
+#include "enhance/refine_pictures.h"
 #include "enhance/refiner.h"
 #include "fit/orbit_scene_test.h"
 #include "fit/pixel_model.h"
+#include "fit/training_views.h"
 #include "formats/test_cloud.h"
 #include "formats/test_folder.h"
 #include "metrics/image_metrics.h"
@@ -162,7 +164,22 @@ TEST_F(Refinement, GoesOnWhereItWasStopped) {
   ASSERT_TRUE(second.ok()) << second.error().message;
   EXPECT_EQ(second->report.resumed_at, 1);
   ExpectSameCloud(second->cloud, whole->cloud);
-  EXPECT_FALSE(std::filesystem::exists(control.checkpoint));
+  EXPECT_TRUE(std::filesystem::exists(control.checkpoint)) << "its owner removes it, once the result is safe";
+
+  // The same counts are not the same run.
+  RefineInput other = input_;
+  other.cloud.sh[0] += 0.01f;
+  EXPECT_THAT(Refine(other, options_, control).error().message, HasSubstr("its input is"));
+  other = input_;
+  other.start.log_scales[0] += 0.01f;
+  EXPECT_THAT(Refine(other, options_, control).error().message, HasSubstr("its start is"));
+
+  // A state that cannot be written costs the state, not the result.
+  stop = true;
+  RefineControl nowhere{folder_ / "no such folder" / "state", false, &stop};
+  const auto kept = Refine(input_, options_, nowhere);
+  ASSERT_TRUE(kept.ok()) << kept.error().message;
+  EXPECT_TRUE(kept->report.interrupted);
 }
 
 TEST_F(Refinement, TimeCanBeTheBound) {
@@ -246,6 +263,42 @@ TEST_F(Refinement, PicturesOfSomethingElseAreRefused) {
   EXPECT_THAT(message(), HasSubstr("dB only"));
   options_.images = folder_ / "nothing";
   EXPECT_FALSE(message().empty());
+}
+
+TEST_F(Refinement, CamerasThatAreNotQuiteThoseOfTheFitAreRefused) {
+  const auto message = [&](const CameraSet& cameras) {
+    EXPECT_TRUE(WriteTransforms(project() / "transforms.json", cameras, {.overwrite = true}).ok());
+    const auto refined = Refine(input_, options_, {});
+    return refined.ok() ? std::string() : refined.error().message;
+  };
+  options_.steps = 1;
+  EXPECT_EQ(message(cameras_), "");
+  CameraSet moved = cameras_;
+  for (Camera& camera : moved.cameras) camera.intrinsics.cx += 1.2;
+  EXPECT_THAT(message(moved), HasSubstr("enlarged by a pixel"));
+  moved = cameras_;
+  for (Camera& camera : moved.cameras) camera.intrinsics.fx = camera.intrinsics.fy *= 1.08;
+  EXPECT_THAT(message(moved), HasSubstr("enlarged by a pixel"));
+}
+
+TEST_F(Refinement, SaysWhichPicturesStandOut) {
+  const auto agreement = [&] {
+    const auto views = OpenProject(project(), {.hold_out = 0});
+    PictureCache pictures(views->train, {0, 0, 0});
+    return MeasureAgreement(input_.cloud, {}, pictures).value();
+  };
+  EXPECT_TRUE(agreement().far_below.empty());
+  EXPECT_EQ(agreement().mismatched, 0);
+  const auto name = [&](size_t i) { return project() / (cameras_.cameras[i].name + ".png"); };
+  std::filesystem::rename(name(3), folder_ / "kept.png");
+  std::filesystem::copy_file(name(7), name(3));
+  EXPECT_EQ(agreement().far_below.size(), 1u);
+  EXPECT_EQ(agreement().mismatched, 1);
+  EXPECT_TRUE(CheckAgreement(agreement(), kLeastInputPsnr).ok()) << "a warning";
+  for (const size_t i : {0u, 1u, 4u}) {
+    std::filesystem::copy_file(name(7), name(i), std::filesystem::copy_options::overwrite_existing);
+  }
+  EXPECT_FALSE(CheckAgreement(agreement(), kLeastInputPsnr).ok());
 }
 
 TEST_F(Refinement, PhotographsMayDifferInExposure) {

@@ -108,7 +108,7 @@ Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitO
   ANCHORSPLAT_ASSIGN_OR_RETURN(out.report.held_out,
                                MeasureQuality(out.cloud, options.objective.render, held_out, pixel));
   std::error_code ignored;
-  if (Exists(control.checkpoint)) std::filesystem::remove(control.checkpoint, ignored);
+  if (Exists(control.checkpoint) && !control.keep_checkpoint) std::filesystem::remove(control.checkpoint, ignored);
   return out;
 }
 

@@ -19,6 +19,7 @@ struct FitControl {
   std::filesystem::path checkpoint;            // empty: none is written or read
   int64_t checkpoint_every = 0;                // steps; 0: only when interrupted
   bool resume = false;                         // go on from `checkpoint` if it is there
+  bool keep_checkpoint = false;                // when the fit ends: its caller removes it, once the result is safe
   const std::atomic<bool>* stop = nullptr;     // becomes true when the user wants to stop
   std::function<void(const Fitter&)> observe;  // after every step; may be empty
 };

@@ -50,11 +50,11 @@ Status CompareSettings(const std::string& file, const std::string& theirs, const
       if (found == a.end()) {
         return Error{ErrorCode::kBadFile, Cat(file, ": is a checkpoint of another version, which knew no ", key)};
       }
-      return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another fit: its ", key, " is ",
+      return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run: its ", key, " is ",
                                                 Printable(found->dump()), ", this one's is ", value.dump())};
     }
   }
-  return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another fit")};
+  return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run")};
 }
 
 }  // namespace
@@ -67,6 +67,13 @@ Status WriteFitCheckpoint(const std::filesystem::path& path, const FitState& sta
   }
   return WriteSafetensors(path, entries, {{"format", kFormat}, {"step", Cat(state.step)}, {"settings", settings}},
                           {.overwrite = true});
+}
+
+bool IsFitCheckpoint(const std::filesystem::path& path) {
+  const auto file = TensorFile::Open(path);
+  if (!file.ok()) return false;
+  const auto format = file->metadata().find("format");
+  return format != file->metadata().end() && format->second == kFormat;
 }
 
 Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std::string& settings) {

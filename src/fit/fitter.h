@@ -79,6 +79,9 @@ class Fitter {
 // the step and `settings`, a JSON object of what the fit depends on. Whole or not at all; replaces an older one.
 Status WriteFitCheckpoint(const std::filesystem::path& path, const FitState& state, const std::string& settings);
 
+// Whether the file says that it is such a checkpoint; false when it cannot be read.
+bool IsFitCheckpoint(const std::filesystem::path& path);
+
 // Errors: those of TensorFile; kBadFile when it is no such checkpoint; kBadArgument when its settings are others than
 // `settings`, naming the first that differs.
 Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std::string& settings);

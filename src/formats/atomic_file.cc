@@ -208,6 +208,11 @@ Status CommitTogether(std::span<OutputFile> files) {
   return {};
 }
 
+Status CheckWritable(const std::filesystem::path& path) {
+  const auto file = OutputFile::Create(path, /*overwrite=*/true);
+  return file.ok() ? Status() : Status(file.error());
+}
+
 Status WriteWholeFile(const std::filesystem::path& path, std::string_view bytes, bool overwrite) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, overwrite));
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(bytes));

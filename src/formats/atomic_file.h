@@ -54,6 +54,10 @@ class OutputFile {
   uint64_t written_ = 0;
 };
 
+// Whether a file can come into being under that name, by trying: for knowing it before hours of work. Errors: those of
+// OutputFile::Create with `overwrite`.
+Status CheckWritable(const std::filesystem::path& path);
+
 // Commits files that belong together, in their order: the last one is the one that names the others. Where one of the
 // names has been taken meanwhile, those given before are taken back.
 Status CommitTogether(std::span<OutputFile> files);

@@ -96,6 +96,23 @@ refine_interrupted() {
 expect 130 "an interrupted refinement" refine_interrupted
 says stderr "--resume"
 expect 0 "what an interrupted refinement leaves" "$program" info "$work/refined3.ply"
+expect 5 "an interrupted refinement is not forgotten" refine -o "$work/refined3.ply" --images "$work/project" --hold-out 5 --steps 9
+expect 2 "an interrupted refinement is not mistaken for another" refine -o "$work/refined3.ply" --images "$work/project" --hold-out 5 --steps 9 --resume
+says stderr "its steps is"
+# No file is lost to a checkpoint.
+expect 2 "the input as a checkpoint" refine -o "$work/x.ply" --steps 2 --checkpoint "$work/whole.ply"
+expect 2 "the output as a checkpoint" refine -o "$work/x.ply" --steps 2 --checkpoint "$work/x.ply"
+expect 5 "another file as a checkpoint" refine -o "$work/x.ply" --steps 2 --checkpoint "$work/mesh/quad.obj" -w
+expect 0 "it is still there" test -s "$work/mesh/quad.obj"
+expect 6 "where no file can be written" refine -o /proc/x.ply --steps 1000000
+expect 2 "steps for the filter" "$program" enhance "$work/whole.ply" --method filter --pixel-size 0.02 -o "$work/x.ply" --steps 5
+says stderr "--steps"
+expect 2 "pictures for two splats" "$program" enhance "$work/whole.ply" "$work/area0.ply" --method refine --out-dir "$work/two" --images "$work/project"
+echo none >"$work/broken.ply"
+expect 1 "one of two is broken" "$program" enhance "$work/broken.ply" "$work/whole.ply" --method filter --pixel-size 0.02 --out-dir "$work/two" --json
+says stdout '"error"'
+says stderr "broken.ply"
+expect 0 "the other is enhanced" test -s "$work/two/whole.ply"
 expect 0 "fit with area pixels" fit -o "$work/area.ply" --steps 40 --pixel area --upscale 2 -q
 expect 2 "upscale without area pixels" fit -o "$work/x.ply" --steps 40 --upscale 2
 # dataset: three meshes, one of them none, become two objects; a kill in between costs nothing.

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// Before anything is read: may this file hold the state of a run that can be resumed? `others` are what the command
+// reads and writes. Errors: kBadArgument: it is one of these; kExists: it is there already, and is no checkpoint, or
+// one that neither --resume nor -w speaks of.
+Status CheckCheckpoint(const std::filesystem::path& checkpoint, std::span<const std::filesystem::path> others,
+                       bool resume, bool overwrite);
+
+// Once the result is written: takes away a checkpoint that is there. Nothing else is.
+void RemoveCheckpoint(const std::filesystem::path& checkpoint);
+
+}  // namespace anchorsplat

@@ -176,6 +176,10 @@ Status FinishModelOptions(const EnhanceFlags& flags) {
     return Error{ErrorCode::kBadArgument,
                  Cat(flags.refinement, " belongs to refinement, which takes its time: --method refine or --images")};
   }
+  if (flags.model->options.prune_opacity > 0 && method != "auto" && method.find("model") == std::string::npos) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--prune-opacity and --method ", method, ": it is for what a model makes")};
+  }
   if (!flags.options.refine.images.empty() && flags.inputs.size() > 1) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--images are the pictures of one splat, and there are ", flags.inputs.size(), " inputs")};
@@ -287,9 +291,14 @@ Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared, int& exi
     }
     // What is wrong with one of several is said, and does not keep the others from being enhanced.
     if (flags.inputs.size() == 1 || result.error().code == ErrorCode::kInterrupted) return result.error();
-    LogError(Cat(flags.inputs[i], ": ", result.error().message));
-    results.push_back({{"input", flags.inputs[i]}, {"error", result.error().message}});
-    ++failures;
+    const Error& error = result.error();
+    const bool named = error.message.find(flags.inputs[i]) != std::string::npos;
+    LogError(named ? error.message : Cat(flags.inputs[i], ": ", error.message));
+    results.push_back(
+        {{"input", flags.inputs[i]}, {"failure", {{"code", CodeName(error.code)}, {"message", error.message}}}});
+    if (++failures == flags.inputs.size()) {
+      return Error{error.code, Cat("all ", failures, " inputs failed, the last one: ", error.message)};
+    }
   }
   if (shared.json) PrintJson(results);
   if (failures > 0 && !shared.json && !shared.quiet) {

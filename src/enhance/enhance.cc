@@ -89,8 +89,7 @@ Status DropUnusable(GaussianCloud& cloud) {
   const int64_t dropped = cloud.size() - static_cast<int64_t>(kept.size());
   if (dropped == 0) return {};
   if (kept.empty()) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("none of the ", WithThousands(cloud.size()), " Gaussians has finite values")};
+    return Error{ErrorCode::kBadFile, Cat("none of the ", WithThousands(cloud.size()), " Gaussians has finite values")};
   }
   LogWarning(Cat("dropped ", WithThousands(dropped), " of ", WithThousands(cloud.size()),
                  " Gaussians: NaN or infinite values"));

@@ -88,8 +88,8 @@ struct Enhanced {
 
 // Runs the method. Logs what it assumed: pixel size and how sure it is, training width, why a splat tagged
 // antialiased or enhanced before is left alone, how many rows were dropped. A result that was given width back says so
-// in its comments (enhance/enhanced_mark.h). kBadArgument: unknown method, both pixel_size and cameras, upscale < 1, no
-// usable Gaussian; and whatever the method reports.
+// in its comments (enhance/enhanced_mark.h). kBadArgument: unknown method, both pixel_size and cameras, upscale < 1;
+// kBadFile: no usable Gaussian; and whatever the method reports.
 Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options);
 
 }  // namespace anchorsplat

@@ -74,6 +74,7 @@ TEST(CompactNetwork, OddCloudsStayFinite) {
   hostile.opacity_logits[0] = -kInfinity;
   hostile.opacity_logits[1] = 1e30f;
   hostile.opacity_logits[2] = -1e30f;
+  hostile.opacity_logits[3] = -3e38f;
   std::fill_n(hostile.quats.begin(), 4, 0.0f);
   std::fill_n(hostile.quats.begin() + 4, 4, 1e-30f);
   hostile.sh[5] = 1e38f;

@@ -109,7 +109,10 @@ void WriteCopies(const CompactConfig& config, const CopyStart& start, const Comp
     out_quat[1] = static_cast<float>(inverse * (quat[1] + x * quat[0] + yy * quat[3] - z * quat[2]));
     out_quat[2] = static_cast<float>(inverse * (quat[2] - x * quat[3] + yy * quat[0] + z * quat[1]));
     out_quat[3] = static_cast<float>(inverse * (quat[3] + x * quat[2] - yy * quat[1] + z * quat[0]));
-    out.opacity_logits[static_cast<size_t>(row)] = static_cast<float>(shape.opacity_logit + next(kCopyAttributes[3]));
+    const double logit = shape.opacity_logit + next(kCopyAttributes[3]);
+    // K copies of something that float can hardly hold as a logit; −Inf stays, as the cloud may have it.
+    out.opacity_logits[static_cast<size_t>(row)] = static_cast<float>(
+        std::isinf(cloud.opacity_logits[static_cast<size_t>(i)]) ? logit : std::clamp(logit, -1e30, 1e30));
 
     const float* sh = cloud.sh.data() + i * cloud.sh_stride();
     float* out_sh = out.sh.data() + row * cloud.sh_stride();

@@ -110,7 +110,7 @@ says stderr "--steps"
 expect 2 "pictures for two splats" "$program" enhance "$work/whole.ply" "$work/area0.ply" --method refine --out-dir "$work/two" --images "$work/project"
 echo none >"$work/broken.ply"
 expect 1 "one of two is broken" "$program" enhance "$work/broken.ply" "$work/whole.ply" --method filter --pixel-size 0.02 --out-dir "$work/two" --json
-says stdout '"error"'
+says stdout '"failure"'
 says stderr "broken.ply"
 expect 0 "the other is enhanced" test -s "$work/two/whole.ply"
 expect 0 "fit with area pixels" fit -o "$work/area.ply" --steps 40 --pixel area --upscale 2 -q

@@ -173,7 +173,7 @@ TEST_F(Fits, ACheckpointOfAnotherFitIsRefused) {
   EXPECT_THAT(fitted.error().message, HasSubstr("its grow_grad2d is 0.0002, this one's is 0.0003"));
   options_.densification.grow_grad2d = 0.0002;
   views_.train.pop_back();
-  EXPECT_THAT(Fit(views_, Initial(), options_, control).error().message, HasSubstr("another fit: its view"));
+  EXPECT_THAT(Fit(views_, Initial(), options_, control).error().message, HasSubstr("another run: its view"));
 }
 
 TEST_F(Fits, ACheckpointOfAVersionWithFewerSettingsIsABadFile) {

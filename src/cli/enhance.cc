@@ -126,7 +126,7 @@ nlohmann::json ToJson(const std::string& input, const fs::path& output, const En
   for (const auto& [name, value] : r.facts) {
     // Counts are whole numbers in JSON, measurements are not.
     const bool measured = name.starts_with("seconds") || name.ends_with("psnr") || name.starts_with("consistency");
-    if (measured || value != std::floor(value)) {
+    if (measured || value != std::floor(value) || std::abs(value) > 9e15) {
       json[r.method][name] = value;
     } else {
       json[r.method][name] = static_cast<int64_t>(value);

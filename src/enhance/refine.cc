@@ -4,13 +4,13 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <system_error>
 #include <utility>
 #include <vector>
 
+#include "core/fingerprint.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "enhance/refine_pictures.h"
@@ -161,24 +161,6 @@ Result<std::vector<double>> Residuals(const GaussianCloud& cloud, double upscale
   }
   return residuals;
 }
-
-// Hexadecimal FNV-1a of arrays of numbers: says whether two runs work with the same ones, to no enemy.
-class Fingerprint {
- public:
-  template <typename Values>
-  void Add(const Values& values) {
-    const auto* bytes = reinterpret_cast<const unsigned char*>(values.data());
-    for (size_t i = 0; i < values.size() * sizeof(values[0]); ++i) hash_ = (hash_ ^ bytes[i]) * 0x100000001b3;
-  }
-  std::string text() const {
-    char digits[17];
-    std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash_));
-    return digits;
-  }
-
- private:
-  uint64_t hash_ = 0xcbf29ce484222325;
-};
 
 std::string FingerprintOf(const GaussianCloud& cloud) {
   Fingerprint print;

@@ -3,6 +3,7 @@
 #include <system_error>
 #include <utility>
 
+#include "core/fingerprint.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "fit/picture_cache.h"
@@ -22,10 +23,9 @@ std::string Settings(const FitOptions& options, const TrainingViews& views, cons
   }
   std::string text = ToJsonText(options);
   text.pop_back();
-  // FNV-1a: the same number on every machine, unlike std::hash.
-  uint64_t hash = 0xcbf29ce484222325u;
-  for (const char c : names) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
-  return text + Cat(",\"views\":", views.train.size(), ",\"view_names\":\"", std::hex, hash, std::dec,
+  Fingerprint print;
+  print.Add(names);
+  return text + Cat(",\"views\":", views.train.size(), ",\"view_names\":\"", print.text(),
                     "\",\"initial_gaussians\":", initial.size(), "}");
 }
 

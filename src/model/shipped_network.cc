@@ -5,6 +5,7 @@
 #include <span>
 
 #include "core/buffer.h"
+#include "core/fingerprint.h"
 #include "core/text.h"
 #include "formats/tensor_file.h"
 
@@ -46,9 +47,9 @@ bool HasShippedNetwork() { return !ShippedBytes().empty(); }
 
 std::string ShippedNetworkIdentity() {
   if (!HasShippedNetwork()) return "";
-  uint64_t hash = 0xcbf29ce484222325ull;  // FNV-1a
-  for (const std::byte b : ShippedBytes()) hash = (hash ^ static_cast<uint64_t>(b)) * 0x100000001b3ull;
-  return Cat(ShippedBytes().size(), " ", hash);
+  Fingerprint print;
+  print.Add(ShippedBytes());
+  return Cat(ShippedBytes().size(), " ", print.value());
 }
 
 Result<CompactNetwork> LoadShippedNetwork() {

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <string>
+
+namespace anchorsplat {
+
+// FNV-1a of 64 bits over the bytes of arrays: the same number in every run and on every machine of the same byte order,
+// unlike std::hash. It tells whether two things are the same where nobody means harm, and no more.
+class Fingerprint {
+ public:
+  // Any contiguous range of plain values.
+  template <typename Values>
+  void Add(const Values& values) {
+    const auto* bytes = reinterpret_cast<const unsigned char*>(values.data());
+    const size_t count = values.size() * sizeof(values[0]);
+    for (size_t i = 0; i < count; ++i) value_ = (value_ ^ bytes[i]) * 0x100000001b3u;
+  }
+
+  uint64_t value() const { return value_; }
+  std::string text() const {  // 16 hexadecimal digits
+    char digits[17];
+    std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(value_));
+    return digits;
+  }
+
+ private:
+  uint64_t value_ = 0xcbf29ce484222325u;
+};
+
+}  // namespace anchorsplat

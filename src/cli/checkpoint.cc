@@ -1,8 +1,6 @@
 #include "cli/checkpoint.h"
 
-#include <algorithm>
 #include <system_error>
-#include <vector>
 
 #include "core/text.h"
 #include "fit/fitter.h"

@@ -64,7 +64,7 @@ void FitFlags::AddTo(CLI::App& verb) {
   verb.add_option("--max-gaussians", standard.densification.max_gaussians, "Growth stops there; 0: no bound")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  verb.add_option("--hold-out", hold_out, "Hold out every so-manieth view, by name; 0: none")
+  verb.add_option("--hold-out", hold_out, "Hold out every Nth view, by name; 0: none")
       ->check(CLI::Range(0, 1 << 30))
       ->capture_default_str();
   auto* init_option = AddChoice(

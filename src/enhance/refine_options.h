@@ -14,7 +14,7 @@ namespace anchorsplat {
 // What a refinement does (enhance/refine.h). Values that are not given depend on whether there are pictures.
 struct RefineOptions {
   std::filesystem::path images;  // project with the training pictures (fit/training_views.h); empty: without any
-  int hold_out = 8;              // every so-manieth view is not trained on, as in fits; 0: all are
+  int hold_out = 8;              // every Nth view is not trained on, as in fits; 0: all are
   std::optional<int64_t> steps;
   std::optional<double> seconds;           // instead of steps: as many as there are in that time. Not reproducible
   std::optional<int> copies;               // K that every Gaussian is split into at the beginning

@@ -46,7 +46,8 @@ struct Fitted {
 
 // Fits Gaussians that begin as `initial` to the training views: the whole of an optimisation, with progress, an
 // interruption that loses nothing, and the quality at its end. When `control.stop` becomes true the result so far comes
-// back with `interrupted` set and the checkpoint is written; when a fit ends, its checkpoint is removed.
+// back with `interrupted` set and the checkpoint is written; when a fit ends, its checkpoint is removed, unless the
+// caller keeps it until the result is safe.
 //
 // Errors: those of Fitter and of the checkpoint's file.
 Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitOptions& options,

@@ -18,7 +18,7 @@ if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
   missing=()
   have_header() { echo "#include <$1>" | ${CXX:-c++} -std=c++20 -E -x c++ - >/dev/null 2>&1; }
   for program in "${CXX:-c++}" cmake ninja; do command -v "$program" >/dev/null || missing+=("$program"); done
-  for header in hwy/highway.h tbb/parallel_for.h CLI/CLI.hpp nlohmann/json.hpp png.h jpeglib.h zlib.h zstd.h webp/decode.h zip.h \
+  for header in hwy/highway.h tbb/parallel_for.h CLI/CLI.hpp nlohmann/json.hpp png.h jpeglib.h zlib.h zstd.h webp/decode.h \
                 assimp/scene.h stb/stb_image.h embree3/rtcore.h toml++/toml.h gtest/gtest.h gmock/gmock.h benchmark/benchmark.h; do
     have_header "$header" || missing+=("<$header>")
   done

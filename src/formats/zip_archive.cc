@@ -1,6 +1,5 @@
 #include "formats/zip_archive.h"
 
-#include <zip.h>
 #include <zlib.h>
 
 #include <algorithm>

@@ -9,6 +9,7 @@
 
 #include "core/log.h"
 #include "core/random.h"
+#include "core/source_dir_for_test.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
 #include "enhance/pixel_size_estimate.h"
@@ -209,7 +210,7 @@ TEST_F(EnhanceDoor, EstimateFollowsTheScaleOfTheCloud) {
 // Two real fits whose training pixel is 1.7 / 309.02 px.
 TEST_F(EnhanceDoor, EstimateIsNearTheTruthOnRealFits) {
   for (const char* object : {"biplane", "stone_lantern"}) {
-    const auto cloud = ReadCloud(std::string(ANCHORSPLAT_SOURCE_DIR) + "/examples/" + object + "/input.ply");
+    const auto cloud = ReadCloud(SourceDirForTest().string() + "/examples/" + object + "/input.ply");
     ASSERT_TRUE(cloud.ok()) << cloud.error().message;
     const auto estimate = EstimatePixelSize(*cloud);
     ASSERT_TRUE(estimate.ok());
@@ -222,7 +223,7 @@ TEST_F(EnhanceDoor, EstimateIsNearTheTruthOnRealFits) {
 
 // What captures of real places have behind their subject must not decide.
 TEST_F(EnhanceDoor, EstimateIsNotMovedByGiantsAndSkies) {
-  const auto example = ReadCloud(std::string(ANCHORSPLAT_SOURCE_DIR) + "/examples/biplane/input.ply");
+  const auto example = ReadCloud(SourceDirForTest().string() + "/examples/biplane/input.ply");
   ASSERT_TRUE(example.ok());
   const double plain = EstimatePixelSize(*example)->size;
   struct Addition {

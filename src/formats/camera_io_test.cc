@@ -12,6 +12,7 @@
 
 #include "core/random.h"
 #include "core/rotation.h"
+#include "core/source_dir_for_test.h"
 #include "formats/image_io.h"
 #include "formats/test_folder.h"
 
@@ -92,7 +93,7 @@ TEST(WriteTransforms, RoundTrips) {
 
 TEST(WriteTransforms, KeepsTheExamples) {
   const TestFolder folder;
-  const auto example = std::filesystem::path(ANCHORSPLAT_SOURCE_DIR) / "examples/biplane/transforms_hr.json";
+  const auto example = SourceDirForTest() / "examples/biplane/transforms_hr.json";
   const auto set = ReadCameras(example);
   ASSERT_TRUE(set.ok());
   ASSERT_TRUE(WriteTransforms(folder / "t.json", *set).ok());

@@ -14,6 +14,7 @@
 #include <string>
 #include <thread>
 
+#include "core/source_dir_for_test.h"
 #include "formats/atomic_file.h"
 #include "formats/ply_writer.h"
 #include "formats/registry.h"
@@ -212,7 +213,7 @@ TEST(Registry, RowsAreConsistent) {
 }
 
 TEST(CloudIo, ReadsThePublishedExample) {
-  const auto cloud = ReadCloud(fs::path(ANCHORSPLAT_SOURCE_DIR) / "examples/biplane/input.ply");
+  const auto cloud = ReadCloud(SourceDirForTest() / "examples/biplane/input.ply");
   ASSERT_TRUE(cloud.ok()) << cloud.error().message;
   EXPECT_EQ(cloud->size(), 20'000);
   EXPECT_EQ(cloud->sh_degree, 3);

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/rotation.h"
+#include "core/source_dir_for_test.h"
 #include "formats/attribute_error.h"
 #include "formats/cloud_io.h"
 
@@ -45,7 +46,7 @@ double LargestShapeDifference(const GaussianCloud& a, const GaussianCloud& b) {
 // Files of independent programs and of ours, against what splat-transform reads from them, or was given where it only
 // writes (testdata/splats/README.md).
 TEST(Golden, ReadsWhatSplatTransformReads) {
-  const std::string folder = ANCHORSPLAT_SOURCE_DIR "/testdata/splats/";
+  const std::string folder = SourceDirForTest().string() + "/testdata/splats/";
   for (const std::string name :
        {"splat-transform.compressed.ply", "splat-transform.sog", "splat-transform.spz", "gaussforge.splat",
         "gaussforge.ksplat", "gaussforge.spz", "splat-transform.glb", "anchorsplat.compressed.ply", "anchorsplat.sog",

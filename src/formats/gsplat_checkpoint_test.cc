@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/source_dir_for_test.h"
 #include "formats/tensor_bytes_test.h"
 #include "formats/tensor_entry.h"
 
@@ -28,7 +29,7 @@ std::string OneGaussian(const std::vector<std::pair<std::string, std::vector<int
 TEST(GsplatCheckpoint, ReadsEveryDegreeThroughTheDoor) {
   for (const int degree : {0, 1, 3}) {
     const auto path =
-        std::string(ANCHORSPLAT_SOURCE_DIR) + "/testdata/tensors/ckpt_degree" + std::to_string(degree) + ".pt";
+        SourceDirForTest().string() + "/testdata/tensors/ckpt_degree" + std::to_string(degree) + ".pt";
     const Result<GaussianCloud> cloud = ReadCloud(path);
     ASSERT_TRUE(cloud.ok()) << cloud.error().message;
     EXPECT_TRUE(Validate(*cloud).ok());

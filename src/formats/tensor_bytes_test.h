@@ -9,12 +9,13 @@
 #include <vector>
 
 #include "core/buffer.h"
+#include "core/source_dir_for_test.h"
 
 // Bytes for the tests of tensor files: files of the repository, and zip archives, pickles and safetensors made by hand.
 namespace anchorsplat::tensor_bytes {
 
 inline std::string ReadTestFile(const std::string& name) {
-  std::ifstream in(ANCHORSPLAT_SOURCE_DIR "/testdata/tensors/" + name, std::ios::binary);
+  std::ifstream in(SourceDirForTest() / ("testdata/tensors/" + name), std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/source_dir_for_test.h"
 #include "formats/tensor_bytes_test.h"
 
 namespace anchorsplat {
@@ -13,7 +14,7 @@ namespace {
 
 using testing::HasSubstr;
 
-std::string TestPath(const std::string& name) { return ANCHORSPLAT_SOURCE_DIR "/testdata/tensors/" + name; }
+std::string TestPath(const std::string& name) { return SourceDirForTest().string() + "/testdata/tensors/" + name; }
 
 TensorFile OpenOrDie(const std::string& name) {
   Result<TensorFile> file = TensorFile::Open(TestPath(name));

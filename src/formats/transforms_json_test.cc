@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "formats/camera_io.h"
+#include "core/source_dir_for_test.h"
 #include "formats/image_io.h"
 #include "formats/test_folder.h"
 
@@ -30,7 +31,7 @@ std::string OneFrame(const std::string& head, const std::string& frame = "") {
 
 TEST(TransformsJson, ReadsTheExamples) {
   for (const std::string scene : {"biplane", "stone_lantern"}) {
-    const std::filesystem::path folder = std::filesystem::path(ANCHORSPLAT_SOURCE_DIR) / "examples" / scene;
+    const std::filesystem::path folder = SourceDirForTest() / "examples" / scene;
     for (const auto& [file, count, size] :
          {std::tuple("transforms_lr.json", 127u, 256), {"transforms_hr.json", 10u, 1024}}) {
       const auto set = ReadCameras(folder / file);

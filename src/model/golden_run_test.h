@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/buffer.h"
+#include "core/source_dir_for_test.h"
 #include "core/text.h"
 #include "model/network_config.h"
 
@@ -23,7 +24,7 @@ struct GoldenRun {
   Shuffles shuffles = kNoShuffles;
 
   GoldenRun() {
-    const std::filesystem::path folder = std::filesystem::path(ANCHORSPLAT_SOURCE_DIR) / "testdata" / "golden";
+    const std::filesystem::path folder = SourceDirForTest() / "testdata" / "golden";
     std::ifstream(folder / "manifest.json") >> manifest;
     count = manifest["N"].get<int64_t>();
     config.copies = manifest["K"].get<int64_t>();

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "core/parallel.h"
+#include "core/source_dir_for_test.h"
 #include "core/text.h"
 #include "model/golden_run_test.h"
 
@@ -155,7 +156,7 @@ TEST(NetworkConfig, TensorsAreThoseOfPublishedCheckpoints) {
   for (const int copies : {20, 1}) {
     NetworkConfig config;
     config.copies = copies;
-    std::ifstream listing(std::string(ANCHORSPLAT_SOURCE_DIR) + Cat("/testdata/network/state_dict_", copies, "x.txt"));
+    std::ifstream listing(SourceDirForTest().string() + Cat("/testdata/network/state_dict_", copies, "x.txt"));
     const auto tensors = NetworkTensors(config);
     size_t i = 0;
     for (std::string line; std::getline(listing, line); ++i) {

@@ -11,6 +11,7 @@
 #include "core/camera.h"
 #include "core/gaussian_cloud.h"
 #include "core/random.h"
+#include "core/source_dir_for_test.h"
 #include "render/rasterizer.h"
 
 // Clouds and cameras that the tests of this room share.
@@ -83,7 +84,7 @@ inline GaussianCloud OneGaussian(double x, double y, double z, double scale, dou
 // when the file is not that.
 inline GaussianCloud ReadExample(const std::string& name) {
   GaussianCloud cloud;
-  std::ifstream file(std::string(ANCHORSPLAT_SOURCE_DIR) + "/examples/" + name + "/input.ply", std::ios::binary);
+  std::ifstream file(SourceDirForTest().string() + "/examples/" + name + "/input.ply", std::ios::binary);
   int64_t count = 0;
   int properties = 0;
   for (std::string line; std::getline(file, line) && line != "end_header";) {

@@ -1,4 +1,5 @@
 #include "train/train_config.h"
+#include "core/source_dir_for_test.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -81,7 +82,7 @@ TEST(TrainConfig, ComplaintsNameFileLineAndKey) {
 
 TEST(TrainConfig, TheRecipesOfTheRepositoryAreRight) {
   int count = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(ANCHORSPLAT_SOURCE_DIR "/configs")) {
+  for (const auto& entry : std::filesystem::directory_iterator(SourceDirForTest() / "configs")) {
     const auto config = ReadTrainConfig(entry.path());
     EXPECT_TRUE(config.ok()) << config.error().message;
     ++count;

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "core/rotation.h"
+#include "core/source_dir_for_test.h"
 #include "formats/camera_io.h"
 #include "formats/cloud_io.h"
 #include "render/rasterizer.h"
@@ -167,7 +168,7 @@ TEST(QuantizedCloud, NothingToShowIsAnError) {
 
 // What all the steps are for: nobody can tell the page's splat from the file's.
 TEST(QuantizedCloud, RendersOfAFittedSplatAreTheSame) {
-  const std::filesystem::path folder = std::filesystem::path(ANCHORSPLAT_SOURCE_DIR) / "examples/biplane";
+  const std::filesystem::path folder = SourceDirForTest() / "examples/biplane";
   const auto cloud = ReadCloud(folder / "input.ply");
   ASSERT_TRUE(cloud.ok()) << cloud.error().message;
   const auto cameras = ReadCameras(folder / "transforms_hr.json");

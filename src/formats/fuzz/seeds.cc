@@ -15,6 +15,7 @@
 
 #include "core/image.h"
 #include "core/random.h"
+#include "core/source_dir_for_test.h"
 #include "core/text.h"
 #include "formats/image_io.h"
 #include "formats/safetensors.h"
@@ -133,7 +134,7 @@ std::string Content(const std::filesystem::path& path) {
 std::vector<std::string> TestFiles(std::initializer_list<const char*> names) {
   std::vector<std::string> files;
   for (const char* name : names) {
-    files.push_back(Content(std::filesystem::path(ANCHORSPLAT_SOURCE_DIR) / "testdata/tensors" / name));
+    files.push_back(Content(SourceDirForTest() / "testdata/tensors" / name));
   }
   return files;
 }

@@ -1,7 +1,8 @@
 # Everything a person types. Details live in CMakePresets.json and scripts/.
 #
 #   make demo     from a bare Debian 12 machine to an enhanced splat and a picture
-#   make test     everything that is checked, sanitizers included
+#   make test     everything that is checked: all tests, and the rooms that handle input and memory by hand under sanitizers
+#   make test-all the same with every room under sanitizers (half an hour more)
 #   make build    the program (build/anchorsplat) and its tests
 #   make lint     clang-tidy and clang-format
 #   make fuzz     mutated files against all readers, SECONDS=60 by default
@@ -55,11 +56,22 @@ debug: dependencies
 demo: program
 	@scripts/demo.sh
 
+debug-all: dependencies
+	@cmake --preset debug-all $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
+	@rm -f build-configure.log
+	@cmake --build --preset debug-all -j $(JOBS)
+
 # A second make, because .venv decides the flags of the first when it starts.
 test: torch
 	@$(MAKE) --no-print-directory build debug
 	@ctest --preset release -j $(JOBS)
 	@ctest --preset debug -j $(JOBS)
+
+test-all: torch
+	@$(MAKE) --no-print-directory build debug-all
+	@ctest --preset release -j $(JOBS)
+	@ctest --preset debug-all -j $(JOBS)
+.PHONY: debug-all test-all
 
 viewer-test: build
 	@scripts/viewer_test.sh build/anchorsplat

@@ -93,12 +93,12 @@ Status RunConvert(const ConvertBenchOptions& options, const SharedFlags& shared)
   return {};
 }
 
-struct RenderFlags {
+struct RenderBenchFlags {
   std::string file;
   RenderBenchOptions options;
 };
 
-Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
+Status RunRenderBench(const RenderBenchFlags& flags, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(flags.file));
   RenderBenchOptions options = flags.options;
   options.seed = shared.seed;
@@ -141,12 +141,12 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
   return {};
 }
 
-struct FitFlags {
+struct FitBenchFlags {
   std::vector<std::string> files = {"examples/biplane/input.ply", "examples/stone_lantern/input.ply"};
   FitBenchOptions options;
 };
 
-Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
+Status RunFitBench(const FitBenchFlags& flags, const SharedFlags& shared) {
   FitBenchOptions options = flags.options;
   options.seed = shared.seed;
   std::vector<FitBenchRow> rows;
@@ -198,14 +198,14 @@ Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
   return {};
 }
 
-struct NetworkFlags {
+struct NetworkBenchFlags {
   std::string file = "examples/biplane/input.ply";
   std::string model;
   WeightPrecision precision = WeightPrecision::kFloat;
   NetworkBenchOptions options;
 };
 
-Status RunNetwork(const NetworkFlags& flags, const SharedFlags& shared) {
+Status RunNetworkBench(const NetworkBenchFlags& flags, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(flags.file));
   const NetworkConfig published;
   auto loaded = flags.model.empty() ? PackedNetwork::Load(published, HashWeights(), flags.precision)
@@ -252,7 +252,7 @@ void AddBench(CLI::App& app, Program& program) {
 
   CLI::App& render = AddVerb(verb, program, "render", "The rasterizer at 256², at 1024², and with every Gaussian split",
                              "anchorsplat bench render examples/biplane/input.ply");
-  const auto render_flags = std::make_shared<RenderFlags>();
+  const auto render_flags = std::make_shared<RenderBenchFlags>();
   render_flags->file = "examples/biplane/input.ply";
   render.add_option("file", render_flags->file, "Splat file, an object near the origin about one unit in size")
       ->capture_default_str();
@@ -269,12 +269,12 @@ void AddBench(CLI::App& app, Program& program) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   render.callback([render_flags, &program] {
-    program.run = [render_flags, &program] { return RunRender(*render_flags, program.flags); };
+    program.run = [render_flags, &program] { return RunRenderBench(*render_flags, program.flags); };
   });
 
   CLI::App& fit = AddVerb(verb, program, "fit", "One iteration of a fit at 256² and at 1024², stage by stage",
                           "anchorsplat bench fit --threads 1");
-  const auto fit_flags = std::make_shared<FitFlags>();
+  const auto fit_flags = std::make_shared<FitBenchFlags>();
   fit.add_option("files", fit_flags->files, "Splat files, objects near the origin about one unit in size")
       ->capture_default_str();
   fit.add_option("--poses", fit_flags->options.poses, "On the orbit")
@@ -290,11 +290,11 @@ void AddBench(CLI::App& app, Program& program) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   fit.callback(
-      [fit_flags, &program] { program.run = [fit_flags, &program] { return RunFit(*fit_flags, program.flags); }; });
+      [fit_flags, &program] { program.run = [fit_flags, &program] { return RunFitBench(*fit_flags, program.flags); }; });
 
   CLI::App& network = AddVerb(verb, program, "network", "The AnchorSplat network against a plain matrix product",
                               "anchorsplat bench network scan.ply --model anchorsplat_20x.pth");
-  const auto network_flags = std::make_shared<NetworkFlags>();
+  const auto network_flags = std::make_shared<NetworkBenchFlags>();
   network.add_option("file", network_flags->file, "Splat file")->capture_default_str();
   network.add_option("--model", network_flags->model,
                      "Checkpoint (default: made-up weights of the published size, K = 20)");
@@ -308,7 +308,7 @@ void AddBench(CLI::App& app, Program& program) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   network.callback([network_flags, &program] {
-    program.run = [network_flags, &program] { return RunNetwork(*network_flags, program.flags); };
+    program.run = [network_flags, &program] { return RunNetworkBench(*network_flags, program.flags); };
   });
 
   CLI::App& convert =

@@ -20,11 +20,11 @@ namespace anchorsplat {
 namespace {
 
 // Ctrl-C asks for an orderly end; the second one ends at once.
-std::atomic<bool> stop_requested{false};
+std::atomic<bool> build_stop_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may not lock");
 
-void RequestStop(int signal) {
-  stop_requested = true;
+void RequestBuildStop(int signal) {
+  build_stop_requested = true;
   std::signal(signal, SIG_DFL);
 }
 
@@ -73,9 +73,9 @@ Status RunBuild(const BuildFlags& flags, Program& program) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto resolved, ResolveAddresses(listed, flags.objects));
     meshes.insert(meshes.end(), resolved.begin(), resolved.end());
   }
-  options.stop = &stop_requested;
-  std::signal(SIGINT, RequestStop);
-  std::signal(SIGTERM, RequestStop);
+  options.stop = &build_stop_requested;
+  std::signal(SIGINT, RequestBuildStop);
+  std::signal(SIGTERM, RequestBuildStop);
   auto built = BuildDataset(meshes, flags.output, options);
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
@@ -162,8 +162,8 @@ struct ObjectFlags {
 Status RunObject(const ObjectFlags& flags) {
   DieWithParent();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ObjectJob job, ReadObjectJob(flags.job));
-  std::signal(SIGTERM, RequestStop);
-  const auto record = BuildObject(job, flags.output, &stop_requested);
+  std::signal(SIGTERM, RequestBuildStop);
+  const auto record = BuildObject(job, flags.output, &build_stop_requested);
   return record.ok() ? Status() : Status(record.error());
 }
 

@@ -22,7 +22,7 @@ namespace anchorsplat {
 namespace {
 
 // A mesh and what was found, without its triangles: a library's meshes together are gigabytes.
-struct Findings {
+struct MeshFindings {
   std::string address;
   MeshOrigin origin;
   std::vector<std::string> warnings;
@@ -40,8 +40,8 @@ struct Findings {
   std::vector<Picture> pictures;
 };
 
-Findings Find(const std::string& address, ImportedMesh imported) {
-  Findings f{address,
+MeshFindings Find(const std::string& address, ImportedMesh imported) {
+  MeshFindings f{address,
              std::move(imported.origin),
              std::move(imported.warnings),
              imported.degenerate,
@@ -66,7 +66,7 @@ nlohmann::json ToJson(const MeshOrigin& origin) {
           {"licence_source", origin.licence_source}};
 }
 
-nlohmann::json ToJson(const Findings& f) {
+nlohmann::json ToJson(const MeshFindings& f) {
   nlohmann::json json = ToJson(f.origin);
   const MeshSummary& s = f.summary;
   json.update({{"file", f.address},
@@ -84,7 +84,7 @@ nlohmann::json ToJson(const Findings& f) {
                {"lines_and_points", f.lines_and_points},
                {"warnings", f.warnings},
                {"pictures", nlohmann::json::array()}});
-  for (const Findings::Picture& picture : f.pictures) {
+  for (const MeshFindings::Picture& picture : f.pictures) {
     json["pictures"].push_back({{"name", picture.name},
                                 {"width", picture.width},
                                 {"height", picture.height},
@@ -94,7 +94,7 @@ nlohmann::json ToJson(const Findings& f) {
   return json;
 }
 
-void PrintTable(const Findings& f) {
+void PrintMeshTable(const MeshFindings& f) {
   const MeshSummary& s = f.summary;
   const auto line = [](const char* name, const std::string& value) {
     if (!value.empty()) std::cout << "  " << name << "  " << value << "\n";
@@ -107,7 +107,7 @@ void PrintTable(const Findings& f) {
   line("triangles ", Cat(WithThousands(s.triangles), ", vertices ", WithThousands(s.vertices), ", normals ",
                          f.has_normals ? "of the file" : "made from the triangles"));
   line("materials ", Cat(s.materials, ", textures ", s.textures, ", colours without texture ", s.colors));
-  for (const Findings::Picture& picture : f.pictures) {
+  for (const MeshFindings::Picture& picture : f.pictures) {
     line("picture   ", Cat(Printable(picture.name), ", ", picture.width, " x ", picture.height,
                            picture.has_alpha ? ", with transparent parts" : ""));
   }
@@ -119,7 +119,7 @@ void PrintTable(const Findings& f) {
 Status RunLibraryInfo(const std::string& path, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const FurnitureCatalog catalog, FurnitureCatalog::Open(path));
   const std::vector<CatalogEntry>& entries = catalog.entries();
-  std::vector<Result<Findings>> all(entries.size(), Error{});
+  std::vector<Result<MeshFindings>> all(entries.size(), Error{});
   {
     Progress progress("objects", static_cast<int64_t>(entries.size()));
     ParallelFor(0, static_cast<int64_t>(entries.size()), 1, [&](int64_t begin, int64_t) {
@@ -195,11 +195,11 @@ bool LooksLikeMesh(const std::string& address) {
 Status RunMeshInfo(const std::string& address, const SharedFlags& shared) {
   if (IsMeshLibrary(address)) return RunLibraryInfo(address, shared);
   ANCHORSPLAT_ASSIGN_OR_RETURN(ImportedMesh imported, ReadMesh(address));
-  const Findings findings = Find(address, std::move(imported));
+  const MeshFindings findings = Find(address, std::move(imported));
   if (shared.json) {
     PrintJson(ToJson(findings));
   } else {
-    PrintTable(findings);
+    PrintMeshTable(findings);
   }
   return {};
 }

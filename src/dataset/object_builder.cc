@@ -80,7 +80,7 @@ Result<RayTracer> PrepareMesh(const ObjectJob& job, ObjectRecord& record) {
   record.textures = std::ssize(imported.mesh.textures);
   auto mesh = NormalizedToUnitCube(std::move(imported.mesh));
   if (!mesh.ok()) return Error{ErrorCode::kBadFile, Cat(job.source, ": ", mesh.error().message)};
-  record.fingerprint = Fingerprint(*mesh);
+  record.fingerprint = MeshFingerprint(*mesh);
   return RayTracer::Create(*std::move(mesh));
 }
 

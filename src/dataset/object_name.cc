@@ -91,7 +91,7 @@ std::string VariantStem(std::string_view name) {
   return stem;
 }
 
-std::string Fingerprint(const Mesh& mesh) {
+std::string MeshFingerprint(const Mesh& mesh) {
   std::array<float, 3> low = {1, 1, 1}, high = {-1, -1, -1};
   double area = 0;
   for (const auto& [a, b, c] : mesh.triangles) {

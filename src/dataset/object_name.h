@@ -24,7 +24,7 @@ std::string VariantStem(std::string_view name);
 
 // A short text that copies and recolourings of a model share: triangles, proportions and area, rounded. Expects a mesh
 // in the unit cube.
-std::string Fingerprint(const Mesh& mesh);
+std::string MeshFingerprint(const Mesh& mesh);
 
 // FNV-1a, 64 bits: the same on every machine.
 uint64_t StableHash(std::string_view text, uint64_t seed = 0);

@@ -56,9 +56,9 @@ TEST(ObjectName, RecolouringsShareAFingerprint) {
   mesh.triangle_materials = {0};
   Mesh red = mesh;
   red.materials[0].diffuse = {1, 0, 0};
-  EXPECT_EQ(Fingerprint(mesh), Fingerprint(red));
+  EXPECT_EQ(MeshFingerprint(mesh), MeshFingerprint(red));
   red.positions[2][1] = 0.4f;
-  EXPECT_NE(Fingerprint(mesh), Fingerprint(red));
+  EXPECT_NE(MeshFingerprint(mesh), MeshFingerprint(red));
 }
 
 }  // namespace

@@ -28,7 +28,7 @@ Status TakeInt(const JsonValue& json, const char* key, int low, int high, int& o
   return {};
 }
 
-Status TakeNumber(const JsonValue& json, const char* key, double& out) {
+Status TakeSetting(const JsonValue& json, const char* key, double& out) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, json.Get(key));
   ANCHORSPLAT_ASSIGN_OR_RETURN(out, value.Number());
   return {};
@@ -64,8 +64,8 @@ Status TakeRig(const JsonValue& json, CameraRig& rig) {
     }
   }
   ANCHORSPLAT_RETURN_IF_ERROR(TakeInt(json, "views", 1, 100000, rig.views));
-  ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(json, "radius", rig.radius));
-  ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(json, "fov_degrees", rig.fov_degrees));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeSetting(json, "radius", rig.radius));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeSetting(json, "fov_degrees", rig.fov_degrees));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue elevations, json.Get("elevations"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto elements, elevations.Elements());
   rig.elevations.clear();
@@ -117,7 +117,7 @@ Result<ObjectSettings> ObjectSettingsFrom(const JsonValue& json) {
   if (json.has("downscale")) ANCHORSPLAT_RETURN_IF_ERROR(TakeInt(json, "downscale", 2, 64, s.downscale));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeInt(json, "hold_out", 0, 100000, s.hold_out));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeWhole(json, "max_gaussians", s.max_gaussians));
-  ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(json, "min_train_psnr", s.min_train_psnr));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeSetting(json, "min_train_psnr", s.min_train_psnr));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeSeed(json, "seed", s.seed));
   v.seed = v.rig.seed = s.seed;
   if (const Status status = Validate(s); !status.ok()) return json.Complain(status.error().message);

@@ -63,7 +63,7 @@ void AveragePlane(const Image& image, int channel, const float* by, const std::v
   }
 }
 
-Status MakeFolder(const fs::path& folder) {
+Status MakeProjectFolder(const fs::path& folder) {
   std::error_code code;
   fs::create_directories(folder, code);
   if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot make this folder: ", code.message())};
@@ -112,7 +112,7 @@ Result<ProjectCameras> MakeCameras(const fs::path& project, const std::vector<Ca
 Status WriteCameras(const fs::path& folder, const CameraSet& cameras, const WriteOptions& write) {
   const int size = cameras.cameras[0].intrinsics.width;
   const fs::path level = folder / std::to_string(size);
-  ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(level / "images"));
+  ANCHORSPLAT_RETURN_IF_ERROR(MakeProjectFolder(level / "images"));
   ANCHORSPLAT_RETURN_IF_ERROR(WriteColmapCameras(level, cameras, ColmapForm::kText, write));
   CameraSet named = cameras;
   for (Camera& camera : named.cameras) camera.name = Cat(size, "/images/", camera.name);
@@ -180,7 +180,7 @@ Result<PictureProjectReport> WritePictureProject(const fs::path& project, const 
   ANCHORSPLAT_RETURN_IF_ERROR(WriteCameras(folder, cameras.low, write));
   ANCHORSPLAT_RETURN_IF_ERROR(WriteCameras(folder, cameras.high, write));
   const fs::path sparse = low / "sparse" / "0";
-  ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(sparse));
+  ANCHORSPLAT_RETURN_IF_ERROR(MakeProjectFolder(sparse));
   ANCHORSPLAT_RETURN_IF_ERROR(WriteColmapCameras(sparse, cameras.low, ColmapForm::kBinary, write));
   if (views.points.size() == 0) {
     views.points = RandomPointsInView(options.random_points, views.train, views.scene_scale, options.seed);

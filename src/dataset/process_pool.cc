@@ -26,7 +26,7 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kPause = std::chrono::milliseconds(20);  // between looks at processes that run for minutes
 constexpr double kGraceSeconds = 10;
 
-double Since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+double SecondsSince(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 struct Running {
   int64_t index = 0;
@@ -72,7 +72,7 @@ void Ask(pid_t pid, Running& running) {
     running.asked = true;
     running.asked_at = Clock::now();
     ::kill(-pid, SIGTERM);
-  } else if (!running.killed && Since(running.asked_at) > kGraceSeconds) {
+  } else if (!running.killed && SecondsSince(running.asked_at) > kGraceSeconds) {
     running.killed = true;
     ::kill(-pid, SIGKILL);
   }
@@ -104,7 +104,7 @@ Status RunProcesses(int64_t count, const std::function<ProcessTask(int64_t)>& ta
     bool any = false;
     for (auto it = running.begin(); it != running.end();) {
       Running& r = it->second;
-      if (options.timeout_seconds > 0 && Since(r.begin) > options.timeout_seconds) r.timed_out = true;
+      if (options.timeout_seconds > 0 && SecondsSince(r.begin) > options.timeout_seconds) r.timed_out = true;
       if (r.timed_out || stopping) Ask(it->first, r);
       int status = 0;
       const pid_t got = ::waitpid(it->first, &status, WNOHANG);
@@ -114,7 +114,7 @@ Status RunProcesses(int64_t count, const std::function<ProcessTask(int64_t)>& ta
       }
       ::kill(-it->first, SIGKILL);  // whatever it has started itself
       ProcessEnd end;
-      end.seconds = Since(r.begin);
+      end.seconds = SecondsSince(r.begin);
       end.timed_out = r.timed_out;
       if (got < 0) {
         end.exit_code = -1;

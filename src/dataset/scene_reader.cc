@@ -27,7 +27,7 @@ bool IsFolder(const fs::path& path) {
   return fs::is_directory(path, ignored);
 }
 
-bool IsFile(const fs::path& path) {
+bool IsRegularFile(const fs::path& path) {
   std::error_code ignored;
   return fs::is_regular_file(path, ignored);
 }
@@ -88,7 +88,7 @@ Result<Image> ReadView(const Camera& camera) {
 Result<std::vector<SceneEntry>> ListScenes(const fs::path& dataset, const SceneListOptions& options) {
   if (!IsFolder(dataset)) return NotFound(Cat(dataset.string(), ": there is no such folder"));
   std::vector<SceneEntry> scenes;
-  if (IsFile(dataset / kManifestName)) {
+  if (IsRegularFile(dataset / kManifestName)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Manifest manifest, ReadManifest(dataset));
     for (const auto& [name, record] : manifest) {
       if (!record.rejected || options.rejected) scenes.push_back({name, dataset / name});
@@ -126,7 +126,7 @@ Result<Scene> Scene::Open(const SceneEntry& entry) {
   }
   const auto& [low, high] = *resolutions;
   scene.low_folder_ = low;
-  if (IsFile(entry.folder / kRecordName)) {
+  if (IsRegularFile(entry.folder / kRecordName)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile json, JsonFile::Read(entry.folder / kRecordName));
     ANCHORSPLAT_ASSIGN_OR_RETURN(scene.record_, ObjectRecordFrom(json.root()));
     scene.background_ = scene.record_->background;
@@ -187,7 +187,7 @@ Result<Image> Scene::HighPicture(size_t view) const {
 
 Result<Image> Scene::Rendered(size_t view) const {
   const fs::path path = folder_ / kMeshName;
-  if (!record_ || !IsFile(path)) {
+  if (!record_ || !IsRegularFile(path)) {
     return NotFound(Cat(folder_.string(), ": no high-resolution picture ", high_views_[view].name, " and no ",
                         kMeshName, " to make it from"));
   }

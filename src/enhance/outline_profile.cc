@@ -9,7 +9,7 @@
 namespace anchorsplat {
 
 namespace {
-constexpr int kRowsPerTask = 32;
+constexpr int kProfileRowsPerTask = 32;
 constexpr float kLeastGradient = 1e-4f;  // per pixel; flatter crossings are noise of a plateau
 }  // namespace
 
@@ -45,10 +45,10 @@ void OutlineProfile::AddRows(const Image& alpha, double pixel, int first, int la
 }
 
 void OutlineProfile::Add(const Image& alpha, double pixel) {
-  std::vector<Sums> parts(static_cast<size_t>((alpha.height + kRowsPerTask - 1) / kRowsPerTask));
-  ParallelFor(0, alpha.height, kRowsPerTask, [&](int64_t first, int64_t last) {
+  std::vector<Sums> parts(static_cast<size_t>((alpha.height + kProfileRowsPerTask - 1) / kProfileRowsPerTask));
+  ParallelFor(0, alpha.height, kProfileRowsPerTask, [&](int64_t first, int64_t last) {
     AddRows(alpha, pixel, static_cast<int>(first), static_cast<int>(last),
-            parts[static_cast<size_t>(first / kRowsPerTask)]);
+            parts[static_cast<size_t>(first / kProfileRowsPerTask)]);
   });
   for (const Sums& part : parts) {
     for (size_t level = 0; level < widths_.size(); ++level) {

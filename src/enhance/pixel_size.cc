@@ -15,7 +15,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kRowsPerTask = 4096;
+constexpr int64_t kGaussiansPerTask = 4096;
 
 // A camera as single-precision rows, with what the projection needs precomputed: scenes have millions of Gaussians and
 // thousands of views.
@@ -59,7 +59,7 @@ Result<CameraPixelSizes> PixelSizesFromCameras(const GaussianCloud& cloud, const
   CameraPixelSizes out;
   out.sizes.resize(static_cast<size_t>(cloud.size()));
   std::atomic<int64_t> unseen = 0;
-  ParallelFor(0, cloud.size(), kRowsPerTask, [&](int64_t first, int64_t last) {
+  ParallelFor(0, cloud.size(), kGaussiansPerTask, [&](int64_t first, int64_t last) {
     int64_t missed = 0;
     Buffer<float> seen;
     for (int64_t i = first; i < last; ++i) {

@@ -18,7 +18,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr double kFieldOfView = std::numbers::pi / 4;
+constexpr double kPoseFieldOfView = std::numbers::pi / 4;
 constexpr int kSmallestSide = 32;    // pixels: less says nothing, and SSIM's window needs 11
 constexpr float kOpaque = 0.1f;      // a Gaussian that hides something
 constexpr double kRoom = 0.05;       // of the distance to the object: nothing opaque may be nearer to a camera
@@ -105,13 +105,13 @@ Result<std::vector<Camera>> PosesAround(const GaussianCloud& cloud, double pixel
     return Error{ErrorCode::kBadArgument, Cat("pixel size ", pixel_size, " is not a positive length")};
   }
   const Framing framing = FrameCloud(cloud);
-  const double distance = FramingDistance(framing, PinholeFromFov(100, 100, kFieldOfView));
-  const double side = 2 * std::tan(kFieldOfView / 2) * distance / pixel_size;
+  const double distance = FramingDistance(framing, PinholeFromFov(100, 100, kPoseFieldOfView));
+  const double side = 2 * std::tan(kPoseFieldOfView / 2) * distance / pixel_size;
   if (side > kMaxImageSide) {
     return Error{ErrorCode::kBadArgument, Cat("with pixels of ", pixel_size, " a picture of this splat would have ",
                                               side, " of them per side: is that the size of a training pixel?")};
   }
-  Pinhole intrinsics = PinholeFromFov(100, 100, kFieldOfView);
+  Pinhole intrinsics = PinholeFromFov(100, 100, kPoseFieldOfView);
   intrinsics.width = intrinsics.height = std::max(kSmallestSide, static_cast<int>(std::lround(side)));
   intrinsics.fx = intrinsics.fy = distance / pixel_size;
   intrinsics.cx = intrinsics.cy = 0.5 * intrinsics.width;

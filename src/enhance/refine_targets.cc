@@ -10,7 +10,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int kRowsPerTask = 32;
+constexpr int kTargetRowsPerTask = 32;
 constexpr float kNothing = 1.0f / 255;  // alpha that 8 bits do not show
 
 void Crop(const Image& from, const PixelBox& window, Image& to) {
@@ -43,7 +43,7 @@ Buffer<uint8_t> FaintPixels(const Image& alpha) {
   Buffer<uint8_t> faint(static_cast<size_t>(alpha.plane()));
   // Rows first: is there something solid within reach along the row?
   Buffer<uint8_t> solid(faint.size());
-  ParallelFor(0, height, kRowsPerTask, [&](int64_t first, int64_t last) {
+  ParallelFor(0, height, kTargetRowsPerTask, [&](int64_t first, int64_t last) {
     for (int64_t y = first; y < last; ++y) {
       const float* row = alpha.pixels.data() + y * width;
       for (int x = 0; x < width; ++x) {
@@ -52,7 +52,7 @@ Buffer<uint8_t> FaintPixels(const Image& alpha) {
       }
     }
   });
-  ParallelFor(0, height, kRowsPerTask, [&](int64_t first, int64_t last) {
+  ParallelFor(0, height, kTargetRowsPerTask, [&](int64_t first, int64_t last) {
     for (int64_t y = first; y < last; ++y) {
       const int64_t from = std::max<int64_t>(0, y - kFaintReach), to = std::min<int64_t>(height, y + kFaintReach + 1);
       for (int x = 0; x < width; ++x) {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "core/stopwatch.h"
 #include "fit/random_streams.h"
-#include "fit/stopwatch.h"
 #include "fit/view_exposure.h"
 #include "metrics/image_metrics.h"
 

@@ -11,7 +11,7 @@
 namespace anchorsplat {
 
 namespace {
-constexpr int64_t kRowsPerTask = 4096;
+constexpr int64_t kSplitRowsPerTask = 4096;
 constexpr int64_t kMostRows = int64_t{1} << 31;
 constexpr int kDoublings = 64, kHalvings = 40;
 }  // namespace
@@ -43,8 +43,8 @@ Result<GaussianCloud> SplitGaussians(const GaussianCloud& cloud, const SplitOpti
   out.Resize(first_row.back(), cloud.sh_degree);
   out.render_mode = cloud.render_mode;
   out.comments = cloud.comments;
-  ParallelFor(0, n, kRowsPerTask, [&](int64_t first, int64_t last) {
-    Random random = RandomStream(options.seed, RandomPurpose::kCopies, first / kRowsPerTask);
+  ParallelFor(0, n, kSplitRowsPerTask, [&](int64_t first, int64_t last) {
+    Random random = RandomStream(options.seed, RandomPurpose::kCopies, first / kSplitRowsPerTask);
     for (int64_t i = first; i < last; ++i) {
       const float* q = cloud.quats.data() + 4 * i;
       const float* s = cloud.log_scales.data() + 3 * i;

@@ -28,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-double Since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
+double SecondsSince(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 // A splat whose fit did not absorb the dilation has nothing to get back.
 double DefaultStrength(const BenchmarkObject& object) {
@@ -49,7 +49,7 @@ EvalMethod Filter(const std::string& name, std::optional<double> strength) {
             const double f = strength.value_or(DefaultStrength(task.object));
             const auto grown = ApplyFilter(cloud, sizes.sizes, {.upscale = task.object.upscale(), .strength = f});
             if (!grown.ok()) return grown.error();
-            const double seconds = Since(begin);
+            const double seconds = SecondsSince(begin);
             MethodViews views = SplatViews(task.object, std::move(cloud));
             views.seconds = seconds;
             views.facts = {{"f", f}, {"pixel_size", static_cast<double>(sizes.median)}};
@@ -66,7 +66,7 @@ EvalMethod FilterAuto() {
             const auto grown = ApplyFilter(
                 cloud, {&size, 1}, {.upscale = task.object.upscale(), .strength = DefaultStrength(task.object)});
             if (!grown.ok()) return grown.error();
-            const double seconds = Since(begin);
+            const double seconds = SecondsSince(begin);
             ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraPixelSizes truth, TruePixelSizes(task.object));
             MethodViews views = SplatViews(task.object, std::move(cloud));
             views.seconds = seconds;
@@ -145,7 +145,7 @@ Result<EvalMethod> Model(const fs::path& file) {
                                                              std::get<CompactNetwork>(**network), 0, report));
                         facts = std::move(report.facts);
                       }
-                      const double seconds = Since(begin);
+                      const double seconds = SecondsSince(begin);
                       MethodViews views = SplatViews(task.object, std::move(cloud));
                       views.seconds = seconds;
                       views.facts = std::move(facts);

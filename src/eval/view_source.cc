@@ -16,9 +16,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class SplatViews : public ViewSource {
+class SplatViewSource : public ViewSource {
  public:
-  SplatViews(GaussianCloud cloud, CameraSet cameras, const RenderOptions& options)
+  SplatViewSource(GaussianCloud cloud, CameraSet cameras, const RenderOptions& options)
       : cloud_(std::move(cloud)), cameras_(std::move(cameras)), options_(options) {
     for (const Camera& camera : cameras_.cameras) names_.push_back(camera.name);
   }
@@ -87,7 +87,7 @@ Result<size_t> FindView(const std::vector<std::string>& names, const std::string
 }
 
 std::unique_ptr<ViewSource> MakeSplatViews(GaussianCloud cloud, CameraSet cameras, const RenderOptions& options) {
-  return std::make_unique<SplatViews>(std::move(cloud), std::move(cameras), options);
+  return std::make_unique<SplatViewSource>(std::move(cloud), std::move(cameras), options);
 }
 
 Result<std::unique_ptr<ViewSource>> OpenImageViews(const fs::path& path, const std::array<float, 3>& background) {

@@ -5,9 +5,9 @@
 
 #include "core/fingerprint.h"
 #include "core/log.h"
+#include "core/stopwatch.h"
 #include "core/text.h"
 #include "fit/picture_cache.h"
-#include "fit/stopwatch.h"
 
 namespace anchorsplat {
 

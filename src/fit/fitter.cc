@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "fit/stopwatch.h"
+#include "core/stopwatch.h"
 #include "metrics/image_metrics.h"
 
 namespace anchorsplat {

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool Exists(const fs::path& path) {
+bool PathExists(const fs::path& path) {
   std::error_code ignored;
   return fs::exists(path, ignored);
 }
@@ -25,7 +25,7 @@ bool Exists(const fs::path& path) {
 // Whether a folder is a project by itself, not only a folder of them.
 bool HasCameras(const fs::path& folder) {
   for (const char* name : {"transforms.json", "transforms_train.json", "cameras.json"}) {
-    if (Exists(folder / name)) return true;
+    if (PathExists(folder / name)) return true;
   }
   return IsColmapModel(folder / "sparse" / "0") || IsColmapModel(folder / "sparse") || IsColmapModel(folder);
 }
@@ -124,13 +124,13 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
 
   TrainingViews out;
   const fs::path train_file = source / "transforms_train.json", test_file = source / "transforms_test.json";
-  if (Exists(train_file)) {
+  if (PathExists(train_file)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(train_file));
     out.background = set.background;
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views,
                                  WithPictures(std::move(set), train_file, out.without_picture));
     out.scene_scale = SceneScale(views);
-    if (Exists(test_file)) {
+    if (PathExists(test_file)) {
       out.train = std::move(views);
       ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet test, ReadCameras(test_file));
       ANCHORSPLAT_ASSIGN_OR_RETURN(out.held_out, WithPictures(std::move(test), test_file, out.without_picture));

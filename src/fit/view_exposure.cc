@@ -11,7 +11,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kGrain = 1 << 14;  // pixels per task
+constexpr int64_t kExposureGrain = 1 << 14;  // pixels per task
 constexpr double kRidge = 1e-4;      // per pixel: outweighed by a contrast of 1 %
 constexpr double kSigmaOfMedian = 1.4826;
 constexpr float kSigmas = 6;
@@ -34,17 +34,17 @@ Result<ViewExposure> EstimateExposure(const Image& rendered, const Image& target
   ViewExposure exposure;
   const int64_t plane = rendered.plane();
   if (plane == 0) return exposure;
-  std::vector<Sums> parts(static_cast<size_t>((plane + kGrain - 1) / kGrain));
+  std::vector<Sums> parts(static_cast<size_t>((plane + kExposureGrain - 1) / kExposureGrain));
   for (int c = 0; c < 3; ++c) {
     const float* r = rendered.channel(c);
     const float* t = target.channel(c);
-    ParallelFor(0, plane, kGrain, [&](int64_t first, int64_t last) {
+    ParallelFor(0, plane, kExposureGrain, [&](int64_t first, int64_t last) {
       Sums sums;
       for (int64_t i = first; i < last; ++i) {
         const double x = r[i], y = t[i];
         sums.x += x, sums.y += y, sums.xx += x * x, sums.xy += x * y;
       }
-      parts[static_cast<size_t>(first / kGrain)] = sums;
+      parts[static_cast<size_t>(first / kExposureGrain)] = sums;
     });
     Sums all;
     for (const Sums& part : parts) all.x += part.x, all.y += part.y, all.xx += part.xx, all.xy += part.xy;
@@ -66,7 +66,7 @@ void RemoveExposure(const ViewExposure& exposure, Image& target) {
     const auto scale = static_cast<float>(1 / exposure.gain[k]);
     const auto shift = static_cast<float>(-exposure.bias[k] / exposure.gain[k]);
     float* t = target.channel(c);
-    ParallelFor(0, target.plane(), kGrain, [&](int64_t first, int64_t last) {
+    ParallelFor(0, target.plane(), kExposureGrain, [&](int64_t first, int64_t last) {
       for (int64_t i = first; i < last; ++i) t[i] = scale * t[i] + shift;
     });
   }

@@ -1,6 +1,6 @@
 #include "fit/view_objective.h"
 
-#include "fit/stopwatch.h"
+#include "core/stopwatch.h"
 
 namespace anchorsplat {
 

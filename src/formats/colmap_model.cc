@@ -28,9 +28,9 @@ constexpr ColmapCameraModel kModels[] = {
     {11, "RAD_TAN_THIN_PRISM_FISHEYE", 2, 16, true},
 };
 
-Error Bad(std::string sentence) { return Error{ErrorCode::kBadFile, std::move(sentence)}; }
+Error BadModel(std::string sentence) { return Error{ErrorCode::kBadFile, std::move(sentence)}; }
 
-bool Exists(const std::filesystem::path& path) {
+bool FileExists(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::exists(path, ignored);
 }
@@ -51,14 +51,14 @@ const ColmapCameraModel* FindColmapCameraModel(const std::string& name) {
 Result<Pinhole> PinholeFromColmap(const ColmapCameraModel& model, uint64_t width, uint64_t height,
                                   std::span<const double> params) {
   const std::string undistort = "; undistort the images first, e.g. colmap image_undistorter";
-  if (model.fisheye) return Bad(Cat("camera model ", model.name, " is not a pinhole camera", undistort));
+  if (model.fisheye) return BadModel(Cat("camera model ", model.name, " is not a pinhole camera", undistort));
   for (const double distortion : params.subspan(model.focals + 2)) {
     if (distortion != 0) {
-      return Bad(Cat("lens distortion ", distortion, " of camera model ", model.name, " is not supported", undistort));
+      return BadModel(Cat("lens distortion ", distortion, " of camera model ", model.name, " is not supported", undistort));
     }
   }
   if (width > kMaxImageSide || height > kMaxImageSide) {
-    return Bad(Cat("size ", width, " x ", height, ", more than ", kMaxImageSide, " pixels on a side"));
+    return BadModel(Cat("size ", width, " x ", height, ", more than ", kMaxImageSide, " pixels on a side"));
   }
   const Pinhole c{static_cast<int>(width),  static_cast<int>(height), params[0],
                   params[model.focals - 1], params[model.focals],     params[model.focals + 1]};
@@ -69,17 +69,17 @@ Result<Pinhole> PinholeFromColmap(const ColmapCameraModel& model, uint64_t width
 Result<Camera> CameraFromColmap(const ColmapImage& image, const ColmapCameras& cameras,
                                 std::span<const std::filesystem::path> picture_folders) {
   const std::string who = Cat("image \"", Printable(image.name), "\": ");
-  if (ViewName(image.name).empty()) return Bad("image without a name");
+  if (ViewName(image.name).empty()) return BadModel("image without a name");
   const auto intrinsics = cameras.find(image.camera);
-  if (intrinsics == cameras.end()) return Bad(Cat(who, "camera ", image.camera, " is not in the list of cameras"));
+  if (intrinsics == cameras.end()) return BadModel(Cat(who, "camera ", image.camera, " is not in the list of cameras"));
   auto pose = PoseFromUnitQuaternion(image.quaternion, image.translation);
-  if (!pose.ok()) return Bad(who + pose.error().message);
+  if (!pose.ok()) return BadModel(who + pose.error().message);
   return Camera{ViewName(image.name), FindPicture(picture_folders, image.name), intrinsics->second, *std::move(pose)};
 }
 
 bool IsColmapModel(const std::filesystem::path& folder) {
-  return (Exists(folder / "cameras.bin") && Exists(folder / "images.bin")) ||
-         (Exists(folder / "cameras.txt") && Exists(folder / "images.txt"));
+  return (FileExists(folder / "cameras.bin") && FileExists(folder / "images.bin")) ||
+         (FileExists(folder / "cameras.txt") && FileExists(folder / "images.txt"));
 }
 
 Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder) {
@@ -89,7 +89,7 @@ Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder) {
     auto pictures = (folder / images).lexically_normal();
     if (std::filesystem::is_directory(pictures, ignored)) picture_folders.push_back(std::move(pictures));
   }
-  const bool binary = Exists(folder / "cameras.bin") && Exists(folder / "images.bin");
+  const bool binary = FileExists(folder / "cameras.bin") && FileExists(folder / "images.bin");
   CameraSet set;
   set.source = CameraSource::kColmap;
   if (binary) {
@@ -99,13 +99,13 @@ Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto cameras, ReadColmapCamerasText(folder / "cameras.txt"));
     ANCHORSPLAT_ASSIGN_OR_RETURN(set.cameras, ReadColmapImagesText(folder / "images.txt", cameras, picture_folders));
   }
-  if (set.cameras.empty()) return Bad(Cat(folder.string(), ": the COLMAP model has no images"));
+  if (set.cameras.empty()) return BadModel(Cat(folder.string(), ": the COLMAP model has no images"));
   return set;
 }
 
 Result<std::vector<ColmapPoint>> ReadColmapPoints(const std::filesystem::path& folder) {
-  if (Exists(folder / "points3D.bin")) return ReadColmapPointsBinary(folder / "points3D.bin");
-  if (Exists(folder / "points3D.txt")) return ReadColmapPointsText(folder / "points3D.txt");
+  if (FileExists(folder / "points3D.bin")) return ReadColmapPointsBinary(folder / "points3D.bin");
+  if (FileExists(folder / "points3D.txt")) return ReadColmapPointsText(folder / "points3D.txt");
   return Error{ErrorCode::kNotFound, Cat(folder.string(), ": neither points3D.bin nor points3D.txt is here")};
 }
 

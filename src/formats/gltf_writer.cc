@@ -26,10 +26,10 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "numbers are written as they lie in memory");
 
 constexpr const char* kPosition = "POSITION";
-constexpr int kFloat = 5126, kUnsignedShort = 5123, kArrayBuffer = 34962;
+constexpr int kFloatComponent = 5126, kUnsignedShortComponent = 5123, kArrayBuffer = 34962;
 
 // One accessor and how its values come about.
-struct Attribute {
+struct WrittenAttribute {
   std::string name;
   const char* type;
   int component_type;
@@ -44,15 +44,15 @@ float LinearFromSrgb(float x) {
 
 void PutFloats(const float* values, size_t count, uint8_t* bytes) { std::memcpy(bytes, values, count * sizeof(float)); }
 
-std::vector<Attribute> Attributes(const GaussianCloud& cloud, const AxisFlip& flip) {
-  std::vector<Attribute> out;
-  out.push_back({kPosition, "VEC3", kFloat, 12, [&](int64_t row, uint8_t* bytes) {
+std::vector<WrittenAttribute> Attributes(const GaussianCloud& cloud, const AxisFlip& flip) {
+  std::vector<WrittenAttribute> out;
+  out.push_back({kPosition, "VEC3", kFloatComponent, 12, [&](int64_t row, uint8_t* bytes) {
                    float mean[3];
                    for (size_t k = 0; k < 3; ++k)
                      mean[k] = flip.mean[k] * cloud.means[static_cast<size_t>(3 * row) + k];
                    PutFloats(mean, 3, bytes);
                  }});
-  out.push_back({"COLOR_0", "VEC4", kUnsignedShort, 8, [&](int64_t row, uint8_t* bytes) {
+  out.push_back({"COLOR_0", "VEC4", kUnsignedShortComponent, 8, [&](int64_t row, uint8_t* bytes) {
                    const float* dc = cloud.sh.data() + row * cloud.sh_stride();
                    uint16_t color[4];
                    for (size_t k = 0; k < 3; ++k) {
@@ -62,7 +62,7 @@ std::vector<Attribute> Attributes(const GaussianCloud& cloud, const AxisFlip& fl
                    color[3] = static_cast<uint16_t>(QuantizeUnit(opacity, 65535));
                    std::memcpy(bytes, color, sizeof color);
                  }});
-  out.push_back({"KHR_gaussian_splatting:ROTATION", "VEC4", kFloat, 16, [&](int64_t row, uint8_t* bytes) {
+  out.push_back({"KHR_gaussian_splatting:ROTATION", "VEC4", kFloatComponent, 16, [&](int64_t row, uint8_t* bytes) {
                    const float* q = cloud.quats.data() + 4 * row;
                    const float norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
                    const bool has_direction = norm > 0 && std::isfinite(norm);
@@ -70,20 +70,20 @@ std::vector<Attribute> Attributes(const GaussianCloud& cloud, const AxisFlip& fl
                    for (size_t k = 0; has_direction && k < 3; ++k) xyzw[k] = flip.quat[k + 1] * q[k + 1] / norm;
                    PutFloats(xyzw, 4, bytes);
                  }});
-  out.push_back({"KHR_gaussian_splatting:SCALE", "VEC3", kFloat, 12, [&](int64_t row, uint8_t* bytes) {
+  out.push_back({"KHR_gaussian_splatting:SCALE", "VEC3", kFloatComponent, 12, [&](int64_t row, uint8_t* bytes) {
                    float scale[3];
                    for (size_t k = 0; k < 3; ++k)
                      scale[k] = std::exp(cloud.log_scales[static_cast<size_t>(3 * row) + k]);
                    PutFloats(scale, 3, bytes);
                  }});
-  out.push_back({"KHR_gaussian_splatting:OPACITY", "SCALAR", kFloat, 4, [&](int64_t row, uint8_t* bytes) {
+  out.push_back({"KHR_gaussian_splatting:OPACITY", "SCALAR", kFloatComponent, 4, [&](int64_t row, uint8_t* bytes) {
                    const float opacity = Sigmoid(cloud.opacity_logits[static_cast<size_t>(row)]);
                    PutFloats(&opacity, 1, bytes);
                  }});
   for (int degree = 0; degree <= cloud.sh_degree; ++degree) {
     for (int n = 0; n <= 2 * degree; ++n) {
       const auto coefficient = static_cast<size_t>(degree * degree + n);
-      out.push_back({Cat("KHR_gaussian_splatting:SH_DEGREE_", degree, "_COEF_", n), "VEC3", kFloat, 12,
+      out.push_back({Cat("KHR_gaussian_splatting:SH_DEGREE_", degree, "_COEF_", n), "VEC3", kFloatComponent, 12,
                      [&, coefficient](int64_t row, uint8_t* bytes) {
                        const float* sh = cloud.sh.data() + row * cloud.sh_stride() + 3 * coefficient;
                        const float sign = flip.sh[coefficient];
@@ -96,23 +96,23 @@ std::vector<Attribute> Attributes(const GaussianCloud& cloud, const AxisFlip& fl
 }
 
 // Of the attributes, each with its values one after the other.
-uint64_t BytesOf(const std::vector<Attribute>& attributes, int64_t count) {
+uint64_t BytesOf(const std::vector<WrittenAttribute>& attributes, int64_t count) {
   uint64_t size = 0;
-  for (const Attribute& attribute : attributes) size += attribute.record * static_cast<uint64_t>(count);
+  for (const WrittenAttribute& attribute : attributes) size += attribute.record * static_cast<uint64_t>(count);
   return size;
 }
 
-nlohmann::json JsonOf(int64_t count, const std::vector<Attribute>& attributes, const nlohmann::json& bounds) {
+nlohmann::json JsonOf(int64_t count, const std::vector<WrittenAttribute>& attributes, const nlohmann::json& bounds) {
   nlohmann::json views = nlohmann::json::array(), accessors = nlohmann::json::array(), names;
   uint64_t offset = 0;
-  for (const Attribute& attribute : attributes) {
+  for (const WrittenAttribute& attribute : attributes) {
     const uint64_t size = attribute.record * static_cast<uint64_t>(count);
     names[attribute.name] = accessors.size();
     nlohmann::json accessor = {{"bufferView", views.size()},
                                {"componentType", attribute.component_type},
                                {"count", count},
                                {"type", attribute.type}};
-    if (attribute.component_type == kUnsignedShort) accessor["normalized"] = true;
+    if (attribute.component_type == kUnsignedShortComponent) accessor["normalized"] = true;
     if (attribute.name == kPosition) accessor.update(bounds);
     views.push_back({{"buffer", 0}, {"byteOffset", offset}, {"byteLength", size}, {"target", kArrayBuffer}});
     accessors.push_back(std::move(accessor));
@@ -147,16 +147,16 @@ nlohmann::json BoundsOf(const GaussianCloud& cloud, const AxisFlip& flip) {
 }
 
 // Of the JSON chunk: the same for all clouds of that size and degree, however many digits their bounds have.
-size_t JsonSize(int64_t count, const std::vector<Attribute>& attributes) {
+size_t JsonSize(int64_t count, const std::vector<WrittenAttribute>& attributes) {
   constexpr size_t kRoomForBounds = 2 * sizeof "\"min\":[,,]," + 6 * sizeof "-1.2345678901234567e-300";
   return (JsonOf(count, attributes, nlohmann::json::object()).dump().size() + kRoomForBounds + 3) / 4 * 4;
 }
 
 // The values of all attributes, one attribute after the other, from byte `at` on.
 Status WriteValues(OutputFile& file, uint64_t at, const GaussianCloud& cloud, const WriteOptions& options,
-                   const std::vector<Attribute>& attributes) {
+                   const std::vector<WrittenAttribute>& attributes) {
   const Buffer<uint32_t> order = WriteOrder(cloud, options.order, SplatOrder::kKeep);
-  for (const Attribute& attribute : attributes) {
+  for (const WrittenAttribute& attribute : attributes) {
     ANCHORSPLAT_RETURN_IF_ERROR(
         WriteRecords(file, at, cloud.size(), attribute.record, [&](int64_t first, int64_t last, uint8_t* bytes) {
           for (int64_t i = first; i < last; ++i, bytes += attribute.record) {
@@ -192,14 +192,14 @@ uint64_t PredictedGlbSize(int64_t count, int sh_degree) {
   GaussianCloud none;
   none.sh_degree = sh_degree;
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
-  const std::vector<Attribute> attributes = Attributes(none, flip);
+  const std::vector<WrittenAttribute> attributes = Attributes(none, flip);
   return kHeads + JsonSize(count, attributes) + BytesOf(attributes, count);
 }
 
 Status WriteGlb(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
-  const std::vector<Attribute> attributes = Attributes(cloud, flip);
+  const std::vector<WrittenAttribute> attributes = Attributes(cloud, flip);
   std::string json = JsonOf(cloud.size(), attributes, BoundsOf(cloud, flip)).dump();
   json.resize(JsonSize(cloud.size(), attributes), ' ');
   const uint64_t binary = BytesOf(attributes, cloud.size());
@@ -224,7 +224,7 @@ uint64_t EstimatedGltfSize(int64_t count, int sh_degree) {
   GaussianCloud none;
   none.sh_degree = sh_degree;
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
-  const std::vector<Attribute> attributes = Attributes(none, flip);
+  const std::vector<WrittenAttribute> attributes = Attributes(none, flip);
   constexpr uint64_t kBoundsAndName = 250;
   return JsonOf(count, attributes, nlohmann::json::object()).dump(2).size() + kBoundsAndName +
          BytesOf(attributes, count);
@@ -234,7 +234,7 @@ Status WriteGltf(const std::filesystem::path& path, const GaussianCloud& cloud, 
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
   const std::filesystem::path beside = std::filesystem::path(path).replace_extension(".bin");
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
-  const std::vector<Attribute> attributes = Attributes(cloud, flip);
+  const std::vector<WrittenAttribute> attributes = Attributes(cloud, flip);
   nlohmann::json json = JsonOf(cloud.size(), attributes, BoundsOf(cloud, flip));
   json["buffers"][0]["uri"] = UriOf(beside.filename().string());
   std::vector<OutputFile> files;

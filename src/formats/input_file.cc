@@ -19,7 +19,7 @@ namespace {
 constexpr uint64_t kMaxPipe = uint64_t{4} << 30;  // a pipe that never ends must not take all memory
 constexpr size_t kBlock = size_t{256} << 10;      // half of a usual L2 cache
 
-std::string Reason(int error) { return std::generic_category().message(error); }
+std::string SystemReason(int error) { return std::generic_category().message(error); }
 
 Error EndsBefore(const std::string& name, uint64_t end) {
   return {ErrorCode::kBadFile,
@@ -34,7 +34,7 @@ Result<std::string> ReadPipe(int descriptor, const std::string& name) {
     const ssize_t n = ::read(descriptor, bytes.data() + had, kBlock);
     bytes.resize(had + static_cast<size_t>(std::max<ssize_t>(n, 0)));
     if (n == 0) return bytes;
-    if (n < 0 && errno != EINTR) return Error{ErrorCode::kIo, Cat(name, ": cannot read: ", Reason(errno))};
+    if (n < 0 && errno != EINTR) return Error{ErrorCode::kIo, Cat(name, ": cannot read: ", SystemReason(errno))};
     if (bytes.size() > kMaxPipe) {
       return Error{ErrorCode::kIo, Cat(name, ": a pipe with more than ", HumanBytes(kMaxPipe), "; save it to a file")};
     }
@@ -55,11 +55,11 @@ Result<InputFile> InputFile::Open(const std::filesystem::path& path) {
   if (file.descriptor_ < 0) {
     const int error = errno;
     if (error == ENOENT || error == ENOTDIR) return Error{ErrorCode::kNotFound, Cat(name, ": no such file")};
-    return Error{ErrorCode::kIo, Cat(name, ": cannot open: ", Reason(error))};
+    return Error{ErrorCode::kIo, Cat(name, ": cannot open: ", SystemReason(error))};
   }
   struct stat info {};
   if (::fstat(file.descriptor_, &info) != 0) {
-    return Error{ErrorCode::kIo, Cat(name, ": cannot read: ", Reason(errno))};
+    return Error{ErrorCode::kIo, Cat(name, ": cannot read: ", SystemReason(errno))};
   }
   if (S_ISDIR(info.st_mode)) return Error{ErrorCode::kIo, Cat(name, ": is a folder, expected a file")};
   if (S_ISFIFO(info.st_mode) || S_ISSOCK(info.st_mode)) {
@@ -107,7 +107,7 @@ Status InputFile::ReadAt(uint64_t offset, void* out, size_t size) const {
   while (size > 0) {
     const ssize_t n = ::pread(descriptor_, to, size, static_cast<off_t>(offset));
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) return Error{ErrorCode::kIo, Cat(name(), ": cannot read: ", Reason(errno))};
+    if (n < 0) return Error{ErrorCode::kIo, Cat(name(), ": cannot read: ", SystemReason(errno))};
     if (n == 0) return EndsBefore(name(), offset);
     to += n;
     offset += static_cast<uint64_t>(n);

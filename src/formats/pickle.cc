@@ -15,7 +15,7 @@ namespace {
 
 // Bounds on what hostile bytes may make us hold. A checkpoint of 541 tensors has a pickle of 0.1 MB and 10,000 values.
 constexpr size_t kMaxPickleBytes = size_t{32} << 20;
-constexpr size_t kMaxValues = size_t{1} << 20;  // also of stack entries and marks
+constexpr size_t kMaxPickleValues = size_t{1} << 20;  // also of stack entries and marks
 constexpr size_t kMaxTensors = size_t{1} << 17;
 constexpr size_t kMaxArguments = 8;
 
@@ -32,8 +32,8 @@ class PickleMachine {
       const auto opcode = static_cast<uint8_t>(bytes_[at_++]);
       stopped = opcode == '.';
       if (!stopped) ANCHORSPLAT_RETURN_IF_ERROR(Step(opcode));
-      if (std::max({document_.values.size(), stack_.size(), marks_.size()}) > kMaxValues) {
-        return Bad(Cat("the pickle makes more than ", kMaxValues, " values"));
+      if (std::max({document_.values.size(), stack_.size(), marks_.size()}) > kMaxPickleValues) {
+        return Bad(Cat("the pickle makes more than ", kMaxPickleValues, " values"));
       }
     }
     if (Available() != 1 || !marks_.empty()) return Bad("the pickle stops with something other than one value");
@@ -283,7 +283,7 @@ class PickleMachine {
       if (arguments.size() > 1 || pairs.kind != PickleKind::kList) return Bad("an OrderedDict of something else");
       // Python writes such a list where it is used, once; one that is used again and again would grow without bound.
       copied_pairs_ += pairs.items.size();
-      if (copied_pairs_ > kMaxValues) return Bad(Cat("OrderedDicts of more than ", kMaxValues, " pairs"));
+      if (copied_pairs_ > kMaxPickleValues) return Bad(Cat("OrderedDicts of more than ", kMaxPickleValues, " pairs"));
       for (const int32_t index : pairs.items) {
         const PickleValue& pair = Value(index);
         if ((pair.kind != PickleKind::kList && pair.kind != PickleKind::kTuple) || pair.items.size() != 2) {

@@ -47,7 +47,7 @@ std::string_view Trimmed(std::string_view text) {
 }
 
 // Cuts the first word off `line`.
-std::string_view TakeWord(std::string_view& line) {
+std::string_view TakeHeaderWord(std::string_view& line) {
   line = Trimmed(line);
   const size_t end = std::min(line.find_first_of(" \t"), line.size());
   const std::string_view word = line.substr(0, end);
@@ -92,7 +92,7 @@ class HeaderParser {
 Status HeaderParser::Line(std::string_view line) {
   ++header_.lines;
   std::string_view rest = line;
-  const std::string_view keyword = TakeWord(rest);
+  const std::string_view keyword = TakeHeaderWord(rest);
   if (header_.lines == 1) {
     if (keyword != "ply" || !rest.empty()) return Unexpected("\"ply\" (this is no PLY file)", line);
     return {};
@@ -116,7 +116,7 @@ Status HeaderParser::Line(std::string_view line) {
 Status HeaderParser::Format(std::string_view rest) {
   if (has_format_) return Bad("a second \"format\" line");
   const std::string_view whole = rest;
-  const std::string_view encoding = TakeWord(rest);
+  const std::string_view encoding = TakeHeaderWord(rest);
   if (encoding == "ascii") {
     header_.encoding = PlyEncoding::kAscii;
   } else if (encoding == "binary_little_endian") {
@@ -134,7 +134,7 @@ Status HeaderParser::Format(std::string_view rest) {
 Status HeaderParser::Element(std::string_view rest) {
   PlyElement element;
   element.line = header_.lines;
-  element.name = TakeWord(rest);
+  element.name = TakeHeaderWord(rest);
   if (element.name.empty()) return Bad("an element without a name");
   if (header_.Find(element.name) != nullptr) {
     return Bad(Cat("a second element \"", Printable(element.name), "\""));
@@ -153,19 +153,19 @@ Status HeaderParser::Property(std::string_view rest) {
   PlyElement& element = header_.elements.back();
   PlyProperty property;
   property.line = header_.lines;
-  std::string_view type = TakeWord(rest);
+  std::string_view type = TakeHeaderWord(rest);
   if (type == "list") {
-    const std::string_view count = TakeWord(rest);
+    const std::string_view count = TakeHeaderWord(rest);
     property.list_count = TypeFromName(count);
     if (!property.list_count || *property.list_count == PlyType::kFloat || *property.list_count == PlyType::kDouble) {
       return Unexpected("an integer type for the count of a list", count);
     }
-    type = TakeWord(rest);
+    type = TakeHeaderWord(rest);
   }
   const auto known = TypeFromName(type);
   if (!known) return Unexpected("a type (char uchar short ushort int uint float double)", type);
   property.type = *known;
-  property.name = TakeWord(rest);
+  property.name = TakeHeaderWord(rest);
   if (property.name.empty()) return Bad("a property without a name");
   if (!rest.empty()) return Unexpected("the end of the line", rest);
   if (!names_.insert(property.name).second) {
@@ -258,7 +258,7 @@ std::optional<RenderMode> RenderModeFromComment(std::string_view comment) {
     rest = Trimmed(rest.substr(kBrush.size()));
     if (rest == "mip") return RenderMode::kAntialiased;
     if (rest == "default") return RenderMode::kClassic;
-  } else if (TakeWord(rest) == "antialiased") {
+  } else if (TakeHeaderWord(rest) == "antialiased") {
     if (rest == "1") return RenderMode::kAntialiased;
     if (rest == "0") return RenderMode::kClassic;
   }

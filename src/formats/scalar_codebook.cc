@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kBins = 8192;
 constexpr int kEntries = 256;
-constexpr int64_t kGrain = 1 << 16;
+constexpr int64_t kCodebookGrain = 1 << 16;
 
 struct Extremes {
   double min = std::numeric_limits<double>::infinity();
@@ -69,9 +69,9 @@ void SolveLayer(const Runs& runs, const std::vector<double>& before, int low, in
 
 template <typename Part, typename Add>
 std::vector<Part> Collect(int64_t rows, Add&& add) {
-  std::vector<Part> parts(static_cast<size_t>((rows + kGrain - 1) / kGrain));
-  ParallelFor(0, rows, kGrain, [&](int64_t first, int64_t last) {
-    for (int64_t i = first; i < last; ++i) add(parts[static_cast<size_t>(first / kGrain)], i);
+  std::vector<Part> parts(static_cast<size_t>((rows + kCodebookGrain - 1) / kCodebookGrain));
+  ParallelFor(0, rows, kCodebookGrain, [&](int64_t first, int64_t last) {
+    for (int64_t i = first; i < last; ++i) add(parts[static_cast<size_t>(first / kCodebookGrain)], i);
   });
   return parts;
 }

@@ -15,7 +15,7 @@ namespace anchorsplat {
 namespace {
 
 constexpr int64_t kMaxWidth = 48;
-constexpr int64_t kGrain = 1 << 13;
+constexpr int64_t kPaletteGrain = 1 << 13;
 constexpr int64_t kBranches = 64;          // that are worked on independently, about
 constexpr int64_t kSmallBranch = 1 << 14;  // not worth a branch of its own below
 constexpr int32_t kSteps = 2047;
@@ -44,10 +44,10 @@ struct Vectors {
 };
 
 float SpreadOf(const GaussianCloud& cloud) {
-  const int64_t parts = (cloud.size() + kGrain - 1) / kGrain;
+  const int64_t parts = (cloud.size() + kPaletteGrain - 1) / kPaletteGrain;
   std::vector<std::array<double, 2>> sums(static_cast<size_t>(parts));  // squares, largest
-  ParallelFor(0, cloud.size(), kGrain, [&](int64_t first, int64_t last) {
-    std::array<double, 2>& sum = sums[static_cast<size_t>(first / kGrain)];
+  ParallelFor(0, cloud.size(), kPaletteGrain, [&](int64_t first, int64_t last) {
+    std::array<double, 2>& sum = sums[static_cast<size_t>(first / kPaletteGrain)];
     for (int64_t i = first; i < last; ++i) {
       const float* sh = cloud.sh.data() + i * cloud.sh_stride();
       for (int64_t k = 3; k < cloud.sh_stride(); ++k) {

@@ -26,7 +26,7 @@ namespace {
 constexpr uint64_t kMaxArchive = uint64_t{8} << 30;
 constexpr uint64_t kMaxMeta = uint64_t{4} << 20;
 constexpr uint64_t kMaxPicture = uint64_t{1} << 30;
-constexpr int64_t kGrain = 1 << 14;
+constexpr int64_t kSogReadGrain = 1 << 14;
 constexpr int64_t kEntriesPerRow = 64;  // of the palette
 
 // Beside meta.json there is nothing to look for in other folders.
@@ -165,7 +165,7 @@ struct Sog {
   }
   template <typename Body>
   void ForAll(Body&& body) const {
-    ParallelFor(0, count, kGrain, [&](int64_t first, int64_t last) {
+    ParallelFor(0, count, kSogReadGrain, [&](int64_t first, int64_t last) {
       for (int64_t i = first; i < last; ++i) body(i);
     });
   }
@@ -294,13 +294,13 @@ Status ReadHarmonics(Sog& sog, const JsonValue& part, const Palette& palette, Ga
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ByteImage labels, sog.Picture(part, 1, 2));
   const int64_t coefficients = cloud.coefficients() - 1;
-  std::vector<char> bad(static_cast<size_t>((sog.count + kGrain - 1) / kGrain), 0);
-  ParallelFor(0, sog.count, kGrain, [&](int64_t first, int64_t last) {
+  std::vector<char> bad(static_cast<size_t>((sog.count + kSogReadGrain - 1) / kSogReadGrain), 0);
+  ParallelFor(0, sog.count, kSogReadGrain, [&](int64_t first, int64_t last) {
     for (int64_t i = first; i < last; ++i) {
       const uint8_t* pixel = labels.rgba.data() + 4 * i;
       const int64_t label = pixel[0] + 256 * pixel[1];
       if (label >= palette.entries) {
-        bad[static_cast<size_t>(first / kGrain)] = 1;
+        bad[static_cast<size_t>(first / kSogReadGrain)] = 1;
         return;
       }
       const int64_t row = label / kEntriesPerRow, column = label % kEntriesPerRow * coefficients;

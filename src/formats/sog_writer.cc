@@ -28,11 +28,11 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kGrain = 1 << 14;
-constexpr int64_t kEntriesPerRow = 64;
+constexpr int64_t kSogWriteGrain = 1 << 14;
+constexpr int64_t kSogEntriesPerRow = 64;
 constexpr int64_t kMaxSide = 16383;  // of a WebP picture
 constexpr int kPaletteRounds = 8;    // further ones gain less than half a percent of the error
-constexpr float kMaxLogScale = 20;
+constexpr float kMaxSogLogScale = 20;
 // The encoder works with some 50 bytes a pixel. Pictures larger than this are compressed and written one after the
 // other, so that a conversion stays within 1.3 × the cloud.
 constexpr int64_t kLargePicture = 1 << 20;
@@ -55,7 +55,7 @@ struct Pictures {
   ByteImage Draw(Pixel&& pixel) const {
     ByteImage image{width, height, {}};
     image.rgba.resize(static_cast<size_t>(4 * image.pixels()));
-    ParallelFor(0, image.pixels(), kGrain, [&](int64_t first, int64_t last) {
+    ParallelFor(0, image.pixels(), kSogWriteGrain, [&](int64_t first, int64_t last) {
       for (int64_t i = first; i < last; ++i) {
         uint8_t* rgba = image.rgba.data() + 4 * i;
         rgba[0] = rgba[1] = rgba[2] = 0;
@@ -118,12 +118,12 @@ nlohmann::json DrawQuats(const Pictures& pictures, std::vector<Picture>& out) {
   return {{"files", {"quats.webp"}}};
 }
 
-float BoundedLogScale(float x) { return std::clamp(x, -kMaxLogScale, kMaxLogScale); }  // NaN stays
+float BoundedLogScale(float x) { return std::clamp(x, -kMaxSogLogScale, kMaxSogLogScale); }  // NaN stays
 
 nlohmann::json DrawScales(const Pictures& pictures, std::vector<Picture>& out) {
   const GaussianCloud& cloud = pictures.cloud;
   Buffer<float> scales(cloud.log_scales.size());
-  ParallelFor(0, static_cast<int64_t>(scales.size()), kGrain, [&](int64_t first, int64_t last) {
+  ParallelFor(0, static_cast<int64_t>(scales.size()), kSogWriteGrain, [&](int64_t first, int64_t last) {
     for (auto i = static_cast<size_t>(first); i < static_cast<size_t>(last); ++i) {
       scales[i] = BoundedLogScale(cloud.log_scales[i]);
     }
@@ -169,8 +169,8 @@ nlohmann::json DrawHarmonics(const Pictures& pictures, std::vector<Picture>& out
                                {"files", {"shN_centroids.webp", "shN_labels.webp"}}};
   const auto shared = std::make_shared<const ShPalette>(std::move(palette));
   out.push_back({"shN_centroids.webp", [shared, codebook, coefficients] {
-                   ByteImage image{static_cast<int>(kEntriesPerRow * coefficients),
-                                   static_cast<int>((shared->entries + kEntriesPerRow - 1) / kEntriesPerRow),
+                   ByteImage image{static_cast<int>(kSogEntriesPerRow * coefficients),
+                                   static_cast<int>((shared->entries + kSogEntriesPerRow - 1) / kSogEntriesPerRow),
                                    {}};
                    image.rgba.assign(static_cast<size_t>(4 * image.pixels()), 255);
                    // The pixels of an entry follow each other, and rows hold 64 entries: one run of pixels.

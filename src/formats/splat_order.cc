@@ -11,7 +11,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kGrain = 1 << 16;
+constexpr int64_t kOrderGrain = 1 << 16;
 
 template <typename Key>
 struct Keyed {
@@ -24,12 +24,12 @@ struct Keyed {
 template <typename Key, typename KeyOf>
 Buffer<uint32_t> OrderBy(int64_t count, KeyOf&& key_of) {
   Buffer<Keyed<Key>> keyed(static_cast<size_t>(count));
-  ParallelFor(0, count, kGrain, [&](int64_t first, int64_t last) {
+  ParallelFor(0, count, kOrderGrain, [&](int64_t first, int64_t last) {
     for (int64_t i = first; i < last; ++i) keyed[static_cast<size_t>(i)] = {key_of(i), static_cast<uint32_t>(i)};
   });
   tbb::parallel_sort(keyed.begin(), keyed.end());
   Buffer<uint32_t> rows(keyed.size());
-  ParallelFor(0, count, kGrain, [&](int64_t first, int64_t last) {
+  ParallelFor(0, count, kOrderGrain, [&](int64_t first, int64_t last) {
     for (int64_t i = first; i < last; ++i) rows[static_cast<size_t>(i)] = keyed[static_cast<size_t>(i)].row;
   });
   return rows;

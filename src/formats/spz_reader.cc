@@ -20,11 +20,11 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "headers are copied as they lie in the file");
 
-struct Header {
+struct SpzHeader {
   uint32_t magic, version, count;
   uint8_t sh_degree, fractional_bits, flags, streams;
 };
-static_assert(sizeof(Header) == 16);
+static_assert(sizeof(SpzHeader) == 16);
 
 // Version 4: follows the header; streams begin after the table.
 struct TablePlace {
@@ -35,15 +35,15 @@ struct StreamSize {
   uint64_t compressed, raw;
 };
 
-constexpr int64_t kBlock = 1 << 15;  // Gaussians that are unpacked while they are in the cache
-constexpr int64_t kGrain = 1 << 12;
+constexpr int64_t kSpzBlock = 1 << 15;  // Gaussians that are unpacked while they are in the cache
+constexpr int64_t kSpzGrain = 1 << 12;
 
 std::string At(const InputFile& file, uint64_t byte) {
   return Cat(file.name(), ": byte ", WithThousands(static_cast<int64_t>(byte)));
 }
 
 // The layout that the header speaks of, and a cloud that has room for it.
-Result<SpzLayout> CheckHeader(const InputFile& file, const Header& header, const ReadLimits& limits) {
+Result<SpzLayout> CheckHeader(const InputFile& file, const SpzHeader& header, const ReadLimits& limits) {
   const auto bad = [&file](uint64_t byte, const std::string& what) {
     return Error{ErrorCode::kBadFile, Cat(At(file, byte), " of the SPZ header: ", what)};
   };
@@ -61,7 +61,7 @@ Result<SpzLayout> CheckHeader(const InputFile& file, const Header& header, const
   return layout;
 }
 
-GaussianCloud MakeCloud(const InputFile& file, const Header& header) {
+GaussianCloud MakeCloud(const InputFile& file, const SpzHeader& header) {
   if (header.sh_degree > kMaxShDegree) LogWarning(Cat(file.name(), ": SH degree 4 is read as 3"));
   GaussianCloud cloud;
   cloud.Resize(header.count, std::min<int>(header.sh_degree, kMaxShDegree));
@@ -72,11 +72,11 @@ GaussianCloud MakeCloud(const InputFile& file, const Header& header) {
 Status ReadSection(const SpzLayout& layout, SpzSection section, InflatingReader& reader, GaussianCloud& cloud) {
   const size_t record = layout.record_size(section);
   const AxisFlip flip = FlipBetween(kRub, kRdf);
-  Buffer<uint8_t> bytes(static_cast<size_t>(std::min(kBlock, cloud.size())) * record);
-  for (int64_t begin = 0; begin < cloud.size(); begin += kBlock) {
-    const int64_t end = std::min(begin + kBlock, cloud.size());
+  Buffer<uint8_t> bytes(static_cast<size_t>(std::min(kSpzBlock, cloud.size())) * record);
+  for (int64_t begin = 0; begin < cloud.size(); begin += kSpzBlock) {
+    const int64_t end = std::min(begin + kSpzBlock, cloud.size());
     ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(bytes.data(), static_cast<size_t>(end - begin) * record));
-    ParallelFor(begin, end, kGrain, [&](int64_t first, int64_t last) {
+    ParallelFor(begin, end, kSpzGrain, [&](int64_t first, int64_t last) {
       UnpackSpz(layout, section, first, last, bytes.data() + static_cast<size_t>(first - begin) * record, flip, cloud);
     });
   }
@@ -85,7 +85,7 @@ Status ReadSection(const SpzLayout& layout, SpzSection section, InflatingReader&
 
 Result<GaussianCloud> ReadGzipped(const InputFile& file, const ReadLimits& limits) {
   const std::unique_ptr<InflatingReader> reader = OpenGzip(file, 0);
-  Header header;
+  SpzHeader header;
   ANCHORSPLAT_RETURN_IF_ERROR(reader->Read(&header, sizeof header));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzLayout layout, CheckHeader(file, header, limits));
   if (layout.version > 3) return Error{ErrorCode::kBadFile, Cat(At(file, 0), ": version 4 in a gzip stream")};
@@ -100,7 +100,7 @@ Result<GaussianCloud> ReadGzipped(const InputFile& file, const ReadLimits& limit
 }
 
 Result<GaussianCloud> ReadStreams(const InputFile& file, const ReadLimits& limits) {
-  Header header;
+  SpzHeader header;
   TablePlace place;
   ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(0, &header, sizeof header));
   ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(sizeof header, &place, sizeof place));
@@ -148,7 +148,7 @@ bool IsGzip(const std::string& head) { return head == "\x1f\x8b"; }
 
 Result<FormatFacts> DescribeSpz(const InputFile& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
-  Header header;
+  SpzHeader header;
   if (IsGzip(head)) {
     ANCHORSPLAT_RETURN_IF_ERROR(OpenGzip(file, 0)->Read(&header, sizeof header));
   } else {

@@ -151,11 +151,11 @@ Status WriteGzip(const Packer& packer, OutputFile& file) {
 
 // ---- version 4: a zstd frame per section
 
-struct StreamSize {
+struct PackedStreamSize {
   uint64_t compressed, raw;
 };
 
-Status WriteZstdStream(const Packer& packer, SpzSection section, OutputFile& file, StreamSize& size) {
+Status WriteZstdStream(const Packer& packer, SpzSection section, OutputFile& file, PackedStreamSize& size) {
   const std::unique_ptr<ZSTD_CCtx, size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(), ZSTD_freeCCtx);
   if (context == nullptr) throw std::bad_alloc();
   const size_t record = packer.layout.record_size(section);
@@ -192,18 +192,18 @@ Status WriteZstdStream(const Packer& packer, SpzSection section, OutputFile& fil
 }
 
 Status WriteStreams(const Packer& packer, OutputFile& file) {
-  std::array<StreamSize, 6> sizes{};
+  std::array<PackedStreamSize, 6> sizes{};
   const size_t streams = packer.layout.sh_degree > 0 ? 6 : 5;
   std::string header = HeaderOf(packer);
   header[15] = static_cast<char>(streams);
   header.append(16, '\0');
   header[16] = 32;  // where the table begins: there are no extensions
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(header));
-  ANCHORSPLAT_RETURN_IF_ERROR(file.Write(sizes.data(), streams * sizeof(StreamSize)));
+  ANCHORSPLAT_RETURN_IF_ERROR(file.Write(sizes.data(), streams * sizeof(PackedStreamSize)));
   for (size_t k = 0; k < streams; ++k) {
     ANCHORSPLAT_RETURN_IF_ERROR(WriteZstdStream(packer, kSpzSections[k], file, sizes[k]));
   }
-  return file.WriteAt(header.size(), sizes.data(), streams * sizeof(StreamSize));
+  return file.WriteAt(header.size(), sizes.data(), streams * sizeof(PackedStreamSize));
 }
 
 }  // namespace

@@ -66,7 +66,7 @@ float FromFloat16(uint16_t bits) {
   return std::bit_cast<float>(sign | ((rest << 13) + ((127u - 15u) << 23)));
 }
 
-constexpr int64_t kGrain = int64_t{1} << 18;
+constexpr int64_t kTensorGrain = int64_t{1} << 18;
 
 // Calls put(i, address) for the row-major indices i in [begin, end).
 template <typename Put>
@@ -111,7 +111,7 @@ Result<Buffer<T>> Allocate(const TensorEntry& entry, int64_t count) {
 // out[i] = convert(element i) for all elements.
 template <typename Stored, typename T, typename Convert>
 void ConvertAll(const TensorEntry& entry, Buffer<T>& out, Convert&& convert) {
-  ParallelFor(0, static_cast<int64_t>(out.size()), kGrain, [&](int64_t begin, int64_t end) {
+  ParallelFor(0, static_cast<int64_t>(out.size()), kTensorGrain, [&](int64_t begin, int64_t end) {
     ForElements(entry, begin, end,
                 [&](int64_t i, const std::byte* at) { out[static_cast<size_t>(i)] = convert(LoadLittle<Stored>(at)); });
   });
@@ -119,7 +119,7 @@ void ConvertAll(const TensorEntry& entry, Buffer<T>& out, Convert&& convert) {
 
 template <size_t kItem>
 void GatherBytes(const TensorEntry& entry, Buffer<std::byte>& out) {
-  ParallelFor(0, entry.elements(), kGrain, [&](int64_t begin, int64_t end) {
+  ParallelFor(0, entry.elements(), kTensorGrain, [&](int64_t begin, int64_t end) {
     ForElements(entry, begin, end, [&](int64_t i, const std::byte* at) {
       std::memcpy(out.data() + static_cast<size_t>(i) * kItem, at, kItem);
     });

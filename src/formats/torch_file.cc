@@ -18,7 +18,7 @@ namespace {
 
 // Bounds against graphs that name few bytes very often. A training checkpoint with optimiser state has some thousands
 // of values, five levels deep.
-constexpr int kMaxDepth = 32;
+constexpr int kMaxNesting = 32;
 constexpr size_t kMaxVisits = size_t{1} << 18;
 constexpr size_t kMaxNameBytes = 1024;
 // A tensor with strides of 0 has more elements than its storage; this many are allowed when it does.
@@ -54,7 +54,7 @@ class ContentsBuilder {
 
   Status Visit(int32_t index, const std::string& path, int depth) {
     if (++visits_ > kMaxVisits) return Bad(Cat("holds more than ", kMaxVisits, " values"));
-    if (depth > kMaxDepth) return Bad(Cat("holds dictionaries or lists nested deeper than ", kMaxDepth));
+    if (depth > kMaxNesting) return Bad(Cat("holds dictionaries or lists nested deeper than ", kMaxNesting));
     if (path.size() > kMaxNameBytes) return Bad(Cat("holds a name longer than ", kMaxNameBytes, " bytes"));
     const PickleValue& value = Value(index);
     switch (value.kind) {

@@ -12,7 +12,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kGrain = 1 << 14;
+constexpr int64_t kLossGrain = 1 << 14;
 
 // Gaussians with a value that the format clamps.
 struct Clamped {
@@ -25,9 +25,9 @@ bool AnyBeyond(const float* values, int64_t count, float min, float max) {
 
 Clamped CountClamped(const FormatRange& range, const GaussianCloud& cloud, int sh_degree) {
   const int64_t harmonics = 3 * (ShCoefficients(sh_degree) - 1);
-  std::vector<Clamped> parts(static_cast<size_t>((cloud.size() + kGrain - 1) / kGrain));
-  ParallelFor(0, cloud.size(), kGrain, [&](int64_t first, int64_t last) {
-    Clamped& part = parts[static_cast<size_t>(first / kGrain)];
+  std::vector<Clamped> parts(static_cast<size_t>((cloud.size() + kLossGrain - 1) / kLossGrain));
+  ParallelFor(0, cloud.size(), kLossGrain, [&](int64_t first, int64_t last) {
+    Clamped& part = parts[static_cast<size_t>(first / kLossGrain)];
     for (int64_t i = first; i < last; ++i) {
       const float* sh = cloud.sh.data() + i * cloud.sh_stride();
       part.log_scales +=

@@ -19,7 +19,7 @@ Image Filled(int width, int height, int channels, float value) {
   return image;
 }
 
-Image RandomImage(int width, int height, uint64_t seed) {
+Image NoiseImage(int width, int height, uint64_t seed) {
   Image image(width, height, 3);
   Random random(seed);
   for (float& x : image.pixels) x = static_cast<float>(random.Uniform());
@@ -42,7 +42,7 @@ TEST(BitmapFont, DrawsInsideOnly) {
 }
 
 TEST(MostDifferentRegion, FindsTheDisturbance) {
-  const Image a = RandomImage(60, 50, 1);
+  const Image a = NoiseImage(60, 50, 1);
   Image b = a;
   for (int y = 20; y < 24; ++y) {
     for (int x = 41; x < 49; ++x) b.at(1, y, x) += b.at(1, y, x) < 0.5f ? 0.4f : -0.4f;
@@ -69,7 +69,7 @@ TEST(MostDifferentRegion, OfEqualPicturesIsTheMostDetailed) {
 }
 
 TEST(SideBySide, ShowsOriginalPixelsInTheEnlargedPart) {
-  const Image truth = RandomImage(100, 80, 2);
+  const Image truth = NoiseImage(100, 80, 2);
   const Image black = Filled(100, 80, 3, 0);
   const LabelledImage images[] = {{"before", "", &black}, {"truth", "", &truth}};
   const ViewRegion region{30, 40, 20, 10};
@@ -106,7 +106,7 @@ TEST(SideBySide, MapsAreProportionalToTheGain) {
 
 TEST(SideBySide, LargeSmallAndOddSizesWork) {
   for (const auto& [width, height] : {std::pair(1, 1), {3, 2}, {1500, 7}, {7, 900}, {641, 479}, {1024, 768}}) {
-    const Image a = RandomImage(width, height, 3), b = RandomImage(width, height, 4);
+    const Image a = NoiseImage(width, height, 3), b = NoiseImage(width, height, 4);
     const LabelledImage images[] = {{"a", "", &a}, {std::string(500, 'w'), "x", &a}, {"b", "", &b}};
     const auto picture = SideBySide(images);
     ASSERT_TRUE(picture.ok()) << width << " x " << height;
@@ -119,7 +119,7 @@ TEST(SideBySide, LargeSmallAndOddSizesWork) {
 }
 
 TEST(SideBySide, ShowsHostileValuesClamped) {
-  Image a = RandomImage(50, 40, 5), b = a;
+  Image a = NoiseImage(50, 40, 5), b = a;
   a.at(0, 3, 3) = std::nanf("");
   a.at(1, 20, 20) = INFINITY;
   b.at(2, 9, 9) = -INFINITY;
@@ -132,7 +132,7 @@ TEST(SideBySide, ShowsHostileValuesClamped) {
 }
 
 TEST(SideBySide, BadArgumentsAreErrors) {
-  const Image a = RandomImage(20, 10, 6), b = RandomImage(10, 20, 7), empty;
+  const Image a = NoiseImage(20, 10, 6), b = NoiseImage(10, 20, 7), empty;
   const LabelledImage good[] = {{"a", "", &a}};
   EXPECT_TRUE(SideBySide(good).ok());
   EXPECT_FALSE(SideBySide({}).ok());

@@ -24,7 +24,7 @@ namespace {
 constexpr int64_t kRowsPerTask = 128;
 constexpr int64_t kMostRows = int64_t{1} << 31;
 
-void Linear(int64_t rows, const float* input, const PackedWeights& weights, float* out,
+void ApplyLinear(int64_t rows, const float* input, const PackedWeights& weights, float* out,
             Activation activation = Activation::kNone, const float* residual = nullptr) {
   LinearCpu({.rows = rows,
              .input = input,
@@ -158,21 +158,21 @@ Buffer<float> CompactNetwork::States(const CompactFeatures& features, const Comp
     const int64_t rows = end - begin;
     Buffer<float> nodes(static_cast<size_t>(rows * kNodeFeatures)), first(static_cast<size_t>(rows * h));
     features.Nodes(begin, end, nodes.data());
-    Linear(rows, nodes.data(), embed_first_, first.data(), Activation::kGelu);
-    Linear(rows, first.data(), embed_second_, states.data() + begin * h);
+    ApplyLinear(rows, nodes.data(), embed_first_, first.data(), Activation::kGelu);
+    ApplyLinear(rows, first.data(), embed_second_, states.data() + begin * h);
     normalise(rows, embed_norm_, states.data() + begin * h);
   });
   for (const Round& round : rounds_) {
-    Linear(n, states.data(), round.other, others.data());
+    ApplyLinear(n, states.data(), round.other, others.data());
     ParallelFor(0, n, kRowsPerTask, [&](int64_t begin, int64_t end) {
       const int64_t rows = end - begin;
       float* own_states = states.data() + begin * h;
       Buffer<float> own(static_cast<size_t>(rows * h)),
           features_of_edges(static_cast<size_t>(rows * m * kEdgeFeatures)), edges(static_cast<size_t>(rows * m * h)),
           messages(edges.size()), pooled(static_cast<size_t>(rows * 3 * h));
-      Linear(rows, own_states, round.own, own.data());
+      ApplyLinear(rows, own_states, round.own, own.data());
       features.Edges(begin, end, features_of_edges.data());
-      Linear(rows * m, features_of_edges.data(), round.edge, edges.data());
+      ApplyLinear(rows * m, features_of_edges.data(), round.edge, edges.data());
       EdgeSumGeluCpu({.points = rows,
                       .neighbours = m,
                       .channels = h,
@@ -180,7 +180,7 @@ Buffer<float> CompactNetwork::States(const CompactFeatures& features, const Comp
                       .other = others.data(),
                       .index = graph.index.data() + begin * m,
                       .edges = edges.data()});
-      Linear(rows * m, edges.data(), round.message, messages.data());
+      ApplyLinear(rows * m, edges.data(), round.message, messages.data());
       for (int64_t i = 0; i < rows; ++i) std::copy_n(own_states + i * h, h, pooled.data() + i * 3 * h);
       EdgePoolCpu({.points = rows,
                    .neighbours = m,
@@ -188,9 +188,9 @@ Buffer<float> CompactNetwork::States(const CompactFeatures& features, const Comp
                    .edges = messages.data(),
                    .out_stride = 3 * h,
                    .out = pooled.data() + h});
-      Linear(rows, pooled.data(), round.update_first, own.data(), Activation::kGelu);
+      ApplyLinear(rows, pooled.data(), round.update_first, own.data(), Activation::kGelu);
       // In place: others were told about the old states before.
-      Linear(rows, own.data(), round.update_second, own_states, Activation::kNone, own_states);
+      ApplyLinear(rows, own.data(), round.update_second, own_states, Activation::kNone, own_states);
       normalise(rows, round.norm, own_states);
     });
   }
@@ -207,9 +207,9 @@ void CompactNetwork::Head(const CompactFeatures& features, const Buffer<float>& 
     std::copy_n(states.data() + (begin + i) * h, h, input.data() + i * width);
     std::copy_n(nodes.data() + i * kNodeFeatures, kNodeFeatures, input.data() + i * width + h);
   }
-  Linear(rows, input.data(), head_first_, first.data(), Activation::kGelu);
-  Linear(rows, first.data(), head_second_, second.data(), Activation::kGelu);
-  Linear(rows, second.data(), out_, out);
+  ApplyLinear(rows, input.data(), head_first_, first.data(), Activation::kGelu);
+  ApplyLinear(rows, first.data(), head_second_, second.data(), Activation::kGelu);
+  ApplyLinear(rows, second.data(), out_, out);
 }
 
 void CompactNetwork::Outputs(const CompactFeatures& features, const CompactGraph& graph, float* out) const {

@@ -13,7 +13,7 @@ namespace anchorsplat {
 
 namespace {
 
-Error BadArgument(std::string message) { return {ErrorCode::kBadArgument, std::move(message)}; }
+Error BadGradientArgument(std::string message) { return {ErrorCode::kBadArgument, std::move(message)}; }
 
 Status CheckGradient(const RenderGradient& g, int width, int height) {
   const auto fits = [&](const Image& image, int channels) {
@@ -21,16 +21,16 @@ Status CheckGradient(const RenderGradient& g, int width, int height) {
            image.pixels.size() == static_cast<size_t>(channels) * static_cast<size_t>(image.plane());
   };
   if (!fits(g.color, 3)) {
-    return BadArgument(Cat("gradient of ", g.color.width, " x ", g.color.height, " x ", g.color.channels,
+    return BadGradientArgument(Cat("gradient of ", g.color.width, " x ", g.color.height, " x ", g.color.channels,
                            " for a picture of ", width, " x ", height, " x 3"));
   }
   if (!g.alpha.pixels.empty() && !fits(g.alpha, 1)) {
-    return BadArgument(Cat("alpha gradient of ", g.alpha.width, " x ", g.alpha.height, " x ", g.alpha.channels,
+    return BadGradientArgument(Cat("alpha gradient of ", g.alpha.width, " x ", g.alpha.height, " x ", g.alpha.channels,
                            " for a picture of ", width, " x ", height, " x 1"));
   }
   const PixelBox& b = g.box;
   if (!b.empty() && (b.x0 < 0 || b.y0 < 0 || b.x1 > width || b.y1 > height)) {
-    return BadArgument(Cat("box [", b.x0, ", ", b.x1, ") x [", b.y0, ", ", b.y1, ") reaches outside of a picture of ",
+    return BadGradientArgument(Cat("box [", b.x0, ", ", b.x1, ") x [", b.y0, ", ", b.y1, ") reaches outside of a picture of ",
                            width, " x ", height));
   }
   return {};
@@ -136,12 +136,12 @@ void Rasterizer::State::ProjectBackward(const GaussianCloud& cloud, CloudGradien
 Status Rasterizer::Backward(const GaussianCloud& cloud, const RenderGradient& output_gradient,
                             CloudGradient& gradient) {
   if (!state_->kept) {
-    return BadArgument("no picture to take the gradient of: render one with RenderOptions::gradient first");
+    return BadGradientArgument("no picture to take the gradient of: render one with RenderOptions::gradient first");
   }
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   const State::Kept& kept = *state_->kept;
   if (cloud.size() != kept.count || cloud.sh_degree != kept.sh_degree) {
-    return BadArgument(Cat("the picture is of ", WithThousands(kept.count), " Gaussians of SH degree ", kept.sh_degree,
+    return BadGradientArgument(Cat("the picture is of ", WithThousands(kept.count), " Gaussians of SH degree ", kept.sh_degree,
                            ", not of ", WithThousands(cloud.size()), " of degree ", cloud.sh_degree));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckGradient(output_gradient, kept.intrinsics.width, kept.intrinsics.height));

@@ -1,13 +1,12 @@
 #pragma once
 
 #include <array>
-#include <chrono>
 #include <cstdint>
 #include <optional>
-#include <utility>
 
 #include "core/buffer.h"
 #include "core/camera.h"
+#include "core/stopwatch.h"
 #include "render/bin.h"
 #include "render/blend_backward.h"
 #include "render/projected_gaussian.h"
@@ -25,17 +24,6 @@ T* Room(Buffer<T>& buffer, int64_t size) {
   }
   return buffer.data();
 }
-
-class Stopwatch {
- public:
-  double Lap() {  // seconds since the last one
-    const auto now = std::chrono::steady_clock::now();
-    return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
 
 // The buffers of a Rasterizer.
 struct Rasterizer::State {

@@ -6,20 +6,13 @@
 
 #include "core/text.h"
 #include "formats/file_bytes.h"
+#include "scene/small_letters.h"
 
 namespace anchorsplat {
 
 namespace fs = std::filesystem;
 
 namespace {
-
-// Only ASCII: other letters differ between encodings anyway.
-std::string SmallLetters(std::string text) {
-  for (char& c : text) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return text;
-}
 
 int HexDigit(char c) {
   if (c >= '0' && c <= '9') return c - '0';

@@ -13,7 +13,7 @@ namespace anchorsplat {
 namespace {
 
 constexpr int kMostViews = 100000;
-using Vec3 = std::array<double, 3>;
+using Direction3 = std::array<double, 3>;
 
 std::string NumberedName(int i, int count) {
   const std::string number = std::to_string(i);
@@ -22,8 +22,8 @@ std::string NumberedName(int i, int count) {
 }
 
 // Directions of the rings' cameras: ring r gets the views r, r + rings, …, so that a prefix of the list is spread out.
-std::vector<Vec3> RingDirections(const CameraRig& rig) {
-  std::vector<Vec3> out;
+std::vector<Direction3> RingDirections(const CameraRig& rig) {
+  std::vector<Direction3> out;
   const int rings = static_cast<int>(rig.elevations.size());
   for (int i = 0; i < rig.views; ++i) {
     const int ring = i % rings;
@@ -37,9 +37,9 @@ std::vector<Vec3> RingDirections(const CameraRig& rig) {
   return out;
 }
 
-std::vector<Vec3> RandomDirections(const CameraRig& rig) {
+std::vector<Direction3> RandomDirections(const CameraRig& rig) {
   Random random(rig.seed);
-  std::vector<Vec3> out;
+  std::vector<Direction3> out;
   for (int i = 0; i < rig.views; ++i) {
     const double y = random.Uniform(-1, 1);
     const double azimuth = random.Uniform(0, 2 * std::numbers::pi);
@@ -79,7 +79,7 @@ Result<CameraSet> MakeRig(const CameraRig& rig, int width, int height) {
   if (rig.kind == RigKind::kSphere) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(set, OrbitCameras(rig.views, rig.radius, {0, 0, 0}, intrinsics));
   } else {
-    for (const Vec3& d : rig.kind == RigKind::kRings ? RingDirections(rig) : RandomDirections(rig)) {
+    for (const Direction3& d : rig.kind == RigKind::kRings ? RingDirections(rig) : RandomDirections(rig)) {
       Camera camera;
       camera.intrinsics = intrinsics;
       ANCHORSPLAT_ASSIGN_OR_RETURN(

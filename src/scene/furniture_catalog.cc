@@ -11,6 +11,7 @@
 #include "formats/file_bytes.h"
 #include "scene/java_properties.h"
 #include "scene/licence.h"
+#include "scene/small_letters.h"
 
 namespace anchorsplat {
 
@@ -21,11 +22,6 @@ constexpr uint64_t kLongestList = uint64_t{1} << 26;     // bytes
 constexpr uint64_t kLongestLicence = uint64_t{1} << 20;  // bytes
 constexpr uint64_t kLongestLibrary = uint64_t{1} << 31;  // bytes: it is kept in memory
 constexpr std::array<float, 9> kIdentity = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-
-std::string SmallLetters(std::string text) {
-  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return text;
-}
 
 std::string FolderOf(const std::string& member) {
   const size_t slash = member.find_last_of('/');

@@ -12,7 +12,7 @@ namespace {
 
 using Vec3 = std::array<float, 3>;
 
-bool Finite(const Vec3& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); }
+bool FinitePoint(const Vec3& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); }
 
 Status CheckCount(const char* what, size_t have, size_t vertices) {
   if (have == 0 || have == vertices) return {};
@@ -74,7 +74,7 @@ DroppedTriangles DropInvisibleTriangles(Mesh& mesh) {
     const Vec3& pc = mesh.positions[c];
     if (!(mesh.materials[static_cast<size_t>(mesh.triangle_materials[t])].opacity >= kMinVisibleOpacity)) {
       ++dropped.transparent;
-    } else if (!Finite(pa) || !Finite(pb) || !Finite(pc)) {
+    } else if (!FinitePoint(pa) || !FinitePoint(pb) || !FinitePoint(pc)) {
       ++dropped.not_finite;
     } else if (!(DoubleArea(pa, pb, pc) > 0)) {
       ++dropped.degenerate;

@@ -9,6 +9,7 @@
 #include "formats/file_bytes.h"
 #include "scene/furniture_catalog.h"
 #include "scene/licence.h"
+#include "scene/small_letters.h"
 
 namespace anchorsplat {
 
@@ -17,11 +18,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::string_view kLibraryEnding = ".sh3f";
-
-std::string SmallLetters(std::string text) {
-  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return text;
-}
 
 struct Address {
   std::string file;

@@ -5,10 +5,10 @@
 #include <utility>
 
 #include "core/random.h"
+#include "core/stopwatch.h"
 #include "core/text.h"
 #include "dataset/object_name.h"
 #include "enhance/filter.h"
-#include "fit/stopwatch.h"
 #include "train/augmentation.h"
 #include "train/object_part.h"
 

@@ -10,9 +10,9 @@
 
 #include "core/log.h"
 #include "core/parallel.h"
+#include "core/stopwatch.h"
 #include "core/text.h"
 #include "dataset/object_name.h"
-#include "fit/stopwatch.h"
 #include "formats/file_bytes.h"
 #include "model/modules/point_batch_norm.h"
 #include "model/modules/trainable_network.h"

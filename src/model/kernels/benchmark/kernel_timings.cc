@@ -25,9 +25,9 @@ Buffer<float> RandomFloats(int64_t count, double size) {
 }
 
 // Times work of one kind and keeps an eye on what the machine can do meanwhile: other programs come and go.
-class Stopwatch {
+class BestOf {
  public:
-  explicit Stopwatch(int repeats) : repeats_(repeats) {}
+  explicit BestOf(int repeats) : repeats_(repeats) {}
 
   template <typename Work>
   double Best(Work&& work) {
@@ -48,7 +48,7 @@ class Stopwatch {
   double peak_ = 0;
 };
 
-double LinearSeconds(Stopwatch& watch, int64_t rows, int64_t inputs, int64_t outputs, Activation activation,
+double LinearSeconds(BestOf& watch, int64_t rows, int64_t inputs, int64_t outputs, Activation activation,
                      WeightPrecision precision) {
   const Buffer<float> x = RandomFloats(rows * inputs, 1);
   const Buffer<float> w = RandomFloats(outputs * inputs, 0.1);
@@ -72,7 +72,7 @@ KernelTimings TimeKernels(const std::vector<int32_t>& voxels, int repeats) {
   auto hierarchy = BuildHierarchy(voxels);
   if (!hierarchy.ok()) return timings;
   const std::vector<Level>& levels = *hierarchy;
-  Stopwatch watch(repeats);
+  BestOf watch(repeats);
   KernelTiming attention[] = {{.name = "attention fp32"}, {.name = "attention fp16"}, {.name = "attention bf16"}};
   KernelTiming convolution[] = {{.name = "convolution fp32"}, {.name = "convolution bf16"}};
   KernelTiming linear[] = {{.name = "linear fp32"}, {.name = "linear bf16"}};

@@ -26,9 +26,12 @@ else
 TORCH_FLAGS = -DANCHORSPLAT_TORCH=$(if $(wildcard .venv/anchorsplat-torch),ON,OFF)
 endif
 
-.PHONY: dependencies torch
+.PHONY: dependencies test-dependencies torch
 dependencies:
 	@scripts/install-dependencies.sh
+
+test-dependencies:
+	@scripts/install-dependencies.sh --with-tests
 
 torch:
 ifndef LEAN
@@ -36,19 +39,19 @@ ifndef LEAN
 	@scripts/install-torch.sh
 endif
 
-build: dependencies
-	@cmake --preset release $(TORCH_FLAGS) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
+build: test-dependencies
+	@cmake --preset release -DANCHORSPLAT_TESTS=ON $(TORCH_FLAGS) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
 	@rm -f build-configure.log
 	@cmake --build --preset release -j $(JOBS)
 
-# Only the program, without the tests: what `make demo` needs.
+# Only the program: what `make demo` needs. A build folder that has the tests keeps them.
 program: dependencies
-	@cmake --preset release $(TORCH_FLAGS) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
+	@cmake --preset release $(if $(wildcard build/release/CMakeCache.txt),,-DANCHORSPLAT_TESTS=OFF) $(TORCH_FLAGS) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
 	@rm -f build-configure.log
 	@cmake --build --preset release -j $(JOBS) --target anchorsplat
 .PHONY: program
 
-debug: dependencies
+debug: test-dependencies
 	@cmake --preset debug $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
 	@rm -f build-configure.log
 	@cmake --build --preset debug -j $(JOBS)

@@ -15,7 +15,6 @@ if(ANCHORSPLAT_WERROR)
   target_compile_options(anchorsplat_flags INTERFACE -Werror)
 endif()
 
-set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
 if(ANCHORSPLAT_SANITIZE)
   # -O1 keeps the fuzz tests quick; frame pointers make their reports readable.
   add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer -O1 -g1)

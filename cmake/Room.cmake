@@ -5,7 +5,9 @@
 #
 # With ANCHORSPLAT_UNITY several files of a room are compiled as one, which halves a build from nothing: reading headers
 # and making the same templates is most of it. A name in an anonymous namespace must then be the only one of its room.
-include(GoogleTest)
+if(ANCHORSPLAT_TESTS)
+  include(GoogleTest)
+endif()
 option(ANCHORSPLAT_UNITY "Compile the files of a room several at a time: quicker from nothing, slower after an edit" OFF)
 function(anchorsplat_unity target)
   if(NOT ANCHORSPLAT_UNITY)
@@ -49,7 +51,7 @@ function(anchorsplat_room name)
       target_link_libraries(anchorsplat_${name} PUBLIC anchorsplat_${used})
     endif()
   endforeach()
-  if(tests)
+  if(tests AND ANCHORSPLAT_TESTS)
     add_executable(${name}_test ${tests})
     anchorsplat_unity(${name}_test)
     target_link_libraries(${name}_test PRIVATE anchorsplat_${name} anchorsplat_source_dir_for_test

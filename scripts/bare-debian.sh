@@ -76,9 +76,16 @@ checkout=$(cd "$(dirname "$0")/.." && pwd)
 cache=${XDG_CACHE_HOME:-${HOME:-/root}/.cache}/anchorsplat
 mkdir -p "$cache"
 
+# The folder of a run that was killed outright is nobody's: its lock went with it.
+for old in "$cache"/run-*; do
+  [ -d "$old" ] && flock --nonblock "$old" rm -rf --one-file-system "$old"
+done
+
 # What runs in the background is ended by its first process inside, and with that one everything in its namespace.
 child=
 scratch=$(mktemp -d "$cache/run-XXXXXX")
+exec 8<"$scratch"
+flock 8
 end_child() {
   [ -n "$child" ] || return 0
   # unshare itself is not killed: it returns when the namespace is empty, and only then may files be removed.

@@ -1,15 +1,33 @@
 #!/usr/bin/env bash
 # Makes sure that everything the build needs is there: on Debian and its relatives by apt (sudo only when not root),
-# elsewhere it says what is missing. Quick when nothing is missing. With --with-torch also what installing LibTorch takes.
+# elsewhere it says what is missing. Quick when nothing is missing. With --with-tests also what the tests take, with
+# --with-torch what installing LibTorch takes. The names are those of Debian 12 and 13.
 set -euo pipefail
 
 packages=(g++ cmake ninja-build pkg-config
   libhwy-dev libtbb-dev libcli11-dev nlohmann-json3-dev libpng-dev libjpeg-dev zlib1g-dev libzstd-dev libwebp-dev
-  libassimp-dev libstb-dev libembree-dev libtomlplusplus-dev libgtest-dev libgmock-dev libbenchmark-dev)
+  libassimp-dev libstb-dev libembree-dev libtomlplusplus-dev)
+headers=(hwy/highway.h tbb/parallel_for.h CLI/CLI.hpp nlohmann/json.hpp png.h jpeglib.h zlib.h zstd.h webp/decode.h
+  assimp/scene.h stb/stb_image.h toml++/toml.h)
+with_torch=
+[ ! -e "$(dirname "$0")/../.venv/anchorsplat-torch" ] || with_torch=1
+for option in "$@"; do
+  case "$option" in
+    --with-tests)
+      packages+=(libgtest-dev libgmock-dev)
+      headers+=(gtest/gtest.h gmock/gmock.h)
+      ;;
+    --with-torch) with_torch=1 ;;
+    *)
+      echo "anchorsplat: install-dependencies.sh has no option $option" >&2
+      exit 2
+      ;;
+  esac
+done
 
 # LibTorch comes in a Python wheel (scripts/install-torch.sh) without the headers of Gloo, which training on several
 # machines needs.
-if [ "${1:-}" = --with-torch ] || [ -e "$(dirname "$0")/../.venv/anchorsplat-torch" ]; then
+if [ -n "$with_torch" ]; then
   packages+=(python3-venv python3-pip libgloo-dev)
 fi
 
@@ -18,14 +36,15 @@ if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
   missing=()
   have_header() { echo "#include <$1>" | ${CXX:-c++} -std=c++20 -E -x c++ - >/dev/null 2>&1; }
   for program in "${CXX:-c++}" cmake ninja; do command -v "$program" >/dev/null || missing+=("$program"); done
-  for header in hwy/highway.h tbb/parallel_for.h CLI/CLI.hpp nlohmann/json.hpp png.h jpeglib.h zlib.h zstd.h webp/decode.h \
-                assimp/scene.h stb/stb_image.h embree3/rtcore.h toml++/toml.h gtest/gtest.h gmock/gmock.h benchmark/benchmark.h; do
+  for header in "${headers[@]}"; do
     have_header "$header" || missing+=("<$header>")
   done
+  have_header embree4/rtcore.h || have_header embree3/rtcore.h || missing+=("<embree4/rtcore.h>")
   [ ${#missing[@]} -eq 0 ] && exit 0
   echo "anchorsplat: this is not a Debian system, so nothing was installed. Missing: ${missing[*]}" >&2
   echo "Install a C++20 compiler, CMake >= 3.22, Ninja and the development packages of Highway (>= 1.0.3), oneTBB," >&2
-  echo "CLI11, nlohmann-json, libpng, libjpeg, zlib, zstd, libwebp, assimp (5.2), stb, Embree (3.13), toml++, GoogleTest and Google Benchmark, then call make again." >&2
+  echo "CLI11, nlohmann-json, libpng, libjpeg, zlib, zstd, libwebp, assimp (>= 5.2), stb, Embree (>= 3.13 or 4), toml++ and, for the" >&2
+  echo "tests, GoogleTest, then call make again." >&2
   exit 1
 fi
 

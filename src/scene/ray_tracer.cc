@@ -1,6 +1,5 @@
 #include "scene/ray_tracer.h"
 
-#include <embree3/rtcore.h>
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
@@ -13,6 +12,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "core/thread_clock.h"
+#include "scene/embree.h"
 #include "scene/surface_shader.h"
 #include "scene/tile_coverage.h"
 
@@ -35,7 +35,7 @@ using EmbreeScene = std::unique_ptr<std::remove_pointer_t<RTCScene>, SceneReleas
 
 // Embree hands its context through to the filter of surfaces with holes.
 struct TraceContext {
-  RTCIntersectContext base;
+  embree::QueryContext base;
   float sample_area;
 };
 
@@ -203,10 +203,9 @@ namespace {
 // One picture being made; tiles are independent of each other.
 class TileTracer {
  public:
-  TileTracer(RTCScene embree, const Part* const* parts, const SurfaceShader& shader, const Camera& camera, int samples)
-      : embree_(embree), parts_(parts), shader_(shader), fan_(camera), per_pixel_(samples * samples) {
-    rtcInitIntersectContext(&context_.base);
-    context_.base.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  TileTracer(RTCScene scene, const Part* const* parts, const SurfaceShader& shader, const Camera& camera, int samples)
+      : scene_(scene), parts_(parts), shader_(shader), fan_(camera), per_pixel_(samples * samples) {
+    embree::Init(context_.base);
     const Pinhole& k = camera.intrinsics;
     context_.sample_area = static_cast<float>(1 / (k.fx * k.fy * per_pixel_));
     for (int pixel = 0; pixel < kTile * kTile; ++pixel) {
@@ -252,7 +251,7 @@ class TileTracer {
         packet.hit.geomID[i] = kMiss;
         packet.hit.instID[0][i] = kMiss;
       }
-      rtcIntersect8(valid, embree_, &context_.base, &packet);
+      embree::IntersectCoherent(valid, scene_, context_.base, packet);
       for (size_t i = 0; i < kPacket; ++i) {
         Hit& hit = hits_[first + i];
         if (packet.hit.geomID[i] == kMiss) {
@@ -288,7 +287,7 @@ class TileTracer {
     }
   }
 
-  RTCScene embree_;
+  RTCScene scene_;
   const Part* const* parts_;
   const SurfaceShader& shader_;
   RayFan fan_;
@@ -374,11 +373,10 @@ std::vector<RayTracer::Sighting> RayTracer::LookAtPoints(std::span<const Surface
     const float distance =
         std::sqrt(direction[0] * direction[0] + direction[1] * direction[1] + direction[2] * direction[2]);
     TraceContext context;
-    rtcInitIntersectContext(&context.base);
+    embree::Init(context.base);
     context.sample_area = sample_area * distance * distance * distance;
     if (scene_->shader->Alpha(points[i], direction, context.sample_area) < kAlphaTest) return false;
-    rtcOccluded1(scene_->embree.get(), &context.base, &ray);
-    if (ray.tfar < 0) return false;
+    if (embree::Occluded(scene_->embree.get(), context.base, ray)) return false;
     out[i] = {static_cast<int>(e), scene_->shader->Color(points[i], direction, context.sample_area)};
     return true;
   };

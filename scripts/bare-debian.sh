@@ -78,7 +78,7 @@ mkdir -p "$cache"
 
 # The folder of a run that was killed outright is nobody's: its lock went with it.
 for old in "$cache"/run-*; do
-  [ -d "$old" ] && flock --nonblock "$old" rm -rf --one-file-system "$old"
+  [ ! -d "$old" ] || flock --nonblock "$old" rm -rf --one-file-system "$old" || true  # in use: of a run beside this one
 done
 
 # What runs in the background is ended by its first process inside, and with that one everything in its namespace.

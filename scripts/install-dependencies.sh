@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Makes sure that everything the build needs is there: on Debian and its relatives by apt (sudo only when not root),
 # elsewhere it says what is missing. Quick when nothing is missing. With --with-tests also what the tests take, with
-# --with-torch what installing LibTorch takes. The names are those of Debian 12 and 13.
+# --with-torch what installing LibTorch takes; --list only names the packages. They are called the same in Debian
+# 12 and 13.
 set -euo pipefail
 
 packages=(g++ cmake ninja-build pkg-config
@@ -9,6 +10,7 @@ packages=(g++ cmake ninja-build pkg-config
   libassimp-dev libstb-dev libembree-dev libtomlplusplus-dev)
 headers=(hwy/highway.h tbb/parallel_for.h CLI/CLI.hpp nlohmann/json.hpp png.h jpeglib.h zlib.h zstd.h webp/decode.h
   assimp/scene.h stb/stb_image.h toml++/toml.h)
+list=
 with_torch=
 [ ! -e "$(dirname "$0")/../.venv/anchorsplat-torch" ] || with_torch=1
 for option in "$@"; do
@@ -18,6 +20,7 @@ for option in "$@"; do
       headers+=(gtest/gtest.h gmock/gmock.h)
       ;;
     --with-torch) with_torch=1 ;;
+    --list) list=1 ;;
     *)
       echo "anchorsplat: install-dependencies.sh has no option $option" >&2
       exit 2
@@ -29,6 +32,11 @@ done
 # machines needs.
 if [ -n "$with_torch" ]; then
   packages+=(python3-venv python3-pip libgloo-dev)
+fi
+
+if [ -n "$list" ]; then
+  printf '%s\n' "${packages[@]}"
+  exit 0
 fi
 
 if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then

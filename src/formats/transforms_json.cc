@@ -1,5 +1,6 @@
 #include "formats/transforms_json.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <numbers>

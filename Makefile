@@ -59,7 +59,7 @@ debug: test-dependencies
 demo: program
 	@scripts/demo.sh
 
-debug-all: dependencies
+debug-all: test-dependencies
 	@cmake --preset debug-all $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
 	@rm -f build-configure.log
 	@cmake --build --preset debug-all -j $(JOBS)

@@ -21,12 +21,10 @@ xargs -d '\n' -r realpath -m -- <"$scratch/named" | grep '^/usr/' | sort -u >"$s
 count=$(wc -l <"$scratch/headers")
 [ "$count" -ge 100 ] || { echo "only $count system headers in $build: is it built?" >&2; exit 2; }
 
-"$here/install-dependencies.sh" --list >"$scratch/list"
-if [ -e "$here/../.venv/anchorsplat-torch" ]; then "$here/install-dependencies.sh" --list --with-torch >"$scratch/list"; fi
+"$here/install-dependencies.sh" --list --with-tests >"$scratch/list"
 # shellcheck disable=SC2046
 apt-cache depends --recurse --no-recommends --no-suggests --no-conflicts --no-breaks --no-replaces --no-enhances \
   $(cat "$scratch/list") 2>/dev/null | grep -E '^[a-z0-9]' | sed 's/:.*//' | sort -u >"$scratch/allowed"
-# build-essential's own: the C library's headers come with any compiler that was installed otherwise, too.
 [ "$(wc -l <"$scratch/allowed")" -gt "$(wc -l <"$scratch/list")" ] || {
   echo "apt knows no packages: run apt-get update first" >&2
   exit 2

@@ -12,6 +12,7 @@ headers=(hwy/highway.h tbb/parallel_for.h CLI/CLI.hpp nlohmann/json.hpp png.h jp
   assimp/scene.h stb/stb_image.h toml++/toml.h)
 list=
 with_torch=
+list_only=
 [ ! -e "$(dirname "$0")/../.venv/anchorsplat-torch" ] || with_torch=1
 for option in "$@"; do
   case "$option" in
@@ -20,6 +21,7 @@ for option in "$@"; do
       headers+=(gtest/gtest.h gmock/gmock.h)
       ;;
     --with-torch) with_torch=1 ;;
+    --list) list_only=1 ;;
     --list) list=1 ;;
     *)
       echo "anchorsplat: install-dependencies.sh has no option $option" >&2
@@ -32,6 +34,10 @@ done
 # machines needs.
 if [ -n "$with_torch" ]; then
   packages+=(python3-venv python3-pip libgloo-dev)
+fi
+if [ -n "$list_only" ]; then
+  printf '%s\n' "${packages[@]}"
+  exit 0
 fi
 
 if [ -n "$list" ]; then

@@ -20,14 +20,19 @@ class GlooGroup : public ProcessGroup {
 
   int rank() const override { return rank_; }
   int size() const override { return size_; }
-  void Sum(torch::Tensor& tensor) override {
+  void Sum(torch::Tensor& tensor) override { Reduce(tensor, c10d::ReduceOp::SUM); }
+  void Max(torch::Tensor& tensor) override { Reduce(tensor, c10d::ReduceOp::MAX); }
+
+ private:
+  void Reduce(torch::Tensor& tensor, c10d::ReduceOp::RedOpType operation) {
     const torch::NoGradGuard no_gradient;
     std::vector<torch::Tensor> own = {tensor.detach().to(torch::kCPU).contiguous()};
-    gloo_->allreduce(own)->wait();
+    c10d::AllreduceOptions options;
+    options.reduceOp = operation;
+    gloo_->allreduce(own, options)->wait();
     if (!own[0].is_same(tensor)) tensor.detach().copy_(own[0]);
   }
 
- private:
   c10::intrusive_ptr<c10d::ProcessGroupGloo> gloo_;
   int rank_, size_;
 };

@@ -23,6 +23,8 @@ class ProcessGroup {
   // Σ over all processes, in place, the same bits everywhere; for tensors of any device. Throws when another process is
   // gone.
   virtual void Sum(torch::Tensor& tensor) = 0;
+  // The largest of all processes, element by element; else as Sum.
+  virtual void Max(torch::Tensor& tensor) = 0;
 };
 
 }  // namespace anchorsplat

@@ -282,6 +282,7 @@ void Trainer::Agree() {
   last_loss_ = sum[at].item<double>();
   agreed_elapsed_ = sum[at + 1].item<double>();
   agreed_stop_ = sum[at + 2].item<double>() > 0;
+  network_->ShareMemory([this](torch::Tensor& tensor) { group_->Max(tensor); });
 }
 
 // Applies the gradient, if it is one.

@@ -128,6 +128,14 @@ Tensor CompactTrainable::Outputs(const NetworkInput& input) {
   return torch::cat({out_strength_(hidden), torch::cat(of_copies, 2).flatten(1)}, 1);
 }
 
+void CompactTrainable::ShareMemory(const std::function<void(Tensor&)>& maximum) {
+  const torch::NoGradGuard no_gradient;
+  Tensor reach = torch::cat({-low_, high_});
+  maximum(reach);
+  low_.copy_(-reach.narrow(0, 0, kNodeFeatures));
+  high_.copy_(reach.narrow(0, kNodeFeatures, kNodeFeatures));
+}
+
 GaussianTensors CompactTrainable::Forward(const NetworkInput& input) {
   const CompactTables& tables = *std::static_pointer_cast<CompactTables>(input.prepared);
   if (is_training()) {

@@ -35,6 +35,8 @@ class CompactTrainable : public TrainableNetwork {
   // of each feature the 0.5 % and 99.5 % quantiles of the splat that went farthest.
   GaussianTensors Forward(const NetworkInput& input) override;
 
+  void ShareMemory(const std::function<void(torch::Tensor&)>& maximum) override;
+
   int copies() const override { return static_cast<int>(config_.copies); }
   std::vector<std::pair<std::string, std::vector<torch::Tensor>>> Groups() override;
   Status Save(const std::filesystem::path& path, const std::map<std::string, std::string>& metadata) override;

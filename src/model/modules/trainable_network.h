@@ -3,6 +3,7 @@
 #include <torch/torch.h>
 
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <span>
@@ -52,6 +53,11 @@ class TrainableNetwork : public torch::nn::Module {
 
   // K·N Gaussians, differentiable with respect to the parameters. Row order k·N + i.
   virtual GaussianTensors Forward(const NetworkInput& input) = 0;
+
+  // What Forward remembers of its inputs while training, brought to what all processes of a training have seen.
+  // `maximum` replaces a tensor by the largest of all processes, element by element; every process calls this after the
+  // same step. Networks that remember nothing have nothing to do.
+  virtual void ShareMemory(const std::function<void(torch::Tensor&)>& maximum);
 
   virtual int copies() const = 0;  // K
 

@@ -4,6 +4,7 @@
 
 #include "core/text.h"
 #include "fit/fitter.h"
+#include "formats/atomic_file.h"
 #include "formats/opened_splat.h"
 
 namespace anchorsplat {
@@ -25,6 +26,7 @@ Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> oth
       return Error{ErrorCode::kBadArgument, Cat("--checkpoint ", checkpoint.string(), ": is the output itself")};
     }
   }
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(checkpoint));
   std::error_code ignored;
   if (!fs::exists(checkpoint, ignored) || resume) return {};  // what a checkpoint is, reading it shows
   if (!IsFitCheckpoint(checkpoint)) {
@@ -36,11 +38,6 @@ Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> oth
   return Error{ErrorCode::kExists, Cat(checkpoint.string(),
                                        " is left from a run that was interrupted: --resume goes on from it, -w begins "
                                        "anew")};
-}
-
-void RemoveCheckpoint(const fs::path& checkpoint) {
-  std::error_code ignored;
-  if (IsFitCheckpoint(checkpoint)) fs::remove(checkpoint, ignored);
 }
 
 }  // namespace anchorsplat

@@ -16,6 +16,7 @@
 #include "cli/verb.h"
 #include "core/log.h"
 #include "core/text.h"
+#include "fit/fitter.h"
 #include "formats/atomic_file.h"
 #include "formats/camera_io.h"
 #include "formats/opened_splat.h"
@@ -240,7 +241,7 @@ Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& 
                  Cat("stopped; ", output.string(), " is as far as it came",
                      resumable ? Cat(", the same command with --resume goes on from ", checkpoint.string()) : "")};
   }
-  if (!checkpoint.empty()) RemoveCheckpoint(checkpoint);
+  if (!checkpoint.empty()) RemoveFitCheckpoint(checkpoint);
   nlohmann::json json = ToJson(input, output, r);
   if (flags.view) json["view"] = ViewPath(output).string();
   if (!shared.json && !shared.quiet) {

@@ -121,12 +121,26 @@ void PrintReport(const FitFlags& flags, const FitReport& r) {
   }
 }
 
+// Each file that can be written is, whatever becomes of the other one.
 Status WriteResults(const FitFlags& flags, const Fitted& fitted) {
   // Whether files may be replaced was decided at the start.
-  ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(flags.output, fitted.cloud, {.overwrite = true}));
-  if (flags.gsplat_checkpoint.empty()) return {};
-  return WriteGsplatCheckpoint(flags.gsplat_checkpoint, fitted.cloud, std::max<int64_t>(0, fitted.report.steps - 1),
-                               {.overwrite = true});
+  const Status splat = WriteCloud(flags.output, fitted.cloud, {.overwrite = true});
+  if (flags.gsplat_checkpoint.empty()) return splat;
+  const Status checkpoint = WriteGsplatCheckpoint(flags.gsplat_checkpoint, fitted.cloud,
+                                                  std::max<int64_t>(0, fitted.report.steps - 1), {.overwrite = true});
+  if (splat.ok() || checkpoint.ok()) return splat.ok() ? checkpoint : splat;
+  return Error{splat.error().code, Cat(splat.error().message, "; ", checkpoint.error().message)};
+}
+
+Error Interrupted(const FitFlags& flags, const FitReport& report, int64_t steps, const fs::path& checkpoint) {
+  std::string after = "there is nothing to resume from";
+  if (report.kept_step == report.steps) {
+    after = Cat("--resume goes on from ", checkpoint.string());
+  } else if (report.kept_step) {
+    after = Cat("--resume goes on at step ", WithThousands(*report.kept_step), " from ", checkpoint.string());
+  }
+  return {ErrorCode::kInterrupted, Cat("stopped after ", WithThousands(report.steps), " of ", WithThousands(steps),
+                                       " steps; ", flags.output, " is what there was, ", after)};
 }
 
 Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
@@ -134,7 +148,7 @@ Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
   control.checkpoint = flags.checkpoint.empty() ? flags.output + ".checkpoint" : flags.checkpoint;
   control.checkpoint_every = flags.checkpoint_every;
   control.resume = flags.resume;
-  control.keep_checkpoint = true;
+  control.deliver = [&](const Fitted& fitted) { return WriteResults(flags, fitted); };
   control.stop = &StopSignal::requested();
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOutputs(flags, control.checkpoint, shared.overwrite));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(flags.project, {.hold_out = flags.hold_out}));
@@ -150,14 +164,7 @@ Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
   auto fitted = Fit(views, std::move(initial), options, control);
   stop_signal.reset();
   if (!fitted.ok()) return fitted.error();
-  ANCHORSPLAT_RETURN_IF_ERROR(WriteResults(flags, *fitted));
-  if (fitted->report.interrupted) {
-    return Error{
-        ErrorCode::kInterrupted,
-        Cat("stopped after ", WithThousands(fitted->report.steps), " of ", WithThousands(options.steps), " steps; ",
-            flags.output, " is what there was, --resume goes on from ", control.checkpoint.string())};
-  }
-  RemoveCheckpoint(control.checkpoint);
+  if (fitted->report.interrupted) return Interrupted(flags, fitted->report, options.steps, control.checkpoint);
   if (shared.json) {
     PrintJson(ToJson(flags, start.origin, fitted->report));
   } else if (!shared.quiet) {

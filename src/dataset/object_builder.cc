@@ -145,17 +145,19 @@ Status FitSplat(const ObjectJob& job, const fs::path& folder, const std::atomic<
   control.checkpoint = folder / kFitCheckpoint;
   control.checkpoint_every = kCheckpointEvery;
   control.resume = true;
+  // A checkpoint of another version of the program is no reason to give the object up.
+  control.anew_if_unfit = true;
   control.stop = stop;
-  auto fitted = Fit(views, std::move(initial), options, control);
-  if (!fitted.ok() && fitted.error().code == ErrorCode::kBadFile && IsFile(control.checkpoint)) {
-    // A checkpoint of another version of the program is no reason to give the object up.
-    LogWarning(Cat("the fit begins anew: ", fitted.error().message));
-    ANCHORSPLAT_RETURN_IF_ERROR(Remove(control.checkpoint));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(
-        initial, InitialCloud(views.points, views.scene_scale,
-                              {.sh_degree = options.objective.render.sh_degree, .seed = job.settings.seed}));
-    fitted = Fit(views, std::move(initial), options, control);
-  }
+  control.deliver = [&](const Fitted& fitted) -> Status {
+    if (fitted.report.interrupted) return {};
+    ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "files"));
+    const fs::path checkpoint = CheckpointPath(low, job.settings.fit_steps);
+    ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(checkpoint.parent_path()));
+    ANCHORSPLAT_RETURN_IF_ERROR(
+        WriteGsplatCheckpoint(checkpoint, fitted.cloud, job.settings.fit_steps - 1, {.overwrite = true}));
+    return WriteCloud(folder / kSplatName, fitted.cloud, {.overwrite = true});
+  };
+  const auto fitted = Fit(views, std::move(initial), options, control);
   if (!fitted.ok()) return fitted.error();
   const FitReport& report = fitted->report;
   if (report.interrupted) {
@@ -168,13 +170,7 @@ Status FitSplat(const ObjectJob& job, const fs::path& folder, const std::atomic<
   record.held_out_psnr = report.held_out.psnr;
   record.held_out_ssim = report.held_out.ssim;
   record.fit_seconds = report.seconds;
-
-  ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "files"));
-  const fs::path checkpoint = CheckpointPath(low, job.settings.fit_steps);
-  ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(checkpoint.parent_path()));
-  ANCHORSPLAT_RETURN_IF_ERROR(
-      WriteGsplatCheckpoint(checkpoint, fitted->cloud, job.settings.fit_steps - 1, {.overwrite = true}));
-  return WriteCloud(folder / kSplatName, fitted->cloud, {.overwrite = true});
+  return {};
 }
 
 // What a stage found out, kept beside its files: the record so far.

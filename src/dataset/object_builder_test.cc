@@ -70,6 +70,46 @@ TEST(ObjectBuilder, KeepsFinishedViewsOfTheSameJobOnly) {
   EXPECT_FALSE(fs::exists(building / "views.json"));
 }
 
+// A building folder whose views are done and whose fit was stopped at its first step.
+fs::path StoppedInItsFit(const ObjectJob& job, const fs::path& set) {
+  const fs::path building = BuildingFolder(set, job.name);
+  EXPECT_TRUE(BuildObject(job, set, nullptr).ok());
+  fs::rename(set / job.name, building);
+  fs::rename(building / "record.json", building / "views.json");
+  std::ofstream(building / "job.json") << ToJsonText(job);
+  const std::atomic<bool> stop = true;
+  EXPECT_EQ(BuildObject(job, set, &stop).error().code, ErrorCode::kInterrupted);
+  EXPECT_TRUE(fs::exists(building / "fit.checkpoint"));
+  return building;
+}
+
+TEST(ObjectBuilder, APictureAtFaultCostsNoCheckpoint) {
+  const TestFolder folder;
+  const ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
+  const fs::path building = StoppedInItsFit(job, folder / "set");
+  const std::string checkpoint = Bytes(building / "fit.checkpoint");
+  const fs::path picture = building / "12/images/004.png";
+  const std::string whole = Bytes(picture);
+  fs::resize_file(picture, whole.size() / 2);
+  const auto failed = BuildObject(job, folder / "set", nullptr);
+  ASSERT_FALSE(failed.ok());
+  EXPECT_EQ(failed.error().code, ErrorCode::kBadFile);
+  EXPECT_NE(failed.error().message.find("004.png"), std::string::npos) << failed.error().message;
+  EXPECT_TRUE(Bytes(building / "fit.checkpoint") == checkpoint);
+  std::ofstream(picture, std::ios::binary) << whole;
+  EXPECT_TRUE(BuildObject(job, folder / "set", nullptr).ok());
+}
+
+TEST(ObjectBuilder, ACheckpointAtFaultCostsNoObject) {
+  const TestFolder folder;
+  const ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
+  const fs::path building = StoppedInItsFit(job, folder / "set");
+  fs::resize_file(building / "fit.checkpoint", fs::file_size(building / "fit.checkpoint") - 20);
+  const auto record = BuildObject(job, folder / "set", nullptr);
+  ASSERT_TRUE(record.ok()) << record.error().message;
+  EXPECT_FALSE(fs::exists(folder / "set/tetra/fit.checkpoint"));
+}
+
 TEST(ObjectBuilder, ReplacesAnOlderObject) {
   const TestFolder folder;
   ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");

@@ -1,7 +1,6 @@
 #include "enhance/refine.h"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -10,13 +9,13 @@
 #include <utility>
 #include <vector>
 
-#include "core/fingerprint.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "enhance/refine_pictures.h"
 #include "enhance/refine_poses.h"
 #include "enhance/refiner.h"
 #include "enhance/split_gaussians.h"
+#include "fit/fingerprints.h"
 #include "fit/training_views.h"
 #include "metrics/image_metrics.h"
 
@@ -162,35 +161,18 @@ Result<std::vector<double>> Residuals(const GaussianCloud& cloud, double upscale
   return residuals;
 }
 
-std::string FingerprintOf(const GaussianCloud& cloud) {
-  Fingerprint print;
-  for (const auto* array : {&cloud.means, &cloud.log_scales, &cloud.quats, &cloud.opacity_logits, &cloud.sh}) {
-    print.Add(*array);
-  }
-  return print.text();
-}
-
-std::string FingerprintOf(const std::vector<Camera>& cameras) {
-  Fingerprint print;
-  for (const Camera& c : cameras) {
-    const Pinhole& k = c.intrinsics;
-    print.Add(c.world_to_camera.rotation);
-    print.Add(c.world_to_camera.translation);
-    print.Add(std::array{k.fx, k.fy, k.cx, k.cy, static_cast<double>(k.width), static_cast<double>(k.height)});
-  }
-  return print.text();
-}
-
-// What a continuation must have in common with what it continues. The pictures' part is how the input agrees with them.
-std::string Settings(const RefineInput& input, const RefineOptions& options, const Views& views) {
+// What a continuation must have in common with what it continues.
+Result<std::string> Settings(const RefineInput& input, const RefineOptions& options, const Views& views) {
   nlohmann::json json = nlohmann::json::parse(ToJsonText(options));
   json["upscale"] = input.upscale;
   json["seed"] = input.seed;
+  json["background"] = views.render.background;
   json["input"] = FingerprintOf(input.cloud);
   json["start"] = FingerprintOf(input.start);
-  json["views"] = views.train.views().size();
-  json["cameras"] = FingerprintOf(views.train.views());
-  json["input_psnr"] = Fixed(views.input_psnr.value_or(0), 6);
+  json["set of cameras"] = FingerprintOf(views.train.views(), views.scene_scale);
+  if (!options.images.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(json["set of pictures"], FingerprintOfPictures(views.train.views()));
+  }
   return json.dump();
 }
 
@@ -292,7 +274,10 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
     return Refined{std::move(input.start), report};
   }
 
-  const std::string settings = Settings(input, options, views);
+  std::string settings;
+  if (!control.checkpoint.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(settings, Settings(input, options, views));
+  }
   FitState state;
   if (control.resume && Exists(control.checkpoint)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(state, ReadFitCheckpoint(control.checkpoint, settings));

@@ -16,6 +16,8 @@
 #include "fit/orbit_scene_test.h"
 #include "fit/pixel_model.h"
 #include "fit/training_views.h"
+#include "formats/flip_bit_test.h"
+#include "formats/image_io.h"
 #include "formats/test_cloud.h"
 #include "formats/test_folder.h"
 #include "metrics/image_metrics.h"
@@ -173,6 +175,17 @@ TEST_F(Refinement, GoesOnWhereItWasStopped) {
   other = input_;
   other.start.log_scales[0] += 0.01f;
   EXPECT_THAT(Refine(other, options_, control).error().message, HasSubstr("its start is"));
+
+  // Nor are other pictures of the same names, or one bit of the state.
+  const auto picture = project() / (cameras_.cameras[2].name + ".png"), aside = folder_ / "aside.png";
+  std::filesystem::copy_file(picture, aside);
+  Image changed = ReadImage(picture).value();
+  changed.pixels[0] = changed.pixels[0] > 0.5f ? 0.0f : 1.0f;
+  ASSERT_TRUE(WritePng(picture, changed, {.overwrite = true}).ok());
+  EXPECT_THAT(Refine(input_, options_, control).error().message, HasSubstr("its set of pictures is another"));
+  std::filesystem::rename(aside, picture);
+  FlipBit(control.checkpoint, 5);
+  EXPECT_THAT(Refine(input_, options_, control).error().message, HasSubstr("is damaged"));
 
   // A state that cannot be written costs the state, not the result.
   stop = true;

@@ -107,14 +107,15 @@ Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
   const InitialPoints points = views.points.size() > 0
                                    ? std::move(views.points)
                                    : RandomPointsInView(kRandomPoints, views.train, views.scene_scale, task.seed);
-  const auto initial = [&] {
-    return InitialCloud(points, views.scene_scale,
-                        {.sh_degree = options.objective.render.sh_degree, .seed = task.seed});
-  };
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      GaussianCloud initial,
+      InitialCloud(points, views.scene_scale, {.sh_degree = options.objective.render.sh_degree, .seed = task.seed}));
   FitControl control;
   control.checkpoint = checkpoint;
   control.checkpoint_every = kCheckpointEvery;
   control.resume = true;
+  control.anew_if_unfit = true;  // it is of another version then
+  control.deliver = [&](const Fitted& fitted) { return WriteCloud(splat, fitted.cloud, {.overwrite = true}); };
   // Time is noted with every checkpoint, so that a fit in several attempts still says what it took.
   const double before = progress.seconds;
   Status noted;
@@ -124,17 +125,8 @@ Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
     noted = WriteProgress(note, progress);
   };
   LogInfo(Cat(object.name, ": fitting ", WithThousands(steps), " steps at ", high.width, " x ", high.height));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud start, initial());
-  auto fit = Fit(views, std::move(start), options, control);
-  if (!fit.ok() && fit.error().code == ErrorCode::kBadFile && fs::exists(checkpoint, code)) {
-    LogWarning(Cat("the fit begins anew: ", fit.error().message));  // a checkpoint of another version
-    fs::remove(checkpoint, code);
-    ANCHORSPLAT_ASSIGN_OR_RETURN(start, initial());
-    fit = Fit(views, std::move(start), options, control);
-  }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Fitted fitted, std::move(fit));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Fitted fitted, Fit(views, std::move(initial), options, control));
   if (!noted.ok()) return noted.error();
-  ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(splat, fitted.cloud, {.overwrite = true}));
   progress = {key, before + Since(begin), fitted.report.train.psnr, true};
   ANCHORSPLAT_RETURN_IF_ERROR(WriteProgress(note, progress));
   fs::remove_all(pictures, code);  // a hundred megabytes that nobody needs again

@@ -1,12 +1,15 @@
 #include "fit/fit.h"
 
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
 #include <system_error>
 #include <utility>
 
-#include "core/fingerprint.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
+#include "fit/fingerprints.h"
 #include "fit/picture_cache.h"
 
 namespace anchorsplat {
@@ -16,17 +19,12 @@ namespace {
 constexpr int64_t kNoteEvery = 20;  // steps: the PSNR of a step costs about as much as one of Adam's arrays
 
 // What a continuation must have in common with the fit that it continues: options, views, start.
-std::string Settings(const FitOptions& options, const TrainingViews& views, const GaussianCloud& initial) {
-  std::string names;
-  for (const Camera& camera : views.train) {
-    names += Cat(camera.name, ' ', camera.intrinsics.width, 'x', camera.intrinsics.height, '\n');
-  }
-  std::string text = ToJsonText(options);
-  text.pop_back();
-  Fingerprint print;
-  print.Add(names);
-  return text + Cat(",\"views\":", views.train.size(), ",\"view_names\":\"", print.text(),
-                    "\",\"initial_gaussians\":", initial.size(), "}");
+Result<std::string> Settings(const FitOptions& options, const TrainingViews& views, const GaussianCloud& initial) {
+  nlohmann::json json = nlohmann::json::parse(ToJsonText(options));
+  json["set of cameras"] = FingerprintOf(views.train, views.scene_scale);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(json["set of pictures"], FingerprintOfPictures(views.train));
+  json["start"] = FingerprintOf(initial);
+  return json.dump();
 }
 
 std::string Note(double psnr, int64_t gaussians) {
@@ -41,8 +39,40 @@ bool Exists(const std::filesystem::path& path) {
   return !path.empty() && std::filesystem::exists(path, ignored);
 }
 
+// The checkpoint of a fit: what it holds of this fit, and why it does not hold more.
+class KeptState {
+ public:
+  KeptState(const std::filesystem::path& path, std::string settings) : path_(path), settings_(std::move(settings)) {}
+
+  std::optional<int64_t> step() const { return step_; }
+  void FoundAt(int64_t step) { step_ = step; }
+
+  // A state that cannot be written costs no more than itself: the one before it, if there is one, stays.
+  void Write(const FitState& state) {
+    if (path_.empty() || step_ == state.step) return;
+    const Status written = WriteFitCheckpoint(path_, state, settings_);
+    if (written.ok()) {
+      step_ = state.step;
+    } else if (!warned_) {
+      LogWarning(Cat("there is no new checkpoint: ", written.error().message));
+    }
+    warned_ = !written.ok();
+  }
+
+  Error NotedIn(Error error) const {
+    if (step_) error.message += Cat("; the state after ", WithThousands(*step_), " steps is kept in ", path_.string());
+    return error;
+  }
+
+ private:
+  std::filesystem::path path_;
+  std::string settings_;
+  std::optional<int64_t> step_;
+  bool warned_ = false;  // once while it goes on
+};
+
 // All steps that are left, or as many as there are before the user stops it.
-Status MakeSteps(Fitter& fitter, const FitControl& control, const std::string& settings, FitReport& report) {
+Status MakeSteps(Fitter& fitter, const FitControl& control, KeptState& kept, FitReport& report) {
   Progress progress("fit", fitter.options().steps);
   int64_t shown = fitter.state().step;
   progress.Advance(shown);
@@ -62,11 +92,22 @@ Status MakeSteps(Fitter& fitter, const FitControl& control, const std::string& s
     if (control.observe) control.observe(fitter);
     report.interrupted = control.stop != nullptr && control.stop->load() && !fitter.done();
     const bool due = control.checkpoint_every > 0 && done % control.checkpoint_every == 0 && !fitter.done();
-    if (!control.checkpoint.empty() && (due || report.interrupted)) {
-      ANCHORSPLAT_RETURN_IF_ERROR(WriteFitCheckpoint(control.checkpoint, fitter.state(), settings));
-    }
+    if (due || report.interrupted) kept.Write(fitter.state());
     if (report.interrupted) break;
   }
+  return {};
+}
+
+// What comes after the steps: the result is brought to safety, then its quality is measured.
+Status Finish(const TrainingViews& views, const FitOptions& options, const FitControl& control, Fitter& fitter,
+              Fitted& out) {
+  if (control.deliver) ANCHORSPLAT_RETURN_IF_ERROR(control.deliver(out));
+  if (out.report.interrupted) return {};
+  const PixelModel pixel = PixelModelAt(options, options.steps);
+  const RenderOptions& render = options.objective.render;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(out.report.train, MeasureQuality(out.cloud, render, fitter.pictures(), pixel));
+  PictureCache held_out(views.held_out, render.background, 0);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(out.report.held_out, MeasureQuality(out.cloud, render, held_out, pixel));
   return {};
 }
 
@@ -74,41 +115,56 @@ Status MakeSteps(Fitter& fitter, const FitControl& control, const std::string& s
 
 Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitOptions& options,
                    const FitControl& control) {
-  const std::string settings = Settings(options, views, initial);
+  std::string settings;
+  if (!control.checkpoint.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(settings, Settings(options, views, initial));
+  }
+  KeptState kept(control.checkpoint, settings);
   FitReport report;
   report.gaussians_in = initial.size();
   report.scene_scale = views.scene_scale;
   FitState state;
+  bool unfit = false;  // what is there is not this fit's
   if (control.resume && Exists(control.checkpoint)) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(state, ReadFitCheckpoint(control.checkpoint, settings));
-    report.resumed_at = state.step;
-    LogInfo(Cat("going on at step ", WithThousands(state.step), " of ", control.checkpoint.string()));
-  } else {
-    state = Fitter::Fresh(std::move(initial));
+    auto earlier = ReadFitCheckpoint(control.checkpoint, settings);
+    if (earlier.ok()) {
+      state = *std::move(earlier);
+      report.resumed_at = state.step;
+      kept.FoundAt(state.step);
+      LogInfo(Cat("going on at step ", WithThousands(state.step), " of ", control.checkpoint.string()));
+    } else {
+      const ErrorCode code = earlier.error().code;
+      unfit = control.anew_if_unfit && (code == ErrorCode::kBadFile || code == ErrorCode::kBadArgument);
+      if (!unfit) return earlier.error();
+      LogWarning(Cat("the fit begins anew: ", earlier.error().message));
+    }
   }
+  if (report.resumed_at == 0) state = Fitter::Fresh(std::move(initial));
 
-  const auto& background = options.objective.render.background;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Fitter fitter, Fitter::Begin(options, PictureCache(views.train, background),
-                                                            views.scene_scale, std::move(state)));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Fitter fitter,
+                               Fitter::Begin(options, PictureCache(views.train, options.objective.render.background),
+                                             views.scene_scale, std::move(state)));
+  // A state that was never this fit's, because a picture is damaged perhaps, is not given up for the sake of an error.
+  const auto failed = [&](const Error& error) {
+    const FitState& now = fitter.state();
+    if (!now.cloud.empty() && now.step > 0 && !(unfit && !kept.step())) kept.Write(now);
+    return kept.NotedIn(error);
+  };
   Stopwatch watch;
-  ANCHORSPLAT_RETURN_IF_ERROR(MakeSteps(fitter, control, settings, report));
+  if (const Status made = MakeSteps(fitter, control, kept, report); !made.ok()) return failed(made.error());
   report.seconds = watch.Lap();
   report.steps = fitter.state().step;
   report.times = fitter.times();
+  if (report.interrupted) report.kept_step = kept.step();
 
-  Fitted out{fitter.TakeCloud(), report};
+  Fitted out{fitter.UsableCloud(), report};
   out.cloud.render_mode = options.objective.render.mode;
   if (options.pixel.upscale > 1) out.cloud.comments.push_back(PixelAreaComment(options.pixel.upscale));
   out.report.gaussians_out = out.cloud.size();
-  if (out.report.interrupted) return out;
-  const PixelModel pixel = PixelModelAt(options, options.steps);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(out.report.train,
-                               MeasureQuality(out.cloud, options.objective.render, fitter.pictures(), pixel));
-  PictureCache held_out(views.held_out, background, 0);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(out.report.held_out,
-                               MeasureQuality(out.cloud, options.objective.render, held_out, pixel));
-  std::error_code ignored;
-  if (Exists(control.checkpoint) && !control.keep_checkpoint) std::filesystem::remove(control.checkpoint, ignored);
+  if (const Status finished = Finish(views, options, control, fitter, out); !finished.ok()) {
+    return failed(finished.error());
+  }
+  if (!out.report.interrupted && !control.checkpoint.empty()) RemoveFitCheckpoint(control.checkpoint);
   return out;
 }
 

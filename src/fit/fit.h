@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
+#include <optional>
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
@@ -14,14 +16,21 @@
 
 namespace anchorsplat {
 
+struct Fitted;
+
 // How a fit is run, besides what it computes (FitOptions).
 struct FitControl {
-  std::filesystem::path checkpoint;            // empty: none is written or read
-  int64_t checkpoint_every = 0;                // steps; 0: only when interrupted
-  bool resume = false;                         // go on from `checkpoint` if it is there
-  bool keep_checkpoint = false;                // when the fit ends: its caller removes it, once the result is safe
+  std::filesystem::path checkpoint;  // empty: none is written or read
+  int64_t checkpoint_every = 0;      // steps; 0: only when the fit ends before its end
+  bool resume = false;               // go on from `checkpoint` if it is there
+  // What to do with a checkpoint that is damaged, another version's or another run's: begin anew with a warning, where
+  // the caller knows that it is its own; else that is an error. The file stays until a new state takes its place.
+  bool anew_if_unfit = false;
   const std::atomic<bool>* stop = nullptr;     // becomes true when the user wants to stop
   std::function<void(const Fitter&)> observe;  // after every step; may be empty
+  // Brings the result to safety, also that of an interrupted fit; may be empty. Called before qualities are measured.
+  // As long as it has not succeeded the state is kept.
+  std::function<Status(const Fitted&)> deliver;
 };
 
 // What was done, for people and for --json.
@@ -29,10 +38,13 @@ struct FitReport {
   int64_t steps = 0;         // done in all
   int64_t resumed_at = 0;    // steps that a checkpoint brought
   bool interrupted = false;  // then the qualities are not measured
+  // Of an interrupted fit: the step of the state that the checkpoint holds. Less than `steps` when there was no room
+  // for a newer one; nothing when there is none at all.
+  std::optional<int64_t> kept_step;
   int64_t gaussians_in = 0;  // that the fit (not its continuation) began with
   int64_t gaussians_out = 0;
-  int64_t duplicated = 0, split = 0, pruned = 0;  // in this run
-  double loss = 0;                                // of the last step
+  int64_t duplicated = 0, split = 0, pruned = 0;           // in this run
+  double loss = std::numeric_limits<double>::quiet_NaN();  // of the last step of this run, if it made any
   double scene_scale = 0;
   ViewQuality train, held_out;
   double seconds = 0;  // of the steps in this run
@@ -46,10 +58,13 @@ struct Fitted {
 
 // Fits Gaussians that begin as `initial` to the training views: the whole of an optimisation, with progress, an
 // interruption that loses nothing, and the quality at its end. When `control.stop` becomes true the result so far comes
-// back with `interrupted` set and the checkpoint is written; when a fit ends, its checkpoint is removed, unless the
-// caller keeps it until the result is safe.
+// back with `interrupted` set and the checkpoint is written. A checkpoint that cannot be written is a warning and costs
+// no more than itself. When anything else fails, the state is kept in the checkpoint, and the message says so; when a
+// fit has ended and its result was delivered, the checkpoint is removed.
 //
-// Errors: those of Fitter and of the checkpoint's file.
+// A checkpoint belongs to these options, views (cameras and the bytes of their pictures) and this start.
+//
+// Errors: those of Fitter, `deliver`, ReadFitCheckpoint and, with a checkpoint, of FingerprintOfPictures.
 Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitOptions& options,
                    const FitControl& control = {});
 

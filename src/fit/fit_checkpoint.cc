@@ -1,17 +1,21 @@
 #include <charconv>
 #include <nlohmann/json.hpp>
+#include <system_error>
+#include <utility>
 #include <vector>
 
 #include "core/text.h"
 #include "fit/fitter.h"
 #include "formats/safetensors.h"
+#include "formats/tensor_checksum.h"
 #include "formats/tensor_file.h"
 
 namespace anchorsplat {
 
 namespace {
 
-constexpr const char* kFormat = "anchorsplat fit 1";
+constexpr const char* kFormat = "anchorsplat fit 2";
+constexpr const char* kFormatBefore = "anchorsplat fit 1";  // knew neither its pictures and start nor a checksum
 
 // An array of the state and what it is called in the file.
 template <typename Array>
@@ -50,8 +54,10 @@ Status CompareSettings(const std::string& file, const std::string& theirs, const
       if (found == a.end()) {
         return Error{ErrorCode::kBadFile, Cat(file, ": is a checkpoint of another version, which knew no ", key)};
       }
-      return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run: its ", key, " is ",
-                                                Printable(found->dump()), ", this one's is ", value.dump())};
+      // Options are numbers; texts are fingerprints, which tell nobody anything.
+      const std::string how =
+          value.is_string() ? "another one" : Cat(Printable(found->dump()), ", this one's is ", value.dump());
+      return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run: its ", key, " is ", how)};
     }
   }
   return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run")};
@@ -65,15 +71,22 @@ Status WriteFitCheckpoint(const std::filesystem::path& path, const FitState& sta
        ArraysOf<const FitState, const Buffer<float>>(state, state.cloud.size(), state.cloud.coefficients())) {
     entries.push_back(MakeEntry(array.name, array.shape, *array.values));
   }
-  return WriteSafetensors(path, entries, {{"format", kFormat}, {"step", Cat(state.step)}, {"settings", settings}},
-                          {.overwrite = true});
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      const auto metadata,
+      WithChecksum({{"format", kFormat}, {"step", Cat(state.step)}, {"settings", settings}}, entries));
+  return WriteSafetensors(path, entries, metadata, {.overwrite = true});
 }
 
 bool IsFitCheckpoint(const std::filesystem::path& path) {
   const auto file = TensorFile::Open(path);
   if (!file.ok()) return false;
   const auto format = file->metadata().find("format");
-  return format != file->metadata().end() && format->second == kFormat;
+  return format != file->metadata().end() && (format->second == kFormat || format->second == kFormatBefore);
+}
+
+void RemoveFitCheckpoint(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (IsFitCheckpoint(path)) std::filesystem::remove(path, ignored);
 }
 
 Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std::string& settings) {
@@ -85,7 +98,14 @@ Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std:
     const auto found = file.metadata().find(key);
     return found == file.metadata().end() ? std::string() : found->second;
   };
+  if (text("format") == kFormatBefore) {
+    return bad(
+        "is a checkpoint of an earlier version, which noted neither what its pictures and its start were nor a "
+        "checksum; "
+        "-w begins anew");
+  }
   if (text("format") != kFormat) return bad("is not a checkpoint of a fit (metadata \"format\")");
+  ANCHORSPLAT_RETURN_IF_ERROR(VerifyChecksum(file));
   ANCHORSPLAT_RETURN_IF_ERROR(CompareSettings(path.string(), text("settings"), settings));
 
   FitState state;

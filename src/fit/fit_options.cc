@@ -45,7 +45,16 @@ Status Validate(const FitOptions& options) {
   const DensificationOptions& d = options.densification;
   if (d.refine_every < 1 || d.reset_every < 1) return bad("refine_every and reset_every must be at least 1");
   if (!(d.prune_opa > 0 && d.prune_opa < 0.5)) return bad("prune_opa must lie between 0 and 0.5");
-  if (!(d.grow_scale3d > 0 && d.prune_scale3d > 0)) return bad("grow_scale3d and prune_scale3d must be positive");
+  for (const auto& [name, value] : {std::pair{"grow_grad2d", d.grow_grad2d},
+                                    {"grow_scale3d", d.grow_scale3d},
+                                    {"grow_scale2d", d.grow_scale2d},
+                                    {"prune_scale3d", d.prune_scale3d},
+                                    {"prune_scale2d", d.prune_scale2d}}) {
+    if (!(value >= 0 && std::isfinite(value))) return bad(Cat(name, " must be a number and not negative"));
+  }
+  if (d.grow_scale3d == 0 || d.prune_scale3d == 0) return bad("grow_scale3d and prune_scale3d must be positive");
+  const double ssim = options.objective.loss.ssim_weight;
+  if (!(ssim >= 0 && ssim <= 1)) return bad("the weight of SSIM must lie in [0, 1]");
   if (d.max_gaussians < 0) return bad("max_gaussians must not be negative");
   const int degree = options.objective.render.sh_degree;
   if (degree < 0 || degree > kMaxShDegree) return bad("SH degree must be 0 to 3");

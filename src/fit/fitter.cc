@@ -75,8 +75,8 @@ double Fitter::LastPsnr() const {
   return psnr.ok() ? *psnr : 0;
 }
 
-GaussianCloud Fitter::TakeCloud() {
-  GaussianCloud cloud = std::move(state_.cloud);
+GaussianCloud Fitter::UsableCloud() const {
+  const GaussianCloud& cloud = state_.cloud;
   std::vector<int64_t> usable;
   for (int64_t i = 0; i < cloud.size(); ++i) {
     if (IsUsable(cloud, i)) usable.push_back(i);

@@ -58,8 +58,8 @@ class Fitter {
   FitTimes times() const;
   // Peak signal-to-noise ratio of the last step's picture, before the step.
   double LastPsnr() const;
-  // The cloud, without rows that are not finite. Ends the fitter.
-  GaussianCloud TakeCloud();
+  // A copy of the cloud, without rows that are not finite.
+  GaussianCloud UsableCloud() const;
 
  private:
   Fitter(const FitOptions& options, PictureCache pictures, double scene_scale, FitState state);
@@ -76,14 +76,19 @@ class Fitter {
 };
 
 // A state as a safetensors file: the cloud, Adam's moments and what densification gathered, exactly; in the metadata
-// the step and `settings`, a JSON object of what the fit depends on. Whole or not at all; replaces an older one.
+// the step, `settings`, a JSON object of what the fit depends on, and a checksum. Whole or not at all; replaces an
+// older one.
 Status WriteFitCheckpoint(const std::filesystem::path& path, const FitState& state, const std::string& settings);
 
-// Whether the file says that it is such a checkpoint; false when it cannot be read.
+// Whether the file says that it is such a checkpoint, of this version or the one before it; false when it cannot be
+// read.
 bool IsFitCheckpoint(const std::filesystem::path& path);
 
-// Errors: those of TensorFile; kBadFile when it is no such checkpoint; kBadArgument when its settings are others than
-// `settings`, naming the first that differs.
+// Takes away such a checkpoint if it is there. Nothing else is.
+void RemoveFitCheckpoint(const std::filesystem::path& path);
+
+// Errors: those of TensorFile; kBadFile when it is no such checkpoint, one of an earlier version or a damaged one;
+// kBadArgument when its settings are others than `settings`, naming the first that differs.
 Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std::string& settings);
 
 }  // namespace anchorsplat

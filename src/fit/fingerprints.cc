@@ -1,0 +1,53 @@
+#include "fit/fingerprints.h"
+
+#include <array>
+#include <cstdint>
+
+#include "core/fingerprint.h"
+#include "core/parallel.h"
+#include "formats/mapped_file.h"
+
+namespace anchorsplat {
+
+std::string FingerprintOf(const GaussianCloud& cloud) {
+  Fingerprint print;
+  for (const auto* array : {&cloud.means, &cloud.log_scales, &cloud.quats, &cloud.opacity_logits, &cloud.sh}) {
+    print.Add(*array);
+  }
+  return print.text();
+}
+
+std::string FingerprintOf(const std::vector<Camera>& cameras, double scene_scale) {
+  Fingerprint print;
+  for (const Camera& c : cameras) {
+    const Pinhole& k = c.intrinsics;
+    print.Add(c.world_to_camera.rotation);
+    print.Add(c.world_to_camera.translation);
+    print.Add(std::array{k.fx, k.fy, k.cx, k.cy, static_cast<double>(k.width), static_cast<double>(k.height)});
+  }
+  print.Add(std::array{scene_scale});
+  return print.text();
+}
+
+Result<std::string> FingerprintOfPictures(const std::vector<Camera>& cameras) {
+  std::vector<uint64_t> prints(cameras.size());
+  std::vector<Status> read(cameras.size());
+  ParallelFor(0, std::ssize(cameras), 1, [&](int64_t first, int64_t last) {
+    for (auto i = static_cast<size_t>(first); i < static_cast<size_t>(last); ++i) {
+      const auto file = MappedFile::Open(cameras[i].image);
+      if (!file.ok()) {
+        read[i] = file.error();
+        continue;
+      }
+      Fingerprint print;
+      print.Add(file->bytes());
+      prints[i] = print.value();
+    }
+  });
+  for (const Status& status : read) ANCHORSPLAT_RETURN_IF_ERROR(status);
+  Fingerprint all;
+  all.Add(prints);
+  return all.text();
+}
+
+}  // namespace anchorsplat

@@ -5,13 +5,15 @@
 
 #include "core/text.h"
 #include "formats/safetensors.h"
+#include "formats/tensor_checksum.h"
 #include "formats/tensor_file.h"
 
 namespace anchorsplat {
 
 namespace {
 
-constexpr const char* kFormat = "anchorsplat training 1";
+constexpr const char* kFormat = "anchorsplat training 2";
+constexpr const char* kFormatBefore = "anchorsplat training 1";  // the same without a checksum: still read
 
 Status ReadTensor(const TensorFile& file, const std::string& name, torch::Tensor tensor) {
   const torch::NoGradGuard no_gradient;
@@ -51,9 +53,10 @@ Status Compare(const std::string& file, const char* what, const std::string& the
 Result<TensorFile> OpenCheckpoint(const std::filesystem::path& path) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(TensorFile file, TensorFile::Open(path));
   const auto format = file.metadata().find("format");
-  if (format == file.metadata().end() || format->second != kFormat) {
+  if (format == file.metadata().end() || (format->second != kFormat && format->second != kFormatBefore)) {
     return Error{ErrorCode::kBadFile, Cat(path.string(), ": is not a checkpoint of a training (metadata \"format\")")};
   }
+  if (format->second == kFormat) ANCHORSPLAT_RETURN_IF_ERROR(VerifyChecksum(file));
   return file;
 }
 
@@ -74,10 +77,12 @@ Status WriteTrainCheckpoint(const std::filesystem::path& path, const Optimizer& 
       {"step", p.step},          {"optimizer_steps", p.optimizer_steps}, {"skipped", p.skipped},
       {"seconds", p.seconds},    {"loss_scale", p.loss_scale},           {"since_scaled", p.since_scaled},
       {"best_psnr", p.best_psnr}};
-  return WriteSafetensors(
-      path, entries,
-      {{"format", kFormat}, {"progress", progress.dump()}, {"settings", p.settings}, {"objects", p.objects}},
-      {.overwrite = true});
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      const auto metadata,
+      WithChecksum(
+          {{"format", kFormat}, {"progress", progress.dump()}, {"settings", p.settings}, {"objects", p.objects}},
+          entries));
+  return WriteSafetensors(path, entries, metadata, {.overwrite = true});
 }
 
 Result<TrainProgress> ReadTrainCheckpoint(const std::filesystem::path& path, const TrainProgress& expected,

@@ -25,13 +25,13 @@ struct TrainProgress {
   std::string objects;       // JSON: names of the training's objects
 };
 
-// All of it as a safetensors file, whole or not at all; replaces an older one.
+// All of it as a safetensors file with a checksum, whole or not at all; replaces an older one.
 Status WriteTrainCheckpoint(const std::filesystem::path& path, const Optimizer& optimizer,
                             const TrainProgress& progress);
 
 // Fills the optimizer's tensors, the network's weights among them. Errors: those of TensorFile; kBadFile: no such
-// checkpoint, or a tensor that is missing or of another shape; kBadArgument: settings or objects others than those in
-// `expected`, naming the first that differs.
+// checkpoint, a damaged one, or a tensor that is missing or of another shape; kBadArgument: settings or objects others
+// than those in `expected`, naming the first that differs.
 Result<TrainProgress> ReadTrainCheckpoint(const std::filesystem::path& path, const TrainProgress& expected,
                                           Optimizer& optimizer);
 

@@ -8,6 +8,7 @@
 
 #include "core/log.h"
 #include "core/parallel.h"
+#include "formats/flip_bit_test.h"
 #include "formats/tensor_file.h"
 #include "model/checkpoint.h"
 #include "train/small_training_test.h"
@@ -259,6 +260,10 @@ TEST(Trainer, ResumedIsTheSameAsUninterrupted) {
   ExpectSameTensors(whole.out / "checkpoint.safetensors", parts.out / "checkpoint.safetensors");
   ExpectSameTensors(whole.out / "model.safetensors", parts.out / "model.safetensors");
   EXPECT_EQ(Timeless(Log(whole.out)), Timeless(Log(parts.out)));
+
+  FlipBit(parts.out / "checkpoint.safetensors", 5);
+  EXPECT_THAT(Train(parts).error().message, HasSubstr("is damaged"));
+  FlipBit(parts.out / "checkpoint.safetensors", 5);
 
   // Another recipe or other objects are another training.
   parts.seed = 3;

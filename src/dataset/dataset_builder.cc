@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstring>
 #include <map>
+#include <set>
 #include <system_error>
 
 #include "core/log.h"
@@ -12,6 +13,7 @@
 #include "dataset/job_list.h"
 #include "dataset/object_builder.h"
 #include "dataset/process_pool.h"
+#include "dataset/unfinished_objects.h"
 #include "formats/atomic_file.h"
 #include "formats/file_bytes.h"
 
@@ -102,13 +104,14 @@ Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, 
     LogWarning(Cat(failure.name, " failed (", failure.stage, "): ", failure.message));
     failures.insert_or_assign(failure.name, failure);
   }
+  std::set<std::string> unfinished;
   const auto write_lists = [&]() -> Status {
     std::vector<ObjectFailure> list;
     for (const auto& [name, failure] : failures) list.push_back(failure);
     ANCHORSPLAT_RETURN_IF_ERROR(WriteFailures(dataset, list));
-    return WriteManifest(dataset, manifest);
+    ANCHORSPLAT_RETURN_IF_ERROR(WriteManifest(dataset, manifest));
+    return WriteUnfinished(dataset, {unfinished.begin(), unfinished.end()});
   };
-  ANCHORSPLAT_RETURN_IF_ERROR(write_lists());
 
   DatasetBuildReport report;
   report.objects = std::ssize(jobs) + std::ssize(todo.failures);
@@ -121,8 +124,10 @@ Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, 
       report.other_settings += SameSettings(there->second, job) ? 0 : 1;
     } else if (failures.count(job.name) == 0 || options.overwrite) {
       wanted.push_back(&job);
+      unfinished.insert(job.name);
     }
   }
+  ANCHORSPLAT_RETURN_IF_ERROR(write_lists());
 
   Progress progress("objects", std::ssize(wanted));
   const auto start = [&](int64_t i) {
@@ -146,6 +151,7 @@ Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, 
     auto record = end.ok() ? ReadRecord(dataset / job.name) : Error{ErrorCode::kIo, ""};
     if (record.ok()) {
       ++report.built;
+      unfinished.erase(job.name);
       note += Cat(": ", Fixed(record->train_psnr, 2), " dB, ", WithThousands(record->gaussians), " Gaussians in ",
                   HumanSeconds(end.seconds));
       manifest.insert_or_assign(job.name, *std::move(record));
@@ -155,6 +161,7 @@ Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, 
       if (end.ok()) failure.message = record.error().message;
       LogWarning(Cat(job.name, " failed (", failure.stage, "): ", failure.message));
       failures.insert_or_assign(job.name, std::move(failure));
+      unfinished.erase(job.name);
     }
     lists = write_lists();
     progress.Advance(1, note);

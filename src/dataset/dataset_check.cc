@@ -10,6 +10,7 @@
 #include "dataset/dataset_split.h"
 #include "dataset/object_builder.h"
 #include "dataset/scene_reader.h"
+#include "dataset/unfinished_objects.h"
 #include "formats/cloud_io.h"
 #include "formats/image_io.h"
 #include "scene/mesh_file.h"
@@ -145,6 +146,26 @@ void CheckSplits(const fs::path& dataset, const Manifest& manifest, std::vector<
   }
 }
 
+Status CheckFinished(const fs::path& dataset, const Manifest& manifest, std::vector<DatasetProblem>& problems) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto failures, ReadFailures(dataset));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto unfinished, FindUnfinished(dataset, failures));
+  for (const UnfinishedObject& object : unfinished) {
+    std::string sentence;
+    if (!object.listed) {
+      sentence = Cat(object.folder.string(),
+                     ": was begun and is not finished; the dataset build that began it goes on, or remove the folder");
+    } else if (manifest.count(object.name) > 0) {
+      sentence = Cat((dataset / object.name).string(),
+                     ": is from before; the build that was to make it again has not ended, the same one goes on");
+    } else {
+      sentence = Cat((dataset / object.name).string(),
+                     ": the build that was to make it has not ended; the same dataset build goes on");
+    }
+    problems.push_back({object.name, std::move(sentence)});
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<std::vector<DatasetProblem>> CheckDataset(const fs::path& dataset, const DatasetCheckOptions& options) {
@@ -157,6 +178,7 @@ Result<std::vector<DatasetProblem>> CheckDataset(const fs::path& dataset, const 
   });
   std::vector<DatasetProblem> problems;
   CheckSplits(dataset, manifest, problems);
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckFinished(dataset, manifest, problems));
   std::error_code code;
   for (fs::directory_iterator it(dataset, code), end; !code && it != end; it.increment(code)) {
     const std::string name = it->path().filename().string();
@@ -212,15 +234,9 @@ Result<DatasetSummary> SummarizeDataset(const fs::path& dataset) {
       summary.splits[split] += record != manifest.end() && !record->second.rejected ? 1 : 0;
     }
   }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto unfinished, FindUnfinished(dataset, failures));
+  summary.unfinished = std::ssize(unfinished);
   std::error_code code;
-  for (fs::directory_iterator it(dataset / kBuildingName, code), end; !code && it != end; it.increment(code)) {
-    std::error_code ignored;
-    const bool failed = std::any_of(failures.begin(), failures.end(), [&](const ObjectFailure& failure) {
-      return failure.name == it->path().filename().string();
-    });
-    summary.unfinished += it->is_directory(ignored) && !failed ? 1 : 0;
-  }
-  code.clear();
   for (fs::recursive_directory_iterator it(dataset, code), end; !code && it != end; it.increment(code)) {
     std::error_code ignored;
     if (it->is_regular_file(ignored)) {

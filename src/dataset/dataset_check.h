@@ -23,8 +23,9 @@ struct DatasetCheckOptions {
 
 // Looks at everything a data set promises: every object of the manifest is there and says the same, has all its views
 // at their sizes, a splat of as many Gaussians as its record says, in both files, all finite; no objects that the
-// manifest does not know; no model in two splits. Problems come sorted by object.
-// Errors: kNotFound: no manifest; kBadFile: of the manifest.
+// manifest does not know; no model in two splits; nothing that a build was to make and has not, because it was killed
+// or is still at work. Problems come sorted by object. Errors: kNotFound: no manifest; kBadFile: of the manifest or the
+// list of failures.
 Result<std::vector<DatasetProblem>> CheckDataset(const std::filesystem::path& dataset,
                                                  const DatasetCheckOptions& options = {});
 
@@ -39,7 +40,7 @@ struct DatasetSummary {
   int64_t objects = 0;  // that are no rejects
   int64_t rejected = 0;
   int64_t failed = 0;
-  int64_t unfinished = 0;                 // begun, neither done nor failed
+  int64_t unfinished = 0;                 // begun or listed by a build, neither done nor failed
   Part all;                               // without rejects
   std::map<std::string, Part> recipes;    // by entry
   std::map<std::string, int64_t> splits;  // objects; empty without splits.json

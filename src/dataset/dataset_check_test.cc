@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "dataset/dataset_split.h"
 #include "dataset/small_dataset_test.h"
+#include "dataset/unfinished_objects.h"
 #include "formats/test_folder.h"
 
 namespace anchorsplat {
@@ -84,6 +87,20 @@ TEST_F(DatasetCheckTest, FindsPartedModelsAndUnknownObjects) {
   manifest_.erase("b");
   ASSERT_TRUE(WriteManifest(set_, manifest_).ok());
   EXPECT_NE(Problems().find("does not know this object"), std::string::npos);
+}
+
+TEST_F(DatasetCheckTest, FindsWhatAKilledBuildLeft) {
+  ASSERT_TRUE(WriteUnfinished(set_, {"b", "c"}).ok());
+  fs::create_directories(BuildingFolder(set_, "d"));
+  fs::create_directories(BuildingFolder(set_, "broken"));
+  ASSERT_TRUE(WriteFailures(set_, {{"broken", "x.obj", "mesh", "broken"}}).ok());
+  const std::string problems = Problems();
+  EXPECT_NE(problems.find("b | " + (set_ / "b").string() + ": is from before"), std::string::npos) << problems;
+  EXPECT_NE(problems.find("c | " + (set_ / "c").string() + ": the build that was to make it has not ended"),
+            std::string::npos);
+  EXPECT_NE(problems.find("d | "), std::string::npos);
+  EXPECT_EQ(std::count(problems.begin(), problems.end(), '\n'), 3) << "what failed is no part of it";
+  EXPECT_EQ(SummarizeDataset(set_)->unfinished, 3);
 }
 
 TEST_F(DatasetCheckTest, SummaryCounts) {

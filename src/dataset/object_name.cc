@@ -20,7 +20,8 @@ char Lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + '
 bool IsReserved(const std::string& name) {
   std::string small;
   for (const char c : name) small += Lower(c);
-  constexpr std::array<std::string_view, 4> kNames = {"manifest.jsonl", "failures.jsonl", "splits.json", "lock"};
+  constexpr std::array<std::string_view, 5> kNames = {"manifest.jsonl", "failures.jsonl", "splits.json", "lock",
+                                                      "unfinished"};
   constexpr std::array<std::string_view, 4> kEndings = {".job", ".log", ".lock", ".replaced"};
   return std::find(kNames.begin(), kNames.end(), small) != kNames.end() ||
          std::any_of(kEndings.begin(), kEndings.end(),

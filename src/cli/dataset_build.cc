@@ -1,11 +1,12 @@
-#include <csignal>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "cli/choice.h"
 #include "cli/dataset.h"
 #include "cli/mesh_views.h"
+#include "cli/stop_signal.h"
 #include "cli/verb.h"
 #include "core/parallel.h"
 #include "core/text.h"
@@ -18,15 +19,6 @@
 namespace anchorsplat {
 
 namespace {
-
-// Ctrl-C asks for an orderly end; the second one ends at once.
-std::atomic<bool> build_stop_requested{false};
-static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may not lock");
-
-void RequestBuildStop(int signal) {
-  build_stop_requested = true;
-  std::signal(signal, SIG_DFL);
-}
 
 struct BuildFlags {
   std::vector<std::string> meshes;
@@ -73,12 +65,10 @@ Status RunBuild(const BuildFlags& flags, Program& program) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto resolved, ResolveAddresses(listed, flags.objects));
     meshes.insert(meshes.end(), resolved.begin(), resolved.end());
   }
-  options.stop = &build_stop_requested;
-  std::signal(SIGINT, RequestBuildStop);
-  std::signal(SIGTERM, RequestBuildStop);
+  options.stop = &StopSignal::requested();
+  std::optional<StopSignal> stop_signal(std::in_place);
   auto built = BuildDataset(meshes, flags.output, options);
-  std::signal(SIGINT, SIG_DFL);
-  std::signal(SIGTERM, SIG_DFL);
+  stop_signal.reset();
   if (!built.ok()) return built.error();
   const DatasetBuildReport& r = *built;
   if (shared.json) {
@@ -162,8 +152,8 @@ struct ObjectFlags {
 Status RunObject(const ObjectFlags& flags) {
   DieWithParent();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ObjectJob job, ReadObjectJob(flags.job));
-  std::signal(SIGTERM, RequestBuildStop);
-  const auto record = BuildObject(job, flags.output, &build_stop_requested);
+  const StopSignal stop_signal;
+  const auto record = BuildObject(job, flags.output, &StopSignal::requested());
   return record.ok() ? Status() : Status(record.error());
 }
 

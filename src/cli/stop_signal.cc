@@ -1,5 +1,7 @@
 #include "cli/stop_signal.h"
 
+#include <signal.h>
+
 #include <csignal>
 
 namespace anchorsplat {
@@ -11,7 +13,13 @@ static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may not 
 
 void RequestStop(int signal) {
   stop_requested = true;
-  std::signal(signal, SIG_DFL);
+  std::signal(signal, signal == SIGHUP ? SIG_IGN : SIG_DFL);
+}
+
+void SetUnlessIgnored(int signal, void (*handler)(int)) {
+  struct sigaction now {};
+  const bool ignored = sigaction(signal, nullptr, &now) == 0 && now.sa_handler == SIG_IGN;
+  if (!ignored) std::signal(signal, handler);
 }
 
 }  // namespace
@@ -19,11 +27,17 @@ void RequestStop(int signal) {
 StopSignal::StopSignal() {
   std::signal(SIGINT, RequestStop);
   std::signal(SIGTERM, RequestStop);
+  SetUnlessIgnored(SIGHUP, RequestStop);
+  std::signal(SIGPIPE, SIG_IGN);
 }
 
 StopSignal::~StopSignal() {
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
+  // What was asked to end still writes what it has, and the terminal is gone.
+  if (stop_requested) return;
+  SetUnlessIgnored(SIGHUP, SIG_DFL);
+  std::signal(SIGPIPE, SIG_DFL);
 }
 
 const std::atomic<bool>& StopSignal::requested() { return stop_requested; }

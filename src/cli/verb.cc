@@ -1,5 +1,6 @@
 #include "cli/verb.h"
 
+#include <csignal>
 #include <cstdio>
 #include <iostream>
 #include <new>
@@ -112,6 +113,8 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
     return Fail(flags, {ErrorCode::kBadArgument, Cat(error.what(), " (--help shows how)")});
   }
 
+  // A limit on the size of files is an error of the write that meets it, not the end of the program.
+  std::signal(SIGXFSZ, SIG_IGN);
   const SharedFlags& flags = program.flags;
   SetLogSink(MakeTerminalSink(flags.quiet));
   SetThreadCount(flags.threads);

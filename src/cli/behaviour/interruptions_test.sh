@@ -1,0 +1,133 @@
+#!/usr/bin/env bash
+# Runs that end before their end, by a signal, a full disk or a lost folder, and what goes on from there:
+# interruptions_test.sh PROGRAM SOURCE_DIR.
+. "$(dirname "$0")/expectations.sh"
+
+mkdir "$work/project"
+cp "$cameras" "$work/project/transforms.json"
+expect 0 "pictures to fit" "$program" render "$input" -o "$work/project/hr" --cameras "$cameras" --size 48x48
+long=1000000
+fit() { "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 "$@"; }
+# Waits until the test is true or the child has ended.
+until_is() {
+  while kill -0 "$child" 2>/dev/null && ! "$@"; do :; done
+}
+says_log() { grep -qF -- "$1" "$work/log"; }
+
+# What a continuation has to have in common with its beginning: not the names alone.
+stopped() {
+  "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 -o "$work/part.ply" --steps 200 \
+    --checkpoint-every 1 -q &
+  child=$!
+  until_is test -e "$work/part.ply.checkpoint"
+  kill -INT $child
+  wait $child
+}
+resumed() { fit -o "$work/part.ply" --steps 200 --resume "$@"; }
+expect 130 "a fit to go on with" stopped
+picture=$(find "$work/project/hr" -name '*.png' | sort | sed -n 2p)
+cp "$picture" "$work/picture.png" && cp "$(find "$work/project/hr" -name '*.png' | sort | sed -n 3p)" "$picture"
+expect 2 "it does not go on with another picture" resumed
+says stderr "its set of pictures is another"
+cp "$work/picture.png" "$picture" && cp "$work/project/transforms.json" "$work/transforms.json"
+sed -i 's/"fl_x": 1236/"fl_x": 1237/' "$work/project/transforms.json"
+expect 2 "it does not go on with other cameras" resumed
+says stderr "its set of cameras is another"
+cp "$work/transforms.json" "$work/project/transforms.json"
+expect 2 "it does not go on from another start" resumed --init-splat "$input"
+says stderr "its start is another"
+cp "$work/part.ply.checkpoint" "$work/checkpoint"
+printf 'anchorsplat' | dd of="$work/part.ply.checkpoint" bs=1 seek=60000 conv=notrunc status=none
+expect 4 "it does not go on from a damaged state" resumed
+says stderr "is damaged"
+cp "$work/checkpoint" "$work/part.ply.checkpoint"
+expect 0 "it goes on with what it began with" resumed
+says stderr "going on"
+
+# A closed terminal: SIGHUP, from the shell and from the system, and nobody to read what is said.
+hung_up() {
+  "$program" fit "$work/project" --init-points 300 --hold-out 5 -o "$work/hung.ply" --steps $long --checkpoint-every 1 \
+    -q 2> >(:) &
+  child=$!
+  until_is test -e "$work/hung.ply.checkpoint"
+  kill -HUP $child && kill -HUP $child 2>/dev/null
+  wait $child
+}
+expect 130 "SIGHUP ends a fit in order" hung_up
+expect 0 "its splat is there" "$program" info "$work/hung.ply"
+expect 0 "its state is there" test -s "$work/hung.ply.checkpoint"
+refine_hung_up() {
+  "$program" enhance "$input" --upscale 2 --pixel-size 0.02 -o "$work/refined.ply" --images "$work/project" --k 1 \
+    --steps $long 2>"$work/log" &
+  child=$!
+  until_is says_log "views with pictures"
+  kill -HUP $child
+  wait $child
+}
+expect 130 "SIGHUP ends a refinement in order" refine_hung_up
+expect 0 "its splat is there, too" "$program" info "$work/refined.ply"
+expect 0 "its state is there, too" test -s "$work/refined.ply.checkpoint"
+hung_up_build() {
+  "$program" dataset build "$work/square.obj" "$work/other.obj" -o "$work/set" --views 8 --size 24 --low-size 12 --points 60 \
+    --steps $long --max-gaussians 100 --jobs 1 -q &
+  child=$!
+  until_is test -e "$work/set/.building/other/views.json"
+  kill -HUP $child
+  wait $child
+}
+printf 'v -1 0 0\nv 1 0 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n' | tee "$work/square.obj" >"$work/other.obj"
+expect 130 "SIGHUP ends the build of a data set in order" hung_up_build
+expect 0 "the state of the fit is there" test -s "$work/set/.building/other/fit.checkpoint"
+expect 4 "the data set is not whole" "$program" dataset check "$work/set"
+says stdout "other: the build that was to make it has not ended"
+says stdout "square: the build that was to make it has not ended"
+expect 0 "info counts both" "$program" dataset info "$work/set" --json
+says stdout '"unfinished": 2'
+# Under nohup it does not end at all.
+not_hung_up() {
+  (trap '' HUP && exec "$program" fit "$work/project" --init-points 300 --hold-out 5 -o "$work/nohup.ply" --steps 100 \
+    --checkpoint-every 1 -q) &
+  child=$!
+  until_is test -e "$work/nohup.ply.checkpoint"
+  kill -HUP $child 2>/dev/null
+  wait $child
+}
+expect 0 "SIGHUP does not end a fit that is not to hear it" not_hung_up
+
+# No room for the state, which is three times as large as the splat: the splat is written.
+no_room() { (ulimit -f 200 && "$@"); }
+expect 0 "a fit without room for its checkpoints" no_room fit -o "$work/room.ply" --steps 30 --checkpoint-every 1
+says stderr "there is no new checkpoint"
+expect 0 "its splat" "$program" info "$work/room.ply"
+no_room_stopped() {
+  (ulimit -f 200 && exec "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 \
+    -o "$work/room2.ply" --steps $long --checkpoint-every 1 2>"$work/log") &
+  child=$!
+  until_is says_log "there is no new checkpoint"
+  kill -INT $child
+  wait $child
+  local code=$?
+  cat "$work/log" >&2
+  return $code
+}
+expect 130 "an interrupted fit without room for its state" no_room_stopped
+says stderr "there is nothing to resume from"
+expect 0 "its splat as it was" "$program" info "$work/room2.ply"
+expect 3 "a folder for the state that is not there" fit -o "$work/x.ply" --steps $long --checkpoint "$work/none/state"
+
+# Nowhere to write the splat: the state is kept.
+mkdir "$work/gone"
+homeless() {
+  "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 -o "$work/gone/splat.ply" --steps 200 \
+    --checkpoint "$work/state" --checkpoint-every 1 &
+  child=$!
+  until_is test -e "$work/state"
+  rm -r "$work/gone"
+  wait $child
+}
+expect 3 "a fit that loses its folder" homeless
+says stderr "the state after 200 steps is kept in $work/state"
+mkdir "$work/gone"
+expect 0 "it is finished at once" fit -o "$work/gone/splat.ply" --steps 200 --checkpoint "$work/state" --resume
+expect 0 "its splat is there at last" "$program" info "$work/gone/splat.ply"
+finish

@@ -4,6 +4,7 @@
 #   make test     everything that is checked: all tests, and the rooms that handle input and memory by hand under sanitizers
 #   make test-all the same with every room under sanitizers (half an hour more)
 #   make build    the program (build/anchorsplat) and its tests
+#   make install PREFIX=/usr/local   program, manual page, completions; make deb: build/anchorsplat_VERSION_ARCHITECTURE.deb
 #   make lint     clang-tidy and clang-format
 #   make fuzz     mutated files against all readers, SECONDS=60 by default
 #   make realdata DATA=DIR   checks on splats of your own
@@ -107,6 +108,35 @@ lpips-check: torch
 	@scripts/fetch-lpips.sh
 	@scripts/lpips_check.sh build/anchorsplat
 .PHONY: lpips-check
+
+# Installed is the build without LibTorch; with TORCH_DIR=<libtorch>/share/cmake/Torch, of a LibTorch that stays where it is,
+# LPIPS and training too. docs/install.md
+PREFIX ?= /usr/local
+ifdef TORCH_DIR
+INSTALL_BUILD = build/with-torch
+INSTALL_CONFIGURE = --preset lean -B $(INSTALL_BUILD) -DANCHORSPLAT_TORCH=ON -DTorch_DIR="$(abspath $(TORCH_DIR))" \
+  -DANCHORSPLAT_PROGRAM_DIR="$(CURDIR)/$(INSTALL_BUILD)"
+else ifeq ($(TORCH_FLAGS),-DANCHORSPLAT_TORCH=ON)
+INSTALL_BUILD = build/lean
+INSTALL_CONFIGURE = --preset lean
+else
+INSTALL_BUILD = build/release
+INSTALL_CONFIGURE = --preset release $(TORCH_FLAGS)
+endif
+.PHONY: installable install deb
+installable: dependencies
+	@cmake $(INSTALL_CONFIGURE) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
+	@rm -f build-configure.log
+	@cmake --build $(INSTALL_BUILD) -j $(JOBS) --target anchorsplat_installable
+
+install: installable
+	@cmake --install $(INSTALL_BUILD) --prefix "$(abspath $(PREFIX))" --strip
+
+deb: installable
+	@scripts/install-dependencies.sh --with-packaging
+	@cpack --config $(INSTALL_BUILD)/CPackConfig.cmake -B build >build/package.log || { cat build/package.log; exit 1; }
+	@rm -rf build/_CPack_Packages build/package.log
+	@ls build/anchorsplat_*.deb
 
 clean:
 	@rm -rf build

@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "core/random.h"
 #include "model/enhance_with_model.h"
+#include "model/kernels/bfloat16_tile.h"
 #include "model/kernels/linear.h"
 
 namespace anchorsplat {
@@ -54,6 +55,7 @@ Result<NetworkBenchReport> BenchNetwork(const GaussianCloud& cloud, const Packed
   if (options.repeats < 1) return Error{ErrorCode::kBadArgument, "the number of repeats must be at least 1"};
   NetworkBenchReport report;
   report.threads = ThreadCount();
+  report.bfloat16_products = UsesBFloat16Dot();
   report.copies = network.config().copies;
   report.seconds = report.enhance_seconds = std::numeric_limits<double>::infinity();
   PlainProduct product(network.precision());

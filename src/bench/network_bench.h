@@ -24,8 +24,9 @@ struct NetworkBenchStep {
 
 struct NetworkBenchReport {
   int threads = 0;
-  int64_t gaussians = 0;     // N anchors
-  int64_t copies = 0;        // K
+  bool bfloat16_products = false;  // the processor has them; without, bf16 is slower than fp32
+  int64_t gaussians = 0;           // N anchors
+  int64_t copies = 0;              // K
   double seconds = 0;        // one forward pass, levels and heads included, without reading, cleaning and restoring
   double multiply_adds = 0;  // of the pass
   double gemm_flops = 0;  // 2·multiply-adds per second of a plain product 17020×512×2048 in the network's precision

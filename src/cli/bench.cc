@@ -219,6 +219,7 @@ Status RunNetworkBench(const NetworkBenchFlags& flags, const SharedFlags& shared
     }
     PrintJson({{"bench", "network"},
                {"threads", report.threads},
+               {"bfloat16_products", report.bfloat16_products},
                {"gaussians", report.gaussians},
                {"copies", report.copies},
                {"seconds", report.seconds},
@@ -239,7 +240,10 @@ Status RunNetworkBench(const NetworkBenchFlags& flags, const SharedFlags& shared
             << " threads; plain matrix product: " << Fixed(report.gemm_flops / 1e9, 0) << " GFLOP/s\n\n"
             << FormatTable(table) << "\nforward pass " << HumanSeconds(report.seconds) << ", "
             << Fixed(report.multiply_adds / 1e9, 1) << " G multiply-adds; ratio to the matrix product's rate "
-            << Fixed(report.ratio, 2) << "\nwhole enhancement " << HumanSeconds(report.enhance_seconds) << "\n";
+            << Fixed(report.ratio, 2) << "\nwhole enhancement " << HumanSeconds(report.enhance_seconds) << "\n"
+            << (report.bfloat16_products ? "this processor has bfloat16 products: bf16 is faster than fp32\n"
+                                         : "this processor has no bfloat16 products: bf16 is slower than fp32, and "
+                                           "`enhance` takes fp32 instead\n");
   return {};
 }
 

@@ -367,7 +367,8 @@ void AddEnhance(CLI::App& app, Program& program) {
                          "How the splat is brought into the network's cube"));
   model_option(AddChoice(verb, "--precision", flags->model->precision,
                          {{"fp32", WeightPrecision::kFloat}, {"bf16", WeightPrecision::kBFloat16}},
-                         "Of matrix products, convolutions and attention"));
+                         "Of matrix products, convolutions and attention; bf16 only where the processor has products "
+                         "of it (`doctor` says), else fp32"));
   model_option(AddChoice(verb, "--attention-rounding", model.rounding,
                          {{"none", Rounding::kNone}, {"fp16", Rounding::kHalf}, {"bf16", Rounding::kBFloat16}},
                          "Of queries, keys, values and probabilities; the release: fp16"));

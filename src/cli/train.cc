@@ -10,6 +10,7 @@
 #include "cli/stop_signal.h"
 #include "cli/table.h"
 #include "cli/verb.h"
+#include "core/companion.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -27,11 +28,12 @@ struct TrainFlags {
 // The program that brings LibTorch along: loading it takes half a second, so the others do without. It is this program
 // with the training in it, and takes the same words.
 Status RunInTrainingProgram(const std::vector<std::string>& words) {
-  std::error_code code;
-  const fs::path program = fs::read_symlink("/proc/self/exe", code).parent_path() / "anchorsplat-train";
-  if (!fs::exists(program, code)) {
-    return Error{ErrorCode::kNotFound,
-                 "training is missing: this program was built without LibTorch (make torch build)"};
+  const fs::path program = CompanionFile("anchorsplat-train");
+  std::error_code ignored;
+  if (!fs::exists(program, ignored)) {
+    return Error{
+        ErrorCode::kNotFound,
+        "training is missing: this program was built without LibTorch (`anchorsplat doctor` says how to get it)"};
   }
   std::vector<char*> arguments;
   for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));

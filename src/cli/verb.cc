@@ -6,6 +6,7 @@
 #include <new>
 #include <nlohmann/json.hpp>
 
+#include "cli/verb_tree.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
@@ -27,7 +28,7 @@ CLI::App& AddVerb(CLI::App& app, Program& program, const std::string& name, cons
   CLI::App& verb = *app.add_subcommand(name, description);
   verb.footer("Example:\n  " + example);
   SharedFlags& flags = program.flags;
-  const std::string group = "Shared flags";
+  const std::string group = kSharedFlagsGroup;
   verb.add_flag("-w,--overwrite", flags.overwrite, "Replace files that exist (else refuse)")->group(group);
   verb.add_flag("-q,--quiet", flags.quiet, "Only warnings and errors on stderr")->group(group);
   verb.add_flag("--json", flags.json, "Results as one JSON document on stdout")->group(group);
@@ -40,42 +41,6 @@ CLI::App& AddVerb(CLI::App& app, Program& program, const std::string& name, cons
       ->capture_default_str()
       ->group(group);
   return verb;
-}
-
-const char* CodeName(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::kBadArgument:
-      return "bad_argument";
-    case ErrorCode::kNotFound:
-      return "not_found";
-    case ErrorCode::kBadFile:
-      return "bad_file";
-    case ErrorCode::kExists:
-      return "exists";
-    case ErrorCode::kIo:
-      return "io";
-    case ErrorCode::kInterrupted:
-      return "interrupted";
-  }
-  return "unknown";
-}
-
-int ExitCode(ErrorCode code) {
-  switch (code) {
-    case ErrorCode::kBadArgument:
-      return kUsageExitCode;
-    case ErrorCode::kNotFound:
-      return 3;
-    case ErrorCode::kBadFile:
-      return 4;
-    case ErrorCode::kExists:
-      return 5;
-    case ErrorCode::kIo:
-      return 6;
-    case ErrorCode::kInterrupted:
-      return 130;
-  }
-  return 1;
 }
 
 void PrintJson(const nlohmann::json& json) {
@@ -102,6 +67,8 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
   AddDataset(app, program);
   AddTrain(app, program);
   AddBench(app, program);
+  AddDoctor(app, program);
+  AddManual(app, program);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

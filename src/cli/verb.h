@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/exit_codes.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
 #include "train/train_request.h"
@@ -52,13 +53,8 @@ void AddFit(CLI::App& app, Program& program);
 void AddDataset(CLI::App& app, Program& program);
 void AddTrain(CLI::App& app, Program& program);
 void AddBench(CLI::App& app, Program& program);
-
-const char* CodeName(ErrorCode code);  // in JSON: "not_found"
-
-// 0 on success; each kind of failure has a number of its own (docs/cli.md).
-int ExitCode(ErrorCode code);
-inline constexpr int kUsageExitCode = 2;
-inline constexpr int kPartialExitCode = 1;  // done, but not for all inputs; messages and results say for which
+void AddDoctor(CLI::App& app, Program& program);
+void AddManual(CLI::App& app, Program& program);
 
 inline WriteOptions WriteOptionsFrom(const SharedFlags& flags) { return {.overwrite = flags.overwrite}; }
 

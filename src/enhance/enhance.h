@@ -77,7 +77,8 @@ struct EnhanceMethod {
   std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&, EnhanceReport&)> run;
 };
 
-// The filter and refinement are always there; higher rooms add theirs at start-up (before threads), from main, by name.
+// The filter and refinement are always there; higher rooms have a function that adds theirs, which the verbs call while
+// the command line is declared (cli/enhance.cc): before threads, and before --help lists the methods.
 void RegisterEnhanceMethod(EnhanceMethod method);
 std::span<const EnhanceMethod> EnhanceMethods();
 

@@ -83,7 +83,7 @@ CameraSet CamerasForPixel(double pixel) {
   return std::move(cameras).value();
 }
 
-TEST_F(EnhanceDoor, AutoIsTheFilterToday) {
+TEST_F(EnhanceDoor, AutoWithoutANetworkIsTheFilter) {
   const GaussianCloud ball = Ball(0.01);
   EnhanceOptions options;
   options.pixel_size = 0.01;

@@ -1,7 +1,6 @@
 #include "metrics/photometric_loss.h"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +9,7 @@
 
 #include "core/parallel.h"
 #include "core/random.h"
+#include "core/simd_targets_for_test.h"
 #include "metrics/image_metrics.h"
 
 namespace anchorsplat {
@@ -249,18 +249,8 @@ TEST(PhotometricLoss, IsTheSameForAnyNumberOfThreads) {
 
 TEST(PhotometricLoss, EveryInstructionSetMatches) {
   const Image a = RandomImage(67, 41, 19), b = Disturbed(a, 0.2, 20);
-  int tried = 0;
-  for (int64_t targets = hwy::SupportedTargets(); targets != 0; targets &= targets - 1) {
-    const int64_t target = targets & -targets;
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(target);
-    SCOPED_TRACE(hwy::TargetName(target));
-    ExpectMatchesReference(a, b, {}, 97);
-    ++tried;
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().DeInit();
-  EXPECT_GE(tried, 1);
+  ForEachSimdTarget([&] { ExpectMatchesReference(a, b, {}, 97); });
+  SkipWhenOnlyOneSimdTarget();
 }
 
 TEST(PhotometricLoss, NotANumberIsNotHidden) {

@@ -7,6 +7,7 @@
 
 #include "core/log.h"
 #include "core/text.h"
+#include "model/kernels/bfloat16_tile.h"
 #include "model/network_file.h"
 #include "model/shipped_network.h"
 
@@ -47,8 +48,16 @@ Result<GaussianCloud> EnhanceWithPackedNetwork(const EnhanceInput& input, const 
   return std::move(result.cloud);
 }
 
+// bfloat16 is there for speed alone. Where a processor has no products of it, it is the slower of the two, and the less
+// exact one.
+WeightPrecision FastPrecision(WeightPrecision asked) {
+  if (asked != WeightPrecision::kBFloat16 || UsesBFloat16Dot()) return asked;
+  LogWarning("this processor has no bfloat16 products, so that bf16 would be slower than fp32: fp32 is taken");
+  return WeightPrecision::kFloat;
+}
+
 Result<AnyNetwork> Load(const ModelMethod& method) {
-  if (!method.file.empty()) return LoadAnyNetwork(method.file, method.precision);
+  if (!method.file.empty()) return LoadAnyNetwork(method.file, FastPrecision(method.precision));
   ANCHORSPLAT_ASSIGN_OR_RETURN(CompactNetwork network, LoadShippedNetwork());
   return AnyNetwork(std::move(network));
 }

@@ -15,7 +15,7 @@ struct ModelMethod {
   // Weights of either kind of network (model/network_file.h). Empty: the network that is part of the program; the
   // method is not ready when there is none.
   std::filesystem::path file;
-  WeightPrecision precision = WeightPrecision::kFloat;
+  WeightPrecision precision = WeightPrecision::kFloat;  // fp32, with a warning, where bfloat16 would be slower
   // Of the published architecture; of these, compact networks know `prune_opacity` only and refuse the others.
   ModelOptions options;
 };

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <hwy/highway.h>
 
 #include <cmath>
 #include <filesystem>
@@ -9,11 +10,13 @@
 #include <string>
 #include <vector>
 
+#include "core/log.h"
 #include "core/random.h"
 #include "enhance/enhance.h"
 #include "formats/safetensors.h"
 #include "model/checkpoint_writer.h"
 #include "model/compact_cloud_test.h"
+#include "model/kernels/bfloat16_tile.h"
 #include "model/shipped_network.h"
 
 namespace anchorsplat {
@@ -100,6 +103,49 @@ TEST_F(SmallModel, AutoPrefersTheModelOnceThereIsAFile) {
     EXPECT_EQ(enhanced->report.gaussians_out, 600);
     EXPECT_TRUE(enhanced->report.pixel_size_source.empty());
   }
+}
+
+class Warnings : public LogSink {
+ public:
+  void Message(LogLevel level, const std::string& text) override {
+    if (level == LogLevel::kWarning) texts.push_back(text);
+  }
+  void TaskBegin(const std::string&, int64_t) override {}
+  void TaskProgress(int64_t, const std::string&) override {}
+  void TaskEnd() override {}
+  std::vector<std::string> texts;
+};
+
+// On a processor without products of bfloat16 that precision is slower and less exact: nobody can have meant it.
+TEST_F(SmallModel, BFloat16IsNeverChosenWhereItIsSlower) {
+  const auto method = std::make_shared<ModelMethod>();
+  method->file = file();
+  const auto run = [&](WeightPrecision precision) {
+    method->precision = precision;
+    RegisterModelMethod(method);  // anew: a network once loaded is kept
+    EnhanceInput input;
+    input.cloud = RandomCloud(300);
+    EnhanceReport report;
+    auto cloud = EnhanceMethods().back().run(std::move(input), EnhanceOptions(), report);
+    return cloud.ok() ? cloud->means : Buffer<float>();
+  };
+  hwy::SetSupportedTargetsForTest(HWY_STATIC_TARGET);  // has none
+  const auto warnings = std::make_shared<Warnings>();
+  const auto before = SetLogSink(warnings);
+  const auto exact = run(WeightPrecision::kFloat);
+  EXPECT_THAT(warnings->texts, testing::Not(testing::Contains(testing::HasSubstr("bf16"))));
+  const auto instead = run(WeightPrecision::kBFloat16);
+  EXPECT_THAT(warnings->texts, testing::Contains(testing::HasSubstr("bf16 would be slower than fp32")));
+  hwy::SetSupportedTargetsForTest(0);
+  warnings->texts.clear();
+  const auto here = run(WeightPrecision::kBFloat16);
+  SetLogSink(before);
+
+  EXPECT_FALSE(exact.empty());
+  EXPECT_EQ(instead, exact);
+  EXPECT_EQ(here == exact, !UsesBFloat16Dot());
+  const auto warned = testing::Contains(testing::HasSubstr("bf16"));
+  EXPECT_EQ(testing::Value(warnings->texts, warned), !UsesBFloat16Dot());
 }
 
 // Writes a compact network of made-up weights.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/companion.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "perceptual/lpips_plugin.h"
@@ -14,16 +15,13 @@ namespace anchorsplat {
 
 namespace fs = std::filesystem;
 
-fs::path Lpips::PluginPath() {
-  std::error_code code;
-  const fs::path program = fs::read_symlink("/proc/self/exe", code);
-  return program.parent_path() / "anchorsplat-lpips.so";
-}
+namespace {
 
-Result<Lpips> Lpips::Open(const LpipsWeights& weights, const fs::path& path) {
+Result<const LpipsPlugin*> LoadPlugin(const fs::path& path) {
   std::error_code ignored;
   if (!fs::exists(path, ignored)) {
-    return Error{ErrorCode::kNotFound, "LPIPS missing: this program was built without LibTorch (make torch build)"};
+    return Error{ErrorCode::kNotFound,
+                 "LPIPS missing: this program was built without LibTorch (`anchorsplat doctor` says how to get it)"};
   }
   // Never closed: LibTorch does not survive being unloaded.
   void* library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
@@ -34,6 +32,20 @@ Result<Lpips> Lpips::Open(const LpipsWeights& weights, const fs::path& path) {
   if (plugin == nullptr || plugin->version != kLpipsPluginVersion) {
     return Error{ErrorCode::kBadFile, Cat("LPIPS missing: ", path.string(), " belongs to another build; make build")};
   }
+  return plugin;
+}
+
+}  // namespace
+
+fs::path Lpips::PluginPath() { return CompanionFile("anchorsplat-lpips.so"); }
+
+Status Lpips::CheckPlugin(const fs::path& path) {
+  const auto plugin = LoadPlugin(path);
+  return plugin.ok() ? Status() : Status(plugin.error());
+}
+
+Result<Lpips> Lpips::Open(const LpipsWeights& weights, const fs::path& path) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const LpipsPlugin* plugin, LoadPlugin(path));
   std::vector<const float*> tensors;
   std::vector<int64_t> sizes;
   for (const Buffer<float>& tensor : weights.tensors) {

@@ -16,8 +16,11 @@ struct LpipsPlugin;  // perceptual/lpips_plugin.h
 // for losses with gradients there is perceptual/torch/lpips_network.h.
 class Lpips {
  public:
-  // The file of the plugin, beside the running program.
+  // The file of the plugin, which came with the running program (core/companion.h).
   static std::filesystem::path PluginPath();
+
+  // Whether it is there and loads, LibTorch with it; the errors are those of Open.
+  static Status CheckPlugin(const std::filesystem::path& plugin = PluginPath());
 
   // Errors: kNotFound "LPIPS missing: …" when the program was built without LibTorch; kBadFile for a plugin of another
   // build; kBadArgument for weights that are not those of their network.

@@ -1,11 +1,11 @@
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <cmath>
 #include <limits>
 #include <string>
 
 #include "core/parallel.h"
+#include "core/simd_targets_for_test.h"
 #include "render/gradient_check_for_test.h"
 #include "render/scenes_for_test.h"
 
@@ -277,18 +277,8 @@ TEST(RasterizerBackward, EveryInstructionSetMatches) {
   const GaussianCloud cloud = RandomCloud(72, {.gaussians = 10, .degree = 3});
   const Camera camera = RandomCamera(72, 19, 18);
   const LinearLoss loss = RandomLoss(72, cloud, camera, Smooth());
-  int tried = 0;
-  for (int64_t targets = hwy::SupportedTargets(); targets != 0; targets &= targets - 1) {
-    const int64_t target = targets & -targets;
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(target);
-    SCOPED_TRACE(hwy::TargetName(target));
-    ExpectGradientMatches(cloud, camera, Smooth(), loss, {.stride = 7});
-    ++tried;
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().DeInit();
-  EXPECT_GE(tried, 1);
+  ForEachSimdTarget([&] { ExpectGradientMatches(cloud, camera, Smooth(), loss, {.stride = 7}); });
+  SkipWhenOnlyOneSimdTarget();
 }
 
 TEST(RasterizerBackward, RefusesWhatDoesNotBelongToThePicture) {

@@ -1,7 +1,6 @@
 #include "render/rasterizer.h"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <cmath>
 #include <limits>
@@ -9,6 +8,7 @@
 #include <string>
 
 #include "core/parallel.h"
+#include "core/simd_targets_for_test.h"
 #include "render/rasterizer_reference.h"
 #include "render/scenes_for_test.h"
 
@@ -158,18 +158,8 @@ TEST(Rasterizer, EveryInstructionSetGivesTheSamePicture) {
   const Camera camera = RandomCamera(11, 67, 41);
   RenderOptions options;
   options.depth = true;
-  int tried = 0;
-  for (int64_t targets = hwy::SupportedTargets(); targets != 0; targets &= targets - 1) {
-    const int64_t target = targets & -targets;
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(target);
-    SCOPED_TRACE(hwy::TargetName(target));
-    ExpectMatchesReference(cloud, camera, options);
-    ++tried;
-  }
-  hwy::SetSupportedTargetsForTest(0);
-  hwy::GetChosenTarget().DeInit();
-  EXPECT_GE(tried, 1);
+  ForEachSimdTarget([&] { ExpectMatchesReference(cloud, camera, options); });
+  SkipWhenOnlyOneSimdTarget();
 }
 
 void ExpectSameBits(const RenderOutput& a, const RenderOutput& b) {

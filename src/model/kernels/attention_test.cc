@@ -10,7 +10,7 @@
 
 #include "core/parallel.h"
 #include "core/random.h"
-#include "model/kernels/simd_targets_testing.h"
+#include "core/simd_targets_for_test.h"
 
 namespace anchorsplat {
 namespace {

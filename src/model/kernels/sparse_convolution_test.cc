@@ -9,7 +9,7 @@
 
 #include "core/parallel.h"
 #include "core/random.h"
-#include "model/kernels/simd_targets_testing.h"
+#include "core/simd_targets_for_test.h"
 #include "model/kernels/voxel_neighbours.h"
 
 namespace anchorsplat {

@@ -1,0 +1,214 @@
+#include <hwy/highway.h>
+
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cli/verb.h"
+#include "core/companion.h"
+#include "core/parallel.h"
+#include "core/text.h"
+#include "model/kernels/bfloat16_tile.h"
+#include "model/shipped_network.h"
+#include "perceptual/lpips.h"
+#include "perceptual/lpips_weights.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kReady = "ready";
+constexpr const char* kMissing = "missing";  // an extra that was not asked for when this was built or set up
+constexpr const char* kBroken = "broken";    // is there and does not work
+
+// One line of the report.
+struct Finding {
+  std::string name;
+  const char* state = kReady;
+  std::string text;
+  std::string command;  // gets what is missing; else empty
+};
+
+std::string FirstLine(const fs::path& path) {
+  std::ifstream file(path);
+  std::string line;
+  std::getline(file, line);
+  return line;
+}
+
+std::string ProcessorName() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);) {
+    const size_t colon = line.find(": ");
+    if (line.starts_with("model name") && colon != std::string::npos) return Printable(line.substr(colon + 2));
+  }
+  return "a processor without a name";
+}
+
+// Bytes by /proc/meminfo, 0 where it does not say.
+uint64_t MemoryOf(const std::string& what) {
+  std::ifstream file("/proc/meminfo");
+  for (std::string line; std::getline(file, line);) {
+    if (line.starts_with(what + ":")) return 1024 * std::strtoull(line.c_str() + what.size() + 1, nullptr, 10);
+  }
+  return 0;
+}
+
+// What a container may use, by its control group; nothing where it is not limited.
+std::optional<uint64_t> MemoryLimit() {
+  for (const char* path : {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"}) {
+    const uint64_t limit = std::strtoull(FirstLine(path).c_str(), nullptr, 10);
+    if (limit > 0 && limit < MemoryOf("MemTotal")) return limit;
+  }
+  return std::nullopt;
+}
+
+struct Machine {
+  std::string processor = ProcessorName();
+  std::string simd;                 // in use
+  std::vector<std::string> lesser;  // what else this program has and this machine could run
+  bool bfloat16_products = UsesBFloat16Dot();
+  int threads = ThreadCount();
+  uint64_t memory = MemoryOf("MemTotal");
+  uint64_t available = MemoryOf("MemAvailable");
+  std::optional<uint64_t> limit = MemoryLimit();
+};
+
+Machine LookAtMachine() {
+  Machine machine;
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    (machine.simd.empty() ? machine.simd : machine.lesser.emplace_back()) = hwy::TargetName(target);
+  }
+  return machine;
+}
+
+const char* BuildKind() {
+#ifdef __SANITIZE_ADDRESS__
+  return "debug build with sanitizers";
+#elif defined(NDEBUG)
+  return "release build";
+#else
+  return "debug build, slow";
+#endif
+}
+
+// How to come by LibTorch, for a program in the build folder of a checkout and for an installed one.
+std::string TorchCommand() {
+  const fs::path folder = ProgramFolder();
+  std::error_code ignored;
+  if (fs::exists(folder.parent_path() / "scripts" / "install-torch.sh", ignored)) return "make torch build";
+  return "in a checkout of the sources: make install TORCH_DIR=<libtorch>/share/cmake/Torch";
+}
+
+Finding FindModel() {
+  if (!HasShippedNetwork()) {
+    return {"model", kMissing, "this program was built without models/anchorsplat-compact.safetensors",
+            "anchorsplat enhance --model FILE, or --method filter"};
+  }
+  const auto network = LoadShippedNetwork();
+  if (!network.ok()) return {"model", kBroken, network.error().message, "make build"};
+  return {"model", kReady, Cat("in the program, ", network->config().copies, " Gaussians for one"), ""};
+}
+
+Finding FindTraining() {
+  std::error_code ignored;
+  const fs::path program = CompanionFile("anchorsplat-train");
+  if (!fs::exists(program, ignored)) return {"training", kMissing, "built without LibTorch", TorchCommand()};
+  return {"training", kReady, program.string(), ""};
+}
+
+Finding FindLpips() {
+  const Status status = Lpips::CheckPlugin();
+  if (status.ok()) return {"LPIPS", kReady, Lpips::PluginPath().string(), ""};
+  if (status.error().code == ErrorCode::kNotFound) {
+    return {"LPIPS", kMissing, "built without LibTorch", TorchCommand()};
+  }
+  return {"LPIPS", kBroken, status.error().message, TorchCommand()};
+}
+
+Finding FindLpipsWeights() {
+  const fs::path folder = LpipsFolder();
+  std::string found;
+  for (const LpipsNet net : {LpipsNet::kAlex, LpipsNet::kVgg, LpipsNet::kSqueeze}) {
+    const auto weights = ReadLpipsWeights(net, folder);
+    if (weights.ok()) {
+      found += Cat(found.empty() ? "" : ", ", LpipsNetName(net));
+    } else if (weights.error().code != ErrorCode::kNotFound) {
+      return {"LPIPS weights", kBroken, weights.error().message, "scripts/fetch-lpips.sh"};
+    }
+  }
+  if (found.empty()) return {"LPIPS weights", kMissing, Cat("none in ", folder.string()), "scripts/fetch-lpips.sh"};
+  return {"LPIPS weights", kReady, Cat(found, " in ", folder.string()), ""};
+}
+
+void PrintReport(const Machine& machine, const std::vector<Finding>& findings) {
+  const auto line = [](const std::string& name, const std::string& text) {
+    constexpr size_t kColumn = 15;
+    std::cout << name << std::string(name.size() < kColumn ? kColumn - name.size() : 1, ' ') << text << "\n";
+  };
+  line("anchorsplat", Cat(ANCHORSPLAT_VERSION, ", ", BuildKind()));
+  line("processor", machine.processor);
+  std::string lesser;
+  for (const std::string& name : machine.lesser) lesser += (lesser.empty() ? "" : ", ") + name;
+  line("SIMD", Cat(machine.simd, lesser.empty() ? "" : Cat(" (also built: ", lesser, ")")));
+  line("bfloat16", machine.bfloat16_products ? "products in hardware: --precision bf16 is faster than fp32"
+                                             : "no products in hardware: slower than fp32, so fp32 is taken instead");
+  line("threads", Cat(machine.threads));
+  line("memory", Cat(HumanBytes(machine.memory), ", ", HumanBytes(machine.available), " free",
+                     machine.limit ? Cat("; this container may use ", HumanBytes(*machine.limit)) : ""));
+  for (const Finding& finding : findings) {
+    const bool ready = finding.state == std::string(kReady);
+    line(finding.name, ready ? finding.text : Cat(finding.state, ": ", finding.text));
+    if (!finding.command.empty()) line("", Cat("→ ", finding.command));
+  }
+}
+
+void PrintReportAsJson(const Machine& machine, const std::vector<Finding>& findings) {
+  nlohmann::json parts = nlohmann::json::object();
+  for (const Finding& finding : findings) {
+    nlohmann::json& part = parts[finding.name] = {{"state", finding.state}, {"text", finding.text}};
+    if (!finding.command.empty()) part["command"] = finding.command;
+  }
+  PrintJson({{"version", ANCHORSPLAT_VERSION},
+             {"build", BuildKind()},
+             {"processor", machine.processor},
+             {"simd", machine.simd},
+             {"simd_also_built", machine.lesser},
+             {"bfloat16_products", machine.bfloat16_products},
+             {"threads", machine.threads},
+             {"memory_bytes", machine.memory},
+             {"memory_available_bytes", machine.available},
+             {"memory_limit_bytes", machine.limit ? nlohmann::json(*machine.limit) : nlohmann::json()},
+             {"parts", parts}});
+}
+
+}  // namespace
+
+void AddDoctor(CLI::App& app, Program& program) {
+  CLI::App& verb =
+      AddVerb(app, program, "doctor", "What this program and this machine have, and how to get what is missing",
+              "anchorsplat doctor");
+  verb.callback([&program] {
+    program.run = [&program]() -> Status {
+      const Machine machine = LookAtMachine();
+      const std::vector<Finding> findings = {FindModel(), FindTraining(), FindLpips(), FindLpipsWeights()};
+      for (const Finding& finding : findings) {
+        if (finding.state == std::string(kBroken)) program.exit_code = kPartialExitCode;
+      }
+      program.flags.json ? PrintReportAsJson(machine, findings) : PrintReport(machine, findings);
+      return {};
+    };
+  });
+}
+
+}  // namespace anchorsplat

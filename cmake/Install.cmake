@@ -5,17 +5,14 @@
 # outside of this checkout, named by -DTorch_DIR=…; that of .venv would be gone with the checkout.
 include(GNUInstallDirs)
 
-set(CMAKE_INSTALL_RPATH_USE_LINK_PATH OFF)
 install(TARGETS anchorsplat RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
 
-set(installed_torch OFF)
 if(ANCHORSPLAT_TORCH)
   get_filename_component(torch_place "${Torch_DIR}" REALPATH)
   string(FIND "${torch_place}/" "${CMAKE_SOURCE_DIR}/" in_checkout)
   if(in_checkout EQUAL 0)
     message(STATUS "To be installed: without LPIPS and training, whose LibTorch lies in this checkout")
   else()
-    set(installed_torch ON)
     # core/companion.h looks for them there.
     set_target_properties(anchorsplat_lpips anchorsplat_train_program PROPERTIES INSTALL_RPATH "${torch_root}/lib")
     install(TARGETS anchorsplat_lpips anchorsplat_train_program
@@ -26,8 +23,10 @@ endif()
 
 # Manual page and completions come from the verbs' own declarations: the program prints them.
 set(made "${CMAKE_BINARY_DIR}/installed")
-set(documents "${made}/anchorsplat.1" "${made}/anchorsplat.bash" "${made}/_anchorsplat" "${made}/THIRD_PARTY")
+set(third_party "${made}/THIRD_PARTY")
+set(documents "${made}/anchorsplat.1" "${made}/anchorsplat.bash" "${made}/_anchorsplat" "${third_party}")
 if(CMAKE_CROSSCOMPILING AND NOT CMAKE_CROSSCOMPILING_EMULATOR)
+  set(third_party THIRD_PARTY)
   message(STATUS "To be installed: without manual page and completions, which the program itself prints "
                  "(CMAKE_CROSSCOMPILING_EMULATOR would let it)")
 else()
@@ -37,7 +36,7 @@ else()
     COMMAND anchorsplat manual man >"${made}/anchorsplat.1"
     COMMAND anchorsplat manual bash >"${made}/anchorsplat.bash"
     COMMAND anchorsplat manual zsh >"${made}/_anchorsplat"
-    COMMAND "${CMAKE_SOURCE_DIR}/scripts/third-party.sh" "$<TARGET_FILE:anchorsplat>" >"${made}/THIRD_PARTY"
+    COMMAND "${CMAKE_SOURCE_DIR}/scripts/third-party.sh" "$<TARGET_FILE:anchorsplat>" >"${third_party}"
     DEPENDS anchorsplat scripts/third-party.sh THIRD_PARTY
     VERBATIM)
   add_custom_target(anchorsplat_documents ALL DEPENDS ${documents})
@@ -53,7 +52,7 @@ else()
     file(INSTALL DESTINATION \"\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DATADIR}/zsh/\${folder}\"
          TYPE FILE FILES \"${made}/_anchorsplat\")")
 endif()
-install(FILES "${made}/THIRD_PARTY" CHANGELOG.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+install(FILES "${third_party}" CHANGELOG.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
 install(FILES LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}" RENAME copyright)
 install(FILES models/README.md DESTINATION "${CMAKE_INSTALL_DOCDIR}" RENAME model-card.md)
 

@@ -54,7 +54,7 @@ anchorsplat itself is under the Apache License 2.0 (LICENSE). Its programs are l
 work of others that is listed here with its notices. A package of a Linux distribution holds the headers' part only and
 uses the system's libraries; a binary that brings libraries along brings these. The C and C++ runtime (glibc, libstdc++,
 libgcc) belong to the system. Some notices name files that are no part of the libraries, such as tests or build scripts:
-they are quoted as a whole.
+they are quoted as a whole. Where one points to /usr/share/common-licenses/Apache-2.0, that is the text of LICENSE.
 
 HEAD
 for source in $sorted; do echo "  $source (${packages[$source]})"; done

@@ -110,6 +110,12 @@ std::string TorchCommand() {
   return "in a checkout of the sources: make install TORCH_DIR=<libtorch>/share/cmake/Torch";
 }
 
+std::string FetchCommand() {
+  const fs::path installed = CompanionFile("fetch-lpips.sh");
+  std::error_code ignored;
+  return fs::exists(installed, ignored) ? installed.string() : "scripts/fetch-lpips.sh";
+}
+
 Finding FindModel() {
   if (!HasShippedNetwork()) {
     return {"model", kMissing, "this program was built without models/anchorsplat-compact.safetensors",
@@ -144,10 +150,10 @@ Finding FindLpipsWeights() {
     if (weights.ok()) {
       found += Cat(found.empty() ? "" : ", ", LpipsNetName(net));
     } else if (weights.error().code != ErrorCode::kNotFound) {
-      return {"LPIPS weights", kBroken, weights.error().message, "scripts/fetch-lpips.sh"};
+      return {"LPIPS weights", kBroken, weights.error().message, FetchCommand()};
     }
   }
-  if (found.empty()) return {"LPIPS weights", kMissing, Cat("none in ", folder.string()), "scripts/fetch-lpips.sh"};
+  if (found.empty()) return {"LPIPS weights", kMissing, Cat("none in ", folder.string()), FetchCommand()};
   return {"LPIPS weights", kReady, Cat(found, " in ", folder.string()), ""};
 }
 

@@ -47,6 +47,7 @@ void AddOption(const DeclaredOption& option, std::string& out) {
   }
   out += "\n" + Sentence(option.description);
   if (option.required) out += "Required.\n";
+  if (!option.range.empty()) out += "In " + Roff(option.range) + ".\n";
   if (!option.default_value.empty()) out += "Default: " + Roff(option.default_value) + ".\n";
 }
 

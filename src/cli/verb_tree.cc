@@ -28,6 +28,9 @@ DeclaredOption Declared(const CLI::Option& option) {
   const std::string type = option.get_type_name();
   out.choices = ChoicesOf(type);
   out.value = type.substr(0, type.find_first_of(": "));
+  if (const size_t in = type.find(" in ["); in != std::string::npos) {
+    out.range = type.substr(in + 4, type.find(']', in) - in - 3);
+  }
   out.default_value = option.get_default_str();
   out.many = option.get_expected_max() > 1;
   return out;

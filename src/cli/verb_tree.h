@@ -15,6 +15,7 @@ struct DeclaredOption {
   std::string group;                 // as --help heads it
   std::string value;                 // "TEXT", "INT"; empty for a flag
   std::vector<std::string> choices;  // the words that it takes, where these are all
+  std::string range;                 // "[0 - 1024]", where it is bounded
   std::string default_value;
   std::string description;
   bool required = false;

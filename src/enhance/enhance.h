@@ -77,8 +77,7 @@ struct EnhanceMethod {
   std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&, EnhanceReport&)> run;
 };
 
-// The filter and refinement are always there; higher rooms have a function that adds theirs, which the verbs call while
-// the command line is declared (cli/enhance.cc): before threads, and before --help lists the methods.
+// Filter and refinement are always there; the verbs add those of higher rooms, by name, while options are declared.
 void RegisterEnhanceMethod(EnhanceMethod method);
 std::span<const EnhanceMethod> EnhanceMethods();
 

@@ -41,7 +41,6 @@ struct EnhanceFlags {
   std::string model_file;
   std::string shuffles = "identity";
   std::string compat;
-  std::string refinement;  // an option of refinement that was given
   bool view = false;
 };
 
@@ -64,14 +63,15 @@ Status CheckOutput(const fs::path& output, bool overwrite) {
   return CheckWritable(output);
 }
 
-bool Refines(const EnhanceOptions& options) {
-  if (options.method == "auto") return !options.refine.images.empty();
-  return options.method.find("refine") != std::string::npos;
+// Whether the user can stop it and go on later.
+bool IsResumable(const EnhanceOptions& options) {
+  const auto plan = PlanEnhancement(options);
+  return plan.ok() && plan->method->resumable;
 }
 
 // Where the state of a refinement of this output goes when the user stops it; empty when it is not kept.
 fs::path CheckpointOf(const EnhanceOptions& options, const fs::path& output) {
-  if (!Refines(options) || options.refine.seconds) return {};
+  if (!IsResumable(options) || options.refine.seconds) return {};
   return options.control.checkpoint.empty() ? fs::path(output.string() + ".checkpoint") : options.control.checkpoint;
 }
 
@@ -124,6 +124,7 @@ nlohmann::json ToJson(const std::string& input, const fs::path& output, const En
                          {"method", r.method},
                          {"gaussians", {{"in", r.gaussians_in}, {"dropped", r.dropped}, {"out", r.gaussians_out}}},
                          {"seconds", r.seconds}};
+  if (!r.quality.empty()) json["quality"] = r.quality;
   for (const auto& [name, value] : r.facts) {
     // Counts are whole numbers in JSON, measurements are not.
     const bool measured = name.starts_with("seconds") || name.ends_with("psnr") || name.starts_with("consistency");
@@ -166,30 +167,12 @@ Result<Shuffles> ParseShuffles(const std::string& text) {
 }
 
 Status FinishModelOptions(const EnhanceFlags& flags) {
-  if (!flags.model_file.empty() && flags.options.method == "filter") {
-    return Error{ErrorCode::kBadArgument, "--model and --method filter: the filter uses no model"};
-  }
-  const std::string& method = flags.options.method;
-  if (!flags.options.refine.images.empty() && method != "auto" && method.find("refine") == std::string::npos) {
-    return Error{ErrorCode::kBadArgument, Cat("--images and --method ", method, ": it uses no pictures, refine does")};
-  }
-  if (!Refines(flags.options) && !flags.refinement.empty()) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat(flags.refinement, " belongs to refinement, which takes its time: --method refine or --images")};
-  }
-  if (flags.model->options.prune_opacity > 0 && method != "auto" && method.find("model") == std::string::npos) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("--prune-opacity and --method ", method, ": it is for what a model makes")};
-  }
   if (!flags.options.refine.images.empty() && flags.inputs.size() > 1) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--images are the pictures of one splat, and there are ", flags.inputs.size(), " inputs")};
   }
   if (!flags.options.control.checkpoint.empty() && flags.inputs.size() > 1) {
     return Error{ErrorCode::kBadArgument, Cat("--checkpoint is for one input, and there are ", flags.inputs.size())};
-  }
-  if (flags.options.control.resume && flags.options.refine.seconds) {
-    return Error{ErrorCode::kBadArgument, "--resume: a refinement for --seconds leaves nothing to go on from"};
   }
   flags.model->file = flags.model_file;
   flags.model->options.upstream = flags.compat == "upstream";
@@ -266,6 +249,7 @@ Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared, int& exi
   if (!flags.cameras.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(options.cameras, ReadCameras(flags.cameras));
   }
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto outputs, OutputPaths(flags, shared.overwrite));
 
   for (const fs::path& output : outputs) {
@@ -327,6 +311,11 @@ void AddEnhance(CLI::App& app, Program& program) {
   auto* output = verb.add_option("-o,--output", flags->output, "File to write (one input)");
   verb.add_option("--out-dir", flags->out_dir, "Folder to write to, under the inputs' names")->excludes(output);
   verb.add_option("--method", options.method, MethodHelp())->capture_default_str();
+  verb.add_option("--quality", options.quality,
+                  "Instead of a method, by the time there is. fast: the filter and the network, as auto, a second; good: "
+                  "the network, then a little refinement, several seconds; best: refinement with the pictures of "
+                  "--images, minutes, and good where there are none")
+      ->check(CLI::IsMember({"fast", "good", "best"}));
   verb.add_option("--upscale", options.upscale, "How many times closer it will be seen; at least 1")
       ->capture_default_str();
   verb.add_option("--pixel-size", flags->pixel_size,
@@ -350,11 +339,11 @@ void AddEnhance(CLI::App& app, Program& program) {
 
   const std::string group = "Model";
   ModelOptions& model = flags->model->options;
-  auto* file = verb.add_option("--model", flags->model_file,
-                               "Weights of an AnchorSplat network or of a compact one, .pth or .safetensors")
-                   ->check(NotEmpty())
-                   ->group(group);
-  const auto model_option = [&](CLI::Option* option) { return option->needs(file)->group(group); };
+  verb.add_option("--model", flags->model_file,
+                  "Weights of an AnchorSplat network or of a compact one, .pth or .safetensors")
+      ->check(NotEmpty())
+      ->group(group);
+  const auto model_option = [&](CLI::Option* option) { return option->group(group); };
   model_option(verb.add_option("--compat", flags->compat,
                                "upstream: do what the published script does, quirks included (its fp16 attention by "
                                "--attention-rounding fp16)"))
@@ -395,9 +384,7 @@ void AddEnhance(CLI::App& app, Program& program) {
   AddRefineFlags(verb, options.refine, options.control);
   verb.callback([flags, &verb, &program] {
     for (const CLI::Option* option : verb.get_options()) {
-      if (option->get_group() == kRefineGroup && option->count() > 0 && option->get_single_name() != "images") {
-        flags->refinement = Cat("--", option->get_single_name());
-      }
+      if (option->count() > 0) flags->options.given.push_back(option->get_single_name());
     }
     program.run = [flags, &program] { return RunEnhance(*flags, program.flags, program.exit_code); };
   });

@@ -29,6 +29,7 @@ std::vector<EnhanceMethod>& Registry() {
       {.name = "filter",
        .summary = "give the width back that the fit absorbed; instant, no weights",
        .rank = 0,
+       .options = WidthOptions(),
        .ready = [](const EnhanceOptions&) { return Status(); },
        .run = [](EnhanceInput input, const EnhanceOptions& options, EnhanceReport&) -> Result<GaussianCloud> {
          ANCHORSPLAT_RETURN_IF_ERROR([&]() -> Status {
@@ -41,43 +42,6 @@ std::vector<EnhanceMethod>& Registry() {
       RefineMethod(),
       RefineImagesMethod()};
   return methods;
-}
-
-Result<const EnhanceMethod*> FindMethod(const EnhanceOptions& options, const std::string& name) {
-  const EnhanceMethod* best = nullptr;
-  std::string names;
-  for (const EnhanceMethod& method : Registry()) {
-    names += ", " + method.name;
-    if (method.name == name) {
-      ANCHORSPLAT_RETURN_IF_ERROR(method.ready(options));
-      return &method;
-    }
-    if ((best == nullptr || method.rank > best->rank) && method.ready(options).ok()) best = &method;
-  }
-  if (name == "auto") return best;  // never null: the filter is always ready
-  return Error{ErrorCode::kBadArgument, Cat("there is no method '", name, "' (known: auto", names, ")")};
-}
-
-// The method, and the one whose result it begins with, if there is one.
-struct Chosen {
-  const EnhanceMethod* method = nullptr;
-  const EnhanceMethod* first = nullptr;
-};
-
-Result<Chosen> ChooseMethod(const EnhanceOptions& options) {
-  Chosen chosen;
-  const size_t plus = options.method.find('+');
-  if (plus == std::string::npos) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(chosen.method, FindMethod(options, options.method));
-    return chosen;
-  }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(chosen.first, FindMethod(options, options.method.substr(0, plus)));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(chosen.method, FindMethod(options, options.method.substr(plus + 1)));
-  if (!chosen.method->takes_start) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("the method '", chosen.method->name, "' cannot go on from the result of another")};
-  }
-  return chosen;
 }
 
 // Drops the rows no method and no viewer can use; says how many.
@@ -216,11 +180,13 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--filter-strength ", *options.filter_strength, " is not between 0 and ", kMaxFilterStrength)};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Chosen chosen, ChooseMethod(options));
-  const EnhanceMethod* method = chosen.method;
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const MethodPlan plan, PlanEnhancement(options));
+  const EnhanceMethod* method = plan.method;
 
   EnhanceReport report;
-  report.method = chosen.first == nullptr ? method->name : Cat(chosen.first->name, "+", method->name);
+  report.method = plan.Name();
+  report.quality = options.quality;
   report.upscale = options.upscale;
   report.gaussians_in = cloud.size();
   EnhanceInput input;
@@ -230,14 +196,9 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(bool sized, method->needs_pixel_size());
   bool first_sized = false;
-  if (chosen.first != nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(first_sized, chosen.first->needs_pixel_size());
+  if (plan.start != nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(first_sized, plan.start->needs_pixel_size());
     sized |= first_sized;
-  }
-  if (!sized && (options.pixel_size || options.cameras || options.filter_strength)) {
-    LogWarning(Cat("the method '", method->name,
-                   "' knows no pixel size and no filter strength: --pixel-size, --cameras and ",
-                   "--filter-strength change nothing"));
   }
   if (!sized && IsMarkedEnhanced(input.cloud)) {
     LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
@@ -262,10 +223,11 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   }
 
   const auto begin = std::chrono::steady_clock::now();
-  if (chosen.first != nullptr) {
+  if (plan.start != nullptr) {
     EnhanceInput first = input;
     if (!first_sized) first.pixel_sizes.clear();
-    ANCHORSPLAT_ASSIGN_OR_RETURN(input.start, chosen.first->run(std::move(first), options, report));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(input.start, plan.start->run(std::move(first), options, report));
+    input.start_has_detail = plan.start->adds_detail;
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, method->run(std::move(input), options, report));
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -21,6 +21,12 @@ struct EnhanceOptions {
   // A registered name, or "auto": the best that is ready without further input. Or two, "A+B": B begins where A ended,
   // if it can (EnhanceMethod::takes_start).
   std::string method = "auto";
+  // Instead of a method, for those who know none: "fast", an instant one; "good", that and gentle refinement; "best",
+  // refinement with the pictures of refine.images, "good" where there are none. Empty: `method` says.
+  std::string quality;
+  // What the user gave, by the names that the command line has for it ("filter-strength"). CheckOptions refuses those
+  // that would change nothing.
+  std::vector<std::string> given;
   double upscale = 4;                     // u ≥ 1: how many times closer the splat will be seen
   std::optional<double> filter_strength;  // f of the filter; its default otherwise, 0 for antialiased splats
   std::optional<double> pixel_size;       // p_LR for all Gaussians; from `cameras`, from the pictures to refine
@@ -39,6 +45,7 @@ inline constexpr const char* kUnknownPixelSize = "unknown";
 // What was done, for people and for --json.
 struct EnhanceReport {
   std::string method;
+  std::string quality;  // as it was asked for
   int64_t gaussians_in = 0;
   int64_t dropped = 0;  // rows with values that are not finite
   int64_t gaussians_out = 0;
@@ -61,6 +68,22 @@ struct EnhanceInput {
   Buffer<float> pixel_sizes;  // one for all, or one per Gaussian
   double filter_strength = 0;
   GaussianCloud start;  // what the method before it made, of "A+B"; else empty
+  bool start_has_detail = false;  // EnhanceMethod::adds_detail of that method
+};
+
+struct EnhanceMethod;
+
+// How a method is about to be used.
+struct MethodUse {
+  const EnhanceOptions& options;
+  const EnhanceMethod* start = nullptr;  // the method before it
+};
+
+// An option that changes what a method does.
+struct MethodOption {
+  std::string name;  // as in EnhanceOptions::given
+  // What it still needs for that, as the end of "it has an effect …": "with --images". Nothing, empty: it has one.
+  std::function<std::string(const MethodUse&)> lacks;
 };
 
 // A way to enhance. `ready` says whether it can run with these options alone (weights there, images given, …) and is
@@ -70,6 +93,11 @@ struct EnhanceMethod {
   std::string summary;  // one line for --help
   int rank = 0;
   bool takes_start = false;  // looks at EnhanceInput::start
+  // Named alone it begins with the best instant method, if that one adds detail.
+  std::function<bool(const EnhanceOptions&)> begins_with_best = [](const EnhanceOptions&) { return false; };
+  bool adds_detail = false;  // shows more than the splat does, not only what it shows with other widths
+  bool resumable = false;    // looks at EnhanceOptions::control
+  std::vector<MethodOption> options;  // all that it looks at: this is the only place that says so
   // False: EnhanceInput::pixel_sizes may be empty, nothing is estimated. Asked once the method is ready. An error: it
   // could not run.
   std::function<Result<bool>()> needs_pixel_size = [] { return true; };
@@ -81,6 +109,25 @@ struct EnhanceMethod {
 void RegisterEnhanceMethod(EnhanceMethod method);
 std::span<const EnhanceMethod> EnhanceMethods();
 
+// --upscale, and those that say pixel sizes and the filter's strength.
+std::vector<MethodOption> WidthOptions(const std::function<std::string(const MethodUse&)>& lacks = {});
+
+// Which methods `method` and `quality` lead to.
+struct MethodPlan {
+  const EnhanceMethod* method = nullptr;  // never null
+  const EnhanceMethod* start = nullptr;   // the one whose result it begins with, if there is one
+  std::string chosen_by;                  // "auto" or "--quality …"; empty when the user named the method
+  std::string Name() const;               // "refine", "model+refine"
+};
+
+// kBadArgument: methods or qualities that there are none of, a method that is not ready or cannot go on from another's
+// result, a quality and a method that is another, pictures for a quality that looks at none.
+Result<MethodPlan> PlanEnhancement(const EnhanceOptions& options);
+
+// kBadArgument: that, or something `given` that has no effect with this plan; says with what it would have one. Names
+// that no method knows are of no concern here.
+Status CheckOptions(const EnhanceOptions& options);
+
 struct Enhanced {
   GaussianCloud cloud;
   EnhanceReport report;
@@ -88,8 +135,8 @@ struct Enhanced {
 
 // Runs the method. Logs what it assumed: pixel size and how sure it is, training width, why a splat tagged
 // antialiased or enhanced before is left alone, how many rows were dropped. A result that was given width back says so
-// in its comments (enhance/enhanced_mark.h). kBadArgument: unknown method, both pixel_size and cameras, upscale < 1;
-// kBadFile: no usable Gaussian; and whatever the method reports.
+// in its comments (enhance/enhanced_mark.h). kBadArgument: that of CheckOptions, both pixel_size and cameras, upscale <
+// 1; kBadFile: no usable Gaussian; and whatever the method reports.
 Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options);
 
 }  // namespace anchorsplat

@@ -11,6 +11,7 @@
 
 #include "core/log.h"
 #include "core/text.h"
+#include "enhance/refine_copies.h"
 #include "enhance/refine_pictures.h"
 #include "enhance/refine_poses.h"
 #include "enhance/refiner.h"
@@ -25,6 +26,10 @@ namespace {
 
 constexpr int64_t kStepsWithPictures = 1500, kStepsWithout = 600;
 constexpr int kCopiesWithPictures = 8, kCopiesWithout = 4;
+// Without pictures, a start that shows more than the splat does would lose it to what the splat shows: a few small
+// steps bring what both know. Chosen on the validation objects (docs/refine.md).
+constexpr int64_t kStepsGentle = 100;
+constexpr double kRate = 1, kRateGentle = 0.1;
 constexpr int64_t kCheckViews = 8;
 constexpr int64_t kResidualViews = 64;
 constexpr int64_t kNoteEvery = 10;           // steps
@@ -41,15 +46,6 @@ struct Views {
   double scene_scale = 1;
   RenderOptions render;
 };
-
-std::vector<Camera> Thinned(const std::vector<Camera>& cameras, int64_t most) {
-  const auto count = static_cast<int64_t>(cameras.size());
-  std::vector<Camera> some;
-  for (int64_t i = 0; i < std::min(most, count); ++i) {
-    some.push_back(cameras[static_cast<size_t>(i * count / std::min(most, count))]);
-  }
-  return some;
-}
 
 Result<Views> OpenPictures(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.images, {.hold_out = options.hold_out}));
@@ -73,28 +69,21 @@ Result<Views> OpenPictures(const RefineInput& input, const RefineOptions& option
 }
 
 Result<Views> OpenSplat(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
-  std::vector<Camera> train, check;
+  RefinePoses poses;
   if (input.cameras && !input.cameras->cameras.empty()) {
     if (input.cameras->background) render.background = *input.cameras->background;
-    const std::vector<Camera>& cameras = input.cameras->cameras;
-    const std::vector<Camera> poses = PosesAlong(cameras, options.between);
-    const std::vector<Camera> between(poses.begin() + std::ssize(cameras), poses.end());
-    // Some of the places between cameras are kept for seeing whether it helped, as long as enough are left.
-    const bool enough = std::ssize(between) > 2 * kCheckViews;
-    check = enough ? Thinned(between, kCheckViews) : Thinned(cameras, kCheckViews);
-    train = cameras;
-    for (const Camera& camera : between) {
-      const auto same = [&](const Camera& other) { return enough && other.name == camera.name; };
-      if (std::none_of(check.begin(), check.end(), same)) train.push_back(camera);
+    poses = RefinePosesAlong(input.cameras->cameras, options.between, kCheckViews);
+    if (!poses.apart) {
+      LogInfo("there is no place between these cameras: whether it helps is looked at where it is learned from");
     }
   } else {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(train, PosesAround(input.cloud, input.pixel_size, options.poses, input.seed));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(check, PosesAround(input.cloud, input.pixel_size, kCheckViews, input.seed + 1));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(
+        poses, RefinePosesAround(input.cloud, input.pixel_size, options.poses, kCheckViews, input.seed));
   }
-  const double scale = SceneScale(train);
+  const double scale = SceneScale(poses.train);
   const auto splat = std::make_shared<const GaussianCloud>(input.cloud);
-  return Views{RefineTargets(splat, render, std::move(train)), RefineTargets(splat, render, std::move(check)),
-               std::nullopt, scale, render};
+  return Views{RefineTargets(splat, render, std::move(poses.train)),
+               RefineTargets(splat, render, std::move(poses.check)), std::nullopt, scale, render};
 }
 
 // How well `cloud`, seen closer and averaged down, agrees with the views: mean PSNR.
@@ -208,6 +197,17 @@ Status MakeSteps(Refiner& refiner, const RefineOptions& options, const RefineCon
   return {};
 }
 
+// K as `max_gaussians` allows it.
+void LimitCopies(int64_t gaussians, RefineOptions& options) {
+  if (options.max_gaussians == 0) return;
+  options.copies = static_cast<int>(
+      std::clamp<int64_t>(options.max_gaussians / std::max<int64_t>(1, gaussians), 1, *options.copies));
+  if (gaussians > options.max_gaussians) {
+    LogWarning(Cat("there are ", WithThousands(gaussians), " Gaussians before any is split, more than ",
+                   WithThousands(options.max_gaussians), ": none is split, and none is left out"));
+  }
+}
+
 // Without what nobody sees and what is not finite.
 GaussianCloud Pruned(GaussianCloud cloud, RefineReport& report) {
   const auto least = static_cast<float>(std::log(kInvisible / (1 - kInvisible)));
@@ -231,16 +231,11 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
     return Error{ErrorCode::kBadArgument, "exposure and robust are about photographs; they need --images"};
   }
   RefineOptions options = given;
-  if (!options.seconds) options.steps = given.steps.value_or(pictures ? kStepsWithPictures : kStepsWithout);
-  options.copies = given.copies.value_or(pictures ? kCopiesWithPictures : kCopiesWithout);
-  if (options.max_gaussians > 0) {
-    options.copies = static_cast<int>(
-        std::clamp<int64_t>(options.max_gaussians / std::max<int64_t>(1, input.start.size()), 1, *options.copies));
-    if (input.start.size() > options.max_gaussians) {
-      LogWarning(Cat("there are ", WithThousands(input.start.size()), " Gaussians before any is split, more than ",
-                     WithThousands(options.max_gaussians), ": none is split, and none is left out"));
-    }
+  const bool gentle = !pictures && input.start_has_detail;
+  if (!options.seconds) {
+    options.steps = given.steps.value_or(pictures ? kStepsWithPictures : gentle ? kStepsGentle : kStepsWithout);
   }
+  options.rate = given.rate.value_or(gentle ? kRateGentle : kRate);
 
   RenderOptions render;
   render.mode = input.cloud.render_mode.value_or(RenderMode::kClassic);
@@ -273,6 +268,17 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
     report.kept_start = true;
     return Refined{std::move(input.start), report};
   }
+
+  if (!given.copies && gentle) {
+    options.copies = 1;
+  } else if (!given.copies) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewDensity density,
+                                 MeasureDensity(input.cloud, views.render, views.train.views()));
+    options.copies = ChooseCopies(density, input.upscale, pictures ? kCopiesWithPictures : kCopiesWithout,
+                                  input.cloud.size(), input.start.size());
+  }
+  LimitCopies(input.start.size(), options);
+  report.copies = *options.copies;
 
   std::string settings;
   if (!control.checkpoint.empty()) {

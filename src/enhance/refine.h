@@ -22,6 +22,7 @@ namespace anchorsplat {
 struct RefineInput {
   GaussianCloud cloud;               // the splat as it was fitted; rows that are not finite are gone
   GaussianCloud start;               // where to begin: the filter's result, or a network's
+  bool start_has_detail = false;     // a network's: it shows more than the splat itself does
   double upscale = 4;                // u, 1 to kMostSamples
   double pixel_size = 0;             // world units; only needed without pictures and cameras
   std::optional<CameraSet> cameras;  // the training cameras, used without pictures
@@ -36,6 +37,7 @@ struct RefineReport {
   bool kept_start = false;   // the result agreed no better with the views than the start did (or only a little better,
                              // where the splat knows more than the pictures): the start is the result
   int64_t views = 0;         // compared with
+  int copies = 1;            // K; with pictures it is a mean
   std::optional<double> input_psnr;  // dB, of the input's ordinary renders against the pictures
   // Against views that were not trained on (where there are any), what they average to at their own resolution, dB.
   double before = 0, after = 0;

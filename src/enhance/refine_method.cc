@@ -20,6 +20,7 @@ void AddFacts(const RefineReport& r, EnhanceReport& report) {
                                            {"views", static_cast<double>(r.views)},
                                            {"consistency_before", r.before},
                                            {"consistency_after", r.after},
+                                           {"k", static_cast<double>(r.copies)},
                                            {"kept_start", r.kept_start ? 1.0 : 0.0},
                                            {"pruned", static_cast<double>(r.pruned)},
                                            {"seconds_load", r.times.load},
@@ -45,6 +46,7 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
   const bool begun = !input.start.empty();
   if (begun) {
     refine.start = std::move(input.start);
+    refine.start_has_detail = input.start_has_detail;
   } else {
     refine.start = input.cloud;
     ANCHORSPLAT_ASSIGN_OR_RETURN(
@@ -62,6 +64,52 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
   return std::move(refined.cloud);
 }
 
+bool HasImages(const MethodUse& use) { return !use.options.refine.images.empty(); }
+bool HasCameras(const MethodUse& use) { return use.options.cameras.has_value(); }
+
+// What refinement looks at, of either of its methods.
+std::vector<MethodOption> RefinementOptions() {
+  const auto with_images = [](const MethodUse& use) { return HasImages(use) ? "" : "with --images"; };
+  const auto filtered = [](const MethodUse& use) {
+    return use.start == nullptr ? "" : "with a --method that uses the filter";
+  };
+  const auto closer = [](const MethodUse& use) { return use.options.upscale > 1 ? "" : "with --upscale above 1"; };
+  const auto for_steps = [](const MethodUse& use) { return use.options.refine.seconds ? "without --seconds" : ""; };
+  return {
+      {"upscale", {}},
+      {"pixel-size", [=](const MethodUse& use) { return HasImages(use) || HasCameras(use) ? filtered(use) : ""; }},
+      {"cameras", [=](const MethodUse& use) { return HasImages(use) ? filtered(use) : ""; }},
+      {"train-width", filtered},
+      {"camera-rule", filtered},
+      {"filter-strength", filtered},
+      {"images", {}},
+      {"hold-out", with_images},
+      {"steps", {}},
+      {"seconds", {}},
+      {"k", {}},
+      {"most-gaussians",
+       [](const MethodUse& use) {
+         const bool gentle = use.start != nullptr && use.start->adds_detail && !HasImages(use);
+         return use.options.refine.copies.value_or(gentle ? 1 : 2) > 1 ? "" : "with --k above 1";
+       }},
+      {"poses",
+       [](const MethodUse& use) { return HasImages(use) || HasCameras(use) ? "without --images and --cameras" : ""; }},
+      {"between",
+       [](const MethodUse& use) { return HasImages(use) || !HasCameras(use) ? "with --cameras, without --images" : ""; }},
+      {"half-from", closer},
+      {"all-from", closer},
+      {"rate", {}},
+      {"rate-decay", {}},
+      {"ssim-weight", {}},
+      {"exposure", with_images},
+      {"robust", with_images},
+      {"checkpoint", for_steps},
+      {"resume", for_steps},
+  };
+}
+
+bool WithPictures(const EnhanceOptions& options) { return !options.refine.images.empty(); }
+
 }  // namespace
 
 EnhanceMethod RefineMethod() {
@@ -69,6 +117,9 @@ EnhanceMethod RefineMethod() {
           .summary = "a minute of optimisation against what the splat shows at low resolution, or --images",
           .rank = -1,  // never without being asked: it takes its time
           .takes_start = true,
+          .begins_with_best = WithPictures,
+          .resumable = true,
+          .options = RefinementOptions(),
           .ready = [](const EnhanceOptions& options) { return Validate(options.refine); },
           .run = RunRefine};
 }
@@ -78,6 +129,9 @@ EnhanceMethod RefineImagesMethod() {
           .summary = "refine with the pictures of --images",
           .rank = 2,
           .takes_start = true,
+          .begins_with_best = WithPictures,
+          .resumable = true,
+          .options = RefinementOptions(),
           .ready = [](const EnhanceOptions& options) -> Status {
             if (!options.refine.images.empty()) return Validate(options.refine);
             return Error{ErrorCode::kBadArgument, "the method 'refine-images' needs pictures: --images PROJECT"};

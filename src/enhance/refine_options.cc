@@ -84,7 +84,7 @@ Status Validate(const RefineOptions& o) {
   if (o.hold_out < 0) return bad("hold-out must not be negative");
   if (o.poses < 1) return bad("there must be at least one pose");
   if (o.between < 0) return bad("poses between cameras must not be negative");
-  if (!(o.rate > 0 && std::isfinite(o.rate))) return bad("the learning rate must be positive");
+  if (o.rate && !(*o.rate > 0 && std::isfinite(*o.rate))) return bad("the learning rate must be positive");
   if (!(o.rate_decay > 0 && o.rate_decay <= 1)) return bad("the learning rate's decay must lie in (0, 1]");
   if (!(o.ssim_weight >= 0 && o.ssim_weight <= 1)) return bad("the SSIM weight must lie in [0, 1]");
   if (!(o.half_from >= 0 && o.half_from <= o.all_from && o.all_from <= 1)) {
@@ -105,7 +105,7 @@ std::string ToJsonText(const RefineOptions& o) {
       {"between", o.between},
       {"half_from", o.half_from},
       {"all_from", o.all_from},
-      {"rate", o.rate},
+      {"rate", o.rate.value_or(0)},
       {"rate_decay", o.rate_decay},
       {"ssim_weight", o.ssim_weight},
       {"exposure", o.exposure},

@@ -11,7 +11,8 @@
 
 namespace anchorsplat {
 
-// What a refinement does (enhance/refine.h). Values that are not given depend on whether there are pictures.
+// What a refinement does (enhance/refine.h). Values that are not given depend on whether there are pictures, on where it
+// begins and on how many Gaussians there are.
 struct RefineOptions {
   std::filesystem::path images;  // project with the training pictures (fit/training_views.h); empty: without any
   int hold_out = 8;              // every Nth view is not trained on, as in fits; 0: all are
@@ -22,7 +23,7 @@ struct RefineOptions {
   int poses = 128;                         // without pictures and cameras: places to look from
   int between = 1;                         // without pictures: poses between each camera and its neighbours
   double half_from = 0.3, all_from = 0.7;  // see PixelSchedule
-  double rate = 1;                         // of fits' learning rates, at the beginning …
+  std::optional<double> rate;              // of fits' learning rates, at the beginning …
   double rate_decay = 0.1;                 // … and what is left of it at the end
   double ssim_weight = 0.2;
   bool exposure = false;  // pictures may differ in brightness and tint
@@ -52,7 +53,10 @@ Status SetRefineOption(RefineOptions& options, std::string_view key, std::string
 // The keys of SetRefineOption, separated by commas.
 std::string RefineOptionKeys();
 
-// All options as one JSON object, defaults filled in: for checkpoints.
+// Changes when the same options come to another result.
+inline constexpr int kRefineRevision = 2;
+
+// All options as one JSON object, 0 for what is not given: for checkpoints.
 std::string ToJsonText(const RefineOptions& options);
 
 }  // namespace anchorsplat

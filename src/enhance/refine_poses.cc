@@ -3,15 +3,19 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <set>
 #include <utility>
 
 #include "core/framing.h"
 #include "core/image.h"
 #include "core/parallel.h"
 #include "core/rotation.h"
+#include "core/statistics.h"
 #include "core/text.h"
 #include "fit/random_streams.h"
+#include "fit/training_views.h"
 #include "formats/quantize.h"
 
 namespace anchorsplat {
@@ -25,6 +29,10 @@ constexpr double kRoom = 0.05;       // of the distance to the object: nothing o
 constexpr double kSigmas = 3;        // and the camera may not be within a Gaussian
 constexpr double kSameWay = 0.7071;  // cosine of 45°
 constexpr double kSameFocal = 1e-3;  // relative
+constexpr int kCheckNeighbours = 3;
+constexpr int64_t kCheckCandidates = 256;
+constexpr int64_t kCamerasPerCheck = 6;
+constexpr float kSamePose = 1e-6f;  // of PoseDistance: cameras that stand in one place have nothing between them
 
 using Vec3 = std::array<double, 3>;
 
@@ -146,11 +154,111 @@ Result<std::vector<Camera>> PosesAround(const GaussianCloud& cloud, double pixel
 
 std::vector<Camera> PosesAlong(const std::vector<Camera>& cameras, int between) {
   std::vector<Camera> poses = cameras;
+  std::set<std::pair<size_t, size_t>> there;  // most pairs are neighbours of each other
   for (size_t i = 0; i < cameras.size() && between > 0; ++i) {
     for (const size_t k : Neighbours(cameras, i, static_cast<size_t>(between))) {
-      poses.push_back(Between(cameras[i], cameras[k]));
+      if (there.insert(std::minmax(i, k)).second) poses.push_back(Between(cameras[i], cameras[k]));
     }
   }
+  return poses;
+}
+
+double PoseDistance(const Camera& a, const Camera& b, double scale) {
+  const Vec3 p = a.Center(), q = b.Center();
+  const auto &r = a.world_to_camera.rotation, &s = b.world_to_camera.rotation;
+  double square = 0;  // of what the matrices differ by: 8 sin²(angle/2)
+  for (size_t k = 0; k < 9; ++k) square += (r[k] - s[k]) * (r[k] - s[k]);
+  const double angle = 2 * std::asin(std::min(1.0, std::sqrt(square / 8)));
+  return std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]) / scale + angle;
+}
+
+std::vector<Camera> Thinned(const std::vector<Camera>& cameras, int64_t most) {
+  const auto count = static_cast<int64_t>(cameras.size());
+  std::vector<Camera> some;
+  for (int64_t i = 0; i < std::min(most, count); ++i) {
+    some.push_back(cameras[static_cast<size_t>(i * count / std::min(most, count))]);
+  }
+  return some;
+}
+
+namespace {
+
+// How far the pose is from the nearest of `others` that is not itself.
+float Clearance(const Camera& pose, const std::vector<Camera>& others, double scale) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Camera& other : others) {
+    if (&other != &pose) least = std::min(least, PoseDistance(pose, other, scale));
+  }
+  return static_cast<float>(least);
+}
+
+// The half of `places` that is farthest from all of `cameras`, which may be the same.
+std::vector<Camera> ClearOf(const std::vector<Camera>& cameras, const std::vector<Camera>& places, double scale) {
+  std::vector<float> clearances;
+  for (const Camera& place : places) clearances.push_back(Clearance(place, cameras, scale));
+  std::vector<float> sorted = clearances;
+  const float least = places.empty() ? 0 : std::max(Quantile(sorted, 0.5), kSamePose);
+  std::vector<Camera> clear;
+  for (size_t i = 0; i < places.size(); ++i) {
+    if (clearances[i] >= least && std::isfinite(clearances[i])) clear.push_back(places[i]);
+  }
+  return clear;
+}
+
+}  // namespace
+
+RefinePoses RefinePosesAlong(const std::vector<Camera>& cameras, int between, int64_t checks) {
+  double reach = 0;
+  for (const Camera& camera : cameras) {
+    for (const double x : camera.Center()) reach = std::max(reach, std::abs(x));
+  }
+  const double scale = std::max(SceneScale(cameras), kSamePose * reach);  // of one place it is what rounding leaves
+  // Not only the nearest neighbours: these may be twins, as of stereo pairs.
+  std::vector<Camera> places = PosesAlong(cameras, std::max(between, kCheckNeighbours));
+  places.erase(places.begin(), places.begin() + std::ssize(cameras));
+  // Of few cameras all the places between them would go.
+  const auto count = std::ssize(cameras);
+  RefinePoses poses;
+  poses.train = PosesAlong(cameras, between);
+  poses.check = Thinned(ClearOf(cameras, Thinned(places, kCheckCandidates), scale),
+                        std::clamp<int64_t>(count / 3, 1, checks));
+  if (!poses.check.empty()) {
+    for (const Camera& check : poses.check) {
+      const double room = 0.5 * Clearance(check, cameras, scale);
+      poses.train.erase(std::remove_if(poses.train.begin() + count, poses.train.end(),
+                                       [&](const Camera& pose) { return PoseDistance(pose, check, scale) < room; }),
+                        poses.train.end());
+    }
+    return poses;
+  }
+  // Too far from each other to have anything between them: some of them, if there are enough.
+  const std::vector<Camera> clear = ClearOf(cameras, cameras, scale);
+  poses.check = Thinned(clear, std::min(count / kCamerasPerCheck, checks));
+  poses.apart = !poses.check.empty();
+  if (!poses.apart) {
+    poses.check = Thinned(cameras, checks);
+    return poses;
+  }
+  for (const Camera& check : poses.check) {
+    std::erase_if(poses.train, [&](const Camera& pose) { return PoseDistance(pose, check, scale) < kSamePose; });
+  }
+  return poses;
+}
+
+Result<RefinePoses> RefinePosesAround(const GaussianCloud& cloud, double pixel_size, int64_t count, int64_t checks,
+                                      uint64_t seed) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> all, PosesAround(cloud, pixel_size, count + checks, seed));
+  RefinePoses poses;
+  poses.check = Thinned(all, checks);
+  size_t next = 0;
+  for (Camera& pose : all) {
+    if (next < poses.check.size() && pose.name == poses.check[next].name) {
+      ++next;
+    } else {
+      poses.train.push_back(std::move(pose));
+    }
+  }
+  if (poses.train.empty()) return Error{ErrorCode::kBadArgument, "there must be at least one pose"};
   return poses;
 }
 

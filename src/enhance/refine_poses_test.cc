@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -86,10 +87,13 @@ TEST(PosesAlong, HalfWayToTheNeighbours) {
   const std::vector<Camera> cameras = orbit_scene::Cameras(300, 64, 48).cameras;
   EXPECT_EQ(PosesAlong(cameras, 0).size(), cameras.size());
   const std::vector<Camera> poses = PosesAlong(cameras, 2);
-  ASSERT_EQ(poses.size(), 3 * cameras.size());
+  ASSERT_GT(poses.size(), 2 * cameras.size());
+  ASSERT_LT(poses.size(), 3 * cameras.size()) << "neighbours of each other share a place";
   for (size_t i = 0; i < cameras.size(); ++i) EXPECT_EQ(poses[i].name, cameras[i].name);
   for (size_t i = cameras.size(); i < poses.size(); ++i) {
-    const Camera& from = cameras[(i - cameras.size()) / 2];
+    const std::string name = poses[i].name.substr(0, poses[i].name.find('+'));
+    const Camera& from =
+        *std::find_if(cameras.begin(), cameras.end(), [&](const Camera& camera) { return camera.name == name; });
     EXPECT_TRUE(poses[i].image.empty());
     EXPECT_EQ(poses[i].intrinsics.width, 64);
     // Still looks at the middle, from a little nearer.
@@ -107,6 +111,82 @@ TEST(PosesAlong, OnlyBetweenCamerasThatLookTheSameWay) {
   cameras.push_back(cameras[0]);
   cameras[2].intrinsics.fx *= 2;
   EXPECT_EQ(PosesAlong(cameras, 1).size(), 3u);
+}
+
+double Nearest(const Camera& pose, const std::vector<Camera>& others) {
+  double nearest = 1e9;
+  for (const Camera& other : others) nearest = std::min(nearest, PoseDistance(pose, other, 1.7));
+  return nearest;
+}
+
+TEST(PosesAlong, OneForEachPairOfCameras) {
+  for (const int between : {1, 3}) {
+    const std::vector<Camera> poses = PosesAlong(orbit_scene::Cameras(127, 64, 48).cameras, between);
+    for (size_t i = 0; i < poses.size(); ++i) {
+      for (size_t k = 0; k < i; ++k) {
+        ASSERT_GT(PoseDistance(poses[i], poses[k], 1.7), 1e-6) << poses[i].name << " and " << poses[k].name;
+      }
+    }
+  }
+}
+
+// What a refinement learned at says nothing about whether it helped elsewhere.
+TEST(RefinePoses, NoCheckIsNearAPlaceThatIsLearnedFrom) {
+  for (const int count : {8, 12, 40, 127}) {
+    const std::vector<Camera> cameras = orbit_scene::Cameras(count, 64, 48).cameras;
+    double apart = 0;  // nearest neighbours, on the mean
+    for (size_t i = 0; i < cameras.size(); ++i) {
+      std::vector<Camera> others = cameras;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+      apart += Nearest(cameras[i], others) / static_cast<double>(cameras.size());
+    }
+    for (const int between : {0, 1, 2, 5}) {
+      const RefinePoses poses = RefinePosesAlong(cameras, between, 8);
+      EXPECT_TRUE(poses.apart);
+      // Of the few, nothing is between them: they look too differently.
+      const bool few = count < 20;
+      EXPECT_EQ(poses.check.size(), few ? cameras.size() / 6 : 8);
+      EXPECT_EQ(std::ssize(poses.train) > std::ssize(cameras), !few && between > 0) << count << ", " << between;
+      ASSERT_GE(poses.train.size() + (few ? poses.check.size() : 0), cameras.size());
+      for (const Camera& check : poses.check) {
+        EXPECT_GT(Nearest(check, poses.train), 0.2 * apart) << check.name << " of " << count << ", " << between;
+      }
+    }
+  }
+}
+
+// Twins are nearest neighbours, and what is between them is what they see themselves.
+TEST(RefinePoses, TwinsLeaveOtherPlacesToCheck) {
+  std::vector<Camera> cameras = orbit_scene::Cameras(40, 64, 48).cameras;
+  for (size_t i = 0; i < 40; ++i) {
+    cameras.push_back(cameras[i]);
+    cameras.back().name += " again";
+    cameras.back().world_to_camera.translation[0] += 1e-3;
+  }
+  const RefinePoses poses = RefinePosesAlong(cameras, 1, 8);
+  ASSERT_TRUE(poses.apart);
+  for (const Camera& check : poses.check) EXPECT_GT(Nearest(check, poses.train), 0.05) << check.name;
+  // Each has a twin, but what it has is not only its twin.
+  EXPECT_EQ(poses.check.size(), 8u);
+  // All in one place: there is nowhere else.
+  cameras.assign(5, cameras[0]);
+  const RefinePoses same = RefinePosesAlong(cameras, 1, 8);
+  EXPECT_FALSE(same.apart);
+  EXPECT_EQ(same.check.size(), 5u);
+}
+
+TEST(RefinePoses, AroundAnObjectSomeAreSetApart) {
+  const GaussianCloud ball = orbit_scene::Ball(500, 1);
+  for (const int64_t count : {1, 20, 128}) {
+    const auto poses = RefinePosesAround(ball, 0.01, count, 8, 3);
+    ASSERT_TRUE(poses.ok()) << poses.error().message;
+    EXPECT_EQ(std::ssize(poses->train), count);
+    EXPECT_EQ(poses->check.size(), 8u);
+    // Places evenly spread over the sphere are 3.5/√n apart.
+    for (const Camera& check : poses->check) {
+      EXPECT_GT(Nearest(check, poses->train), 1.5 / std::sqrt(static_cast<double>(count) + 8)) << count;
+    }
+  }
 }
 
 }  // namespace

@@ -102,7 +102,7 @@ Result<FitStep> Refiner::Step(double done) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Compare(objective, state_.cloud, target_.picture, gradient_));
 
   watch.Lap();
-  const LearningRates rates = Scaled(LearningRates(), options_.rate * std::pow(options_.rate_decay, done));
+  const LearningRates rates = Scaled(LearningRates(), options_.rate.value_or(1) * std::pow(options_.rate_decay, done));
   state_.optimizer.Step(rates, rates.means * problem_.scene_scale, kMaxShDegree, gradient_, state_.cloud);
   times_.adam += watch.Lap();
   ++state_.step;

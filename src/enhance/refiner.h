@@ -22,7 +22,7 @@ struct RefineProblem {
 
 // The iterations of a refinement, one at a time: a view and a window of it, what the candidate shows there when seen
 // `upscale` times closer and averaged down to the view's pixels, how far that is from the target, a step of Adam.
-// Learning rates are those of fits times options.rate, and fall to options.rate_decay of that.
+// Learning rates are those of fits times options.rate (1 when it is not given), and fall to options.rate_decay of that.
 //
 // The state is that of a fit (fit/fitter.h) and is written and read like one. Same bits for any number of threads.
 class Refiner {

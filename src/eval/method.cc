@@ -177,10 +177,12 @@ struct RegisteredMethod {
   std::string Settings() const {
     RefineOptions with_pictures = refine;
     if (name.ends_with("refine-images")) with_pictures.images = "the object's";
-    std::string settings = name.find("refine") != std::string::npos ? ToJsonText(with_pictures) : "";
+    const bool refines = name.find("refine") != std::string::npos;
+    std::string settings = refines ? Cat(ToJsonText(with_pictures), " revision ", kRefineRevision) : "";
     if (refine.seconds) settings += Cat(" ", *refine.seconds, " s");
     if (filter_strength) settings += Cat(" f ", *filter_strength);
-    if (name.starts_with("model")) settings += ShippedNetworkIdentity();
+    // Refinement with pictures begins with a network's result, too.
+    if (name.starts_with("model") || name == "refine-images") settings += ShippedNetworkIdentity();
     return settings;
   }
 };
@@ -208,6 +210,17 @@ Status SetOption(RegisteredMethod& method, std::string_view key, std::string_vie
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(method.filter_strength, ParseStrength(method.word, value));
   return {};
+}
+
+// Nothing that is set without an effect.
+Status CheckGiven(const RegisteredMethod& method, const std::set<std::string>& keys) {
+  EnhanceOptions options;
+  options.method = method.name;
+  options.refine = method.refine;
+  if (method.name.ends_with("refine-images")) options.refine.images = "the object's";
+  if (!method.auto_pixel_size) options.cameras.emplace();
+  for (const std::string& key : keys) options.given.push_back(key == "f" ? "filter-strength" : key);
+  return CheckOptions(options);
 }
 
 constexpr std::string_view kAuto = "-auto";
@@ -252,7 +265,9 @@ Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word)
     ANCHORSPLAT_RETURN_IF_ERROR(SetOption(method, option.substr(0, equals), option.substr(equals + 1)));
     at = end;
   }
-  if (const Status valid = Validate(method.refine); !valid.ok()) {
+  Status valid = Validate(method.refine);
+  if (valid.ok() && !keys.empty()) valid = CheckGiven(method, keys);
+  if (!valid.ok()) {
     return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(word), ": ", valid.error().message)};
   }
   return std::optional<RegisteredMethod>(std::move(method));

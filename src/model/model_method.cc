@@ -18,21 +18,40 @@ namespace {
 // Shares worth a word.
 constexpr double kNotable = 0.01, kMost = 0.5;
 
-// Options that only the published architecture has.
-Status CheckCompactOptions(const ModelMethod& method) {
-  const ModelOptions& given = method.options;
-  const ModelOptions defaults;
-  const char* option = given.upstream                                  ? "--compat"
-                       : given.normalisation != defaults.normalisation ? "--normalisation"
-                       : given.shuffles != defaults.shuffles           ? "--shuffles"
-                       : given.depth_rule != defaults.depth_rule       ? "--curve-depth"
-                       : given.rounding != defaults.rounding           ? "--attention-rounding"
-                       : given.max_gaussians != defaults.max_gaussians ? "--max-gaussians"
-                       : method.precision != WeightPrecision::kFloat   ? "--precision"
-                                                                       : nullptr;
-  if (option == nullptr) return {};
-  return Error{ErrorCode::kBadArgument,
-               Cat(method.file.string(), " is a compact network; ", option, " is for the published architecture")};
+// Whether it is certainly of that kind; what cannot be read is for loading to tell.
+bool IsCompact(const ModelMethod& method) {
+  if (method.file.empty()) return true;  // the one that is part of the program
+  const auto compact = HoldsCompactNetwork(method.file);
+  return compact.ok() && *compact;
+}
+bool IsPublished(const ModelMethod& method) {
+  if (method.file.empty()) return false;
+  const auto compact = HoldsCompactNetwork(method.file);
+  return compact.ok() && !*compact;
+}
+
+// What a network looks at. The compact ones work on top of the filter, the published ones have arithmetic of their own.
+std::vector<MethodOption> NetworkOptions(const std::shared_ptr<const ModelMethod>& method) {
+  std::vector<MethodOption> options = WidthOptions([method](const MethodUse&) {
+    return IsPublished(*method) ? "with a compact network, --method filter or refine" : "";
+  });
+  options.push_back({"model", {}});
+  options.push_back({"prune-opacity", {}});
+  const auto published = [method](const MethodUse&) {
+    return IsCompact(*method) ? "with a network of the published architecture (--model FILE)" : "";
+  };
+  for (const char* name : {"compat", "normalisation", "precision", "curve-depth", "shuffles", "max-gaussians"}) {
+    options.push_back({name, published});
+  }
+  options.push_back({"attention-rounding", [method, published](const MethodUse& use) -> std::string {
+                       const bool none = method->options.rounding == Rounding::kNone;
+                       if (none && method->precision == WeightPrecision::kBFloat16) return "without --precision bf16";
+                       return published(use);
+                     }});
+  options.push_back({"block-gaussians", [method, published](const MethodUse& use) -> std::string {
+                       return method->options.upstream ? "without --compat upstream" : published(use);
+                     }});
+  return options;
 }
 
 Result<GaussianCloud> EnhanceWithPackedNetwork(const EnhanceInput& input, const PackedNetwork& network,
@@ -124,6 +143,8 @@ void RegisterModelMethod(const std::shared_ptr<const ModelMethod>& method) {
        .summary = HasShippedNetwork() ? "one pass of the network of --model, or of the one that is part of this program"
                                       : "one pass of the network of --model",
        .rank = 1,
+       .adds_detail = true,
+       .options = NetworkOptions(method),
        .needs_pixel_size = [method]() -> Result<bool> {
          if (method->file.empty()) return true;
          return HoldsCompactNetwork(method->file);
@@ -141,7 +162,6 @@ void RegisterModelMethod(const std::shared_ptr<const ModelMethod>& method) {
          if (const auto* packed = std::get_if<PackedNetwork>(&(*loaded)->network)) {
            return EnhanceWithPackedNetwork(input, *packed, method->options, report);
          }
-         ANCHORSPLAT_RETURN_IF_ERROR(CheckCompactOptions(*method));
          return EnhanceWithCompactNetwork(std::move(input), options.upscale,
                                           std::get<CompactNetwork>((*loaded)->network), method->options.prune_opacity,
                                           report);

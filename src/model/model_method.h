@@ -16,7 +16,7 @@ struct ModelMethod {
   // method is not ready when there is none.
   std::filesystem::path file;
   WeightPrecision precision = WeightPrecision::kFloat;  // fp32, with a warning, where bfloat16 would be slower
-  // Of the published architecture; of these, compact networks know `prune_opacity` only and refuse the others.
+  // Of the published architecture; of these, compact networks look at `prune_opacity` only.
   ModelOptions options;
 };
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -202,13 +203,46 @@ TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
   ASSERT_TRUE(enhanced.ok());
   EXPECT_LT(enhanced->size(), 600);
   for (const float logit : enhanced->opacity_logits) EXPECT_GE(1 / (1 + std::exp(-logit)), 0.3f);
-  method->options.normalisation = NormalisationMode::kBbox;
-  enhanced = registered.run(input, options, report);
-  ASSERT_FALSE(enhanced.ok());
-  EXPECT_THAT(enhanced.error().message, testing::HasSubstr("--normalisation"));
-
   method->file = file();
   EXPECT_FALSE(*registered.needs_pixel_size());
+}
+
+// What would change nothing is refused, with the words for where it would.
+TEST_F(SmallModel, EveryOptionBelongsToAnArchitecture) {
+  const auto method = std::make_shared<ModelMethod>();
+  RegisterModelMethod(method);
+  // The registry of this program may have others of the same name before it.
+  const std::vector<MethodOption> options = EnhanceMethods().back().options;
+  EnhanceOptions enhance;
+  const auto lacks = [&](const std::string& name) -> std::string {
+    const auto found = std::find_if(options.begin(), options.end(), [&](const auto& o) { return o.name == name; });
+    if (found == options.end()) return "no option";
+    return found->lacks ? found->lacks({enhance}) : "";
+  };
+  const fs::path compact = folder_ / "compact.safetensors";
+  WriteCompact(compact, {.copies = 3, .hidden = 16, .head_hidden = 16});
+  ASSERT_FALSE(HasFatalFailure());
+  for (const fs::path& weights : {fs::path(), compact, file()}) {
+    method->file = weights;
+    const bool published = weights == file();
+    for (const char* name : {"compat", "normalisation", "precision", "curve-depth", "shuffles", "max-gaussians",
+                             "attention-rounding", "block-gaussians"}) {
+      EXPECT_EQ(lacks(name), published ? "" : "with a network of the published architecture (--model FILE)") << name;
+    }
+    for (const char* name : {"upscale", "pixel-size", "cameras", "filter-strength"}) {
+      EXPECT_EQ(lacks(name), published ? "with a compact network, --method filter or refine" : "") << name;
+    }
+    EXPECT_EQ(lacks("prune-opacity"), "");
+    EXPECT_EQ(lacks("steps"), "no option");
+  }
+  method->options.upstream = true;
+  EXPECT_EQ(lacks("block-gaussians"), "without --compat upstream");
+  method->precision = WeightPrecision::kBFloat16;
+  EXPECT_EQ(lacks("attention-rounding"), "without --precision bf16");
+  // Loading tells what is wrong with a file.
+  method->file = folder_ / "none.pth";
+  EXPECT_EQ(lacks("upscale"), "");
+  EXPECT_EQ(lacks("normalisation"), "");
 }
 
 TEST_F(SmallModel, TheShippedNetworkOpens) {

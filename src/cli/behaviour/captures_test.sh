@@ -74,6 +74,8 @@ says stdout '"consistency_after"'
 expect 0 "what refine wrote" "$program" info "$work/refined.ply"
 expect 0 "refine with pictures" refine -o "$work/refined2.ply" --images "$work/project" --hold-out 5 --steps 8
 says stderr "views with pictures"
+expect 0 "the best quality there is with pictures" "$program" enhance "$work/whole.ply" --quality best --upscale 2 --pixel-size 0.02 -o "$work/best.ply" --images "$work/project" --hold-out 5 --steps 8 --json
+says stdout '"method": "model+refine-images"'
 expect 2 "refine with pictures of something else" "$program" enhance "$source/examples/stone_lantern/input.ply" -o "$work/x.ply" --method refine --pixel-size 0.0055 --images "$work/project" --steps 8
 says stderr "order of their cameras"
 expect 3 "refine with pictures that are not there" refine -o "$work/x.ply" --images "$work/none"

@@ -162,7 +162,32 @@ expect 4 "the same cut short" bash -c "head -c 400000 '$source/models/anchorspla
 expect 0 "a compact network, then refinement" "$program" enhance "$input" -o "$work/compact.ply" -w --model "$compact" --pixel-size 0.0055 --method model+refine --steps 1 --poses 8 --json
 says stdout '"method": "model+refine"'
 expect 2 "options of the other architecture" "$program" enhance "$input" -o "$work/bad.ply" --model "$compact" --pixel-size 0.0055 --normalisation bbox
-says stderr "normalisation is for the published architecture"
+says stderr "--normalisation has no effect with --method model, which auto chose; it has one with a network of the published architecture"
+# Options that would change nothing are refused, with the words for where they would.
+expect 2 "blocks of a compact network" "$program" enhance "$input" -o "$work/bad.ply" --model "$compact" --pixel-size 0.0055 --block-gaussians 5000
+says stderr "--block-gaussians has no effect"
+expect 2 "a model for the filter" "$program" enhance "$input" -o "$work/bad.ply" --model "$compact" --pixel-size 0.0055 --method filter
+says stderr "--model has no effect with --method filter; it has one with --method model"
+expect 2 "pruning by the filter" "$program" enhance "$input" -o "$work/bad.ply" --prune-opacity 0.1 --pixel-size 0.0055 --method filter
+says stderr "--prune-opacity has no effect"
+expect 2 "pruning with pictures and the filter" "$program" enhance "$input" -o "$work/bad.ply" --prune-opacity 0.1 --method filter+refine-images --images "$source/examples/biplane/transforms_lr.json" --steps 1
+says stderr "--prune-opacity has no effect with --method filter+refine-images; it has one with --method model"
+expect 2 "places without a refinement" "$program" enhance "$input" -o "$work/bad.ply" --poses 5 --pixel-size 0.0055
+says stderr "which auto chose; it has one with --method refine or refine-images"
+expect 2 "places where cameras say them" "$program" enhance "$input" -o "$work/bad.ply" --poses 5 --method refine --cameras "$cameras"
+says stderr "without --images and --cameras"
+# Qualities.
+expect 0 "quality fast" "$program" enhance "$input" -o "$work/fast.ply" --quality fast --pixel-size 0.0055 --json
+says stdout '"quality": "fast"'
+says stdout '"method": "model"'
+expect 0 "quality good" "$program" enhance "$input" -o "$work/good.ply" --quality good --pixel-size 0.0055 --steps 1 --poses 8 --json
+says stdout '"method": "model+refine"'
+says stdout '"k": 1'
+expect 2 "a quality and another method" "$program" enhance "$input" -o "$work/bad.ply" --quality good --method filter --pixel-size 0.0055
+says stderr "--quality good is --method model+refine, and --method filter was given"
+expect 2 "no such quality" "$program" enhance "$input" -o "$work/bad.ply" --quality perfect --pixel-size 0.0055
+expect 2 "pictures that a quality does not look at" "$program" enhance "$input" -o "$work/bad.ply" --quality good --images "$source/examples/biplane/transforms_lr.json"
+says stderr "--quality best"
 head -c 9000 "$compact" >"$work/cut.safetensors"
 expect 4 "a compact network cut short" "$program" enhance "$input" -o "$work/bad.ply" --model "$work/cut.safetensors"
 expect 4 "a splat as weights" "$program" convert "$input" "$work/weights.safetensors"

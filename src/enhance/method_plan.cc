@@ -1,0 +1,142 @@
+#include <algorithm>
+#include <utility>
+
+#include "core/text.h"
+#include "enhance/enhance.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// The best that is ready and takes no time: the filter always is.
+const EnhanceMethod* BestInstant(const EnhanceOptions& options) {
+  const EnhanceMethod* best = nullptr;
+  for (const EnhanceMethod& method : EnhanceMethods()) {
+    if (method.takes_start || !method.ready(options).ok()) continue;
+    if (best == nullptr || method.rank > best->rank) best = &method;
+  }
+  return best;
+}
+
+// What refinement can make better: a splat with other widths alone is what it begins with anyway.
+const EnhanceMethod* StartWithDetail(const EnhanceOptions& options) {
+  const EnhanceMethod* best = BestInstant(options);
+  return best->adds_detail ? best : nullptr;
+}
+
+Result<const EnhanceMethod*> FindMethod(const EnhanceOptions& options, const std::string& name) {
+  const EnhanceMethod* best = nullptr;
+  std::string names;
+  for (const EnhanceMethod& method : EnhanceMethods()) {
+    names += ", " + method.name;
+    if (method.name == name) {
+      ANCHORSPLAT_RETURN_IF_ERROR(method.ready(options));
+      return &method;
+    }
+    if ((best == nullptr || method.rank > best->rank) && method.ready(options).ok()) best = &method;
+  }
+  if (name == "auto") return best;
+  return Error{ErrorCode::kBadArgument, Cat("there is no method '", Printable(name), "' (known: auto", names, ")")};
+}
+
+Result<MethodPlan> PlanQuality(const EnhanceOptions& options) {
+  const std::string& quality = options.quality;
+  if (quality != "fast" && quality != "good" && quality != "best") {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("there is no quality '", Printable(quality), "' (known: fast, good, best)")};
+  }
+  const bool pictures = !options.refine.images.empty();
+  if (pictures && quality != "best") {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--images have no effect with --quality ", quality, "; they have one with --quality best")};
+  }
+  MethodPlan plan;
+  plan.chosen_by = "--quality " + quality;
+  if (quality == "fast") {
+    plan.method = BestInstant(options);
+  } else {
+    plan.start = StartWithDetail(options);
+    ANCHORSPLAT_ASSIGN_OR_RETURN(plan.method, FindMethod(options, pictures ? "refine-images" : "refine"));
+  }
+  if (options.method != "auto" && options.method != plan.Name()) {
+    return Error{ErrorCode::kBadArgument, Cat(plan.chosen_by, " is --method ", plan.Name(), ", and --method ",
+                                              Printable(options.method), " was given: give one of the two")};
+  }
+  return plan;
+}
+
+std::string OrList(const std::vector<std::string>& words) {
+  std::string list;
+  for (size_t i = 0; i < words.size(); ++i) list += (i == 0 ? "" : i + 1 == words.size() ? " or " : ", ") + words[i];
+  return list;
+}
+
+const MethodOption* FindOption(const EnhanceMethod* method, const std::string& name) {
+  if (method == nullptr) return nullptr;
+  const auto named = [&](const MethodOption& option) { return option.name == name; };
+  const auto found = std::find_if(method->options.begin(), method->options.end(), named);
+  return found == method->options.end() ? nullptr : &*found;
+}
+
+}  // namespace
+
+std::vector<MethodOption> WidthOptions(const std::function<std::string(const MethodUse&)>& lacks) {
+  std::vector<MethodOption> options;
+  for (const char* name : {"upscale", "pixel-size", "cameras", "train-width", "camera-rule", "filter-strength"}) {
+    options.push_back({name, lacks});
+  }
+  return options;
+}
+
+std::string MethodPlan::Name() const { return start == nullptr ? method->name : Cat(start->name, "+", method->name); }
+
+Result<MethodPlan> PlanEnhancement(const EnhanceOptions& options) {
+  if (!options.quality.empty()) return PlanQuality(options);
+  MethodPlan plan;
+  const size_t plus = options.method.find('+');
+  if (plus == std::string::npos) {
+    if (options.method == "auto") plan.chosen_by = "auto";
+    ANCHORSPLAT_ASSIGN_OR_RETURN(plan.method, FindMethod(options, options.method));
+    if (plan.method->begins_with_best(options)) plan.start = StartWithDetail(options);
+    return plan;
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(plan.start, FindMethod(options, options.method.substr(0, plus)));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(plan.method, FindMethod(options, options.method.substr(plus + 1)));
+  if (!plan.method->takes_start) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("the method '", plan.method->name, "' cannot go on from the result of another")};
+  }
+  return plan;
+}
+
+Status CheckOptions(const EnhanceOptions& options) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const MethodPlan plan, PlanEnhancement(options));
+  for (const std::string& name : options.given) {
+    std::string lack;
+    bool works = false;
+    for (const auto& [method, start] : {std::pair(plan.method, plan.start), std::pair(plan.start, plan.start)}) {
+      const MethodOption* option = FindOption(method, name);
+      if (option == nullptr) continue;
+      const MethodUse use{options, method == plan.method ? start : nullptr};
+      const std::string lacking = option->lacks ? option->lacks(use) : "";
+      works |= lacking.empty();
+      if (lack.empty()) lack = lacking;
+    }
+    if (works) continue;
+    if (lack.empty()) {
+      std::vector<std::string> owners;
+      for (const EnhanceMethod& method : EnhanceMethods()) {
+        const bool listed = std::find(owners.begin(), owners.end(), method.name) != owners.end();
+        if (FindOption(&method, name) != nullptr && !listed) owners.push_back(method.name);
+      }
+      if (owners.empty()) continue;
+      lack = "with --method " + OrList(owners);
+    }
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--", name, " has no effect with --method ", plan.Name(),
+                     plan.chosen_by.empty() ? "" : Cat(", which ", plan.chosen_by, " chose"), "; it has one ", lack)};
+  }
+  return {};
+}
+
+}  // namespace anchorsplat

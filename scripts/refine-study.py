@@ -73,7 +73,7 @@ def imperfect(args, example):
         spoil(example, kind, folder)
         for flags in tried:
             enhance(args, f"{example.name}, pictures: {kind} {' '.join(flags)}", example / "input.ply", example, "--method",
-                    "refine", "--images", folder, "--hold-out", "0", "--k", args.k, "--steps", args.steps, *flags)
+                    "filter+refine", "--images", folder, "--hold-out", "0", "--k", args.k, "--steps", args.steps, *flags)
 
 
 def fine(args, example):
@@ -86,8 +86,8 @@ def fine(args, example):
            seconds)
     enhance(args, f"{example.name}, pixel areas, refined without pictures", area, example, "--method", "refine", "--cameras",
             low)
-    enhance(args, f"{example.name}, pixel areas, refined with pictures", area, example, "--method", "refine", "--images", low,
-            "--hold-out", "0", "--k", args.k, "--steps", args.steps)
+    enhance(args, f"{example.name}, pixel areas, refined with pictures", area, example, "--method", "filter+refine", "--images",
+            low, "--hold-out", "0", "--k", args.k, "--steps", args.steps)
 
 
 def trace(args, mesh, low, high, *more):
@@ -113,8 +113,8 @@ def trained_high(args, mesh):
                          mode, "--steps", args.fit_steps, "--max-gaussians", "20000")
         report(name, args.program, splat, folder / "held_out", folder / "held_out.json", seconds)
         out = folder / f"{mode}-refined.ply"
-        _, seconds = run(args.program, "enhance", splat, "-o", out, "-w", "-q", "--threads", "1", "--method", "refine", "--images",
-                         folder / "transforms_128.json", "--k", args.k, "--steps", args.steps)
+        _, seconds = run(args.program, "enhance", splat, "-o", out, "-w", "-q", "--threads", "1", "--method",
+                         "filter+refine", "--images", folder / "transforms_128.json", "--k", args.k, "--steps", args.steps)
         report(f"{name}, refined with 128 x 128", args.program, out, folder / "held_out", folder / "held_out.json", seconds)
 
 
@@ -139,7 +139,7 @@ def nerf(args, mesh):
     report(f"{name}, fit of 200 x 200", args.program, splat, *truth, seconds, "--background", "1,1,1")
     ways = {"filter": ("--method", "filter", "--cameras", scene / "transforms_train.json", "--camera-rule", "median"),
             "refined without pictures": ("--method", "refine", "--cameras", scene / "transforms_train.json"),
-            "refined with pictures": ("--method", "refine", "--images", scene, "--hold-out", "0")}
+            "refined with pictures": ("--method", "filter+refine", "--images", scene, "--hold-out", "0")}
     for way, options in ways.items():
         out = folder / f"{way.replace(' ', '-')}.ply"
         _, seconds = run(args.program, "enhance", splat, "-o", out, "-w", "-q", "--threads", "1", *options)
@@ -153,8 +153,8 @@ def equal_time(args, example):
     plain, area = args.work / f"{example.name}-plain.ply", args.work / f"{example.name}-area.ply"
     _, first = run(*fit, "-o", plain, "--steps", args.fit_steps, "--max-gaussians", "20000")
     refined = args.work / f"{example.name}-refined.ply"
-    _, second = run(args.program, "enhance", plain, "-o", refined, "-w", "-q", "--threads", "1", "--method", "refine", "--images",
-                    low, "--hold-out", "0", "--k", args.k, "--steps", args.steps)
+    _, second = run(args.program, "enhance", plain, "-o", refined, "-w", "-q", "--threads", "1", "--method",
+                    "filter+refine", "--images", low, "--hold-out", "0", "--k", args.k, "--steps", args.steps)
     report(f"{example.name}, fit, then refine", args.program, refined, example / "hr", example / "transforms_hr.json",
            first + second)
     gaussians = json.loads(run(args.program, "info", refined, "--json")[0])

@@ -311,10 +311,11 @@ void AddEnhance(CLI::App& app, Program& program) {
   auto* output = verb.add_option("-o,--output", flags->output, "File to write (one input)");
   verb.add_option("--out-dir", flags->out_dir, "Folder to write to, under the inputs' names")->excludes(output);
   verb.add_option("--method", options.method, MethodHelp())->capture_default_str();
-  verb.add_option("--quality", options.quality,
-                  "Instead of a method, by the time there is. fast: the filter and the network, as auto, a second; good: "
-                  "the network, then a little refinement, several seconds; best: refinement with the pictures of "
-                  "--images, minutes, and good where there are none")
+  verb.add_option(
+          "--quality", options.quality,
+          "Instead of a method, by the time there is. fast: the filter and the network, as auto, a second; good: "
+          "the network, then a little refinement, several seconds; best: refinement with the pictures of "
+          "--images, minutes, and good where there are none")
       ->check(CLI::IsMember({"fast", "good", "best"}));
   verb.add_option("--upscale", options.upscale, "How many times closer it will be seen; at least 1")
       ->capture_default_str();

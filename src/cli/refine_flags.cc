@@ -16,7 +16,8 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
       ->check(CLI::Range(0, 1 << 30))
       ->capture_default_str()
       ->group(group);
-  auto* steps = verb.add_option("--steps", options.steps, "Steps (default: 1500 with --images, 600 without, 100 of a network's result without)")
+  auto* steps = verb.add_option("--steps", options.steps,
+                                "Steps (default: 1500 with --images, 600 without, 100 of a network's result without)")
                     ->check(CLI::Range(int64_t{1}, int64_t{1} << 40))
                     ->group(group);
   verb.add_option("--seconds", options.seconds,
@@ -24,8 +25,10 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
       ->check(CLI::PositiveNumber)
       ->excludes(steps)
       ->group(group);
-  verb.add_option("--k", options.copies, "Gaussians that each becomes at first (default: 8 of the input's with --images, 4 without, 1 of a network's "
-                  "result without; fewer where a closer view has no room for more)")
+  verb.add_option(
+          "--k", options.copies,
+          "Gaussians that each becomes at first (default: 8 of the input's with --images, 4 without, 1 of a network's "
+          "result without; fewer where a closer view has no room for more)")
       ->check(CLI::Range(1, kMostCopies))
       ->group(group);
   verb.add_option("--most-gaussians", options.max_gaussians, "Bound for --k; 0: none")
@@ -48,8 +51,9 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
       ->check(Fraction())
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--rate", options.rate,
-                  "Learning rates, as a part of those of `fit` (default: 1; 0.1 of a network's result without --images)")
+  verb.add_option(
+          "--rate", options.rate,
+          "Learning rates, as a part of those of `fit` (default: 1; 0.1 of a network's result without --images)")
       ->check(CLI::PositiveNumber)
       ->group(group);
   verb.add_option("--rate-decay", options.rate_decay, "What is left of them at the end")
@@ -60,8 +64,7 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
       ->check(Fraction())
       ->capture_default_str()
       ->group(group);
-  verb.add_flag("--exposure", options.exposure, "Pictures of --images differ in brightness and tint")
-      ->group(group);
+  verb.add_flag("--exposure", options.exposure, "Pictures of --images differ in brightness and tint")->group(group);
   verb.add_flag("--robust", options.robust, "Ignore what differs grossly from --images: passers-by, flares")
       ->group(group);
   verb.add_option_function<std::string>("--checkpoint", path(control.checkpoint),

@@ -67,7 +67,7 @@ struct EnhanceInput {
   GaussianCloud cloud;
   Buffer<float> pixel_sizes;  // one for all, or one per Gaussian
   double filter_strength = 0;
-  GaussianCloud start;  // what the method before it made, of "A+B"; else empty
+  GaussianCloud start;            // what the method before it made, of "A+B"; else empty
   bool start_has_detail = false;  // EnhanceMethod::adds_detail of that method
 };
 
@@ -95,8 +95,8 @@ struct EnhanceMethod {
   bool takes_start = false;  // looks at EnhanceInput::start
   // Named alone it begins with the best instant method, if that one adds detail.
   std::function<bool(const EnhanceOptions&)> begins_with_best = [](const EnhanceOptions&) { return false; };
-  bool adds_detail = false;  // shows more than the splat does, not only what it shows with other widths
-  bool resumable = false;    // looks at EnhanceOptions::control
+  bool adds_detail = false;           // shows more than the splat does, not only what it shows with other widths
+  bool resumable = false;             // looks at EnhanceOptions::control
   std::vector<MethodOption> options;  // all that it looks at: this is the only place that says so
   // False: EnhanceInput::pixel_sizes may be empty, nothing is estimated. Asked once the method is ready. An error: it
   // could not run.

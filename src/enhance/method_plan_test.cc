@@ -18,20 +18,18 @@ constexpr uint64_t kWithNetwork = 20'002;
 class Plan : public testing::Test {
  protected:
   static void SetUpTestSuite() {
-    RegisterEnhanceMethod(
-        {.name = "sharpen",
-         .summary = "for this test",
-         .rank = 1,
-         .adds_detail = true,
-         .options = {{"prune-opacity", {}},
-                     {"block-gaussians", [](const MethodUse&) { return "with a larger network"; }}},
-         .ready = [](const EnhanceOptions& options) -> Status {
-           if (options.seed == kWithNetwork) return {};
-           return Error{ErrorCode::kBadArgument, "no network"};
-         },
-         .run = [](EnhanceInput input, const EnhanceOptions&, EnhanceReport&) -> Result<GaussianCloud> {
-           return std::move(input.cloud);
-         }});
+    RegisterEnhanceMethod({.name = "sharpen",
+                           .summary = "for this test",
+                           .rank = 1,
+                           .adds_detail = true,
+                           .options = {{"prune-opacity", {}},
+                                       {"block-gaussians", [](const MethodUse&) { return "with a larger network"; }}},
+                           .ready = [](const EnhanceOptions& options) -> Status {
+                             if (options.seed == kWithNetwork) return {};
+                             return Error{ErrorCode::kBadArgument, "no network"};
+                           },
+                           .run = [](EnhanceInput input, const EnhanceOptions&,
+                                     EnhanceReport&) -> Result<GaussianCloud> { return std::move(input.cloud); }});
   }
   // The methods' name, or what is wrong.
   std::string Name() const {

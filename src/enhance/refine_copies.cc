@@ -11,8 +11,8 @@ namespace anchorsplat {
 
 namespace {
 constexpr int64_t kViews = 16;
-constexpr float kShown = 0.5f;          // alpha
-constexpr double kMostPerPixel = 2;     // Gaussians, half of them unseen
+constexpr float kShown = 0.5f;       // alpha
+constexpr double kMostPerPixel = 2;  // Gaussians, half of them unseen
 }  // namespace
 
 Result<ViewDensity> MeasureDensity(const GaussianCloud& cloud, const RenderOptions& render,
@@ -45,15 +45,12 @@ int ChooseCopies(const ViewDensity& density, double upscale, int wanted, int64_t
   const int copies = std::max(1, static_cast<int>(std::lround(wanted / each)));
   const double pixels = density.pixels * upscale * upscale, gaussians = density.gaussians * each;
   const int most = static_cast<int>(std::clamp(kMostPerPixel * pixels / std::max(1.0, gaussians), 1.0, 1e6));
-  const std::string why = Cat("a closer view shows the splat in about ", WithThousands(std::llround(pixels)),
-                              " pixels, by ", WithThousands(std::llround(gaussians)), " Gaussians");
-  if (most >= copies) {
-    LogInfo(Cat("every Gaussian becomes ", copies, ": ", why, " now; --k says otherwise"));
-    return copies;
-  }
-  LogInfo(Cat("every Gaussian becomes ", most, " instead of ", copies, ": ", why,
-              " already, and more than ", kMostPerPixel, " for a pixel have nothing to draw; --k says otherwise"));
-  return most;
+  const int chosen = std::min(copies, most);
+  LogInfo(Cat(chosen == 1 ? "no Gaussian is split" : Cat("every Gaussian becomes ", chosen),
+              chosen < copies ? Cat(" instead of ", copies, ", which nobody would see") : "",
+              ": a closer view shows the splat in about ", WithThousands(std::llround(pixels)), " pixels, by ",
+              WithThousands(std::llround(gaussians)), " Gaussians before that; --k says otherwise"));
+  return chosen;
 }
 
 }  // namespace anchorsplat

@@ -43,20 +43,20 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
   refine.pixel_size = report.pixel_size;
   refine.cameras = options.cameras;
   refine.seed = options.seed;
-  const bool begun = !input.start.empty();
-  if (begun) {
-    refine.start = std::move(input.start);
-    refine.start_has_detail = input.start_has_detail;
-  } else {
+  refine.start_has_detail = input.start_has_detail;
+  refine.start = std::move(input.start);
+  if (refine.start.empty()) {
     refine.start = input.cloud;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(
-        const int64_t grown,
-        ApplyFilter(refine.start, input.pixel_sizes, {.upscale = options.upscale, .strength = input.filter_strength}));
-    if (grown == 0 && options.refine.images.empty()) {
-      LogInfo("there is no lost width to give back, and without pictures nothing else to learn: the splat stays");
-      report.facts.emplace_back("kept_start", 1.0);
-      return std::move(refine.start);
-    }
+    const auto grown =
+        ApplyFilter(refine.start, input.pixel_sizes, {.upscale = options.upscale, .strength = input.filter_strength});
+    if (!grown.ok()) return grown.error();
+  }
+  // No more than what the closer view's own pixels add.
+  const bool lost_none = input.filter_strength * options.upscale * options.upscale <= 1;
+  if (lost_none && options.refine.images.empty()) {
+    LogInfo("there is no lost width to give back, and without pictures nothing else to learn: the splat stays");
+    report.facts.emplace_back("kept_start", 1.0);
+    return std::move(refine.start);
   }
   refine.cloud = std::move(input.cloud);
   ANCHORSPLAT_ASSIGN_OR_RETURN(Refined refined, Refine(std::move(refine), options.refine, options.control));
@@ -95,7 +95,9 @@ std::vector<MethodOption> RefinementOptions() {
       {"poses",
        [](const MethodUse& use) { return HasImages(use) || HasCameras(use) ? "without --images and --cameras" : ""; }},
       {"between",
-       [](const MethodUse& use) { return HasImages(use) || !HasCameras(use) ? "with --cameras, without --images" : ""; }},
+       [](const MethodUse& use) {
+         return HasImages(use) || !HasCameras(use) ? "with --cameras, without --images" : "";
+       }},
       {"half-from", closer},
       {"all-from", closer},
       {"rate", {}},

@@ -11,8 +11,8 @@
 
 namespace anchorsplat {
 
-// What a refinement does (enhance/refine.h). Values that are not given depend on whether there are pictures, on where it
-// begins and on how many Gaussians there are.
+// What a refinement does (enhance/refine.h). Values that are not given depend on whether there are pictures, on where
+// it begins and on how many Gaussians there are.
 struct RefineOptions {
   std::filesystem::path images;  // project with the training pictures (fit/training_views.h); empty: without any
   int hold_out = 8;              // every Nth view is not trained on, as in fits; 0: all are

@@ -220,8 +220,8 @@ RefinePoses RefinePosesAlong(const std::vector<Camera>& cameras, int between, in
   const auto count = std::ssize(cameras);
   RefinePoses poses;
   poses.train = PosesAlong(cameras, between);
-  poses.check = Thinned(ClearOf(cameras, Thinned(places, kCheckCandidates), scale),
-                        std::clamp<int64_t>(count / 3, 1, checks));
+  poses.check =
+      Thinned(ClearOf(cameras, Thinned(places, kCheckCandidates), scale), std::clamp<int64_t>(count / 3, 1, checks));
   if (!poses.check.empty()) {
     for (const Camera& check : poses.check) {
       const double room = 0.5 * Clearance(check, cameras, scale);

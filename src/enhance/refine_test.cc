@@ -409,6 +409,8 @@ TEST_F(Refinement, ThroughTheDoor) {
   GaussianCloud antialiased = input_.cloud;
   antialiased.render_mode = RenderMode::kAntialiased;
   ExpectSameCloud(Enhance(antialiased, options)->cloud, antialiased);
+  options.method = "filter+refine";
+  ExpectSameCloud(Enhance(antialiased, options)->cloud, antialiased);
 }
 
 // What is right when seen closer comes back unharmed: as a fit to the areas of pixels makes it, as an antialiased one

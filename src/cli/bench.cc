@@ -264,7 +264,7 @@ void AddBench(CLI::App& app, Program& program) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   render.add_option("--radius", render_flags->options.radius, "Of the orbit, world units")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->capture_default_str();
   render.add_option("--repeats", render_flags->options.repeats, "The fastest counts")
       ->check(CLI::Range(1, 1000))
@@ -285,7 +285,7 @@ void AddBench(CLI::App& app, Program& program) {
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   fit.add_option("--radius", fit_flags->options.radius, "Of the orbit, world units")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->capture_default_str();
   fit.add_option("--width", fit_flags->options.widths, "Pixels per side, one or more")
       ->check(CLI::Range(11, 8192))

@@ -24,6 +24,26 @@ inline CLI::Validator AtLeastOne() {
       "");
 }
 
+// Bounds without an end. The library's own print the end, which has 309 digits, and let "nan" through.
+inline CLI::Validator Positive() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        double value = 0;
+        const bool number = CLI::detail::lexical_cast(text, value);
+        return number && value > 0 ? "" : "must be a number above 0, found '" + text + "'";
+      },
+      "POSITIVE");
+}
+inline CLI::Validator NotNegative() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        double value = 0;
+        const bool number = CLI::detail::lexical_cast(text, value);
+        return number && value >= 0 ? "" : "must be a number of 0 or more, found '" + text + "'";
+      },
+      "NONNEGATIVE");
+}
+
 // For shares of a whole. The library's own range lets "nan" through.
 inline CLI::Validator Fraction() {
   return CLI::Validator(
@@ -34,6 +54,11 @@ inline CLI::Validator Fraction() {
       },
       "");
 }
+
+// Gives every option of `verb` and of its subcommands that takes a number the check that the number is one: finite and
+// of a size that single precision holds where it is real, within 64 bits where it is whole. The library alone takes
+// "inf" and "nan", and the nearest number of 64 bits for what is beyond them. Done once for all verbs (verb.cc).
+void CheckNumbers(CLI::App& verb);
 
 // An option that takes one of several words for the values of an enumeration. Help shows the words and the default;
 // numbers are not accepted.

@@ -123,7 +123,7 @@ void AddDatasetBuild(CLI::App& parent, Program& program) {
       ->check(CLI::Range(2, 64))
       ->capture_default_str();
   verb.add_option("--max-gaussians", flags->settings.max_gaussians, "Bound on a fit's size; 0: none")
-      ->check(CLI::NonNegativeNumber)
+      ->check(NotNegative())
       ->capture_default_str();
   verb.add_option("--min-psnr", flags->settings.min_train_psnr,
                   "Objects whose fit is further from its own training views are rejected, dB")
@@ -131,7 +131,7 @@ void AddDatasetBuild(CLI::App& parent, Program& program) {
   verb.add_option("--jobs", flags->jobs, "Objects at the same time (default: one per core)")
       ->check(CLI::Range(1, 1024));
   verb.add_option("--timeout", flags->timeout, "Seconds an object may take; 0: any")
-      ->check(CLI::NonNegativeNumber)
+      ->check(NotNegative())
       ->capture_default_str();
   verb.add_option("--licence", flags->licence, "Licence of meshes that name none, such as GPL-2.0-or-later")
       ->check(NotEmpty());

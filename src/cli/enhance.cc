@@ -326,7 +326,7 @@ void AddEnhance(CLI::App& app, Program& program) {
                       ->check(NotEmpty());
   verb.add_option("--train-width", options.train_width,
                   "Image width in training where it was less than the cameras say")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->needs(cameras);
   AddChoice(verb, "--camera-rule", options.camera_rule,
             {{"smallest", CameraPixelRule::kSmallest}, {"median", CameraPixelRule::kMedian}},
@@ -371,7 +371,7 @@ void AddEnhance(CLI::App& app, Program& program) {
       ->capture_default_str();
   model_option(verb.add_option("--max-gaussians", model.max_gaussians,
                                "Anchors at most, the largest by opacity x size; 0 is all"))
-      ->check(CLI::NonNegativeNumber)
+      ->check(NotNegative())
       ->capture_default_str();
   verb.add_option("--prune-opacity", model.prune_opacity,
                   "Leave Gaussians of less opacity out of what the model makes; 1/255 = 0.0039 is invisible")

@@ -139,7 +139,7 @@ void AddEval(CLI::App& app, Program& program) {
   verb.add_option("--split", flags->split, "Only the objects of this split of the data set: train, validation or test");
   verb.add_option("--objects", flags->objects, "Only these, by name; separated by commas")->delimiter(',');
   verb.add_option("--max-views", flags->max_views, "At most so many views per object, for a quick look; 0: all")
-      ->check(CLI::NonNegativeNumber)
+      ->check(NotNegative())
       ->capture_default_str();
   AddLpipsFlags(verb, flags->lpips, flags->lpips_weights);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunEval(*flags, program); }; });

@@ -16,7 +16,7 @@ void AddScheduleFlags(CLI::App& verb, FitFlags& f) {
     verb.add_option(name, value, help)->check(CLI::Range(int64_t{1}, kMostSteps))->group(group);
   };
   const auto number = [&](const char* name, double& value, const char* help) {
-    verb.add_option(name, value, help)->check(CLI::NonNegativeNumber)->capture_default_str()->group(group);
+    verb.add_option(name, value, help)->check(NotNegative())->capture_default_str()->group(group);
   };
   steps("--refine-start", f.refine_start, "First growth after this step");
   steps("--refine-stop", f.refine_stop, "No growth from this step on");
@@ -39,7 +39,7 @@ void AddRateFlags(CLI::App& verb, FitFlags& f) {
   const std::string group = "Learning rates";
   LearningRates& r = f.standard.rates;
   const auto rate = [&](const char* name, double& value, const char* help) {
-    verb.add_option(name, value, help)->check(CLI::NonNegativeNumber)->capture_default_str()->group(group);
+    verb.add_option(name, value, help)->check(NotNegative())->capture_default_str()->group(group);
   };
   rate("--rate-means", r.means, "Of centres, in scene scales");
   rate("--rate-means-decay", r.means_decay, "What is left of it at the last step");
@@ -62,7 +62,7 @@ void FitFlags::AddTo(CLI::App& verb) {
       ->check(CLI::Range(int64_t{1}, kMostSteps))
       ->capture_default_str();
   verb.add_option("--max-gaussians", standard.densification.max_gaussians, "Growth stops there; 0: no bound")
-      ->check(CLI::NonNegativeNumber)
+      ->check(NotNegative())
       ->capture_default_str();
   verb.add_option("--hold-out", hold_out, "Hold out every Nth view, by name; 0: none")
       ->check(CLI::Range(0, 1 << 30))

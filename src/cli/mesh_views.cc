@@ -85,7 +85,7 @@ void ViewSetFlags::AddTo(CLI::App& verb) {
       ->check(CLI::Range(1.0, 170.0))
       ->capture_default_str();
   verb.add_option("--radius", views.rig.radius, "Distance of the cameras; the object's longest side is 1")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->capture_default_str();
   AddChoice<RigKind>(verb, "--rig", views.rig.kind,
                      {{"sphere", RigKind::kSphere}, {"rings", RigKind::kRings}, {"random", RigKind::kRandom}},

@@ -22,7 +22,7 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
                     ->group(group);
   verb.add_option("--seconds", options.seconds,
                   "As many steps as there are in that time; then the result is not the same each time")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->excludes(steps)
       ->group(group);
   verb.add_option(
@@ -32,7 +32,7 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
       ->check(CLI::Range(1, kMostCopies))
       ->group(group);
   verb.add_option("--most-gaussians", options.max_gaussians, "Bound for --k; 0: none")
-      ->check(CLI::NonNegativeNumber)
+      ->check(NotNegative())
       ->capture_default_str()
       ->group(group);
   verb.add_option("--poses", options.poses, "Without --images and --cameras: places around the object to look from")
@@ -54,7 +54,7 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
   verb.add_option(
           "--rate", options.rate,
           "Learning rates, as a part of those of `fit` (default: 1; 0.1 of a network's result without --images)")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->group(group);
   verb.add_option("--rate-decay", options.rate_decay, "What is left of them at the end")
       ->check(Fraction())

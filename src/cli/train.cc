@@ -132,7 +132,7 @@ void AddTrain(CLI::App& app, Program& program) {
       ->check(CLI::Range(int64_t{1}, int64_t{1'000'000'000}));
   verb.add_option("--minutes", request.minutes,
                   "Stop after so many minutes of training, with the schedule fitted to them")
-      ->check(CLI::PositiveNumber);
+      ->check(Positive());
   verb.callback([flags, &program, &verb] {
     if (verb.get_option("--seed")->count() > 0) flags->request.seed = program.flags.seed;
     program.run = [flags, &program] { return RunTrain(*flags, program); };

@@ -6,6 +6,7 @@
 #include <new>
 #include <nlohmann/json.hpp>
 
+#include "cli/choice.h"
 #include "cli/verb_tree.h"
 #include "core/log.h"
 #include "core/parallel.h"
@@ -37,7 +38,7 @@ CLI::App& AddVerb(CLI::App& app, Program& program, const std::string& name, cons
       ->capture_default_str()
       ->group(group);
   verb.add_option("--seed", flags.seed, "Seed of everything random")
-      ->check(CLI::NonNegativeNumber)
+      ->check(NotNegative())
       ->capture_default_str()
       ->group(group);
   return verb;
@@ -69,6 +70,7 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
   AddBench(app, program);
   AddDoctor(app, program);
   AddManual(app, program);
+  CheckNumbers(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

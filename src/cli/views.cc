@@ -64,7 +64,7 @@ void ViewFlags::AddTo(CLI::App& verb) {
       ->check(CLI::Range(1, 100000))
       ->excludes(cameras_option);
   verb.add_option("--radius", radius, "Orbit: distance, world units (default: what frames the splat)")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->excludes(cameras_option);
   verb.add_option("--target", target, "Orbit: X,Y,Z to look at (default: the splat's middle)")
       ->excludes(cameras_option);

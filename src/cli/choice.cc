@@ -1,0 +1,50 @@
+#include "cli/choice.h"
+
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+
+namespace anchorsplat {
+
+namespace {
+
+// What is no number at all is said by the library.
+CLI::Validator Finite() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        double value = 0;
+        const bool bad = CLI::detail::lexical_cast(text, value) &&
+                         !(std::abs(value) <= double{std::numeric_limits<float>::max()});
+        return bad ? "must be a finite number of at most 3.4e38, found '" + text + "'" : "";
+      },
+      "");
+}
+
+CLI::Validator Within64Bits(bool negative_too) {
+  return CLI::Validator(
+      [negative_too](const std::string& text) {
+        errno = 0;
+        if (negative_too) {
+          static_cast<void>(std::strtoll(text.c_str(), nullptr, 0));
+        } else {
+          static_cast<void>(std::strtoull(text.c_str(), nullptr, 0));
+        }
+        return errno == ERANGE ? "must be a number of 64 bits, found '" + text + "'" : "";
+      },
+      "");
+}
+
+}  // namespace
+
+void CheckNumbers(CLI::App& verb) {
+  for (CLI::Option* option : verb.get_options([](const CLI::Option*) { return true; })) {
+    const std::string type = option->get_type_name();  // "FLOAT:POSITIVE"
+    if (type.starts_with("FLOAT")) option->check(Finite());
+    if (type.starts_with("INT")) option->check(Within64Bits(true));
+    if (type.starts_with("UINT")) option->check(Within64Bits(false));
+  }
+  for (CLI::App* part : verb.get_subcommands([](const CLI::App*) { return true; })) CheckNumbers(*part);
+}
+
+}  // namespace anchorsplat

@@ -5,6 +5,7 @@
 
 #include "core/log.h"
 #include "core/text.h"
+#include "formats/extra_properties.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "formats/write_losses.h"
@@ -37,15 +38,25 @@ Result<GaussianCloud> ReadCloud(const std::filesystem::path& path, const ReadLim
   return OutOfMemory(path);
 }
 
-Status WriteCloud(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) try {
+Status WriteCloud(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) {
+  return WriteCloud(path, cloud, options, ExtraProperties{});
+}
+
+Status WriteCloud(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options,
+                  const ExtraProperties& extras) try {
   const SplatFormat* format = FormatOfExtension(path);
   if (format == nullptr || format->write == nullptr) {
     const std::string what = format == nullptr ? Cat("has no extension of a splat format")
                                                : Cat("is a ", format->name, " file, which this version does not write");
     return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", what, "; it writes ", WrittenFormats())};
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(format->write(path, cloud, options));
+  const bool keeps = format->write_with_extras != nullptr;
+  ANCHORSPLAT_RETURN_IF_ERROR(keeps ? format->write_with_extras(path, cloud, options, extras)
+                                    : format->write(path, cloud, options));
   for (const std::string& loss : WriteLosses(*format, cloud)) LogWarning(Cat(path.string(), ": ", loss));
+  if (const std::string lost = extras.lost(keeps); !lost.empty()) {
+    LogWarning(Cat(path.string(), ": other properties of the input are dropped: ", lost));
+  }
   return {};
 } catch (const std::bad_alloc&) {
   return OutOfMemory(path);

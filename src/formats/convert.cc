@@ -14,9 +14,11 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "formats/extra_properties.h"
 #include "formats/opened_splat.h"
 #include "formats/quantize.h"
 #include "formats/registry.h"
+#include "formats/row_arrays.h"
 #include "formats/splat_order.h"
 
 namespace anchorsplat {
@@ -37,18 +39,9 @@ void ForEachArray(GaussianCloud& cloud, Visit&& visit) {
   visit(cloud.sh, cloud.sh_stride());
 }
 
-// Closes up the rows for which keep[i] is set; their order stays.
-void KeepRows(GaussianCloud& cloud, const std::vector<char>& keep) {
-  ForEachArray(cloud, [&keep](Buffer<float>& array, int64_t width) {
-    float* to = array.data();
-    for (size_t i = 0; i < keep.size(); ++i) {
-      if (keep[i] == 0) continue;
-      const float* from = array.data() + static_cast<int64_t>(i) * width;
-      if (to != from) std::memmove(to, from, static_cast<size_t>(width) * sizeof(float));
-      to += width;
-    }
-    array.resize(static_cast<size_t>(to - array.data()));
-  });
+void KeepRows(GaussianCloud& cloud, ExtraProperties* extras, const std::vector<char>& keep) {
+  ForEachArray(cloud, [&keep](Buffer<float>& array, int64_t width) { KeepRows(array, width, keep); });
+  if (extras != nullptr) KeepRows(*extras, keep);
 }
 
 // Rows with a position, scale, rotation or opacity that is NaN or infinite (−Inf, a scale or opacity of zero, is fine).
@@ -96,19 +89,19 @@ Status ParseAxes(std::string_view text, ConvertOptions& options) {
   return {};
 }
 
-void DropFaint(GaussianCloud& cloud, float min_opacity) {
+void DropFaint(GaussianCloud& cloud, float min_opacity, ExtraProperties* extras) {
   if (!(min_opacity > 0)) return;
   std::vector<char> keep(static_cast<size_t>(cloud.size()));
   for (size_t i = 0; i < keep.size(); ++i) keep[i] = Sigmoid(cloud.opacity_logits[i]) >= min_opacity ? 1 : 0;
-  KeepRows(cloud, keep);
+  KeepRows(cloud, extras, keep);
 }
 
-void KeepMostImportant(GaussianCloud& cloud, int64_t most) {
+void KeepMostImportant(GaussianCloud& cloud, int64_t most, ExtraProperties* extras) {
   if (cloud.size() <= most) return;
   const Buffer<uint32_t> order = ImportanceOrder(cloud);
   std::vector<char> keep(static_cast<size_t>(cloud.size()), 0);
   for (int64_t i = 0; i < most; ++i) keep[order[static_cast<size_t>(i)]] = 1;
-  KeepRows(cloud, keep);
+  KeepRows(cloud, extras, keep);
 }
 
 void SetShDegree(GaussianCloud& cloud, int degree) {
@@ -126,26 +119,9 @@ void SetShDegree(GaussianCloud& cloud, int degree) {
   cloud.sh.resize(static_cast<size_t>(cloud.size() * to));
 }
 
-void Reorder(GaussianCloud& cloud, Buffer<uint32_t> rows) {
-  // Along the cycles of the permutation, so that there is no second copy of any array.
-  ForEachArray(cloud, [&rows](Buffer<float>& array, int64_t width) {
-    const size_t bytes = static_cast<size_t>(width) * sizeof(float);
-    const auto row = [&](uint32_t i) { return array.data() + int64_t{i} * width; };
-    std::vector<char> done(rows.size(), 0);
-    Buffer<float> held(static_cast<size_t>(width));
-    for (uint32_t start = 0; start < rows.size(); ++start) {
-      if (done[start] != 0 || rows[start] == start) continue;
-      std::memcpy(held.data(), row(start), bytes);
-      uint32_t at = start;
-      while (rows[at] != start) {
-        std::memcpy(row(at), row(rows[at]), bytes);
-        done[at] = 1;
-        at = rows[at];
-      }
-      std::memcpy(row(at), held.data(), bytes);
-      done[at] = 1;
-    }
-  });
+void Reorder(GaussianCloud& cloud, const Buffer<uint32_t>& rows, ExtraProperties* extras) {
+  ForEachArray(cloud, [&rows](Buffer<float>& array, int64_t width) { ReorderRows(array, width, rows); });
+  if (extras != nullptr) ReorderRows(*extras, rows);
 }
 
 Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output, const ConvertOptions& options,
@@ -158,7 +134,8 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   const SplatFormat* const from = file.format();
 
   const double begin = Now();
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read());
+  ExtraProperties extras;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read({}, &extras));
   report.read_seconds = Now() - begin;
   report.input_format = from != nullptr ? from->name : "";
   report.output_format = to->name;
@@ -171,32 +148,40 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   }
 
   if (options.sh_degree) SetShDegree(cloud, *options.sh_degree);
-  DropFaint(cloud, options.min_opacity);
-  if (options.max_gaussians) KeepMostImportant(cloud, *options.max_gaussians);
+  DropFaint(cloud, options.min_opacity, &extras);
+  if (options.max_gaussians) KeepMostImportant(cloud, *options.max_gaussians, &extras);
   if (cloud.empty()) {
     return Error{ErrorCode::kBadArgument, Cat(input.string(), ": no Gaussian has an opacity of ", options.min_opacity,
                                               " or more: nothing to write")};
   }
   // Readers and writers follow their formats; what the file really is comes on top.
-  if (options.input_axes) FlipAxes(cloud, FlipBetween(from != nullptr ? from->axes : kRdf, *options.input_axes));
-  if (options.output_axes) FlipAxes(cloud, FlipBetween(to->axes, *options.output_axes));
+  const auto flip = [&](const AxisFlip& signs) {
+    FlipAxes(cloud, signs);
+    FlipAxes(extras, signs);
+  };
+  if (options.input_axes) flip(FlipBetween(from != nullptr ? from->axes : kRdf, *options.input_axes));
+  if (options.output_axes) flip(FlipBetween(to->axes, *options.output_axes));
   WriteOptions write = options.write;
   if (write.order != SplatOrder::kFormat) {
     if (Buffer<uint32_t> rows = WriteOrder(cloud, write.order, SplatOrder::kKeep); !rows.empty()) {
-      Reorder(cloud, std::move(rows));
+      Reorder(cloud, rows, &extras);
     }
     write.order = SplatOrder::kKeep;
   }
 
   const double written = Now();
-  ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(output, cloud, write));
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(output, cloud, write, extras));
   report.write_seconds = Now() - written;
   report.gaussians_written = cloud.size();
   report.sh_degree_written = std::min(cloud.sh_degree, to->range.sh_degree);
   if (const Result<OpenedSplat> written_file = OpenedSplat::Open(output, to); written_file.ok()) {
     report.output_bytes = written_file->bytes();
   }
-  if (to->predicted_size != nullptr) report.predicted_bytes = to->predicted_size(cloud.size(), cloud.sh_degree);
+  if (to->predicted_size != nullptr) {
+    report.predicted_bytes = to->predicted_size(cloud.size(), cloud.sh_degree);
+    if (to->write_with_extras != nullptr)
+      *report.predicted_bytes += static_cast<uint64_t>(cloud.size()) * extras.row_size();
+  }
   report.predicted_roughly = to->size_is_estimate;
   if (options.measure && to->read != nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadCloud(output));

@@ -14,6 +14,7 @@
 
 namespace anchorsplat {
 
+struct ExtraProperties;
 struct SplatFormat;
 
 struct ConvertOptions {
@@ -49,9 +50,11 @@ Result<ConvertReport> ConvertFile(const std::filesystem::path& input, const std:
                                   const ConvertOptions& options, GaussianCloud* kept = nullptr);
 
 // The parts of it that change a cloud, in the order in which they are done. In place.
-void DropFaint(GaussianCloud& cloud, float min_opacity);
-void KeepMostImportant(GaussianCloud& cloud, int64_t most);  // their order stays
+// `extras` are changed alike, if not null.
+void DropFaint(GaussianCloud& cloud, float min_opacity, ExtraProperties* extras = nullptr);
+void KeepMostImportant(GaussianCloud& cloud, int64_t most, ExtraProperties* extras = nullptr);  // their order stays
 void SetShDegree(GaussianCloud& cloud, int degree);
-void Reorder(GaussianCloud& cloud, Buffer<uint32_t> rows);  // row i becomes the old row rows[i]; a permutation
+// Row i becomes the old row rows[i]; a permutation.
+void Reorder(GaussianCloud& cloud, const Buffer<uint32_t>& rows, ExtraProperties* extras = nullptr);
 
 }  // namespace anchorsplat

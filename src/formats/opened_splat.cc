@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "core/text.h"
+#include "formats/extra_properties.h"
 
 namespace anchorsplat {
 
@@ -52,7 +53,7 @@ uint64_t OpenedSplat::bytes() const {
   return format_ != nullptr && format_->size != nullptr ? format_->size(input_) : input_.size();
 }
 
-Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits) const try {
+Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits, ExtraProperties* extras) const try {
   if (format_ == nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, input_.Head(8));
     return Error{ErrorCode::kBadFile, Cat(input_.name(), ": byte 0: is no splat file of a known format: found \"",
@@ -61,6 +62,9 @@ Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits) const try {
   if (format_->read == nullptr) {
     return Error{ErrorCode::kBadFile, Cat(input_.name(), ": is a ", format_->name,
                                           " file, which this version does not read; it reads ", ReadFormats())};
+  }
+  if (extras != nullptr && format_->read_with_extras != nullptr) {
+    return format_->read_with_extras(input_, limits, *extras);
   }
   return format_->read(input_, limits);
 } catch (const std::bad_alloc&) {

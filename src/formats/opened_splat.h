@@ -22,9 +22,10 @@ class OpenedSplat {
   static Result<OpenedSplat> Open(const std::filesystem::path& path, const SplatFormat* format = nullptr);
 
   const InputFile& input() const { return input_; }
-  const SplatFormat* format() const { return format_; }             // null: not known, Read() will fail
-  uint64_t bytes() const;                                           // with the files beside it that belong to it
-  Result<GaussianCloud> Read(const ReadLimits& limits = {}) const;  // errors: see ReadCloud
+  const SplatFormat* format() const { return format_; }  // null: not known, Read() will fail
+  uint64_t bytes() const;                                // with the files beside it that belong to it
+  // Errors: see ReadCloud. `extras` gets what the file says beside its Gaussians, if not null.
+  Result<GaussianCloud> Read(const ReadLimits& limits = {}, ExtraProperties* extras = nullptr) const;
 
  private:
   OpenedSplat(InputFile input, const SplatFormat* format) : input_(std::move(input)), format_(format) {}

@@ -1,8 +1,12 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
+#include <limits>
+#include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "core/text.h"
 #include "formats/ply_rows.h"
@@ -87,6 +91,49 @@ bool ParseFloat(std::string_view word, float& value) {
   return result.ec == std::errc{} && result.ptr == end;
 }
 
+// Whole numbers may be written as "3.0".
+template <typename T>
+bool ParseAs(std::string_view word, std::byte* out) {
+  double number = 0;
+  if (!word.empty() && word.front() == '+') word.remove_prefix(1);
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+  if (error == std::errc::invalid_argument || end != word.data() + word.size()) return false;
+  if (error == std::errc::result_out_of_range) number = std::strtod(std::string(word).c_str(), nullptr);  // 0 or ∞
+  if (std::is_integral_v<T> && !(number >= double{std::numeric_limits<T>::min()} &&
+                                 number <= double{std::numeric_limits<T>::max()} && number == std::floor(number))) {
+    return false;
+  }
+  const T value = static_cast<T>(number);
+  std::memcpy(out, &value, sizeof(T));
+  return true;
+}
+
+// The value of a property that is kept as it is.
+bool ParseBytes(std::string_view word, PlyType type, std::byte* out) {
+  float value = 0;
+  switch (type) {
+    case PlyType::kInt8:
+      return ParseAs<int8_t>(word, out);
+    case PlyType::kUint8:
+      return ParseAs<uint8_t>(word, out);
+    case PlyType::kInt16:
+      return ParseAs<int16_t>(word, out);
+    case PlyType::kUint16:
+      return ParseAs<uint16_t>(word, out);
+    case PlyType::kInt32:
+      return ParseAs<int32_t>(word, out);
+    case PlyType::kUint32:
+      return ParseAs<uint32_t>(word, out);
+    case PlyType::kFloat:
+      if (!ParseFloat(word, value)) return false;
+      std::memcpy(out, &value, sizeof value);
+      return true;
+    case PlyType::kDouble:
+      return ParseAs<double>(word, out);
+  }
+  return false;
+}
+
 class RowReader {
  public:
   RowReader(const InputFile& file, const PlyHeader& header) : file_(&file), words_(file, header) {}
@@ -148,20 +195,20 @@ Status RowReader::Read(const PlyElement& element, int64_t row, const Store& stor
 
 }  // namespace
 
-Status ReadAsciiBody(const InputFile& file, const PlyHeader& header, const PlyLayout& layout, GaussianCloud& cloud) {
+Status ReadAsciiBody(const InputFile& file, const PlyHeader& header, const PlyElement& vertex,
+                     const std::vector<PlyDestination>& to) {
   RowReader reader(file, header);
   for (const PlyElement& element : header.elements) {
-    if (&element == layout.vertex) break;
+    if (&element == &vertex) break;
     if (element.properties.empty()) continue;  // its rows have no text, however many there are
     for (int64_t row = 0; row < element.count; ++row) {
       ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(element, row, [](size_t, std::string_view) { return true; }));
     }
   }
-  for (int64_t row = 0; row < layout.vertex->count; ++row) {
-    ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(*layout.vertex, row, [&](size_t p, std::string_view word) {
-      const auto& target = layout.targets[p];
-      if (!target) return true;
-      return ParseFloat(word, (cloud.*(target->array))[static_cast<size_t>(row * target->width + target->component)]);
+  for (int64_t row = 0; row < vertex.count; ++row) {
+    ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(vertex, row, [&](size_t p, std::string_view word) {
+      if (to[p].number != nullptr) return ParseFloat(word, to[p].number[row * to[p].stride]);
+      return to[p].bytes == nullptr || ParseBytes(word, vertex.properties[p].type, to[p].bytes + row * to[p].stride);
     }));
   }
   return {};

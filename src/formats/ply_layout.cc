@@ -58,6 +58,17 @@ Error NotASplat(const InputFile& file, const PlyHeader& header) {
               " without Gaussians: element \"vertex\" has no f_dc_*, opacity, scale_* or rot_* ", kNeeded)};
 }
 
+// 0, 1, 2 for nx, ny, nz; else −1.
+int NormalAxis(const PlyProperty& property) {
+  if (property.list_count || property.name.size() != 2 || property.name[0] != 'n') return -1;
+  const char axis = property.name[1];
+  return axis >= 'x' && axis <= 'z' ? axis - 'x' : -1;
+}
+
+bool HasNormals(const PlyElement& vertex) {
+  return std::ranges::any_of(vertex.properties, [](const PlyProperty& p) { return NormalAxis(p) >= 0; });
+}
+
 // Degree from the number of f_rest properties; their targets.
 Result<int> PlanRest(const InputFile& file, const PlyElement& vertex, std::vector<std::optional<PlyTarget>>& targets) {
   struct Rest {
@@ -135,6 +146,49 @@ Result<PlyLayout> PlanPly(const InputFile& file, const PlyHeader& header) {
                  Cat(Where(file, vertex.line), "the file has no Gaussians (0 rows of \"vertex\")")};
   }
   return layout;
+}
+
+ExtraProperties PlanExtras(const PlyHeader& header, const PlyLayout& layout) {
+  ExtraProperties extras;
+  const PlyElement& vertex = *layout.vertex;
+  for (size_t p = 0; p < vertex.properties.size(); ++p) {
+    const PlyProperty& property = vertex.properties[p];
+    if (layout.targets[p] || NormalAxis(property) >= 0) continue;
+    if (property.list_count) {
+      extras.not_kept.push_back(Cat("list \"", Printable(property.name), "\""));
+    } else {
+      extras.properties.push_back({property.name, property.type});
+    }
+  }
+  for (const PlyElement& element : header.elements) {
+    if (&element == &vertex || element.count == 0) continue;
+    extras.not_kept.push_back(Cat("element \"", Printable(element.name), "\""));
+  }
+  const auto rows = static_cast<size_t>(vertex.count);
+  extras.rows.resize(rows * extras.row_size());
+  if (HasNormals(vertex)) extras.normals.assign(3 * rows, 0.0f);  // an axis may be missing
+  return extras;
+}
+
+std::vector<PlyDestination> Destinations(const PlyLayout& layout, GaussianCloud& cloud, ExtraProperties* extras) {
+  std::vector<PlyDestination> out(layout.targets.size());
+  const PlyElement& vertex = *layout.vertex;
+  const auto extra_row = static_cast<int64_t>(extras == nullptr ? 0 : extras->row_size());
+  int64_t offset = 0;
+  for (size_t p = 0; p < out.size(); ++p) {
+    const PlyProperty& property = vertex.properties[p];
+    if (const auto& target = layout.targets[p]) {
+      out[p] = {.number = (cloud.*(target->array)).data() + target->component, .stride = target->width};
+    } else if (extras == nullptr || property.list_count) {
+      continue;
+    } else if (const int axis = NormalAxis(property); axis >= 0) {
+      out[p] = {.number = extras->normals.data() + axis, .stride = 3};
+    } else {
+      out[p] = {.bytes = extras->rows.data() + offset, .stride = extra_row};
+      offset += PlyTypeSize(property.type);
+    }
+  }
+  return out;
 }
 
 }  // namespace anchorsplat

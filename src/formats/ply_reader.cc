@@ -1,5 +1,7 @@
 #include "formats/ply_reader.h"
 
+#include <algorithm>
+
 #include "core/text.h"
 #include "formats/ply_header.h"
 #include "formats/ply_layout.h"
@@ -23,7 +25,9 @@ Status CheckPromise(const InputFile& file, const PlyElement& element, uint64_t r
                    " bytes are left for them")};
 }
 
-Status ReadBinaryBody(const InputFile& file, const PlyHeader& header, const PlyLayout& layout, GaussianCloud& cloud) {
+// Room for all rows is made once the file is known to hold them.
+Status ReadBinaryBody(const InputFile& file, const PlyHeader& header, const PlyLayout& layout, GaussianCloud& cloud,
+                      ExtraProperties* extras) {
   uint64_t begin = header.body;
   const PlyElement& vertex = *layout.vertex;
   for (const PlyElement& element : header.elements) {
@@ -38,14 +42,14 @@ Status ReadBinaryBody(const InputFile& file, const PlyHeader& header, const PlyL
     }
   }
   cloud.Resize(vertex.count, layout.sh_degree);
-  if (!vertex.has_lists()) return ReadFixedRows(file, layout, header.encoding, begin, cloud);
+  if (extras != nullptr) *extras = PlanExtras(header, layout);
+  const std::vector<PlyDestination> to = Destinations(layout, cloud, extras);
+  if (!vertex.has_lists()) return ReadFixedRows(file, vertex, header.encoding, begin, to);
   SequentialReader reader(file, begin);
-  return ReadRowsWithLists(reader, file, layout, header.encoding, cloud);
+  return ReadRowsWithLists(reader, file, vertex, header.encoding, to);
 }
 
-}  // namespace
-
-Result<GaussianCloud> ReadPly(const InputFile& file, const ReadLimits& limits) {
+Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, ExtraProperties* extras) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(PlyHeader header, ReadPlyHeader(file));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyLayout layout, PlanPly(file, header));
   const PlyElement& vertex = *layout.vertex;
@@ -60,13 +64,26 @@ Result<GaussianCloud> ReadPly(const InputFile& file, const ReadLimits& limits) {
       return CheckPromise(file, vertex, 2 * vertex.properties.size(), header.body).error();
     }
     cloud.Resize(vertex.count, layout.sh_degree);
-    ANCHORSPLAT_RETURN_IF_ERROR(ReadAsciiBody(file, header, layout, cloud));
+    if (extras != nullptr) *extras = PlanExtras(header, layout);
+    ANCHORSPLAT_RETURN_IF_ERROR(ReadAsciiBody(file, header, vertex, Destinations(layout, cloud, extras)));
   } else {
-    ANCHORSPLAT_RETURN_IF_ERROR(ReadBinaryBody(file, header, layout, cloud));
+    ANCHORSPLAT_RETURN_IF_ERROR(ReadBinaryBody(file, header, layout, cloud, extras));
+  }
+  // Trainers write normals of zero: there is nothing in them to keep.
+  if (extras != nullptr && std::ranges::all_of(extras->normals, [](float x) { return x == 0; })) {
+    extras->normals = {};
   }
   cloud.render_mode = header.render_mode;
   cloud.comments = std::move(header.comments);
   return cloud;
+}
+
+}  // namespace
+
+Result<GaussianCloud> ReadPly(const InputFile& file, const ReadLimits& limits) { return Read(file, limits, nullptr); }
+
+Result<GaussianCloud> ReadPlyWithExtras(const InputFile& file, const ReadLimits& limits, ExtraProperties& extras) {
+  return Read(file, limits, &extras);
 }
 
 Result<FormatFacts> DescribePly(const InputFile& file) {
@@ -76,14 +93,14 @@ Result<FormatFacts> DescribePly(const InputFile& file) {
   facts.Add("encoding", header.encoding == PlyEncoding::kAscii          ? "text"
                         : header.encoding == PlyEncoding::kLittleEndian ? "binary, little-endian"
                                                                         : "binary, big-endian");
-  std::string passed_over;
+  std::string others;
   for (size_t k = 0; k < layout.targets.size(); ++k) {
-    if (!layout.targets[k]) passed_over += (passed_over.empty() ? "" : " ") + layout.vertex->properties[k].name;
+    if (!layout.targets[k]) others += (others.empty() ? "" : " ") + layout.vertex->properties[k].name;
   }
   for (const PlyElement& element : header.elements) {
-    if (&element != layout.vertex) passed_over += Cat(passed_over.empty() ? "" : " ", "(element ", element.name, ")");
+    if (&element != layout.vertex) others += Cat(others.empty() ? "" : " ", "(element ", element.name, ")");
   }
-  if (!passed_over.empty()) facts.Add("not read", Printable(passed_over, 200));
+  if (!others.empty()) facts.Add("other properties", Printable(others, 200));
   return facts;
 }
 

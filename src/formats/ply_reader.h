@@ -5,6 +5,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
+#include "formats/extra_properties.h"
 #include "formats/format_facts.h"
 #include "formats/input_file.h"
 
@@ -20,7 +21,11 @@ namespace anchorsplat {
 // `limits.max_gaussians`, in ASCII a value that is no number (the message gives the line).
 Result<GaussianCloud> ReadPly(const InputFile& file, const ReadLimits& limits = {});
 
-// The encoding and what is not read of a file. Errors as ReadPly.
+// The same with what the file says of its Gaussians beside them; in ASCII these values are checked too. Errors as
+// ReadPly.
+Result<GaussianCloud> ReadPlyWithExtras(const InputFile& file, const ReadLimits& limits, ExtraProperties& extras);
+
+// The encoding, and what a file has beside its Gaussians. Errors as ReadPly.
 Result<FormatFacts> DescribePly(const InputFile& file);
 
 }  // namespace anchorsplat

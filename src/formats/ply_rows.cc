@@ -28,22 +28,53 @@ bool NeedsSwap(PlyEncoding encoding) {
   return (encoding == PlyEncoding::kBigEndian) != (std::endian::native == std::endian::big);
 }
 
-// One property and the array it goes to.
+// The value of a property as a float; those of Gaussians are floats or doubles, normals may be anything.
+float LoadNumber(PlyType type, const char* from, bool swap) {
+  switch (type) {
+    case PlyType::kInt8:
+      return Load<int8_t>(from, swap);
+    case PlyType::kUint8:
+      return Load<uint8_t>(from, swap);
+    case PlyType::kInt16:
+      return Load<int16_t>(from, swap);
+    case PlyType::kUint16:
+      return Load<uint16_t>(from, swap);
+    case PlyType::kInt32:
+      return static_cast<float>(Load<int32_t>(from, swap));
+    case PlyType::kUint32:
+      return static_cast<float>(Load<uint32_t>(from, swap));
+    case PlyType::kFloat:
+      return Load<float>(from, swap);
+    case PlyType::kDouble:
+      return static_cast<float>(Load<double>(from, swap));
+  }
+  return 0;
+}
+
+// Kept bytes are little-endian, as the program is.
+void Store(PlyType type, const char* from, bool swap, const PlyDestination& to, int64_t row) {
+  if (to.number != nullptr) {
+    to.number[row * to.stride] = LoadNumber(type, from, swap);
+  } else if (to.bytes != nullptr) {
+    const auto size = static_cast<size_t>(PlyTypeSize(type));
+    auto* const out = reinterpret_cast<char*>(to.bytes + row * to.stride);
+    swap ? std::reverse_copy(from, from + size, out) : std::copy_n(from, size, out);
+  }
+}
+
+// A property that is wanted.
 struct Column {
   size_t offset;  // bytes from the row's begin
-  PlyType type;   // float or double
-  float* base;    // of row 0
-  int64_t width;  // floats from row to row
+  PlyType type;
+  PlyDestination to;
 };
 
-std::vector<Column> Columns(const PlyLayout& layout, GaussianCloud& cloud) {
+std::vector<Column> Columns(const PlyElement& vertex, const std::vector<PlyDestination>& to) {
   std::vector<Column> columns;
   size_t offset = 0;
-  for (size_t p = 0; p < layout.targets.size(); ++p) {
-    const PlyType type = layout.vertex->properties[p].type;
-    if (const auto& target = layout.targets[p]) {
-      columns.push_back({offset, type, (cloud.*(target->array)).data() + target->component, target->width});
-    }
+  for (size_t p = 0; p < to.size(); ++p) {
+    const PlyType type = vertex.properties[p].type;
+    if (!to[p].skipped()) columns.push_back({offset, type, to[p]});
     offset += static_cast<size_t>(PlyTypeSize(type));
   }
   return columns;
@@ -53,7 +84,7 @@ std::vector<Column> Columns(const PlyLayout& layout, GaussianCloud& cloud) {
 // array are walked forward.
 void CopyFloats(const char* rows, size_t row_size, const std::vector<Column>& columns, int64_t first, int64_t last) {
   for (int64_t i = first; i < last; ++i, rows += row_size) {
-    for (const Column& c : columns) std::memcpy(c.base + i * c.width, rows + c.offset, sizeof(float));
+    for (const Column& c : columns) std::memcpy(c.to.number + i * c.to.stride, rows + c.offset, sizeof(float));
   }
 }
 
@@ -61,13 +92,11 @@ void Convert(const char* rows, size_t row_size, const std::vector<Column>& colum
              int64_t last) {
   for (const Column& c : columns) {
     const char* from = rows + c.offset;
-    float* to = c.base + first * c.width;
-    if (c.type == PlyType::kFloat) {
-      for (int64_t i = first; i < last; ++i, from += row_size, to += c.width) *to = Load<float>(from, swap);
+    if (c.to.number != nullptr && c.type == PlyType::kFloat) {
+      float* out = c.to.number + first * c.to.stride;
+      for (int64_t i = first; i < last; ++i, from += row_size, out += c.to.stride) *out = Load<float>(from, swap);
     } else {
-      for (int64_t i = first; i < last; ++i, from += row_size, to += c.width) {
-        *to = static_cast<float>(Load<double>(from, swap));
-      }
+      for (int64_t i = first; i < last; ++i, from += row_size) Store(c.type, from, swap, c.to, i);
     }
   }
 }
@@ -93,17 +122,18 @@ class FirstFailure {
 
 }  // namespace
 
-Status ReadFixedRows(const InputFile& file, const PlyLayout& layout, PlyEncoding encoding, uint64_t begin,
-                     GaussianCloud& cloud) {
-  const auto row_size = static_cast<size_t>(layout.vertex->row_size());
-  const std::vector<Column> columns = Columns(layout, cloud);
+Status ReadFixedRows(const InputFile& file, const PlyElement& vertex, PlyEncoding encoding, uint64_t begin,
+                     const std::vector<PlyDestination>& to) {
+  const auto row_size = static_cast<size_t>(vertex.row_size());
+  const std::vector<Column> columns = Columns(vertex, to);
   const bool swap = NeedsSwap(encoding);
-  const bool copy =
-      !swap && std::all_of(columns.begin(), columns.end(), [](const Column& c) { return c.type == PlyType::kFloat; });
+  const bool copy = !swap && std::all_of(columns.begin(), columns.end(), [](const Column& c) {
+    return c.type == PlyType::kFloat && c.to.number != nullptr;
+  });
   // A block and the rows it becomes stay in the L2 cache together; a task is many blocks that share one buffer.
   const auto block = static_cast<int64_t>(std::max<size_t>(1, (size_t{128} << 10) / row_size));
   FirstFailure failure;
-  ParallelFor(0, layout.vertex->count, 32 * block, [&](int64_t first, int64_t last) {
+  ParallelFor(0, vertex.count, 32 * block, [&](int64_t first, int64_t last) {
     Buffer<char> rows(static_cast<size_t>(std::min(block, last - first)) * row_size);
     for (int64_t i = first; i < last; i += block) {
       const int64_t end = std::min(last, i + block);
@@ -162,11 +192,11 @@ Status SkipList(SequentialReader& reader, const InputFile& file, const PlyProper
 
 }  // namespace
 
-Status ReadRowsWithLists(SequentialReader& reader, const InputFile& file, const PlyLayout& layout, PlyEncoding encoding,
-                         GaussianCloud& cloud) {
+Status ReadRowsWithLists(SequentialReader& reader, const InputFile& file, const PlyElement& vertex,
+                         PlyEncoding encoding, const std::vector<PlyDestination>& to) {
   const bool swap = NeedsSwap(encoding);
-  const auto& properties = layout.vertex->properties;
-  for (int64_t i = 0; i < layout.vertex->count; ++i) {
+  const auto& properties = vertex.properties;
+  for (int64_t i = 0; i < vertex.count; ++i) {
     for (size_t p = 0; p < properties.size(); ++p) {
       if (properties[p].list_count) {
         ANCHORSPLAT_RETURN_IF_ERROR(SkipList(reader, file, properties[p], swap));
@@ -174,11 +204,7 @@ Status ReadRowsWithLists(SequentialReader& reader, const InputFile& file, const 
       }
       ANCHORSPLAT_ASSIGN_OR_RETURN(const char* bytes,
                                    reader.View(static_cast<size_t>(PlyTypeSize(properties[p].type))));
-      const auto& target = layout.targets[p];
-      if (!target) continue;
-      float* to = (cloud.*(target->array)).data() + i * target->width + target->component;
-      *to = properties[p].type == PlyType::kFloat ? Load<float>(bytes, swap)
-                                                  : static_cast<float>(Load<double>(bytes, swap));
+      Store(properties[p].type, bytes, swap, to[p], i);
     }
   }
   return {};

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
-#include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/input_file.h"
 #include "formats/ply_header.h"
@@ -10,19 +10,21 @@
 
 namespace anchorsplat {
 
-// The three kinds of PLY body. `cloud` has room for all rows of `layout.vertex`.
+// The three kinds of PLY body. The rows of element `vertex` go to `to`, one per property (ply_layout.h), which has room
+// for all of them.
 
 // Binary rows of one size that begin at byte `begin`. In parallel, block by block.
-Status ReadFixedRows(const InputFile& file, const PlyLayout& layout, PlyEncoding encoding, uint64_t begin,
-                     GaussianCloud& cloud);
+Status ReadFixedRows(const InputFile& file, const PlyElement& vertex, PlyEncoding encoding, uint64_t begin,
+                     const std::vector<PlyDestination>& to);
 
 // Binary rows with lists, whose places are only known by reading the ones before.
-Status ReadRowsWithLists(SequentialReader& reader, const InputFile& file, const PlyLayout& layout, PlyEncoding encoding,
-                         GaussianCloud& cloud);
+Status ReadRowsWithLists(SequentialReader& reader, const InputFile& file, const PlyElement& vertex,
+                         PlyEncoding encoding, const std::vector<PlyDestination>& to);
 Status SkipRowsWithLists(SequentialReader& reader, const InputFile& file, const PlyElement& element,
                          PlyEncoding encoding);
 
 // The body of an ASCII file, one row per line; elements before "vertex" are passed over.
-Status ReadAsciiBody(const InputFile& file, const PlyHeader& header, const PlyLayout& layout, GaussianCloud& cloud);
+Status ReadAsciiBody(const InputFile& file, const PlyHeader& header, const PlyElement& vertex,
+                     const std::vector<PlyDestination>& to);
 
 }  // namespace anchorsplat

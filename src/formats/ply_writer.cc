@@ -20,7 +20,7 @@ static_assert(std::endian::native == std::endian::little, "rows are copied as th
 int64_t RowFloats(int sh_degree) { return 6 + 3 * ShCoefficients(sh_degree) + 8; }
 
 std::string Header(int64_t count, int sh_degree, std::optional<RenderMode> render_mode,
-                   std::span<const std::string> comments) {
+                   std::span<const std::string> comments, const ExtraProperties& extras) {
   std::string header = "ply\nformat binary_little_endian 1.0\n";
   for (const std::string& comment : comments) {
     std::string line = comment;
@@ -38,7 +38,13 @@ std::string Header(int64_t count, int sh_degree, std::optional<RenderMode> rende
   property("opacity");
   for (int k = 0; k < 3; ++k) property("scale_", k);
   for (int k = 0; k < 4; ++k) property("rot_", k);
+  for (const auto& [name, type] : extras.properties) header += Cat("property ", PlyTypeName(type), " ", name, "\n");
   return header + "end_header\n";
+}
+
+// Bytes of a row.
+size_t RowSize(int sh_degree, const ExtraProperties& extras) {
+  return static_cast<size_t>(RowFloats(sh_degree)) * sizeof(float) + extras.row_size();
 }
 
 template <int kDegree>
@@ -75,40 +81,69 @@ void Pack(const GaussianCloud& cloud, int64_t first, int64_t last, float* out) {
   }
 }
 
+// Rows of `floats` values each with those of `extras` put in and behind.
+void PackExtras(const ExtraProperties& extras, int64_t first, int64_t last, float* rows, size_t floats,
+                std::byte* wide) {
+  constexpr size_t kNormals = 3;  // floats before them
+  const size_t own = floats * sizeof(float), extra = extras.row_size();
+  for (int64_t i = first; i < last; ++i, rows += floats) {
+    if (!extras.normals.empty()) std::copy_n(extras.normals.data() + 3 * i, 3, rows + kNormals);
+    if (extra == 0) continue;
+    std::memcpy(wide, rows, own);
+    std::memcpy(wide + own, extras.rows.data() + static_cast<size_t>(i) * extra, extra);
+    wide += own + extra;
+  }
+}
+
 }  // namespace
 
 uint64_t PredictedPlySize(int64_t count, int sh_degree, std::optional<RenderMode> render_mode,
                           std::span<const std::string> comments) {
-  return Header(count, sh_degree, render_mode, comments).size() +
-         static_cast<uint64_t>(count) * static_cast<uint64_t>(RowFloats(sh_degree)) * sizeof(float);
+  return Header(count, sh_degree, render_mode, comments, {}).size() +
+         static_cast<uint64_t>(count) * RowSize(sh_degree, {});
 }
 
 Status WritePly(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) {
+  return WritePlyWithExtras(path, cloud, options, {});
+}
+
+Status WritePlyWithExtras(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options,
+                          const ExtraProperties& extras) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   if (cloud.empty()) {
     return Error{ErrorCode::kBadArgument, Cat(path.string(), ": there are no Gaussians to write")};
   }
-  const std::string header = Header(cloud.size(), cloud.sh_degree, cloud.render_mode, cloud.comments);
+  if (!extras.fits(cloud.size())) {
+    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": the other properties (", extras.names(),
+                                              ") are not of these ", WithThousands(cloud.size()), " Gaussians")};
+  }
+  const std::string header = Header(cloud.size(), cloud.sh_degree, cloud.render_mode, cloud.comments, extras);
   if (header.size() > kMaxPlyHeader) {
     return Error{ErrorCode::kBadArgument,
-                 Cat(path.string(), ": comments of ", HumanBytes(header.size()),
+                 Cat(path.string(), ": comments and names of properties of ", HumanBytes(header.size()),
                      " do not fit a PLY header, which ends within ", HumanBytes(kMaxPlyHeader))};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
-  const auto row_size = static_cast<uint64_t>(RowFloats(cloud.sh_degree)) * sizeof(float);
+  const auto floats = static_cast<size_t>(RowFloats(cloud.sh_degree));
+  const size_t row_size = RowSize(cloud.sh_degree, extras);
+  const bool wider = !extras.properties.empty();
   ANCHORSPLAT_RETURN_IF_ERROR(file.Reserve(header.size() + static_cast<uint64_t>(cloud.size()) * row_size));
   ANCHORSPLAT_RETURN_IF_ERROR(file.WriteAt(0, header.data(), header.size()));
 
   // A block stays in the L2 cache between packing and writing; a task is many blocks that share one buffer.
-  const auto block = static_cast<int64_t>((size_t{256} << 10) / row_size);
+  const auto block = static_cast<int64_t>(std::max<size_t>(1, (size_t{256} << 10) / row_size));
   std::mutex mutex;
   Status failure;
   ParallelFor(0, cloud.size(), 16 * block, [&](int64_t first, int64_t last) {
-    Buffer<float> rows(static_cast<size_t>(std::min(block, last - first) * RowFloats(cloud.sh_degree)));
+    const auto most = static_cast<size_t>(std::min(block, last - first));
+    Buffer<float> rows(most * floats);
+    Buffer<std::byte> wide(wider ? most * row_size : 0);
     for (int64_t i = first; i < last; i += block) {
       const int64_t end = std::min(last, i + block);
       Pack(cloud, i, end, rows.data());
-      const Status status = file.WriteAt(header.size() + static_cast<uint64_t>(i) * row_size, rows.data(),
+      if (!extras.empty()) PackExtras(extras, i, end, rows.data(), floats, wide.data());
+      const void* const packed = wider ? static_cast<const void*>(wide.data()) : rows.data();
+      const Status status = file.WriteAt(header.size() + static_cast<uint64_t>(i) * row_size, packed,
                                          static_cast<size_t>(static_cast<uint64_t>(end - i) * row_size));
       if (status.ok()) continue;
       const std::lock_guard lock(mutex);

@@ -9,6 +9,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
+#include "formats/extra_properties.h"
 
 namespace anchorsplat {
 
@@ -18,6 +19,11 @@ namespace anchorsplat {
 // Streamed in blocks: needs no second copy of the cloud.
 // Errors: kExists, kIo, kBadArgument (arrays that disagree, no Gaussians, comments longer than a header may be).
 Status WritePly(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options = {});
+
+// The same with the normals of `extras`, and its properties behind ours. kBadArgument too: it has not a row for each
+// Gaussian; names longer than a header may be.
+Status WritePlyWithExtras(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options,
+                          const ExtraProperties& extras);
 
 // Bytes of the file WritePly makes of `count` Gaussians.
 uint64_t PredictedPlySize(int64_t count, int sh_degree, std::optional<RenderMode> render_mode = {},

@@ -7,6 +7,7 @@
 #include "core/text.h"
 #include "formats/compressed_ply_reader.h"
 #include "formats/compressed_ply_writer.h"
+#include "formats/extra_properties.h"
 #include "formats/gltf_reader.h"
 #include "formats/gltf_writer.h"
 #include "formats/gsplat_checkpoint.h"
@@ -75,7 +76,9 @@ constexpr SplatFormat kFormats[] = {
      .sniff = IsPly,
      .describe = DescribePly,
      .read = ReadPly,
+     .read_with_extras = ReadPlyWithExtras,
      .write = WritePly,
+     .write_with_extras = WritePlyWithExtras,
      .predicted_size = [](int64_t count, int sh_degree) { return PredictedPlySize(count, sh_degree); }},
     {.name = "SPZ",
      .extensions = kSpzExtensions,

@@ -16,6 +16,8 @@
 
 namespace anchorsplat {
 
+struct ExtraProperties;
+
 // What a format can hold; writers clamp what is beyond. Half a step of the format wider than its last values.
 struct FormatRange {
   int sh_degree = kMaxShDegree;
@@ -41,7 +43,12 @@ struct SplatFormat {
   uint64_t (*size)(const InputFile& file) = nullptr;
   // Null: recognised, but not read or not written by this version.
   Result<GaussianCloud> (*read)(const InputFile& file, const ReadLimits& limits) = nullptr;
+  // `read` and `write` with what a file says beside its Gaussians (extra_properties.h). Null where that has no place.
+  Result<GaussianCloud> (*read_with_extras)(const InputFile& file, const ReadLimits& limits,
+                                            ExtraProperties& extras) = nullptr;
   Status (*write)(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) = nullptr;
+  Status (*write_with_extras)(const std::filesystem::path& path, const GaussianCloud& cloud,
+                              const WriteOptions& options, const ExtraProperties& extras) = nullptr;
   // Bytes of the file `write` makes of a cloud without comments. Null where nothing can be said.
   uint64_t (*predicted_size)(int64_t count, int sh_degree) = nullptr;
   // The prediction is what real splats take; values that compress better or worse take less or more.

@@ -12,6 +12,7 @@
 #include "core/text.h"
 #include "formats/camera_io.h"
 #include "formats/colmap_model.h"
+#include "formats/extra_properties.h"
 #include "formats/fuzz/seeds.h"
 #include "formats/image_io.h"
 #include "formats/registry.h"
@@ -48,6 +49,11 @@ Status ReadAsCloud(const std::string& file, const std::string& bytes) {
   if (!cloud.ok()) return CheckError(cloud.error(), file);
   Require(!cloud->empty(), "an empty cloud");
   Require(Validate(*cloud).ok(), "a cloud whose arrays disagree");
+  if (format->read_with_extras == nullptr) return {};
+  ExtraProperties extras;
+  const auto again = format->read_with_extras(input, {}, extras);
+  if (!again.ok()) return CheckError(again.error(), file);
+  Require(again->size() == cloud->size() && extras.fits(cloud->size()), "values beside other Gaussians");
   return {};
 }
 

@@ -1,0 +1,51 @@
+#include "formats/extra_properties.h"
+
+#include <numeric>
+
+#include "core/parallel.h"
+#include "core/text.h"
+#include "formats/row_arrays.h"
+
+namespace anchorsplat {
+
+size_t ExtraProperties::row_size() const {
+  return std::accumulate(properties.begin(), properties.end(), size_t{0},
+                         [](size_t sum, const Property& p) { return sum + static_cast<size_t>(PlyTypeSize(p.type)); });
+}
+
+bool ExtraProperties::fits(int64_t gaussians) const {
+  const auto n = static_cast<size_t>(gaussians);
+  return rows.size() == n * row_size() && (normals.empty() || normals.size() == 3 * n);
+}
+
+std::string ExtraProperties::names() const {
+  std::string text;
+  for (const Property& p : properties) text += Cat(text.empty() ? "" : ", ", Printable(p.name));
+  if (!normals.empty()) text += text.empty() ? "normals" : ", normals";
+  return Printable(text, 300);
+}
+
+std::string ExtraProperties::lost(bool writer_keeps) const {
+  std::string text = writer_keeps ? "" : names();
+  for (const std::string& other : not_kept) text += Cat(text.empty() ? "" : ", ", other);
+  return Printable(text, 300);
+}
+
+void KeepRows(ExtraProperties& extras, const std::vector<char>& keep) {
+  if (!extras.properties.empty()) KeepRows(extras.rows, static_cast<int64_t>(extras.row_size()), keep);
+  if (!extras.normals.empty()) KeepRows(extras.normals, 3, keep);
+}
+
+void ReorderRows(ExtraProperties& extras, const Buffer<uint32_t>& rows) {
+  if (!extras.properties.empty()) ReorderRows(extras.rows, static_cast<int64_t>(extras.row_size()), rows);
+  if (!extras.normals.empty()) ReorderRows(extras.normals, 3, rows);
+}
+
+void FlipAxes(ExtraProperties& extras, const AxisFlip& flip) {
+  if (flip.changes_nothing()) return;
+  ParallelFor(0, static_cast<int64_t>(extras.normals.size() / 3), 1 << 14, [&](int64_t first, int64_t last) {
+    for (int64_t i = 3 * first; i < 3 * last; ++i) extras.normals[static_cast<size_t>(i)] *= flip.mean[i % 3];
+  });
+}
+
+}  // namespace anchorsplat

@@ -90,6 +90,7 @@ InputFile& InputFile::operator=(InputFile&& other) noexcept {
   descriptor_ = std::exchange(other.descriptor_, -1);
   memory_ = std::move(other.memory_);
   size_ = std::exchange(other.size_, 0);
+  kept_ = std::move(other.kept_);
   return *this;
 }
 
@@ -128,6 +129,15 @@ Result<std::string> InputFile::ReadAll(uint64_t max_size) const {
                                           " expected for such a file")};
   }
   return Head(static_cast<size_t>(size_));
+}
+
+Result<std::string_view> InputFile::Whole(uint64_t max_size) const {
+  if (descriptor_ < 0 && size_ <= max_size) return std::string_view(memory_);
+  const std::lock_guard lock(kept_->mutex);
+  if (!kept_->bytes) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(kept_->bytes, ReadAll(max_size));
+  }
+  return std::string_view(*kept_->bytes);
 }
 
 SequentialReader::SequentialReader(const InputFile& file, uint64_t offset)

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -36,6 +38,9 @@ class InputFile {
   Result<std::string> Head(size_t size) const;
   // The whole file; kBadFile when it is larger than `max_size`.
   Result<std::string> ReadAll(uint64_t max_size) const;
+  // The same without a copy for each caller: read at the first call and kept as long as the file, so that what needs
+  // all of it in several places reads it once. The view is valid until the file is moved or gone.
+  Result<std::string_view> Whole(uint64_t max_size) const;
 
  private:
   InputFile() = default;
@@ -44,6 +49,11 @@ class InputFile {
   int descriptor_ = -1;  // −1: the bytes are in memory
   std::string memory_;
   uint64_t size_ = 0;
+  struct Kept {
+    std::mutex mutex;
+    std::optional<std::string> bytes;
+  };
+  std::unique_ptr<Kept> kept_ = std::make_unique<Kept>();
 };
 
 // Forward reading with a block buffer, for the parts of files whose layout is only known while reading.

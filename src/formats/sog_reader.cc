@@ -35,15 +35,16 @@ bool IsPlainName(const std::string& member) {
          member.find('\0') == member.npos;
 }
 
-// Where the members are: in an archive, or beside meta.json.
+// Where the members are: in an archive, or beside meta.json. Not longer there than the file.
 class Members {
  public:
-  static Result<Members> Of(const InputFile& file, const std::string& head) {
+  static Result<Members> Of(const InputFile& file) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
     Members members;
     members.name_ = file.name();
-    if (head.starts_with("PK")) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(std::string bytes, file.ReadAll(kMaxArchive));
-      ANCHORSPLAT_ASSIGN_OR_RETURN(ZipReader archive, ZipReader::Open(file.name(), std::move(bytes)));
+    if (head == "PK") {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string_view bytes, file.Whole(kMaxArchive));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(ZipReader archive, ZipReader::View(file.name(), bytes));
       members.archive_.emplace(std::move(archive));
     } else {
       members.folder_ = file.path().parent_path();
@@ -324,8 +325,7 @@ struct OpenedSog {
 };
 
 Result<OpenedSog> OpenSog(const InputFile& file) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Members members, Members::Of(file, head));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Members members, Members::Of(file));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, members.Meta(file));
   ANCHORSPLAT_ASSIGN_OR_RETURN(JsonFile json, JsonFile::Parse(members.meta_name(), text));
   return OpenedSog{std::move(members), std::move(json)};
@@ -356,9 +356,11 @@ Result<FormatFacts> DescribeSog(const InputFile& file) {
 }
 
 uint64_t SogSize(const InputFile& file) {
-  const Result<OpenedSog> opened = OpenSog(file);
   uint64_t sum = file.size();
-  if (!opened.ok() || opened->members.is_archive()) return sum;
+  const Result<std::string> head = file.Head(2);
+  if (!head.ok() || *head == "PK") return sum;  // an archive holds all of it
+  const Result<OpenedSog> opened = OpenSog(file);
+  if (!opened.ok()) return sum;
   std::set<std::string> seen;
   for (const char* part : {"means", "quats", "scales", "sh0", "shN"}) {
     const std::optional<JsonValue> value = opened->json.root().Find(part);

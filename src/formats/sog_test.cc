@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -12,6 +13,7 @@
 #include "core/parallel.h"
 #include "formats/attribute_error.h"
 #include "formats/nearest_centroid.h"
+#include "formats/opened_splat.h"
 #include "formats/scalar_codebook.h"
 #include "formats/sh_palette.h"
 #include "formats/sog_reader.h"
@@ -28,6 +30,16 @@ namespace {
 Result<GaussianCloud> Read(const std::filesystem::path& path, const ReadLimits& limits = {}) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
   return ReadSog(file, limits);
+}
+
+// Bytes that this process has asked the system for.
+uint64_t BytesAskedFor() {
+  std::ifstream io("/proc/self/io");
+  std::string name;
+  uint64_t bytes = 0;
+  io >> name >> bytes;
+  EXPECT_EQ(name, "rchar:");
+  return bytes;
 }
 
 std::string Bytes(const std::filesystem::path& path) { return *InputFile::Open(path)->ReadAll(1 << 30); }
@@ -471,6 +483,19 @@ TEST(ZipArchive, BombsAreRefused) {
   const auto zip = ZipReader::Open("a.zip", archive);
   ASSERT_TRUE(zip.ok());
   EXPECT_CONTAINS(zip->Read("a", 1 << 30).error().message, "bomb");
+}
+
+// Its size, its Gaussians and what it says about itself: `info` wants all of them.
+TEST(Sog, AnArchiveIsReadOnce) {
+  const TestFolder folder;
+  ASSERT_TRUE(WriteSog(folder / "a.sog", RandomCloud(20'000, 3, 1), {}).ok());
+  const uint64_t before = BytesAskedFor();
+  const auto file = OpenedSplat::Open(folder / "a.sog");
+  ASSERT_TRUE(file.ok());
+  EXPECT_EQ(file->bytes(), std::filesystem::file_size(folder / "a.sog"));
+  EXPECT_TRUE(file->Read().ok());
+  EXPECT_TRUE(file->format()->describe(file->input()).ok());
+  EXPECT_LT(BytesAskedFor() - before, file->bytes() + file->bytes() / 4);
 }
 
 }  // namespace

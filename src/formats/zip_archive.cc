@@ -78,11 +78,16 @@ constexpr uint32_t kFirstOf1980 = 0x210000;  // date 1980-01-01, time 0:00
 }  // namespace
 
 Result<ZipReader> ZipReader::Open(std::string name, std::string bytes) {
+  auto kept = std::make_unique<const std::string>(std::move(bytes));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ZipReader reader, View(std::move(name), *kept));
+  reader.bytes_ = std::move(kept);
+  return reader;
+}
+
+Result<ZipReader> ZipReader::View(std::string name, std::string_view bytes) {
   ZipReader reader;
   reader.name_ = std::move(name);
-  reader.bytes_ = std::make_unique<const std::string>(std::move(bytes));
-  const auto archive = std::as_bytes(std::span(*reader.bytes_));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(reader.entries_, ReadZipDirectory(archive, reader.name_));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(reader.entries_, ReadZipDirectory(std::as_bytes(std::span(bytes)), reader.name_));
   return reader;
 }
 

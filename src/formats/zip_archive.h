@@ -19,6 +19,8 @@ class ZipReader {
  public:
   // kBadFile: no ZIP archive, or a damaged one (zip_directory.h). `name` is what messages call it.
   static Result<ZipReader> Open(std::string name, std::string bytes);
+  // The same of bytes that stay where they are as long as the reader.
+  static Result<ZipReader> View(std::string name, std::string_view bytes);
 
   // Names of all members, in the order of the directory; those that end in a slash are folders.
   std::vector<std::string> Members() const;
@@ -30,7 +32,7 @@ class ZipReader {
   ZipReader() = default;
 
   std::string name_;
-  std::unique_ptr<const std::string> bytes_;  // what the entries point into, wherever the reader moves
+  std::unique_ptr<const std::string> bytes_;  // what the entries point into, wherever the reader moves; null: a view
   std::vector<ZipEntry> entries_;
 };
 

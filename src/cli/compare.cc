@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "cli/choice.h"
+#include "cli/clean_output.h"
 #include "cli/lpips_flags.h"
 #include "cli/parse.h"
 #include "cli/table.h"
@@ -110,7 +111,8 @@ void PrintTable(const CompareFlags& flags, const std::vector<Comparison>& result
   }
   if (results.size() == 2) {
     rows[0].push_back("gain dB");
-    std::cout << "A  " << flags.a << "\nB  " << flags.b << "\nboth against  " << flags.truth << "\n\n";
+    std::cout << "A  " << Shown(flags.a) << "\nB  " << Shown(flags.b) << "\nboth against  " << Shown(flags.truth)
+              << "\n\n";
   }
   const auto add = [&](const std::string& name, const auto& score_of) {
     std::vector<std::string> row = {name};

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/choice.h"
+#include "cli/clean_output.h"
 #include "cli/lpips_flags.h"
 #include "cli/verb.h"
 #include "core/log.h"
@@ -96,7 +97,7 @@ Status RunEval(const EvalFlags& flags, Program& program) {
   } else {
     std::cout << ToMarkdown(evaluation, summaries, title) << chosen;
     if (!shared.quiet) {
-      std::cout << "\nWritten: " << (fs::path(flags.out) / "table.md").string()
+      std::cout << "\nWritten: " << Shown(fs::path(flags.out) / "table.md")
                 << ", table.csv, results.json, contact_sheet.png\n";
     }
   }

@@ -7,6 +7,7 @@
 
 #include "cli/checkpoint.h"
 #include "cli/choice.h"
+#include "cli/clean_output.h"
 #include "cli/fit_flags.h"
 #include "cli/parse.h"
 #include "cli/stop_signal.h"
@@ -112,9 +113,10 @@ nlohmann::json ToJson(const FitFlags& flags, const std::string& origin, const Fi
 }
 
 void PrintReport(const FitFlags& flags, const FitReport& r) {
-  std::cout << flags.output << ": " << WithThousands(r.gaussians_out) << " Gaussians after " << WithThousands(r.steps)
-            << " steps in " << HumanSeconds(r.seconds) << "\n  training views: " << r.train.views << ", "
-            << Fixed(r.train.psnr, 2) << " dB, SSIM " << Fixed(r.train.ssim, 4) << "\n";
+  std::cout << Shown(flags.output) << ": " << WithThousands(r.gaussians_out) << " Gaussians after "
+            << WithThousands(r.steps) << " steps in " << HumanSeconds(r.seconds)
+            << "\n  training views: " << r.train.views << ", " << Fixed(r.train.psnr, 2) << " dB, SSIM "
+            << Fixed(r.train.ssim, 4) << "\n";
   if (r.held_out.views > 0) {
     std::cout << "  held-out views: " << r.held_out.views << ", " << Fixed(r.held_out.psnr, 2) << " dB, SSIM "
               << Fixed(r.held_out.ssim, 4) << "\n";

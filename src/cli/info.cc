@@ -9,6 +9,7 @@
 #include <span>
 
 #include "cli/choice.h"
+#include "cli/clean_output.h"
 #include "cli/mesh_info.h"
 #include "cli/parse.h"
 #include "cli/table.h"
@@ -75,7 +76,7 @@ std::string Number(double value) {
 
 void PrintTable(const Findings& f) {
   const CloudStatistics& s = f.statistics;
-  std::cout << f.file << "\n"
+  std::cout << Shown(f.file) << "\n"
             << "  Gaussians    " << WithThousands(s.gaussians) << ", SH degree " << s.sh_degree << "\n"
             << "  file         " << HumanBytes(f.file_bytes) << (f.format.empty() ? "" : ", " + f.format) << "\n"
             << "  render mode  " << ModeName(f.cloud) << "\n";
@@ -225,8 +226,10 @@ Status RunModelInfo(const std::string& path, const SharedFlags& shared) {
                {"metadata", found.facts}});
     return {};
   }
-  std::cout << path << "\n  parameters   " << WithThousands(parameters) << " in " << found.tensors << " tensors\n";
-  for (const auto& [key, value] : found.facts) std::cout << "  " << key << "  " << Printable(value, 2000) << "\n";
+  std::cout << Shown(path) << "\n  parameters   " << WithThousands(parameters) << " in " << found.tensors
+            << " tensors\n";
+  for (const auto& [key, value] : found.facts)
+    std::cout << "  " << Printable(key) << "  " << Printable(value, 2000) << "\n";
   return {};
 }
 

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "cli/clean_output.h"
 #include "cli/table.h"
 #include "core/log.h"
 #include "core/parallel.h"
@@ -99,7 +100,7 @@ void PrintMeshTable(const MeshFindings& f) {
   const auto line = [](const char* name, const std::string& value) {
     if (!value.empty()) std::cout << "  " << name << "  " << value << "\n";
   };
-  std::cout << f.address << "\n";
+  std::cout << Shown(f.address) << "\n";
   line("object    ", Printable(f.origin.name, 200));
   line("category  ", Printable(f.origin.category, 200));
   line("creator   ", Printable(f.origin.creator, 200));
@@ -113,7 +114,7 @@ void PrintMeshTable(const MeshFindings& f) {
   }
   line("size      ", Cat(s.high[0] - s.low[0], " x ", s.high[1] - s.low[1], " x ", s.high[2] - s.low[2]));
   std::cout << "\n" << (f.warnings.empty() ? "no problems found" : "found:") << "\n";
-  for (const std::string& warning : f.warnings) std::cout << "  - " << warning << "\n";
+  for (const std::string& warning : f.warnings) std::cout << "  - " << Shown(warning) << "\n";
 }
 
 Status RunLibraryInfo(const std::string& path, const SharedFlags& shared) {
@@ -162,7 +163,7 @@ Status RunLibraryInfo(const std::string& path, const SharedFlags& shared) {
     }
     rows.push_back(std::move(row));
   }
-  std::cout << path << ": " << Printable(catalog.name(), 200) << ", " << entries.size() << " objects\n\n"
+  std::cout << Shown(path) << ": " << Printable(catalog.name(), 200) << ", " << entries.size() << " objects\n\n"
             << FormatTable(rows);
   for (const auto& result : all) {
     if (!result.ok()) LogWarning(result.error().message);

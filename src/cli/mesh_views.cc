@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/choice.h"
+#include "cli/clean_output.h"
 #include "cli/parse.h"
 #include "cli/verb.h"
 #include "core/log.h"
@@ -60,7 +61,8 @@ Status RunViews(const ViewsFlags& flags, const SharedFlags& shared) {
     const double seconds = cost.low.ray_seconds + cost.high.ray_seconds;
     std::cout << options.rig.views << (options.rig.views == 1 ? " view of " : " views of ")
               << WithThousands(std::ssize(mesh.triangles)) << " triangles at " << options.low_size << " and "
-              << options.high_size << " pixels in " << HumanSeconds(cost.seconds) << " to " << flags.output << '\n'
+              << options.high_size << " pixels in " << HumanSeconds(cost.seconds) << " to " << Shown(flags.output)
+              << '\n'
               << "processor time: rays " << HumanSeconds(seconds) << " (" << Fixed(rays / 1e6, 0) << " million, "
               << Fixed(seconds > 0 ? rays / seconds / 1e6 : 0, 0) << " million a second and thread), shading "
               << HumanSeconds(cost.low.shade_seconds + cost.high.shade_seconds) << ", PNG "

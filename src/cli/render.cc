@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/choice.h"
+#include "cli/clean_output.h"
 #include "cli/parse.h"
 #include "cli/verb.h"
 #include "cli/views.h"
@@ -101,7 +102,7 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
   } else if (!shared.quiet) {
     std::cout << "rendered " << paths.size() << (paths.size() == 1 ? " view of " : " views of ")
               << WithThousands(cloud.size()) << " Gaussians in " << HumanSeconds(seconds) << " (without reading and "
-              << "writing) to " << flags.output << '\n';
+              << "writing) to " << Shown(flags.output) << '\n';
   }
   return {};
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "cli/clean_output.h"
+
 namespace anchorsplat {
 
 namespace {
@@ -12,7 +14,10 @@ size_t Width(const std::string& text) {
 }
 }  // namespace
 
-std::string FormatTable(const std::vector<std::vector<std::string>>& rows) {
+std::string FormatTable(std::vector<std::vector<std::string>> rows) {
+  for (auto& row : rows) {
+    for (std::string& cell : row) cell = Shown(cell);  // names of files and views may hold anything
+  }
   std::vector<size_t> widths;
   for (const auto& row : rows) {
     widths.resize(std::max(widths.size(), row.size()));

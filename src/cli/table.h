@@ -6,7 +6,8 @@
 namespace anchorsplat {
 
 // Rows of text as aligned columns, two spaces apart: the first column left-aligned, the others right-aligned. The first
-// row is the heading and gets a rule below it.
-std::string FormatTable(const std::vector<std::vector<std::string>>& rows);
+// row is the heading and gets a rule below it. Cells may hold any bytes: what could command a terminal or end the line
+// is escaped.
+std::string FormatTable(std::vector<std::vector<std::string>> rows);
 
 }  // namespace anchorsplat

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/choice.h"
+#include "cli/clean_output.h"
 #include "cli/stop_signal.h"
 #include "cli/table.h"
 #include "cli/verb.h"
@@ -63,7 +64,7 @@ nlohmann::json ToJson(const TrainReport& r) {
 }
 
 void PrintReport(const TrainReport& r) {
-  std::cout << r.file.string() << ": " << WithThousands(r.parameters) << " parameters after " << WithThousands(r.steps)
+  std::cout << Shown(r.file) << ": " << WithThousands(r.parameters) << " parameters after " << WithThousands(r.steps)
             << " steps on " << r.objects << " objects, " << HumanSeconds(r.seconds) << "\n";
   if (!r.model) return;
   std::vector<std::vector<std::string>> rows = {{"validation", "PSNR", "SSIM", "LPIPS"}};

@@ -1,5 +1,6 @@
 #include "cli/verb.h"
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <iostream>
@@ -7,7 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/choice.h"
+#include "cli/clean_output.h"
 #include "cli/verb_tree.h"
+#include "cli/verb_words.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
@@ -46,10 +49,11 @@ CLI::App& AddVerb(CLI::App& app, Program& program, const std::string& name, cons
 
 void PrintJson(const nlohmann::json& json) {
   // Replacing invalid UTF-8: file names are bytes, JSON is text.
-  std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
+  std::cout << CleanJson(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace)) << '\n';
 }
 
 int RunProgram(int argc, const char* const* argv, Trainer trainer) {
+  const CleanOutput clean_output(std::cout);
   CLI::App app{"anchorsplat: makes a low-quality 3D Gaussian splat hold up when seen closer", "anchorsplat"};
   app.set_version_flag("--version", std::string("anchorsplat ") + ANCHORSPLAT_VERSION);
   app.require_subcommand(1);
@@ -71,15 +75,19 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
   AddDoctor(app, program);
   AddManual(app, program);
   CheckNumbers(app);
+  // Parsing failed, so whether JSON was asked for has to be read off the words themselves.
+  const auto usage_error = [&program](const Error& error) {
+    SharedFlags flags;
+    flags.json = std::ranges::find(program.words, "--json") != program.words.end();
+    return Fail(flags, error);
+  };
+  if (const Status verbs = CheckVerbWords(app, program.words); !verbs.ok()) return usage_error(verbs.error());
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     // CLI11 answers --help and --version through this path with exit code 0.
     if (error.get_exit_code() == 0) return app.exit(error);
-    // Parsing failed, so whether JSON was asked for has to be read off the words themselves.
-    SharedFlags flags;
-    for (int i = 1; i < argc; ++i) flags.json |= std::string_view(argv[i]) == "--json";
-    return Fail(flags, {ErrorCode::kBadArgument, Cat(error.what(), " (--help shows how)")});
+    return usage_error({ErrorCode::kBadArgument, Cat(error.what(), " (--help shows how)")});
   }
 
   // A limit on the size of files is an error of the write that meets it, not the end of the program.

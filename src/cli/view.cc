@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/choice.h"
+#include "cli/clean_output.h"
 #include "cli/parse.h"
 #include "cli/verb.h"
 #include "core/text.h"
@@ -122,6 +123,8 @@ Status RunView(const PageFlags& flags, const SharedFlags& shared) {
   ViewerPage page;
   page.title = flags.title;
   page.max_sh_degree = flags.sh_degree;
+  page.smaller =
+      "leave out view-dependent colour (--sh-degree 0), --before or the true pictures, or show a part of the scene";
   ANCHORSPLAT_ASSIGN_OR_RETURN(page.views, ChooseViews(flags, cameras));
   if (cameras.background) page.background = *cameras.background;
   if (!flags.background.empty()) {
@@ -152,7 +155,7 @@ Status RunView(const PageFlags& flags, const SharedFlags& shared) {
                {"views", page.views.size()},
                {"pixel_size", page.pixel_size ? nlohmann::json(*page.pixel_size) : nlohmann::json()}});
   } else if (!shared.quiet) {
-    std::cout << flags.output << ": " << HumanBytes(bytes) << ", open it in any browser\n";
+    std::cout << Shown(flags.output) << ": " << HumanBytes(bytes) << ", open it in any browser\n";
   }
   return {};
 }

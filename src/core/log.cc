@@ -56,7 +56,7 @@ class TerminalSink : public LogSink {
       line += " " + WithThousands(done) + "  " + HumanSeconds(seconds);
     }
     if (!note.empty()) line += "  " + note;
-    std::fprintf(stderr, "\r\x1b[2K%s", line.c_str());
+    std::fprintf(stderr, "\r\x1b[2K%s", Printable(line, std::numeric_limits<size_t>::max()).c_str());
     std::fflush(stderr);
     visible_ = true;
   }

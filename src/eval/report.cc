@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -36,12 +37,11 @@ std::string Rule(size_t columns) {
   return rule + "\n";
 }
 
-// A bar or a line break in a name would end the cell.
+// A bar or a line break in a name would end the cell, and a control character could command the terminal that shows it.
 std::string Cell(std::string text) {
-  for (char& c : text) {
-    if (c == '|' || c == '\n' || c == '\r') c = ' ';
-  }
-  return text;
+  std::ranges::replace_if(
+      text, [](char c) { return c == '|' || c == '\n' || c == '\r'; }, ' ');
+  return Printable(text, std::numeric_limits<size_t>::max());
 }
 
 std::string ProtocolSentence(const Evaluation& evaluation) {

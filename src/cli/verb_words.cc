@@ -1,0 +1,78 @@
+#include "cli/verb_words.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "core/text.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// Those that help lists.
+std::vector<std::string> Verbs(const CLI::App& app) {
+  std::vector<std::string> verbs;
+  for (const CLI::App* verb : app.get_subcommands([](const CLI::App* v) { return !v->get_group().empty(); })) {
+    verbs.push_back(verb->get_name());
+  }
+  return verbs;
+}
+
+// Half of the letters may differ: more is another word.
+std::string Nearest(const std::string& word, const std::vector<std::string>& verbs) {
+  std::string best;
+  size_t least = std::string::npos;
+  for (const std::string& verb : verbs) {
+    const size_t distance = EditDistance(word, verb);
+    if (2 * distance > std::max(word.size(), verb.size()) + 1 || distance >= least) continue;
+    best = verb;
+    least = distance;
+  }
+  return best;
+}
+
+}  // namespace
+
+Status CheckVerbWords(const CLI::App& app, std::span<const std::string> words) {
+  const CLI::App* at = &app;
+  std::string said = app.get_name();
+  for (size_t k = 1;; ++k) {
+    const std::vector<std::string> verbs = Verbs(*at);
+    if (verbs.empty() || (k < words.size() && words[k].starts_with('-'))) return {};
+    std::string list;
+    for (const std::string& verb : verbs) list += (list.empty() ? "" : ", ") + verb;
+    if (k >= words.size()) {
+      return Error{ErrorCode::kBadArgument, Cat("'", said, "' needs a verb: ", list, " (--help shows more)")};
+    }
+    const CLI::App* next = nullptr;  // hidden ones too
+    for (const CLI::App* verb : at->get_subcommands([](const CLI::App*) { return true; })) {
+      if (verb->check_name(words[k])) next = verb;
+    }
+    if (next == nullptr) {
+      const std::string nearest = Nearest(words[k], verbs);
+      return Error{ErrorCode::kBadArgument, Cat("'", said, "' has no verb '", Printable(words[k]), "'",
+                                                nearest.empty() ? "." : Cat("; did you mean '", nearest, "'?"),
+                                                " There are ", list, " (--help shows more)")};
+    }
+    at = next;
+    said += " " + words[k];
+  }
+}
+
+size_t EditDistance(std::string_view a, std::string_view b) {
+  // Optimal string alignment: rows of the table for the last two letters of `a` are enough.
+  std::vector<size_t> before, last, now(b.size() + 1);
+  for (size_t j = 0; j <= b.size(); ++j) now[j] = j;
+  for (size_t i = 1; i <= a.size(); ++i) {
+    before = std::move(last);
+    last = std::move(now);
+    now.assign(b.size() + 1, i);
+    for (size_t j = 1; j <= b.size(); ++j) {
+      now[j] = std::min({last[j] + 1, now[j - 1] + 1, last[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1)});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) now[j] = std::min(now[j], before[j - 2] + 1);
+    }
+  }
+  return now[b.size()];
+}
+
+}  // namespace anchorsplat

@@ -14,8 +14,8 @@ CLI::Validator Finite() {
   return CLI::Validator(
       [](const std::string& text) {
         double value = 0;
-        const bool bad = CLI::detail::lexical_cast(text, value) &&
-                         !(std::abs(value) <= double{std::numeric_limits<float>::max()});
+        const bool bad =
+            CLI::detail::lexical_cast(text, value) && !(std::abs(value) <= double{std::numeric_limits<float>::max()});
         return bad ? "must be a finite number of at most 3.4e38, found '" + text + "'" : "";
       },
       "");

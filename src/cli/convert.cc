@@ -6,7 +6,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "cli/batch.h"
 #include "cli/choice.h"
+#include "cli/clean_output.h"
 #include "cli/parse.h"
 #include "cli/verb.h"
 #include "core/log.h"
@@ -74,10 +76,11 @@ Result<std::vector<Job>> Jobs(const ConvertFlags& flags, bool overwrite) {
     ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay({&jobs[0].input, 1}, {&jobs[0].output, 1}));
     return jobs;
   }
-  // Folders of pictures get one folder each; ".spz" may be said without its dot.
+  // Folders of pictures get one folder each; ".spz" may be said without its dot. A slash would lead out of --out-dir.
   const bool folders = flags.to == "meta.json";
   const std::string extension = folders ? "/meta.json" : flags.to.starts_with('.') ? flags.to : "." + flags.to;
-  const SplatFormat* const format = FormatOfExtension(fs::path("x" + extension));
+  const bool leads_away = !folders && extension.find('/') != std::string::npos;
+  const SplatFormat* const format = leads_away ? nullptr : FormatOfExtension(fs::path("x" + extension));
   if (format == nullptr || format->write == nullptr) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--to: '", Printable(flags.to), "' is no format that is written; written are ", WrittenFormats())};
@@ -139,8 +142,8 @@ nlohmann::json ToJson(const Job& job, const ConvertReport& r, const std::optiona
 }
 
 void Print(const Job& job, const ConvertReport& r, const std::optional<ConversionLoss>& loss) {
-  std::cout << job.input.string() << " (" << r.input_format << ", " << HumanBytes(r.input_bytes) << ") -> "
-            << job.output.string() << " (" << r.output_format << ", " << HumanBytes(r.output_bytes);
+  std::cout << Shown(job.input) << " (" << r.input_format << ", " << HumanBytes(r.input_bytes) << ") -> "
+            << Shown(job.output) << " (" << r.output_format << ", " << HumanBytes(r.output_bytes);
   if (r.predicted_bytes) {
     std::cout << ", predicted " << (r.predicted_roughly ? "about " : "") << HumanBytes(*r.predicted_bytes);
   }
@@ -167,7 +170,7 @@ Status ConvertModel(const ConvertFlags& flags, const SharedFlags& shared) {
     PrintJson(
         nlohmann::json::array({{{"input", from.string()}, {"output", to.string()}, {"bytes", {{"out", bytes}}}}}));
   } else if (!shared.quiet) {
-    std::cout << from.string() << " -> " << to.string() << " (" << HumanBytes(bytes) << ")\n";
+    std::cout << Shown(from) << " -> " << Shown(to) << " (" << HumanBytes(bytes) << ")\n";
   }
   return {};
 }
@@ -203,29 +206,10 @@ Status RunConvert(const ConvertFlags& flags, Program& program) {
     if (!axes.ok()) return Error{axes.error().code, Cat("--coords: ", axes.error().message)};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto jobs, Jobs(flags, shared.overwrite));
-  nlohmann::json results = nlohmann::json::array();
-  size_t failed = 0;
-  for (const Job& job : jobs) {
-    const Result<nlohmann::json> row = RunJob(job, options, flags.views, shared);
-    if (row.ok()) {
-      results.push_back(*row);
-      continue;
-    }
-    const Error& error = row.error();
-    if (jobs.size() == 1 || error.code == ErrorCode::kInterrupted) return error;
-    // One bad file of many is no reason to leave the others undone.
-    ++failed;
-    LogError(error.message);
-    results.push_back({{"input", job.input.string()},
-                       {"output", job.output.string()},
-                       {"failure", {{"code", CodeName(error.code)}, {"message", error.message}}}});
-  }
-  if (shared.json) PrintJson(results);
-  if (failed > 0) {
-    LogError(Cat(failed, " of ", jobs.size(), " files could not be converted"));
-    program.exit_code = kPartialExitCode;
-  }
-  return {};
+  std::vector<BatchItem> items;
+  for (const Job& job : jobs) items.push_back({job.input.string(), job.output.string()});
+  return RunBatch(
+      items, [&](size_t k) { return RunJob(jobs[k], options, flags.views, shared); }, program);
 }
 
 }  // namespace

@@ -8,8 +8,11 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "cli/batch.h"
+#include "cli/before_after_page.h"
 #include "cli/checkpoint.h"
 #include "cli/choice.h"
+#include "cli/clean_output.h"
 #include "cli/parse.h"
 #include "cli/refine_flags.h"
 #include "cli/stop_signal.h"
@@ -19,10 +22,11 @@
 #include "fit/fitter.h"
 #include "formats/atomic_file.h"
 #include "formats/camera_io.h"
+#include "formats/extra_properties.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
+#include "formats/row_arrays.h"
 #include "model/model_method.h"
-#include "viewer/page_writer.h"
 
 namespace anchorsplat {
 
@@ -188,24 +192,30 @@ std::string Details(const EnhanceReport& r) {
              r.pixel_size_source, ")");
 }
 
-// The page beside the output: scan-4x.ply and scan-4x.html.
-fs::path ViewPath(const fs::path& output) { return fs::path(output).replace_extension(".html"); }
-
-Status WriteView(const std::string& input, const GaussianCloud& before, const fs::path& output,
-                 const Enhanced& enhanced, const WriteOptions& options) {
-  ViewerPage page;
-  page.before = ViewerSplat{&before, fs::path(input).filename().string(), {}};
-  page.after = {&enhanced.cloud, output.filename().string(), {}};
-  if (enhanced.report.pixel_size > 0) page.pixel_size = static_cast<float>(enhanced.report.pixel_size);
-  return WriteViewerPage(ViewPath(output), page, options);
+// Leaves those of `extras` that belong to Gaussians that are enhanced. The means of these Gaussians, by which the
+// result shows whether they are still the same ones; nothing where there is nothing to keep.
+Buffer<float> KeepUsable(ExtraProperties& extras, const GaussianCloud& cloud) {
+  if (extras.empty()) return {};
+  std::vector<char> usable(static_cast<size_t>(cloud.size()));
+  for (size_t i = 0; i < usable.size(); ++i) usable[i] = IsUsable(cloud, static_cast<int64_t>(i)) ? 1 : 0;
+  Buffer<float> means = cloud.means;
+  KeepRows(means, 3, usable);
+  KeepRows(extras, usable);
+  return means;
 }
 
 // From one file to another; its entry of the results.
 Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& shared, EnhanceOptions options,
                                   const std::string& input, const fs::path& output) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, ReadCloud(input));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(input));
+  ExtraProperties extras;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read({}, &extras));
+  const Buffer<float> means = KeepUsable(extras, cloud);
   GaussianCloud before;
-  if (flags.view) before = cloud;
+  if (flags.view) {
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckPageFits(output, cloud, options));
+    before = cloud;
+  }
   WriteOptions write = WriteOptionsFrom(shared);
   write.overwrite |= Continues(options, output);
   options.control.checkpoint = CheckpointOf(options, output);
@@ -214,9 +224,14 @@ Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& 
   stop_signal.reset();
   if (!result.ok()) return result.error();
   const Enhanced enhanced = *std::move(result);
-  ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(output, enhanced.cloud, write));
+  if (!extras.empty() && enhanced.cloud.means != means) {
+    LogWarning(Cat(input, ": other properties of its Gaussians are dropped, as those of the result are others: ",
+                   extras.lost(/*writer_keeps=*/false)));
+    extras = {};
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(output, enhanced.cloud, write, extras));
   const EnhanceReport& r = enhanced.report;
-  if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(WriteView(input, before, output, enhanced, write));
+  if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(WritePage(input, before, output, enhanced, write));
   const fs::path& checkpoint = options.control.checkpoint;
   if (r.interrupted) {
     const bool resumable = !checkpoint.empty() && fs::exists(checkpoint);
@@ -226,21 +241,22 @@ Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& 
   }
   if (!checkpoint.empty()) RemoveFitCheckpoint(checkpoint);
   nlohmann::json json = ToJson(input, output, r);
-  if (flags.view) json["view"] = ViewPath(output).string();
+  if (flags.view) json["view"] = PagePath(output).string();
   if (!shared.json && !shared.quiet) {
-    std::cout << input << " -> " << output.string() << "\n  " << WithThousands(r.gaussians_in) << " Gaussians in, "
+    std::cout << Shown(input) << " -> " << Shown(output) << "\n  " << WithThousands(r.gaussians_in) << " Gaussians in, "
               << WithThousands(r.gaussians_out) << " out; " << r.method << Details(r) << ", " << HumanSeconds(r.seconds)
               << '\n';
     if (flags.view) {
       std::error_code unknown;
-      std::cout << "  " << ViewPath(output).string() << ": " << HumanBytes(fs::file_size(ViewPath(output), unknown))
+      std::cout << "  " << Shown(PagePath(output)) << ": " << HumanBytes(fs::file_size(PagePath(output), unknown))
                 << ", open it in any browser\n";
     }
   }
   return json;
 }
 
-Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared, int& exit_code) {
+Status RunEnhance(const EnhanceFlags& flags, Program& program) {
+  const SharedFlags& shared = program.flags;
   ANCHORSPLAT_RETURN_IF_ERROR(FinishModelOptions(flags));
   EnhanceOptions options = flags.options;
   options.seed = shared.seed;
@@ -252,10 +268,10 @@ Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared, int& exi
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto outputs, OutputPaths(flags, shared.overwrite));
 
-  for (const fs::path& output : outputs) {
-    if (flags.view && !shared.overwrite && !Continues(options, output) && fs::exists(ViewPath(output))) {
-      return Error{ErrorCode::kExists, Cat(ViewPath(output).string(), " exists; -w replaces it")};
-    }
+  if (flags.view) {
+    const std::vector<fs::path> inputs(flags.inputs.begin(), flags.inputs.end());
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckPages(
+        inputs, outputs, [&](const fs::path& output) { return shared.overwrite || Continues(options, output); }));
   }
 
   std::vector<fs::path> used(flags.inputs.begin(), flags.inputs.end());
@@ -266,31 +282,10 @@ Status RunEnhance(const EnhanceFlags& flags, const SharedFlags& shared, int& exi
     ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(checkpoint, used, options.control.resume, shared.overwrite));
   }
 
-  nlohmann::json results = nlohmann::json::array();
-  size_t failures = 0;
-  for (size_t i = 0; i < flags.inputs.size(); ++i) {
-    const auto result = EnhanceOne(flags, shared, options, flags.inputs[i], outputs[i]);
-    if (result.ok()) {
-      results.push_back(*result);
-      continue;
-    }
-    // What is wrong with one of several is said, and does not keep the others from being enhanced.
-    if (flags.inputs.size() == 1 || result.error().code == ErrorCode::kInterrupted) return result.error();
-    const Error& error = result.error();
-    const bool named = error.message.find(flags.inputs[i]) != std::string::npos;
-    LogError(named ? error.message : Cat(flags.inputs[i], ": ", error.message));
-    results.push_back(
-        {{"input", flags.inputs[i]}, {"failure", {{"code", CodeName(error.code)}, {"message", error.message}}}});
-    if (++failures == flags.inputs.size()) {
-      return Error{error.code, Cat("all ", failures, " inputs failed, the last one: ", error.message)};
-    }
-  }
-  if (shared.json) PrintJson(results);
-  if (failures > 0 && !shared.json && !shared.quiet) {
-    std::cout << failures << " of " << flags.inputs.size() << " failed\n";
-  }
-  if (failures > 0) exit_code = kPartialExitCode;
-  return {};
+  std::vector<BatchItem> items;
+  for (size_t i = 0; i < outputs.size(); ++i) items.push_back({flags.inputs[i], outputs[i].string()});
+  return RunBatch(
+      items, [&](size_t i) { return EnhanceOne(flags, shared, options, flags.inputs[i], outputs[i]); }, program);
 }
 
 std::string MethodHelp() {
@@ -387,7 +382,7 @@ void AddEnhance(CLI::App& app, Program& program) {
     for (const CLI::Option* option : verb.get_options()) {
       if (option->count() > 0) flags->options.given.push_back(option->get_single_name());
     }
-    program.run = [flags, &program] { return RunEnhance(*flags, program.flags, program.exit_code); };
+    program.run = [flags, &program] { return RunEnhance(*flags, program); };
   });
 }
 

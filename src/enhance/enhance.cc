@@ -170,6 +170,13 @@ double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud)
 void RegisterEnhanceMethod(EnhanceMethod method) { Registry().push_back(std::move(method)); }
 std::span<const EnhanceMethod> EnhanceMethods() { return Registry(); }
 
+int64_t ExpectedGaussians(int64_t count, const EnhanceOptions& options) {
+  const Result<MethodPlan> plan = PlanEnhancement(options);
+  if (!plan.ok()) return count;
+  if (plan->start != nullptr) count = plan->start->expected(count, options);
+  return plan->method->expected(count, options);
+}
+
 Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   if (cloud.empty()) return Error{ErrorCode::kBadArgument, "the splat has no Gaussians"};

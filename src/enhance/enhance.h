@@ -101,6 +101,10 @@ struct EnhanceMethod {
   // False: EnhanceInput::pixel_sizes may be empty, nothing is estimated. Asked once the method is ready. An error: it
   // could not run.
   std::function<Result<bool>()> needs_pixel_size = [] { return true; };
+  // About how many Gaussians come of `count`, for what has to be known before the work begins.
+  std::function<int64_t(int64_t count, const EnhanceOptions&)> expected = [](int64_t count, const EnhanceOptions&) {
+    return count;
+  };
   std::function<Status(const EnhanceOptions&)> ready;
   std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&, EnhanceReport&)> run;
 };
@@ -127,6 +131,9 @@ Result<MethodPlan> PlanEnhancement(const EnhanceOptions& options);
 // kBadArgument: that, or something `given` that has no effect with this plan; says with what it would have one. Names
 // that no method knows are of no concern here.
 Status CheckOptions(const EnhanceOptions& options);
+
+// About how many Gaussians Enhance() makes of `count`; `count` where no method can be chosen.
+int64_t ExpectedGaussians(int64_t count, const EnhanceOptions& options);
 
 struct Enhanced {
   GaussianCloud cloud;

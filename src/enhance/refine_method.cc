@@ -112,6 +112,9 @@ std::vector<MethodOption> RefinementOptions() {
 
 bool WithPictures(const EnhanceOptions& options) { return !options.refine.images.empty(); }
 
+// At least; without --k it depends on what there is to see.
+int64_t Expected(int64_t count, const EnhanceOptions& options) { return count * options.refine.copies.value_or(1); }
+
 }  // namespace
 
 EnhanceMethod RefineMethod() {
@@ -122,6 +125,7 @@ EnhanceMethod RefineMethod() {
           .begins_with_best = WithPictures,
           .resumable = true,
           .options = RefinementOptions(),
+          .expected = Expected,
           .ready = [](const EnhanceOptions& options) { return Validate(options.refine); },
           .run = RunRefine};
 }
@@ -134,6 +138,7 @@ EnhanceMethod RefineImagesMethod() {
           .begins_with_best = WithPictures,
           .resumable = true,
           .options = RefinementOptions(),
+          .expected = Expected,
           .ready = [](const EnhanceOptions& options) -> Status {
             if (!options.refine.images.empty()) return Validate(options.refine);
             return Error{ErrorCode::kBadArgument, "the method 'refine-images' needs pictures: --images PROJECT"};

@@ -1,5 +1,6 @@
 #include "model/model_method.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -138,6 +139,12 @@ void RegisterModelMethod(const std::shared_ptr<const ModelMethod>& method) {
     AnyNetwork network;
   };
   const auto loaded = std::make_shared<std::optional<Loaded>>();
+  const auto load = [method, loaded]() -> Status {
+    if (*loaded && (*loaded)->file == method->file) return {};
+    ANCHORSPLAT_ASSIGN_OR_RETURN(AnyNetwork network, Load(*method));
+    *loaded = Loaded{method->file, std::move(network)};
+    return {};
+  };
   RegisterEnhanceMethod(
       {.name = "model",
        .summary = HasShippedNetwork() ? "one pass of the network of --model, or of the one that is part of this program"
@@ -149,16 +156,21 @@ void RegisterModelMethod(const std::shared_ptr<const ModelMethod>& method) {
          if (method->file.empty()) return true;
          return HoldsCompactNetwork(method->file);
        },
+       .expected = [method, loaded, load](int64_t count, const EnhanceOptions&) -> int64_t {
+         if (!load().ok()) return count;  // which the run will say
+         if (const auto* packed = std::get_if<PackedNetwork>(&(*loaded)->network)) {
+           const int64_t most = method->options.max_gaussians;
+           return packed->config().copies * (most > 0 ? std::min(count, most) : count);
+         }
+         return count * std::get<CompactNetwork>((*loaded)->network).config().copies;
+       },
        .ready = [method](const EnhanceOptions&) -> Status {
          if (!method->file.empty() || HasShippedNetwork()) return {};
          return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};
        },
-       .run = [method, loaded](EnhanceInput input, const EnhanceOptions& options,
-                               EnhanceReport& report) -> Result<GaussianCloud> {
-         if (!*loaded || (*loaded)->file != method->file) {
-           ANCHORSPLAT_ASSIGN_OR_RETURN(AnyNetwork network, Load(*method));
-           *loaded = Loaded{method->file, std::move(network)};
-         }
+       .run = [method, loaded, load](EnhanceInput input, const EnhanceOptions& options,
+                                     EnhanceReport& report) -> Result<GaussianCloud> {
+         ANCHORSPLAT_RETURN_IF_ERROR(load());
          if (const auto* packed = std::get_if<PackedNetwork>(&(*loaded)->network)) {
            return EnhanceWithPackedNetwork(input, *packed, method->options, report);
          }

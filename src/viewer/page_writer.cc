@@ -37,11 +37,9 @@ struct DataElement {
   std::string base64;
 };
 
-Error TooLarge(const std::filesystem::path& path, uint64_t bytes, uint64_t limit) {
-  return {ErrorCode::kBadArgument,
-          Cat(path.string(), ": the page would take ", HumanBytes(bytes), ", more than the ", HumanBytes(limit),
-              " a browser opens well; leave out view-dependent colour (--sh-degree 0), BEFORE or the true pictures, "
-              "or show a part of the scene")};
+Error TooLarge(const std::filesystem::path& path, uint64_t bytes, const ViewerPage& page) {
+  return {ErrorCode::kBadArgument, Cat(path.string(), ": the page would take ", HumanBytes(bytes), ", more than the ",
+                                       HumanBytes(page.max_bytes), " a browser opens well; ", page.smaller)};
 }
 
 // Looking for repeated strings is of no use in planes of numbers: runs and Huffman codes alone make 1 % less of them,
@@ -168,6 +166,24 @@ std::string InlineScripts() {
 
 }  // namespace
 
+double MostPageBytes(int sh_degree) { return PlanesPerGaussian(sh_degree) * 4.0 / 3; }
+
+uint64_t EstimatedPageBytes(const GaussianCloud& cloud, int max_sh_degree) {
+  constexpr int64_t kSample = 1 << 16;
+  const int64_t step = std::max<int64_t>(1, cloud.size() / kSample);
+  std::vector<int64_t> rows;
+  for (int64_t i = 0; i < cloud.size(); i += step) rows.push_back(i);
+  const Result<GaussianCloud> sample = Subset(cloud, rows);
+  if (!sample.ok()) return 0;
+  ViewerSplat splat;
+  splat.cloud = &*sample;
+  std::vector<DataElement> elements;
+  if (rows.empty() || !AddSplat(splat, "sample", max_sh_degree, elements).ok()) return 0;
+  double bytes = 0;
+  for (const DataElement& element : elements) bytes += static_cast<double>(element.base64.size());
+  return static_cast<uint64_t>(bytes * static_cast<double>(cloud.size()) / static_cast<double>(rows.size()));
+}
+
 Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page, const WriteOptions& options) {
   if (page.pixel_size && !(std::isfinite(*page.pixel_size) && *page.pixel_size > 0)) {
     return Error{ErrorCode::kBadArgument, "the training pixel size must be positive and finite"};
@@ -176,7 +192,7 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
   uint64_t at_least = static_cast<uint64_t>(page.after.cloud == nullptr ? 0 : page.after.cloud->size());
   if (page.before && page.before->cloud != nullptr) at_least += static_cast<uint64_t>(page.before->cloud->size());
   at_least *= kLeastBytes;
-  if (at_least > page.max_bytes) return TooLarge(path, at_least, page.max_bytes);
+  if (at_least > page.max_bytes) return TooLarge(path, at_least, page);
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
   std::vector<DataElement> elements;
@@ -218,7 +234,7 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
 
   uint64_t bytes = head.size() + tail.size();
   for (const DataElement& element : elements) bytes += element.base64.size() + element.id.size() + 50;
-  if (bytes > page.max_bytes) return TooLarge(path, bytes, page.max_bytes);
+  if (bytes > page.max_bytes) return TooLarge(path, bytes, page);
 
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(head));
   for (const DataElement& element : elements) {

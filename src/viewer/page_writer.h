@@ -38,6 +38,7 @@ struct ViewerPage {
   std::array<float, 3> background{};  // rgb 0–1
   int max_sh_degree = kMaxShDegree;   // higher coefficients are left out: they are most of the page
   uint64_t max_bytes = kMaxPageBytes;
+  std::string smaller = "leave something out";  // what to do about a page above it, in the words of who asks for it
 };
 
 // One HTML file that shows the splats in any browser with WebGL 2, from disk, with no network: the clouds quantised
@@ -46,5 +47,10 @@ struct ViewerPage {
 // Errors: kExists; kIo; kNotFound or kBadFile (a picture that is missing or neither PNG nor JPEG); kBadArgument: a
 // cloud without usable Gaussians, a pixel size that is not positive, a page above `max_bytes`.
 Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page, const WriteOptions& options = {});
+
+// Bytes that a splat takes in a page, from a sample of it; 0 where nothing of it can be shown. MostPageBytes: of one
+// Gaussian at most, as if nothing could be compressed.
+uint64_t EstimatedPageBytes(const GaussianCloud& cloud, int max_sh_degree = kMaxShDegree);
+double MostPageBytes(int sh_degree);
 
 }  // namespace anchorsplat

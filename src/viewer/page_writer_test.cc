@@ -290,12 +290,31 @@ TEST(PageWriter, ErrorsSayWhatToDoAndLeaveNothingBehind) {
     page = good;
     page.max_bytes = limit;
     EXPECT_EQ(error(page).code, ErrorCode::kBadArgument);
-    EXPECT_NE(error(page).message.find("--sh-degree"), std::string::npos);
+    EXPECT_NE(error(page).message.find("a browser opens well; leave something out"), std::string::npos);
   }
 
   ASSERT_TRUE(WriteViewerPage(folder / "page.html", good).ok());
   EXPECT_EQ(WriteViewerPage(folder / "page.html", good).error().code, ErrorCode::kExists);
   EXPECT_TRUE(WriteViewerPage(folder / "page.html", good, {.overwrite = true}).ok());
+}
+
+TEST(ViewerPage, EstimateIsNearWhatItTakes) {
+  const TestFolder folder;
+  const auto page_bytes = [&folder](const GaussianCloud& cloud, int degree) {
+    ViewerPage page;
+    page.after.cloud = &cloud;
+    page.max_sh_degree = degree;
+    EXPECT_TRUE(WriteViewerPage(folder / "page.html", page, {.overwrite = true}).ok());
+    return static_cast<double>(std::filesystem::file_size(folder / "page.html"));
+  };
+  const double empty = page_bytes(FittedLookingCloud(1, 0, 1), 0);
+  const GaussianCloud cloud = FittedLookingCloud(150'000, 2, 1);  // more than the sample
+  for (const int degree : {0, cloud.sh_degree}) {
+    const double bytes = page_bytes(cloud, degree) - empty;
+    EXPECT_NEAR(static_cast<double>(EstimatedPageBytes(cloud, degree)), bytes, 0.1 * bytes) << degree;
+    EXPECT_LT(bytes, 150'000 * MostPageBytes(degree)) << degree;
+  }
+  EXPECT_EQ(EstimatedPageBytes(GaussianCloud{}), 0u);
 }
 
 }  // namespace

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <span>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "enhance/enhance.h"
+#include "formats/cloud_io.h"
+
+namespace anchorsplat {
+
+// The page that `enhance --view` writes beside its output: scan-4x.ply and scan-4x.html.
+std::filesystem::path PagePath(const std::filesystem::path& output);
+
+// What can be known to fail before anything is read. Errors: kBadArgument where two outputs would have one page, or a
+// page would replace an input; kExists where there is one that `may_replace` does not allow for its output.
+Status CheckPages(std::span<const std::filesystem::path> inputs, std::span<const std::filesystem::path> outputs,
+                  const std::function<bool(const std::filesystem::path&)>& may_replace);
+
+// That a page of `before` and of what will come of it is not far beyond what a browser opens (kBadArgument): estimated,
+// before the work begins.
+Status CheckPageFits(const std::filesystem::path& output, const GaussianCloud& before, const EnhanceOptions& options);
+
+// Errors say that `output` is written all the same.
+Status WritePage(const std::filesystem::path& input, const GaussianCloud& before, const std::filesystem::path& output,
+                 const Enhanced& enhanced, const WriteOptions& options);
+
+}  // namespace anchorsplat

@@ -13,17 +13,17 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kChunk = int64_t{1} << 20;  // bytes that one thread adds up; part of what the checksum is
+constexpr int64_t kChecksumChunk = int64_t{1} << 20;  // bytes that one thread adds up; part of what the checksum is
 
 // Arrays are added up in chunks of their own, side by side, because a checkpoint has gigabytes.
 void AddBytes(std::span<const std::byte> bytes, Fingerprint& print) {
   const int64_t size = std::ssize(bytes);
-  std::vector<uint64_t> chunks(static_cast<size_t>((size + kChunk - 1) / kChunk));
+  std::vector<uint64_t> chunks(static_cast<size_t>((size + kChecksumChunk - 1) / kChecksumChunk));
   ParallelFor(0, std::ssize(chunks), 1, [&](int64_t first, int64_t last) {
     for (int64_t i = first; i < last; ++i) {
       Fingerprint chunk;
-      chunk.Add(
-          bytes.subspan(static_cast<size_t>(i * kChunk), static_cast<size_t>(std::min(kChunk, size - i * kChunk))));
+      chunk.Add(bytes.subspan(static_cast<size_t>(i * kChecksumChunk),
+                              static_cast<size_t>(std::min(kChecksumChunk, size - i * kChecksumChunk))));
       chunks[static_cast<size_t>(i)] = chunk.value();
     }
   });

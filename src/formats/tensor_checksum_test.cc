@@ -18,12 +18,12 @@ namespace {
 
 using testing::HasSubstr;
 
-std::string Bytes(const std::filesystem::path& path) {
+std::string WholeFile(const std::filesystem::path& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-std::string ErrorOf(const std::string& bytes) {
+std::string ProblemOf(const std::string& bytes) {
   const auto file = TensorFile::FromBytes(tensor_bytes::ToBuffer(bytes), "state");
   if (!file.ok()) return file.error().message;
   const Status status = VerifyChecksum(*file);
@@ -39,8 +39,8 @@ TEST(TensorChecksum, FindsEveryFlippedBit) {
   const auto metadata = WithChecksum({{"step", "31"}, {"settings", R"({"seed":7})"}}, entries);
   ASSERT_TRUE(metadata.ok());
   ASSERT_TRUE(WriteSafetensors(folder / "state", entries, *metadata).ok());
-  const std::string whole = Bytes(folder / "state");
-  ASSERT_EQ(ErrorOf(whole), "");
+  const std::string whole = WholeFile(folder / "state");
+  ASSERT_EQ(ProblemOf(whole), "");
   // What fills the header up to 64 bytes means nothing.
   const size_t data = 8 + LoadLittle<uint64_t>(reinterpret_cast<const std::byte*>(whole.data())),
                filling = whole.rfind('}', data) + 1;
@@ -48,17 +48,17 @@ TEST(TensorChecksum, FindsEveryFlippedBit) {
     if (bit / 8 >= filling && bit / 8 < data) continue;
     std::string damaged = whole;
     damaged[bit / 8] = static_cast<char>(damaged[bit / 8] ^ (1 << (bit % 8)));
-    ASSERT_NE(ErrorOf(damaged), "") << "bit " << bit % 8 << " of byte " << bit / 8;
+    ASSERT_NE(ProblemOf(damaged), "") << "bit " << bit % 8 << " of byte " << bit / 8;
   }
   std::string damaged = whole;
   damaged.back() = 1;
-  EXPECT_THAT(ErrorOf(damaged), HasSubstr("state: is damaged"));
+  EXPECT_THAT(ProblemOf(damaged), HasSubstr("state: is damaged"));
 }
 
 TEST(TensorChecksum, FilesWithoutOneSaySo) {
   const TestFolder folder;
   ASSERT_TRUE(WriteSafetensors(folder / "state", {}, {{"step", "31"}}).ok());
-  EXPECT_THAT(ErrorOf(Bytes(folder / "state")), HasSubstr("has no checksum"));
+  EXPECT_THAT(ProblemOf(WholeFile(folder / "state")), HasSubstr("has no checksum"));
 }
 
 // Of more than one chunk, of other strides, by any number of threads; and of a sum that is already there.

@@ -86,6 +86,12 @@ bool ParseFloat(std::string_view word, float& value) {
     // Too large or too small for a float: round as binary doubles are, to infinity or towards zero.
     double wide = 0;
     result = std::from_chars(word.data(), end, wide);
+    // Too small for a double, too: zero. A word is too short to get there without an exponent.
+    const size_t exponent = std::min(word.find_first_of("eE"), word.size() - 1);
+    if (result.ec == std::errc::result_out_of_range && word.substr(exponent + 1).starts_with('-')) {
+      wide = word.front() == '-' ? -0.0 : 0.0;
+      result.ec = std::errc{};
+    }
     value = static_cast<float>(wide);
   }
   return result.ec == std::errc{} && result.ptr == end;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdio>
 #include <functional>
 #include <string>
@@ -375,9 +376,15 @@ TEST_F(PlyErrors, AsciiRows) {
   EXPECT_ERROR(with_first_word("1 2"), "expected the end of the line after 23 properties");
   EXPECT_ERROR(with_first_word(""), "the line ends before property \"rot_3\"");
   EXPECT_ERROR(with_first_word(std::string(100, '1')), "expected a number, found \"111");
-  for (const char* word : {"+1", "nan", "-inf", "1e300", "1e-300", "0x1", "."}) {
+  for (const char* word : {"+1", "nan", "-inf", "1e300", "1e-300", "1e-400", "-2.5E-9999", "0x1", "."}) {
     const bool number = std::string(word) != "0x1" && std::string(word) != ".";
     EXPECT_EQ(ErrorOf(with_first_word(word)) == "accepted", number) << word;
+  }
+  for (const char* word : {"1e-400", "-1e-400"}) {
+    const auto read = ReadPly(InputFile::FromBytes("test.ply", with_first_word(word)));
+    ASSERT_TRUE(read.ok()) << word;
+    EXPECT_EQ(read->means[0], 0) << word;
+    EXPECT_EQ(std::signbit(read->means[0]), *word == '-') << word;
   }
   // Blank lines between rows are no rows.
   EXPECT_EQ(ErrorOf(bytes.substr(0, body) + "\n \n" + bytes.substr(body)), "accepted");

@@ -56,14 +56,23 @@ Status RefuseDistortion(const JsonValue& frame, const JsonValue& root) {
   if (const auto value = FindEither(frame, root, "is_fisheye"); value && value->raw() == true) {
     return value->Complain("a fisheye lens is not a pinhole camera");
   }
+  const auto refuse = [&model](const JsonValue& value, double number) {
+    return value.Complain(Cat("lens distortion ", number, " (camera model ", model,
+                              ") is not supported; undistort the images first, e.g. colmap image_undistorter"));
+  };
+  // nerfstudio's list of all of them.
+  if (const auto list = FindEither(frame, root, "distortion_params"); list && !list->raw().is_null()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> numbers, list->Elements());
+    for (const JsonValue& value : numbers) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const double number, value.Number());
+      if (number != 0) return refuse(value, number);
+    }
+  }
   for (const char* key : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"}) {
     const auto value = FindEither(frame, root, key);
     if (!value) continue;
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double number, value->Number());
-    if (number != 0) {
-      return value->Complain(Cat("lens distortion ", number, " (camera model ", model,
-                                 ") is not supported; undistort the images first, e.g. colmap image_undistorter"));
-    }
+    if (number != 0) return refuse(*value, number);
   }
   return {};
 }

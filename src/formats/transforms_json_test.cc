@@ -8,8 +8,8 @@
 #include <tuple>
 #include <utility>
 
-#include "formats/camera_io.h"
 #include "core/source_dir_for_test.h"
+#include "formats/camera_io.h"
 #include "formats/image_io.h"
 #include "formats/test_folder.h"
 
@@ -112,6 +112,7 @@ TEST(TransformsJson, MalformedFilesSayWhatIsWrong) {
   const TestFolder folder;
   const std::string good = R"("w": 8, "h": 8, "fl_x": 10)";
   ASSERT_TRUE(ReadText(folder, OneFrame(good)).ok());
+  EXPECT_TRUE(ReadText(folder, OneFrame(good, R"("distortion_params": [0, 0.0, 0, 0, 0, 0])")).ok());
   const auto replaced = [&](const std::string& from, const std::string& to) {
     std::string text = OneFrame(good);
     return text.replace(text.find(from), from.size(), to);
@@ -144,6 +145,10 @@ TEST(TransformsJson, MalformedFilesSayWhatIsWrong) {
       {OneFrame(R"("w": 8, "h": 8, "camera_angle_x": 3.2)"), "camera_angle_x: field of view"},
       {OneFrame(good, R"("k1": 0.01)"), "OPENCV"},
       {OneFrame(good, R"("p2": -1e-9)"), "distortion"},
+      {OneFrame(good, R"("distortion_params": [0, 0, 0, 0.1, 0, 0])"),
+       "frames[0].distortion_params[3]: lens distortion"},
+      {OneFrame(good + R"(, "distortion_params": [0.2])"), "lens distortion 0.2"},
+      {OneFrame(good, R"("distortion_params": 0.1)"), "distortion_params: expected an array"},
       {OneFrame(good + R"(, "camera_model": "OPENCV_FISHEYE")"), "OPENCV_FISHEYE"},
       {OneFrame(good + R"(, "camera_model": "EQUIRECTANGULAR")"), "EQUIRECTANGULAR"},
       {OneFrame(good + R"(, "is_fisheye": true)"), "fisheye"},

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
@@ -18,5 +19,10 @@ Status WriteCompressedPly(const std::filesystem::path& path, const GaussianCloud
                           const WriteOptions& options = {});
 
 uint64_t PredictedCompressedPlySize(int64_t count, int sh_degree);
+
+// A sentence where chunks of this cloud reach so far that their 2047 steps are coarse; else nothing. One Gaussian far
+// out does that to those that share its chunk, and farther out still, where the Morton order tells no others apart, to
+// all.
+std::string CompressedPlyMeanLoss(const GaussianCloud& cloud);
 
 }  // namespace anchorsplat

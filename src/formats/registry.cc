@@ -54,11 +54,9 @@ constexpr std::string_view kGltfJsonExtensions[] = {".gltf"};
 constexpr std::string_view kCsvExtensions[] = {".csv"};
 constexpr std::string_view kNpzExtensions[] = {".npz"};
 
-// Log-scales below −20 are lengths of a billionth: no rasterizer tells them from nothing, so they are no loss.
-constexpr float kAnyLow = -std::numeric_limits<float>::infinity();
-constexpr FormatRange kCompressedPlyRange = {.log_scale_min = kAnyLow, .log_scale_max = 20, .harmonics = 4};
+constexpr FormatRange kCompressedPlyRange = {.log_scale_min = -20, .log_scale_max = 20, .harmonics = 4};
 constexpr FormatRange kSpzRange = {.log_scale_min = -10.03f, .log_scale_max = 5.97f, .dc = 3.346f, .harmonics = 1.03f};
-constexpr FormatRange kSogRange = {.log_scale_min = kAnyLow, .log_scale_max = 20};
+constexpr FormatRange kSogRange = {.log_scale_min = -20, .log_scale_max = 20};
 constexpr FormatRange kSplatRange = {.sh_degree = 0, .dc = 1.779f};
 
 constexpr SplatFormat kFormats[] = {
@@ -70,7 +68,8 @@ constexpr SplatFormat kFormats[] = {
      .write = WriteCompressedPly,
      .predicted_size = PredictedCompressedPlySize,
      .order = SplatOrder::kMorton,
-     .range = kCompressedPlyRange},
+     .range = kCompressedPlyRange,
+     .mean_loss = CompressedPlyMeanLoss},
     {.name = "PLY",
      .extensions = kPlyExtensions,
      .sniff = IsPly,

@@ -102,6 +102,21 @@ TEST(SplatFile, EdgeValuesStayDefined) {
   for (int64_t i = 0; i < 4; ++i) EXPECT_TRUE(IsUsable(*read, i));
 }
 
+TEST(SplatFile, WhatIsWrittenIsRead) {
+  const TestFolder folder;
+  GaussianCloud cloud = RandomCloud(100, 0, 5);
+  for (float& x : cloud.means) x += 5.4e6f;  // coordinates of the Earth
+  ASSERT_TRUE(WriteSplat(folder / "a.splat", cloud, {.order = SplatOrder::kKeep}).ok());
+  const auto read = Read(folder / "a.splat");
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  EXPECT_TRUE(SameBits(read->means, cloud.means));
+  for (float& x : cloud.means) x = 1e20f;
+  const Status refused = WriteSplat(folder / "b.splat", cloud);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().message.find("100 of 100 Gaussians"), std::string::npos) << refused.error().message;
+  EXPECT_FALSE(std::filesystem::exists(folder / "b.splat"));
+}
+
 TEST(SplatFile, TextAndOtherFilesAreNone) {
   const auto error_of = [](std::string bytes) {
     const auto cloud = ReadSplat(InputFile::FromBytes("a.splat", std::move(bytes)));
@@ -119,7 +134,7 @@ TEST(SplatFile, TextAndOtherFilesAreNone) {
   const TestFolder folder;
   ASSERT_TRUE(WriteSplat(folder / "a.splat", RandomCloud(4, 0, 3)).ok());
   std::string bytes = *InputFile::Open(folder / "a.splat")->ReadAll(1000);
-  const float damage[] = {std::nanf(""), 2e6f, -1e-3f};  // a mean, a mean, a scale
+  const float damage[] = {std::nanf(""), 2e12f, -1e-3f};  // a mean, a mean, a scale
   std::memcpy(bytes.data(), &damage[0], 4);
   std::memcpy(bytes.data() + 32 + 8, &damage[1], 4);
   EXPECT_EQ(error_of(bytes), "accepted");

@@ -2,6 +2,7 @@
 
 #include <tbb/parallel_sort.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -74,7 +75,9 @@ Buffer<uint32_t> ImportanceOrder(const GaussianCloud& cloud) {
     const float logit = cloud.opacity_logits[static_cast<size_t>(i)];
     // ln sigmoid(x) = −ln(1 + e^−x), which for very negative x is x itself.
     const float log_opacity = logit < -80 ? logit : -std::log1p(std::exp(-logit));
-    const float importance = s[0] + s[1] + s[2] + log_opacity;
+    // Flat Gaussians (a log-scale of −Inf) are seen all the same; NaN stays.
+    const auto bounded = [](float log_scale) { return std::max(log_scale, -20.0f); };
+    const float importance = bounded(s[0]) + bounded(s[1]) + bounded(s[2]) + log_opacity;
     return std::isnan(importance) ? std::numeric_limits<float>::infinity() : -importance;
   });
 }

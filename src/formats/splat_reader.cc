@@ -6,7 +6,6 @@
 #include <cstring>
 
 #include "core/spherical_harmonics.h"
-#include "core/statistics.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
 #include "formats/quantize.h"
@@ -16,18 +15,13 @@ namespace anchorsplat {
 
 static_assert(std::endian::native == std::endian::little, "records are copied as they lie in the file");
 
-namespace {
-
-// Three coordinates and three lengths that no Gaussian of a scene has. Comparisons that NaN fails.
-bool IsAbsurd(const float numbers[6]) {
+bool IsNoSplatRow(const float numbers[6]) {  // comparisons that NaN fails
   for (int k = 0; k < 3; ++k) {
-    if (!(std::fabs(numbers[k]) <= kPlausibleExtent)) return true;
-    if (!(numbers[3 + k] >= 0 && numbers[3 + k] <= kPlausibleExtent)) return true;
+    if (!(std::fabs(numbers[k]) <= kSplatExtent)) return true;
+    if (!(numbers[3 + k] >= 0 && numbers[3 + k] <= kSplatExtent)) return true;
   }
   return false;
 }
-
-}  // namespace
 
 Result<GaussianCloud> ReadSplat(const InputFile& file, const ReadLimits& limits) {
   if (file.size() == 0) {
@@ -49,7 +43,7 @@ Result<GaussianCloud> ReadSplat(const InputFile& file, const ReadLimits& limits)
         for (int64_t i = first; i < last; ++i, bytes += kSplatRecord) {
           float numbers[6];
           std::memcpy(numbers, bytes, sizeof numbers);
-          if (IsAbsurd(numbers)) ++absurd_here;
+          if (IsNoSplatRow(numbers)) ++absurd_here;
           for (int k = 0; k < 3; ++k) {
             cloud.means[static_cast<size_t>(3 * i + k)] = numbers[k];
             cloud.log_scales[static_cast<size_t>(3 * i + k)] = LogFromScale(numbers[3 + k]);
@@ -63,9 +57,10 @@ Result<GaussianCloud> ReadSplat(const InputFile& file, const ReadLimits& limits)
         absurd += absurd_here;
       }));
   if (2 * absurd > count) {
-    return Error{ErrorCode::kBadFile,
-                 Cat(file.name(), ": is no .splat file: ", WithThousands(absurd), " of ", WithThousands(count),
-                     " rows of 32 bytes have positions or scales that are no numbers, negative or above a million")};
+    return Error{
+        ErrorCode::kBadFile,
+        Cat(file.name(), ": is no .splat file: ", WithThousands(absurd), " of ", WithThousands(count),
+            " rows of 32 bytes have positions or scales that are no numbers, negative or above a million millions")};
   }
   return cloud;
 }

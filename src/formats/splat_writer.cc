@@ -1,8 +1,10 @@
 #include "formats/splat_writer.h"
 
+#include <atomic>
 #include <cmath>
 #include <cstring>
 
+#include "core/parallel.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
@@ -13,10 +15,40 @@
 
 namespace anchorsplat {
 
+namespace {
+
+// Rows that ReadSplat would not take for Gaussians.
+int64_t CountUnreadable(const GaussianCloud& cloud) {
+  constexpr int64_t kGrain = 1 << 14;
+  std::atomic<int64_t> sum = 0;
+  ParallelFor(0, cloud.size(), kGrain, [&](int64_t first, int64_t last) {
+    int64_t here = 0;
+    for (int64_t i = first; i < last; ++i) {
+      float numbers[6];
+      for (int64_t k = 0; k < 3; ++k) {
+        numbers[k] = cloud.means[static_cast<size_t>(3 * i + k)];
+        numbers[3 + k] = std::exp(cloud.log_scales[static_cast<size_t>(3 * i + k)]);
+      }
+      here += IsNoSplatRow(numbers) ? 1 : 0;
+    }
+    sum += here;
+  });
+  return sum;
+}
+
+}  // namespace
+
 uint64_t PredictedSplatSize(int64_t count, int /*sh_degree*/) { return static_cast<uint64_t>(count) * kSplatRecord; }
 
 Status WriteSplat(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
+  const int64_t unreadable = CountUnreadable(cloud);
+  if (2 * unreadable > cloud.size()) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat(path.string(), ": ", WithThousands(unreadable), " of ", WithThousands(cloud.size()),
+                     " Gaussians have positions or scales that are no numbers or above a million millions, so that "
+                     "nobody would take the file for a .splat, which has no mark: write another format")};
+  }
   const Buffer<uint32_t> rows = WriteOrder(cloud, options.order, SplatOrder::kImportance);
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
   ANCHORSPLAT_RETURN_IF_ERROR(file.Reserve(PredictedSplatSize(cloud.size(), 0)));

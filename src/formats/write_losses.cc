@@ -63,12 +63,8 @@ std::vector<std::string> WriteLosses(const SplatFormat& format, const GaussianCl
     losses.push_back(Cat(WithThousands(count), " of ", WithThousands(cloud.size()), " Gaussians have ", what,
                          ", the range of ", format.name, ": clamped to it"));
   };
-  if (std::isinf(range.log_scale_min)) {
-    add(clamped.log_scales, Cat("log-scales above ", range.log_scale_max));
-  } else {
-    add(clamped.log_scales, Cat("log-scales beyond ", range.log_scale_min, " to ", range.log_scale_max, " (lengths of ",
-                                std::exp(range.log_scale_min), " to ", std::exp(range.log_scale_max), ")"));
-  }
+  add(clamped.log_scales, Cat("log-scales beyond ", range.log_scale_min, " to ", range.log_scale_max, " (lengths of ",
+                              std::exp(range.log_scale_min), " to ", std::exp(range.log_scale_max), ")"));
   add(clamped.colors, Cat("f_dc beyond ±", range.dc));
   add(clamped.harmonics, Cat("spherical harmonics beyond ±", range.harmonics));
   if (format.mean_loss != nullptr) {

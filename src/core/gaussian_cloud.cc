@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/statistics.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -17,6 +18,10 @@ void GatherRows(const Buffer<float>& from, int64_t width, std::span<const int64_
 }
 
 void AppendRows(Buffer<float>& to, const Buffer<float>& from) { to.insert(to.end(), from.begin(), from.end()); }
+
+bool AllFinite(const float* p, int64_t n) {
+  return std::all_of(p, p + n, [](float x) { return std::isfinite(x); });
+}
 
 bool FiniteOrMinusInf(float x) { return std::isfinite(x) || x == -std::numeric_limits<float>::infinity(); }
 
@@ -111,14 +116,14 @@ GaussianCloud WithShDegree(const GaussianCloud& cloud, int degree) {
   return out;
 }
 
-bool IsUsable(const GaussianCloud& cloud, int64_t i) {
-  const auto all_finite = [](const float* p, int64_t n) {
-    return std::all_of(p, p + n, [](float x) { return std::isfinite(x); });
-  };
+bool HasUsableShape(const GaussianCloud& cloud, int64_t i) {
   const float* scales = cloud.log_scales.data() + 3 * i;
-  return all_finite(cloud.means.data() + 3 * i, 3) && std::all_of(scales, scales + 3, FiniteOrMinusInf) &&
-         all_finite(cloud.quats.data() + 4 * i, 4) && FiniteOrMinusInf(cloud.opacity_logits[static_cast<size_t>(i)]) &&
-         all_finite(cloud.sh.data() + i * cloud.sh_stride(), cloud.sh_stride());
+  return AllFinite(cloud.means.data() + 3 * i, 3) && std::all_of(scales, scales + 3, FiniteOrMinusInf) &&
+         AllFinite(cloud.quats.data() + 4 * i, 4) && !std::isnan(cloud.opacity_logits[static_cast<size_t>(i)]);
+}
+
+bool IsUsable(const GaussianCloud& cloud, int64_t i) {
+  return HasUsableShape(cloud, i) && AllFinite(cloud.sh.data() + i * cloud.sh_stride(), cloud.sh_stride());
 }
 
 }  // namespace anchorsplat

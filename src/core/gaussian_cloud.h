@@ -62,8 +62,8 @@ Status Append(GaussianCloud& cloud, const GaussianCloud& more);
 // A copy with another SH degree: higher coefficients dropped, or zeros added.
 GaussianCloud WithShDegree(const GaussianCloud& cloud, int degree);
 
-// True when every stored value of row i is finite, except that a log-scale or an opacity logit may be −Inf
-// (scale 0, opacity 0: legal, and written by some tools).
+// True when every stored value of row i is finite, except that a log-scale may be −Inf (a flat Gaussian) and an opacity
+// logit ±Inf (opacity 1 or 0): legal, and written by some tools. What it is false for is nowhere drawn (docs/formats.md).
 bool IsUsable(const GaussianCloud& cloud, int64_t i);
 
 }  // namespace anchorsplat

@@ -89,7 +89,7 @@ TEST(GaussianCloud, AppendRaisesTheLowerDegree) {
   EXPECT_EQ(joined.sh[48 * 3 + 5], 0.0f);
 }
 
-TEST(GaussianCloud, MinusInfinityIsLegalOnlyWhereItMeansZero) {
+TEST(GaussianCloud, InfinityIsLegalOnlyWhereItMeansZeroOrOne) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   const GaussianCloud good = RandomCloud(1, 1, 7);
   GaussianCloud cloud = good;
@@ -98,6 +98,8 @@ TEST(GaussianCloud, MinusInfinityIsLegalOnlyWhereItMeansZero) {
   cloud.opacity_logits[0] = -kInfinity;
   EXPECT_TRUE(IsUsable(cloud, 0));
   cloud.opacity_logits[0] = kInfinity;
+  EXPECT_TRUE(IsUsable(cloud, 0));
+  cloud.log_scales[1] = kInfinity;
   EXPECT_FALSE(IsUsable(cloud, 0));
   for (Buffer<float> GaussianCloud::*array : {&GaussianCloud::means, &GaussianCloud::log_scales, &GaussianCloud::quats,
                                               &GaussianCloud::opacity_logits, &GaussianCloud::sh}) {

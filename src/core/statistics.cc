@@ -1,8 +1,11 @@
 #include "core/statistics.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
+
+#include "core/parallel.h"
 
 namespace anchorsplat {
 
@@ -62,6 +65,17 @@ float Quantile(std::span<float> values, double q) {
   return static_cast<float>(low + fraction * (static_cast<double>(high) - low));
 }
 
+int64_t CountUnusable(const GaussianCloud& cloud, bool harmonics) {
+  constexpr int64_t kGrain = 1 << 14;
+  std::atomic<int64_t> sum = 0;
+  ParallelFor(0, cloud.size(), kGrain, [&](int64_t first, int64_t last) {
+    int64_t here = 0;
+    for (int64_t i = first; i < last; ++i) here += (harmonics ? IsUsable(cloud, i) : HasUsableShape(cloud, i)) ? 0 : 1;
+    sum += here;
+  });
+  return sum;
+}
+
 CloudStatistics ComputeStatistics(const GaussianCloud& cloud) {
   CloudStatistics out;
   out.gaussians = cloud.size();
@@ -94,13 +108,11 @@ CloudStatistics ComputeStatistics(const GaussianCloud& cloud) {
     const float* s = cloud.log_scales.data() + 3 * i;
     const auto [low, high] = std::minmax({s[0], s[1], s[2]});
     if (low >= 0) ++positive_scales;
-    if (!std::isfinite(low)) {
-      ++out.zero_scales;
-      continue;
-    }
+    if (!std::isfinite(low)) ++out.zero_scales;
+    if (!std::isfinite(high)) continue;
     largest.push_back(std::exp(high));
     smallest.push_back(std::exp(low));
-    ratio.push_back(std::exp(high - low));
+    if (std::isfinite(low)) ratio.push_back(std::exp(high - low));
   }
   out.largest_axis = ComputePercentiles(largest);
   out.smallest_axis = ComputePercentiles(smallest);

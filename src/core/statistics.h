@@ -21,8 +21,15 @@ using Percentiles = std::array<float, kPercentiles.size()>;
 // is damaged, of another kind, or in coordinates (of the Earth, say) that floats are too coarse for.
 inline constexpr float kPlausibleExtent = 1e6f;
 
-// What a person wants to know about a cloud before trusting it. Percentiles are over usable rows with three finite
-// scales; all are NaN when there are none.
+// IsUsable, as far as position, scales, rotation and opacity go.
+bool HasUsableShape(const GaussianCloud& cloud, int64_t i);
+
+// Rows that nobody draws (not IsUsable). Without `harmonics` those whose SH alone is to blame are not counted: it is
+// most of a cloud's memory.
+int64_t CountUnusable(const GaussianCloud& cloud, bool harmonics = true);
+
+// What a person wants to know about a cloud before trusting it. Percentiles are over usable rows, those of the axes
+// over rows that have any extent, of their ratio over those with three; NaN when there are none.
 struct CloudStatistics {
   int64_t gaussians = 0;
   int sh_degree = 0;
@@ -33,7 +40,7 @@ struct CloudStatistics {
   Percentiles opacity{};         // 0–1
 
   // Problems, as row counts.
-  int64_t not_finite = 0;                 // NaN anywhere, or Inf where it has no meaning (see IsUsable)
+  int64_t not_finite = 0;                 // NaN anywhere, or Inf where it has no meaning (see CountUnusable)
   int64_t zero_quaternions = 0;           // norm below 1e-12: no rotation at all
   int64_t unnormalised_quaternions = 0;   // norm off by more than 1 %: legal, but some programs expect 1
   int64_t zero_scales = 0;                // a log-scale of −Inf

@@ -47,6 +47,24 @@ TEST(Statistics, HealthyCloudHasNoProblems) {
   EXPECT_GE(s.axis_ratio[0], 1);
 }
 
+TEST(Statistics, FlatGaussiansHaveAnExtent) {
+  GaussianCloud cloud = HealthyCloud(500);
+  const CloudStatistics healthy = ComputeStatistics(cloud);
+  for (size_t i = 0; i < 500; ++i) cloud.log_scales[3 * i] = -std::numeric_limits<float>::infinity();
+  const CloudStatistics s = ComputeStatistics(cloud);
+  EXPECT_EQ(s.not_finite, 0);
+  EXPECT_EQ(s.zero_scales, 500);
+  EXPECT_GT(s.largest_axis[2], 0.3f * healthy.largest_axis[2]);
+  EXPECT_EQ(s.smallest_axis[2], 0);
+}
+
+TEST(Statistics, CountsHarmonicsOnlyWhereAsked) {
+  GaussianCloud cloud = HealthyCloud(10);
+  cloud.sh[0] = std::nanf("");
+  EXPECT_EQ(CountUnusable(cloud), 1);
+  EXPECT_EQ(CountUnusable(cloud, false), 0);
+}
+
 TEST(Statistics, CountsEachProblemOnce) {
   GaussianCloud cloud = HealthyCloud(1000);
   cloud.means[0] = std::nanf("");                                     // row 0
@@ -63,6 +81,7 @@ TEST(Statistics, CountsEachProblemOnce) {
   EXPECT_EQ(s.zero_scales, 1);
   EXPECT_EQ(s.outliers, 1);
   EXPECT_EQ(s.invisible, invisible_before + 1);
+  EXPECT_EQ(CountUnusable(cloud), 1);
   EXPECT_EQ(s.implausible, 0);
   cloud.means[16] = -2e6f;
   cloud.log_scales[20] = 14;  // 1.2 million

@@ -56,7 +56,7 @@ Status DropUnusable(GaussianCloud& cloud) {
     return Error{ErrorCode::kBadFile, Cat("none of the ", WithThousands(cloud.size()), " Gaussians has finite values")};
   }
   LogWarning(Cat("dropped ", WithThousands(dropped), " of ", WithThousands(cloud.size()),
-                 " Gaussians: NaN or infinite values"));
+                 " Gaussians: NaN or infinite values, so that nobody draws them"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(cloud, Subset(cloud, kept));
   return {};
 }

@@ -115,6 +115,32 @@ TEST_F(EnhanceDoor, DropsBrokenRowsAndSaysSo) {
   EXPECT_FALSE(Enhance(GaussianCloud{}, options).ok());
 }
 
+TEST_F(EnhanceDoor, KeepsWhatIsOpaqueOrFlat) {
+  GaussianCloud ball = Ball(0.01);
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  ball.opacity_logits[0] = kInfinity;
+  ball.opacity_logits[1] = -kInfinity;
+  ball.log_scales[6] = -kInfinity;
+  EnhanceOptions options;
+  options.pixel_size = 0.01;
+  options.method = "filter";
+  const auto enhanced = Enhance(ball, options);
+  ASSERT_TRUE(enhanced.ok());
+  EXPECT_EQ(enhanced->report.dropped, 0);
+  EXPECT_EQ(enhanced->cloud.opacity_logits[0], kInfinity);
+  EXPECT_TRUE(std::isfinite(enhanced->cloud.log_scales[6])) << "a flat Gaussian gets a width";
+
+  // Surfels: an estimate of a splat that is flat all over is that of the splat.
+  const auto estimate = EstimatePixelSize(Ball(0.01));
+  for (size_t i = 0; i < ball.log_scales.size(); i += 3) {
+    const auto row = ball.log_scales.begin() + static_cast<std::ptrdiff_t>(i);
+    *std::min_element(row, row + 3) = -kInfinity;
+  }
+  const auto flat = EstimatePixelSize(ball);
+  ASSERT_TRUE(flat.ok()) << flat.error().message;
+  EXPECT_NEAR(std::log2(flat->size / estimate->size), 0, 1);
+}
+
 TEST_F(EnhanceDoor, LeavesAntialiasedSplatsAlone) {
   GaussianCloud ball = Ball(0.01);
   ball.render_mode = RenderMode::kAntialiased;

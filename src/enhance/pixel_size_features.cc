@@ -92,7 +92,7 @@ std::optional<double> AxisOfSmallGaussians(const GaussianCloud& cloud) {
     for (size_t a = 0; a < 3; ++a) axes[a] = std::exp(cloud.log_scales[static_cast<size_t>(3 * i) + a]);
     std::sort(axes.begin(), axes.end());
     const double weight = double{opacity} * axes[1] * axes[2];
-    if (!(axes[0] > 0) || !(weight > 0)) continue;
+    if (!(weight > 0)) continue;
     middle.emplace_back(axes[1], weight);
     largest.emplace_back(axes[2], weight);
   }

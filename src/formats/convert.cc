@@ -1,7 +1,6 @@
 #include "formats/convert.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -12,7 +11,7 @@
 #include <vector>
 
 #include "core/log.h"
-#include "core/parallel.h"
+#include "core/statistics.h"
 #include "core/text.h"
 #include "formats/extra_properties.h"
 #include "formats/opened_splat.h"
@@ -42,29 +41,6 @@ void ForEachArray(GaussianCloud& cloud, Visit&& visit) {
 void KeepRows(GaussianCloud& cloud, ExtraProperties* extras, const std::vector<char>& keep) {
   ForEachArray(cloud, [&keep](Buffer<float>& array, int64_t width) { KeepRows(array, width, keep); });
   if (extras != nullptr) KeepRows(*extras, keep);
-}
-
-// Rows with a position, scale, rotation or opacity that is NaN or infinite (−Inf, a scale or opacity of zero, is fine).
-// Harmonics are left out: looking through them would take longer than all else here.
-int64_t CountNotFinite(const GaussianCloud& cloud) {
-  constexpr int64_t kGrain = 1 << 14;
-  std::atomic<int64_t> sum = 0;
-  ParallelFor(0, cloud.size(), kGrain, [&](int64_t first, int64_t last) {
-    int64_t here = 0;
-    const auto finite = [](float x) { return std::isfinite(x); };
-    const auto finite_or_zero = [](float x) { return std::isfinite(x) || x == -INFINITY; };
-    for (int64_t i = first; i < last; ++i) {
-      const float* mean = cloud.means.data() + 3 * i;
-      const float* scale = cloud.log_scales.data() + 3 * i;
-      const float* quat = cloud.quats.data() + 4 * i;
-      const bool good = std::all_of(mean, mean + 3, finite) && std::all_of(scale, scale + 3, finite_or_zero) &&
-                        std::all_of(quat, quat + 4, finite) &&
-                        finite_or_zero(cloud.opacity_logits[static_cast<size_t>(i)]);
-      here += good ? 0 : 1;
-    }
-    sum += here;
-  });
-  return sum;
 }
 
 }  // namespace
@@ -142,9 +118,11 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   report.gaussians_read = cloud.size();
   report.sh_degree_read = cloud.sh_degree;
   report.input_bytes = file.bytes();
-  if (const int64_t bad = CountNotFinite(cloud); bad > 0) {
-    LogWarning(Cat(input.string(), ": ", WithThousands(bad), " of ", WithThousands(cloud.size()),
-                   " Gaussians have a position, scale, rotation or opacity that is NaN or infinite"));
+  // Without harmonics: looking through them would take longer than all else here.
+  if (const int64_t bad = CountUnusable(cloud, false); bad > 0) {
+    LogWarning(
+        Cat(input.string(), ": ", WithThousands(bad), " of ", WithThousands(cloud.size()),
+            " Gaussians have a position, scale, rotation or opacity that is NaN or infinite: no verb draws them"));
   }
 
   if (options.sh_degree) SetShDegree(cloud, *options.sh_degree);

@@ -195,16 +195,27 @@ TEST(Convert, SaysWhatHasNoPlaceInTheFormat) {
   EXPECT_THAT(warn(cloud, ".spz"), ElementsAre(HasSubstr("1 of 2,000 Gaussians have log-scales beyond"),
                                                AllOf(HasSubstr("1 of 2,000"), HasSubstr("harmonics beyond"))));
   EXPECT_THAT(warn(WithShDegree(cloud, 0), ".splat"), ElementsAre(HasSubstr("f_dc beyond")));
-  EXPECT_THAT(warn(cloud, ".sog"), ElementsAre(HasSubstr("log-scales above 20")));
+  EXPECT_THAT(warn(cloud, ".sog"), ElementsAre(HasSubstr("log-scales beyond -20 to 20")));
+  EXPECT_THAT(warn(cloud, ".ply"), IsEmpty());
+
+  cloud = tame;
+  cloud.log_scales[3] = -25;
+  cloud.log_scales[7] = -INFINITY;
+  for (const char* lossy : {".compressed.ply", ".sog"}) {
+    EXPECT_THAT(warn(cloud, lossy), ElementsAre(HasSubstr("2 of 2,000 Gaussians have log-scales beyond -20"))) << lossy;
+  }
   EXPECT_THAT(warn(cloud, ".ply"), IsEmpty());
 
   cloud = tame;
   cloud.means[0] = 30'000;  // one stray Gaussian
+  EXPECT_THAT(warn(cloud, ".compressed.ply"),
+              ElementsAre(AllOf(HasSubstr("positions of 256 of 2,000 Gaussians"), HasSubstr("98 % lie within"))));
   EXPECT_THAT(warn(cloud, ".spz"), ElementsAre(AllOf(HasSubstr("1/256 instead of 1/4096"), HasSubstr("reach 30000"))));
   EXPECT_THAT(warn(cloud, ".sog"), IsEmpty());
   cloud.means[0] = 1e30f;
   EXPECT_THAT(warn(cloud, ".spz"), ElementsAre(HasSubstr("clamped")));
   EXPECT_THAT(warn(cloud, ".sog"), ElementsAre(HasSubstr("98 %")));
+  EXPECT_THAT(warn(cloud, ".compressed.ply"), ElementsAre(HasSubstr("98 %")));
   for (float& x : cloud.means) x *= 1e4f;  // large all over: coarse steps are right
   cloud.means[0] = 0;
   EXPECT_THAT(warn(cloud, ".spz"), IsEmpty());
@@ -312,7 +323,9 @@ TEST(Convert, SaysWhatIsNoNumber) {
     return warnings.Take();
   };
   EXPECT_THAT(warn(), testing::IsEmpty());
-  cloud.opacity_logits[9] = INFINITY;
+  cloud.opacity_logits[9] = INFINITY;  // an opacity of one
+  EXPECT_THAT(warn(), testing::IsEmpty());
+  cloud.log_scales[29] = INFINITY;
   cloud.means[30] = cloud.quats[41] = NAN;  // of one Gaussian
   EXPECT_THAT(warn(), testing::ElementsAre(testing::HasSubstr("2 of 300 Gaussians")));
   // A compressed PLY whose ranges are no numbers.

@@ -5,6 +5,7 @@
 #include <limits>
 #include <new>
 #include <numeric>
+#include <optional>
 #include <random>
 #include <utility>
 #include <vector>
@@ -33,6 +34,29 @@ bool RowIsFinite(const GaussianCloud& cloud, int64_t i) {
   return AllFinite(cloud.means.data() + 3 * i, 3) && AllFinite(cloud.log_scales.data() + 3 * i, 3) &&
          AllFinite(cloud.quats.data() + 4 * i, 4) && std::isfinite(cloud.opacity_logits[static_cast<size_t>(i)]) &&
          AllFinite(cloud.sh.data() + i * cloud.sh_stride(), cloud.sh_stride());
+}
+
+// What is legal and infinite (core/gaussian_cloud.h, IsUsable) as the nearest that a network can read: opacities of 0
+// and 1, and the missing lengths of flat Gaussians, thin beside their longest axis. Nothing where all is finite.
+std::optional<GaussianCloud> WithoutInfinities(const GaussianCloud& cloud) {
+  constexpr float kThin = 10, kPoint = -20;  // logarithms: 1/22,000 of the longest axis; a length of 2e-9
+  const auto infinite = [](float x) { return std::isinf(x); };
+  if (std::none_of(cloud.opacity_logits.begin(), cloud.opacity_logits.end(), infinite) &&
+      std::none_of(cloud.log_scales.begin(), cloud.log_scales.end(), infinite)) {
+    return std::nullopt;
+  }
+  GaussianCloud finite = cloud;
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    if (!IsUsable(cloud, i)) continue;
+    float& logit = finite.opacity_logits[static_cast<size_t>(i)];
+    if (std::isinf(logit)) logit = std::clamp(logit, -kLargestLogit, kLargestLogit);
+    float* s = finite.log_scales.data() + 3 * i;
+    const float longest = std::max({s[0], s[1], s[2]});
+    for (int a = 0; a < 3; ++a) {
+      if (std::isinf(s[a])) s[a] = std::isinf(longest) ? kPoint : longest - kThin;
+    }
+  }
+  return finite;
 }
 
 // torch.randperm(n)[:count] of PyTorch's CPU generator.
@@ -202,8 +226,10 @@ Status EnhanceBlock(const GaussianCloud& cloud, std::span<const int64_t> anchors
   return {};
 }
 
-Result<ModelResult> Run(const GaussianCloud& cloud, const PackedNetwork& network, const ModelOptions& options) {
-  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
+Result<ModelResult> Run(const GaussianCloud& given, const PackedNetwork& network, const ModelOptions& options) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(given));
+  const std::optional<GaussianCloud> finite = options.upstream ? std::nullopt : WithoutInfinities(given);
+  const GaussianCloud& cloud = finite ? *finite : given;
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options.shuffles));
   ModelReport report;
   report.gaussians_in = cloud.size();

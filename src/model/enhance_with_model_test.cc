@@ -127,7 +127,7 @@ TEST_F(EnhanceWithModelTest, UpstreamKeepsQuaternionsAndScramblesLowDegrees) {
 TEST_F(EnhanceWithModelTest, DropsWhatIsNotFiniteAndSaysSo) {
   GaussianCloud cloud = RandomCloud(50);
   cloud.sh[48 * 3 + 40] = std::numeric_limits<float>::quiet_NaN();
-  cloud.opacity_logits[5] = std::numeric_limits<float>::infinity();
+  cloud.log_scales[15] = std::numeric_limits<float>::infinity();
   const auto result = EnhanceWithModel(cloud, IdentityNetwork());
   ASSERT_TRUE(result.ok());
   EXPECT_EQ(result->report.not_finite, 2);
@@ -138,6 +138,27 @@ TEST_F(EnhanceWithModelTest, DropsWhatIsNotFiniteAndSaysSo) {
   for (auto& v : cloud.means) v = std::numeric_limits<float>::quiet_NaN();
   EXPECT_FALSE(EnhanceWithModel(cloud, IdentityNetwork()).ok());
   EXPECT_FALSE(EnhanceWithModel(GaussianCloud{}, IdentityNetwork()).ok());
+}
+
+TEST_F(EnhanceWithModelTest, ReadsWhatIsOpaqueOrFlat) {
+  GaussianCloud cloud = RandomCloud(50);
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  cloud.opacity_logits[5] = kInfinity;
+  cloud.opacity_logits[6] = -kInfinity;
+  cloud.log_scales[21] = -kInfinity;
+  for (size_t k = 24; k < 27; ++k) cloud.log_scales[k] = -kInfinity;
+  const auto result = EnhanceWithModel(cloud, IdentityNetwork(1));
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(result->report.not_finite, 0);
+  ASSERT_EQ(result->cloud.size(), 50);
+  for (int64_t i = 0; i < 50; ++i) EXPECT_TRUE(IsUsable(result->cloud, i)) << i;
+  EXPECT_GT(result->cloud.opacity_logits[5], 10);
+  EXPECT_LT(result->cloud.opacity_logits[6], -10);
+  EXPECT_LT(result->cloud.log_scales[21], std::max(cloud.log_scales[22], cloud.log_scales[23]) - 9);
+  // The published network's own program drops them.
+  const auto upstream = EnhanceWithModel(cloud, IdentityNetwork(1), {.upstream = true});
+  ASSERT_TRUE(upstream.ok());
+  EXPECT_EQ(upstream->report.not_finite, 4);
 }
 
 TEST_F(EnhanceWithModelTest, OnlyUpstreamLosesExtremesToRounding) {

@@ -101,6 +101,8 @@ HWY_INLINE V NotPositiveInfinity(D d, V x) {
   return hn::IfThenElseZero(hn::Le(x, hn::Set(d, double{std::numeric_limits<float>::max()})), hn::Set(d, 1.0));
 }
 
+HWY_INLINE V IsNumber(D d, V x) { return hn::IfThenElseZero(hn::Eq(x, x), hn::Set(d, 1.0)); }
+
 HWY_INLINE V Dot3(V a0, V a1, V a2, V b0, V b1, V b2) {
   return hn::MulAdd(a0, b0, hn::MulAdd(a1, b1, hn::Mul(a2, b2)));
 }
@@ -124,7 +126,7 @@ HWY_INLINE void ProjectLanes(const View& view, RasterProfile profile, RenderMode
   V usable = hn::Mul(hn::Mul(Finite(d, mx), Finite(d, my)), Finite(d, mz));
   usable = hn::Mul(usable, hn::Mul(hn::Mul(Finite(d, qw), Finite(d, qx)), hn::Mul(Finite(d, qy), Finite(d, qz))));
   usable = hn::Mul(usable, hn::Mul(NotPositiveInfinity(d, ls0), NotPositiveInfinity(d, ls1)));
-  usable = hn::Mul(usable, hn::Mul(NotPositiveInfinity(d, ls2), NotPositiveInfinity(d, logit)));
+  usable = hn::Mul(usable, hn::Mul(NotPositiveInfinity(d, ls2), IsNumber(d, logit)));
 
   // Camera space.
   const double* r = view.r;

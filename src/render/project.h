@@ -21,7 +21,7 @@ struct ProjectParams {
   const float* means;           // [N,3] world
   const float* log_scales;      // [N,3] ln(world units); −Inf is scale 0
   const float* quats;           // [N,4] wxyz, any norm; the zero quaternion is the identity
-  const float* opacity_logits;  // [N] logit(opacity)
+  const float* opacity_logits;  // [N] logit(opacity); ±Inf is opacity 1 or 0
   Pinhole intrinsics;           // pixels
   Pose world_to_camera;         // OpenCV axes
   RasterProfile profile = RasterProfile::kGsplat14;
@@ -42,7 +42,7 @@ struct ProjectParams {
 inline int64_t ProjectChunks(int64_t count) { return (count + kProjectChunk - 1) / kProjectChunk; }
 inline int TilesAcross(int pixels) { return (pixels + kTile - 1) / kTile; }
 
-// Gaussians with a value that is not finite (other than −Inf as a log-scale or opacity logit), behind the near plane,
+// Gaussians that are not usable (IsUsable in core/gaussian_cloud.h, as far as these arrays go), behind the near plane,
 // beyond the far plane, off the image, or with a covariance that is not positive definite are culled.
 void ProjectCpu(const ProjectParams& p);
 

@@ -326,19 +326,19 @@ TEST(Rasterizer, SkipsWhatIsNotFinite) {
   GaussianCloud spoilt = Subset(good, std::vector<int64_t>(50, 0)).value();
   for (size_t i = 0; i < 50; ++i) {
     const float bad = i % 3 == 0 ? std::nanf("") : i % 3 == 1 ? kInfinity : -kInfinity;
-    const float bad_or_infinite = bad == -kInfinity ? kInfinity : bad;  // −Inf is legal for these
+    const float bad_length = bad == -kInfinity ? kInfinity : bad;  // −Inf is legal
     switch (i % 5) {
       case 0:
         spoilt.means[3 * i + i % 3] = bad;
         break;
       case 1:
-        spoilt.log_scales[3 * i + i % 3] = bad_or_infinite;
+        spoilt.log_scales[3 * i + i % 3] = bad_length;
         break;
       case 2:
         spoilt.quats[4 * i + i % 4] = bad;
         break;
       case 3:
-        spoilt.opacity_logits[i] = bad_or_infinite;
+        spoilt.opacity_logits[i] = std::nanf("");  // both infinities are legal
         break;
       default:
         spoilt.sh[48 * i + i % 48] = bad;

@@ -19,6 +19,7 @@
 #include "cli/verb.h"
 #include "core/log.h"
 #include "core/text.h"
+#include "core/world_up.h"
 #include "fit/fitter.h"
 #include "formats/atomic_file.h"
 #include "formats/camera_io.h"
@@ -223,11 +224,14 @@ Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& 
   auto result = Enhance(std::move(cloud), options);
   stop_signal.reset();
   if (!result.ok()) return result.error();
-  const Enhanced enhanced = *std::move(result);
+  Enhanced enhanced = *std::move(result);
   if (!extras.empty() && enhanced.cloud.means != means) {
     LogWarning(Cat(input, ": other properties of its Gaussians are dropped, as those of the result are others: ",
                    extras.lost(/*writer_keeps=*/false)));
     extras = {};
+  }
+  if (options.cameras && !UpOf(enhanced.cloud.comments)) {
+    if (const auto up = WorldUp(options.cameras->cameras)) enhanced.cloud.comments.push_back(UpComment(*up));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(output, enhanced.cloud, write, extras));
   const EnhanceReport& r = enhanced.report;

@@ -86,6 +86,21 @@ Result<std::array<double, 3>> ParsePoint(const std::string& option, const std::s
   return ParseTriple(option, text, "X,Y,Z in world units, such as 0,0.5,0");
 }
 
+Result<std::array<double, 3>> ParseDirection(const std::string& option, const std::string& text) {
+  constexpr const char* kForm = "a direction: X,Y,Z such as 0,0,1, or an axis such as z or -y";
+  const bool negative = text.starts_with('-');
+  const std::string_view axis = std::string_view(text).substr(negative || text.starts_with('+') ? 1 : 0);
+  std::array<double, 3> out{};
+  if (axis == "x" || axis == "y" || axis == "z") {
+    out[static_cast<size_t>(axis[0] - 'x')] = negative ? -1 : 1;
+    return out;
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(out, ParseTriple(option, text, kForm));
+  const double length = std::hypot(out[0], out[1], out[2]);
+  if (length > 0 && std::isfinite(length)) return out;
+  return Error{ErrorCode::kBadArgument, Cat(option, ": '", Printable(text), "' is not ", kForm)};
+}
+
 Result<std::optional<double>> ParsePixelSize(const std::string& option, const std::string& text) {
   if (text == "auto") return std::optional<double>();
   const auto number = ParseNumber(text);

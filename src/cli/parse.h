@@ -19,6 +19,8 @@ struct SizeOption {
 Result<SizeOption> ParseSize(const std::string& option, const std::string& text);              // "1024x768"
 Result<std::array<float, 3>> ParseColor(const std::string& option, const std::string& text);   // "R,G,B", each 0–1
 Result<std::array<double, 3>> ParsePoint(const std::string& option, const std::string& text);  // "X,Y,Z"
+// "X,Y,Z", not all 0, or "x", "-z" and the like.
+Result<std::array<double, 3>> ParseDirection(const std::string& option, const std::string& text);
 // A format that is read, by an extension of it with or without its dot; null for "".
 Result<const SplatFormat*> ParseInputFormat(const std::string& option, const std::string& text);
 inline constexpr const char* kInputFormatHelp =

@@ -9,6 +9,7 @@
 #include "core/log.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
+#include "core/world_up.h"
 #include "fit/fingerprints.h"
 #include "fit/picture_cache.h"
 
@@ -160,6 +161,7 @@ Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitO
   Fitted out{fitter.UsableCloud(), report};
   out.cloud.render_mode = options.objective.render.mode;
   if (options.pixel.upscale > 1) out.cloud.comments.push_back(PixelAreaComment(options.pixel.upscale));
+  if (const auto up = WorldUp(views.train)) out.cloud.comments.push_back(UpComment(*up));
   out.report.gaussians_out = out.cloud.size();
   if (const Status finished = Finish(views, options, control, fitter, out); !finished.ok()) {
     return failed(finished.error());

@@ -3,6 +3,7 @@
 #include <cctype>
 
 #include "core/parallel.h"
+#include "core/world_up.h"
 
 namespace anchorsplat {
 
@@ -51,6 +52,7 @@ AxisFlip FlipBetween(const Axes& from, const Axes& to) {
 
 void FlipAxes(GaussianCloud& cloud, const AxisFlip& flip) {
   if (flip.changes_nothing()) return;
+  FlipUp(flip.mean, cloud.comments);
   ParallelFor(0, cloud.size(), 1 << 14, [&](int64_t first, int64_t last) {
     for (int64_t i = first; i < last; ++i) {
       float* mean = cloud.means.data() + 3 * i;

@@ -8,8 +8,10 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "core/framing.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "core/world_up.h"
 #include "formats/atomic_file.h"
 #include "render/constants.h"
 #include "viewer/base64.h"
@@ -82,6 +84,7 @@ Result<Json> AddSplat(const ViewerSplat& splat, const std::string& id, int max_s
       texts[k] = DeflateBase64({q.planes.data() + begin, std::min(kPieceBytes, q.planes.size() - begin)});
     }
   });
+  const Framing framing = FrameCloud(*splat.cloud);
   Json ids = Json::array();
   for (size_t k = 0; k < pieces; ++k) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::string text, *std::move(texts[k]));
@@ -98,6 +101,7 @@ Result<Json> AddSplat(const ViewerSplat& splat, const std::string& id, int max_s
               {"center", q.center},
               {"spread", q.spread},
               {"reach", q.reach},
+              {"subject", {{"target", framing.target}, {"radius", framing.radius}}},
               {"logScale", q.log_scale},
               {"dc", q.dc},
               {"shMax", q.sh_max},
@@ -149,6 +153,15 @@ Result<Json> AddView(const ViewerView& view, size_t index, std::vector<DataEleme
               {"rotation", pose.rotation},
               {"translation", pose.translation},
               {"picture", std::move(picture)}};
+}
+
+// What the page's cameras hold upright, else what a splat says about itself.
+std::array<double, 3> WorldUpOf(const ViewerPage& page) {
+  std::vector<Camera> cameras;
+  for (const ViewerView& view : page.views) cameras.push_back(view.camera);
+  if (const auto up = WorldUp(cameras)) return *up;
+  if (const auto up = UpOf(page.after.cloud->comments)) return *up;
+  return (page.before ? UpOf(page.before->cloud->comments) : std::nullopt).value_or(kUsualUp);
 }
 
 // Replaces the one occurrence of `mark`; the template is ours, so it is there.
@@ -213,12 +226,14 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
                             {"views", std::move(views)},
                             {"pixelSize", page.pixel_size ? Json(*page.pixel_size) : Json()},
                             {"background", page.background},
+                            {"up", WorldUpOf(page)},
                             // The page draws with the renderer's own numbers.
                             {"constants",
                              {{"dilation", kDilation},
                               {"minAlpha", kMinAlpha},
                               {"maxAlpha", kMaxAlpha},
                               {"near", kNear},
+                              {"nearShare", kNearShare},
                               {"frustumMargin", kFrustumMargin}}}};
 
   std::string head(PageFile("page.html"));

@@ -8,9 +8,12 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "core/framing.h"
 #include "core/text.h"
+#include "core/world_up.h"
 #include "formats/image_io.h"
 #include "formats/test_folder.h"
+#include "render/constants.h"
 #include "viewer/fitted_cloud.h"
 #include "viewer/page_files.h"
 #include "viewer/quantized_cloud.h"
@@ -112,6 +115,27 @@ TEST(PageWriter, DataComesBackAsItWentIn) {
   EXPECT_EQ(description["after"]["planes"], PlanesPerGaussian(3));
   EXPECT_EQ(description["before"]["planes"], PlanesPerGaussian(1));
   EXPECT_EQ(Planes(text, description["before"]), Quantize(before, 3)->planes);
+}
+
+TEST(PageWriter, SaysWhereUpIsAndHowLargeTheSplatIs) {
+  TestFolder folder;
+  GaussianCloud cloud = FittedLookingCloud(500, 0, 1);
+  const auto description = [&](const ViewerPage& page) {
+    EXPECT_TRUE(WriteViewerPage(folder / "page.html", page, {.overwrite = true}).ok());
+    return nlohmann::json::parse(ElementText(FileText(folder / "page.html"), "description"));
+  };
+  ViewerPage page;
+  page.after = {&cloud, "after.ply", {}};
+  const auto plain = description(page);
+  EXPECT_EQ(plain["up"], (nlohmann::json{0, -1, 0}));
+  const Framing framing = FrameCloud(cloud);
+  EXPECT_EQ(plain["after"]["subject"]["radius"], framing.radius);
+  EXPECT_EQ(plain["after"]["subject"]["target"], nlohmann::json(framing.target));
+  EXPECT_FLOAT_EQ(plain["constants"]["nearShare"].get<float>(), kNearShare);
+  cloud.comments = {UpComment({0, 0, 1})};
+  EXPECT_EQ(description(page)["up"], (nlohmann::json{0, 0, 1}));
+  page.views = {View("a")};  // cameras know better
+  EXPECT_EQ(description(page)["up"], (nlohmann::json{0, 1, 0}));
 }
 
 TEST(PageWriter, APairOfFourTimesAsManyGaussiansFitsEightMegabytes) {

@@ -52,7 +52,7 @@ class Viewer {
     splats.forEach((splat, k) => this.renderer.addSplat(splat, loaded[k]));
     const after = this.splats.after.description;
     this.camera = new OrbitCamera(after.center, loaded[splats.indexOf(this.splats.after)].radius,
-      worldUp(this.description.views));
+      this.description.up);
     const names = this.description.views.map((view, k) => view.name || `View ${k + 1}`);
     fillViews([...names, ...OWN_VIEWS.map(([name]) => name)], this.description.views.map((view) => view.picture), this);
     this.pairs.forEach(([first, second], k) => {
@@ -265,11 +265,18 @@ class Viewer {
 
   // Drawing.
 
+  // Where the picture begins, as the renderer has it: scenes may have any unit.
+  near(splat) {
+    const {near, nearShare} = this.description.constants;
+    const {target, radius} = splat.description.subject;
+    return Math.min(near, nearShare * Math.max(Math.hypot(...add(this.camera.eye, target, -1)), radius));
+  }
+
   cameraChanged() {
     const {camera} = this;
     for (const splat of Object.values(this.splats)) {
       const depth = dot(camera.forward, add(splat.description.center, camera.eye, -1));
-      splat.requestOrder(camera.forward, depth, this.description.constants.near);
+      splat.requestOrder(camera.forward, depth, this.near(splat));
     }
     this.draw();
   }
@@ -293,7 +300,8 @@ class Viewer {
       const texture = this.truthTexture();
       if (texture) this.renderer.drawPicture(k, texture, intrinsics);
     } else {
-      this.renderer.drawSplat(k, this.splats[name], this.camera.axes, this.camera.eye, intrinsics, tangents);
+      const splat = this.splats[name];
+      this.renderer.drawSplat(k, splat, this.camera.axes, this.camera.eye, intrinsics, tangents, this.near(splat));
     }
   }
 

@@ -98,13 +98,3 @@ class OrbitCamera {
     };
   }
 }
-
-// The world's up: what the page's cameras hold upright on average, the nearest axis when that is almost it. Without
-// cameras y points down, as most captured scenes have it.
-function worldUp(views) {
-  if (views.length === 0) return [0, -1, 0];
-  const mean = unit(views.reduce((sum, view) => add(sum, view.rotation.slice(3, 6), -1), [0, 0, 0]));
-  const largest = [0, 1, 2].reduce((a, b) => (Math.abs(mean[b]) > Math.abs(mean[a]) ? b : a), 0);
-  if (Math.abs(mean[largest]) < 0.93) return mean;
-  return [0, 1, 2].map((k) => (k === largest ? Math.sign(mean[k]) : 0));
-}

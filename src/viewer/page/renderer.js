@@ -128,8 +128,8 @@ class Renderer {
       Math.ceil(region.width), Math.ceil(region.height));
   }
 
-  // `intrinsics` in pixels of the target; `tangents` as the shader wants them.
-  drawSplat(k, splat, axes, eye, intrinsics, tangents) {
+  // `intrinsics` in pixels of the target; `tangents` as the shader wants them; nothing is drawn before camera z `near`.
+  drawSplat(k, splat, axes, eye, intrinsics, tangents, near) {
     const gl = this.gl;
     const d = splat.description;
     const {program, uniforms: u} = this.splatPrograms.get(d.degree);
@@ -159,7 +159,7 @@ class Renderer {
     gl.uniform1f(u.uDilation, this.constants.dilation);
     gl.uniform1f(u.uMinAlpha, this.constants.minAlpha);
     gl.uniform1f(u.uMaxAlpha, this.constants.maxAlpha);
-    gl.uniform1f(u.uNear, this.constants.near);
+    gl.uniform1f(u.uNear, near);
     gl.uniform1i(u.uAntialiased, d.antialiased ? 1 : 0);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/camera.h"
+
+namespace anchorsplat {
+
+// Where up is in a splat's world. The files of the field do not say; most captures have y down, as their first camera
+// had it.
+inline constexpr std::array<double, 3> kUsualUp = {0, -1, 0};
+
+// What the cameras hold upright on average: an axis where that is almost it. Nothing without cameras, or where their
+// ups cancel out.
+std::optional<std::array<double, 3>> WorldUp(std::span<const Camera> cameras);
+
+// The comment by which a splat of ours says where up is (GaussianCloud::comments), and what such comments say: a unit
+// vector, nothing where there is none or a broken one. FlipUp rewrites it for a world whose axes changed their signs.
+std::string UpComment(const std::array<double, 3>& up);
+std::optional<std::array<double, 3>> UpOf(const std::vector<std::string>& comments);
+void FlipUp(const std::array<float, 3>& signs, std::vector<std::string>& comments);
+
+// Turns the cameras about `target` so that what was +y becomes `up` (of any length but 0).
+void TurnUp(const std::array<double, 3>& target, const std::array<double, 3>& up, std::vector<Camera>& cameras);
+
+}  // namespace anchorsplat

@@ -56,7 +56,7 @@ Result<Sides> OpenSides(const CompareFlags& flags) {
   const GaussianCloud* first = nullptr;
   for (size_t k = 0; k < 3; ++k) {
     if (paths[k]->empty() || LooksLikeImages(*paths[k])) continue;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(clouds[k], ReadCloud(*paths[k]));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(clouds[k], ReadToShow(*paths[k]));
     if (first == nullptr) first = &*clouds[k];
   }
   std::optional<CameraSet> cameras;

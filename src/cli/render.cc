@@ -15,6 +15,7 @@
 #include "core/text.h"
 #include "formats/image_io.h"
 #include "render/rasterizer.h"
+#include "render/shown_range.h"
 
 namespace anchorsplat {
 
@@ -75,7 +76,7 @@ Image WithAlpha(const RenderOutput& render) {
 }
 
 Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(flags.input));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadToShow(flags.input));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraSet cameras, MakeViews(flags.views, cloud));
   ANCHORSPLAT_ASSIGN_OR_RETURN(RenderOptions options, MakeRenderOptions(flags.views, cloud, cameras));
   if (flags.transparent) options.background = {0, 0, 0};
@@ -85,17 +86,27 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
   RenderOutput render;
   double seconds = 0;
   nlohmann::json views = nlohmann::json::array();
+  std::string empty;  // what is wrong with the first view that shows nothing
+  int64_t empty_views = 0;
   {
     Progress progress("render", static_cast<int64_t>(paths.size()));
     for (size_t i = 0; i < paths.size(); ++i) {
+      const Camera& camera = cameras.cameras[i];
       const auto begin = std::chrono::steady_clock::now();
-      ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, cameras.cameras[i], options, render));
+      ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, camera, options, render));
       seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+      const std::string warning = NothingToSee(cloud, camera, options, rasterizer.statistics().visible);
+      if (!warning.empty() && empty_views++ == 0) empty = warning;
       ANCHORSPLAT_RETURN_IF_ERROR(
           WritePng(paths[i], flags.transparent ? WithAlpha(render) : render.color, WriteOptionsFrom(shared)));
-      views.push_back({{"name", cameras.cameras[i].name}, {"file", paths[i].string()}});
+      views.push_back({{"name", camera.name}, {"file", paths[i].string()}});
       progress.Advance();
     }
+  }
+  if (empty_views > 0) {
+    LogWarning(
+        Cat(empty, " --near and --far say what is in range",
+            empty_views > 1 ? Cat(" (", empty_views - 1, " more of ", paths.size(), " views are as empty)") : ""));
   }
   if (shared.json) {
     PrintJson({{"input", flags.input}, {"gaussians", cloud.size()}, {"render_seconds", seconds}, {"views", views}});

@@ -9,6 +9,8 @@
 #include "cli/clean_output.h"
 #include "cli/parse.h"
 #include "cli/verb.h"
+#include "cli/views.h"
+#include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/pixel_size_estimate.h"
 #include "formats/camera_io.h"
@@ -90,8 +92,9 @@ Result<Shown> ReadShown(const fs::path& path) {
   const fs::path named = path.has_filename() ? path : path.parent_path();
   Shown shown{{}, named.filename().string(), file.bytes()};
   ANCHORSPLAT_ASSIGN_OR_RETURN(shown.cloud, file.Read());
-  for (int64_t i = 0; i < shown.cloud.size(); ++i) {
-    if (IsUsable(shown.cloud, i)) return shown;
+  if (CountUnusable(shown.cloud) < shown.cloud.size()) {
+    WarnOfUnusable(path.string(), shown.cloud);
+    return shown;
   }
   return Error{ErrorCode::kBadFile, Cat(path.string(), ": there is nothing to show: all of its ",
                                         WithThousands(shown.cloud.size()), " Gaussians have NaN or infinite values")};

@@ -6,9 +6,14 @@
 #include "cli/choice.h"
 #include "cli/parse.h"
 #include "core/framing.h"
+#include "core/log.h"
+#include "core/statistics.h"
 #include "core/text.h"
+#include "core/world_up.h"
 #include "eval/view_source.h"
 #include "formats/camera_io.h"
+#include "formats/cloud_io.h"
+#include "render/shown_range.h"
 
 namespace anchorsplat {
 
@@ -16,7 +21,15 @@ namespace {
 
 constexpr int kOrbitSize = 1024;
 
-Result<CameraSet> OrbitViews(const ViewFlags& flags, const GaussianCloud& cloud) {
+// Of an orbit: what was said, what the cameras say, what the splat says, what is usual.
+Result<std::array<double, 3>> ChooseUp(const ViewFlags& flags, const GaussianCloud& cloud, const CameraSet& cameras) {
+  if (!flags.up.empty()) return ParseDirection("--up", flags.up);
+  if (const auto up = WorldUp(cameras.cameras)) return *up;
+  return UpOf(cloud.comments).value_or(kUsualUp);
+}
+
+// `cameras` may be none; from those that there are an orbit takes what they know about the world.
+Result<CameraSet> OrbitViews(const ViewFlags& flags, const GaussianCloud& cloud, const CameraSet& cameras) {
   SizeOption size{kOrbitSize, kOrbitSize};
   if (!flags.size.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(size, ParseSize("--size", flags.size));
@@ -27,7 +40,12 @@ Result<CameraSet> OrbitViews(const ViewFlags& flags, const GaussianCloud& cloud)
     ANCHORSPLAT_ASSIGN_OR_RETURN(framing.target, ParsePoint("--target", flags.target));
   }
   const double radius = flags.radius > 0 ? flags.radius : FramingDistance(framing, intrinsics);
-  return OrbitCameras(std::max(1, flags.orbit), radius, framing.target, intrinsics);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto up, ChooseUp(flags, cloud, cameras));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet orbit,
+                               OrbitCameras(std::max(1, flags.orbit), radius, framing.target, intrinsics));
+  TurnUp(framing.target, up, orbit.cameras);
+  orbit.background = cameras.background;
+  return orbit;
 }
 
 Result<CameraSet> KeepView(CameraSet cameras, const std::string& view) {
@@ -60,21 +78,35 @@ void ViewFlags::AddTo(CLI::App& verb) {
   auto* cameras_option =
       verb.add_option("--cameras", cameras, "transforms.json, cameras.json or a COLMAP folder with the views")
           ->check(NotEmpty());
-  verb.add_option("--orbit", orbit, "Views on a sphere around the splat instead")
-      ->check(CLI::Range(1, 100000))
-      ->excludes(cameras_option);
-  verb.add_option("--radius", radius, "Orbit: distance, world units (default: what frames the splat)")
-      ->check(Positive())
-      ->excludes(cameras_option);
-  verb.add_option("--target", target, "Orbit: X,Y,Z to look at (default: the splat's middle)")
-      ->excludes(cameras_option);
-  verb.add_option("--fov", fov, "Orbit: horizontal field of view, degrees")
-      ->check(CLI::Range(1.0, 170.0))
-      ->capture_default_str()
-      ->excludes(cameras_option);
+  auto* orbit_option =
+      verb.add_option(
+              "--orbit", orbit,
+              "Views on a sphere around the splat instead; --cameras then only say where up is, and the background")
+          ->check(CLI::Range(1, 100000));
+  auto* radius_option =
+      verb.add_option("--radius", radius, "Orbit: distance, world units (default: what frames the splat)")
+          ->check(Positive());
+  auto* target_option = verb.add_option("--target", target, "Orbit: X,Y,Z to look at (default: the splat's middle)");
+  auto* fov_option = verb.add_option("--fov", fov, "Orbit: horizontal field of view, degrees")
+                         ->check(CLI::Range(1.0, 170.0))
+                         ->capture_default_str();
+  auto* up_option = verb.add_option("--up", up,
+                                    "Orbit: where up is, X,Y,Z or an axis as in --up=-z (default: what the cameras or "
+                                    "the splat's own comment say, else -y as captures have it)")
+                        ->check(NotEmpty());
+  verb.parse_complete_callback([=] {
+    if (!*cameras_option || *orbit_option) return;
+    for (const CLI::Option* option : {radius_option, target_option, fov_option, up_option}) {
+      if (*option) throw CLI::ExcludesError(option->get_name(), cameras_option->get_name());
+    }
+  });
   verb.add_option("--view", view, "Only the view of this name");
   verb.add_option("--size", size, "WxH in pixels (default: the cameras' own; 1024x1024 for an orbit)");
   verb.add_option("--background", background, "R,G,B from 0 to 1 (default: what the camera file says, else black)");
+  verb.add_option("--near", near_plane,
+                  "World units in front of the camera where the picture begins (default: 0.01, or a thousandth of the "
+                  "distance to the splat where that is nearer)");
+  verb.add_option("--far", far_plane, "World units where it ends (default: nowhere)");
   verb.add_option("--mode", mode, "Rasterization (default: the file's tag, else classic)")
       ->check(CLI::IsMember({"classic", "antialiased"}));
   verb.add_option("--profile", profile, "Extent of a Gaussian: 3 sigma as gsplat 1.0-1.4, or opacity-aware as 1.5")
@@ -82,12 +114,28 @@ void ViewFlags::AddTo(CLI::App& verb) {
       ->capture_default_str();
 }
 
+void WarnOfUnusable(const std::string& path, const GaussianCloud& cloud) {
+  const int64_t unusable = CountUnusable(cloud);
+  if (unusable == 0) return;
+  LogWarning(Cat(path, ": ", WithThousands(unusable), " of ", WithThousands(cloud.size()),
+                 " Gaussians are not drawn: NaN or infinite values"));
+}
+
+Result<GaussianCloud> ReadToShow(const std::string& path) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, ReadCloud(path));
+  WarnOfUnusable(path, cloud);
+  return cloud;
+}
+
 Result<CameraSet> MakeViews(const ViewFlags& flags, const GaussianCloud& cloud) {
-  if (flags.cameras.empty()) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet cameras, OrbitViews(flags, cloud));
+  CameraSet cameras;
+  if (!flags.cameras.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, ReadCameras(flags.cameras));
+  }
+  if (flags.cameras.empty() || flags.orbit > 0) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, OrbitViews(flags, cloud, cameras));
     return KeepView(std::move(cameras), flags.view);
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet cameras, ReadCameras(flags.cameras));
   if (!flags.size.empty()) {
     ANCHORSPLAT_RETURN_IF_ERROR(Resize(cameras, flags.size));
   }
@@ -95,8 +143,20 @@ Result<CameraSet> MakeViews(const ViewFlags& flags, const GaussianCloud& cloud) 
 }
 
 Result<RenderOptions> MakeRenderOptions(const ViewFlags& flags, const GaussianCloud& cloud, const CameraSet& cameras) {
-  RenderOptions options;
-  options.mode = cloud.render_mode.value_or(RenderMode::kClassic);
+  RenderOptions options = OptionsFor(cloud);
+  const auto beyond = [](const std::optional<double>& plane) { return plane && !(*plane > 0 && *plane <= kNoFar); };
+  if (beyond(flags.near_plane) || beyond(flags.far_plane)) {
+    return Error{ErrorCode::kBadArgument, "--near and --far are distances in world units, more than 0"};
+  }
+  if (flags.near_plane) {
+    options.near_plane = static_cast<float>(*flags.near_plane);
+    options.subject.reset();  // as it was said
+  }
+  if (flags.far_plane) options.far_plane = static_cast<float>(*flags.far_plane);
+  if (flags.near_plane && !(options.far_plane > options.near_plane)) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--near ", options.near_plane, " does not lie before --far ", options.far_plane)};
+  }
   if (!flags.mode.empty()) options.mode = flags.mode == "classic" ? RenderMode::kClassic : RenderMode::kAntialiased;
   options.profile = flags.profile == "gsplat15" ? RasterProfile::kGsplat15 : RasterProfile::kGsplat14;
   options.background = cameras.background.value_or(options.background);

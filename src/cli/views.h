@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 
 #include "core/camera.h"
@@ -22,15 +23,22 @@ struct ViewFlags {
   std::string mode;        // "classic" or "antialiased"; empty: the file's tag, else classic
   std::string view;        // the only view wanted, by name; empty: all
   std::string profile = "gsplat14";
+  std::string up;  // "X,Y,Z" or an axis, of an orbit; empty: what the cameras or the file say, else −y
+  std::optional<double> near_plane, far_plane;  // world units; nothing: what render/shown_range.h says
 
   void AddTo(CLI::App& verb);
 };
 
-// The views to render, all or the one of --view. An orbit is laid around `cloud`. `--size` must keep the cameras'
-// aspect ratio. Errors name the option.
+// A splat to be looked at. Says how many of its Gaussians nobody draws (CountUnusable).
+Result<GaussianCloud> ReadToShow(const std::string& path);
+void WarnOfUnusable(const std::string& path, const GaussianCloud& cloud);
+
+// The views to render, all or the one of --view. An orbit is laid around `cloud`, upright. `--size` must keep the
+// cameras' aspect ratio. Errors name the option.
 Result<CameraSet> MakeViews(const ViewFlags& flags, const GaussianCloud& cloud);
 
-// Mode (flags, else the file's tag, else classic), profile and background (flags, else the cameras', else black).
+// Mode (flags, else the file's tag, else classic), profile, background (flags, else the cameras', else black), and what
+// is in range.
 Result<RenderOptions> MakeRenderOptions(const ViewFlags& flags, const GaussianCloud& cloud, const CameraSet& cameras);
 
 }  // namespace anchorsplat

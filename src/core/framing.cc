@@ -40,7 +40,19 @@ Framing FrameCloud(const GaussianCloud& cloud) {
       },
       least);
   const double radius = Quantile(distances, 0.98);
-  if (radius > 0 && std::isfinite(radius)) framing.radius = radius;
+  if (radius > 0 && std::isfinite(radius)) {
+    framing.radius = radius;
+    return framing;
+  }
+  double largest = 0;
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    if (!(cloud.opacity_logits[static_cast<size_t>(i)] >= least)) continue;
+    for (size_t a = 0; a < 3; ++a) {
+      const double reach = 3 * std::exp(double{cloud.log_scales[static_cast<size_t>(3 * i) + a]});
+      if (std::isfinite(reach)) largest = std::max(largest, reach);
+    }
+  }
+  if (largest > 0) framing.radius = largest;
   return framing;
 }
 

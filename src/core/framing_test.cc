@@ -36,9 +36,12 @@ TEST(Framing, AlwaysHasARadius) {
   one.Resize(1, 0);
   one.means = {3, 4, 5};
   one.opacity_logits = {-9};
+  one.log_scales = {-3, std::log(0.5f), -INFINITY};
   const Framing framing = FrameCloud(one);
   EXPECT_EQ(framing.target[1], 4);
-  EXPECT_EQ(framing.radius, 1);
+  EXPECT_NEAR(framing.radius, 1.5, 1e-6);  // three times its longest axis
+  one.log_scales = {-INFINITY, NAN, INFINITY};
+  EXPECT_EQ(FrameCloud(one).radius, 1);
 }
 
 TEST(Framing, DistanceFitsTheSphereIntoTheSmallerSide) {

@@ -9,7 +9,7 @@
 #include "core/parallel.h"
 #include "core/statistics.h"
 #include "core/text.h"
-#include "render/constants.h"
+#include "render/shown_range.h"
 
 namespace anchorsplat {
 
@@ -25,9 +25,10 @@ struct View {
   float center[3];
   float x0, x1, y0, y1;  // x/z and y/z of the image's edges
   float focal;           // sqrt(fx·fy) at the training width
+  float near;            // z of the near plane
 };
 
-View MakeView(const Camera& camera, std::optional<int> train_width) {
+View MakeView(const Camera& camera, const RenderOptions& shown, std::optional<int> train_width) {
   View view{};
   const Pinhole& k = camera.intrinsics;
   std::transform(camera.world_to_camera.rotation.begin(), camera.world_to_camera.rotation.end(), view.r,
@@ -42,6 +43,7 @@ View MakeView(const Camera& camera, std::optional<int> train_width) {
   view.y1 = static_cast<float>((k.height - k.cy) / k.fy);
   const double shrink = train_width && *train_width < k.width ? static_cast<double>(*train_width) / k.width : 1.0;
   view.focal = static_cast<float>(std::sqrt(k.fx * k.fy) * shrink);
+  view.near = NearPlane(shown, camera);
   return view;
 }
 
@@ -54,7 +56,8 @@ Result<CameraPixelSizes> PixelSizesFromCameras(const GaussianCloud& cloud, const
     return Error{ErrorCode::kBadArgument, Cat("training width ", *train_width, " is not a number of pixels")};
   }
   std::vector<View> views;
-  for (const Camera& camera : cameras.cameras) views.push_back(MakeView(camera, train_width));
+  const RenderOptions shown = OptionsFor(cloud);
+  for (const Camera& camera : cameras.cameras) views.push_back(MakeView(camera, shown, train_width));
 
   CameraPixelSizes out;
   out.sizes.resize(static_cast<size_t>(cloud.size()));
@@ -68,7 +71,7 @@ Result<CameraPixelSizes> PixelSizesFromCameras(const GaussianCloud& cloud, const
       seen.clear();
       for (const View& v : views) {
         const float z = v.r[6] * p[0] + v.r[7] * p[1] + v.r[8] * p[2] + v.t[2];
-        if (!(z > kNear)) continue;
+        if (!(z > v.near)) continue;
         const float x = v.r[0] * p[0] + v.r[1] * p[1] + v.r[2] * p[2] + v.t[0];
         const float y = v.r[3] * p[0] + v.r[4] * p[1] + v.r[5] * p[2] + v.t[1];
         if (x < v.x0 * z || x > v.x1 * z || y < v.y0 * z || y > v.y1 * z) continue;

@@ -56,6 +56,18 @@ TEST(PixelSizesFromCameras, MedianOverTheViewsThatSeeIt) {
   EXPECT_FLOAT_EQ(sizes->sizes[2], 10.0f / 50);  // behind all: the nearest camera's distance
 }
 
+TEST(PixelSizesFromCameras, FollowTheUnitOfTheScene) {
+  for (const float unit : {1e-4f, 1.0f, 1e5f}) {
+    const GaussianCloud cloud = CloudAt({{0, 0, 4 * unit}, {unit, 0, 5 * unit}, {0, unit, 6 * unit}});
+    CameraSet cameras;
+    cameras.cameras = {CameraAt(0)};
+    const auto sizes = PixelSizesFromCameras(cloud, cameras, std::nullopt);
+    ASSERT_TRUE(sizes.ok());
+    EXPECT_EQ(sizes->unseen, 0) << unit;
+    EXPECT_FLOAT_EQ(sizes->sizes[0], unit * 4 / 50);
+  }
+}
+
 TEST(PixelSizesFromCameras, TrainWidthOnlyShrinks) {
   const GaussianCloud cloud = CloudAt({{0, 0, 5}});
   CameraSet cameras;

@@ -19,6 +19,7 @@
 #include "fit/fingerprints.h"
 #include "fit/training_views.h"
 #include "metrics/image_metrics.h"
+#include "render/shown_range.h"
 
 namespace anchorsplat {
 
@@ -79,6 +80,12 @@ Result<Views> OpenSplat(const RefineInput& input, const RefineOptions& options, 
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(
         poses, RefinePosesAround(input.cloud, input.pixel_size, options.poses, kCheckViews, input.seed));
+  }
+  for (const Camera& camera : poses.check) {
+    const std::string warning = NothingToSee(input.cloud, camera, render, std::nullopt);
+    if (warning.empty()) continue;
+    LogWarning(Cat(warning, " Refinement learns nothing from such views"));
+    break;
   }
   const double scale = SceneScale(poses.train);
   const auto splat = std::make_shared<const GaussianCloud>(input.cloud);
@@ -237,8 +244,7 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
   }
   options.rate = given.rate.value_or(gentle ? kRateGentle : kRate);
 
-  RenderOptions render;
-  render.mode = input.cloud.render_mode.value_or(RenderMode::kClassic);
+  const RenderOptions render = OptionsFor(input.cloud);
   ANCHORSPLAT_ASSIGN_OR_RETURN(Views views,
                                pictures ? OpenPictures(input, options, render) : OpenSplat(input, options, render));
   RefineReport report;

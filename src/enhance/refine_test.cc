@@ -122,6 +122,29 @@ TEST_F(Refinement, WithoutPicturesComesNearerToTheViewsItSees) {
   }
 }
 
+// The near plane of a fit would show nothing of this scene, neither before nor after, and so nothing to mend.
+TEST_F(Refinement, WorksInAnyUnit) {
+  options_.images.clear();
+  options_.steps = 30;
+  input_.cameras = cameras_;
+  const auto expected = Refine(input_, options_, {});
+  ASSERT_TRUE(expected.ok()) << expected.error().message;
+  constexpr float kUnit = 1e-3f;
+  for (GaussianCloud* cloud : {&input_.cloud, &input_.start}) {
+    for (float& x : cloud->means) x *= kUnit;
+    for (float& x : cloud->log_scales) x += std::log(kUnit);
+  }
+  for (Camera& camera : input_.cameras->cameras) {
+    for (double& x : camera.world_to_camera.translation) x *= double{kUnit};
+  }
+  input_.pixel_size *= double{kUnit};
+  const auto refined = Refine(input_, options_, {});
+  ASSERT_TRUE(refined.ok()) << refined.error().message;
+  EXPECT_FALSE(refined->report.kept_start);
+  EXPECT_NEAR(refined->report.before, expected->report.before, 0.1);
+  EXPECT_NEAR(refined->report.after, expected->report.after, 0.3);
+}
+
 TEST_F(Refinement, SameBitsForAnyNumberOfThreads) {
   options_.steps = 20;
   GaussianCloud expected;

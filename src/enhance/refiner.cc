@@ -36,7 +36,7 @@ PixelBox ChooseWindow(const Camera& camera, const GaussianCloud& cloud, uint64_t
   for (int i = 0; i < kTries && !cloud.empty(); ++i) {
     const float* p = cloud.means.data() + 3 * random.Below(cloud.size());
     const auto c = camera.ToCamera({p[0], p[1], p[2]});
-    if (!(c[2] > kNear)) continue;
+    if (!(c[2] > 0)) continue;
     const double u = k.fx * c[0] / c[2] + k.cx, v = k.fy * c[1] / c[2] + k.cy;
     if (!(u >= 0 && u < k.width && v >= 0 && v < k.height)) continue;
     x = u, y = v;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <set>
 
+#include "core/log.h"
 #include "core/text.h"
 #include "enhance/enhance.h"
 #include "enhance/filter.h"
@@ -20,6 +21,7 @@
 #include "model/network_file.h"
 #include "model/shipped_network.h"
 #include "render/rasterizer.h"
+#include "render/shown_range.h"
 
 namespace anchorsplat {
 
@@ -89,8 +91,7 @@ EvalMethod Upsample() {
             const auto rasterizer = std::make_shared<Rasterizer>();
             MethodViews views;
             views.render = [&object, rasterizer](size_t view) -> Result<Image> {
-              RenderOptions options;
-              options.mode = object.low.render_mode.value_or(RenderMode::kClassic);
+              RenderOptions options = OptionsFor(object.low);
               options.background = object.background;
               RenderOutput output;
               ANCHORSPLAT_RETURN_IF_ERROR(rasterizer->Render(object.low, object.LowCamera(view), options, output));
@@ -312,16 +313,24 @@ MethodViews SplatViews(const BenchmarkObject& object, GaussianCloud cloud) {
     GaussianCloud cloud;
     Rasterizer rasterizer;
     RenderOptions options;
+    bool warned = false;  // of views with nothing in them: one is enough
   };
   const auto state = std::make_shared<State>();
-  state->options.mode = cloud.render_mode.value_or(RenderMode::kClassic);
+  state->options = OptionsFor(cloud);
   state->options.background = object.background;
   state->cloud = std::move(cloud);
   MethodViews views;
   views.gaussians = state->cloud.size();
   views.render = [&object, state](size_t view) -> Result<Image> {
     RenderOutput output;
-    ANCHORSPLAT_RETURN_IF_ERROR(state->rasterizer.Render(state->cloud, object.views[view], state->options, output));
+    const Camera& camera = object.views[view];
+    ANCHORSPLAT_RETURN_IF_ERROR(state->rasterizer.Render(state->cloud, camera, state->options, output));
+    if (!state->warned) {
+      const std::string warning =
+          NothingToSee(state->cloud, camera, state->options, state->rasterizer.statistics().visible);
+      if (!warning.empty()) LogWarning(Cat(object.name, ": ", warning));
+      state->warned = !warning.empty();
+    }
     return std::move(output.color);
   };
   return views;

@@ -4,11 +4,13 @@
 #include <cctype>
 #include <utility>
 
+#include "core/log.h"
 #include "core/text.h"
 #include "formats/camera_checks.h"
 #include "formats/image_io.h"
 #include "metrics/compare.h"
 #include "metrics/image_metrics.h"
+#include "render/shown_range.h"
 
 namespace anchorsplat {
 
@@ -28,7 +30,13 @@ class SplatViewSource : public ViewSource {
     return ImageSize{cameras_.cameras[view].intrinsics.width, cameras_.cameras[view].intrinsics.height};
   }
   Result<Image> Load(size_t view) override {
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud_, cameras_.cameras[view], options_, output_));
+    const Camera& camera = cameras_.cameras[view];
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud_, camera, options_, output_));
+    if (!warned_) {
+      const std::string warning = NothingToSee(cloud_, camera, options_, rasterizer_.statistics().visible);
+      if (!warning.empty()) LogWarning(warning + " --near and --far say what is in range");
+      warned_ = !warning.empty();
+    }
     Image image = output_.color;
     Clamp01(image);
     return image;
@@ -42,6 +50,7 @@ class SplatViewSource : public ViewSource {
   GaussianCloud cloud_;
   CameraSet cameras_;
   RenderOptions options_;
+  bool warned_ = false;  // of a view with nothing in it: one is enough
   Rasterizer rasterizer_;
   RenderOutput output_;
   std::vector<std::string> names_;

@@ -35,7 +35,7 @@ std::string ViewLabel(const std::string& name);
 // The view called `name`, with its folder and extension or without. kBadArgument when there is none, or several.
 Result<size_t> FindView(const std::vector<std::string>& names, const std::string& name);
 
-// Renders `cloud` through `cameras`.
+// Renders `cloud` through `cameras`; warns of the first view with nothing in it (render/shown_range.h).
 std::unique_ptr<ViewSource> MakeSplatViews(GaussianCloud cloud, CameraSet cameras, const RenderOptions& options);
 
 // A folder of PNG and JPEG pictures, or a single one. Errors: kNotFound, kBadFile (no pictures in the folder).

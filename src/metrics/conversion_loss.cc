@@ -8,6 +8,7 @@
 #include "core/framing.h"
 #include "metrics/image_metrics.h"
 #include "render/rasterizer.h"
+#include "render/shown_range.h"
 
 namespace anchorsplat {
 
@@ -25,7 +26,7 @@ Result<ConversionLoss> MeasureConversionLoss(const GaussianCloud& before, const 
                                OrbitCameras(views, FramingDistance(framing, intrinsics), framing.target, intrinsics));
   Rasterizer rasterizer;
   RenderOutput first, second;
-  RenderOptions options;
+  RenderOptions options = OptionsFor(before);
   // A format that has no place for the mode has not changed it.
   options.mode = before.render_mode.value_or(after.render_mode.value_or(RenderMode::kClassic));
   ConversionLoss loss;

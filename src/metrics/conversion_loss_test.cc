@@ -29,6 +29,21 @@ TEST(ConversionLoss, NothingForTheSameCloudInAnotherOrder) {
   EXPECT_GT(MeasureConversionLoss(cloud, *Subset(cloud, rows), 2)->min_psnr, 90);
 }
 
+TEST(ConversionLoss, IsTheSameInAnyUnit) {
+  const GaussianCloud cloud = Ball();
+  GaussianCloud changed = cloud;
+  for (float& x : changed.sh) x += 0.1f;
+  const double expected = MeasureConversionLoss(cloud, changed, 2)->mean_psnr;
+  for (const float unit : {1e-6f, 1e-3f, 1e4f}) {
+    GaussianCloud a = cloud, b = changed;
+    for (GaussianCloud* scaled : {&a, &b}) {
+      for (float& x : scaled->means) x *= unit;
+      for (float& x : scaled->log_scales) x += std::log(unit);
+    }
+    EXPECT_NEAR(MeasureConversionLoss(a, b, 2)->mean_psnr, expected, 0.01) << unit;
+  }
+}
+
 TEST(ConversionLoss, GrowsWithTheChange) {
   const GaussianCloud cloud = Ball();
   double last = INFINITY;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 
 namespace anchorsplat {
 
@@ -9,8 +10,12 @@ inline constexpr float kDilation = 0.3f;  // px²: the low-pass of Kerbl et al. 
 inline constexpr float kMinAlpha = 1.0f / 255;     // smaller contributions are invisible at 8 bits
 inline constexpr float kMaxAlpha = 0.999f;         // keeps 1/(1−α) of the backward pass finite (gsplat ≤ 1.5)
 inline constexpr float kMinTransmittance = 1e-4f;  // stop *before* the Gaussian that would cross it
-inline constexpr float kNear = 0.01f;              // world units along z
+// gsplat's near and far plane, world units along z: what a fit draws. A splat that is shown may have any unit
+// (render/shown_range.h): there the near plane is at most this part of the distance to it, and nothing is too far.
+inline constexpr float kNear = 0.01f;
 inline constexpr float kFar = 1e10f;
+inline constexpr float kNearShare = 1e-3f;
+inline constexpr float kNoFar = std::numeric_limits<float>::max();
 inline constexpr int kTile = 16;               // px: the unit of gsplat's screen culling, part of its output
 inline constexpr float kFrustumMargin = 0.3f;  // the Jacobian's x/z is clamped to the image plus 30 % of its tangent
 inline constexpr double kExtent14 = 3.0;       // σ_max: half side of the square of gsplat 1.0–1.4

@@ -11,6 +11,7 @@
 #include "render/blend.h"
 #include "render/project.h"
 #include "render/rasterizer_state.h"
+#include "render/shown_range.h"
 #include "render/sort.h"
 #include "render/spherical_harmonics.h"
 
@@ -80,7 +81,7 @@ int64_t Rasterizer::State::Project(const GaussianCloud& cloud, const Camera& cam
   project.world_to_camera = camera.world_to_camera;
   project.profile = options.profile;
   project.mode = options.mode;
-  project.near_plane = options.near_plane;
+  project.near_plane = NearPlane(options, camera);
   project.far_plane = options.far_plane;
   project.dilation = options.dilation;
   project.compensated_from = options.compensated_from;
@@ -214,6 +215,9 @@ Status Rasterizer::Render(const GaussianCloud& cloud, const Camera& camera, cons
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckCamera(camera));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
+  if (const float near = NearPlane(options, camera); !(options.far_plane > near)) {
+    return BadArgument(Cat("far plane ", options.far_plane, " must lie behind the near plane, which is at ", near));
+  }
   if (cloud.size() > std::numeric_limits<int32_t>::max()) {
     return BadArgument(Cat("cloud of ", WithThousands(cloud.size()), " Gaussians; at most 2,147,483,647 can be drawn"));
   }

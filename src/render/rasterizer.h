@@ -3,8 +3,10 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "core/camera.h"
+#include "core/framing.h"
 #include "core/gaussian_cloud.h"
 #include "core/image.h"
 #include "core/result.h"
@@ -17,9 +19,12 @@ struct RenderOptions {
   RasterProfile profile = RasterProfile::kGsplat14;
   RenderMode mode = RenderMode::kClassic;
   std::array<float, 3> background = {0, 0, 0};
-  float near_plane = kNear;
-  float far_plane = kFar;
+  float near_plane = kNear;    // world units along z
+  float far_plane = kFar;      // world units along z
   float dilation = kDilation;  // px²
+  // What is shown: no near plane lies farther than kNearShare of the distance to it (NearPlane in
+  // render/shown_range.h). Fits have none and draw what gsplat does.
+  std::optional<Framing> subject = std::nullopt;
   // RenderMode::kAntialiased keeps the integral that a Gaussian has with this much dilation instead of `dilation`: its
   // opacity becomes o·sqrt(det(Σ₂ + compensated_from·I) / det(Σ₂ + dilation·I)). 0 is Mip-Splatting's rule. Otherwise
   // the picture shows what larger pixels would average of one with the smaller dilation, as far as every Gaussian for
@@ -92,9 +97,10 @@ class Rasterizer {
 
   // Errors (kBadArgument): an invalid cloud or one of 2^31 Gaussians or more; a camera without pixels, with more than
   // 2^19 per side, with a focal length that is not positive and finite, or with another value that is not finite; a
-  // near plane that is not positive; options out of their range; not enough memory for the picture. Gaussians with a
-  // value that is not finite are skipped, as far as the picture needs the value: SH coefficients of a degree that is
-  // not used are not looked at. −Inf is legal as a log-scale (scale 0) and as an opacity logit (invisible).
+  // near plane that is not positive or not before the far one; options out of their range; not enough memory for the
+  // picture. Gaussians with a value that is not finite are skipped, as far as the picture needs the value: SH
+  // coefficients of a degree that is not used are not looked at. −Inf is legal as a log-scale (a flat Gaussian), ±Inf
+  // as an opacity logit.
   Status Render(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options, RenderOutput& output);
 
   // The gradient of the last Render, which must have been asked to keep what this needs (RenderOptions::gradient), with

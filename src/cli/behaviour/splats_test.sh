@@ -244,7 +244,27 @@ expect 0 "one view by name" "$program" render "$input" -o "$work/016.png" --came
 expect 2 "no such view" "$program" render "$input" -o "$work/x.png" --cameras "$cameras" --view 999
 expect 2 "nonsense size" "$program" render "$input" -o "$work/x.png" --orbit 1 --size 0x5
 expect 2 "other shape" "$program" render "$input" -o "$work/x" --cameras "$cameras" --size 100x50
-expect 2 "cameras and orbit" "$program" render "$input" -o "$work/x" --cameras "$cameras" --orbit 3
+expect 2 "a radius without an orbit" "$program" render "$input" -o "$work/x" --cameras "$cameras" --radius 3
+# Up: −y unless somebody knows better.
+expect 0 "up by itself" "$program" render "$input" -o "$work/up" --orbit 2 --size 64x64
+expect 0 "up as it is said" "$program" render "$input" -o "$work/up-said" --orbit 2 --size 64x64 --up=-y
+expect 0 "the same" cmp "$work/up/001.png" "$work/up-said/001.png"
+expect 0 "up as the cameras hold it" "$program" render "$input" -o "$work/up-cameras" --orbit 2 --size 64x64 --cameras "$cameras"
+expect 0 "up as the comment says" "$program" render "$work/cameras.ply" -o "$work/up-comment" --orbit 2 --size 64x64
+expect 0 "a comment that says up" grep -qa '^comment world up: 0 [0-9]' "$work/cameras.ply"
+expect 0 "compare takes the cameras' up" "$program" compare "$input" "$work/up-cameras" --orbit 2 --size 64x64 --cameras "$cameras" --json
+expect 2 "up is no direction" "$program" render "$input" -o "$work/x" --orbit 2 --up 0,0,0
+says stderr "--up: '0,0,0' is not a direction"
+# What is in range.
+expect 0 "nothing in range" "$program" render "$input" -o "$work/far" --cameras "$cameras" --size 64x64 --near 100
+says stderr "shows nothing of the 20,000 Gaussians: 20,000 before the near plane (100)"
+says stderr "--near and --far say what is in range (9 more of 10 views are as empty)"
+expect 0 "nothing in range of a comparison" "$program" compare "$input" "$work/out.ply" --orbit 2 --size 64x64 --far 0.1
+says stderr "20,000 beyond the far plane (0.1)"
+expect 2 "near behind far" "$program" render "$input" -o "$work/x" --orbit 2 --near 3 --far 2
+expect 2 "near of nothing" "$program" render "$input" -o "$work/x" --orbit 2 --near 0
+expect 0 "what is not drawn is said" "$program" render "$work/nan.ply" -o "$work/none.png" --orbit 1 --size 64x64
+says stderr "2 of 2 Gaussians are not drawn"
 expect 2 "not a PNG" "$program" render "$input" -o "$work/x.jpg" --orbit 1
 expect 2 "too many pixels" "$program" render "$input" -o "$work/x.png" --orbit 1 --size 32768x32768
 expect 3 "missing cameras" "$program" render "$input" -o "$work/x" --cameras "$work/none.json"

@@ -12,7 +12,7 @@ for object in biplane stone_lantern; do
   echo "== $object: a 3DGS fit of 256x256 pictures, seen at 1024x1024 from ten new places"
   "$program" info "$example/input.ply" | sed -n '2,6p'
   echo
-  "$program" enhance "$example/input.ply" -o "$out/$object-4x.ply" --cameras "$example/transforms_lr.json" --camera-rule median -w
+  "$program" enhance "$example/input.ply" -o "$out/$object-4x.ply" --cameras "$example/transforms_lr.json" -w
   echo
   "$program" compare "$example/input.ply" "$out/$object-4x.ply" --truth "$example/hr" \
     --cameras "$example/transforms_hr.json" --side-by-side "$out/$object.png" -w

@@ -63,7 +63,9 @@ Status WritePage(const fs::path& input, const GaussianCloud& before, const fs::p
   ViewerPage page;
   page.before = ViewerSplat{&before, input.filename().string(), {}};
   page.after = {&enhanced.cloud, output.filename().string(), {}};
-  if (enhanced.report.pixel_size > 0) page.pixel_size = static_cast<float>(enhanced.report.pixel_size);
+  // A cautious one is no training pixel to measure by.
+  const bool cautious = enhanced.report.pixel_size_source == kCautiousPixelSize;
+  if (enhanced.report.pixel_size > 0 && !cautious) page.pixel_size = static_cast<float>(enhanced.report.pixel_size);
   page.smaller = kSmaller;
   const Status written = WriteViewerPage(PagePath(output), page, options);
   if (written.ok()) return {};

@@ -144,6 +144,11 @@ nlohmann::json ToJson(const std::string& input, const fs::path& output, const En
     json["filter_strength"] = r.filter_strength;
     json["pixel_size"] = {{"value", r.pixel_size}, {"source", r.pixel_size_source}};
     if (r.pixel_size_source == kUnknownPixelSize) json["pixel_size"]["value"] = nullptr;
+    if (r.finding) {
+      json["pixel_size"]["estimate"] = r.finding->estimate.size;
+      json["pixel_size"]["contradictions"] = r.finding->contradictions;
+    }
+    if (!r.camera_rule.empty()) json["camera_rule"] = r.camera_rule;
     if (r.train_width) json["train_width"] = *r.train_width;
   }
   return json;
@@ -318,8 +323,10 @@ void AddEnhance(CLI::App& app, Program& program) {
       ->check(CLI::IsMember({"fast", "good", "best"}));
   verb.add_option("--upscale", options.upscale, "How many times closer it will be seen; at least 1")
       ->capture_default_str();
-  verb.add_option("--pixel-size", flags->pixel_size,
-                  "World size of one pixel of the training views (depth / focal length), or auto to estimate it")
+  verb.add_option(
+          "--pixel-size", flags->pixel_size,
+          "World size of one pixel of the training views (depth / focal length), or auto to estimate it from the "
+          "splat; an estimate that its other features contradict is not acted on")
       ->capture_default_str();
   auto* cameras = verb.add_option("--cameras", flags->cameras, "Training cameras: exact pixel size for every Gaussian")
                       ->check(NotEmpty());
@@ -328,9 +335,11 @@ void AddEnhance(CLI::App& app, Program& program) {
       ->check(Positive())
       ->needs(cameras);
   AddChoice(verb, "--camera-rule", options.camera_rule,
-            {{"smallest", CameraPixelRule::kSmallest}, {"median", CameraPixelRule::kMedian}},
+            {{"auto", CameraPixelRule::kAuto},
+             {"smallest", CameraPixelRule::kSmallest},
+             {"median", CameraPixelRule::kMedian}},
             "Which of the views that hold a Gaussian says its pixel size: the smallest never blurs, the median suits "
-            "objects seen from all around")
+            "objects seen from all around; auto: by where the cameras stand and look")
       ->needs(cameras);
   verb.add_option("--filter-strength", options.filter_strength,
                   "Share of the absorbed 0.3 px² to give back (default: 1 - (1 - 1/upscale²)/3.6)");

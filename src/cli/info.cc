@@ -16,7 +16,7 @@
 #include "cli/verb.h"
 #include "core/statistics.h"
 #include "core/text.h"
-#include "enhance/pixel_size_estimate.h"
+#include "enhance/pixel_size_guard.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "formats/tensor_file.h"
@@ -35,7 +35,7 @@ struct Findings {
   uint64_t file_bytes = 0;
   GaussianCloud cloud;
   CloudStatistics statistics;
-  Result<PixelSizeEstimate> pixel_size = Error{};
+  Result<PixelSizeFinding> pixel_size = Error{};
   std::vector<std::string> problems;  // sentences
 };
 
@@ -93,8 +93,13 @@ void PrintTable(const Findings& f) {
     std::cout << "\n";
   }
   if (f.pixel_size.ok()) {
-    std::cout << "  training pixel, estimated  " << Number(f.pixel_size->size) << " (likely "
-              << Number(f.pixel_size->low) << " to " << Number(f.pixel_size->high) << ")\n";
+    std::cout << "  training pixel, estimated  " << Number(f.pixel_size->estimate.size) << " (likely "
+              << Number(f.pixel_size->estimate.low) << " to " << Number(f.pixel_size->estimate.high) << ")\n";
+    for (const std::string& contradiction : f.pixel_size->contradictions)
+      std::cout << "    but " << contradiction << "\n";
+    if (f.pixel_size->contradicted()) {
+      std::cout << "    so enhance would take the smallest plausible pixel, " << Number(f.pixel_size->size) << "\n";
+    }
   } else {
     std::cout << "  training pixel  no estimate: " << f.pixel_size.error().message << "\n";
   }
@@ -157,7 +162,11 @@ nlohmann::json ToJson(const Findings& f) {
   if (s.bounds) json["bounds"] = {{"min", s.bounds->min}, {"max", s.bounds->max}};
   if (f.cloud.render_mode) json["render_mode"] = ModeName(f.cloud);
   if (f.pixel_size.ok()) {
-    json["pixel_size"] = {{"estimate", f.pixel_size->size}, {"low", f.pixel_size->low}, {"high", f.pixel_size->high}};
+    json["pixel_size"] = {{"estimate", f.pixel_size->estimate.size},
+                          {"low", f.pixel_size->estimate.low},
+                          {"high", f.pixel_size->estimate.high},
+                          {"contradictions", f.pixel_size->contradictions},
+                          {"used", f.pixel_size->size}};
   }
   for (const SplatFormat& format : Formats()) {
     if (format.write == nullptr || format.predicted_size == nullptr) continue;
@@ -253,7 +262,7 @@ Status RunInfo(const InfoFlags& flags, const SharedFlags& shared) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(findings.facts, file.format()->describe(file.input()));
   }
   findings.statistics = ComputeStatistics(findings.cloud);
-  findings.pixel_size = EstimatePixelSize(findings.cloud);
+  findings.pixel_size = FindPixelSize(findings.cloud);
   findings.problems = Problems(findings.statistics);
   if (shared.json) {
     PrintJson(ToJson(findings));

@@ -12,7 +12,7 @@
 #include "cli/views.h"
 #include "core/statistics.h"
 #include "core/text.h"
-#include "enhance/pixel_size_estimate.h"
+#include "enhance/pixel_size_guard.h"
 #include "formats/camera_io.h"
 #include "formats/opened_splat.h"
 #include "viewer/page_writer.h"
@@ -145,8 +145,8 @@ Status RunView(const PageFlags& flags, const SharedFlags& shared) {
     page.pixel_size = static_cast<float>(*pixel_size);
   } else if (page.before) {
     // Of what was trained; what came out of it says less. A splat with too little to say gets no scale bar.
-    if (const auto estimate = EstimatePixelSize(before.cloud); estimate.ok()) {
-      page.pixel_size = static_cast<float>(estimate->size);
+    if (const auto found = FindPixelSize(before.cloud); found.ok() && !found->contradicted()) {
+      page.pixel_size = static_cast<float>(found->size);
     }
   }
   ANCHORSPLAT_RETURN_IF_ERROR(WriteViewerPage(flags.output, page, WriteOptionsFrom(shared)));

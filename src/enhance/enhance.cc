@@ -10,7 +10,7 @@
 #include "core/text.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
-#include "enhance/pixel_size_estimate.h"
+#include "enhance/pixel_size_guard.h"
 #include "enhance/refine_method.h"
 #include "fit/pixel_model.h"
 #include "fit/training_views.h"
@@ -76,12 +76,16 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
     LogInfo(Cat(WithThousands(from_cameras.unseen), " of ", WithThousands(input.cloud.size()),
                 " Gaussians lie outside all views; their pixel size is that of the nearest camera"));
   }
-  const auto estimate = EstimatePixelSize(input.cloud);
-  if (estimate.ok()) {
-    const double ratio = estimate->size / from_cameras.median;
+  report.camera_rule = from_cameras.rule == CameraPixelRule::kMedian ? "median" : "smallest";
+  if (!from_cameras.why.empty()) {
+    LogInfo(Cat("--camera-rule ", report.camera_rule, ": ", from_cameras.why));
+  }
+  const auto found = FindPixelSize(input.cloud);
+  if (found.ok() && !found->contradicted()) {
+    const double ratio = found->size / from_cameras.median;
     if (ratio > kSuspiciousRatio || ratio < 1 / kSuspiciousRatio) {
       LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
-                     " (median), the splat itself looks like ", estimate->size,
+                     " (median), the splat itself looks like ", found->size,
                      ": are these its training cameras, at the size it was trained at (--train-width)?"));
     }
   }
@@ -103,6 +107,27 @@ Status PixelSizesFromPictures(const EnhanceOptions& options, EnhanceInput& input
   return {};
 }
 
+void SayWhatWasFound(const PixelSizeFinding& found) {
+  const PixelSizeEstimate& estimate = found.estimate;
+  if (found.contradicted()) {
+    std::string contradictions;
+    for (const std::string& sentence : found.contradictions) {
+      contradictions += (contradictions.empty() ? "" : "; and ") + sentence;
+    }
+    LogWarning(Cat("outlines say a training pixel of ", estimate.size, ", but ", contradictions,
+                   ". So that nothing is blurred, the smallest plausible pixel is taken, ", found.size,
+                   "; --cameras or --pixel-size will do better"));
+    return;
+  }
+  if (estimate.high > kVague * estimate.low) {
+    LogWarning(
+        "this splat says little about the pixels it was trained at, so the estimate is rough and rather too small; "
+        "--cameras or --pixel-size will do better");
+  }
+  LogInfo(Cat("estimated size of a training pixel: ", estimate.size, " (likely ", estimate.low, " to ", estimate.high,
+              "), and nothing else about the splat contradicts it; --cameras or --pixel-size make it exact"));
+}
+
 Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, EnhanceInput& input, EnhanceReport& report) {
   if (options.pixel_size && !(*options.pixel_size > 0 && std::isfinite(*options.pixel_size))) {
     return Error{ErrorCode::kBadArgument, Cat("pixel size ", *options.pixel_size, " is not a positive length")};
@@ -121,21 +146,16 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, EnhanceInp
   } else if (pictures) {
     return PixelSizesFromPictures(options, input, report);
   } else {
-    const auto estimate = EstimatePixelSize(input.cloud);
-    if (!estimate.ok()) {
-      LogWarning(estimate.error().message + ": the splat stays as it is; --pixel-size or --cameras would tell");
+    const auto found = FindPixelSize(input.cloud);
+    if (!found.ok()) {
+      LogWarning(found.error().message + ": the splat stays as it is; --pixel-size or --cameras would tell");
       report.pixel_size_source = kUnknownPixelSize;
       return {};
     }
-    report.pixel_size = estimate->size;
-    report.pixel_size_source = "estimated";
-    if (estimate->high > kVague * estimate->low) {
-      LogWarning(
-          "this splat says little about the pixels it was trained at, so the estimate is rough and rather too small; "
-          "--cameras or --pixel-size will do better");
-    }
-    LogInfo(Cat("estimated size of a training pixel: ", estimate->size, " (likely ", estimate->low, " to ",
-                estimate->high, "); --cameras or --pixel-size make it exact"));
+    report.finding = *found;
+    report.pixel_size = found->size;
+    report.pixel_size_source = found->contradicted() ? kCautiousPixelSize : "estimated";
+    SayWhatWasFound(*found);
   }
   input.pixel_sizes.assign(1, static_cast<float>(report.pixel_size));
   return {};

@@ -12,6 +12,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "enhance/pixel_size.h"
+#include "enhance/pixel_size_guard.h"
 #include "enhance/refine_options.h"
 
 namespace anchorsplat {
@@ -33,7 +34,7 @@ struct EnhanceOptions {
                                           // against, or estimated otherwise
   std::optional<CameraSet> cameras;       // the training cameras
   std::optional<int> train_width;         // pixels; see AssumedTrainWidth
-  CameraPixelRule camera_rule = CameraPixelRule::kSmallest;
+  CameraPixelRule camera_rule = CameraPixelRule::kAuto;
   RefineOptions refine;
   RefineControl control;  // of methods that take long
   uint64_t seed = 0;
@@ -41,6 +42,8 @@ struct EnhanceOptions {
 
 // The splat says nothing about its pixels, so that no method can know what to do: it has been left as it is.
 inline constexpr const char* kUnknownPixelSize = "unknown";
+// The estimate is contradicted (enhance/pixel_size_guard.h); the smallest plausible pixel was taken instead.
+inline constexpr const char* kCautiousPixelSize = "cautious";
 
 // What was done, for people and for --json.
 struct EnhanceReport {
@@ -52,10 +55,12 @@ struct EnhanceReport {
   double upscale = 1;
   double filter_strength = 0;
   double pixel_size = 0;  // p_LR, the median when there is one per Gaussian
-  // "given", "cameras", "pictures" (the cameras of those to refine against), "estimated" or kUnknownPixelSize; empty
-  // for methods that need none.
+  // "given", "cameras", "pictures" (the cameras of those to refine against), "estimated", kCautiousPixelSize or
+  // kUnknownPixelSize; empty for methods that need none.
   std::string pixel_size_source;
-  std::optional<int> train_width;  // pixels, given or assumed; nothing when the cameras' own size was taken
+  std::optional<PixelSizeFinding> finding;  // where it was to be estimated
+  std::string camera_rule;                  // "smallest" or "median" where it came from cameras
+  std::optional<int> train_width;           // pixels, given or assumed; nothing when the cameras' own size was taken
   // What else the method has to tell, by name: counts of the model, for example.
   std::vector<std::pair<std::string, double>> facts;
   bool interrupted = false;  // stopped by the user; the cloud is valid all the same

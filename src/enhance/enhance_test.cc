@@ -187,7 +187,14 @@ TEST_F(EnhanceDoor, PixelSizeFromCameras) {
   const auto enhanced = Enhance(Ball(0.01), options);
   ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
   EXPECT_EQ(enhanced->report.pixel_size_source, "cameras");
-  EXPECT_NEAR(enhanced->report.pixel_size, 0.0105, 0.0005);
+  EXPECT_NEAR(enhanced->report.pixel_size, 0.0116, 0.0005);  // of the median view: they stand all around
+  EXPECT_EQ(enhanced->report.camera_rule, "median");
+  EXPECT_TRUE(log_->Says("--camera-rule median: the cameras look at one thing")) << log_->text();
+  options.camera_rule = CameraPixelRule::kSmallest;
+  const auto smallest = Enhance(Ball(0.01), options);
+  ASSERT_TRUE(smallest.ok()) << smallest.error().message;
+  EXPECT_NEAR(smallest->report.pixel_size, 0.0105, 0.0005);
+  EXPECT_EQ(smallest->report.camera_rule, "smallest");
   options.pixel_size = 0.01;
   EXPECT_FALSE(Enhance(Ball(0.01), options).ok());  // both
 }

@@ -4,11 +4,13 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "core/parallel.h"
 #include "core/statistics.h"
 #include "core/text.h"
+#include "enhance/camera_rule.h"
 #include "render/shown_range.h"
 
 namespace anchorsplat {
@@ -60,6 +62,12 @@ Result<CameraPixelSizes> PixelSizesFromCameras(const GaussianCloud& cloud, const
   for (const Camera& camera : cameras.cameras) views.push_back(MakeView(camera, shown, train_width));
 
   CameraPixelSizes out;
+  if (rule == CameraPixelRule::kAuto) {
+    CameraRuleChoice choice = ChooseCameraRule(cloud, cameras);
+    rule = choice.rule;
+    out.why = std::move(choice.why);
+  }
+  out.rule = rule;
   out.sizes.resize(static_cast<size_t>(cloud.size()));
   std::atomic<int64_t> unseen = 0;
   ParallelFor(0, cloud.size(), kGaussiansPerTask, [&](int64_t first, int64_t last) {

@@ -11,7 +11,7 @@
 #include "core/text.h"
 #include "enhance/enhance.h"
 #include "enhance/filter.h"
-#include "enhance/pixel_size_estimate.h"
+#include "enhance/pixel_size_guard.h"
 #include "eval/bicubic_fit.h"
 #include "eval/filter_sweep.h"
 #include "metrics/bicubic.h"
@@ -60,11 +60,11 @@ EvalMethod Filter(const std::string& name, std::optional<double> strength) {
 }
 
 EvalMethod FilterAuto() {
-  return {"filter-auto", "", [](const MethodTask& task) -> Result<MethodViews> {
+  return {"filter-auto", "contradicted estimates are not acted on", [](const MethodTask& task) -> Result<MethodViews> {
             const auto begin = Clock::now();
-            ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEstimate estimate, EstimatePixelSize(task.object.low));
+            ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeFinding found, FindPixelSize(task.object.low));
             GaussianCloud cloud = task.object.low;
-            const float size = static_cast<float>(estimate.size);
+            const float size = static_cast<float>(found.size);
             const auto grown = ApplyFilter(
                 cloud, {&size, 1}, {.upscale = task.object.upscale(), .strength = DefaultStrength(task.object)});
             if (!grown.ok()) return grown.error();
@@ -72,8 +72,8 @@ EvalMethod FilterAuto() {
             ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraPixelSizes truth, TruePixelSizes(task.object));
             MethodViews views = SplatViews(task.object, std::move(cloud));
             views.seconds = seconds;
-            views.facts = {{"pixel_size", estimate.size},
-                           {"pixel_size_ratio", estimate.size / static_cast<double>(truth.median)}};
+            views.facts = {{"pixel_size", found.size},
+                           {"pixel_size_ratio", found.size / static_cast<double>(truth.median)}};
             return views;
           }};
 }
@@ -182,6 +182,7 @@ struct RegisteredMethod {
     std::string settings = refines ? Cat(ToJsonText(with_pictures), " revision ", kRefineRevision) : "";
     if (refine.seconds) settings += Cat(" ", *refine.seconds, " s");
     if (filter_strength) settings += Cat(" f ", *filter_strength);
+    if (auto_pixel_size) settings += " contradicted estimates are not acted on ";
     // Refinement with pictures begins with a network's result, too.
     if (name.starts_with("model") || name == "refine-images") settings += ShippedNetworkIdentity();
     return settings;

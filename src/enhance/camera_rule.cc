@@ -1,0 +1,106 @@
+#include "enhance/camera_rule.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "core/statistics.h"
+#include "core/text.h"
+
+namespace anchorsplat {
+
+namespace {
+
+using Vector = std::array<double, 3>;
+
+constexpr size_t kLeastCameras = 8;
+constexpr float kMostDistant = 1.6f;  // farthest camera (95 % of them) over nearest (5 %)
+constexpr float kMostAside = 0.2f;    // of the distance, between an axis and the point (90 % of the axes)
+constexpr double kLeastInFront = 0.95;
+// Length of the mean direction to the cameras: 0 all around, ½ for an upper half or a ring at 30°, 1 for one place.
+constexpr double kMostOneSided = 0.85;
+// Share of the visible Gaussians that must lie nearer to the point than this part of the cameras' distance.
+constexpr double kLeastInside = 0.9, kInside = 0.8;
+constexpr float kVisibleLogit = -2.2f;  // opacity 0.1
+
+double Dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vector Minus(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+double Norm(const Vector& a) { return std::sqrt(Dot(a, a)); }
+
+// The axis of a view: the third row of the rotation.
+Vector AxisOf(const Camera& camera) {
+  const auto& r = camera.world_to_camera.rotation;
+  return {r[6], r[7], r[8]};
+}
+
+// The point with the least sum of squared distances to all axes; nothing where they are (nearly) parallel.
+std::optional<Vector> NearestToAxes(const std::vector<Camera>& cameras) {
+  std::array<Vector, 3> m{};  // Σ (I − d dᵀ)
+  Vector b{};                 // Σ (I − d dᵀ) c
+  for (const Camera& camera : cameras) {
+    const Vector d = AxisOf(camera), c = camera.Center();
+    const double along = Dot(d, c);
+    for (size_t i = 0; i < 3; ++i) {
+      for (size_t j = 0; j < 3; ++j) m[i][j] += (i == j ? 1.0 : 0.0) - d[i] * d[j];
+      b[i] += c[i] - d[i] * along;
+    }
+  }
+  const auto cross = [](const Vector& p, const Vector& q) {
+    return Vector{p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
+  };
+  const Vector c12 = cross(m[1], m[2]), c20 = cross(m[2], m[0]), c01 = cross(m[0], m[1]);
+  const double determinant = Dot(m[0], c12);
+  const auto n = static_cast<double>(cameras.size());
+  if (!(determinant > 1e-4 * n * n * n)) return std::nullopt;
+  Vector x;
+  for (size_t i = 0; i < 3; ++i) x[i] = (c12[i] * b[0] + c20[i] * b[1] + c01[i] * b[2]) / determinant;
+  return x;
+}
+
+}  // namespace
+
+CameraRuleChoice ChooseCameraRule(const GaussianCloud& cloud, const CameraSet& set) {
+  const std::vector<Camera>& cameras = set.cameras;
+  const auto smallest = [](std::string why) { return CameraRuleChoice{CameraPixelRule::kSmallest, std::move(why)}; };
+  if (cameras.size() < kLeastCameras) return smallest(Cat("there are only ", cameras.size(), " cameras"));
+  const std::optional<Vector> point = NearestToAxes(cameras);
+  if (!point) return smallest("the cameras look the same way");
+
+  Buffer<float> distances, asides;
+  Vector mean{};
+  size_t in_front = 0;
+  for (const Camera& camera : cameras) {
+    const Vector to = Minus(*point, camera.Center());
+    const double distance = Norm(to), along = Dot(to, AxisOf(camera));
+    if (!(distance > 0) || !std::isfinite(distance)) return smallest("the cameras do not look at one thing");
+    if (along > 0) ++in_front;
+    distances.push_back(static_cast<float>(distance));
+    asides.push_back(static_cast<float>(std::sqrt(std::max(0.0, 1 - std::pow(along / distance, 2)))));
+    for (size_t a = 0; a < 3; ++a) mean[a] += to[a] / distance / static_cast<double>(cameras.size());
+  }
+  if (static_cast<double>(in_front) < kLeastInFront * static_cast<double>(cameras.size()) ||
+      Quantile(asides, 0.9) > kMostAside) {
+    return smallest("the cameras do not look at one thing");
+  }
+  if (Norm(mean) > kMostOneSided) return smallest("the cameras look from one side");
+  const float near = Quantile(distances, 0.05), far = Quantile(distances, 0.95), typical = Quantile(distances, 0.5);
+  if (far > kMostDistant * near) {
+    return smallest(Cat("some cameras stand ", Fixed(far / near, 1), " times closer to what they look at than others"));
+  }
+
+  int64_t visible = 0, inside = 0;
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    if (!IsUsable(cloud, i) || cloud.opacity_logits[static_cast<size_t>(i)] < kVisibleLogit) continue;
+    const float* p = cloud.means.data() + 3 * i;
+    ++visible;
+    if (Norm(Minus({p[0], p[1], p[2]}, *point)) < kInside * typical) ++inside;
+  }
+  if (static_cast<double>(inside) < kLeastInside * static_cast<double>(visible)) {
+    return smallest("much of the splat lies around the cameras, not between them");
+  }
+  return {CameraPixelRule::kMedian, "the cameras look at one thing from all around"};
+}
+
+}  // namespace anchorsplat

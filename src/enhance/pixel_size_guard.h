@@ -1,0 +1,44 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "enhance/pixel_size_estimate.h"
+
+namespace anchorsplat {
+
+// First, do no harm. An estimate of a training pixel that is too large blurs what was sharp, one that is too small
+// gives back less width than was lost; so the estimate of outlines is acted on only while nothing else says that the
+// pixel must be much smaller, and a pixel so small that it can hardly blur anything is taken otherwise.
+struct PixelSizeFinding {
+  double size = 0;                          // to act on; world units
+  PixelSizeEstimate estimate;               // what the outlines say
+  std::vector<std::string> contradictions;  // sentences that say what speaks against it; empty: nothing does
+
+  bool contradicted() const { return !contradictions.empty(); }
+};
+
+// The numbers that an estimate is held against, of the Gaussians that show: opacity of 10 % or more, not nearly black.
+// Fits on black keep black Gaussians around the object that no picture shows (where nothing else is there, all count).
+struct PixelSizeEvidence {
+  int64_t gaussians = 0;     // that show, near the middle of the cloud; no more than 200,000 of them
+  double spacing = 0;        // side of the square that each has of the surface: from the distances to 8 neighbours
+  double small_axis = 0;     // of the smallest tenth by area: PixelSizeProbe::start
+  double width = 0;          // the middle axis that three of four exceed
+  double without_black = 0;  // the estimate without black Gaussians; 0: there are few of them
+};
+Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud);
+
+// Gaussians on every pixel of the surface that fits keep at most: a cloud of `gaussians` that has more of them with a
+// pixel size was fitted to smaller pixels.
+double MostGaussiansPerPixel(int64_t gaussians);
+
+// What to make of an estimate in the light of the evidence.
+PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidence& evidence);
+
+// Scales with the cloud. Errors: those of EstimatePixelSize.
+Result<PixelSizeFinding> FindPixelSize(const GaussianCloud& cloud);
+
+}  // namespace anchorsplat

@@ -1,0 +1,150 @@
+#include "enhance/pixel_size_guard.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+#include "core/random.h"
+#include "core/source_dir_for_test.h"
+#include "enhance/filter.h"
+#include "formats/cloud_io.h"
+
+namespace anchorsplat {
+namespace {
+
+constexpr double kTruth = 0.0055013;  // of both examples: 1.7 / 309.02 px
+
+GaussianCloud Example(const char* object) {
+  auto cloud = ReadCloud(SourceDirForTest() / "examples" / object / "input.ply");
+  EXPECT_TRUE(cloud.ok());
+  return cloud.ok() ? *std::move(cloud) : GaussianCloud{};
+}
+
+struct Dust {
+  int64_t count;
+  double size;  // world units, of all axes
+  double opacity;
+  float colour;   // of all channels
+  double radius;  // of the ball it fills
+};
+
+void Add(GaussianCloud& cloud, const Dust& dust) {
+  GaussianCloud more;
+  more.Resize(dust.count, 0);
+  Random random(17);
+  std::fill(more.log_scales.begin(), more.log_scales.end(), static_cast<float>(std::log(dust.size)));
+  std::fill(more.quats.begin(), more.quats.end(), 0.5f);
+  std::fill(more.opacity_logits.begin(), more.opacity_logits.end(),
+            static_cast<float>(std::log(dust.opacity / (1 - dust.opacity))));
+  std::fill(more.sh.begin(), more.sh.end(), (dust.colour - 0.5f) / 0.2820948f);
+  for (size_t i = 0; i < static_cast<size_t>(dust.count); ++i) {
+    double at[3], norm = 0;
+    for (double& x : at) {
+      x = random.Normal();
+      norm += x * x;
+    }
+    const double r = dust.radius * std::cbrt(random.Uniform()) / std::sqrt(norm);
+    for (size_t a = 0; a < 3; ++a) more.means[3 * i + a] = static_cast<float>(r * at[a]);
+  }
+  ASSERT_TRUE(Append(cloud, more).ok());
+}
+
+// A splat that was fitted to small pictures says the same thing in all ways.
+TEST(PixelSizeGuard, FitsOfSmallPicturesPass) {
+  for (const char* object : {"biplane", "stone_lantern"}) {
+    const auto found = FindPixelSize(Example(object));
+    ASSERT_TRUE(found.ok()) << found.error().message;
+    EXPECT_FALSE(found->contradicted()) << object << ": " << found->contradictions.front();
+    EXPECT_EQ(found->size, found->estimate.size);
+  }
+}
+
+// What fits of photographs on black keep around the object: black Gaussians that cover what is behind them with black,
+// and so are seen in no picture, but whose alpha makes outlines wide.
+TEST(PixelSizeGuard, BlackVeilsAreSeenThrough) {
+  GaussianCloud cloud = Example("biplane");
+  Add(cloud, {6000, 0.05, 0.3, 0.0f, 0.9});  // veils
+  Add(cloud, {200, 0.01, 0.9, 0.3f, 1.0});   // floaters
+  const auto found = FindPixelSize(cloud);
+  ASSERT_TRUE(found.ok()) << found.error().message;
+  EXPECT_GT(found->estimate.size, 2 * kTruth) << "the veils do not mislead the outlines: a test of nothing";
+  ASSERT_TRUE(found->contradicted()) << found->estimate.size;
+  EXPECT_LT(found->size, kTruth);
+  EXPECT_GT(found->size, 0.05 * kTruth);
+  bool black = false;
+  for (const std::string& sentence : found->contradictions) black |= sentence.find("black") != std::string::npos;
+  EXPECT_TRUE(black);
+}
+
+// A capture: many Gaussians on a surface whose outline is soft, as they are where a subject was cut out of its place.
+TEST(PixelSizeGuard, ManySmallGaussiansWithSoftOutlinesAreNotBlurred) {
+  GaussianCloud cloud = Example("stone_lantern");
+  for (float& x : cloud.log_scales) x -= std::log(2.0f);
+  const GaussianCloud part = cloud;
+  for (int copy = 1; copy < 4; ++copy) {  // four times as many, half as large: the detail of half the pixel
+    GaussianCloud more = part;
+    Random random(static_cast<uint64_t>(copy));
+    for (float& x : more.means) x += static_cast<float>(0.004 * random.Normal());
+    ASSERT_TRUE(Append(cloud, more).ok());
+  }
+  Add(cloud, {4000, 0.04, 0.15, 0.5f, 0.5});
+  const auto found = FindPixelSize(cloud);
+  ASSERT_TRUE(found.ok()) << found.error().message;
+  ASSERT_TRUE(found->contradicted()) << found->estimate.size;
+  // Harmless: no more than a quarter of the Gaussians gets more than a twentieth wider.
+  const double added = 0.3 * (DefaultFilterStrength(4) - 1.0 / 16) * found->size * found->size;
+  const auto evidence = GatherPixelSizeEvidence(cloud);
+  ASSERT_TRUE(evidence.ok());
+  EXPECT_LT(std::sqrt(evidence->width * evidence->width + added), 1.051 * evidence->width);
+}
+
+TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
+  const PixelSizeEstimate estimate = {0.01, 0.008, 0.012};
+  const PixelSizeEvidence plain = {
+      .gaussians = 20'000, .spacing = 0.02, .small_axis = 0.01, .width = 0.004, .without_black = 0};
+  EXPECT_FALSE(Judge(estimate, plain).contradicted());
+  EXPECT_EQ(Judge(estimate, plain).size, 0.01);
+
+  PixelSizeEvidence crowded = plain;
+  crowded.spacing = 0.006;  // 2.8 on a pixel
+  EXPECT_TRUE(Judge(estimate, crowded).contradicted());
+  crowded.gaussians = 3000;  // a thin thing in few pixels keeps as many
+  crowded.spacing = 0.007;
+  EXPECT_FALSE(Judge(estimate, crowded).contradicted());
+  crowded.gaussians = 100'000;
+  crowded.spacing = 0.012;  // 0.7
+  EXPECT_TRUE(Judge(estimate, crowded).contradicted());
+
+  PixelSizeEvidence small = plain;
+  small.small_axis = 0.001;
+  EXPECT_TRUE(Judge(estimate, small).contradicted());
+
+  PixelSizeEvidence black = plain;
+  black.without_black = 0.005;
+  const PixelSizeFinding finding = Judge(estimate, black);
+  ASSERT_EQ(finding.contradictions.size(), 1u);
+  EXPECT_LT(finding.size, 0.004);
+  black.without_black = 0.02;  // the estimate is the smaller one: it cannot blur
+  EXPECT_FALSE(Judge(estimate, black).contradicted());
+
+  // Never larger than what was estimated.
+  small.width = 1;
+  EXPECT_EQ(Judge(estimate, small).size, 0.01);
+}
+
+TEST(PixelSizeGuard, FollowsTheScaleOfTheCloud) {
+  GaussianCloud cloud = Example("biplane");
+  const auto evidence = GatherPixelSizeEvidence(cloud);
+  for (float& x : cloud.means) x *= 1000;
+  for (float& x : cloud.log_scales) x += std::log(1000.0f);
+  const auto large = GatherPixelSizeEvidence(cloud);
+  ASSERT_TRUE(evidence.ok() && large.ok());
+  EXPECT_EQ(evidence->gaussians, large->gaussians);
+  EXPECT_NEAR(large->spacing / evidence->spacing, 1000, 1);
+  EXPECT_NEAR(large->width / evidence->width, 1000, 1);
+  EXPECT_NEAR(large->small_axis / evidence->small_axis, 1000, 1);
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -25,7 +25,7 @@ for object in biplane stone_lantern; do
   for factor in 0.5 0.65 0.8 0.9 1 1.1 1.25 1.5 2; do
     echo "  x $factor: $(mean "$object" --pixel-size "$(awk "BEGIN {print $true_pixel * $factor}")")"
   done
+  echo "$object, --cameras, --camera-rule smallest: $(mean "$object" --cameras "examples/$object/transforms_lr.json" --camera-rule smallest)"
   echo "$object, --cameras: $(mean "$object" --cameras "examples/$object/transforms_lr.json")"
-  echo "$object, --cameras, --camera-rule median: $(mean "$object" --cameras "examples/$object/transforms_lr.json" --camera-rule median)"
   echo "$object, --pixel-size auto: $(mean "$object")"
 done

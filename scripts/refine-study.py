@@ -137,7 +137,7 @@ def nerf(args, mesh):
     _, seconds = run(args.program, "fit", scene, "-o", splat, "-w", "-q", "--threads", "1", "--hold-out", "0", "--background",
                      "1,1,1", "--max-gaussians", "50000")
     report(f"{name}, fit of 200 x 200", args.program, splat, *truth, seconds, "--background", "1,1,1")
-    ways = {"filter": ("--method", "filter", "--cameras", scene / "transforms_train.json", "--camera-rule", "median"),
+    ways = {"filter": ("--method", "filter", "--cameras", scene / "transforms_train.json"),
             "refined without pictures": ("--method", "refine", "--cameras", scene / "transforms_train.json"),
             "refined with pictures": ("--method", "filter+refine", "--images", scene, "--hold-out", "0")}
     for way, options in ways.items():

@@ -243,6 +243,14 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
         ChoosePixelSizes(options, method->takes_start && !options.refine.images.empty(), input, report));
   }
 
+  if (report.pixel_size_source == kCautiousPixelSize && options.method == "auto" && method->name != "filter") {
+    LogInfo(Cat("the filter alone: '", method->name,
+                "' measures Gaussians in pixels, and goes wrong where the pixel is not known (--method ", method->name,
+                " takes it all the same)"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(method, FindMethod(options, "filter"));
+    report.method = method->name;
+  }
+
   if (report.pixel_size_source == kUnknownPixelSize) {
     report.filter_strength = 0;
     report.gaussians_out = input.cloud.size();

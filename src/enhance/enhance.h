@@ -19,8 +19,8 @@ namespace anchorsplat {
 
 // What every method is told. Spaces: the cloud in stored space, lengths in world units.
 struct EnhanceOptions {
-  // A registered name, or "auto": the best that is ready without further input. Or two, "A+B": B begins where A ended,
-  // if it can (EnhanceMethod::takes_start).
+  // A registered name, or "auto": the best that is ready (but see kCautiousPixelSize). Or two, "A+B": B begins where A
+  // ended, if it can (EnhanceMethod::takes_start).
   std::string method = "auto";
   // Instead of a method, for those who know none: "fast", an instant one; "good", that and gentle refinement; "best",
   // refinement with the pictures of refine.images, "good" where there are none. Empty: `method` says.
@@ -42,7 +42,7 @@ struct EnhanceOptions {
 
 // The splat says nothing about its pixels, so that no method can know what to do: it has been left as it is.
 inline constexpr const char* kUnknownPixelSize = "unknown";
-// The estimate is contradicted (enhance/pixel_size_guard.h); the smallest plausible pixel was taken instead.
+// The estimate is contradicted (pixel_size_guard.h); the smallest plausible pixel was taken, and by "auto" the filter.
 inline constexpr const char* kCautiousPixelSize = "cautious";
 
 // What was done, for people and for --json.

@@ -315,6 +315,52 @@ TEST_F(EnhanceDoor, EstimateRefusesWhatSaysNothing) {
   }
 }
 
+// Black veils around a ball, as fits of photographs on black keep them: no picture shows them, but alpha does.
+TEST_F(EnhanceDoor, ContradictedEstimateIsNotActedOn) {
+  constexpr uint64_t kOnlyHere = 4711;
+  RegisterEnhanceMethod(
+      {.name = "network",
+       .summary = "of this test",
+       .rank = 100,
+       .ready =
+           [](const EnhanceOptions& o) {
+             return o.seed == kOnlyHere ? Status() : Status(Error{ErrorCode::kBadArgument, "not here"});
+           },
+       .run = [](EnhanceInput input, const EnhanceOptions&, EnhanceReport&) -> Result<GaussianCloud> {
+         return std::move(input.cloud);
+       }});
+  GaussianCloud cloud = Ball(0.01, 3000), veils = Ball(0.01, 3000);
+  Random random(3);
+  for (size_t i = 0; i < size_t{3} * 3000; ++i) {
+    veils.means[i] *= static_cast<float>(random.Uniform(1.1, 1.8));
+    veils.log_scales[i] = std::log(0.08f);
+    veils.sh[i] = -2;
+  }
+  for (float& x : veils.opacity_logits) x = -0.5f;
+  ASSERT_TRUE(Append(cloud, veils).ok());
+  EnhanceOptions options;
+  options.seed = kOnlyHere;
+  const auto enhanced = Enhance(cloud, options);
+  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+  const EnhanceReport& report = enhanced->report;
+  EXPECT_EQ(report.pixel_size_source, kCautiousPixelSize);
+  ASSERT_TRUE(report.finding && report.finding->contradicted());
+  EXPECT_LT(report.pixel_size, report.finding->estimate.size);
+  EXPECT_EQ(report.method, "filter");
+  EXPECT_TRUE(log_->Says("smallest plausible pixel")) << log_->text();
+  EXPECT_TRUE(log_->Says("the filter alone")) << log_->text();
+
+  options.method = "network";
+  EXPECT_EQ(Enhance(cloud, options)->report.method, "network");
+  options.method = "auto";
+  options.pixel_size = 0.01;
+  const auto given = Enhance(cloud, options);
+  ASSERT_TRUE(given.ok());
+  EXPECT_EQ(given->report.method, "network");
+  EXPECT_EQ(given->report.pixel_size, 0.01);
+  EXPECT_FALSE(given->report.finding);
+}
+
 TEST_F(EnhanceDoor, RefusesNonsense) {
   EnhanceOptions options;
   options.pixel_size = 0.01;

@@ -27,11 +27,11 @@ constexpr float kConstantHarmonic = 0.28209479177387814f;
 constexpr int64_t kNeighbours = 8;
 constexpr int64_t kSamples = 256;  // of the spacing; its median is good to a few percent
 
-// Gaussians on a pixel of the surface. In fits of known pixels with 2,700 to 28,000 visible Gaussians there are 0.1 to
-// 1.2, most where thin things were seen in few pixels; many Gaussians come of many pixels, on which they stand
-// sparsely. An estimate that is k times too large says k² times as many.
-constexpr double kCrowded = 1.5, kCrowdedAt = 20'000;
-constexpr double kMostCrowded = 2.5, kNeverCrowded = 0.5;
+// Gaussians on a pixel of the surface × Gaussians. In fits of known pixels with 2,700 to 28,000 visible Gaussians there
+// are 0.1 to 1.3 on a pixel, most where thin things were seen in few; many Gaussians come of many pixels, on which they
+// stand sparsely. An estimate that is k times too large says k² times as many.
+constexpr double kCrowded = 40'000;
+constexpr double kMostCrowded = 2.5, kNeverCrowded = 0.35;
 // √(largest × middle axis) of the smallest tenth lies between 0.3 and 2.3 pixels in the 152 fits of the regression, and
 // at 0.2 in one of a chair whose slats are thinner than a pixel.
 constexpr double kSmallestAxis = 0.12;  // pixels; with a margin
@@ -116,8 +116,7 @@ std::string Number(double value) { return Fixed(value, value < 10 ? 1 : 0); }
 }  // namespace
 
 double MostGaussiansPerPixel(int64_t gaussians) {
-  const double crowded = kCrowded * std::sqrt(kCrowdedAt / static_cast<double>(std::max<int64_t>(1, gaussians)));
-  return std::clamp(crowded, kNeverCrowded, kMostCrowded);
+  return std::clamp(kCrowded / static_cast<double>(std::max<int64_t>(1, gaussians)), kNeverCrowded, kMostCrowded);
 }
 
 Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud) {

@@ -3,10 +3,17 @@ add_library(anchorsplat_flags INTERFACE)
 target_include_directories(anchorsplat_flags INTERFACE "${CMAKE_SOURCE_DIR}/src")
 target_compile_definitions(anchorsplat_flags INTERFACE ANCHORSPLAT_VERSION="${PROJECT_VERSION}")
 target_compile_options(anchorsplat_flags INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+  -Wall -Wextra -Wpedantic -Wnon-virtual-dtor
   # a*b+c must round twice unless a kernel asks for FMA by name: row counts of the network's input depend on it, and
   # results must not change with the compiler's mood.
   -ffp-contract=off)
+# Every file that stands behind another one shadows what is global there: where rooms are compiled as one, only what is
+# local counts. Presets that compile file by file have the whole warnings.
+if(NOT ANCHORSPLAT_UNITY)
+  target_compile_options(anchorsplat_flags INTERFACE -Wshadow)
+elseif(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_compile_options(anchorsplat_flags INTERFACE -Wshadow=local -Wno-subobject-linkage)
+endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   # g++ 12 sees overlapping copies in std::string's operator+ that are not there (GCC bug 105651).
   target_compile_options(anchorsplat_flags INTERFACE -Wno-restrict)

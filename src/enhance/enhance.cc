@@ -208,7 +208,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
                  Cat("--filter-strength ", *options.filter_strength, " is not between 0 and ", kMaxFilterStrength)};
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const MethodPlan plan, PlanEnhancement(options));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(MethodPlan plan, PlanEnhancement(options));
   const EnhanceMethod* method = plan.method;
 
   EnhanceReport report;
@@ -243,12 +243,19 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
         ChoosePixelSizes(options, method->takes_start && !options.refine.images.empty(), input, report));
   }
 
-  if (report.pixel_size_source == kCautiousPixelSize && options.method == "auto" && method->name != "filter") {
-    LogInfo(Cat("the filter alone: '", method->name,
-                "' measures Gaussians in pixels, and goes wrong where the pixel is not known (--method ", method->name,
+  const bool begins_with_network = plan.start != nullptr && plan.start->adds_detail;
+  if (report.pixel_size_source == kCautiousPixelSize && !plan.chosen_by.empty() &&
+      (method->adds_detail || begins_with_network)) {
+    const std::string network = begins_with_network ? plan.start->name : method->name;
+    LogInfo(Cat("the filter instead of '", network,
+                "', which measures Gaussians in pixels and goes wrong where the pixel is not known (--method ", network,
                 " takes it all the same)"));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(method, FindMethod(options, "filter"));
-    report.method = method->name;
+    if (method->adds_detail) {
+      method = &*std::ranges::find(EnhanceMethods(), std::string("filter"), &EnhanceMethod::name);
+      plan.method = method;
+    }
+    if (begins_with_network) plan.start = nullptr;
+    report.method = plan.Name();
   }
 
   if (report.pixel_size_source == kUnknownPixelSize) {

@@ -17,15 +17,15 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr float kVisibleOpacity = 0.1f;
+constexpr float kGuardVisibleOpacity = 0.1f;
 constexpr float kBlack = 0.04f;     // brightest channel of the constant colour; ten steps of 255
 constexpr double kFewBlack = 0.01;  // share of the Gaussians below which black ones cannot move an outline
-constexpr double kFarthest = 1.5;   // of the radius that frames the cloud, as the estimate looks
-constexpr size_t kMostGaussians = 200'000;
+constexpr double kGuardFarthest = 1.5;   // of the radius that frames the cloud, as the estimate looks
+constexpr size_t kGuardMostGaussians = 200'000;
 constexpr float kConstantHarmonic = 0.28209479177387814f;
 
 constexpr int64_t kNeighbours = 8;
-constexpr int64_t kSamples = 256;  // of the spacing; its median is good to a few percent
+constexpr int64_t kGuardSamples = 256;  // of the spacing; its median is good to a few percent
 
 // Gaussians on a pixel of the surface × Gaussians. In fits of known pixels with 2,700 to 28,000 visible Gaussians there
 // are 0.1 to 1.3 on a pixel, most where thin things were seen in few; many Gaussians come of many pixels, on which they
@@ -69,14 +69,14 @@ Showing ShowingGaussians(const GaussianCloud& cloud) {
     if (!black) showing.not_black.push_back(i);
     const float opacity = 1 / (1 + std::exp(-cloud.opacity_logits[static_cast<size_t>(i)]));
     const double distance = SquaredDistance(cloud.means.data() + 3 * i, middle.data());
-    if (opacity < kVisibleOpacity || std::sqrt(distance) > kFarthest * framing.radius) continue;
+    if (opacity < kGuardVisibleOpacity || std::sqrt(distance) > kGuardFarthest * framing.radius) continue;
     all.emplace_back(distance, i);
     if (!black) bright.emplace_back(distance, i);
   }
   auto& chosen = static_cast<int64_t>(bright.size()) >= kLeastGaussians ? bright : all;
-  if (chosen.size() > kMostGaussians) {
-    std::nth_element(chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(kMostGaussians), chosen.end());
-    chosen.resize(kMostGaussians);
+  if (chosen.size() > kGuardMostGaussians) {
+    std::nth_element(chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(kGuardMostGaussians), chosen.end());
+    chosen.resize(kGuardMostGaussians);
   }
   for (const auto& item : chosen) showing.rows.push_back(item.second);
   std::sort(showing.rows.begin(), showing.rows.end());
@@ -91,7 +91,7 @@ double Spacing(const GaussianCloud& cloud, const std::vector<int64_t>& rows) {
   for (int64_t k = 0; k < count; ++k) {
     std::copy_n(cloud.means.data() + 3 * rows[static_cast<size_t>(k)], 3, positions.data() + 3 * k);
   }
-  const int64_t samples = std::min(kSamples, count);
+  const int64_t samples = std::min(kGuardSamples, count);
   Buffer<float> farthest(static_cast<size_t>(samples));
   ParallelFor(0, samples, 8, [&](int64_t first, int64_t last) {
     for (int64_t s = first; s < last; ++s) {

@@ -10,7 +10,7 @@
 namespace anchorsplat {
 
 namespace {
-constexpr int64_t kViews = 16;
+constexpr int64_t kDensityViews = 16;
 constexpr float kShown = 0.5f;       // alpha
 constexpr double kMostPerPixel = 2;  // Gaussians, half of them unseen
 }  // namespace
@@ -18,7 +18,7 @@ constexpr double kMostPerPixel = 2;  // Gaussians, half of them unseen
 Result<ViewDensity> MeasureDensity(const GaussianCloud& cloud, const RenderOptions& render,
                                    const std::vector<Camera>& cameras) {
   ViewDensity density;
-  const std::vector<Camera> views = Thinned(cameras, kViews);
+  const std::vector<Camera> views = Thinned(cameras, kDensityViews);
   Rasterizer rasterizer;
   RenderOutput output;
   for (const Camera& view : views) {

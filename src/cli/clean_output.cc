@@ -12,7 +12,7 @@ namespace {
 constexpr size_t kWhole = std::numeric_limits<size_t>::max();
 }  // namespace
 
-std::string Shown(const std::filesystem::path& name) { return Printable(name.string(), kWhole); }
+std::string OneLine(const std::filesystem::path& name) { return Printable(name.string(), kWhole); }
 
 CleanOutput::CleanOutput(std::ostream& stream) : stream_(stream), target_(stream.rdbuf(this)) {}
 

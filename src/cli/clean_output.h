@@ -9,11 +9,11 @@ namespace anchorsplat {
 
 // A name as it is shown within a line: bytes that are no UTF-8 or could command a terminal, line ends among them, are
 // escaped.
-std::string Shown(const std::filesystem::path& name);
+std::string OneLine(const std::filesystem::path& name);
 
 // While it lives, what is written to `stream` arrives line by line as Printable() shows it: results name files, folders
 // and views, and quote what is in them, and none of that may command a terminal. Messages on stderr go through the same
-// (core/log.cc). Only line ends pass; those in names are Shown()'s business.
+// (core/log.cc). Only line ends pass; those in names are OneLine()'s business.
 class CleanOutput : private std::streambuf {
  public:
   explicit CleanOutput(std::ostream& stream);

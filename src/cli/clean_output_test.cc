@@ -63,7 +63,7 @@ TEST(CleanOutput, JsonStaysWhatItSays) {
   EXPECT_EQ(stream.str(), text);
 }
 
-TEST(Shown, IsOneLine) { EXPECT_EQ(Shown("a\nb\x1b.ply"), "a\\x0ab\\x1b.ply"); }
+TEST(OneLine, EscapesLineEndsToo) { EXPECT_EQ(OneLine("a\nb\x1b.ply"), "a\\x0ab\\x1b.ply"); }
 
 }  // namespace
 }  // namespace anchorsplat

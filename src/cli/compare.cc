@@ -111,7 +111,7 @@ void PrintTable(const CompareFlags& flags, const std::vector<Comparison>& result
   }
   if (results.size() == 2) {
     rows[0].push_back("gain dB");
-    std::cout << "A  " << Shown(flags.a) << "\nB  " << Shown(flags.b) << "\nboth against  " << Shown(flags.truth)
+    std::cout << "A  " << OneLine(flags.a) << "\nB  " << OneLine(flags.b) << "\nboth against  " << OneLine(flags.truth)
               << "\n\n";
   }
   const auto add = [&](const std::string& name, const auto& score_of) {

@@ -142,8 +142,8 @@ nlohmann::json ToJson(const Job& job, const ConvertReport& r, const std::optiona
 }
 
 void Print(const Job& job, const ConvertReport& r, const std::optional<ConversionLoss>& loss) {
-  std::cout << Shown(job.input) << " (" << r.input_format << ", " << HumanBytes(r.input_bytes) << ") -> "
-            << Shown(job.output) << " (" << r.output_format << ", " << HumanBytes(r.output_bytes);
+  std::cout << OneLine(job.input) << " (" << r.input_format << ", " << HumanBytes(r.input_bytes) << ") -> "
+            << OneLine(job.output) << " (" << r.output_format << ", " << HumanBytes(r.output_bytes);
   if (r.predicted_bytes) {
     std::cout << ", predicted " << (r.predicted_roughly ? "about " : "") << HumanBytes(*r.predicted_bytes);
   }
@@ -170,7 +170,7 @@ Status ConvertModel(const ConvertFlags& flags, const SharedFlags& shared) {
     PrintJson(
         nlohmann::json::array({{{"input", from.string()}, {"output", to.string()}, {"bytes", {{"out", bytes}}}}}));
   } else if (!shared.quiet) {
-    std::cout << Shown(from) << " -> " << Shown(to) << " (" << HumanBytes(bytes) << ")\n";
+    std::cout << OneLine(from) << " -> " << OneLine(to) << " (" << HumanBytes(bytes) << ")\n";
   }
   return {};
 }

@@ -46,7 +46,7 @@ Status RunSplit(const SplitFlags& flags, const SharedFlags& shared) {
   if (shared.json) {
     PrintJson({{"dataset", flags.dataset}, {"objects", manifest.size()}, {"splits", counts}});
   } else if (!shared.quiet) {
-    std::cout << Shown(path) << ": " << Objects(std::ssize(manifest));
+    std::cout << OneLine(path) << ": " << Objects(std::ssize(manifest));
     for (const auto& [split, count] : counts) std::cout << ", " << count << " for " << split;
     std::cout << '\n';
   }
@@ -84,17 +84,17 @@ Status RunCheck(const CheckFlags& flags, const SharedFlags& shared) {
     for (const DatasetProblem& p : problems) list.push_back({{"object", p.object}, {"problem", p.sentence}});
     PrintJson({{"dataset", flags.dataset}, {"problems", list}, {"failed", failed.size()}});
   } else {
-    for (const DatasetProblem& p : problems) std::cout << Shown(p.sentence) << '\n';
+    for (const DatasetProblem& p : problems) std::cout << OneLine(p.sentence) << '\n';
     if (!failed.empty() && !shared.quiet) {
       std::cout << Objects(std::ssize(failed)) << " failed and " << (failed.size() == 1 ? "is" : "are")
-                << " no part of it: " << Shown(std::filesystem::path(flags.dataset) / kFailuresName) << '\n';
+                << " no part of it: " << OneLine(std::filesystem::path(flags.dataset) / kFailuresName) << '\n';
     }
   }
   if (!problems.empty()) {
     return Error{ErrorCode::kBadFile,
                  Cat(flags.dataset, ": ", problems.size(), problems.size() == 1 ? " problem" : " problems")};
   }
-  if (!shared.json && !shared.quiet) std::cout << Shown(flags.dataset) << ": everything is there and fits together\n";
+  if (!shared.json && !shared.quiet) std::cout << OneLine(flags.dataset) << ": everything is there and fits together\n";
   return {};
 }
 
@@ -137,9 +137,9 @@ Status RunInfo(const std::string& dataset, const SharedFlags& shared) {
     PrintJson(ToJson(dataset, s));
     return {};
   }
-  std::cout << Shown(dataset) << ": " << Objects(s.objects) << ", " << HumanBytes(s.bytes) << '\n'
+  std::cout << OneLine(dataset) << ": " << Objects(s.objects) << ", " << HumanBytes(s.bytes) << '\n'
             << "left out: " << s.rejected << " rejected for their training PSNR, " << s.failed << " failed";
-  for (const auto& [stage, count] : s.failures) std::cout << " (" << Shown(stage) << ' ' << count << ')';
+  for (const auto& [stage, count] : s.failures) std::cout << " (" << OneLine(stage) << ' ' << count << ')';
   std::cout << ", " << s.unfinished << " unfinished\n";
   std::vector<std::vector<std::string>> rows = {{"recipe", "objects", "training PSNR", "held-out PSNR", "Gaussians"}};
   const auto add = [&](const std::string& name, const DatasetSummary::Part& part) {
@@ -149,9 +149,9 @@ Status RunInfo(const std::string& dataset, const SharedFlags& shared) {
   for (const auto& [name, part] : s.recipes) add(name, part);
   if (s.recipes.size() > 1) add("all", s.all);
   std::cout << FormatTable(rows);
-  for (const auto& [split, count] : s.splits) std::cout << Shown(split) << ": " << Objects(count) << '\n';
+  for (const auto& [split, count] : s.splits) std::cout << OneLine(split) << ": " << Objects(count) << '\n';
   std::cout << "licences:";
-  for (const auto& [licence, count] : s.licences) std::cout << ' ' << Shown(licence) << " (" << count << ')';
+  for (const auto& [licence, count] : s.licences) std::cout << ' ' << OneLine(licence) << " (" << count << ')';
   std::cout << "\ntime: meshes " << HumanSeconds(s.read_seconds) << ", views " << HumanSeconds(s.view_seconds)
             << ", fits " << HumanSeconds(s.fit_seconds) << '\n';
   return {};

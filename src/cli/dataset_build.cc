@@ -83,14 +83,14 @@ Status RunBuild(const BuildFlags& flags, Program& program) {
                {"interrupted", r.interrupted},
                {"seconds", r.seconds}});
   } else if (!shared.quiet) {
-    std::cout << Shown(flags.output) << ": " << r.objects << (r.objects == 1 ? " object: " : " objects: ") << r.built
+    std::cout << OneLine(flags.output) << ": " << r.objects << (r.objects == 1 ? " object: " : " objects: ") << r.built
               << " built in " << HumanSeconds(r.seconds) << ", " << r.there_already << " there already, " << r.failed
               << " failed, " << r.rejected << " rejected for their training PSNR\n";
     if (r.other_settings > 0) {
       std::cout << r.other_settings << " of those there " << (r.other_settings == 1 ? "was" : "were")
                 << " made with other settings; -w makes them again\n";
     }
-    if (r.failed > 0) std::cout << "why: " << Shown(flags.output) << "/failures.jsonl; --retry tries them again\n";
+    if (r.failed > 0) std::cout << "why: " << OneLine(flags.output) << "/failures.jsonl; --retry tries them again\n";
   }
   if (r.interrupted) {
     return Error{ErrorCode::kInterrupted, Cat(flags.output, ": stopped; the same command goes on from here")};

@@ -252,12 +252,12 @@ Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& 
   nlohmann::json json = ToJson(input, output, r);
   if (flags.view) json["view"] = PagePath(output).string();
   if (!shared.json && !shared.quiet) {
-    std::cout << Shown(input) << " -> " << Shown(output) << "\n  " << WithThousands(r.gaussians_in) << " Gaussians in, "
-              << WithThousands(r.gaussians_out) << " out; " << r.method << Details(r) << ", " << HumanSeconds(r.seconds)
-              << '\n';
+    std::cout << OneLine(input) << " -> " << OneLine(output) << "\n  " << WithThousands(r.gaussians_in)
+              << " Gaussians in, " << WithThousands(r.gaussians_out) << " out; " << r.method << Details(r) << ", "
+              << HumanSeconds(r.seconds) << '\n';
     if (flags.view) {
       std::error_code unknown;
-      std::cout << "  " << Shown(PagePath(output)) << ": " << HumanBytes(fs::file_size(PagePath(output), unknown))
+      std::cout << "  " << OneLine(PagePath(output)) << ": " << HumanBytes(fs::file_size(PagePath(output), unknown))
                 << ", open it in any browser\n";
     }
   }

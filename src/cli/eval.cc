@@ -97,7 +97,7 @@ Status RunEval(const EvalFlags& flags, Program& program) {
   } else {
     std::cout << ToMarkdown(evaluation, summaries, title) << chosen;
     if (!shared.quiet) {
-      std::cout << "\nWritten: " << Shown(fs::path(flags.out) / "table.md")
+      std::cout << "\nWritten: " << OneLine(fs::path(flags.out) / "table.md")
                 << ", table.csv, results.json, contact_sheet.png\n";
     }
   }

@@ -113,7 +113,7 @@ nlohmann::json ToJson(const FitFlags& flags, const std::string& origin, const Fi
 }
 
 void PrintReport(const FitFlags& flags, const FitReport& r) {
-  std::cout << Shown(flags.output) << ": " << WithThousands(r.gaussians_out) << " Gaussians after "
+  std::cout << OneLine(flags.output) << ": " << WithThousands(r.gaussians_out) << " Gaussians after "
             << WithThousands(r.steps) << " steps in " << HumanSeconds(r.seconds)
             << "\n  training views: " << r.train.views << ", " << Fixed(r.train.psnr, 2) << " dB, SSIM "
             << Fixed(r.train.ssim, 4) << "\n";

@@ -76,7 +76,7 @@ std::string Number(double value) {
 
 void PrintTable(const Findings& f) {
   const CloudStatistics& s = f.statistics;
-  std::cout << Shown(f.file) << "\n"
+  std::cout << OneLine(f.file) << "\n"
             << "  Gaussians    " << WithThousands(s.gaussians) << ", SH degree " << s.sh_degree << "\n"
             << "  file         " << HumanBytes(f.file_bytes) << (f.format.empty() ? "" : ", " + f.format) << "\n"
             << "  render mode  " << ModeName(f.cloud) << "\n";
@@ -235,7 +235,7 @@ Status RunModelInfo(const std::string& path, const SharedFlags& shared) {
                {"metadata", found.facts}});
     return {};
   }
-  std::cout << Shown(path) << "\n  parameters   " << WithThousands(parameters) << " in " << found.tensors
+  std::cout << OneLine(path) << "\n  parameters   " << WithThousands(parameters) << " in " << found.tensors
             << " tensors\n";
   for (const auto& [key, value] : found.facts)
     std::cout << "  " << Printable(key) << "  " << Printable(value, 2000) << "\n";

@@ -43,14 +43,14 @@ struct MeshFindings {
 
 MeshFindings Find(const std::string& address, ImportedMesh imported) {
   MeshFindings f{address,
-             std::move(imported.origin),
-             std::move(imported.warnings),
-             imported.degenerate,
-             imported.lines_and_points,
-             imported.has_normals,
-             !imported.mesh.colors.empty(),
-             {},
-             {}};
+                 std::move(imported.origin),
+                 std::move(imported.warnings),
+                 imported.degenerate,
+                 imported.lines_and_points,
+                 imported.has_normals,
+                 !imported.mesh.colors.empty(),
+                 {},
+                 {}};
   for (const Texture& texture : imported.mesh.textures) {
     f.pictures.push_back({texture.name, texture.width, texture.height, texture.has_alpha,
                           static_cast<uint32_t>(crc32_z(0, texture.rgba.data(), texture.rgba.size()))});
@@ -100,7 +100,7 @@ void PrintMeshTable(const MeshFindings& f) {
   const auto line = [](const char* name, const std::string& value) {
     if (!value.empty()) std::cout << "  " << name << "  " << value << "\n";
   };
-  std::cout << Shown(f.address) << "\n";
+  std::cout << OneLine(f.address) << "\n";
   line("object    ", Printable(f.origin.name, 200));
   line("category  ", Printable(f.origin.category, 200));
   line("creator   ", Printable(f.origin.creator, 200));
@@ -114,7 +114,7 @@ void PrintMeshTable(const MeshFindings& f) {
   }
   line("size      ", Cat(s.high[0] - s.low[0], " x ", s.high[1] - s.low[1], " x ", s.high[2] - s.low[2]));
   std::cout << "\n" << (f.warnings.empty() ? "no problems found" : "found:") << "\n";
-  for (const std::string& warning : f.warnings) std::cout << "  - " << Shown(warning) << "\n";
+  for (const std::string& warning : f.warnings) std::cout << "  - " << OneLine(warning) << "\n";
 }
 
 Status RunLibraryInfo(const std::string& path, const SharedFlags& shared) {
@@ -163,7 +163,7 @@ Status RunLibraryInfo(const std::string& path, const SharedFlags& shared) {
     }
     rows.push_back(std::move(row));
   }
-  std::cout << Shown(path) << ": " << Printable(catalog.name(), 200) << ", " << entries.size() << " objects\n\n"
+  std::cout << OneLine(path) << ": " << Printable(catalog.name(), 200) << ", " << entries.size() << " objects\n\n"
             << FormatTable(rows);
   for (const auto& result : all) {
     if (!result.ok()) LogWarning(result.error().message);

@@ -61,7 +61,7 @@ Status RunViews(const ViewsFlags& flags, const SharedFlags& shared) {
     const double seconds = cost.low.ray_seconds + cost.high.ray_seconds;
     std::cout << options.rig.views << (options.rig.views == 1 ? " view of " : " views of ")
               << WithThousands(std::ssize(mesh.triangles)) << " triangles at " << options.low_size << " and "
-              << options.high_size << " pixels in " << HumanSeconds(cost.seconds) << " to " << Shown(flags.output)
+              << options.high_size << " pixels in " << HumanSeconds(cost.seconds) << " to " << OneLine(flags.output)
               << '\n'
               << "processor time: rays " << HumanSeconds(seconds) << " (" << Fixed(rays / 1e6, 0) << " million, "
               << Fixed(seconds > 0 ? rays / seconds / 1e6 : 0, 0) << " million a second and thread), shading "

@@ -113,7 +113,7 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
   } else if (!shared.quiet) {
     std::cout << "rendered " << paths.size() << (paths.size() == 1 ? " view of " : " views of ")
               << WithThousands(cloud.size()) << " Gaussians in " << HumanSeconds(seconds) << " (without reading and "
-              << "writing) to " << Shown(flags.output) << '\n';
+              << "writing) to " << OneLine(flags.output) << '\n';
   }
   return {};
 }

@@ -16,7 +16,7 @@ size_t Width(const std::string& text) {
 
 std::string FormatTable(std::vector<std::vector<std::string>> rows) {
   for (auto& row : rows) {
-    for (std::string& cell : row) cell = Shown(cell);  // names of files and views may hold anything
+    for (std::string& cell : row) cell = OneLine(cell);  // names of files and views may hold anything
   }
   std::vector<size_t> widths;
   for (const auto& row : rows) {

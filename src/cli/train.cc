@@ -64,7 +64,7 @@ nlohmann::json ToJson(const TrainReport& r) {
 }
 
 void PrintReport(const TrainReport& r) {
-  std::cout << Shown(r.file) << ": " << WithThousands(r.parameters) << " parameters after " << WithThousands(r.steps)
+  std::cout << OneLine(r.file) << ": " << WithThousands(r.parameters) << " parameters after " << WithThousands(r.steps)
             << " steps on " << r.objects << " objects, " << HumanSeconds(r.seconds) << "\n";
   if (!r.model) return;
   std::vector<std::vector<std::string>> rows = {{"validation", "PSNR", "SSIM", "LPIPS"}};

@@ -158,7 +158,7 @@ Status RunView(const PageFlags& flags, const SharedFlags& shared) {
                {"views", page.views.size()},
                {"pixel_size", page.pixel_size ? nlohmann::json(*page.pixel_size) : nlohmann::json()}});
   } else if (!shared.quiet) {
-    std::cout << Shown(flags.output) << ": " << HumanBytes(bytes) << ", open it in any browser\n";
+    std::cout << OneLine(flags.output) << ": " << HumanBytes(bytes) << ", open it in any browser\n";
   }
   return {};
 }

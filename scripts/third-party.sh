@@ -19,8 +19,7 @@ command -v dpkg-query >/dev/null || give_up "this is not a Debian system" "${2:-
 
 # Tools and tests leave nothing in the program.
 left_out='^(g\+\+|cmake|ninja-build|pkg-config|libgtest-dev|libgmock-dev|libbenchmark-dev|python3.*|libgloo-dev|dpkg-dev|file)$'
-wanted=$(sed -n '/^packages=(/,/)/p' "$here/install-dependencies.sh" | sed 's/^packages=(//; s/)//' | tr -s ' \n' '\n\n' |
-  grep -vE "$left_out|^$")
+wanted=$("$here/install-dependencies.sh" --list | grep -vE "$left_out")
 # A library may be known by its path of before /usr was merged. Some come from elsewhere than a package.
 for library in $(ldd "$program" | sed -n 's/.* => \(\/[^ ]*\) .*/\1/p'); do
   for path in "$library" "$(readlink -f "$library")" "${library#/usr}" "/usr$library"; do

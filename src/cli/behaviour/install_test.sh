@@ -40,7 +40,7 @@ expect 0 "version in the manual page" grep -qF "anchorsplat $version" "$prefix/s
 expect 0 "version in the changes" grep -q "^## $version\b" "$prefix/share/doc/anchorsplat/CHANGELOG.md"
 
 # It works.
-expect 0 "enhance" elsewhere "$installed" enhance "$input" -o "$work/enhanced.ply" --json
+expect 0 "enhance" elsewhere "$installed" enhance "$input" -o "$work/enhanced.ply" --method model --json
 says stdout '"method": "model"'
 expect 0 "a page" elsewhere "$installed" view "$work/enhanced.ply" -o "$work/page.html"
 

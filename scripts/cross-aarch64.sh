@@ -4,7 +4,7 @@
 #
 #   scripts/cross-aarch64.sh [options of bare-debian.sh] [-- ROOM...]     core formats render enhance unless named
 #
-# Needs root and debootstrap. Half an hour on four cores; not a part of CI.
+# Needs root and debootstrap. Not a part of CI.
 set -euo pipefail
 
 if [ "${1:-}" != --inside ]; then
@@ -31,7 +31,7 @@ done
 apt-get install -y -qq --no-install-recommends "${packages[@]}"
 
 cmake -S . -B build/aarch64 -G Ninja -DCMAKE_TOOLCHAIN_FILE="$PWD/cmake/aarch64-linux-gnu.cmake" -DCMAKE_BUILD_TYPE=Release \
-  -DANCHORSPLAT_TORCH=OFF -DANCHORSPLAT_TESTS=ON
+  -DANCHORSPLAT_TORCH=OFF -DANCHORSPLAT_TESTS=ON -DANCHORSPLAT_UNITY=ON
 cmake --build build/aarch64 -j "${JOBS:-$(nproc)}" --target "${rooms[@]/%/_test}"
 failed=()
 for processor in cortex-a72 max; do

@@ -1,7 +1,6 @@
 #include "cli/before_after_page.h"
 
 #include <map>
-#include <vector>
 
 #include "core/text.h"
 #include "formats/opened_splat.h"
@@ -23,24 +22,14 @@ constexpr const char* kSmaller =
 
 fs::path PagePath(const fs::path& output) { return fs::path(output).replace_extension(".html"); }
 
-Status CheckPages(std::span<const fs::path> inputs, std::span<const fs::path> outputs,
-                  const std::function<bool(const fs::path&)>& may_replace) {
-  std::vector<fs::path> pages;
+Status CheckPages(std::span<const fs::path> outputs) {
   std::map<fs::path, fs::path> taken;
   for (const fs::path& output : outputs) {
-    pages.push_back(PagePath(output));
-    const auto [other, fresh] = taken.emplace(pages.back(), output);
+    const auto [other, fresh] = taken.emplace(PagePath(output), output);
     if (!fresh) {
       return Error{ErrorCode::kBadArgument,
                    Cat("--view: the pages of ", other->second.string(), " and ", output.string(), " would both be ",
-                       pages.back().string(), ": enhance them one after the other into different folders")};
-    }
-  }
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay(inputs, pages));
-  for (size_t k = 0; k < pages.size(); ++k) {
-    std::error_code unknown;
-    if (fs::exists(pages[k], unknown) && !may_replace(outputs[k])) {
-      return Error{ErrorCode::kExists, Cat(pages[k].string(), " exists; -w replaces it")};
+                       PagePath(output).string(), ": enhance them one after the other into different folders")};
     }
   }
   return {};

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <span>
 
 #include "core/gaussian_cloud.h"
@@ -14,10 +13,8 @@ namespace anchorsplat {
 // The page that `enhance --view` writes beside its output: scan-4x.ply and scan-4x.html.
 std::filesystem::path PagePath(const std::filesystem::path& output);
 
-// What can be known to fail before anything is read. Errors: kBadArgument where two outputs would have one page, or a
-// page would replace an input; kExists where there is one that `may_replace` does not allow for its output.
-Status CheckPages(std::span<const std::filesystem::path> inputs, std::span<const std::filesystem::path> outputs,
-                  const std::function<bool(const std::filesystem::path&)>& may_replace);
+// Errors: kBadArgument where two outputs would have one page.
+Status CheckPages(std::span<const std::filesystem::path> outputs);
 
 // That a page of `before` and of what will come of it is not far beyond what a browser opens (kBadArgument): estimated,
 // before the work begins.

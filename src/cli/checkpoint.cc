@@ -1,11 +1,14 @@
 #include "cli/checkpoint.h"
 
+#include <algorithm>
+#include <string>
 #include <system_error>
+#include <vector>
 
 #include "core/text.h"
 #include "fit/fitter.h"
 #include "formats/atomic_file.h"
-#include "formats/opened_splat.h"
+#include "formats/input_record.h"
 
 namespace anchorsplat {
 
@@ -14,15 +17,16 @@ namespace fs = std::filesystem;
 namespace {
 
 bool SamePlace(const fs::path& a, const fs::path& b) {
-  return fs::absolute(a).lexically_normal() == fs::absolute(b).lexically_normal();
+  std::error_code code;
+  return AbsoluteName(a) == AbsoluteName(b) || fs::equivalent(a, b, code);
 }
 
 }  // namespace
 
-Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> others, bool resume, bool overwrite) {
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay(others, {&checkpoint, 1}));
-  for (const fs::path& other : others) {
-    if (!other.empty() && SamePlace(other, checkpoint)) {
+Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> outputs, bool resume, bool overwrite) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(checkpoint));
+  for (const fs::path& output : outputs) {
+    if (!output.empty() && SamePlace(output, checkpoint)) {
       return Error{ErrorCode::kBadArgument, Cat("--checkpoint ", checkpoint.string(), ": is the output itself")};
     }
   }
@@ -38,6 +42,13 @@ Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> oth
   return Error{ErrorCode::kExists, Cat(checkpoint.string(),
                                        " is left from a run that was interrupted: --resume goes on from it, -w begins "
                                        "anew")};
+}
+
+void RecordWhatWasLeft(const fs::path& checkpoint, std::span<const fs::path> outputs) {
+  const std::vector<std::string> left = FilesLeftWith(checkpoint);
+  for (const fs::path& output : outputs) {
+    if (std::find(left.begin(), left.end(), AbsoluteName(output)) != left.end()) RecordOwnFile(output);
+  }
 }
 
 }  // namespace anchorsplat

@@ -7,10 +7,14 @@
 
 namespace anchorsplat {
 
-// Before anything is read: may this file hold the state of a run that can be resumed? `others` are what the command
-// reads and writes. Errors: kBadArgument: it is one of these; kExists: it is there already, and is no checkpoint, or
-// one that neither --resume nor -w speaks of; those of CheckWritable.
-Status CheckCheckpoint(const std::filesystem::path& checkpoint, std::span<const std::filesystem::path> others,
+// Before any work: may this file hold the state of a run that can be resumed? Errors: kBadArgument: it is an input, or
+// one of the command's `outputs`; kExists: it is there already, and is no checkpoint, or one that neither --resume nor
+// -w speaks of; those of CheckWritable.
+Status CheckCheckpoint(const std::filesystem::path& checkpoint, std::span<const std::filesystem::path> outputs,
                        bool resume, bool overwrite);
+
+// Before a run goes on from this checkpoint: what its interruption left under these names is the command's own, to be
+// replaced without -w. What has the name of another output is not.
+void RecordWhatWasLeft(const std::filesystem::path& checkpoint, std::span<const std::filesystem::path> outputs);
 
 }  // namespace anchorsplat

@@ -18,7 +18,9 @@
 #include "core/text.h"
 #include "eval/comparison.h"
 #include "eval/view_source.h"
+#include "formats/atomic_file.h"
 #include "formats/image_io.h"
+#include "formats/input_record.h"
 #include "metrics/side_by_side.h"
 
 namespace anchorsplat {
@@ -182,11 +184,10 @@ Status RunCompare(const CompareFlags& flags, const SharedFlags& shared) {
       return Error{ErrorCode::kBadArgument,
                    Cat("--side-by-side ", flags.side_by_side, ": pictures are written as .png")};
     }
-    if (!shared.overwrite && fs::exists(flags.side_by_side)) {
-      return Error{ErrorCode::kExists, Cat(flags.side_by_side, " exists; -w replaces it")};
-    }
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(flags.side_by_side, shared.overwrite));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(Sides sides, OpenSides(flags));
+  if (!flags.side_by_side.empty()) ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(flags.side_by_side));
   std::vector<ViewSource*> sources = {sides.a.get()};
   if (sides.truth) sources.push_back(sides.b.get());
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Lpips> lpips, OpenLpipsOrWarn(flags.lpips, flags.lpips_weights));

@@ -11,8 +11,12 @@
 #include "cli/clean_output.h"
 #include "cli/parse.h"
 #include "cli/verb.h"
+#include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
+#include "formats/atomic_file.h"
+#include "formats/cloud_output.h"
+#include "formats/input_record.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "metrics/conversion_loss.h"
@@ -40,8 +44,7 @@ struct ConvertFlags {
 std::string Stem(const fs::path& input) {
   const fs::path found = SplatPath(input);
   if (found.filename() == "meta.json" && found.has_parent_path()) {
-    std::error_code ignored;
-    const std::string folder = fs::weakly_canonical(found.parent_path(), ignored).filename().string();
+    const std::string folder = RealPath(found.parent_path()).filename().string();
     return folder.empty() ? "meta" : folder;
   }
   const std::string name = input.filename().string();
@@ -73,7 +76,6 @@ Result<std::vector<Job>> Jobs(const ConvertFlags& flags, bool overwrite) {
       return Error{ErrorCode::kBadArgument, "say IN OUT, or several inputs with --out-dir DIR"};
     }
     jobs.push_back({flags.paths[0], flags.paths[1]});
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay({&jobs[0].input, 1}, {&jobs[0].output, 1}));
     return jobs;
   }
   // Folders of pictures get one folder each; ".spz" may be said without its dot. A slash would lead out of --out-dir.
@@ -90,7 +92,8 @@ Result<std::vector<Job>> Jobs(const ConvertFlags& flags, bool overwrite) {
     inputs.emplace_back(input);
     outputs.push_back(fs::path(flags.out_dir) / (Stem(input) + extension));
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay(inputs, outputs));
+  // Those that are read later are inputs already when the first output is written.
+  for (const fs::path& input : inputs) RecordSplat(input);
   std::map<fs::path, std::string> taken;
   for (size_t k = 0; k < inputs.size(); ++k) {
     const std::string& input = flags.paths[k];
@@ -101,7 +104,8 @@ Result<std::vector<Job>> Jobs(const ConvertFlags& flags, bool overwrite) {
                    Cat(other->second, " and ", input, " would both become ", output.string(), ": rename one")};
     }
     // Checked for all before the first is read: a batch should not fail half-way on something known at its start.
-    if (!overwrite && fs::exists(output)) {
+    for (const fs::path& file : FilesOfCloud(output, kMaxShDegree)) ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(file));
+    if (!overwrite && Exists(output)) {
       return Error{ErrorCode::kExists, Cat(output.string(), " exists; -w replaces it")};
     }
     jobs.push_back({input, output});
@@ -160,9 +164,8 @@ void Print(const Job& job, const ConvertReport& r, const std::optional<Conversio
 // A network's weights, which only become .safetensors.
 Status ConvertModel(const ConvertFlags& flags, const SharedFlags& shared) {
   const fs::path from = flags.paths[0], to = flags.paths[1];
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay({&from, 1}, {&to, 1}));
-  if (!shared.overwrite && fs::exists(to))
-    return Error{ErrorCode::kExists, Cat(to.string(), " exists; -w replaces it")};
+  RecordInput(from);
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(to, shared.overwrite));
   ANCHORSPLAT_RETURN_IF_ERROR(ConvertCheckpoint(from, to, {.overwrite = shared.overwrite}));
   std::error_code unknown;
   const uint64_t bytes = fs::file_size(to, unknown);

@@ -11,6 +11,7 @@
 #include "core/text.h"
 #include "dataset/dataset_check.h"
 #include "dataset/dataset_split.h"
+#include "formats/atomic_file.h"
 
 namespace anchorsplat {
 
@@ -27,9 +28,7 @@ struct SplitFlags {
 Status RunSplit(const SplitFlags& flags, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Manifest manifest, ReadManifest(flags.dataset));
   const std::filesystem::path path = std::filesystem::path(flags.dataset) / kSplitsName;
-  if (!shared.overwrite && std::filesystem::exists(path)) {
-    return Error{ErrorCode::kExists, Cat(path.string(), " exists; -w replaces it")};
-  }
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, shared.overwrite));
   Splits splits;
   if (flags.lists.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(splits, SplitByModel(manifest, flags.fractions, shared.seed));

@@ -17,12 +17,14 @@
 #include "cli/refine_flags.h"
 #include "cli/stop_signal.h"
 #include "cli/verb.h"
+#include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "core/world_up.h"
 #include "fit/fitter.h"
 #include "formats/atomic_file.h"
 #include "formats/camera_io.h"
+#include "formats/cloud_output.h"
 #include "formats/extra_properties.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
@@ -59,13 +61,7 @@ Status CheckOutput(const fs::path& output, bool overwrite) {
     }
     return Error{ErrorCode::kBadArgument, Cat(output.string(), ": not a format that is written; known are", known)};
   }
-  if (!overwrite && fs::exists(output))
-    return Error{ErrorCode::kExists, Cat(output.string(), " exists; -w replaces it")};
-  const fs::path folder = output.parent_path();
-  if (!folder.empty() && !fs::is_directory(folder)) {
-    return Error{ErrorCode::kNotFound, Cat(output.string(), ": there is no folder ", folder.string())};
-  }
-  return CheckWritable(output);
+  return CheckCanWriteCloud(output, 0, {.overwrite = overwrite});
 }
 
 // Whether the user can stop it and go on later.
@@ -80,26 +76,24 @@ fs::path CheckpointOf(const EnhanceOptions& options, const fs::path& output) {
   return options.control.checkpoint.empty() ? fs::path(output.string() + ".checkpoint") : options.control.checkpoint;
 }
 
-// What an interruption left is to be replaced.
-bool Continues(const EnhanceOptions& options, const fs::path& output) {
-  const fs::path checkpoint = CheckpointOf(options, output);
-  return options.control.resume && !checkpoint.empty() && fs::exists(checkpoint);
+// All that is written for an output.
+std::vector<fs::path> OutputFiles(const EnhanceFlags& flags, const fs::path& output) {
+  std::vector<fs::path> files = FilesOfCloud(output, kMaxShDegree);
+  if (flags.view) files.push_back(PagePath(output));
+  return files;
 }
 
-// Where each input goes. Nothing may be written twice or over its own input by accident.
-Result<std::vector<fs::path>> OutputPaths(const EnhanceFlags& flags, bool overwrite) {
+// Where each input goes. Nothing may be written twice.
+Result<std::vector<fs::path>> OutputPaths(const EnhanceFlags& flags) {
   if (flags.output.empty() == flags.out_dir.empty()) {
     return Error{ErrorCode::kBadArgument, "say where to write: -o FILE for one input, --out-dir DIR for several"};
   }
-  const std::vector<fs::path> inputs(flags.inputs.begin(), flags.inputs.end());
+  for (const std::string& input : flags.inputs) RecordSplat(input);
   if (!flags.output.empty()) {
     if (flags.inputs.size() > 1) {
       return Error{ErrorCode::kBadArgument, Cat(flags.inputs.size(), " inputs and one -o file: use --out-dir DIR")};
     }
-    const fs::path output = flags.output;
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay(inputs, {&output, 1}));
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(output, overwrite || Continues(flags.options, output)));
-    return std::vector<fs::path>{output};
+    return std::vector<fs::path>{flags.output};
   }
   std::vector<fs::path> outputs;
   std::map<fs::path, std::string> taken;
@@ -112,14 +106,9 @@ Result<std::vector<fs::path>> OutputPaths(const EnhanceFlags& flags, bool overwr
     }
     outputs.push_back(output);
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay(inputs, outputs));
   std::error_code code;
   fs::create_directories(flags.out_dir, code);
   if (code) return Error{ErrorCode::kIo, Cat(flags.out_dir, ": cannot make this folder: ", code.message())};
-  // For all before the first is computed: a batch should not fail half-way on something known at its start.
-  for (const fs::path& output : outputs) {
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(output, overwrite || Continues(flags.options, output)));
-  }
   return outputs;
 }
 
@@ -222,9 +211,11 @@ Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& 
     ANCHORSPLAT_RETURN_IF_ERROR(CheckPageFits(output, cloud, options));
     before = cloud;
   }
-  WriteOptions write = WriteOptionsFrom(shared);
-  write.overwrite |= Continues(options, output);
+  const WriteOptions write = WriteOptionsFrom(shared);
+  // Again, now that the inputs with the files beside them are known.
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckCanWriteCloud(output, cloud.sh_degree, write));
   options.control.checkpoint = CheckpointOf(options, output);
+  options.control.outputs = OutputFiles(flags, output);
   std::optional<StopSignal> stop_signal(std::in_place);
   auto result = Enhance(std::move(cloud), options);
   stop_signal.reset();
@@ -238,12 +229,12 @@ Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& 
   if (options.cameras && !UpOf(enhanced.cloud.comments)) {
     if (const auto up = WorldUp(options.cameras->cameras)) enhanced.cloud.comments.push_back(UpComment(*up));
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(WriteCloud(output, enhanced.cloud, write, extras));
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteCloudOrKeep(output, enhanced.cloud, write, extras));
   const EnhanceReport& r = enhanced.report;
   if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(WritePage(input, before, output, enhanced, write));
   const fs::path& checkpoint = options.control.checkpoint;
   if (r.interrupted) {
-    const bool resumable = !checkpoint.empty() && fs::exists(checkpoint);
+    const bool resumable = !checkpoint.empty() && Exists(checkpoint);
     return Error{ErrorCode::kInterrupted,
                  Cat("stopped; ", output.string(), " is as far as it came",
                      resumable ? Cat(", the same command with --resume goes on from ", checkpoint.string()) : "")};
@@ -275,20 +266,19 @@ Status RunEnhance(const EnhanceFlags& flags, Program& program) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(options.cameras, ReadCameras(flags.cameras));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto outputs, OutputPaths(flags, shared.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto outputs, OutputPaths(flags));
+  if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(CheckPages(outputs));
 
-  if (flags.view) {
-    const std::vector<fs::path> inputs(flags.inputs.begin(), flags.inputs.end());
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckPages(
-        inputs, outputs, [&](const fs::path& output) { return shared.overwrite || Continues(options, output); }));
-  }
-
-  std::vector<fs::path> used(flags.inputs.begin(), flags.inputs.end());
-  used.insert(used.end(), outputs.begin(), outputs.end());
+  // For all before the first is computed: a batch should not fail half-way on something known at its start.
   for (const fs::path& output : outputs) {
     const fs::path checkpoint = CheckpointOf(options, output);
-    if (checkpoint.empty()) continue;
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(checkpoint, used, options.control.resume, shared.overwrite));
+    const std::vector<fs::path> files = OutputFiles(flags, output);
+    if (!checkpoint.empty()) {
+      ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(checkpoint, files, options.control.resume, shared.overwrite));
+      if (options.control.resume) RecordWhatWasLeft(checkpoint, files);
+    }
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(output, shared.overwrite));
+    if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(PagePath(output), shared.overwrite));
   }
 
   std::vector<BatchItem> items;

@@ -17,6 +17,7 @@
 #include "fit/initial_cloud.h"
 #include "formats/atomic_file.h"
 #include "formats/cloud_io.h"
+#include "formats/cloud_output.h"
 #include "formats/gsplat_checkpoint_writer.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
@@ -27,29 +28,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What can be known to fail before hours of work.
-Status CheckOutputs(const FitFlags& flags, const fs::path& checkpoint, bool overwrite) {
+// All that a fit writes.
+std::vector<fs::path> OutputFiles(const FitFlags& flags) {
+  std::vector<fs::path> files = FilesOfCloud(flags.output, flags.standard.objective.render.sh_degree);
+  if (!flags.gsplat_checkpoint.empty()) files.emplace_back(flags.gsplat_checkpoint);
+  return files;
+}
+
+// What can be known to fail before hours of work, once the inputs are known.
+Status CheckOutputs(const FitFlags& flags, const FitControl& control, bool overwrite) {
   const SplatFormat* format = FormatOfExtension(flags.output);
   if (format == nullptr || format->write == nullptr) {
     return Error{ErrorCode::kBadArgument, Cat("-o ", flags.output, ": not a format that is written (.ply is)")};
   }
-  const fs::path inputs[] = {flags.init_splat}, outputs[] = {flags.output, flags.gsplat_checkpoint};
-  if (!flags.init_splat.empty()) ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay(inputs, outputs));
-  const fs::path others[] = {flags.init_splat, flags.output, flags.gsplat_checkpoint};
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(checkpoint, others, flags.resume, overwrite));
-  const bool continued = flags.resume && fs::exists(checkpoint);
-  for (const std::string& path : {flags.output, flags.gsplat_checkpoint}) {
-    if (path.empty()) continue;
-    // A continued fit replaces what its interruption left.
-    if (fs::exists(path) && !overwrite && !continued) {
-      return Error{ErrorCode::kExists, Cat(path, " exists; -w replaces it")};
-    }
-    const fs::path folder = fs::path(path).parent_path();
-    if (!folder.empty() && !fs::is_directory(folder)) {
-      return Error{ErrorCode::kNotFound, Cat(path, ": there is no folder ", folder.string())};
-    }
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path));
-  }
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(control.checkpoint, control.outputs, flags.resume, overwrite));
+  // A continued fit replaces what its interruption left.
+  if (flags.resume) RecordWhatWasLeft(control.checkpoint, control.outputs);
+  for (const fs::path& path : control.outputs) ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, overwrite));
   return {};
 }
 
@@ -124,12 +119,14 @@ void PrintReport(const FitFlags& flags, const FitReport& r) {
 }
 
 // Each file that can be written is, whatever becomes of the other one.
-Status WriteResults(const FitFlags& flags, const Fitted& fitted) {
-  // Whether files may be replaced was decided at the start.
-  const Status splat = WriteCloud(flags.output, fitted.cloud, {.overwrite = true});
+Status WriteResults(const FitFlags& flags, const Fitted& fitted, bool overwrite) {
+  const Status splat = WriteCloudOrKeep(flags.output, fitted.cloud, {.overwrite = overwrite});
   if (flags.gsplat_checkpoint.empty()) return splat;
-  const Status checkpoint = WriteGsplatCheckpoint(flags.gsplat_checkpoint, fitted.cloud,
-                                                  std::max<int64_t>(0, fitted.report.steps - 1), {.overwrite = true});
+  const Status checkpoint =
+      WriteOrKeep(flags.gsplat_checkpoint, overwrite, [&](const fs::path& path, bool replace) {
+        return WriteGsplatCheckpoint(path, fitted.cloud, std::max<int64_t>(0, fitted.report.steps - 1),
+                                     {.overwrite = replace});
+      });
   if (splat.ok() || checkpoint.ok()) return splat.ok() ? checkpoint : splat;
   return Error{splat.error().code, Cat(splat.error().message, "; ", checkpoint.error().message)};
 }
@@ -150,10 +147,12 @@ Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
   control.checkpoint = flags.checkpoint.empty() ? flags.output + ".checkpoint" : flags.checkpoint;
   control.checkpoint_every = flags.checkpoint_every;
   control.resume = flags.resume;
-  control.deliver = [&](const Fitted& fitted) { return WriteResults(flags, fitted); };
+  control.deliver = [&](const Fitted& fitted) { return WriteResults(flags, fitted, shared.overwrite); };
   control.stop = &StopSignal::requested();
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckOutputs(flags, control.checkpoint, shared.overwrite));
+  control.outputs = OutputFiles(flags);
+  if (!flags.init_splat.empty()) RecordSplat(flags.init_splat);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(flags.project, {.hold_out = flags.hold_out}));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckOutputs(flags, control, shared.overwrite));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const FitOptions options, MakeFitOptions(flags, views.background, shared.seed));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Start start, ChooseStart(flags, views, shared.seed));
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial,

@@ -11,9 +11,11 @@
 #include "cli/parse.h"
 #include "cli/verb.h"
 #include "cli/views.h"
+#include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "formats/image_io.h"
+#include "formats/input_record.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
 
@@ -50,7 +52,8 @@ Result<std::vector<fs::path>> OutputPaths(const std::string& output, const Camer
       return Error{ErrorCode::kBadArgument,
                    Cat("views ", other->second, " and ", camera.name, " would both become ", paths.back().string())};
     }
-    if (!overwrite && fs::exists(paths.back())) {
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(paths.back()));
+    if (!overwrite && Exists(paths.back())) {
       return Error{ErrorCode::kExists, Cat(paths.back().string(), " exists; -w replaces it")};
     }
   }

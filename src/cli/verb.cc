@@ -14,6 +14,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "formats/input_record.h"
 
 namespace anchorsplat {
 
@@ -95,6 +96,7 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
   const SharedFlags& flags = program.flags;
   SetLogSink(MakeTerminalSink(flags.quiet));
   SetThreadCount(flags.threads);
+  const InputRecord record;  // nothing that the verb reads is overwritten by it
   try {
     const Status status = program.run();
     if (!status.ok()) return Fail(flags, status.error());

@@ -10,10 +10,13 @@
 #include "cli/parse.h"
 #include "cli/verb.h"
 #include "cli/views.h"
+#include "core/file_system.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/pixel_size_guard.h"
+#include "formats/atomic_file.h"
 #include "formats/camera_io.h"
+#include "formats/input_record.h"
 #include "formats/opened_splat.h"
 #include "viewer/page_writer.h"
 
@@ -43,8 +46,9 @@ std::optional<fs::path> FindPicture(const fs::path& folder, const Camera& camera
     if (stem.empty()) continue;
     for (const char* extension : {".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
       fs::path path = folder / (stem + extension);
-      std::error_code ignored;
-      if (fs::is_regular_file(path, ignored)) return path;
+      if (!IsFile(path)) continue;
+      RecordInput(path);
+      return path;
     }
   }
   return std::nullopt;
@@ -111,13 +115,10 @@ Status RunView(const PageFlags& flags, const SharedFlags& shared) {
   if (!IsPageName(flags.output)) {
     return Error{ErrorCode::kBadArgument, Cat("--output: ", flags.output, " is no name for a page, expected .html")};
   }
-  std::error_code unknown;
-  if (!flags.truth.empty() && !fs::is_directory(flags.truth, unknown)) {
+  if (!flags.truth.empty() && !IsFolder(flags.truth)) {
     return Error{ErrorCode::kNotFound, Cat("--truth: ", flags.truth, ": no such folder")};
   }
-  if (!shared.overwrite && fs::exists(flags.output)) {
-    return Error{ErrorCode::kExists, Cat(flags.output, " exists; -w replaces it")};
-  }
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(flags.output, shared.overwrite));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto pixel_size, ParsePixelSize("--pixel-size", flags.pixel_size));
   CameraSet cameras;
   if (!flags.cameras.empty()) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
+#include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "dataset/file_lock.h"
@@ -16,6 +17,7 @@
 #include "formats/atomic_file.h"
 #include "formats/cloud_io.h"
 #include "formats/gsplat_checkpoint_writer.h"
+#include "formats/input_record.h"
 #include "scene/mesh_file.h"
 #include "scene/mesh_reader.h"
 #include "scene/ray_tracer.h"
@@ -35,11 +37,6 @@ constexpr int64_t kCheckpointEvery = 1000;  // steps: a few seconds of work
 
 double Since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
-bool IsFile(const fs::path& path) {
-  std::error_code ignored;
-  return fs::is_regular_file(path, ignored);
-}
-
 Status Remove(const fs::path& path) {
   std::error_code code;
   fs::remove_all(path, code);
@@ -58,6 +55,7 @@ Status MakeFolder(const fs::path& path) {
 Status OpenFolder(const ObjectJob& job, const fs::path& folder) {
   const std::string text = ToJsonText(job);
   if (IsFile(folder / kJobName)) {
+    RecordOwnFile(folder / kJobName);
     auto earlier = ReadObjectJob(folder / kJobName);
     if (earlier.ok() && ToJsonText(*earlier) == text) return {};
   }
@@ -184,20 +182,42 @@ Status Recall(const fs::path& path, ObjectRecord& record) {
   return {};
 }
 
+// Whether the object may have its folder: what is there is no folder of somebody else, and holds nothing that it is
+// made of.
+Status CheckPlace(const ObjectJob& job, const fs::path& target) {
+  std::error_code code;
+  const fs::file_status there = fs::symlink_status(target, code);
+  if (there.type() == fs::file_type::not_found || there.type() == fs::file_type::none) return {};
+  if (there.type() != fs::file_type::directory) {
+    return Error{ErrorCode::kExists, Cat(target.string(), ": is in the way of the object's folder and is no folder")};
+  }
+  if (!IsFile(target / kRecordName)) {
+    return Error{ErrorCode::kExists, Cat(target.string(),
+                                         ": is in the way of the object's folder and is no object of a "
+                                         "data set (it has no ",
+                                         kRecordName, ")")};
+  }
+  // Also a source that was read by an earlier attempt; a mesh may be an address inside of a library.
+  const fs::path folder = RealPath(target), source = RealPath(job.source);
+  if (std::mismatch(folder.begin(), folder.end(), source.begin(), source.end()).first == folder.end()) {
+    return Error{ErrorCode::kBadArgument, Cat(target.string(), ": holds the input ", job.source,
+                                              ", which would be lost with it; write to another data set")};
+  }
+  return CheckHoldsNoInput(target);
+}
+
 // Everything is in the folder: gives it its name, in place of an older object. The job goes last, because a folder
 // without it is begun anew.
-Status Publish(const fs::path& folder, const fs::path& target) {
+Status Publish(const ObjectJob& job, const fs::path& folder, const fs::path& target) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckPlace(job, target));
   for (const char* name : {kViewsDone, kFitCheckpoint, kStageName}) ANCHORSPLAT_RETURN_IF_ERROR(Remove(folder / name));
   fs::path replaced = folder;
   replaced += ".replaced";
   ANCHORSPLAT_RETURN_IF_ERROR(Remove(replaced));
   std::error_code code;
   const fs::file_status there = fs::symlink_status(target, code);
-  if (fs::exists(there) && !fs::is_directory(there)) {
-    return Error{ErrorCode::kExists, Cat(target.string(), ": is in the way of the object's folder and is no folder")};
-  }
   code.clear();
-  if (fs::exists(there)) fs::rename(target, replaced, code);
+  if (there.type() != fs::file_type::not_found) fs::rename(target, replaced, code);
   if (!code) fs::rename(folder, target, code);
   if (code) return Error{ErrorCode::kIo, Cat(target.string(), ": cannot give the object its name: ", code.message())};
   ANCHORSPLAT_RETURN_IF_ERROR(Remove(replaced));
@@ -240,6 +260,7 @@ Result<ObjectJob> ReadObjectJob(const fs::path& path) {
 
 Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset, const std::atomic<bool>* stop) {
   const fs::path folder = BuildingFolder(dataset, job.name);
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckPlace(job, dataset / job.name));  // before hours of work
   ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(folder.parent_path()));
   // A process whose parent was killed may still be on its way out.
   ANCHORSPLAT_ASSIGN_OR_RETURN(const FileLock lock, FileLock::Take(folder.string() + ".lock", true));
@@ -274,7 +295,7 @@ Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset, 
     }
     ANCHORSPLAT_RETURN_IF_ERROR(Keep(folder / kRecordName, record));
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(Publish(folder, dataset / job.name));
+  ANCHORSPLAT_RETURN_IF_ERROR(Publish(job, folder, dataset / job.name));
   return record;
 }
 

@@ -8,6 +8,7 @@
 #include "core/text.h"
 #include "formats/atomic_file.h"
 #include "formats/file_bytes.h"
+#include "formats/input_record.h"
 
 namespace anchorsplat {
 
@@ -47,8 +48,9 @@ bool IsFolderName(const std::string& name) {
          name.find('\0') == std::string::npos;
 }
 
-// Calls `take` for every line that is not empty.
+// Calls `take` for every line that is not empty of one of the data set's own lists.
 Status ForEachLine(const fs::path& path, const std::function<Status(const JsonValue&)>& take) {
+  RecordOwnFile(path);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, ReadFileBytes(path, kMaxManifestBytes));
   int64_t number = 0;
   for (size_t at = 0; at < text.size();) {

@@ -13,8 +13,10 @@
 #include "core/text.h"
 #include "fit/initial_points.h"
 #include "fit/training_views.h"
+#include "formats/atomic_file.h"
 #include "formats/camera_io.h"
 #include "formats/colmap_writer.h"
+#include "formats/file_bytes.h"
 #include "formats/image_io.h"
 
 namespace anchorsplat {
@@ -62,6 +64,8 @@ void AveragePlane(const Image& image, int channel, const float* by, const std::v
     }
   }
 }
+
+constexpr uint64_t kMaxPictureBytes = uint64_t{4} << 30;
 
 Status MakeProjectFolder(const fs::path& folder) {
   std::error_code code;
@@ -124,9 +128,8 @@ Status WritePictures(const Camera& source, const fs::path& high, const fs::path&
                      const WriteOptions& write) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Image image, ReadImage(source.image));
   if (source.image.extension() == ".png") {
-    std::error_code code;
-    fs::copy_file(source.image, high, fs::copy_options::overwrite_existing, code);
-    if (code) return Error{ErrorCode::kIo, Cat(high.string(), ": cannot copy the picture: ", code.message())};
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(source.image, kMaxPictureBytes));
+    ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(high, bytes, write.overwrite));
   } else {
     ANCHORSPLAT_RETURN_IF_ERROR(WritePng(high, image, write));
   }

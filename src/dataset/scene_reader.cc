@@ -5,6 +5,7 @@
 #include <map>
 #include <system_error>
 
+#include "core/file_system.h"
 #include "core/text.h"
 #include "dataset/dataset_split.h"
 #include "formats/camera_checks.h"
@@ -21,16 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr size_t kHoldOut = 8;  // gsplat's trainer: where no record says otherwise
-
-bool IsFolder(const fs::path& path) {
-  std::error_code ignored;
-  return fs::is_directory(path, ignored);
-}
-
-bool IsRegularFile(const fs::path& path) {
-  std::error_code ignored;
-  return fs::is_regular_file(path, ignored);
-}
 
 std::optional<int64_t> WholeNumber(std::string_view text) {
   int64_t value = 0;
@@ -88,13 +79,13 @@ Result<Image> ReadView(const Camera& camera) {
 Result<std::vector<SceneEntry>> ListScenes(const fs::path& dataset, const SceneListOptions& options) {
   if (!IsFolder(dataset)) return NotFound(Cat(dataset.string(), ": there is no such folder"));
   std::vector<SceneEntry> scenes;
-  if (IsRegularFile(dataset / kManifestName)) {
+  if (IsFile(dataset / kManifestName)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Manifest manifest, ReadManifest(dataset));
     for (const auto& [name, record] : manifest) {
       if (!record.rejected || options.rejected) scenes.push_back({name, dataset / name});
     }
   } else if (Resolutions(dataset)) {
-    scenes.push_back({fs::weakly_canonical(dataset).filename().string(), dataset});
+    scenes.push_back({RealPath(dataset).filename().string(), dataset});
   } else {
     for (const fs::path& entry : Entries(dataset)) {
       if (IsFolder(entry) && Resolutions(entry)) scenes.push_back({entry.filename().string(), entry});
@@ -126,7 +117,7 @@ Result<Scene> Scene::Open(const SceneEntry& entry) {
   }
   const auto& [low, high] = *resolutions;
   scene.low_folder_ = low;
-  if (IsRegularFile(entry.folder / kRecordName)) {
+  if (IsFile(entry.folder / kRecordName)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile json, JsonFile::Read(entry.folder / kRecordName));
     ANCHORSPLAT_ASSIGN_OR_RETURN(scene.record_, ObjectRecordFrom(json.root()));
     scene.background_ = scene.record_->background;
@@ -187,7 +178,7 @@ Result<Image> Scene::HighPicture(size_t view) const {
 
 Result<Image> Scene::Rendered(size_t view) const {
   const fs::path path = folder_ / kMeshName;
-  if (!record_ || !IsRegularFile(path)) {
+  if (!record_ || !IsFile(path)) {
     return NotFound(Cat(folder_.string(), ": no high-resolution picture ", high_views_[view].name, " and no ",
                         kMeshName, " to make it from"));
   }

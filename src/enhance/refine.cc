@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "enhance/refine_copies.h"
@@ -172,11 +173,6 @@ Result<std::string> Settings(const RefineInput& input, const RefineOptions& opti
   return json.dump();
 }
 
-bool Exists(const std::filesystem::path& path) {
-  std::error_code ignored;
-  return !path.empty() && std::filesystem::exists(path, ignored);
-}
-
 // Steps until they are done, the time is over or the user stops it.
 Status MakeSteps(Refiner& refiner, const RefineOptions& options, const RefineControl& control, RefineReport& report) {
   const auto begin = std::chrono::steady_clock::now();
@@ -314,6 +310,7 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
   report.steps = refiner.state().step;
   report.times = refiner.times();
   if (report.interrupted && !control.checkpoint.empty() && !options.seconds) {
+    Leave(refiner.state(), control.outputs);
     const Status written = WriteFitCheckpoint(control.checkpoint, refiner.state(), settings);
     if (!written.ok()) LogWarning(Cat("there is nothing to resume from: ", written.error().message));
   }

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/result.h"
 
@@ -34,8 +35,9 @@ struct RefineOptions {
 struct RefineControl {
   // Empty: none is written or read. Written when the user stops it, unless it runs for seconds; never removed.
   std::filesystem::path checkpoint;
-  bool resume = false;                      // go on from `checkpoint` if it is there
-  const std::atomic<bool>* stop = nullptr;  // becomes true when the user wants to stop
+  bool resume = false;                         // go on from `checkpoint` if it is there
+  std::vector<std::filesystem::path> outputs;  // that its caller writes, also when it was interrupted
+  const std::atomic<bool>* stop = nullptr;     // becomes true when the user wants to stop
 };
 
 inline constexpr int kMostCopies = 64;

@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "core/file_system.h"
 #include "core/text.h"
 #include "dataset/scene_reader.h"
 #include "eval/protocol.h"
@@ -24,11 +25,6 @@ constexpr const char* kHighTransforms = "transforms_hr.json";
 
 Error NotFound(std::string sentence) { return Error{ErrorCode::kNotFound, std::move(sentence)}; }
 Error Bad(std::string sentence) { return Error{ErrorCode::kBadFile, std::move(sentence)}; }
-
-bool IsFile(const fs::path& path) {
-  std::error_code ignored;
-  return fs::is_regular_file(path, ignored);
-}
 
 // What is in a folder, sorted by name; nothing when it is none.
 std::vector<fs::path> Entries(const fs::path& folder) {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "fit/fit.h"
@@ -15,6 +16,7 @@
 #include "formats/atomic_file.h"
 #include "formats/cloud_io.h"
 #include "formats/image_io.h"
+#include "formats/input_record.h"
 #include "formats/json_file.h"
 #include "metrics/bicubic.h"
 
@@ -32,7 +34,7 @@ double Since(Clock::time_point begin) { return std::chrono::duration<double>(Clo
 // Of one training picture; nothing to do when an earlier attempt wrote it.
 Status Enlarge(const Camera& camera, const Pinhole& high, const std::array<float, 3>& background,
                const fs::path& file) {
-  if (fs::exists(file)) return {};
+  if (Exists(file)) return {};
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Image image, ReadImage(camera.image));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Image large,
                                EnlargeBicubic(CompositeOver(image, background), high.width, high.height));
@@ -48,6 +50,7 @@ struct Progressed {
 };
 
 std::optional<Progressed> ReadProgress(const fs::path& path) {
+  RecordOwnFile(path);
   const auto file = JsonFile::Read(path);
   if (!file.ok()) return std::nullopt;
   const nlohmann::json& json = file->root().raw();

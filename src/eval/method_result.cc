@@ -6,6 +6,7 @@
 
 #include "core/text.h"
 #include "formats/atomic_file.h"
+#include "formats/input_record.h"
 #include "formats/json_file.h"
 
 namespace anchorsplat {
@@ -50,6 +51,7 @@ Result<double> ReadNumber(const JsonValue& json, const char* key) {
 }
 
 Result<std::optional<MethodResult>> Read(const std::filesystem::path& path, const std::string& key) {
+  RecordOwnFile(path);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile file, JsonFile::Read(path));
   const JsonValue root = file.root();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue said, root.Get("key"));

@@ -4,10 +4,12 @@
 #include <cctype>
 #include <utility>
 
+#include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "formats/camera_checks.h"
 #include "formats/image_io.h"
+#include "formats/input_record.h"
 #include "metrics/compare.h"
 #include "metrics/image_metrics.h"
 #include "render/shown_range.h"
@@ -101,11 +103,12 @@ std::unique_ptr<ViewSource> MakeSplatViews(GaussianCloud cloud, CameraSet camera
 
 Result<std::unique_ptr<ViewSource>> OpenImageViews(const fs::path& path, const std::array<float, 3>& background) {
   std::vector<fs::path> files = {path};
-  if (fs::is_directory(path)) {
+  if (IsFolder(path)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(files, ListPictures(path));
-  } else if (!fs::exists(path)) {
+  } else if (!Exists(path)) {
     return Error{ErrorCode::kNotFound, Cat(path.string(), ": no such file or folder")};
   }
+  for (const fs::path& file : files) RecordInput(file);
   return std::unique_ptr<ViewSource>(std::make_unique<ImageViews>(std::move(files), background));
 }
 
@@ -114,8 +117,7 @@ bool LooksLikeImages(const fs::path& path) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (extension == ".png" || extension == ".jpg" || extension == ".jpeg") return true;
-  std::error_code code;
-  return fs::is_directory(path, code);
+  return IsFolder(path);
 }
 
 }  // namespace anchorsplat

@@ -6,6 +6,7 @@
 #include <system_error>
 #include <utility>
 
+#include "core/file_system.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
@@ -34,11 +35,6 @@ std::string Note(double psnr, int64_t gaussians) {
 
 // A mean that follows: single views differ by several dB.
 void Follow(double& mean, double value) { mean = mean == 0 ? value : 0.9 * mean + 0.1 * value; }
-
-bool Exists(const std::filesystem::path& path) {
-  std::error_code ignored;
-  return !path.empty() && std::filesystem::exists(path, ignored);
-}
 
 // The checkpoint of a fit: what it holds of this fit, and why it does not hold more.
 class KeptState {
@@ -93,6 +89,7 @@ Status MakeSteps(Fitter& fitter, const FitControl& control, KeptState& kept, Fit
     if (control.observe) control.observe(fitter);
     report.interrupted = control.stop != nullptr && control.stop->load() && !fitter.done();
     const bool due = control.checkpoint_every > 0 && done % control.checkpoint_every == 0 && !fitter.done();
+    if (report.interrupted) fitter.Leave(control.outputs);
     if (due || report.interrupted) kept.Write(fitter.state());
     if (report.interrupted) break;
   }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <vector>
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
@@ -26,6 +27,7 @@ struct FitControl {
   // What to do with a checkpoint that is damaged, another version's or another run's: begin anew with a warning, where
   // the caller knows that it is its own; else that is an error. The file stays until a new state takes its place.
   bool anew_if_unfit = false;
+  std::vector<std::filesystem::path> outputs;  // that its caller writes, also when it was interrupted
   const std::atomic<bool>* stop = nullptr;     // becomes true when the user wants to stop
   std::function<void(const Fitter&)> observe;  // after every step; may be empty
   // Brings the result to safety, also that of an interrupted fit; may be empty. Called before qualities are measured.

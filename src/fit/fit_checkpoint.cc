@@ -1,11 +1,15 @@
 #include <charconv>
+#include <cstdint>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <system_error>
 #include <utility>
 #include <vector>
 
+#include "core/file_system.h"
 #include "core/text.h"
 #include "fit/fitter.h"
+#include "formats/input_record.h"
 #include "formats/safetensors.h"
 #include "formats/tensor_checksum.h"
 #include "formats/tensor_file.h"
@@ -71,13 +75,16 @@ Status WriteFitCheckpoint(const std::filesystem::path& path, const FitState& sta
        ArraysOf<const FitState, const Buffer<float>>(state, state.cloud.size(), state.cloud.coefficients())) {
     entries.push_back(MakeEntry(array.name, array.shape, *array.values));
   }
+  std::string left;
+  for (const std::string& file : state.left) left += file + '\n';
   ANCHORSPLAT_ASSIGN_OR_RETURN(
       const auto metadata,
-      WithChecksum({{"format", kFormat}, {"step", Cat(state.step)}, {"settings", settings}}, entries));
+      WithChecksum({{"format", kFormat}, {"step", Cat(state.step)}, {"settings", settings}, {"left", left}}, entries));
   return WriteSafetensors(path, entries, metadata, {.overwrite = true});
 }
 
 bool IsFitCheckpoint(const std::filesystem::path& path) {
+  RecordOwnFile(path);
   const auto file = TensorFile::Open(path);
   if (!file.ok()) return false;
   const auto format = file->metadata().find("format");
@@ -89,7 +96,27 @@ void RemoveFitCheckpoint(const std::filesystem::path& path) {
   if (IsFitCheckpoint(path)) std::filesystem::remove(path, ignored);
 }
 
+std::vector<std::string> FilesLeftWith(const std::filesystem::path& checkpoint) {
+  RecordOwnFile(checkpoint);
+  std::vector<std::string> files;
+  const auto file = TensorFile::Open(checkpoint);
+  if (!file.ok()) return files;
+  const auto left = file->metadata().find("left");
+  if (left == file->metadata().end()) return files;
+  std::istringstream lines(left->second);
+  for (std::string line; std::getline(lines, line);) files.push_back(line);
+  return files;
+}
+
+std::string AbsoluteName(const std::filesystem::path& file) { return Printable(AbsolutePath(file).string(), SIZE_MAX); }
+
+void Leave(FitState& state, std::span<const std::filesystem::path> files) {
+  state.left.clear();
+  for (const std::filesystem::path& file : files) state.left.push_back(AbsoluteName(file));
+}
+
 Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std::string& settings) {
+  RecordOwnFile(path);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorFile file, TensorFile::Open(path));
   const auto bad = [&](const std::string& sentence) {
     return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", sentence)};
@@ -109,6 +136,7 @@ Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std:
   ANCHORSPLAT_RETURN_IF_ERROR(CompareSettings(path.string(), text("settings"), settings));
 
   FitState state;
+  state.left = FilesLeftWith(path);
   const std::string step = text("step");
   const auto [end, code] = std::from_chars(step.data(), step.data() + step.size(), state.step);
   if (code != std::errc() || end != step.data() + step.size() || state.step < 0) {

@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "core/gaussian_cloud.h"
 #include "core/image.h"
@@ -22,7 +24,12 @@ struct FitState {
   GaussianCloud cloud;
   CloudOptimizer optimizer;
   Densification densification;
+  // Files that an interruption leaves besides its checkpoint, by their AbsoluteName: what goes on may replace them.
+  std::vector<std::string> left;
 };
+
+// Notes what an interruption leaves besides its checkpoint.
+void Leave(FitState& state, std::span<const std::filesystem::path> files);
 
 // What one step saw.
 struct FitStep {
@@ -53,6 +60,7 @@ class Fitter {
 
   bool done() const { return state_.step >= options_.steps; }
   const FitState& state() const { return state_; }
+  void Leave(std::span<const std::filesystem::path> files) { anchorsplat::Leave(state_, files); }
   const FitOptions& options() const { return options_; }
   PictureCache& pictures() { return pictures_; }
   FitTimes times() const;
@@ -86,6 +94,12 @@ bool IsFitCheckpoint(const std::filesystem::path& path);
 
 // Takes away such a checkpoint if it is there. Nothing else is.
 void RemoveFitCheckpoint(const std::filesystem::path& path);
+
+// The `left` of the state in such a checkpoint; nothing when it cannot be read.
+std::vector<std::string> FilesLeftWith(const std::filesystem::path& checkpoint);
+
+// What a file is called for `left`: its absolute path, without "..", as printable text.
+std::string AbsoluteName(const std::filesystem::path& file);
 
 // Errors: those of TensorFile; kBadFile when it is no such checkpoint, one of an earlier version or a damaged one;
 // kBadArgument when its settings are others than `settings`, naming the first that differs.

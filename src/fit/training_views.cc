@@ -6,6 +6,7 @@
 #include <system_error>
 #include <utility>
 
+#include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "formats/camera_io.h"
@@ -17,15 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool PathExists(const fs::path& path) {
-  std::error_code ignored;
-  return fs::exists(path, ignored);
-}
-
 // Whether a folder is a project by itself, not only a folder of them.
 bool HasCameras(const fs::path& folder) {
   for (const char* name : {"transforms.json", "transforms_train.json", "cameras.json"}) {
-    if (PathExists(folder / name)) return true;
+    if (Exists(folder / name)) return true;
   }
   return IsColmapModel(folder / "sparse" / "0") || IsColmapModel(folder / "sparse") || IsColmapModel(folder);
 }
@@ -124,13 +120,13 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
 
   TrainingViews out;
   const fs::path train_file = source / "transforms_train.json", test_file = source / "transforms_test.json";
-  if (PathExists(train_file)) {
+  if (Exists(train_file)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(train_file));
     out.background = set.background;
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views,
                                  WithPictures(std::move(set), train_file, out.without_picture));
     out.scene_scale = SceneScale(views);
-    if (PathExists(test_file)) {
+    if (Exists(test_file)) {
       out.train = std::move(views);
       ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet test, ReadCameras(test_file));
       ANCHORSPLAT_ASSIGN_OR_RETURN(out.held_out, WithPictures(std::move(test), test_file, out.without_picture));

@@ -12,20 +12,21 @@
 #include <utility>
 
 #include "core/text.h"
+#include "formats/input_record.h"
 
 namespace anchorsplat {
 
 namespace {
 
+namespace fs = std::filesystem;
+
 std::string Reason(int error) { return std::generic_category().message(error); }
 
-Error WriteError(const std::filesystem::path& path, const char* what, int error) {
+Error WriteError(const fs::path& path, const char* what, int error) {
   return {ErrorCode::kIo, Cat(path.string(), ": cannot ", what, ": ", Reason(error))};
 }
 
-Error Exists(const std::filesystem::path& path) {
-  return {ErrorCode::kExists, Cat(path.string(), ": exists already and would be overwritten")};
-}
+Error Exists(const fs::path& path) { return {ErrorCode::kExists, Cat(path.string(), ": exists; -w replaces it")}; }
 
 // Short and independent of the final name, which may be as long as the file system allows.
 std::string TemporaryName() {
@@ -35,7 +36,7 @@ std::string TemporaryName() {
 
 // A file without a name, which the system removes by itself however the process ends; −1 where the file system or the
 // absence of /proc, through which it will be named, does not allow it.
-int OpenNameless([[maybe_unused]] const std::filesystem::path& folder) {
+int OpenNameless([[maybe_unused]] const fs::path& folder) {
 #ifdef O_TMPFILE
   if (::access("/proc/self/fd", X_OK) == 0) return ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
 #endif
@@ -43,7 +44,7 @@ int OpenNameless([[maybe_unused]] const std::filesystem::path& folder) {
 }
 
 // Gives a nameless file its first name; refuses to replace. An errno.
-int NameTheNameless(int descriptor, const std::filesystem::path& name) {
+int NameTheNameless(int descriptor, const fs::path& name) {
   const std::string link = Cat("/proc/self/fd/", descriptor);
   return ::linkat(AT_FDCWD, link.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0 ? 0 : errno;
 }
@@ -59,9 +60,49 @@ int RenameToNewName(const char* from, const char* to) {
   return ::rename(from, to) == 0 ? 0 : errno;
 }
 
+// Renames over `to` and keeps the file that was there as `old`. The name always stands for one of the two.
+int RenameKeepingOld(const fs::path& from, const fs::path& to, fs::path& old) {
+#ifdef RENAME_EXCHANGE
+  if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_EXCHANGE) == 0) {
+    old = from;
+    return 0;
+  }
+  if (errno != EINVAL && errno != ENOSYS) return errno;
+#endif
+  fs::path kept;
+  do {
+    kept = to.parent_path() / TemporaryName();
+  } while (::link(to.c_str(), kept.c_str()) != 0 && errno == EEXIST);
+  struct stat info {};
+  if (::lstat(kept.c_str(), &info) != 0 && ::rename(to.c_str(), kept.c_str()) != 0) return errno;  // it has no links
+  if (::rename(from.c_str(), to.c_str()) == 0) {
+    old = kept;
+    return 0;
+  }
+  const int error = errno;
+  if (::lstat(to.c_str(), &info) == 0) {
+    ::unlink(kept.c_str());
+  } else {
+    (void)::rename(kept.c_str(), to.c_str());
+  }
+  return error;
+}
+
+// What a name stands for where its last part is a symbolic link, also one to a file that is not there yet. An errno.
+int FollowLinks(fs::path& path) {
+  constexpr int kMostLinks = 40;  // as the system has it
+  for (int links = 0; links < kMostLinks; ++links) {
+    std::error_code code;
+    const fs::path named = fs::read_symlink(path, code);
+    if (code) return code.value() == EINVAL || code.value() == ENOENT ? 0 : code.value();  // no link, or no file
+    path = path.parent_path() / named;
+  }
+  return ELOOP;
+}
+
 }  // namespace
 
-Result<OutputFile> OutputFile::Create(const std::filesystem::path& path, bool overwrite) {
+Result<OutputFile> OutputFile::Create(const fs::path& path, bool overwrite) {
   if (path.empty() || !path.has_filename()) {
     return Error{ErrorCode::kBadArgument, Cat("\"", path.string(), "\" is not the name of a file to write")};
   }
@@ -75,17 +116,20 @@ Result<OutputFile> OutputFile::Create(const std::filesystem::path& path, bool ov
   const bool exists = ::stat(path.c_str(), &info) == 0;
   if (exists) {
     if (S_ISDIR(info.st_mode)) return Error{ErrorCode::kIo, Cat(path.string(), ": is a folder, not a file to write")};
-    if (!overwrite) return Exists(path);
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(path));
+    if (!overwrite && !IsOwnFile(path)) return Exists(path);
     if (!S_ISREG(info.st_mode)) {
       return Error{ErrorCode::kIo, Cat(path.string(), ": is not a regular file and cannot be replaced by one")};
     }
     mode = info.st_mode & 0777;
-    // Renaming onto a symbolic link would replace the link and leave the file it names as it was.
-    std::error_code ignored;
-    if (auto real = std::filesystem::canonical(path, ignored); !ignored) file.target_ = std::move(real);
+  } else if (errno != ENOENT && errno != ENOTDIR) {  // a name too long, a link to itself: known now, not after the work
+    return WriteError(path, "create a file of this name", errno);
+  }
+  if (const int error = FollowLinks(file.target_); error != 0 && error != ENOTDIR) {
+    return WriteError(path, "follow the symbolic link", error);
   }
 
-  std::filesystem::path folder = file.target_.parent_path();
+  fs::path folder = file.target_.parent_path();
   if (folder.empty()) folder = ".";
   file.descriptor_ = OpenNameless(folder);
   while (file.descriptor_ < 0) {  // a name left over by a killed process with our number is skipped
@@ -97,7 +141,7 @@ Result<OutputFile> OutputFile::Create(const std::filesystem::path& path, bool ov
     const int error = errno;
     file.temporary_.clear();
     std::error_code unknown;
-    if ((error == ENOENT || error == ENOTDIR) && !std::filesystem::is_directory(folder, unknown)) {
+    if ((error == ENOENT || error == ENOTDIR) && !fs::is_directory(folder, unknown)) {
       return Error{ErrorCode::kNotFound, Cat(path.string(), ": its folder ", folder.string(), " does not exist")};
     }
     return WriteError(path, "create a file in its folder", error);
@@ -160,60 +204,118 @@ Status OutputFile::WriteAt(uint64_t offset, const void* data, size_t size) const
   return {};
 }
 
-Status OutputFile::Commit() {
-  if (temporary_.empty()) {  // nameless so far
-    int error = 0;
-    if (overwrite_) {  // a name for an instant: only rename() replaces
-      const std::filesystem::path name = target_.parent_path() / TemporaryName();
-      error = NameTheNameless(descriptor_, name);
-      if (error == 0) temporary_ = name;
-    } else {
-      error = NameTheNameless(descriptor_, target_);
-    }
-    if (error != 0) {
-      Discard();
-      return error == EEXIST ? Exists(path_) : WriteError(path_, "give the file its name", error);
-    }
-    if (!overwrite_) {
-      const int closed = ::close(std::exchange(descriptor_, -1));
-      return closed == 0 || errno == EINTR ? Status() : Status(WriteError(path_, "write", errno));
-    }
+// No bytes follow. Files that may replace one get a name to be renamed from.
+Status OutputFile::FinishBytes() {
+  const bool replaces = overwrite_ || IsOwnFile(target_);
+  if (temporary_.empty() && !replaces) return {};  // nameless, and stays so until it is given its name at once
+  while (temporary_.empty()) {
+    fs::path name = target_.parent_path() / TemporaryName();
+    const int error = NameTheNameless(descriptor_, name);
+    if (error == 0) temporary_ = std::move(name);
+    // A name left over by a killed process with our number, or of one with our number in another container.
+    if (error != 0 && error != EEXIST) return WriteError(path_, "give the file its name", error);
   }
+  RecordWritten(descriptor_);
   // close() is where network file systems report what they could not write.
   const int closed = ::close(std::exchange(descriptor_, -1));
-  if (closed != 0 && errno != EINTR) {
-    const int error = errno;
-    Discard();
-    return WriteError(path_, "write", error);
-  }
-  const int error = overwrite_ ? (::rename(temporary_.c_str(), target_.c_str()) == 0 ? 0 : errno)
-                               : RenameToNewName(temporary_.c_str(), target_.c_str());
-  if (error == 0) {
-    temporary_.clear();
-    return {};
-  }
-  Discard();
-  if (error == EEXIST) return Exists(path_);
-  return WriteError(path_, "give the file its name", error);
-}
-
-Status CommitTogether(std::span<OutputFile> files) {
-  for (size_t k = 0; k < files.size(); ++k) {
-    const Status status = files[k].Commit();
-    if (status.ok()) continue;
-    std::error_code ignored;
-    for (size_t named = 0; named < k; ++named) std::filesystem::remove(files[named].path(), ignored);
-    return status;
-  }
+  if (closed != 0 && errno != EINTR) return WriteError(path_, "write", errno);
   return {};
 }
 
-Status CheckWritable(const std::filesystem::path& path) {
-  const auto file = OutputFile::Create(path, /*overwrite=*/true);
+Status OutputFile::TakeName(bool keep_old) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(target_));
+  int error = 0;
+  if (temporary_.empty()) {
+    error = NameTheNameless(descriptor_, target_);
+    if (error == 0) {
+      RecordWritten(descriptor_);
+      ::close(std::exchange(descriptor_, -1));  // only local file systems have nameless files
+      return {};
+    }
+  } else if (struct stat info{}; overwrite_ || IsOwnFile(target_)) {
+    const bool there = ::lstat(target_.c_str(), &info) == 0;
+    if (there && !S_ISREG(info.st_mode) && !S_ISLNK(info.st_mode)) {
+      error = S_ISDIR(info.st_mode) ? EISDIR : EEXIST;
+    } else if (there && keep_old) {
+      error = RenameKeepingOld(temporary_, target_, old_);
+    } else {
+      error = ::rename(temporary_.c_str(), target_.c_str()) == 0 ? 0 : errno;
+    }
+  } else {
+    error = RenameToNewName(temporary_.c_str(), target_.c_str());
+  }
+  if (error == EEXIST) return Exists(path_);
+  if (error != 0) return WriteError(path_, "give the file its name", error);
+  temporary_.clear();
+  return {};
+}
+
+Status OutputFile::GiveNameBack() {
+  if (old_.empty()) return ::unlink(target_.c_str()) == 0 ? Status() : Status(WriteError(path_, "remove", errno));
+  const fs::path old = std::exchange(old_, {});
+  if (::rename(old.c_str(), target_.c_str()) == 0) return {};
+  return WriteError(path_, Cat("put back what was there, which is kept as ", old.string()).c_str(), errno);
+}
+
+Status OutputFile::Commit() { return CommitTogether({this, 1}); }
+
+Status CommitTogether(std::span<OutputFile> files) {
+  Status status;
+  size_t named = 0;
+  for (size_t k = 0; k < files.size() && status.ok(); ++k) status = files[k].FinishBytes();
+  while (named < files.size() && status.ok()) {
+    status = files[named].TakeName(/*keep_old=*/files.size() > 1);
+    if (status.ok()) ++named;
+  }
+  if (!status.ok()) {
+    for (size_t k = named; k > 0; --k) {
+      const Status back = files[k - 1].GiveNameBack();
+      if (!back.ok()) status = Error{status.error().code, Cat(status.error().message, "; ", back.error().message)};
+    }
+  }
+  for (OutputFile& file : files) {
+    if (!file.old_.empty()) ::unlink(file.old_.c_str());
+    file.old_.clear();
+    file.Discard();
+  }
+  return status;
+}
+
+Status CheckWritable(const fs::path& path, bool overwrite) {
+  const auto file = OutputFile::Create(path, overwrite);
   return file.ok() ? Status() : Status(file.error());
 }
 
-Status WriteWholeFile(const std::filesystem::path& path, std::string_view bytes, bool overwrite) {
+Status WriteOrKeep(const fs::path& path, bool overwrite,
+                   const std::function<Status(const fs::path& name, bool overwrite)>& write) {
+  const Status status = write(path, overwrite);
+  if (status.ok() || (status.error().code != ErrorCode::kExists && status.error().code != ErrorCode::kBadArgument)) {
+    return status;
+  }
+  // "scan-2.ply", also of "scan.compressed.ply"; a SOG of pictures is its folder, where all names are given.
+  const bool folder = path.filename() == "meta.json";
+  const fs::path named = folder ? path.parent_path() : path;
+  const std::string name = named.filename().string();
+  const size_t stem = folder ? name.size() : std::min(name.find('.', 1), name.size());
+  constexpr int kMostTries = 1000;
+  for (int number = 2; number < kMostTries; ++number) {
+    fs::path beside = named.parent_path() / Cat(name.substr(0, stem), "-", number, name.substr(stem));
+    if (folder) {
+      std::error_code code;
+      if (!fs::create_directory(beside, code)) continue;
+      beside /= "meta.json";
+    }
+    const Status kept = write(beside, /*overwrite=*/false);
+    if (kept.ok()) {
+      return Error{status.error().code, Cat(status.error().message, "; the result is kept as ", beside.string())};
+    }
+    if (folder) ::rmdir(beside.parent_path().c_str());
+    if (kept.error().code != ErrorCode::kExists) break;
+  }
+  return status;
+}
+
+Status WriteWholeFile(const fs::path& path, std::string_view bytes, bool overwrite) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, overwrite));
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(bytes));
   return file.Commit();

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <vector>
 
 #include "formats/test_folder.h"
 
@@ -146,6 +147,133 @@ TEST(AtomicFile, AKilledProcessLeavesNoFileUnderTheName) {
   // A later run is not in the way of what was left.
   EXPECT_TRUE(WriteWholeFile(folder / "a.bin", "whole", false).ok());
   EXPECT_EQ(Content(folder / "a.bin"), "whole");
+}
+
+TEST(AtomicFile, WritesTheFileThatALinkNamesAndIsNotThereYet) {
+  const TestFolder folder;
+  fs::create_directory(folder / "in");
+  fs::create_symlink("in/real.bin", folder / "link.bin");
+  fs::create_symlink("link.bin", folder / "second.bin");
+  ASSERT_TRUE(WriteWholeFile(folder / "second.bin", "new", false).ok());
+  EXPECT_TRUE(fs::is_symlink(folder / "link.bin"));
+  EXPECT_EQ(Content(folder / "in" / "real.bin"), "new");
+}
+
+TEST(AtomicFile, ANameThatCannotBeIsKnownBeforeTheWork) {
+  const TestFolder folder;
+  fs::create_symlink("b", folder / "a");
+  fs::create_symlink("a", folder / "b");
+  for (const fs::path& path : {folder / std::string(300, 'x'), folder / "a", folder / "a" / "file"}) {
+    for (const bool overwrite : {false, true}) {
+      const Status status = CheckWritable(path, overwrite);
+      ASSERT_FALSE(status.ok()) << path;
+      EXPECT_EQ(status.error().code, ErrorCode::kIo);
+    }
+  }
+}
+
+// As a process that had our number leaves them when it is killed: under all names that are tried next.
+TEST(AtomicFile, LeftoversOfTheSameNameAreNotInTheWay) {
+  const TestFolder folder;
+  ASSERT_TRUE(WriteWholeFile(folder / "a.bin", "old", false).ok());
+  for (int k = 0; k < 1000; ++k) {
+    std::ofstream(folder / (".anchorsplat-" + std::to_string(::getpid()) + "-" + std::to_string(k) + ".partial"));
+  }
+  const Status status = WriteWholeFile(folder / "a.bin", "new", true);
+  ASSERT_TRUE(status.ok()) << status.error().message;
+  EXPECT_EQ(Content(folder / "a.bin"), "new");
+  EXPECT_EQ(folder.Entries(), 1001);
+}
+
+// Three files that belong together. The name of number `fails` becomes that of a folder before they are committed, or
+// of a file where nothing may be replaced.
+class CommitOfThree : public testing::TestWithParam<int> {
+ protected:
+  std::vector<OutputFile> Written(bool overwrite) {
+    std::vector<OutputFile> files;
+    for (const char* name : {"a", "b", "c"}) {
+      auto file = OutputFile::Create(folder_ / name, overwrite);
+      EXPECT_TRUE(file.ok());
+      EXPECT_TRUE(file->Write("new").ok());
+      files.push_back(*std::move(file));
+    }
+    return files;
+  }
+  fs::path Failing() const { return folder_ / std::string(1, static_cast<char>('a' + GetParam())); }
+  TestFolder folder_;
+};
+
+TEST_P(CommitOfThree, GivesTheNamesBackToTheFilesThatHadThem) {
+  for (const char* name : {"a", "b", "c"}) std::ofstream(folder_ / name) << "old " << name;
+  auto files = Written(true);
+  fs::remove(Failing());
+  fs::create_directory(Failing());
+  const Status status = CommitTogether(files);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kIo);
+  for (const char* name : {"a", "b", "c"}) {
+    if (folder_ / name == Failing()) continue;
+    EXPECT_EQ(Content(folder_ / name), std::string("old ") + name);
+  }
+  EXPECT_EQ(folder_.Entries(), 3);  // nothing is left aside
+}
+
+TEST_P(CommitOfThree, LeavesLinksAndWhatTheyName) {
+  fs::create_directory(folder_ / "real");
+  for (const char* name : {"a", "b", "c"}) {
+    std::ofstream(folder_ / "real" / name) << "old " << name;
+    fs::create_symlink(fs::path("real") / name, folder_ / name);
+  }
+  auto files = Written(true);
+  fs::remove(folder_ / "real" / Failing().filename());
+  fs::create_directory(folder_ / "real" / Failing().filename());
+  ASSERT_FALSE(CommitTogether(files).ok());
+  for (const char* name : {"a", "b", "c"}) {
+    EXPECT_TRUE(fs::is_symlink(folder_ / name));
+    if (folder_ / name == Failing()) continue;
+    EXPECT_EQ(Content(folder_ / name), std::string("old ") + name);
+  }
+}
+
+TEST_P(CommitOfThree, TakesBackNamesThatNobodyHad) {
+  auto files = Written(false);
+  std::ofstream(Failing()) << "theirs";
+  const Status status = CommitTogether(files);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kExists);
+  EXPECT_EQ(Content(Failing()), "theirs");
+  EXPECT_EQ(folder_.Entries(), 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(EachOrderOfFailure, CommitOfThree, testing::Values(0, 1, 2));
+
+TEST(AtomicFile, FilesThatBelongTogetherReplaceOldOnes) {
+  const TestFolder folder;
+  std::ofstream(folder / "b") << "old";
+  std::vector<OutputFile> files;
+  for (const char* name : {"a", "b"}) {
+    files.push_back(*OutputFile::Create(folder / name, true));
+    ASSERT_TRUE(files.back().Write("new").ok());
+  }
+  ASSERT_TRUE(CommitTogether(files).ok());
+  EXPECT_EQ(Content(folder / "a") + Content(folder / "b"), "newnew");
+  EXPECT_EQ(folder.Entries(), 2);
+}
+
+TEST(AtomicFile, KeepsAResultWhoseNameWasTaken) {
+  const TestFolder folder;
+  const auto write = [](const fs::path& path, bool overwrite) { return WriteWholeFile(path, "mine", overwrite); };
+  std::ofstream(folder / "scan.compressed.ply") << "theirs";
+  std::ofstream(folder / "scan-2.compressed.ply") << "theirs";
+  const Status status = WriteOrKeep(folder / "scan.compressed.ply", false, write);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().code, ErrorCode::kExists);
+  EXPECT_NE(status.error().message.find("scan-3.compressed.ply"), std::string::npos) << status.error().message;
+  EXPECT_EQ(Content(folder / "scan.compressed.ply"), "theirs");
+  EXPECT_EQ(Content(folder / "scan-3.compressed.ply"), "mine");
+  ASSERT_TRUE(WriteOrKeep(folder / "scan.compressed.ply", true, write).ok());
+  EXPECT_EQ(Content(folder / "scan.compressed.ply"), "mine");
+  EXPECT_EQ(folder.Entries(), 3);
 }
 
 }  // namespace

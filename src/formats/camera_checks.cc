@@ -5,20 +5,17 @@
 #include <cmath>
 #include <system_error>
 
+#include "core/file_system.h"
 #include "core/rotation.h"
 #include "core/text.h"
 #include "formats/image_io.h"
+#include "formats/input_record.h"
 
 namespace anchorsplat {
 
 namespace {
 
 Error Bad(std::string sentence) { return Error{ErrorCode::kBadFile, std::move(sentence)}; }
-
-bool IsFile(const std::filesystem::path& path) {
-  std::error_code ignored;  // unreadable is as good as absent here
-  return std::filesystem::is_regular_file(path, ignored);
-}
 
 }  // namespace
 
@@ -69,7 +66,9 @@ std::filesystem::path FindPicture(std::span<const std::filesystem::path> folders
   for (const auto& folder : folders) {
     for (const char* extension : {"", ".png", ".jpg", ".jpeg"}) {
       auto path = (folder / (relative + extension)).lexically_normal();
-      if (IsFile(path)) return path;
+      if (!IsFile(path)) continue;
+      RecordInput(path);  // the pictures are a part of what the cameras are read from, whoever opens them
+      return path;
     }
   }
   return {};

@@ -5,6 +5,7 @@
 #include <system_error>
 #include <vector>
 
+#include "core/file_system.h"
 #include "core/text.h"
 #include "formats/colmap_model.h"
 #include "formats/inria_cameras.h"
@@ -57,18 +58,17 @@ Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder) {
     for (const auto& candidate : candidates) list += (list.empty() ? "" : ", ") + candidate.string();
     return Error{ErrorCode::kBadArgument, Cat(folder.string(), ": several sets of cameras, name one of them: ", list)};
   }
-  return std::filesystem::is_directory(candidates[0]) ? ReadColmapModel(candidates[0]) : ReadCameraJson(candidates[0]);
+  return IsFolder(candidates[0]) ? ReadColmapModel(candidates[0]) : ReadCameraJson(candidates[0]);
 }
 
 }  // namespace
 
 Result<CameraSet> ReadCameras(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) return ReadCameraFolder(path);
+  if (IsFolder(path)) return ReadCameraFolder(path);
   // Any file of a COLMAP model stands for the model.
   const std::string name = path.filename().string();
   const bool colmap = name == "cameras.bin" || name == "images.bin" || name == "cameras.txt" || name == "images.txt";
-  if (colmap && std::filesystem::exists(path, ignored)) {
+  if (colmap && Exists(path)) {
     const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
     if (IsColmapModel(folder)) return ReadColmapModel(folder);
     return Error{ErrorCode::kNotFound,

@@ -4,6 +4,7 @@
 #include <iterator>
 #include <system_error>
 
+#include "core/file_system.h"
 #include "core/text.h"
 #include "formats/camera_checks.h"
 #include "formats/image_io.h"
@@ -29,11 +30,6 @@ constexpr ColmapCameraModel kModels[] = {
 };
 
 Error BadModel(std::string sentence) { return Error{ErrorCode::kBadFile, std::move(sentence)}; }
-
-bool FileExists(const std::filesystem::path& path) {
-  std::error_code ignored;
-  return std::filesystem::exists(path, ignored);
-}
 
 }  // namespace
 
@@ -78,8 +74,8 @@ Result<Camera> CameraFromColmap(const ColmapImage& image, const ColmapCameras& c
 }
 
 bool IsColmapModel(const std::filesystem::path& folder) {
-  return (FileExists(folder / "cameras.bin") && FileExists(folder / "images.bin")) ||
-         (FileExists(folder / "cameras.txt") && FileExists(folder / "images.txt"));
+  return (Exists(folder / "cameras.bin") && Exists(folder / "images.bin")) ||
+         (Exists(folder / "cameras.txt") && Exists(folder / "images.txt"));
 }
 
 Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder) {
@@ -89,7 +85,7 @@ Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder) {
     auto pictures = (folder / images).lexically_normal();
     if (std::filesystem::is_directory(pictures, ignored)) picture_folders.push_back(std::move(pictures));
   }
-  const bool binary = FileExists(folder / "cameras.bin") && FileExists(folder / "images.bin");
+  const bool binary = Exists(folder / "cameras.bin") && Exists(folder / "images.bin");
   CameraSet set;
   set.source = CameraSource::kColmap;
   if (binary) {
@@ -104,8 +100,8 @@ Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder) {
 }
 
 Result<std::vector<ColmapPoint>> ReadColmapPoints(const std::filesystem::path& folder) {
-  if (FileExists(folder / "points3D.bin")) return ReadColmapPointsBinary(folder / "points3D.bin");
-  if (FileExists(folder / "points3D.txt")) return ReadColmapPointsText(folder / "points3D.txt");
+  if (Exists(folder / "points3D.bin")) return ReadColmapPointsBinary(folder / "points3D.bin");
+  if (Exists(folder / "points3D.txt")) return ReadColmapPointsText(folder / "points3D.txt");
   return Error{ErrorCode::kNotFound, Cat(folder.string(), ": neither points3D.bin nor points3D.txt is here")};
 }
 

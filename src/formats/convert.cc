@@ -14,6 +14,7 @@
 #include "core/statistics.h"
 #include "core/text.h"
 #include "formats/extra_properties.h"
+#include "formats/input_record.h"
 #include "formats/opened_splat.h"
 #include "formats/quantize.h"
 #include "formats/registry.h"
@@ -105,8 +106,9 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   ConvertReport report;
   const SplatFormat* const to = FormatOfExtension(output);
   if (to == nullptr || to->write == nullptr) return WriteCloud(output, GaussianCloud{}, options.write).error();
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckInputsStay({&input, 1}, {&output, 1}));
+  const InputRecord record;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(input, options.input_format));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(output));
   const SplatFormat* const from = file.format();
 
   const double begin = Now();

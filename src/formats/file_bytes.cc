@@ -1,11 +1,13 @@
 #include "formats/file_bytes.h"
 
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <system_error>
 
 #include "core/text.h"
 #include "formats/input_file.h"
+#include "formats/input_record.h"
 
 namespace anchorsplat {
 
@@ -16,15 +18,17 @@ Result<OpenedFile> OpenForReading(const std::filesystem::path& path) {
     return Error{ErrorCode::kNotFound, Cat(path.string(), ": no such file")};
   }
   if (code) return Error{ErrorCode::kIo, Cat(path.string(), ": ", code.message())};
-  if (!std::filesystem::is_regular_file(status)) {
-    return Error{ErrorCode::kIo, Cat(path.string(), ": expected a file, found ",
-                                     std::filesystem::is_directory(status) ? "a folder" : "something else")};
+  if (status.type() != std::filesystem::file_type::regular) {
+    return Error{ErrorCode::kIo,
+                 Cat(path.string(), ": expected a file, found ",
+                     status.type() == std::filesystem::file_type::directory ? "a folder" : "something else")};
   }
   OpenedFile file;
   file.size = std::filesystem::file_size(path, code);
   if (code) return Error{ErrorCode::kIo, Cat(path.string(), ": ", code.message())};
   file.handle.reset(std::fopen(path.c_str(), "rb"));
   if (!file.handle) return Error{ErrorCode::kIo, Cat(path.string(), ": cannot be opened: ", std::strerror(errno))};
+  RecordInput(::fileno(file.handle.get()), path);
   return file;
 }
 

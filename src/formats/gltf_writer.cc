@@ -230,9 +230,13 @@ uint64_t EstimatedGltfSize(int64_t count, int sh_degree) {
          BytesOf(attributes, count);
 }
 
+std::filesystem::path GltfFileBeside(const std::filesystem::path& path) {
+  return std::filesystem::path(path).replace_extension(".bin");
+}
+
 Status WriteGltf(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
-  const std::filesystem::path beside = std::filesystem::path(path).replace_extension(".bin");
+  const std::filesystem::path beside = GltfFileBeside(path);
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
   const std::vector<WrittenAttribute> attributes = Attributes(cloud, flip);
   nlohmann::json json = JsonOf(cloud.size(), attributes, BoundsOf(cloud, flip));

@@ -22,6 +22,7 @@ Status WriteGlb(const std::filesystem::path& path, const GaussianCloud& cloud, c
 // The same as JSON with its numbers in a file of their own beside it: scan.gltf and scan.bin. Both appear when both are
 // complete. Errors: as WriteGlb, without its bound; kExists for each of the two.
 Status WriteGltf(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options = {});
+std::filesystem::path GltfFileBeside(const std::filesystem::path& path);
 
 uint64_t EstimatedGltfSize(int64_t count, int sh_degree);  // of both
 uint64_t PredictedGlbSize(int64_t count, int sh_degree);

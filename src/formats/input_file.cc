@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/text.h"
+#include "formats/input_record.h"
 
 namespace anchorsplat {
 
@@ -69,6 +70,7 @@ Result<InputFile> InputFile::Open(const std::filesystem::path& path) {
     return file;
   }
   if (!S_ISREG(info.st_mode)) return Error{ErrorCode::kIo, Cat(name, ": is a device, expected a file")};
+  RecordInput(file.descriptor_, path);
   file.size_ = static_cast<uint64_t>(info.st_size);
   return file;
 }

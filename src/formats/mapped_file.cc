@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/text.h"
+#include "formats/input_record.h"
 
 namespace anchorsplat {
 
@@ -58,6 +59,7 @@ Result<MappedFile> MappedFile::Open(const std::filesystem::path& path) {
         Cat(path.string(), S_ISDIR(info.st_mode) ? ": is a folder, expected a file"
                                                  : ": is a pipe or a device, which cannot be mapped; expected a file")};
   }
+  RecordInput(file.number, path);
   MappedFile mapped;
   if (info.st_size == 0) return mapped;
   const auto size = static_cast<size_t>(info.st_size);

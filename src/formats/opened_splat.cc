@@ -1,14 +1,12 @@
 #include "formats/opened_splat.h"
 
-#include <sys/stat.h>
-
-#include <map>
 #include <new>
 #include <string>
 #include <system_error>
 
 #include "core/text.h"
 #include "formats/extra_properties.h"
+#include "formats/input_record.h"
 
 namespace anchorsplat {
 
@@ -71,25 +69,16 @@ Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits, ExtraPropertie
   return Error{ErrorCode::kIo, Cat(input_.name(), ": there is not enough memory for its Gaussians")};
 }
 
-Status CheckInputsStay(std::span<const fs::path> inputs, std::span<const fs::path> outputs) {
-  std::map<std::pair<dev_t, ino_t>, const fs::path*> files;
-  for (const fs::path& input : inputs) {
-    struct stat info {};
-    // "-" may be a file too: `convert - scan.ply < scan.ply`.
-    const fs::path path = input == "-" ? fs::path("/dev/stdin") : SplatPath(input);
-    if (::stat(path.c_str(), &info) != 0 || !S_ISREG(info.st_mode)) continue;
-    files.emplace(std::pair(info.st_dev, info.st_ino), &input);
-  }
-  for (const fs::path& output : outputs) {
-    struct stat info {};
-    if (::stat(output.c_str(), &info) != 0) continue;
-    const auto same = files.find({info.st_dev, info.st_ino});
-    if (same == files.end()) continue;
-    return Error{ErrorCode::kBadArgument,
-                 Cat(output.string(), ": is the input ", same->second->string(),
-                     " itself, which would be lost; write to another name and rename it when you are content")};
-  }
-  return {};
+void RecordSplat(const fs::path& path) {
+  if (path == "-") return RecordInput(path);
+  const fs::path found = SplatPath(path);
+  RecordInput(found);
+  std::error_code ignored;
+  if (!fs::is_regular_file(found, ignored)) return;  // a pipe can be read only once
+  const Result<OpenedSplat> file = OpenedSplat::Open(path);
+  if (!file.ok()) return;
+  const Result<std::string> head = file->input().Head(2);
+  if (head.ok() && *head != "PK") (void)file->bytes();  // looks at all of them; an archive has none, and would be read
 }
 
 }  // namespace anchorsplat

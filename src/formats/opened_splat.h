@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <span>
 #include <utility>
 
 #include "core/gaussian_cloud.h"
@@ -37,8 +36,7 @@ class OpenedSplat {
 // What OpenedSplat opens for a path: the meta.json of a folder, other paths as they are.
 std::filesystem::path SplatPath(const std::filesystem::path& path);
 
-// That no output replaces one of the inputs, under whatever name: the same path, a symbolic or a hard link. What an
-// output was made from should outlive it. Errors: kBadArgument.
-Status CheckInputsStay(std::span<const std::filesystem::path> inputs, std::span<const std::filesystem::path> outputs);
+// Puts a splat that will be read later down as an input, with the files beside it that belong to it (input_record.h).
+void RecordSplat(const std::filesystem::path& path);
 
 }  // namespace anchorsplat

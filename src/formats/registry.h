@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
@@ -49,6 +50,8 @@ struct SplatFormat {
   Status (*write)(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) = nullptr;
   Status (*write_with_extras)(const std::filesystem::path& path, const GaussianCloud& cloud,
                               const WriteOptions& options, const ExtraProperties& extras) = nullptr;
+  // Files that `write` makes beside the one it is told. Null: none.
+  std::vector<std::filesystem::path> (*written_beside)(const std::filesystem::path& path, int sh_degree) = nullptr;
   // Bytes of the file `write` makes of a cloud without comments. Null where nothing can be said.
   uint64_t (*predicted_size)(int64_t count, int sh_degree) = nullptr;
   // The prediction is what real splats take; values that compress better or worse take less or more.

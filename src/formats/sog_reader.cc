@@ -14,6 +14,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
+#include "formats/input_record.h"
 #include "formats/json_file.h"
 #include "formats/quantize.h"
 #include "formats/webp_image.h"
@@ -60,6 +61,7 @@ class Members {
   uint64_t SizeBeside(const std::string& name) const {
     std::error_code failed;
     const uint64_t size = IsPlainName(name) ? std::filesystem::file_size(folder_ / name, failed) : 0;
+    if (size > 0) RecordInput(folder_ / name);
     return failed ? 0 : size;
   }
   std::string meta_name() const { return archive_ ? name_ + ": meta.json" : name_; }

@@ -196,6 +196,13 @@ nlohmann::json DrawHarmonics(const Pictures& pictures, std::vector<Picture>& out
 
 std::span<const char* const> SogPictures(int sh_degree) { return std::span(kPictures).subspan(sh_degree > 0 ? 0 : 2); }
 
+std::vector<std::filesystem::path> SogFilesBeside(const std::filesystem::path& path, int sh_degree) {
+  std::vector<std::filesystem::path> names;
+  if (path.filename() != "meta.json") return names;  // all in one archive
+  for (const char* name : SogPictures(sh_degree)) names.push_back(path.parent_path() / name);
+  return names;
+}
+
 Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
   // Multiples of four, as other programs make them.
@@ -205,16 +212,14 @@ Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, c
     return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", WithThousands(cloud.size()),
                                               " Gaussians are more than a WebP picture has room for")};
   }
-  const bool bundled = path.filename() != "meta.json";
+  const std::vector<std::filesystem::path> names = SogFilesBeside(path, cloud.sh_degree);
+  const bool bundled = names.empty();
   // Before the work, so that a file in the way is not found out minutes later.
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
   std::vector<OutputFile> beside;
-  if (!bundled) {
-    for (const char* name : SogPictures(cloud.sh_degree)) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile picture,
-                                   OutputFile::Create(path.parent_path() / name, options.overwrite));
-      beside.push_back(std::move(picture));
-    }
+  for (const std::filesystem::path& name : names) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile picture, OutputFile::Create(name, options.overwrite));
+    beside.push_back(std::move(picture));
   }
 
   const Pictures pictures{cloud, WriteOrder(cloud, options.order, SplatOrder::kMorton), static_cast<int>(width),

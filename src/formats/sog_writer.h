@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
@@ -25,6 +26,8 @@ Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, c
 
 // The pictures of a splat of that degree by name, in the order in which they are drawn.
 std::span<const char* const> SogPictures(int sh_degree);
+// Where they are for a meta.json; none for an archive.
+std::vector<std::filesystem::path> SogFilesBeside(const std::filesystem::path& path, int sh_degree);
 
 // From what splats of real scenes take per Gaussian, and the palette (docs/formats.md has the deviations).
 uint64_t EstimatedSogSize(int64_t count, int sh_degree);

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "core/text.h"
+#include "formats/input_record.h"
 #include "formats/safetensors.h"
 #include "formats/tensor_checksum.h"
 #include "formats/tensor_file.h"
@@ -87,6 +88,7 @@ Status WriteTrainCheckpoint(const std::filesystem::path& path, const Optimizer& 
 
 Result<TrainProgress> ReadTrainCheckpoint(const std::filesystem::path& path, const TrainProgress& expected,
                                           Optimizer& optimizer) {
+  RecordOwnFile(path);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorFile file, OpenCheckpoint(path));
   const auto text = [&](const char* key) {
     const auto found = file.metadata().find(key);

@@ -8,12 +8,14 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "core/file_system.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
 #include "dataset/object_name.h"
 #include "formats/file_bytes.h"
+#include "formats/input_record.h"
 #include "model/modules/point_batch_norm.h"
 #include "model/modules/trainable_network.h"
 #include "train/optimizer.h"
@@ -130,11 +132,11 @@ class Trainer {
 Status CheckFolder(const TrainRequest& request) {
   std::error_code code;
   fs::create_directories(request.out, code);
-  if (!fs::is_directory(request.out)) {
+  if (!IsFolder(request.out)) {
     return Error{ErrorCode::kIo, Cat(request.out.string(), ": cannot be made a folder: ", code.message())};
   }
   const fs::path checkpoint = request.out / "checkpoint.safetensors";
-  if (fs::exists(checkpoint) && !request.resume && !request.overwrite) {
+  if (Exists(checkpoint) && !request.resume && !request.overwrite) {
     return Error{ErrorCode::kExists, Cat(checkpoint.string(), " is there: --resume goes on from it, -w begins anew")};
   }
   return {};
@@ -189,10 +191,11 @@ Status Trainer::Begin() {
   progress_.objects = data_.names;
   progress_.loss_scale = config_.precision == Precision::kFp16 ? kFirstLossScale : 1;
   const fs::path checkpoint = request_.out / "checkpoint.safetensors";
-  if (request_.resume && fs::exists(checkpoint)) {
+  if (request_.resume && Exists(checkpoint)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(progress_, ReadTrainCheckpoint(checkpoint, progress_, *optimizer_));
   } else if (!request_.start.empty()) {
     ANCHORSPLAT_RETURN_IF_ERROR(StartFromCheckpoint(request_.start, *optimizer_));
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(checkpoint));  // not the one that is to be replaced
   }
   if (Leads()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(log_, TrainLog::Open(request_.out, progress_.step));

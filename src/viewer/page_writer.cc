@@ -13,6 +13,7 @@
 #include "core/text.h"
 #include "core/world_up.h"
 #include "formats/atomic_file.h"
+#include "formats/file_bytes.h"
 #include "render/constants.h"
 #include "viewer/base64.h"
 #include "viewer/html_text.h"
@@ -115,24 +116,13 @@ Result<Json> AddSplat(const ViewerSplat& splat, const std::string& id, int max_s
 
 // The picture's MIME type goes by its first bytes: a browser that is told the truth does not guess.
 Result<Json> AddPicture(const std::filesystem::path& path, const std::string& id, std::vector<DataElement>& elements) {
-  std::error_code failed;
-  const uint64_t size = std::filesystem::file_size(path, failed);
-  if (failed) return Error{ErrorCode::kNotFound, Cat(path.string(), ": cannot be read: ", failed.message())};
-  if (size > kMaxPictureBytes) {
-    return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", HumanBytes(size), ", more than the ",
-                                          HumanBytes(kMaxPictureBytes), " allowed for a picture")};
-  }
-  std::vector<uint8_t> bytes(size);
-  std::ifstream file(path, std::ios::binary);
-  if (!file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size))) {
-    return Error{ErrorCode::kIo, Cat(path.string(), ": cannot be read")};
-  }
-  const std::string_view head(reinterpret_cast<const char*>(bytes.data()), std::min<size_t>(bytes.size(), 8));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(path, kMaxPictureBytes));
+  const std::string_view head = std::string_view(bytes).substr(0, 8);
   std::string type;
   if (head == "\x89PNG\r\n\x1a\n") type = "image/png";
   if (head.starts_with("\xff\xd8\xff")) type = "image/jpeg";
   if (type.empty()) return Error{ErrorCode::kBadFile, Cat(path.string(), ": neither a PNG nor a JPEG")};
-  elements.push_back({id, Base64(bytes)});
+  elements.push_back({id, Base64({reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()})});
   return Json{{"type", type}, {"element", id}};
 }
 

@@ -26,7 +26,7 @@ Error WriteError(const fs::path& path, const char* what, int error) {
   return {ErrorCode::kIo, Cat(path.string(), ": cannot ", what, ": ", Reason(error))};
 }
 
-Error Exists(const fs::path& path) { return {ErrorCode::kExists, Cat(path.string(), ": exists; -w replaces it")}; }
+Error AlreadyThere(const fs::path& path) { return {ErrorCode::kExists, Cat(path.string(), ": exists; -w replaces it")}; }
 
 // Short and independent of the final name, which may be as long as the file system allows.
 std::string TemporaryName() {
@@ -117,7 +117,7 @@ Result<OutputFile> OutputFile::Create(const fs::path& path, bool overwrite) {
   if (exists) {
     if (S_ISDIR(info.st_mode)) return Error{ErrorCode::kIo, Cat(path.string(), ": is a folder, not a file to write")};
     ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(path));
-    if (!overwrite && !IsOwnFile(path)) return Exists(path);
+    if (!overwrite && !IsOwnFile(path)) return AlreadyThere(path);
     if (!S_ISREG(info.st_mode)) {
       return Error{ErrorCode::kIo, Cat(path.string(), ": is not a regular file and cannot be replaced by one")};
     }
@@ -244,7 +244,7 @@ Status OutputFile::TakeName(bool keep_old) {
   } else {
     error = RenameToNewName(temporary_.c_str(), target_.c_str());
   }
-  if (error == EEXIST) return Exists(path_);
+  if (error == EEXIST) return AlreadyThere(path_);
   if (error != 0) return WriteError(path_, "give the file its name", error);
   temporary_.clear();
   return {};

@@ -322,6 +322,8 @@ TEST_F(EnhanceDoor, ContradictedEstimateIsNotActedOn) {
       {.name = "network",
        .summary = "of this test",
        .rank = 100,
+       .adds_detail = true,
+       .options = WidthOptions(),
        .ready =
            [](const EnhanceOptions& o) {
              return o.seed == kOnlyHere ? Status() : Status(Error{ErrorCode::kBadArgument, "not here"});
@@ -348,7 +350,7 @@ TEST_F(EnhanceDoor, ContradictedEstimateIsNotActedOn) {
   EXPECT_LT(report.pixel_size, report.finding->estimate.size);
   EXPECT_EQ(report.method, "filter");
   EXPECT_TRUE(log_->Says("smallest plausible pixel")) << log_->text();
-  EXPECT_TRUE(log_->Says("the filter alone")) << log_->text();
+  EXPECT_TRUE(log_->Says("the filter instead of 'network'")) << log_->text();
 
   options.method = "network";
   EXPECT_EQ(Enhance(cloud, options)->report.method, "network");

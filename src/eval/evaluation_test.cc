@@ -343,6 +343,7 @@ TEST(Evaluate, MethodsOfEnhanceComeByThemselves) {
   RegisterEnhanceMethod(
       {.name = "thicken",
        .summary = "for this test",
+       .options = {},
        .ready = [](const EnhanceOptions&) { return Status(); },
        .run = [](EnhanceInput input, const EnhanceOptions& options, EnhanceReport& report) -> Result<GaussianCloud> {
          EXPECT_TRUE(options.cameras);

@@ -39,7 +39,7 @@ torch::nn::Linear LinearWithoutBias(int64_t inputs, int64_t outputs) {
   return torch::nn::Linear(torch::nn::LinearOptions(inputs, outputs).bias(false));
 }
 
-torch::nn::LayerNorm LayerNormOf(int64_t channels) {
+torch::nn::LayerNorm CompactLayerNorm(int64_t channels) {
   return torch::nn::LayerNorm(torch::nn::LayerNormOptions({channels}).eps(kLayerNormEpsilon));
 }
 
@@ -65,7 +65,7 @@ CompactTrainable::CompactTrainable(const CompactConfig& config)
   register_module("domain", domain);
   embed_first_ = embed->register_module("first", torch::nn::Linear(kNodeFeatures, h));
   embed_second_ = embed->register_module("second", torch::nn::Linear(h, h));
-  embed_norm_ = embed->register_module("norm", LayerNormOf(h));
+  embed_norm_ = embed->register_module("norm", CompactLayerNorm(h));
   for (int64_t r = 0; r < config.rounds; ++r) {
     Group group;
     rounds->register_module(Cat(r), group);
@@ -76,7 +76,7 @@ CompactTrainable::CompactTrainable(const CompactConfig& config)
     round.message = group->register_module("message", torch::nn::Linear(h, h));
     round.update_first = group->register_module("update_first", torch::nn::Linear(3 * h, h));
     round.update_second = group->register_module("update_second", torch::nn::Linear(h, h));
-    round.norm = group->register_module("norm", LayerNormOf(h));
+    round.norm = group->register_module("norm", CompactLayerNorm(h));
   }
   head_first_ = head->register_module("first", torch::nn::Linear(h + kNodeFeatures, g));
   head_second_ = head->register_module("second", torch::nn::Linear(g, g));

@@ -39,7 +39,7 @@ struct PartTables {
   FeatureRange range;
 };
 
-Tensor FromBuffer(const Buffer<float>& values, std::vector<int64_t> shape) {
+Tensor TensorFromBuffer(const Buffer<float>& values, std::vector<int64_t> shape) {
   return torch::from_blob(const_cast<float*>(values.data()), shape, torch::kFloat32).clone();
 }
 
@@ -173,23 +173,23 @@ Result<std::shared_ptr<CompactTables>> MakeCompactTables(const CompactConfig& co
     made->rounds.push_back(MakeEdgeIndex(
         torch::from_blob(const_cast<int32_t*>(graph.index.data()), {points * m}, torch::kInt32), points, others));
   }
-  made->axes = FromBuffer(graph.axes, {n, 3, 3});
+  made->axes = TensorFromBuffer(graph.axes, {n, 3, 3});
   made->handedness = Handedness(graph, n);
   made->stored_axis =
       torch::from_blob(const_cast<uint8_t*>(graph.stored_axis.data()), {n, 3}, torch::kUInt8).to(torch::kInt64);
-  made->log_scales = FromBuffer(cloud.log_scales, {n, 3}).gather(1, made->stored_axis);
-  const Tensor quats = FromBuffer(cloud.quats, {n, 4}).to(torch::kFloat64), norms = quats.norm(2, 1, true);
+  made->log_scales = TensorFromBuffer(cloud.log_scales, {n, 3}).gather(1, made->stored_axis);
+  const Tensor quats = TensorFromBuffer(cloud.quats, {n, 4}).to(torch::kFloat64), norms = quats.norm(2, 1, true);
   const Tensor identity = torch::tensor({1.0, 0.0, 0.0, 0.0}, torch::kFloat64).expand({n, 4});
   made->quats = torch::where(norms > 0, quats / norms.clamp_min(1e-300), identity).to(torch::kFloat32);
-  made->log_pixel = FromBuffer(splat.pixel_sizes, {n, 1}).log();
+  made->log_pixel = TensorFromBuffer(splat.pixel_sizes, {n, 1}).log();
   Buffer<float> logits(static_cast<size_t>(n)), shorter(static_cast<size_t>(3 * n));
   for (size_t i = 0; i < static_cast<size_t>(n); ++i) {
     const CopyStart::Shape shape = start.ShapeOf(cloud.opacity_logits[i]);
     logits[i] = static_cast<float>(shape.opacity_logit);
     for (size_t a = 0; a < 3; ++a) shorter[3 * i + a] = static_cast<float>(shape.log_shorter[a]);
   }
-  made->start_logit = FromBuffer(logits, {n});
-  made->log_shorter = FromBuffer(shorter, {n, 3});
+  made->start_logit = TensorFromBuffer(logits, {n});
+  made->log_shorter = TensorFromBuffer(shorter, {n, 3});
   if (config.offset_unit == OffsetUnit::kCube) made->offset_side = CubeSide(cloud.means);
 
   for (Tensor* tensor :

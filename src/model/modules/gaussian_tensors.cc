@@ -12,7 +12,7 @@ torch::Tensor Copied(const Buffer<float>& values, std::vector<int64_t> shape) {
   return tensor;
 }
 
-void CopyTo(const torch::Tensor& tensor, Buffer<float>& values) {
+void CopyInto(const torch::Tensor& tensor, Buffer<float>& values) {
   const torch::Tensor host = tensor.detach().to(torch::kCPU, torch::kFloat32).contiguous();
   std::copy_n(host.const_data_ptr<float>(), values.size(), values.data());
 }
@@ -35,11 +35,11 @@ GaussianCloud ToCloud(const GaussianTensors& gaussians) {
   GaussianCloud cloud;
   cloud.Resize(gaussians.size(), degree);
   TORCH_CHECK(cloud.coefficients() == gaussians.sh.size(1), "a splat has 1, 4, 9 or 16 SH coefficients");
-  CopyTo(gaussians.means, cloud.means);
-  CopyTo(gaussians.log_scales, cloud.log_scales);
-  CopyTo(gaussians.quats, cloud.quats);
-  CopyTo(gaussians.opacity_logits, cloud.opacity_logits);
-  CopyTo(gaussians.sh, cloud.sh);
+  CopyInto(gaussians.means, cloud.means);
+  CopyInto(gaussians.log_scales, cloud.log_scales);
+  CopyInto(gaussians.quats, cloud.quats);
+  CopyInto(gaussians.opacity_logits, cloud.opacity_logits);
+  CopyInto(gaussians.sh, cloud.sh);
   return cloud;
 }
 

@@ -10,8 +10,8 @@ namespace anchorsplat {
 namespace {
 
 // A module that only holds others or parameters, to give them their names.
-class GroupImpl : public torch::nn::Module {};
-TORCH_MODULE(Group);
+class HeadGroupImpl : public torch::nn::Module {};
+TORCH_MODULE(HeadGroup);
 
 void AppendState(const torch::nn::Module& module, const std::string& prefix,
                  std::vector<std::pair<std::string, torch::Tensor>>& state) {
@@ -38,10 +38,10 @@ GaussianHeadsImpl::GaussianHeadsImpl(int64_t channels, int64_t hidden, int64_t c
 }
 
 void GaussianHeadsImpl::RegisterIn(torch::nn::Module& network) {
-  Group mlps, points;
+  HeadGroup mlps, points;
   for (size_t a = 0; a < layers.size(); ++a) {
     const std::string name = kAttributes[a].name;
-    Group mlp;
+    HeadGroup mlp;
     // Even indices: ReLUs stand between.
     for (size_t i = 0; i < layers[a].size(); ++i) mlp->register_module(Cat(2 * i), layers[a][i]);
     mlps->register_module(name, mlp);
@@ -69,7 +69,7 @@ AnchorSplatNetworkImpl::AnchorSplatNetworkImpl(const NetworkConfig& network_conf
     : config(network_config),
       backbone(network_config),
       heads(network_config.context_channels(), network_config.head_hidden, network_config.copies) {
-  register_module("backbone", Group())->register_module("backbone", backbone);
+  register_module("backbone", HeadGroup())->register_module("backbone", backbone);
   heads->RegisterIn(*this);
 }
 

@@ -132,7 +132,7 @@ def measure(args, mesh, views, seed):
     used = json.loads(run(args.program, "enhance", splat, "-o", folder / "auto.ply", "-w", "--json"))[0]["pixel_size"]["value"]
     results = []
     for which in ("input", "auto", "cameras"):
-        report = json.loads(run(args.program, "compare", folder / f"{which}.ply", "--truth", folder / "hr", "--cameras",
+        report = json.loads(run(args.program, "compare", folder / f"{which}.ply", folder / "hr", "--cameras",
                                 folder / "transforms_hr.json", "--json"))
         results.append(report["mean"]["psnr"])
     print(f"{name:16} as it is {results[0]:.2f}, enhanced {results[1]:.2f}, with cameras {results[2]:.2f} dB; estimate "

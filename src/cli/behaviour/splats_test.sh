@@ -127,10 +127,13 @@ says stderr "exists"
 expect 0 "enhance overwrites when told" "$program" enhance "$input" -o "$work/out.ply" --pixel-size 0.0055 -w -q
 silent stdout
 expect 0 "enhance with cameras" "$program" enhance "$input" -o "$work/cameras.ply" --cameras "$source/examples/biplane/transforms_lr.json" --json
-silent stderr
+says stderr "--camera-rule median: the cameras look at one thing from all around"
 says stdout '"source": "cameras"'
+says stdout '"camera_rule": "median"'
 expect 0 "enhance with estimated pixel size" "$program" enhance "$input" -o "$work/auto.ply"
 says stderr "estimated"
+expect 0 "what contradicts the estimate" "$program" info "$input" --json
+says stdout '"contradictions": []'
 expect 0 "upscale 1 changes nothing" "$program" enhance "$input" -o "$work/same.ply" --upscale 1 --pixel-size 1
 expect 0 "upscale 1 against its input" "$program" compare "$input" "$work/same.ply" --orbit 2 --size 64x64 --json
 says stdout '"psnr": null'

@@ -216,7 +216,7 @@ TEST_F(Refinement, GoesOnWhereItWasStopped) {
   const auto whole = Refine(input_, options_, {});
   ASSERT_TRUE(whole.ok());
   std::atomic<bool> stop{true};  // after the first step
-  RefineControl control{.checkpoint = folder_ / "state", .stop = &stop};
+  RefineControl control{.checkpoint = folder_ / "state", .outputs = {}, .stop = &stop};
   const auto first = Refine(input_, options_, control);
   ASSERT_TRUE(first.ok());
   EXPECT_TRUE(first->report.interrupted);
@@ -256,7 +256,7 @@ TEST_F(Refinement, GoesOnWhereItWasStopped) {
 
   // A state that cannot be written costs the state, not the result.
   stop = true;
-  RefineControl nowhere{.checkpoint = folder_ / "no such folder" / "state", .stop = &stop};
+  RefineControl nowhere{.checkpoint = folder_ / "no such folder" / "state", .outputs = {}, .stop = &stop};
   const auto kept = Refine(input_, options_, nowhere);
   ASSERT_TRUE(kept.ok()) << kept.error().message;
   EXPECT_TRUE(kept->report.interrupted);

@@ -33,10 +33,10 @@ else()
   add_custom_command(
     OUTPUT ${documents}
     COMMAND ${CMAKE_COMMAND} -E make_directory "${made}"
-    COMMAND anchorsplat manual man >"${made}/anchorsplat.1"
-    COMMAND anchorsplat manual bash >"${made}/anchorsplat.bash"
-    COMMAND anchorsplat manual zsh >"${made}/_anchorsplat"
-    COMMAND "${CMAKE_SOURCE_DIR}/scripts/third-party.sh" "$<TARGET_FILE:anchorsplat>" >"${third_party}"
+    COMMAND anchorsplat manual man > "${made}/anchorsplat.1"
+    COMMAND anchorsplat manual bash > "${made}/anchorsplat.bash"
+    COMMAND anchorsplat manual zsh > "${made}/_anchorsplat"
+    COMMAND "${CMAKE_SOURCE_DIR}/scripts/third-party.sh" "$<TARGET_FILE:anchorsplat>" > "${third_party}"
     DEPENDS anchorsplat scripts/third-party.sh THIRD_PARTY
     VERBATIM)
   add_custom_target(anchorsplat_documents ALL DEPENDS ${documents})

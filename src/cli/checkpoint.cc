@@ -47,10 +47,7 @@ Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> out
 void RecordWhatWasLeft(const fs::path& checkpoint, std::span<const fs::path> outputs) {
   const std::vector<std::string> left = FilesLeftWith(checkpoint);
   for (const fs::path& output : outputs) {
-    // An interruption writes its checkpoint first. What is older was in the way then, and the result has another name.
-    std::error_code code;
-    const bool later = fs::last_write_time(output, code) >= fs::last_write_time(checkpoint, code) && !code;
-    if (later && std::find(left.begin(), left.end(), AbsoluteName(output)) != left.end()) RecordOwnFile(output);
+    if (std::find(left.begin(), left.end(), AbsoluteName(output)) != left.end()) RecordOwnFile(output);
   }
 }
 

@@ -26,6 +26,7 @@
 #include "formats/camera_io.h"
 #include "formats/cloud_output.h"
 #include "formats/extra_properties.h"
+#include "formats/input_record.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "formats/row_arrays.h"
@@ -278,6 +279,9 @@ Status RunEnhance(const EnhanceFlags& flags, Program& program) {
       if (options.control.resume) RecordWhatWasLeft(checkpoint, files);
     }
     ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(output, shared.overwrite));
+    if (shared.overwrite) {  // so that an interruption leaves them under these names
+      for (const fs::path& file : files) RecordOwnFile(file);
+    }
     if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(PagePath(output), shared.overwrite));
   }
 

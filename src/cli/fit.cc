@@ -19,6 +19,7 @@
 #include "formats/cloud_io.h"
 #include "formats/cloud_output.h"
 #include "formats/gsplat_checkpoint_writer.h"
+#include "formats/input_record.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
 
@@ -44,7 +45,10 @@ Status CheckOutputs(const FitFlags& flags, const FitControl& control, bool overw
   ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(control.checkpoint, control.outputs, flags.resume, overwrite));
   // A continued fit replaces what its interruption left.
   if (flags.resume) RecordWhatWasLeft(control.checkpoint, control.outputs);
-  for (const fs::path& path : control.outputs) ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, overwrite));
+  for (const fs::path& path : control.outputs) {
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, overwrite));
+    if (overwrite) RecordOwnFile(path);  // so that an interruption leaves it under this name
+  }
   return {};
 }
 

@@ -112,7 +112,10 @@ std::string AbsoluteName(const std::filesystem::path& file) { return Printable(A
 
 void Leave(FitState& state, std::span<const std::filesystem::path> files) {
   state.left.clear();
-  for (const std::filesystem::path& file : files) state.left.push_back(AbsoluteName(file));
+  for (const std::filesystem::path& file : files) {
+    // What is there now and is not the command's own is in its way: the result will have another name.
+    if (!Exists(file) || IsOwnFile(file)) state.left.push_back(AbsoluteName(file));
+  }
 }
 
 Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std::string& settings) {

@@ -28,7 +28,7 @@ struct FitState {
   std::vector<std::string> left;
 };
 
-// Notes what an interruption leaves besides its checkpoint.
+// Before an interruption writes its results: notes which of these files it will leave besides its checkpoint.
 void Leave(FitState& state, std::span<const std::filesystem::path> files);
 
 // What one step saw.

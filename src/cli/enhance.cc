@@ -107,10 +107,15 @@ Result<std::vector<fs::path>> OutputPaths(const EnhanceFlags& flags) {
     }
     outputs.push_back(output);
   }
+  return outputs;
+}
+
+Status MakeOutDir(const EnhanceFlags& flags) {
+  if (flags.out_dir.empty()) return {};
   std::error_code code;
   fs::create_directories(flags.out_dir, code);
   if (code) return Error{ErrorCode::kIo, Cat(flags.out_dir, ": cannot make this folder: ", code.message())};
-  return outputs;
+  return {};
 }
 
 nlohmann::json ToJson(const std::string& input, const fs::path& output, const EnhanceReport& r) {
@@ -269,6 +274,7 @@ Status RunEnhance(const EnhanceFlags& flags, Program& program) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto outputs, OutputPaths(flags));
   if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(CheckPages(outputs));
+  ANCHORSPLAT_RETURN_IF_ERROR(MakeOutDir(flags));
 
   // For all before the first is computed: a batch should not fail half-way on something known at its start.
   for (const fs::path& output : outputs) {

@@ -293,8 +293,9 @@ void AddBench(CLI::App& app, Program& program) {
   fit.add_option("--repeats", fit_flags->options.repeats, "The fastest counts")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  fit.callback(
-      [fit_flags, &program] { program.run = [fit_flags, &program] { return RunFitBench(*fit_flags, program.flags); }; });
+  fit.callback([fit_flags, &program] {
+    program.run = [fit_flags, &program] { return RunFitBench(*fit_flags, program.flags); };
+  });
 
   CLI::App& network = AddVerb(verb, program, "network", "The AnchorSplat network against a plain matrix product",
                               "anchorsplat bench network scan.ply --model anchorsplat_20x.pth");

@@ -126,11 +126,10 @@ void PrintReport(const FitFlags& flags, const FitReport& r) {
 Status WriteResults(const FitFlags& flags, const Fitted& fitted, bool overwrite) {
   const Status splat = WriteCloudOrKeep(flags.output, fitted.cloud, {.overwrite = overwrite});
   if (flags.gsplat_checkpoint.empty()) return splat;
-  const Status checkpoint =
-      WriteOrKeep(flags.gsplat_checkpoint, overwrite, [&](const fs::path& path, bool replace) {
-        return WriteGsplatCheckpoint(path, fitted.cloud, std::max<int64_t>(0, fitted.report.steps - 1),
-                                     {.overwrite = replace});
-      });
+  const Status checkpoint = WriteOrKeep(flags.gsplat_checkpoint, overwrite, [&](const fs::path& path, bool replace) {
+    return WriteGsplatCheckpoint(path, fitted.cloud, std::max<int64_t>(0, fitted.report.steps - 1),
+                                 {.overwrite = replace});
+  });
   if (splat.ok() || checkpoint.ok()) return splat.ok() ? checkpoint : splat;
   return Error{splat.error().code, Cat(splat.error().message, "; ", checkpoint.error().message)};
 }

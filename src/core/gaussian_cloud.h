@@ -63,7 +63,8 @@ Status Append(GaussianCloud& cloud, const GaussianCloud& more);
 GaussianCloud WithShDegree(const GaussianCloud& cloud, int degree);
 
 // True when every stored value of row i is finite, except that a log-scale may be −Inf (a flat Gaussian) and an opacity
-// logit ±Inf (opacity 1 or 0): legal, and written by some tools. What it is false for is nowhere drawn (docs/formats.md).
+// logit ±Inf (opacity 1 or 0): legal, and written by some tools. What it is false for is nowhere drawn
+// (docs/formats.md).
 bool IsUsable(const GaussianCloud& cloud, int64_t i);
 
 }  // namespace anchorsplat

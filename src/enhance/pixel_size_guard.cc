@@ -18,9 +18,9 @@ namespace anchorsplat {
 namespace {
 
 constexpr float kGuardVisibleOpacity = 0.1f;
-constexpr float kBlack = 0.04f;     // brightest channel of the constant colour; ten steps of 255
-constexpr double kFewBlack = 0.01;  // share of the Gaussians below which black ones cannot move an outline
-constexpr double kGuardFarthest = 1.5;   // of the radius that frames the cloud, as the estimate looks
+constexpr float kBlack = 0.04f;         // brightest channel of the constant colour; ten steps of 255
+constexpr double kFewBlack = 0.01;      // share of the Gaussians below which black ones cannot move an outline
+constexpr double kGuardFarthest = 1.5;  // of the radius that frames the cloud, as the estimate looks
 constexpr size_t kGuardMostGaussians = 200'000;
 constexpr float kConstantHarmonic = 0.28209479177387814f;
 

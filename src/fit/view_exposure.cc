@@ -12,7 +12,7 @@ namespace anchorsplat {
 namespace {
 
 constexpr int64_t kExposureGrain = 1 << 14;  // pixels per task
-constexpr double kRidge = 1e-4;      // per pixel: outweighed by a contrast of 1 %
+constexpr double kRidge = 1e-4;              // per pixel: outweighed by a contrast of 1 %
 constexpr double kSigmaOfMedian = 1.4826;
 constexpr float kSigmas = 6;
 constexpr float kVisible = 0.5f / 255;  // differences below say nothing about noise: both show plain background

@@ -26,7 +26,9 @@ Error WriteError(const fs::path& path, const char* what, int error) {
   return {ErrorCode::kIo, Cat(path.string(), ": cannot ", what, ": ", Reason(error))};
 }
 
-Error AlreadyThere(const fs::path& path) { return {ErrorCode::kExists, Cat(path.string(), ": exists; -w replaces it")}; }
+Error AlreadyThere(const fs::path& path) {
+  return {ErrorCode::kExists, Cat(path.string(), ": exists; -w replaces it")};
+}
 
 // Short and independent of the final name, which may be as long as the file system allows.
 std::string TemporaryName() {

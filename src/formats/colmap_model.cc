@@ -50,7 +50,8 @@ Result<Pinhole> PinholeFromColmap(const ColmapCameraModel& model, uint64_t width
   if (model.fisheye) return BadModel(Cat("camera model ", model.name, " is not a pinhole camera", undistort));
   for (const double distortion : params.subspan(model.focals + 2)) {
     if (distortion != 0) {
-      return BadModel(Cat("lens distortion ", distortion, " of camera model ", model.name, " is not supported", undistort));
+      return BadModel(
+          Cat("lens distortion ", distortion, " of camera model ", model.name, " is not supported", undistort));
     }
   }
   if (width > kMaxImageSide || height > kMaxImageSide) {

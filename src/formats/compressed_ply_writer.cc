@@ -231,8 +231,8 @@ Status WriteCompressedPly(const std::filesystem::path& path, const GaussianCloud
 }
 
 std::string CompressedPlyMeanLoss(const GaussianCloud& cloud) {
-  constexpr double kStray = 8;         // of the box of the middle 98 %: where it ends well, nobody needs to look closer
-  constexpr double kUsualChunk = 4;    // times its share of the volume: surfaces have larger ones than solids
+  constexpr double kStray = 8;       // of the box of the middle 98 %: where it ends well, nobody needs to look closer
+  constexpr double kUsualChunk = 4;  // times its share of the volume: surfaces have larger ones than solids
   constexpr double kLeastChunk = 0.5, kMostChunk = 2;  // of the box: steps of 1/4094 and 1/1023 of it
   const MiddleOfMeans middle = FindMiddleOfMeans(cloud);
   const std::optional<Bounds> bounds = ComputeBounds(cloud);

@@ -28,8 +28,7 @@ std::string OneGaussian(const std::vector<std::pair<std::string, std::vector<int
 
 TEST(GsplatCheckpoint, ReadsEveryDegreeThroughTheDoor) {
   for (const int degree : {0, 1, 3}) {
-    const auto path =
-        SourceDirForTest().string() + "/testdata/tensors/ckpt_degree" + std::to_string(degree) + ".pt";
+    const auto path = SourceDirForTest().string() + "/testdata/tensors/ckpt_degree" + std::to_string(degree) + ".pt";
     const Result<GaussianCloud> cloud = ReadCloud(path);
     ASSERT_TRUE(cloud.ok()) << cloud.error().message;
     EXPECT_TRUE(Validate(*cloud).ok());

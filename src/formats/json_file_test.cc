@@ -24,8 +24,7 @@ TEST(JsonFile, ReadsWhatTheLibraryReads) {
 }
 
 TEST(JsonFile, SyntaxErrorsSayWhere) {
-  for (const std::string text :
-       {"", "{", "[1,", "{\"a\" 1}", "[1] 2", "{\n\"a\": nul}", "[\"\xff\"]", "nan"}) {
+  for (const std::string text : {"", "{", "[1,", "{\"a\" 1}", "[1] 2", "{\n\"a\": nul}", "[\"\xff\"]", "nan"}) {
     EXPECT_NE(ErrorOf(text).find("a.json: not valid JSON: line "), std::string::npos) << text << ": " << ErrorOf(text);
   }
   EXPECT_NE(ErrorOf("{\n\"a\": nul}").find("line 2"), std::string::npos);

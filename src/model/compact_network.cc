@@ -25,7 +25,7 @@ constexpr int64_t kRowsPerTask = 128;
 constexpr int64_t kMostRows = int64_t{1} << 31;
 
 void ApplyLinear(int64_t rows, const float* input, const PackedWeights& weights, float* out,
-            Activation activation = Activation::kNone, const float* residual = nullptr) {
+                 Activation activation = Activation::kNone, const float* residual = nullptr) {
   LinearCpu({.rows = rows,
              .input = input,
              .input_stride = weights.inputs(),

@@ -22,16 +22,16 @@ Status CheckGradient(const RenderGradient& g, int width, int height) {
   };
   if (!fits(g.color, 3)) {
     return BadGradientArgument(Cat("gradient of ", g.color.width, " x ", g.color.height, " x ", g.color.channels,
-                           " for a picture of ", width, " x ", height, " x 3"));
+                                   " for a picture of ", width, " x ", height, " x 3"));
   }
   if (!g.alpha.pixels.empty() && !fits(g.alpha, 1)) {
     return BadGradientArgument(Cat("alpha gradient of ", g.alpha.width, " x ", g.alpha.height, " x ", g.alpha.channels,
-                           " for a picture of ", width, " x ", height, " x 1"));
+                                   " for a picture of ", width, " x ", height, " x 1"));
   }
   const PixelBox& b = g.box;
   if (!b.empty() && (b.x0 < 0 || b.y0 < 0 || b.x1 > width || b.y1 > height)) {
-    return BadGradientArgument(Cat("box [", b.x0, ", ", b.x1, ") x [", b.y0, ", ", b.y1, ") reaches outside of a picture of ",
-                           width, " x ", height));
+    return BadGradientArgument(Cat("box [", b.x0, ", ", b.x1, ") x [", b.y0, ", ", b.y1,
+                                   ") reaches outside of a picture of ", width, " x ", height));
   }
   return {};
 }
@@ -141,8 +141,9 @@ Status Rasterizer::Backward(const GaussianCloud& cloud, const RenderGradient& ou
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   const State::Kept& kept = *state_->kept;
   if (cloud.size() != kept.count || cloud.sh_degree != kept.sh_degree) {
-    return BadGradientArgument(Cat("the picture is of ", WithThousands(kept.count), " Gaussians of SH degree ", kept.sh_degree,
-                           ", not of ", WithThousands(cloud.size()), " of degree ", cloud.sh_degree));
+    return BadGradientArgument(Cat("the picture is of ", WithThousands(kept.count), " Gaussians of SH degree ",
+                                   kept.sh_degree, ", not of ", WithThousands(cloud.size()), " of degree ",
+                                   cloud.sh_degree));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckGradient(output_gradient, kept.intrinsics.width, kept.intrinsics.height));
   try {

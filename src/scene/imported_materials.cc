@@ -17,7 +17,9 @@ namespace {
 // Black materials with a picture are common in OBJ files, so only formats that define the product get it.
 bool MultipliesPicture(const std::string& ending) { return ending == ".gltf" || ending == ".glb" || ending == ".ac"; }
 
-float UnitFactor(float value, float otherwise) { return std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : otherwise; }
+float UnitFactor(float value, float otherwise) {
+  return std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : otherwise;
+}
 
 // How one material wants its picture; materials that want the same share it.
 struct PictureKey {

@@ -1,11 +1,12 @@
 #include "train/train_config.h"
-#include "core/source_dir_for_test.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+
+#include "core/source_dir_for_test.h"
 
 namespace anchorsplat {
 namespace {

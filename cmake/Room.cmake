@@ -1,6 +1,6 @@
-# anchorsplat_room(NAME USES rooms... LIBRARIES targets...)
+# anchorsplat_room(NAME FOLDERS folders... USES rooms... LIBRARIES targets...)
 #
-# One library target `anchorsplat_NAME` of all foo.cc in the folder, and, when there are foo_test.cc, one test program
+# One library target `anchorsplat_NAME` of all foo.cc in the folder and in FOLDERS, and, when there are foo_test.cc, one test program
 # `NAME_test` whose cases are found by CTest. Tests find files of the repository by core/source_dir_for_test.h.
 #
 # With ANCHORSPLAT_UNITY several files of a room are compiled as one, which halves a build from nothing: reading headers
@@ -31,8 +31,12 @@ add_library(anchorsplat_source_dir_for_test STATIC EXCLUDE_FROM_ALL "${CMAKE_BIN
 target_link_libraries(anchorsplat_source_dir_for_test PUBLIC anchorsplat_flags)
 
 function(anchorsplat_room name)
-  cmake_parse_arguments(ROOM "" "" "USES;LIBRARIES" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cc")
+  cmake_parse_arguments(ROOM "" "" "FOLDERS;USES;LIBRARIES" ${ARGN})
+  set(patterns "${CMAKE_CURRENT_SOURCE_DIR}/*.cc")
+  foreach(folder IN LISTS ROOM_FOLDERS)
+    list(APPEND patterns "${CMAKE_CURRENT_SOURCE_DIR}/${folder}/*.cc")
+  endforeach()
+  file(GLOB sources CONFIGURE_DEPENDS ${patterns})
   set(tests ${sources})
   list(FILTER sources EXCLUDE REGEX "_test\\.cc$")
   list(FILTER tests INCLUDE REGEX "_test\\.cc$")
@@ -49,7 +53,7 @@ function(anchorsplat_room name)
   endforeach()
   if(tests AND ANCHORSPLAT_TESTS)
     add_executable(${name}_test ${tests})
-    if(NOT name MATCHES "^(bench|dataset|formats|metrics|model|model_kernels|model_modules|render)$")  # their tests call what they compare alike
+    if(NOT name MATCHES "^(bench|dataset|formats|metrics|model.*|render)$")  # their tests call what they compare alike
       anchorsplat_unity(${name}_test)
     endif()
     target_link_libraries(${name}_test PRIVATE anchorsplat_${name} anchorsplat_source_dir_for_test

@@ -12,7 +12,7 @@
 #include "core/text.h"
 #include "formats/cloud_io.h"
 #include "formats/convert.h"
-#include "formats/ply_writer.h"
+#include "formats/ply/ply_writer.h"
 
 namespace anchorsplat {
 

@@ -9,7 +9,7 @@
 #include "core/random.h"
 #include "core/text.h"
 #include "formats/cloud_io.h"
-#include "formats/ply_writer.h"
+#include "formats/ply/ply_writer.h"
 
 namespace anchorsplat {
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "formats/test_folder.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

@@ -7,9 +7,9 @@
 #include "core/buffer.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "model/enhance_with_model.h"
 #include "model/kernels/bfloat16_tile.h"
 #include "model/kernels/linear.h"
+#include "model/published/enhance_with_published.h"
 
 namespace anchorsplat {
 
@@ -50,7 +50,7 @@ class PlainProduct {
 
 }  // namespace
 
-Result<NetworkBenchReport> BenchNetwork(const GaussianCloud& cloud, const PackedNetwork& network,
+Result<NetworkBenchReport> BenchNetwork(const GaussianCloud& cloud, const PublishedNetwork& network,
                                         const NetworkBenchOptions& options) {
   if (options.repeats < 1) return Error{ErrorCode::kBadArgument, "the number of repeats must be at least 1"};
   NetworkBenchReport report;
@@ -62,11 +62,11 @@ Result<NetworkBenchReport> BenchNetwork(const GaussianCloud& cloud, const Packed
   for (int i = 0; i <= options.repeats; ++i) {
     report.gemm_flops = std::max(report.gemm_flops, product.Flops());
     NetworkProfile profile;
-    ModelOptions model;
+    PublishedOptions model;
     model.rounding = options.rounding;
     model.profile = &profile;
     const auto begin = std::chrono::steady_clock::now();
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const ModelResult result, EnhanceWithModel(cloud, network, model));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const PublishedResult result, EnhanceWithPublishedNetwork(cloud, network, model));
     const double enhance_seconds = Seconds(begin);
     if (i == 0) continue;
     report.enhance_seconds = std::min(report.enhance_seconds, enhance_seconds);

@@ -6,7 +6,7 @@
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
-#include "model/packed_network.h"
+#include "model/published/published_network.h"
 
 namespace anchorsplat {
 
@@ -31,13 +31,13 @@ struct NetworkBenchReport {
   double multiply_adds = 0;  // of the pass
   double gemm_flops = 0;  // 2·multiply-adds per second of a plain product 17020×512×2048 in the network's precision
   double ratio = 0;       // seconds over the time that product's rate would need for the same multiply-adds
-  double enhance_seconds = 0;  // EnhanceWithModel as a whole, fastest repeat
+  double enhance_seconds = 0;  // EnhanceWithPublishedNetwork as a whole, fastest repeat
   std::vector<NetworkBenchStep> steps;
 };
 
 // Times the network on a cloud. Matrix product and forward pass take turns, so that both see the same machine.
-// Errors: those of EnhanceWithModel; kBadArgument when repeats < 1.
-Result<NetworkBenchReport> BenchNetwork(const GaussianCloud& cloud, const PackedNetwork& network,
+// Errors: those of EnhanceWithPublishedNetwork; kBadArgument when repeats < 1.
+Result<NetworkBenchReport> BenchNetwork(const GaussianCloud& cloud, const PublishedNetwork& network,
                                         const NetworkBenchOptions& options = {});
 
 }  // namespace anchorsplat

@@ -8,7 +8,7 @@ namespace anchorsplat {
 namespace {
 
 TEST(NetworkBench, CountsWhatTheNetworkDoes) {
-  NetworkConfig config;
+  PublishedConfig config;
   config.copies = 2;
   config.encoder_channels = {16};
   config.encoder_blocks = {1};
@@ -16,7 +16,7 @@ TEST(NetworkBench, CountsWhatTheNetworkDoes) {
   config.decoder_channels = config.decoder_blocks = config.decoder_heads = {};
   config.strides = {};
   config.head_hidden = 8;
-  const auto network = PackedNetwork::Load(config, HashWeights());
+  const auto network = PublishedNetwork::Load(config, HashWeights());
   ASSERT_TRUE(network.ok());
 
   // Ten Gaussians far from each other: the convolution has its centre only.

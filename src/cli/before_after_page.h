@@ -6,7 +6,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "enhance/enhance.h"
-#include "formats/cloud_io.h"
+#include "io/write_options.h"
 
 namespace anchorsplat {
 

@@ -15,8 +15,8 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "formats/cloud_io.h"
-#include "model/checkpoint.h"
-#include "model/weights.h"
+#include "model/published/published_checkpoint.h"
+#include "model/shared/weights.h"
 
 namespace anchorsplat {
 
@@ -207,10 +207,10 @@ struct NetworkBenchFlags {
 
 Status RunNetworkBench(const NetworkBenchFlags& flags, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(flags.file));
-  const NetworkConfig published;
-  auto loaded = flags.model.empty() ? PackedNetwork::Load(published, HashWeights(), flags.precision)
-                                    : LoadNetwork(flags.model, flags.precision);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PackedNetwork network, std::move(loaded));
+  const PublishedConfig published;
+  auto loaded = flags.model.empty() ? PublishedNetwork::Load(published, HashWeights(), flags.precision)
+                                    : LoadPublishedNetwork(flags.model, flags.precision);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PublishedNetwork network, std::move(loaded));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const NetworkBenchReport report, BenchNetwork(cloud, network, flags.options));
   if (shared.json) {
     nlohmann::json steps = nlohmann::json::array();

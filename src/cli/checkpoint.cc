@@ -7,8 +7,8 @@
 
 #include "core/text.h"
 #include "fit/fitter.h"
-#include "formats/atomic_file.h"
-#include "formats/input_record.h"
+#include "io/atomic_file.h"
+#include "io/input_record.h"
 
 namespace anchorsplat {
 

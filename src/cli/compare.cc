@@ -18,9 +18,9 @@
 #include "core/text.h"
 #include "eval/comparison.h"
 #include "eval/view_source.h"
-#include "formats/atomic_file.h"
-#include "formats/image_io.h"
-#include "formats/input_record.h"
+#include "images/image_io.h"
+#include "io/atomic_file.h"
+#include "io/input_record.h"
 #include "metrics/side_by_side.h"
 
 namespace anchorsplat {

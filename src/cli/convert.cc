@@ -14,13 +14,13 @@
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
-#include "formats/atomic_file.h"
 #include "formats/cloud_output.h"
-#include "formats/input_record.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
+#include "io/atomic_file.h"
+#include "io/input_record.h"
 #include "metrics/conversion_loss.h"
-#include "model/checkpoint_writer.h"
+#include "model/published/published_checkpoint_writer.h"
 
 namespace anchorsplat {
 

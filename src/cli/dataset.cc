@@ -11,7 +11,7 @@
 #include "core/text.h"
 #include "dataset/dataset_check.h"
 #include "dataset/dataset_split.h"
-#include "formats/atomic_file.h"
+#include "io/atomic_file.h"
 
 namespace anchorsplat {
 

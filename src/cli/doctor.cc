@@ -16,8 +16,8 @@
 #include "core/companion.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "model/compact/shipped_network.h"
 #include "model/kernels/bfloat16_tile.h"
-#include "model/shipped_network.h"
 #include "perceptual/lpips.h"
 #include "perceptual/lpips_weights.h"
 

@@ -8,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "cameras/camera_io.h"
 #include "cli/batch.h"
 #include "cli/before_after_page.h"
 #include "cli/checkpoint.h"
@@ -22,14 +23,13 @@
 #include "core/text.h"
 #include "core/world_up.h"
 #include "fit/fitter.h"
-#include "formats/atomic_file.h"
-#include "formats/camera_io.h"
 #include "formats/cloud_output.h"
 #include "formats/extra_properties.h"
-#include "formats/input_record.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "formats/row_arrays.h"
+#include "io/atomic_file.h"
+#include "io/input_record.h"
 #include "model/model_method.h"
 
 namespace anchorsplat {
@@ -347,7 +347,7 @@ void AddEnhance(CLI::App& app, Program& program) {
   verb.add_flag("--view", flags->view, "Also write an HTML page beside the output that shows before and after");
 
   const std::string group = "Model";
-  ModelOptions& model = flags->model->options;
+  PublishedOptions& model = flags->model->options;
   verb.add_option("--model", flags->model_file,
                   "Weights of an AnchorSplat network or of a compact one, .pth or .safetensors")
       ->check(NotEmpty())

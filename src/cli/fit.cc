@@ -15,13 +15,13 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "fit/initial_cloud.h"
-#include "formats/atomic_file.h"
 #include "formats/cloud_io.h"
 #include "formats/cloud_output.h"
-#include "formats/gsplat_checkpoint_writer.h"
-#include "formats/input_record.h"
+#include "formats/gsplat_checkpoint/gsplat_checkpoint_writer.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
+#include "io/atomic_file.h"
+#include "io/input_record.h"
 
 namespace anchorsplat {
 

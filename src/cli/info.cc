@@ -19,9 +19,9 @@
 #include "enhance/pixel_size_guard.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
-#include "formats/tensor_file.h"
-#include "model/checkpoint_writer.h"
-#include "model/compact_network.h"
+#include "model/compact/compact_network.h"
+#include "model/published/published_checkpoint_writer.h"
+#include "tensors/tensor_file.h"
 
 namespace anchorsplat {
 
@@ -207,7 +207,7 @@ Result<ModelFindings> LookAtCompactNetwork(const TensorFile& file) {
 
 Result<ModelFindings> LookAtCheckpoint(const std::string& path) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Checkpoint checkpoint, Checkpoint::Open(path));
-  ModelFindings found{checkpoint.file().metadata(), NetworkTensors(checkpoint.config()),
+  ModelFindings found{checkpoint.file().metadata(), PublishedTensors(checkpoint.config()),
                       checkpoint.file().tensors().size()};
   std::erase_if(found.learned, [](const TensorSpec& tensor) {
     return tensor.counter || tensor.name.ends_with("running_mean") || tensor.name.ends_with("running_var");

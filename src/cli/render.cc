@@ -14,8 +14,8 @@
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
-#include "formats/image_io.h"
-#include "formats/input_record.h"
+#include "images/image_io.h"
+#include "io/input_record.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
 

@@ -14,7 +14,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
-#include "formats/input_record.h"
+#include "io/input_record.h"
 
 namespace anchorsplat {
 

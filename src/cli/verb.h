@@ -9,7 +9,7 @@
 
 #include "cli/exit_codes.h"
 #include "core/result.h"
-#include "formats/cloud_io.h"
+#include "io/write_options.h"
 #include "train/train_request.h"
 
 namespace anchorsplat {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "cameras/camera_io.h"
 #include "cli/choice.h"
 #include "cli/clean_output.h"
 #include "cli/parse.h"
@@ -14,10 +15,9 @@
 #include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/pixel_size_guard.h"
-#include "formats/atomic_file.h"
-#include "formats/camera_io.h"
-#include "formats/input_record.h"
 #include "formats/opened_splat.h"
+#include "io/atomic_file.h"
+#include "io/input_record.h"
 #include "viewer/page_writer.h"
 
 namespace anchorsplat {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "cameras/camera_io.h"
 #include "cli/choice.h"
 #include "cli/parse.h"
 #include "core/framing.h"
@@ -11,7 +12,6 @@
 #include "core/text.h"
 #include "core/world_up.h"
 #include "eval/view_source.h"
-#include "formats/camera_io.h"
 #include "formats/cloud_io.h"
 #include "render/shown_range.h"
 

@@ -14,8 +14,8 @@
 #include "dataset/object_builder.h"
 #include "dataset/process_pool.h"
 #include "dataset/unfinished_objects.h"
-#include "formats/atomic_file.h"
-#include "formats/file_bytes.h"
+#include "io/atomic_file.h"
+#include "io/file_bytes.h"
 
 namespace anchorsplat {
 

@@ -12,7 +12,7 @@
 #include "dataset/scene_reader.h"
 #include "dataset/unfinished_objects.h"
 #include "formats/cloud_io.h"
-#include "formats/image_io.h"
+#include "images/image_io.h"
 #include "scene/mesh_file.h"
 
 namespace anchorsplat {

@@ -5,9 +5,9 @@
 #include <algorithm>
 
 #include "dataset/dataset_split.h"
-#include "dataset/small_dataset_test.h"
+#include "dataset/small_dataset_for_test.h"
 #include "dataset/unfinished_objects.h"
-#include "formats/test_folder.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

@@ -7,9 +7,9 @@
 
 #include "core/text.h"
 #include "dataset/object_name.h"
-#include "formats/atomic_file.h"
-#include "formats/file_bytes.h"
-#include "formats/json_file.h"
+#include "io/atomic_file.h"
+#include "io/file_bytes.h"
+#include "io/json_file.h"
 
 namespace anchorsplat {
 

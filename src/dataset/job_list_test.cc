@@ -4,7 +4,7 @@
 
 #include <fstream>
 
-#include "formats/test_folder.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

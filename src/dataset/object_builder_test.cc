@@ -5,8 +5,8 @@
 #include <iterator>
 
 #include "dataset/scene_reader.h"
-#include "dataset/small_dataset_test.h"
-#include "formats/test_folder.h"
+#include "dataset/small_dataset_for_test.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

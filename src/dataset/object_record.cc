@@ -6,9 +6,9 @@
 #include <system_error>
 
 #include "core/text.h"
-#include "formats/atomic_file.h"
-#include "formats/file_bytes.h"
-#include "formats/input_record.h"
+#include "io/atomic_file.h"
+#include "io/file_bytes.h"
+#include "io/input_record.h"
 
 namespace anchorsplat {
 

@@ -5,7 +5,7 @@
 
 #include "core/result.h"
 #include "fit/fit_options.h"
-#include "formats/json_file.h"
+#include "io/json_file.h"
 #include "scene/view_set.h"
 
 namespace anchorsplat {

@@ -9,15 +9,15 @@
 #include <system_error>
 #include <vector>
 
+#include "cameras/camera_io.h"
+#include "cameras/colmap_writer.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "fit/initial_points.h"
 #include "fit/training_views.h"
-#include "formats/atomic_file.h"
-#include "formats/camera_io.h"
-#include "formats/colmap_writer.h"
-#include "formats/file_bytes.h"
-#include "formats/image_io.h"
+#include "images/image_io.h"
+#include "io/atomic_file.h"
+#include "io/file_bytes.h"
 
 namespace anchorsplat {
 

@@ -6,14 +6,14 @@
 #include <fstream>
 #include <iterator>
 
+#include "cameras/camera_io.h"
+#include "cameras/colmap_writer.h"
 #include "core/random.h"
 #include "dataset/scene_reader.h"
-#include "dataset/small_dataset_test.h"
+#include "dataset/small_dataset_for_test.h"
 #include "fit/training_views.h"
-#include "formats/camera_io.h"
-#include "formats/colmap_writer.h"
-#include "formats/image_io.h"
-#include "formats/test_folder.h"
+#include "images/image_io.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

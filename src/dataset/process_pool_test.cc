@@ -8,7 +8,7 @@
 #include <map>
 
 #include "dataset/file_lock.h"
-#include "formats/test_folder.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

@@ -12,7 +12,7 @@
 #include "core/random.h"
 #include "core/text.h"
 #include "dataset/object_name.h"
-#include "formats/file_bytes.h"
+#include "io/file_bytes.h"
 
 namespace anchorsplat {
 

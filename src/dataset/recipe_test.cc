@@ -5,7 +5,7 @@
 #include <fstream>
 #include <set>
 
-#include "formats/test_folder.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

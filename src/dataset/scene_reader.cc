@@ -5,13 +5,13 @@
 #include <map>
 #include <system_error>
 
+#include "cameras/camera_checks.h"
+#include "cameras/colmap_model.h"
 #include "core/file_system.h"
 #include "core/text.h"
 #include "dataset/dataset_split.h"
-#include "formats/camera_checks.h"
 #include "formats/cloud_io.h"
-#include "formats/colmap_model.h"
-#include "formats/image_io.h"
+#include "images/image_io.h"
 #include "scene/mesh_file.h"
 #include "scene/view_set.h"
 

@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "dataset/dataset_split.h"
-#include "dataset/small_dataset_test.h"
-#include "formats/test_folder.h"
+#include "dataset/small_dataset_for_test.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "core/text.h"
 #include "dataset/object_builder.h"
-#include "formats/atomic_file.h"
-#include "formats/file_bytes.h"
+#include "io/atomic_file.h"
+#include "io/file_bytes.h"
 
 namespace anchorsplat {
 

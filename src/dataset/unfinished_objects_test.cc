@@ -5,7 +5,7 @@
 
 #include "core/text.h"
 #include "dataset/object_builder.h"
-#include "formats/test_folder.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

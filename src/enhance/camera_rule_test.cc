@@ -5,9 +5,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "cameras/camera_io.h"
 #include "core/random.h"
 #include "core/source_dir_for_test.h"
-#include "formats/camera_io.h"
 #include "formats/cloud_io.h"
 
 namespace anchorsplat {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "fit/orbit_scene_test.h"
+#include "fit/orbit_scene_for_test.h"
 
 namespace anchorsplat {
 namespace {

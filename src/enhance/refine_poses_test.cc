@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "core/framing.h"
-#include "fit/orbit_scene_test.h"
+#include "fit/orbit_scene_for_test.h"
 
 namespace anchorsplat {
 namespace {

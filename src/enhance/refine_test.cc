@@ -13,13 +13,13 @@
 #include "enhance/filter.h"
 #include "enhance/refine_pictures.h"
 #include "enhance/refiner.h"
-#include "fit/orbit_scene_test.h"
+#include "fit/orbit_scene_for_test.h"
 #include "fit/pixel_model.h"
 #include "fit/training_views.h"
-#include "formats/flip_bit_test.h"
-#include "formats/image_io.h"
-#include "formats/test_cloud.h"
-#include "formats/test_folder.h"
+#include "formats/random_cloud_for_test.h"
+#include "images/image_io.h"
+#include "io/flip_bit_for_test.h"
+#include "io/folder_for_test.h"
 #include "metrics/image_metrics.h"
 
 namespace anchorsplat {

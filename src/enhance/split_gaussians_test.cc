@@ -7,7 +7,7 @@
 
 #include "core/parallel.h"
 #include "core/rotation.h"
-#include "formats/test_cloud.h"
+#include "formats/random_cloud_for_test.h"
 
 namespace anchorsplat {
 namespace {

@@ -5,14 +5,14 @@
 #include <set>
 #include <utility>
 
+#include "cameras/camera_io.h"
 #include "core/file_system.h"
 #include "core/text.h"
 #include "dataset/scene_reader.h"
 #include "eval/protocol.h"
-#include "formats/camera_io.h"
 #include "formats/cloud_io.h"
-#include "formats/image_io.h"
 #include "formats/registry.h"
+#include "images/image_io.h"
 
 namespace anchorsplat {
 

@@ -13,11 +13,11 @@
 #include "fit/initial_cloud.h"
 #include "fit/initial_points.h"
 #include "fit/training_views.h"
-#include "formats/atomic_file.h"
 #include "formats/cloud_io.h"
-#include "formats/image_io.h"
-#include "formats/input_record.h"
-#include "formats/json_file.h"
+#include "images/image_io.h"
+#include "io/atomic_file.h"
+#include "io/input_record.h"
+#include "io/json_file.h"
 #include "metrics/bicubic.h"
 
 namespace anchorsplat {

@@ -7,7 +7,7 @@
 
 #include "core/text.h"
 #include "eval/protocol.h"
-#include "formats/image_io.h"
+#include "images/image_io.h"
 #include "metrics/bitmap_font.h"
 
 namespace anchorsplat {

@@ -10,7 +10,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "eval/object_state.h"
-#include "formats/image_io.h"
+#include "images/image_io.h"
 #include "metrics/image_metrics.h"
 #include "metrics/side_by_side.h"
 

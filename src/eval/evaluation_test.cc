@@ -9,15 +9,15 @@
 #include <fstream>
 #include <limits>
 
+#include "cameras/camera_io.h"
+#include "cameras/colmap_writer.h"
 #include "core/text.h"
 #include "enhance/enhance.h"
 #include "eval/contact_sheet.h"
-#include "formats/camera_io.h"
-#include "formats/colmap_writer.h"
-#include "formats/gsplat_checkpoint_writer.h"
-#include "formats/image_io.h"
-#include "formats/test_cloud.h"
-#include "formats/test_folder.h"
+#include "formats/gsplat_checkpoint/gsplat_checkpoint_writer.h"
+#include "formats/random_cloud_for_test.h"
+#include "images/image_io.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

@@ -16,10 +16,10 @@
 #include "eval/filter_sweep.h"
 #include "metrics/bicubic.h"
 #include "metrics/image_metrics.h"
-#include "model/enhance_with_model.h"
+#include "model/any_network.h"
+#include "model/compact/shipped_network.h"
 #include "model/model_method.h"
-#include "model/network_file.h"
-#include "model/shipped_network.h"
+#include "model/published/enhance_with_published.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
 
@@ -131,8 +131,9 @@ Result<EvalMethod> Model(const fs::path& file) {
                       const auto begin = Clock::now();
                       GaussianCloud cloud;
                       std::vector<std::pair<std::string, double>> facts;
-                      if (const auto* packed = std::get_if<PackedNetwork>(&**network)) {
-                        ANCHORSPLAT_ASSIGN_OR_RETURN(ModelResult result, EnhanceWithModel(task.object.low, *packed));
+                      if (const auto* packed = std::get_if<PublishedNetwork>(&**network)) {
+                        ANCHORSPLAT_ASSIGN_OR_RETURN(PublishedResult result,
+                                                     EnhanceWithPublishedNetwork(task.object.low, *packed));
                         cloud = std::move(result.cloud);
                       } else {
                         ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes, TruePixelSizes(task.object));

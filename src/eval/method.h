@@ -54,7 +54,7 @@ struct MethodOptions {
 //   filter-best   the f that measures best on this very object (fact "f"): not a method, the most a filter could do
 //   upsample      the low-resolution picture enlarged by cubic convolution, no 3-D at all
 //   bicubic       a splat fitted anew to the enlarged low-resolution pictures (eval/bicubic_fit.h): minutes per object
-//   FILE          the network of a file of weights, .safetensors or .pth, of either kind (model/network_file.h)
+//   FILE          the network of a file of weights, .safetensors or .pth, of either kind (model/any_network.h)
 //   NAME          whatever else is registered with enhance/enhance.h, given the training cameras: "model" for example
 //                 is the network that is part of the program. NAME+NAME: the second begins where the first ended.
 //                 NAME-auto gets no cameras and estimates the pixel size (fact "pixel_size_ratio").

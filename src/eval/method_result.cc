@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include "core/text.h"
-#include "formats/atomic_file.h"
-#include "formats/input_record.h"
-#include "formats/json_file.h"
+#include "io/atomic_file.h"
+#include "io/input_record.h"
+#include "io/json_file.h"
 
 namespace anchorsplat {
 

@@ -8,8 +8,8 @@
 
 #include "core/text.h"
 #include "eval/contact_sheet.h"
-#include "formats/atomic_file.h"
-#include "formats/image_io.h"
+#include "images/image_io.h"
+#include "io/atomic_file.h"
 
 namespace anchorsplat {
 

@@ -4,12 +4,12 @@
 #include <cctype>
 #include <utility>
 
+#include "cameras/camera_checks.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
-#include "formats/camera_checks.h"
-#include "formats/image_io.h"
-#include "formats/input_record.h"
+#include "images/image_io.h"
+#include "io/input_record.h"
 #include "metrics/compare.h"
 #include "metrics/image_metrics.h"
 #include "render/shown_range.h"

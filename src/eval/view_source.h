@@ -9,7 +9,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/image.h"
 #include "core/result.h"
-#include "formats/image_io.h"
+#include "images/image_io.h"
 #include "render/rasterizer.h"
 
 namespace anchorsplat {

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
+#include "cameras/camera_io.h"
 #include "core/source_dir_for_test.h"
-#include "formats/camera_io.h"
 #include "formats/cloud_io.h"
 #include "metrics/image_metrics.h"
 #include "render/shown_range.h"

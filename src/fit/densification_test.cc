@@ -9,7 +9,7 @@
 #include "core/parallel.h"
 #include "core/rotation.h"
 #include "fit/random_streams.h"
-#include "formats/test_cloud.h"
+#include "formats/random_cloud_for_test.h"
 
 namespace anchorsplat {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "core/fingerprint.h"
 #include "core/parallel.h"
-#include "formats/mapped_file.h"
+#include "io/mapped_file.h"
 
 namespace anchorsplat {
 

@@ -9,10 +9,10 @@
 #include "core/file_system.h"
 #include "core/text.h"
 #include "fit/fitter.h"
-#include "formats/input_record.h"
-#include "formats/safetensors.h"
-#include "formats/tensor_checksum.h"
-#include "formats/tensor_file.h"
+#include "io/input_record.h"
+#include "tensors/safetensors.h"
+#include "tensors/tensor_checksum.h"
+#include "tensors/tensor_file.h"
 
 namespace anchorsplat {
 

@@ -15,12 +15,12 @@
 #include "core/parallel.h"
 #include "fit/fit.h"
 #include "fit/initial_cloud.h"
-#include "fit/orbit_scene_test.h"
-#include "formats/flip_bit_test.h"
-#include "formats/safetensors.h"
-#include "formats/tensor_checksum.h"
-#include "formats/test_cloud.h"
-#include "formats/test_folder.h"
+#include "fit/orbit_scene_for_test.h"
+#include "formats/random_cloud_for_test.h"
+#include "io/flip_bit_for_test.h"
+#include "io/folder_for_test.h"
+#include "tensors/safetensors.h"
+#include "tensors/tensor_checksum.h"
 
 namespace anchorsplat {
 namespace {

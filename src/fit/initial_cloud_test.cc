@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/spherical_harmonics.h"
-#include "formats/test_cloud.h"
+#include "formats/random_cloud_for_test.h"
 
 namespace anchorsplat {
 namespace {

@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
+#include "cameras/colmap_model.h"
 #include "core/buffer.h"
 #include "core/camera.h"
 #include "core/gaussian_cloud.h"
-#include "formats/colmap_model.h"
 
 namespace anchorsplat {
 

@@ -4,8 +4,8 @@
 
 #include "core/parallel.h"
 #include "core/text.h"
-#include "formats/image_io.h"
 #include "formats/quantize.h"
+#include "images/image_io.h"
 
 namespace anchorsplat {
 

@@ -5,8 +5,8 @@
 #include <filesystem>
 
 #include "core/random.h"
-#include "formats/image_io.h"
-#include "formats/test_folder.h"
+#include "images/image_io.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

@@ -6,11 +6,11 @@
 #include <system_error>
 #include <utility>
 
+#include "cameras/camera_io.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
-#include "formats/camera_io.h"
-#include "formats/image_io.h"
+#include "images/image_io.h"
 
 namespace anchorsplat {
 

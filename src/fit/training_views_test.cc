@@ -6,8 +6,8 @@
 #include <cstring>
 #include <fstream>
 
-#include "fit/orbit_scene_test.h"
-#include "formats/test_folder.h"
+#include "fit/orbit_scene_for_test.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

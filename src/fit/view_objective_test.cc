@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
-#include "fit/orbit_scene_test.h"
+#include "fit/orbit_scene_for_test.h"
 
 namespace anchorsplat {
 namespace {

@@ -4,7 +4,7 @@
 
 #include "core/rotation.h"
 #include "core/spherical_harmonics.h"
-#include "formats/test_cloud.h"
+#include "formats/random_cloud_for_test.h"
 
 namespace anchorsplat {
 namespace {

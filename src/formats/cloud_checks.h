@@ -17,8 +17,4 @@ Status CheckWritable(const std::filesystem::path& path, const GaussianCloud& clo
 // message: "scene.spz: byte 8".
 Status CheckCount(const std::string& where, uint64_t count, const ReadLimits& limits);
 
-// That compressed data of `compressed` bytes may become `raw` bytes. Real splats shrink to a tenth; what promises two
-// hundred times its size would take memory that the file never paid for. kBadFile otherwise.
-Status CheckRatio(const std::string& where, uint64_t compressed, uint64_t raw);
-
 }  // namespace anchorsplat

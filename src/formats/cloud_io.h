@@ -21,7 +21,8 @@ enum class SplatOrder {
   kImportance,  // largest size × opacity first
 };
 
-struct WriteOptions {
+// WriteOptions (io/write_options.h) of splats.
+struct CloudWriteOptions {
   bool overwrite = false;  // an existing file is kExists otherwise
   SplatOrder order = SplatOrder::kFormat;
   int spz_version = 4;  // 3: one gzip stream, which older programs read; 4: zstd streams
@@ -34,6 +35,6 @@ Result<GaussianCloud> ReadCloud(const std::filesystem::path& path, const ReadLim
 
 // Writes a splat file; the format is found by the extension. The file appears whole or not at all: it is written under
 // a temporary name beside the target and renamed. Errors: kExists, kIo, kBadArgument (unknown extension, bad cloud).
-Status WriteCloud(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options = {});
+Status WriteCloud(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options = {});
 
 }  // namespace anchorsplat

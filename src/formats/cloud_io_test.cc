@@ -15,11 +15,11 @@
 #include <thread>
 
 #include "core/source_dir_for_test.h"
-#include "formats/atomic_file.h"
-#include "formats/ply_writer.h"
+#include "formats/ply/ply_writer.h"
+#include "formats/random_cloud_for_test.h"
 #include "formats/registry.h"
-#include "formats/test_cloud.h"
-#include "formats/test_folder.h"
+#include "io/atomic_file.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

@@ -1,7 +1,7 @@
 #include "formats/cloud_output.h"
 
-#include "formats/atomic_file.h"
 #include "formats/registry.h"
+#include "io/atomic_file.h"
 
 namespace anchorsplat {
 
@@ -15,17 +15,17 @@ std::vector<fs::path> FilesOfCloud(const fs::path& path, int sh_degree) {
   return files;
 }
 
-Status CheckCanWriteCloud(const fs::path& path, int sh_degree, const WriteOptions& options) {
+Status CheckCanWriteCloud(const fs::path& path, int sh_degree, const CloudWriteOptions& options) {
   for (const fs::path& file : FilesOfCloud(path, sh_degree)) {
     ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(file, options.overwrite));
   }
   return {};
 }
 
-Status WriteCloudOrKeep(const fs::path& path, const GaussianCloud& cloud, const WriteOptions& options,
+Status WriteCloudOrKeep(const fs::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options,
                         const ExtraProperties& extras) {
   return WriteOrKeep(path, options.overwrite, [&](const fs::path& name, bool overwrite) {
-    WriteOptions write = options;
+    CloudWriteOptions write = options;
     write.overwrite = overwrite;
     return WriteCloud(name, cloud, write, extras);
   });

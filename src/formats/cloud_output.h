@@ -16,11 +16,11 @@ namespace anchorsplat {
 std::vector<std::filesystem::path> FilesOfCloud(const std::filesystem::path& path, int sh_degree);
 
 // The errors that WriteCloud would have with these files, before the work.
-Status CheckCanWriteCloud(const std::filesystem::path& path, int sh_degree, const WriteOptions& options = {});
+Status CheckCanWriteCloud(const std::filesystem::path& path, int sh_degree, const CloudWriteOptions& options = {});
 
 // WriteCloud after the work. Where the name cannot be had any more, because a file of that name came into being
 // meanwhile, the result goes to the next free name beside it, "scan-2.ply", and the error says so.
-Status WriteCloudOrKeep(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options = {},
-                        const ExtraProperties& extras = {});
+Status WriteCloudOrKeep(const std::filesystem::path& path, const GaussianCloud& cloud,
+                        const CloudWriteOptions& options = {}, const ExtraProperties& extras = {});
 
 }  // namespace anchorsplat

@@ -14,12 +14,12 @@
 #include "core/statistics.h"
 #include "core/text.h"
 #include "formats/extra_properties.h"
-#include "formats/input_record.h"
 #include "formats/opened_splat.h"
 #include "formats/quantize.h"
 #include "formats/registry.h"
 #include "formats/row_arrays.h"
 #include "formats/splat_order.h"
+#include "io/input_record.h"
 
 namespace anchorsplat {
 
@@ -141,7 +141,7 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   };
   if (options.input_axes) flip(FlipBetween(from != nullptr ? from->axes : kRdf, *options.input_axes));
   if (options.output_axes) flip(FlipBetween(to->axes, *options.output_axes));
-  WriteOptions write = options.write;
+  CloudWriteOptions write = options.write;
   if (write.order != SplatOrder::kFormat) {
     if (Buffer<uint32_t> rows = WriteOrder(cloud, write.order, SplatOrder::kKeep); !rows.empty()) {
       Reorder(cloud, rows, &extras);

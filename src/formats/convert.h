@@ -24,7 +24,7 @@ struct ConvertOptions {
   std::optional<int64_t> max_gaussians = {};  // the ones of the largest size × opacity stay
   // What the axes of the files really are, where a program did not follow the format's own convention.
   std::optional<Axes> input_axes = {}, output_axes = {};
-  WriteOptions write = {};
+  CloudWriteOptions write = {};
   bool measure = false;  // read the output back and compare
 };
 

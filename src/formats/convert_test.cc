@@ -13,14 +13,14 @@
 #include <vector>
 
 #include "core/log.h"
-#include "formats/atomic_file.h"
-#include "formats/input_record.h"
 #include "formats/opened_splat.h"
-#include "formats/ply_writer.h"
+#include "formats/ply/ply_writer.h"
+#include "formats/random_cloud_for_test.h"
 #include "formats/registry.h"
 #include "formats/splat_order.h"
-#include "formats/test_cloud.h"
-#include "formats/test_folder.h"
+#include "io/atomic_file.h"
+#include "io/folder_for_test.h"
+#include "io/input_record.h"
 
 namespace anchorsplat {
 namespace {

@@ -11,14 +11,14 @@
 
 #include "core/log.h"
 #include "core/text.h"
-#include "formats/atomic_file.h"
 #include "formats/convert.h"
 #include "formats/opened_splat.h"
-#include "formats/ply_reader.h"
-#include "formats/ply_writer.h"
+#include "formats/ply/ply_reader.h"
+#include "formats/ply/ply_writer.h"
+#include "formats/random_cloud_for_test.h"
 #include "formats/splat_order.h"
-#include "formats/test_cloud.h"
-#include "formats/test_folder.h"
+#include "io/atomic_file.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "formats/cloud_io.h"
 #include "formats/quantize.h"
-#include "formats/test_cloud.h"
-#include "formats/test_folder.h"
+#include "formats/random_cloud_for_test.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {
@@ -99,7 +99,8 @@ Worst Compare(const GaussianCloud& a, const GaussianCloud& b, double sh_end) {
   EXPECT_LE(measured, (stated)*1.0001 + 3e-6) << name; \
   EXPECT_GE(measured, (stated)*0.8) << name << ": the table says more than is lost"
 
-Worst WriteAndCompare(const GaussianCloud& cloud, const std::string& name, const WriteOptions& options, double sh_end) {
+Worst WriteAndCompare(const GaussianCloud& cloud, const std::string& name, const CloudWriteOptions& options,
+                      double sh_end) {
   const TestFolder folder;
   EXPECT_TRUE(WriteCloud(folder / name, cloud, options).ok());
   const auto back = ReadCloud(folder / name);

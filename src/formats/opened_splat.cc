@@ -6,7 +6,7 @@
 
 #include "core/text.h"
 #include "formats/extra_properties.h"
-#include "formats/input_record.h"
+#include "io/input_record.h"
 
 namespace anchorsplat {
 

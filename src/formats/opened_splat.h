@@ -7,8 +7,8 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
-#include "formats/input_file.h"
 #include "formats/registry.h"
+#include "io/input_file.h"
 
 namespace anchorsplat {
 

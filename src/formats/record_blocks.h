@@ -7,8 +7,8 @@
 #include "core/buffer.h"
 #include "core/parallel.h"
 #include "core/result.h"
-#include "formats/atomic_file.h"
-#include "formats/input_file.h"
+#include "io/atomic_file.h"
+#include "io/input_file.h"
 
 namespace anchorsplat {
 

@@ -13,7 +13,7 @@
 #include "formats/axes.h"
 #include "formats/cloud_io.h"
 #include "formats/format_facts.h"
-#include "formats/input_file.h"
+#include "io/input_file.h"
 
 namespace anchorsplat {
 
@@ -47,9 +47,10 @@ struct SplatFormat {
   // `read` and `write` with what a file says beside its Gaussians (extra_properties.h). Null where that has no place.
   Result<GaussianCloud> (*read_with_extras)(const InputFile& file, const ReadLimits& limits,
                                             ExtraProperties& extras) = nullptr;
-  Status (*write)(const std::filesystem::path& path, const GaussianCloud& cloud, const WriteOptions& options) = nullptr;
+  Status (*write)(const std::filesystem::path& path, const GaussianCloud& cloud,
+                  const CloudWriteOptions& options) = nullptr;
   Status (*write_with_extras)(const std::filesystem::path& path, const GaussianCloud& cloud,
-                              const WriteOptions& options, const ExtraProperties& extras) = nullptr;
+                              const CloudWriteOptions& options, const ExtraProperties& extras) = nullptr;
   // Files that `write` makes beside the one it is told. Null: none.
   std::vector<std::filesystem::path> (*written_beside)(const std::filesystem::path& path, int sh_degree) = nullptr;
   // Bytes of the file `write` makes of a cloud without comments. Null where nothing can be said.

@@ -5,9 +5,9 @@
 #include <map>
 #include <system_error>
 
+#include "cameras/camera_checks.h"
 #include "core/text.h"
-#include "formats/camera_checks.h"
-#include "formats/image_io.h"
+#include "images/image_io.h"
 
 namespace anchorsplat {
 

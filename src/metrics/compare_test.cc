@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "formats/image_io.h"
-#include "formats/test_folder.h"
+#include "images/image_io.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {

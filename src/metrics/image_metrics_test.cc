@@ -10,7 +10,7 @@
 
 #include "core/parallel.h"
 #include "core/random.h"
-#include "formats/image_io.h"
+#include "images/image_io.h"
 
 namespace anchorsplat {
 namespace {

@@ -8,9 +8,9 @@
 
 #include "core/log.h"
 #include "core/text.h"
+#include "model/any_network.h"
+#include "model/compact/shipped_network.h"
 #include "model/kernels/bfloat16_tile.h"
-#include "model/network_file.h"
-#include "model/shipped_network.h"
 
 namespace anchorsplat {
 
@@ -55,10 +55,10 @@ std::vector<MethodOption> NetworkOptions(const std::shared_ptr<const ModelMethod
   return options;
 }
 
-Result<GaussianCloud> EnhanceWithPackedNetwork(const EnhanceInput& input, const PackedNetwork& network,
-                                               const ModelOptions& options, EnhanceReport& report) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(ModelResult result, EnhanceWithModel(input.cloud, network, options));
-  const ModelReport& r = result.report;
+Result<GaussianCloud> EnhanceWithPublished(const EnhanceInput& input, const PublishedNetwork& network,
+                                           const PublishedOptions& options, EnhanceReport& report) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(PublishedResult result, EnhanceWithPublishedNetwork(input.cloud, network, options));
+  const PublishedReport& r = result.report;
   report.dropped += r.not_finite + r.outside;
   report.facts = {{"over_limit", static_cast<double>(r.over_limit)},
                   {"anchors", static_cast<double>(r.anchors)},
@@ -158,7 +158,7 @@ void RegisterModelMethod(const std::shared_ptr<const ModelMethod>& method) {
        },
        .expected = [method, loaded, load](int64_t count, const EnhanceOptions&) -> int64_t {
          if (!load().ok()) return count;  // which the run will say
-         if (const auto* packed = std::get_if<PackedNetwork>(&(*loaded)->network)) {
+         if (const auto* packed = std::get_if<PublishedNetwork>(&(*loaded)->network)) {
            const int64_t most = method->options.max_gaussians;
            return packed->config().copies * (most > 0 ? std::min(count, most) : count);
          }
@@ -171,8 +171,8 @@ void RegisterModelMethod(const std::shared_ptr<const ModelMethod>& method) {
        .run = [method, loaded, load](EnhanceInput input, const EnhanceOptions& options,
                                      EnhanceReport& report) -> Result<GaussianCloud> {
          ANCHORSPLAT_RETURN_IF_ERROR(load());
-         if (const auto* packed = std::get_if<PackedNetwork>(&(*loaded)->network)) {
-           return EnhanceWithPackedNetwork(input, *packed, method->options, report);
+         if (const auto* packed = std::get_if<PublishedNetwork>(&(*loaded)->network)) {
+           return EnhanceWithPublished(input, *packed, method->options, report);
          }
          return EnhanceWithCompactNetwork(std::move(input), options.upscale,
                                           std::get<CompactNetwork>((*loaded)->network), method->options.prune_opacity,

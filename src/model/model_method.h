@@ -5,19 +5,19 @@
 
 #include "core/result.h"
 #include "enhance/enhance.h"
-#include "model/compact_network.h"
-#include "model/enhance_with_model.h"
+#include "model/compact/compact_network.h"
+#include "model/published/enhance_with_published.h"
 
 namespace anchorsplat {
 
 // What the method "model" of enhance/enhance.h works with. Filled in (by the command line) before Enhance is called.
 struct ModelMethod {
-  // Weights of either kind of network (model/network_file.h). Empty: the network that is part of the program; the
+  // Weights of either kind of network (model/any_network.h). Empty: the network that is part of the program; the
   // method is not ready when there is none.
   std::filesystem::path file;
   WeightPrecision precision = WeightPrecision::kFloat;  // fp32, with a warning, where bfloat16 would be slower
   // Of the published architecture; of these, compact networks look at `prune_opacity` only.
-  ModelOptions options;
+  PublishedOptions options;
 };
 
 // Adds the method "model", which "auto" prefers to the filter once there is a network. It is loaded at the first cloud

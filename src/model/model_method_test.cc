@@ -14,19 +14,19 @@
 #include "core/log.h"
 #include "core/random.h"
 #include "enhance/enhance.h"
-#include "formats/safetensors.h"
-#include "model/checkpoint_writer.h"
-#include "model/compact_cloud_test.h"
+#include "model/compact/sheet_cloud_for_test.h"
+#include "model/compact/shipped_network.h"
 #include "model/kernels/bfloat16_tile.h"
-#include "model/shipped_network.h"
+#include "model/published/published_checkpoint_writer.h"
+#include "tensors/safetensors.h"
 
 namespace anchorsplat {
 namespace {
 
 namespace fs = std::filesystem;
 
-NetworkConfig SmallConfig() {
-  NetworkConfig config;
+PublishedConfig SmallConfig() {
+  PublishedConfig config;
   config.copies = 2;
   config.encoder_channels = {8, 12};
   config.encoder_blocks = {1, 1};
@@ -49,7 +49,7 @@ class SmallModel : public testing::Test {
     fs::create_directories(folder_);
     std::vector<std::vector<float>> values;
     std::vector<TensorEntry> entries;
-    const auto specs = NetworkTensors(SmallConfig());
+    const auto specs = PublishedTensors(SmallConfig());
     values.reserve(specs.size());
     for (const TensorSpec& spec : specs) {
       if (spec.counter) continue;

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/text.h"
-#include "formats/tensor_file.h"
+#include "tensors/tensor_file.h"
 
 namespace anchorsplat {
 

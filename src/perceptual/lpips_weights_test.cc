@@ -9,10 +9,10 @@
 
 #include "core/image.h"
 #include "core/text.h"
-#include "formats/safetensors.h"
-#include "formats/test_folder.h"
+#include "io/folder_for_test.h"
 #include "perceptual/lpips.h"
-#include "perceptual/lpips_synthetic_test.h"
+#include "perceptual/lpips_synthetic_for_test.h"
+#include "tensors/safetensors.h"
 
 namespace anchorsplat {
 namespace {

@@ -5,7 +5,7 @@
 #include <system_error>
 
 #include "core/text.h"
-#include "formats/file_bytes.h"
+#include "io/file_bytes.h"
 #include "scene/small_letters.h"
 
 namespace anchorsplat {

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "core/result.h"
-#include "formats/zip_archive.h"
+#include "io/zip_archive.h"
 
 namespace anchorsplat {
 

@@ -8,7 +8,7 @@
 
 #include "core/image.h"
 #include "core/text.h"
-#include "formats/png_file.h"
+#include "images/png_file.h"
 #include "scene/asset_source.h"
 
 namespace anchorsplat {

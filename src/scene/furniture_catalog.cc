@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/text.h"
-#include "formats/file_bytes.h"
+#include "io/file_bytes.h"
 #include "scene/java_properties.h"
 #include "scene/licence.h"
 #include "scene/small_letters.h"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/result.h"
-#include "formats/zip_archive.h"
+#include "io/zip_archive.h"
 #include "scene/mesh_import.h"
 
 namespace anchorsplat {

@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-#include "formats/test_folder.h"
+#include "io/folder_for_test.h"
 #include "scene/assets_for_test.h"
 #include "scene/mesh_reader.h"
 

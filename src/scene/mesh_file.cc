@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "core/text.h"
-#include "formats/safetensors.h"
-#include "formats/tensor_file.h"
+#include "tensors/safetensors.h"
+#include "tensors/tensor_file.h"
 
 namespace anchorsplat {
 

@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "core/result.h"
-#include "formats/cloud_io.h"
+#include "io/write_options.h"
 #include "scene/mesh.h"
 
 namespace anchorsplat {

@@ -7,7 +7,7 @@
 #include <iterator>
 #include <limits>
 
-#include "formats/test_folder.h"
+#include "io/folder_for_test.h"
 #include "scene/meshes_for_test.h"
 
 namespace anchorsplat {

@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "core/text.h"
-#include "formats/input_file.h"
-#include "formats/ply_header.h"
+#include "formats/ply/ply_header.h"
+#include "io/input_file.h"
 #include "scene/assimp_import.h"
 #include "scene/imported_materials.h"
 #include "scene/isolated_process.h"

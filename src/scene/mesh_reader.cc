@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/text.h"
-#include "formats/file_bytes.h"
+#include "io/file_bytes.h"
 #include "scene/furniture_catalog.h"
 #include "scene/licence.h"
 #include "scene/small_letters.h"

@@ -5,8 +5,8 @@
 
 #include <fstream>
 
-#include "formats/image_io.h"
-#include "formats/test_folder.h"
+#include "images/image_io.h"
+#include "io/folder_for_test.h"
 #include "scene/mesh_summary.h"
 
 namespace anchorsplat {

@@ -7,10 +7,10 @@
 #include <string_view>
 
 #include "core/text.h"
-#include "formats/file_bytes.h"
-#include "formats/jpeg_file.h"
-#include "formats/png_file.h"
-#include "formats/webp_image.h"
+#include "images/jpeg_file.h"
+#include "images/png_file.h"
+#include "images/webp_image.h"
+#include "io/file_bytes.h"
 #include "scene/sgi_image.h"
 
 // Only the two formats that need it: the others have readers that are looked after better.

@@ -7,13 +7,13 @@
 #include <system_error>
 #include <vector>
 
+#include "cameras/camera_io.h"
+#include "cameras/colmap_writer.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "core/thread_clock.h"
-#include "formats/camera_io.h"
-#include "formats/colmap_writer.h"
-#include "formats/image_io.h"
+#include "images/image_io.h"
 #include "scene/surface_samples.h"
 
 namespace anchorsplat {

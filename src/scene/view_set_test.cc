@@ -4,9 +4,9 @@
 
 #include <filesystem>
 
-#include "formats/camera_io.h"
-#include "formats/image_io.h"
-#include "formats/test_folder.h"
+#include "cameras/camera_io.h"
+#include "images/image_io.h"
+#include "io/folder_for_test.h"
 #include "scene/meshes_for_test.h"
 
 namespace anchorsplat {

@@ -8,8 +8,8 @@
 #include <fstream>
 
 #include "core/parallel.h"
-#include "formats/tensor_file.h"
-#include "train/small_training_test.h"
+#include "tensors/tensor_file.h"
+#include "train/small_training_for_test.h"
 #include "train/trainer.h"
 
 namespace anchorsplat {

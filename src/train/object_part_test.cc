@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <set>
 
-#include "model/compact_cloud_test.h"
-#include "model/modules/render_op.h"
+#include "model/compact/sheet_cloud_for_test.h"
+#include "model/shared/torch/render_op.h"
 #include "render/rasterizer.h"
 
 namespace anchorsplat {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/result.h"
-#include "model/modules/trainable_network.h"
+#include "model/shared/torch/trainable_network.h"
 #include "train/train_config.h"
 
 namespace anchorsplat {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/random.h"
-#include "perceptual/lpips_synthetic_test.h"
+#include "perceptual/lpips_synthetic_for_test.h"
 
 namespace anchorsplat {
 namespace {

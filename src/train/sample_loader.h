@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/camera.h"
-#include "model/modules/render_op.h"
-#include "model/modules/trainable_network.h"
+#include "model/shared/torch/render_op.h"
+#include "model/shared/torch/trainable_network.h"
 #include "render/rasterizer.h"
 #include "train/photometric_objective.h"
 #include "train/train_config.h"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/spherical_harmonics.h"
-#include "model/compact_cloud_test.h"
+#include "model/compact/sheet_cloud_for_test.h"
 #include "render/rasterizer.h"
 
 namespace anchorsplat {

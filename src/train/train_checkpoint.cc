@@ -4,10 +4,10 @@
 #include <span>
 
 #include "core/text.h"
-#include "formats/input_record.h"
-#include "formats/safetensors.h"
-#include "formats/tensor_checksum.h"
-#include "formats/tensor_file.h"
+#include "io/input_record.h"
+#include "tensors/safetensors.h"
+#include "tensors/tensor_checksum.h"
+#include "tensors/tensor_file.h"
 
 namespace anchorsplat {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/text.h"
-#include "formats/file_bytes.h"
+#include "io/file_bytes.h"
 
 namespace anchorsplat {
 

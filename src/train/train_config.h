@@ -8,7 +8,7 @@
 #include <string>
 
 #include "core/result.h"
-#include "model/modules/network_options.h"
+#include "model/shared/torch/network_options.h"
 #include "perceptual/lpips_net.h"
 
 namespace anchorsplat {

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "core/text.h"
-#include "formats/atomic_file.h"
+#include "io/atomic_file.h"
 
 namespace anchorsplat {
 

@@ -8,10 +8,10 @@
 
 #include "core/log.h"
 #include "core/parallel.h"
-#include "formats/flip_bit_test.h"
-#include "formats/tensor_file.h"
-#include "model/checkpoint.h"
-#include "train/small_training_test.h"
+#include "io/flip_bit_for_test.h"
+#include "model/published/published_checkpoint.h"
+#include "tensors/tensor_file.h"
+#include "train/small_training_for_test.h"
 
 namespace anchorsplat {
 namespace {
@@ -135,7 +135,7 @@ views = 2
   EXPECT_TRUE(fs::exists(request.out / "best.safetensors"));
 
   // The file is one that `enhance --model` opens, and says where it comes from.
-  EXPECT_TRUE(LoadNetwork(report->file).ok());
+  EXPECT_TRUE(LoadPublishedNetwork(report->file).ok());
   const auto file = TensorFile::Open(report->file);
   ASSERT_TRUE(file.ok());
   EXPECT_EQ(file->metadata().at("object_names"), R"(["a","b"])");
@@ -246,7 +246,7 @@ TEST(Trainer, ResumedIsTheSameAsUninterrupted) {
   ASSERT_TRUE(first.ok()) << first.error().message;
   EXPECT_TRUE(first->interrupted);
   EXPECT_EQ(first->steps, 4);
-  EXPECT_TRUE(LoadNetwork(parts.out / "model.safetensors").ok()) << "what there was can be used";
+  EXPECT_TRUE(LoadPublishedNetwork(parts.out / "model.safetensors").ok()) << "what there was can be used";
   // A crash may leave more in the log than the checkpoint knows.
   std::ofstream(parts.out / "log.jsonl", std::ios::app) << R"({"step":5,"loss":1})"
                                                         << "\n{\"st";

@@ -8,7 +8,7 @@
 
 #include "core/text.h"
 #include "dataset/object_name.h"
-#include "formats/image_io.h"
+#include "images/image_io.h"
 
 namespace anchorsplat {
 

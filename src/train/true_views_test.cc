@@ -4,8 +4,8 @@
 
 #include <fstream>
 
-#include "dataset/small_dataset_test.h"
-#include "formats/test_folder.h"
+#include "dataset/small_dataset_for_test.h"
+#include "io/folder_for_test.h"
 #include "train/training_object.h"
 
 namespace anchorsplat {

@@ -10,7 +10,7 @@
 #include "core/camera.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
-#include "formats/cloud_io.h"
+#include "io/write_options.h"
 
 namespace anchorsplat {
 

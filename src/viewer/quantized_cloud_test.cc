@@ -8,9 +8,9 @@
 #include <limits>
 #include <numeric>
 
+#include "cameras/camera_io.h"
 #include "core/rotation.h"
 #include "core/source_dir_for_test.h"
-#include "formats/camera_io.h"
 #include "formats/cloud_io.h"
 #include "render/rasterizer.h"
 #include "viewer/dequantize.h"

@@ -7,16 +7,16 @@
 #include <iterator>
 #include <utility>
 
+#include "cameras/camera_io.h"
+#include "cameras/colmap_model.h"
 #include "core/gaussian_cloud.h"
 #include "core/random.h"
 #include "core/text.h"
-#include "formats/camera_io.h"
-#include "formats/colmap_model.h"
 #include "formats/extra_properties.h"
 #include "formats/fuzz/seeds.h"
-#include "formats/image_io.h"
 #include "formats/registry.h"
-#include "formats/tensor_file.h"
+#include "images/image_io.h"
+#include "tensors/tensor_file.h"
 
 namespace anchorsplat {
 

@@ -17,10 +17,10 @@
 #include "core/random.h"
 #include "core/source_dir_for_test.h"
 #include "core/text.h"
-#include "formats/image_io.h"
-#include "formats/safetensors.h"
-#include "formats/spz_writer.h"
-#include "formats/tensor_entry.h"
+#include "formats/spz/spz_writer.h"
+#include "images/image_io.h"
+#include "tensors/safetensors.h"
+#include "tensors/tensor_entry.h"
 
 namespace anchorsplat {
 

@@ -10,7 +10,7 @@
 
 #include "core/random.h"
 #include "perceptual/lpips.h"
-#include "perceptual/lpips_synthetic_test.h"
+#include "perceptual/lpips_synthetic_for_test.h"
 
 namespace anchorsplat {
 namespace {

@@ -1,0 +1,77 @@
+#include "cameras/camera_checks.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <system_error>
+
+#include "core/file_system.h"
+#include "core/rotation.h"
+#include "core/text.h"
+#include "images/image_io.h"
+#include "io/input_record.h"
+
+namespace anchorsplat {
+
+namespace {
+
+Error Bad(std::string sentence) { return Error{ErrorCode::kBadFile, std::move(sentence)}; }
+
+}  // namespace
+
+Status CheckIntrinsics(const Pinhole& c) {
+  if (c.width < 1 || c.height < 1) return Bad(Cat("size ", c.width, " x ", c.height, ", expected at least 1 x 1"));
+  if (int64_t{c.width} * c.height > kMaxImagePixels) {
+    return Bad(Cat("size ", c.width, " x ", c.height, ", more than ", WithThousands(kMaxImagePixels), " pixels"));
+  }
+  if (!(c.fx > 0) || !(c.fy > 0) || !std::isfinite(c.fx) || !std::isfinite(c.fy)) {
+    return Bad(Cat("focal length ", c.fx, ", ", c.fy, ", expected positive numbers"));
+  }
+  if (!std::isfinite(c.cx) || !std::isfinite(c.cy)) {
+    return Bad(Cat("principal point ", c.cx, ", ", c.cy, ", expected finite numbers"));
+  }
+  return {};
+}
+
+Result<Pose> PoseFromCameraToWorld(const std::array<double, 9>& r, const std::array<double, 3>& c) {
+  auto pose = PoseFromOpenGlCameraToWorld(
+      {r[0], -r[1], -r[2], c[0], r[3], -r[4], -r[5], c[1], r[6], -r[7], -r[8], c[2], 0, 0, 0, 1});
+  if (!pose.ok()) return Bad(pose.error().message);
+  return pose;
+}
+
+Result<Pose> PoseFromUnitQuaternion(const std::array<double, 4>& q, const std::array<double, 3>& t) {
+  const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  if (!(std::abs(norm - 1) <= 1e-3)) return Bad(Cat("quaternion has norm ", norm, ", expected 1"));
+  for (const double x : t) {
+    if (!std::isfinite(x)) return Bad("translation is not finite");
+  }
+  return Pose{RotationFromQuaternion(q[0], q[1], q[2], q[3]), t};
+}
+
+std::string ViewName(const std::string& image_path) {
+  std::string name = image_path.starts_with("./") ? image_path.substr(2) : image_path;
+  const size_t dot = name.rfind('.');
+  if (dot == std::string::npos) return name;
+  std::string extension = name.substr(dot + 1);
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const char* known : {"png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "exr", "hdr"}) {
+    if (extension == known) return name.substr(0, dot);
+  }
+  return name;
+}
+
+std::filesystem::path FindPicture(std::span<const std::filesystem::path> folders, const std::string& relative) {
+  for (const auto& folder : folders) {
+    for (const char* extension : {"", ".png", ".jpg", ".jpeg"}) {
+      auto path = (folder / (relative + extension)).lexically_normal();
+      if (!IsFile(path)) continue;
+      RecordInput(path);  // the pictures are a part of what the cameras are read from, whoever opens them
+      return path;
+    }
+  }
+  return {};
+}
+
+}  // namespace anchorsplat

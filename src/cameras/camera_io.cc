@@ -1,0 +1,80 @@
+#include "cameras/camera_io.h"
+
+#include <algorithm>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "cameras/colmap_model.h"
+#include "cameras/inria_cameras.h"
+#include "cameras/transforms_json.h"
+#include "core/file_system.h"
+#include "core/text.h"
+#include "io/json_file.h"
+
+namespace anchorsplat {
+
+namespace {
+
+Result<CameraSet> ReadCameraJson(const std::filesystem::path& path) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile file, JsonFile::Read(path));
+  const JsonValue root = file.root();
+  if (root.raw().is_array()) return CamerasFromInria(root, path.parent_path());
+  if (root.raw().is_object()) return CamerasFromTransforms(root, path.parent_path());
+  return root.Complain("expected a transforms.json (an object with \"frames\") or a cameras.json (an array)");
+}
+
+// transforms*.json and cameras.json of a folder, sorted.
+Result<std::vector<std::filesystem::path>> FindCameraJsons(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> found;
+  std::error_code code;
+  for (std::filesystem::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
+    const std::string name = it->path().filename().string();
+    const bool transforms = name.starts_with("transforms") && name.ends_with(".json");
+    if (transforms || name == "cameras.json") found.push_back(it->path());
+  }
+  if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": ", code.message())};
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<std::filesystem::path> candidates, FindCameraJsons(folder));
+  // Where several models are there, they are stages of one reconstruction: the project's sparse/0 is its result, the
+  // text files beside it are what it was given.
+  for (const auto& model : {folder / "sparse" / "0", folder / "sparse", folder}) {
+    if (!IsColmapModel(model)) continue;
+    candidates.push_back(model);
+    break;
+  }
+  if (candidates.empty()) {
+    return Error{ErrorCode::kNotFound,
+                 Cat(folder.string(),
+                     ": no cameras here: expected transforms.json, cameras.json or a COLMAP model "
+                     "(cameras and images as .bin or .txt, also in sparse/0 or sparse)")};
+  }
+  if (candidates.size() > 1) {
+    std::string list;
+    for (const auto& candidate : candidates) list += (list.empty() ? "" : ", ") + candidate.string();
+    return Error{ErrorCode::kBadArgument, Cat(folder.string(), ": several sets of cameras, name one of them: ", list)};
+  }
+  return IsFolder(candidates[0]) ? ReadColmapModel(candidates[0]) : ReadCameraJson(candidates[0]);
+}
+
+}  // namespace
+
+Result<CameraSet> ReadCameras(const std::filesystem::path& path) {
+  if (IsFolder(path)) return ReadCameraFolder(path);
+  // Any file of a COLMAP model stands for the model.
+  const std::string name = path.filename().string();
+  const bool colmap = name == "cameras.bin" || name == "images.bin" || name == "cameras.txt" || name == "images.txt";
+  if (colmap && Exists(path)) {
+    const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+    if (IsColmapModel(folder)) return ReadColmapModel(folder);
+    return Error{ErrorCode::kNotFound,
+                 Cat(folder.string(), ": a COLMAP model needs both cameras and images, as .bin or .txt")};
+  }
+  return ReadCameraJson(path);
+}
+
+}  // namespace anchorsplat

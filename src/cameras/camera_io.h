@@ -1,0 +1,27 @@
+#pragma once
+
+#include <filesystem>
+
+#include "core/camera.h"
+#include "core/result.h"
+#include "io/write_options.h"
+
+namespace anchorsplat {
+
+// Reads cameras from a NeRF/nerfstudio transforms.json, an INRIA cameras.json, or a COLMAP sparse model (any of its
+// files, its folder, or a project folder that has it at sparse/0 or sparse). A folder may also hold one
+// transforms*.json or cameras.json. Order as in the file; names may repeat.
+//
+// Errors: kNotFound; kIo; kBadFile with file, line or byte or JSON path (distortion is refused with the model's name);
+// kBadArgument for a folder with several sets of cameras, which are listed.
+Result<CameraSet> ReadCameras(const std::filesystem::path& path);
+
+// Writes a transforms.json in nerfstudio's form (fl_x, fl_y, cx, cy, w, h; OpenGL camera-to-world matrices) with our
+// `background`. Intrinsics are those of the first camera; other cameras repeat only what differs. `file_path` is the
+// camera's name with its picture's extension (.png where it has no picture). ReadCameras gives back the same numbers,
+// up to the last bits of the translations. Whole or not at all.
+//
+// Errors: kExists, kNotFound, kIo; kBadArgument: no cameras, a name that is not UTF-8, numbers that are not finite.
+Status WriteTransforms(const std::filesystem::path& path, const CameraSet& cameras, const WriteOptions& options = {});
+
+}  // namespace anchorsplat

@@ -1,0 +1,208 @@
+#include "cameras/camera_io.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "core/random.h"
+#include "core/rotation.h"
+#include "core/source_dir_for_test.h"
+#include "images/image_io.h"
+#include "io/folder_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+void Write(const std::filesystem::path& path, const std::string& text) {
+  std::ofstream(path, std::ios::binary | std::ios::trunc) << text;
+}
+
+std::string Text(const std::filesystem::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+CameraSet RandomCameras(int count, uint64_t seed) {
+  Random random(seed);
+  CameraSet set;
+  for (int i = 0; i < count; ++i) {
+    Camera camera;
+    camera.name = "views/" + std::to_string(i);
+    camera.intrinsics = {320, 240, 300.25, 1.0 / 3, 160.5, 119};
+    camera.world_to_camera.rotation =
+        RotationFromQuaternion(random.Normal(), random.Normal(), random.Normal(), random.Normal());
+    for (double& x : camera.world_to_camera.translation) x = 10 * random.Normal();
+    set.cameras.push_back(camera);
+  }
+  return set;
+}
+
+void ExpectSame(const CameraSet& a, const CameraSet& b, double tolerance) {
+  EXPECT_EQ(a.background, b.background);
+  ASSERT_EQ(a.cameras.size(), b.cameras.size());
+  for (size_t i = 0; i < a.cameras.size(); ++i) {
+    const Camera &x = a.cameras[i], &y = b.cameras[i];
+    EXPECT_EQ(x.name, y.name);
+    EXPECT_EQ(x.intrinsics.width, y.intrinsics.width);
+    EXPECT_EQ(x.intrinsics.height, y.intrinsics.height);
+    EXPECT_EQ(x.intrinsics.fx, y.intrinsics.fx);
+    EXPECT_EQ(x.intrinsics.fy, y.intrinsics.fy);
+    EXPECT_EQ(x.intrinsics.cx, y.intrinsics.cx);
+    EXPECT_EQ(x.intrinsics.cy, y.intrinsics.cy);
+    EXPECT_EQ(x.world_to_camera.rotation, y.world_to_camera.rotation);
+    for (size_t k = 0; k < 3; ++k) {
+      EXPECT_NEAR(x.world_to_camera.translation[k], y.world_to_camera.translation[k], tolerance);
+    }
+  }
+}
+
+TEST(WriteTransforms, RoundTrips) {
+  const TestFolder folder;
+  CameraSet set = RandomCameras(5, 1);
+  set.background = {0.1f, 0.0f, 1.0f};
+  set.cameras[2].intrinsics.fx = 299;
+  set.cameras[3].intrinsics = {64, 32, 10, 11, 12, 13};
+  const auto path = folder / "transforms.json";
+  ASSERT_TRUE(WriteTransforms(path, set).ok());
+  const auto read = ReadCameras(path);
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  ExpectSame(set, *read, 1e-13);
+  // Each frame says only what is its own.
+  const std::string text = Text(path);
+  const auto count = [&](const std::string& what) {
+    int found = 0;
+    for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++found;
+    return found;
+  };
+  EXPECT_EQ(count("\"fl_x\""), 3);
+  EXPECT_EQ(count("\"fl_y\""), 2);
+  EXPECT_EQ(count("\"w\": 320"), 1);
+  EXPECT_EQ(count("0.1,"), 1) << text.substr(0, 200);
+
+  const Status again = WriteTransforms(path, set);
+  ASSERT_FALSE(again.ok());
+  EXPECT_EQ(again.error().code, ErrorCode::kExists);
+  EXPECT_TRUE(WriteTransforms(path, *read, {.overwrite = true}).ok());
+}
+
+TEST(WriteTransforms, KeepsTheExamples) {
+  const TestFolder folder;
+  const auto example = SourceDirForTest() / "examples/biplane/transforms_hr.json";
+  const auto set = ReadCameras(example);
+  ASSERT_TRUE(set.ok());
+  ASSERT_TRUE(WriteTransforms(folder / "t.json", *set).ok());
+  const auto read = ReadCameras(folder / "t.json");
+  ASSERT_TRUE(read.ok()) << read.error().message;
+  ExpectSame(*set, *read, 1e-6);  // its matrices are rotations to float precision
+}
+
+TEST(WriteTransforms, KeepsThePicturesExtension) {
+  const TestFolder folder;
+  CameraSet set = RandomCameras(1, 2);
+  set.cameras[0].image = "/somewhere/else/0.JPG";
+  ASSERT_TRUE(WriteTransforms(folder / "t.json", set).ok());
+  EXPECT_NE(Text(folder / "t.json").find("\"views/0.JPG\""), std::string::npos);
+}
+
+TEST(WriteTransforms, RefusesWhatCouldNotBeReadAgain) {
+  const TestFolder folder;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  std::vector<CameraSet> sets(8, RandomCameras(2, 3));
+  sets[0].cameras.clear();
+  sets[1].cameras[1].intrinsics.fx = nan;
+  sets[2].cameras[0].intrinsics.cx = nan;
+  sets[3].cameras[1].world_to_camera.translation[1] = nan;
+  sets[4].cameras[1].world_to_camera.rotation[0] += 0.5;
+  sets[5].cameras[1].name = "\xff\xfe";
+  sets[6].cameras[1].name = "";
+  sets[7].background = {0.0f, 2.0f, 0.0f};
+  for (size_t i = 0; i < sets.size(); ++i) {
+    const Status status = WriteTransforms(folder / "t.json", sets[i]);
+    ASSERT_FALSE(status.ok()) << i;
+    EXPECT_EQ(status.error().code, ErrorCode::kBadArgument) << i;
+  }
+  EXPECT_EQ(folder.Entries(), 0);
+}
+
+const char kInria[] = R"([{"id": 0, "img_name": "a", "width": 40, "height": 30, "position": [1, 2, 3],
+  "rotation": [[0, 0, 1], [1, 0, 0], [0, 1, 0]], "fy": 60.0, "fx": 50.0}])";
+
+TEST(InriaCameras, ArePositionAndCameraToWorld) {
+  const TestFolder folder;
+  std::filesystem::create_directory(folder / "images");
+  ASSERT_TRUE(WritePng(folder / "images" / "a.png", Image(4, 4, 3)).ok());
+  Write(folder / "cameras.json", kInria);
+  const auto set = ReadCameras(folder / "cameras.json");
+  ASSERT_TRUE(set.ok()) << set.error().message;
+  const Camera& camera = set->cameras.at(0);
+  EXPECT_EQ(camera.name, "a");
+  EXPECT_EQ(camera.image, folder / "images/a.png");
+  EXPECT_EQ(camera.intrinsics.fx, 50);
+  EXPECT_EQ(camera.intrinsics.fy, 60);
+  EXPECT_EQ(camera.intrinsics.cx, 20);
+  EXPECT_EQ(camera.intrinsics.cy, 15);
+  const auto center = camera.Center();
+  EXPECT_NEAR(center[0], 1, 1e-12);
+  EXPECT_NEAR(center[1], 2, 1e-12);
+  EXPECT_NEAR(center[2], 3, 1e-12);
+  // The third column is where the camera looks: the world's x.
+  const auto ahead = camera.ToCamera({6, 2, 3});
+  EXPECT_NEAR(ahead[0], 0, 1e-12);
+  EXPECT_NEAR(ahead[2], 5, 1e-12);
+}
+
+TEST(InriaCameras, MalformedFilesSayWhatIsWrong) {
+  const std::pair<std::pair<const char*, const char*>, const char*> cases[] = {
+      {{"\"img_name\": \"a\", ", ""}, "[0]: \"img_name\" is missing"},
+      {{"\"width\": 40", "\"width\": 0"}, "[0].width: expected a whole number"},
+      {{"\"width\": 40", "\"width\": \"40\""}, "[0].width: expected a number, found string"},
+      {{"\"fx\": 50.0", "\"fx\": 0"}, "focal length 0"},
+      {{"\"fx\": 50.0", "\"f\": 50"}, "[0]: \"fx\" is missing"},
+      {{"[1, 2, 3]", "[1, 2]"}, "[0].position: expected 3 numbers, found 2"},
+      {{"[1, 2, 3]", "[1, 2, null]"}, "[0].position[2]"},
+      {{"[0, 0, 1], ", ""}, "3 rows"},
+      {{"[0, 0, 1]", "[0, 0, 2]"}, "[0].rotation: camera matrix is not a rotation"},
+      {{"[0, 0, 1]", "[0, 0, -1]"}, "not a rotation"},
+      {{"{\"id\"", "3, {\"id\""}, "[0]: expected an object"},
+  };
+  for (const auto& [change, expected] : cases) {
+    const TestFolder folder;
+    std::string text = kInria;
+    text.replace(text.find(change.first), std::string(change.first).size(), change.second);
+    Write(folder / "cameras.json", text);
+    const auto set = ReadCameras(folder / "cameras.json");
+    ASSERT_FALSE(set.ok()) << text;
+    EXPECT_EQ(set.error().code, ErrorCode::kBadFile);
+    EXPECT_NE(set.error().message.find(expected), std::string::npos) << expected << "\n" << set.error().message;
+  }
+  const TestFolder folder;
+  for (const char* text : {"[]", "3", "\"x\"", "null", "{}"}) {
+    Write(folder / "cameras.json", text);
+    EXPECT_EQ(ReadCameras(folder / "cameras.json").error().code, ErrorCode::kBadFile) << text;
+  }
+}
+
+TEST(ReadCameras, TakesTheOnlyCandidateOfAFolder) {
+  const TestFolder folder;
+  EXPECT_EQ(ReadCameras(folder.path()).error().code, ErrorCode::kNotFound);
+  ASSERT_TRUE(WriteTransforms(folder / "transforms_train.json", RandomCameras(3, 4)).ok());
+  auto set = ReadCameras(folder.path());
+  ASSERT_TRUE(set.ok()) << set.error().message;
+  EXPECT_EQ(set->cameras.size(), 3u);
+  Write(folder / "cameras.json", kInria);
+  set = ReadCameras(folder.path());
+  ASSERT_FALSE(set.ok());
+  EXPECT_EQ(set.error().code, ErrorCode::kBadArgument);
+  for (const char* name : {"transforms_train.json", "cameras.json"}) {
+    EXPECT_NE(set.error().message.find(name), std::string::npos) << set.error().message;
+  }
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <filesystem>
+
+#include "core/camera.h"
+#include "core/result.h"
+#include "io/json_file.h"
+
+namespace anchorsplat {
+
+// Cameras of a NeRF transforms.json that is already parsed: `frames` with `file_path` and `transform_matrix`
+// (camera-to-world, OpenGL axes, 4x4 or 3x4), intrinsics by `camera_angle_x` or `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`
+// for all frames or per frame (the frame's own win), optionally our `background` (rgb 0–1). Without `w` and `h` the
+// size is that of the picture. `folder` is the one the paths are relative to.
+Result<CameraSet> CamerasFromTransforms(const JsonValue& root, const std::filesystem::path& folder);
+
+}  // namespace anchorsplat

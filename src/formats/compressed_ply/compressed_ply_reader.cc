@@ -1,0 +1,229 @@
+#include "formats/compressed_ply/compressed_ply_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <string_view>
+#include <vector>
+
+#include "core/spherical_harmonics.h"
+#include "core/text.h"
+#include "formats/cloud_checks.h"
+#include "formats/ply/ply_header.h"
+#include "formats/quantize.h"
+#include "formats/record_blocks.h"
+
+namespace anchorsplat {
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "values are copied as they lie in the file");
+
+constexpr std::array<std::string_view, 18> kChunkProperties = {
+    "min_x",       "min_y",       "min_z",       "max_x", "max_y", "max_z", "min_scale_x", "min_scale_y", "min_scale_z",
+    "max_scale_x", "max_scale_y", "max_scale_z", "min_r", "min_g", "min_b", "max_r",       "max_g",       "max_b"};
+constexpr size_t kRequiredChunkProperties = 12;
+constexpr std::array<std::string_view, 4> kVertexProperties = {"packed_position", "packed_rotation", "packed_scale",
+                                                               "packed_color"};
+
+// min and max of x y z, of the three log-scales and of r g b: the order of kChunkProperties.
+struct ChunkRanges {
+  float mean_min[3], mean_max[3], scale_min[3], scale_max[3], color_min[3], color_max[3];
+};
+static_assert(sizeof(ChunkRanges) == 18 * sizeof(float));
+
+// An element whose rows have one size, and where it lies.
+struct Rows {
+  const PlyElement* element = nullptr;
+  uint64_t begin = 0;
+};
+
+Error BadHeader(const InputFile& file, const std::string& what) {
+  return {ErrorCode::kBadFile, Cat(file.name(), ": is no complete compressed PLY: ", what)};
+}
+
+// Byte of property `name` in a row, which must be of `type`.
+Result<size_t> OffsetOf(const InputFile& file, const PlyElement& element, std::string_view name, PlyType type) {
+  size_t offset = 0;
+  for (const PlyProperty& property : element.properties) {
+    if (property.name == name && property.type == type) return offset;
+    offset += static_cast<size_t>(PlyTypeSize(property.type));
+  }
+  return BadHeader(file,
+                   Cat("element \"", element.name, "\" has no property \"", name, "\" of type ", PlyTypeName(type)));
+}
+
+Result<Rows> Locate(const InputFile& file, const PlyHeader& header, std::string_view name) {
+  uint64_t begin = header.body;
+  for (const PlyElement& element : header.elements) {
+    if (element.has_lists()) {
+      return BadHeader(file, Cat("line ", element.line, ": element \"", Printable(element.name), "\" has lists"));
+    }
+    const uint64_t available = file.size() - begin;
+    const uint64_t row_size = std::max<uint64_t>(1, element.row_size());
+    if (static_cast<uint64_t>(element.count) > available / row_size) {
+      return Error{ErrorCode::kBadFile, Cat(file.name(), ": byte ", WithThousands(static_cast<int64_t>(file.size())),
+                                            ": the file ends too early: element \"", Printable(element.name), "\" has ",
+                                            WithThousands(element.count), " rows of ", element.row_size(), " bytes")};
+    }
+    if (element.name == name) return Rows{&element, begin};
+    begin += static_cast<uint64_t>(element.count) * element.row_size();
+  }
+  return Rows{};
+}
+
+Result<std::vector<ChunkRanges>> ReadChunks(const InputFile& file, const Rows& rows) {
+  const PlyElement& element = *rows.element;
+  const bool has_colors = element.Find("min_r") != nullptr;
+  std::array<size_t, kChunkProperties.size()> offsets{};
+  for (size_t k = 0; k < (has_colors ? kChunkProperties.size() : kRequiredChunkProperties); ++k) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(offsets[k], OffsetOf(file, element, kChunkProperties[k], PlyType::kFloat));
+  }
+  std::vector<ChunkRanges> chunks(static_cast<size_t>(element.count));
+  const auto row_size = static_cast<size_t>(element.row_size());
+  ANCHORSPLAT_RETURN_IF_ERROR(
+      ReadRecords(file, rows.begin, element.count, row_size, [&](int64_t first, int64_t last, const uint8_t* bytes) {
+        for (int64_t i = first; i < last; ++i, bytes += row_size) {
+          std::array<float, kChunkProperties.size()> values = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1};
+          for (size_t k = 0; k < (has_colors ? values.size() : kRequiredChunkProperties); ++k) {
+            std::memcpy(&values[k], bytes + offsets[k], sizeof(float));
+          }
+          std::memcpy(&chunks[static_cast<size_t>(i)], values.data(), sizeof values);
+        }
+      }));
+  return chunks;
+}
+
+// Weighted, not min + t·(max − min): both ends come out exactly.
+float Mix(float min, float max, uint32_t value, uint32_t steps) {
+  const float t = static_cast<float>(value) / static_cast<float>(steps);
+  return min * (1 - t) + max * t;
+}
+
+void UnpackRanged(uint32_t packed, const float min[3], const float max[3], float out[3]) {
+  out[0] = Mix(min[0], max[0], packed >> 21, 2047);
+  out[1] = Mix(min[1], max[1], packed >> 11 & 1023, 1023);
+  out[2] = Mix(min[2], max[2], packed & 2047, 2047);
+}
+
+void UnpackQuat(uint32_t packed, float quat[4]) {
+  SmallestThree three;
+  three.largest = packed >> 30;
+  for (int k = 0; k < 3; ++k) {
+    const uint32_t bits = packed >> (20 - 10 * k) & 1023;
+    three.rest[k] = (static_cast<float>(bits) / 1023 - 0.5f) / kSqrtHalf;
+  }
+  RestoreLargest(three, quat);
+}
+
+Status ReadVertices(const InputFile& file, const Rows& rows, const std::vector<ChunkRanges>& chunks,
+                    GaussianCloud& cloud) {
+  std::array<size_t, 4> offsets{};
+  for (size_t k = 0; k < 4; ++k) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(offsets[k], OffsetOf(file, *rows.element, kVertexProperties[k], PlyType::kUint32));
+  }
+  std::array<float, 256> logits{};
+  for (size_t k = 0; k < 256; ++k) logits[k] = LogitFromOpacity(static_cast<float>(k) / 255);
+  const auto row_size = static_cast<size_t>(rows.element->row_size());
+  return ReadRecords(file, rows.begin, rows.element->count, row_size,
+                     [&](int64_t first, int64_t last, const uint8_t* bytes) {
+                       for (int64_t i = first; i < last; ++i, bytes += row_size) {
+                         uint32_t packed[4];
+                         for (size_t k = 0; k < 4; ++k) std::memcpy(&packed[k], bytes + offsets[k], sizeof(uint32_t));
+                         const ChunkRanges& chunk = chunks[static_cast<size_t>(i / kCompressedPlyChunk)];
+                         UnpackRanged(packed[0], chunk.mean_min, chunk.mean_max, cloud.means.data() + 3 * i);
+                         UnpackQuat(packed[1], cloud.quats.data() + 4 * i);
+                         UnpackRanged(packed[2], chunk.scale_min, chunk.scale_max, cloud.log_scales.data() + 3 * i);
+                         float* dc = cloud.sh.data() + i * cloud.sh_stride();
+                         for (int k = 0; k < 3; ++k) {
+                           const uint32_t bits = packed[3] >> (24 - 8 * k) & 255;
+                           dc[k] = DcFromColor(Mix(chunk.color_min[k], chunk.color_max[k], bits, 255));
+                         }
+                         cloud.opacity_logits[static_cast<size_t>(i)] = logits[packed[3] & 255];
+                       }
+                     });
+}
+
+Status ReadHarmonics(const InputFile& file, const Rows& rows, GaussianCloud& cloud) {
+  const auto rest = static_cast<size_t>(cloud.sh_stride()) - 3;
+  std::vector<size_t> offsets(rest);
+  for (size_t k = 0; k < rest; ++k) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(offsets[k], OffsetOf(file, *rows.element, Cat("f_rest_", k), PlyType::kUint8));
+  }
+  std::array<float, 256> values{};
+  for (size_t k = 1; k < 255; ++k) values[k] = (static_cast<float>(k) + 0.5f) / 256 * 8 - 4;
+  values[0] = -4;
+  values[255] = 4;
+  const auto row_size = static_cast<size_t>(rows.element->row_size());
+  return ReadRecords(file, rows.begin, rows.element->count, row_size,
+                     [&](int64_t first, int64_t last, const uint8_t* bytes) {
+                       for (int64_t i = first; i < last; ++i, bytes += row_size) {
+                         float* out = cloud.sh.data() + i * cloud.sh_stride() + 3;
+                         for (size_t k = 0; k < rest / 3; ++k) {
+                           for (size_t channel = 0; channel < 3; ++channel)
+                             *out++ = values[bytes[offsets[channel * (rest / 3) + k]]];
+                         }
+                       }
+                     });
+}
+
+}  // namespace
+
+Result<GaussianCloud> ReadCompressedPly(const InputFile& file, const ReadLimits& limits) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(PlyHeader header, ReadPlyHeader(file));
+  if (header.encoding != PlyEncoding::kLittleEndian) return BadHeader(file, "it is not binary little-endian");
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Rows chunk_rows, Locate(file, header, "chunk"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Rows vertex_rows, Locate(file, header, "vertex"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Rows sh_rows, Locate(file, header, "sh"));
+  for (const auto& [rows, name] : {std::pair(chunk_rows, "chunk"), std::pair(vertex_rows, "vertex")}) {
+    if (rows.element == nullptr) return BadHeader(file, Cat("it has no element \"", name, "\""));
+  }
+  const int64_t count = vertex_rows.element->count;
+  ANCHORSPLAT_RETURN_IF_ERROR(
+      CheckCount(Cat(file.name(), ": line ", vertex_rows.element->line), static_cast<uint64_t>(count), limits));
+  if (chunk_rows.element->count != (count + kCompressedPlyChunk - 1) / kCompressedPlyChunk) {
+    return BadHeader(file, Cat("line ", chunk_rows.element->line, ": has ", WithThousands(chunk_rows.element->count),
+                               " chunks for ", WithThousands(count), " Gaussians, expected one for 256"));
+  }
+  int degree = 0;
+  if (sh_rows.element != nullptr) {
+    if (sh_rows.element->count != count) {
+      return BadHeader(file, Cat("line ", sh_rows.element->line, ": has ", WithThousands(sh_rows.element->count),
+                                 " rows of \"sh\" for ", WithThousands(count), " Gaussians"));
+    }
+    const auto rest = std::ranges::count_if(
+        sh_rows.element->properties, [](const PlyProperty& property) { return property.name.starts_with("f_rest_"); });
+    for (degree = 1; degree <= kMaxShDegree && rest != 3 * (ShCoefficients(degree) - 1);) ++degree;
+    if (degree > kMaxShDegree) {
+      return BadHeader(file, Cat("line ", sh_rows.element->line, ": element \"sh\" has ", rest,
+                                 " properties f_rest_*, expected 9, 24 or 45"));
+    }
+  }
+  // Rows of no bytes would let the header promise any number of them.
+  for (const std::string_view name : kVertexProperties) {
+    ANCHORSPLAT_RETURN_IF_ERROR(OffsetOf(file, *vertex_rows.element, name, PlyType::kUint32));
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<ChunkRanges> chunks, ReadChunks(file, chunk_rows));
+  GaussianCloud cloud;
+  cloud.Resize(count, degree);
+  ANCHORSPLAT_RETURN_IF_ERROR(ReadVertices(file, vertex_rows, chunks, cloud));
+  if (degree > 0) ANCHORSPLAT_RETURN_IF_ERROR(ReadHarmonics(file, sh_rows, cloud));
+  cloud.render_mode = header.render_mode;
+  cloud.comments = std::move(header.comments);
+  return cloud;
+}
+
+Result<FormatFacts> DescribeCompressedPly(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyHeader header, ReadPlyHeader(file));
+  FormatFacts facts;
+  if (const PlyElement* chunks = header.Find("chunk")) {
+    facts.Add("chunks", WithThousands(chunks->count), " of up to ", kCompressedPlyChunk);
+    facts.Add("colours", chunks->Find("min_r") != nullptr ? "in a range per chunk" : "from 0 to 1");
+  }
+  const PlyElement* harmonics = header.Find("sh");
+  facts.Add("harmonics", harmonics == nullptr ? "none" : Cat(harmonics->properties.size(), " bytes per Gaussian"));
+  return facts;
+}
+
+}  // namespace anchorsplat

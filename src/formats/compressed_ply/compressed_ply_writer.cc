@@ -1,0 +1,272 @@
+#include "formats/compressed_ply/compressed_ply_writer.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <mutex>
+
+#include "core/parallel.h"
+#include "core/spherical_harmonics.h"
+#include "core/text.h"
+#include "formats/cloud_checks.h"
+#include "formats/compressed_ply/compressed_ply_reader.h"
+#include "formats/ply/ply_header.h"
+#include "formats/quantize.h"
+#include "formats/splat_order.h"
+#include "formats/write_losses.h"
+#include "io/atomic_file.h"
+
+namespace anchorsplat {
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "values are copied as they lie in memory");
+
+constexpr int64_t kChunk = kCompressedPlyChunk;
+constexpr size_t kChunkBytes = 18 * sizeof(float);
+constexpr size_t kVertexBytes = 4 * sizeof(uint32_t);
+constexpr int64_t kChunksPerTask = 32;
+// Scales beyond are as good as zero or infinite, and one of them would take all bits of its chunk.
+constexpr float kMaxLogScale = 20;
+
+int64_t Chunks(int64_t count) { return (count + kChunk - 1) / kChunk; }
+
+std::string Header(const GaussianCloud& cloud, int64_t count, int sh_degree) {
+  std::string header = "ply\nformat binary_little_endian 1.0\n";
+  for (const std::string& comment : cloud.comments) {
+    std::string line = comment;
+    // A line end would turn the rest into header lines.
+    std::ranges::replace_if(
+        line, [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
+    header += "comment " + line + "\n";
+  }
+  if (cloud.render_mode) header += "comment " + CommentFromRenderMode(*cloud.render_mode) + "\n";
+  header += Cat("element chunk ", Chunks(count), "\n");
+  for (const char* what : {"", "scale_"}) {
+    for (const char* end : {"min_", "max_"}) {
+      for (const char* axis : {"x", "y", "z"}) header += Cat("property float ", end, what, axis, "\n");
+    }
+  }
+  for (const char* end : {"min_", "max_"}) {
+    for (const char* channel : {"r", "g", "b"}) header += Cat("property float ", end, channel, "\n");
+  }
+  header += Cat("element vertex ", count, "\n");
+  for (const char* what : {"position", "rotation", "scale", "color"})
+    header += Cat("property uint packed_", what, "\n");
+  if (sh_degree > 0) {
+    header += Cat("element sh ", count, "\n");
+    for (int k = 0; k < 3 * (ShCoefficients(sh_degree) - 1); ++k) header += Cat("property uchar f_rest_", k, "\n");
+  }
+  return header + "end_header\n";
+}
+
+// Three values of each Gaussian of a chunk with the range of the finite ones.
+struct RangedValues {
+  float values[kChunk][3];
+  float min[3], max[3];
+
+  void FindRange(int64_t count) {
+    for (int k = 0; k < 3; ++k) {
+      constexpr float kInfinity = std::numeric_limits<float>::infinity();
+      float low = kInfinity, high = -kInfinity;
+      for (int64_t i = 0; i < count; ++i) {
+        const float value = values[i][k];
+        if (!std::isfinite(value)) continue;
+        low = std::min(low, value);
+        high = std::max(high, value);
+      }
+      min[k] = low <= high ? low : 0;
+      max[k] = low <= high ? high : 0;
+    }
+  }
+  // In double: the difference of two floats of any size is finite there.
+  uint32_t Quantize(int64_t i, int k, uint32_t steps) const {
+    const double extent = double{max[k]} - double{min[k]};
+    if (!(extent > 0)) return 0;
+    return QuantizeUnit(static_cast<float>((double{values[i][k]} - double{min[k]}) / extent), steps);
+  }
+  uint32_t Pack111011(int64_t i) const {
+    return Quantize(i, 0, 2047) << 21 | Quantize(i, 1, 1023) << 11 | Quantize(i, 2, 2047);
+  }
+};
+
+uint32_t PackQuat(const float quat[4]) {
+  const SmallestThree three = DropLargest(quat, 0);
+  uint32_t packed = three.largest;
+  for (const float component : three.rest) packed = packed << 10 | QuantizeUnit(component * kSqrtHalf + 0.5f, 1023);
+  return packed;
+}
+
+void PackHarmonics(const float* sh, size_t rest, uint8_t* out) {
+  uint8_t bytes[3 * ShCoefficients(kMaxShDegree)];
+  for (size_t k = 0; k < rest; ++k) {
+    // Truncated, not rounded: the reader puts values into the middle of their step.
+    const float scaled = (sh[k] / 8 + 0.5f) * 256;
+    const float bounded = scaled > 0 ? (scaled < 255 ? scaled : 255.0f) : 0.0f;
+    bytes[k] = static_cast<uint8_t>(static_cast<int32_t>(bounded));
+  }
+  for (size_t channel = 0; channel < 3; ++channel) {
+    for (size_t k = 0; k < rest / 3; ++k) *out++ = bytes[3 * k + channel];
+  }
+}
+
+// Asks for the memory of a Gaussian. In Morton order rows lie anywhere, and waiting for one after the other takes
+// longer than all the arithmetic.
+void Prefetch(const GaussianCloud& cloud, int64_t row) {
+  const auto fetch = [](const float* values, int64_t count) {
+    constexpr int64_t kLine = 64 / sizeof(float);
+    for (int64_t k = 0; k < count; k += kLine) __builtin_prefetch(values + k);
+    __builtin_prefetch(values + count - 1);  // of a row that begins within a line
+  };
+  fetch(cloud.means.data() + 3 * row, 3);
+  fetch(cloud.log_scales.data() + 3 * row, 3);
+  fetch(cloud.quats.data() + 4 * row, 4);
+  fetch(cloud.opacity_logits.data() + row, 1);
+  fetch(cloud.sh.data() + row * cloud.sh_stride(), cloud.sh_stride());
+}
+
+// The three parts of the file that one chunk fills.
+struct PackedChunk {
+  uint8_t* ranges;     // [18] floats
+  uint8_t* vertices;   // [count][4] uints
+  uint8_t* harmonics;  // [count][rest]
+};
+
+void PackChunk(const GaussianCloud& cloud, const Buffer<uint32_t>& order, int64_t first, int64_t count,
+               const PackedChunk& out) {
+  RangedValues means, scales, colors;
+  std::array<int64_t, kChunk> rows{};
+  for (int64_t i = 0; i < count; ++i) {
+    rows[static_cast<size_t>(i)] = order.empty() ? first + i : int64_t{order[static_cast<size_t>(first + i)]};
+    Prefetch(cloud, rows[static_cast<size_t>(i)]);
+  }
+  for (int64_t i = 0; i < count; ++i) {
+    const int64_t row = rows[static_cast<size_t>(i)];
+    const float* dc = cloud.sh.data() + row * cloud.sh_stride();
+    for (int k = 0; k < 3; ++k) {
+      means.values[i][k] = cloud.means[static_cast<size_t>(3 * row + k)];
+      const float log_scale = cloud.log_scales[static_cast<size_t>(3 * row + k)];
+      scales.values[i][k] = std::clamp(log_scale, -kMaxLogScale, kMaxLogScale);  // NaN stays
+      colors.values[i][k] = ColorFromDc(dc[k]);
+    }
+  }
+  uint8_t* ranges = out.ranges;
+  for (RangedValues* ranged : {&means, &scales, &colors}) {
+    ranged->FindRange(count);
+    std::memcpy(ranges, ranged->min, sizeof ranged->min);
+    std::memcpy(ranges + sizeof ranged->min, ranged->max, sizeof ranged->max);
+    ranges += 2 * sizeof ranged->min;
+  }
+  const auto rest = static_cast<size_t>(cloud.sh_stride()) - 3;
+  for (int64_t i = 0; i < count; ++i) {
+    const int64_t row = rows[static_cast<size_t>(i)];
+    uint32_t color = 0;
+    for (int k = 0; k < 3; ++k) color = color << 8 | colors.Quantize(i, k, 255);
+    color = color << 8 | QuantizeUnit(Sigmoid(cloud.opacity_logits[static_cast<size_t>(row)]), 255);
+    const uint32_t packed[4] = {means.Pack111011(i), PackQuat(cloud.quats.data() + 4 * row), scales.Pack111011(i),
+                                color};
+    std::memcpy(out.vertices + static_cast<size_t>(i) * kVertexBytes, packed, sizeof packed);
+    if (rest > 0) {
+      PackHarmonics(cloud.sh.data() + row * cloud.sh_stride() + 3, rest, out.harmonics + static_cast<size_t>(i) * rest);
+    }
+  }
+}
+
+}  // namespace
+
+uint64_t PredictedCompressedPlySize(int64_t count, int sh_degree) {
+  const auto rest = static_cast<uint64_t>(3 * (ShCoefficients(sh_degree) - 1));
+  return Header({}, count, sh_degree).size() + static_cast<uint64_t>(Chunks(count)) * kChunkBytes +
+         static_cast<uint64_t>(count) * (kVertexBytes + rest);
+}
+
+Status WriteCompressedPly(const std::filesystem::path& path, const GaussianCloud& cloud,
+                          const CloudWriteOptions& options) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
+  const std::string header = Header(cloud, cloud.size(), cloud.sh_degree);
+  if (header.size() > kMaxPlyHeader) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat(path.string(), ": comments of ", HumanBytes(header.size()),
+                     " do not fit a PLY header, which ends within ", HumanBytes(kMaxPlyHeader))};
+  }
+  const Buffer<uint32_t> order = WriteOrder(cloud, options.order, SplatOrder::kMorton);
+  const int64_t chunks = Chunks(cloud.size());
+  const auto rest = static_cast<size_t>(cloud.sh_stride()) - 3;
+  const uint64_t ranges_begin = header.size();
+  const uint64_t vertices_begin = ranges_begin + static_cast<uint64_t>(chunks) * kChunkBytes;
+  const uint64_t harmonics_begin = vertices_begin + static_cast<uint64_t>(cloud.size()) * kVertexBytes;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  ANCHORSPLAT_RETURN_IF_ERROR(file.Reserve(harmonics_begin + static_cast<uint64_t>(cloud.size()) * rest));
+  ANCHORSPLAT_RETURN_IF_ERROR(file.WriteAt(0, header.data(), header.size()));
+
+  std::mutex mutex;
+  Status failure;
+  ParallelFor(0, chunks, kChunksPerTask, [&](int64_t first, int64_t last) {
+    const int64_t begin = first * kChunk;
+    const int64_t end = std::min(last * kChunk, cloud.size());
+    const auto gaussians = static_cast<size_t>(end - begin);
+    Buffer<uint8_t> ranges(static_cast<size_t>(last - first) * kChunkBytes);
+    Buffer<uint8_t> vertices(gaussians * kVertexBytes);
+    Buffer<uint8_t> harmonics(gaussians * rest);
+    for (int64_t chunk = first; chunk < last; ++chunk) {
+      const auto offset = static_cast<size_t>((chunk - first) * kChunk);
+      PackChunk(cloud, order, chunk * kChunk, std::min(kChunk, end - chunk * kChunk),
+                {ranges.data() + static_cast<size_t>(chunk - first) * kChunkBytes,
+                 vertices.data() + offset * kVertexBytes, harmonics.data() + offset * rest});
+    }
+    const auto at = static_cast<uint64_t>(begin);
+    for (const Status& status :
+         {file.WriteAt(ranges_begin + static_cast<uint64_t>(first) * kChunkBytes, ranges.data(), ranges.size()),
+          file.WriteAt(vertices_begin + at * kVertexBytes, vertices.data(), vertices.size()),
+          file.WriteAt(harmonics_begin + at * rest, harmonics.data(), harmonics.size())}) {
+      if (status.ok()) continue;
+      const std::lock_guard lock(mutex);
+      failure = status;
+    }
+  });
+  ANCHORSPLAT_RETURN_IF_ERROR(failure);
+  return file.Commit();
+}
+
+std::string CompressedPlyMeanLoss(const GaussianCloud& cloud) {
+  constexpr double kStray = 8;       // of the box of the middle 98 %: where it ends well, nobody needs to look closer
+  constexpr double kUsualChunk = 4;  // times its share of the volume: surfaces have larger ones than solids
+  constexpr double kLeastChunk = 0.5, kMostChunk = 2;  // of the box: steps of 1/4094 and 1/1023 of it
+  const MiddleOfMeans middle = FindMiddleOfMeans(cloud);
+  const std::optional<Bounds> bounds = ComputeBounds(cloud);
+  double widest = 0;
+  for (size_t a = 0; bounds && a < 3; ++a) widest = std::max(widest, double{bounds->max[a]} - double{bounds->min[a]});
+  if (!(widest > kStray * double{middle.extent})) return {};
+
+  const double share = std::cbrt(static_cast<double>(kChunk) / static_cast<double>(cloud.size()));
+  const double usual = std::clamp(kUsualChunk * share, kLeastChunk, kMostChunk) * double{middle.extent};
+  const Buffer<uint32_t> order = MortonOrder(cloud);
+  int64_t coarse = 0;
+  double largest = 0;
+  for (int64_t first = 0; first < cloud.size(); first += kChunk) {
+    const int64_t last = std::min(first + kChunk, cloud.size());
+    double side = 0;
+    for (int64_t a = 0; a < 3; ++a) {
+      double low = std::numeric_limits<double>::infinity(), high = -low;
+      for (int64_t i = first; i < last; ++i) {
+        const double x = cloud.means[static_cast<size_t>(3 * int64_t{order[static_cast<size_t>(i)]} + a)];
+        if (!std::isfinite(x)) continue;
+        low = std::min(low, x);
+        high = std::max(high, x);
+      }
+      side = std::max(side, high - low);  // −∞ where none is finite
+    }
+    if (side <= usual) continue;
+    coarse += last - first;
+    largest = std::max(largest, side);
+  }
+  if (coarse == 0) return {};
+  return Cat("positions of ", WithThousands(coarse), " of ", WithThousands(cloud.size()),
+             " Gaussians are rounded to steps of up to ", largest / 2047, ", as their chunks of ", kChunk,
+             " reach so far, while 98 % lie within a box of ", middle.extent, "; remove what is far out");
+}
+
+}  // namespace anchorsplat

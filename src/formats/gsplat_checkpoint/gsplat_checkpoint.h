@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string_view>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "formats/cloud_io.h"
+#include "io/input_file.h"
+
+namespace anchorsplat {
+
+// Whether a file that begins with `head` is what torch.save writes: a zip archive with a data.pkl, or the older
+// pickles.
+bool IsTorchCheckpoint(std::string_view head);
+
+// Reads the Gaussians of a checkpoint of gsplat's trainer (examples/simple_trainer.py, ckpt_{step}_rank{r}.pt): a
+// dictionary "splats" with means [N,3], scales [N,3] (logarithms), quats [N,4] (wxyz, any norm), opacities [N]
+// (logits), sh0 [N,1,3] and shN [N,(degree+1)²−1,3], which is our stored space; other members are left alone. Of a run
+// on several processors each file holds its own part of the Gaussians.
+//
+// The file is read into memory, not mapped: its values are copied once, and splats may come through a pipe.
+// Errors (kBadFile): as for TensorFile; a tensor missing, of another shape, or not of floating-point numbers; an SH
+// degree above 3; no Gaussians, or more than limits.max_gaussians.
+Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& file, const ReadLimits& limits = {});
+
+}  // namespace anchorsplat

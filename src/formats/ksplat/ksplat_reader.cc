@@ -1,0 +1,263 @@
+#include "formats/ksplat/ksplat_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <vector>
+
+#include "core/spherical_harmonics.h"
+#include "core/text.h"
+#include "formats/cloud_checks.h"
+#include "formats/half.h"
+#include "formats/quantize.h"
+#include "formats/record_blocks.h"
+
+namespace anchorsplat {
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "numbers are copied as they lie in the file");
+
+constexpr uint64_t kHeaderBytes = 4096;
+constexpr uint64_t kSectionHeaderBytes = 1024;
+constexpr float kDefaultShRange = 1.5f;
+
+// Bytes of the parts of a Gaussian at each compression level.
+struct Level {
+  size_t number;    // bytes of a scale or a component of the quaternion
+  size_t mean;      // of a coordinate
+  size_t harmonic;  // of an SH coefficient
+  uint32_t range;   // of 16-bit coordinates, where the section does not say
+};
+constexpr std::array<Level, 3> kLevels = {{{4, 4, 4, 1}, {2, 2, 2, 32767}, {2, 2, 1, 32767}}};
+
+template <typename T>
+T At(const std::string& bytes, size_t offset) {
+  T value;
+  std::memcpy(&value, bytes.data() + offset, sizeof value);
+  return value;
+}
+
+struct Section {
+  uint64_t count, max_count, bucket_size, buckets, full_buckets, partial_buckets, bucket_bytes;
+  float block_size;
+  uint32_t range;
+  int degree;
+  uint64_t begin;   // byte of the bucket sizes
+  uint64_t record;  // bytes per Gaussian
+
+  uint64_t centers_begin() const { return begin + 4 * partial_buckets; }
+  uint64_t data_begin() const { return centers_begin() + bucket_bytes * buckets; }
+  uint64_t end() const { return data_begin() + record * max_count; }
+};
+
+struct Ksplat {
+  size_t level = 0;
+  float sh_min = -kDefaultShRange, sh_max = kDefaultShRange;
+  std::vector<Section> sections;
+  uint64_t count = 0;
+  int degree = 0;
+};
+
+Error Bad(const InputFile& file, uint64_t byte, const std::string& what) {
+  return {ErrorCode::kBadFile, Cat(file.name(), ": byte ", WithThousands(static_cast<int64_t>(byte)), ": ", what)};
+}
+
+Status ReadSectionHeader(const InputFile& file, uint64_t at, uint64_t begin, const Level& level, Section& section) {
+  std::string header(48, '\0');
+  ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(at, header.data(), header.size()));
+  section.count = At<uint32_t>(header, 0);
+  section.max_count = At<uint32_t>(header, 4);
+  section.bucket_size = At<uint32_t>(header, 8);
+  section.buckets = At<uint32_t>(header, 12);
+  section.block_size = At<float>(header, 16);
+  section.bucket_bytes = At<uint16_t>(header, 20);
+  section.range = At<uint32_t>(header, 24);
+  if (section.range == 0) section.range = level.range;
+  section.full_buckets = At<uint32_t>(header, 32);
+  section.partial_buckets = At<uint32_t>(header, 36);
+  const int degree = At<uint16_t>(header, 40);
+  if (degree > kMaxShDegree) return Bad(file, at + 40, Cat("SH degree ", degree, ", expected 0 to 3"));
+  section.degree = degree;
+  section.begin = begin;
+  section.record = 3 * level.mean + 7 * level.number + 4 + 3 * level.harmonic * (ShCoefficients(degree) - 1);
+  // Every factor has 32 bits at most and every record fewer than 256 bytes: nothing overflows 64.
+  if (section.count > section.max_count || section.end() > file.size()) {
+    return Bad(file, at,
+               Cat("a section of ", section.count, " Gaussians (room for ", section.max_count,
+                   ") that would end at byte ", section.end(), " of ", file.size()));
+  }
+  if (level.mean == 2) {
+    const bool enough = section.full_buckets + section.partial_buckets <= section.buckets &&
+                        (section.bucket_bytes >= 12 || section.buckets == 0);
+    if (!enough || !std::isfinite(section.block_size)) {
+      return Bad(file, at + 8, "the section's buckets do not belong together");
+    }
+  }
+  return {};
+}
+
+Result<Ksplat> ReadHeaders(const InputFile& file, const ReadLimits& limits) {
+  if (file.size() < kHeaderBytes) return Bad(file, file.size(), "is shorter than the header of a KSPLAT file");
+  std::string header(48, '\0');
+  ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(0, header.data(), header.size()));
+  const int major = At<uint8_t>(header, 0), minor = At<uint8_t>(header, 1);
+  if (major != 0 || minor < 1) return Bad(file, 0, Cat("KSPLAT version ", major, ".", minor, ", expected 0.1"));
+  Ksplat ksplat;
+  const uint64_t sections = At<uint32_t>(header, 4);
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckCount(Cat(file.name(), ": byte 16"), At<uint32_t>(header, 16), limits));
+  ksplat.level = At<uint16_t>(header, 20);
+  if (ksplat.level >= kLevels.size())
+    return Bad(file, 20, Cat("compression level ", ksplat.level, ", expected 0 to 2"));
+  const float min = At<float>(header, 36), max = At<float>(header, 40);
+  if (std::isfinite(min) && min != 0) ksplat.sh_min = min;
+  if (std::isfinite(max) && max != 0) ksplat.sh_max = max;
+  if (sections > (file.size() - kHeaderBytes) / kSectionHeaderBytes) {
+    return Bad(file, 4, Cat(sections, " sections in a file of ", file.size(), " bytes"));
+  }
+  uint64_t begin = kHeaderBytes + sections * kSectionHeaderBytes;
+  for (uint64_t k = 0; k < sections; ++k) {
+    Section section;
+    ANCHORSPLAT_RETURN_IF_ERROR(
+        ReadSectionHeader(file, kHeaderBytes + k * kSectionHeaderBytes, begin, kLevels[ksplat.level], section));
+    begin = section.end();
+    ksplat.count += section.count;
+    if (section.count > 0) ksplat.degree = std::max(ksplat.degree, section.degree);
+    ksplat.sections.push_back(section);
+  }
+  if (ksplat.count != At<uint32_t>(header, 16)) {
+    return Bad(file, 16, Cat("has ", At<uint32_t>(header, 16), " Gaussians, but its sections have ", ksplat.count));
+  }
+  return ksplat;
+}
+
+// Which bucket a Gaussian lies in: full ones come first, then partly filled ones, whose first Gaussians `starts` tells.
+struct Buckets {
+  std::vector<float> centers;    // [buckets,3]
+  std::vector<uint64_t> starts;  // of the partly filled ones
+
+  const float* CenterOf(const Section& section, uint64_t i) const {
+    uint64_t bucket = 0;
+    if (section.bucket_size > 0 && i < section.full_buckets * section.bucket_size) {
+      bucket = i / section.bucket_size;
+    } else {
+      const auto after = std::upper_bound(starts.begin(), starts.end(), i);
+      if (after == starts.begin()) return nullptr;
+      bucket = section.full_buckets + static_cast<uint64_t>(after - starts.begin()) - 1;
+    }
+    return bucket < section.buckets ? centers.data() + 3 * bucket : nullptr;
+  }
+};
+
+Result<Buckets> ReadBuckets(const InputFile& file, const Section& section) {
+  Buckets buckets;
+  std::vector<uint32_t> sizes(section.partial_buckets);
+  ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(section.begin, sizes.data(), 4 * sizes.size()));
+  uint64_t next = section.full_buckets * section.bucket_size;
+  for (const uint32_t size : sizes) {
+    buckets.starts.push_back(next);
+    next += size;
+  }
+  buckets.centers.resize(3 * section.buckets);
+  std::string raw(section.bucket_bytes * section.buckets, '\0');
+  ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(section.centers_begin(), raw.data(), raw.size()));
+  for (size_t k = 0; k < section.buckets; ++k) std::memcpy(&buckets.centers[3 * k], &raw[section.bucket_bytes * k], 12);
+  return buckets;
+}
+
+float Number(const uint8_t* bytes, size_t size) {
+  if (size == 2) return FloatFromHalf(bytes);
+  float value;
+  std::memcpy(&value, bytes, sizeof value);
+  return value;
+}
+
+void UnpackHarmonics(const Ksplat& ksplat, const Section& section, const uint8_t* bytes, float* sh) {
+  const size_t size = kLevels[ksplat.level].harmonic;
+  for (int degree = 1; degree <= section.degree; ++degree) {
+    const int first = ShCoefficients(degree - 1), count = 2 * degree + 1;
+    for (int channel = 0; channel < 3; ++channel) {
+      for (int k = first; k < first + count; ++k, bytes += size) {
+        sh[3 * k + channel] = size == 1
+                                  ? ksplat.sh_min + static_cast<float>(*bytes) / 255 * (ksplat.sh_max - ksplat.sh_min)
+                                  : Number(bytes, size);
+      }
+    }
+  }
+}
+
+Status ReadSection(const InputFile& file, const Ksplat& ksplat, const Section& section, int64_t begin,
+                   GaussianCloud& cloud) {
+  const Level& level = kLevels[ksplat.level];
+  Buckets buckets;
+  if (level.mean == 2) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(buckets, ReadBuckets(file, section));
+  }
+  const float step = section.block_size / 2 / static_cast<float>(section.range);
+  std::atomic<bool> lost = false;
+  ANCHORSPLAT_RETURN_IF_ERROR(ReadRecords(
+      file, section.data_begin(), static_cast<int64_t>(section.count), section.record,
+      [&](int64_t first, int64_t last, const uint8_t* record) {
+        for (int64_t i = first; i < last; ++i, record += section.record) {
+          const int64_t row = begin + i;
+          const uint8_t* bytes = record;
+          float* mean = cloud.means.data() + 3 * row;
+          const float* center = level.mean == 2 ? buckets.CenterOf(section, static_cast<uint64_t>(i)) : nullptr;
+          if (level.mean == 2 && center == nullptr) {
+            lost = true;
+            return;
+          }
+          for (int k = 0; k < 3; ++k, bytes += level.mean) {
+            mean[k] = level.mean == 4
+                          ? Number(bytes, 4)
+                          : (static_cast<float>(bytes[0] + 256 * bytes[1]) - static_cast<float>(section.range)) * step +
+                                center[k];
+          }
+          for (int k = 0; k < 3; ++k, bytes += level.number) {
+            cloud.log_scales[static_cast<size_t>(3 * row + k)] = LogFromScale(Number(bytes, level.number));
+          }
+          for (int k = 0; k < 4; ++k, bytes += level.number) {
+            cloud.quats[static_cast<size_t>(4 * row + k)] = Number(bytes, level.number);
+          }
+          float* sh = cloud.sh.data() + row * cloud.sh_stride();
+          std::fill_n(sh, cloud.sh_stride(), 0.0f);
+          for (int k = 0; k < 3; ++k) sh[k] = DcFromColor(static_cast<float>(*bytes++) / 255);
+          cloud.opacity_logits[static_cast<size_t>(row)] = LogitFromOpacity(static_cast<float>(*bytes++) / 255);
+          UnpackHarmonics(ksplat, section, bytes, sh);
+        }
+      }));
+  if (lost) return Bad(file, section.begin, "a Gaussian lies in no bucket of its section");
+  return {};
+}
+
+}  // namespace
+
+Result<FormatFacts> DescribeKsplat(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Ksplat ksplat, ReadHeaders(file, {}));
+  FormatFacts facts;
+  facts.Add("version", "0.1");
+  facts.Add("compression", "level ", ksplat.level,
+            ksplat.level == 0   ? ": floats"
+            : ksplat.level == 1 ? ": 16 bits"
+                                : ": 16 bits, harmonics of 8 bits");
+  facts.Add("sections", ksplat.sections.size());
+  return facts;
+}
+
+Result<GaussianCloud> ReadKsplat(const InputFile& file, const ReadLimits& limits) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Ksplat ksplat, ReadHeaders(file, limits));
+  GaussianCloud cloud;
+  cloud.Resize(static_cast<int64_t>(ksplat.count), ksplat.degree);
+  int64_t begin = 0;
+  for (const Section& section : ksplat.sections) {
+    ANCHORSPLAT_RETURN_IF_ERROR(ReadSection(file, ksplat, section, begin, cloud));
+    begin += static_cast<int64_t>(section.count);
+  }
+  return cloud;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,272 @@
+#include "formats/ply/ply_header.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <limits>
+#include <unordered_set>
+#include <utility>
+
+#include "core/text.h"
+
+namespace anchorsplat {
+
+namespace {
+
+struct TypeInfo {
+  std::string_view name;
+  std::string_view other_name;
+  PlyType type;
+  int size;
+};
+constexpr std::array<TypeInfo, 8> kTypes = {{{"char", "int8", PlyType::kInt8, 1},
+                                             {"uchar", "uint8", PlyType::kUint8, 1},
+                                             {"short", "int16", PlyType::kInt16, 2},
+                                             {"ushort", "uint16", PlyType::kUint16, 2},
+                                             {"int", "int32", PlyType::kInt32, 4},
+                                             {"uint", "uint32", PlyType::kUint32, 4},
+                                             {"float", "float32", PlyType::kFloat, 4},
+                                             {"double", "float64", PlyType::kDouble, 8}}};
+
+const TypeInfo& Info(PlyType type) { return kTypes[static_cast<size_t>(type)]; }
+
+std::optional<PlyType> TypeFromName(std::string_view name) {
+  for (const TypeInfo& info : kTypes) {
+    if (name == info.name || name == info.other_name) return info.type;
+  }
+  return std::nullopt;
+}
+
+bool IsBlank(char c) { return c == ' ' || c == '\t'; }
+
+std::string_view Trimmed(std::string_view text) {
+  while (!text.empty() && IsBlank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && IsBlank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+// Cuts the first word off `line`.
+std::string_view TakeHeaderWord(std::string_view& line) {
+  line = Trimmed(line);
+  const size_t end = std::min(line.find_first_of(" \t"), line.size());
+  const std::string_view word = line.substr(0, end);
+  line = Trimmed(line.substr(end));
+  return word;
+}
+
+std::string LowerCase(std::string_view text) {
+  std::string out(text);
+  for (char& c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return out;
+}
+
+class HeaderParser {
+ public:
+  explicit HeaderParser(std::string file) : file_(std::move(file)) {}
+
+  // One line without its end; `done()` after end_header.
+  Status Line(std::string_view line);
+  bool done() const { return done_; }
+  PlyHeader& header() { return header_; }
+
+ private:
+  Error Bad(const std::string& what) const {
+    return {ErrorCode::kBadFile, Cat(file_, ": line ", header_.lines, ": ", what)};
+  }
+  Error Unexpected(const char* expected, std::string_view found) const {
+    return Bad(Cat("expected ", expected, ", found \"", Printable(std::string(found)), "\""));
+  }
+  Status Format(std::string_view rest);
+  Status Element(std::string_view rest);
+  Status Property(std::string_view rest);
+  void Comment(std::string_view rest);
+
+  std::string file_;
+  PlyHeader header_;
+  std::unordered_set<std::string> names_;  // of the current element's properties
+  bool has_format_ = false;
+  bool done_ = false;
+};
+
+Status HeaderParser::Line(std::string_view line) {
+  ++header_.lines;
+  std::string_view rest = line;
+  const std::string_view keyword = TakeHeaderWord(rest);
+  if (header_.lines == 1) {
+    if (keyword != "ply" || !rest.empty()) return Unexpected("\"ply\" (this is no PLY file)", line);
+    return {};
+  }
+  if (keyword.empty() || keyword == "obj_info") return {};
+  if (keyword == "comment") {
+    Comment(rest);
+    return {};
+  }
+  if (keyword == "format") return Format(rest);
+  if (keyword == "element") return Element(rest);
+  if (keyword == "property") return Property(rest);
+  if (keyword == "end_header" && rest.empty()) {
+    if (!has_format_) return Bad("the header has no \"format\" line");
+    done_ = true;
+    return {};
+  }
+  return Unexpected("format, comment, obj_info, element, property or end_header", line);
+}
+
+Status HeaderParser::Format(std::string_view rest) {
+  if (has_format_) return Bad("a second \"format\" line");
+  const std::string_view whole = rest;
+  const std::string_view encoding = TakeHeaderWord(rest);
+  if (encoding == "ascii") {
+    header_.encoding = PlyEncoding::kAscii;
+  } else if (encoding == "binary_little_endian") {
+    header_.encoding = PlyEncoding::kLittleEndian;
+  } else if (encoding == "binary_big_endian") {
+    header_.encoding = PlyEncoding::kBigEndian;
+  } else {
+    return Unexpected("ascii, binary_little_endian or binary_big_endian", whole);
+  }
+  if (rest != "1.0") return Unexpected("version 1.0", rest);
+  has_format_ = true;
+  return {};
+}
+
+Status HeaderParser::Element(std::string_view rest) {
+  PlyElement element;
+  element.line = header_.lines;
+  element.name = TakeHeaderWord(rest);
+  if (element.name.empty()) return Bad("an element without a name");
+  if (header_.Find(element.name) != nullptr) {
+    return Bad(Cat("a second element \"", Printable(element.name), "\""));
+  }
+  const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), element.count);
+  if (error != std::errc{} || end != rest.data() + rest.size() || element.count < 0) {
+    return Unexpected("a count of rows from 0 to 2^63 - 1", rest);
+  }
+  header_.elements.push_back(std::move(element));
+  names_.clear();
+  return {};
+}
+
+Status HeaderParser::Property(std::string_view rest) {
+  if (header_.elements.empty()) return Bad("a property before the first element");
+  PlyElement& element = header_.elements.back();
+  PlyProperty property;
+  property.line = header_.lines;
+  std::string_view type = TakeHeaderWord(rest);
+  if (type == "list") {
+    const std::string_view count = TakeHeaderWord(rest);
+    property.list_count = TypeFromName(count);
+    if (!property.list_count || *property.list_count == PlyType::kFloat || *property.list_count == PlyType::kDouble) {
+      return Unexpected("an integer type for the count of a list", count);
+    }
+    type = TakeHeaderWord(rest);
+  }
+  const auto known = TypeFromName(type);
+  if (!known) return Unexpected("a type (char uchar short ushort int uint float double)", type);
+  property.type = *known;
+  property.name = TakeHeaderWord(rest);
+  if (property.name.empty()) return Bad("a property without a name");
+  if (!rest.empty()) return Unexpected("the end of the line", rest);
+  if (!names_.insert(property.name).second) {
+    return Bad(
+        Cat("a second property \"", Printable(property.name), "\" of element \"", Printable(element.name), "\""));
+  }
+  element.properties.push_back(std::move(property));
+  return {};
+}
+
+void HeaderParser::Comment(std::string_view rest) {
+  // The last one counts, as in other readers: tools that rewrite a file append their own.
+  if (const auto mode = RenderModeFromComment(rest)) {
+    header_.render_mode = mode;
+  } else {
+    header_.comments.emplace_back(rest);
+  }
+}
+
+}  // namespace
+
+int PlyTypeSize(PlyType type) { return Info(type).size; }
+const char* PlyTypeName(PlyType type) { return Info(type).name.data(); }
+
+bool PlyElement::has_lists() const {
+  return std::any_of(properties.begin(), properties.end(),
+                     [](const PlyProperty& p) { return p.list_count.has_value(); });
+}
+
+uint64_t PlyElement::row_size() const {
+  uint64_t size = 0;
+  for (const PlyProperty& p : properties) size += static_cast<uint64_t>(PlyTypeSize(p.list_count.value_or(p.type)));
+  return size;
+}
+
+const PlyProperty* PlyElement::Find(std::string_view property) const {
+  for (const PlyProperty& p : properties) {
+    if (p.name == property) return &p;
+  }
+  return nullptr;
+}
+
+const PlyElement* PlyHeader::Find(std::string_view element) const {
+  for (const PlyElement& e : elements) {
+    if (e.name == element) return &e;
+  }
+  return nullptr;
+}
+
+Result<PlyHeader> ReadPlyHeader(const InputFile& file) {
+  if (file.size() == 0) return Error{ErrorCode::kBadFile, Cat(file.name(), ": is empty")};
+  HeaderParser parser(file.name());
+  std::string bytes;
+  size_t at = 0;
+  bool lone_cr = false;  // old Macintosh line ends; then a LF after CR belongs to the data
+  // Most headers fit the first piece; of a long one the bytes are read again, the lines are not.
+  for (const size_t piece : {size_t{16} << 10, kMaxPlyHeader}) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(bytes, file.Head(piece));
+    if (!bytes.starts_with("ply")) {
+      return Error{ErrorCode::kBadFile, Cat(file.name(), ": byte 0: is no PLY file: expected \"ply\", found \"",
+                                            Printable(bytes.substr(0, 8)), "\"")};
+    }
+    while (!parser.done()) {
+      const size_t end = bytes.find_first_of("\r\n", at);
+      // A CR at the end of the piece may be half of CR LF.
+      if (end == std::string::npos || (bytes[end] == '\r' && end + 1 == bytes.size() && bytes.size() < file.size())) {
+        break;
+      }
+      ANCHORSPLAT_RETURN_IF_ERROR(parser.Line(std::string_view(bytes).substr(at, end - at)));
+      const bool cr_lf = !lone_cr && bytes[end] == '\r' && end + 1 < bytes.size() && bytes[end + 1] == '\n';
+      if (at == 0) lone_cr = bytes[end] == '\r' && !cr_lf;
+      at = end + (cr_lf ? 2 : 1);
+    }
+    if (parser.done()) {
+      parser.header().body = at;
+      return std::move(parser.header());
+    }
+    if (bytes.size() == file.size()) break;
+  }
+  return Error{ErrorCode::kBadFile,
+               Cat(file.name(), ": line ", parser.header().lines + 1, ": the header has no \"end_header\" within ",
+                   WithThousands(static_cast<int64_t>(bytes.size())), " bytes")};
+}
+
+std::optional<RenderMode> RenderModeFromComment(std::string_view comment) {
+  const std::string lower = LowerCase(comment);
+  std::string_view rest = Trimmed(lower);
+  constexpr std::string_view kBrush = "splatrendermode:";
+  if (rest.starts_with(kBrush)) {
+    rest = Trimmed(rest.substr(kBrush.size()));
+    if (rest == "mip") return RenderMode::kAntialiased;
+    if (rest == "default") return RenderMode::kClassic;
+  } else if (TakeHeaderWord(rest) == "antialiased") {
+    if (rest == "1") return RenderMode::kAntialiased;
+    if (rest == "0") return RenderMode::kClassic;
+  }
+  return std::nullopt;
+}
+
+std::string CommentFromRenderMode(RenderMode mode) {
+  return mode == RenderMode::kAntialiased ? "SplatRenderMode: mip" : "SplatRenderMode: default";
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,158 @@
+#include "formats/ply/ply_writer.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <mutex>
+
+#include "core/parallel.h"
+#include "core/text.h"
+#include "formats/ply/ply_header.h"
+#include "io/atomic_file.h"
+
+namespace anchorsplat {
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "rows are copied as they lie in memory");
+
+// x y z nx ny nz, f_dc and f_rest, opacity scale rot
+int64_t RowFloats(int sh_degree) { return 6 + 3 * ShCoefficients(sh_degree) + 8; }
+
+std::string Header(int64_t count, int sh_degree, std::optional<RenderMode> render_mode,
+                   std::span<const std::string> comments, const ExtraProperties& extras) {
+  std::string header = "ply\nformat binary_little_endian 1.0\n";
+  for (const std::string& comment : comments) {
+    std::string line = comment;
+    for (char& c : line) {
+      if (static_cast<unsigned char>(c) < 0x20) c = ' ';  // a line end would turn the rest into header lines
+    }
+    header += "comment " + line + "\n";
+  }
+  if (render_mode) header += "comment " + CommentFromRenderMode(*render_mode) + "\n";
+  header += Cat("element vertex ", count, "\n");
+  const auto property = [&header](const auto&... name) { header += Cat("property float ", name..., "\n"); };
+  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) property(name);
+  for (int k = 0; k < 3; ++k) property("f_dc_", k);
+  for (int k = 0; k < 3 * (ShCoefficients(sh_degree) - 1); ++k) property("f_rest_", k);
+  property("opacity");
+  for (int k = 0; k < 3; ++k) property("scale_", k);
+  for (int k = 0; k < 4; ++k) property("rot_", k);
+  for (const auto& [name, type] : extras.properties) header += Cat("property ", PlyTypeName(type), " ", name, "\n");
+  return header + "end_header\n";
+}
+
+// Bytes of a row.
+size_t RowSize(int sh_degree, const ExtraProperties& extras) {
+  return static_cast<size_t>(RowFloats(sh_degree)) * sizeof(float) + extras.row_size();
+}
+
+template <int kDegree>
+void PackRows(const GaussianCloud& cloud, int64_t first, int64_t last, float* out) {
+  constexpr int kCoefficients = ShCoefficients(kDegree);
+  const float* mean = cloud.means.data() + 3 * first;
+  const float* scale = cloud.log_scales.data() + 3 * first;
+  const float* quat = cloud.quats.data() + 4 * first;
+  const float* sh = cloud.sh.data() + 3 * kCoefficients * first;
+  for (int64_t i = first; i < last; ++i) {
+    out = std::copy_n(mean, 3, out);
+    out = std::fill_n(out, 3, 0.0f);
+    out = std::copy_n(sh, 3, out);
+    for (int channel = 0; channel < 3; ++channel) {
+      for (int k = 1; k < kCoefficients; ++k) *out++ = sh[3 * k + channel];
+    }
+    *out++ = cloud.opacity_logits[static_cast<size_t>(i)];
+    out = std::copy_n(scale, 3, out);
+    out = std::copy_n(quat, 4, out);
+    mean += 3, scale += 3, quat += 4, sh += 3 * kCoefficients;
+  }
+}
+
+void Pack(const GaussianCloud& cloud, int64_t first, int64_t last, float* out) {
+  switch (cloud.sh_degree) {
+    case 0:
+      return PackRows<0>(cloud, first, last, out);
+    case 1:
+      return PackRows<1>(cloud, first, last, out);
+    case 2:
+      return PackRows<2>(cloud, first, last, out);
+    default:
+      return PackRows<3>(cloud, first, last, out);
+  }
+}
+
+// Rows of `floats` values each with those of `extras` put in and behind.
+void PackExtras(const ExtraProperties& extras, int64_t first, int64_t last, float* rows, size_t floats,
+                std::byte* wide) {
+  constexpr size_t kNormals = 3;  // floats before them
+  const size_t own = floats * sizeof(float), extra = extras.row_size();
+  for (int64_t i = first; i < last; ++i, rows += floats) {
+    if (!extras.normals.empty()) std::copy_n(extras.normals.data() + 3 * i, 3, rows + kNormals);
+    if (extra == 0) continue;
+    std::memcpy(wide, rows, own);
+    std::memcpy(wide + own, extras.rows.data() + static_cast<size_t>(i) * extra, extra);
+    wide += own + extra;
+  }
+}
+
+}  // namespace
+
+uint64_t PredictedPlySize(int64_t count, int sh_degree, std::optional<RenderMode> render_mode,
+                          std::span<const std::string> comments) {
+  return Header(count, sh_degree, render_mode, comments, {}).size() +
+         static_cast<uint64_t>(count) * RowSize(sh_degree, {});
+}
+
+Status WritePly(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options) {
+  return WritePlyWithExtras(path, cloud, options, {});
+}
+
+Status WritePlyWithExtras(const std::filesystem::path& path, const GaussianCloud& cloud,
+                          const CloudWriteOptions& options, const ExtraProperties& extras) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
+  if (cloud.empty()) {
+    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": there are no Gaussians to write")};
+  }
+  if (!extras.fits(cloud.size())) {
+    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": the other properties (", extras.names(),
+                                              ") are not of these ", WithThousands(cloud.size()), " Gaussians")};
+  }
+  const std::string header = Header(cloud.size(), cloud.sh_degree, cloud.render_mode, cloud.comments, extras);
+  if (header.size() > kMaxPlyHeader) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat(path.string(), ": comments and names of properties of ", HumanBytes(header.size()),
+                     " do not fit a PLY header, which ends within ", HumanBytes(kMaxPlyHeader))};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  const auto floats = static_cast<size_t>(RowFloats(cloud.sh_degree));
+  const size_t row_size = RowSize(cloud.sh_degree, extras);
+  const bool wider = !extras.properties.empty();
+  ANCHORSPLAT_RETURN_IF_ERROR(file.Reserve(header.size() + static_cast<uint64_t>(cloud.size()) * row_size));
+  ANCHORSPLAT_RETURN_IF_ERROR(file.WriteAt(0, header.data(), header.size()));
+
+  // A block stays in the L2 cache between packing and writing; a task is many blocks that share one buffer.
+  const auto block = static_cast<int64_t>(std::max<size_t>(1, (size_t{256} << 10) / row_size));
+  std::mutex mutex;
+  Status failure;
+  ParallelFor(0, cloud.size(), 16 * block, [&](int64_t first, int64_t last) {
+    const auto most = static_cast<size_t>(std::min(block, last - first));
+    Buffer<float> rows(most * floats);
+    Buffer<std::byte> wide(wider ? most * row_size : 0);
+    for (int64_t i = first; i < last; i += block) {
+      const int64_t end = std::min(last, i + block);
+      Pack(cloud, i, end, rows.data());
+      if (!extras.empty()) PackExtras(extras, i, end, rows.data(), floats, wide.data());
+      const void* const packed = wider ? static_cast<const void*>(wide.data()) : rows.data();
+      const Status status = file.WriteAt(header.size() + static_cast<uint64_t>(i) * row_size, packed,
+                                         static_cast<size_t>(static_cast<uint64_t>(end - i) * row_size));
+      if (status.ok()) continue;
+      const std::lock_guard lock(mutex);
+      failure = status;
+      return;
+    }
+  });
+  if (!failure.ok()) return failure;
+  return file.Commit();
+}
+
+}  // namespace anchorsplat

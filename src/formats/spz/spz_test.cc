@@ -1,0 +1,257 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string>
+
+#include "core/parallel.h"
+#include "formats/attribute_error.h"
+#include "formats/axes.h"
+#include "formats/half.h"
+#include "formats/random_cloud_for_test.h"
+#include "formats/splat_order.h"
+#include "formats/spz/spz_reader.h"
+#include "formats/spz/spz_writer.h"
+#include "io/folder_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+Result<GaussianCloud> Read(const std::filesystem::path& path, const ReadLimits& limits = {}) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
+  return ReadSpz(file, limits);
+}
+
+std::string Bytes(const std::filesystem::path& path) { return *InputFile::Open(path)->ReadAll(1 << 30); }
+
+std::string ErrorOf(std::string bytes) {
+  const auto cloud = ReadSpz(InputFile::FromBytes("a.spz", std::move(bytes)));
+  return cloud.ok() ? "accepted" : cloud.error().message;
+}
+
+std::string Gzip(const std::string& raw) {
+  z_stream stream{};
+  EXPECT_EQ(deflateInit2(&stream, 6, Z_DEFLATED, 16 + MAX_WBITS, 9, Z_DEFAULT_STRATEGY), Z_OK);
+  std::string out(deflateBound(&stream, raw.size()) + 32, '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(raw.data()));
+  stream.avail_in = static_cast<uInt>(raw.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  out.resize(stream.total_out);
+  deflateEnd(&stream);
+  return out;
+}
+
+std::string RawHeader(uint32_t version, uint32_t count, uint8_t degree, uint8_t bits, uint8_t flags) {
+  const uint32_t numbers[3] = {0x5053474e, version, count};
+  std::string out(reinterpret_cast<const char*>(numbers), sizeof numbers);
+  for (const uint8_t byte : {degree, bits, flags, uint8_t{0}}) out += static_cast<char>(byte);
+  return out;
+}
+
+// Values within what the format can hold.
+GaussianCloud Tame(int64_t n, int degree, uint64_t seed) {
+  GaussianCloud cloud = RandomCloud(n, degree, seed);
+  for (float& x : cloud.log_scales) x -= 5;
+  for (int64_t i = 0; i < n; ++i) {
+    for (int64_t k = 0; k < cloud.sh_stride(); ++k) {
+      float& x = cloud.sh[static_cast<size_t>(i * cloud.sh_stride() + k)];
+      x = k < 3 ? std::clamp(x, -3.3f, 3.3f) : std::clamp(x * 0.2f, -1.0f, 0.9f);
+    }
+  }
+  return cloud;
+}
+
+TEST(Spz, RoundTripWithinTheStepsOfTheFormat) {
+  const TestFolder folder;
+  for (const int version : {3, 4}) {
+    for (int degree = 0; degree <= kMaxShDegree; ++degree) {
+      for (const int64_t n : {1, 100, 150'000}) {
+        if (n > 100 && degree == 1) continue;  // enough
+        GaussianCloud cloud = Tame(n, degree, static_cast<uint64_t>(n + degree));
+        if (degree == 2) cloud.render_mode = RenderMode::kAntialiased;
+        ASSERT_TRUE(WriteSpz(folder / "a.spz", cloud, {.overwrite = true, .spz_version = version}).ok());
+        const auto read = Read(folder / "a.spz");
+        ASSERT_TRUE(read.ok()) << read.error().message;
+        ASSERT_EQ(read->sh_degree, degree);
+        EXPECT_EQ(read->render_mode, cloud.render_mode);
+        const auto error = CompareAttributes(*read, cloud);
+        ASSERT_TRUE(error.ok());
+        EXPECT_EQ(error->compared, n);
+        EXPECT_LT(error->means.max, 0.9 / 4096);
+        EXPECT_LT(error->log_scales.max, 0.5 / 16 + 1e-5);
+        EXPECT_LT(error->rotations.max, 0.01);
+        EXPECT_LT(error->opacities.max, 0.5 / 255 + 1e-6);
+        EXPECT_LT(error->colors.max, 0.2820948 * 0.5 / 38 + 1e-4);
+        EXPECT_LE(error->harmonics.max, (degree > 1 ? 1.0 / 16 : 1.0 / 32) + 1e-6);
+        EXPECT_GE(error->harmonics.max, degree > 0 && n > 50 ? 0.02 : 0.0);
+      }
+    }
+  }
+}
+
+TEST(Spz, BytesOfOneGaussian) {
+  // Versions 1–3 side by side, by hand from the specification: x right, y up, z back.
+  std::string body;
+  const std::string fixed("\x00\x18\x00\x00\xe8\xff\x00\x10\x00", 9);  // 1.5, −1.5, 1 with 12 bits
+  const std::string halves("\x00\x3e\x00\xbe\x00\x3c", 6);
+  const std::string middle("\x80\xff\x80\x00\xa0\x90\x00", 7);
+  const std::string xyz("\xff\x80\x80", 3);
+  const uint32_t three = 0u << 30 | (512u | 255u) << 20 | 0u << 10 | 511u;  // x largest; y, z, w
+  const std::string smallest(reinterpret_cast<const char*>(&three), 4);
+  std::string sh(9, '\x80');
+  sh[0] = '\xc0';  // Y_1,−1 (odd in y) of red
+  sh[8] = '\x00';  // Y_1,1 (odd in x) of blue
+  for (const uint32_t version : {1u, 2u, 3u}) {
+    const std::string file = Gzip(RawHeader(version, 1, 1, 12, version == 2 ? 1 : 0) + (version == 1 ? halves : fixed) +
+                                  middle + (version < 3 ? xyz : smallest) + sh);
+    const auto cloud = ReadSpz(InputFile::FromBytes("a.spz", file));
+    ASSERT_TRUE(cloud.ok()) << cloud.error().message;
+    EXPECT_THAT(cloud->means, testing::ElementsAre(1.5f, 1.5f, -1.0f));
+    EXPECT_THAT(cloud->log_scales, testing::ElementsAre(0.0f, -1.0f, -10.0f));
+    EXPECT_NEAR(1 / (1 + std::exp(-cloud->opacity_logits[0])), 128.0 / 255, 1e-6);
+    EXPECT_NEAR(cloud->sh[0], 127.5 / 38.25, 1e-5);
+    EXPECT_NEAR(cloud->sh[2], -127.5 / 38.25, 1e-5);
+    EXPECT_EQ(cloud->sh[3], -0.5f);
+    EXPECT_EQ(cloud->sh[11], -1.0f);
+    EXPECT_EQ(cloud->render_mode.has_value(), version == 2);
+    if (version < 3) {
+      EXPECT_NEAR(cloud->quats[1], 1, 1e-6);
+    } else {
+      const double y = -255.0 / 511 * std::sqrt(0.5), w = std::sqrt(0.5);
+      EXPECT_NEAR(cloud->quats[0], w, 1e-6);
+      EXPECT_NEAR(cloud->quats[1], std::sqrt(1 - y * y - w * w), 1e-6);
+      EXPECT_NEAR(cloud->quats[2], -y, 1e-6);
+      EXPECT_NEAR(cloud->quats[3], 0, 1e-6);
+    }
+  }
+}
+
+TEST(Spz, DegreeFourIsReadAsThree) {
+  std::string sh(72, '\x80');
+  sh[44] = '\x81';
+  sh[45] = '\xff';
+  const std::string file = Gzip(RawHeader(3, 1, 4, 12, 0) + std::string(9 + 7 + 4, '\x80') + sh);
+  const auto cloud = ReadSpz(InputFile::FromBytes("a.spz", file));
+  ASSERT_TRUE(cloud.ok()) << cloud.error().message;
+  EXPECT_EQ(cloud->sh_degree, 3);
+  EXPECT_EQ(std::fabs(cloud->sh[47]), 1.0f / 128);
+}
+
+TEST(Spz, FractionalBitsFollowTheScene) {
+  const TestFolder folder;
+  for (const auto& [scale, allowed] :
+       {std::pair(1e-3f, 1e-7), std::pair(1.0f, 1e-4), std::pair(100.0f, 2.2e-4), std::pair(1e5f, 0.2)}) {
+    GaussianCloud cloud = Tame(500, 0, 8);
+    for (float& x : cloud.means) x *= scale;
+    ASSERT_TRUE(WriteSpz(folder / "a.spz", cloud, {.overwrite = true}).ok());
+    EXPECT_LT(CompareAttributes(*Read(folder / "a.spz"), cloud)->means.max, allowed) << scale;
+  }
+}
+
+TEST(Spz, SameBytesForAnyNumberOfThreads) {
+  const TestFolder folder;
+  const GaussianCloud cloud = Tame(200'000, 1, 8);
+  for (const int version : {3, 4}) {
+    SetThreadCount(1);
+    ASSERT_TRUE(WriteSpz(folder / "one.spz", cloud, {.overwrite = true, .spz_version = version}).ok());
+    SetThreadCount(3);
+    ASSERT_TRUE(WriteSpz(folder / "three.spz", cloud, {.overwrite = true, .spz_version = version}).ok());
+    SetThreadCount(0);
+    EXPECT_EQ(Bytes(folder / "one.spz"), Bytes(folder / "three.spz"));
+  }
+}
+
+TEST(Spz, OrderWhenAsked) {
+  const TestFolder folder;
+  const GaussianCloud cloud = Tame(2000, 1, 8);
+  ASSERT_TRUE(WriteSpz(folder / "a.spz", cloud, {.order = SplatOrder::kMorton}).ok());
+  EXPECT_LT(CompareAttributes(*Read(folder / "a.spz"), cloud, MortonOrder(cloud))->means.max, 1e-3);
+}
+
+TEST(Spz, EdgeValuesStayDefined) {
+  const TestFolder folder;
+  GaussianCloud cloud = Tame(8, 1, 4);
+  const float inf = std::numeric_limits<float>::infinity();
+  for (float* value :
+       {&cloud.means[0], &cloud.log_scales[0], &cloud.quats[0], &cloud.sh[0], &cloud.sh[5], &cloud.opacity_logits[0]}) {
+    *value = std::nanf("");
+  }
+  cloud.means[3] = -inf;
+  cloud.log_scales[6] = -inf;
+  cloud.sh[12 * 3 + 4] = inf;
+  std::fill_n(&cloud.quats[16], 4, 0.0f);
+  ASSERT_TRUE(WriteSpz(folder / "a.spz", cloud).ok());
+  const auto read = Read(folder / "a.spz");
+  ASSERT_TRUE(read.ok());
+  for (int64_t i = 0; i < 8; ++i) EXPECT_TRUE(IsUsable(*read, i)) << i;
+  EXPECT_EQ(read->log_scales[6], -10);
+  EXPECT_EQ(read->quats[16], 1);
+  EXPECT_EQ(read->sh[5], 0);
+  EXPECT_EQ(CompareAttributes(*read, cloud)->left_out, 3);
+}
+
+TEST(Spz, HalfFloats) {
+  for (const auto& [bits, value] :
+       {std::pair(0x0000, 0.0f), std::pair(0x3c00, 1.0f), std::pair(0xc000, -2.0f), std::pair(0x7bff, 65504.0f),
+        std::pair(0x0001, 5.9604645e-8f), std::pair(0x0400, 6.1035156e-5f), std::pair(0x7c00, INFINITY)}) {
+    const uint8_t bytes[2] = {static_cast<uint8_t>(bits), static_cast<uint8_t>(bits >> 8)};
+    EXPECT_EQ(FloatFromHalf(bytes), value);
+  }
+  const uint8_t nan[2] = {1, 0x7c};
+  EXPECT_TRUE(std::isnan(FloatFromHalf(nan)));
+}
+
+TEST(Spz, RefusesDamageLiesAndBombs) {
+  const TestFolder folder;
+  const auto expect = [](const std::string& message, const std::string& part) {
+    EXPECT_NE(message.find(part), std::string::npos) << message;
+  };
+  const GaussianCloud cloud = Tame(3000, 1, 8);
+  ASSERT_TRUE(WriteSpz(folder / "3.spz", cloud, {.spz_version = 3}).ok());
+  ASSERT_TRUE(WriteSpz(folder / "4.spz", cloud, {.spz_version = 4}).ok());
+  const std::string v3 = Bytes(folder / "3.spz"), v4 = Bytes(folder / "4.spz");
+  for (const std::string& good : {v3, v4}) {
+    EXPECT_EQ(ErrorOf(good), "accepted");
+    for (const size_t size : {size_t{0}, size_t{1}, size_t{5}, size_t{20}, good.size() / 2, good.size() - 40}) {
+      EXPECT_NE(ErrorOf(good.substr(0, size)), "accepted") << size;
+    }
+  }
+  const auto changed = [](std::string bytes, size_t at, char to) {
+    bytes[at] = to;
+    return bytes;
+  };
+  expect(ErrorOf(changed(v4, 0, 'X')), "NGSP");
+  expect(ErrorOf(changed(v4, 4, 9)), "version 9");
+  expect(ErrorOf(changed(v4, 12, 5)), "SH degree 5");
+  expect(ErrorOf(changed(v4, 13, 25)), "25 fractional bits");
+  expect(ErrorOf(changed(v4, 15, 5)), "5 streams");
+  expect(ErrorOf(changed(v4, 16, 31)), "byte 31");
+  expect(ErrorOf(changed(v4, 11, 100)), "limit");
+  expect(ErrorOf(changed(v4, 11, 5)), "bomb");
+  expect(ErrorOf(changed(v4, 9, 1)), "stream 0");
+  expect(ErrorOf(changed(v4, 39, 1)), "stream 0");
+  expect(ErrorOf(changed(v4, 32 + 96 + 20, static_cast<char>(v4[32 + 96 + 20] ^ 0x55))), "damaged");
+  // 2 million Gaussians of zeros in a few kilobytes.
+  const std::string bomb = Gzip(RawHeader(3, 2'000'000, 3, 12, 0) + std::string(130'000'000, '\0'));
+  expect(ErrorOf(bomb), "bomb");
+  expect(ErrorOf(Gzip(RawHeader(4, 1, 0, 12, 0) + std::string(20, '\0'))), "version 4 in a gzip stream");
+  expect(ErrorOf(Gzip(RawHeader(3, 2, 0, 12, 0) + std::string(39, '\0'))), "ends before");
+  // A splat of one Gaussian is 20 bytes of values and not one more, and nothing follows it.
+  expect(ErrorOf(Gzip(RawHeader(3, 1, 0, 12, 0) + std::string(20, '\0'))), "accepted");
+  expect(ErrorOf(Gzip(RawHeader(3, 1, 0, 12, 0) + std::string(21, '\0'))), "goes on behind its data");
+  expect(ErrorOf(v3 + "x"), "bytes behind the gzip stream");
+  expect(ErrorOf(v3.substr(0, v3.size() - 1)), "ends before its gzip stream");
+  expect(ErrorOf(changed(v3, v3.size() - 6, static_cast<char>(v3[v3.size() - 6] ^ 1))), "damaged");  // the checksum
+  EXPECT_EQ(Read(folder / "4.spz", {.max_gaussians = 2999}).error().code, ErrorCode::kBadFile);
+  EXPECT_EQ(WriteSpz(folder / "b.spz", cloud, {.spz_version = 2}).error().code, ErrorCode::kBadArgument);
+  EXPECT_EQ(folder.Entries(), 2);
+}
+
+}  // namespace
+}  // namespace anchorsplat

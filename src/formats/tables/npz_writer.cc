@@ -1,0 +1,76 @@
+#include <array>
+#include <bit>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/text.h"
+#include "formats/cloud_checks.h"
+#include "formats/tables/table_writers.h"
+#include "io/atomic_file.h"
+#include "io/zip_archive.h"
+
+namespace anchorsplat {
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "arrays are written as they lie in memory");
+
+// What comes before the values in a .npy file of version 1.0: a Python dictionary, filled up to a multiple of 64 bytes.
+std::string NpyHeader(const std::string& shape) {
+  std::string text = Cat("{'descr': '<f4', 'fortran_order': False, 'shape': (", shape, "), }");
+  constexpr size_t kPreamble = 10;
+  text.append(63 - (kPreamble + text.size()) % 64, ' ');
+  text += '\n';
+  std::string header("\x93NUMPY\x01\x00", 8);
+  header += static_cast<char>(text.size() & 255);
+  header += static_cast<char>(text.size() >> 8);
+  return header + text;
+}
+
+struct Array {
+  const char* name;
+  std::string shape;
+  uint64_t floats;
+  const float* values;
+};
+
+std::array<Array, 5> Arrays(const GaussianCloud* cloud, int64_t n, int degree) {
+  const auto count = static_cast<uint64_t>(n);
+  const auto coefficients = static_cast<uint64_t>(ShCoefficients(degree));
+  const auto data = [cloud](Buffer<float> GaussianCloud::*array) {
+    return cloud != nullptr ? (cloud->*array).data() : nullptr;
+  };
+  return {{{"means.npy", Cat(n, ", 3"), 3 * count, data(&GaussianCloud::means)},
+           {"log_scales.npy", Cat(n, ", 3"), 3 * count, data(&GaussianCloud::log_scales)},
+           {"quats.npy", Cat(n, ", 4"), 4 * count, data(&GaussianCloud::quats)},
+           {"opacity_logits.npy", Cat(n, ","), count, data(&GaussianCloud::opacity_logits)},
+           {"sh.npy", Cat(n, ", ", coefficients, ", 3"), 3 * coefficients * count, data(&GaussianCloud::sh)}}};
+}
+
+}  // namespace
+
+// Below 4 GiB, where no member needs the 64-bit extensions.
+uint64_t PredictedNpzSize(int64_t count, int sh_degree) {
+  uint64_t size = 22;
+  for (const Array& array : Arrays(nullptr, count, sh_degree)) {
+    size += 30 + 46 + 2 * std::string_view(array.name).size() + NpyHeader(array.shape).size() + 4 * array.floats;
+  }
+  return size;
+}
+
+Status WriteNpz(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  ZipWriter archive(file);
+  for (const Array& array : Arrays(&cloud, cloud.size(), cloud.sh_degree)) {
+    const std::string header = NpyHeader(array.shape);
+    const std::string_view parts[] = {
+        header, {reinterpret_cast<const char*>(array.values), static_cast<size_t>(4 * array.floats)}};
+    ANCHORSPLAT_RETURN_IF_ERROR(archive.Add(array.name, parts));
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(archive.Finish());
+  return file.Commit();
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+
+#include "core/image.h"
+#include "core/result.h"
+#include "io/write_options.h"
+
+namespace anchorsplat {
+
+// Reads a PNG or JPEG (found by content) as floats value/255 (16-bit: /65535): 3 channels, or 4 where the file has
+// alpha. Grey becomes rgb. Errors: kNotFound, kIo, kBadFile.
+Result<Image> ReadImage(const std::filesystem::path& path);
+
+// Width and height without decoding the pixels.
+struct ImageSize {
+  int width = 0;
+  int height = 0;
+};
+Result<ImageSize> ReadImageSize(const std::filesystem::path& path);
+
+// Writes an 8-bit PNG: value·255 rounded to nearest, clamped; 1 (grey), 3 or 4 channels. Whole or not at all.
+Status WritePng(const std::filesystem::path& path, const Image& image, const WriteOptions& options = {});
+
+// rgb·a + background·(1−a); images without alpha come back as they are.
+Image CompositeOver(const Image& image, const std::array<float, 3>& background);
+
+}  // namespace anchorsplat

@@ -1,0 +1,144 @@
+#include "images/jpeg_file.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+// Behind <cstdio>: it needs FILE.
+#include <jpeglib.h>
+
+#include "images/image_io.h"
+#include "io/folder_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+// A smooth picture, so that compression costs little: sample c of pixel (x, y).
+int Sample(int x, int y, int c) { return (c == 0 ? 40 + 5 * x : c == 1 ? 60 + 4 * y : 200 - 2 * x - 2 * y) & 0xff; }
+
+std::string Jpeg(int width, int height, int components, bool progressive = false) {
+  jpeg_compress_struct info{};
+  jpeg_error_mgr errors{};
+  info.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&info);
+  unsigned char* memory = nullptr;
+  unsigned long size = 0;  // NOLINT(google-runtime-int): libjpeg's type
+  jpeg_mem_dest(&info, &memory, &size);
+  info.image_width = static_cast<JDIMENSION>(width);
+  info.image_height = static_cast<JDIMENSION>(height);
+  info.input_components = components;
+  info.in_color_space = components == 1 ? JCS_GRAYSCALE : components == 3 ? JCS_RGB : JCS_CMYK;
+  jpeg_set_defaults(&info);
+  jpeg_set_quality(&info, 95, TRUE);
+  if (progressive) jpeg_simple_progression(&info);
+  jpeg_start_compress(&info, TRUE);
+  std::vector<JSAMPLE> row(static_cast<size_t>(width * components));
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      for (int c = 0; c < components; ++c)
+        row[static_cast<size_t>(x * components + c)] = static_cast<JSAMPLE>(Sample(x, y, c));
+    }
+    JSAMPROW rows = row.data();
+    jpeg_write_scanlines(&info, &rows, 1);
+  }
+  jpeg_finish_compress(&info);
+  jpeg_destroy_compress(&info);
+  const std::string bytes(reinterpret_cast<const char*>(memory), size);
+  std::free(memory);
+  return bytes;
+}
+
+std::filesystem::path Written(const TestFolder& folder, const std::string& bytes) {
+  std::filesystem::remove(folder / "a.jpg");  // some file systems flush a file that is emptied and written again
+  std::ofstream(folder / "a.jpg", std::ios::binary | std::ios::trunc) << bytes;
+  return folder / "a.jpg";
+}
+
+TEST(JpegFile, ReadsColourAndGrey) {
+  const TestFolder folder;
+  for (const bool progressive : {false, true}) {
+    for (const int components : {1, 3}) {
+      const auto path = Written(folder, Jpeg(29, 21, components, progressive));
+      const auto image = ReadImage(path);
+      ASSERT_TRUE(image.ok()) << image.error().message;
+      ASSERT_EQ(image->width, 29);
+      ASSERT_EQ(image->height, 21);
+      ASSERT_EQ(image->channels, 3);
+      for (int c = 0; c < 3; ++c) {
+        for (int y = 0; y < 21; ++y) {
+          for (int x = 0; x < 29; ++x) {
+            const int expected = Sample(x, y, components == 1 ? 0 : c);
+            EXPECT_NEAR(image->at(c, y, x) * 255, expected, 14) << c << " " << y << " " << x;  // 4:2:0 chroma
+          }
+        }
+      }
+      const auto size = ReadImageSize(path);
+      ASSERT_TRUE(size.ok());
+      EXPECT_EQ(size->width, 29);
+      EXPECT_EQ(size->height, 21);
+    }
+  }
+}
+
+TEST(JpegFile, CmykIsRefused) {
+  const TestFolder folder;
+  const auto image = ReadImage(Written(folder, Jpeg(16, 16, 4)));
+  ASSERT_FALSE(image.ok());
+  EXPECT_EQ(image.error().code, ErrorCode::kBadFile);
+  EXPECT_NE(image.error().message.find("CMYK"), std::string::npos) << image.error().message;
+}
+
+TEST(JpegFile, EveryTruncationIsAnError) {
+  const TestFolder folder;
+  for (const bool progressive : {false, true}) {
+    const std::string whole = Jpeg(24, 16, 3, progressive);
+    for (size_t length = 0; length < whole.size(); ++length) {
+      const auto image = ReadImage(Written(folder, whole.substr(0, length)));
+      ASSERT_FALSE(image.ok()) << length << " of " << whole.size();
+      EXPECT_EQ(image.error().code, ErrorCode::kBadFile);
+    }
+  }
+}
+
+TEST(JpegFile, DamagedBytesNeverCrash) {
+  const TestFolder folder;
+  for (const bool progressive : {false, true}) {
+    const std::string whole = Jpeg(24, 16, 3, progressive);
+    int refused = 0;
+    for (size_t at = 0; at < whole.size(); ++at) {
+      std::string bytes = whole;
+      bytes[at] = static_cast<char>(bytes[at] ^ 0xff);
+      const auto path = Written(folder, bytes);
+      const auto image = ReadImage(path);
+      refused += image.ok() ? 0 : 1;
+      if (!image.ok()) {
+        EXPECT_EQ(image.error().code, ErrorCode::kBadFile);
+      }
+      (void)ReadImageSize(path).ok();
+    }
+    EXPECT_GT(refused, 20);
+  }
+}
+
+TEST(JpegFile, HugePromisesAreRefused) {
+  const TestFolder folder;
+  std::string bytes = Jpeg(24, 16, 3);
+  const size_t frame = bytes.find("\xff\xc0");
+  ASSERT_NE(frame, std::string::npos);
+  bytes.replace(frame + 5, 4, "\xff\x00\xff\x00", 4);  // height, width
+  for (const auto& error : {ReadImage(Written(folder, bytes)).error(), ReadImageSize(folder / "a.jpg").error()}) {
+    EXPECT_EQ(error.code, ErrorCode::kBadFile);
+    EXPECT_NE(error.message.find("65280 x 65280"), std::string::npos) << error.message;
+  }
+  bytes.replace(frame + 5, 4, "\x30\x00\x30\x00", 4);
+  EXPECT_NE(ReadImage(Written(folder, bytes)).error().message.find("cannot have only"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -1,0 +1,135 @@
+#include "model/compact/compact_graph.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "core/kd_tree.h"
+#include "core/parallel.h"
+#include "core/rotation.h"
+#include "model/kernels/serialization.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// Of Gaussian i, whose neighbours are known.
+void FindFrame(const GaussianCloud& cloud, int64_t i, CompactGraph& graph) {
+  const float* q = cloud.quats.data() + 4 * i;
+  const float* scales = cloud.log_scales.data() + 3 * i;
+  const auto rotation = RotationFromQuaternion<double>(q[0], q[1], q[2], q[3]);
+  uint8_t* stored = graph.stored_axis.data() + 3 * i;
+  for (uint8_t a = 0; a < 3; ++a) stored[a] = a;
+  std::stable_sort(stored, stored + 3, [&](uint8_t a, uint8_t b) { return scales[a] > scales[b]; });
+
+  std::array<double, 3> sum = {0, 0, 0};  // of unit vectors to the neighbours
+  for (int64_t k = 0; k < graph.neighbours; ++k) {
+    const float* from = cloud.means.data() + 3 * i;
+    const float* to = cloud.means.data() + int64_t{3} * graph.index[static_cast<size_t>(i * graph.neighbours + k)];
+    std::array<double, 3> d;
+    double square = 0;
+    for (size_t c = 0; c < 3; ++c) {
+      d[c] = double{to[c]} - from[c];
+      square += d[c] * d[c];
+    }
+    if (!(square > 0)) continue;
+    for (size_t c = 0; c < 3; ++c) sum[c] += d[c] / std::sqrt(square);
+  }
+  for (size_t a = 0; a < 3; ++a) {
+    double along = 0;
+    for (size_t c = 0; c < 3; ++c) along += rotation[3 * c + stored[a]] * sum[c];
+    const double sign = along < 0 ? -1 : 1;
+    for (size_t c = 0; c < 3; ++c) {
+      graph.axes[static_cast<size_t>(9 * i) + 3 * a + c] = static_cast<float>(sign * rotation[3 * c + stored[a]]);
+    }
+    graph.sidedness[static_cast<size_t>(3 * i) + a] =
+        static_cast<float>(std::abs(along) / static_cast<double>(std::max<int64_t>(1, graph.neighbours)));
+  }
+}
+
+void FindFrames(const GaussianCloud& cloud, CompactGraph& graph) {
+  graph.axes.resize(static_cast<size_t>(9 * graph.count));
+  graph.stored_axis.resize(static_cast<size_t>(3 * graph.count));
+  graph.sidedness.resize(static_cast<size_t>(3 * graph.count));
+  ParallelFor(0, graph.count, 512, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) FindFrame(cloud, i, graph);
+  });
+}
+
+void FindNearest(const GaussianCloud& cloud, CompactGraph& graph) {
+  const KdTree tree(cloud.means);
+  ParallelFor(0, graph.count, 512, [&](int64_t begin, int64_t end) {
+    std::vector<KdTree::Neighbour> nearest(static_cast<size_t>(graph.neighbours));
+    for (int64_t place = begin; place < end; ++place) {
+      tree.Nearest(place, nearest);
+      int32_t* out = graph.index.data() + tree.PointAt(place) * graph.neighbours;
+      for (const KdTree::Neighbour& neighbour : nearest) *out++ = static_cast<int32_t>(neighbour.index);
+    }
+  });
+}
+
+// Along the Hilbert curve through the cloud's box; a last patch that is not full borrows the Gaussians before it.
+void FindPatches(const GaussianCloud& cloud, CompactGraph& graph) {
+  const int64_t n = graph.count, m = graph.neighbours;
+  if (n == 0) return;
+  const Bounds box = *ComputeBounds(cloud);
+  double side = 0;
+  for (size_t c = 0; c < 3; ++c) side = std::max(side, double{box.max[c]} - box.min[c]);
+  std::vector<int32_t> voxels(static_cast<size_t>(3 * n), 0);
+  if (side > 0) {
+    constexpr double kLargest = (1 << kMaxCurveDepth) - 1;
+    for (size_t k = 0; k < voxels.size(); ++k) {
+      voxels[k] = static_cast<int32_t>((double{cloud.means[k]} - box.min[k % 3]) / side * kLargest);
+    }
+  }
+  std::vector<int64_t> codes(static_cast<size_t>(n));
+  CurveCodes(Curve::kHilbert, kMaxCurveDepth, voxels, codes);
+  const Buffer<int32_t> order = OrderOfCodes(codes);
+  ParallelFor(0, n, 512, [&](int64_t begin, int64_t end) {
+    std::vector<std::pair<double, int32_t>> others;
+    for (int64_t place = begin; place < end; ++place) {
+      const int64_t first = std::min(place / (m + 1) * (m + 1), n - (m + 1));
+      const int32_t i = order[static_cast<size_t>(place)];
+      others.clear();
+      for (int64_t other = first; other <= first + m; ++other) {
+        if (other == place) continue;
+        const int32_t j = order[static_cast<size_t>(other)];
+        double square = 0;
+        for (int64_t c = 0; c < 3; ++c) {
+          const double d = double{cloud.means[static_cast<size_t>(3 * int64_t{j} + c)]} -
+                           cloud.means[static_cast<size_t>(3 * int64_t{i} + c)];
+          square += d * d;
+        }
+        others.emplace_back(square, j);
+      }
+      std::sort(others.begin(), others.end());
+      for (int64_t k = 0; k < m; ++k)
+        graph.index[static_cast<size_t>(i * m + k)] = others[static_cast<size_t>(k)].second;
+    }
+  });
+}
+
+}  // namespace
+
+CompactGraph BuildCompactGraph(const GaussianCloud& cloud, int64_t neighbours, CompactContext context) {
+  CompactGraph graph;
+  const int64_t n = cloud.size();
+  graph.count = n;
+  graph.neighbours = std::clamp<int64_t>(n - 1, 0, neighbours);
+  graph.index.resize(static_cast<size_t>(n * graph.neighbours));
+  context == CompactContext::kPatches ? FindPatches(cloud, graph) : FindNearest(cloud, graph);
+  FindFrames(cloud, graph);
+  return graph;
+}
+
+CompactGraph GraphOfNeighbours(const GaussianCloud& cloud, int64_t neighbours, Buffer<int32_t> index) {
+  CompactGraph graph;
+  graph.count = cloud.size();
+  graph.neighbours = neighbours;
+  graph.index = std::move(index);
+  FindFrames(cloud, graph);
+  return graph;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,347 @@
+#include "model/compact/compact_network.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <new>
+#include <set>
+#include <utility>
+
+#include "core/log.h"
+#include "core/parallel.h"
+#include "core/text.h"
+#include "model/compact/compact_residual.h"
+#include "model/compact/compact_start.h"
+#include "model/kernels/edge_messages.h"
+#include "model/kernels/layer_norm.h"
+#include "model/kernels/linear.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// Gaussians whose messages are made at once: with 8 neighbours and 64 channels these are 256 KB and stay in the cache.
+constexpr int64_t kRowsPerTask = 128;
+constexpr int64_t kMostRows = int64_t{1} << 31;
+
+void ApplyLinear(int64_t rows, const float* input, const PackedWeights& weights, float* out,
+                 Activation activation = Activation::kNone, const float* residual = nullptr) {
+  LinearCpu({.rows = rows,
+             .input = input,
+             .input_stride = weights.inputs(),
+             .weights = &weights,
+             .activation = activation,
+             .residual = residual,
+             .out = out,
+             .output_stride = weights.outputs()});
+}
+
+}  // namespace
+
+class CompactNetwork::Loader {
+ public:
+  Loader(const CompactConfig& config, const WeightSource& source) : tensors_(CompactTensors(config)), source_(source) {}
+
+  Result<std::vector<float>> Read(const std::string& name) const {
+    const auto spec = std::find_if(tensors_.begin(), tensors_.end(), [&](const auto& t) { return t.name == name; });
+    int64_t count = 1;
+    for (const int64_t side : spec->shape) count *= side;
+    std::vector<float> values(static_cast<size_t>(count));
+    ANCHORSPLAT_RETURN_IF_ERROR(source_(*spec, values));
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckFinite(name, values));
+    return values;
+  }
+  bool Has(const std::string& name) const {
+    return std::any_of(tensors_.begin(), tensors_.end(), [&](const auto& t) { return t.name == name; });
+  }
+  Status Into(const std::string& name, PackedWeights& out) const {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto weight, Read(name + ".weight"));
+    const auto spec =
+        std::find_if(tensors_.begin(), tensors_.end(), [&](const auto& t) { return t.name == name + ".weight"; });
+    std::vector<float> bias;
+    if (Has(name + ".bias")) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(bias, Read(name + ".bias"));
+    }
+    out = PackedWeights(weight.data(), bias.empty() ? nullptr : bias.data(), spec->shape[0], spec->shape[1]);
+    return {};
+  }
+  Status Into(const std::string& name, Norm& out) const {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto weight, Read(name + ".weight"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto bias, Read(name + ".bias"));
+    out.weight.assign(weight.begin(), weight.end());
+    out.bias.assign(bias.begin(), bias.end());
+    return {};
+  }
+
+  // The output layers of the attributes as one: rows in the order that WriteCopies reads.
+  Status Outputs(const CompactConfig& config, PackedWeights& out) const {
+    const int64_t inputs = config.head_hidden, outputs = CompactOutputs(config), per_copy = ChannelsPerCopy(config);
+    std::vector<float> weights(static_cast<size_t>(outputs * inputs)), biases(static_cast<size_t>(outputs));
+    const auto place = [&](const CompactAttribute& attribute, int64_t copies, int64_t first, int64_t stride) -> Status {
+      const std::string name = std::string("out.") + attribute.name;
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const auto weight, Read(name + ".weight"));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const auto bias, Read(name + ".bias"));
+      for (int64_t k = 0; k < copies; ++k) {
+        const int64_t to = first + k * stride, from = k * attribute.channels;
+        std::copy_n(weight.begin() + from * inputs, attribute.channels * inputs, weights.begin() + to * inputs);
+        std::copy_n(bias.begin() + from, attribute.channels, biases.begin() + to);
+      }
+      return {};
+    };
+    ANCHORSPLAT_RETURN_IF_ERROR(place(kStrengthAttribute, 1, 0, 0));
+    int64_t first = 1;
+    for (const CompactAttribute& attribute : CopyAttributes(config)) {
+      ANCHORSPLAT_RETURN_IF_ERROR(place(attribute, config.copies, first, per_copy));
+      first += attribute.channels;
+    }
+    out = PackedWeights(weights.data(), biases.data(), outputs, inputs);
+    return {};
+  }
+
+ private:
+  std::vector<TensorSpec> tensors_;
+  const WeightSource& source_;
+};
+
+Result<CompactNetwork> CompactNetwork::Load(const CompactConfig& config, const WeightSource& source) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(config));
+  const Loader loader(config, source);
+  CompactNetwork network;
+  network.config_ = config;
+  ANCHORSPLAT_RETURN_IF_ERROR(loader.Into("embed.first", network.embed_first_));
+  ANCHORSPLAT_RETURN_IF_ERROR(loader.Into("embed.second", network.embed_second_));
+  ANCHORSPLAT_RETURN_IF_ERROR(loader.Into("embed.norm", network.embed_norm_));
+  for (int64_t r = 0; r < config.rounds; ++r) {
+    Round& round = network.rounds_.emplace_back();
+    const std::string name = Cat("rounds.", r, ".");
+    ANCHORSPLAT_RETURN_IF_ERROR(loader.Into(name + "own", round.own));
+    ANCHORSPLAT_RETURN_IF_ERROR(loader.Into(name + "other", round.other));
+    ANCHORSPLAT_RETURN_IF_ERROR(loader.Into(name + "edge", round.edge));
+    ANCHORSPLAT_RETURN_IF_ERROR(loader.Into(name + "message", round.message));
+    ANCHORSPLAT_RETURN_IF_ERROR(loader.Into(name + "update_first", round.update_first));
+    ANCHORSPLAT_RETURN_IF_ERROR(loader.Into(name + "update_second", round.update_second));
+    ANCHORSPLAT_RETURN_IF_ERROR(loader.Into(name + "norm", round.norm));
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(loader.Into("head.first", network.head_first_));
+  ANCHORSPLAT_RETURN_IF_ERROR(loader.Into("head.second", network.head_second_));
+  ANCHORSPLAT_RETURN_IF_ERROR(loader.Outputs(config, network.out_));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(network.low_, loader.Read("domain.low"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(network.high_, loader.Read("domain.high"));
+  return network;
+}
+
+bool CompactNetwork::KnowsItsDomain() const {
+  for (size_t c = 0; c < low_.size(); ++c) {
+    if (low_[c] > high_[c]) return false;
+  }
+  return true;
+}
+
+std::pair<double, double> CompactNetwork::TrainedUpscales() const {
+  const auto upscale = [](float feature) { return std::exp2(2 * double{feature}); };
+  return {upscale(low_[kUpscaleFeature]), upscale(high_[kUpscaleFeature])};
+}
+
+Buffer<float> CompactNetwork::States(const CompactFeatures& features, const CompactGraph& graph) const {
+  const int64_t n = graph.count, h = config_.hidden, m = graph.neighbours;
+  Buffer<float> states(static_cast<size_t>(n * h)), others(rounds_.empty() ? 0 : static_cast<size_t>(n * h));
+  const auto normalise = [&](int64_t rows, const Norm& norm, float* x) {
+    LayerNormCpu({.rows = rows,
+                  .channels = h,
+                  .input = x,
+                  .weight = norm.weight.data(),
+                  .bias = norm.bias.data(),
+                  .epsilon = static_cast<float>(kLayerNormEpsilon),
+                  .out = x});
+  };
+  ParallelFor(0, n, kRowsPerTask, [&](int64_t begin, int64_t end) {
+    const int64_t rows = end - begin;
+    Buffer<float> nodes(static_cast<size_t>(rows * kNodeFeatures)), first(static_cast<size_t>(rows * h));
+    features.Nodes(begin, end, nodes.data());
+    ApplyLinear(rows, nodes.data(), embed_first_, first.data(), Activation::kGelu);
+    ApplyLinear(rows, first.data(), embed_second_, states.data() + begin * h);
+    normalise(rows, embed_norm_, states.data() + begin * h);
+  });
+  for (const Round& round : rounds_) {
+    ApplyLinear(n, states.data(), round.other, others.data());
+    ParallelFor(0, n, kRowsPerTask, [&](int64_t begin, int64_t end) {
+      const int64_t rows = end - begin;
+      float* own_states = states.data() + begin * h;
+      Buffer<float> own(static_cast<size_t>(rows * h)),
+          features_of_edges(static_cast<size_t>(rows * m * kEdgeFeatures)), edges(static_cast<size_t>(rows * m * h)),
+          messages(edges.size()), pooled(static_cast<size_t>(rows * 3 * h));
+      ApplyLinear(rows, own_states, round.own, own.data());
+      features.Edges(begin, end, features_of_edges.data());
+      ApplyLinear(rows * m, features_of_edges.data(), round.edge, edges.data());
+      EdgeSumGeluCpu({.points = rows,
+                      .neighbours = m,
+                      .channels = h,
+                      .own = own.data(),
+                      .other = others.data(),
+                      .index = graph.index.data() + begin * m,
+                      .edges = edges.data()});
+      ApplyLinear(rows * m, edges.data(), round.message, messages.data());
+      for (int64_t i = 0; i < rows; ++i) std::copy_n(own_states + i * h, h, pooled.data() + i * 3 * h);
+      EdgePoolCpu({.points = rows,
+                   .neighbours = m,
+                   .channels = h,
+                   .edges = messages.data(),
+                   .out_stride = 3 * h,
+                   .out = pooled.data() + h});
+      ApplyLinear(rows, pooled.data(), round.update_first, own.data(), Activation::kGelu);
+      // In place: others were told about the old states before.
+      ApplyLinear(rows, own.data(), round.update_second, own_states, Activation::kNone, own_states);
+      normalise(rows, round.norm, own_states);
+    });
+  }
+  return states;
+}
+
+void CompactNetwork::Head(const CompactFeatures& features, const Buffer<float>& states, int64_t begin, int64_t end,
+                          float* out) const {
+  const int64_t rows = end - begin, h = config_.hidden, width = h + kNodeFeatures, g = config_.head_hidden;
+  Buffer<float> nodes(static_cast<size_t>(rows * kNodeFeatures)), input(static_cast<size_t>(rows * width)),
+      first(static_cast<size_t>(rows * g)), second(static_cast<size_t>(rows * g));
+  features.Nodes(begin, end, nodes.data());
+  for (int64_t i = 0; i < rows; ++i) {
+    std::copy_n(states.data() + (begin + i) * h, h, input.data() + i * width);
+    std::copy_n(nodes.data() + i * kNodeFeatures, kNodeFeatures, input.data() + i * width + h);
+  }
+  ApplyLinear(rows, input.data(), head_first_, first.data(), Activation::kGelu);
+  ApplyLinear(rows, first.data(), head_second_, second.data(), Activation::kGelu);
+  ApplyLinear(rows, second.data(), out_, out);
+}
+
+void CompactNetwork::Outputs(const CompactFeatures& features, const CompactGraph& graph, float* out) const {
+  const Buffer<float> states = States(features, graph);
+  ParallelFor(0, graph.count, kRowsPerTask,
+              [&](int64_t begin, int64_t end) { Head(features, states, begin, end, out + begin * out_.outputs()); });
+}
+
+float CompactNetwork::Fade(const float* node, const std::array<float, 3>& widths) const {
+  float farthest = 0;
+  for (size_t c = 0; c < static_cast<size_t>(kNodeFeatures); ++c) {
+    if (low_[c] > high_[c]) continue;
+    float value = node[c];
+    // A feature stops at its bounds, so the network cannot tell how far beyond a width lies. Where training had widths
+    // up to the bound, nobody knows how far they went.
+    if (c < widths.size() && (widths[c] < value ? low_[c] > kLowestWidth : high_[c] < kHighestWidth)) value = widths[c];
+    farthest = std::max({farthest, low_[c] - value, value - high_[c]});
+  }
+  return std::clamp((kFadeEnd - farthest) / (kFadeEnd - kFadeBegin), 0.0f, 1.0f);
+}
+
+Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const CompactTask& task) const {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
+  const int64_t n = cloud.size();
+  if (n == 0) return Error{ErrorCode::kBadArgument, "the splat has no Gaussians"};
+  if (n >= kMostRows / config_.copies) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat(WithThousands(n), " Gaussians cannot become ", config_.copies, " each: more than 2^31 in all")};
+  }
+  if (task.pixel_sizes.size() != 1 && task.pixel_sizes.size() != static_cast<size_t>(n)) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat(task.pixel_sizes.size(), " pixel sizes for ", n, " Gaussians: expected one, or one each")};
+  }
+  for (const float p : task.pixel_sizes) {
+    if (!(p > 0) || !std::isfinite(p)) {
+      return Error{ErrorCode::kBadArgument, Cat("pixel size ", p, " is not a positive length")};
+    }
+  }
+  if (!(task.upscale >= 1) || !std::isfinite(task.upscale) || !(task.strength >= 0) || !std::isfinite(task.strength)) {
+    return Error{ErrorCode::kBadArgument, Cat("upscale ", task.upscale, " must be at least 1 and the filter strength ",
+                                              task.strength, " not negative")};
+  }
+  const CompactGraph graph = BuildCompactGraph(cloud, config_.neighbours, config_.context);
+  const CompactFeatures features(cloud, graph, task.pixel_sizes, task.upscale);
+
+  // Where the copies of each go: those that are alone stand behind all others.
+  std::vector<float> fades(static_cast<size_t>(n));
+  ParallelFor(0, n, kRowsPerTask, [&](int64_t begin, int64_t end) {
+    Buffer<float> nodes(static_cast<size_t>((end - begin) * kNodeFeatures));
+    features.Nodes(begin, end, nodes.data());
+    for (int64_t i = begin; i < end; ++i) {
+      fades[static_cast<size_t>(i)] = Fade(nodes.data() + (i - begin) * kNodeFeatures, features.Widths(i));
+    }
+  });
+  CompactResult result;
+  for (const float fade : fades) {
+    result.outside += fade == 0 ? 1 : 0;
+    result.partly += fade > 0 && fade < 1 ? 1 : 0;
+  }
+  const int64_t inside = n - result.outside, copied = config_.copies * inside;
+  std::vector<int64_t> rows(static_cast<size_t>(n));
+  for (int64_t i = 0, next = 0, alone = copied; i < n; ++i) {
+    rows[static_cast<size_t>(i)] = fades[static_cast<size_t>(i)] > 0 ? next++ : alone++;
+  }
+
+  CompactConfig single = config_;
+  single.copies = 1;
+  const CopyStart start(config_.copies, config_.spread), single_start(1, 0);
+  CompactAnchors anchors{&cloud, &graph, task.pixel_sizes, task.upscale, task.strength, 0};
+  if (config_.offset_unit == OffsetUnit::kCube) anchors.offset_side = CubeSide(cloud.means);
+  std::atomic<int64_t> not_finite = 0;
+  const std::vector<float> nothing(static_cast<size_t>(CompactOutputs(config_)), 0.0f);
+  try {
+    result.cloud.Resize(copied + result.outside, cloud.sh_degree);
+    const Buffer<float> states = States(features, graph);
+    ParallelFor(0, n, kRowsPerTask, [&](int64_t begin, int64_t end) {
+      Buffer<float> raw(static_cast<size_t>((end - begin) * out_.outputs()));
+      Head(features, states, begin, end, raw.data());
+      for (int64_t i = begin; i < end; ++i) {
+        const float fade = fades[static_cast<size_t>(i)];
+        const int64_t row = rows[static_cast<size_t>(i)];
+        if (fade > 0) {
+          const float* said = raw.data() + (i - begin) * out_.outputs();
+          if (!std::all_of(said, said + out_.outputs(), [](float x) { return std::isfinite(x); })) {
+            said = nothing.data();
+            ++not_finite;
+          }
+          WriteCopies(config_, start, anchors, i, said, fade, row, inside, result.cloud);
+        } else {
+          WriteCopies(single, single_start, anchors, i, nothing.data(), 0, row, 1, result.cloud);
+        }
+      }
+    });
+  } catch (const std::bad_alloc&) {
+    return Error{ErrorCode::kBadArgument, Cat("no memory for ", WithThousands(copied + result.outside), " Gaussians")};
+  }
+  result.not_finite = not_finite;
+  result.cloud.render_mode = cloud.render_mode;
+  result.cloud.comments = cloud.comments;
+  return result;
+}
+
+bool IsCompactNetwork(const TensorFile& file) {
+  const auto format = file.metadata().find("format");
+  return format != file.metadata().end() && format->second == kCompactFormat;
+}
+
+Result<CompactNetwork> LoadCompactNetwork(const TensorFile& file) {
+  const auto bad = [&](const std::string& message) {
+    return Error{ErrorCode::kBadFile,
+                 message.find(file.name()) == std::string::npos ? Cat(file.name(), ": ", message) : message};
+  };
+  const auto config = CompactConfigFromMetadata(file.metadata());
+  if (!config.ok()) return bad(config.error().message);
+  std::set<std::string> expected;
+  for (const TensorSpec& tensor : CompactTensors(*config)) expected.insert(tensor.name);
+  for (const TensorEntry& entry : file.tensors()) {
+    if (!expected.contains(entry.name)) {
+      return bad(Cat("tensor \"", Printable(entry.name), "\" belongs to no part of the network"));
+    }
+  }
+  auto network = CompactNetwork::Load(*config, [&](const TensorSpec& tensor, std::span<float> values) -> Status {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values read, file.ReadFloat32(tensor.name, tensor.shape));
+    std::copy(read.values().begin(), read.values().end(), values.begin());
+    return {};
+  });
+  if (!network.ok()) return bad(network.error().message);
+  if (!network->KnowsItsDomain()) {
+    LogWarning(Cat(file.name(), ": says nothing about the range of its training data (domain.low above domain.high), ",
+                   "so no Gaussian will count as unlike them"));
+  }
+  return network;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/buffer.h"
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "model/compact/compact_config.h"
+#include "model/compact/compact_features.h"
+#include "model/kernels/packed_weights.h"
+#include "model/shared/weights.h"
+#include "tensors/tensor_file.h"
+
+namespace anchorsplat {
+
+// What a compact network is asked for.
+struct CompactTask {
+  std::span<const float> pixel_sizes;  // p_LR, world units, one for all or one per Gaussian
+  double upscale = 4;                  // u ≥ 1
+  double strength = 0;                 // f of the filter that residuals are added to, > 0
+};
+
+struct CompactResult {
+  GaussianCloud cloud;  // copy k of all anchors before copy k + 1, then those that stayed alone; the input's metadata
+  int64_t outside = 0;  // Gaussians unlike the training data: filtered, and nothing else
+  int64_t partly = 0;   // Gaussians somewhat unlike it: a part of the residual
+  int64_t not_finite = 0;  // Gaussians for which the network says something that is not finite: its start
+};
+
+// A compact network for inference on the CPU, as a row of kernel calls on raw arrays. The torch module in model/modules
+// is the same network for training; a test holds the two together.
+//
+// Where the network comes from knows the range of every feature of the Gaussians it was trained on. A Gaussian outside
+// of it keeps a part of the residual that falls from 1 to 0 with its distance (kFadeBegin to kFadeEnd, in feature units
+// of model/compact/compact_features.h; widths count as they are, beyond the bounds of their features too); at 0 it is
+// what the filter makes of it, one Gaussian.
+class CompactNetwork {
+ public:
+  // Errors: of Validate(config) and of `source`; kBadFile naming the tensor when a weight is NaN or infinite.
+  static Result<CompactNetwork> Load(const CompactConfig& config, const WeightSource& source);
+
+  const CompactConfig& config() const { return config_; }
+  // False when the range of a feature in training is not known, so that nothing lies outside of it.
+  bool KnowsItsDomain() const;
+  // The least and the greatest upscale it was trained for; least above greatest: not known.
+  std::pair<double, double> TrainedUpscales() const;
+
+  // Enhances a cloud of finite values (log-scales and opacity logits may be −Inf). The same bits for any number of
+  // threads. Needs about 4·(2·H + 60) bytes per Gaussian besides the result.
+  // Errors (kBadArgument): of Validate(cloud); no Gaussians or 2^31 rows; a wrong number of pixel sizes, one that is
+  // not positive and finite; upscale below 1; a strength that is negative; more output than memory holds.
+  Result<CompactResult> Apply(const GaussianCloud& cloud, const CompactTask& task) const;
+
+  // The raw outputs [N, CompactOutputs(config())] for the features of a cloud, before bounds and fading.
+  void Outputs(const CompactFeatures& features, const CompactGraph& graph, float* out) const;
+
+ private:
+  struct Norm {
+    Buffer<float> weight, bias;
+  };
+  struct Round {
+    PackedWeights own, other, edge, message, update_first, update_second;
+    Norm norm;
+  };
+  class Loader;
+
+  // States [N,H] of all Gaussians after all rounds.
+  Buffer<float> States(const CompactFeatures& features, const CompactGraph& graph) const;
+  void Head(const CompactFeatures& features, const Buffer<float>& states, int64_t begin, int64_t end, float* out) const;
+  float Fade(const float* node, const std::array<float, 3>& widths) const;
+
+  CompactConfig config_;
+  PackedWeights embed_first_, embed_second_;
+  Norm embed_norm_;
+  std::vector<Round> rounds_;
+  PackedWeights head_first_, head_second_, out_;
+  std::vector<float> low_, high_;  // of the features in training; low above high: not known, nothing is outside
+};
+
+inline constexpr float kFadeBegin = 0.25f, kFadeEnd = 0.75f;
+
+// True when the metadata of a tensor file is that of a compact network.
+bool IsCompactNetwork(const TensorFile& file);
+
+// The network of a file, fully checked. Errors (kBadFile with the file's name): of CompactConfigFromMetadata; tensors
+// missing, of another shape, or that belong to nothing; values that are not finite.
+Result<CompactNetwork> LoadCompactNetwork(const TensorFile& file);
+
+}  // namespace anchorsplat

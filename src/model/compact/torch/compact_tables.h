@@ -1,0 +1,50 @@
+#pragma once
+
+#include <torch/torch.h>
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/result.h"
+#include "model/compact/compact_config.h"
+#include "model/compact/compact_start.h"
+#include "model/compact/torch/edge_messages.h"
+#include "model/shared/torch/trainable_network.h"
+
+namespace anchorsplat {
+
+// What the features of a splat range over: quantiles of each, [kNodeFeatures].
+struct FeatureRange {
+  torch::Tensor low, high;
+};
+
+// What Prepare makes of a splat or a part of it. Round r leaves states of the first rings[rounds − r] rows: after the
+// last one, of those whose copies are wanted. Of a whole splat all rings end at N.
+struct CompactTables {
+  std::vector<int64_t> rings;
+  torch::Tensor nodes;            // [rings[rounds],kNodeFeatures]
+  torch::Tensor edges;            // [rings[rounds − 1]·m,kEdgeFeatures]
+  std::vector<EdgeIndex> rounds;  // of each round's edges
+  // Of the wanted rows, N from here on.
+  torch::Tensor axes;         // [N,3,3] axis a is row a
+  torch::Tensor handedness;   // [N,1] ±1
+  torch::Tensor stored_axis;  // [N,3] int64
+  torch::Tensor log_scales;   // [N,3] longest first
+  torch::Tensor quats;        // [N,4] unit
+  torch::Tensor log_pixel;    // [N,1]
+  torch::Tensor start_logit;  // [N]
+  torch::Tensor log_shorter;  // [N,3] longest first
+  FeatureRange range;
+  double offset_side = 0;  // of OffsetUnit::kCube
+};
+
+// Errors: those of CompactTrainable's methods, which these are.
+Result<std::shared_ptr<CompactTables>> MakeCompactTables(const CompactConfig& config, const CopyStart& start,
+                                                         const NetworkInput& input);
+Result<std::shared_ptr<const void>> SurveySplat(const CompactConfig& config, const NetworkInput& whole);
+SplatPart PartOfSplat(const CompactConfig& config, const std::shared_ptr<const void>& survey,
+                      std::span<const int64_t> wanted);
+
+}  // namespace anchorsplat

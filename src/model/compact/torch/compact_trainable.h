@@ -1,0 +1,15 @@
+#pragma once
+
+#include <memory>
+
+#include "core/result.h"
+#include "model/shared/torch/network_options.h"
+#include "model/shared/torch/trainable_network.h"
+
+namespace anchorsplat {
+
+// A compact network for training. Options are those of VisitCompactOptions, and `init`: a file for InitialiseFrom.
+// Errors: those of MakeTrainableNetwork (model/torch/make_trainable_network.h).
+Result<std::shared_ptr<TrainableNetwork>> MakeCompactTrainable(NetworkOptions options);
+
+}  // namespace anchorsplat

@@ -1,0 +1,16 @@
+#include "model/torch/make_trainable_network.h"
+
+#include "core/text.h"
+#include "model/compact/torch/compact_trainable.h"
+#include "model/published/torch/published_trainable.h"
+
+namespace anchorsplat {
+
+Result<std::shared_ptr<TrainableNetwork>> MakeTrainableNetwork(const std::string& kind, const NetworkOptions& options) {
+  if (kind == "anchorsplat") return MakePublishedTrainable(options);
+  if (kind == "compact") return MakeCompactTrainable(options);
+  return Error{ErrorCode::kBadArgument,
+               Cat("kind: there is no network \"", Printable(kind), "\" (anchorsplat and compact are)")};
+}
+
+}  // namespace anchorsplat

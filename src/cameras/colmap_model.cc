@@ -80,11 +80,10 @@ bool IsColmapModel(const std::filesystem::path& folder) {
 }
 
 Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder) {
-  std::error_code ignored;
   std::vector<std::filesystem::path> picture_folders;
   for (const char* images : {"images", "../images", "../../images"}) {
     auto pictures = (folder / images).lexically_normal();
-    if (std::filesystem::is_directory(pictures, ignored)) picture_folders.push_back(std::move(pictures));
+    if (IsFolder(pictures)) picture_folders.push_back(std::move(pictures));
   }
   const bool binary = Exists(folder / "cameras.bin") && Exists(folder / "images.bin");
   CameraSet set;

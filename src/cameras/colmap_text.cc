@@ -6,6 +6,7 @@
 
 #include "cameras/colmap_model.h"
 #include "core/text.h"
+#include "core/words.h"
 #include "io/file_bytes.h"
 
 namespace anchorsplat {
@@ -14,8 +15,6 @@ namespace {
 
 // images.txt lists every feature point: gigabytes are possible, but a file that long is more likely not one at all.
 constexpr uint64_t kMaxTextBytes = uint64_t{4} << 30;
-
-bool IsSpace(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 
 class Lines {
  public:
@@ -35,7 +34,7 @@ class Lines {
   bool NextStatement(std::string_view& line) {
     while (Next(line)) {
       size_t first = 0;
-      while (first < line.size() && IsSpace(line[first])) ++first;
+      while (first < line.size() && IsBlank(line[first])) ++first;
       if (first < line.size() && line[first] != '#') return true;
     }
     return false;
@@ -50,16 +49,6 @@ class Lines {
   std::string_view rest_;
   int64_t number_ = 0;
 };
-
-// Takes the next word off the line; empty at its end.
-std::string_view TakeWord(std::string_view& line) {
-  while (!line.empty() && IsSpace(line.front())) line.remove_prefix(1);
-  size_t end = 0;
-  while (end < line.size() && !IsSpace(line[end])) ++end;
-  const std::string_view word = line.substr(0, end);
-  line.remove_prefix(end);
-  return word;
-}
 
 template <typename T>
 Status TakeNumber(const Lines& lines, std::string_view& line, const char* what, T& out) {
@@ -137,9 +126,7 @@ Result<std::vector<Camera>> ReadColmapImagesText(const std::filesystem::path& pa
     }
     ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(lines, line, "the camera's id", image.camera));
     // The rest of the line: names may have spaces inside.
-    while (!line.empty() && IsSpace(line.front())) line.remove_prefix(1);
-    while (!line.empty() && IsSpace(line.back())) line.remove_suffix(1);
-    image.name = line;
+    image.name = Trimmed(line);
     auto camera = CameraFromColmap(image, cameras, picture_folders);
     if (!camera.ok()) return lines.Complain(camera.error().message);
     views.push_back(*std::move(camera));

@@ -5,6 +5,7 @@
 #include <system_error>
 #include <vector>
 
+#include "core/file_system.h"
 #include "core/text.h"
 #include "fit/fitter.h"
 #include "io/atomic_file.h"
@@ -31,8 +32,7 @@ Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> out
     }
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(checkpoint));
-  std::error_code ignored;
-  if (!fs::exists(checkpoint, ignored) || resume) return {};  // what a checkpoint is, reading it shows
+  if (!Exists(checkpoint) || resume) return {};  // what a checkpoint is, reading it shows
   if (!IsFitCheckpoint(checkpoint)) {
     return Error{ErrorCode::kExists,
                  Cat(checkpoint.string(),

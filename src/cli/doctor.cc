@@ -14,6 +14,7 @@
 
 #include "cli/verb.h"
 #include "core/companion.h"
+#include "core/file_system.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "model/compact/shipped_network.h"
@@ -105,15 +106,13 @@ const char* BuildKind() {
 // How to come by LibTorch, for a program in the build folder of a checkout and for an installed one.
 std::string TorchCommand() {
   const fs::path folder = ProgramFolder();
-  std::error_code ignored;
-  if (fs::exists(folder.parent_path() / "scripts" / "install-torch.sh", ignored)) return "make torch build";
+  if (Exists(folder.parent_path() / "scripts" / "install-torch.sh")) return "make torch build";
   return "in a checkout of the sources: make install TORCH_DIR=<libtorch>/share/cmake/Torch";
 }
 
 std::string FetchCommand() {
   const fs::path installed = CompanionFile("fetch-lpips.sh");
-  std::error_code ignored;
-  return fs::exists(installed, ignored) ? installed.string() : "scripts/fetch-lpips.sh";
+  return Exists(installed) ? installed.string() : "scripts/fetch-lpips.sh";
 }
 
 Finding FindModel() {
@@ -127,9 +126,8 @@ Finding FindModel() {
 }
 
 Finding FindTraining() {
-  std::error_code ignored;
   const fs::path program = CompanionFile("anchorsplat-train");
-  if (!fs::exists(program, ignored)) return {"training", kMissing, "built without LibTorch", TorchCommand()};
+  if (!Exists(program)) return {"training", kMissing, "built without LibTorch", TorchCommand()};
   return {"training", kReady, program.string(), ""};
 }
 

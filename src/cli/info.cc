@@ -14,6 +14,7 @@
 #include "cli/parse.h"
 #include "cli/table.h"
 #include "cli/verb.h"
+#include "core/file_system.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/pixel_size_guard.h"
@@ -178,8 +179,7 @@ nlohmann::json ToJson(const Findings& f) {
 
 // By content: gsplat keeps splats in files of the same kind, and other formats are zip archives too.
 bool LooksLikeModel(const std::filesystem::path& path) {
-  std::error_code code;
-  if (!std::filesystem::is_regular_file(path, code)) return false;  // a pipe can be read only once
+  if (!IsFile(path)) return false;  // a pipe can be read only once
   std::array<char, 16> beginning{};
   std::ifstream in(path, std::ios::binary);
   in.read(beginning.data(), beginning.size());

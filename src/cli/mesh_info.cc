@@ -11,6 +11,7 @@
 
 #include "cli/clean_output.h"
 #include "cli/table.h"
+#include "core/file_system.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
@@ -173,8 +174,7 @@ Status RunLibraryInfo(const std::string& path, const SharedFlags& shared) {
 
 // The beginning of a file, where a PLY has its header and a glTF its list of extensions, as a rule.
 std::string Beginning(const std::string& path) {
-  std::error_code code;
-  if (!std::filesystem::is_regular_file(path, code)) return {};
+  if (!IsFile(path)) return {};
   std::string head(size_t{1} << 16, '\0');
   std::ifstream in(path, std::ios::binary);
   in.read(head.data(), static_cast<std::streamsize>(head.size()));

@@ -12,6 +12,7 @@
 #include "cli/table.h"
 #include "cli/verb.h"
 #include "core/companion.h"
+#include "core/file_system.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -30,8 +31,7 @@ struct TrainFlags {
 // with the training in it, and takes the same words.
 Status RunInTrainingProgram(const std::vector<std::string>& words) {
   const fs::path program = CompanionFile("anchorsplat-train");
-  std::error_code ignored;
-  if (!fs::exists(program, ignored)) {
+  if (!Exists(program)) {
     return Error{
         ErrorCode::kNotFound,
         "training is missing: this program was built without LibTorch (`anchorsplat doctor` says how to get it)"};

@@ -63,6 +63,15 @@ Pinhole Scaled(const Pinhole& intrinsics, double factor) {
   return out;
 }
 
+Camera Crop(const Camera& camera, const PixelBox& box) {
+  Camera cropped = camera;
+  cropped.intrinsics.width = box.x1 - box.x0;
+  cropped.intrinsics.height = box.y1 - box.y0;
+  cropped.intrinsics.cx -= box.x0;
+  cropped.intrinsics.cy -= box.y0;
+  return cropped;
+}
+
 Result<Pose> LookAt(const Vec3& center, const Vec3& target, const Vec3& up) {
   const Vec3 along = {target[0] - center[0], target[1] - center[1], target[2] - center[2]};
   if (!Finite(along) || !Finite(up)) return Error{ErrorCode::kBadArgument, "camera position is not finite"};

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/image.h"
 #include "core/result.h"
 
 namespace anchorsplat {
@@ -48,6 +49,9 @@ struct CameraSet {
 // The same view with `factor` times as many pixels per side (width and height rounded, at least 1); the rays through
 // the image corners stay where they were, up to that rounding.
 Pinhole Scaled(const Pinhole& intrinsics, double factor);
+
+// The view that shows only `box` of the picture, which may reach beyond it.
+Camera Crop(const Camera& camera, const PixelBox& box);
 
 // Camera at `center` looking at `target`. `up` is the world's up; where it is parallel to the view direction, another
 // axis is taken. kBadArgument when center and target coincide or anything is not finite.

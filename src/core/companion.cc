@@ -2,6 +2,8 @@
 
 #include <system_error>
 
+#include "core/file_system.h"
+
 namespace anchorsplat {
 
 namespace fs = std::filesystem;
@@ -12,11 +14,10 @@ fs::path ProgramFolder() {
 }
 
 fs::path CompanionFile(const std::string& name, const fs::path& program_folder) {
-  std::error_code ignored;
   const fs::path beside = program_folder / name;
-  if (fs::exists(beside, ignored)) return beside;
+  if (Exists(beside)) return beside;
   const fs::path installed = program_folder.parent_path() / "lib" / "anchorsplat" / name;
-  return fs::exists(installed, ignored) ? installed : beside;
+  return Exists(installed) ? installed : beside;
 }
 
 }  // namespace anchorsplat

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <span>
 #include <string>
 
 namespace anchorsplat {
@@ -17,6 +19,11 @@ class Fingerprint {
     const auto* bytes = reinterpret_cast<const unsigned char*>(values.data());
     const size_t count = values.size() * sizeof(values[0]);
     for (size_t i = 0; i < count; ++i) value_ = (value_ ^ bytes[i]) * 0x100000001b3u;
+  }
+
+  // The same by words of 32 bits instead of bytes, four times as quick: another number.
+  void AddWords(std::span<const float> values) {
+    for (const float value : values) value_ = (value_ ^ std::bit_cast<uint32_t>(value)) * 0x100000001b3u;
   }
 
   uint64_t value() const { return value_; }

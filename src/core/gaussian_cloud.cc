@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/finite.h"
 #include "core/statistics.h"
 #include "core/text.h"
 
@@ -18,10 +19,6 @@ void GatherRows(const Buffer<float>& from, int64_t width, std::span<const int64_
 }
 
 void AppendRows(Buffer<float>& to, const Buffer<float>& from) { to.insert(to.end(), from.begin(), from.end()); }
-
-bool AllFinite(const float* p, int64_t n) {
-  return std::all_of(p, p + n, [](float x) { return std::isfinite(x); });
-}
 
 bool FiniteOrMinusInf(float x) { return std::isfinite(x) || x == -std::numeric_limits<float>::infinity(); }
 
@@ -124,6 +121,12 @@ bool HasUsableShape(const GaussianCloud& cloud, int64_t i) {
 
 bool IsUsable(const GaussianCloud& cloud, int64_t i) {
   return HasUsableShape(cloud, i) && AllFinite(cloud.sh.data() + i * cloud.sh_stride(), cloud.sh_stride());
+}
+
+bool IsFinite(const GaussianCloud& cloud, int64_t i) {
+  return AllFinite(cloud.means.data() + 3 * i, 3) && AllFinite(cloud.log_scales.data() + 3 * i, 3) &&
+         AllFinite(cloud.quats.data() + 4 * i, 4) && std::isfinite(cloud.opacity_logits[static_cast<size_t>(i)]) &&
+         AllFinite(cloud.sh.data() + i * cloud.sh_stride(), cloud.sh_stride());
 }
 
 }  // namespace anchorsplat

@@ -66,5 +66,7 @@ GaussianCloud WithShDegree(const GaussianCloud& cloud, int degree);
 // logit ±Inf (opacity 1 or 0): legal, and written by some tools. What it is false for is nowhere drawn
 // (docs/formats.md).
 bool IsUsable(const GaussianCloud& cloud, int64_t i);
+// True when all of them are.
+bool IsFinite(const GaussianCloud& cloud, int64_t i);
 
 }  // namespace anchorsplat

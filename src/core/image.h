@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "core/buffer.h"
@@ -40,5 +41,24 @@ struct PixelBox {
   bool empty() const { return x0 >= x1 || y0 >= y1; }
   friend bool operator==(const PixelBox&, const PixelBox&) = default;
 };
+
+// The part of a picture in `box`, which lies within it. Memory of `out` is used again where the shape is the same.
+inline void CropInto(const Image& image, const PixelBox& box, Image& out) {
+  const int width = box.x1 - box.x0, height = box.y1 - box.y0;
+  if (out.width != width || out.height != height || out.channels != image.channels) {
+    out = Image(width, height, image.channels);
+  }
+  for (int c = 0; c < image.channels; ++c) {
+    for (int y = 0; y < height; ++y) {
+      std::copy_n(image.channel(c) + int64_t{box.y0 + y} * image.width + box.x0, width,
+                  out.channel(c) + int64_t{y} * width);
+    }
+  }
+}
+inline Image Crop(const Image& image, const PixelBox& box) {
+  Image out;
+  CropInto(image, box, out);
+  return out;
+}
 
 }  // namespace anchorsplat

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/activations.h"
 #include "core/parallel.h"
 
 namespace anchorsplat {
@@ -100,7 +101,7 @@ CloudStatistics ComputeStatistics(const GaussianCloud& cloud) {
       ++out.unnormalised_quaternions;
     }
     const float logit = cloud.opacity_logits[static_cast<size_t>(i)];
-    const float alpha = 1 / (1 + std::exp(-logit));
+    const float alpha = Sigmoid(logit);
     opacity.push_back(alpha);
     if (alpha < 1.0f / 255) ++out.invisible;
     if (logit >= 0 && logit <= 1) ++unit_opacities;

@@ -5,6 +5,7 @@
 #include <set>
 #include <system_error>
 
+#include "core/file_system.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "dataset/dataset_split.h"
@@ -28,8 +29,7 @@ class ObjectCheck {
       : folder_(dataset / record.name), record_(record), decode_(decode) {}
 
   std::vector<DatasetProblem> Run() && {
-    std::error_code ignored;
-    if (!fs::is_directory(folder_, ignored)) {
+    if (!IsFolder(folder_)) {
       Complain(Cat(folder_.string(), ": the manifest has it, the folder is missing"));
       return std::move(problems_);
     }
@@ -117,10 +117,7 @@ class ObjectCheck {
   std::vector<DatasetProblem> problems_;
 };
 
-bool HasSplits(const fs::path& dataset) {
-  std::error_code ignored;
-  return fs::exists(dataset / kSplitsName, ignored);
-}
+bool HasSplits(const fs::path& dataset) { return Exists(dataset / kSplitsName); }
 
 void CheckSplits(const fs::path& dataset, const Manifest& manifest, std::vector<DatasetProblem>& problems) {
   if (!HasSplits(dataset)) return;
@@ -182,8 +179,7 @@ Result<std::vector<DatasetProblem>> CheckDataset(const fs::path& dataset, const 
   std::error_code code;
   for (fs::directory_iterator it(dataset, code), end; !code && it != end; it.increment(code)) {
     const std::string name = it->path().filename().string();
-    std::error_code ignored;
-    if (fs::exists(it->path() / kRecordName, ignored) && manifest.count(name) == 0 && !name.starts_with(".")) {
+    if (Exists(it->path() / kRecordName) && manifest.count(name) == 0 && !name.starts_with(".")) {
       problems.push_back(
           {name, Cat(it->path().string(), ": the manifest does not know this object; dataset build adds it")});
     }

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
+#include "core/file_system.h"
 #include "core/text.h"
 #include "dataset/object_name.h"
 #include "io/atomic_file.h"
@@ -151,7 +152,7 @@ Result<std::vector<std::string>> ResolveAddresses(const std::vector<std::string>
     const fs::path file = mark == std::string::npos ? address : address.substr(0, mark + 5);
     const std::string object = mark == std::string::npos ? "" : address.substr(mark + 5);
     std::error_code code;
-    if (fs::is_regular_file(objects / file, code)) {
+    if (IsFile(objects / file)) {
       out.push_back((objects / file).string() + object);
       continue;
     }

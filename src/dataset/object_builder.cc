@@ -274,8 +274,7 @@ Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset, 
   if (IsFile(folder / kViewsDone)) {
     ANCHORSPLAT_RETURN_IF_ERROR(Recall(folder / kViewsDone, record));
   } else {
-    std::error_code ignored;
-    const bool pictures = fs::is_directory(job.source, ignored);
+    const bool pictures = IsFolder(job.source);
     ANCHORSPLAT_RETURN_IF_ERROR((pictures ? CopyViews : MakeViews)(job, folder, stop, record));
     if (record.origin.licence.empty() && !job.licence.empty()) {
       record.origin.licence = job.licence;

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
+#include "core/file_system.h"
 #include "core/text.h"
 #include "io/atomic_file.h"
 #include "io/file_bytes.h"
@@ -180,8 +181,7 @@ Result<Manifest> CollectRecords(const fs::path& dataset) {
   std::error_code code;
   for (fs::directory_iterator it(dataset, code), end; !code && it != end; it.increment(code)) {
     const fs::path path = it->path() / kRecordName;
-    std::error_code ignored;
-    if (it->path().filename().string().starts_with(".") || !fs::is_regular_file(path, ignored)) continue;
+    if (it->path().filename().string().starts_with(".") || !IsFile(path)) continue;
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile json, JsonFile::Read(path));
     ANCHORSPLAT_ASSIGN_OR_RETURN(ObjectRecord record, ObjectRecordFrom(json.root()));
     if (record.name != it->path().filename().string()) {
@@ -203,8 +203,7 @@ Status WriteFailures(const fs::path& dataset, const std::vector<ObjectFailure>& 
 
 Result<std::vector<ObjectFailure>> ReadFailures(const fs::path& dataset) {
   std::vector<ObjectFailure> failures;
-  std::error_code ignored;
-  if (!fs::exists(dataset / kFailuresName, ignored)) return failures;
+  if (!Exists(dataset / kFailuresName)) return failures;
   const auto take = [&](const JsonValue& json) -> Status {
     ObjectFailure f;
     ANCHORSPLAT_RETURN_IF_ERROR(TakeText(json, "name", f.name));

@@ -5,6 +5,7 @@
 #include <system_error>
 #include <utility>
 
+#include "core/file_system.h"
 #include "core/text.h"
 #include "dataset/object_builder.h"
 #include "io/atomic_file.h"
@@ -39,7 +40,7 @@ Result<std::vector<UnfinishedObject>> FindUnfinished(const fs::path& dataset,
   std::map<std::string, UnfinishedObject> found;
   const fs::path building = dataset / kBuildingName, list = building / kListName;
   std::error_code ignored;
-  if (fs::exists(list, ignored)) {
+  if (Exists(list)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, ReadFileBytes(list, kMaxListBytes));
     for (size_t at = 0; at < text.size();) {
       const size_t end = std::min(text.find('\n', at), text.size());

@@ -5,20 +5,13 @@
 
 #include "core/parallel.h"
 #include "core/text.h"
+#include "core/widened.h"
 #include "render/constants.h"
 
 namespace anchorsplat {
 
 namespace {
 constexpr int64_t kRowsPerTask = 16384;
-
-// ln of sqrt(exp(2·log_scale) + variance), in a form that neither overflows for huge scales nor loses tiny ones.
-float WidenedLogScale(float log_scale, double variance) {
-  const double twice = 2.0 * log_scale;  // −Inf for a scale of zero
-  const double log_variance = std::log(variance);
-  const double high = std::max(twice, log_variance), low = std::min(twice, log_variance);
-  return static_cast<float>(0.5 * (high + std::log1p(std::exp(low - high))));
-}
 
 }  // namespace
 
@@ -55,7 +48,10 @@ Result<int64_t> ApplyFilter(GaussianCloud& cloud, std::span<const float> pixel_s
       float* scales = cloud.log_scales.data() + 3 * i;
       if (!IsUsable(cloud, i)) continue;
       const double p = pixel_sizes[pixel_sizes.size() == 1 ? 0 : static_cast<size_t>(i)];
-      for (int axis = 0; axis < 3; ++axis) scales[axis] = WidenedLogScale(scales[axis], gain * p * p);
+      const double log_variance = std::log(gain * p * p);
+      for (int axis = 0; axis < 3; ++axis) {
+        scales[axis] = static_cast<float>(WidenedLogScale(scales[axis], log_variance));
+      }
       ++count;
     }
     grown += count;

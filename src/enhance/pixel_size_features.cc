@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/activations.h"
 #include "core/framing.h"
 #include "core/text.h"
 
@@ -86,7 +87,7 @@ GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing, double
 std::optional<double> AxisOfSmallGaussians(const GaussianCloud& cloud) {
   std::vector<std::pair<float, double>> largest, middle;
   for (int64_t i = 0; i < cloud.size(); ++i) {
-    const float opacity = 1 / (1 + std::exp(-cloud.opacity_logits[static_cast<size_t>(i)]));
+    const float opacity = Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]);
     if (opacity < kVisibleOpacity) continue;
     std::array<float, 3> axes;
     for (size_t a = 0; a < 3; ++a) axes[a] = std::exp(cloud.log_scales[static_cast<size_t>(3 * i) + a]);

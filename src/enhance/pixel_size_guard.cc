@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "core/activations.h"
 #include "core/framing.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
@@ -67,7 +68,7 @@ Showing ShowingGaussians(const GaussianCloud& cloud) {
     if (!IsUsable(cloud, i)) continue;
     const bool black = IsBlack(cloud, i);
     if (!black) showing.not_black.push_back(i);
-    const float opacity = 1 / (1 + std::exp(-cloud.opacity_logits[static_cast<size_t>(i)]));
+    const float opacity = Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]);
     const double distance = SquaredDistance(cloud.means.data() + 3 * i, middle.data());
     if (opacity < kGuardVisibleOpacity || std::sqrt(distance) > kGuardFarthest * framing.radius) continue;
     all.emplace_back(distance, i);

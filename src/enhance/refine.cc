@@ -106,7 +106,7 @@ Result<double> MeasureConsistency(const GaussianCloud& cloud, const RenderOption
     const PixelBox window = ChooseWindow(camera, input, 0, view);  // the same for whatever is measured
     ANCHORSPLAT_RETURN_IF_ERROR(targets.Load(view, window, target));
     ANCHORSPLAT_RETURN_IF_ERROR(
-        objective.Show({.render = render, .loss = {}, .pixel = AreaModel(upscale)}, cloud, Cropped(camera, window)));
+        objective.Show({.render = render, .loss = {}, .pixel = AreaModel(upscale)}, cloud, Crop(camera, window)));
     Image shown = objective.rendered();
     Clamp01(shown);
     for (size_t i = 0; i < target.ignored.size(); ++i) {
@@ -141,7 +141,7 @@ Result<std::vector<double>> Residuals(const GaussianCloud& cloud, double upscale
     const Camera& camera = views.train.views()[static_cast<size_t>(view)];
     const PixelBox window = ChooseWindow(camera, cloud, 0, view);
     ANCHORSPLAT_RETURN_IF_ERROR(views.train.Load(view, window, target));
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, Cropped(camera, window), render, output));
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, Crop(camera, window), render, output));
     off.color = output.color;
     for (size_t k = 0; k < off.color.pixels.size(); ++k) {
       off.color.pixels[k] = std::abs(off.color.pixels[k] - target.picture.pixels[k]);

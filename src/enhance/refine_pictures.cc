@@ -95,7 +95,7 @@ Image Halved(const Image& image) {
 
 Camera Halved(const Camera& camera) {
   const Pinhole& k = camera.intrinsics;
-  Camera half = Cropped(camera, {0, 0, k.width / 2 * 2, k.height / 2 * 2});
+  Camera half = Crop(camera, {0, 0, k.width / 2 * 2, k.height / 2 * 2});
   half.intrinsics = Scaled(half.intrinsics, 0.5);
   return half;
 }

@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "core/activations.h"
 #include "core/framing.h"
 #include "core/image.h"
 #include "core/parallel.h"
@@ -16,7 +17,6 @@
 #include "core/text.h"
 #include "fit/random_streams.h"
 #include "fit/training_views.h"
-#include "formats/quantize.h"
 
 namespace anchorsplat {
 

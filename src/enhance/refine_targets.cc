@@ -13,30 +13,9 @@ namespace {
 constexpr int kTargetRowsPerTask = 32;
 constexpr float kNothing = 1.0f / 255;  // alpha that 8 bits do not show
 
-void Crop(const Image& from, const PixelBox& window, Image& to) {
-  const int width = window.x1 - window.x0, height = window.y1 - window.y0;
-  if (to.width != width || to.height != height || to.channels != from.channels)
-    to = Image(width, height, from.channels);
-  for (int c = 0; c < from.channels; ++c) {
-    for (int y = 0; y < height; ++y) {
-      std::copy_n(from.channel(c) + int64_t{window.y0 + y} * from.width + window.x0, width,
-                  to.channel(c) + int64_t{y} * width);
-    }
-  }
-}
-
 bool IsWhole(const PixelBox& window, const Pinhole& size) { return window == PixelBox{0, 0, size.width, size.height}; }
 
 }  // namespace
-
-Camera Cropped(const Camera& camera, const PixelBox& window) {
-  Camera cropped = camera;
-  cropped.intrinsics.width = window.x1 - window.x0;
-  cropped.intrinsics.height = window.y1 - window.y0;
-  cropped.intrinsics.cx -= window.x0;
-  cropped.intrinsics.cy -= window.y0;
-  return cropped;
-}
 
 Buffer<uint8_t> FaintPixels(const Image& alpha) {
   const int width = alpha.width, height = alpha.height;
@@ -82,7 +61,7 @@ Status RefineTargets::Load(int64_t view, const PixelBox& window, RefineTarget& t
     target.ignored.clear();
     if (whole) return pictures_->Load(view, target.picture);
     ANCHORSPLAT_RETURN_IF_ERROR(pictures_->Load(view, whole_));
-    Crop(whole_, window, target.picture);
+    CropInto(whole_, window, target.picture);
     return {};
   }
   RefineTarget& kept = kept_[static_cast<size_t>(view)];
@@ -90,7 +69,7 @@ Status RefineTargets::Load(int64_t view, const PixelBox& window, RefineTarget& t
     target = kept;
     return {};
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(*splat_, Cropped(camera, window), render_, output_));
+  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(*splat_, Crop(camera, window), render_, output_));
   target.picture = output_.color;
   Clamp01(target.picture);
   target.ignored = FaintPixels(output_.alpha);

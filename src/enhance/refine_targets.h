@@ -54,9 +54,6 @@ class RefineTargets {
   RenderOutput output_;
 };
 
-// `camera` with only the pixels of `window`.
-Camera Cropped(const Camera& camera, const PixelBox& window);
-
 // 1 for pixels with 0 < alpha < kFaint that have no pixel of at least kFaint within kFaintReach rows and columns.
 // Empty when there is none.
 Buffer<uint8_t> FaintPixels(const Image& alpha);

@@ -96,7 +96,7 @@ Result<FitStep> Refiner::Step(double done) {
   objective.render = problem_.render;
   objective.loss.ssim_weight = options_.ssim_weight;
   objective.pixel = PixelModelAt({problem_.upscale, options_.half_from, options_.all_from}, done);
-  const Camera camera = Cropped(view, window);
+  const Camera camera = Crop(view, window);
   ANCHORSPLAT_RETURN_IF_ERROR(objective_.Show(objective, state_.cloud, camera));
   AdjustTarget(done);
   ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Compare(objective, state_.cloud, target_.picture, gradient_));

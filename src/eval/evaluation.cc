@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "eval/object_state.h"
@@ -42,17 +43,6 @@ std::string Key(const BenchmarkObject& object, const EvalMethod& method, const s
   return Cat("anchorsplat ", ANCHORSPLAT_VERSION, "; ", ProtocolName(options.protocol), ", ", views.size(), " views; ",
              method.name, " ", method.settings, "; seed ", options.seed, "; lpips ",
              options.lpips == nullptr ? "none" : LpipsNetName(options.lpips->net()), "; ", ObjectState(object, views));
-}
-
-Image Crop(const Image& image, const ViewRegion& region) {
-  Image out(region.width, region.height, 3);
-  for (int c = 0; c < 3; ++c) {
-    for (int y = 0; y < region.height; ++y) {
-      const float* row = image.channel(c) + int64_t{region.y + y} * image.width + region.x;
-      std::copy(row, row + region.width, out.channel(c) + int64_t{y} * region.width);
-    }
-  }
-  return out;
 }
 
 // The part that the contact sheet shows: of the middle view, where the low-quality splat is farthest off.
@@ -93,7 +83,7 @@ Status MeasureView(const BenchmarkObject& object, size_t view, const std::option
   const bool shown = excerpt && excerpt->view == view;
   if (shown) {
     ANCHORSPLAT_RETURN_IF_ERROR(
-        WritePng(folder / Cat(kTruthStem, ".png"), Crop(*truth, excerpt->region), {.overwrite = true}));
+        WritePng(folder / Cat(kTruthStem, ".png"), Crop(*truth, excerpt->region.box()), {.overwrite = true}));
   }
   for (Pending& p : pending) {
     if (p.failure) continue;
@@ -120,7 +110,8 @@ Status MeasureView(const BenchmarkObject& object, size_t view, const std::option
       ++times.pictures;
       p.result.views.push_back(std::move(score));
       if (!shown) return {};
-      return WritePng(folder / (FileStem(p.method->name) + ".png"), Crop(*image, excerpt->region), {.overwrite = true});
+      return WritePng(folder / (FileStem(p.method->name) + ".png"), Crop(*image, excerpt->region.box()),
+                      {.overwrite = true});
     };
     if (const Status status = measure(); !status.ok()) p.failure = status.error().message;
   }
@@ -147,8 +138,7 @@ Status EvaluateObject(const BenchmarkEntry& entry, const std::string& place, con
     p.method = &method;
     p.key = Key(object, method, views, options);
     std::optional<MethodResult> known;
-    const bool shown = fs::exists(folder / (FileStem(method.name) + ".png"), code) &&
-                       fs::exists(folder / Cat(kTruthStem, ".png"), code);
+    const bool shown = Exists(folder / (FileStem(method.name) + ".png")) && Exists(folder / Cat(kTruthStem, ".png"));
     if (!options.again && shown) known = ReadMethodResult(folder / (FileStem(method.name) + ".json"), p.key);
     if (known) {
       ++evaluation.resumed;

@@ -5,10 +5,10 @@
 #include <utility>
 #include <vector>
 
+#include "core/activations.h"
 #include "core/parallel.h"
 #include "core/rotation.h"
 #include "fit/random_streams.h"
-#include "formats/quantize.h"
 
 namespace anchorsplat {
 

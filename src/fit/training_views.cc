@@ -82,8 +82,7 @@ Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source, 
 
 // The sparse model that ReadCameras takes for a project, if it takes one; else nothing.
 fs::path ModelFolder(const fs::path& project) {
-  std::error_code ignored;
-  if (!fs::is_directory(project, ignored)) return project.parent_path();
+  if (!IsFolder(project)) return project.parent_path();
   for (const auto& model : {project / "sparse" / "0", project / "sparse", project}) {
     if (IsColmapModel(model)) return model;
   }
@@ -114,9 +113,8 @@ double SceneScale(const std::vector<Camera>& cameras) {
 }
 
 Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions& options) {
-  std::error_code ignored;
   fs::path source = project;
-  if (fs::is_directory(project, ignored) && !HasCameras(project)) source = SmallestResolution(project);
+  if (IsFolder(project) && !HasCameras(project)) source = SmallestResolution(project);
 
   TrainingViews out;
   const fs::path train_file = source / "transforms_train.json", test_file = source / "transforms_test.json";

@@ -6,10 +6,10 @@
 #include <sstream>
 #include <vector>
 
+#include "core/activations.h"
 #include "core/parallel.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
-#include "formats/quantize.h"
 
 namespace anchorsplat {
 

@@ -10,12 +10,12 @@
 #include <utility>
 #include <vector>
 
+#include "core/activations.h"
 #include "core/log.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "formats/extra_properties.h"
 #include "formats/opened_splat.h"
-#include "formats/quantize.h"
 #include "formats/registry.h"
 #include "formats/row_arrays.h"
 #include "formats/splat_order.h"

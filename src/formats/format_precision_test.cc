@@ -5,8 +5,8 @@
 #include <functional>
 #include <string>
 
+#include "core/activations.h"
 #include "formats/cloud_io.h"
-#include "formats/quantize.h"
 #include "formats/random_cloud_for_test.h"
 #include "io/folder_for_test.h"
 

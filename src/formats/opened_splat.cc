@@ -4,6 +4,7 @@
 #include <string>
 #include <system_error>
 
+#include "core/file_system.h"
 #include "core/text.h"
 #include "formats/extra_properties.h"
 #include "io/input_record.h"
@@ -26,16 +27,14 @@ std::string ReadFormats() {
 }  // namespace
 
 fs::path SplatPath(const fs::path& path) {
-  std::error_code ignored;
-  if (!fs::is_directory(path, ignored)) return path;
+  if (!IsFolder(path)) return path;
   fs::path meta = path / "meta.json";
-  return fs::exists(meta, ignored) ? meta : path;
+  return Exists(meta) ? meta : path;
 }
 
 Result<OpenedSplat> OpenedSplat::Open(const fs::path& path, const SplatFormat* format) {
   const fs::path found = SplatPath(path);
-  std::error_code ignored;
-  if (fs::is_directory(found, ignored)) {
+  if (IsFolder(found)) {
     return Error{ErrorCode::kBadFile,
                  Cat(path.string(), ": is a folder without a meta.json: expected a splat file or the folder of a SOG")};
   }
@@ -73,8 +72,7 @@ void RecordSplat(const fs::path& path) {
   if (path == "-") return RecordInput(path);
   const fs::path found = SplatPath(path);
   RecordInput(found);
-  std::error_code ignored;
-  if (!fs::is_regular_file(found, ignored)) return;  // a pipe can be read only once
+  if (!IsFile(found)) return;  // a pipe can be read only once
   const Result<OpenedSplat> file = OpenedSplat::Open(path);
   if (!file.ok()) return;
   const Result<std::string> head = file->input().Head(2);

@@ -22,19 +22,6 @@ inline uint8_t QuantizeByte(float value) {
   return static_cast<uint8_t>(static_cast<int32_t>(bounded));
 }
 
-inline float Sigmoid(float logit) { return 1.0f / (1.0f + std::exp(-logit)); }
-
-// Logit of an opacity stored in 0–1. The ends become ∓13.8 (opacity 1e-6 and 1 − 1e-6), as infinite logits trip other
-// programs and a byte cannot tell 1 from 0.999 anyway.
-inline float LogitFromOpacity(float opacity) {
-  constexpr float kEnd = 1e-6f;
-  const float inside = opacity > kEnd ? (opacity < 1 - kEnd ? opacity : 1 - kEnd) : kEnd;  // NaN: invisible
-  return std::log(inside / (1 - inside));
-}
-
-// ln of a scale stored as a length; zero, negative and NaN lengths become −Inf, a Gaussian without extent.
-inline float LogFromScale(float scale) { return scale > 0 ? std::log(scale) : -INFINITY; }
-
 // A unit quaternion without its largest component, which follows from the others: the sign is chosen so that it is
 // positive. `rest` keeps the order of the components that are left; each lies in ±√½. A quaternion without direction
 // (zero, NaN) counts as (1, 0, 0, 0) of `quat`'s own order, given by `identity`.

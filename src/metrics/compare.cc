@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "cameras/camera_checks.h"
+#include "core/file_system.h"
 #include "core/text.h"
 #include "images/image_io.h"
 
@@ -71,7 +72,7 @@ Result<std::vector<ViewPair>> MatchViews(std::span<const std::string> a, std::sp
 
 Result<std::vector<std::filesystem::path>> ListPictures(const std::filesystem::path& folder) {
   std::error_code code;
-  if (!std::filesystem::is_directory(folder, code)) {
+  if (!IsFolder(folder)) {
     return Error{ErrorCode::kNotFound, Cat(folder.string(), ": no such folder")};
   }
   std::vector<std::filesystem::path> pictures;

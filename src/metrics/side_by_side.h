@@ -18,6 +18,8 @@ struct LabelledImage {
 // A part of the views, in their pixels.
 struct ViewRegion {
   int x = 0, y = 0, width = 0, height = 0;
+
+  PixelBox box() const { return {x, y, x + width, y + height}; }
 };
 
 struct SideBySideOptions {

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/activations.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "model/any_network.h"
@@ -121,7 +122,7 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
   if (prune_opacity > 0) {
     std::vector<int64_t> kept;
     for (int64_t i = 0; i < before; ++i) {
-      if (1 / (1 + std::exp(-result.cloud.opacity_logits[static_cast<size_t>(i)])) >= prune_opacity) kept.push_back(i);
+      if (Sigmoid(result.cloud.opacity_logits[static_cast<size_t>(i)]) >= prune_opacity) kept.push_back(i);
     }
     ANCHORSPLAT_ASSIGN_OR_RETURN(result.cloud, Subset(result.cloud, kept));
   }

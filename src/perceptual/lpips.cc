@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/companion.h"
+#include "core/file_system.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "perceptual/lpips_plugin.h"
@@ -18,8 +19,7 @@ namespace fs = std::filesystem;
 namespace {
 
 Result<const LpipsPlugin*> LoadPlugin(const fs::path& path) {
-  std::error_code ignored;
-  if (!fs::exists(path, ignored)) {
+  if (!Exists(path)) {
     return Error{ErrorCode::kNotFound,
                  "LPIPS missing: this program was built without LibTorch (`anchorsplat doctor` says how to get it)"};
   }

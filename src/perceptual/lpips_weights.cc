@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "core/file_system.h"
 #include "core/text.h"
 #include "tensors/tensor_file.h"
 
@@ -62,11 +63,10 @@ Result<LpipsWeights> ReadLpipsWeights(LpipsNet net, const fs::path& folder) {
   const fs::path whole = folder / (name + ".safetensors");
   const fs::path backbone = folder / (name + ".backbone.pth"), heads = folder / (name + ".heads.pth");
   std::vector<TensorFile> files;
-  std::error_code ignored;
-  if (fs::exists(whole, ignored)) {
+  if (Exists(whole)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(TensorFile file, TensorFile::Open(whole));
     files.push_back(std::move(file));
-  } else if (fs::exists(backbone, ignored) && fs::exists(heads, ignored)) {
+  } else if (Exists(backbone) && Exists(heads)) {
     for (const fs::path& path : {backbone, heads}) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(TensorFile file, TensorFile::Open(path));
       files.push_back(std::move(file));

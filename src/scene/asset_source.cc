@@ -4,6 +4,7 @@
 #include <array>
 #include <system_error>
 
+#include "core/file_system.h"
 #include "core/text.h"
 #include "io/file_bytes.h"
 #include "scene/small_letters.h"
@@ -83,7 +84,7 @@ Result<std::string> AssetSource::Read(const std::string& name, uint64_t max_byte
 std::string FolderAssets::Find(const std::string& relative) const {
   const fs::path path = folder_ / relative;
   std::error_code error;
-  if (fs::is_regular_file(path, error)) return path.string();
+  if (IsFile(path)) return path.string();
   // Letters of the wrong case, in the file's name only. A bound on what a full folder costs.
   constexpr int kMostEntries = 100'000;
   const std::string wanted = SmallLetters(path.filename().string());

@@ -14,13 +14,12 @@
 #include <utility>
 #include <vector>
 
+#include "core/finite.h"
 #include "core/text.h"
 
 namespace anchorsplat {
 
 namespace {
-
-float Unit(float value, float otherwise) { return std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : otherwise; }
 
 // IEC 61966-2-1.
 float SrgbFromLinear(float v) { return v <= 0.0031308f ? 12.92f * v : 1.055f * std::pow(v, 1 / 2.4f) - 0.055f; }
@@ -32,7 +31,7 @@ struct Materials {
 
   // A colour as this project keeps colours; what is not finite becomes 1.
   std::array<float, 4> ToSrgb(const aiColor4D& color) const {
-    std::array<float, 4> out = {Unit(color.r, 1), Unit(color.g, 1), Unit(color.b, 1), Unit(color.a, 1)};
+    std::array<float, 4> out = {UnitOr(color.r, 1), UnitOr(color.g, 1), UnitOr(color.b, 1), UnitOr(color.a, 1)};
     if (linear) std::transform(out.begin(), out.begin() + 3, out.begin(), SrgbFromLinear);
     return out;
   }
@@ -66,9 +65,9 @@ RawMaterial ReadMaterial(const aiMaterial& from, Materials& materials) {
   }
   float opacity = 1;
   if (from.Get(AI_MATKEY_OPACITY, opacity) == aiReturn_SUCCESS) {
-    material.opacity = Unit(opacity, 1);
+    material.opacity = UnitOr(opacity, 1);
   } else if (material.has_color) {
-    material.opacity = Unit(color.a, 1);
+    material.opacity = UnitOr(color.a, 1);
   }
   int two_sided = 0;
   if (from.Get(AI_MATKEY_TWOSIDED, two_sided) == aiReturn_SUCCESS) material.two_sided = two_sided != 0;
@@ -151,8 +150,6 @@ using Vec3 = std::array<float, 3>;
 
 Vec3 ToArray(const aiVector3D& v) { return {v.x, v.y, v.z}; }
 
-bool Finite(const Vec3& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); }
-
 // Normals come in any length, and as NaN where a file's own program divided by zero; zero asks for one of ours.
 Vec3 UnitOrZero(const aiVector3D& v) {
   const double length = std::sqrt(double{v.x} * v.x + double{v.y} * v.y + double{v.z} * v.z);
@@ -165,8 +162,6 @@ bool HasArea(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double v[3] = {double{c[0]} - a[0], double{c[1]} - a[1], double{c[2]} - a[2]};
   return u[1] * v[2] - u[2] * v[1] != 0 || u[2] * v[0] - u[0] * v[2] != 0 || u[0] * v[1] - u[1] * v[0] != 0;
 }
-
-float FiniteOr(float value, float otherwise) { return std::isfinite(value) ? value : otherwise; }
 
 // All triangles of one instance, appended corner by corner.
 void AppendInstance(const Instance& instance, const Materials& materials, RawScene& out) {
@@ -197,7 +192,7 @@ void AppendInstance(const Instance& instance, const Materials& materials, RawSce
       in_range = index[k] < mesh.mNumVertices;
       if (in_range) p[k] = ToArray(instance.to_world * mesh.mVertices[index[k]]);
     }
-    if (!in_range || !Finite(p[0]) || !Finite(p[1]) || !Finite(p[2])) {
+    if (!in_range || !AllFinite(p[0].data(), 3) || !AllFinite(p[1].data(), 3) || !AllFinite(p[2].data(), 3)) {
       ++out.not_finite;
       continue;
     }

@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "core/finite.h"
 #include "core/text.h"
 #include "scene/texture_decoder.h"
 
@@ -16,10 +17,6 @@ namespace {
 
 // Black materials with a picture are common in OBJ files, so only formats that define the product get it.
 bool MultipliesPicture(const std::string& ending) { return ending == ".gltf" || ending == ".glb" || ending == ".ac"; }
-
-float UnitFactor(float value, float otherwise) {
-  return std::isfinite(value) ? std::clamp(value, 0.0f, 1.0f) : otherwise;
-}
 
 // How one material wants its picture; materials that want the same share it.
 struct PictureKey {
@@ -117,9 +114,9 @@ void LoadMaterials(const RawScene& scene, const AssetSource& source, const std::
       if (said.insert(warning).second) warnings.push_back(std::move(warning));
     };
     if (raw.has_color) {
-      for (size_t k = 0; k < 3; ++k) material.diffuse[k] = UnitFactor(raw.color[k], material.diffuse[k]);
+      for (size_t k = 0; k < 3; ++k) material.diffuse[k] = UnitOr(raw.color[k], material.diffuse[k]);
     }
-    material.opacity = UnitFactor(raw.opacity, 1);
+    material.opacity = UnitOr(raw.opacity, 1);
     material.two_sided = raw.two_sided;
     if (!raw.picture.empty()) {
       PictureKey key{raw.picture, {255, 255, 255}, raw.opaque};

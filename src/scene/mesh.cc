@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/finite.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -11,8 +12,6 @@ namespace anchorsplat {
 namespace {
 
 using Vec3 = std::array<float, 3>;
-
-bool FinitePoint(const Vec3& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); }
 
 Status CheckCount(const char* what, size_t have, size_t vertices) {
   if (have == 0 || have == vertices) return {};
@@ -74,7 +73,7 @@ DroppedTriangles DropInvisibleTriangles(Mesh& mesh) {
     const Vec3& pc = mesh.positions[c];
     if (!(mesh.materials[static_cast<size_t>(mesh.triangle_materials[t])].opacity >= kMinVisibleOpacity)) {
       ++dropped.transparent;
-    } else if (!FinitePoint(pa) || !FinitePoint(pb) || !FinitePoint(pc)) {
+    } else if (!AllFinite(pa.data(), 3) || !AllFinite(pb.data(), 3) || !AllFinite(pc.data(), 3)) {
       ++dropped.not_finite;
     } else if (!(DoubleArea(pa, pb, pc) > 0)) {
       ++dropped.degenerate;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/finite.h"
+
 namespace anchorsplat {
 
 namespace {
@@ -20,8 +22,6 @@ Vec3 Normalized(const Vec3& a, const Vec3& fallback) {
 }
 
 // Colours of a file may be anything.
-float Fraction(float x, float otherwise) { return std::isfinite(x) ? std::clamp(x, 0.0f, 1.0f) : otherwise; }
-
 // Twice the area times the unit normal, in double: triangles may be tiny.
 std::array<double, 3> CrossOfEdges(const Vec3& a, const Vec3& b, const Vec3& c) {
   const double e[3] = {double{b[0]} - a[0], double{b[1]} - a[1], double{b[2]} - a[2]};
@@ -38,7 +38,7 @@ SurfaceShader::SurfaceShader(const Mesh& mesh) : mesh_(mesh) {
   const Material plain;
   for (const Material& material : mesh.materials) {
     Surface surface{{}, mesh.uvs.empty() ? -1 : material.texture};
-    for (size_t c = 0; c < 3; ++c) surface.diffuse[c] = Fraction(material.diffuse[c], plain.diffuse[c]);
+    for (size_t c = 0; c < 3; ++c) surface.diffuse[c] = UnitOr(material.diffuse[c], plain.diffuse[c]);
     materials_.push_back(surface);
   }
 
@@ -98,7 +98,7 @@ Vec3 SurfaceShader::AlbedoAt(const Triangle& triangle, const SurfacePoint& point
   if (!mesh_.colors.empty()) {
     const auto& [a, b, c] = mesh_.triangles[point.triangle];
     for (size_t k = 0; k < 3; ++k) {
-      albedo[k] *= Fraction(w * mesh_.colors[a][k] + point.u * mesh_.colors[b][k] + point.v * mesh_.colors[c][k], 1);
+      albedo[k] *= UnitOr(w * mesh_.colors[a][k] + point.u * mesh_.colors[b][k] + point.v * mesh_.colors[c][k], 1);
     }
   }
   return albedo;

@@ -8,6 +8,7 @@
 #include <new>
 #include <utility>
 
+#include "core/half.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "io/little_endian.h"
@@ -51,19 +52,6 @@ TypeFacts Facts(TensorType type) {
       return {"bool", 1};
   }
   return {"", 0};
-}
-
-float FromBFloat16(uint16_t bits) { return std::bit_cast<float>(static_cast<uint32_t>(bits) << 16); }
-
-float FromFloat16(uint16_t bits) {
-  const uint32_t sign = static_cast<uint32_t>(bits & 0x8000) << 16;
-  const uint32_t rest = bits & 0x7fff;
-  if (rest >= 0x7c00) return std::bit_cast<float>(sign | 0x7f800000 | (rest & 0x3ff) << 13);  // infinity, NaN
-  if (rest < 0x400) {  // zero and subnormals: multiples of 2^-24, exact in float32
-    const float magnitude = static_cast<float>(rest) * 0x1p-24f;
-    return sign != 0 ? -magnitude : magnitude;
-  }
-  return std::bit_cast<float>(sign | ((rest << 13) + ((127u - 15u) << 23)));
 }
 
 constexpr int64_t kTensorGrain = int64_t{1} << 18;
@@ -213,9 +201,9 @@ Result<Buffer<float>> CopyFloat32(const TensorEntry& entry) {
   } else if (type == TensorType::kFloat64) {
     ConvertAll<double>(entry, out, [](double x) { return static_cast<float>(x); });
   } else if (type == TensorType::kFloat16) {
-    ConvertAll<uint16_t>(entry, out, FromFloat16);
+    ConvertAll<uint16_t>(entry, out, FloatFromHalf);
   } else {
-    ConvertAll<uint16_t>(entry, out, FromBFloat16);
+    ConvertAll<uint16_t>(entry, out, FloatFromBFloat16);
   }
   return out;
 }

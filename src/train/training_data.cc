@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "dataset/dataset_split.h"
@@ -13,10 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool HasSplits(const fs::path& dataset) {
-  std::error_code ignored;
-  return fs::exists(dataset / kSplitsName, ignored);
-}
+bool HasSplits(const fs::path& dataset) { return Exists(dataset / kSplitsName); }
 
 Status AppendScenes(const fs::path& dataset, const std::string& split, std::vector<SceneEntry>& scenes) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto found, ListScenes(dataset, {.split = split}));

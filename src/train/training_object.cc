@@ -13,15 +13,6 @@ namespace anchorsplat {
 
 namespace {
 
-bool IsFinite(const GaussianCloud& cloud, int64_t i) {
-  const auto all = [](const float* values, int64_t n) {
-    return std::all_of(values, values + n, [](float v) { return std::isfinite(v); });
-  };
-  return all(cloud.means.data() + 3 * i, 3) && all(cloud.log_scales.data() + 3 * i, 3) &&
-         all(cloud.quats.data() + 4 * i, 4) && all(cloud.opacity_logits.data() + i, 1) &&
-         all(cloud.sh.data() + i * cloud.sh_stride(), cloud.sh_stride());
-}
-
 // `count` of the values, drawn by the name alone; in ascending order.
 std::vector<size_t> Drawn(std::vector<size_t> values, size_t count, const std::string& name) {
   if (count == 0 || count >= values.size()) return values;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "core/activations.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
 
@@ -178,7 +179,7 @@ Result<QuantizedCloud> Quantize(const GaussianCloud& cloud, int max_sh_degree) {
       for (size_t k = 0; k < 3; ++k) {
         put_scalar(LinearCode(cloud.log_scales[3 * i + k], q.log_scale[0], q.log_scale[1], kScalarBits));
       }
-      put_scalar(LinearCode(1 / (1 + std::exp(-static_cast<double>(cloud.opacity_logits[i]))), 0, 1, kScalarBits));
+      put_scalar(LinearCode(Sigmoid(double{cloud.opacity_logits[i]}), 0, 1, kScalarBits));
       for (size_t k = 0; k < 3; ++k) {
         put_scalar(LinearCode(cloud.sh[stride * i + k], q.dc[0], q.dc[1], kScalarBits));
       }

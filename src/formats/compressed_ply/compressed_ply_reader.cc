@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/activations.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"

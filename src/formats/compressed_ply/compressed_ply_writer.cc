@@ -8,6 +8,7 @@
 #include <limits>
 #include <mutex>
 
+#include "core/activations.h"
 #include "core/parallel.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"

@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "core/activations.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "formats/axes.h"
 #include "formats/cloud_checks.h"
 #include "formats/gltf/gltf_document.h"
-#include "formats/quantize.h"
 #include "formats/record_blocks.h"
 #include "io/compression_ratio.h"
 

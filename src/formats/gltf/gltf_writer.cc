@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/activations.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
 #include "formats/axes.h"

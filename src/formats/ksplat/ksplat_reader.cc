@@ -9,12 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "core/activations.h"
+#include "core/half.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
-#include "formats/half.h"
-#include "formats/quantize.h"
 #include "formats/record_blocks.h"
+#include "io/little_endian.h"
 
 namespace anchorsplat {
 
@@ -170,7 +171,7 @@ Result<Buckets> ReadBuckets(const InputFile& file, const Section& section) {
 }
 
 float Number(const uint8_t* bytes, size_t size) {
-  if (size == 2) return FloatFromHalf(bytes);
+  if (size == 2) return FloatFromHalf(LoadLittle<uint16_t>(bytes));
   float value;
   std::memcpy(&value, bytes, sizeof value);
   return value;

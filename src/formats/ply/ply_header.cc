@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/text.h"
+#include "core/words.h"
 
 namespace anchorsplat {
 
@@ -36,23 +37,6 @@ std::optional<PlyType> TypeFromName(std::string_view name) {
     if (name == info.name || name == info.other_name) return info.type;
   }
   return std::nullopt;
-}
-
-bool IsBlank(char c) { return c == ' ' || c == '\t'; }
-
-std::string_view Trimmed(std::string_view text) {
-  while (!text.empty() && IsBlank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && IsBlank(text.back())) text.remove_suffix(1);
-  return text;
-}
-
-// Cuts the first word off `line`.
-std::string_view TakeHeaderWord(std::string_view& line) {
-  line = Trimmed(line);
-  const size_t end = std::min(line.find_first_of(" \t"), line.size());
-  const std::string_view word = line.substr(0, end);
-  line = Trimmed(line.substr(end));
-  return word;
 }
 
 std::string LowerCase(std::string_view text) {
@@ -92,7 +76,7 @@ class HeaderParser {
 Status HeaderParser::Line(std::string_view line) {
   ++header_.lines;
   std::string_view rest = line;
-  const std::string_view keyword = TakeHeaderWord(rest);
+  const std::string_view keyword = TakeWord(rest);
   if (header_.lines == 1) {
     if (keyword != "ply" || !rest.empty()) return Unexpected("\"ply\" (this is no PLY file)", line);
     return {};
@@ -116,7 +100,7 @@ Status HeaderParser::Line(std::string_view line) {
 Status HeaderParser::Format(std::string_view rest) {
   if (has_format_) return Bad("a second \"format\" line");
   const std::string_view whole = rest;
-  const std::string_view encoding = TakeHeaderWord(rest);
+  const std::string_view encoding = TakeWord(rest);
   if (encoding == "ascii") {
     header_.encoding = PlyEncoding::kAscii;
   } else if (encoding == "binary_little_endian") {
@@ -134,7 +118,7 @@ Status HeaderParser::Format(std::string_view rest) {
 Status HeaderParser::Element(std::string_view rest) {
   PlyElement element;
   element.line = header_.lines;
-  element.name = TakeHeaderWord(rest);
+  element.name = TakeWord(rest);
   if (element.name.empty()) return Bad("an element without a name");
   if (header_.Find(element.name) != nullptr) {
     return Bad(Cat("a second element \"", Printable(element.name), "\""));
@@ -153,19 +137,19 @@ Status HeaderParser::Property(std::string_view rest) {
   PlyElement& element = header_.elements.back();
   PlyProperty property;
   property.line = header_.lines;
-  std::string_view type = TakeHeaderWord(rest);
+  std::string_view type = TakeWord(rest);
   if (type == "list") {
-    const std::string_view count = TakeHeaderWord(rest);
+    const std::string_view count = TakeWord(rest);
     property.list_count = TypeFromName(count);
     if (!property.list_count || *property.list_count == PlyType::kFloat || *property.list_count == PlyType::kDouble) {
       return Unexpected("an integer type for the count of a list", count);
     }
-    type = TakeHeaderWord(rest);
+    type = TakeWord(rest);
   }
   const auto known = TypeFromName(type);
   if (!known) return Unexpected("a type (char uchar short ushort int uint float double)", type);
   property.type = *known;
-  property.name = TakeHeaderWord(rest);
+  property.name = TakeWord(rest);
   if (property.name.empty()) return Bad("a property without a name");
   if (!rest.empty()) return Unexpected("the end of the line", rest);
   if (!names_.insert(property.name).second) {
@@ -258,7 +242,7 @@ std::optional<RenderMode> RenderModeFromComment(std::string_view comment) {
     rest = Trimmed(rest.substr(kBrush.size()));
     if (rest == "mip") return RenderMode::kAntialiased;
     if (rest == "default") return RenderMode::kClassic;
-  } else if (TakeHeaderWord(rest) == "antialiased") {
+  } else if (TakeWord(rest) == "antialiased") {
     if (rest == "1") return RenderMode::kAntialiased;
     if (rest == "0") return RenderMode::kClassic;
   }

@@ -11,6 +11,7 @@
 #include <system_error>
 #include <vector>
 
+#include "core/activations.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/activations.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"

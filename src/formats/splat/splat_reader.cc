@@ -5,10 +5,10 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/activations.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
-#include "formats/quantize.h"
 #include "formats/record_blocks.h"
 
 namespace anchorsplat {

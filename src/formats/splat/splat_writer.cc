@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/activations.h"
 #include "core/parallel.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"

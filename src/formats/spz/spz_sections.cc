@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/activations.h"
+#include "core/half.h"
 #include "core/spherical_harmonics.h"
-#include "formats/half.h"
 #include "formats/quantize.h"
+#include "io/little_endian.h"
 
 namespace anchorsplat {
 
@@ -106,7 +108,8 @@ void UnpackSpz(const SpzLayout& layout, SpzSection section, int64_t first, int64
       float* out = cloud.means.data() + 3 * first;
       for (int64_t i = first; i < last; ++i) {
         for (size_t k = 0; k < 3; ++k, bytes += record / 3) {
-          *out++ = flip.mean[k] * (layout.version == 1 ? FloatFromHalf(bytes) : FixedPoint(bytes, step));
+          *out++ = flip.mean[k] *
+                   (layout.version == 1 ? FloatFromHalf(LoadLittle<uint16_t>(bytes)) : FixedPoint(bytes, step));
         }
       }
       return;

@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "core/finite.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
@@ -293,7 +294,7 @@ Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const Co
         const int64_t row = rows[static_cast<size_t>(i)];
         if (fade > 0) {
           const float* said = raw.data() + (i - begin) * out_.outputs();
-          if (!std::all_of(said, said + out_.outputs(), [](float x) { return std::isfinite(x); })) {
+          if (!AllFinite(said, out_.outputs())) {
             said = nothing.data();
             ++not_finite;
           }

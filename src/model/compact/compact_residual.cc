@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/widened.h"
 #include "model/shared/normalisation.h"
 #include "render/constants.h"
 
@@ -15,12 +16,6 @@ using Vector = std::array<double, 3>;
 
 double Bounded(const CompactAttribute& attribute, double y) {
   return attribute.bound * std::tanh(attribute.gain * y / attribute.bound);
-}
-
-// ln of sqrt(exp(2·log_scale) + exp(log_variance)).
-double Widened(double log_scale, double log_variance) {
-  const double high = std::max(2 * log_scale, log_variance), low = std::min(2 * log_scale, log_variance);
-  return 0.5 * (high + std::log1p(std::exp(low - high)));
 }
 
 }  // namespace
@@ -45,7 +40,7 @@ void WriteCopies(const CompactConfig& config, const CopyStart& start, const Comp
     const double f = anchors.strength + Bounded(kStrengthAttribute, double{fade} * raw[0]);
     const double gain = std::max(kLeastGain, f - 1 / (anchors.upscale * anchors.upscale));
     const double log_variance = std::log(kDilation * gain) + 2 * std::log(p);
-    for (double& s : log_scale) s = Widened(s, log_variance);
+    for (double& s : log_scale) s = WidenedLogScale(s, log_variance);
   }
   Vector unit;
   for (size_t a = 0; a < 3; ++a) {

@@ -26,16 +26,6 @@ constexpr float kLargestSh = 10;
 constexpr int64_t kHeadRows = 1024;
 constexpr uint64_t kUpstreamSubsetSeed = 918;
 
-bool AllFinite(const float* values, int64_t count) {
-  return std::all_of(values, values + count, [](float v) { return std::isfinite(v); });
-}
-
-bool RowIsFinite(const GaussianCloud& cloud, int64_t i) {
-  return AllFinite(cloud.means.data() + 3 * i, 3) && AllFinite(cloud.log_scales.data() + 3 * i, 3) &&
-         AllFinite(cloud.quats.data() + 4 * i, 4) && std::isfinite(cloud.opacity_logits[static_cast<size_t>(i)]) &&
-         AllFinite(cloud.sh.data() + i * cloud.sh_stride(), cloud.sh_stride());
-}
-
 // What is legal and infinite (core/gaussian_cloud.h, IsUsable) as the nearest that a network can read: opacities of 0
 // and 1, and the missing lengths of flat Gaussians, thin beside their longest axis. Nothing where all is finite.
 std::optional<GaussianCloud> WithoutInfinities(const GaussianCloud& cloud) {
@@ -159,7 +149,7 @@ void DropRows(GaussianCloud& out, const PublishedOptions& options, PublishedRepo
                           : 0;
   int64_t kept = 0;
   for (int64_t i = 0; i < out.size(); ++i) {
-    if (!RowIsFinite(out, i)) {
+    if (!IsFinite(out, i)) {
       ++report.output_not_finite;
       continue;
     }
@@ -237,7 +227,7 @@ Result<PublishedResult> Run(const GaussianCloud& given, const PublishedNetwork& 
 
   std::vector<int64_t> anchors;
   for (int64_t i = 0; i < cloud.size(); ++i) {
-    if (RowIsFinite(cloud, i)) anchors.push_back(i);
+    if (IsFinite(cloud, i)) anchors.push_back(i);
   }
   report.not_finite = cloud.size() - static_cast<int64_t>(anchors.size());
   if (report.not_finite > 0) {

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <string>
 
+#include "core/fingerprint.h"
+
 namespace anchorsplat {
 
 namespace {
@@ -30,8 +32,9 @@ WeightSource HashWeights() {
     } else if (name.ends_with(".weight")) {
       centre = 1;
     }
-    uint64_t hash = 0xcbf29ce484222325ull;
-    for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ull;
+    Fingerprint print;
+    print.Add(name);
+    const uint64_t hash = print.value();
     for (size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(centre + scale * HashUniform(hash, i));
     return {};
   };

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <span>
 
+#include "core/fingerprint.h"
 #include "model/published/feature_rows.h"
 #include "model/published/published_checkpoint.h"
 #include "model/published/torch/published_module.h"
@@ -22,17 +23,6 @@ struct Prepared {
   torch::Tensor features;  // [N,59] of the normalised splat
   Hierarchy hierarchy;
 };
-
-// A number that changes with any value of the splat and with nothing else: a resumed training draws the same orders.
-uint64_t Fingerprint(std::span<const float> values) {
-  uint64_t hash = 0xcbf29ce484222325;
-  for (const float value : values) {
-    uint32_t bits = 0;
-    std::memcpy(&bits, &value, sizeof(bits));
-    hash = (hash ^ bits) * 0x100000001b3;
-  }
-  return hash;
-}
 
 // The published network (Point Transformer V3 with six heads) behind the training loop's interface.
 class AnchorSplatTrainable : public TrainableNetwork {
@@ -72,7 +62,10 @@ Result<std::shared_ptr<void>> AnchorSplatTrainable::Prepare(const NetworkInput& 
       torch::cat({in_cube, g.log_scales.to(torch::kCPU) + to_cube.LogScale(),
                   g.opacity_logits.to(torch::kCPU).unsqueeze(1), g.quats.to(torch::kCPU), sh.flatten(1)},
                  1);
-  const Shuffles shuffles = shuffle_ ? ShufflesFromSeed(Fingerprint(values)) : kNoShuffles;
+  // A number that changes with any value of the splat and with nothing else: a resumed training draws the same orders.
+  Fingerprint print;
+  print.AddWords(values);
+  const Shuffles shuffles = shuffle_ ? ShufflesFromSeed(print.value()) : kNoShuffles;
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Level> levels,
                                BuildHierarchy(GridVoxels(features.const_data_ptr<float>(), n, kFeatures),
                                               HierarchyOptionsFor(network_->config, shuffles)));

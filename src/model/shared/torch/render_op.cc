@@ -232,13 +232,4 @@ Result<std::vector<RenderedView>> RenderOp::operator()(const GaussianTensors& ga
   return views;
 }
 
-Camera Crop(const Camera& camera, const PixelBox& box) {
-  Camera cropped = camera;
-  cropped.intrinsics.width = box.x1 - box.x0;
-  cropped.intrinsics.height = box.y1 - box.y0;
-  cropped.intrinsics.cx -= box.x0;
-  cropped.intrinsics.cy -= box.y0;
-  return cropped;
-}
-
 }  // namespace anchorsplat

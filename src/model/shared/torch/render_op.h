@@ -23,7 +23,8 @@ struct RenderedView {
 // the rasterizer's own backward pass (which says where it is exact). Views are rendered side by side, one thread each
 // where there are as many views as threads; pictures and gradients are the same bits as those made one after the other.
 //
-// A part of a picture is rendered by a camera with a smaller size and a shifted principal point: see Crop.
+// A part of a picture is rendered by a camera with a smaller size and a shifted principal point: see Crop in
+// core/camera.h.
 //
 // Buffers are kept for the next call until the object and all graphs made by it are gone.
 class RenderOp {
@@ -45,8 +46,5 @@ class RenderOp {
  private:
   std::shared_ptr<Pool> pool_;
 };
-
-// The camera of pixels [box.x0, box.x1) × [box.y0, box.y1) of `camera`'s picture.
-Camera Crop(const Camera& camera, const PixelBox& box);
 
 }  // namespace anchorsplat

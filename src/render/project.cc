@@ -14,28 +14,13 @@
 #include <hwy/foreach_target.h>
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
+#include "render/projection-inl.h"
 // clang-format on
 
 HWY_BEFORE_NAMESPACE();
 namespace anchorsplat {
 namespace HWY_NAMESPACE {
 namespace {
-
-namespace hn = hwy::HWY_NAMESPACE;
-using D = hn::CappedTag<double, 8>;
-using V = hn::Vec<D>;
-using M = hn::Mask<D>;
-
-// Gaussians are turned from rows into columns this many at a time: long enough that a column is read after its stores
-// have left the store buffer, short enough for the L1 cache.
-constexpr size_t kBatch = 64;
-
-struct Columns {
-  alignas(64) double means[3][kBatch];
-  alignas(64) double log_scales[3][kBatch];
-  alignas(64) double quats[4][kBatch];
-  alignas(64) double logits[kBatch];
-};
 
 struct Projection {
   alignas(64) double x[kBatch], y[kBatch], z[kBatch];
@@ -45,39 +30,27 @@ struct Projection {
   alignas(64) double radius_x[kBatch], radius_y[kBatch];                                  // px, 0 where culled
 };
 
-// What does not depend on the Gaussian.
-struct View {
-  double r[9], t[3];
-  double fx, fy, cx, cy;
-  double left, right, up, down;  // limits of x/z and y/z in the Jacobian
-  double width, height;          // px
+// The view, and what only this direction needs of it.
+struct Frame {
+  View view;
+  double width, height;  // px
   double tiles_x, tiles_y;
-  double near_plane, far_plane, dilation, compensated_from;
+  double near_plane, far_plane;
   double log2_min_alpha;
 };
 
-View MakeView(const ProjectParams& p) {
-  View v;
-  std::copy(p.world_to_camera.rotation.begin(), p.world_to_camera.rotation.end(), v.r);
-  std::copy(p.world_to_camera.translation.begin(), p.world_to_camera.translation.end(), v.t);
-  const Pinhole& k = p.intrinsics;
-  v.fx = k.fx, v.fy = k.fy, v.cx = k.cx, v.cy = k.cy;
-  v.width = k.width, v.height = k.height;
-  const double margin_x = double{kFrustumMargin} * 0.5 * k.width / k.fx;
-  const double margin_y = double{kFrustumMargin} * 0.5 * k.height / k.fy;
-  v.left = -(k.cx / k.fx + margin_x);
-  v.right = (k.width - k.cx) / k.fx + margin_x;
-  v.up = -(k.cy / k.fy + margin_y);
-  v.down = (k.height - k.cy) / k.fy + margin_y;
-  v.tiles_x = TilesAcross(k.width);
-  v.tiles_y = TilesAcross(k.height);
-  v.near_plane = p.near_plane, v.far_plane = p.far_plane, v.dilation = p.dilation;
-  v.compensated_from = p.compensated_from;
-  v.log2_min_alpha = std::log2(double{p.min_alpha});
-  return v;
+Frame MakeFrame(const ProjectParams& p) {
+  return {.view = MakeView(p),
+          .width = static_cast<double>(p.intrinsics.width),
+          .height = static_cast<double>(p.intrinsics.height),
+          .tiles_x = static_cast<double>(TilesAcross(p.intrinsics.width)),
+          .tiles_y = static_cast<double>(TilesAcross(p.intrinsics.height)),
+          .near_plane = p.near_plane,
+          .far_plane = p.far_plane,
+          .log2_min_alpha = std::log2(double{p.min_alpha})};
 }
 
-void ReadColumns(const ProjectParams& p, int64_t first, size_t n, Columns& c) {
+void ReadColumns(const ProjectParams& p, int64_t first, size_t n, StoredColumns& c) {
   for (size_t j = 0; j < n; ++j) {
     const int64_t i = first + static_cast<int64_t>(j);
     for (int a = 0; a < 3; ++a) c.means[a][j] = p.means[3 * i + a];
@@ -103,24 +76,17 @@ HWY_INLINE V NotPositiveInfinity(D d, V x) {
 
 HWY_INLINE V IsNumber(D d, V x) { return hn::IfThenElseZero(hn::Eq(x, x), hn::Set(d, 1.0)); }
 
-HWY_INLINE V Dot3(V a0, V a1, V a2, V b0, V b1, V b2) {
-  return hn::MulAdd(a0, b0, hn::MulAdd(a1, b1, hn::Mul(a2, b2)));
-}
-
-HWY_INLINE V Clamped(D d, V x, double low, double high) {
-  return hn::Min(hn::Max(x, hn::Set(d, low)), hn::Set(d, high));
-}
-
 // One register of Gaussians, columns j … j + lanes − 1.
-HWY_INLINE void ProjectLanes(const View& view, RasterProfile profile, RenderMode mode, const Columns& in, size_t j,
-                             Projection& out) {
+HWY_INLINE void ProjectLanes(const Frame& frame, RasterProfile profile, RenderMode mode, const StoredColumns& in,
+                             size_t j, Projection& out) {
   const D d;
+  const View& view = frame.view;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0);
   const V mx = hn::Load(d, in.means[0] + j), my = hn::Load(d, in.means[1] + j), mz = hn::Load(d, in.means[2] + j);
   const V ls0 = hn::Load(d, in.log_scales[0] + j), ls1 = hn::Load(d, in.log_scales[1] + j),
           ls2 = hn::Load(d, in.log_scales[2] + j);
-  V qw = hn::Load(d, in.quats[0] + j), qx = hn::Load(d, in.quats[1] + j), qy = hn::Load(d, in.quats[2] + j),
-    qz = hn::Load(d, in.quats[3] + j);
+  const V qw = hn::Load(d, in.quats[0] + j), qx = hn::Load(d, in.quats[1] + j), qy = hn::Load(d, in.quats[2] + j),
+          qz = hn::Load(d, in.quats[3] + j);
   const V logit = hn::Load(d, in.logits + j);
 
   V usable = hn::Mul(hn::Mul(Finite(d, mx), Finite(d, my)), Finite(d, mz));
@@ -128,69 +94,27 @@ HWY_INLINE void ProjectLanes(const View& view, RasterProfile profile, RenderMode
   usable = hn::Mul(usable, hn::Mul(NotPositiveInfinity(d, ls0), NotPositiveInfinity(d, ls1)));
   usable = hn::Mul(usable, hn::Mul(NotPositiveInfinity(d, ls2), IsNumber(d, logit)));
 
-  // Camera space.
-  const double* r = view.r;
-  const V z = hn::Add(Dot3(hn::Set(d, r[6]), hn::Set(d, r[7]), hn::Set(d, r[8]), mx, my, mz), hn::Set(d, view.t[2]));
-  const V x = hn::Add(Dot3(hn::Set(d, r[0]), hn::Set(d, r[1]), hn::Set(d, r[2]), mx, my, mz), hn::Set(d, view.t[0]));
-  const V y = hn::Add(Dot3(hn::Set(d, r[3]), hn::Set(d, r[4]), hn::Set(d, r[5]), mx, my, mz), hn::Set(d, view.t[1]));
+  const V x = CameraSpace(d, view, in, j, 0), y = CameraSpace(d, view, in, j, 1), z = CameraSpace(d, view, in, j, 2);
   M keep = hn::And(hn::Gt(usable, zero),
-                   hn::And(hn::Ge(z, hn::Set(d, view.near_plane)), hn::Le(z, hn::Set(d, view.far_plane))));
-  const V safe_z = hn::IfThenElse(keep, z, one);
-  const V inverse_z = hn::Div(one, safe_z);
-  const V ratio_x = hn::Mul(x, inverse_z), ratio_y = hn::Mul(y, inverse_z);
-  const V px = hn::MulAdd(hn::Set(d, view.fx), ratio_x, hn::Set(d, view.cx));
-  const V py = hn::MulAdd(hn::Set(d, view.fy), ratio_y, hn::Set(d, view.cy));
-
-  // Rotation and scale.
-  const V norm2 = hn::Add(Dot3(qw, qx, qy, qw, qx, qy), hn::Mul(qz, qz));
-  const M zero_quat = hn::Eq(norm2, zero);
-  const V inverse_norm = hn::IfThenElse(zero_quat, one, hn::Div(one, hn::Sqrt(norm2)));
-  qw = hn::IfThenElse(zero_quat, one, hn::Mul(qw, inverse_norm));
-  qx = hn::Mul(qx, inverse_norm), qy = hn::Mul(qy, inverse_norm), qz = hn::Mul(qz, inverse_norm);
-  const V two = hn::Set(d, 2.0);
-  const V x2 = hn::Mul(two, qx), y2 = hn::Mul(two, qy), z2 = hn::Mul(two, qz);
-  const V r00 = hn::NegMulAdd(y2, qy, hn::NegMulAdd(z2, qz, one)), r01 = hn::MulSub(x2, qy, hn::Mul(z2, qw)),
-          r02 = hn::MulAdd(x2, qz, hn::Mul(y2, qw));
-  const V r10 = hn::MulAdd(x2, qy, hn::Mul(z2, qw)), r11 = hn::NegMulAdd(x2, qx, hn::NegMulAdd(z2, qz, one)),
-          r12 = hn::MulSub(y2, qz, hn::Mul(x2, qw));
-  const V r20 = hn::MulSub(x2, qz, hn::Mul(y2, qw)), r21 = hn::MulAdd(y2, qz, hn::Mul(x2, qw)),
-          r22 = hn::NegMulAdd(x2, qx, hn::NegMulAdd(y2, qy, one));
-  // Above ln(1e300) the covariance is infinite and culled below; the bound only keeps exp inside its domain.
-  const V top = hn::Set(d, 690.0);
-  const V s0 = hn::Exp(d, hn::Min(ls0, top)), s1 = hn::Exp(d, hn::Min(ls1, top)), s2 = hn::Exp(d, hn::Min(ls2, top));
-
-  // A = J·R (rows for image x and y), B = A·R_q·S, Σ₂ = B·Bᵀ.
-  const V u = Clamped(d, ratio_x, view.left, view.right), v = Clamped(d, ratio_y, view.up, view.down);
-  const V focal_x = hn::Mul(hn::Set(d, view.fx), inverse_z), focal_y = hn::Mul(hn::Set(d, view.fy), inverse_z);
-  const V a0 = hn::Mul(focal_x, hn::NegMulAdd(u, hn::Set(d, r[6]), hn::Set(d, r[0]))),
-          a1 = hn::Mul(focal_x, hn::NegMulAdd(u, hn::Set(d, r[7]), hn::Set(d, r[1]))),
-          a2 = hn::Mul(focal_x, hn::NegMulAdd(u, hn::Set(d, r[8]), hn::Set(d, r[2])));
-  const V a3 = hn::Mul(focal_y, hn::NegMulAdd(v, hn::Set(d, r[6]), hn::Set(d, r[3]))),
-          a4 = hn::Mul(focal_y, hn::NegMulAdd(v, hn::Set(d, r[7]), hn::Set(d, r[4]))),
-          a5 = hn::Mul(focal_y, hn::NegMulAdd(v, hn::Set(d, r[8]), hn::Set(d, r[5])));
-  const V b0 = hn::Mul(s0, Dot3(a0, a1, a2, r00, r10, r20)), b1 = hn::Mul(s1, Dot3(a0, a1, a2, r01, r11, r21)),
-          b2 = hn::Mul(s2, Dot3(a0, a1, a2, r02, r12, r22));
-  const V b3 = hn::Mul(s0, Dot3(a3, a4, a5, r00, r10, r20)), b4 = hn::Mul(s1, Dot3(a3, a4, a5, r01, r11, r21)),
-          b5 = hn::Mul(s2, Dot3(a3, a4, a5, r02, r12, r22));
-  const V sharp_xx = Dot3(b0, b1, b2, b0, b1, b2), xy = Dot3(b0, b1, b2, b3, b4, b5),
-          sharp_yy = Dot3(b3, b4, b5, b3, b4, b5);
-  const V dilation = hn::Set(d, view.dilation);
-  const V xx = hn::Add(sharp_xx, dilation), yy = hn::Add(sharp_yy, dilation);
-  const V det = hn::MulSub(xx, yy, hn::Mul(xy, xy));
+                   hn::And(hn::Ge(z, hn::Set(d, frame.near_plane)), hn::Le(z, hn::Set(d, frame.far_plane))));
+  const Shape shape = ShapeOf(d, view, in, j, x, y, hn::IfThenElse(keep, z, one));
+  const V px = hn::MulAdd(hn::Set(d, view.fx), shape.ratio_x, hn::Set(d, view.cx));
+  const V py = hn::MulAdd(hn::Set(d, view.fy), shape.ratio_y, hn::Set(d, view.cy));
+  const Covariance covariance = CovarianceOf(d, view, shape);
+  const V xx = covariance.xx, xy = covariance.xy, yy = covariance.yy, det = covariance.det;
   keep = hn::And(keep, hn::And(hn::Gt(det, zero), hn::Lt(det, hn::Set(d, 1e300))));  // false for NaN, too
   const V safe_det = hn::IfThenElse(keep, det, one);
 
   // Opacity.
   V compensation = one;
   if (mode == RenderMode::kAntialiased) {
-    const V from = hn::Set(d, view.compensated_from);
-    const V kept_det = hn::Max(zero, hn::MulSub(hn::Add(sharp_xx, from), hn::Add(sharp_yy, from), hn::Mul(xy, xy)));
+    const V kept_det = hn::Max(zero, covariance.from_det);
     compensation = hn::Sqrt(hn::Div(kept_det, safe_det));
   }
-  const V opacity = hn::Div(compensation, hn::Add(one, hn::Exp(d, hn::Min(hn::Neg(logit), top))));
+  const V opacity = hn::Div(compensation, hn::Add(one, ExpInDomain(d, hn::Neg(logit))));
   const V log2_opacity =  // the bound keeps log inside its domain; such an opacity is culled
       hn::Mul(hn::Set(d, std::numbers::log2e), hn::Log(d, hn::Max(opacity, hn::Set(d, 1e-300))));
-  const V room = hn::Sub(log2_opacity, hn::Set(d, view.log2_min_alpha));             // log2(opacity / min_alpha)
+  const V room = hn::Sub(log2_opacity, hn::Set(d, frame.log2_min_alpha));            // log2(opacity / min_alpha)
   const V reach2 = hn::Mul(hn::Set(d, 2 * std::numbers::ln2), hn::Max(room, zero));  // σ² where α = min_alpha
 
   // Radius and square of the profile.
@@ -206,7 +130,7 @@ HWY_INLINE void ProjectLanes(const View& view, RasterProfile profile, RenderMode
     radius_x = hn::Ceil(hn::Mul(extent, hn::Sqrt(xx)));
     radius_y = hn::Ceil(hn::Mul(extent, hn::Sqrt(yy)));
   }
-  const V width = hn::Set(d, view.width), height = hn::Set(d, view.height);
+  const V width = hn::Set(d, frame.width), height = hn::Set(d, frame.height);
   keep = hn::And(keep, hn::And(hn::And(hn::Gt(hn::Add(px, radius_x), zero), hn::Lt(hn::Sub(px, radius_x), width)),
                                hn::And(hn::Gt(hn::Add(py, radius_y), zero), hn::Lt(hn::Sub(py, radius_y), height))));
   hn::Store(hn::IfThenElseZero(keep, radius_x), d, out.radius_x + j);
@@ -227,8 +151,8 @@ HWY_INLINE void ProjectLanes(const View& view, RasterProfile profile, RenderMode
       hn::Min(hn::Ceil(hn::Mul(hn::Add(px, radius_x), per_tile)), hn::Add(hn::Floor(hn::Mul(box_x1, per_tile)), one));
   const V y1 =
       hn::Min(hn::Ceil(hn::Mul(hn::Add(py, radius_y), per_tile)), hn::Add(hn::Floor(hn::Mul(box_y1, per_tile)), one));
-  const V cut_x0 = Clamped(d, x0, 0, view.tiles_x), cut_x1 = Clamped(d, x1, 0, view.tiles_x);
-  const V cut_y0 = Clamped(d, y0, 0, view.tiles_y), cut_y1 = Clamped(d, y1, 0, view.tiles_y);
+  const V cut_x0 = Clamped(d, x0, 0, frame.tiles_x), cut_x1 = Clamped(d, x1, 0, frame.tiles_x);
+  const V cut_y0 = Clamped(d, y0, 0, frame.tiles_y), cut_y1 = Clamped(d, y1, 0, frame.tiles_y);
   keep = hn::And(keep, hn::And(hn::Lt(cut_x0, cut_x1), hn::Lt(cut_y0, cut_y1)));
   hn::Store(hn::IfThenElseZero(keep, cut_x0), d, out.tile_x0 + j);
   hn::Store(hn::IfThenElseZero(keep, cut_x1), d, out.tile_x1 + j);
@@ -250,8 +174,8 @@ HWY_INLINE void ProjectLanes(const View& view, RasterProfile profile, RenderMode
 
 // Gaussians [first, last): at most one chunk.
 void ProjectChunk(const ProjectParams& p, int64_t first, int64_t last) {
-  const View view = MakeView(p);
-  Columns in;
+  const Frame frame = MakeFrame(p);
+  StoredColumns in;
   Projection out;
   const size_t lanes = hn::Lanes(D());
   int32_t* visible = p.visible + first;
@@ -259,7 +183,7 @@ void ProjectChunk(const ProjectParams& p, int64_t first, int64_t last) {
   for (int64_t begin = first; begin < last; begin += static_cast<int64_t>(kBatch)) {
     const size_t n = static_cast<size_t>(std::min<int64_t>(kBatch, last - begin));
     ReadColumns(p, begin, n, in);
-    for (size_t j = 0; j < n; j += lanes) ProjectLanes(view, p.profile, p.mode, in, j, out);
+    for (size_t j = 0; j < n; j += lanes) ProjectLanes(frame, p.profile, p.mode, in, j, out);
     for (size_t j = 0; j < n; ++j) {
       const int64_t i = begin + static_cast<int64_t>(j);
       if (p.radii != nullptr) {

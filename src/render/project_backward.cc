@@ -17,6 +17,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
+#include "render/projection-inl.h"
 // clang-format on
 
 HWY_BEFORE_NAMESPACE();
@@ -24,19 +25,10 @@ namespace anchorsplat {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using D = hn::CappedTag<double, 8>;
-using V = hn::Vec<D>;
-using M = hn::Mask<D>;
-
-constexpr size_t kBatch = 64;
 constexpr ptrdiff_t kAhead = 24;  // Gaussians that are fetched ahead: rows are large and not all of them are needed
 
 struct Columns {
-  alignas(64) double means[3][kBatch];
-  alignas(64) double log_scales[3][kBatch];
-  alignas(64) double quats[4][kBatch];
-  alignas(64) double logits[kBatch];
+  StoredColumns stored;
   alignas(64) double u_xx[kBatch], u_xy[kBatch], u_yy[kBatch];
   alignas(64) double q[kBatch], qu[kBatch], qv[kBatch], quu[kBatch], quv[kBatch], qvv[kBatch];
 };
@@ -49,41 +41,14 @@ struct Gradients {
   alignas(64) double means2d[2][kBatch];
 };
 
-// What does not depend on the Gaussian.
-struct View {
-  double r[9], t[3];
-  double fx, fy;
-  double left, right, up, down;  // limits of x/z and y/z in the Jacobian, as in ProjectCpu
-  double dilation, compensated_from;
-  bool antialiased;
-};
-
-View MakeView(const ProjectBackwardParams& p) {
-  View v;
-  std::copy(p.world_to_camera.rotation.begin(), p.world_to_camera.rotation.end(), v.r);
-  std::copy(p.world_to_camera.translation.begin(), p.world_to_camera.translation.end(), v.t);
-  const Pinhole& k = p.intrinsics;
-  v.fx = k.fx, v.fy = k.fy;
-  const double margin_x = double{kFrustumMargin} * 0.5 * k.width / k.fx;
-  const double margin_y = double{kFrustumMargin} * 0.5 * k.height / k.fy;
-  v.left = -(k.cx / k.fx + margin_x);
-  v.right = (k.width - k.cx) / k.fx + margin_x;
-  v.up = -(k.cy / k.fy + margin_y);
-  v.down = (k.height - k.cy) / k.fy + margin_y;
-  v.dilation = p.dilation;
-  v.compensated_from = p.compensated_from;
-  v.antialiased = p.mode == RenderMode::kAntialiased;
-  return v;
-}
-
 void ReadColumns(const ProjectBackwardParams& p, const int32_t* rows, size_t n, Columns& c) {
   const size_t end = std::min(kBatch, (n + 7) / 8 * 8);
   for (size_t j = 0; j < end; ++j) {
     const int64_t i = rows[std::min(j, n - 1)];  // the last register is filled up with one that is not written
-    for (int a = 0; a < 3; ++a) c.means[a][j] = p.means[3 * i + a];
-    for (int a = 0; a < 3; ++a) c.log_scales[a][j] = p.log_scales[3 * i + a];
-    for (int a = 0; a < 4; ++a) c.quats[a][j] = p.quats[4 * i + a];
-    c.logits[j] = p.opacity_logits[i];
+    for (int a = 0; a < 3; ++a) c.stored.means[a][j] = p.means[3 * i + a];
+    for (int a = 0; a < 3; ++a) c.stored.log_scales[a][j] = p.log_scales[3 * i + a];
+    for (int a = 0; a < 4; ++a) c.stored.quats[a][j] = p.quats[4 * i + a];
+    c.stored.logits[j] = p.opacity_logits[i];
     const ProjectedGaussian& g = p.projected[i];
     c.u_xx[j] = g.u_xx;
     c.u_xy[j] = g.u_xy;
@@ -98,56 +63,16 @@ void ReadColumns(const ProjectBackwardParams& p, const int32_t* rows, size_t n, 
   }
 }
 
-HWY_INLINE V Dot3(V a0, V a1, V a2, V b0, V b1, V b2) {
-  return hn::MulAdd(a0, b0, hn::MulAdd(a1, b1, hn::Mul(a2, b2)));
-}
-
-// One register of Gaussians, columns j … j + lanes − 1. First again what ProjectCpu calculates, under the same names,
-// then its gradients in the opposite order; g_x is ∂L/∂x.
-HWY_INLINE void BackwardLanes(const View& view, const Columns& in, size_t j, Gradients& out) {
+// One register of Gaussians, columns j … j + lanes − 1: the gradients of what ProjectCpu calculates, in the opposite
+// order; g_x is ∂L/∂x.
+HWY_INLINE void BackwardLanes(const View& view, bool antialiased, const Columns& in, size_t j, Gradients& out) {
   const D d;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0), two = hn::Set(d, 2.0);
-  const V mx = hn::Load(d, in.means[0] + j), my = hn::Load(d, in.means[1] + j), mz = hn::Load(d, in.means[2] + j);
   const double* r = view.r;
-  const V z = hn::Add(Dot3(hn::Set(d, r[6]), hn::Set(d, r[7]), hn::Set(d, r[8]), mx, my, mz), hn::Set(d, view.t[2]));
-  const V x = hn::Add(Dot3(hn::Set(d, r[0]), hn::Set(d, r[1]), hn::Set(d, r[2]), mx, my, mz), hn::Set(d, view.t[0]));
-  const V y = hn::Add(Dot3(hn::Set(d, r[3]), hn::Set(d, r[4]), hn::Set(d, r[5]), mx, my, mz), hn::Set(d, view.t[1]));
-  const V inverse_z = hn::Div(one, z);
-  const V ratio_x = hn::Mul(x, inverse_z), ratio_y = hn::Mul(y, inverse_z);
-
-  V qw = hn::Load(d, in.quats[0] + j), qx = hn::Load(d, in.quats[1] + j), qy = hn::Load(d, in.quats[2] + j),
-    qz = hn::Load(d, in.quats[3] + j);
-  const V norm2 = hn::Add(Dot3(qw, qx, qy, qw, qx, qy), hn::Mul(qz, qz));
-  const M zero_quat = hn::Eq(norm2, zero);
-  const V inverse_norm = hn::IfThenElse(zero_quat, one, hn::Div(one, hn::Sqrt(norm2)));
-  qw = hn::IfThenElse(zero_quat, one, hn::Mul(qw, inverse_norm));
-  qx = hn::Mul(qx, inverse_norm), qy = hn::Mul(qy, inverse_norm), qz = hn::Mul(qz, inverse_norm);
-  const V x2 = hn::Mul(two, qx), y2 = hn::Mul(two, qy), z2 = hn::Mul(two, qz);
-  const V r00 = hn::NegMulAdd(y2, qy, hn::NegMulAdd(z2, qz, one)), r01 = hn::MulSub(x2, qy, hn::Mul(z2, qw)),
-          r02 = hn::MulAdd(x2, qz, hn::Mul(y2, qw));
-  const V r10 = hn::MulAdd(x2, qy, hn::Mul(z2, qw)), r11 = hn::NegMulAdd(x2, qx, hn::NegMulAdd(z2, qz, one)),
-          r12 = hn::MulSub(y2, qz, hn::Mul(x2, qw));
-  const V r20 = hn::MulSub(x2, qz, hn::Mul(y2, qw)), r21 = hn::MulAdd(y2, qz, hn::Mul(x2, qw)),
-          r22 = hn::NegMulAdd(x2, qx, hn::NegMulAdd(y2, qy, one));
-  const V top = hn::Set(d, 690.0);  // only keeps exp inside its domain: such Gaussians are culled
-  const V s0 = hn::Exp(d, hn::Min(hn::Load(d, in.log_scales[0] + j), top)),
-          s1 = hn::Exp(d, hn::Min(hn::Load(d, in.log_scales[1] + j), top)),
-          s2 = hn::Exp(d, hn::Min(hn::Load(d, in.log_scales[2] + j), top));
-
-  // A = J·R (rows for image x and y), E = A·R_q, B = E·S, Σ₂ = B·Bᵀ.
-  const V u = hn::Min(hn::Max(ratio_x, hn::Set(d, view.left)), hn::Set(d, view.right));
-  const V v = hn::Min(hn::Max(ratio_y, hn::Set(d, view.up)), hn::Set(d, view.down));
-  const V focal_x = hn::Mul(hn::Set(d, view.fx), inverse_z), focal_y = hn::Mul(hn::Set(d, view.fy), inverse_z);
-  const V a0 = hn::Mul(focal_x, hn::NegMulAdd(u, hn::Set(d, r[6]), hn::Set(d, r[0]))),
-          a1 = hn::Mul(focal_x, hn::NegMulAdd(u, hn::Set(d, r[7]), hn::Set(d, r[1]))),
-          a2 = hn::Mul(focal_x, hn::NegMulAdd(u, hn::Set(d, r[8]), hn::Set(d, r[2])));
-  const V a3 = hn::Mul(focal_y, hn::NegMulAdd(v, hn::Set(d, r[6]), hn::Set(d, r[3]))),
-          a4 = hn::Mul(focal_y, hn::NegMulAdd(v, hn::Set(d, r[7]), hn::Set(d, r[4]))),
-          a5 = hn::Mul(focal_y, hn::NegMulAdd(v, hn::Set(d, r[8]), hn::Set(d, r[5])));
-  const V b0 = hn::Mul(s0, Dot3(a0, a1, a2, r00, r10, r20)), b1 = hn::Mul(s1, Dot3(a0, a1, a2, r01, r11, r21)),
-          b2 = hn::Mul(s2, Dot3(a0, a1, a2, r02, r12, r22));
-  const V b3 = hn::Mul(s0, Dot3(a3, a4, a5, r00, r10, r20)), b4 = hn::Mul(s1, Dot3(a3, a4, a5, r01, r11, r21)),
-          b5 = hn::Mul(s2, Dot3(a3, a4, a5, r02, r12, r22));
+  const Shape shape = ShapeOf(d, view, in.stored, j, CameraSpace(d, view, in.stored, j, 0),
+                              CameraSpace(d, view, in.stored, j, 1), CameraSpace(d, view, in.stored, j, 2));
+  const auto& [inverse_z, ratio_x, ratio_y, focal_x, focal_y, u, v, qw, qx, qy, qz, inverse_norm, zero_quat, r00, r01,
+               r02, r10, r11, r12, r20, r21, r22, s0, s1, s2, a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, b5] = shape;
 
   // ln α = ln o − ½ dᵀΣ₂⁻¹d, and with W the factor that gives (u, v) = W·d, Σ₂⁻¹ = 2 ln 2·WᵀW. So
   //   ∂L/∂mean2d = Σ q·Σ₂⁻¹d = 2 ln 2·Wᵀ Σ q·(u, v),   ∂L/∂Σ₂ = ½ Σ q·Σ₂⁻¹d dᵀΣ₂⁻¹ = 2 ln²2·Wᵀ(Σ q·(u, v)(u, v)ᵀ)W.
@@ -164,15 +89,9 @@ HWY_INLINE void BackwardLanes(const View& view, const Columns& in, size_t j, Gra
   V g_xx = hn::Mul(scale, hn::Mul(w_xx, hn::Mul(w_xx, quu)));
   V g_xy = hn::Mul(scale, hn::Mul(w_xx, left_x));  // of each of the two equal entries
   V g_yy = hn::Mul(scale, hn::MulAdd(w_xy, left_x, hn::Mul(w_yy, left_y)));
-  if (view.antialiased) {
+  if (antialiased) {
     // o = sigmoid·sqrt(det Σ_from / det Σ₂), Σ_from with the lesser dilation:  ∂ln o/∂Σ = ½ (Σ_from⁻¹ − Σ₂⁻¹).
-    const V sharp_xx = Dot3(b0, b1, b2, b0, b1, b2), xy = Dot3(b0, b1, b2, b3, b4, b5),
-            sharp_yy = Dot3(b3, b4, b5, b3, b4, b5);
-    const V dilation = hn::Set(d, view.dilation), from = hn::Set(d, view.compensated_from);
-    const V xx = hn::Add(sharp_xx, dilation), yy = hn::Add(sharp_yy, dilation);
-    const V from_xx = hn::Add(sharp_xx, from), from_yy = hn::Add(sharp_yy, from);
-    const V from_det = hn::MulSub(from_xx, from_yy, hn::Mul(xy, xy));
-    const V det = hn::MulSub(xx, yy, hn::Mul(xy, xy));
+    const auto& [xx, xy, yy, det, from_xx, from_yy, from_det] = CovarianceOf(d, view, shape);
     // Where the determinant is 0, so was the opacity, and the Gaussian is not here.
     const V half_q = hn::Mul(hn::Set(d, 0.5), q);
     const V by_from = hn::IfThenElseZero(hn::Gt(from_det, zero), hn::Div(half_q, from_det));
@@ -239,7 +158,7 @@ HWY_INLINE void BackwardLanes(const View& view, const Columns& in, size_t j, Gra
               out.means[a] + j);
   }
   // ∂ln sigmoid(x)/∂x = 1/(1 + e^x).
-  hn::Store(hn::Div(q, hn::Add(one, hn::Exp(d, hn::Min(hn::Load(d, in.logits + j), top)))), d, out.logits + j);
+  hn::Store(hn::Div(q, hn::Add(one, ExpInDomain(d, hn::Load(d, in.stored.logits + j)))), d, out.logits + j);
 }
 
 // Gaussians of one chunk.
@@ -252,6 +171,7 @@ void BackwardChunk(const ProjectBackwardParams& p, int64_t chunk) {
   std::fill_n(p.means2d + 2 * first, 2 * n_all, 0.0f);
 
   const View view = MakeView(p);
+  const bool antialiased = p.mode == RenderMode::kAntialiased;
   const size_t lanes = hn::Lanes(D());
   Columns in;
   Gradients out;
@@ -272,7 +192,7 @@ void BackwardChunk(const ProjectBackwardParams& p, int64_t chunk) {
     }
     if (n == 0) break;
     ReadColumns(p, rows, n, in);
-    for (size_t j = 0; j < n; j += lanes) BackwardLanes(view, in, j, out);
+    for (size_t j = 0; j < n; j += lanes) BackwardLanes(view, antialiased, in, j, out);
     for (size_t j = 0; j < n; ++j) {
       const int64_t i = rows[j];
       for (int a = 0; a < 3; ++a) p.mean_gradients[3 * i + a] = static_cast<float>(out.means[a][j]);

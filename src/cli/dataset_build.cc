@@ -66,7 +66,6 @@ Status RunBuild(const BuildFlags& flags, Program& program) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto resolved, ResolveAddresses(listed, flags.objects));
     meshes.insert(meshes.end(), resolved.begin(), resolved.end());
   }
-  options.stop = &StopSignal::requested();
   std::optional<StopSignal> stop_signal(std::in_place);
   auto built = BuildDataset(meshes, flags.output, options);
   stop_signal.reset();
@@ -154,7 +153,7 @@ Status RunObject(const ObjectFlags& flags) {
   DieWithParent();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ObjectJob job, ReadObjectJob(flags.job));
   const StopSignal stop_signal;
-  const auto record = BuildObject(job, flags.output, &StopSignal::requested());
+  const auto record = BuildObject(job, flags.output);
   return record.ok() ? Status() : Status(record.error());
 }
 

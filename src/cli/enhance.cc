@@ -266,7 +266,6 @@ Status RunEnhance(const EnhanceFlags& flags, Program& program) {
   ANCHORSPLAT_RETURN_IF_ERROR(FinishModelOptions(flags));
   EnhanceOptions options = flags.options;
   options.seed = shared.seed;
-  options.control.stop = &StopSignal::requested();
   ANCHORSPLAT_ASSIGN_OR_RETURN(options.pixel_size, ParsePixelSize("--pixel-size", flags.pixel_size));
   if (!flags.cameras.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(options.cameras, ReadCameras(flags.cameras));

@@ -151,7 +151,6 @@ Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
   control.checkpoint_every = flags.checkpoint_every;
   control.resume = flags.resume;
   control.deliver = [&](const Fitted& fitted) { return WriteResults(flags, fitted, shared.overwrite); };
-  control.stop = &StopSignal::requested();
   control.outputs = OutputFiles(flags);
   if (!flags.init_splat.empty()) RecordSplat(flags.init_splat);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(flags.project, {.hold_out = flags.hold_out}));

@@ -24,7 +24,7 @@ void SetUnlessIgnored(int signal, void (*handler)(int)) {
 
 }  // namespace
 
-StopSignal::StopSignal() {
+StopSignal::StopSignal() : run_({.stop = &stop_requested}) {
   std::signal(SIGINT, RequestStop);
   std::signal(SIGTERM, RequestStop);
   SetUnlessIgnored(SIGHUP, RequestStop);
@@ -39,7 +39,5 @@ StopSignal::~StopSignal() {
   SetUnlessIgnored(SIGHUP, SIG_DFL);
   std::signal(SIGPIPE, SIG_DFL);
 }
-
-const std::atomic<bool>& StopSignal::requested() { return stop_requested; }
 
 }  // namespace anchorsplat

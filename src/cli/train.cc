@@ -87,7 +87,6 @@ Status RunTrain(TrainFlags& flags, const Program& program) {
   request.cache = flags.cache;
   request.start = flags.start;
   request.overwrite = program.flags.overwrite;
-  request.stop = &StopSignal::requested();
   std::optional<StopSignal> stop_signal(std::in_place);
   const auto report = program.trainer(request);
   stop_signal.reset();

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <utility>
 
+#include "core/run.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -78,19 +79,30 @@ class TerminalSink : public LogSink {
   Clock::time_point drawn_;
 };
 
-std::mutex& Mutex() {
+std::mutex& ProcessMutex() {
   static std::mutex mutex;
   return mutex;
 }
 
-std::shared_ptr<LogSink>& Sink() {
+std::shared_ptr<LogSink>& ProcessSink() {
   static std::shared_ptr<LogSink> sink = MakeTerminalSink(false);
   return sink;
 }
 
+// Calls say(sink) for the sink of the run, or the process's where the run has none; one event at a time.
+template <typename Say>
+void Tell(const std::shared_ptr<internal::Run>& run, Say&& say) {
+  if (run && run->context.sink) {
+    const std::lock_guard lock(run->log_mutex);
+    say(*run->context.sink);
+  } else {
+    const std::lock_guard lock(ProcessMutex());
+    say(*ProcessSink());
+  }
+}
+
 void Log(LogLevel level, const std::string& text) {
-  const std::lock_guard lock(Mutex());
-  Sink()->Message(level, text);
+  Tell(internal::CurrentRun(), [&](LogSink& sink) { sink.Message(level, text); });
 }
 
 }  // namespace
@@ -98,28 +110,27 @@ void Log(LogLevel level, const std::string& text) {
 std::shared_ptr<LogSink> MakeTerminalSink(bool quiet) { return std::make_shared<TerminalSink>(quiet); }
 
 std::shared_ptr<LogSink> SetLogSink(std::shared_ptr<LogSink> sink) {
-  const std::lock_guard lock(Mutex());
-  return std::exchange(Sink(), std::move(sink));
+  const std::lock_guard lock(ProcessMutex());
+  return std::exchange(ProcessSink(), std::move(sink));
 }
 
 void LogInfo(const std::string& text) { Log(LogLevel::kInfo, text); }
 void LogWarning(const std::string& text) { Log(LogLevel::kWarning, text); }
 void LogError(const std::string& text) { Log(LogLevel::kError, text); }
 
-Progress::Progress(const std::string& name, int64_t total) {
-  const std::lock_guard lock(Mutex());
-  Sink()->TaskBegin(name, total);
+Progress::Progress(const std::string& name, int64_t total) : run_(internal::CurrentRun()) {
+  Tell(run_, [&](LogSink& sink) { sink.TaskBegin(name, total); });
 }
 
 Progress::~Progress() {
-  const std::lock_guard lock(Mutex());
-  Sink()->TaskEnd();
+  Tell(run_, [](LogSink& sink) { sink.TaskEnd(); });
 }
 
 void Progress::Advance(int64_t steps, const std::string& note) {
-  const std::lock_guard lock(Mutex());
-  done_ += steps;
-  Sink()->TaskProgress(done_, note);
+  Tell(run_, [&](LogSink& sink) {
+    done_ += steps;
+    sink.TaskProgress(done_, note);
+  });
 }
 
 }  // namespace anchorsplat

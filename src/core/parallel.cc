@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "core/run.h"
+
 namespace anchorsplat {
 
 namespace {
@@ -25,9 +27,12 @@ void SetThreadCount(int threads) {
 }
 
 int ThreadCount() {
-  return static_cast<int>(
+  const size_t of_process =
       std::min<size_t>(static_cast<size_t>(tbb::info::default_concurrency()),
-                       tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism)));
+                       tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  const auto& run = internal::CurrentRun();
+  const int of_run = run ? run->context.threads : 0;
+  return of_run > 0 ? std::min(of_run, static_cast<int>(of_process)) : static_cast<int>(of_process);
 }
 
 namespace internal {
@@ -40,13 +45,23 @@ void ParallelRanges(int64_t begin, int64_t end, int64_t grain, RangeFunction fun
     function(context, begin, end);
     return;
   }
-  tbb::parallel_for(
-      int64_t{0}, chunks,
-      [&](int64_t chunk) {
-        const int64_t first = begin + chunk * grain;
-        function(context, first, std::min(end, first + grain));
-      },
-      tbb::simple_partitioner());
+  const auto one = [&](int64_t chunk) {
+    const int64_t first = begin + chunk * grain;
+    function(context, first, std::min(end, first + grain));
+  };
+  if (const std::shared_ptr<Run> run = CurrentRun()) {
+    run->arena.execute([&] {
+      tbb::parallel_for(
+          int64_t{0}, chunks,
+          [&](int64_t chunk) {
+            const TakePart part(run);
+            one(chunk);
+          },
+          tbb::simple_partitioner());
+    });
+    return;
+  }
+  tbb::parallel_for(int64_t{0}, chunks, one, tbb::simple_partitioner());
 }
 
 }  // namespace internal

@@ -7,9 +7,9 @@
 namespace anchorsplat {
 
 // Threads that parallel loops may use, for the whole process; 0 = as many as the machine has (the default). Call it
-// before the first loop, from one thread.
+// before the first loop, from one thread. A run may have fewer (core/run_context.h).
 void SetThreadCount(int threads);
-int ThreadCount();
+int ThreadCount();  // of the run that this thread takes part in
 
 namespace internal {
 using RangeFunction = void (*)(void* context, int64_t begin, int64_t end);

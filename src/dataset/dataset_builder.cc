@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "core/log.h"
+#include "core/run_context.h"
 #include "core/text.h"
 #include "dataset/file_lock.h"
 #include "dataset/job_list.h"
@@ -145,7 +146,7 @@ Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, 
   const auto ended = [&](int64_t i, const ProcessEnd& end) {
     const ObjectJob& job = *wanted[static_cast<size_t>(i)];
     const fs::path folder = BuildingFolder(dataset, job.name);
-    const bool stopping = options.stop != nullptr && options.stop->load();
+    const bool stopping = StopRequested();
     failures.erase(job.name);
     std::string note = job.name;
     auto record = end.ok() ? ReadRecord(dataset / job.name) : Error{ErrorCode::kIo, ""};
@@ -167,9 +168,8 @@ Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, 
     progress.Advance(1, note);
     return lists.ok();
   };
-  ANCHORSPLAT_RETURN_IF_ERROR(
-      RunProcesses(std::ssize(wanted), start, ended,
-                   {.jobs = options.jobs, .timeout_seconds = options.timeout_seconds, .stop = options.stop}));
+  ANCHORSPLAT_RETURN_IF_ERROR(RunProcesses(std::ssize(wanted), start, ended,
+                                           {.jobs = options.jobs, .timeout_seconds = options.timeout_seconds}));
   ANCHORSPLAT_RETURN_IF_ERROR(lists);
 
   for (const ObjectJob& job : jobs) {
@@ -177,7 +177,7 @@ Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, 
     const auto there = manifest.find(job.name);
     report.rejected += there != manifest.end() && there->second.rejected ? 1 : 0;
   }
-  report.interrupted = options.stop != nullptr && options.stop->load();
+  report.interrupted = StopRequested();
   report.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
   return report;
 }

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -22,7 +21,6 @@ struct DatasetBuildOptions {
   std::string licence;                      // of meshes that name none
   std::string creator;                      // likewise
   std::filesystem::path program;            // ours: runs `dataset object JOB -o DATASET`
-  const std::atomic<bool>* stop = nullptr;  // ends the build in order
 };
 
 struct DatasetBuildReport {

@@ -82,7 +82,7 @@ Result<RayTracer> PrepareMesh(const ObjectJob& job, ObjectRecord& record) {
   return RayTracer::Create(*std::move(mesh));
 }
 
-Status MakeViews(const ObjectJob& job, const fs::path& folder, const std::atomic<bool>* stop, ObjectRecord& record) {
+Status MakeViews(const ObjectJob& job, const fs::path& folder, ObjectRecord& record) {
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "mesh"));
   const auto begin = Clock::now();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const RayTracer tracer, PrepareMesh(job, record));
@@ -97,7 +97,7 @@ Status MakeViews(const ObjectJob& job, const fs::path& folder, const std::atomic
   record.low_size = options.low_size;
   record.high_size = options.high_size;
   record.background = options.background;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewSetCost cost, WriteViewSet(tracer, folder, options, stop));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewSetCost cost, WriteViewSet(tracer, folder, options));
   record.view_seconds = cost.seconds;
   if (!options.store_high) {
     ANCHORSPLAT_RETURN_IF_ERROR(WriteMeshFile(folder / kMeshName, tracer.mesh(), {.overwrite = true}));
@@ -106,14 +106,13 @@ Status MakeViews(const ObjectJob& job, const fs::path& folder, const std::atomic
 }
 
 // The views of an object that comes as pictures.
-Status CopyViews(const ObjectJob& job, const fs::path& folder, const std::atomic<bool>* stop, ObjectRecord& record) {
+Status CopyViews(const ObjectJob& job, const fs::path& folder, ObjectRecord& record) {
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "views"));
   PictureProjectOptions options;
   options.downscale = job.settings.downscale;
   options.background = job.settings.views.background;
   options.seed = job.settings.seed;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureProjectReport report,
-                               WritePictureProject(job.source, folder, options, stop));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureProjectReport report, WritePictureProject(job.source, folder, options));
   record.origin.name = job.name;
   record.fingerprint = Cat("pictures-", StableHash(job.source));
   record.views = report.views;
@@ -124,7 +123,7 @@ Status CopyViews(const ObjectJob& job, const fs::path& folder, const std::atomic
   return {};
 }
 
-Status FitSplat(const ObjectJob& job, const fs::path& folder, const std::atomic<bool>* stop, ObjectRecord& record) {
+Status FitSplat(const ObjectJob& job, const fs::path& folder, ObjectRecord& record) {
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "fit"));
   const fs::path low = folder / std::to_string(record.low_size);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(low, {.hold_out = job.settings.hold_out}));
@@ -145,7 +144,6 @@ Status FitSplat(const ObjectJob& job, const fs::path& folder, const std::atomic<
   control.resume = true;
   // A checkpoint of another version of the program is no reason to give the object up.
   control.anew_if_unfit = true;
-  control.stop = stop;
   control.deliver = [&](const Fitted& fitted) -> Status {
     if (fitted.report.interrupted) return {};
     ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "files"));
@@ -258,7 +256,7 @@ Result<ObjectJob> ReadObjectJob(const fs::path& path) {
   return job;
 }
 
-Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset, const std::atomic<bool>* stop) {
+Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset) {
   const fs::path folder = BuildingFolder(dataset, job.name);
   ANCHORSPLAT_RETURN_IF_ERROR(CheckPlace(job, dataset / job.name));  // before hours of work
   ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(folder.parent_path()));
@@ -275,7 +273,7 @@ Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset, 
     ANCHORSPLAT_RETURN_IF_ERROR(Recall(folder / kViewsDone, record));
   } else {
     const bool pictures = IsFolder(job.source);
-    ANCHORSPLAT_RETURN_IF_ERROR((pictures ? CopyViews : MakeViews)(job, folder, stop, record));
+    ANCHORSPLAT_RETURN_IF_ERROR((pictures ? CopyViews : MakeViews)(job, folder, record));
     if (record.origin.licence.empty() && !job.licence.empty()) {
       record.origin.licence = job.licence;
       record.origin.licence_source = "--licence";
@@ -286,7 +284,7 @@ Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset, 
   if (IsFile(folder / kRecordName)) {  // cut off while it got its name
     ANCHORSPLAT_RETURN_IF_ERROR(Recall(folder / kRecordName, record));
   } else {
-    ANCHORSPLAT_RETURN_IF_ERROR(FitSplat(job, folder, stop, record));
+    ANCHORSPLAT_RETURN_IF_ERROR(FitSplat(job, folder, record));
     record.rejected = record.train_psnr < job.settings.min_train_psnr;
     if (record.rejected) {
       record.reason = Cat("PSNR on the fit's own training views is ", Fixed(record.train_psnr, 2), " dB, below ",

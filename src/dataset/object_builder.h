@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <filesystem>
 #include <string>
 
@@ -36,9 +35,8 @@ std::filesystem::path CheckpointPath(const std::filesystem::path& low_folder, in
 // step. Whatever an earlier attempt has finished there is kept if it was made by the same job: views as a whole, the
 // fit up to its last checkpoint. Deterministic but for the seconds in the record.
 //
-// `stop` ends the fit in order (kInterrupted): the next attempt goes on from there. Other errors: kExists: a file, not
+// Asked to stop (core/run_context.h), the fit ends in order (kInterrupted): the next attempt goes on from there. Other errors: kExists: a file, not
 // a folder, has the object's name; those of the mesh, the views and the fit; the file `stage` says which.
-Result<ObjectRecord> BuildObject(const ObjectJob& job, const std::filesystem::path& dataset,
-                                 const std::atomic<bool>* stop);
+Result<ObjectRecord> BuildObject(const ObjectJob& job, const std::filesystem::path& dataset);
 
 }  // namespace anchorsplat

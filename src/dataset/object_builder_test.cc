@@ -4,6 +4,7 @@
 
 #include <iterator>
 
+#include "core/run_context.h"
 #include "dataset/scene_reader.h"
 #include "dataset/small_dataset_for_test.h"
 #include "io/folder_for_test.h"
@@ -21,7 +22,7 @@ std::string Bytes(const fs::path& path) {
 TEST(ObjectBuilder, MakesTheBenchmarksFiles) {
   const TestFolder folder;
   const ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
-  const auto record = BuildObject(job, folder / "set", nullptr);
+  const auto record = BuildObject(job, folder / "set");
   ASSERT_TRUE(record.ok()) << record.error().message;
   EXPECT_EQ(record->triangles, 4);
   EXPECT_EQ(record->initial_points, 60);
@@ -41,13 +42,15 @@ TEST(ObjectBuilder, MakesTheBenchmarksFiles) {
 TEST(ObjectBuilder, GoesOnWhereItWasStoppedAndGetsTheSame) {
   const TestFolder folder;
   const ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
-  ASSERT_TRUE(BuildObject(job, folder / "whole", nullptr).ok());
+  ASSERT_TRUE(BuildObject(job, folder / "whole").ok());
 
-  const std::atomic<bool> stop = true;
-  EXPECT_EQ(BuildObject(job, folder / "cut", &stop).error().code, ErrorCode::kInterrupted);
+  std::atomic<bool> stop = true;
+  const RunScope run({.stop = &stop});
+  EXPECT_EQ(BuildObject(job, folder / "cut").error().code, ErrorCode::kInterrupted);
   EXPECT_FALSE(fs::exists(folder / "cut/tetra"));
+  stop = false;
   // Views that were cut off are made anew, views that are done are not touched again.
-  ASSERT_TRUE(BuildObject(job, folder / "cut", nullptr).ok());
+  ASSERT_TRUE(BuildObject(job, folder / "cut").ok());
   for (const char* name : {"splat.ply", "12/images/003.png", "24/images/003.png", "12/sparse/0/points3D.bin",
                            "12/gaussian_splatting/ckpts/ckpt_59_rank0.pt"}) {
     EXPECT_TRUE(Bytes(folder / "whole/tetra" / name) == Bytes(folder / "cut/tetra" / name)) << name;
@@ -60,25 +63,27 @@ TEST(ObjectBuilder, KeepsFinishedViewsOfTheSameJobOnly) {
   job.settings.fit_steps = 200000;
   // Stopped by a fit that cannot begin: the project's pictures are gone.
   const fs::path building = BuildingFolder(folder.path(), "tetra");
-  ASSERT_TRUE(BuildObject(SmallJob(job.source, "other"), folder.path(), nullptr).ok());
+  ASSERT_TRUE(BuildObject(SmallJob(job.source, "other"), folder.path()).ok());
   fs::create_directories(building);
   fs::copy(folder / "other", building, fs::copy_options::recursive);
   std::ofstream(building / "views.json") << Bytes(folder / "other/record.json");
   // Another job's work: begun anew, so that the stop finds no views.
   const std::atomic<bool> stop = true;
-  EXPECT_EQ(BuildObject(job, folder.path(), &stop).error().code, ErrorCode::kInterrupted);
+  const RunScope run({.stop = &stop});
+  EXPECT_EQ(BuildObject(job, folder.path()).error().code, ErrorCode::kInterrupted);
   EXPECT_FALSE(fs::exists(building / "views.json"));
 }
 
 // A building folder whose views are done and whose fit was stopped at its first step.
 fs::path StoppedInItsFit(const ObjectJob& job, const fs::path& set) {
   const fs::path building = BuildingFolder(set, job.name);
-  EXPECT_TRUE(BuildObject(job, set, nullptr).ok());
+  EXPECT_TRUE(BuildObject(job, set).ok());
   fs::rename(set / job.name, building);
   fs::rename(building / "record.json", building / "views.json");
   std::ofstream(building / "job.json") << ToJsonText(job);
   const std::atomic<bool> stop = true;
-  EXPECT_EQ(BuildObject(job, set, &stop).error().code, ErrorCode::kInterrupted);
+  const RunScope run({.stop = &stop});
+  EXPECT_EQ(BuildObject(job, set).error().code, ErrorCode::kInterrupted);
   EXPECT_TRUE(fs::exists(building / "fit.checkpoint"));
   return building;
 }
@@ -91,13 +96,13 @@ TEST(ObjectBuilder, APictureAtFaultCostsNoCheckpoint) {
   const fs::path picture = building / "12/images/004.png";
   const std::string whole = Bytes(picture);
   fs::resize_file(picture, whole.size() / 2);
-  const auto failed = BuildObject(job, folder / "set", nullptr);
+  const auto failed = BuildObject(job, folder / "set");
   ASSERT_FALSE(failed.ok());
   EXPECT_EQ(failed.error().code, ErrorCode::kBadFile);
   EXPECT_NE(failed.error().message.find("004.png"), std::string::npos) << failed.error().message;
   EXPECT_TRUE(Bytes(building / "fit.checkpoint") == checkpoint);
   std::ofstream(picture, std::ios::binary) << whole;
-  EXPECT_TRUE(BuildObject(job, folder / "set", nullptr).ok());
+  EXPECT_TRUE(BuildObject(job, folder / "set").ok());
 }
 
 TEST(ObjectBuilder, ACheckpointAtFaultCostsNoObject) {
@@ -105,7 +110,7 @@ TEST(ObjectBuilder, ACheckpointAtFaultCostsNoObject) {
   const ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
   const fs::path building = StoppedInItsFit(job, folder / "set");
   fs::resize_file(building / "fit.checkpoint", fs::file_size(building / "fit.checkpoint") - 20);
-  const auto record = BuildObject(job, folder / "set", nullptr);
+  const auto record = BuildObject(job, folder / "set");
   ASSERT_TRUE(record.ok()) << record.error().message;
   EXPECT_FALSE(fs::exists(folder / "set/tetra/fit.checkpoint"));
 }
@@ -113,9 +118,9 @@ TEST(ObjectBuilder, ACheckpointAtFaultCostsNoObject) {
 TEST(ObjectBuilder, ReplacesAnOlderObject) {
   const TestFolder folder;
   ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
-  ASSERT_TRUE(BuildObject(job, folder / "set", nullptr).ok());
+  ASSERT_TRUE(BuildObject(job, folder / "set").ok());
   job.settings.views.rig.views = 3;
-  ASSERT_TRUE(BuildObject(job, folder / "set", nullptr).ok());
+  ASSERT_TRUE(BuildObject(job, folder / "set").ok());
   EXPECT_FALSE(fs::exists(folder / "set/tetra/12/images/008.png"));
   EXPECT_FALSE(fs::exists(BuildingFolder(folder / "set", "tetra.replaced")));
 }
@@ -125,14 +130,14 @@ TEST(ObjectBuilder, ReplacesNothingThatIsNoFolder) {
   ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
   fs::create_directories(folder / "set");
   std::ofstream(folder / "set/tetra") << "mine";
-  const auto record = BuildObject(job, folder / "set", nullptr);
+  const auto record = BuildObject(job, folder / "set");
   ASSERT_FALSE(record.ok());
   EXPECT_EQ(record.error().code, ErrorCode::kExists);
   EXPECT_NE(record.error().message.find("is no folder"), std::string::npos);
   EXPECT_EQ(Bytes(folder / "set/tetra"), "mine");
   // What was made waits for its place.
   fs::remove(folder / "set/tetra");
-  EXPECT_TRUE(BuildObject(job, folder / "set", nullptr).ok());
+  EXPECT_TRUE(BuildObject(job, folder / "set").ok());
 }
 
 TEST(ObjectBuilder, LicencesOfTheBuildAreForMeshesThatNameNone) {
@@ -140,13 +145,13 @@ TEST(ObjectBuilder, LicencesOfTheBuildAreForMeshesThatNameNone) {
   ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
   job.licence = "GPL-2.0-or-later";
   job.creator = "somebody";
-  const auto record = BuildObject(job, folder / "set", nullptr);
+  const auto record = BuildObject(job, folder / "set");
   ASSERT_TRUE(record.ok()) << record.error().message;
   EXPECT_EQ(record->origin.licence, "GPL-2.0-or-later");
   EXPECT_EQ(record->origin.licence_source, "--licence");
   EXPECT_EQ(record->origin.creator, "somebody");
   std::ofstream(folder / "LICENSE.txt") << "CC0";
-  const auto own = BuildObject(job, folder / "set2", nullptr);
+  const auto own = BuildObject(job, folder / "set2");
   ASSERT_TRUE(own.ok());
   EXPECT_EQ(own->origin.licence, "CC0-1.0");
   EXPECT_EQ(own->origin.licence_source, "LICENSE.txt");
@@ -156,7 +161,7 @@ TEST(ObjectBuilder, RejectsFitsFarFromTheirOwnViews) {
   const TestFolder folder;
   ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
   job.settings.min_train_psnr = 90;
-  const auto record = BuildObject(job, folder / "set", nullptr);
+  const auto record = BuildObject(job, folder / "set");
   ASSERT_TRUE(record.ok());
   EXPECT_TRUE(record->rejected);
   EXPECT_NE(record->reason.find("90"), std::string::npos);
@@ -166,9 +171,9 @@ TEST(ObjectBuilder, RejectsFitsFarFromTheirOwnViews) {
 TEST(ObjectBuilder, BadMeshesAreErrorsWithTheirStage) {
   const TestFolder folder;
   std::ofstream(folder / "empty.obj") << "v 0 0 0\n";
-  EXPECT_FALSE(BuildObject(SmallJob((folder / "empty.obj").string(), "empty"), folder / "set", nullptr).ok());
+  EXPECT_FALSE(BuildObject(SmallJob((folder / "empty.obj").string(), "empty"), folder / "set").ok());
   EXPECT_EQ(Bytes(BuildingFolder(folder / "set", "empty") / kStageName), "mesh");
-  EXPECT_EQ(BuildObject(SmallJob((folder / "none.obj").string(), "none"), folder / "set", nullptr).error().code,
+  EXPECT_EQ(BuildObject(SmallJob((folder / "none.obj").string(), "none"), folder / "set").error().code,
             ErrorCode::kNotFound);
 }
 

@@ -12,6 +12,7 @@
 #include "cameras/camera_io.h"
 #include "cameras/colmap_writer.h"
 #include "core/parallel.h"
+#include "core/run_context.h"
 #include "core/text.h"
 #include "fit/initial_points.h"
 #include "fit/training_views.h"
@@ -167,7 +168,7 @@ Image AreaAveraged(const Image& image, int width, int height) {
 }
 
 Result<PictureProjectReport> WritePictureProject(const fs::path& project, const fs::path& folder,
-                                                 const PictureProjectOptions& options, const std::atomic<bool>* stop) {
+                                                 const PictureProjectOptions& options) {
   const auto begin = Clock::now();
   const WriteOptions write{.overwrite = true};
   ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews views, OpenProject(project, {.hold_out = 0}));
@@ -196,7 +197,7 @@ Result<PictureProjectReport> WritePictureProject(const fs::path& project, const 
   ParallelFor(0, report.views, 1, [&](int64_t i, int64_t) {
     {
       const std::lock_guard<std::mutex> lock(mutex);
-      if (failed.ok() && stop != nullptr && stop->load()) {
+      if (failed.ok() && StopRequested()) {
         failed = Error{ErrorCode::kInterrupted, Cat(folder.string(), ": stopped while the views were made")};
       }
       if (!failed.ok()) return;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <filesystem>
 
@@ -30,14 +29,13 @@ struct PictureProjectReport {
 
 // Fills `folder` as WriteViewSet does (view_set.h), except that the files are called after the project's pictures, and
 // are PNGs whatever those were: copies, where they are PNGs too. NeRF-synthetic scenes give their training views only.
-// When `stop` becomes true it ends between two views (kInterrupted).
+// When the run is asked to stop (core/run_context.h) it ends between two views (kInterrupted).
 //
 // Errors: those of OpenProject and ReadImage; kBadArgument: cameras or sizes that differ from view to view (the layout
 // has one camera), pictures too small to be made smaller, views of one name.
 Result<PictureProjectReport> WritePictureProject(const std::filesystem::path& project,
                                                  const std::filesystem::path& folder,
-                                                 const PictureProjectOptions& options,
-                                                 const std::atomic<bool>* stop = nullptr);
+                                                 const PictureProjectOptions& options);
 
 // A smaller picture: every pixel is the average of the area it covers, colours weighted by alpha where there is one.
 // Sizes at least 1 and at most the picture's.

@@ -9,6 +9,7 @@
 #include "cameras/camera_io.h"
 #include "cameras/colmap_writer.h"
 #include "core/random.h"
+#include "core/run_context.h"
 #include "dataset/scene_reader.h"
 #include "dataset/small_dataset_for_test.h"
 #include "fit/training_views.h"
@@ -133,8 +134,9 @@ TEST(PictureProject, RefusesWhatTheLayoutCannotHold) {
   EXPECT_NE(mixed.error().message.find("different cameras"), std::string::npos);
   EXPECT_FALSE(WritePictureProject(folder / "none", folder / "out", {}).ok());
   const std::atomic<bool> stop = true;
+  const RunScope run({.stop = &stop});
   WriteNerfScene(folder / "lego", 2, 16);
-  EXPECT_EQ(WritePictureProject(folder / "lego", folder / "out", {}, &stop).error().code, ErrorCode::kInterrupted);
+  EXPECT_EQ(WritePictureProject(folder / "lego", folder / "out", {}).error().code, ErrorCode::kInterrupted);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include <system_error>
 #include <thread>
 
+#include "core/run_context.h"
 #include "core/text.h"
 
 extern char** environ;
@@ -87,7 +88,7 @@ Status RunProcesses(int64_t count, const std::function<ProcessTask(int64_t)>& ta
   bool stopping = false;
   Status failed;
   while (true) {
-    stopping |= options.stop != nullptr && options.stop->load();
+    stopping |= StopRequested();
     while (!stopping && next < count && std::ssize(running) < options.jobs) {
       auto pid = Start(task(next));
       if (!pid.ok()) {

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <map>
 
+#include "core/run_context.h"
 #include "dataset/file_lock.h"
 #include "io/folder_for_test.h"
 
@@ -55,7 +56,8 @@ TEST(ProcessPool, WhatTakesTooLongIsEndedWithItsChildren) {
 TEST(ProcessPool, StopsWhenAsked) {
   const TestFolder folder;
   const std::atomic<bool> stop = true;
-  EXPECT_TRUE(RunShell({"true", "true"}, {.jobs = 1, .stop = &stop}, folder).ends.empty());
+  const RunScope run({.stop = &stop});
+  EXPECT_TRUE(RunShell({"true", "true"}, {.jobs = 1}, folder).ends.empty());
   int64_t count = 0;
   const auto task = [&](int64_t) { return ProcessTask{{"/bin/true"}, folder / "log"}; };
   ASSERT_TRUE(RunProcesses(5, task, [&](int64_t, const ProcessEnd&) { return ++count < 2; }, {.jobs = 1}).ok());

@@ -11,6 +11,7 @@
 
 #include "core/file_system.h"
 #include "core/log.h"
+#include "core/run_context.h"
 #include "core/text.h"
 #include "enhance/refine_copies.h"
 #include "enhance/refine_pictures.h"
@@ -194,7 +195,7 @@ Status MakeSteps(Refiner& refiner, const RefineOptions& options, const RefineCon
                                         WithThousands(refiner.state().cloud.size()), " Gaussians"));
       shown = now;
     }
-    report.interrupted = control.stop != nullptr && control.stop->load() && done() < 1;
+    report.interrupted = StopRequested() && done() < 1;
     if (report.interrupted) break;
   }
   return {};

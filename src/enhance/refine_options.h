@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -37,7 +36,6 @@ struct RefineControl {
   std::filesystem::path checkpoint;
   bool resume = false;                         // go on from `checkpoint` if it is there
   std::vector<std::filesystem::path> outputs;  // that its caller writes, also when it was interrupted
-  const std::atomic<bool>* stop = nullptr;     // becomes true when the user wants to stop
 };
 
 inline constexpr int kMostCopies = 64;

@@ -9,6 +9,7 @@
 
 #include "core/log.h"
 #include "core/parallel.h"
+#include "core/run_context.h"
 #include "enhance/enhance.h"
 #include "enhance/filter.h"
 #include "enhance/refine_pictures.h"
@@ -216,7 +217,8 @@ TEST_F(Refinement, GoesOnWhereItWasStopped) {
   const auto whole = Refine(input_, options_, {});
   ASSERT_TRUE(whole.ok());
   std::atomic<bool> stop{true};  // after the first step
-  RefineControl control{.checkpoint = folder_ / "state", .outputs = {}, .stop = &stop};
+  const RunScope run({.stop = &stop});
+  RefineControl control{.checkpoint = folder_ / "state", .outputs = {}};
   const auto first = Refine(input_, options_, control);
   ASSERT_TRUE(first.ok());
   EXPECT_TRUE(first->report.interrupted);
@@ -256,7 +258,7 @@ TEST_F(Refinement, GoesOnWhereItWasStopped) {
 
   // A state that cannot be written costs the state, not the result.
   stop = true;
-  RefineControl nowhere{.checkpoint = folder_ / "no such folder" / "state", .outputs = {}, .stop = &stop};
+  RefineControl nowhere{.checkpoint = folder_ / "no such folder" / "state", .outputs = {}};
   const auto kept = Refine(input_, options_, nowhere);
   ASSERT_TRUE(kept.ok()) << kept.error().message;
   EXPECT_TRUE(kept->report.interrupted);

@@ -8,6 +8,7 @@
 
 #include "core/file_system.h"
 #include "core/log.h"
+#include "core/run_context.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
 #include "core/world_up.h"
@@ -87,7 +88,7 @@ Status MakeSteps(Fitter& fitter, const FitControl& control, KeptState& kept, Fit
       shown = done;
     }
     if (control.observe) control.observe(fitter);
-    report.interrupted = control.stop != nullptr && control.stop->load() && !fitter.done();
+    report.interrupted = StopRequested() && !fitter.done();
     const bool due = control.checkpoint_every > 0 && done % control.checkpoint_every == 0 && !fitter.done();
     if (report.interrupted) fitter.Leave(control.outputs);
     if (due || report.interrupted) kept.Write(fitter.state());

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -28,7 +27,6 @@ struct FitControl {
   // the caller knows that it is its own; else that is an error. The file stays until a new state takes its place.
   bool anew_if_unfit = false;
   std::vector<std::filesystem::path> outputs;  // that its caller writes, also when it was interrupted
-  const std::atomic<bool>* stop = nullptr;     // becomes true when the user wants to stop
   std::function<void(const Fitter&)> observe;  // after every step; may be empty
   // Brings the result to safety, also that of an interrupted fit; may be empty. Called before qualities are measured.
   // As long as it has not succeeded the state is kept.
@@ -59,7 +57,7 @@ struct Fitted {
 };
 
 // Fits Gaussians that begin as `initial` to the training views: the whole of an optimisation, with progress, an
-// interruption that loses nothing, and the quality at its end. When `control.stop` becomes true the result so far comes
+// interruption that loses nothing, and the quality at its end. When the run is asked to stop (core/run_context.h) the result so far comes
 // back with `interrupted` set and the checkpoint is written. A checkpoint that cannot be written is a warning and costs
 // no more than itself. When anything else fails, the state is kept in the checkpoint, and the message says so; when a
 // fit has ended and its result was delivered, the checkpoint is removed.

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/parallel.h"
+#include "core/run_context.h"
 #include "fit/fit.h"
 #include "fit/initial_cloud.h"
 #include "fit/orbit_scene_for_test.h"
@@ -132,7 +133,7 @@ TEST_F(Fits, AnInterruptionLosesNothing) {
   std::atomic<bool> stop{false};
   FitControl control;
   control.checkpoint = folder_ / "state";
-  control.stop = &stop;
+  const RunScope run({.stop = &stop});
   control.observe = [&](const Fitter& fitter) { stop = fitter.state().step >= 31; };
   const auto first = Fit(views_, Initial(), options_, control);
   ASSERT_TRUE(first.ok());
@@ -170,7 +171,7 @@ TEST_F(Fits, ACheckpointOfAnotherFitIsRefused) {
   std::atomic<bool> stop{true};
   FitControl control;
   control.checkpoint = folder_ / "state";
-  control.stop = &stop;
+  const RunScope run({.stop = &stop});
   ASSERT_TRUE(Fit(views_, Initial(), options_, control).ok());
   control.resume = true;
   options_.densification.grow_grad2d = 0.0003;
@@ -185,12 +186,12 @@ TEST_F(Fits, ACheckpointOfAnotherFitIsRefused) {
 
 // The same numbers and names of everything are not the same fit.
 TEST_F(Fits, AContinuationHasTheSameCamerasPicturesAndStart) {
-  const std::atomic<bool> stop{true};
+  std::atomic<bool> stop{true};
   FitControl control;
   control.checkpoint = folder_ / "state";
-  control.stop = &stop;
+  const RunScope run({.stop = &stop});
   ASSERT_TRUE(Fit(views_, Initial(), options_, control).ok());
-  control.stop = nullptr;
+  stop = false;
   control.resume = true;
   const auto refusal = [&](const TrainingViews& views, const GaussianCloud& initial) {
     const auto fitted = Fit(views, initial, options_, control);
@@ -252,7 +253,7 @@ TEST_F(Fits, ACheckpointWithoutRoomCostsNoMoreThanItself) {
   std::atomic<bool> stop{false};
   std::optional<NoRoom> full;
   control.checkpoint = folder_ / "state";
-  control.stop = &stop;
+  const RunScope run({.stop = &stop});
   control.observe = [&](const Fitter& fitter) {
     if (fitter.state().step < 25) return;
     if (!full) full.emplace();
@@ -273,7 +274,7 @@ TEST_F(Fits, ACheckpointWithoutRoomCostsNoMoreThanItself) {
   EXPECT_EQ(Fit(views_, Initial(), options_, control)->report.kept_step, std::nullopt);
 
   control.checkpoint = folder_ / "state";
-  control.stop = nullptr;
+  stop = false;
   control.resume = true;
   const auto second = Fit(views_, Initial(), options_, control);
   ASSERT_TRUE(second.ok()) << second.error().message;
@@ -309,14 +310,14 @@ TEST_F(Fits, WhatIsNotDeliveredIsKept) {
 TEST_F(Fits, AFlippedBitIsNotGoneOnFrom) {
   const auto whole = Fit(views_, Initial(), options_);
   ASSERT_TRUE(whole.ok());
-  const std::atomic<bool> stop{true};
+  std::atomic<bool> stop{true};
   FitControl control;
   control.checkpoint = folder_ / "state";
-  control.stop = &stop;
+  const RunScope run({.stop = &stop});
   ASSERT_TRUE(Fit(views_, Initial(), options_, control).ok());
   FlipBit(control.checkpoint, 5);
 
-  control.stop = nullptr;
+  stop = false;
   control.resume = true;
   const auto refused = Fit(views_, Initial(), options_, control);
   ASSERT_FALSE(refused.ok());
@@ -337,7 +338,7 @@ TEST_F(Fits, APictureAtFaultCostsNoCheckpoint) {
   std::atomic<bool> stop{false};
   FitControl control;
   control.checkpoint = folder_ / "state";
-  control.stop = &stop;
+  const RunScope run({.stop = &stop});
   control.observe = [&](const Fitter& fitter) { stop = fitter.state().step == 31; };
   ASSERT_TRUE(Fit(views_, Initial(), options_, control).ok());
   stop = false;

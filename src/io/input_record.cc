@@ -13,6 +13,7 @@
 #include <system_error>
 #include <tuple>
 
+#include "core/run_context.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -54,13 +55,9 @@ struct State {
   std::set<Identity> own, written;
 };
 
-State& TheState() {
-  static State state;
-  return state;
-}
-
 void Record(const std::optional<Identity>& identity, const fs::path& name) {
-  State& state = TheState();
+  const auto state_of_run = internal::CurrentStorage().Get<State>();
+  State& state = *state_of_run;
   const std::lock_guard lock(state.mutex);
   if (state.records == 0 || !identity || state.own.count(*identity) > 0 || state.written.count(*identity) > 0) return;
   state.inputs.emplace(*identity, name.string());
@@ -69,13 +66,15 @@ void Record(const std::optional<Identity>& identity, const fs::path& name) {
 }  // namespace
 
 InputRecord::InputRecord() {
-  State& state = TheState();
+  const auto state_of_run = internal::CurrentStorage().Get<State>();
+  State& state = *state_of_run;
   const std::lock_guard lock(state.mutex);
   ++state.records;
 }
 
 InputRecord::~InputRecord() {
-  State& state = TheState();
+  const auto state_of_run = internal::CurrentStorage().Get<State>();
+  State& state = *state_of_run;
   const std::lock_guard lock(state.mutex);
   if (--state.records > 0) return;
   state.inputs.clear();
@@ -92,21 +91,24 @@ void RecordInput(const fs::path& path) {
 
 void RecordOwnFile(const fs::path& path) {
   const std::optional<Identity> identity = IdentityOf(path);
-  State& state = TheState();
+  const auto state_of_run = internal::CurrentStorage().Get<State>();
+  State& state = *state_of_run;
   const std::lock_guard lock(state.mutex);
   if (state.records > 0 && identity && state.inputs.count(*identity) == 0) state.own.insert(*identity);
 }
 
 bool IsOwnFile(const fs::path& path) {
   const std::optional<Identity> identity = IdentityOf(path);
-  State& state = TheState();
+  const auto state_of_run = internal::CurrentStorage().Get<State>();
+  State& state = *state_of_run;
   const std::lock_guard lock(state.mutex);
   return identity && state.own.count(*identity) > 0;
 }
 
 void RecordWritten(int descriptor) {
   const std::optional<Identity> identity = IdentityOf(descriptor, "", true);
-  State& state = TheState();
+  const auto state_of_run = internal::CurrentStorage().Get<State>();
+  State& state = *state_of_run;
   const std::lock_guard lock(state.mutex);
   if (state.records > 0 && identity) state.written.insert(*identity);
 }
@@ -114,7 +116,8 @@ void RecordWritten(int descriptor) {
 Status CheckIsNoInput(const fs::path& output) {
   const std::optional<Identity> identity = IdentityOf(output);
   if (!identity) return {};
-  State& state = TheState();
+  const auto state_of_run = internal::CurrentStorage().Get<State>();
+  State& state = *state_of_run;
   const std::lock_guard lock(state.mutex);
   const auto same = state.inputs.find(*identity);
   if (same == state.inputs.end()) return {};
@@ -124,7 +127,8 @@ Status CheckIsNoInput(const fs::path& output) {
 }
 
 Status CheckHoldsNoInput(const fs::path& folder) {
-  State& state = TheState();
+  const auto state_of_run = internal::CurrentStorage().Get<State>();
+  State& state = *state_of_run;
   const std::lock_guard lock(state.mutex);
   if (state.inputs.empty()) return {};
   std::error_code code;

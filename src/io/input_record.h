@@ -12,7 +12,8 @@ namespace anchorsplat {
 // early what they will read later, and what is their own.
 //
 // The program opens one record for its verb. Records within a record are part of it. Without one nothing is put down
-// and nothing refused. All functions may be called from any thread.
+// and nothing refused. Every run has its own (core/run_context.h). All functions may be called from any thread that
+// takes part in it.
 class InputRecord {
  public:
   InputRecord();

@@ -11,6 +11,7 @@
 #include "cameras/colmap_writer.h"
 #include "core/log.h"
 #include "core/parallel.h"
+#include "core/run_context.h"
 #include "core/text.h"
 #include "core/thread_clock.h"
 #include "images/image_io.h"
@@ -101,8 +102,7 @@ Result<Image> RenderStoredView(const RayTracer& tracer, const Camera& camera, co
   return image;
 }
 
-Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const fs::path& folder, const ViewSetOptions& options,
-                                 const std::atomic<bool>* stop) {
+Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const fs::path& folder, const ViewSetOptions& options) {
   const auto begin = Clock::now();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewSetCameras cameras, MakeViewSetCameras(options));
   const WriteOptions write{.overwrite = options.overwrite};
@@ -132,7 +132,7 @@ Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const fs::path& folder
     const Camera& camera = (is_high ? cameras.high : cameras.low).cameras[static_cast<size_t>(i % views)];
     {
       const std::lock_guard<std::mutex> lock(mutex);
-      if (failed.ok() && stop != nullptr && stop->load()) {
+      if (failed.ok() && StopRequested()) {
         failed = Error{ErrorCode::kInterrupted, Cat(folder.string(), ": stopped while the views were made")};
       }
       if (!failed.ok()) return;

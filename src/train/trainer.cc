@@ -11,6 +11,7 @@
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/parallel.h"
+#include "core/run_context.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
 #include "dataset/object_name.h"
@@ -99,7 +100,7 @@ class Trainer {
   bool Over() const;
   double PartDone() const;
   bool Leads() const { return !group_ || group_->rank() == 0; }
-  bool Asked() const { return request_.stop != nullptr && request_.stop->load(); }
+  bool Asked() const { return StopRequested(); }
   // With others, only what all of them know of counts: else one would wait for another that has gone.
   bool Stopping() const { return group_ ? agreed_stop_ : Asked(); }
   void Agree();

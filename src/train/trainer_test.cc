@@ -8,6 +8,7 @@
 
 #include "core/log.h"
 #include "core/parallel.h"
+#include "core/run_context.h"
 #include "io/flip_bit_for_test.h"
 #include "model/published/published_checkpoint.h"
 #include "tensors/tensor_file.h"
@@ -218,7 +219,7 @@ TEST(Trainer, PartsTeachTheWholeAndAreResumedExactly) {
   EXPECT_GT(report->model->psnr, before + 0.1);
 
   std::atomic<bool> stop = false;
-  parts.stop = &stop;
+  const RunScope run({.stop = &stop});
   const auto sink = SetLogSink(std::make_shared<StopAfter>(33, stop));
   const auto first = Train(parts);
   SetLogSink(sink);
@@ -239,7 +240,7 @@ TEST(Trainer, ResumedIsTheSameAsUninterrupted) {
   ASSERT_TRUE(Train(whole).ok());
 
   std::atomic<bool> stop = false;
-  parts.stop = &stop;
+  const RunScope run({.stop = &stop});
   const auto sink = SetLogSink(std::make_shared<StopAfter>(4, stop));
   const auto first = Train(parts);
   SetLogSink(sink);

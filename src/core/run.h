@@ -1,0 +1,32 @@
+#pragma once
+
+#include <tbb/task_arena.h>
+
+#include <memory>
+#include <mutex>
+
+#include "core/run_context.h"
+
+namespace anchorsplat::internal {
+
+// A run as log.cc and parallel.cc see it. Only for core/.
+struct Run {
+  RunContext context;  // complete: what was left out is filled in, as far as an outer run has it
+  std::mutex log_mutex;
+  std::shared_ptr<RunStorage> storage;
+  tbb::task_arena arena;  // loops of two runs do not wait for each other's work
+};
+
+// Makes a thread take part in a run.
+class TakePart {
+ public:
+  explicit TakePart(const std::shared_ptr<Run>& run);
+  ~TakePart();
+  TakePart(const TakePart&) = delete;
+  TakePart& operator=(const TakePart&) = delete;
+
+ private:
+  std::shared_ptr<Run> before_;
+};
+
+}  // namespace anchorsplat::internal

@@ -1,0 +1,48 @@
+#include "core/run_context.h"
+
+#include <utility>
+
+#include "core/parallel.h"
+#include "core/run.h"
+
+namespace anchorsplat {
+
+namespace internal {
+
+namespace {
+thread_local std::shared_ptr<Run> current_run;
+}
+
+const std::shared_ptr<Run>& CurrentRun() { return current_run; }
+
+RunStorage& CurrentStorage() {
+  static RunStorage of_process;
+  return current_run ? *current_run->storage : of_process;
+}
+
+TakePart::TakePart(const std::shared_ptr<Run>& run) : before_(std::exchange(current_run, run)) {}
+TakePart::~TakePart() { current_run = std::move(before_); }
+
+}  // namespace internal
+
+RunScope::RunScope(RunContext context) : before_(internal::CurrentRun()) {
+  auto run = std::make_shared<internal::Run>();
+  if (before_) {
+    if (context.threads <= 0) context.threads = before_->context.threads;
+    if (!context.sink) context.sink = before_->context.sink;
+    if (context.stop == nullptr) context.stop = before_->context.stop;
+  }
+  run->context = std::move(context);
+  run->storage = before_ ? before_->storage : std::make_shared<internal::RunStorage>();
+  if (run->context.threads > 0) run->arena.initialize(run->context.threads);
+  internal::current_run = std::move(run);
+}
+
+RunScope::~RunScope() { internal::current_run = std::move(before_); }
+
+bool StopRequested() {
+  const auto& run = internal::CurrentRun();
+  return run && run->context.stop != nullptr && run->context.stop->load(std::memory_order_relaxed);
+}
+
+}  // namespace anchorsplat

@@ -30,7 +30,6 @@
 #include "formats/row_arrays.h"
 #include "io/atomic_file.h"
 #include "io/input_record.h"
-#include "model/model_method.h"
 
 namespace anchorsplat {
 
@@ -45,7 +44,6 @@ struct EnhanceFlags {
   std::string pixel_size = "auto";
   std::string cameras;
   EnhanceOptions options;
-  std::shared_ptr<ModelMethod> model = std::make_shared<ModelMethod>();
   std::string model_file;
   std::string shuffles = "identity";
   std::string compat;
@@ -125,13 +123,9 @@ nlohmann::json ToJson(const std::string& input, const fs::path& output, const En
                          {"gaussians", {{"in", r.gaussians_in}, {"dropped", r.dropped}, {"out", r.gaussians_out}}},
                          {"seconds", r.seconds}};
   if (!r.quality.empty()) json["quality"] = r.quality;
-  for (const auto& [name, value] : r.facts) {
-    // Counts are whole numbers in JSON, measurements are not.
-    const bool measured = name.starts_with("seconds") || name.ends_with("psnr") || name.starts_with("consistency");
-    if (measured || value != std::floor(value) || std::abs(value) > 9e15) {
-      json[r.method][name] = value;
-    } else {
-      json[r.method][name] = static_cast<int64_t>(value);
+  for (const StepReport& step : r.steps) {
+    for (const auto& [name, value] : step.facts) {
+      std::visit([&, &fact = name](auto number) { json[step.method][fact] = number; }, value);
     }
   }
   if (!r.pixel_size_source.empty()) {
@@ -171,7 +165,8 @@ Result<Shuffles> ParseShuffles(const std::string& text) {
                    "' is neither 'identity', nor a seed, nor five permutations such as 1230,0321,1023,3102,0321")};
 }
 
-Status FinishModelOptions(const EnhanceFlags& flags) {
+// What several flags say together.
+Status FinishModelOptions(const EnhanceFlags& flags, ModelSettings& model) {
   if (!flags.options.refine.images.empty() && flags.inputs.size() > 1) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--images are the pictures of one splat, and there are ", flags.inputs.size(), " inputs")};
@@ -179,9 +174,9 @@ Status FinishModelOptions(const EnhanceFlags& flags) {
   if (!flags.options.control.checkpoint.empty() && flags.inputs.size() > 1) {
     return Error{ErrorCode::kBadArgument, Cat("--checkpoint is for one input, and there are ", flags.inputs.size())};
   }
-  flags.model->file = flags.model_file;
-  flags.model->options.upstream = flags.compat == "upstream";
-  ANCHORSPLAT_ASSIGN_OR_RETURN(flags.model->options.shuffles, ParseShuffles(flags.shuffles));
+  model.file = flags.model_file;
+  model.options.upstream = flags.compat == "upstream";
+  ANCHORSPLAT_ASSIGN_OR_RETURN(model.options.shuffles, ParseShuffles(flags.shuffles));
   return {};
 }
 
@@ -263,8 +258,8 @@ Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& 
 
 Status RunEnhance(const EnhanceFlags& flags, Program& program) {
   const SharedFlags& shared = program.flags;
-  ANCHORSPLAT_RETURN_IF_ERROR(FinishModelOptions(flags));
   EnhanceOptions options = flags.options;
+  ANCHORSPLAT_RETURN_IF_ERROR(FinishModelOptions(flags, options.model));
   options.seed = shared.seed;
   ANCHORSPLAT_ASSIGN_OR_RETURN(options.pixel_size, ParsePixelSize("--pixel-size", flags.pixel_size));
   if (!flags.cameras.empty()) {
@@ -308,7 +303,6 @@ void AddEnhance(CLI::App& app, Program& program) {
   CLI::App& verb = AddVerb(app, program, "enhance", "Make a splat hold up when seen closer",
                            "anchorsplat enhance scan.ply -o scan-4x.ply --cameras transforms.json");
   const auto flags = std::make_shared<EnhanceFlags>();
-  RegisterModelMethod(flags->model);  // before --method lists what there is
   EnhanceOptions& options = flags->options;
   verb.add_option("inputs", flags->inputs, "Splat files")->required()->check(NotEmpty());
   auto* output = verb.add_option("-o,--output", flags->output, "File to write (one input)");
@@ -346,7 +340,7 @@ void AddEnhance(CLI::App& app, Program& program) {
   verb.add_flag("--view", flags->view, "Also write an HTML page beside the output that shows before and after");
 
   const std::string group = "Model";
-  PublishedOptions& model = flags->model->options;
+  PublishedOptions& model = options.model.options;
   verb.add_option("--model", flags->model_file,
                   "Weights of an AnchorSplat network or of a compact one, .pth or .safetensors")
       ->check(NotEmpty())
@@ -362,7 +356,7 @@ void AddEnhance(CLI::App& app, Program& program) {
                           {"bbox", NormalisationMode::kBbox},
                           {"unit", NormalisationMode::kUnit}},
                          "How the splat is brought into the network's cube"));
-  model_option(AddChoice(verb, "--precision", flags->model->precision,
+  model_option(AddChoice(verb, "--precision", options.model.precision,
                          {{"fp32", WeightPrecision::kFloat}, {"bf16", WeightPrecision::kBFloat16}},
                          "Of matrix products, convolutions and attention; bf16 only where the processor has products "
                          "of it (`doctor` says), else fp32"));

@@ -31,7 +31,7 @@ std::vector<EnhanceMethod>& Registry() {
        .rank = 0,
        .options = WidthOptions(),
        .ready = [](const EnhanceOptions&) { return Status(); },
-       .run = [](EnhanceInput input, const EnhanceOptions& options, EnhanceReport&) -> Result<GaussianCloud> {
+       .run = [](EnhanceInput input, const EnhanceOptions& options, StepReport&) -> Result<GaussianCloud> {
          ANCHORSPLAT_RETURN_IF_ERROR([&]() -> Status {
            const auto grown = ApplyFilter(input.cloud, input.pixel_sizes,
                                           {.upscale = options.upscale, .strength = input.filter_strength});
@@ -185,9 +185,28 @@ double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud)
   return DefaultFilterStrength(options.upscale);
 }
 
+// Runs one method and adds its report.
+Result<GaussianCloud> RunStep(const EnhanceMethod& method, EnhanceInput input, const EnhanceOptions& options,
+                              EnhanceReport& report) {
+  StepReport step;
+  step.method = method.name;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, method.run(std::move(input), options, step));
+  report.dropped += step.dropped;
+  report.interrupted |= step.interrupted;
+  report.steps.push_back(std::move(step));
+  return out;
+}
+
 }  // namespace
 
-void RegisterEnhanceMethod(EnhanceMethod method) { Registry().push_back(std::move(method)); }
+void RegisterEnhanceMethod(EnhanceMethod method) {
+  const auto same = std::ranges::find(Registry(), method.name, &EnhanceMethod::name);
+  if (same == Registry().end()) {
+    Registry().push_back(std::move(method));
+  } else {
+    *same = std::move(method);
+  }
+}
 std::span<const EnhanceMethod> EnhanceMethods() { return Registry(); }
 
 int64_t ExpectedGaussians(int64_t count, const EnhanceOptions& options) {
@@ -221,10 +240,10 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(DropUnusable(input.cloud));
   report.dropped = report.gaussians_in - input.cloud.size();
 
-  ANCHORSPLAT_ASSIGN_OR_RETURN(bool sized, method->needs_pixel_size());
+  ANCHORSPLAT_ASSIGN_OR_RETURN(bool sized, method->needs_pixel_size(options));
   bool first_sized = false;
   if (plan.start != nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(first_sized, plan.start->needs_pixel_size());
+    ANCHORSPLAT_ASSIGN_OR_RETURN(first_sized, plan.start->needs_pixel_size(options));
     sized |= first_sized;
   }
   if (!sized && IsMarkedEnhanced(input.cloud)) {
@@ -241,6 +260,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
     }
     ANCHORSPLAT_RETURN_IF_ERROR(
         ChoosePixelSizes(options, method->takes_start && !options.refine.images.empty(), input, report));
+    input.pixel_size = report.pixel_size;
   }
 
   const bool begins_with_network = plan.start != nullptr && plan.start->adds_detail;
@@ -268,10 +288,10 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   if (plan.start != nullptr) {
     EnhanceInput first = input;
     if (!first_sized) first.pixel_sizes.clear();
-    ANCHORSPLAT_ASSIGN_OR_RETURN(input.start, plan.start->run(std::move(first), options, report));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(input.start, RunStep(*plan.start, std::move(first), options, report));
     input.start_has_detail = plan.start->adds_detail;
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, method->run(std::move(input), options, report));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, RunStep(*method, std::move(input), options, report));
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   report.gaussians_out = out.size();
   if (!sized || report.filter_strength * options.upscale * options.upscale > 1) {

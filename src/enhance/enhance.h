@@ -6,11 +6,13 @@
 #include <span>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "core/camera.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
+#include "enhance/model_settings.h"
 #include "enhance/pixel_size.h"
 #include "enhance/pixel_size_guard.h"
 #include "enhance/refine_options.h"
@@ -37,6 +39,7 @@ struct EnhanceOptions {
   CameraPixelRule camera_rule = CameraPixelRule::kAuto;
   RefineOptions refine;
   RefineControl control;  // of methods that take long
+  ModelSettings model;    // of networks
   uint64_t seed = 0;
 };
 
@@ -45,12 +48,23 @@ inline constexpr const char* kUnknownPixelSize = "unknown";
 // The estimate is contradicted (pixel_size_guard.h); the smallest plausible pixel was taken, and by "auto" the filter.
 inline constexpr const char* kCautiousPixelSize = "cautious";
 
+// A number that a method has to tell: counts are whole, measurements are not.
+using Fact = std::pair<std::string, std::variant<int64_t, double>>;
+
+// What one method did; "A+B" are two steps.
+struct StepReport {
+  std::string method;
+  int64_t dropped = 0;       // Gaussians that it could not read
+  bool interrupted = false;  // stopped by the user; its result is valid all the same
+  std::vector<Fact> facts;   // what else it has to tell, by name: the steps of a refinement, the anchors of a network
+};
+
 // What was done, for people and for --json.
 struct EnhanceReport {
   std::string method;
   std::string quality;  // as it was asked for
   int64_t gaussians_in = 0;
-  int64_t dropped = 0;  // rows with values that are not finite
+  int64_t dropped = 0;  // rows with values that are not finite, and what the steps dropped
   int64_t gaussians_out = 0;
   double upscale = 1;
   double filter_strength = 0;
@@ -61,16 +75,16 @@ struct EnhanceReport {
   std::optional<PixelSizeFinding> finding;  // where it was to be estimated
   std::string camera_rule;                  // "smallest" or "median" where it came from cameras
   std::optional<int> train_width;           // pixels, given or assumed; nothing when the cameras' own size was taken
-  // What else the method has to tell, by name: counts of the model, for example.
-  std::vector<std::pair<std::string, double>> facts;
-  bool interrupted = false;  // stopped by the user; the cloud is valid all the same
-  double seconds = 0;        // of the method itself, without reading and writing
+  std::vector<StepReport> steps;            // in their order; none where the splat was left alone
+  bool interrupted = false;                 // one of them was
+  double seconds = 0;                       // of the method itself, without reading and writing
 };
 
 // The cloud as methods get it: rows that are not finite are gone; p_LR is known to those that need it.
 struct EnhanceInput {
   GaussianCloud cloud;
   Buffer<float> pixel_sizes;  // one for all, or one per Gaussian
+  double pixel_size = 0;      // their median
   double filter_strength = 0;
   GaussianCloud start;            // what the method before it made, of "A+B"; else empty
   bool start_has_detail = false;  // EnhanceMethod::adds_detail of that method
@@ -105,16 +119,17 @@ struct EnhanceMethod {
   std::vector<MethodOption> options;  // all that it looks at: this is the only place that says so
   // False: EnhanceInput::pixel_sizes may be empty, nothing is estimated. Asked once the method is ready. An error: it
   // could not run.
-  std::function<Result<bool>()> needs_pixel_size = [] { return true; };
+  std::function<Result<bool>(const EnhanceOptions&)> needs_pixel_size = [](const EnhanceOptions&) { return true; };
   // About how many Gaussians come of `count`, for what has to be known before the work begins.
   std::function<int64_t(int64_t count, const EnhanceOptions&)> expected = [](int64_t count, const EnhanceOptions&) {
     return count;
   };
   std::function<Status(const EnhanceOptions&)> ready;
-  std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&, EnhanceReport&)> run;
+  std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&, StepReport&)> run;
 };
 
-// Filter and refinement are always there; the verbs add those of higher rooms, by name, while options are declared.
+// Filter and refinement are always there. What higher rooms have is added by name when the program starts, before the
+// first call of anything else here (model/model_method.h); a method of the same name takes the place of the one before.
 void RegisterEnhanceMethod(EnhanceMethod method);
 std::span<const EnhanceMethod> EnhanceMethods();
 

@@ -328,7 +328,7 @@ TEST_F(EnhanceDoor, ContradictedEstimateIsNotActedOn) {
            [](const EnhanceOptions& o) {
              return o.seed == kOnlyHere ? Status() : Status(Error{ErrorCode::kBadArgument, "not here"});
            },
-       .run = [](EnhanceInput input, const EnhanceOptions&, EnhanceReport&) -> Result<GaussianCloud> {
+       .run = [](EnhanceInput input, const EnhanceOptions&, StepReport&) -> Result<GaussianCloud> {
          return std::move(input.cloud);
        }});
   GaussianCloud cloud = Ball(0.01, 3000), veils = Ball(0.01, 3000);

@@ -28,8 +28,9 @@ class Plan : public testing::Test {
                              if (options.seed == kWithNetwork) return {};
                              return Error{ErrorCode::kBadArgument, "no network"};
                            },
-                           .run = [](EnhanceInput input, const EnhanceOptions&,
-                                     EnhanceReport&) -> Result<GaussianCloud> { return std::move(input.cloud); }});
+                           .run = [](EnhanceInput input, const EnhanceOptions&, StepReport&) -> Result<GaussianCloud> {
+                             return std::move(input.cloud);
+                           }});
   }
   // The methods' name, or what is wrong.
   std::string Name() const {

@@ -13,25 +13,25 @@ namespace anchorsplat {
 
 namespace {
 
-void AddFacts(const RefineReport& r, EnhanceReport& report) {
+void AddFacts(const RefineReport& r, StepReport& report) {
   report.interrupted = r.interrupted;
-  report.facts.insert(report.facts.end(), {{"steps", static_cast<double>(r.steps)},
-                                           {"resumed_at", static_cast<double>(r.resumed_at)},
-                                           {"views", static_cast<double>(r.views)},
-                                           {"consistency_before", r.before},
-                                           {"consistency_after", r.after},
-                                           {"k", static_cast<double>(r.copies)},
-                                           {"kept_start", r.kept_start ? 1.0 : 0.0},
-                                           {"pruned", static_cast<double>(r.pruned)},
-                                           {"seconds_load", r.times.load},
-                                           {"seconds_render", r.times.objective.render},
-                                           {"seconds_loss", r.times.objective.loss},
-                                           {"seconds_backward", r.times.objective.backward},
-                                           {"seconds_adam", r.times.adam}});
+  report.facts = {{"steps", r.steps},
+                  {"resumed_at", r.resumed_at},
+                  {"views", r.views},
+                  {"consistency_before", r.before},
+                  {"consistency_after", r.after},
+                  {"k", int64_t{r.copies}},
+                  {"kept_start", int64_t{r.kept_start}},
+                  {"pruned", r.pruned},
+                  {"seconds_load", r.times.load},
+                  {"seconds_render", r.times.objective.render},
+                  {"seconds_loss", r.times.objective.loss},
+                  {"seconds_backward", r.times.objective.backward},
+                  {"seconds_adam", r.times.adam}};
   if (r.input_psnr) report.facts.emplace_back("input_psnr", *r.input_psnr);
 }
 
-Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& options, EnhanceReport& report) {
+Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& options, StepReport& report) {
   if (options.upscale > kMostSamples) {
     return Error{ErrorCode::kBadArgument, Cat("--upscale ", options.upscale,
                                               ": refinement renders that many rays per "
@@ -40,7 +40,7 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
   }
   RefineInput refine;
   refine.upscale = options.upscale;
-  refine.pixel_size = report.pixel_size;
+  refine.pixel_size = input.pixel_size;
   refine.cameras = options.cameras;
   refine.seed = options.seed;
   refine.start_has_detail = input.start_has_detail;
@@ -55,7 +55,7 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
   const bool lost_none = input.filter_strength * options.upscale * options.upscale <= 1;
   if (lost_none && options.refine.images.empty()) {
     LogInfo("there is no lost width to give back, and without pictures nothing else to learn: the splat stays");
-    report.facts.emplace_back("kept_start", 1.0);
+    report.facts.emplace_back("kept_start", int64_t{1});
     return std::move(refine.start);
   }
   refine.cloud = std::move(input.cloud);

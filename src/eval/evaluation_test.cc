@@ -345,7 +345,7 @@ TEST(Evaluate, MethodsOfEnhanceComeByThemselves) {
        .summary = "for this test",
        .options = {},
        .ready = [](const EnhanceOptions&) { return Status(); },
-       .run = [](EnhanceInput input, const EnhanceOptions& options, EnhanceReport& report) -> Result<GaussianCloud> {
+       .run = [](EnhanceInput input, const EnhanceOptions& options, StepReport& report) -> Result<GaussianCloud> {
          EXPECT_TRUE(options.cameras);
          for (float& value : input.cloud.log_scales) value += 0.4f;
          report.facts = {{"by", 0.4}};

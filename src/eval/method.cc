@@ -121,6 +121,14 @@ Result<std::string> Identity(const fs::path& path) {
   return Cat(path.string(), " ", size, " ", fs::last_write_time(path, code).time_since_epoch().count());
 }
 
+std::vector<std::pair<std::string, double>> Numbers(const std::vector<Fact>& facts) {
+  std::vector<std::pair<std::string, double>> numbers;
+  for (const auto& [name, value] : facts) {
+    numbers.emplace_back(name, std::visit([](auto number) { return static_cast<double>(number); }, value));
+  }
+  return numbers;
+}
+
 Result<EvalMethod> Model(const fs::path& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string identity, Identity(file));
   const auto network = std::make_shared<std::optional<AnyNetwork>>();  // loaded for the first object
@@ -130,7 +138,7 @@ Result<EvalMethod> Model(const fs::path& file) {
                       }
                       const auto begin = Clock::now();
                       GaussianCloud cloud;
-                      std::vector<std::pair<std::string, double>> facts;
+                      StepReport report;
                       if (const auto* packed = std::get_if<PublishedNetwork>(&**network)) {
                         ANCHORSPLAT_ASSIGN_OR_RETURN(PublishedResult result,
                                                      EnhanceWithPublishedNetwork(task.object.low, *packed));
@@ -141,16 +149,14 @@ Result<EvalMethod> Model(const fs::path& file) {
                         input.cloud = task.object.low;
                         input.pixel_sizes = std::move(sizes.sizes);
                         input.filter_strength = DefaultStrength(task.object);
-                        EnhanceReport report;
                         ANCHORSPLAT_ASSIGN_OR_RETURN(
                             cloud, EnhanceWithCompactNetwork(std::move(input), task.object.upscale(),
                                                              std::get<CompactNetwork>(**network), 0, report));
-                        facts = std::move(report.facts);
                       }
                       const double seconds = SecondsSince(begin);
                       MethodViews views = SplatViews(task.object, std::move(cloud));
                       views.seconds = seconds;
-                      views.facts = std::move(facts);
+                      views.facts = Numbers(report.facts);
                       return views;
                     }};
 }
@@ -297,7 +303,13 @@ EvalMethod Registered(const RegisteredMethod& method) {
             ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, Enhance(task.object.low, options));
             MethodViews views = SplatViews(task.object, std::move(enhanced.cloud));
             views.seconds = enhanced.report.seconds;
-            views.facts = enhanced.report.facts;
+            for (const StepReport& step : enhanced.report.steps) {
+              // Of "A+B", B's facts are the result's; A's say whose they are.
+              const bool last = &step == &enhanced.report.steps.back();
+              for (auto& [name, value] : Numbers(step.facts)) {
+                views.facts.emplace_back(last ? name : Cat(step.method, "_", name), value);
+              }
+            }
             views.facts.emplace_back("processor_seconds", ProcessorSeconds() - begin);
             if (method.auto_pixel_size) {
               ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraPixelSizes truth, TruePixelSizes(task.object));

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <filesystem>
+#include <memory>
+#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -21,51 +23,52 @@ namespace {
 constexpr double kNotable = 0.01, kMost = 0.5;
 
 // Whether it is certainly of that kind; what cannot be read is for loading to tell.
-bool IsCompact(const ModelMethod& method) {
-  if (method.file.empty()) return true;  // the one that is part of the program
-  const auto compact = HoldsCompactNetwork(method.file);
+bool IsCompact(const ModelSettings& model) {
+  if (model.file.empty()) return true;  // the one that is part of the program
+  const auto compact = HoldsCompactNetwork(model.file);
   return compact.ok() && *compact;
 }
-bool IsPublished(const ModelMethod& method) {
-  if (method.file.empty()) return false;
-  const auto compact = HoldsCompactNetwork(method.file);
+bool IsPublished(const ModelSettings& model) {
+  if (model.file.empty()) return false;
+  const auto compact = HoldsCompactNetwork(model.file);
   return compact.ok() && !*compact;
 }
 
 // What a network looks at. The compact ones work on top of the filter, the published ones have arithmetic of their own.
-std::vector<MethodOption> NetworkOptions(const std::shared_ptr<const ModelMethod>& method) {
-  std::vector<MethodOption> options = WidthOptions([method](const MethodUse&) {
-    return IsPublished(*method) ? "with a compact network, --method filter or refine" : "";
+std::vector<MethodOption> NetworkOptions() {
+  std::vector<MethodOption> options = WidthOptions([](const MethodUse& use) {
+    return IsPublished(use.options.model) ? "with a compact network, --method filter or refine" : "";
   });
   options.push_back({"model", {}});
   options.push_back({"prune-opacity", {}});
-  const auto published = [method](const MethodUse&) {
-    return IsCompact(*method) ? "with a network of the published architecture (--model FILE)" : "";
+  const auto published = [](const MethodUse& use) {
+    return IsCompact(use.options.model) ? "with a network of the published architecture (--model FILE)" : "";
   };
   for (const char* name : {"compat", "normalisation", "precision", "curve-depth", "shuffles", "max-gaussians"}) {
     options.push_back({name, published});
   }
-  options.push_back({"attention-rounding", [method, published](const MethodUse& use) -> std::string {
-                       const bool none = method->options.rounding == Rounding::kNone;
-                       if (none && method->precision == WeightPrecision::kBFloat16) return "without --precision bf16";
+  options.push_back({"attention-rounding", [published](const MethodUse& use) -> std::string {
+                       const ModelSettings& model = use.options.model;
+                       const bool none = model.options.rounding == Rounding::kNone;
+                       if (none && model.precision == WeightPrecision::kBFloat16) return "without --precision bf16";
                        return published(use);
                      }});
-  options.push_back({"block-gaussians", [method, published](const MethodUse& use) -> std::string {
-                       return method->options.upstream ? "without --compat upstream" : published(use);
+  options.push_back({"block-gaussians", [published](const MethodUse& use) -> std::string {
+                       return use.options.model.options.upstream ? "without --compat upstream" : published(use);
                      }});
   return options;
 }
 
 Result<GaussianCloud> EnhanceWithPublished(const EnhanceInput& input, const PublishedNetwork& network,
-                                           const PublishedOptions& options, EnhanceReport& report) {
+                                           const PublishedOptions& options, StepReport& report) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(PublishedResult result, EnhanceWithPublishedNetwork(input.cloud, network, options));
   const PublishedReport& r = result.report;
   report.dropped += r.not_finite + r.outside;
-  report.facts = {{"over_limit", static_cast<double>(r.over_limit)},
-                  {"anchors", static_cast<double>(r.anchors)},
-                  {"output_not_finite", static_cast<double>(r.output_not_finite)},
-                  {"pruned", static_cast<double>(r.pruned)},
-                  {"blocks", static_cast<double>(r.blocks)}};
+  report.facts = {{"over_limit", r.over_limit},
+                  {"anchors", r.anchors},
+                  {"output_not_finite", r.output_not_finite},
+                  {"pruned", r.pruned},
+                  {"blocks", r.blocks}};
   return std::move(result.cloud);
 }
 
@@ -77,20 +80,41 @@ WeightPrecision FastPrecision(WeightPrecision asked) {
   return WeightPrecision::kFloat;
 }
 
-Result<AnyNetwork> Load(const ModelMethod& method) {
-  if (!method.file.empty()) return LoadAnyNetwork(method.file, FastPrecision(method.precision));
+Result<AnyNetwork> Load(const ModelSettings& model) {
+  if (!model.file.empty()) return LoadAnyNetwork(model.file, FastPrecision(model.precision));
   ANCHORSPLAT_ASSIGN_OR_RETURN(CompactNetwork network, LoadShippedNetwork());
   return AnyNetwork(std::move(network));
 }
 
+// The network that was used last, for all calls that ask for it; one that is in use stays with whoever uses it.
+class LastNetwork {
+ public:
+  Result<std::shared_ptr<const AnyNetwork>> Get(const ModelSettings& model) {
+    const std::lock_guard lock(mutex_);
+    if (network_ == nullptr || file_ != model.file || precision_ != model.precision) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(AnyNetwork network, Load(model));
+      network_ = std::make_shared<const AnyNetwork>(std::move(network));
+      file_ = model.file;
+      precision_ = model.precision;
+    }
+    return network_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::filesystem::path file_;
+  WeightPrecision precision_ = WeightPrecision::kFloat;
+  std::shared_ptr<const AnyNetwork> network_;
+};
+
 }  // namespace
 
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
-                                                float prune_opacity, EnhanceReport& report) {
+                                                float prune_opacity, StepReport& report) {
   if (input.filter_strength * upscale * upscale <= 1) {
     LogInfo(
         "the network's residuals are on top of the filter, and there is no lost width to give back: the splat stays");
-    report.facts = {{"copies", 1.0}};
+    report.facts = {{"copies", int64_t{1}}};
     return std::move(input.cloud);
   }
   const auto n = static_cast<double>(input.cloud.size());
@@ -126,58 +150,47 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
     }
     ANCHORSPLAT_ASSIGN_OR_RETURN(result.cloud, Subset(result.cloud, kept));
   }
-  report.facts = {{"copies", static_cast<double>(network.config().copies)},
-                  {"unlike_training", outside},
-                  {"partly_unlike_training", partly},
-                  {"output_not_finite", static_cast<double>(result.not_finite)},
-                  {"pruned", static_cast<double>(before - result.cloud.size())}};
+  report.facts = {{"copies", network.config().copies},
+                  {"unlike_training", result.outside},
+                  {"partly_unlike_training", result.partly},
+                  {"output_not_finite", result.not_finite},
+                  {"pruned", before - result.cloud.size()}};
   return std::move(result.cloud);
 }
 
-void RegisterModelMethod(const std::shared_ptr<const ModelMethod>& method) {
-  struct Loaded {
-    std::filesystem::path file;
-    AnyNetwork network;
-  };
-  const auto loaded = std::make_shared<std::optional<Loaded>>();
-  const auto load = [method, loaded]() -> Status {
-    if (*loaded && (*loaded)->file == method->file) return {};
-    ANCHORSPLAT_ASSIGN_OR_RETURN(AnyNetwork network, Load(*method));
-    *loaded = Loaded{method->file, std::move(network)};
-    return {};
-  };
+void RegisterModelMethod() {
+  const auto last = std::make_shared<LastNetwork>();
   RegisterEnhanceMethod(
       {.name = "model",
        .summary = HasShippedNetwork() ? "one pass of the network of --model, or of the one that is part of this program"
                                       : "one pass of the network of --model",
        .rank = 1,
        .adds_detail = true,
-       .options = NetworkOptions(method),
-       .needs_pixel_size = [method]() -> Result<bool> {
-         if (method->file.empty()) return true;
-         return HoldsCompactNetwork(method->file);
+       .options = NetworkOptions(),
+       .needs_pixel_size = [](const EnhanceOptions& options) -> Result<bool> {
+         if (options.model.file.empty()) return true;
+         return HoldsCompactNetwork(options.model.file);
        },
-       .expected = [method, loaded, load](int64_t count, const EnhanceOptions&) -> int64_t {
-         if (!load().ok()) return count;  // which the run will say
-         if (const auto* packed = std::get_if<PublishedNetwork>(&(*loaded)->network)) {
-           const int64_t most = method->options.max_gaussians;
-           return packed->config().copies * (most > 0 ? std::min(count, most) : count);
+       .expected = [last](int64_t count, const EnhanceOptions& options) -> int64_t {
+         const auto network = last->Get(options.model);
+         if (!network.ok()) return count;  // which the run will say
+         if (const auto* published = std::get_if<PublishedNetwork>(network->get())) {
+           const int64_t most = options.model.options.max_gaussians;
+           return published->config().copies * (most > 0 ? std::min(count, most) : count);
          }
-         return count * std::get<CompactNetwork>((*loaded)->network).config().copies;
+         return count * std::get<CompactNetwork>(**network).config().copies;
        },
-       .ready = [method](const EnhanceOptions&) -> Status {
-         if (!method->file.empty() || HasShippedNetwork()) return {};
+       .ready = [](const EnhanceOptions& options) -> Status {
+         if (!options.model.file.empty() || HasShippedNetwork()) return {};
          return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};
        },
-       .run = [method, loaded, load](EnhanceInput input, const EnhanceOptions& options,
-                                     EnhanceReport& report) -> Result<GaussianCloud> {
-         ANCHORSPLAT_RETURN_IF_ERROR(load());
-         if (const auto* packed = std::get_if<PublishedNetwork>(&(*loaded)->network)) {
-           return EnhanceWithPublished(input, *packed, method->options, report);
+       .run = [last](EnhanceInput input, const EnhanceOptions& options, StepReport& report) -> Result<GaussianCloud> {
+         ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const AnyNetwork> network, last->Get(options.model));
+         if (const auto* published = std::get_if<PublishedNetwork>(network.get())) {
+           return EnhanceWithPublished(input, *published, options.model.options, report);
          }
-         return EnhanceWithCompactNetwork(std::move(input), options.upscale,
-                                          std::get<CompactNetwork>((*loaded)->network), method->options.prune_opacity,
-                                          report);
+         return EnhanceWithCompactNetwork(std::move(input), options.upscale, std::get<CompactNetwork>(*network),
+                                          options.model.options.prune_opacity, report);
        }});
 }
 

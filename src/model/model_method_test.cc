@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "core/log.h"
@@ -79,9 +80,13 @@ GaussianCloud RandomCloud(int64_t n) {
   return cloud;
 }
 
+const EnhanceMethod& Registered() {
+  const auto methods = EnhanceMethods();
+  return *std::find_if(methods.begin(), methods.end(), [](const auto& method) { return method.name == "model"; });
+}
+
 TEST_F(SmallModel, AutoPrefersTheModelOnceThereIsAFile) {
-  const auto method = std::make_shared<ModelMethod>();
-  RegisterModelMethod(method);
+  RegisterModelMethod();
   EnhanceOptions options;
   options.pixel_size = 0.01;
   auto enhanced = Enhance(RandomCloud(300), options);
@@ -95,7 +100,7 @@ TEST_F(SmallModel, AutoPrefersTheModelOnceThereIsAFile) {
     EXPECT_THAT(enhanced.error().message, testing::HasSubstr("--model"));
   }
 
-  method->file = file();
+  options.model.file = file();
   options.method = "auto";
   for (int repeat = 0; repeat < 2; ++repeat) {  // the second finds the network loaded
     enhanced = Enhance(RandomCloud(300), options);
@@ -119,15 +124,15 @@ class Warnings : public LogSink {
 
 // On a processor without products of bfloat16 that precision is slower and less exact: nobody can have meant it.
 TEST_F(SmallModel, BFloat16IsNeverChosenWhereItIsSlower) {
-  const auto method = std::make_shared<ModelMethod>();
-  method->file = file();
+  EnhanceOptions options;
+  options.model.file = file();
   const auto run = [&](WeightPrecision precision) {
-    method->precision = precision;
-    RegisterModelMethod(method);  // anew: a network once loaded is kept
+    options.model.precision = precision;
+    RegisterModelMethod();  // anew: a network once loaded is kept
     EnhanceInput input;
     input.cloud = RandomCloud(300);
-    EnhanceReport report;
-    auto cloud = EnhanceMethods().back().run(std::move(input), EnhanceOptions(), report);
+    StepReport report;
+    auto cloud = Registered().run(std::move(input), options, report);
     return cloud.ok() ? cloud->means : Buffer<float>();
   };
   hwy::SetSupportedTargetsForTest(HWY_STATIC_TARGET);  // has none
@@ -167,15 +172,14 @@ void WriteCompact(const fs::path& path, const CompactConfig& config) {
 }
 
 TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
-  const auto method = std::make_shared<ModelMethod>();
-  method->file = folder_ / "compact.safetensors";
-  WriteCompact(method->file, {.copies = 3, .hidden = 16, .head_hidden = 16});
-  ASSERT_FALSE(HasFatalFailure());
-  RegisterModelMethod(method);
-  const EnhanceMethod registered = EnhanceMethods().back();
-  EXPECT_TRUE(*registered.needs_pixel_size());
   EnhanceOptions options;
-  EnhanceReport report;
+  options.model.file = folder_ / "compact.safetensors";
+  WriteCompact(options.model.file, {.copies = 3, .hidden = 16, .head_hidden = 16});
+  ASSERT_FALSE(HasFatalFailure());
+  RegisterModelMethod();
+  const EnhanceMethod registered = Registered();
+  EXPECT_TRUE(*registered.needs_pixel_size(options));
+  StepReport report;
   EnhanceInput input;
   input.cloud = SheetCloud(200);
   input.pixel_sizes = {kSheetPixel};
@@ -183,9 +187,9 @@ TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
   auto enhanced = registered.run(input, options, report);
   ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
   EXPECT_EQ(enhanced->size(), 600);
-  const std::map<std::string, double> facts(report.facts.begin(), report.facts.end());
-  EXPECT_EQ(facts.at("copies"), 3);
-  EXPECT_EQ(facts.at("unlike_training"), 0);
+  const std::map<std::string, std::variant<int64_t, double>> facts(report.facts.begin(), report.facts.end());
+  EXPECT_EQ(std::get<int64_t>(facts.at("copies")), 3);
+  EXPECT_EQ(std::get<int64_t>(facts.at("unlike_training")), 0);
 
   // No lost width, nothing to build on: fitted with antialiasing, or seen no closer.
   EnhanceInput without = input;
@@ -200,21 +204,19 @@ TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
   EXPECT_EQ(enhanced->means, input.cloud.means);
   options.upscale = 4;
 
-  method->options.prune_opacity = 0.3f;
+  options.model.options.prune_opacity = 0.3f;
   enhanced = registered.run(input, options, report);
   ASSERT_TRUE(enhanced.ok());
   EXPECT_LT(enhanced->size(), 600);
   for (const float logit : enhanced->opacity_logits) EXPECT_GE(1 / (1 + std::exp(-logit)), 0.3f);
-  method->file = file();
-  EXPECT_FALSE(*registered.needs_pixel_size());
+  options.model.file = file();
+  EXPECT_FALSE(*registered.needs_pixel_size(options));
 }
 
 // What would change nothing is refused, with the words for where it would.
 TEST_F(SmallModel, EveryOptionBelongsToAnArchitecture) {
-  const auto method = std::make_shared<ModelMethod>();
-  RegisterModelMethod(method);
-  // The registry of this program may have others of the same name before it.
-  const std::vector<MethodOption> options = EnhanceMethods().back().options;
+  RegisterModelMethod();
+  const std::vector<MethodOption> options = Registered().options;
   EnhanceOptions enhance;
   const auto lacks = [&](const std::string& name) -> std::string {
     const auto found = std::find_if(options.begin(), options.end(), [&](const auto& o) { return o.name == name; });
@@ -225,7 +227,7 @@ TEST_F(SmallModel, EveryOptionBelongsToAnArchitecture) {
   WriteCompact(compact, {.copies = 3, .hidden = 16, .head_hidden = 16});
   ASSERT_FALSE(HasFatalFailure());
   for (const fs::path& weights : {fs::path(), compact, file()}) {
-    method->file = weights;
+    enhance.model.file = weights;
     const bool published = weights == file();
     for (const char* name : {"compat", "normalisation", "precision", "curve-depth", "shuffles", "max-gaussians",
                              "attention-rounding", "block-gaussians"}) {
@@ -237,12 +239,12 @@ TEST_F(SmallModel, EveryOptionBelongsToAnArchitecture) {
     EXPECT_EQ(lacks("prune-opacity"), "");
     EXPECT_EQ(lacks("steps"), "no option");
   }
-  method->options.upstream = true;
+  enhance.model.options.upstream = true;
   EXPECT_EQ(lacks("block-gaussians"), "without --compat upstream");
-  method->precision = WeightPrecision::kBFloat16;
+  enhance.model.precision = WeightPrecision::kBFloat16;
   EXPECT_EQ(lacks("attention-rounding"), "without --precision bf16");
   // Loading tells what is wrong with a file.
-  method->file = folder_ / "none.pth";
+  enhance.model.file = folder_ / "none.pth";
   EXPECT_EQ(lacks("upscale"), "");
   EXPECT_EQ(lacks("normalisation"), "");
 }

@@ -1,0 +1,139 @@
+#include "enhance/refine_views.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "core/log.h"
+#include "core/text.h"
+#include "enhance/refine_pictures.h"
+#include "enhance/refine_poses.h"
+#include "enhance/refiner.h"
+#include "fit/training_views.h"
+#include "metrics/image_metrics.h"
+#include "render/shown_range.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr int64_t kCheckViews = 8;
+constexpr int64_t kResidualViews = 64;
+constexpr double kPerfect = 100;  // dB that stand for identical pictures in means
+
+Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.images, {.hold_out = options.hold_out}));
+  if (!project.without_picture.empty()) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--images ", options.images.string(), ": ", project.without_picture.size(), " of its ",
+                     project.without_picture.size() + project.train.size() + project.held_out.size(),
+                     " cameras have no picture, the first is ", Printable(project.without_picture.front()),
+                     "; are these the pictures of these cameras? If so, take those out that have none")};
+  }
+  if (project.background) render.background = *project.background;
+  PictureCache pictures(project.train, render.background);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement agreement, MeasureAgreement(input.cloud, render, pictures));
+  LogInfo(Cat(project.train.size(), " views with pictures, ", project.held_out.size(),
+              " held out; the splat's own renders agree with them to ", Fixed(agreement.psnr, 2), " dB"));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckAgreement(agreement, kLeastInputPsnr));
+  const auto& check = project.held_out.empty() ? project.train : project.held_out;
+  return RefineViews{RefineTargets(std::move(pictures)),
+                     RefineTargets(PictureCache(Thinned(check, kCheckViews), render.background)), agreement.psnr,
+                     project.scene_scale, render};
+}
+
+Result<RefineViews> OpenSplat(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
+  RefinePoses poses;
+  if (input.cameras && !input.cameras->cameras.empty()) {
+    if (input.cameras->background) render.background = *input.cameras->background;
+    poses = RefinePosesAlong(input.cameras->cameras, options.between, kCheckViews);
+    if (!poses.apart) {
+      LogInfo("there is no place between these cameras: whether it helps is looked at where it is learned from");
+    }
+  } else {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(
+        poses, RefinePosesAround(input.cloud, input.pixel_size, options.poses, kCheckViews, input.seed));
+  }
+  for (const Camera& camera : poses.check) {
+    const std::string warning = NothingToSee(input.cloud, camera, render, std::nullopt);
+    if (warning.empty()) continue;
+    LogWarning(Cat(warning, " Refinement learns nothing from such views"));
+    break;
+  }
+  const double scale = SceneScale(poses.train);
+  const auto splat = std::make_shared<const GaussianCloud>(input.cloud);
+  return RefineViews{RefineTargets(splat, render, std::move(poses.train)),
+                     RefineTargets(splat, render, std::move(poses.check)), std::nullopt, scale, render};
+}
+
+}  // namespace
+
+Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOptions& options) {
+  const RenderOptions render = OptionsFor(input.cloud);
+  return options.images.empty() ? OpenSplat(input, options, render) : OpenPictures(input, options, render);
+}
+
+Result<double> MeasureConsistency(const GaussianCloud& cloud, double upscale, const GaussianCloud& input,
+                                  RefineViews& views) {
+  RefineTargets& targets = views.check;
+  ViewObjective objective;
+  RefineTarget target;
+  double sum = 0;
+  const auto count = static_cast<int64_t>(targets.views().size());
+  for (int64_t view = 0; view < count; ++view) {
+    const Camera& camera = targets.views()[static_cast<size_t>(view)];
+    const PixelBox window = ChooseWindow(camera, input, 0, view);  // the same for whatever is measured
+    ANCHORSPLAT_RETURN_IF_ERROR(targets.Load(view, window, target));
+    ANCHORSPLAT_RETURN_IF_ERROR(
+        objective.Show({.render = views.render, .loss = {}, .pixel = AreaModel(upscale)}, cloud, Crop(camera, window)));
+    Image shown = objective.rendered();
+    Clamp01(shown);
+    for (size_t i = 0; i < target.ignored.size(); ++i) {
+      if (target.ignored[i] == 0) continue;
+      for (int c = 0; c < 3; ++c) shown.channel(c)[i] = target.picture.channel(c)[i];
+    }
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, Psnr(shown, target.picture));
+    sum += std::min(psnr, kPerfect);
+  }
+  return count > 0 ? sum / static_cast<double>(count) : 0;
+}
+
+Result<std::vector<double>> Residuals(const GaussianCloud& cloud, double upscale, RefineViews& views) {
+  const PixelModel one_ray{1, upscale};
+  RenderOptions render = RaysOf(one_ray, views.render);
+  render.gradient = true;
+
+  Rasterizer rasterizer;
+  RenderOutput output;
+  RenderGradient off;
+  CloudGradient weighted;
+  RefineTarget target;
+  std::vector<double> residuals(static_cast<size_t>(cloud.size()), 0.0);
+  const auto stride = static_cast<size_t>(cloud.sh_stride());
+  const auto count = static_cast<int64_t>(views.train.views().size());
+  const int64_t looked_at = std::min(count, kResidualViews);
+  for (int64_t i = 0; i < looked_at; ++i) {
+    const int64_t view = i * count / looked_at;
+    const Camera& camera = views.train.views()[static_cast<size_t>(view)];
+    const PixelBox window = ChooseWindow(camera, cloud, 0, view);
+    ANCHORSPLAT_RETURN_IF_ERROR(views.train.Load(view, window, target));
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, Crop(camera, window), render, output));
+    off.color = output.color;
+    for (size_t k = 0; k < off.color.pixels.size(); ++k) {
+      off.color.pixels[k] = std::abs(off.color.pixels[k] - target.picture.pixels[k]);
+    }
+    for (size_t k = 0; k < target.ignored.size(); ++k) {
+      for (int c = 0; c < 3 && target.ignored[k] != 0; ++c) off.color.channel(c)[k] = 0;
+    }
+    off.box = {0, 0, off.color.width, off.color.height};
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Backward(cloud, off, weighted));
+    for (size_t k = 0; k < residuals.size(); ++k) {
+      for (size_t c = 0; c < 3; ++c) residuals[k] += double{weighted.sh[k * stride + c]};
+    }
+  }
+  return residuals;
+}
+
+}  // namespace anchorsplat

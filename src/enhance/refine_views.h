@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "enhance/refine.h"
+#include "enhance/refine_targets.h"
+#include "render/rasterizer.h"
+
+namespace anchorsplat {
+
+// The views to compare with, and others to see whether it helped.
+struct RefineViews {
+  RefineTargets train, check;
+  std::optional<double> input_psnr;
+  double scene_scale = 1;
+  RenderOptions render;
+};
+
+// Those that `options` and `input` name: pictures, cameras, or places around the splat. Errors: see Refine.
+Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOptions& options);
+
+// How well `cloud`, seen closer and averaged down, agrees with views.check: mean PSNR, dB. `input` is the splat that is
+// refined.
+Result<double> MeasureConsistency(const GaussianCloud& cloud, double upscale, const GaussianCloud& input,
+                                  RefineViews& views);
+
+// What every Gaussian has to do with what the views find wrong: Σ over up to kResidualViews views and their pixels of
+// its weight in the pixel × how far the picture is off there, 0–1. That weight is how the picture depends on its
+// colour.
+Result<std::vector<double>> Residuals(const GaussianCloud& cloud, double upscale, RefineViews& views);
+
+}  // namespace anchorsplat

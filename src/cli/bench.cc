@@ -247,15 +247,10 @@ Status RunNetworkBench(const NetworkBenchFlags& flags, const SharedFlags& shared
   return {};
 }
 
-}  // namespace
-
-void AddBench(CLI::App& app, Program& program) {
-  CLI::App& verb = *app.add_subcommand("bench", "Measure this machine, as ratios to its own limits");
-  verb.require_subcommand(1);
-  verb.footer("Example:\n  anchorsplat bench render");
-
-  CLI::App& render = AddVerb(verb, program, "render", "The rasterizer at 256², at 1024², and with every Gaussian split",
-                             "anchorsplat bench render examples/biplane/input.ply");
+void AddRenderBench(CLI::App& parent, Program& program) {
+  CLI::App& render =
+      AddVerb(parent, program, "render", "The rasterizer at 256², at 1024², and with every Gaussian split",
+              "anchorsplat bench render examples/biplane/input.ply");
   const auto render_flags = std::make_shared<RenderBenchFlags>();
   render_flags->file = "examples/biplane/input.ply";
   render.add_option("file", render_flags->file, "Splat file, an object near the origin about one unit in size")
@@ -275,8 +270,10 @@ void AddBench(CLI::App& app, Program& program) {
   render.callback([render_flags, &program] {
     program.run = [render_flags, &program] { return RunRenderBench(*render_flags, program.flags); };
   });
+}
 
-  CLI::App& fit = AddVerb(verb, program, "fit", "One iteration of a fit at 256² and at 1024², stage by stage",
+void AddFitBench(CLI::App& parent, Program& program) {
+  CLI::App& fit = AddVerb(parent, program, "fit", "One iteration of a fit at 256² and at 1024², stage by stage",
                           "anchorsplat bench fit --threads 1");
   const auto fit_flags = std::make_shared<FitBenchFlags>();
   fit.add_option("files", fit_flags->files, "Splat files, objects near the origin about one unit in size")
@@ -296,8 +293,10 @@ void AddBench(CLI::App& app, Program& program) {
   fit.callback([fit_flags, &program] {
     program.run = [fit_flags, &program] { return RunFitBench(*fit_flags, program.flags); };
   });
+}
 
-  CLI::App& network = AddVerb(verb, program, "network", "The AnchorSplat network against a plain matrix product",
+void AddNetworkBench(CLI::App& parent, Program& program) {
+  CLI::App& network = AddVerb(parent, program, "network", "The AnchorSplat network against a plain matrix product",
                               "anchorsplat bench network scan.ply --model anchorsplat_20x.pth");
   const auto network_flags = std::make_shared<NetworkBenchFlags>();
   network.add_option("file", network_flags->file, "Splat file")->capture_default_str();
@@ -315,9 +314,11 @@ void AddBench(CLI::App& app, Program& program) {
   network.callback([network_flags, &program] {
     program.run = [network_flags, &program] { return RunNetworkBench(*network_flags, program.flags); };
   });
+}
 
+void AddConvertBench(CLI::App& parent, Program& program) {
   CLI::App& convert =
-      AddVerb(verb, program, "convert", "From PLY to every format against bare reads, writes and copies",
+      AddVerb(parent, program, "convert", "From PLY to every format against bare reads, writes and copies",
               "anchorsplat bench convert examples/biplane/input.ply --to .sog");
   const auto convert_options = std::make_shared<ConvertBenchOptions>();
   convert.add_option("file", convert_options->file, "A PLY (default: made-up values)");
@@ -337,8 +338,10 @@ void AddBench(CLI::App& app, Program& program) {
   convert.callback([convert_options, &program] {
     program.run = [convert_options, &program] { return RunConvert(*convert_options, program.flags); };
   });
+}
 
-  CLI::App& io = AddVerb(verb, program, "io", "Reading and writing PLY against bare reads, writes and copies",
+void AddIoBench(CLI::App& parent, Program& program) {
+  CLI::App& io = AddVerb(parent, program, "io", "Reading and writing PLY against bare reads, writes and copies",
                          "anchorsplat bench io --gaussians 500000");
   const auto options = std::make_shared<IoBenchOptions>();
   io.add_option("--gaussians", options->gaussians, "How many")
@@ -350,7 +353,19 @@ void AddBench(CLI::App& app, Program& program) {
   io.add_option("--repeats", options->repeats, "The fastest counts")->check(CLI::Range(1, 1000))->capture_default_str();
   io.add_option("--folder", options->folder, "Where to make the file (default: the system's temporary folder)");
   io.callback([options, &program] { program.run = [options, &program] { return RunIo(*options, program.flags); }; });
+}
 
+}  // namespace
+
+void AddBench(CLI::App& app, Program& program) {
+  CLI::App& verb = *app.add_subcommand("bench", "Measure this machine, as ratios to its own limits");
+  verb.require_subcommand(1);
+  verb.footer("Example:\n  anchorsplat bench render");
+  AddRenderBench(verb, program);
+  AddFitBench(verb, program);
+  AddNetworkBench(verb, program);
+  AddConvertBench(verb, program);
+  AddIoBench(verb, program);
   AddPixelSizeBench(verb, program);
 }
 

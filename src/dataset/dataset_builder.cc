@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstring>
 #include <map>
+#include <optional>
 #include <set>
 #include <system_error>
 
@@ -65,6 +66,144 @@ Result<ObjectRecord> ReadRecord(const fs::path& folder) {
   return ObjectRecordFrom(json.root());
 }
 
+// One build: what is there, what is wanted, and the lists that say so after every object.
+class DatasetBuild {
+ public:
+  DatasetBuild(const fs::path& dataset, const DatasetBuildOptions& options) : dataset_(dataset), options_(options) {}
+
+  // Reads the lists of earlier builds and finds out which objects are wanted.
+  Status Plan(const std::vector<std::string>& meshes) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(manifest_, CollectRecords(dataset_));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto earlier, ReadFailures(dataset_));
+    JobList todo = ListJobs(meshes, options_.recipe, manifest_, earlier);
+    if (todo.jobs.empty() && todo.failures.empty()) {
+      return Error{ErrorCode::kBadArgument, "the libraries have no object to build a data set of"};
+    }
+    jobs_ = std::move(todo.jobs);
+    for (ObjectJob& job : jobs_) {
+      job.licence = options_.licence;
+      job.creator = options_.creator;
+    }
+    CarryFailures(meshes, earlier);
+    for (const ObjectFailure& failure : todo.failures) Fail(failure);
+    report_.objects = std::ssize(jobs_) + std::ssize(todo.failures);
+    report_.failed = std::ssize(todo.failures);
+    ChooseWanted();
+    return WriteLists();
+  }
+
+  // Makes the wanted ones, a process each.
+  Status Run() {
+    progress_.emplace("objects", std::ssize(wanted_));
+    Status lists;
+    ANCHORSPLAT_RETURN_IF_ERROR(RunProcesses(
+        std::ssize(wanted_), [&](int64_t i) { return Task(*wanted_[static_cast<size_t>(i)]); },
+        [&](int64_t i, const ProcessEnd& end) {
+          const std::string note = TakeResult(*wanted_[static_cast<size_t>(i)], end);
+          lists = WriteLists();
+          progress_->Advance(1, note);
+          return lists.ok();
+        },
+        {.jobs = options_.jobs, .timeout_seconds = options_.timeout_seconds}));
+    progress_.reset();
+    return lists;
+  }
+
+  DatasetBuildReport Report() {
+    for (const ObjectJob& job : jobs_) {
+      report_.failed += static_cast<int64_t>(failures_.count(job.name));
+      const auto there = manifest_.find(job.name);
+      report_.rejected += there != manifest_.end() && there->second.rejected ? 1 : 0;
+    }
+    report_.interrupted = StopRequested();
+    return report_;
+  }
+
+ private:
+  // What failed before has failed still, unless it is tried again.
+  void CarryFailures(const std::vector<std::string>& meshes, const std::vector<ObjectFailure>& earlier) {
+    for (const ObjectFailure& failure : earlier) {
+      // Libraries are looked into on every build.
+      const bool asked_for = std::find(meshes.begin(), meshes.end(), failure.source) != meshes.end();
+      if (failure.stage == kReadStage && asked_for) continue;
+      if (!options_.retry && manifest_.count(failure.name) == 0) failures_.emplace(failure.name, failure);
+    }
+  }
+
+  void Fail(ObjectFailure failure) {
+    LogWarning(Cat(failure.name, " failed (", failure.stage, "): ", failure.message));
+    const std::string name = failure.name;
+    failures_.insert_or_assign(name, std::move(failure));
+  }
+
+  void ChooseWanted() {
+    for (const ObjectJob& job : jobs_) {
+      const auto there = manifest_.find(job.name);
+      if (there != manifest_.end() && !options_.overwrite) {
+        ++report_.there_already;
+        report_.other_settings += SameSettings(there->second, job) ? 0 : 1;
+      } else if (failures_.count(job.name) == 0 || options_.overwrite) {
+        wanted_.push_back(&job);
+        unfinished_.insert(job.name);
+      }
+    }
+  }
+
+  Status WriteLists() const {
+    std::vector<ObjectFailure> list;
+    for (const auto& [name, failure] : failures_) list.push_back(failure);
+    ANCHORSPLAT_RETURN_IF_ERROR(WriteFailures(dataset_, list));
+    ANCHORSPLAT_RETURN_IF_ERROR(WriteManifest(dataset_, manifest_));
+    return WriteUnfinished(dataset_, {unfinished_.begin(), unfinished_.end()});
+  }
+
+  ProcessTask Task(const ObjectJob& job) const {
+    const fs::path folder = BuildingFolder(dataset_, job.name);
+    std::error_code ignored;
+    if (options_.overwrite) fs::remove_all(folder, ignored);
+    const fs::path file = folder.string() + ".job";
+    // A job that cannot be written fails in the process, which says why.
+    (void)WriteWholeFile(file, ToJsonText(job), true);
+    return ProcessTask{{options_.program.string(), "dataset", "object", file.string(), "-o", dataset_.string(),
+                        "--threads", std::to_string(options_.threads), "--quiet"},
+                       folder.string() + ".log"};
+  }
+
+  // Puts the object into the manifest or among the failures; a word about it.
+  std::string TakeResult(const ObjectJob& job, const ProcessEnd& end) {
+    const fs::path folder = BuildingFolder(dataset_, job.name);
+    failures_.erase(job.name);
+    auto record = end.ok() ? ReadRecord(dataset_ / job.name) : Error{ErrorCode::kIo, ""};
+    if (record.ok()) {
+      ++report_.built;
+      unfinished_.erase(job.name);
+      const std::string note = Cat(job.name, ": ", Fixed(record->train_psnr, 2), " dB, ",
+                                   WithThousands(record->gaussians), " Gaussians in ", HumanSeconds(end.seconds));
+      manifest_.insert_or_assign(job.name, *std::move(record));
+      std::error_code ignored;
+      for (const char* ending : {".job", ".log", ".lock"}) fs::remove(folder.string() + ending, ignored);
+      return note;
+    }
+    if (!StopRequested() || end.timed_out) {
+      ObjectFailure failure = DescribeFailure(job, folder, end, options_.timeout_seconds);
+      if (end.ok()) failure.message = record.error().message;
+      Fail(std::move(failure));
+      unfinished_.erase(job.name);
+    }
+    return job.name;
+  }
+
+  const fs::path dataset_;
+  const DatasetBuildOptions& options_;
+  Manifest manifest_;
+  std::map<std::string, ObjectFailure> failures_;
+  std::vector<ObjectJob> jobs_;
+  std::vector<const ObjectJob*> wanted_;
+  std::set<std::string> unfinished_;  // wanted, and not yet made
+  std::optional<Progress> progress_;
+  DatasetBuildReport report_;
+};
+
 }  // namespace
 
 Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, const fs::path& dataset,
@@ -81,103 +220,10 @@ Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, 
   }
   if (!lock.ok()) return lock.error();
 
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Manifest manifest, CollectRecords(dataset));
-  std::map<std::string, ObjectFailure> failures;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto earlier, ReadFailures(dataset));
-  JobList todo = ListJobs(meshes, options.recipe, manifest, earlier);
-  std::vector<ObjectJob>& jobs = todo.jobs;
-  if (jobs.empty() && todo.failures.empty()) {
-    return Error{ErrorCode::kBadArgument, "the libraries have no object to build a data set of"};
-  }
-  for (ObjectJob& job : jobs) {
-    job.licence = options.licence;
-    job.creator = options.creator;
-  }
-  const auto asked_for = [&](const std::string& library) {
-    return std::find(meshes.begin(), meshes.end(), library) != meshes.end();
-  };
-  for (const ObjectFailure& failure : earlier) {
-    // Libraries are looked into on every build.
-    if (failure.stage == kReadStage && asked_for(failure.source)) continue;
-    if (!options.retry && manifest.count(failure.name) == 0) failures.emplace(failure.name, failure);
-  }
-  for (const ObjectFailure& failure : todo.failures) {
-    LogWarning(Cat(failure.name, " failed (", failure.stage, "): ", failure.message));
-    failures.insert_or_assign(failure.name, failure);
-  }
-  std::set<std::string> unfinished;
-  const auto write_lists = [&]() -> Status {
-    std::vector<ObjectFailure> list;
-    for (const auto& [name, failure] : failures) list.push_back(failure);
-    ANCHORSPLAT_RETURN_IF_ERROR(WriteFailures(dataset, list));
-    ANCHORSPLAT_RETURN_IF_ERROR(WriteManifest(dataset, manifest));
-    return WriteUnfinished(dataset, {unfinished.begin(), unfinished.end()});
-  };
-
-  DatasetBuildReport report;
-  report.objects = std::ssize(jobs) + std::ssize(todo.failures);
-  report.failed = std::ssize(todo.failures);
-  std::vector<const ObjectJob*> wanted;
-  for (const ObjectJob& job : jobs) {
-    const auto there = manifest.find(job.name);
-    if (there != manifest.end() && !options.overwrite) {
-      ++report.there_already;
-      report.other_settings += SameSettings(there->second, job) ? 0 : 1;
-    } else if (failures.count(job.name) == 0 || options.overwrite) {
-      wanted.push_back(&job);
-      unfinished.insert(job.name);
-    }
-  }
-  ANCHORSPLAT_RETURN_IF_ERROR(write_lists());
-
-  Progress progress("objects", std::ssize(wanted));
-  const auto start = [&](int64_t i) {
-    const ObjectJob& job = *wanted[static_cast<size_t>(i)];
-    const fs::path folder = BuildingFolder(dataset, job.name);
-    if (options.overwrite) fs::remove_all(folder, code);
-    const fs::path file = folder.string() + ".job";
-    // A job that cannot be written fails in the process, which says why.
-    (void)WriteWholeFile(file, ToJsonText(job), true);
-    return ProcessTask{{options.program.string(), "dataset", "object", file.string(), "-o", dataset.string(),
-                        "--threads", std::to_string(options.threads), "--quiet"},
-                       folder.string() + ".log"};
-  };
-  Status lists;
-  const auto ended = [&](int64_t i, const ProcessEnd& end) {
-    const ObjectJob& job = *wanted[static_cast<size_t>(i)];
-    const fs::path folder = BuildingFolder(dataset, job.name);
-    const bool stopping = StopRequested();
-    failures.erase(job.name);
-    std::string note = job.name;
-    auto record = end.ok() ? ReadRecord(dataset / job.name) : Error{ErrorCode::kIo, ""};
-    if (record.ok()) {
-      ++report.built;
-      unfinished.erase(job.name);
-      note += Cat(": ", Fixed(record->train_psnr, 2), " dB, ", WithThousands(record->gaussians), " Gaussians in ",
-                  HumanSeconds(end.seconds));
-      manifest.insert_or_assign(job.name, *std::move(record));
-      for (const char* ending : {".job", ".log", ".lock"}) fs::remove(folder.string() + ending, code);
-    } else if (!stopping || end.timed_out) {
-      ObjectFailure failure = DescribeFailure(job, folder, end, options.timeout_seconds);
-      if (end.ok()) failure.message = record.error().message;
-      LogWarning(Cat(job.name, " failed (", failure.stage, "): ", failure.message));
-      failures.insert_or_assign(job.name, std::move(failure));
-      unfinished.erase(job.name);
-    }
-    lists = write_lists();
-    progress.Advance(1, note);
-    return lists.ok();
-  };
-  ANCHORSPLAT_RETURN_IF_ERROR(RunProcesses(std::ssize(wanted), start, ended,
-                                           {.jobs = options.jobs, .timeout_seconds = options.timeout_seconds}));
-  ANCHORSPLAT_RETURN_IF_ERROR(lists);
-
-  for (const ObjectJob& job : jobs) {
-    report.failed += static_cast<int64_t>(failures.count(job.name));
-    const auto there = manifest.find(job.name);
-    report.rejected += there != manifest.end() && there->second.rejected ? 1 : 0;
-  }
-  report.interrupted = StopRequested();
+  DatasetBuild build(dataset, options);
+  ANCHORSPLAT_RETURN_IF_ERROR(build.Plan(meshes));
+  ANCHORSPLAT_RETURN_IF_ERROR(build.Run());
+  DatasetBuildReport report = build.Report();
   report.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
   return report;
 }

@@ -53,7 +53,7 @@ function(anchorsplat_room name)
   endforeach()
   if(tests AND ANCHORSPLAT_TESTS)
     add_executable(${name}_test ${tests})
-    if(NOT name MATCHES "^(bench|dataset|formats|metrics|model.*|render)$")  # their tests call what they compare alike
+    if(NOT name MATCHES "^(bench|cameras|cli|dataset|formats|images|io|metrics|model.*|render|tensors)$")  # their tests call what they compare alike
       anchorsplat_unity(${name}_test)
     endif()
     target_link_libraries(${name}_test PRIVATE anchorsplat_${name} anchorsplat_source_dir_for_test

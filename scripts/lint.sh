@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# clang-format over our own code, clang-tidy over all of it that needs no LibTorch. FILES="a.cc b.cc" looks at some.
+# clang-format over our own code, clang-tidy over all of it that needs no LibTorch, and a build that finds names given twice.
+# FILES="a.cc b.cc" looks at some.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 for tool in clang-format clang-tidy; do
@@ -17,4 +18,5 @@ if ! printf '%s\n' $files |
   echo "lint: see above" >&2
   exit 1
 fi
+[ -n "${FILES:-}" ] || scripts/check-one-definition.sh
 echo "lint: clean"

@@ -8,7 +8,7 @@
 #include "core/text.h"
 #include "eval/protocol.h"
 #include "images/image_io.h"
-#include "metrics/bitmap_font.h"
+#include "metrics/caption_text.h"
 
 namespace anchorsplat {
 
@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 constexpr int kTileSide = 256;  // pixels that an excerpt may take
 constexpr int kGap = 8;
 constexpr int kTextScale = 2;
-constexpr int kLine = (kGlyphHeight + 4) * kTextScale;
+constexpr int kLine = (kCapitalHeight + 4) * kTextScale;
 constexpr std::array<float, 3> kPaper = {0.11f, 0.11f, 0.12f};
 constexpr std::array<float, 3> kInk = {0.95f, 0.95f, 0.95f};
 constexpr std::array<float, 3> kDim = {0.65f, 0.65f, 0.68f};
@@ -46,10 +46,7 @@ void Paste(Image& canvas, const Image& tile, int left, int top) {
 }
 
 // As much of a text as fits into a column.
-std::string Fitting(const std::string& text) {
-  const size_t most = static_cast<size_t>(kTileSide / (kGlyphCellWidth * kTextScale));
-  return text.size() <= most ? text : text.substr(0, most);
-}
+std::string Fitting(const std::string& text) { return FittingText(text, kTileSide, kTextScale, ""); }
 
 }  // namespace
 

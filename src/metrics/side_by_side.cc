@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/text.h"
-#include "metrics/bitmap_font.h"
+#include "metrics/caption_text.h"
 
 namespace anchorsplat {
 
@@ -124,10 +124,8 @@ void Paste(Image& canvas, const Image& panel, int x, int y) {
   }
 }
 
-void DrawCaption(Image& canvas, int x, int y, int width, std::string text, int scale, const Colour& colour) {
-  const auto fits = static_cast<size_t>(width / (kGlyphCellWidth * scale));
-  if (text.size() > fits) text = text.substr(0, fits > 3 ? fits - 3 : 0) + "...";
-  DrawText(canvas, x, y, text, scale, colour);
+void DrawCaption(Image& canvas, int x, int y, int width, const std::string& text, int scale, const Colour& colour) {
+  DrawText(canvas, x, y, FittingText(text, width, scale), scale, colour);
 }
 
 // How large w × h pixels are shown: by a whole factor that makes them about as wide as `wanted`, or shrunk if even the
@@ -179,7 +177,7 @@ Layout Arrange(std::span<const LabelledImage> images, const SideBySideOptions& o
   l.margin = l.column / 24;
   l.line = std::max(2, l.column / 256);
   const bool details = std::any_of(images.begin(), images.end(), [](const auto& i) { return !i.detail.empty(); });
-  l.caption_height = (kGlyphHeight + 4) * l.scale;
+  l.caption_height = (kCapitalHeight + 4) * l.scale;
   l.view_y = l.margin + l.caption_height * (details ? 2 : 1) + l.margin / 4;
   l.enlarged_y = l.view_y + l.view.height + l.margin;
   const int enlarged_end = l.enlarged_y + l.enlarged.height;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/random.h"
-#include "metrics/bitmap_font.h"
+#include "metrics/caption_text.h"
 
 namespace anchorsplat {
 namespace {
@@ -26,15 +26,18 @@ Image NoiseImage(int width, int height, uint64_t seed) {
   return image;
 }
 
-TEST(BitmapFont, DrawsInsideOnly) {
+TEST(CaptionText, DrawsInsideOnly) {
   Image image = Filled(40, 9, 3, 0);
   DrawText(image, 1, 1, "I", 1, {1, 0.5f, 0});
-  const char* expected[] = {".###.", "..#..", "..#..", "..#..", "..#..", "..#..", ".###."};
+  const char* expected[] = {"###", ".#.", ".#.", ".#.", ".#.", ".#.", "###"};
   for (int y = 0; y < 7; ++y) {
-    for (int x = 0; x < 5; ++x) EXPECT_EQ(image.at(0, y + 1, x + 1), expected[y][x] == '#' ? 1.0f : 0.0f) << y << x;
+    for (int x = 0; x < 3; ++x) EXPECT_EQ(image.at(0, y + 1, x + 1), expected[y][x] == '#' ? 1.0f : 0.0f) << y << x;
   }
-  EXPECT_EQ(image.at(1, 1, 3), 0.5f);
-  EXPECT_EQ(TextWidth("ab", 3), 33);
+  EXPECT_EQ(image.at(1, 1, 2), 0.5f);
+  EXPECT_EQ(TextWidth("I", 3), 12);
+  EXPECT_EQ(TextWidth("II", 3), 2 * 12 + 3);
+  EXPECT_EQ(FittingText("IIII", TextWidth("III", 2), 2, ""), "III");
+  EXPECT_EQ(FittingText("a long one", TextWidth("a lo...", 1), 1), "a lo...");
   EXPECT_EQ(TextWidth("", 3), 0);
   // Far outside, and bytes that no glyph stands for.
   DrawText(image, -20, -3, "long text that leaves on the right \x01\xff", 2, {1, 1, 1});

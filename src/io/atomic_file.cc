@@ -104,7 +104,7 @@ int FollowLinks(fs::path& path) {
 
 }  // namespace
 
-Result<OutputFile> OutputFile::Create(const fs::path& path, bool overwrite) {
+Result<OutputFile> OutputFile::Create(const fs::path& path, bool overwrite, OutputMemory* memory) {
   if (path.empty() || !path.has_filename()) {
     return Error{ErrorCode::kBadArgument, Cat("\"", path.string(), "\" is not the name of a file to write")};
   }
@@ -112,6 +112,11 @@ Result<OutputFile> OutputFile::Create(const fs::path& path, bool overwrite) {
   file.path_ = path;
   file.target_ = path;
   file.overwrite_ = overwrite;
+  if (memory != nullptr) {
+    file.memory_ = memory;
+    file.bytes_ = std::make_unique<MemoryBytes>();
+    return file;
+  }
 
   mode_t mode = 0666;  // less the umask, like any new file
   struct stat info {};
@@ -161,6 +166,8 @@ OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
   target_ = std::move(other.target_);
   temporary_ = std::exchange(other.temporary_, {});
   descriptor_ = std::exchange(other.descriptor_, -1);
+  memory_ = std::exchange(other.memory_, nullptr);
+  bytes_ = std::move(other.bytes_);
   overwrite_ = other.overwrite_;
   written_ = other.written_;
   return *this;
@@ -171,11 +178,16 @@ OutputFile::~OutputFile() { Discard(); }
 void OutputFile::Discard() noexcept {
   if (descriptor_ >= 0) ::close(descriptor_);
   descriptor_ = -1;
+  bytes_.reset();
   if (!temporary_.empty()) ::unlink(temporary_.c_str());
   temporary_.clear();
 }
 
 Status OutputFile::Reserve(uint64_t bytes) {
+  if (bytes_) {
+    bytes_->Reserve(bytes);
+    return {};
+  }
 #ifdef FALLOC_FL_KEEP_SIZE
   if (::fallocate(descriptor_, FALLOC_FL_KEEP_SIZE, 0, static_cast<off_t>(bytes)) != 0 && errno == ENOSPC) {
     return Error{ErrorCode::kIo,
@@ -194,6 +206,10 @@ Status OutputFile::Write(const void* data, size_t size) {
 }
 
 Status OutputFile::WriteAt(uint64_t offset, const void* data, size_t size) const {
+  if (bytes_) {
+    bytes_->WriteAt(offset, data, size);
+    return {};
+  }
   const char* from = static_cast<const char*>(data);
   while (size > 0) {
     const ssize_t n = ::pwrite(descriptor_, from, size, static_cast<off_t>(offset));
@@ -208,6 +224,7 @@ Status OutputFile::WriteAt(uint64_t offset, const void* data, size_t size) const
 
 // No bytes follow. Files that may replace one get a name to be renamed from.
 Status OutputFile::FinishBytes() {
+  if (memory_ != nullptr) return {};
   const bool replaces = overwrite_ || IsOwnFile(target_);
   if (temporary_.empty() && !replaces) return {};  // nameless, and stays so until it is given its name at once
   while (temporary_.empty()) {
@@ -225,6 +242,10 @@ Status OutputFile::FinishBytes() {
 }
 
 Status OutputFile::TakeName(bool keep_old) {
+  if (memory_ != nullptr) {
+    memory_->files.insert_or_assign(path_, bytes_->Take());
+    return {};
+  }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(target_));
   int error = 0;
   if (temporary_.empty()) {
@@ -253,6 +274,10 @@ Status OutputFile::TakeName(bool keep_old) {
 }
 
 Status OutputFile::GiveNameBack() {
+  if (memory_ != nullptr) {
+    memory_->files.erase(path_);
+    return {};
+  }
   if (old_.empty()) return ::unlink(target_.c_str()) == 0 ? Status() : Status(WriteError(path_, "remove", errno));
   const fs::path old = std::exchange(old_, {});
   if (::rename(old.c_str(), target_.c_str()) == 0) return {};

@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string_view>
 
 #include "core/result.h"
+#include "io/output_memory.h"
 
 namespace anchorsplat {
 
@@ -26,7 +28,9 @@ class OutputFile {
  public:
   // Errors: kBadArgument when `path` is an input; kExists when it exists and `overwrite` is false; kNotFound when its
   // folder does not; kIo when the system refuses or `path` is something that cannot be replaced by a file.
-  static Result<OutputFile> Create(const std::filesystem::path& path, bool overwrite);
+  // With `memory` the file goes there under the name `path` and nothing of the file system is looked at: then only an
+  // empty name is an error. Running out of memory throws std::bad_alloc.
+  static Result<OutputFile> Create(const std::filesystem::path& path, bool overwrite, OutputMemory* memory = nullptr);
 
   OutputFile(OutputFile&& other) noexcept;
   OutputFile& operator=(OutputFile&& other) noexcept;
@@ -61,6 +65,8 @@ class OutputFile {
   std::filesystem::path temporary_;
   std::filesystem::path old_;  // where the file that had the name is kept until the others have theirs
   int descriptor_ = -1;
+  OutputMemory* memory_ = nullptr;  // where it goes instead
+  std::unique_ptr<MemoryBytes> bytes_;
   bool overwrite_ = false;
   uint64_t written_ = 0;
 };

@@ -47,6 +47,7 @@ Result<std::string> ReadPipe(int descriptor, const std::string& name) {
 Result<InputFile> InputFile::Open(const std::filesystem::path& path) {
   InputFile file;
   file.path_ = path;
+  file.has_folder_ = true;
   const std::string name = path.string();
   // Opening a pipe without a writer would wait for one, so look before (O_NONBLOCK would then break its reading).
   do {
@@ -64,9 +65,9 @@ Result<InputFile> InputFile::Open(const std::filesystem::path& path) {
   }
   if (S_ISDIR(info.st_mode)) return Error{ErrorCode::kIo, Cat(name, ": is a folder, expected a file")};
   if (S_ISFIFO(info.st_mode) || S_ISSOCK(info.st_mode)) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(file.memory_, ReadPipe(file.descriptor_, name));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(file.owned_, ReadPipe(file.descriptor_, name));
     ::close(std::exchange(file.descriptor_, -1));
-    file.size_ = file.memory_.size();
+    file.size_ = file.owned_.size();
     return file;
   }
   if (!S_ISREG(info.st_mode)) return Error{ErrorCode::kIo, Cat(name, ": is a device, expected a file")};
@@ -79,8 +80,24 @@ InputFile InputFile::FromBytes(std::string name, std::string bytes) {
   InputFile file;
   file.path_ = std::move(name);
   file.size_ = bytes.size();
-  file.memory_ = std::move(bytes);
+  file.owned_ = std::move(bytes);
   return file;
+}
+
+InputFile InputFile::View(std::string name, std::string_view bytes) {
+  InputFile file;
+  file.path_ = std::move(name);
+  file.size_ = bytes.size();
+  file.borrowed_ = bytes;
+  return file;
+}
+
+Result<InputFile> InputFile::OpenBeside(const std::filesystem::path& name) const {
+  if (!has_folder_) {
+    return Error{ErrorCode::kBadFile, Cat(this->name(), ": consists of several files (", Printable(name.string()),
+                                          " is one of them), which cannot be read from memory")};
+  }
+  return Open(path_.parent_path() / name);
 }
 
 InputFile::InputFile(InputFile&& other) noexcept { *this = std::move(other); }
@@ -90,7 +107,9 @@ InputFile& InputFile::operator=(InputFile&& other) noexcept {
   if (descriptor_ >= 0) ::close(descriptor_);
   path_ = std::move(other.path_);
   descriptor_ = std::exchange(other.descriptor_, -1);
-  memory_ = std::move(other.memory_);
+  has_folder_ = other.has_folder_;
+  owned_ = std::move(other.owned_);
+  borrowed_ = std::exchange(other.borrowed_, {});
   size_ = std::exchange(other.size_, 0);
   kept_ = std::move(other.kept_);
   return *this;
@@ -103,7 +122,7 @@ InputFile::~InputFile() {
 Status InputFile::ReadAt(uint64_t offset, void* out, size_t size) const {
   if (offset > size_ || size > size_ - offset) return EndsBefore(name(), size_);
   if (descriptor_ < 0) {
-    if (size > 0) std::memcpy(out, memory_.data() + offset, size);
+    if (size > 0) std::memcpy(out, memory().data() + offset, size);
     return {};
   }
   char* to = static_cast<char*>(out);
@@ -134,7 +153,7 @@ Result<std::string> InputFile::ReadAll(uint64_t max_size) const {
 }
 
 Result<std::string_view> InputFile::Whole(uint64_t max_size) const {
-  if (descriptor_ < 0 && size_ <= max_size) return std::string_view(memory_);
+  if (descriptor_ < 0 && size_ <= max_size) return memory();
   const std::lock_guard lock(kept_->mutex);
   if (!kept_->bytes) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(kept_->bytes, ReadAll(max_size));

@@ -23,10 +23,16 @@ class InputFile {
   static Result<InputFile> Open(const std::filesystem::path& path);
   // Bytes in memory that read like a file; `name` is what messages call it.
   static InputFile FromBytes(std::string name, std::string bytes);
+  // The same of bytes that stay where they are as long as the file.
+  static InputFile View(std::string name, std::string_view bytes);
 
   InputFile(InputFile&& other) noexcept;
   InputFile& operator=(InputFile&& other) noexcept;
   ~InputFile();
+
+  // A file that belongs to this one, by its name relative to this one's folder. Errors: those of Open; kBadFile where
+  // this one is bytes in memory, beside which there are no files.
+  Result<InputFile> OpenBeside(const std::filesystem::path& name) const;
 
   const std::filesystem::path& path() const { return path_; }
   std::string name() const { return path_.string(); }  // for messages
@@ -44,10 +50,13 @@ class InputFile {
 
  private:
   InputFile() = default;
+  std::string_view memory() const { return owned_.empty() ? borrowed_ : std::string_view(owned_); }
 
   std::filesystem::path path_;
-  int descriptor_ = -1;  // −1: the bytes are in memory
-  std::string memory_;
+  int descriptor_ = -1;      // −1: the bytes are in memory
+  bool has_folder_ = false;  // it was opened by its path
+  std::string owned_;
+  std::string_view borrowed_;  // where nothing is owned
   uint64_t size_ = 0;
   struct Kept {
     std::mutex mutex;

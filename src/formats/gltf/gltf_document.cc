@@ -140,7 +140,7 @@ Status GltfDocument::OpenBuffers(uint64_t binary_begin, uint64_t binary_size) {
         if (!beside) {
           return uri->Complain(Cat("expected the name of a file beside it, found \"", Printable(name), "\""));
         }
-        Result<InputFile> opened = InputFile::Open(file_->path().parent_path() / *beside);
+        Result<InputFile> opened = file_->OpenBeside(*beside);
         if (!opened.ok()) return Error{opened.error().code, uri->Complain(opened.error().message).message};
         buffer.own = *std::move(opened);
         bytes_beside_ += buffer.own->size();

@@ -50,6 +50,7 @@ class Members {
       ANCHORSPLAT_ASSIGN_OR_RETURN(ZipReader archive, ZipReader::View(file.name(), bytes));
       members.archive_.emplace(std::move(archive));
     } else {
+      members.file_ = &file;
       members.folder_ = file.path().parent_path();
     }
     return members;
@@ -78,7 +79,7 @@ class Members {
     if (archive_) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(bytes, archive_->Read(member, kMaxPicture));
     } else {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(folder_ / member));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, file_->OpenBeside(member));
       ANCHORSPLAT_ASSIGN_OR_RETURN(bytes, file.ReadAll(kMaxPicture));
     }
     const std::string where = archive_ ? Cat(name_, ": ", member) : (folder_ / member).string();
@@ -89,7 +90,8 @@ class Members {
  private:
   std::string name_;
   std::optional<ZipReader> archive_;
-  std::filesystem::path folder_;
+  const InputFile* file_ = nullptr;  // meta.json itself, and
+  std::filesystem::path folder_;     // where it lies
 };
 
 // 256 values per channel that bytes stand for.

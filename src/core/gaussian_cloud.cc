@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/cloud_view.h"
 #include "core/finite.h"
 #include "core/statistics.h"
 #include "core/text.h"
@@ -39,36 +40,9 @@ void GaussianCloud::Resize(int64_t n, int degree) {
   sh.resize(count * static_cast<size_t>(sh_stride()));
 }
 
-Status Validate(const GaussianCloud& cloud) {
-  if (cloud.sh_degree < 0 || cloud.sh_degree > kMaxShDegree) {
-    return Error{ErrorCode::kBadArgument, Cat("SH degree ", cloud.sh_degree, " is not 0 to ", kMaxShDegree)};
-  }
-  const size_t n = cloud.opacity_logits.size();
-  const auto check = [n](const Buffer<float>& array, int64_t width, const char* name) -> Status {
-    if (array.size() == n * static_cast<size_t>(width)) return {};
-    return Error{ErrorCode::kBadArgument,
-                 Cat("Gaussian cloud: ", name, " has ", array.size(), " values, expected ", n, " x ", width)};
-  };
-  ANCHORSPLAT_RETURN_IF_ERROR(check(cloud.means, 3, "means"));
-  ANCHORSPLAT_RETURN_IF_ERROR(check(cloud.log_scales, 3, "log_scales"));
-  ANCHORSPLAT_RETURN_IF_ERROR(check(cloud.quats, 4, "quats"));
-  return check(cloud.sh, cloud.sh_stride(), "sh");
-}
+Status Validate(const GaussianCloud& cloud) { return Validate(CloudView(cloud)); }
 
-std::optional<Bounds> ComputeBounds(const GaussianCloud& cloud) {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  Bounds box{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
-  for (int64_t i = 0; i < cloud.size(); ++i) {
-    const float* p = &cloud.means[static_cast<size_t>(3 * i)];
-    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) continue;
-    for (size_t a = 0; a < 3; ++a) {
-      box.min[a] = std::min(box.min[a], p[a]);
-      box.max[a] = std::max(box.max[a], p[a]);
-    }
-  }
-  if (box.min[0] > box.max[0]) return std::nullopt;
-  return box;
-}
+std::optional<Bounds> ComputeBounds(const GaussianCloud& cloud) { return ComputeBounds(CloudView(cloud)); }
 
 Result<GaussianCloud> Subset(const GaussianCloud& cloud, std::span<const int64_t> rows) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));

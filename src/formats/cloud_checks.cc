@@ -4,7 +4,7 @@
 
 namespace anchorsplat {
 
-Status CheckWritable(const std::filesystem::path& path, const GaussianCloud& cloud) {
+Status CheckWritable(const std::filesystem::path& path, const CloudView& cloud) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   if (!cloud.empty()) return {};
   return Error{ErrorCode::kBadArgument, Cat(path.string(), ": there are no Gaussians to write")};

@@ -4,14 +4,14 @@
 #include <filesystem>
 #include <string>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
 
 namespace anchorsplat {
 
 // What every writer asks first: arrays that agree and at least one Gaussian (kBadArgument otherwise).
-Status CheckWritable(const std::filesystem::path& path, const GaussianCloud& cloud);
+Status CheckWritable(const std::filesystem::path& path, const CloudView& cloud);
 
 // What every reader asks before it allocates: 1 … `limits.max_gaussians` (kBadFile otherwise). `where` begins the
 // message: "scene.spz: byte 8".

@@ -38,11 +38,11 @@ Result<GaussianCloud> ReadCloud(const std::filesystem::path& path, const ReadLim
   return OutOfMemory(path);
 }
 
-Status WriteCloud(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options) {
+Status WriteCloud(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {
   return WriteCloud(path, cloud, options, ExtraProperties{});
 }
 
-Status WriteCloud(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options,
+Status WriteCloud(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options,
                   const ExtraProperties& extras) try {
   const SplatFormat* format = FormatOfExtension(path);
   if (format == nullptr || format->write == nullptr) {

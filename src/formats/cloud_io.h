@@ -3,10 +3,13 @@
 #include <cstdint>
 #include <filesystem>
 
+#include "core/cloud_view.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 
 namespace anchorsplat {
+
+struct OutputMemory;
 
 // Bounds on what a file may make us allocate.
 struct ReadLimits {
@@ -25,7 +28,8 @@ enum class SplatOrder {
 struct CloudWriteOptions {
   bool overwrite = false;  // an existing file is kExists otherwise
   SplatOrder order = SplatOrder::kFormat;
-  int spz_version = 4;  // 3: one gzip stream, which older programs read; 4: zstd streams
+  int spz_version = 4;             // 3: one gzip stream, which older programs read; 4: zstd streams
+  OutputMemory* memory = nullptr;  // the files go there instead of a folder (io/output_memory.h)
 };
 
 // Reads a splat file of any known format, found by its content first and its extension second; a folder with a
@@ -35,6 +39,6 @@ Result<GaussianCloud> ReadCloud(const std::filesystem::path& path, const ReadLim
 
 // Writes a splat file; the format is found by the extension. The file appears whole or not at all: it is written under
 // a temporary name beside the target and renamed. Errors: kExists, kIo, kBadArgument (unknown extension, bad cloud).
-Status WriteCloud(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options = {});
+Status WriteCloud(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options = {});
 
 }  // namespace anchorsplat

@@ -22,7 +22,7 @@ Status CheckCanWriteCloud(const fs::path& path, int sh_degree, const CloudWriteO
   return {};
 }
 
-Status WriteCloudOrKeep(const fs::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options,
+Status WriteCloudOrKeep(const fs::path& path, const CloudView& cloud, const CloudWriteOptions& options,
                         const ExtraProperties& extras) {
   return WriteOrKeep(path, options.overwrite, [&](const fs::path& name, bool overwrite) {
     CloudWriteOptions write = options;

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
 #include "formats/extra_properties.h"
@@ -20,7 +20,7 @@ Status CheckCanWriteCloud(const std::filesystem::path& path, int sh_degree, cons
 
 // WriteCloud after the work. Where the name cannot be had any more, because a file of that name came into being
 // meanwhile, the result goes to the next free name beside it, "scan-2.ply", and the error says so.
-Status WriteCloudOrKeep(const std::filesystem::path& path, const GaussianCloud& cloud,
+Status WriteCloudOrKeep(const std::filesystem::path& path, const CloudView& cloud,
                         const CloudWriteOptions& options = {}, const ExtraProperties& extras = {});
 
 }  // namespace anchorsplat

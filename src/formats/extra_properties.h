@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/buffer.h"
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/axes.h"
 #include "formats/cloud_io.h"
@@ -45,7 +45,7 @@ void FlipAxes(ExtraProperties& extras, const AxisFlip& flip);
 
 // WriteCloud (cloud_io.h) with what the input says of the same Gaussians beside them, in the order of the cloud.
 // Formats without a place for it leave it out, and a warning names it.
-Status WriteCloud(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options,
+Status WriteCloud(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options,
                   const ExtraProperties& extras);
 
 }  // namespace anchorsplat

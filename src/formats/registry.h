@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/cloud_view.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/axes.h"
@@ -47,9 +48,9 @@ struct SplatFormat {
   // `read` and `write` with what a file says beside its Gaussians (extra_properties.h). Null where that has no place.
   Result<GaussianCloud> (*read_with_extras)(const InputFile& file, const ReadLimits& limits,
                                             ExtraProperties& extras) = nullptr;
-  Status (*write)(const std::filesystem::path& path, const GaussianCloud& cloud,
+  Status (*write)(const std::filesystem::path& path, const CloudView& cloud,
                   const CloudWriteOptions& options) = nullptr;
-  Status (*write_with_extras)(const std::filesystem::path& path, const GaussianCloud& cloud,
+  Status (*write_with_extras)(const std::filesystem::path& path, const CloudView& cloud,
                               const CloudWriteOptions& options, const ExtraProperties& extras) = nullptr;
   // Files that `write` makes beside the one it is told. Null: none.
   std::vector<std::filesystem::path> (*written_beside)(const std::filesystem::path& path, int sh_degree) = nullptr;
@@ -63,7 +64,7 @@ struct SplatFormat {
   Axes axes = kRdf;
   FormatRange range = {};
   // A sentence where `write` must round the means of this cloud more coarsely than is usual, else nothing. May be null.
-  std::string (*mean_loss)(const GaussianCloud& cloud) = nullptr;
+  std::string (*mean_loss)(const CloudView& cloud) = nullptr;
 };
 
 inline constexpr size_t kSniffBytes = 4096;

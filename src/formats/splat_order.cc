@@ -47,7 +47,7 @@ uint64_t SpreadBits(uint64_t x) {
 
 }  // namespace
 
-Buffer<uint32_t> MortonOrder(const GaussianCloud& cloud) {
+Buffer<uint32_t> MortonOrder(const CloudView& cloud) {
   const std::optional<Bounds> bounds = ComputeBounds(cloud);
   constexpr double kCells = 1 << 21;
   double scale[3] = {0, 0, 0};
@@ -69,7 +69,7 @@ Buffer<uint32_t> MortonOrder(const GaussianCloud& cloud) {
   });
 }
 
-Buffer<uint32_t> ImportanceOrder(const GaussianCloud& cloud) {
+Buffer<uint32_t> ImportanceOrder(const CloudView& cloud) {
   return OrderBy<float>(cloud.size(), [&](int64_t i) {
     const float* s = cloud.log_scales.data() + 3 * i;
     const float logit = cloud.opacity_logits[static_cast<size_t>(i)];
@@ -82,7 +82,7 @@ Buffer<uint32_t> ImportanceOrder(const GaussianCloud& cloud) {
   });
 }
 
-Buffer<uint32_t> WriteOrder(const GaussianCloud& cloud, SplatOrder asked, SplatOrder of_format) {
+Buffer<uint32_t> WriteOrder(const CloudView& cloud, SplatOrder asked, SplatOrder of_format) {
   const SplatOrder order = asked == SplatOrder::kFormat ? of_format : asked;
   if (order == SplatOrder::kMorton) return MortonOrder(cloud);
   if (order == SplatOrder::kImportance) return ImportanceOrder(cloud);

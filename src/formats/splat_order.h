@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "core/buffer.h"
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "formats/cloud_io.h"
 
 namespace anchorsplat {
@@ -13,13 +13,13 @@ namespace anchorsplat {
 
 // Along a Morton (Z-order) curve of 2²¹ cells per axis through the box of the finite means, so that neighbours in the
 // file are neighbours in space: ranges of chunks become small and general compressors find more.
-Buffer<uint32_t> MortonOrder(const GaussianCloud& cloud);
+Buffer<uint32_t> MortonOrder(const CloudView& cloud);
 
 // By size × opacity, largest first: exp(Σ log-scales) · sigmoid(logit), what viewers that show a file while it loads
 // want to have first.
-Buffer<uint32_t> ImportanceOrder(const GaussianCloud& cloud);
+Buffer<uint32_t> ImportanceOrder(const CloudView& cloud);
 
 // The order a writer uses: `asked`, or what the format likes. Empty: as in the cloud.
-Buffer<uint32_t> WriteOrder(const GaussianCloud& cloud, SplatOrder asked, SplatOrder of_format);
+Buffer<uint32_t> WriteOrder(const CloudView& cloud, SplatOrder asked, SplatOrder of_format);
 
 }  // namespace anchorsplat

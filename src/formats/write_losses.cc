@@ -23,7 +23,7 @@ bool AnyBeyond(const float* values, int64_t count, float min, float max) {
   return std::any_of(values, values + count, [&](float x) { return x < min || x > max; });
 }
 
-Clamped CountClamped(const FormatRange& range, const GaussianCloud& cloud, int sh_degree) {
+Clamped CountClamped(const FormatRange& range, const CloudView& cloud, int sh_degree) {
   const int64_t harmonics = 3 * (ShCoefficients(sh_degree) - 1);
   std::vector<Clamped> parts(static_cast<size_t>((cloud.size() + kLossGrain - 1) / kLossGrain));
   ParallelFor(0, cloud.size(), kLossGrain, [&](int64_t first, int64_t last) {
@@ -49,7 +49,7 @@ Clamped CountClamped(const FormatRange& range, const GaussianCloud& cloud, int s
 
 }  // namespace
 
-std::vector<std::string> WriteLosses(const SplatFormat& format, const GaussianCloud& cloud) {
+std::vector<std::string> WriteLosses(const SplatFormat& format, const CloudView& cloud) {
   const FormatRange& range = format.range;
   std::vector<std::string> losses;
   if (cloud.sh_degree > range.sh_degree) {
@@ -73,7 +73,7 @@ std::vector<std::string> WriteLosses(const SplatFormat& format, const GaussianCl
   return losses;
 }
 
-MiddleOfMeans FindMiddleOfMeans(const GaussianCloud& cloud) {
+MiddleOfMeans FindMiddleOfMeans(const CloudView& cloud) {
   constexpr int64_t kSamples = 1 << 16;
   const int64_t step = (cloud.size() + kSamples - 1) / kSamples;
   MiddleOfMeans middle;

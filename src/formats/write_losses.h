@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "formats/registry.h"
 
 namespace anchorsplat {
@@ -12,13 +12,13 @@ namespace anchorsplat {
 // that are dropped, values that are clamped to the format's range, means that one stray Gaussian makes coarse. A
 // sentence each, for people; nothing when all is well. WriteCloud says them as warnings. Values that are not numbers
 // are not counted.
-std::vector<std::string> WriteLosses(const SplatFormat& format, const GaussianCloud& cloud);
+std::vector<std::string> WriteLosses(const SplatFormat& format, const CloudView& cloud);
 
 // Largest side of a box that holds the middle 98 % of the means on every axis, and its farthest coordinate from zero;
 // estimated from at most 65,536 of them. Zeros when none is finite.
 struct MiddleOfMeans {
   float extent = 0, farthest = 0;  // world units
 };
-MiddleOfMeans FindMiddleOfMeans(const GaussianCloud& cloud);
+MiddleOfMeans FindMiddleOfMeans(const CloudView& cloud);
 
 }  // namespace anchorsplat

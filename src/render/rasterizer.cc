@@ -67,7 +67,7 @@ void Shape(int width, int height, int channels, Image& image) {
 }  // namespace
 
 // Projection and colours. Returns how many Gaussians are visible.
-int64_t Rasterizer::State::Project(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options,
+int64_t Rasterizer::State::Project(const CloudView& cloud, const Camera& camera, const RenderOptions& options,
                                    Stopwatch& watch) {
   const int64_t n = cloud.size();
   const int64_t chunks = ProjectChunks(n);
@@ -209,7 +209,7 @@ Rasterizer& Rasterizer::operator=(Rasterizer&&) noexcept = default;
 
 const RenderStatistics& Rasterizer::statistics() const { return state_->statistics; }
 
-Status Rasterizer::Render(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options,
+Status Rasterizer::Render(const CloudView& cloud, const Camera& camera, const RenderOptions& options,
                           RenderOutput& output) {
   state_->kept.reset();
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/camera.h"
+#include "core/cloud_view.h"
 #include "core/framing.h"
 #include "core/gaussian_cloud.h"
 #include "core/image.h"
@@ -101,7 +102,7 @@ class Rasterizer {
   // picture. Gaussians with a value that is not finite are skipped, as far as the picture needs the value: SH
   // coefficients of a degree that is not used are not looked at. −Inf is legal as a log-scale (a flat Gaussian), ±Inf
   // as an opacity logit.
-  Status Render(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options, RenderOutput& output);
+  Status Render(const CloudView& cloud, const Camera& camera, const RenderOptions& options, RenderOutput& output);
 
   // The gradient of the last Render, which must have been asked to keep what this needs (RenderOptions::gradient), with
   // the same values in `cloud`. Exact for what Render calculates: cut-offs and the order of depths count as constant,
@@ -112,7 +113,7 @@ class Rasterizer {
   //
   // Errors (kBadArgument): no such Render before; a cloud of another size or degree; gradients of another size than the
   // picture; a box that reaches outside of it; not enough memory (kIo).
-  Status Backward(const GaussianCloud& cloud, const RenderGradient& output_gradient, CloudGradient& gradient);
+  Status Backward(const CloudView& cloud, const RenderGradient& output_gradient, CloudGradient& gradient);
 
   const RenderStatistics& statistics() const;  // of the last Render that succeeded
 

@@ -85,7 +85,7 @@ void Rasterizer::State::BlendBackward(const RenderGradient& output_gradient, std
   for (size_t c = 0; c < 3; ++c) background[c] = static_cast<float>(background_gradient[c]);
 }
 
-void Rasterizer::State::ProjectBackward(const GaussianCloud& cloud, CloudGradient& gradient) {
+void Rasterizer::State::ProjectBackward(const CloudView& cloud, CloudGradient& gradient) {
   const size_t n = static_cast<size_t>(kept->count);
   gradient.means.resize(3 * n);
   gradient.log_scales.resize(3 * n);
@@ -133,8 +133,7 @@ void Rasterizer::State::ProjectBackward(const GaussianCloud& cloud, CloudGradien
   SphericalHarmonicsBackwardCpu(sh);
 }
 
-Status Rasterizer::Backward(const GaussianCloud& cloud, const RenderGradient& output_gradient,
-                            CloudGradient& gradient) {
+Status Rasterizer::Backward(const CloudView& cloud, const RenderGradient& output_gradient, CloudGradient& gradient) {
   if (!state_->kept) {
     return BadGradientArgument("no picture to take the gradient of: render one with RenderOptions::gradient first");
   }

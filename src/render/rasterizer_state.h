@@ -49,13 +49,13 @@ struct Rasterizer::State {
   Buffer<BlendGradient> gradients, partial;
   Buffer<double> tile_backgrounds;
 
-  int64_t Project(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options, Stopwatch& watch);
+  int64_t Project(const CloudView& cloud, const Camera& camera, const RenderOptions& options, Stopwatch& watch);
   void Sort(int64_t count, int64_t total);
   BinParams MakeBinParams(int64_t visible_total, const Pinhole& intrinsics, float min_alpha);
   void BinAndBlend(int64_t visible_total, const Camera& camera, const RenderOptions& options, RenderOutput& output,
                    Stopwatch& watch);
   void BlendBackward(const RenderGradient& output_gradient, std::array<float, 3>& background);
-  void ProjectBackward(const GaussianCloud& cloud, CloudGradient& gradient);
+  void ProjectBackward(const CloudView& cloud, CloudGradient& gradient);
 };
 
 }  // namespace anchorsplat

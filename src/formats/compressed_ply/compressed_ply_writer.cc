@@ -35,7 +35,7 @@ constexpr float kMaxLogScale = 20;
 
 int64_t Chunks(int64_t count) { return (count + kChunk - 1) / kChunk; }
 
-std::string Header(const GaussianCloud& cloud, int64_t count, int sh_degree) {
+std::string Header(const CloudView& cloud, int64_t count, int sh_degree) {
   std::string header = "ply\nformat binary_little_endian 1.0\n";
   for (const std::string& comment : cloud.comments) {
     std::string line = comment;
@@ -116,7 +116,7 @@ void PackHarmonics(const float* sh, size_t rest, uint8_t* out) {
 
 // Asks for the memory of a Gaussian. In Morton order rows lie anywhere, and waiting for one after the other takes
 // longer than all the arithmetic.
-void Prefetch(const GaussianCloud& cloud, int64_t row) {
+void Prefetch(const CloudView& cloud, int64_t row) {
   const auto fetch = [](const float* values, int64_t count) {
     constexpr int64_t kLine = 64 / sizeof(float);
     for (int64_t k = 0; k < count; k += kLine) __builtin_prefetch(values + k);
@@ -136,7 +136,7 @@ struct PackedChunk {
   uint8_t* harmonics;  // [count][rest]
 };
 
-void PackChunk(const GaussianCloud& cloud, const Buffer<uint32_t>& order, int64_t first, int64_t count,
+void PackChunk(const CloudView& cloud, const Buffer<uint32_t>& order, int64_t first, int64_t count,
                const PackedChunk& out) {
   RangedValues means, scales, colors;
   std::array<int64_t, kChunk> rows{};
@@ -184,8 +184,7 @@ uint64_t PredictedCompressedPlySize(int64_t count, int sh_degree) {
          static_cast<uint64_t>(count) * (kVertexBytes + rest);
 }
 
-Status WriteCompressedPly(const std::filesystem::path& path, const GaussianCloud& cloud,
-                          const CloudWriteOptions& options) {
+Status WriteCompressedPly(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
   const std::string header = Header(cloud, cloud.size(), cloud.sh_degree);
   if (header.size() > kMaxPlyHeader) {
@@ -199,7 +198,7 @@ Status WriteCompressedPly(const std::filesystem::path& path, const GaussianCloud
   const uint64_t ranges_begin = header.size();
   const uint64_t vertices_begin = ranges_begin + static_cast<uint64_t>(chunks) * kChunkBytes;
   const uint64_t harmonics_begin = vertices_begin + static_cast<uint64_t>(cloud.size()) * kVertexBytes;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   ANCHORSPLAT_RETURN_IF_ERROR(file.Reserve(harmonics_begin + static_cast<uint64_t>(cloud.size()) * rest));
   ANCHORSPLAT_RETURN_IF_ERROR(file.WriteAt(0, header.data(), header.size()));
 
@@ -232,7 +231,7 @@ Status WriteCompressedPly(const std::filesystem::path& path, const GaussianCloud
   return file.Commit();
 }
 
-std::string CompressedPlyMeanLoss(const GaussianCloud& cloud) {
+std::string CompressedPlyMeanLoss(const CloudView& cloud) {
   constexpr double kStray = 8;       // of the box of the middle 98 %: where it ends well, nobody needs to look closer
   constexpr double kUsualChunk = 4;  // times its share of the volume: surfaces have larger ones than solids
   constexpr double kLeastChunk = 0.5, kMostChunk = 2;  // of the box: steps of 1/4094 and 1/1023 of it

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
 
@@ -15,7 +15,7 @@ namespace anchorsplat {
 // Lost: means and log-scales are rounded to 1/2047 (y: 1/1023) of the range of their chunk, log-scales clamped to ±20,
 // quaternion components to 1/1447, colours to 1/255 of the chunk's range, opacities to 1/255, SH to 1/32 within ±4.
 // Errors: kExists, kIo, kBadArgument (arrays that disagree, no Gaussians).
-Status WriteCompressedPly(const std::filesystem::path& path, const GaussianCloud& cloud,
+Status WriteCompressedPly(const std::filesystem::path& path, const CloudView& cloud,
                           const CloudWriteOptions& options = {});
 
 uint64_t PredictedCompressedPlySize(int64_t count, int sh_degree);
@@ -23,6 +23,6 @@ uint64_t PredictedCompressedPlySize(int64_t count, int sh_degree);
 // A sentence where chunks of this cloud reach so far that their 2047 steps are coarse; else nothing. One Gaussian far
 // out does that to those that share its chunk, and farther out still, where the Morton order tells no others apart, to
 // all.
-std::string CompressedPlyMeanLoss(const GaussianCloud& cloud);
+std::string CompressedPlyMeanLoss(const CloudView& cloud);
 
 }  // namespace anchorsplat

@@ -45,7 +45,7 @@ float LinearFromSrgb(float x) {
 
 void PutFloats(const float* values, size_t count, uint8_t* bytes) { std::memcpy(bytes, values, count * sizeof(float)); }
 
-std::vector<WrittenAttribute> Attributes(const GaussianCloud& cloud, const AxisFlip& flip) {
+std::vector<WrittenAttribute> Attributes(const CloudView& cloud, const AxisFlip& flip) {
   std::vector<WrittenAttribute> out;
   out.push_back({kPosition, "VEC3", kFloatComponent, 12, [&](int64_t row, uint8_t* bytes) {
                    float mean[3];
@@ -136,7 +136,7 @@ nlohmann::json JsonOf(int64_t count, const std::vector<WrittenAttribute>& attrib
           {"accessors", accessors}};
 }
 
-nlohmann::json BoundsOf(const GaussianCloud& cloud, const AxisFlip& flip) {
+nlohmann::json BoundsOf(const CloudView& cloud, const AxisFlip& flip) {
   const std::optional<Bounds> bounds = ComputeBounds(cloud);
   if (!bounds) return nlohmann::json::object();
   nlohmann::json min, max;
@@ -154,7 +154,7 @@ size_t JsonSize(int64_t count, const std::vector<WrittenAttribute>& attributes) 
 }
 
 // The values of all attributes, one attribute after the other, from byte `at` on.
-Status WriteValues(OutputFile& file, uint64_t at, const GaussianCloud& cloud, const CloudWriteOptions& options,
+Status WriteValues(OutputFile& file, uint64_t at, const CloudView& cloud, const CloudWriteOptions& options,
                    const std::vector<WrittenAttribute>& attributes) {
   const Buffer<uint32_t> order = WriteOrder(cloud, options.order, SplatOrder::kKeep);
   for (const WrittenAttribute& attribute : attributes) {
@@ -190,14 +190,14 @@ constexpr uint64_t kHeads = 12 + 8 + 8;  // of the file and its two chunks
 }  // namespace
 
 uint64_t PredictedGlbSize(int64_t count, int sh_degree) {
-  GaussianCloud none;
+  CloudView none;
   none.sh_degree = sh_degree;
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
   const std::vector<WrittenAttribute> attributes = Attributes(none, flip);
   return kHeads + JsonSize(count, attributes) + BytesOf(attributes, count);
 }
 
-Status WriteGlb(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options) {
+Status WriteGlb(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
   const std::vector<WrittenAttribute> attributes = Attributes(cloud, flip);
@@ -209,7 +209,7 @@ Status WriteGlb(const std::filesystem::path& path, const GaussianCloud& cloud, c
     return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", WithThousands(cloud.size()), " Gaussians take ",
                                               HumanBytes(binary), ", a GLB file ends at 4.3 GB")};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   ANCHORSPLAT_RETURN_IF_ERROR(file.Reserve(begin + binary));
   const uint32_t head[5] = {0x46546c67, 2, static_cast<uint32_t>(begin + binary), static_cast<uint32_t>(json.size()),
                             0x4e4f534a};                                  // "glTF", version, length; length, "JSON"
@@ -222,7 +222,7 @@ Status WriteGlb(const std::filesystem::path& path, const GaussianCloud& cloud, c
 }
 
 uint64_t EstimatedGltfSize(int64_t count, int sh_degree) {
-  GaussianCloud none;
+  CloudView none;
   none.sh_degree = sh_degree;
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
   const std::vector<WrittenAttribute> attributes = Attributes(none, flip);
@@ -235,7 +235,7 @@ std::filesystem::path GltfFileBeside(const std::filesystem::path& path) {
   return std::filesystem::path(path).replace_extension(".bin");
 }
 
-Status WriteGltf(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options) {
+Status WriteGltf(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
   const std::filesystem::path beside = GltfFileBeside(path);
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
@@ -244,7 +244,7 @@ Status WriteGltf(const std::filesystem::path& path, const GaussianCloud& cloud, 
   json["buffers"][0]["uri"] = UriOf(beside.filename().string());
   std::vector<OutputFile> files;
   for (const std::filesystem::path& name : {beside, path}) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(name, options.overwrite));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(name, options.overwrite, options.memory));
     files.push_back(std::move(file));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(files[0].Reserve(BytesOf(attributes, cloud.size())));

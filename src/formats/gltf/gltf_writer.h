@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
 
@@ -17,11 +17,11 @@ namespace anchorsplat {
 // extension is without the 0.3 px² by which the usual rasterizers widen every Gaussian: a viewer that takes it at its
 // word shows a classic splat thinner and dimmer than it was fitted.
 // Errors: kExists, kIo, kBadArgument (arrays that disagree, no Gaussians, more than the format's 4 GiB).
-Status WriteGlb(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options = {});
+Status WriteGlb(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options = {});
 
 // The same as JSON with its numbers in a file of their own beside it: scan.gltf and scan.bin. Both appear when both are
 // complete. Errors: as WriteGlb, without its bound; kExists for each of the two.
-Status WriteGltf(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options = {});
+Status WriteGltf(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options = {});
 std::filesystem::path GltfFileBeside(const std::filesystem::path& path);
 
 uint64_t EstimatedGltfSize(int64_t count, int sh_degree);  // of both

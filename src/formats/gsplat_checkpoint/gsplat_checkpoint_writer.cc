@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -76,15 +77,15 @@ class PickleWriter {
 struct Tensor {
   const char* name;
   std::vector<int64_t> shape;
-  const Buffer<float>* values;
+  std::span<const float> values;
 };
 
-std::string_view Bytes(const Buffer<float>& values) {
+std::string_view Bytes(std::span<const float> values) {
   return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float)};
 }
 
 // Columns [first, first + count) of every Gaussian's SH row.
-Buffer<float> ShColumns(const GaussianCloud& cloud, int64_t first, int64_t count) {
+Buffer<float> ShColumns(const CloudView& cloud, int64_t first, int64_t count) {
   Buffer<float> out(static_cast<size_t>(cloud.size() * count));
   for (int64_t i = 0; i < cloud.size(); ++i) {
     std::copy_n(cloud.sh.data() + i * cloud.sh_stride() + first, count, out.data() + i * count);
@@ -94,7 +95,7 @@ Buffer<float> ShColumns(const GaussianCloud& cloud, int64_t first, int64_t count
 
 }  // namespace
 
-Status WriteGsplatCheckpoint(const std::filesystem::path& path, const GaussianCloud& cloud, int64_t step,
+Status WriteGsplatCheckpoint(const std::filesystem::path& path, const CloudView& cloud, int64_t step,
                              const CloudWriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   const auto bad = [&](const char* what) {
@@ -106,25 +107,25 @@ Status WriteGsplatCheckpoint(const std::filesystem::path& path, const GaussianCl
   const int64_t n = cloud.size();
   const Buffer<float> constant = ShColumns(cloud, 0, 3);
   const Buffer<float> higher = ShColumns(cloud, 3, cloud.sh_stride() - 3);
-  const std::array<Tensor, 6> tensors = {{{"means", {n, 3}, &cloud.means},
-                                          {"opacities", {n}, &cloud.opacity_logits},
-                                          {"quats", {n, 4}, &cloud.quats},
-                                          {"scales", {n, 3}, &cloud.log_scales},
-                                          {"sh0", {n, 1, 3}, &constant},
-                                          {"shN", {n, cloud.coefficients() - 1, 3}, &higher}}};
+  const std::array<Tensor, 6> tensors = {{{"means", {n, 3}, cloud.means},
+                                          {"opacities", {n}, cloud.opacity_logits},
+                                          {"quats", {n, 4}, cloud.quats},
+                                          {"scales", {n, 3}, cloud.log_scales},
+                                          {"sh0", {n, 1, 3}, constant},
+                                          {"shN", {n, cloud.coefficients() - 1, 3}, higher}}};
 
   PickleWriter pickle;
   pickle.Op('}').Op('(').Text("step").Integer(step).Text("splats").Op('}').Op('(');
   for (size_t t = 0; t < tensors.size(); ++t) pickle.Text(tensors[t].name).Tensor(Cat(t), tensors[t].shape);
   pickle.Op('u').Op('u').Op('.');
 
-  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   ZipWriter zip(file);
   // torch.load takes the folder's name from the first member and wants a version in it.
   ANCHORSPLAT_RETURN_IF_ERROR(zip.Add("archive/data.pkl", pickle.bytes()));
   ANCHORSPLAT_RETURN_IF_ERROR(zip.Add("archive/byteorder", "little"));
   for (size_t t = 0; t < tensors.size(); ++t) {
-    ANCHORSPLAT_RETURN_IF_ERROR(zip.Add(Cat("archive/data/", t), Bytes(*tensors[t].values)));
+    ANCHORSPLAT_RETURN_IF_ERROR(zip.Add(Cat("archive/data/", t), Bytes(tensors[t].values)));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(zip.Add("archive/version", "3\n"));
   ANCHORSPLAT_RETURN_IF_ERROR(zip.Finish());

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
 
@@ -15,7 +15,7 @@ namespace anchorsplat {
 // file by the index of its last step: ckpt_14999_rank0.pt after 15,000. Equal clouds make equal files.
 //
 // Errors: kBadArgument (no Gaussians, arrays that disagree, a negative step), kExists, kNotFound, kIo.
-Status WriteGsplatCheckpoint(const std::filesystem::path& path, const GaussianCloud& cloud, int64_t step,
+Status WriteGsplatCheckpoint(const std::filesystem::path& path, const CloudView& cloud, int64_t step,
                              const CloudWriteOptions& options = {});
 
 }  // namespace anchorsplat

@@ -48,7 +48,7 @@ size_t RowSize(int sh_degree, const ExtraProperties& extras) {
 }
 
 template <int kDegree>
-void PackRows(const GaussianCloud& cloud, int64_t first, int64_t last, float* out) {
+void PackRows(const CloudView& cloud, int64_t first, int64_t last, float* out) {
   constexpr int kCoefficients = ShCoefficients(kDegree);
   const float* mean = cloud.means.data() + 3 * first;
   const float* scale = cloud.log_scales.data() + 3 * first;
@@ -68,7 +68,7 @@ void PackRows(const GaussianCloud& cloud, int64_t first, int64_t last, float* ou
   }
 }
 
-void Pack(const GaussianCloud& cloud, int64_t first, int64_t last, float* out) {
+void Pack(const CloudView& cloud, int64_t first, int64_t last, float* out) {
   switch (cloud.sh_degree) {
     case 0:
       return PackRows<0>(cloud, first, last, out);
@@ -103,12 +103,12 @@ uint64_t PredictedPlySize(int64_t count, int sh_degree, std::optional<RenderMode
          static_cast<uint64_t>(count) * RowSize(sh_degree, {});
 }
 
-Status WritePly(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options) {
+Status WritePly(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {
   return WritePlyWithExtras(path, cloud, options, {});
 }
 
-Status WritePlyWithExtras(const std::filesystem::path& path, const GaussianCloud& cloud,
-                          const CloudWriteOptions& options, const ExtraProperties& extras) {
+Status WritePlyWithExtras(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options,
+                          const ExtraProperties& extras) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   if (cloud.empty()) {
     return Error{ErrorCode::kBadArgument, Cat(path.string(), ": there are no Gaussians to write")};
@@ -123,7 +123,7 @@ Status WritePlyWithExtras(const std::filesystem::path& path, const GaussianCloud
                  Cat(path.string(), ": comments and names of properties of ", HumanBytes(header.size()),
                      " do not fit a PLY header, which ends within ", HumanBytes(kMaxPlyHeader))};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   const auto floats = static_cast<size_t>(RowFloats(cloud.sh_degree));
   const size_t row_size = RowSize(cloud.sh_degree, extras);
   const bool wider = !extras.properties.empty();

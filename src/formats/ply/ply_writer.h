@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
 #include "formats/extra_properties.h"
@@ -18,12 +18,12 @@ namespace anchorsplat {
 // render mode and the comments go to the header (control bytes in comments become blanks, so that they stay comments).
 // Streamed in blocks: needs no second copy of the cloud.
 // Errors: kExists, kIo, kBadArgument (arrays that disagree, no Gaussians, comments longer than a header may be).
-Status WritePly(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options = {});
+Status WritePly(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options = {});
 
 // The same with the normals of `extras`, and its properties behind ours. kBadArgument too: it has not a row for each
 // Gaussian; names longer than a header may be.
-Status WritePlyWithExtras(const std::filesystem::path& path, const GaussianCloud& cloud,
-                          const CloudWriteOptions& options, const ExtraProperties& extras);
+Status WritePlyWithExtras(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options,
+                          const ExtraProperties& extras);
 
 // Bytes of the file WritePly makes of `count` Gaussians.
 uint64_t PredictedPlySize(int64_t count, int sh_degree, std::optional<RenderMode> render_mode = {},

@@ -26,12 +26,12 @@ int64_t GroupEntries(int64_t count) { return std::clamp((int64_t{1} << 24) / cou
 // The SH vectors of a cloud as rows of `width` int16, zero beyond `values`. Made from the cloud whenever they are
 // looked at, as a copy of all of them would be 40 % of it.
 struct Vectors {
-  const GaussianCloud* cloud = nullptr;
+  CloudView cloud;
   float scale = 0;  // to 12 bits
   int64_t count = 0, width = 0, values = 0;
 
   void Copy(int64_t row, int16_t* out) const {
-    const float* sh = cloud->sh.data() + row * cloud->sh_stride() + 3;
+    const float* sh = cloud.sh.data() + row * cloud.sh_stride() + 3;
     constexpr float kMost = kSteps;
     for (int64_t k = 0; k < values; ++k) {  // written so that compilers make vectors of it
       const float number = sh[k] == sh[k] ? sh[k] * scale : 0.0f;
@@ -43,7 +43,7 @@ struct Vectors {
   }
 };
 
-float SpreadOf(const GaussianCloud& cloud) {
+float SpreadOf(const CloudView& cloud) {
   const int64_t parts = (cloud.size() + kPaletteGrain - 1) / kPaletteGrain;
   std::vector<std::array<double, 2>> sums(static_cast<size_t>(parts));  // squares, largest
   ParallelFor(0, cloud.size(), kPaletteGrain, [&](int64_t first, int64_t last) {
@@ -66,9 +66,9 @@ float SpreadOf(const GaussianCloud& cloud) {
   return static_cast<float>(std::min(largest, 64 * std::sqrt(squares / values)));
 }
 
-Vectors VectorsOf(const GaussianCloud& cloud, float spread) {
+Vectors VectorsOf(const CloudView& cloud, float spread) {
   Vectors out;
-  out.cloud = &cloud;
+  out.cloud = cloud;
   out.scale = spread > 0 ? static_cast<float>(kSteps) / spread : 0;
   out.count = cloud.size();
   out.values = cloud.sh_stride() - 3;
@@ -384,7 +384,7 @@ void Refine(const Branch& branch, const Branch::Group& group, int64_t first_entr
 
 }  // namespace
 
-ShPalette BuildShPalette(const GaussianCloud& cloud, int64_t entries, int iterations) {
+ShPalette BuildShPalette(const CloudView& cloud, int64_t entries, int iterations) {
   const float spread = SpreadOf(cloud);
   const Vectors all = VectorsOf(cloud, spread);
   std::vector<Branch> branches = Branches(all);

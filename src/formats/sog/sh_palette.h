@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "core/buffer.h"
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 
 namespace anchorsplat {
 
@@ -20,6 +20,6 @@ struct ShPalette {
 // k-means improve the result, in which a vector may choose among the 256 centroids of its branch of the tree (4,096 in
 // small sets). Vectors are compared in 12-bit integers over ±64 standard deviations at most, so the result is the same
 // everywhere; NaN counts as 0. Takes about 16 bytes per Gaussian. The cloud has degree 1–3 and at least one Gaussian.
-ShPalette BuildShPalette(const GaussianCloud& cloud, int64_t entries, int iterations);
+ShPalette BuildShPalette(const CloudView& cloud, int64_t entries, int iterations);
 
 }  // namespace anchorsplat

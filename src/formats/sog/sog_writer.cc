@@ -45,7 +45,7 @@ struct Picture {
 };
 
 struct Pictures {
-  const GaussianCloud& cloud;
+  const CloudView& cloud;
   Buffer<uint32_t> order;
   int width, height;
 
@@ -78,7 +78,7 @@ struct MeanRange {
   std::array<double, 3> min{}, max{};
 };
 
-MeanRange RangeOfMeans(const GaussianCloud& cloud) {
+MeanRange RangeOfMeans(const CloudView& cloud) {
   MeanRange range;
   const std::optional<Bounds> bounds = ComputeBounds(cloud);
   for (size_t k = 0; bounds && k < 3; ++k) {
@@ -91,7 +91,7 @@ MeanRange RangeOfMeans(const GaussianCloud& cloud) {
 constexpr double kMeanSteps = 65535;
 
 nlohmann::json DrawMeans(const Pictures& pictures, std::vector<Picture>& out) {
-  const GaussianCloud& cloud = pictures.cloud;
+  const CloudView& cloud = pictures.cloud;
   const auto [min, max] = RangeOfMeans(cloud);
   const auto bits = [&cloud, min = min, max = max](int64_t row, size_t k) -> uint32_t {
     if (!(max[k] > min[k])) return 0;
@@ -122,7 +122,7 @@ nlohmann::json DrawQuats(const Pictures& pictures, std::vector<Picture>& out) {
 float BoundedLogScale(float x) { return std::clamp(x, -kMaxSogLogScale, kMaxSogLogScale); }  // NaN stays
 
 nlohmann::json DrawScales(const Pictures& pictures, std::vector<Picture>& out) {
-  const GaussianCloud& cloud = pictures.cloud;
+  const CloudView& cloud = pictures.cloud;
   Buffer<float> scales(cloud.log_scales.size());
   ParallelFor(0, static_cast<int64_t>(scales.size()), kSogWriteGrain, [&](int64_t first, int64_t last) {
     for (auto i = static_cast<size_t>(first); i < static_cast<size_t>(last); ++i) {
@@ -140,7 +140,7 @@ nlohmann::json DrawScales(const Pictures& pictures, std::vector<Picture>& out) {
 }
 
 nlohmann::json DrawColors(const Pictures& pictures, std::vector<Picture>& out) {
-  const GaussianCloud& cloud = pictures.cloud;
+  const CloudView& cloud = pictures.cloud;
   const ScalarCodebook codebook = BuildScalarCodebook(cloud.sh.data(), cloud.size(), 3, cloud.sh_stride());
   out.push_back({"sh0.webp", [&pictures, &cloud, codebook] {
                    return pictures.Draw([&](int64_t row, uint8_t* rgba) {
@@ -159,7 +159,7 @@ int64_t PaletteEntries(int64_t count) {
 }
 
 nlohmann::json DrawHarmonics(const Pictures& pictures, std::vector<Picture>& out) {
-  const GaussianCloud& cloud = pictures.cloud;
+  const CloudView& cloud = pictures.cloud;
   ShPalette palette = BuildShPalette(cloud, PaletteEntries(cloud.size()), kPaletteRounds);
   const int64_t coefficients = cloud.coefficients() - 1;
   const ScalarCodebook codebook =
@@ -204,7 +204,7 @@ std::vector<std::filesystem::path> SogFilesBeside(const std::filesystem::path& p
   return names;
 }
 
-Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options) {
+Status WriteSog(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
   // Multiples of four, as other programs make them.
   const int64_t width = static_cast<int64_t>(std::ceil(std::sqrt(static_cast<double>(cloud.size())) / 4)) * 4;
@@ -216,10 +216,10 @@ Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, c
   const std::vector<std::filesystem::path> names = SogFilesBeside(path, cloud.sh_degree);
   const bool bundled = names.empty();
   // Before the work, so that a file in the way is not found out minutes later.
-  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   std::vector<OutputFile> beside;
   for (const std::filesystem::path& name : names) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile picture, OutputFile::Create(name, options.overwrite));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile picture, OutputFile::Create(name, options.overwrite, options.memory));
     beside.push_back(std::move(picture));
   }
 
@@ -279,7 +279,7 @@ uint64_t EstimatedSogSize(int64_t count, int sh_degree) {
   return static_cast<uint64_t>(size);
 }
 
-std::string SogMeanLoss(const GaussianCloud& cloud) {
+std::string SogMeanLoss(const CloudView& cloud) {
   const MeanRange range = RangeOfMeans(cloud);
   double widest = 0;
   for (size_t k = 0; k < 3; ++k) widest = std::max(widest, range.max[k] - range.min[k]);

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
 
@@ -22,7 +22,7 @@ namespace anchorsplat {
 // The files of a folder appear when all of them are complete, meta.json last.
 // Errors: kExists (each file of a folder), kIo, kBadArgument (arrays that disagree, no Gaussians, more than fit a
 // picture).
-Status WriteSog(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options = {});
+Status WriteSog(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options = {});
 
 // The pictures of a splat of that degree by name, in the order in which they are drawn.
 std::span<const char* const> SogPictures(int sh_degree);
@@ -33,6 +33,6 @@ std::vector<std::filesystem::path> SogFilesBeside(const std::filesystem::path& p
 uint64_t EstimatedSogSize(int64_t count, int sh_degree);
 
 // A sentence when Gaussians far out stretch the range of the means so much that it is coarse for most of them.
-std::string SogMeanLoss(const GaussianCloud& cloud);
+std::string SogMeanLoss(const CloudView& cloud);
 
 }  // namespace anchorsplat

@@ -19,7 +19,7 @@ namespace anchorsplat {
 namespace {
 
 // Rows that ReadSplat would not take for Gaussians.
-int64_t CountUnreadable(const GaussianCloud& cloud) {
+int64_t CountUnreadable(const CloudView& cloud) {
   constexpr int64_t kGrain = 1 << 14;
   std::atomic<int64_t> sum = 0;
   ParallelFor(0, cloud.size(), kGrain, [&](int64_t first, int64_t last) {
@@ -41,7 +41,7 @@ int64_t CountUnreadable(const GaussianCloud& cloud) {
 
 uint64_t PredictedSplatSize(int64_t count, int /*sh_degree*/) { return static_cast<uint64_t>(count) * kSplatRecord; }
 
-Status WriteSplat(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options) {
+Status WriteSplat(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
   const int64_t unreadable = CountUnreadable(cloud);
   if (2 * unreadable > cloud.size()) {
@@ -51,7 +51,7 @@ Status WriteSplat(const std::filesystem::path& path, const GaussianCloud& cloud,
                      "nobody would take the file for a .splat, which has no mark: write another format")};
   }
   const Buffer<uint32_t> rows = WriteOrder(cloud, options.order, SplatOrder::kImportance);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   ANCHORSPLAT_RETURN_IF_ERROR(file.Reserve(PredictedSplatSize(cloud.size(), 0)));
   ANCHORSPLAT_RETURN_IF_ERROR(
       WriteRecords(file, 0, cloud.size(), kSplatRecord, [&](int64_t first, int64_t last, uint8_t* bytes) {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
 
@@ -13,7 +13,7 @@ namespace anchorsplat {
 // while they load. Lost: SH beyond degree 0; colours, opacities and quaternions are rounded to 8 bits, colours beyond
 // 0–1 clamped. Render mode and comments have no place. Errors: kExists, kIo, kBadArgument (arrays that disagree, no
 // Gaussians).
-Status WriteSplat(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options = {});
+Status WriteSplat(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options = {});
 
 uint64_t PredictedSplatSize(int64_t count, int sh_degree);
 

@@ -152,7 +152,7 @@ void UnpackSpz(const SpzLayout& layout, SpzSection section, int64_t first, int64
   }
 }
 
-void PackSpz(const SpzLayout& layout, SpzSection section, int64_t first, int64_t last, const GaussianCloud& cloud,
+void PackSpz(const SpzLayout& layout, SpzSection section, int64_t first, int64_t last, const CloudView& cloud,
              std::span<const uint32_t> order, const AxisFlip& flip, uint8_t* bytes) {
   const auto row = [&](int64_t i) { return order.empty() ? i : int64_t{order[static_cast<size_t>(i)]}; };
   switch (section) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 
+#include "core/cloud_view.h"
 #include "core/gaussian_cloud.h"
 #include "formats/axes.h"
 
@@ -44,7 +45,7 @@ void UnpackSpz(const SpzLayout& layout, SpzSection section, int64_t first, int64
 
 // The other way, version 3 on; record i is Gaussian order[i], or i when `order` is empty. `flip` goes to the file's
 // axes.
-void PackSpz(const SpzLayout& layout, SpzSection section, int64_t first, int64_t last, const GaussianCloud& cloud,
+void PackSpz(const SpzLayout& layout, SpzSection section, int64_t first, int64_t last, const CloudView& cloud,
              std::span<const uint32_t> order, const AxisFlip& flip, uint8_t* bytes);
 
 }  // namespace anchorsplat

@@ -43,7 +43,7 @@ struct MeansInSpz {
   int fractional_bits = kUsualBits;
 };
 
-MeansInSpz LookAtMeans(const GaussianCloud& cloud) {
+MeansInSpz LookAtMeans(const CloudView& cloud) {
   MeansInSpz out;
   float extent = 0;
   if (const std::optional<Bounds> bounds = ComputeBounds(cloud)) {
@@ -59,7 +59,7 @@ MeansInSpz LookAtMeans(const GaussianCloud& cloud) {
 }
 
 struct Packer {
-  const GaussianCloud& cloud;
+  const CloudView& cloud;
   SpzLayout layout;
   Buffer<uint32_t> order;
   AxisFlip flip = FlipBetween(kRdf, kRub);
@@ -208,7 +208,7 @@ Status WriteStreams(const Packer& packer, OutputFile& file) {
 
 }  // namespace
 
-Status WriteSpz(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options) {
+Status WriteSpz(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
   if (options.spz_version != 3 && options.spz_version != 4) {
     return Error{ErrorCode::kBadArgument,
@@ -221,7 +221,7 @@ Status WriteSpz(const std::filesystem::path& path, const GaussianCloud& cloud, c
   const Packer packer{.cloud = cloud,
                       .layout = {options.spz_version, cloud.sh_degree, LookAtMeans(cloud).fractional_bits},
                       .order = WriteOrder(cloud, options.order, SplatOrder::kKeep)};
-  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   ANCHORSPLAT_RETURN_IF_ERROR(options.spz_version == 3 ? WriteGzip(packer, file) : WriteStreams(packer, file));
   return file.Commit();
 }
@@ -231,7 +231,7 @@ uint64_t EstimatedSpzSize(int64_t count, int sh_degree) {
   return 128 + static_cast<uint64_t>(kBytes[static_cast<size_t>(sh_degree)] * static_cast<double>(count));
 }
 
-std::string SpzMeanLoss(const GaussianCloud& cloud) {
+std::string SpzMeanLoss(const CloudView& cloud) {
   const MeansInSpz means = LookAtMeans(cloud);
   if (means.largest > kMaxFixed) {
     return Cat("coordinates reach ", means.largest, ", SPZ ends at ", kMaxFixed,

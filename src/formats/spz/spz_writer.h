@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
 
@@ -18,13 +18,13 @@ namespace anchorsplat {
 // which follows from the others, is off by 1/482 at most), opacities to 1/255, f_dc to 1/38 within ±3.33, SH to 1/16
 // (degree 1) and 1/8 within ±1. Comments have no place.
 // Errors: kExists, kIo, kBadArgument (arrays that disagree, no Gaussians, another version).
-Status WriteSpz(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options = {});
+Status WriteSpz(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options = {});
 
 // From what splats of real scenes take per Gaussian (docs/formats.md has the deviations).
 uint64_t EstimatedSpzSize(int64_t count, int sh_degree);
 
 // A sentence when this cloud has fewer than 12 fractional bits because of coordinates far from zero, and that is coarse
 // for most of it; or when a coordinate does not fit at all. Nothing otherwise.
-std::string SpzMeanLoss(const GaussianCloud& cloud);
+std::string SpzMeanLoss(const CloudView& cloud);
 
 }  // namespace anchorsplat

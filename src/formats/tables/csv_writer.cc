@@ -27,7 +27,7 @@ std::string Names(int degree) {
   return line + "\n";
 }
 
-void AppendRow(const GaussianCloud& cloud, int64_t i, std::string& text) {
+void AppendRow(const CloudView& cloud, int64_t i, std::string& text) {
   const auto append = [&text](float value) {
     char digits[32];
     const auto [end, error] = std::to_chars(digits, digits + sizeof digits, value);
@@ -48,10 +48,10 @@ void AppendRow(const GaussianCloud& cloud, int64_t i, std::string& text) {
 
 }  // namespace
 
-Status WriteCsv(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options) {
+Status WriteCsv(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
   const Buffer<uint32_t> order = WriteOrder(cloud, options.order, SplatOrder::kKeep);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(Names(cloud.sh_degree)));
   std::vector<std::string> texts(static_cast<size_t>(kTasksAtOnce));
   for (int64_t begin = 0; begin < cloud.size(); begin += kTasksAtOnce * kRowsPerTask) {

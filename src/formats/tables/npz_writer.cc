@@ -35,17 +35,14 @@ struct Array {
   const float* values;
 };
 
-std::array<Array, 5> Arrays(const GaussianCloud* cloud, int64_t n, int degree) {
+std::array<Array, 5> Arrays(const CloudView& cloud, int64_t n, int degree) {
   const auto count = static_cast<uint64_t>(n);
   const auto coefficients = static_cast<uint64_t>(ShCoefficients(degree));
-  const auto data = [cloud](Buffer<float> GaussianCloud::*array) {
-    return cloud != nullptr ? (cloud->*array).data() : nullptr;
-  };
-  return {{{"means.npy", Cat(n, ", 3"), 3 * count, data(&GaussianCloud::means)},
-           {"log_scales.npy", Cat(n, ", 3"), 3 * count, data(&GaussianCloud::log_scales)},
-           {"quats.npy", Cat(n, ", 4"), 4 * count, data(&GaussianCloud::quats)},
-           {"opacity_logits.npy", Cat(n, ","), count, data(&GaussianCloud::opacity_logits)},
-           {"sh.npy", Cat(n, ", ", coefficients, ", 3"), 3 * coefficients * count, data(&GaussianCloud::sh)}}};
+  return {{{"means.npy", Cat(n, ", 3"), 3 * count, cloud.means.data()},
+           {"log_scales.npy", Cat(n, ", 3"), 3 * count, cloud.log_scales.data()},
+           {"quats.npy", Cat(n, ", 4"), 4 * count, cloud.quats.data()},
+           {"opacity_logits.npy", Cat(n, ","), count, cloud.opacity_logits.data()},
+           {"sh.npy", Cat(n, ", ", coefficients, ", 3"), 3 * coefficients * count, cloud.sh.data()}}};
 }
 
 }  // namespace
@@ -53,17 +50,17 @@ std::array<Array, 5> Arrays(const GaussianCloud* cloud, int64_t n, int degree) {
 // Below 4 GiB, where no member needs the 64-bit extensions.
 uint64_t PredictedNpzSize(int64_t count, int sh_degree) {
   uint64_t size = 22;
-  for (const Array& array : Arrays(nullptr, count, sh_degree)) {
+  for (const Array& array : Arrays({}, count, sh_degree)) {
     size += 30 + 46 + 2 * std::string_view(array.name).size() + NpyHeader(array.shape).size() + 4 * array.floats;
   }
   return size;
 }
 
-Status WriteNpz(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options) {
+Status WriteNpz(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   ZipWriter archive(file);
-  for (const Array& array : Arrays(&cloud, cloud.size(), cloud.sh_degree)) {
+  for (const Array& array : Arrays(cloud, cloud.size(), cloud.sh_degree)) {
     const std::string header = NpyHeader(array.shape);
     const std::string_view parts[] = {
         header, {reinterpret_cast<const char*>(array.values), static_cast<size_t>(4 * array.floats)}};

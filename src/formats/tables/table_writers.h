@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
 
@@ -14,11 +14,11 @@ namespace anchorsplat {
 
 // Text: a line of names as in an INRIA PLY (x,y,z,f_dc_0 … f_rest_* channel-major …,opacity,scale_0 …,rot_0 …), then a
 // line per Gaussian with the shortest decimal numbers that read back as the same floats.
-Status WriteCsv(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options = {});
+Status WriteCsv(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options = {});
 
 // NumPy's archive of float32 arrays: means [N,3], log_scales [N,3], quats [N,4] wxyz, opacity_logits [N],
 // sh [N,(degree+1)²,3]. numpy.load(path)["means"].
-Status WriteNpz(const std::filesystem::path& path, const GaussianCloud& cloud, const CloudWriteOptions& options = {});
+Status WriteNpz(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options = {});
 uint64_t PredictedNpzSize(int64_t count, int sh_degree);
 
 }  // namespace anchorsplat

@@ -1,0 +1,55 @@
+#include "core/cloud_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/text.h"
+
+namespace anchorsplat {
+
+Status Validate(const CloudView& cloud) {
+  if (cloud.sh_degree < 0 || cloud.sh_degree > kMaxShDegree) {
+    return Error{ErrorCode::kBadArgument, Cat("SH degree ", cloud.sh_degree, " is not 0 to ", kMaxShDegree)};
+  }
+  const size_t n = cloud.opacity_logits.size();
+  const auto check = [n](std::span<const float> array, int64_t width, const char* name) -> Status {
+    if (array.size() == n * static_cast<size_t>(width)) return {};
+    return Error{ErrorCode::kBadArgument,
+                 Cat("Gaussian cloud: ", name, " has ", array.size(), " values, expected ", n, " x ", width)};
+  };
+  ANCHORSPLAT_RETURN_IF_ERROR(check(cloud.means, 3, "means"));
+  ANCHORSPLAT_RETURN_IF_ERROR(check(cloud.log_scales, 3, "log_scales"));
+  ANCHORSPLAT_RETURN_IF_ERROR(check(cloud.quats, 4, "quats"));
+  return check(cloud.sh, cloud.sh_stride(), "sh");
+}
+
+std::optional<Bounds> ComputeBounds(const CloudView& cloud) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  Bounds box{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    const float* p = &cloud.means[static_cast<size_t>(3 * i)];
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) continue;
+    for (size_t a = 0; a < 3; ++a) {
+      box.min[a] = std::min(box.min[a], p[a]);
+      box.max[a] = std::max(box.max[a], p[a]);
+    }
+  }
+  if (box.min[0] > box.max[0]) return std::nullopt;
+  return box;
+}
+
+GaussianCloud CopyOf(const CloudView& view) {
+  GaussianCloud cloud;
+  cloud.sh_degree = view.sh_degree;
+  cloud.means.assign(view.means.begin(), view.means.end());
+  cloud.log_scales.assign(view.log_scales.begin(), view.log_scales.end());
+  cloud.quats.assign(view.quats.begin(), view.quats.end());
+  cloud.opacity_logits.assign(view.opacity_logits.begin(), view.opacity_logits.end());
+  cloud.sh.assign(view.sh.begin(), view.sh.end());
+  cloud.render_mode = view.render_mode;
+  cloud.comments.assign(view.comments.begin(), view.comments.end());
+  return cloud;
+}
+
+}  // namespace anchorsplat

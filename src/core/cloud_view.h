@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// The columns of a splat that others own: a GaussianCloud, or arrays of a program that called us. Spaces, shapes and
+// names are those of GaussianCloud. What only looks at a cloud takes this, so that nobody has to copy one to be
+// looked at. Valid as long as the arrays stay where they are.
+struct CloudView {
+  int sh_degree = 0;                      // 0–3
+  std::span<const float> means;           // [N,3]
+  std::span<const float> log_scales;      // [N,3]
+  std::span<const float> quats;           // [N,4]
+  std::span<const float> opacity_logits;  // [N]
+  std::span<const float> sh;              // [N,(sh_degree+1)²,3]
+
+  std::optional<RenderMode> render_mode;
+  std::span<const std::string> comments;
+
+  CloudView() = default;
+  CloudView(const GaussianCloud& cloud)  // NOLINT: implicit on purpose
+      : sh_degree(cloud.sh_degree),
+        means(cloud.means),
+        log_scales(cloud.log_scales),
+        quats(cloud.quats),
+        opacity_logits(cloud.opacity_logits),
+        sh(cloud.sh),
+        render_mode(cloud.render_mode),
+        comments(cloud.comments) {}
+
+  int64_t size() const { return static_cast<int64_t>(opacity_logits.size()); }
+  bool empty() const { return opacity_logits.empty(); }
+  int coefficients() const { return ShCoefficients(sh_degree); }
+  int64_t sh_stride() const { return int64_t{3} * coefficients(); }  // floats of `sh` per Gaussian
+};
+
+// Those of core/gaussian_cloud.h.
+Status Validate(const CloudView& cloud);
+std::optional<Bounds> ComputeBounds(const CloudView& cloud);
+
+// An owner of its own with the same values.
+GaussianCloud CopyOf(const CloudView& view);
+
+}  // namespace anchorsplat

@@ -49,20 +49,7 @@ CLI::App& AddVerb(CLI::App& app, Program& program, const std::string& name, cons
   return verb;
 }
 
-void PrintJson(const nlohmann::json& json) {
-  // Replacing invalid UTF-8: file names are bytes, JSON is text.
-  std::cout << CleanJson(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace)) << '\n';
-}
-
-int RunProgram(int argc, const char* const* argv, Trainer trainer) {
-  const CleanOutput clean_output(std::cout);
-  CLI::App app{"anchorsplat: makes a low-quality 3D Gaussian splat hold up when seen closer", "anchorsplat"};
-  app.set_version_flag("--version", std::string("anchorsplat ") + ANCHORSPLAT_VERSION);
-  app.require_subcommand(1);
-  RegisterModelMethod();  // beside the methods that enhance/ has itself
-  Program program;
-  program.words.assign(argv, argv + argc);
-  program.trainer = trainer;
+void AddVerbs(CLI::App& app, Program& program) {
   AddEnhance(app, program);
   AddInfo(app, program);
   AddRender(app, program);
@@ -78,6 +65,23 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
   AddDoctor(app, program);
   AddManual(app, program);
   CheckNumbers(app);
+}
+
+void PrintJson(const nlohmann::json& json) {
+  // Replacing invalid UTF-8: file names are bytes, JSON is text.
+  std::cout << CleanJson(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace)) << '\n';
+}
+
+int RunProgram(int argc, const char* const* argv, Trainer trainer) {
+  const CleanOutput clean_output(std::cout);
+  CLI::App app{"anchorsplat: makes a low-quality 3D Gaussian splat hold up when seen closer", "anchorsplat"};
+  app.set_version_flag("--version", std::string("anchorsplat ") + ANCHORSPLAT_VERSION);
+  app.require_subcommand(1);
+  RegisterModelMethod();  // beside the methods that enhance/ has itself
+  Program program;
+  program.words.assign(argv, argv + argc);
+  program.trainer = trainer;
+  AddVerbs(app, program);
   // Parsing failed, so whether JSON was asked for has to be read off the words themselves.
   const auto usage_error = [&program](const Error& error) {
     SharedFlags flags;

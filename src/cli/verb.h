@@ -56,6 +56,9 @@ void AddBench(CLI::App& app, Program& program);
 void AddDoctor(CLI::App& app, Program& program);
 void AddManual(CLI::App& app, Program& program);
 
+// All of them, in the order in which --help lists them.
+void AddVerbs(CLI::App& app, Program& program);
+
 inline WriteOptions WriteOptionsFrom(const SharedFlags& flags) { return {.overwrite = flags.overwrite}; }
 
 // Prints a JSON document to stdout. Numbers that are not finite become null.

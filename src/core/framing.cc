@@ -12,7 +12,7 @@ namespace {
 constexpr float kVisibleLogit = -2.2f;  // opacity 10 %: haze around an object should not move the camera
 }
 
-Framing FrameCloud(const GaussianCloud& cloud) {
+Framing FrameCloud(const CloudView& cloud) {
   const auto collect = [&](auto&& value, float least_logit) {
     Buffer<float> out;
     for (int64_t i = 0; i < cloud.size(); ++i) {

@@ -3,7 +3,7 @@
 #include <array>
 
 #include "core/camera.h"
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 
 namespace anchorsplat {
 
@@ -14,7 +14,7 @@ struct Framing {
   std::array<double, 3> target = {0, 0, 0};  // world
   double radius = 1;                         // world; always positive
 };
-Framing FrameCloud(const GaussianCloud& cloud);
+Framing FrameCloud(const CloudView& cloud);
 
 // Distance from which a sphere of `radius` fills the smaller side of the image, with a tenth to spare.
 double FramingDistance(const Framing& framing, const Pinhole& intrinsics);

@@ -17,7 +17,7 @@ struct Depths {
   int64_t behind = 0, too_near = 0, in_range = 0, too_far = 0;
 };
 
-Depths CountDepths(const GaussianCloud& cloud, const Camera& camera, double near, double far) {
+Depths CountDepths(const CloudView& cloud, const Camera& camera, double near, double far) {
   Depths depths;
   for (int64_t i = 0; i < cloud.size(); ++i) {
     const float* p = cloud.means.data() + 3 * i;
@@ -30,7 +30,7 @@ Depths CountDepths(const GaussianCloud& cloud, const Camera& camera, double near
 
 }  // namespace
 
-RenderOptions OptionsFor(const GaussianCloud& cloud) {
+RenderOptions OptionsFor(const CloudView& cloud) {
   RenderOptions options;
   options.mode = cloud.render_mode.value_or(RenderMode::kClassic);
   options.subject = FrameCloud(cloud);
@@ -47,7 +47,7 @@ float NearPlane(const RenderOptions& options, const Camera& camera) {
   return share >= std::numeric_limits<float>::min() ? share : options.near_plane;
 }
 
-std::string NothingToSee(const GaussianCloud& cloud, const Camera& camera, const RenderOptions& options,
+std::string NothingToSee(const CloudView& cloud, const Camera& camera, const RenderOptions& options,
                          std::optional<int64_t> drawn) {
   if (cloud.empty() || drawn.value_or(0) * kAlmostNothing >= cloud.size()) return {};
   const float near = NearPlane(options, camera);

@@ -1,0 +1,97 @@
+#include "cli/run_for_test.h"
+#include "cli/small_scan_for_test.h"
+#include "core/text.h"
+#include "dataset/small_dataset_for_test.h"
+#include "io/folder_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ContainsRegex;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+class InfoVerb : public testing::Test {
+ protected:
+  TestFolder folder_;
+};
+
+TEST_F(InfoVerb, OfASplat) {
+  const std::string input = Biplane() / "input.ply";
+  const ProgramRun table = ExpectDone({"info", input});
+  EXPECT_THAT(table.out, AllOf(HasSubstr("20,000, SH degree 3"), HasSubstr("training pixel, estimated"),
+                               HasSubstr("written as:"), HasSubstr("largest axis")));
+  EXPECT_THAT(table.err, IsEmpty());
+  const nlohmann::json json = ExpectJson({"info", input});
+  EXPECT_EQ(json["file"], input);
+  EXPECT_EQ(json["format"], "ply");
+  EXPECT_EQ(json["gaussians"], 20000);
+  EXPECT_EQ(json["sh_degree"], 3);
+  EXPECT_EQ(json["bytes"], std::filesystem::file_size(input));
+  EXPECT_EQ(json["predicted_bytes"]["ply"], json["bytes"]);
+  EXPECT_EQ(json["counts"]["not_finite"], 0);
+  EXPECT_EQ(json["pixel_size"]["contradictions"], nlohmann::json::array());
+  EXPECT_NEAR(json["pixel_size"]["used"].get<double>(), 0.0055, 0.002);
+}
+
+TEST_F(InfoVerb, OfWhatFormatsSayAboutThemselves) {
+  const std::string scan = WriteScan(folder_ / "scan.ply");
+  for (const char* name : {"scan.spz", "scan.glb", "scan.sog"}) ExpectDone({"convert", scan, folder_ / name});
+  const nlohmann::json spz = ExpectJson({"info", folder_ / "scan.spz"});
+  EXPECT_EQ(spz["facts"]["version"], "4, a zstd stream per attribute");
+  EXPECT_THAT(spz["facts"]["positions"].get<std::string>(), testing::StartsWith("1"));
+  EXPECT_THAT(ExpectDone({"info", folder_ / "scan.glb"}).out, HasSubstr("kernel  ellipse"));
+  EXPECT_THAT(ExpectDone({"info", folder_ / "scan.sog"}).out, HasSubstr("a ZIP archive"));
+}
+
+TEST_F(InfoVerb, OfASplatOfNaN) {
+  const std::string scan = WriteNanScan(folder_ / "nan.ply");
+  const std::string out = ExpectDone({"info", scan}).out;
+  EXPECT_THAT(out, HasSubstr("2 of 2 Gaussians with NaN"));
+  // It is named as a problem and shown nowhere as a number.
+  EXPECT_THAT(out.substr(out.find('\n'), out.find("found:") - out.find('\n')), Not(ContainsRegex("[nN][aA][nN]")));
+  const nlohmann::json json = ExpectJson({"info", scan});
+  EXPECT_EQ(json["counts"]["not_finite"], 2);
+  EXPECT_EQ(json["bounds"], nullptr);
+  EXPECT_EQ(json["pixel_size"], nullptr);
+}
+
+TEST_F(InfoVerb, OfANetwork) {
+  const std::string weights = SourceDirForTest() / "testdata/compact/small.safetensors";
+  EXPECT_THAT(ExpectDone({"info", weights}).out, AllOf(HasSubstr("anchorsplat-compact"), HasSubstr("4,675 in 40")));
+  const nlohmann::json json = ExpectJson({"info", weights});
+  EXPECT_EQ(json["kind"], "model");
+  EXPECT_EQ(json["parameters"], 4675);
+  EXPECT_EQ(json["metadata"]["option.copies"], "2");
+  const nlohmann::json shipped = ExpectJson({"info", SourceDirForTest() / "models/anchorsplat-compact.safetensors"});
+  EXPECT_TRUE(shipped["metadata"].contains("object_names"));
+  WriteText(folder_ / "cut.safetensors", FileText(weights).substr(0, 9000));
+  ExpectRefused({"info", folder_ / "cut.safetensors"}, ErrorCode::kBadFile, {"cut.safetensors"});
+}
+
+TEST_F(InfoVerb, OfAMesh) {
+  const std::string mesh = WriteTetrahedron(folder_.path(), "tetra");
+  EXPECT_THAT(ExpectDone({"info", mesh}).out, AllOf(HasSubstr("triangles   4"), HasSubstr("materials   4")));
+  const nlohmann::json json = ExpectJson({"info", mesh});
+  EXPECT_EQ(json["kind"], "mesh");
+  EXPECT_EQ(json["triangles"], 4);
+  EXPECT_EQ(json["warnings"], nlohmann::json::array());
+}
+
+TEST_F(InfoVerb, RefusesWhatIsNoSplat) {
+  WriteText(folder_ / "points.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n");
+  const ProgramRun run = ExpectRefused({"info", folder_ / "points.ply", "--json"}, ErrorCode::kBadFile, {"points.ply"});
+  EXPECT_EQ(run.json()["error"]["code"], "bad_file");
+  WriteText(folder_ / "text.splat", FileText(SourceDirForTest() / "docs/architecture.md").substr(0, 3200));
+  ExpectRefused({"info", folder_ / "text.splat"}, ErrorCode::kBadFile, {"is no .splat file"});
+  WriteText(folder_ / "empty.splat", "");
+  ExpectRefused({"info", folder_ / "empty.splat"}, ErrorCode::kBadFile, {"empty.splat: is empty"});
+  ExpectRefused({"info", folder_ / "\x1b[2J\xff.ply"}, ErrorCode::kNotFound, {"\\x1b[2J\\xff.ply: no such file"});
+  ExpectRefused({"info"}, ErrorCode::kBadArgument, {"file"});
+  ExpectRefused({"info", folder_ / "points.ply", "--from", "magic"}, ErrorCode::kBadArgument, {"--from: 'magic'"});
+}
+
+}  // namespace
+}  // namespace anchorsplat

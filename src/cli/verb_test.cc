@@ -1,0 +1,187 @@
+#include "cli/verb.h"
+
+#include <fstream>
+
+#include "cli/run_for_test.h"
+#include "cli/small_scan_for_test.h"
+#include "cli/verb_tree.h"
+#include "core/text.h"
+#include "io/folder_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+// All verbs that have options, those below other verbs too.
+std::vector<DeclaredVerb> VerbsWithOptions() {
+  CLI::App app{"", "anchorsplat"};
+  Program program;
+  AddVerbs(app, program);
+  std::vector<DeclaredVerb> out, todo = DeclaredVerbs(app);
+  while (!todo.empty()) {
+    const DeclaredVerb verb = todo.back();
+    todo.pop_back();
+    todo.insert(todo.end(), verb.verbs.begin(), verb.verbs.end());
+    if (verb.verbs.empty()) out.push_back(verb);
+  }
+  return out;
+}
+
+TEST(CommandLine, Version) {
+  const ProgramRun run = ExpectDone({"--version"});
+  EXPECT_EQ(run.out, Cat("anchorsplat ", ANCHORSPLAT_VERSION, "\n"));
+  EXPECT_THAT(run.err, IsEmpty());
+}
+
+TEST(CommandLine, HelpListsEveryVerbAndEachHasItsOwn) {
+  const std::vector<DeclaredVerb> verbs = VerbsWithOptions();
+  EXPECT_GE(verbs.size(), 20u);
+  const std::string help = ExpectDone({"--help"}).out;
+  for (const DeclaredVerb& verb : verbs) {
+    EXPECT_THAT(help, HasSubstr("\n  " + verb.words[0] + " "));
+    std::vector<std::string> words = verb.words;
+    words.emplace_back("--help");
+    const ProgramRun run = ExpectDone(words);
+    EXPECT_THAT(run.out, AllOf(HasSubstr("Example:\n  anchorsplat " + verb.name()), HasSubstr("--overwrite")));
+    EXPECT_THAT(run.err, IsEmpty());
+  }
+}
+
+TEST(CommandLine, WordsThatAreNoVerb) {
+  ExpectRefused({}, ErrorCode::kBadArgument, {"'anchorsplat' needs a verb"});
+  ExpectRefused(
+      {"convrt", "x.ply"}, ErrorCode::kBadArgument,
+      {"did you mean 'convert'?", "enhance, info, render, convert, compare, eval, view, views, fit, dataset"});
+  ExpectRefused({"dataset", "chekc", "x"}, ErrorCode::kBadArgument, {"did you mean 'check'?"});
+  const ProgramRun far = ExpectRefused({"xyzzyxyzzy", "--json"}, ErrorCode::kBadArgument);
+  EXPECT_EQ(far.json()["error"]["code"], "bad_argument");
+  EXPECT_THAT(far.err, Not(HasSubstr("did you mean")));
+  EXPECT_EQ(ExpectRefused({"enhance", "--json"}, ErrorCode::kBadArgument).json()["error"]["code"], "bad_argument");
+  ExpectRefused({"info", "x.ply", "--colour"}, ErrorCode::kBadArgument, {"--colour", "--help shows how"});
+}
+
+// Finite ones, whatever the option; whole ones have 64 bits. The message names the option and stays readable.
+TEST(CommandLine, NumbersAreNumbers) {
+  int options = 0;
+  for (const DeclaredVerb& verb : VerbsWithOptions()) {
+    for (const DeclaredOption& option : verb.options) {
+      if (option.value != "FLOAT" && option.value != "INT" && option.value != "UINT") continue;
+      ++options;
+      const std::string name = option.names.empty() ? option.positional : option.names.back();
+      ASSERT_TRUE(name.starts_with("--")) << verb.name() << ' ' << name;
+      const std::vector<std::string> values =
+          option.value == "FLOAT" ? std::vector<std::string>{"nan", "inf", "-inf", "1e39", "-nan"}
+                                  : std::vector<std::string>{"99999999999999999999", "-99999999999999999999"};
+      for (const std::string& value : values) {
+        std::vector<std::string> words = verb.words;
+        words.push_back(Cat(name, "=", value));
+        const ProgramRun run = ExpectRefused(words, ErrorCode::kBadArgument, {name + ": "});
+        EXPECT_LT(run.err.size(), 200u) << run.err;
+      }
+    }
+  }
+  EXPECT_GE(options, 100);
+}
+
+TEST(CommandLine, TheLargestSeed) {
+  const TestFolder folder;
+  const std::string scan = WriteScan(folder / "scan.ply");
+  ExpectDone({"convert", scan, folder / "out.ply", "--seed", "18446744073709551615"});
+  ExpectRefused({"convert", scan, folder / "no.ply", "--seed", "-1"}, ErrorCode::kBadArgument, {"--seed"});
+}
+
+TEST(CommandLine, QuietSaysNothingAndJsonNothingElse) {
+  const TestFolder folder;
+  const std::string scan = WriteScan(folder / "scan.ply");
+  const ProgramRun quiet = ExpectDone({"convert", scan, folder / "a.ply", "-q"});
+  EXPECT_THAT(quiet.out, IsEmpty());
+  EXPECT_THAT(quiet.err, IsEmpty());
+  EXPECT_TRUE(ExpectJson({"convert", scan, folder / "b.ply"}).is_array());
+  // Warnings are said all the same.
+  EXPECT_THAT(ExpectDone({"convert", scan, folder / "c.splat", "-q"}).err, HasSubstr("warning: "));
+}
+
+TEST(CommandLine, ErrorsAreDocumentsToo) {
+  const TestFolder folder;
+  const ProgramRun run = ExpectRefused({"info", folder / "none.ply", "--json"}, ErrorCode::kNotFound, {"none.ply"});
+  EXPECT_EQ(run.json()["error"]["code"], "not_found");
+  EXPECT_THAT(run.json()["error"]["message"].get<std::string>(), HasSubstr("none.ply"));
+}
+
+TEST(CommandLine, AnyNumberOfThreadsMakesTheSamePicture) {
+  const TestFolder folder;
+  const std::string scan = WriteScan(folder / "scan.ply", 2000, 1);
+  for (const std::string threads : {"1", "3"}) {
+    ExpectDone(
+        {"render", scan, "-o", folder / (threads + ".png"), "--orbit", "1", "--size", "200x150", "--threads", threads});
+  }
+  EXPECT_EQ(FileText(folder / "1.png"), FileText(folder / "3.png"));
+}
+
+// A batch in which one input fails is done for the others; one in which all do has the code of the last.
+TEST(CommandLine, OneBadInputDoesNotStopTheOthers) {
+  const TestFolder folder;
+  const std::string scan = WriteScan(folder / "scan.ply"), other = WriteScan(folder / "other.spz");
+  const std::vector<std::string> words = {
+      "convert", scan, folder / "none.ply", other, "--out-dir", folder / "out", "--to", ".glb", "--json"};
+  const ProgramRun run = RunWords(words);
+  EXPECT_EQ(run.code, kPartialExitCode);
+  EXPECT_THAT(run.err, HasSubstr("1 of 3 files"));
+  const nlohmann::json rows = run.json();
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_EQ(rows[0]["gaussians"]["out"], 200);
+  EXPECT_EQ(rows[1]["failure"]["code"], "not_found");
+  EXPECT_EQ(rows[2]["gaussians"]["out"], 200);
+
+  WriteText(folder / "text.ply", "# Read me\n");
+  WriteText(folder / "cameras.ply", "{}");
+  for (const std::string verb : {"convert", "enhance"}) {
+    ExpectRefused({verb, folder / "cameras.ply", folder / "text.ply", "--out-dir", folder / "none"},
+                  ErrorCode::kBadFile, {"all 2 inputs failed"});
+  }
+}
+
+TEST(CommandLine, ManualPageAndCompletionsKnowTheVerbs) {
+  for (const auto& [kind, beginning] :
+       {std::pair<std::string, std::string>{"man", ".TH"}, {"bash", ""}, {"zsh", "#compdef"}}) {
+    const ProgramRun run = ExpectDone({"manual", kind});
+    EXPECT_THAT(run.out, AllOf(HasSubstr(beginning), HasSubstr("enhance"), HasSubstr("prune"))) << kind;
+  }
+  ExpectRefused({"manual", "fish"}, ErrorCode::kBadArgument, {"fish"});
+  ExpectRefused({"manual"}, ErrorCode::kBadArgument, {"kind"});
+}
+
+// What the program changes for the whole process, these tests put back.
+TEST(CommandLine, ARunLeavesTheProcessAsItWas) {
+  class Counting : public LogSink {
+   public:
+    void Message(LogLevel, const std::string&) override { ++messages; }
+    void TaskBegin(const std::string&, int64_t) override {}
+    void TaskProgress(int64_t, const std::string&) override {}
+    void TaskEnd() override {}
+    int messages = 0;
+  };
+  const auto sink = std::make_shared<Counting>();
+  const auto before = SetLogSink(sink);
+  std::streambuf* const console = std::cout.rdbuf();
+  const int threads = ThreadCount();
+  struct sigaction then {
+  }, now{};
+  sigaction(SIGXFSZ, nullptr, &then);
+  ExpectRefused({"info", "/none.ply", "--threads", "1"}, ErrorCode::kNotFound);
+  EXPECT_EQ(sink->messages, 0);
+  LogWarning("after");
+  EXPECT_EQ(sink->messages, 1);
+  SetLogSink(before);
+  EXPECT_EQ(std::cout.rdbuf(), console);
+  EXPECT_EQ(ThreadCount(), threads);
+  sigaction(SIGXFSZ, nullptr, &now);
+  EXPECT_EQ(now.sa_handler, then.sa_handler);
+}
+
+}  // namespace
+}  // namespace anchorsplat

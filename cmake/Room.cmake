@@ -44,6 +44,8 @@ function(anchorsplat_room name)
     return()
   endif()
   add_library(anchorsplat_${name} STATIC ${sources})
+  # Every room may become part of a shared library.
+  set_target_properties(anchorsplat_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
   anchorsplat_unity(anchorsplat_${name})
   target_link_libraries(anchorsplat_${name} PUBLIC anchorsplat_flags ${ROOM_LIBRARIES})
   foreach(used IN LISTS ROOM_USES)

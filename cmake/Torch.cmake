@@ -53,6 +53,7 @@ function(anchorsplat_torch_sources)
   foreach(target IN LISTS ARGN)
     if(TARGET ${target})
       target_precompile_headers(${target} REUSE_FROM anchorsplat_torch_header)
+      set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE OFF)  # as the header
     endif()
   endforeach()
 endfunction()

@@ -21,7 +21,7 @@ class DatasetCheckTest : public testing::Test {
     for (const char* name : {"a", "b"}) {
       ObjectJob job = SmallJob(mesh, name);
       job.settings.views.store_high = job.name == "a";
-      const auto record = BuildObject(job, set_, nullptr);
+      const auto record = BuildObject(job, set_);
       ASSERT_TRUE(record.ok()) << record.error().message;
       manifest_.emplace(name, *record);
     }

@@ -118,7 +118,7 @@ TEST(PictureProject, IsAnObjectOfADataSet) {
   ObjectJob job = SmallJob((folder / "lego").string(), "lego");
   job.settings.downscale = 2;
   job.settings.fit_steps = 5;
-  const auto record = BuildObject(job, folder / "set", nullptr);
+  const auto record = BuildObject(job, folder / "set");
   ASSERT_TRUE(record.ok()) << record.error().message;
   EXPECT_EQ(record->low_size, 12);
   EXPECT_TRUE(fs::exists(folder / "set/lego/12/gaussian_splatting/ckpts/ckpt_4_rank0.pt"));

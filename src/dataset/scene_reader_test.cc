@@ -14,9 +14,9 @@ namespace fs = std::filesystem;
 TEST(SceneReader, HighViewsOnDemandAreTheStoredOnesBitByBit) {
   const TestFolder folder;
   ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
-  ASSERT_TRUE(BuildObject(job, folder / "stored", nullptr).ok());
+  ASSERT_TRUE(BuildObject(job, folder / "stored").ok());
   job.settings.views.store_high = false;
-  ASSERT_TRUE(BuildObject(job, folder / "demand", nullptr).ok());
+  ASSERT_TRUE(BuildObject(job, folder / "demand").ok());
   const auto stored = Scene::Open({"tetra", folder / "stored/tetra"});
   const auto demand = Scene::Open({"tetra", folder / "demand/tetra"});
   ASSERT_TRUE(stored.ok() && demand.ok());
@@ -35,7 +35,7 @@ TEST(SceneReader, HighViewsOnDemandAreTheStoredOnesBitByBit) {
 
 TEST(SceneReader, ViewsOfBothResolutionsAreTheSamePlaces) {
   const TestFolder folder;
-  ASSERT_TRUE(BuildObject(SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra"), folder / "set", nullptr).ok());
+  ASSERT_TRUE(BuildObject(SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra"), folder / "set").ok());
   const auto scene = Scene::Open({"tetra", folder / "set/tetra"});
   ASSERT_TRUE(scene.ok()) << scene.error().message;
   ASSERT_EQ(scene->low_views().size(), 9u);
@@ -57,7 +57,7 @@ TEST(SceneReader, ViewsOfBothResolutionsAreTheSamePlaces) {
 TEST(SceneReader, ReadsDataSetsWithoutOurRecords) {
   // As the published ones: no manifest, no record.
   const TestFolder folder;
-  ASSERT_TRUE(BuildObject(SmallJob(WriteTetrahedron(folder.path(), "tetra"), "b"), folder / "set", nullptr).ok());
+  ASSERT_TRUE(BuildObject(SmallJob(WriteTetrahedron(folder.path(), "tetra"), "b"), folder / "set").ok());
   fs::copy(folder / "set/b", folder / "set/a", fs::copy_options::recursive);
   for (const char* name : {"a", "b"}) fs::remove(folder / "set" / name / kRecordName);
   fs::create_directories(folder / "set/notes");
@@ -80,7 +80,7 @@ TEST(SceneReader, ListsWhatTheManifestAndTheSplitSay) {
   const std::string mesh = WriteTetrahedron(folder.path(), "tetra");
   Manifest manifest;
   for (const char* name : {"a", "b", "c"}) {
-    auto record = BuildObject(SmallJob(mesh, name), folder / "set", nullptr);
+    auto record = BuildObject(SmallJob(mesh, name), folder / "set");
     ASSERT_TRUE(record.ok());
     record->rejected = record->name == "b";
     manifest.emplace(name, *record);
@@ -98,7 +98,7 @@ TEST(SceneReader, ListsWhatTheManifestAndTheSplitSay) {
 
 TEST(SceneReader, RefusesWhatDoesNotFit) {
   const TestFolder folder;
-  ASSERT_TRUE(BuildObject(SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra"), folder / "set", nullptr).ok());
+  ASSERT_TRUE(BuildObject(SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra"), folder / "set").ok());
   const fs::path object = folder / "set/tetra";
   std::ofstream(object / "24/cameras.txt", std::ios::app) << "2 PINHOLE 30 24 30 30 15 12\n";
   EXPECT_EQ(Scene::Open({"tetra", object}).error().code, ErrorCode::kBadFile);

@@ -23,9 +23,9 @@ TEST(TrueViews, RenderedOnceTheyAreThoseThatWouldHaveBeenStored) {
   const TestFolder folder;
   ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
   job.settings.views.background = {0.25f, 0, 1};
-  ASSERT_TRUE(BuildObject(job, folder / "stored", nullptr).ok());
+  ASSERT_TRUE(BuildObject(job, folder / "stored").ok());
   job.settings.views.store_high = false;
-  ASSERT_TRUE(BuildObject(job, folder / "demand", nullptr).ok());
+  ASSERT_TRUE(BuildObject(job, folder / "demand").ok());
   const SceneEntry stored_entry{"tetra", folder / "stored/tetra"}, entry{"tetra", folder / "demand/tetra"};
   const auto stored_scene = Scene::Open(stored_entry), scene = Scene::Open(entry);
   ASSERT_TRUE(stored_scene.ok() && scene.ok());
@@ -102,7 +102,7 @@ TEST(TrueViews, TheObjectsBoxOfPicturesWithAndWithoutAlpha) {
 
 TEST(TrainingObject, HeldOutViewsAreNeverTrainedOn) {
   const TestFolder folder;
-  ASSERT_TRUE(BuildObject(SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra"), folder / "set", nullptr).ok());
+  ASSERT_TRUE(BuildObject(SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra"), folder / "set").ok());
   const SceneEntry entry{"tetra", folder / "set/tetra"};
   const auto all = OpenTrainingObject(entry, 0, folder / "cache"),
              some = OpenTrainingObject(entry, 3, folder / "cache");

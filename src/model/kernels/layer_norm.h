@@ -4,6 +4,8 @@
 
 namespace anchorsplat {
 
+inline constexpr double kLayerNormEpsilon = 1e-5;  // of both networks
+
 // LayerNorm of each row, out = (add or 0) + (x − mean) / √(variance + ε) · weight + bias, variance by 1/C.
 struct LayerNormParams {
   int64_t rows;                // N

@@ -31,7 +31,6 @@ inline constexpr int kGridResolution = 384;
 // ε: how far an output Gaussian's mean may lie from its anchor, per axis, in the normalised cube.
 inline constexpr float kAnchorOffsetScale = 0.015f;
 
-inline constexpr double kLayerNormEpsilon = 1e-5;
 inline constexpr double kBatchNormEpsilon = 1e-3;
 inline constexpr double kBatchNormMomentum = 0.01;
 

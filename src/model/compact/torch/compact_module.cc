@@ -12,6 +12,8 @@
 #include "model/compact/compact_residual.h"
 #include "model/compact/torch/compact_tables.h"
 #include "model/compact/torch/edge_messages.h"
+#include "model/kernels/layer_norm.h"
+#include "model/shared/torch/group.h"
 #include "render/constants.h"
 #include "tensors/safetensors.h"
 
@@ -20,10 +22,6 @@ namespace anchorsplat {
 namespace {
 
 using torch::Tensor;
-
-// Gives parameters their names.
-class GroupImpl : public torch::nn::Module {};
-TORCH_MODULE(Group);
 
 constexpr float kNoLimit = 1e30f;
 

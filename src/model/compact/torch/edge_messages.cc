@@ -15,7 +15,7 @@ using torch::Tensor;
 constexpr int64_t kPointsPerBlock = 256;
 
 // A range of points and what belongs to it, as views.
-struct Block {
+struct EdgeBlock {
   int64_t begin, points, m;
 
   Tensor Points(const Tensor& table) const { return table.narrow(0, begin, points); }
@@ -29,13 +29,13 @@ void ForEachBlock(int64_t n, int64_t m, Body&& body) {
     const torch::NoGradGuard no_gradient;  // of this thread
     for (int64_t b = first; b < last; ++b) {
       const int64_t begin = b * kPointsPerBlock;
-      body(b, Block{begin, std::min(kPointsPerBlock, n - begin), m});
+      body(b, EdgeBlock{begin, std::min(kPointsPerBlock, n - begin), m});
     }
   });
 }
 
 // own_i + other_j + W·e_ij of a block's edges.
-Tensor Sums(const Block& block, const Tensor& own, const Tensor& other, const Tensor& edges, const Tensor& index,
+Tensor Sums(const EdgeBlock& block, const Tensor& own, const Tensor& other, const Tensor& edges, const Tensor& index,
             const Tensor& edge_weight) {
   Tensor sums = torch::addmm(other.index_select(0, block.Edges(index)), block.Edges(edges), edge_weight.t());
   sums.view({block.points, block.m, -1}).add_(block.Points(own).unsqueeze(1));
@@ -91,7 +91,7 @@ class PooledMessagesFunction : public torch::autograd::Function<PooledMessagesFu
     const int64_t n = own.size(0), h = own.size(1);
     const Tensor pooled = torch::empty({n, 2 * h}, own.options());
     const Tensor where = torch::empty({n, h}, torch::kInt32);
-    ForEachBlock(n, m, [&](int64_t, const Block& block) {
+    ForEachBlock(n, m, [&](int64_t, const EdgeBlock& block) {
       const Tensor sums = Sums(block, own, other, edges, index, edge_weight);
       const Tensor messages = torch::addmm(message_bias, torch::gelu(sums), message_weight.t());
       Pool(messages, block.Points(pooled), block.Points(where));
@@ -112,7 +112,7 @@ class PooledMessagesFunction : public torch::autograd::Function<PooledMessagesFu
     const Tensor to_own = torch::empty_like(own), to_sums = torch::empty({n * m, h}, own.options());
     const auto blocks = static_cast<size_t>((n + kPointsPerBlock - 1) / kPointsPerBlock);
     std::vector<Tensor> to_edge_weight(blocks), to_message_weight(blocks), to_bias(blocks);  // summed in order
-    ForEachBlock(n, m, [&](int64_t b, const Block& block) {
+    ForEachBlock(n, m, [&](int64_t b, const EdgeBlock& block) {
       const Tensor sums = Sums(block, own, other, edges, index, edge_weight);
       const Tensor to_messages = torch::empty_like(sums);
       Unpool(block.Points(gradient), block.Points(where), to_messages);

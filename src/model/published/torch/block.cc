@@ -1,5 +1,6 @@
 #include "model/published/torch/block.h"
 
+#include "model/kernels/layer_norm.h"
 #include "model/published/published_config.h"
 
 namespace anchorsplat {

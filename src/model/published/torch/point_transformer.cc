@@ -4,14 +4,11 @@
 
 #include "core/text.h"
 #include "model/kernels/serialization.h"
+#include "model/shared/torch/group.h"
 
 namespace anchorsplat {
 
 namespace {
-
-// A module that only holds others, to give them their names.
-class GroupImpl : public torch::nn::Module {};
-TORCH_MODULE(Group);
 
 // Linear from 0 to `last` over `count` blocks.
 std::vector<double> DropPathRates(double last, int64_t count) {

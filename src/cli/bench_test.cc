@@ -1,0 +1,35 @@
+#include "cli/run_for_test.h"
+#include "cli/small_scan_for_test.h"
+#include "io/folder_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+using ::testing::HasSubstr;
+
+// What is measured needs a quiet machine and is no test (docs/results/speed.md); that words are understood is.
+TEST(BenchVerb, TakesAndRefusesWords) {
+  const TestFolder folder;
+  const std::string none = folder / "none.ply";
+  ExpectRefused({"bench"}, ErrorCode::kBadArgument, {"needs a verb: render, fit, network, convert, io, pixel-size"});
+  ExpectRefused({"bench", "render", none}, ErrorCode::kNotFound, {"none.ply"});
+  ExpectRefused({"bench", "network", none}, ErrorCode::kNotFound, {"none.ply"});
+  ExpectRefused({"bench", "convert", none}, ErrorCode::kNotFound, {"none.ply"});
+  ExpectRefused({"bench", "network", none, "--precision", "fp64"}, ErrorCode::kBadArgument, {"--precision"});
+  ExpectRefused({"bench", "render", none, "--repeats", "0"}, ErrorCode::kBadArgument, {"--repeats"});
+  ExpectRefused({"bench", "fit", "--width", "10"}, ErrorCode::kBadArgument, {"--width"});
+  ExpectRefused({"bench", "convert", "--gaussians", "999"}, ErrorCode::kBadArgument, {"--gaussians"});
+  ExpectRefused({"bench", "io", "--sh-degree", "4"}, ErrorCode::kBadArgument, {"--sh-degree"});
+  ExpectRefused({"bench", "pixel-size", none}, ErrorCode::kBadArgument, {"none.ply"});
+}
+
+TEST(BenchVerb, PixelSize) {
+  const nlohmann::json json = ExpectJson({"bench", "pixel-size", Biplane(), "--features"});
+  ASSERT_EQ(json["objects"].size(), 1u);
+  EXPECT_GT(json["objects"][0]["samples"].size(), 0u);
+  EXPECT_LT(json["error_median"], 0.5);
+  EXPECT_THAT(ExpectDone({"bench", "pixel-size", Biplane()}).out, HasSubstr("% in the median"));
+}
+
+}  // namespace
+}  // namespace anchorsplat

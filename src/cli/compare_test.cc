@@ -1,0 +1,86 @@
+#include "cli/run_for_test.h"
+#include "cli/small_scan_for_test.h"
+#include "images/image_io.h"
+#include "io/folder_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class CompareVerb : public testing::Test {
+ protected:
+  void SetUp() override {
+    ExpectDone({"enhance", scan_, "-o", other_, "--method", "filter", "--pixel-size", "0.02", "-q"});
+    ExpectDone({"render", scan_, "-o", views_, "--orbit", "2", "--size", "48x48", "-q"});
+  }
+
+  TestFolder folder_;
+  std::string scan_ = WriteScan(folder_ / "scan.ply");
+  std::string other_ = folder_ / "other.ply";
+  std::string views_ = folder_ / "views";  // of the scan
+};
+
+TEST_F(CompareVerb, TwoSplats) {
+  const nlohmann::json json = ExpectJson({"compare", scan_, other_, "--orbit", "2", "--size", "48x48"});
+  ASSERT_EQ(json["views"].size(), 2u);
+  EXPECT_EQ(json["views"][1]["name"], "001");
+  EXPECT_GT(json["mean"]["psnr"], 10);
+  EXPECT_LT(json["mean"]["ssim"], 1);
+  const ProgramRun same = ExpectDone({"compare", scan_, scan_, "--orbit", "2", "--size", "48x48"});
+  EXPECT_THAT(same.out, AllOf(HasSubstr("PSNR"), HasSubstr("inf  1.0000")));
+  EXPECT_THAT(same.err, IsEmpty());
+  EXPECT_EQ(ExpectJson({"compare", scan_, scan_, "--orbit", "1", "--size", "48x48"})["mean"]["psnr"], nullptr);
+}
+
+TEST_F(CompareVerb, SplatsAndPictures) {
+  // Rendered again they differ only by what eight bits do not hold.
+  EXPECT_GT(ExpectJson({"compare", scan_, views_, "--orbit", "2", "--size", "48x48"})["mean"]["psnr"], 50);
+  EXPECT_EQ(ExpectJson({"compare", views_, views_})["mean"]["psnr"], nullptr);
+  const std::string one = folder_ / "views/000.png", two = folder_ / "views/001.png", sides = folder_ / "sides.png";
+  ExpectDone({"compare", one, two, "--side-by-side", sides});
+  EXPECT_GT(ReadImage(sides)->width, 2 * 48);
+  ExpectRefused({"compare", one, two, "--side-by-side", sides}, ErrorCode::kExists, {"sides.png"});
+  ExpectRefused({"compare", one, two, "--side-by-side", folder_ / "sides.jpg"}, ErrorCode::kBadArgument,
+                {"written as .png"});
+}
+
+TEST_F(CompareVerb, BothAgainstTheTruth) {
+  const std::vector<std::string> words = {"compare", scan_, other_,   "--truth", views_,
+                                          "--orbit", "2",   "--size", "48x48"};
+  EXPECT_THAT(ExpectDone(words).out, AllOf(HasSubstr("both against"), HasSubstr("gain dB")));
+  const nlohmann::json json = ExpectJson(words);
+  EXPECT_GT(json["a"]["mean"]["psnr"], json["b"]["mean"]["psnr"]);
+}
+
+TEST_F(CompareVerb, RefusesWhatCannotBeCompared) {
+  ExpectRefused({"compare", scan_, other_}, ErrorCode::kBadArgument, {"--orbit"});
+  ExpectRefused({"compare", "", scan_, "--orbit", "1"}, ErrorCode::kBadArgument, {"must not be empty"});
+  ExpectRefused({"compare", scan_, views_, "--orbit", "2", "--size", "32x32"}, ErrorCode::kBadArgument, {"48x48"});
+  ExpectRefused({"compare", scan_, views_, "--orbit", "3", "--size", "48x48"}, ErrorCode::kBadArgument, {"002"});
+  fs::create_directory(folder_ / "empty");
+  ExpectRefused({"compare", scan_, folder_ / "empty", "--orbit", "1"}, ErrorCode::kNotFound, {"no PNG or JPEG"});
+  ExpectRefused({"compare", scan_, folder_ / "none.ply", "--orbit", "1"}, ErrorCode::kNotFound, {"none.ply"});
+}
+
+// LPIPS is missing without its weights; the other metrics are there all the same.
+TEST_F(CompareVerb, LpipsWithoutItsWeights) {
+  const std::string one = folder_ / "views/000.png", two = folder_ / "views/001.png";
+  const std::vector<std::string> words = {"compare",          one, two, "--lpips", "alex", "--lpips-weights",
+                                          folder_ / "weights"};
+  fs::create_directory(folder_ / "weights");
+  EXPECT_THAT(ExpectDone(words).err, HasSubstr("LPIPS missing"));
+  const nlohmann::json json = ExpectJson(words);
+  EXPECT_TRUE(json["mean"].contains("ssim"));
+  EXPECT_FALSE(json["mean"].contains("lpips"));
+  WriteText(folder_ / "weights/alex.safetensors", "no tensors");
+  ExpectRefused(words, ErrorCode::kBadFile, {"alex.safetensors"});
+  ExpectRefused({"compare", one, two, "--lpips", "resnet"}, ErrorCode::kBadArgument, {"--lpips"});
+  ExpectRefused({"compare", one, two, "--lpips-weights", folder_ / "weights"}, ErrorCode::kBadArgument, {"--lpips"});
+}
+
+}  // namespace
+}  // namespace anchorsplat

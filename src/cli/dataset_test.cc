@@ -1,0 +1,102 @@
+#include "cli/dataset.h"
+
+#include "cli/run_for_test.h"
+#include "cli/small_scan_for_test.h"
+#include "dataset/small_dataset_for_test.h"
+#include "io/folder_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+// What `dataset build` makes with its processes is in behaviour/datasets_test.sh; what can be asked of it is here.
+class DatasetVerb : public testing::Test {
+ protected:
+  // A data set of these objects, all of one mesh.
+  void Make(const std::vector<std::string>& names) {
+    Manifest manifest;
+    for (const std::string& name : names) {
+      const auto record = BuildObject(SmallJob(mesh_, name), set_);
+      ASSERT_TRUE(record.ok()) << record.error().message;
+      manifest.emplace(name, *record);
+    }
+    ASSERT_TRUE(WriteManifest(set_, manifest).ok());
+  }
+
+  TestFolder folder_;
+  std::string mesh_ = WriteTetrahedron(folder_.path(), "tetra");
+  std::string set_ = folder_ / "set";
+};
+
+TEST_F(DatasetVerb, Info) {
+  Make({"a"});
+  const nlohmann::json json = ExpectJson({"dataset", "info", set_});
+  EXPECT_EQ(json["objects"], 1);
+  EXPECT_EQ(json["failed"], 0);
+  EXPECT_EQ(json["unfinished"], 0);
+  EXPECT_EQ(json["recipes"]["small"]["objects"], 1);
+  EXPECT_THAT(ExpectDone({"dataset", "info", set_}).out,
+              AllOf(HasSubstr("set: 1 object, "), HasSubstr("training PSNR"), HasSubstr("licences:")));
+}
+
+TEST_F(DatasetVerb, Check) {
+  Make({"a"});
+  EXPECT_THAT(ExpectDone({"dataset", "check", set_, "--decode"}).out, HasSubstr("everything is there"));
+  EXPECT_EQ(ExpectJson({"dataset", "check", set_})["problems"], nlohmann::json::array());
+  fs::remove(fs::path(set_) / "a/24/images/004.png");
+  EXPECT_THAT(ExpectRefused({"dataset", "check", set_}, ErrorCode::kBadFile, {"set: 1 problem"}).out,
+              HasSubstr("picture 004 is missing"));
+  // `eval` says so, too.
+  ExpectRefused({"eval", set_, "-o", folder_ / "out", "--methods", "raw"}, ErrorCode::kBadFile, {"a"});
+}
+
+TEST_F(DatasetVerb, Split) {
+  Make({"a", "b"});
+  const std::vector<std::string> words = {"dataset", "split", set_, "--test", "1", "--validation", "0"};
+  EXPECT_EQ(ExpectJson(words)["splits"], nlohmann::json({{"test", 2}}));
+  ExpectRefused(words, ErrorCode::kExists, {"splits.json"});
+  EXPECT_THAT(ExpectDone({"dataset", "info", set_}).out, HasSubstr("test: 2 objects"));
+  WriteText(folder_ / "list.txt", "# one mesh\ntetra.obj\n");
+  EXPECT_THAT(ExpectDone({"dataset", "split", set_, "--train-list", folder_ / "list.txt", "-w"}).out,
+              HasSubstr("2 objects, 2 for train"));
+  ExpectRefused({"dataset", "split", set_, "-w", "--test", "0.7", "--validation", "0.7"}, ErrorCode::kBadArgument);
+  ExpectRefused({"dataset", "split", set_, "-w", "--test", "2"}, ErrorCode::kBadArgument, {"from 0 to 1"});
+  ExpectRefused({"eval", set_, "-o", folder_ / "out", "--split", "test", "--methods", "raw"}, ErrorCode::kNotFound);
+}
+
+TEST_F(DatasetVerb, EvaluationOfADataSet) {
+  Make({"a"});
+  EXPECT_EQ(ExpectJson({"eval", set_, "-o", folder_ / "out", "--protocol", "upstream", "--methods",
+                        "raw,filter,bicubic", "--fit-steps", "10"})["objects"],
+            1);
+}
+
+TEST_F(DatasetVerb, RefusesWhatIsNoDataSet) {
+  for (const char* verb : {"info", "check", "split"}) {
+    ExpectRefused({"dataset", verb, folder_ / "none"}, ErrorCode::kNotFound, {"none"});
+  }
+  ExpectRefused({"dataset"}, ErrorCode::kBadArgument, {"needs a verb"});
+}
+
+// Before a process is started.
+TEST_F(DatasetVerb, BuildsThatMakeNoSense) {
+  const auto refused = [&](std::vector<std::string> words, ErrorCode code, const std::string& why) {
+    words.insert(words.begin(), {"dataset", "build"});
+    words.insert(words.end(), {"-o", set_});
+    ExpectRefused(words, code, {why});
+  };
+  refused({}, ErrorCode::kBadArgument, "");
+  refused({mesh_, "--size", "12", "--low-size", "12"}, ErrorCode::kBadArgument, "");
+  WriteText(folder_ / "list.txt", "tetra.obj\n");
+  refused({"--list", folder_ / "list.txt"}, ErrorCode::kBadArgument, "--objects");
+  refused({"--list", folder_ / "none.txt", "--objects", folder_.path()}, ErrorCode::kNotFound, "none.txt");
+  WriteText(folder_ / "bad.toml", "steps = 60\n[[mix]]\nlow_size = 12\n[[mix]]\nlow_siize = 10\n");
+  refused({mesh_, "--recipe", folder_ / "bad.toml"}, ErrorCode::kBadFile, "line 5: low_siize");
+  EXPECT_FALSE(fs::exists(set_));
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -1,0 +1,100 @@
+#include "cli/run_for_test.h"
+#include "cli/small_scan_for_test.h"
+#include "io/folder_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class FitVerb : public testing::Test {
+ protected:
+  // `fit project -o out WORDS` of a few steps, unless the words say how many.
+  std::vector<std::string> Fit(const std::string& out, const std::vector<std::string>& words, bool few = true) {
+    std::vector<std::string> all = {"fit", project_, "-o", folder_ / out, "--init-points", "200"};
+    if (few) all.insert(all.end(), {"--steps", "12"});
+    all.insert(all.end(), words.begin(), words.end());
+    return all;
+  }
+
+  TestFolder folder_;
+  std::string project_ = WriteProject(folder_ / "project");
+};
+
+TEST_F(FitVerb, MakesASplat) {
+  const nlohmann::json json =
+      ExpectJson(Fit("fit.ply", {"--hold-out", "5", "--gsplat-checkpoint", folder_ / "ckpt_11_rank0.pt"}));
+  EXPECT_EQ(json["steps"], 12);
+  EXPECT_EQ(json["resumed_at"], 0);
+  EXPECT_EQ(json["initial_points"], "view");
+  EXPECT_EQ(json["train"]["views"], 8);
+  EXPECT_EQ(json["held_out"]["views"], 2);
+  EXPECT_EQ(json["gaussians"]["in"], 200);
+  EXPECT_EQ(ExpectJson({"info", folder_ / "fit.ply"})["gaussians"], json["gaussians"]["out"]);
+  EXPECT_FALSE(fs::exists(folder_ / "fit.ply.checkpoint"));  // it is finished
+  // Both files hold the same splat.
+  EXPECT_EQ(ExpectJson({"compare", folder_ / "fit.ply", folder_ / "ckpt_11_rank0.pt", "--orbit", "1", "--size",
+                        "48x48"})["mean"]["psnr"],
+            nullptr);
+  EXPECT_EQ(ExpectJson({"compare", folder_ / "fit.ply", project_ + "/views", "--cameras", project_})["views"].size(),
+            10u);
+}
+
+TEST_F(FitVerb, SaysWhatItDid) {
+  const ProgramRun run = ExpectDone(Fit("fit.ply", {"--hold-out", "0"}));
+  EXPECT_THAT(run.err, HasSubstr("10 training views, 0 held out"));
+  EXPECT_THAT(run.out, AllOf(HasSubstr("Gaussians after 12 steps"), HasSubstr("training views: 10, ")));
+  EXPECT_THAT(ExpectDone(Fit("quiet.ply", {"-q"})).err, IsEmpty());
+}
+
+TEST_F(FitVerb, BeginsWhereItIsTold) {
+  EXPECT_EQ(ExpectJson(Fit("random.ply", {"--init", "random"}))["initial_points"], "random");
+  const std::string scan = WriteScan(folder_ / "scan.ply", 50);
+  const nlohmann::json json = ExpectJson(Fit("again.ply", {"--init-splat", scan}));
+  EXPECT_EQ(json["initial_points"], "splat");
+  EXPECT_EQ(json["gaussians"]["in"], 50);
+  ExpectDone(Fit("area.ply", {"--pixel", "area", "--upscale", "2"}));
+}
+
+TEST_F(FitVerb, TheSameSeedMakesTheSameSplat) {
+  ExpectDone(Fit("a.ply", {"--seed", "7"}));
+  ExpectDone(Fit("b.ply", {"--seed", "7", "--threads", "1"}));
+  ExpectDone(Fit("c.ply", {"--seed", "8"}));
+  EXPECT_EQ(FileText(folder_ / "a.ply"), FileText(folder_ / "b.ply"));
+  EXPECT_NE(FileText(folder_ / "a.ply"), FileText(folder_ / "c.ply"));
+}
+
+TEST_F(FitVerb, RefusesWhatMakesNoSense) {
+  const auto refused = [&](const std::vector<std::string>& words, const std::string& why) {
+    ExpectRefused(Fit("x.ply", words, /*few=*/false), ErrorCode::kBadArgument, {why});
+  };
+  refused({"--steps", "0"}, "--steps");
+  refused({"--refine-every", "0"}, "--refine-every");
+  refused({"--hold-out", "1"}, "");
+  refused({"--init", "points"}, "has none");
+  refused({"--upscale", "2"}, "--pixel");
+  refused({"--init", "view", "--init-splat", "x.ply"}, "--init");
+  refused({"--background", "1"}, "--background");
+  ExpectRefused(Fit("x.xyz", {}), ErrorCode::kBadArgument, {"not a format that is written"});
+  ExpectRefused(Fit("x.ply", {"--checkpoint", folder_ / "x.ply"}), ErrorCode::kBadArgument, {"is the output itself"});
+  ExpectRefused(Fit("x.ply", {"--checkpoint", folder_ / "none/state"}), ErrorCode::kNotFound);
+  ExpectRefused({"fit", folder_ / "none", "-o", folder_ / "x.ply"}, ErrorCode::kNotFound, {"none"});
+  fs::create_directory(folder_ / "empty");
+  ExpectRefused({"fit", folder_ / "empty", "-o", folder_ / "x.ply"}, ErrorCode::kNotFound);
+  EXPECT_EQ(folder_.Entries(), 2);
+}
+
+TEST_F(FitVerb, OverwritesOnlyWhenTold) {
+  WriteText(folder_ / "mine.ply", "mine");
+  ExpectRefused(Fit("mine.ply", {}), ErrorCode::kExists, {"mine.ply"});
+  ExpectRefused(Fit("x.ply", {"--gsplat-checkpoint", folder_ / "mine.ply"}), ErrorCode::kExists, {"mine.ply"});
+  EXPECT_EQ(FileText(folder_ / "mine.ply"), "mine");
+  ExpectDone(Fit("mine.ply", {"-w"}));
+  EXPECT_NE(FileText(folder_ / "mine.ply"), "mine");
+}
+
+}  // namespace
+}  // namespace anchorsplat

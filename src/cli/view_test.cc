@@ -1,0 +1,68 @@
+#include "cli/run_for_test.h"
+#include "cli/small_scan_for_test.h"
+#include "io/folder_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class ViewVerb : public testing::Test {
+ protected:
+  TestFolder folder_;
+  std::string scan_ = WriteScan(folder_ / "scan.ply");
+  std::string page_ = folder_ / "page.html";
+};
+
+TEST_F(ViewVerb, BeforeAndAfterWithTruePictures) {
+  const std::string project = WriteProject(folder_ / "project");
+  ExpectDone({"enhance", scan_, "-o", folder_ / "out.ply", "--method", "filter", "--pixel-size", "0.02"});
+  const std::vector<std::string> words = {
+      "view",  folder_ / "out.ply", "--before", scan_, "--truth", project + "/views", "--cameras",
+      project, "--views",           "3",        "-o",  page_,     "--pixel-size",     "0.02"};
+  const nlohmann::json json = ExpectJson(words);
+  EXPECT_EQ(json["output"], page_);
+  EXPECT_EQ(json["views"], 3);
+  EXPECT_EQ(json["bytes"], fs::file_size(page_));
+  EXPECT_NEAR(json["pixel_size"].get<double>(), 0.02, 1e-6);
+  EXPECT_THAT(FileText(page_), AllOf(HasSubstr(R"("title":"out.ply")"), HasSubstr(R"(id="picture-2")")));
+  ExpectRefused(words, ErrorCode::kExists, {"page.html"});
+}
+
+TEST_F(ViewVerb, OneSplat) {
+  const ProgramRun run = ExpectDone({"view", scan_, "-o", page_, "--sh-degree", "0", "--title", "a</script>b"});
+  EXPECT_THAT(run.out, HasSubstr("open it in any browser"));
+  EXPECT_THAT(run.err, IsEmpty());
+  EXPECT_THAT(FileText(page_), AllOf(HasSubstr(R"("degree":0)"), HasSubstr(R"(a\u003c/script\u003eb)")));
+  ExpectDone({"convert", scan_, folder_ / "scan/meta.json"});
+  ExpectDone({"view", folder_ / "scan/", "-o", page_, "-w"});
+  EXPECT_THAT(FileText(page_), HasSubstr(R"("title":"scan")"));
+}
+
+TEST_F(ViewVerb, RefusesWhatMakesNoSense) {
+  const auto refused = [&](std::vector<std::string> words, ErrorCode code, const std::string& why) {
+    words.insert(words.begin(), {"view", scan_, "-o", page_});
+    ExpectRefused(words, code, {why});
+  };
+  const std::string cameras = Biplane() / "transforms_hr.json";
+  refused({"--truth", folder_.path()}, ErrorCode::kBadArgument, "--cameras");
+  refused({"--truth", folder_.path(), "--cameras", cameras}, ErrorCode::kNotFound, "no PNG or JPEG");
+  refused({"--truth", folder_ / "nowhere", "--cameras", cameras}, ErrorCode::kNotFound, "no such folder");
+  refused({"--sh-degree", "4"}, ErrorCode::kBadArgument, "--sh-degree");
+  refused({"--views", "0"}, ErrorCode::kBadArgument, "1 or more");
+  refused({"--pixel-size", "0"}, ErrorCode::kBadArgument, "--pixel-size");
+  refused({"--background", "white"}, ErrorCode::kBadArgument, "--background");
+  refused({"--before", folder_ / "none.ply"}, ErrorCode::kNotFound, "none.ply");
+  const std::string before = FileText(scan_);
+  ExpectRefused({"view", scan_, "-o", folder_ / "other.spz", "-w"}, ErrorCode::kBadArgument, {".html"});
+  const std::string nan = WriteNanScan(folder_ / "nan.ply");
+  ExpectRefused({"view", nan, "-o", page_}, ErrorCode::kBadFile, {"nan.ply: there is nothing to show"});
+  EXPECT_EQ(FileText(scan_), before);
+  EXPECT_FALSE(fs::exists(page_));
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Runs that end before their end, by a signal, a full disk or a lost folder, and what goes on from there:
-# interruptions_test.sh PROGRAM SOURCE_DIR.
+# Runs that end before their end, by a signal, a full disk or a lost folder, what goes on from there, and which files it
+# may replace: interruptions_test.sh PROGRAM SOURCE_DIR.
 . "$(dirname "$0")/expectations.sh"
 
 mkdir "$work/project"
@@ -14,16 +14,29 @@ until_is() {
 }
 says_log() { grep -qF -- "$1" "$work/log"; }
 
-# What a continuation has to have in common with its beginning: not the names alone.
+# Ctrl-C while it runs, then on from there: the same file as in one go.
 stopped() {
   "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 -o "$work/part.ply" --steps 200 \
-    --checkpoint-every 1 -q &
+    --checkpoint-every 1 -q "$@" &
   child=$!
   until_is test -e "$work/part.ply.checkpoint"
   kill -INT $child
   wait $child
 }
 resumed() { fit -o "$work/part.ply" --steps 200 --resume "$@"; }
+expect 0 "fit in one go" fit -o "$work/whole.ply" --steps 200 -q
+expect 130 "an interrupted fit" stopped
+says stderr "--resume"
+expect 0 "what an interrupted fit leaves" "$program" info "$work/part.ply"
+expect 5 "an interrupted fit is not forgotten" fit -o "$work/part.ply" --steps 200
+expect 2 "an interrupted fit is not mistaken for another" resumed --seed 8
+says stderr "seed"
+expect 0 "an interrupted fit goes on" resumed
+says stderr "going on"
+expect 0 "an interruption does not change the splat" cmp "$work/whole.ply" "$work/part.ply"
+rm "$work/part.ply"
+
+# What a continuation has to have in common with its beginning: not the names alone.
 expect 130 "a fit to go on with" stopped
 picture=$(find "$work/project/hr" -name '*.png' | sort | sed -n 2p)
 cp "$picture" "$work/picture.png" && cp "$(find "$work/project/hr" -name '*.png' | sort | sed -n 3p)" "$picture"
@@ -56,6 +69,7 @@ hung_up() {
 expect 130 "SIGHUP ends a fit in order" hung_up
 expect 0 "its splat is there" "$program" info "$work/hung.ply"
 expect 0 "its state is there" test -s "$work/hung.ply.checkpoint"
+refine() { "$program" enhance "$input" --upscale 2 --pixel-size 0.02 -o "$work/refined.ply" --images "$work/project" --k 1 "$@"; }
 refine_hung_up() {
   "$program" enhance "$input" --upscale 2 --pixel-size 0.02 -o "$work/refined.ply" --images "$work/project" --k 1 \
     --steps $long 2>"$work/log" &
@@ -63,10 +77,17 @@ refine_hung_up() {
   until_is says_log "views with pictures"
   kill -HUP $child
   wait $child
+  local code=$?
+  cat "$work/log" >&2
+  return $code
 }
 expect 130 "SIGHUP ends a refinement in order" refine_hung_up
+says stderr "--resume"
 expect 0 "its splat is there, too" "$program" info "$work/refined.ply"
 expect 0 "its state is there, too" test -s "$work/refined.ply.checkpoint"
+expect 5 "an interrupted refinement is not forgotten" refine --steps 9
+expect 2 "an interrupted refinement is not mistaken for another" refine --steps 9 --resume
+says stderr "its steps is"
 hung_up_build() {
   "$program" dataset build "$work/square.obj" "$work/other.obj" -o "$work/set" --views 8 --size 24 --low-size 12 --points 60 \
     --steps $long --max-gaussians 100 --jobs 1 -q &
@@ -113,7 +134,6 @@ no_room_stopped() {
 expect 130 "an interrupted fit without room for its state" no_room_stopped
 says stderr "there is nothing to resume from"
 expect 0 "its splat as it was" "$program" info "$work/room2.ply"
-expect 3 "a folder for the state that is not there" fit -o "$work/x.ply" --steps $long --checkpoint "$work/none/state"
 
 # Nowhere to write the splat: the state is kept.
 mkdir "$work/gone"
@@ -130,4 +150,34 @@ says stderr "the state after 200 steps is kept in $work/state"
 mkdir "$work/gone"
 expect 0 "it is finished at once" fit -o "$work/gone/splat.ply" --steps 200 --checkpoint "$work/state" --resume
 expect 0 "its splat is there at last" "$program" info "$work/gone/splat.ply"
+
+# A file that comes into being while a fit runs, and what a fit that goes on may replace.
+running() {
+  "$program" fit "$work/project" --init-points 100 --hold-out 5 --steps 2000 --max-gaussians 100 --checkpoint-every 1 \
+    --checkpoint "$work/running" -q "$@" &
+  child=$!
+  until_is test -e "$work/running"
+  [ -z "$meanwhile" ] || echo theirs >"$meanwhile"
+  kill -INT $child
+  wait $child
+}
+goes_on() { "$program" fit "$work/project" --init-points 100 --hold-out 5 --steps 2000 --max-gaussians 100 --checkpoint "$work/running" --resume -q "$@"; }
+meanwhile=$work/taken.ply
+expect 5 "a file that came into being meanwhile" running -o "$work/taken.ply"
+says stderr "taken-2.ply"
+expect 0 "it is what it was" grep -q theirs "$work/taken.ply"
+expect 0 "and the work is kept" "$program" info "$work/taken-2.ply"
+expect 5 "going on over a file that the interruption did not leave" goes_on -o "$work/taken.ply"
+expect 0 "it is still what it was" grep -q theirs "$work/taken.ply"
+rm "$work/running"
+meanwhile=
+expect 130 "an interrupted fit" running -o "$work/mine.ply"
+echo theirs >"$work/other.ply" && cp "$work/other.ply" "$work/other.pt"
+expect 5 "going on with another output" goes_on -o "$work/other.ply"
+says stderr "other.ply: exists; -w replaces it"
+expect 5 "going on with another gsplat checkpoint" goes_on -o "$work/mine.ply" --gsplat-checkpoint "$work/other.pt"
+says stderr "other.pt: exists; -w replaces it"
+expect 0 "they are what they were" cmp "$work/other.ply" "$work/other.pt"
+expect 0 "going on with its own output" goes_on -o "$work/mine.ply"
+
 finish

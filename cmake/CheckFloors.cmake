@@ -22,6 +22,7 @@ set(FLOOR_model/torch 9)
 set(FLOOR_train 10)
 set(FLOOR_eval 10)
 set(FLOOR_bench 10)
+set(FLOOR_api 11)
 set(FLOOR_cli 11)
 
 # Of model/ every folder is a room of its own.

@@ -7,6 +7,18 @@ include(GNUInstallDirs)
 
 install(TARGETS anchorsplat RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
 
+# The library, for find_package(anchorsplat).
+if(TARGET anchorsplat_shared)
+  include(CMakePackageConfigHelpers)
+  set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/anchorsplat")
+  write_basic_package_version_file("${CMAKE_BINARY_DIR}/anchorsplatConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
+  install(TARGETS anchorsplat_shared EXPORT anchorsplat LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}")
+  install(DIRECTORY include/anchorsplat DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.h")
+  install(EXPORT anchorsplat NAMESPACE anchorsplat:: FILE anchorsplatTargets.cmake DESTINATION "${package_dir}")
+  install(FILES cmake/anchorsplatConfig.cmake "${CMAKE_BINARY_DIR}/anchorsplatConfigVersion.cmake"
+          DESTINATION "${package_dir}")
+endif()
+
 if(ANCHORSPLAT_TORCH)
   get_filename_component(torch_place "${Torch_DIR}" REALPATH)
   string(FIND "${torch_place}/" "${CMAKE_SOURCE_DIR}/" in_checkout)
@@ -61,11 +73,19 @@ add_custom_target(anchorsplat_installable DEPENDS anchorsplat)
 if(TARGET anchorsplat_documents)
   add_dependencies(anchorsplat_installable anchorsplat_documents)
 endif()
+if(TARGET anchorsplat_shared)
+  add_dependencies(anchorsplat_installable anchorsplat_shared)
+endif()
 
 if(NOT ANCHORSPLAT_SANITIZE)
   add_test(NAME cli.install
            COMMAND ${CMAKE_SOURCE_DIR}/src/cli/behaviour/install_test.sh $<TARGET_FILE:anchorsplat> ${CMAKE_SOURCE_DIR}
                    ${CMAKE_BINARY_DIR} ${CMAKE_COMMAND})
+  if(TARGET anchorsplat_shared)
+    add_test(NAME api.installed_package
+             COMMAND ${CMAKE_SOURCE_DIR}/src/api/installed_package_test.sh ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}
+                     ${CMAKE_COMMAND} ${CMAKE_CXX_COMPILER} ${CMAKE_NM})
+  endif()
 endif()
 
 # `make deb`. What the program is linked with becomes its dependencies, by dpkg-shlibdeps.

@@ -39,9 +39,13 @@ Result<OpenedSplat> OpenedSplat::Open(const fs::path& path, const SplatFormat* f
                  Cat(path.string(), ": is a folder without a meta.json: expected a splat file or the folder of a SOG")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(InputFile input, InputFile::Open(found));
+  return Of(std::move(input), format);
+}
+
+Result<OpenedSplat> OpenedSplat::Of(InputFile input, const SplatFormat* format) {
   if (format == nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, input.Head(kSniffBytes));
-    format = FormatOfFile(head, found);
+    format = FormatOfFile(head, input.path());
   }
   return OpenedSplat(std::move(input), format);
 }

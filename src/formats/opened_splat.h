@@ -19,6 +19,8 @@ class OpenedSplat {
   // `format`: what the file is, whatever its content and name say; null: by content first and extension second.
   // Errors: of InputFile::Open; kBadFile for a folder that is no splat.
   static Result<OpenedSplat> Open(const std::filesystem::path& path, const SplatFormat* format = nullptr);
+  // The same of a file that is open, or of bytes in memory. Errors: those of reading its first bytes.
+  static Result<OpenedSplat> Of(InputFile input, const SplatFormat* format = nullptr);
 
   const InputFile& input() const { return input_; }
   const SplatFormat* format() const { return format_; }  // null: not known, Read() will fail

@@ -260,6 +260,34 @@ TEST(AtomicFile, FilesThatBelongTogetherReplaceOldOnes) {
   EXPECT_EQ(folder.Entries(), 2);
 }
 
+TEST(AtomicFile, GoesIntoMemoryWholeOrNotAtAll) {
+  const auto text = [](const std::vector<std::byte>& bytes) {
+    return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  };
+  OutputMemory memory;
+  {
+    OutputFile file = *OutputFile::Create("none/a", false, &memory);
+    ASSERT_TRUE(file.Write("dropped").ok());
+  }
+  EXPECT_TRUE(memory.files.empty());
+  OutputFile first = *OutputFile::Create("none/a", false, &memory);
+  ASSERT_TRUE(first.Reserve(100).ok());
+  ASSERT_TRUE(first.WriteAt(4, "d", 1).ok());  // what nobody writes is 0
+  ASSERT_TRUE(first.Write("ab").ok());
+  OutputFile moved = std::move(first);
+  ASSERT_TRUE(moved.Write("c").ok());
+  ASSERT_TRUE(moved.Commit().ok());
+  EXPECT_EQ(text(memory.files.at("none/a")), std::string("abc\0d", 5));
+  std::vector<OutputFile> files;
+  for (const char* name : {"b", "c"}) files.push_back(*OutputFile::Create(name, false, &memory));
+  ASSERT_TRUE(files[0].Write("b").ok());
+  ASSERT_TRUE(CommitTogether(files).ok());
+  EXPECT_EQ(text(memory.files.at("b")), "b");
+  EXPECT_TRUE(memory.files.at("c").empty());
+  EXPECT_FALSE(fs::exists("b"));
+  EXPECT_EQ(OutputFile::Create("", false, &memory).error().code, ErrorCode::kBadArgument);
+}
+
 TEST(AtomicFile, KeepsAResultWhoseNameWasTaken) {
   const TestFolder folder;
   const auto write = [](const fs::path& path, bool overwrite) { return WriteWholeFile(path, "mine", overwrite); };

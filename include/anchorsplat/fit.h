@@ -1,0 +1,56 @@
+#pragma once
+
+#include <anchorsplat/error.h>
+#include <anchorsplat/export.h>
+#include <anchorsplat/run.h>
+#include <anchorsplat/splat.h>
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+
+namespace anchorsplat {
+
+// The standard 3DGS optimisation; `anchorsplat fit --help` and docs/fit.md say more. Schedules follow `steps`.
+struct FitSettings {
+  int64_t steps = 15000;
+  int sh_degree = 3;
+  int64_t max_gaussians = 0;  // growth stops there; 0: no bound
+  int hold_out = 8;           // every Nth view, by name, is not trained on; 0: all are
+  std::optional<int64_t> initial_points =
+      std::nullopt;  // thinned to as many, or random ones; 100,000 where there are none
+  std::optional<std::array<float, 3>> background =
+      std::nullopt;                       // what the project says otherwise, black where it says nothing
+  std::filesystem::path checkpoint = {};  // state of a stopped fit; empty: none is written
+  bool resume = false;                    // go on from it where it is there
+  uint64_t seed = 0;
+};
+
+// How alike renders and pictures are: means over views.
+struct FitQuality {
+  int64_t views = 0;
+  double psnr = 0;  // dB
+  double ssim = 0;
+};
+
+struct FitOutcome {
+  Splat splat;
+  int64_t steps = 0;     // done in all
+  bool stopped = false;  // by RunSettings::stop; then the splat is what there was and the qualities are not measured
+  int64_t gaussians_in = 0;
+  FitQuality train, held_out;
+  double seconds = 0;  // of the steps
+};
+
+// Fits a splat to the pictures of a project: a COLMAP project, a folder with a transforms.json, a NeRF-synthetic
+// scene. Begins at the project's points or, where it has none, at random ones that many cameras see; or, with `start`,
+// at the centres and colours of another splat.
+//
+// Failures: kNotFound; kIo; kBadFile; kBadArgument: settings out of range, a start without finite Gaussians.
+ANCHORSPLAT_PUBLIC Expected<FitOutcome> FitProject(const std::filesystem::path& project,
+                                                   const FitSettings& settings = {}, const RunSettings& run = {});
+ANCHORSPLAT_PUBLIC Expected<FitOutcome> FitProject(const std::filesystem::path& project, const SplatView& start,
+                                                   const FitSettings& settings = {}, const RunSettings& run = {});
+
+}  // namespace anchorsplat

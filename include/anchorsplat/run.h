@@ -1,0 +1,40 @@
+#pragma once
+
+#include <anchorsplat/export.h>
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+namespace anchorsplat {
+
+enum class MessageLevel { kInfo, kWarning };
+
+// How far a task has come. Tasks of a call follow each other.
+struct TaskProgress {
+  std::string task = {};  // "fit"
+  int64_t done = 0;       // steps
+  int64_t total = 0;
+  std::string note = {};  // "27.31 dB, 84,120 Gaussians"
+  bool ended = false;
+};
+
+// How a call is run; results do not depend on any of it. Every function that may take long takes one as its last
+// argument. Calls of several threads do not see each other: each has its own limit, callbacks and flag.
+//
+// Callbacks come from any thread of the call, one at a time. They must not throw. Without them nothing is said: the
+// library writes to neither stdout nor stderr.
+struct RunSettings {
+  int threads = 0;                                                              // at most; 0: all of the machine
+  std::function<void(MessageLevel, const std::string& sentence)> message = {};  // may be empty
+  std::function<void(const TaskProgress&)> progress = {};                       // may be empty
+  // Becomes true when the call is to end: optimisations return what they have so far and say so, others a
+  // FailureKind::kStopped. Must outlive the call.
+  const std::atomic<bool>* stop = nullptr;
+};
+
+// "0.1.0", of the library that is loaded.
+ANCHORSPLAT_PUBLIC const char* LibraryVersion();
+
+}  // namespace anchorsplat

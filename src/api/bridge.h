@@ -1,0 +1,64 @@
+#pragma once
+
+#include <anchorsplat/error.h>
+#include <anchorsplat/picture.h>
+#include <anchorsplat/render.h>
+#include <anchorsplat/run.h>
+#include <anchorsplat/splat.h>
+
+#include <exception>
+#include <new>
+#include <optional>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+#include "core/camera.h"
+#include "core/cloud_view.h"
+#include "core/gaussian_cloud.h"
+#include "core/image.h"
+#include "core/result.h"
+#include "core/run_context.h"
+
+// Between the public types (include/anchorsplat/) and ours.
+namespace anchorsplat {
+
+struct Splat::Owned {
+  GaussianCloud cloud;
+};
+
+struct SplatAccess {
+  static Splat Make(GaussianCloud cloud);
+  static GaussianCloud Take(Splat splat);
+};
+
+Failure ToFailure(const Error& error);
+CloudView ToCloud(const SplatView& view);
+SplatView ToView(const CloudView& cloud);
+std::optional<RenderMode> ToMode(std::optional<Rasterization> rasterization);
+std::optional<Rasterization> ToRasterization(std::optional<RenderMode> mode);
+Camera ToCamera(const PinholeCamera& camera);
+PinholeCamera ToPinhole(const Camera& camera);
+// kBadArgument: not as many values as the shape says.
+Result<Image> ToImage(const Picture& picture);
+Picture ToPicture(const Image& image);
+RunContext ToContext(const RunSettings& run);
+
+// What a call of ours comes to, as the caller of the library gets it: in a run of its own, and without exceptions.
+template <typename T, typename Call>
+Expected<T> InRun(const RunSettings& run, Call&& call) try {
+  const RunScope scope(ToContext(run));
+  auto result = call();
+  if (!result.ok()) return ToFailure(result.error());
+  if constexpr (std::is_void_v<T>) {
+    return {};
+  } else {
+    return *std::move(result);
+  }
+} catch (const std::bad_alloc&) {
+  return Failure{FailureKind::kIo, "there is not enough memory"};
+} catch (const std::exception& error) {
+  return Failure{FailureKind::kIo, std::string("unexpected: ") + error.what()};
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,93 @@
+#include "enhance/enhance.h"
+
+#include <anchorsplat/enhance.h>
+
+#include <mutex>
+
+#include "api/bridge.h"
+#include "model/model_method.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// The methods that the library has.
+void HaveMethods() {
+  static std::once_flag once;
+  std::call_once(once, RegisterModelMethod);
+}
+
+Result<EnhanceOptions> ToOptions(const EnhanceSettings& settings) {
+  EnhanceOptions options;
+  const auto given = [&](bool is_given, const char* name) {
+    if (is_given) options.given.emplace_back(name);
+  };
+  options.method = settings.method;
+  options.quality = settings.quality;
+  options.upscale = settings.upscale;
+  options.filter_strength = settings.filter_strength;
+  options.pixel_size = settings.pixel_size;
+  options.refine.images = settings.images;
+  options.model.file = settings.model;
+  options.seed = settings.seed;
+  given(settings.upscale != EnhanceSettings().upscale, "upscale");
+  given(settings.filter_strength.has_value(), "filter-strength");
+  given(settings.pixel_size.has_value(), "pixel-size");
+  given(!settings.cameras.empty(), "cameras");
+  given(!settings.images.empty(), "images");
+  given(!settings.model.empty(), "model");
+  if (!settings.cameras.empty()) {
+    options.cameras.emplace();
+    for (const PinholeCamera& camera : settings.cameras) options.cameras->cameras.push_back(ToCamera(camera));
+  }
+  for (const auto& [name, value] : settings.refine) {
+    ANCHORSPLAT_RETURN_IF_ERROR(SetRefineOption(options.refine, name, value));
+    given(true, name.c_str());
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(options.refine));
+  return options;
+}
+
+Result<EnhanceOutcome> RunMethod(GaussianCloud cloud, const EnhanceSettings& settings) {
+  HaveMethods();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const EnhanceOptions options, ToOptions(settings));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, Enhance(std::move(cloud), options));
+  EnhanceReport& report = enhanced.report;
+  EnhanceOutcome outcome{.splat = SplatAccess::Make(std::move(enhanced.cloud)),
+                         .method = std::move(report.method),
+                         .gaussians_in = report.gaussians_in,
+                         .dropped = report.dropped,
+                         .gaussians_out = report.gaussians_out,
+                         .filter_strength = report.filter_strength,
+                         .pixel_size = report.pixel_size,
+                         .pixel_size_source = std::move(report.pixel_size_source),
+                         .steps = {},
+                         .stopped = report.interrupted,
+                         .seconds = report.seconds};
+  for (StepReport& step : report.steps) {
+    outcome.steps.push_back({std::move(step.method), step.dropped, step.interrupted, std::move(step.facts)});
+  }
+  return outcome;
+}
+
+}  // namespace
+
+std::vector<EnhanceMethodName> ListEnhanceMethods() {
+  HaveMethods();
+  std::vector<EnhanceMethodName> names;
+  for (const EnhanceMethod& method : EnhanceMethods()) names.push_back({method.name, method.summary});
+  return names;
+}
+
+Expected<EnhanceOutcome> Enhance(const SplatView& splat, const EnhanceSettings& settings, const RunSettings& run) {
+  return InRun<EnhanceOutcome>(run, [&]() -> Result<EnhanceOutcome> {
+    ANCHORSPLAT_RETURN_IF_ERROR(Validate(ToCloud(splat)));
+    return RunMethod(CopyOf(ToCloud(splat)), settings);
+  });
+}
+
+Expected<EnhanceOutcome> Enhance(Splat&& splat, const EnhanceSettings& settings, const RunSettings& run) {
+  return InRun<EnhanceOutcome>(run, [&] { return RunMethod(SplatAccess::Take(std::move(splat)), settings); });
+}
+
+}  // namespace anchorsplat

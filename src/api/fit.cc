@@ -1,0 +1,77 @@
+#include "fit/fit.h"
+
+#include <anchorsplat/fit.h>
+
+#include "api/bridge.h"
+#include "fit/initial_cloud.h"
+#include "fit/initial_points.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// Where the Gaussians begin, as `anchorsplat fit` has it.
+InitialPoints StartOf(const TrainingViews& views, const GaussianCloud* start, const FitSettings& settings) {
+  if (start != nullptr || views.points.size() > 0) {
+    InitialPoints points = start != nullptr ? PointsOf(*start) : views.points;
+    return settings.initial_points ? Thinned(points, *settings.initial_points) : std::move(points);
+  }
+  return RandomPointsInView(settings.initial_points.value_or(kRandomPoints), views.train, views.scene_scale,
+                            settings.seed);
+}
+
+FitQuality ToQuality(const ViewQuality& quality) { return {quality.views, quality.psnr, quality.ssim}; }
+
+Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianCloud* start,
+                         const FitSettings& settings) {
+  if (settings.sh_degree < 0 || settings.sh_degree > kMaxShDegree) {
+    return Error{ErrorCode::kBadArgument, "the SH degree of a fit is 0 to 3"};
+  }
+  if (settings.steps < 1 || settings.max_gaussians < 0 || settings.hold_out < 0 ||
+      settings.initial_points.value_or(1) < 1) {
+    return Error{ErrorCode::kBadArgument,
+                 "a fit has at least one step and one Gaussian; max_gaussians and hold_out are not negative"};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(project, {.hold_out = settings.hold_out}));
+  FitOptions options = FitOptionsFor(settings.steps);
+  options.seed = settings.seed;
+  options.densification.max_gaussians = settings.max_gaussians;
+  options.objective.render.sh_degree = settings.sh_degree;
+  if (const auto background = settings.background ? settings.background : views.background) {
+    options.objective.render.background = *background;
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(options));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial,
+                               InitialCloud(StartOf(views, start, settings), views.scene_scale,
+                                            {.sh_degree = settings.sh_degree, .seed = settings.seed}));
+  FitControl control;
+  control.checkpoint = settings.checkpoint;
+  control.resume = settings.resume;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Fitted fitted, Fit(views, std::move(initial), options, control));
+  const FitReport& report = fitted.report;
+  return FitOutcome{.splat = SplatAccess::Make(std::move(fitted.cloud)),
+                    .steps = report.steps,
+                    .stopped = report.interrupted,
+                    .gaussians_in = report.gaussians_in,
+                    .train = ToQuality(report.train),
+                    .held_out = ToQuality(report.held_out),
+                    .seconds = report.seconds};
+}
+
+}  // namespace
+
+Expected<FitOutcome> FitProject(const std::filesystem::path& project, const FitSettings& settings,
+                                const RunSettings& run) {
+  return InRun<FitOutcome>(run, [&] { return FitTo(project, nullptr, settings); });
+}
+
+Expected<FitOutcome> FitProject(const std::filesystem::path& project, const SplatView& start,
+                                const FitSettings& settings, const RunSettings& run) {
+  return InRun<FitOutcome>(run, [&]() -> Result<FitOutcome> {
+    ANCHORSPLAT_RETURN_IF_ERROR(Validate(ToCloud(start)));
+    const GaussianCloud cloud = CopyOf(ToCloud(start));
+    return FitTo(project, &cloud, settings);
+  });
+}
+
+}  // namespace anchorsplat

@@ -91,7 +91,7 @@ lint:
 	@scripts/lint.sh
 
 format:
-	@git ls-files 'src/*.h' 'src/*.cc' | xargs clang-format -i
+	@git ls-files 'src/*.h' 'src/*.cc' 'include/*.h' 'examples/*.cc' | xargs clang-format -i
 
 fuzz: debug
 	@scripts/fuzz.sh $(SECONDS)

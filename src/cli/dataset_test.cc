@@ -69,9 +69,10 @@ TEST_F(DatasetVerb, Split) {
 
 TEST_F(DatasetVerb, EvaluationOfADataSet) {
   Make({"a"});
-  EXPECT_EQ(ExpectJson({"eval", set_, "-o", folder_ / "out", "--protocol", "upstream", "--methods",
-                        "raw,filter,bicubic", "--fit-steps", "10"})["objects"],
-            1);
+  const nlohmann::json json = ExpectJson({"eval", set_, "-o", folder_ / "out", "--protocol", "upstream", "--methods",
+                                          "raw,filter,bicubic", "--fit-steps", "10"});
+  EXPECT_EQ(json["objects"], nlohmann::json::array({"a"}));
+  EXPECT_EQ(json["methods"].size(), 3u);
 }
 
 TEST_F(DatasetVerb, RefusesWhatIsNoDataSet) {

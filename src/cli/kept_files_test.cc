@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <map>
 
 #include "cli/run_for_test.h"
@@ -10,7 +11,6 @@ namespace anchorsplat {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 

@@ -37,6 +37,7 @@ TEST_F(ViewVerb, OneSplat) {
   EXPECT_THAT(run.out, HasSubstr("open it in any browser"));
   EXPECT_THAT(run.err, IsEmpty());
   EXPECT_THAT(FileText(page_), AllOf(HasSubstr(R"("degree":0)"), HasSubstr(R"(a\u003c/script\u003eb)")));
+  fs::create_directory(folder_ / "scan");
   ExpectDone({"convert", scan_, folder_ / "scan/meta.json"});
   ExpectDone({"view", folder_ / "scan/", "-o", page_, "-w"});
   EXPECT_THAT(FileText(page_), HasSubstr(R"("title":"scan")"));

@@ -67,8 +67,8 @@ inline ProgramRun RunWords(const std::vector<std::string>& words, Trainer traine
     run.command += " " + word;
     arguments.push_back(word.c_str());
   }
-  const ProcessState state;
   std::ostringstream out;
+  const ProcessState state;
   std::cout.rdbuf(out.rdbuf());
   testing::internal::CaptureStderr();
   run.code = RunProgram(static_cast<int>(arguments.size()), arguments.data(), trainer);

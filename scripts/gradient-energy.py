@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How much detail an enhanced splat keeps, without a truth to compare with: gradient energy of renders, after / before.
 
-    scripts/gradient-energy.py SPLAT... [--program build/anchorsplat] [--size 1600] [--view 001] [--keep FOLDER]
+    scripts/gradient-energy.py SPLAT... [--program PROGRAM] [--size 1600] [--view 001] [--keep FOLDER]
 
 Each splat is enhanced with the default method and nothing else given, and both are rendered from one place of an orbit
 (`render --orbit 4`). The number is the sum of squared differences between neighbouring pixels, after over before. A splat
@@ -32,11 +32,14 @@ def run(*command):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("splats", nargs="+", type=pathlib.Path)
-    parser.add_argument("--program", default="build/anchorsplat")
+    program = pathlib.Path(__file__).resolve().parent.parent / "build/anchorsplat"
+    parser.add_argument("--program", default=program, type=pathlib.Path)
     parser.add_argument("--size", type=int, default=1600)
     parser.add_argument("--view", default="001")
     parser.add_argument("--keep", type=pathlib.Path)
     args = parser.parse_args()
+    if not args.program.exists():
+        parser.error(f"there is no program {args.program}; --program says where it is (make build makes it)")
     with tempfile.TemporaryDirectory() as temporary:
         keep = args.keep or pathlib.Path(temporary)
         for splat in args.splats:

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "core/file_system.h"
@@ -49,6 +50,16 @@ void RecordWhatWasLeft(const fs::path& checkpoint, std::span<const fs::path> out
   for (const fs::path& output : outputs) {
     if (std::find(left.begin(), left.end(), AbsoluteName(output)) != left.end()) RecordOwnFile(output);
   }
+}
+
+Result<std::optional<FileLock>> HoldCheckpoint(const fs::path& checkpoint) {
+  if (checkpoint.empty()) return std::optional<FileLock>();
+  auto lock = FileLock::TakeAndRemove(checkpoint.string() + ".lock");
+  if (lock.ok()) return std::optional<FileLock>(*std::move(lock));
+  if (lock.error().code != ErrorCode::kExists) return lock.error();
+  return Error{ErrorCode::kExists, Cat(checkpoint.string(),
+                                       ": another run that keeps its state there is at work; give this one another "
+                                       "output, or another --checkpoint")};
 }
 
 }  // namespace anchorsplat

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <span>
 
 #include "core/result.h"
+#include "io/file_lock.h"
 
 namespace anchorsplat {
 
@@ -16,5 +18,8 @@ Status CheckCheckpoint(const std::filesystem::path& checkpoint, std::span<const 
 // Before a run goes on from this checkpoint: what its interruption left under these names is the command's own, to be
 // replaced without -w. What has the name of another output is not.
 void RecordWhatWasLeft(const std::filesystem::path& checkpoint, std::span<const std::filesystem::path> outputs);
+
+// For as long as a run may write this checkpoint; nothing where `checkpoint` is empty. kExists: another run is at work.
+Result<std::optional<FileLock>> HoldCheckpoint(const std::filesystem::path& checkpoint);
 
 }  // namespace anchorsplat

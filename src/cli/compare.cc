@@ -37,6 +37,7 @@ struct CompareFlags {
   std::string lpips;
   std::string lpips_weights;
   ViewFlags views;
+  std::vector<std::string> given;  // by their names on the command line
 };
 
 // The two things compared and, with --truth, what both are compared with.
@@ -52,6 +53,18 @@ Result<std::unique_ptr<ViewSource>> OpenSide(const std::string& path, const Gaus
   return MakeSplatViews(*cloud, *cameras, options);
 }
 
+// Of pictures alone: what says how splats are rendered has no effect.
+Status CheckNothingIsRendered(const CompareFlags& flags) {
+  for (const std::string& option : flags.given) {
+    for (const char* name : {"orbit", "radius", "target", "fov", "size", "near", "far", "mode", "up", "profile"}) {
+      if (option == name) {
+        return Error{ErrorCode::kBadArgument, Cat("--", name, " has no effect on pictures; it has one on splats")};
+      }
+    }
+  }
+  return {};
+}
+
 Result<Sides> OpenSides(const CompareFlags& flags) {
   const std::array<const std::string*, 3> paths = {&flags.a, &flags.b, &flags.truth};
   std::array<std::optional<GaussianCloud>, 3> clouds;
@@ -61,6 +74,7 @@ Result<Sides> OpenSides(const CompareFlags& flags) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(clouds[k], ReadToShow(*paths[k]));
     if (first == nullptr) first = &*clouds[k];
   }
+  if (first == nullptr) ANCHORSPLAT_RETURN_IF_ERROR(CheckNothingIsRendered(flags));
   std::optional<CameraSet> cameras;
   if (first != nullptr) {
     if (flags.views.cameras.empty() && flags.views.orbit == 0) {
@@ -223,7 +237,10 @@ void AddCompare(CLI::App& app, Program& program) {
       ->check(NotEmpty());
   AddLpipsFlags(verb, flags->lpips, flags->lpips_weights);
   flags->views.AddTo(verb);
-  verb.callback([flags, &program] { program.run = [flags, &program] { return RunCompare(*flags, program.flags); }; });
+  verb.callback([flags, &verb, &program] {
+    flags->given = GivenOptions(verb);
+    program.run = [flags, &program] { return RunCompare(*flags, program.flags); };
+  });
 }
 
 }  // namespace anchorsplat

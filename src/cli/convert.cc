@@ -1,5 +1,6 @@
 #include "formats/convert.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -29,6 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct ConvertFlags {
+  bool spz_version_given = false;
   std::vector<std::string> paths;  // inputs, and the output as the last one without --out-dir
   std::string out_dir;
   std::string to = ".ply";
@@ -209,6 +211,10 @@ Status RunConvert(const ConvertFlags& flags, Program& program) {
     if (!axes.ok()) return Error{axes.error().code, Cat("--coords: ", axes.error().message)};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto jobs, Jobs(flags, shared.overwrite));
+  const auto is_spz = [](const Job& job) { return job.output.extension() == ".spz"; };
+  if (flags.spz_version_given && std::none_of(jobs.begin(), jobs.end(), is_spz)) {
+    return Error{ErrorCode::kBadArgument, "--spz-version has no effect here; it has one where a .spz is written"};
+  }
   std::vector<BatchItem> items;
   for (const Job& job : jobs) items.push_back({job.input.string(), job.output.string()});
   return RunBatch(
@@ -247,14 +253,19 @@ void AddConvert(CLI::App& app, Program& program) {
              {"morton", SplatOrder::kMorton},
              {"importance", SplatOrder::kImportance}},
             "Order of the Gaussians in the file");
-  verb.add_option("--spz-version", options.write.spz_version, "4, or 3 for programs that only know gzip")
-      ->check(CLI::IsMember({3, 4}))
-      ->capture_default_str();
-  verb.add_flag("--report", flags->report, "Read the output back: attribute errors, and PSNR of pictures of both");
+  auto* spz_version =
+      verb.add_option("--spz-version", options.write.spz_version, "4, or 3 for programs that only know gzip");
+  spz_version->check(CLI::IsMember({3, 4}))->capture_default_str();
+  auto* report =
+      verb.add_flag("--report", flags->report, "Read the output back: attribute errors, and PSNR of pictures of both");
   verb.add_option("--report-views", flags->views, "Views around the splat for the PSNR")
       ->check(CLI::Range(1, 1000))
+      ->needs(report)
       ->capture_default_str();
-  verb.callback([flags, &program] { program.run = [flags, &program] { return RunConvert(*flags, program); }; });
+  verb.callback([flags, spz_version, &program] {
+    flags->spz_version_given = spz_version->count() > 0;
+    program.run = [flags, &program] { return RunConvert(*flags, program); };
+  });
 }
 
 }  // namespace anchorsplat

@@ -212,11 +212,12 @@ Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& 
     ANCHORSPLAT_RETURN_IF_ERROR(CheckPageFits(output, cloud, options));
     before = cloud;
   }
-  const WriteOptions write = WriteOptionsFrom(shared);
+  const CloudWriteOptions write{.overwrite = shared.overwrite};
   // Again, now that the inputs with the files beside them are known.
   ANCHORSPLAT_RETURN_IF_ERROR(CheckCanWriteCloud(output, cloud.sh_degree, write));
   options.control.checkpoint = CheckpointOf(options, output);
   options.control.outputs = OutputFiles(flags, output);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto lock, HoldCheckpoint(options.control.checkpoint));
   std::optional<StopSignal> stop_signal(std::in_place);
   auto result = Enhance(std::move(cloud), options);
   stop_signal.reset();
@@ -232,10 +233,14 @@ Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& 
   }
   ANCHORSPLAT_RETURN_IF_ERROR(WriteCloudOrKeep(output, enhanced.cloud, write, extras));
   const EnhanceReport& r = enhanced.report;
-  if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(WritePage(input, before, output, enhanced, write));
+  if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(WritePage(input, before, output, enhanced, WriteOptionsFrom(shared)));
   const fs::path& checkpoint = options.control.checkpoint;
   if (r.interrupted) {
     const bool resumable = !checkpoint.empty() && Exists(checkpoint);
+    if (resumable) {
+      const Status noted = NoteFilesLeft(checkpoint);
+      if (!noted.ok()) LogWarning(Cat("going on will need -w for what is left here: ", noted.error().message));
+    }
     return Error{ErrorCode::kInterrupted,
                  Cat("stopped; ", output.string(), " is as far as it came",
                      resumable ? Cat(", the same command with --resume goes on from ", checkpoint.string()) : "")};
@@ -385,9 +390,7 @@ void AddEnhance(CLI::App& app, Program& program) {
       ->capture_default_str();
   AddRefineFlags(verb, options.refine, options.control);
   verb.callback([flags, &verb, &program] {
-    for (const CLI::Option* option : verb.get_options()) {
-      if (option->count() > 0) flags->options.given.push_back(option->get_single_name());
-    }
+    flags->options.given = GivenOptions(verb);
     program.run = [flags, &program] { return RunEnhance(*flags, program); };
   });
 }

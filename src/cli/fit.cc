@@ -155,6 +155,7 @@ Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
   if (!flags.init_splat.empty()) RecordSplat(flags.init_splat);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(flags.project, {.hold_out = flags.hold_out}));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOutputs(flags, control, shared.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto lock, HoldCheckpoint(control.checkpoint));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const FitOptions options, MakeFitOptions(flags, views.background, shared.seed));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Start start, ChooseStart(flags, views, shared.seed));
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial,
@@ -183,7 +184,10 @@ void AddFit(CLI::App& app, Program& program) {
                            "anchorsplat fit scan/ -o scan.ply --max-gaussians 200000");
   const auto flags = std::make_shared<FitFlags>();
   flags->AddTo(verb);
-  verb.callback([flags, &program] { program.run = [flags, &program] { return RunFit(*flags, program.flags); }; });
+  verb.callback([flags, &verb, &program] {
+    flags->given = GivenOptions(verb);
+    program.run = [flags, &program] { return RunFit(*flags, program.flags); };
+  });
 }
 
 }  // namespace anchorsplat

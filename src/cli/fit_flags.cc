@@ -1,7 +1,10 @@
 #include "cli/fit_flags.h"
 
+#include <algorithm>
+
 #include "cli/choice.h"
 #include "cli/parse.h"
+#include "core/text.h"
 
 namespace anchorsplat {
 
@@ -108,6 +111,37 @@ void FitFlags::AddTo(CLI::App& verb) {
   AddRateFlags(verb, *this);
 }
 
+namespace {
+
+// kBadArgument: an option was given that changes nothing beside the others.
+Status CheckEffects(const FitFlags& flags, const FitOptions& options) {
+  const DensificationOptions& d = options.densification;
+  const bool grows = d.refine_start_iter < std::min(d.refine_stop_iter, options.steps);
+  struct Need {
+    const char* option;
+    bool met;
+    const char* with;
+  };
+  const bool harmonics = options.objective.render.sh_degree > 0, resets = d.opacity_reset != OpacityReset::kNever;
+  const Need needs[] = {
+      {"upscale", flags.pixel == FitPixel::kArea, "with --pixel area"},
+      {"rate-sh-rest", harmonics, "with --sh-degree above 0"},
+      {"sh-degree-interval", harmonics, "with --sh-degree above 0"},
+      {"reset-every", resets, "with --opacity-reset positive or from-zero"},
+      {"refine-start", grows, "where it comes before --refine-stop and the last step"},
+      {"refine-every", grows, "where --refine-start comes before --refine-stop and the last step"},
+      {"grow-grad2d", grows, "where --refine-start comes before --refine-stop and the last step"},
+      {"grow-scale3d", grows, "where --refine-start comes before --refine-stop and the last step"},
+  };
+  for (const Need& need : needs) {
+    if (need.met || std::find(flags.given.begin(), flags.given.end(), need.option) == flags.given.end()) continue;
+    return Error{ErrorCode::kBadArgument, Cat("--", need.option, " has no effect here; it has one ", need.with)};
+  }
+  return {};
+}
+
+}  // namespace
+
 Result<FitOptions> MakeFitOptions(const FitFlags& flags, const std::optional<std::array<float, 3>>& background,
                                   uint64_t seed) {
   FitOptions options = flags.standard;
@@ -126,6 +160,7 @@ Result<FitOptions> MakeFitOptions(const FitFlags& flags, const std::optional<std
   }
   options.pixel.upscale = flags.pixel == FitPixel::kArea ? flags.upscale : 1;
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckEffects(flags, options));
   return options;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/result.h"
 #include "fit/fit_options.h"
@@ -42,6 +43,8 @@ struct FitFlags {
   int64_t steps = kDefaultFitSteps;
   FitOptions standard = FitOptionsFor(kDefaultFitSteps);  // values whose default does not depend on the steps
   std::optional<int64_t> sh_degree_interval, refine_start, refine_stop, refine_every, reset_every;
+
+  std::vector<std::string> given;  // options, by their names on the command line
 
   void AddTo(CLI::App& verb);
 };

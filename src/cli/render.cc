@@ -131,8 +131,9 @@ void AddRender(CLI::App& app, Program& program) {
   verb.add_option("-o,--output", flags->output, "A .png file for one view, a folder for several")
       ->required()
       ->check(NotEmpty());
-  verb.add_flag("--transparent", flags->transparent, "Write an alpha channel instead of a background");
   flags->views.AddTo(verb);
+  verb.add_flag("--transparent", flags->transparent, "Write an alpha channel instead of a background")
+      ->excludes("--background");
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunRender(*flags, program.flags); }; });
 }
 

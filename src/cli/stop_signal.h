@@ -5,10 +5,10 @@
 namespace anchorsplat {
 
 // While the object lives, Ctrl-C, SIGTERM and SIGHUP, which a closed terminal or a lost connection sends, ask for an
-// orderly end: StopRequested() (core/run_context.h) becomes true. The second Ctrl-C or SIGTERM ends the program at once; SIGHUP may come twice
-// by itself, from the shell and from the system, and changes nothing more. It is not listened to under nohup. A pipe
-// whose reader has gone (SIGPIPE: `2>&1 | tee` dies with the terminal, too) ends nothing: what was to be said is lost,
-// not the work. One at a time.
+// orderly end: StopRequested() (core/run_context.h) becomes true. The second Ctrl-C or SIGTERM ends the program at
+// once; SIGHUP may come twice by itself, from the shell and from the system, and changes nothing more. It is not
+// listened to under nohup. A pipe whose reader has gone (SIGPIPE: `2>&1 | tee` dies with the terminal, too) ends
+// nothing: what was to be said is lost, not the work. One at a time.
 class StopSignal {
  public:
   StopSignal();

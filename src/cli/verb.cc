@@ -67,6 +67,14 @@ void AddVerbs(CLI::App& app, Program& program) {
   CheckNumbers(app);
 }
 
+std::vector<std::string> GivenOptions(const CLI::App& verb) {
+  std::vector<std::string> given;
+  for (const CLI::Option* option : verb.get_options()) {
+    if (option->count() > 0) given.push_back(option->get_single_name());
+  }
+  return given;
+}
+
 void PrintJson(const nlohmann::json& json) {
   // Replacing invalid UTF-8: file names are bytes, JSON is text.
   std::cout << CleanJson(json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace)) << '\n';

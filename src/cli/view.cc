@@ -12,12 +12,14 @@
 #include "cli/verb.h"
 #include "cli/views.h"
 #include "core/file_system.h"
+#include "core/log.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/pixel_size_guard.h"
 #include "formats/opened_splat.h"
 #include "io/atomic_file.h"
 #include "io/input_record.h"
+#include "render/shown_range.h"
 #include "viewer/page_writer.h"
 
 namespace anchorsplat {
@@ -137,6 +139,11 @@ Status RunView(const PageFlags& flags, const SharedFlags& shared) {
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown after, ReadShown(flags.after));
   page.after = {&after.cloud, after.name, after.bytes};
+  if (!page.views.empty()) {  // the first is where the page opens
+    const std::string warning =
+        NothingToSee(after.cloud, page.views.front().camera, OptionsFor(after.cloud), std::nullopt);
+    if (!warning.empty()) LogWarning(warning);
+  }
   Shown before;
   if (!flags.before.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(before, ReadShown(flags.before));
@@ -177,7 +184,8 @@ void AddView(CLI::App& app, Program& program) {
   verb.add_option("--truth", flags->truth, "Folder of true pictures with the cameras' names")->needs(cameras);
   verb.add_option("--views", flags->views, "How many of the cameras at most, evenly chosen")
       ->check(AtLeastOne())
-      ->capture_default_str();
+      ->capture_default_str()
+      ->needs(cameras);
   verb.add_option("--pixel-size", flags->pixel_size,
                   "World size of one training pixel, for the scale bar; auto: estimated from BEFORE")
       ->capture_default_str();

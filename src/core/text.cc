@@ -48,6 +48,18 @@ std::string HumanSeconds(double seconds) {
   return text;
 }
 
+namespace {
+// The characters that change the direction of what follows them (Unicode's Bidi_Control): a line that holds them can
+// read as another one.
+bool TurnsText(std::string_view character) {
+  if (character == "\xd8\x9c") return true;  // U+061C
+  if (character.size() != 3 || character[0] != '\xe2') return false;
+  const auto last = static_cast<unsigned char>(character[2]);
+  return (character[1] == '\x80' && (last == 0x8e || last == 0x8f || (last >= 0xaa && last <= 0xae))) ||  // U+200E …
+         (character[1] == '\x81' && last >= 0xa6 && last <= 0xa9);                                        // U+2066 …
+}
+}  // namespace
+
 std::string Printable(const std::string& bytes, size_t longest) {
   std::string out;
   std::string_view rest = bytes;
@@ -60,7 +72,7 @@ std::string Printable(const std::string& bytes, size_t longest) {
         byte < 0x20 || byte == 0x7f || (size == 2 && byte == 0xc2 && static_cast<unsigned char>(rest[1]) < 0xa0);
     const size_t shown = std::max<size_t>(1, size);
     for (const char c : rest.substr(0, shown)) {
-      if (size > 0 && !control) {
+      if (size > 0 && !control && !TurnsText(rest.substr(0, shown))) {
         out += c;
       } else {
         char escaped[8];

@@ -56,6 +56,10 @@ TEST(Text, HostileBytesBecomePrintable) {
   EXPECT_EQ(Printable("a\xff\xc3(\xe2\x82"), "a\\xff\\xc3(\\xe2\\x82");
   EXPECT_EQ(Printable("\xc2\x9b\xc2\xa0€"), "\\xc2\\x9b\xc2\xa0€");  // a control character of two bytes, and none
   EXPECT_EQ(Printable("\xc2"), "\\xc2");
+  // What turns the direction of a line.
+  EXPECT_EQ(Printable("a\u202egnp"), "a\\xe2\\x80\\xaegnp");
+  EXPECT_EQ(Printable("\u2066\u061c"), "\\xe2\\x81\\xa6\\xd8\\x9c");
+  EXPECT_EQ(Printable("\u2026\u0627"), "\u2026\u0627");  // neighbours that do not
   const std::string long_text = Printable("x" + std::string(30, '\xc3') + std::string(100, 'a'));
   EXPECT_LT(long_text.size(), 70u);
 }

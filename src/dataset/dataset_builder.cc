@@ -11,13 +11,13 @@
 #include "core/log.h"
 #include "core/run_context.h"
 #include "core/text.h"
-#include "dataset/file_lock.h"
 #include "dataset/job_list.h"
 #include "dataset/object_builder.h"
 #include "dataset/process_pool.h"
 #include "dataset/unfinished_objects.h"
 #include "io/atomic_file.h"
 #include "io/file_bytes.h"
+#include "io/file_lock.h"
 
 namespace anchorsplat {
 

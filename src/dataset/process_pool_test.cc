@@ -8,7 +8,6 @@
 #include <map>
 
 #include "core/run_context.h"
-#include "dataset/file_lock.h"
 #include "io/folder_for_test.h"
 
 namespace anchorsplat {
@@ -70,17 +69,6 @@ TEST(ProcessPool, AProgramThatIsNotThereIsAnError) {
   const Status status = RunProcesses(1, task, [](int64_t, const ProcessEnd&) { return true; }, {});
   ASSERT_FALSE(status.ok());
   EXPECT_NE(status.error().message.find("/nowhere/program"), std::string::npos);
-}
-
-TEST(FileLock, IsHeldOnce) {
-  const TestFolder folder;
-  {
-    const auto lock = FileLock::Take(folder / "lock", false);
-    ASSERT_TRUE(lock.ok());
-    EXPECT_EQ(FileLock::Take(folder / "lock", false).error().code, ErrorCode::kExists);
-  }
-  EXPECT_TRUE(FileLock::Take(folder / "lock", true).ok());
-  EXPECT_EQ(FileLock::Take(folder / "none" / "lock", false).error().code, ErrorCode::kIo);
 }
 
 }  // namespace

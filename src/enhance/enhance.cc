@@ -63,6 +63,14 @@ Status DropUnusable(GaussianCloud& cloud) {
 
 Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
   std::optional<int> train_width = options.train_width;
+  if (train_width) {
+    int widest = 0;
+    for (const Camera& camera : options.cameras->cameras) widest = std::max(widest, camera.intrinsics.width);
+    if (*train_width > widest) {
+      return Error{ErrorCode::kBadArgument, Cat("--train-width ", *train_width,
+                                                " has no effect: the cameras' views are only ", widest, " wide")};
+    }
+  }
   if (!train_width) {
     train_width = AssumedTrainWidth(*options.cameras);
     if (train_width) {
@@ -72,9 +80,16 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes from_cameras,
                                PixelSizesFromCameras(input.cloud, *options.cameras, train_width, options.camera_rule));
+  if (from_cameras.unseen == input.cloud.size()) {
+    return Error{
+        ErrorCode::kBadArgument,
+        "no Gaussian lies in any of the cameras' views: are these cameras of this splat, in its unit and axes?"};
+  }
   if (from_cameras.unseen > 0) {
-    LogInfo(Cat(WithThousands(from_cameras.unseen), " of ", WithThousands(input.cloud.size()),
-                " Gaussians lie outside all views; their pixel size is that of the nearest camera"));
+    const std::string text = Cat(WithThousands(from_cameras.unseen), " of ", WithThousands(input.cloud.size()),
+                                 " Gaussians lie outside all views; their pixel size is that of the nearest camera");
+    2 * from_cameras.unseen > input.cloud.size() ? LogWarning(text + ". Are these cameras of this splat?")
+                                                 : LogInfo(text);
   }
   report.camera_rule = from_cameras.rule == CameraPixelRule::kMedian ? "median" : "smallest";
   if (!from_cameras.why.empty()) {
@@ -119,16 +134,20 @@ void SayWhatWasFound(const PixelSizeFinding& found) {
                    "; --cameras or --pixel-size will do better"));
     return;
   }
+  const std::string size =
+      Cat("estimated size of a training pixel: ", estimate.size, " (likely ", estimate.low, " to ", estimate.high, ")");
   if (estimate.high > kVague * estimate.low) {
-    LogWarning(
-        "this splat says little about the pixels it was trained at, so the estimate is rough and rather too small; "
-        "--cameras or --pixel-size will do better");
+    LogWarning(Cat(size,
+                   ". That is rough, and rather too small: this splat says little about the pixels it was trained at; "
+                   "--cameras or --pixel-size will do better"));
+    return;
   }
-  LogInfo(Cat("estimated size of a training pixel: ", estimate.size, " (likely ", estimate.low, " to ", estimate.high,
-              "), and nothing else about the splat contradicts it; --cameras or --pixel-size make it exact"));
+  LogInfo(Cat(size, ", and nothing else about the splat contradicts it; --cameras or --pixel-size make it exact"));
 }
 
-Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, EnhanceInput& input, EnhanceReport& report) {
+// `says`: whether what is found matters to the user, as there is width to give back.
+Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says, EnhanceInput& input,
+                        EnhanceReport& report) {
   if (options.pixel_size && !(*options.pixel_size > 0 && std::isfinite(*options.pixel_size))) {
     return Error{ErrorCode::kBadArgument, Cat("pixel size ", *options.pixel_size, " is not a positive length")};
   }
@@ -155,7 +174,7 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, EnhanceInp
     report.finding = *found;
     report.pixel_size = found->size;
     report.pixel_size_source = found->contradicted() ? kCautiousPixelSize : "estimated";
-    SayWhatWasFound(*found);
+    if (says) SayWhatWasFound(*found);
   }
   input.pixel_sizes.assign(1, static_cast<float>(report.pixel_size));
   return {};
@@ -246,6 +265,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(first_sized, plan.start->needs_pixel_size(options));
     sized |= first_sized;
   }
+  bool gives_width = false;
   if (!sized && IsMarkedEnhanced(input.cloud)) {
     LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
   }
@@ -258,13 +278,14 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
                      " is no more than what the closer view's own pixels add (1/", options.upscale,
                      "²): nothing changes"));
     }
+    gives_width = input.filter_strength * options.upscale * options.upscale > 1;
     ANCHORSPLAT_RETURN_IF_ERROR(
-        ChoosePixelSizes(options, method->takes_start && !options.refine.images.empty(), input, report));
+        ChoosePixelSizes(options, method->takes_start && !options.refine.images.empty(), gives_width, input, report));
     input.pixel_size = report.pixel_size;
   }
 
   const bool begins_with_network = plan.start != nullptr && plan.start->adds_detail;
-  if (report.pixel_size_source == kCautiousPixelSize && !plan.chosen_by.empty() &&
+  if (gives_width && report.pixel_size_source == kCautiousPixelSize && !plan.chosen_by.empty() &&
       (method->adds_detail || begins_with_network)) {
     const std::string network = begins_with_network ? plan.start->name : method->name;
     LogInfo(Cat("the filter instead of '", network,

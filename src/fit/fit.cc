@@ -97,6 +97,10 @@ Status MakeSteps(Fitter& fitter, const FitControl& control, KeptState& kept, Fit
   return {};
 }
 
+void WarnUnlessNoted(const Status& noted) {
+  if (!noted.ok()) LogWarning(Cat("going on will need -w for what is left here: ", noted.error().message));
+}
+
 // What comes after the steps: the result is brought to safety, then its quality is measured.
 Status Finish(const TrainingViews& views, const FitOptions& options, const FitControl& control, Fitter& fitter,
               Fitted& out) {
@@ -165,6 +169,7 @@ Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitO
     return failed(finished.error());
   }
   if (!out.report.interrupted && !control.checkpoint.empty()) RemoveFitCheckpoint(control.checkpoint);
+  if (out.report.interrupted && kept.step() == out.report.steps) WarnUnlessNoted(NoteFilesLeft(control.checkpoint));
   return out;
 }
 

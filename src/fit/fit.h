@@ -57,10 +57,10 @@ struct Fitted {
 };
 
 // Fits Gaussians that begin as `initial` to the training views: the whole of an optimisation, with progress, an
-// interruption that loses nothing, and the quality at its end. When the run is asked to stop (core/run_context.h) the result so far comes
-// back with `interrupted` set and the checkpoint is written. A checkpoint that cannot be written is a warning and costs
-// no more than itself. When anything else fails, the state is kept in the checkpoint, and the message says so; when a
-// fit has ended and its result was delivered, the checkpoint is removed.
+// interruption that loses nothing, and the quality at its end. When the run is asked to stop (core/run_context.h) the
+// result so far comes back with `interrupted` set and the checkpoint is written. A checkpoint that cannot be written is
+// a warning and costs no more than itself. When anything else fails, the state is kept in the checkpoint, and the
+// message says so; when a fit has ended and its result was delivered, the checkpoint is removed.
 //
 // A checkpoint belongs to these options, views (cameras and the bytes of their pictures) and this start.
 //

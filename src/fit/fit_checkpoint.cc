@@ -1,5 +1,8 @@
+#include <sys/stat.h>
+
 #include <charconv>
 #include <cstdint>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <system_error>
@@ -28,6 +31,14 @@ struct Named {
   std::vector<int64_t> shape;
   Array* values;
 };
+
+// Which file has this name, and whether it has been written to since: a word that another file, or another version of
+// this one, does not have. Empty where there is none.
+std::string VersionOf(const std::string& file) {
+  struct stat info {};
+  if (::stat(file.c_str(), &info) != 0) return "";
+  return Cat(info.st_ino, " ", info.st_size, " ", info.st_mtim.tv_sec, ".", info.st_mtim.tv_nsec);
+}
 
 // Every array of a state, in one order for writing and reading. `State` may be const.
 template <typename State, typename Array>
@@ -104,8 +115,27 @@ std::vector<std::string> FilesLeftWith(const std::filesystem::path& checkpoint) 
   const auto left = file->metadata().find("left");
   if (left == file->metadata().end()) return files;
   std::istringstream lines(left->second);
-  for (std::string line; std::getline(lines, line);) files.push_back(line);
+  for (std::string line; std::getline(lines, line);) {
+    const size_t tab = std::min(line.find('\t'), line.size());
+    const std::string name = line.substr(0, tab), version = tab < line.size() ? line.substr(tab + 1) : "";
+    if (!version.empty() && version == VersionOf(name)) files.push_back(name);
+  }
   return files;
+}
+
+Status NoteFilesLeft(const std::filesystem::path& checkpoint) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorFile file, TensorFile::Open(checkpoint));
+  std::map<std::string, std::string> metadata = file.metadata();
+  std::istringstream lines(metadata["left"]);
+  std::string left;
+  for (std::string line; std::getline(lines, line);) {
+    const std::string name = line.substr(0, line.find('\t'));
+    left += Cat(name, "\t", VersionOf(name), "\n");
+  }
+  metadata["left"] = left;
+  const std::vector<TensorEntry> entries(file.tensors().begin(), file.tensors().end());
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto checked, WithChecksum(std::move(metadata), entries));
+  return WriteSafetensors(checkpoint, entries, checked, {.overwrite = true});
 }
 
 std::string AbsoluteName(const std::filesystem::path& file) { return Printable(AbsolutePath(file).string(), SIZE_MAX); }

@@ -95,8 +95,13 @@ bool IsFitCheckpoint(const std::filesystem::path& path);
 // Takes away such a checkpoint if it is there. Nothing else is.
 void RemoveFitCheckpoint(const std::filesystem::path& path);
 
-// The `left` of the state in such a checkpoint; nothing when it cannot be read.
+// Those of the `left` files of such a checkpoint that are still as NoteFilesLeft found them: another file of the name,
+// or one that was written to since, is none of the run's business. Nothing when the checkpoint cannot be read.
 std::vector<std::string> FilesLeftWith(const std::filesystem::path& checkpoint);
+
+// Once they are written: puts down in the checkpoint which files the `left` ones are. Errors: it cannot be read or
+// written; then none of them counts as left.
+Status NoteFilesLeft(const std::filesystem::path& checkpoint);
 
 // What a file is called for `left`: its absolute path, without "..", as printable text.
 std::string AbsoluteName(const std::filesystem::path& file);

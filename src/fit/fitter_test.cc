@@ -7,6 +7,7 @@
 #include <atomic>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <optional>
 #include <string>
@@ -17,6 +18,7 @@
 #include "fit/fit.h"
 #include "fit/initial_cloud.h"
 #include "fit/orbit_scene_for_test.h"
+#include "formats/cloud_io.h"
 #include "formats/random_cloud_for_test.h"
 #include "io/flip_bit_for_test.h"
 #include "io/folder_for_test.h"
@@ -152,6 +154,37 @@ TEST_F(Fits, AnInterruptionLosesNothing) {
   EXPECT_EQ(second->report.steps, 60);
   ExpectSameCloud(second->cloud, whole->cloud);
   EXPECT_FALSE(std::filesystem::exists(control.checkpoint)) << "a finished fit has no state to keep";
+}
+
+// What an interruption left may be replaced when the run goes on; another file of the name, or one that somebody wrote
+// to, may not.
+TEST_F(Fits, WhatItLeftIsKnownAgain) {
+  std::atomic<bool> stop{true};
+  const RunScope run({.stop = &stop});
+  const auto left = folder_ / "left.ply", other = folder_ / "other.ply";
+  FitControl control;
+  control.checkpoint = folder_ / "state";
+  control.outputs = {left, other};
+  control.deliver = [&](const Fitted& fitted) { return WriteCloud(left, fitted.cloud, {.overwrite = true}); };
+  ASSERT_TRUE(Fit(views_, Initial(), options_, control).ok());
+  EXPECT_EQ(FilesLeftWith(control.checkpoint), std::vector<std::string>{AbsoluteName(left)});
+
+  std::filesystem::copy_file(left, other);  // it never wrote this one
+  EXPECT_EQ(FilesLeftWith(control.checkpoint), std::vector<std::string>{AbsoluteName(left)});
+  const auto aside = folder_ / "aside.ply";
+  std::filesystem::copy_file(left, aside);
+  std::filesystem::remove(left);
+  std::filesystem::copy_file(aside, left);  // the same bytes, but somebody put them there
+  EXPECT_TRUE(FilesLeftWith(control.checkpoint).empty());
+  ASSERT_TRUE(NoteFilesLeft(control.checkpoint).ok());
+  EXPECT_EQ(FilesLeftWith(control.checkpoint).size(), 2u);
+  std::ofstream(left, std::ios::app) << "more";
+  EXPECT_EQ(FilesLeftWith(control.checkpoint), std::vector<std::string>{AbsoluteName(other)});
+
+  stop = false;
+  control.resume = true;
+  control.deliver = nullptr;
+  EXPECT_TRUE(Fit(views_, Initial(), options_, control).ok()) << "its checksum is right, too";
 }
 
 TEST_F(Fits, CheckpointsComeInTime) {

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "core/activations.h"
 #include "core/text.h"
+#include "render/constants.h"
 
 namespace anchorsplat {
 
@@ -26,6 +28,13 @@ Depths CountDepths(const CloudView& cloud, const Camera& camera, double near, do
     ++(z <= 0 ? depths.behind : z < near ? depths.too_near : z > far ? depths.too_far : depths.in_range);
   }
   return depths;
+}
+
+// Too faint to be drawn by anybody.
+int64_t CountInvisible(const CloudView& cloud) {
+  int64_t count = 0;
+  for (int64_t i = 0; i < cloud.size(); ++i) count += Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) < kMinAlpha;
+  return count;
 }
 
 }  // namespace
@@ -60,7 +69,9 @@ std::string NothingToSee(const CloudView& cloud, const Camera& camera, const Ren
   add(depths.behind, "behind the camera");
   add(depths.too_near, Cat("before the near plane (", near, ")"));
   add(depths.too_far, Cat("beyond the far plane (", options.far_plane, ")"));
-  add(depths.in_range, drawn.value_or(1) == 0 ? "in range but beside the picture" : "in range");
+  const int64_t faint = std::min(CountInvisible(cloud), depths.in_range);
+  add(faint, "less opaque than 1/255");
+  add(depths.in_range - faint, drawn.value_or(1) == 0 ? "in range but beside the picture" : "in range");
   return Cat("view ", Printable(camera.name), " shows ", drawn.value_or(1) == 0 ? "nothing" : "almost nothing",
              " of the ", WithThousands(cloud.size()), " Gaussians: ", where.empty() ? "none has a position" : where,
              "; are these cameras of this splat, in its unit and its axes?");

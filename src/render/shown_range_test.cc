@@ -97,6 +97,9 @@ TEST(ShownRange, SaysWhyThereIsNothingToSee) {
   EXPECT_EQ(NothingToSee(cloud, camera, options, 2000), "");
   EXPECT_EQ(NothingToSee(cloud, camera, options, std::nullopt), "");
   EXPECT_THAT(NothingToSee(cloud, camera, options, 0), HasSubstr("2,000 in range but beside the picture"));
+  GaussianCloud faint = cloud;
+  for (float& logit : faint.opacity_logits) logit = -std::numeric_limits<float>::infinity();
+  EXPECT_THAT(NothingToSee(faint, camera, options, 0), HasSubstr("Gaussians: 2,000 less opaque than 1/255;"));
   options.far_plane = 2e-4f;
   EXPECT_THAT(NothingToSee(cloud, camera, options, std::nullopt), HasSubstr("2,000 beyond the far plane (0.0002)"));
   options.far_plane = kNoFar;

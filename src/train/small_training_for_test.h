@@ -68,7 +68,7 @@ views_per_step = 2
     job.settings.fit_steps = 500;
     job.settings.max_gaussians = 300;
     job.settings.min_train_psnr = 1;
-    const auto record = BuildObject(job, folder_ / set, nullptr);
+    const auto record = BuildObject(job, folder_ / set);
     if (!record.ok()) throw std::runtime_error(record.error().message);
   }
 

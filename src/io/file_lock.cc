@@ -1,7 +1,8 @@
-#include "dataset/file_lock.h"
+#include "io/file_lock.h"
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -27,10 +28,28 @@ Result<FileLock> FileLock::Take(const std::filesystem::path& path, bool wait) {
   return Error{ErrorCode::kIo, Cat(path.string(), ": cannot lock: ", std::strerror(errno))};
 }
 
-FileLock::FileLock(FileLock&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+Result<FileLock> FileLock::TakeAndRemove(const std::filesystem::path& path) {
+  for (;;) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(FileLock lock, Take(path, false));
+    struct stat held {
+    }, named{};
+    // Whoever held it may have removed it after we opened it: then it is not the file of that name any more.
+    if (::fstat(lock.descriptor_, &held) == 0 && ::stat(path.c_str(), &named) == 0 && held.st_ino == named.st_ino) {
+      lock.remove_ = path;
+      return lock;
+    }
+  }
+}
+
+FileLock::FileLock(FileLock&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)), remove_(std::move(other.remove_)) {
+  other.remove_.clear();
+}
 
 FileLock::~FileLock() {
-  if (descriptor_ >= 0) ::close(descriptor_);
+  if (descriptor_ < 0) return;
+  if (!remove_.empty()) ::unlink(remove_.c_str());
+  ::close(descriptor_);
 }
 
 }  // namespace anchorsplat

@@ -1,0 +1,87 @@
+// What would have no effect is refused, with the words for where it would have one.
+
+#include "cli/run_for_test.h"
+#include "cli/small_scan_for_test.h"
+#include "io/file_lock.h"
+#include "io/folder_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+class Effects : public testing::Test {
+ protected:
+  void ExpectNoEffect(std::vector<std::string> words, const std::string& says) {
+    ExpectRefused(words, ErrorCode::kBadArgument, {says});
+  }
+
+  TestFolder folder_;
+  std::string scan_ = WriteScan(folder_ / "scan.ply");
+};
+
+TEST_F(Effects, OfRenderingOnPictures) {
+  const std::string views = folder_ / "views";
+  ExpectDone({"render", scan_, "-o", views, "--orbit", "1", "--size", "48x48", "-q"});
+  for (const std::vector<std::string>& option :
+       {std::vector<std::string>{"--near", "100"}, {"--size", "64x64"}, {"--orbit", "5"}, {"--mode", "classic"}}) {
+    ExpectNoEffect({"compare", views, views, option[0], option[1]}, option[0] + " has no effect on pictures");
+  }
+  ExpectDone({"compare", views, views});
+  ExpectRefused({"render", scan_, "-o", folder_ / "one.png", "--orbit", "1", "--transparent", "--background", "1,1,1"},
+                ErrorCode::kBadArgument, {"--transparent"});
+}
+
+TEST_F(Effects, OfReportsAndFormats) {
+  ExpectRefused({"convert", scan_, folder_ / "o.spz", "--report-views", "3"}, ErrorCode::kBadArgument, {"--report"});
+  ExpectNoEffect({"convert", scan_, folder_ / "o.ply", "--spz-version", "3"}, "where a .spz is written");
+  ExpectDone({"convert", scan_, folder_ / "o.spz", "--spz-version", "3", "-q"});
+  ExpectRefused({"view", scan_, "-o", folder_ / "o.html", "--views", "3"}, ErrorCode::kBadArgument, {"--cameras"});
+}
+
+TEST_F(Effects, OfTheScheduleOfAFit) {
+  const std::string project = WriteProject(folder_ / "project");
+  const auto fit = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"fit", project, "-o", folder_ / "fit.ply", "--steps", "2", "--init-points", "50"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  };
+  ExpectNoEffect(fit({"--pixel", "point", "--upscale", "3"}), "--pixel area");
+  ExpectNoEffect(fit({"--sh-degree", "0", "--rate-sh-rest", "1"}), "--sh-degree above 0");
+  ExpectNoEffect(fit({"--sh-degree", "0", "--sh-degree-interval", "3"}), "--sh-degree above 0");
+  ExpectNoEffect(fit({"--opacity-reset", "never", "--reset-every", "3"}), "--opacity-reset positive or from-zero");
+  ExpectNoEffect(fit({"--refine-stop", "1", "--refine-start", "5"}), "--refine-start has no effect here");
+}
+
+TEST_F(Effects, OfCamerasThatSeeNothing) {
+  const std::string cameras = folder_ / "away.json";
+  WriteText(cameras, R"({"w": 64, "h": 64, "fl_x": 60, "fl_y": 60, "cx": 32, "cy": 32, "frames": [{"file_path": "a",
+      "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,-50],[0,0,0,1]]}]})");
+  ExpectRefused({"enhance", scan_, "-o", folder_ / "o.ply", "--method", "filter", "--cameras", cameras},
+                ErrorCode::kBadArgument, {"no Gaussian lies in any of the cameras' views"});
+  const ProgramRun page = ExpectDone({"view", scan_, "-o", folder_ / "o.html", "--cameras", cameras});
+  EXPECT_THAT(page.err, HasSubstr("behind the camera"));
+  WriteProject(folder_ / "project");
+  ExpectRefused({"enhance", scan_, "-o", folder_ / "o.ply", "--method", "filter", "--train-width", "1000", "--cameras",
+                 folder_ / "project"},
+                ErrorCode::kBadArgument, {"--train-width 1000 has no effect"});
+}
+
+// Two runs that keep their state in one place would take it away from each other.
+TEST_F(Effects, OneRunForACheckpoint) {
+  const std::string project = WriteProject(folder_ / "project");
+  const std::vector<std::string> words = {"fit", project,         "-o", folder_ / "fit.ply", "--steps",
+                                          "2",   "--init-points", "50"};
+  {
+    const auto other = FileLock::TakeAndRemove(folder_ / "fit.ply.checkpoint.lock");
+    ASSERT_TRUE(other.ok());
+    ExpectRefused(words, ErrorCode::kExists, {"another run that keeps its state there is at work"});
+  }
+  const ProgramRun run = ExpectDone(words);
+  EXPECT_THAT(run.err, Not(HasSubstr("warning")));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "fit.ply.checkpoint.lock"));
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -35,7 +35,7 @@ TEST_F(ConvertVerb, WritesEveryFormatThatItReadsBack) {
 
 TEST_F(ConvertVerb, SaysWhatItDid) {
   const ProgramRun run = ExpectDone({"convert", scan_, folder_ / "out.spz"});
-  EXPECT_THAT(run.out, AllOf(HasSubstr("scan.ply (ply, "), HasSubstr("out.spz (spz, "),
+  EXPECT_THAT(run.out, AllOf(HasSubstr("scan.ply (PLY, "), HasSubstr("out.spz (SPZ, "),
                              HasSubstr("200 Gaussians of SH degree 2 in, 200 of degree 2 out")));
   EXPECT_THAT(run.err, IsEmpty());
 }

@@ -46,11 +46,12 @@ TEST_F(DatasetVerb, Check) {
   Make({"a"});
   EXPECT_THAT(ExpectDone({"dataset", "check", set_, "--decode"}).out, HasSubstr("everything is there"));
   EXPECT_EQ(ExpectJson({"dataset", "check", set_})["problems"], nlohmann::json::array());
-  fs::remove(fs::path(set_) / "a/24/images/004.png");
+  fs::remove(fs::path(set_) / "a/24/images/000.png");
   EXPECT_THAT(ExpectRefused({"dataset", "check", set_}, ErrorCode::kBadFile, {"set: 1 problem"}).out,
-              HasSubstr("picture 004 is missing"));
+              HasSubstr("picture 000 is missing"));
   // `eval` says so, too.
-  ExpectRefused({"eval", set_, "-o", folder_ / "out", "--methods", "raw"}, ErrorCode::kBadFile, {"a"});
+  ExpectRefused({"eval", set_, "-o", folder_ / "out", "--methods", "raw"}, ErrorCode::kBadFile,
+                {"no high-resolution picture 000"});
 }
 
 TEST_F(DatasetVerb, Split) {

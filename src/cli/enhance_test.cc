@@ -108,7 +108,10 @@ TEST_F(EnhanceVerb, PageThatNoBrowserOpens) {
 
 TEST_F(EnhanceVerb, NetworkThatIsPartOfTheProgram) {
   EXPECT_THAT(ExpectDone(Enhance({})).out, HasSubstr("200 Gaussians in, 800 out; model"));
-  const nlohmann::json pruned = ExpectJson(Enhance({"--prune-opacity", "0.8"}, "pruned.ply"))[0];
+  const std::string real = folder_ / "real.ply";
+  ExpectDone({"convert", Biplane() / "input.ply", real, "--max-gaussians", "200", "--sh-degree", "1", "-q"});
+  const nlohmann::json pruned =
+      ExpectJson({"enhance", real, "-o", folder_ / "pruned.ply", "--pixel-size", "0.02", "--prune-opacity", "0.3"})[0];
   EXPECT_EQ(pruned["method"], "model");
   EXPECT_GT(pruned["model"]["pruned"], 0);
   // What has been enhanced already stays as it is.

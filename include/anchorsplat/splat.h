@@ -47,7 +47,7 @@ class ANCHORSPLAT_PUBLIC Splat {
   Splat(Splat&& other) noexcept;
   Splat& operator=(Splat&& other) noexcept;
 
-  // All values zero. kBadArgument: a negative count, a degree that is not 0–3; kIo: not enough memory.
+  // All values zero. kBadArgument: a count that is not 0–2³¹, a degree that is not 0–3; kIo: not enough memory.
   static Expected<Splat> OfSize(int64_t count, int sh_degree);
   // kBadArgument: CheckShape; kIo: not enough memory.
   static Expected<Splat> CopyOf(const SplatView& view);

@@ -54,9 +54,11 @@ TEST(ProcessPool, WhatTakesTooLongIsEndedWithItsChildren) {
 
 TEST(ProcessPool, StopsWhenAsked) {
   const TestFolder folder;
-  const std::atomic<bool> stop = true;
-  const RunScope run({.stop = &stop});
-  EXPECT_TRUE(RunShell({"true", "true"}, {.jobs = 1}, folder).ends.empty());
+  {
+    const std::atomic<bool> stop = true;
+    const RunScope run({.stop = &stop});
+    EXPECT_TRUE(RunShell({"true", "true"}, {.jobs = 1}, folder).ends.empty());
+  }
   int64_t count = 0;
   const auto task = [&](int64_t) { return ProcessTask{{"/bin/true"}, folder / "log"}; };
   ASSERT_TRUE(RunProcesses(5, task, [&](int64_t, const ProcessEnd&) { return ++count < 2; }, {.jobs = 1}).ok());

@@ -9,10 +9,10 @@ trap 'rm -rf "$work"' EXIT
 fail() { echo "FAILED: $*"; [ -e "$work/log" ] && tail -n 30 "$work/log"; exit 1; }
 
 "$cmake" --install "$build" --prefix "$work/prefix" >"$work/log" 2>&1 || fail "install"
-for part in include/anchorsplat/anchorsplat.h lib/cmake/anchorsplat/anchorsplatConfigVersion.cmake lib/libanchorsplat.so; do
-  ls "$work/prefix/$part" >/dev/null 2>&1 || ls "$work"/prefix/${part/#lib/lib\/*} >/dev/null 2>&1 || fail "$part is not there"
+for part in anchorsplat.h anchorsplatConfig.cmake anchorsplatConfigVersion.cmake libanchorsplat.so; do
+  [ -n "$(find "$work/prefix/include" "$work"/prefix/lib* -name $part)" ] || fail "$part is not there"
 done
-grep -rqF -e "$source" -e "$build" "$work"/prefix/lib/cmake "$work"/prefix/include && fail "the package knows where it was built"
+grep -rqF -e "$source" -e "$build" "$work"/prefix/lib*/cmake "$work"/prefix/lib*/libanchorsplat.so "$work/prefix/include" 2>/dev/null && fail "the package knows where it was built"
 
 cp -r "$source/examples/cpp" "$work/program"
 "$cmake" -S "$work/program" -B "$work/built" -DCMAKE_PREFIX_PATH="$work/prefix" -DCMAKE_CXX_COMPILER="$compiler" \

@@ -13,6 +13,7 @@
 #include "cli/verb_words.h"
 #include "core/log.h"
 #include "core/parallel.h"
+#include "core/run_context.h"
 #include "core/text.h"
 #include "io/input_record.h"
 #include "model/model_method.h"
@@ -110,6 +111,8 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
   const SharedFlags& flags = program.flags;
   SetLogSink(MakeTerminalSink(flags.quiet));
   SetThreadCount(flags.threads);
+  const RunScope run({});  // what is put down here is known in the runs that verbs begin to be stopped (stop_signal.h)
+  const RunScope run({});  // one for all that the verb does, whatever scopes it opens in it
   const InputRecord record;  // nothing that the verb reads is overwritten by it
   try {
     const Status status = program.run();

@@ -34,7 +34,7 @@ says stderr "seed"
 expect 0 "an interrupted fit goes on" resumed
 says stderr "going on"
 expect 0 "an interruption does not change the splat" cmp "$work/whole.ply" "$work/part.ply"
-rm "$work/part.ply"
+rm -f "$work"/part.ply*
 
 # What a continuation has to have in common with its beginning: not the names alone.
 expect 130 "a fit to go on with" stopped

@@ -112,7 +112,6 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
   SetLogSink(MakeTerminalSink(flags.quiet));
   SetThreadCount(flags.threads);
   const RunScope run({});  // what is put down here is known in the runs that verbs begin to be stopped (stop_signal.h)
-  const RunScope run({});  // one for all that the verb does, whatever scopes it opens in it
   const InputRecord record;  // nothing that the verb reads is overwritten by it
   try {
     const Status status = program.run();

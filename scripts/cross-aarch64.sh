@@ -2,7 +2,7 @@
 # Builds for 64-bit ARM in a bare Debian of this machine's own processor and runs the tests of the rooms that do arithmetic
 # (or those named) under QEMU: once as a processor with NEON alone, once as one that has everything QEMU knows.
 #
-#   scripts/cross-aarch64.sh [options of bare-debian.sh] [-- ROOM...]     core formats render enhance unless named
+#   scripts/cross-aarch64.sh [options of bare-debian.sh] [-- ROOM...]     core io images tensors cameras formats render enhance
 #
 # Needs root and debootstrap. Not a part of CI.
 set -euo pipefail
@@ -18,7 +18,7 @@ if [ "${1:-}" != --inside ]; then
 fi
 shift
 rooms=("$@")
-[ $# -gt 0 ] || rooms=(core formats render enhance)
+[ $# -gt 0 ] || rooms=(core io images tensors cameras formats render enhance)
 
 export DEBIAN_FRONTEND=noninteractive
 dpkg --add-architecture arm64

@@ -2,7 +2,9 @@
 # Builds for 64-bit ARM in a bare Debian of this machine's own processor and runs the tests of the rooms that do arithmetic
 # (or those named) under QEMU: once as a processor with NEON alone, once as one that has everything QEMU knows.
 #
-#   scripts/cross-aarch64.sh [options of bare-debian.sh] [-- ROOM...]     core io images tensors cameras formats render enhance
+#   scripts/cross-aarch64.sh [options of bare-debian.sh] [-- ROOM...]
+#
+# Rooms: core io images tensors cameras formats render enhance unless named.
 #
 # Needs root and debootstrap. Not a part of CI.
 set -euo pipefail

@@ -216,15 +216,9 @@ Status EnhanceBlock(const GaussianCloud& cloud, std::span<const int64_t> anchors
   return {};
 }
 
-Result<PublishedResult> Run(const GaussianCloud& given, const PublishedNetwork& network,
-                            const PublishedOptions& options) {
-  ANCHORSPLAT_RETURN_IF_ERROR(Validate(given));
-  const std::optional<GaussianCloud> finite = options.upstream ? std::nullopt : WithoutInfinities(given);
-  const GaussianCloud& cloud = finite ? *finite : given;
-  ANCHORSPLAT_RETURN_IF_ERROR(Validate(options.shuffles));
-  PublishedReport report;
-  report.gaussians_in = cloud.size();
-
+// The rows that the network can read, at most options.max_gaussians of them.
+Result<std::vector<int64_t>> ChooseAnchors(const GaussianCloud& cloud, const PublishedOptions& options,
+                                           PublishedReport& report) {
   std::vector<int64_t> anchors;
   for (int64_t i = 0; i < cloud.size(); ++i) {
     if (IsFinite(cloud, i)) anchors.push_back(i);
@@ -243,18 +237,20 @@ Result<PublishedResult> Run(const GaussianCloud& given, const PublishedNetwork& 
     anchors = options.upstream ? RandomChoice(std::move(anchors), options.max_gaussians)
                                : MostVisible(cloud, std::move(anchors), options.max_gaussians);
   }
-  if (anchors.empty()) {
-    return Error{ErrorCode::kBadArgument,
-                 cloud.empty() ? "the splat has no Gaussians" : "no Gaussian of the splat has finite values"};
-  }
+  if (!anchors.empty()) return anchors;
+  return Error{ErrorCode::kBadArgument,
+               cloud.empty() ? "the splat has no Gaussians" : "no Gaussian of the splat has finite values"};
+}
 
+// The anchors' means in the cube. Outside it there is no grid: upstream drops what rounding left there, the default
+// only what a given mode (unit) truly leaves out.
+Result<Buffer<float>> PlacesInCube(const GaussianCloud& cloud, const PublishedOptions& options,
+                                   std::vector<int64_t>& anchors, PublishedReport& report) {
   Buffer<float> positions(anchors.size() * 3);
-  for (size_t j = 0; j < anchors.size(); ++j)
+  for (size_t j = 0; j < anchors.size(); ++j) {
     std::copy_n(cloud.means.data() + 3 * anchors[j], 3, positions.data() + 3 * j);
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(report.normalisation, FitNormalisation(positions, options.normalisation));
-
-  // Means in the cube. Outside it there is no grid: upstream drops what rounding left there, the default only what a
-  // given mode (unit) truly leaves out.
   const float tolerance = options.upstream ? 0.0f : 1e-5f;
   size_t inside = 0;
   for (size_t j = 0; j < anchors.size(); ++j) {
@@ -276,7 +272,13 @@ Result<PublishedResult> Run(const GaussianCloud& given, const PublishedNetwork& 
   }
   if (anchors.empty()) return Error{ErrorCode::kBadArgument, "no Gaussian lies in the network's cube"};
   report.anchors = static_cast<int64_t>(anchors.size());
+  return positions;
+}
 
+// Copies of all anchors, block by block.
+Result<GaussianCloud> EnhanceBlocks(const GaussianCloud& cloud, std::span<const int64_t> anchors,
+                                    Buffer<float> positions, const PublishedNetwork& network,
+                                    const PublishedOptions& options, PublishedReport& report) {
   SpatialBlockOptions block_options;
   block_options.most = options.upstream ? report.anchors : std::max<int64_t>(1, options.block_gaussians);
   const std::vector<SpatialBlock> blocks = SplitIntoBlocks(positions, {0, 0, 0}, 1, block_options);
@@ -286,28 +288,28 @@ Result<PublishedResult> Run(const GaussianCloud& given, const PublishedNetwork& 
     LogInfo(Cat(WithThousands(report.anchors), " Gaussians are enhanced in ", report.blocks,
                 " overlapping blocks of at most ", WithThousands(block_options.most)));
   }
-
-  PublishedResult result;
-  result.cloud.Resize(report.anchors * network.config().copies, kMaxShDegree);
-  if (blocks.size() > 1) SetZero(result.cloud);  // blocks add their shares
-  result.cloud.render_mode = cloud.render_mode;
-  result.cloud.comments = cloud.comments;
-  {
-    Progress progress("Network", report.anchors);
-    for (const SpatialBlock& block : blocks) {
-      const Normalisation normalisation =
-          blocks.size() == 1 ? report.normalisation : NormalisationOf(block, report.normalisation);
-      ANCHORSPLAT_RETURN_IF_ERROR(
-          EnhanceBlock(cloud, anchors, block, normalisation, network, options, result.cloud, progress));
-    }
+  GaussianCloud out;
+  out.Resize(report.anchors * network.config().copies, kMaxShDegree);
+  if (blocks.size() > 1) SetZero(out);  // blocks add their shares
+  Progress progress("Network", report.anchors);
+  for (const SpatialBlock& block : blocks) {
+    const Normalisation normalisation =
+        blocks.size() == 1 ? report.normalisation : NormalisationOf(block, report.normalisation);
+    ANCHORSPLAT_RETURN_IF_ERROR(EnhanceBlock(cloud, anchors, block, normalisation, network, options, out, progress));
   }
-  ParallelFor(0, result.cloud.size(), 4096, [&](int64_t first, int64_t last) {
+  return out;
+}
+
+// Bounds of what came out, and what of it stays.
+void FinishRows(const GaussianCloud& cloud, std::span<const int64_t> anchors, const PublishedOptions& options,
+                GaussianCloud& out, PublishedReport& report) {
+  ParallelFor(0, out.size(), 4096, [&](int64_t first, int64_t last) {
     for (int64_t row = first; row < last; ++row) {
       const float* s = cloud.log_scales.data() + 3 * anchors[static_cast<size_t>(row % report.anchors)];
-      Finish(std::max({s[0], s[1], s[2]}), options.upstream, row, result.cloud);
+      Finish(std::max({s[0], s[1], s[2]}), options.upstream, row, out);
     }
   });
-  DropRows(result.cloud, options, report);
+  DropRows(out, options, report);
   if (report.output_not_finite > 0) {
     LogWarning(
         Cat("the network gave ", WithThousands(report.output_not_finite), " Gaussians that are not finite; dropped"));
@@ -315,9 +317,25 @@ Result<PublishedResult> Run(const GaussianCloud& given, const PublishedNetwork& 
   if (report.pruned > 0) {
     LogInfo(Cat("left out ", WithThousands(report.pruned), " Gaussians of opacity below ", options.prune_opacity));
   }
-  report.gaussians_out = result.cloud.size();
-  result.report = report;
-  return result;
+  report.gaussians_out = out.size();
+}
+
+Result<PublishedResult> Run(const GaussianCloud& given, const PublishedNetwork& network,
+                            const PublishedOptions& options) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(given));
+  const std::optional<GaussianCloud> finite = options.upstream ? std::nullopt : WithoutInfinities(given);
+  const GaussianCloud& cloud = finite ? *finite : given;
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(options.shuffles));
+  PublishedReport report;
+  report.gaussians_in = cloud.size();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<int64_t> anchors, ChooseAnchors(cloud, options, report));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Buffer<float> positions, PlacesInCube(cloud, options, anchors, report));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out,
+                               EnhanceBlocks(cloud, anchors, std::move(positions), network, options, report));
+  out.render_mode = cloud.render_mode;
+  out.comments = cloud.comments;
+  FinishRows(cloud, anchors, options, out, report);
+  return PublishedResult{std::move(out), report};
 }
 
 }  // namespace

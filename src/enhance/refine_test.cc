@@ -13,7 +13,6 @@
 #include "enhance/enhance.h"
 #include "enhance/filter.h"
 #include "enhance/refine_pictures.h"
-#include "enhance/refiner.h"
 #include "fit/orbit_scene_for_test.h"
 #include "fit/pixel_model.h"
 #include "fit/training_views.h"
@@ -495,72 +494,6 @@ TEST_F(Refinement, WhatKnowsMoreThanThePicturesStays) {
   ASSERT_TRUE(refined.ok()) << refined.error().message;
   EXPECT_FALSE(refined->report.kept_start);
   EXPECT_GT(refined->report.after, refined->report.before + 2);
-}
-
-TEST(ChooseWindow, IsTheWholeOfSmallViews) {
-  const GaussianCloud ball = orbit_scene::Ball(20, 1);
-  const auto cameras = orbit_scene::Cameras(2, 300, 200).cameras;
-  EXPECT_EQ(ChooseWindow(cameras[0], ball, 1, 5), (PixelBox{0, 0, 300, 200}));
-  const auto large = orbit_scene::Cameras(2, 2000, 300).cameras;
-  for (int64_t step = 0; step < 20; ++step) {
-    const PixelBox box = ChooseWindow(large[0], ball, 1, step);
-    EXPECT_EQ(box.x1 - box.x0, kWindow);
-    EXPECT_EQ(box.y1 - box.y0, 300);
-    EXPECT_GE(box.x0, 0);
-    EXPECT_LE(box.x1, 2000);
-    EXPECT_EQ(ChooseWindow(large[0], ball, 1, step), box);
-  }
-  EXPECT_NE(ChooseWindow(large[0], ball, 1, 0), ChooseWindow(large[0], ball, 1, 1));
-}
-
-TEST(RefineOptions, RefusesNonsense) {
-  const auto bad = [](auto&& change) {
-    RefineOptions options;
-    change(options);
-    return !Validate(options).ok();
-  };
-  EXPECT_TRUE(Validate(RefineOptions{}).ok());
-  EXPECT_TRUE(bad([](RefineOptions& o) { o.steps = 0; }));
-  EXPECT_TRUE(bad([](RefineOptions& o) { o.seconds = -1; }));
-  EXPECT_TRUE(bad([](RefineOptions& o) { o.steps = 1, o.seconds = 1; }));
-  EXPECT_TRUE(bad([](RefineOptions& o) { o.copies = 0; }));
-  EXPECT_TRUE(bad([](RefineOptions& o) { o.rate = 0; }));
-  EXPECT_TRUE(bad([](RefineOptions& o) { o.rate_decay = 0; }));
-  EXPECT_TRUE(bad([](RefineOptions& o) { o.half_from = 0.9; }));
-  EXPECT_TRUE(bad([](RefineOptions& o) { o.ssim_weight = 2; }));
-  EXPECT_TRUE(bad([](RefineOptions& o) { o.poses = 0; }));
-}
-
-TEST(RefineOptions, AreSetByName) {
-  RefineOptions o;
-  const auto set = [&](std::string_view key, std::string_view value) {
-    const Status status = SetRefineOption(o, key, value);
-    return status.ok() ? std::string() : status.error().message;
-  };
-  EXPECT_EQ(set("k", "3"), "");
-  EXPECT_EQ(o.copies, 3);
-  EXPECT_EQ(set("steps", "1e3"), "");
-  EXPECT_EQ(o.steps, 1000);
-  EXPECT_EQ(set("half-from", "0.125"), "");
-  EXPECT_EQ(o.half_from, 0.125);
-  EXPECT_EQ(set("robust", "1"), "");
-  EXPECT_TRUE(o.robust);
-  // Every key is understood by the name that the list has for it.
-  std::string keys = RefineOptionKeys() + ", ";
-  for (size_t at = 0, end; at < keys.size(); at = end + 2) {
-    end = keys.find(", ", at);
-    EXPECT_EQ(set(keys.substr(at, end - at), "1"), "") << keys.substr(at, end - at);
-  }
-  EXPECT_EQ(o.poses, 1);
-  EXPECT_EQ(o.hold_out, 1);
-  EXPECT_EQ(o.max_gaussians, 1);
-  EXPECT_EQ(o.seconds, 1);
-
-  EXPECT_THAT(set("speed", "1"), HasSubstr("no option 'speed' (known: steps, "));
-  EXPECT_THAT(set("k", "2.5"), HasSubstr("k cannot be '2.5'"));
-  for (const char* value : {"", "x", "1x", "nan", "1e30", "-1e30", " 1"}) EXPECT_NE(set("k", value), "") << value;
-  EXPECT_NE(set("exposure", "2"), "");
-  EXPECT_NE(set("", "1"), "");
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ struct CompactResult {
   int64_t not_finite = 0;  // Gaussians for which the network says something that is not finite: its start
 };
 
-// A compact network for inference on the CPU, as a row of kernel calls on raw arrays. The torch module in model/modules
+// A compact network for inference on the CPU, as a row of kernel calls on raw arrays. The torch module in torch/
 // is the same network for training; a test holds the two together.
 //
 // Where the network comes from knows the range of every feature of the Gaussians it was trained on. A Gaussian outside

@@ -17,7 +17,7 @@ namespace anchorsplat {
 
 // The network for inference on the CPU: Point Transformer V3 and the heads as a row of kernel calls on raw arrays, with
 // weights in the kernels' order and every BatchNorm folded into the linear layer before it where nothing stands
-// between. The torch modules in model/modules are the same network for training and other devices; a test holds the two
+// between. The torch modules in torch/ are the same network for training and other devices; a test holds the two
 // together.
 class PublishedNetwork {
  public:

@@ -111,7 +111,7 @@ TEST(Modules, StateDictIsThatOfPublishedCheckpoints) {
   }
 }
 
-TEST(Modules, PackedNetworkIsTheSameFunction) {
+TEST(PublishedModule, ThePackedNetworkIsTheSameFunction) {
   const PublishedConfig config = SmallConfig();
   AnchorSplatNetwork network = HashNetwork(config);
   const SmallCloud cloud(config);

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 
+#include "core/parallel_section.h"
 #include "core/run.h"
 
 namespace anchorsplat {
@@ -33,6 +34,14 @@ int ThreadCount() {
   const auto& run = internal::CurrentRun();
   const int of_run = run ? run->context.threads : 0;
   return of_run > 0 ? std::min(of_run, static_cast<int>(of_process)) : static_cast<int>(of_process);
+}
+
+void ParallelSection(const std::function<void()>& section) {
+  if (const std::shared_ptr<internal::Run> run = internal::CurrentRun()) {
+    run->arena.execute(section);
+  } else {
+    section();
+  }
 }
 
 namespace internal {

@@ -9,7 +9,7 @@
 
 namespace anchorsplat::internal {
 
-// A run as log.cc and parallel.cc see it. Only for core/.
+// A run as log.cc and parallel.cc see it. Of others, only threads that are started by hand need it: for TakePart.
 struct Run {
   RunContext context;  // complete: what was left out is filled in, as far as an outer run has it
   std::mutex log_mutex;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/random.h"
+#include "core/run.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
 #include "dataset/object_name.h"
@@ -202,7 +203,13 @@ Result<TrainingSample> MakeSample(const TrainConfig& config, int64_t index, Obje
 
 SampleLoader::SampleLoader(const TrainConfig& config, Order order, ObjectStore& objects, TrainableNetwork& network,
                            torch::Device device)
-    : config_(config), order_(order), objects_(objects), network_(network), device_(device), thread_([this] {
+    : config_(config),
+      order_(order),
+      objects_(objects),
+      network_(network),
+      device_(device),
+      thread_([this, run = internal::CurrentRun()] {
+        const internal::TakePart part(run);  // in what the training takes part in
         Run();
       }) {}
 

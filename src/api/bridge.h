@@ -19,6 +19,7 @@
 #include "core/image.h"
 #include "core/result.h"
 #include "core/run_context.h"
+#include "io/input_record.h"
 
 // Between the public types (include/anchorsplat/) and ours.
 namespace anchorsplat {
@@ -48,6 +49,7 @@ RunContext ToContext(const RunSettings& run);
 template <typename T, typename Call>
 Expected<T> InRun(const RunSettings& run, Call&& call) try {
   const RunScope scope(ToContext(run));
+  const InputRecord record;  // nothing that the call reads is overwritten by it
   auto result = call();
   if (!result.ok()) return ToFailure(result.error());
   if constexpr (std::is_void_v<T>) {

@@ -3,6 +3,7 @@
 #include <anchorsplat/fit.h>
 
 #include "api/bridge.h"
+#include "fit/checkpoint_guard.h"
 #include "fit/initial_cloud.h"
 #include "fit/initial_points.h"
 
@@ -47,6 +48,10 @@ Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianClo
   FitControl control;
   control.checkpoint = settings.checkpoint;
   control.resume = settings.resume;
+  if (!control.checkpoint.empty()) {
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(control.checkpoint, {}, control.resume, /*overwrite=*/false));
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto lock, HoldCheckpoint(control.checkpoint));
   ANCHORSPLAT_ASSIGN_OR_RETURN(Fitted fitted, Fit(views, std::move(initial), options, control));
   const FitReport& report = fitted.report;
   return FitOutcome{.splat = SplatAccess::Make(std::move(fitted.cloud)),

@@ -185,6 +185,21 @@ TEST(Fit, ComesCloserToThePictures) {
   EXPECT_EQ(FitProject("/there/is/none").failure().kind, FailureKind::kNotFound);
 }
 
+// A name given for the state of a fit by mistake costs nothing.
+TEST(Fit, TakesNoForeignFileForItsState) {
+  const TestFolder folder;
+  WriteProject(folder.path(), SmallSplat(80, 0, 5), 6, 40);
+  const auto scan = folder / "scan.ply";
+  ASSERT_TRUE(WriteSplat(scan, SmallSplat(20, 0, 1)).ok());
+  const auto size = std::filesystem::file_size(scan);
+  std::atomic<bool> stop = true;
+  const auto fitted =
+      FitProject(folder.path(), {.steps = 2, .initial_points = 50, .checkpoint = scan}, {.stop = &stop});
+  ASSERT_FALSE(fitted.ok());
+  EXPECT_EQ(fitted.failure().kind, FailureKind::kExists);
+  EXPECT_EQ(std::filesystem::file_size(scan), size);
+}
+
 // One is stopped half-way, the other one is not, and each hears of itself only.
 TEST(RunSettings, TwoLongCallsSideBySide) {
   const TestFolder folder;

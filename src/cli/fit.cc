@@ -5,7 +5,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "cli/checkpoint.h"
 #include "cli/choice.h"
 #include "cli/clean_output.h"
 #include "cli/fit_flags.h"
@@ -14,6 +13,7 @@
 #include "cli/verb.h"
 #include "core/log.h"
 #include "core/text.h"
+#include "fit/checkpoint_guard.h"
 #include "fit/initial_cloud.h"
 #include "formats/cloud_io.h"
 #include "formats/cloud_output.h"

@@ -1,4 +1,4 @@
-#include "cli/checkpoint.h"
+#include "fit/checkpoint_guard.h"
 
 #include <algorithm>
 #include <string>

@@ -17,6 +17,7 @@ constexpr int64_t kAlmostNothing = 1000;  // one of so many Gaussians
 // Gaussians along the view's axis.
 struct Depths {
   int64_t behind = 0, too_near = 0, in_range = 0, too_far = 0;
+  int64_t faint = 0;  // of those in range: drawn by nobody
 };
 
 Depths CountDepths(const CloudView& cloud, const Camera& camera, double near, double far) {
@@ -25,16 +26,11 @@ Depths CountDepths(const CloudView& cloud, const Camera& camera, double near, do
     const float* p = cloud.means.data() + 3 * i;
     const double z = camera.ToCamera({p[0], p[1], p[2]})[2];
     if (!std::isfinite(z)) continue;
-    ++(z <= 0 ? depths.behind : z < near ? depths.too_near : z > far ? depths.too_far : depths.in_range);
+    int64_t& where = z <= 0 ? depths.behind : z < near ? depths.too_near : z > far ? depths.too_far : depths.in_range;
+    ++where;
+    if (&where == &depths.in_range && Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) < kMinAlpha) ++depths.faint;
   }
   return depths;
-}
-
-// Too faint to be drawn by anybody.
-int64_t CountInvisible(const CloudView& cloud) {
-  int64_t count = 0;
-  for (int64_t i = 0; i < cloud.size(); ++i) count += Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) < kMinAlpha;
-  return count;
 }
 
 }  // namespace
@@ -69,9 +65,8 @@ std::string NothingToSee(const CloudView& cloud, const Camera& camera, const Ren
   add(depths.behind, "behind the camera");
   add(depths.too_near, Cat("before the near plane (", near, ")"));
   add(depths.too_far, Cat("beyond the far plane (", options.far_plane, ")"));
-  const int64_t faint = std::min(CountInvisible(cloud), depths.in_range);
-  add(faint, "less opaque than 1/255");
-  add(depths.in_range - faint, drawn.value_or(1) == 0 ? "in range but beside the picture" : "in range");
+  add(depths.faint, "less opaque than 1/255");
+  add(depths.in_range - depths.faint, drawn.value_or(1) == 0 ? "in range but beside the picture" : "in range");
   return Cat("view ", Printable(camera.name), " shows ", drawn.value_or(1) == 0 ? "nothing" : "almost nothing",
              " of the ", WithThousands(cloud.size()), " Gaussians: ", where.empty() ? "none has a position" : where,
              "; are these cameras of this splat, in its unit and its axes?");

@@ -100,6 +100,10 @@ TEST(ShownRange, SaysWhyThereIsNothingToSee) {
   GaussianCloud faint = cloud;
   for (float& logit : faint.opacity_logits) logit = -std::numeric_limits<float>::infinity();
   EXPECT_THAT(NothingToSee(faint, camera, options, 0), HasSubstr("Gaussians: 2,000 less opaque than 1/255;"));
+  for (size_t i = 0; i < 1000; ++i) faint.means[3 * i + 2] = -1;  // the faint ones are not those beside the picture
+  for (size_t i = 1000; i < 2000; ++i) faint.opacity_logits[i] = 0;
+  EXPECT_THAT(NothingToSee(faint, camera, options, 0),
+              HasSubstr("1,000 behind the camera, 1,000 in range but beside the picture"));
   options.far_plane = 2e-4f;
   EXPECT_THAT(NothingToSee(cloud, camera, options, std::nullopt), HasSubstr("2,000 beyond the far plane (0.0002)"));
   options.far_plane = kNoFar;

@@ -11,7 +11,6 @@
 #include "cameras/camera_io.h"
 #include "cli/batch.h"
 #include "cli/before_after_page.h"
-#include "cli/checkpoint.h"
 #include "cli/choice.h"
 #include "cli/clean_output.h"
 #include "cli/parse.h"
@@ -22,6 +21,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "core/world_up.h"
+#include "fit/checkpoint_guard.h"
 #include "fit/fitter.h"
 #include "formats/cloud_output.h"
 #include "formats/extra_properties.h"
@@ -124,8 +124,9 @@ nlohmann::json ToJson(const std::string& input, const fs::path& output, const En
                          {"seconds", r.seconds}};
   if (!r.quality.empty()) json["quality"] = r.quality;
   for (const StepReport& step : r.steps) {
+    const std::string key = json.contains(step.method) ? step.method + " again" : step.method;
     for (const auto& [name, value] : step.facts) {
-      std::visit([&, &fact = name](auto number) { json[step.method][fact] = number; }, value);
+      std::visit([&, &fact = name](auto number) { json[key][fact] = number; }, value);
     }
   }
   if (!r.pixel_size_source.empty()) {

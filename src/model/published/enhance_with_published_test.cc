@@ -78,7 +78,7 @@ class CollectingSink : public LogSink {
   int64_t total = -1, done = -1;
 };
 
-class EnhanceWithModelTest : public testing::Test {
+class EnhanceWithPublishedTest : public testing::Test {
  protected:
   void SetUp() override { before_ = SetLogSink(sink); }
   void TearDown() override { SetLogSink(before_); }
@@ -88,7 +88,7 @@ class EnhanceWithModelTest : public testing::Test {
   std::shared_ptr<LogSink> before_;
 };
 
-TEST_F(EnhanceWithModelTest, CopiesOfTheAnchorsInOrderWhenTheHeadsSayNothing) {
+TEST_F(EnhanceWithPublishedTest, CopiesOfTheAnchorsInOrderWhenTheHeadsSayNothing) {
   const GaussianCloud cloud = RandomCloud(300);
   const auto result = EnhanceWithPublishedNetwork(cloud, IdentityNetwork(3));
   ASSERT_TRUE(result.ok());
@@ -112,7 +112,7 @@ TEST_F(EnhanceWithModelTest, CopiesOfTheAnchorsInOrderWhenTheHeadsSayNothing) {
   EXPECT_EQ(sink->done, 300);
 }
 
-TEST_F(EnhanceWithModelTest, UpstreamKeepsQuaternionsAndScramblesLowDegrees) {
+TEST_F(EnhanceWithPublishedTest, UpstreamKeepsQuaternionsAndScramblesLowDegrees) {
   const GaussianCloud cloud = RandomCloud(100, 1);
   const auto upstream = EnhanceWithPublishedNetwork(cloud, IdentityNetwork(1), {.upstream = true});
   const auto corrected = EnhanceWithPublishedNetwork(cloud, IdentityNetwork(1));
@@ -124,7 +124,7 @@ TEST_F(EnhanceWithModelTest, UpstreamKeepsQuaternionsAndScramblesLowDegrees) {
   EXPECT_EQ(upstream->cloud.sh[48 * 7 + 3 * 4], cloud.sh[12 * 7 + 4]) << "green's first is red's fourth";
 }
 
-TEST_F(EnhanceWithModelTest, DropsWhatIsNotFiniteAndSaysSo) {
+TEST_F(EnhanceWithPublishedTest, DropsWhatIsNotFiniteAndSaysSo) {
   GaussianCloud cloud = RandomCloud(50);
   cloud.sh[48 * 3 + 40] = std::numeric_limits<float>::quiet_NaN();
   cloud.log_scales[15] = std::numeric_limits<float>::infinity();
@@ -140,7 +140,7 @@ TEST_F(EnhanceWithModelTest, DropsWhatIsNotFiniteAndSaysSo) {
   EXPECT_FALSE(EnhanceWithPublishedNetwork(GaussianCloud{}, IdentityNetwork()).ok());
 }
 
-TEST_F(EnhanceWithModelTest, ReadsWhatIsOpaqueOrFlat) {
+TEST_F(EnhanceWithPublishedTest, ReadsWhatIsOpaqueOrFlat) {
   GaussianCloud cloud = RandomCloud(50);
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   cloud.opacity_logits[5] = kInfinity;
@@ -161,7 +161,7 @@ TEST_F(EnhanceWithModelTest, ReadsWhatIsOpaqueOrFlat) {
   EXPECT_EQ(upstream->report.not_finite, 4);
 }
 
-TEST_F(EnhanceWithModelTest, OnlyUpstreamLosesExtremesToRounding) {
+TEST_F(EnhanceWithPublishedTest, OnlyUpstreamLosesExtremesToRounding) {
   const PublishedNetwork network = IdentityNetwork(1);
   int64_t lost = 0;
   for (uint64_t seed = 0; seed < 30; ++seed) {
@@ -181,7 +181,7 @@ TEST_F(EnhanceWithModelTest, OnlyUpstreamLosesExtremesToRounding) {
   EXPECT_EQ(EnhanceWithPublishedNetwork(cloud, network, {.normalisation = NormalisationMode::kUnit})->cloud.size(), 19);
 }
 
-TEST_F(EnhanceWithModelTest, LimitKeepsTheMostVisible) {
+TEST_F(EnhanceWithPublishedTest, LimitKeepsTheMostVisible) {
   GaussianCloud cloud = RandomCloud(60);
   for (int64_t i = 0; i < 60; ++i) {
     cloud.opacity_logits.data()[i] = i % 2 == 0 ? 4 : -4;
@@ -200,7 +200,7 @@ TEST_F(EnhanceWithModelTest, LimitKeepsTheMostVisible) {
   EXPECT_FALSE(upstream->cloud.means == result->cloud.means);
 }
 
-TEST_F(EnhanceWithModelTest, PrunesWhatIsInvisible) {
+TEST_F(EnhanceWithPublishedTest, PrunesWhatIsInvisible) {
   GaussianCloud cloud = RandomCloud(40);
   for (int64_t i = 0; i < 40; ++i) cloud.opacity_logits.data()[i] = i < 30 ? 0.0f : -7.0f;
   const auto result = EnhanceWithPublishedNetwork(cloud, IdentityNetwork(2), {.prune_opacity = 1.0f / 255});
@@ -209,7 +209,7 @@ TEST_F(EnhanceWithModelTest, PrunesWhatIsInvisible) {
   EXPECT_EQ(result->report.pruned, 20);
 }
 
-TEST_F(EnhanceWithModelTest, ClampsAsTheReleaseDoes) {
+TEST_F(EnhanceWithPublishedTest, ClampsAsTheReleaseDoes) {
   GaussianCloud cloud = RandomCloud(30);
   cloud.opacity_logits[0] = 50;
   cloud.sh[1] = -30;
@@ -222,7 +222,7 @@ TEST_F(EnhanceWithModelTest, ClampsAsTheReleaseDoes) {
   EXPECT_NEAR(corrected->cloud.log_scales[2], 6, 1e-5) << "a large scene's units are no mistake";
 }
 
-TEST_F(EnhanceWithModelTest, SameBitsForAnyNumberOfThreadsAndOnEveryRun) {
+TEST_F(EnhanceWithPublishedTest, SameBitsForAnyNumberOfThreadsAndOnEveryRun) {
   const GaussianCloud cloud = RandomCloud(3000);
   const PublishedNetwork network = SmallNetwork();
   const auto run = [&](int threads, int64_t block) {
@@ -240,7 +240,7 @@ TEST_F(EnhanceWithModelTest, SameBitsForAnyNumberOfThreadsAndOnEveryRun) {
 
 // Blocks see less of the cloud than the whole does, and each in its own coordinates, so their results differ. What must
 // not be is a step where they meet: next to a cell's face, neighbours should differ as they do elsewhere.
-TEST_F(EnhanceWithModelTest, BlocksMeetWithoutSeams) {
+TEST_F(EnhanceWithPublishedTest, BlocksMeetWithoutSeams) {
   // A smooth sheet of equal Gaussians: whatever structure the output has beside the sheet's own comes from the blocks.
   const int64_t side = 48;
   GaussianCloud cloud;

@@ -10,7 +10,7 @@
 namespace anchorsplat {
 
 // A network of the given kind with fresh parameters (torch's generator): "anchorsplat" or "compact".
-// Errors (kBadArgument): an unknown kind; an option that the kind does not have (UnknownOption) or of another type.
+// Errors (kBadArgument): an unknown kind; an option that the kind does not have or of another type.
 Result<std::shared_ptr<TrainableNetwork>> MakeTrainableNetwork(const std::string& kind, const NetworkOptions& options);
 
 }  // namespace anchorsplat

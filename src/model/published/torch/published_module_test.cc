@@ -111,7 +111,7 @@ TEST(Modules, StateDictIsThatOfPublishedCheckpoints) {
   }
 }
 
-TEST(PublishedModule, ThePackedNetworkIsTheSameFunction) {
+TEST(PublishedModule, TheNetworkOfInferenceIsTheSameFunction) {
   const PublishedConfig config = SmallConfig();
   AnchorSplatNetwork network = HashNetwork(config);
   const SmallCloud cloud(config);

@@ -7,6 +7,7 @@ for tool in clang-format clang-tidy; do
   command -v "$tool" >/dev/null || { echo "make lint needs $tool (Debian: apt-get install clang-format clang-tidy)" >&2; exit 1; }
 done
 scripts/check-filesystem-calls.sh
+scripts/check-includes.py
 git ls-files 'src/*.h' 'src/*.cc' 'include/*.h' 'examples/*.cc' | xargs clang-format --dry-run -Werror
 cmake --preset lean >/dev/null
 # Only files of the lean build have a command to be read with. g++ knows warnings that clang does not.

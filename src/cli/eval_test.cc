@@ -1,3 +1,5 @@
+#include <map>
+
 #include "cli/run_for_test.h"
 #include "cli/small_scan_for_test.h"
 #include "io/folder_for_test.h"

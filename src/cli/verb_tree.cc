@@ -1,5 +1,7 @@
 #include "cli/verb_tree.h"
 
+#include <utility>
+
 #include "core/text.h"
 
 namespace anchorsplat {

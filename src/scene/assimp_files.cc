@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <assimp/IOStream.hpp>
+#include <cstdint>
 #include <cstring>
 #include <utility>
 

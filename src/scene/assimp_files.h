@@ -1,6 +1,7 @@
 #pragma once
 
 #include <assimp/IOSystem.hpp>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>

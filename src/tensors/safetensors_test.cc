@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "core/text.h"
 #include "io/folder_for_test.h"
 #include "tensors/tensor_bytes_for_test.h"

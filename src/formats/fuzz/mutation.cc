@@ -5,6 +5,7 @@
 #include <cctype>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 namespace anchorsplat {

@@ -2,6 +2,8 @@
 
 #include <torch/torch.h>
 
+#include <cstdint>
+
 namespace anchorsplat {
 
 // Who hears from whom, both ways: neighbours of every point, and for every point the edges that bring it to others.

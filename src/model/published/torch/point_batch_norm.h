@@ -2,7 +2,9 @@
 
 #include <torch/torch.h>
 
+#include <cstdint>
 #include <functional>
+#include <utility>
 
 namespace anchorsplat {
 

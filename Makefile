@@ -125,7 +125,7 @@ INSTALL_CONFIGURE = --preset release $(TORCH_FLAGS)
 endif
 .PHONY: installable install deb
 installable: dependencies
-	@cmake $(INSTALL_CONFIGURE) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
+	@cmake $(INSTALL_CONFIGURE) $(if $(wildcard $(INSTALL_BUILD)/CMakeCache.txt),,-DANCHORSPLAT_TESTS=OFF) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
 	@rm -f build-configure.log
 	@cmake --build $(INSTALL_BUILD) -j $(JOBS) --target anchorsplat_installable
 

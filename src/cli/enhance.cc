@@ -116,6 +116,20 @@ Status MakeOutDir(const EnhanceFlags& flags) {
   return {};
 }
 
+nlohmann::json ToJson(const RefinePlan& plan) {
+  nlohmann::json json = {
+      {"from_input", plan.from_input}, {"nothing_to_do", plan.nothing_to_do}, {"least_gain", plan.least_gain}};
+  if (!plan.why.empty()) json["why"] = plan.why;
+  if (plan.nothing_to_do) return json;
+  const RefineOptions& options = plan.options;
+  if (options.steps) json["steps"] = *options.steps;
+  if (options.seconds) json["seconds"] = *options.seconds;
+  if (options.copies) json["k"] = *options.copies;
+  if (options.rate) json["rate"] = *options.rate;
+  if (plan.gaussians > 0) json["gaussians"] = plan.gaussians;
+  return json;
+}
+
 nlohmann::json ToJson(const std::string& input, const fs::path& output, const EnhanceReport& r) {
   nlohmann::json json = {{"input", input},
                          {"output", output.string()},
@@ -126,8 +140,9 @@ nlohmann::json ToJson(const std::string& input, const fs::path& output, const En
   for (const StepReport& step : r.steps) {
     const std::string key = json.contains(step.method) ? step.method + " again" : step.method;
     for (const auto& [name, value] : step.facts) {
-      std::visit([&, &fact = name](auto number) { json[key][fact] = number; }, value);
+      std::visit([&, &fact = name](auto told) { json[key][fact] = told; }, value);
     }
+    if (step.plan) json[key]["plan"] = ToJson(*step.plan);
   }
   if (!r.pixel_size_source.empty()) {
     json["upscale"] = r.upscale;

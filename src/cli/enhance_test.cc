@@ -180,6 +180,13 @@ TEST_F(EnhanceVerb, Refinement) {
       ExpectJson(Enhance({"--method", "refine", "--upscale", "2", "--steps", "3", "--poses", "10", "--k", "2"}))[0];
   EXPECT_EQ(row["method"], "refine");
   EXPECT_TRUE(row["refine"].contains("consistency_after"));
+  EXPECT_TRUE(row["refine"]["kept_start"].is_boolean());
+  const nlohmann::json& plan = row["refine"]["plan"];
+  EXPECT_EQ(plan["from_input"], false);
+  EXPECT_EQ(plan["least_gain"], 0);
+  EXPECT_EQ(plan["steps"], 3);
+  EXPECT_EQ(plan["k"], 2);
+  EXPECT_EQ(plan["gaussians"], 2 * row["gaussians"]["in"].get<int64_t>());
   EXPECT_EQ(ExpectJson({"info", folder_ / "out.ply"})["gaussians"], row["gaussians"]["out"]);
   EXPECT_FALSE(Exists("out.ply.checkpoint"));  // it is finished
 }

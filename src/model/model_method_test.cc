@@ -187,7 +187,7 @@ TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
   auto enhanced = registered.run(input, options, report);
   ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
   EXPECT_EQ(enhanced->size(), 600);
-  const std::map<std::string, std::variant<int64_t, double>> facts(report.facts.begin(), report.facts.end());
+  const std::map<std::string, FactValue> facts(report.facts.begin(), report.facts.end());
   EXPECT_EQ(std::get<int64_t>(facts.at("copies")), 3);
   EXPECT_EQ(std::get<int64_t>(facts.at("unlike_training")), 0);
 

@@ -43,12 +43,12 @@ struct EnhanceSettings {
   uint64_t seed = 0;
 };
 
-// What one method did. Facts are numbers by name: counts are whole, measurements are not.
+// What one method did. Facts by name: whether something was so; counts, which are whole; measurements, which are not.
 struct EnhanceStep {
   std::string method = {};
   int64_t dropped = 0;   // Gaussians that it could not use
   bool stopped = false;  // by RunSettings::stop; its result is valid all the same
-  std::vector<std::pair<std::string, std::variant<int64_t, double>>> facts = {};
+  std::vector<std::pair<std::string, std::variant<bool, int64_t, double>>> facts = {};
 };
 
 struct EnhanceOutcome {

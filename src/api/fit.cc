@@ -11,16 +11,6 @@ namespace anchorsplat {
 
 namespace {
 
-// Where the Gaussians begin, as `anchorsplat fit` has it.
-InitialPoints StartOf(const TrainingViews& views, const GaussianCloud* start, const FitSettings& settings) {
-  if (start != nullptr || views.points.size() > 0) {
-    InitialPoints points = start != nullptr ? PointsOf(*start) : views.points;
-    return settings.initial_points ? Thinned(points, *settings.initial_points) : std::move(points);
-  }
-  return RandomPointsInView(settings.initial_points.value_or(kRandomPoints), views.train, views.scene_scale,
-                            settings.seed);
-}
-
 FitQuality ToQuality(const ViewQuality& quality) { return {quality.views, quality.psnr, quality.ssim}; }
 
 Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianCloud* start,
@@ -42,9 +32,11 @@ Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianClo
     options.objective.render.background = *background;
   }
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial,
-                               InitialCloud(StartOf(views, start, settings), views.scene_scale,
-                                            {.sh_degree = settings.sh_degree, .seed = settings.seed}));
+  const InitialPoints points = start != nullptr ? Thinned(PointsOf(*start), settings.initial_points)
+                                                : UsualStart(views, settings.initial_points, settings.seed);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      GaussianCloud initial,
+      InitialCloud(points, views.scene_scale, {.sh_degree = settings.sh_degree, .seed = settings.seed}));
   FitControl control;
   control.checkpoint = settings.checkpoint;
   control.resume = settings.resume;

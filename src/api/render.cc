@@ -26,10 +26,10 @@ Result<std::vector<PinholeCamera>> Orbit(const CloudView& cloud, int count, int 
   }
   const Pinhole intrinsics = PinholeFromFov(width, height, fov * std::numbers::pi / 180);
   const Framing framing = FrameCloud(cloud);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet orbit,
-                               OrbitCameras(count, FramingDistance(framing, intrinsics), framing.target, intrinsics));
   const std::vector<std::string> comments(cloud.comments.begin(), cloud.comments.end());
-  TurnUp(framing.target, UpOf(comments).value_or(kUsualUp), orbit.cameras);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraSet orbit,
+                               UprightOrbit(count, FramingDistance(framing, intrinsics), framing.target,
+                                            UpOf(comments).value_or(kUsualUp), intrinsics));
   std::vector<PinholeCamera> cameras;
   for (const Camera& camera : orbit.cameras) cameras.push_back(ToPinhole(camera));
   return cameras;

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "core/file_system.h"
+#include "core/finite.h"
 #include "core/rotation.h"
 #include "core/text.h"
 #include "images/image_io.h"
@@ -43,9 +44,7 @@ Result<Pose> PoseFromCameraToWorld(const std::array<double, 9>& r, const std::ar
 Result<Pose> PoseFromUnitQuaternion(const std::array<double, 4>& q, const std::array<double, 3>& t) {
   const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (!(std::abs(norm - 1) <= 1e-3)) return Bad(Cat("quaternion has norm ", norm, ", expected 1"));
-  for (const double x : t) {
-    if (!std::isfinite(x)) return Bad("translation is not finite");
-  }
+  if (!AllFinite(t)) return Bad("translation is not finite");
   return Pose{RotationFromQuaternion(q[0], q[1], q[2], q[3]), t};
 }
 

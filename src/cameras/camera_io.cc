@@ -7,6 +7,7 @@
 
 #include "cameras/colmap_model.h"
 #include "cameras/inria_cameras.h"
+#include "cameras/parse_cameras.h"
 #include "cameras/transforms_json.h"
 #include "core/file_system.h"
 #include "core/text.h"
@@ -16,12 +17,15 @@ namespace anchorsplat {
 
 namespace {
 
+Result<CameraSet> CamerasFromJson(const JsonValue& root, const std::filesystem::path& folder) {
+  if (root.raw().is_array()) return CamerasFromInria(root, folder);
+  if (root.raw().is_object()) return CamerasFromTransforms(root, folder);
+  return root.Complain("expected a transforms.json (an object with \"frames\") or a cameras.json (an array)");
+}
+
 Result<CameraSet> ReadCameraJson(const std::filesystem::path& path) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile file, JsonFile::Read(path));
-  const JsonValue root = file.root();
-  if (root.raw().is_array()) return CamerasFromInria(root, path.parent_path());
-  if (root.raw().is_object()) return CamerasFromTransforms(root, path.parent_path());
-  return root.Complain("expected a transforms.json (an object with \"frames\") or a cameras.json (an array)");
+  return CamerasFromJson(file.root(), path.parent_path());
 }
 
 // transforms*.json and cameras.json of a folder, sorted.
@@ -62,6 +66,11 @@ Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder) {
 }
 
 }  // namespace
+
+Result<CameraSet> ParseCameras(const std::string& name, std::string_view bytes, const std::filesystem::path& folder) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile file, JsonFile::Parse(name, bytes));
+  return CamerasFromJson(file.root(), folder);
+}
 
 Result<CameraSet> ReadCameras(const std::filesystem::path& path) {
   if (IsFolder(path)) return ReadCameraFolder(path);

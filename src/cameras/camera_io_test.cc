@@ -5,15 +5,16 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <limits>
 #include <string>
 #include <utility>
 
+#include "cameras/parse_cameras.h"
 #include "core/random.h"
 #include "core/rotation.h"
 #include "core/source_dir_for_test.h"
 #include "images/image_io.h"
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 
 namespace anchorsplat {
@@ -21,11 +22,6 @@ namespace {
 
 void Write(const std::filesystem::path& path, const std::string& text) {
   std::ofstream(path, std::ios::binary | std::ios::trunc) << text;
-}
-
-std::string Text(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 CameraSet RandomCameras(int count, uint64_t seed) {
@@ -74,7 +70,7 @@ TEST(WriteTransforms, RoundTrips) {
   ASSERT_TRUE(read.ok()) << read.error().message;
   ExpectSame(set, *read, 1e-13);
   // Each frame says only what is its own.
-  const std::string text = Text(path);
+  const std::string text = FileBytes(path);
   const auto count = [&](const std::string& what) {
     int found = 0;
     for (size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++found;
@@ -89,6 +85,20 @@ TEST(WriteTransforms, RoundTrips) {
   ASSERT_FALSE(again.ok());
   EXPECT_EQ(again.error().code, ErrorCode::kExists);
   EXPECT_TRUE(WriteTransforms(path, *read, {.overwrite = true}).ok());
+}
+
+TEST(ParseCameras, IsWhatTheFileSays) {
+  const auto example = SourceDirForTest() / "examples/biplane/transforms_hr.json";
+  const auto read = ReadCameras(example);
+  const auto parsed = ParseCameras("upload", FileBytes(example), example.parent_path());
+  ASSERT_TRUE(parsed.ok()) << parsed.error().message;
+  ExpectSame(*read, *parsed, 0);
+  for (const char* text : {"", "3", "{}", "[{}]", "{\"frames\": 1"}) {
+    const auto none = ParseCameras("upload", text);
+    ASSERT_FALSE(none.ok()) << text;
+    EXPECT_EQ(none.error().code, ErrorCode::kBadFile) << text;
+    EXPECT_TRUE(none.error().message.starts_with("upload: ")) << none.error().message;
+  }
 }
 
 TEST(WriteTransforms, KeepsTheExamples) {
@@ -107,7 +117,7 @@ TEST(WriteTransforms, KeepsThePicturesExtension) {
   CameraSet set = RandomCameras(1, 2);
   set.cameras[0].image = "/somewhere/else/0.JPG";
   ASSERT_TRUE(WriteTransforms(folder / "t.json", set).ok());
-  EXPECT_NE(Text(folder / "t.json").find("\"views/0.JPG\""), std::string::npos);
+  EXPECT_NE(FileBytes(folder / "t.json").find("\"views/0.JPG\""), std::string::npos);
 }
 
 TEST(WriteTransforms, RefusesWhatCouldNotBeReadAgain) {

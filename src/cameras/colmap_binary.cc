@@ -1,10 +1,10 @@
 #include <bit>
-#include <cmath>
 #include <cstdio>
 #include <string>
 #include <vector>
 
 #include "cameras/colmap_model.h"
+#include "core/finite.h"
 #include "core/text.h"
 #include "io/file_bytes.h"
 
@@ -163,9 +163,7 @@ Result<std::vector<ColmapPoint>> ReadColmapPointsBinary(const std::filesystem::p
     for (double& x : point.position) ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(x, "a point's position"));
     for (uint8_t& c : point.color) ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(c, "a point's colour"));
     ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(error, "a point's error"));
-    for (const double x : point.position) {
-      if (!std::isfinite(x)) return stream.Complain(Cat("point ", id, " has no finite position"));
-    }
+    if (!AllFinite(point.position)) return stream.Complain(Cat("point ", id, " has no finite position"));
     ANCHORSPLAT_RETURN_IF_ERROR(stream.ReadCount(track, kTrackElement, "a point's number of images"));
     ANCHORSPLAT_RETURN_IF_ERROR(stream.Skip(track * kTrackElement));
   }

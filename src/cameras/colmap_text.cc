@@ -1,10 +1,10 @@
 #include <charconv>
-#include <cmath>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "cameras/colmap_model.h"
+#include "core/finite.h"
 #include "core/text.h"
 #include "core/words.h"
 #include "io/file_bytes.h"
@@ -148,9 +148,7 @@ Result<std::vector<ColmapPoint>> ReadColmapPointsText(const std::filesystem::pat
     for (uint8_t& c : point.color) {
       ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(lines, line, "the colour R G B, 0 to 255", c));
     }
-    for (const double x : point.position) {
-      if (!std::isfinite(x)) return lines.Complain(Cat("point ", id, " has no finite position"));
-    }
+    if (!AllFinite(point.position)) return lines.Complain(Cat("point ", id, " has no finite position"));
     points.push_back(point);
     // What follows, the error and the images that see the point, is not needed.
   }

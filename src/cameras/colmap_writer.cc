@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <string>
 #include <vector>
 
 #include "cameras/camera_checks.h"
+#include "core/finite.h"
 #include "core/rotation.h"
 #include "core/text.h"
 #include "io/atomic_file.h"
@@ -60,12 +60,8 @@ Result<Model> MakeModel(const std::filesystem::path& folder, const CameraSet& se
     if (entry.name.find_first_of(std::string("\n\r\0", 3)) != std::string::npos) {
       return complain("its name has a line break or a zero byte, which a COLMAP model cannot hold");
     }
-    for (const double x : camera.world_to_camera.rotation) {
-      if (!std::isfinite(x)) return complain("its rotation is not finite");
-    }
-    for (const double x : camera.world_to_camera.translation) {
-      if (!std::isfinite(x)) return complain("its position is not finite");
-    }
+    if (!AllFinite(camera.world_to_camera.rotation)) return complain("its rotation is not finite");
+    if (!AllFinite(camera.world_to_camera.translation)) return complain("its position is not finite");
     entry.quaternion = QuaternionFromRotation(camera.world_to_camera.rotation);
     entry.translation = camera.world_to_camera.translation;
     const auto known = std::find_if(model.cameras.begin(), model.cameras.end(),
@@ -185,10 +181,8 @@ Status WriteColmapCameras(const std::filesystem::path& folder, const CameraSet& 
 Status WriteColmapPoints(const std::filesystem::path& folder, std::span<const ColmapPoint> points, ColmapForm form,
                          const WriteOptions& options) {
   for (const ColmapPoint& point : points) {
-    for (const double x : point.position) {
-      if (!std::isfinite(x)) {
-        return Error{ErrorCode::kBadArgument, Cat(folder.string(), ": a point's position is not finite")};
-      }
+    if (!AllFinite(point.position)) {
+      return Error{ErrorCode::kBadArgument, Cat(folder.string(), ": a point's position is not finite")};
     }
   }
   const bool binary = form == ColmapForm::kBinary;

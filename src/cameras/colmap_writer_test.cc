@@ -10,6 +10,7 @@
 #include "cameras/camera_io.h"
 #include "core/random.h"
 #include "core/rotation.h"
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 #include "io/little_endian.h"
 
@@ -67,8 +68,7 @@ TEST(ColmapWriter, PointsFollowTheFormat) {
   const TestFolder folder;
   const std::vector<ColmapPoint> points = {{{1, 2, 3}, {10, 20, 30}}, {{-0.5, 0, 1e-3}, {255, 0, 1}}};
   ASSERT_TRUE(WriteColmapPoints(folder.path(), points, ColmapForm::kBinary).ok());
-  std::ifstream in(folder / "points3D.bin", std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  const std::string bytes = FileBytes(folder / "points3D.bin");
   ASSERT_EQ(bytes.size(), 8u + 2 * 51);
   EXPECT_EQ(LoadLittle<uint64_t>(bytes.data()), 2u);
   EXPECT_EQ(LoadLittle<uint64_t>(bytes.data() + 8), 1u);

@@ -21,6 +21,7 @@
 #include "images/image_io.h"
 #include "io/atomic_file.h"
 #include "io/input_record.h"
+#include "io/json_file.h"
 #include "metrics/side_by_side.h"
 
 namespace anchorsplat {
@@ -103,12 +104,11 @@ Result<Sides> OpenSides(const CompareFlags& flags) {
 }
 
 nlohmann::json ToJson(const Comparison& comparison) {
-  const auto psnr = [](double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); };
-  nlohmann::json json = {{"mean", {{"psnr", psnr(comparison.mean_psnr)}, {"ssim", comparison.mean_ssim}}},
+  nlohmann::json json = {{"mean", {{"psnr", FiniteOrNull(comparison.mean_psnr)}, {"ssim", comparison.mean_ssim}}},
                          {"views", nlohmann::json::array()}};
   if (comparison.mean_lpips) json["mean"]["lpips"] = *comparison.mean_lpips;
   for (const ViewScore& view : comparison.views) {
-    json["views"].push_back({{"name", view.name}, {"psnr", psnr(view.psnr)}, {"ssim", view.ssim}});
+    json["views"].push_back({{"name", view.name}, {"psnr", FiniteOrNull(view.psnr)}, {"ssim", view.ssim}});
     if (view.lpips) json["views"].back()["lpips"] = *view.lpips;
   }
   return json;

@@ -163,7 +163,7 @@ std::string WriteLabelledScan(const std::filesystem::path& path) {
 TEST_F(ConvertVerb, KeepsWhatAPlySaysBesideItsGaussians) {
   const std::string extras = WriteLabelledScan(folder_ / "extras.ply");
   const auto has_labels = [&](const char* name) {
-    return FileText(folder_ / name).find("property uchar label") != std::string::npos;
+    return FileBytes(folder_ / name).find("property uchar label") != std::string::npos;
   };
   EXPECT_THAT(ExpectDone({"convert", extras, folder_ / "kept.ply", "--min-opacity", "0.6", "--sort", "morton"}).err,
               IsEmpty());

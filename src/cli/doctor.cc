@@ -40,6 +40,8 @@ struct Finding {
   std::string command;  // gets what is missing; else empty
 };
 
+// The kernel's files say that they are empty, so that io/'s readers would take them for that.
+
 std::string FirstLine(const fs::path& path) {
   std::ifstream file(path);
   std::string line;

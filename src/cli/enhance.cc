@@ -116,6 +116,20 @@ Status MakeOutDir(const EnhanceFlags& flags) {
   return {};
 }
 
+nlohmann::json ToJson(const RefinePlan& plan) {
+  nlohmann::json json = {
+      {"from_input", plan.from_input}, {"nothing_to_do", plan.nothing_to_do}, {"least_gain", plan.least_gain}};
+  if (!plan.why.empty()) json["why"] = plan.why;
+  if (plan.nothing_to_do) return json;
+  const RefineOptions& options = plan.options;
+  if (options.steps) json["steps"] = *options.steps;
+  if (options.seconds) json["seconds"] = *options.seconds;
+  if (options.copies) json["k"] = *options.copies;
+  if (options.rate) json["rate"] = *options.rate;
+  if (plan.gaussians > 0) json["gaussians"] = plan.gaussians;
+  return json;
+}
+
 nlohmann::json ToJson(const std::string& input, const fs::path& output, const EnhanceReport& r) {
   nlohmann::json json = {{"input", input},
                          {"output", output.string()},
@@ -126,8 +140,9 @@ nlohmann::json ToJson(const std::string& input, const fs::path& output, const En
   for (const StepReport& step : r.steps) {
     const std::string key = json.contains(step.method) ? step.method + " again" : step.method;
     for (const auto& [name, value] : step.facts) {
-      std::visit([&, &fact = name](auto number) { json[key][fact] = number; }, value);
+      std::visit([&, &fact = name](auto told) { json[key][fact] = told; }, value);
     }
+    if (step.plan) json[key]["plan"] = ToJson(*step.plan);
   }
   if (!r.pixel_size_source.empty()) {
     json["upscale"] = r.upscale;
@@ -303,16 +318,11 @@ std::string MethodHelp() {
   return text;
 }
 
-}  // namespace
-
-void AddEnhance(CLI::App& app, Program& program) {
-  CLI::App& verb = AddVerb(app, program, "enhance", "Make a splat hold up when seen closer",
-                           "anchorsplat enhance scan.ply -o scan-4x.ply --cameras transforms.json");
-  const auto flags = std::make_shared<EnhanceFlags>();
-  EnhanceOptions& options = flags->options;
-  verb.add_option("inputs", flags->inputs, "Splat files")->required()->check(NotEmpty());
-  auto* output = verb.add_option("-o,--output", flags->output, "File to write (one input)");
-  verb.add_option("--out-dir", flags->out_dir, "Folder to write to, under the inputs' names")->excludes(output);
+void AddTaskFlags(CLI::App& verb, EnhanceFlags& flags) {
+  EnhanceOptions& options = flags.options;
+  verb.add_option("inputs", flags.inputs, "Splat files")->required()->check(NotEmpty());
+  auto* output = verb.add_option("-o,--output", flags.output, "File to write (one input)");
+  verb.add_option("--out-dir", flags.out_dir, "Folder to write to, under the inputs' names")->excludes(output);
   verb.add_option("--method", options.method, MethodHelp())->capture_default_str();
   verb.add_option(
           "--quality", options.quality,
@@ -322,12 +332,16 @@ void AddEnhance(CLI::App& app, Program& program) {
       ->check(CLI::IsMember({"fast", "good", "best"}));
   verb.add_option("--upscale", options.upscale, "How many times closer it will be seen; at least 1")
       ->capture_default_str();
+}
+
+void AddPixelSizeFlags(CLI::App& verb, EnhanceFlags& flags) {
+  EnhanceOptions& options = flags.options;
   verb.add_option(
-          "--pixel-size", flags->pixel_size,
+          "--pixel-size", flags.pixel_size,
           "World size of one pixel of the training views (depth / focal length), or auto to estimate it from the "
           "splat; an estimate that its other features contradict is not acted on")
       ->capture_default_str();
-  auto* cameras = verb.add_option("--cameras", flags->cameras, "Training cameras: exact pixel size for every Gaussian")
+  auto* cameras = verb.add_option("--cameras", flags.cameras, "Training cameras: exact pixel size for every Gaussian")
                       ->check(NotEmpty());
   verb.add_option("--train-width", options.train_width,
                   "Image width in training where it was less than the cameras say")
@@ -342,17 +356,17 @@ void AddEnhance(CLI::App& app, Program& program) {
       ->needs(cameras);
   verb.add_option("--filter-strength", options.filter_strength,
                   "Share of the absorbed 0.3 px² to give back (default: 1 - (1 - 1/upscale²)/3.6)");
+}
 
-  verb.add_flag("--view", flags->view, "Also write an HTML page beside the output that shows before and after");
-
+void AddModelFlags(CLI::App& verb, EnhanceFlags& flags) {
   const std::string group = "Model";
-  PublishedOptions& model = options.model.options;
-  verb.add_option("--model", flags->model_file,
+  PublishedOptions& model = flags.options.model.options;
+  verb.add_option("--model", flags.model_file,
                   "Weights of an AnchorSplat network or of a compact one, .pth or .safetensors")
       ->check(NotEmpty())
       ->group(group);
   const auto model_option = [&](CLI::Option* option) { return option->group(group); };
-  model_option(verb.add_option("--compat", flags->compat,
+  model_option(verb.add_option("--compat", flags.compat,
                                "upstream: do what the published script does, quirks included (its fp16 attention by "
                                "--attention-rounding fp16)"))
       ->check(CLI::IsMember({"upstream"}));
@@ -362,7 +376,7 @@ void AddEnhance(CLI::App& app, Program& program) {
                           {"bbox", NormalisationMode::kBbox},
                           {"unit", NormalisationMode::kUnit}},
                          "How the splat is brought into the network's cube"));
-  model_option(AddChoice(verb, "--precision", options.model.precision,
+  model_option(AddChoice(verb, "--precision", flags.options.model.precision,
                          {{"fp32", WeightPrecision::kFloat}, {"bf16", WeightPrecision::kBFloat16}},
                          "Of matrix products, convolutions and attention; bf16 only where the processor has products "
                          "of it (`doctor` says), else fp32"));
@@ -373,7 +387,7 @@ void AddEnhance(CLI::App& app, Program& program) {
                          {{"v1.5", DepthRule::kLargest}, {"v1.6", DepthRule::kLargestPlusOne}},
                          "Bits of the space-filling curves as Pointcept's release counted them"));
   model_option(
-      verb.add_option("--shuffles", flags->shuffles,
+      verb.add_option("--shuffles", flags.shuffles,
                       "Orders of the space-filling curves: identity, a seed of PyTorch's, or five permutations"))
       ->capture_default_str();
   model_option(verb.add_option("--max-gaussians", model.max_gaussians,
@@ -389,7 +403,19 @@ void AddEnhance(CLI::App& app, Program& program) {
                                "Larger splats are enhanced in overlapping blocks of this many"))
       ->check(CLI::Range(int64_t{1000}, int64_t{100'000'000}))
       ->capture_default_str();
-  AddRefineFlags(verb, options.refine, options.control);
+}
+
+}  // namespace
+
+void AddEnhance(CLI::App& app, Program& program) {
+  CLI::App& verb = AddVerb(app, program, "enhance", "Make a splat hold up when seen closer",
+                           "anchorsplat enhance scan.ply -o scan-4x.ply --cameras transforms.json");
+  const auto flags = std::make_shared<EnhanceFlags>();
+  AddTaskFlags(verb, *flags);
+  AddPixelSizeFlags(verb, *flags);
+  verb.add_flag("--view", flags->view, "Also write an HTML page beside the output that shows before and after");
+  AddModelFlags(verb, *flags);
+  AddRefineFlags(verb, flags->options.refine, flags->options.control);
   verb.callback([flags, &verb, &program] {
     flags->options.given = GivenOptions(verb);
     program.run = [flags, &program] { return RunEnhance(*flags, program); };

@@ -48,11 +48,11 @@ TEST_F(EnhanceVerb, Filter) {
 
 TEST_F(EnhanceVerb, OverwritesOnlyWhenTold) {
   ExpectDone(Enhance({"--method", "filter"}));
-  const std::string before = FileText(folder_ / "out.ply");
+  const std::string before = FileBytes(folder_ / "out.ply");
   ExpectRefused(Enhance({"--method", "filter", "--upscale", "2"}), ErrorCode::kExists, {"out.ply: exists"});
-  EXPECT_EQ(FileText(folder_ / "out.ply"), before);
+  EXPECT_EQ(FileBytes(folder_ / "out.ply"), before);
   EXPECT_THAT(ExpectDone(Enhance({"--method", "filter", "--upscale", "2", "-w", "-q"})).out, IsEmpty());
-  EXPECT_NE(FileText(folder_ / "out.ply"), before);
+  EXPECT_NE(FileBytes(folder_ / "out.ply"), before);
 }
 
 TEST_F(EnhanceVerb, UpscaleOfOneChangesNothing) {
@@ -69,7 +69,7 @@ TEST_F(EnhanceVerb, PixelSizeOfTheCamerasOrOfTheSplat) {
   EXPECT_THAT(run.err, HasSubstr("--camera-rule median: the cameras look at one thing from all around"));
   EXPECT_EQ(run.json()[0]["pixel_size"]["source"], "cameras");
   EXPECT_EQ(run.json()[0]["camera_rule"], "median");
-  EXPECT_THAT(FileText(folder_ / "cameras.ply").substr(0, 500), HasSubstr("\ncomment world up: 0 "));
+  EXPECT_THAT(FileBytes(folder_ / "cameras.ply").substr(0, 500), HasSubstr("\ncomment world up: 0 "));
   const ProgramRun estimated = ExpectDone({"enhance", input, "-o", folder_ / "auto.ply", "--method", "filter"});
   EXPECT_THAT(estimated.err, HasSubstr("estimated"));
 
@@ -87,7 +87,7 @@ TEST_F(EnhanceVerb, PixelSizeOfTheCamerasOrOfTheSplat) {
 TEST_F(EnhanceVerb, PageBesideTheResult) {
   const ProgramRun run = ExpectDone(Enhance({"--method", "filter", "--view"}));
   EXPECT_THAT(run.out, HasSubstr("out.html: "));
-  EXPECT_THAT(FileText(folder_ / "out.html"), HasSubstr("<html"));
+  EXPECT_THAT(FileBytes(folder_ / "out.html"), HasSubstr("<html"));
   ExpectRefused(Enhance({"--method", "filter", "--view"}, "out.splat"), ErrorCode::kExists, {"out.html"});
   // Known to be two before the work begins.
   const std::string other = WriteScan(folder_ / "scan.spz");
@@ -119,7 +119,7 @@ TEST_F(EnhanceVerb, NetworkThatIsPartOfTheProgram) {
       RunWords({"enhance", folder_ / "pruned.ply", "-o", folder_ / "twice.ply", "--pixel-size", "0.02"});
   EXPECT_EQ(twice.code, 0);
   EXPECT_THAT(twice.err, HasSubstr("enhanced already"));
-  EXPECT_EQ(FileText(folder_ / "twice.ply"), FileText(folder_ / "pruned.ply"));
+  EXPECT_EQ(FileBytes(folder_ / "twice.ply"), FileBytes(folder_ / "pruned.ply"));
 }
 
 TEST_F(EnhanceVerb, NetworkOfAFile) {
@@ -130,7 +130,7 @@ TEST_F(EnhanceVerb, NetworkOfAFile) {
   ExpectRefused(Enhance({"--model", folder_ / "none.pth"}, "bad.ply"), ErrorCode::kNotFound, {"none.pth"});
   ExpectRefused(Enhance({"--model", scan_}, "bad.ply"), ErrorCode::kBadFile, {"scan.ply"});
   ExpectRefused(Enhance({"--model", ""}, "bad.ply"), ErrorCode::kBadArgument, {"--model"});
-  WriteText(folder_ / "cut.safetensors", FileText(compact_).substr(0, 9000));
+  WriteText(folder_ / "cut.safetensors", FileBytes(compact_).substr(0, 9000));
   ExpectRefused(Enhance({"--model", folder_ / "cut.safetensors"}, "bad.ply"), ErrorCode::kBadFile, {"cut.safetensors"});
   EXPECT_FALSE(Exists("bad.ply"));
 }
@@ -180,6 +180,13 @@ TEST_F(EnhanceVerb, Refinement) {
       ExpectJson(Enhance({"--method", "refine", "--upscale", "2", "--steps", "3", "--poses", "10", "--k", "2"}))[0];
   EXPECT_EQ(row["method"], "refine");
   EXPECT_TRUE(row["refine"].contains("consistency_after"));
+  EXPECT_TRUE(row["refine"]["kept_start"].is_boolean());
+  const nlohmann::json& plan = row["refine"]["plan"];
+  EXPECT_EQ(plan["from_input"], false);
+  EXPECT_EQ(plan["least_gain"], 0);
+  EXPECT_EQ(plan["steps"], 3);
+  EXPECT_EQ(plan["k"], 2);
+  EXPECT_EQ(plan["gaussians"], 2 * row["gaussians"]["in"].get<int64_t>());
   EXPECT_EQ(ExpectJson({"info", folder_ / "out.ply"})["gaussians"], row["gaussians"]["out"]);
   EXPECT_FALSE(Exists("out.ply.checkpoint"));  // it is finished
 }
@@ -216,7 +223,7 @@ TEST_F(EnhanceVerb, RefinementsThatMakeNoSense) {
   refused({"--steps", "2", "--checkpoint", scan_}, ErrorCode::kBadArgument);
   refused({"--steps", "2", "--checkpoint", folder_ / "x.ply"}, ErrorCode::kBadArgument, "is the output itself");
   refused({"--steps", "2", "--checkpoint", folder_ / "mine", "-w"}, ErrorCode::kExists, "is no checkpoint");
-  EXPECT_EQ(FileText(folder_ / "mine"), "mine");
+  EXPECT_EQ(FileBytes(folder_ / "mine"), "mine");
   ExpectRefused({"enhance", scan_, "-o", "/proc/x.ply", "--method", "refine", "--pixel-size", "0.02"}, ErrorCode::kIo);
   EXPECT_FALSE(Exists("x.ply"));
 }

@@ -59,22 +59,21 @@ struct Start {
 };
 
 Result<Start> ChooseStart(const FitFlags& flags, const TrainingViews& views, uint64_t seed) {
-  const auto thinned = [&](const InitialPoints& points) {
-    return flags.init_points ? Thinned(points, *flags.init_points) : points;
-  };
   if (!flags.init_splat.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(flags.init_splat));
-    return Start{thinned(PointsOf(cloud)), "splat"};
+    return Start{Thinned(PointsOf(cloud), flags.init_points), "splat"};
   }
   if (flags.init == FitInit::kPoints && views.points.size() == 0) {
     return Error{ErrorCode::kBadArgument, Cat(flags.project, ": --init points, but the project has none")};
   }
-  if (flags.init == FitInit::kPoints || (flags.init == FitInit::kAuto && views.points.size() > 0)) {
-    return Start{thinned(views.points), "points"};
+  if (flags.init == FitInit::kRandom) {
+    return Start{RandomPoints(flags.init_points.value_or(kRandomPoints), views.scene_scale, seed), "random"};
   }
-  const int64_t count = flags.init_points.value_or(kRandomPoints);
-  if (flags.init == FitInit::kRandom) return Start{RandomPoints(count, views.scene_scale, seed), "random"};
-  return Start{RandomPointsInView(count, views.train, views.scene_scale, seed), "view"};
+  if (flags.init == FitInit::kView) {
+    const int64_t count = flags.init_points.value_or(kRandomPoints);
+    return Start{RandomPointsInView(count, views.train, views.scene_scale, seed), "view"};
+  }
+  return Start{UsualStart(views, flags.init_points, seed), views.points.size() > 0 ? "points" : "view"};
 }
 
 nlohmann::json ToJson(const ViewQuality& quality) {

@@ -65,8 +65,8 @@ TEST_F(FitVerb, TheSameSeedMakesTheSameSplat) {
   ExpectDone(Fit("a.ply", {"--seed", "7"}));
   ExpectDone(Fit("b.ply", {"--seed", "7", "--threads", "1"}));
   ExpectDone(Fit("c.ply", {"--seed", "8"}));
-  EXPECT_EQ(FileText(folder_ / "a.ply"), FileText(folder_ / "b.ply"));
-  EXPECT_NE(FileText(folder_ / "a.ply"), FileText(folder_ / "c.ply"));
+  EXPECT_EQ(FileBytes(folder_ / "a.ply"), FileBytes(folder_ / "b.ply"));
+  EXPECT_NE(FileBytes(folder_ / "a.ply"), FileBytes(folder_ / "c.ply"));
 }
 
 TEST_F(FitVerb, RefusesWhatMakesNoSense) {
@@ -93,9 +93,9 @@ TEST_F(FitVerb, OverwritesOnlyWhenTold) {
   WriteText(folder_ / "mine.ply", "mine");
   ExpectRefused(Fit("mine.ply", {}), ErrorCode::kExists, {"mine.ply"});
   ExpectRefused(Fit("x.ply", {"--gsplat-checkpoint", folder_ / "mine.ply"}), ErrorCode::kExists, {"mine.ply"});
-  EXPECT_EQ(FileText(folder_ / "mine.ply"), "mine");
+  EXPECT_EQ(FileBytes(folder_ / "mine.ply"), "mine");
   ExpectDone(Fit("mine.ply", {"-w"}));
-  EXPECT_NE(FileText(folder_ / "mine.ply"), "mine");
+  EXPECT_NE(FileBytes(folder_ / "mine.ply"), "mine");
 }
 
 }  // namespace

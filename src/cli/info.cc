@@ -1,7 +1,5 @@
-#include <array>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <map>
 #include <memory>
@@ -20,6 +18,7 @@
 #include "enhance/pixel_size_guard.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
+#include "io/input_file.h"
 #include "model/compact/compact_network.h"
 #include "model/published/published_checkpoint_writer.h"
 #include "tensors/tensor_file.h"
@@ -180,10 +179,9 @@ nlohmann::json ToJson(const Findings& f) {
 // By content: gsplat keeps splats in files of the same kind, and other formats are zip archives too.
 bool LooksLikeModel(const std::filesystem::path& path) {
   if (!IsFile(path)) return false;  // a pipe can be read only once
-  std::array<char, 16> beginning{};
-  std::ifstream in(path, std::ios::binary);
-  in.read(beginning.data(), beginning.size());
-  if (!LooksLikeTensorFile(std::as_bytes(std::span(beginning).first(static_cast<size_t>(in.gcount()))))) return false;
+  const auto in = InputFile::Open(path);
+  const auto beginning = in.ok() ? in->Head(16) : Result<std::string>(in.error());
+  if (!beginning.ok() || !LooksLikeTensorFile(std::as_bytes(std::span(*beginning)))) return false;
   const auto file = TensorFile::Open(path);
   if (file.ok()) return file->Find("splats.means") == nullptr;
   const std::filesystem::path extension = path.extension();

@@ -67,7 +67,7 @@ TEST_F(InfoVerb, OfANetwork) {
   EXPECT_EQ(json["metadata"]["option.copies"], "2");
   const nlohmann::json shipped = ExpectJson({"info", SourceDirForTest() / "models/anchorsplat-compact.safetensors"});
   EXPECT_TRUE(shipped["metadata"].contains("object_names"));
-  WriteText(folder_ / "cut.safetensors", FileText(weights).substr(0, 9000));
+  WriteText(folder_ / "cut.safetensors", FileBytes(weights).substr(0, 9000));
   ExpectRefused({"info", folder_ / "cut.safetensors"}, ErrorCode::kBadFile, {"cut.safetensors"});
 }
 
@@ -84,7 +84,7 @@ TEST_F(InfoVerb, RefusesWhatIsNoSplat) {
   WriteText(folder_ / "points.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n");
   const ProgramRun run = ExpectRefused({"info", folder_ / "points.ply", "--json"}, ErrorCode::kBadFile, {"points.ply"});
   EXPECT_EQ(run.json()["error"]["code"], "bad_file");
-  WriteText(folder_ / "text.splat", FileText(SourceDirForTest() / "docs/architecture.md").substr(0, 3200));
+  WriteText(folder_ / "text.splat", FileBytes(SourceDirForTest() / "docs/architecture.md").substr(0, 3200));
   ExpectRefused({"info", folder_ / "text.splat"}, ErrorCode::kBadFile, {"is no .splat file"});
   WriteText(folder_ / "empty.splat", "");
   ExpectRefused({"info", folder_ / "empty.splat"}, ErrorCode::kBadFile, {"empty.splat: is empty"});

@@ -22,9 +22,9 @@ class KeptFiles : public testing::Test {
   void ExpectKept(const std::vector<fs::path>& files, const std::vector<std::string>& words,
                   const std::source_location& at = std::source_location::current()) {
     std::map<fs::path, std::string> before;
-    for (const fs::path& file : files) before[file] = FileText(file);
+    for (const fs::path& file : files) before[file] = FileBytes(file);
     ExpectRefused(words, ErrorCode::kBadArgument, {"write to another name"}, at);
-    for (const fs::path& file : files) EXPECT_EQ(FileText(file), before[file]) << file;
+    for (const fs::path& file : files) EXPECT_EQ(FileBytes(file), before[file]) << file;
   }
   static std::vector<fs::path> FilesIn(const fs::path& folder) {
     std::vector<fs::path> files;
@@ -58,7 +58,7 @@ TEST_F(KeptFiles, BufferOfAGltf) {
   const fs::path gltf = folder_ / "a.gltf", buffer = folder_ / "b.bin";
   ExpectDone({"convert", scan_, gltf});
   fs::rename(folder_ / "a.bin", buffer);
-  std::string text = FileText(gltf);
+  std::string text = FileBytes(gltf);
   text.replace(text.find("a.bin"), 5, "b.bin");
   WriteText(gltf, text);
   ExpectKept({gltf, buffer}, {"convert", gltf, folder_ / "b.gltf", "-w"});

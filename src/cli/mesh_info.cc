@@ -3,7 +3,6 @@
 #include <zlib.h>
 
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -15,6 +14,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "io/input_file.h"
 #include "scene/furniture_catalog.h"
 #include "scene/mesh_reader.h"
 #include "scene/mesh_summary.h"
@@ -175,11 +175,9 @@ Status RunLibraryInfo(const std::string& path, const SharedFlags& shared) {
 // The beginning of a file, where a PLY has its header and a glTF its list of extensions, as a rule.
 std::string Beginning(const std::string& path) {
   if (!IsFile(path)) return {};
-  std::string head(size_t{1} << 16, '\0');
-  std::ifstream in(path, std::ios::binary);
-  in.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<size_t>(in.gcount()));
-  return head;
+  const auto in = InputFile::Open(path);
+  const auto head = in.ok() ? in->Head(size_t{1} << 16) : Result<std::string>(in.error());
+  return head.ok() ? *head : std::string();
 }
 
 }  // namespace

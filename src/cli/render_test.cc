@@ -45,7 +45,7 @@ TEST_F(RenderVerb, OnePictureOfEveryCamera) {
   for (const nlohmann::json& view : json["views"]) EXPECT_TRUE(fs::exists(view["file"].get<std::string>()));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "views"), {}), 10);
   ExpectDone(Render("003.png", {"--cameras", cameras, "--view", "003", "--size", "32x32"}));
-  EXPECT_EQ(FileText(folder_ / "003.png"), FileText(folder_ / "views/003.png"));
+  EXPECT_EQ(FileBytes(folder_ / "003.png"), FileBytes(folder_ / "views/003.png"));
   ExpectDone(Render("clear.png", {"--cameras", cameras, "--view", "003", "--transparent"}));
   EXPECT_EQ(ReadImage(folder_ / "clear.png")->channels, 4);
   ExpectRefused(Render("x.png", {"--cameras", cameras, "--view", "999"}), ErrorCode::kBadArgument, {"999"});
@@ -58,7 +58,7 @@ TEST_F(RenderVerb, UpOfAnOrbit) {
   const auto picture = [&](const std::string& name, const std::string& scan, std::vector<std::string> words) {
     words.insert(words.begin(), {"render", scan, "-o", folder_ / name, "--orbit", "2", "--size", "64x64"});
     ExpectDone(words);
-    return FileText(folder_ / name / "001.png");
+    return FileBytes(folder_ / name / "001.png");
   };
   const std::string cameras = Biplane() / "transforms_lr.json";
   const std::string usual = picture("usual", scan_, {});

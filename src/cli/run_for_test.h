@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <source_location>
 #include <sstream>
@@ -20,6 +19,7 @@
 #include "cli/verb.h"
 #include "core/log.h"
 #include "core/parallel.h"
+#include "io/file_bytes_for_test.h"
 
 namespace anchorsplat {
 
@@ -105,12 +105,6 @@ inline ProgramRun ExpectRefused(const std::vector<std::string>& words, ErrorCode
   EXPECT_EQ(run.code, ExitCode(code)) << run.err;
   for (const std::string& text : says) EXPECT_THAT(run.err, testing::HasSubstr(text));
   return run;
-}
-
-inline std::string FileText(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  EXPECT_TRUE(in.good()) << path;
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 inline void WriteText(const std::filesystem::path& path, const std::string& text) {

@@ -119,7 +119,7 @@ TEST(CommandLine, AnyNumberOfThreadsMakesTheSamePicture) {
     ExpectDone(
         {"render", scan, "-o", folder / (threads + ".png"), "--orbit", "1", "--size", "200x150", "--threads", threads});
   }
-  EXPECT_EQ(FileText(folder / "1.png"), FileText(folder / "3.png"));
+  EXPECT_EQ(FileBytes(folder / "1.png"), FileBytes(folder / "3.png"));
 }
 
 // A batch in which one input fails is done for the others; one in which all do has the code of the last.

@@ -28,7 +28,7 @@ TEST_F(ViewVerb, BeforeAndAfterWithTruePictures) {
   EXPECT_EQ(json["views"], 3);
   EXPECT_EQ(json["bytes"], fs::file_size(page_));
   EXPECT_NEAR(json["pixel_size"].get<double>(), 0.02, 1e-6);
-  EXPECT_THAT(FileText(page_), AllOf(HasSubstr(R"("title":"out.ply")"), HasSubstr(R"(id="picture-2")")));
+  EXPECT_THAT(FileBytes(page_), AllOf(HasSubstr(R"("title":"out.ply")"), HasSubstr(R"(id="picture-2")")));
   ExpectRefused(words, ErrorCode::kExists, {"page.html"});
 }
 
@@ -36,11 +36,11 @@ TEST_F(ViewVerb, OneSplat) {
   const ProgramRun run = ExpectDone({"view", scan_, "-o", page_, "--sh-degree", "0", "--title", "a</script>b"});
   EXPECT_THAT(run.out, HasSubstr("open it in any browser"));
   EXPECT_THAT(run.err, IsEmpty());
-  EXPECT_THAT(FileText(page_), AllOf(HasSubstr(R"("degree":0)"), HasSubstr(R"(a\u003c/script\u003eb)")));
+  EXPECT_THAT(FileBytes(page_), AllOf(HasSubstr(R"("degree":0)"), HasSubstr(R"(a\u003c/script\u003eb)")));
   fs::create_directory(folder_ / "scan");
   ExpectDone({"convert", scan_, folder_ / "scan/meta.json"});
   ExpectDone({"view", folder_ / "scan/", "-o", page_, "-w"});
-  EXPECT_THAT(FileText(page_), HasSubstr(R"("title":"scan")"));
+  EXPECT_THAT(FileBytes(page_), HasSubstr(R"("title":"scan")"));
 }
 
 TEST_F(ViewVerb, RefusesWhatMakesNoSense) {
@@ -57,11 +57,11 @@ TEST_F(ViewVerb, RefusesWhatMakesNoSense) {
   refused({"--pixel-size", "0"}, ErrorCode::kBadArgument, "--pixel-size");
   refused({"--background", "white"}, ErrorCode::kBadArgument, "--background");
   refused({"--before", folder_ / "none.ply"}, ErrorCode::kNotFound, "none.ply");
-  const std::string before = FileText(scan_);
+  const std::string before = FileBytes(scan_);
   ExpectRefused({"view", scan_, "-o", folder_ / "other.spz", "-w"}, ErrorCode::kBadArgument, {".html"});
   const std::string nan = WriteNanScan(folder_ / "nan.ply");
   ExpectRefused({"view", nan, "-o", page_}, ErrorCode::kBadFile, {"nan.ply: there is nothing to show"});
-  EXPECT_EQ(FileText(scan_), before);
+  EXPECT_EQ(FileBytes(scan_), before);
   EXPECT_FALSE(fs::exists(page_));
 }
 

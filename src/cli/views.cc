@@ -42,8 +42,7 @@ Result<CameraSet> OrbitViews(const ViewFlags& flags, const GaussianCloud& cloud,
   const double radius = flags.radius > 0 ? flags.radius : FramingDistance(framing, intrinsics);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto up, ChooseUp(flags, cloud, cameras));
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet orbit,
-                               OrbitCameras(std::max(1, flags.orbit), radius, framing.target, intrinsics));
-  TurnUp(framing.target, up, orbit.cameras);
+                               UprightOrbit(std::max(1, flags.orbit), radius, framing.target, up, intrinsics));
   orbit.background = cameras.background;
   return orbit;
 }

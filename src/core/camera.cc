@@ -5,7 +5,9 @@
 #include <cstdio>
 #include <numbers>
 
+#include "core/finite.h"
 #include "core/text.h"
+#include "core/vector3.h"
 
 namespace anchorsplat {
 
@@ -13,15 +15,10 @@ namespace {
 
 using Vec3 = std::array<double, 3>;
 
-double Dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 Cross(const Vec3& a, const Vec3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 Vec3 Normalized(const Vec3& a) {
   const double norm = std::sqrt(Dot(a, a));
   return {a[0] / norm, a[1] / norm, a[2] / norm};
 }
-bool Finite(const Vec3& a) { return std::isfinite(a[0]) && std::isfinite(a[1]) && std::isfinite(a[2]); }
 
 // Rows are the camera's axes in world coordinates; the translation puts `center` at the origin.
 Pose PoseFromAxes(const Vec3& right, const Vec3& down, const Vec3& forward, const Vec3& center) {
@@ -74,7 +71,7 @@ Camera Crop(const Camera& camera, const PixelBox& box) {
 
 Result<Pose> LookAt(const Vec3& center, const Vec3& target, const Vec3& up) {
   const Vec3 along = {target[0] - center[0], target[1] - center[1], target[2] - center[2]};
-  if (!Finite(along) || !Finite(up)) return Error{ErrorCode::kBadArgument, "camera position is not finite"};
+  if (!AllFinite(along) || !AllFinite(up)) return Error{ErrorCode::kBadArgument, "camera position is not finite"};
   if (Dot(along, along) == 0) return Error{ErrorCode::kBadArgument, "camera stands on the point it looks at"};
   const Vec3 forward = Normalized(along);
   Vec3 right = Cross(forward, up);
@@ -91,9 +88,7 @@ Result<Pose> LookAt(const Vec3& center, const Vec3& target, const Vec3& up) {
 }
 
 Result<Pose> PoseFromOpenGlCameraToWorld(const std::array<double, 16>& m) {
-  for (const double x : m) {
-    if (!std::isfinite(x)) return Error{ErrorCode::kBadArgument, "camera matrix has a value that is not finite"};
-  }
+  if (!AllFinite(m)) return Error{ErrorCode::kBadArgument, "camera matrix has a value that is not finite"};
   const Vec3 right = {m[0], m[4], m[8]};
   const Vec3 up = {m[1], m[5], m[9]};
   const Vec3 back = {m[2], m[6], m[10]};

@@ -13,6 +13,9 @@ namespace anchorsplat {
 // unlike std::hash. It tells whether two things are the same where nobody means harm, and no more.
 class Fingerprint {
  public:
+  // A seed gives another number for the same bytes; 0 is FNV-1a itself.
+  explicit Fingerprint(uint64_t seed = 0) : value_(0xcbf29ce484222325u ^ seed) {}
+
   // Any contiguous range of plain values.
   template <typename Values>
   void Add(const Values& values) {
@@ -34,7 +37,7 @@ class Fingerprint {
   }
 
  private:
-  uint64_t value_ = 0xcbf29ce484222325u;
+  uint64_t value_;
 };
 
 }  // namespace anchorsplat

@@ -3,11 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 
 namespace anchorsplat {
 
-inline bool AllFinite(const float* values, int64_t count) {
-  return std::all_of(values, values + count, [](float x) { return std::isfinite(x); });
+template <typename T>
+bool AllFinite(const T* values, int64_t count) {
+  return std::all_of(values, values + count, [](T x) { return std::isfinite(x); });
+}
+
+// Of an array, vector or span.
+template <typename Values>
+bool AllFinite(const Values& values) {
+  return AllFinite(std::data(values), std::ssize(values));
 }
 
 inline float FiniteOr(float value, float otherwise) { return std::isfinite(value) ? value : otherwise; }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/finite.h"
 #include "core/statistics.h"
 
 namespace anchorsplat {
@@ -17,7 +18,7 @@ Framing FrameCloud(const CloudView& cloud) {
     Buffer<float> out;
     for (int64_t i = 0; i < cloud.size(); ++i) {
       const float* p = cloud.means.data() + 3 * i;
-      if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) continue;
+      if (!AllFinite(p, 3)) continue;
       if (cloud.opacity_logits[static_cast<size_t>(i)] >= least_logit) out.push_back(value(p));
     }
     return out;

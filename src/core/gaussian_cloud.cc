@@ -87,15 +87,26 @@ GaussianCloud WithShDegree(const GaussianCloud& cloud, int degree) {
   return out;
 }
 
-bool HasUsableShape(const GaussianCloud& cloud, int64_t i) {
+namespace {
+
+// Of a GaussianCloud or a CloudView; making the one into the other for every row would cost more than the look.
+template <typename Cloud>
+bool ShapeIsUsable(const Cloud& cloud, int64_t i) {
   const float* scales = cloud.log_scales.data() + 3 * i;
   return AllFinite(cloud.means.data() + 3 * i, 3) && std::all_of(scales, scales + 3, FiniteOrMinusInf) &&
          AllFinite(cloud.quats.data() + 4 * i, 4) && !std::isnan(cloud.opacity_logits[static_cast<size_t>(i)]);
 }
 
-bool IsUsable(const GaussianCloud& cloud, int64_t i) {
-  return HasUsableShape(cloud, i) && AllFinite(cloud.sh.data() + i * cloud.sh_stride(), cloud.sh_stride());
+template <typename Cloud>
+bool HarmonicsAreFinite(const Cloud& cloud, int64_t i) {
+  return AllFinite(cloud.sh.data() + i * cloud.sh_stride(), cloud.sh_stride());
 }
+
+}  // namespace
+
+bool HasUsableShape(const CloudView& cloud, int64_t i) { return ShapeIsUsable(cloud, i); }
+bool IsUsable(const CloudView& cloud, int64_t i) { return ShapeIsUsable(cloud, i) && HarmonicsAreFinite(cloud, i); }
+bool IsUsable(const GaussianCloud& cloud, int64_t i) { return ShapeIsUsable(cloud, i) && HarmonicsAreFinite(cloud, i); }
 
 bool IsFinite(const GaussianCloud& cloud, int64_t i) {
   return AllFinite(cloud.means.data() + 3 * i, 3) && AllFinite(cloud.log_scales.data() + 3 * i, 3) &&

@@ -18,7 +18,7 @@ Percentiles ComputePercentiles(std::span<float> values) {
   return out;
 }
 
-bool IsPlausible(const GaussianCloud& cloud, int64_t i) {
+bool IsPlausible(const CloudView& cloud, int64_t i) {
   static const float kLongest = std::log(kPlausibleExtent);
   const float* mean = cloud.means.data() + 3 * i;
   const float* scale = cloud.log_scales.data() + 3 * i;
@@ -27,7 +27,7 @@ bool IsPlausible(const GaussianCloud& cloud, int64_t i) {
 }
 
 // Rows whose mean leaves the box of the middle 98 %, grown tenfold about its centre, along any axis.
-int64_t CountOutliers(const GaussianCloud& cloud) {
+int64_t CountOutliers(const CloudView& cloud) {
   std::array<float, 3> low, high;
   Buffer<float> axis;
   for (size_t a = 0; a < 3; ++a) {
@@ -66,7 +66,7 @@ float Quantile(std::span<float> values, double q) {
   return static_cast<float>(low + fraction * (static_cast<double>(high) - low));
 }
 
-int64_t CountUnusable(const GaussianCloud& cloud, bool harmonics) {
+int64_t CountUnusable(const CloudView& cloud, bool harmonics) {
   constexpr int64_t kGrain = 1 << 14;
   std::atomic<int64_t> sum = 0;
   ParallelFor(0, cloud.size(), kGrain, [&](int64_t first, int64_t last) {
@@ -77,7 +77,7 @@ int64_t CountUnusable(const GaussianCloud& cloud, bool harmonics) {
   return sum;
 }
 
-CloudStatistics ComputeStatistics(const GaussianCloud& cloud) {
+CloudStatistics ComputeStatistics(const CloudView& cloud) {
   CloudStatistics out;
   out.gaussians = cloud.size();
   out.sh_degree = cloud.sh_degree;

@@ -5,7 +5,7 @@
 #include <optional>
 #include <span>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 
 namespace anchorsplat {
 
@@ -21,12 +21,15 @@ using Percentiles = std::array<float, kPercentiles.size()>;
 // is damaged, of another kind, or in coordinates (of the Earth, say) that floats are too coarse for.
 inline constexpr float kPlausibleExtent = 1e6f;
 
-// IsUsable, as far as position, scales, rotation and opacity go.
-bool HasUsableShape(const GaussianCloud& cloud, int64_t i);
+// IsUsable of core/gaussian_cloud.h for the Gaussians of a view.
+bool IsUsable(const CloudView& cloud, int64_t i);
+
+// The same, as far as position, scales, rotation and opacity go.
+bool HasUsableShape(const CloudView& cloud, int64_t i);
 
 // Rows that nobody draws (not IsUsable). Without `harmonics` those whose SH alone is to blame are not counted: it is
 // most of a cloud's memory.
-int64_t CountUnusable(const GaussianCloud& cloud, bool harmonics = true);
+int64_t CountUnusable(const CloudView& cloud, bool harmonics = true);
 
 // What a person wants to know about a cloud before trusting it. Percentiles are over usable rows, those of the axes
 // over rows that have any extent, of their ratio over those with three; NaN when there are none.
@@ -50,6 +53,6 @@ struct CloudStatistics {
   bool linear_looking_scales = false;     // stored scales look like lengths, not logarithms
   bool linear_looking_opacities = false;  // stored opacities look like 0–1, not logits
 };
-CloudStatistics ComputeStatistics(const GaussianCloud& cloud);
+CloudStatistics ComputeStatistics(const CloudView& cloud);
 
 }  // namespace anchorsplat

@@ -14,10 +14,13 @@ class Stopwatch {
     lap_ = now;
     return seconds;
   }
+  // Since the beginning.
+  double Total() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
 
  private:
   using Clock = std::chrono::steady_clock;
-  Clock::time_point lap_ = Clock::now();
+  Clock::time_point begin_ = Clock::now();
+  Clock::time_point lap_ = begin_;
 };
 
 }  // namespace anchorsplat

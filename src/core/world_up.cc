@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "core/text.h"
+#include "core/vector3.h"
 
 namespace anchorsplat {
 
@@ -81,9 +82,9 @@ void TurnUp(const Vec3& target, const Vec3& up, std::vector<Camera>& cameras) {
   const Vec3& y = *unit;
   // The columns of the rotation: where x, y and z go. x stays as near to itself as it can.
   const Vec3 start = std::abs(y[0]) < 0.9 ? Vec3{1, 0, 0} : Vec3{0, 0, 1};
-  const double along = start[0] * y[0] + start[1] * y[1] + start[2] * y[2];
+  const double along = Dot(start, y);
   const Vec3 x = *Unit({start[0] - along * y[0], start[1] - along * y[1], start[2] - along * y[2]}, 0);
-  const Vec3 z = {x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]};
+  const Vec3 z = Cross(x, y);
   for (Camera& camera : cameras) {
     Pose& pose = camera.world_to_camera;
     const Pose old = pose;
@@ -97,6 +98,13 @@ void TurnUp(const Vec3& target, const Vec3& up, std::vector<Camera>& cameras) {
       }
     }
   }
+}
+
+Result<CameraSet> UprightOrbit(int count, double radius, const Vec3& target, const Vec3& up,
+                               const Pinhole& intrinsics) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet orbit, OrbitCameras(count, radius, target, intrinsics));
+  TurnUp(target, up, orbit.cameras);
+  return orbit;
 }
 
 }  // namespace anchorsplat

@@ -24,6 +24,10 @@ std::string UpComment(const std::array<double, 3>& up);
 std::optional<std::array<double, 3>> UpOf(const std::vector<std::string>& comments);
 void FlipUp(const std::array<float, 3>& signs, std::vector<std::string>& comments);
 
+// OrbitCameras (core/camera.h) that hold `up` upright.
+Result<CameraSet> UprightOrbit(int count, double radius, const std::array<double, 3>& target,
+                               const std::array<double, 3>& up, const Pinhole& intrinsics);
+
 // Turns the cameras about `target` so that what was +y becomes `up` (of any length but 0).
 void TurnUp(const std::array<double, 3>& target, const std::array<double, 3>& up, std::vector<Camera>& cameras);
 

@@ -1,12 +1,12 @@
 #include "dataset/object_builder.h"
 
 #include <algorithm>
-#include <chrono>
 #include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "core/file_system.h"
 #include "core/log.h"
+#include "core/stopwatch.h"
 #include "core/text.h"
 #include "dataset/object_name.h"
 #include "dataset/picture_project.h"
@@ -28,14 +28,11 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-using Clock = std::chrono::steady_clock;
 
 constexpr const char* kJobName = "job.json";
 constexpr const char* kViewsDone = "views.json";
 constexpr const char* kFitCheckpoint = "fit.checkpoint";
 constexpr int64_t kCheckpointEvery = 1000;  // steps: a few seconds of work
-
-double Since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 Status Remove(const fs::path& path) {
   std::error_code code;
@@ -84,9 +81,9 @@ Result<RayTracer> PrepareMesh(const ObjectJob& job, ObjectRecord& record) {
 
 Status MakeViews(const ObjectJob& job, const fs::path& folder, ObjectRecord& record) {
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "mesh"));
-  const auto begin = Clock::now();
+  const Stopwatch watch;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const RayTracer tracer, PrepareMesh(job, record));
-  record.read_seconds = Since(begin);
+  record.read_seconds = watch.Total();
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "views"));
   for (const int size : {job.settings.views.low_size, job.settings.views.high_size}) {
     ANCHORSPLAT_RETURN_IF_ERROR(Remove(folder / std::to_string(size)));  // of an attempt that was cut off

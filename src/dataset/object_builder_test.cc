@@ -2,22 +2,16 @@
 
 #include <gtest/gtest.h>
 
-#include <iterator>
-
 #include "core/run_context.h"
 #include "dataset/scene_reader.h"
 #include "dataset/small_dataset_for_test.h"
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string Bytes(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 TEST(ObjectBuilder, MakesTheBenchmarksFiles) {
   const TestFolder folder;
@@ -53,7 +47,7 @@ TEST(ObjectBuilder, GoesOnWhereItWasStoppedAndGetsTheSame) {
   ASSERT_TRUE(BuildObject(job, folder / "cut").ok());
   for (const char* name : {"splat.ply", "12/images/003.png", "24/images/003.png", "12/sparse/0/points3D.bin",
                            "12/gaussian_splatting/ckpts/ckpt_59_rank0.pt"}) {
-    EXPECT_TRUE(Bytes(folder / "whole/tetra" / name) == Bytes(folder / "cut/tetra" / name)) << name;
+    EXPECT_TRUE(FileBytes(folder / "whole/tetra" / name) == FileBytes(folder / "cut/tetra" / name)) << name;
   }
 }
 
@@ -66,7 +60,7 @@ TEST(ObjectBuilder, KeepsFinishedViewsOfTheSameJobOnly) {
   ASSERT_TRUE(BuildObject(SmallJob(job.source, "other"), folder.path()).ok());
   fs::create_directories(building);
   fs::copy(folder / "other", building, fs::copy_options::recursive);
-  std::ofstream(building / "views.json") << Bytes(folder / "other/record.json");
+  std::ofstream(building / "views.json") << FileBytes(folder / "other/record.json");
   // Another job's work: begun anew, so that the stop finds no views.
   const std::atomic<bool> stop = true;
   const RunScope run({.stop = &stop});
@@ -92,15 +86,15 @@ TEST(ObjectBuilder, APictureAtFaultCostsNoCheckpoint) {
   const TestFolder folder;
   const ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
   const fs::path building = StoppedInItsFit(job, folder / "set");
-  const std::string checkpoint = Bytes(building / "fit.checkpoint");
+  const std::string checkpoint = FileBytes(building / "fit.checkpoint");
   const fs::path picture = building / "12/images/004.png";
-  const std::string whole = Bytes(picture);
+  const std::string whole = FileBytes(picture);
   fs::resize_file(picture, whole.size() / 2);
   const auto failed = BuildObject(job, folder / "set");
   ASSERT_FALSE(failed.ok());
   EXPECT_EQ(failed.error().code, ErrorCode::kBadFile);
   EXPECT_NE(failed.error().message.find("004.png"), std::string::npos) << failed.error().message;
-  EXPECT_TRUE(Bytes(building / "fit.checkpoint") == checkpoint);
+  EXPECT_TRUE(FileBytes(building / "fit.checkpoint") == checkpoint);
   std::ofstream(picture, std::ios::binary) << whole;
   EXPECT_TRUE(BuildObject(job, folder / "set").ok());
 }
@@ -134,7 +128,7 @@ TEST(ObjectBuilder, ReplacesNothingThatIsNoFolder) {
   ASSERT_FALSE(record.ok());
   EXPECT_EQ(record.error().code, ErrorCode::kExists);
   EXPECT_NE(record.error().message.find("is no folder"), std::string::npos);
-  EXPECT_EQ(Bytes(folder / "set/tetra"), "mine");
+  EXPECT_EQ(FileBytes(folder / "set/tetra"), "mine");
   // What was made waits for its place.
   fs::remove(folder / "set/tetra");
   EXPECT_TRUE(BuildObject(job, folder / "set").ok());
@@ -172,7 +166,7 @@ TEST(ObjectBuilder, BadMeshesAreErrorsWithTheirStage) {
   const TestFolder folder;
   std::ofstream(folder / "empty.obj") << "v 0 0 0\n";
   EXPECT_FALSE(BuildObject(SmallJob((folder / "empty.obj").string(), "empty"), folder / "set").ok());
-  EXPECT_EQ(Bytes(BuildingFolder(folder / "set", "empty") / kStageName), "mesh");
+  EXPECT_EQ(FileBytes(BuildingFolder(folder / "set", "empty") / kStageName), "mesh");
   EXPECT_EQ(BuildObject(SmallJob((folder / "none.obj").string(), "none"), folder / "set").error().code,
             ErrorCode::kNotFound);
 }

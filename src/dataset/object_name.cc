@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <vector>
 
+#include "core/fingerprint.h"
 #include "core/text.h"
 #include "scene/mesh_reader.h"
 
@@ -54,8 +55,9 @@ std::string SafeName(const std::string& text) {
 }
 
 uint64_t StableHash(std::string_view text, uint64_t seed) {
-  uint64_t hash = 0xCBF29CE484222325u ^ (seed * 0x9E3779B97F4A7C15u);
-  for (const char c : text) hash = (hash ^ static_cast<uint8_t>(c)) * 0x100000001B3u;
+  Fingerprint fingerprint(seed * 0x9E3779B97F4A7C15u);
+  fingerprint.Add(text);
+  uint64_t hash = fingerprint.value();
   // FNV's high bits hardly depend on the last characters: finish as splitmix64 does.
   hash = (hash ^ (hash >> 30)) * 0xBF58476D1CE4E5B9u;
   hash = (hash ^ (hash >> 27)) * 0x94D049BB133111EBu;

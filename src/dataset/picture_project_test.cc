@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
-#include <iterator>
 
 #include "cameras/camera_io.h"
 #include "cameras/colmap_writer.h"
@@ -14,6 +12,7 @@
 #include "dataset/small_dataset_for_test.h"
 #include "fit/training_views.h"
 #include "images/image_io.h"
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 
 namespace anchorsplat {
@@ -40,11 +39,6 @@ void WriteNerfScene(const fs::path& folder, int views, int size) {
                     .ok());
   }
   ASSERT_TRUE(WriteTransforms(folder / "transforms_train.json", named).ok());
-}
-
-std::string Bytes(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 TEST(PictureProject, AverageKeepsWhatThePictureShows) {
@@ -79,7 +73,7 @@ TEST(PictureProject, NerfSceneBecomesTheLayout) {
   EXPECT_EQ(report->low_size, 8);
   EXPECT_EQ(report->high_size, 32);
   EXPECT_EQ(report->points, 50);
-  EXPECT_TRUE(Bytes(folder / "lego/train/r_3.png") == Bytes(folder / "out/32/images/r_3.png"));
+  EXPECT_TRUE(FileBytes(folder / "lego/train/r_3.png") == FileBytes(folder / "out/32/images/r_3.png"));
   const auto scene = Scene::Open({"lego", folder / "out"});
   ASSERT_TRUE(scene.ok()) << scene.error().message;
   ASSERT_EQ(scene->low_views().size(), 5u);

@@ -8,6 +8,7 @@
 
 #include "core/statistics.h"
 #include "core/text.h"
+#include "core/vector3.h"
 
 namespace anchorsplat {
 
@@ -25,7 +26,6 @@ constexpr double kMostOneSided = 0.85;
 constexpr double kLeastInside = 0.9, kInside = 0.8;
 constexpr float kVisibleLogit = -2.2f;  // opacity 0.1
 
-double Dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 Vector Minus(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 double Norm(const Vector& a) { return std::sqrt(Dot(a, a)); }
 
@@ -47,10 +47,7 @@ std::optional<Vector> NearestToAxes(const std::vector<Camera>& cameras) {
       b[i] += c[i] - d[i] * along;
     }
   }
-  const auto cross = [](const Vector& p, const Vector& q) {
-    return Vector{p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
-  };
-  const Vector c12 = cross(m[1], m[2]), c20 = cross(m[2], m[0]), c01 = cross(m[0], m[1]);
+  const Vector c12 = Cross(m[1], m[2]), c20 = Cross(m[2], m[0]), c01 = Cross(m[0], m[1]);
   const double determinant = Dot(m[0], c12);
   const auto n = static_cast<double>(cameras.size());
   if (!(determinant > 1e-4 * n * n * n)) return std::nullopt;

@@ -1,12 +1,12 @@
 #include "enhance/enhance.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include "core/log.h"
 #include "core/statistics.h"
+#include "core/stopwatch.h"
 #include "core/text.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
@@ -235,7 +235,9 @@ int64_t ExpectedGaussians(int64_t count, const EnhanceOptions& options) {
   return plan->method->expected(count, options);
 }
 
-Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
+namespace {
+
+Status CheckTask(const GaussianCloud& cloud, const EnhanceOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   if (cloud.empty()) return Error{ErrorCode::kBadArgument, "the splat has no Gaussians"};
   if (!(options.upscale >= 1) || !std::isfinite(options.upscale)) {
@@ -245,12 +247,77 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--filter-strength ", *options.filter_strength, " is not between 0 and ", kMaxFilterStrength)};
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(MethodPlan plan, PlanEnhancement(options));
-  const EnhanceMethod* method = plan.method;
+  return CheckOptions(options);
+}
 
+// Which methods of a plan work with pixel sizes.
+struct SizedMethods {
+  bool start = false;
+  bool any = false;
+};
+
+Result<SizedMethods> FindSizedMethods(const MethodPlan& plan, const EnhanceOptions& options) {
+  SizedMethods sized;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(sized.any, plan.method->needs_pixel_size(options));
+  if (plan.start != nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(sized.start, plan.start->needs_pixel_size(options));
+    sized.any |= sized.start;
+  }
+  return sized;
+}
+
+// More than what the closer view's own pixels add.
+bool GivesWidth(double strength, double upscale) { return strength * upscale * upscale > 1; }
+
+// The filter's strength and the pixel sizes, for methods that work with them.
+Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
+  input.filter_strength = ChooseStrength(options, input.cloud);
+  report.filter_strength = input.filter_strength;
+  const bool gives_width = GivesWidth(input.filter_strength, options.upscale);
+  if (input.filter_strength > 0 && !gives_width && options.upscale > 1) {
+    LogWarning(Cat("a strength of ", input.filter_strength,
+                   " is no more than what the closer view's own pixels add (1/", options.upscale,
+                   "²): nothing changes"));
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(ChoosePixelSizes(options, plan.method->takes_start && !options.refine.images.empty(),
+                                               gives_width, input, report));
+  input.pixel_size = report.pixel_size;
+  return {};
+}
+
+// Networks measure Gaussians in pixels: where the pixel is not known and nobody asked for one, the filter takes its
+// place.
+void LeaveNetworksOut(MethodPlan& plan) {
+  const bool begins_with_network = plan.start != nullptr && plan.start->adds_detail;
+  if (plan.chosen_by.empty() || !(plan.method->adds_detail || begins_with_network)) return;
+  const std::string network = begins_with_network ? plan.start->name : plan.method->name;
+  LogInfo(Cat("the filter instead of '", network,
+              "', which measures Gaussians in pixels and goes wrong where the pixel is not known (--method ", network,
+              " takes it all the same)"));
+  if (plan.method->adds_detail) {
+    plan.method = &*std::ranges::find(EnhanceMethods(), std::string("filter"), &EnhanceMethod::name);
+  }
+  if (begins_with_network) plan.start = nullptr;
+}
+
+// One method after the other.
+Result<GaussianCloud> RunPlan(const MethodPlan& plan, const SizedMethods& sized, EnhanceInput input,
+                              const EnhanceOptions& options, EnhanceReport& report) {
+  if (plan.start != nullptr) {
+    EnhanceInput first = input;
+    if (!sized.start) first.pixel_sizes.clear();
+    ANCHORSPLAT_ASSIGN_OR_RETURN(input.start, RunStep(*plan.start, std::move(first), options, report));
+    input.start_has_detail = plan.start->adds_detail;
+  }
+  return RunStep(*plan.method, std::move(input), options, report);
+}
+
+}  // namespace
+
+Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckTask(cloud, options));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(MethodPlan plan, PlanEnhancement(options));
   EnhanceReport report;
-  report.method = plan.Name();
   report.quality = options.quality;
   report.upscale = options.upscale;
   report.gaussians_in = cloud.size();
@@ -259,45 +326,16 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(DropUnusable(input.cloud));
   report.dropped = report.gaussians_in - input.cloud.size();
 
-  ANCHORSPLAT_ASSIGN_OR_RETURN(bool sized, method->needs_pixel_size(options));
-  bool first_sized = false;
-  if (plan.start != nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(first_sized, plan.start->needs_pixel_size(options));
-    sized |= first_sized;
-  }
-  bool gives_width = false;
-  if (!sized && IsMarkedEnhanced(input.cloud)) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SizedMethods sized, FindSizedMethods(plan, options));
+  if (sized.any) {
+    ANCHORSPLAT_RETURN_IF_ERROR(ChooseWidths(plan, options, input, report));
+  } else if (IsMarkedEnhanced(input.cloud)) {
     LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
   }
-  if (sized) {
-    input.filter_strength = ChooseStrength(options, input.cloud);
-    report.filter_strength = input.filter_strength;
-    if (input.filter_strength > 0 && input.filter_strength * options.upscale * options.upscale <= 1 &&
-        options.upscale > 1) {
-      LogWarning(Cat("a strength of ", input.filter_strength,
-                     " is no more than what the closer view's own pixels add (1/", options.upscale,
-                     "²): nothing changes"));
-    }
-    gives_width = input.filter_strength * options.upscale * options.upscale > 1;
-    ANCHORSPLAT_RETURN_IF_ERROR(
-        ChoosePixelSizes(options, method->takes_start && !options.refine.images.empty(), gives_width, input, report));
-    input.pixel_size = report.pixel_size;
+  if (report.pixel_size_source == kCautiousPixelSize && GivesWidth(input.filter_strength, options.upscale)) {
+    LeaveNetworksOut(plan);
   }
-
-  const bool begins_with_network = plan.start != nullptr && plan.start->adds_detail;
-  if (gives_width && report.pixel_size_source == kCautiousPixelSize && !plan.chosen_by.empty() &&
-      (method->adds_detail || begins_with_network)) {
-    const std::string network = begins_with_network ? plan.start->name : method->name;
-    LogInfo(Cat("the filter instead of '", network,
-                "', which measures Gaussians in pixels and goes wrong where the pixel is not known (--method ", network,
-                " takes it all the same)"));
-    if (method->adds_detail) {
-      method = &*std::ranges::find(EnhanceMethods(), std::string("filter"), &EnhanceMethod::name);
-      plan.method = method;
-    }
-    if (begins_with_network) plan.start = nullptr;
-    report.method = plan.Name();
-  }
+  report.method = plan.Name();
 
   if (report.pixel_size_source == kUnknownPixelSize) {
     report.filter_strength = 0;
@@ -305,17 +343,11 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
     return Enhanced{std::move(input.cloud), std::move(report)};
   }
 
-  const auto begin = std::chrono::steady_clock::now();
-  if (plan.start != nullptr) {
-    EnhanceInput first = input;
-    if (!first_sized) first.pixel_sizes.clear();
-    ANCHORSPLAT_ASSIGN_OR_RETURN(input.start, RunStep(*plan.start, std::move(first), options, report));
-    input.start_has_detail = plan.start->adds_detail;
-  }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, RunStep(*method, std::move(input), options, report));
-  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const Stopwatch watch;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, RunPlan(plan, sized, std::move(input), options, report));
+  report.seconds = watch.Total();
   report.gaussians_out = out.size();
-  if (!sized || report.filter_strength * options.upscale * options.upscale > 1) {
+  if (!sized.any || GivesWidth(report.filter_strength, options.upscale)) {
     out.comments.push_back(EnhancedComment(report.method, options.upscale));
   }
   return Enhanced{std::move(out), std::move(report)};

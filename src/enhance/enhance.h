@@ -48,15 +48,17 @@ inline constexpr const char* kUnknownPixelSize = "unknown";
 // The estimate is contradicted (pixel_size_guard.h); the smallest plausible pixel was taken, and by "auto" the filter.
 inline constexpr const char* kCautiousPixelSize = "cautious";
 
-// A number that a method has to tell: counts are whole, measurements are not.
-using Fact = std::pair<std::string, std::variant<int64_t, double>>;
+// Something that a method has to tell: whether it was so; counts, which are whole; measurements, which are not.
+using FactValue = std::variant<bool, int64_t, double>;
+using Fact = std::pair<std::string, FactValue>;
 
 // What one method did; "A+B" are two steps.
 struct StepReport {
   std::string method;
-  int64_t dropped = 0;       // Gaussians that it could not read
-  bool interrupted = false;  // stopped by the user; its result is valid all the same
-  std::vector<Fact> facts;   // what else it has to tell, by name: the steps of a refinement, the anchors of a network
+  int64_t dropped = 0;             // Gaussians that it could not read
+  bool interrupted = false;        // stopped by the user; its result is valid all the same
+  std::optional<RefinePlan> plan;  // of a refinement
+  std::vector<Fact> facts;  // what else it has to tell, by name: the steps of a refinement, the anchors of a network
 };
 
 // What was done, for people and for --json.

@@ -1,7 +1,6 @@
 #include "enhance/refine.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -11,10 +10,12 @@
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/run_context.h"
+#include "core/stopwatch.h"
 #include "core/text.h"
 #include "enhance/refine_plan.h"
 #include "enhance/refine_views.h"
 #include "enhance/refiner.h"
+#include "enhance/split_gaussians.h"
 #include "fit/fingerprints.h"
 
 namespace anchorsplat {
@@ -43,10 +44,10 @@ Result<std::string> Settings(const RefineInput& input, const GaussianCloud& star
 
 // Steps until they are done, the time is over or the user stops it.
 Status MakeSteps(Refiner& refiner, const RefineOptions& options, RefineReport& report) {
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   const auto done = [&] {
     if (!options.seconds) return static_cast<double>(refiner.state().step) / static_cast<double>(*options.steps);
-    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / *options.seconds;
+    return watch.Total() / *options.seconds;
   };
   const int64_t total = options.seconds ? kShownSteps : *options.steps;
   Progress progress("refine", total);
@@ -82,19 +83,23 @@ GaussianCloud Pruned(GaussianCloud cloud, RefineReport& report) {
 }
 
 // The iterations, from the start or from a checkpoint, to the last or until the user stops them.
-Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianCloud& start, const RefinePlan& plan,
+Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianCloud& start, bool resumes,
                                     const RefineControl& control, RefineViews& views, RefineReport& report) {
+  RefinePlan& plan = report.plan;
   std::string settings;
   if (!control.checkpoint.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(settings, Settings(input, start, plan.options, views));
   }
   FitState state;
-  if (control.resume && Exists(control.checkpoint)) {
+  if (resumes) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(state, ReadFitCheckpoint(control.checkpoint, settings));
     report.resumed_at = state.step;
     LogInfo(Cat("going on at step ", WithThousands(state.step), " of ", control.checkpoint.string()));
   } else {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud split, SplitForRefinement(start, input, plan, views));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(
+        GaussianCloud split,
+        SplitGaussians(start, {.copies = *plan.options.copies, .seed = input.seed, .each = plan.each}));
+    plan.each = std::vector<int>();
     state = Fitter::Fresh(std::move(split));
   }
   const RefineProblem problem{views.render, input.upscale, views.scene_scale, input.seed};
@@ -133,29 +138,31 @@ Refined KeptStart(GaussianCloud start, RefineReport report) {
 }  // namespace
 
 Result<Refined> Refine(RefineInput input, const RefineOptions& given, const RefineControl& control) {
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch watch;
   RefineReport report;
   const auto timed = [&](Refined refined) {
-    refined.report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    refined.report.seconds = watch.Total();
     return refined;
   };
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const RefineOptions options, ChooseRefineOptions(input, given));
   ANCHORSPLAT_ASSIGN_OR_RETURN(RefineViews views, OpenRefineViews(input, options));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const RefinePlan plan, PlanRefinement(input, options, views));
+  const bool resumes = control.resume && Exists(control.checkpoint);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(report.plan, PlanRefinement(input, options, resumes, views));
+  const RefinePlan& plan = report.plan;
   if (!plan.why.empty()) LogInfo(plan.why);
   report.views = static_cast<int64_t>(views.train.views().size());
   report.input_psnr = views.input_psnr;
   report.before = plan.before;
   GaussianCloud start = plan.from_input ? input.cloud : std::move(input.start);
-  if (plan.nothing_to_do) return timed(KeptStart(std::move(start), report));
+  if (plan.nothing_to_do) return timed(KeptStart(std::move(start), std::move(report)));
   report.copies = *plan.options.copies;
 
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud result, RunRefinement(input, start, plan, control, views, report));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud result, RunRefinement(input, start, resumes, control, views, report));
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(report.after, MeasureConsistency(result, input.upscale, input.cloud, views));
-  if (!IsWorthIt(plan, report.after)) return timed(KeptStart(std::move(start), report));
-  return timed({std::move(result), report});
+  if (!IsWorthIt(plan, report.after)) return timed(KeptStart(std::move(start), std::move(report)));
+  return timed({std::move(result), std::move(report)});
 }
 
 }  // namespace anchorsplat

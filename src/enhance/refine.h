@@ -31,6 +31,7 @@ struct RefineInput {
 
 // What was done, for people and for --json.
 struct RefineReport {
+  RefinePlan plan;
   int64_t steps = 0;         // done in all
   int64_t resumed_at = 0;    // steps that a checkpoint brought
   bool interrupted = false;  // stopped by the user

@@ -15,13 +15,14 @@ namespace {
 
 void AddFacts(const RefineReport& r, StepReport& report) {
   report.interrupted = r.interrupted;
+  report.plan = r.plan;
   report.facts = {{"steps", r.steps},
                   {"resumed_at", r.resumed_at},
                   {"views", r.views},
                   {"consistency_before", r.before},
                   {"consistency_after", r.after},
                   {"k", int64_t{r.copies}},
-                  {"kept_start", int64_t{r.kept_start}},
+                  {"kept_start", r.kept_start},
                   {"pruned", r.pruned},
                   {"seconds_load", r.times.load},
                   {"seconds_render", r.times.objective.render},
@@ -54,8 +55,12 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
   // No more than what the closer view's own pixels add.
   const bool lost_none = input.filter_strength * options.upscale * options.upscale <= 1;
   if (lost_none && options.refine.images.empty()) {
-    LogInfo("there is no lost width to give back, and without pictures nothing else to learn: the splat stays");
-    report.facts.emplace_back("kept_start", int64_t{1});
+    RefinePlan& plan = report.plan.emplace();
+    plan.options = options.refine;
+    plan.nothing_to_do = true;
+    plan.why = "there is no lost width to give back, and without pictures nothing else to learn: the splat stays";
+    LogInfo(plan.why);
+    report.facts.emplace_back("kept_start", true);
     return std::move(refine.start);
   }
   refine.cloud = std::move(input.cloud);

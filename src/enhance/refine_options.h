@@ -38,6 +38,20 @@ struct RefineControl {
   std::vector<std::filesystem::path> outputs;  // that its caller writes, also when it was interrupted
 };
 
+// What a refinement is going to do, decided before anything is optimised.
+struct RefinePlan {
+  RefineOptions options;       // steps (unless it runs for seconds), copies and rate are chosen
+  bool from_input = false;     // it begins with the splat as it was fitted, not with the start that it was given
+  bool nothing_to_do = false;  // the start shows what the splat does already, or there is no width to give back
+  double before = 0;           // dB, of what it begins with
+  // dB that it has to gain, or else the start is kept. More than 0 for a splat that may know more than the pictures
+  // show.
+  double least_gain = 0;
+  std::vector<int> each;  // that every Gaussian is split into, where that is not the same for all; gone once they are
+  int64_t gaussians = 0;  // that the iterations begin with; 0 where a checkpoint brings them
+  std::string why;        // for people; empty where there is nothing special
+};
+
 inline constexpr int kMostCopies = 64;
 
 // kBadArgument for what cannot be run; names the option.

@@ -1,6 +1,8 @@
 #include "enhance/refine_plan.h"
 
 #include <algorithm>
+#include <numeric>
+#include <vector>
 
 #include "core/log.h"
 #include "core/text.h"
@@ -53,7 +55,8 @@ Result<RefineOptions> ChooseRefineOptions(const RefineInput& input, const Refine
   return options;
 }
 
-Result<RefinePlan> PlanRefinement(const RefineInput& input, const RefineOptions& chosen, RefineViews& views) {
+Result<RefinePlan> PlanRefinement(const RefineInput& input, const RefineOptions& chosen, bool resumes,
+                                  RefineViews& views) {
   RefinePlan plan;
   plan.options = chosen;
   const bool pictures = HasPictures(chosen);
@@ -79,27 +82,25 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const RefineOptions&
     return plan;
   }
 
-  const int64_t count = plan.from_input ? input.cloud.size() : input.start.size();
+  const GaussianCloud& start = plan.from_input ? input.cloud : input.start;
   if (!plan.options.copies) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewDensity density,
                                  MeasureDensity(input.cloud, views.render, views.train.views()));
     plan.options.copies = ChooseCopies(density, input.upscale, pictures ? kCopiesWithPictures : kCopiesWithout,
-                                       input.cloud.size(), count);
+                                       input.cloud.size(), start.size());
   }
-  LimitCopies(count, plan.options);
-  return plan;
-}
-
-Result<GaussianCloud> SplitForRefinement(const GaussianCloud& start, const RefineInput& input, const RefinePlan& plan,
-                                         RefineViews& views) {
+  LimitCopies(start.size(), plan.options);
+  if (resumes) return plan;
   const int copies = *plan.options.copies;
-  std::vector<int> each;
-  // Without pictures the differences are what the fit itself got wrong; copies do not help there.
-  if (HasPictures(plan.options) && copies > 1) {
+  plan.gaussians = start.size() * copies;
+  // More where the pictures find more wrong. Without pictures the differences are what the fit itself got wrong; copies
+  // do not help there.
+  if (pictures && copies > 1) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> residuals, Residuals(start, input.upscale, views));
-    each = CopiesByResidual(residuals, copies);
+    plan.each = CopiesByResidual(residuals, copies);
+    plan.gaussians = std::accumulate(plan.each.begin(), plan.each.end(), int64_t{0});
   }
-  return SplitGaussians(start, {.copies = copies, .seed = input.seed, .each = each});
+  return plan;
 }
 
 }  // namespace anchorsplat

@@ -1,6 +1,5 @@
 #include "eval/bicubic_fit.h"
 
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -8,6 +7,7 @@
 
 #include "core/file_system.h"
 #include "core/log.h"
+#include "core/stopwatch.h"
 #include "core/text.h"
 #include "fit/fit.h"
 #include "fit/initial_cloud.h"
@@ -25,11 +25,8 @@ namespace anchorsplat {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
 
 constexpr int64_t kCheckpointEvery = 500;  // steps: about half a minute at 1024²
-
-double Since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 // Of one training picture; nothing to do when an earlier attempt wrote it.
 Status Enlarge(const Camera& camera, const Pinhole& high, const std::array<float, 3>& background,
@@ -72,7 +69,7 @@ Status WriteProgress(const fs::path& path, const Progressed& progress) {
 }  // namespace
 
 Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
-  const auto begin = Clock::now();
+  const Stopwatch watch;
   const BenchmarkObject& object = task.object;
   ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews views, OpenProject(object.low_project, {.hold_out = object.hold_out}));
   FitOptions options = FitOptionsFor(steps);
@@ -124,13 +121,13 @@ Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
   Status noted;
   control.observe = [&](const Fitter& fitter) {
     if (fitter.state().step % kCheckpointEvery != 0) return;
-    progress.seconds = before + Since(begin);
+    progress.seconds = before + watch.Total();
     noted = WriteProgress(note, progress);
   };
   LogInfo(Cat(object.name, ": fitting ", WithThousands(steps), " steps at ", high.width, " x ", high.height));
   ANCHORSPLAT_ASSIGN_OR_RETURN(Fitted fitted, Fit(views, std::move(initial), options, control));
   if (!noted.ok()) return noted.error();
-  progress = {key, before + Since(begin), fitted.report.train.psnr, true};
+  progress = {key, before + watch.Total(), fitted.report.train.psnr, true};
   ANCHORSPLAT_RETURN_IF_ERROR(WriteProgress(note, progress));
   fs::remove_all(pictures, code);  // a hundred megabytes that nobody needs again
   return BicubicFit{std::move(fitted.cloud), progress.seconds, progress.train_psnr};

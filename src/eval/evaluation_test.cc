@@ -235,17 +235,17 @@ TEST(EvalMethods, RefinementTakesOptions) {
   const auto evaluation = Evaluate(folder.path(), Methods({few, one, longer}), out.path(), {});
   ASSERT_TRUE(evaluation.ok() && evaluation->failures.empty());
   EXPECT_THAT(evaluation->methods, ElementsAre(few, one, longer)) << "as they were written";
-  EXPECT_EQ(evaluation->Find("ball", few)->facts.at("steps"), 2);
-  EXPECT_EQ(evaluation->Find("ball", longer)->facts.at("steps"), 3);
+  EXPECT_EQ(evaluation->Find("ball", few)->facts.at("steps"), FactValue(int64_t{2}));
+  EXPECT_EQ(evaluation->Find("ball", longer)->facts.at("steps"), FactValue(int64_t{3}));
   EXPECT_LE(evaluation->Find("ball", one)->gaussians, 200);
-  EXPECT_GE(evaluation->Find("ball", one)->facts.at("processor_seconds"), 0);
+  EXPECT_GE(NumberOf(evaluation->Find("ball", one)->facts.at("processor_seconds")), 0);
   EXPECT_TRUE(fs::exists(ObjectFolder(out.path(), "ball") / "refine@steps_2@k_2@f_0.5.json"));
   EXPECT_EQ(Evaluate(folder.path(), Methods({few, one, longer}), out.path(), {})->resumed, 3);
 
   const std::string alone = "refine-auto@steps=2@k=1";
   const auto estimated = Evaluate(folder.path(), Methods({alone}), out.path(), {});
   ASSERT_TRUE(estimated.ok() && estimated->failures.empty());
-  EXPECT_GT(estimated->Find("ball", alone)->facts.at("pixel_size_ratio"), 0);
+  EXPECT_GT(NumberOf(estimated->Find("ball", alone)->facts.at("pixel_size_ratio")), 0);
 
   const auto error = [](const std::string& word) {
     const auto method = MakeEvalMethod(word, {});
@@ -308,7 +308,7 @@ TEST(Evaluate, BicubicFitsAnewAndGoesOnWhereItWasStopped) {
   ASSERT_TRUE(fitted->failures.empty()) << fitted->failures[0].message;
   ASSERT_EQ(fitted->results.size(), 1u);
   EXPECT_GT(fitted->results[0].gaussians, 0);
-  EXPECT_GT(fitted->results[0].facts.at("train_psnr"), 5);
+  EXPECT_GT(NumberOf(fitted->results[0].facts.at("train_psnr")), 5);
   // The result is measured again, the fit only read.
   const fs::path cache = out / "objects/ball/bicubic";
   const auto written = fs::last_write_time(cache / "splat.ply");
@@ -357,7 +357,7 @@ TEST(Evaluate, MethodsOfEnhanceComeByThemselves) {
   ASSERT_TRUE(evaluation.ok()) << evaluation.error().message;
   ASSERT_EQ(evaluation->results.size(), 1u);
   EXPECT_GT(evaluation->results[0].MeanPsnr(), 50);
-  EXPECT_EQ(evaluation->results[0].facts.at("by"), 0.4);
+  EXPECT_EQ(evaluation->results[0].facts.at("by"), FactValue(0.4));
 }
 
 TEST(MethodResult, RoundTrip) {
@@ -368,7 +368,7 @@ TEST(MethodResult, RoundTrip) {
   result.views = {{"a", 31.25, 0.5, 0.125}, {"b", std::numeric_limits<double>::infinity(), 1, std::nullopt}};
   result.seconds = 1.5;
   result.gaussians = 12;
-  result.facts = {{"f", 0.74}};
+  result.facts = {{"f", 0.74}, {"whole", 2.0}, {"steps", int64_t{2}}, {"kept_start", true}};
   ASSERT_TRUE(WriteMethodResult(folder / "m.json", "key", result).ok());
   EXPECT_FALSE(ReadMethodResult(folder / "m.json", "another key"));
   EXPECT_FALSE(ReadMethodResult(folder / "none.json", "key"));

@@ -121,14 +121,6 @@ Result<std::string> Identity(const fs::path& path) {
   return Cat(path.string(), " ", size, " ", fs::last_write_time(path, code).time_since_epoch().count());
 }
 
-std::vector<std::pair<std::string, double>> Numbers(const std::vector<Fact>& facts) {
-  std::vector<std::pair<std::string, double>> numbers;
-  for (const auto& [name, value] : facts) {
-    numbers.emplace_back(name, std::visit([](auto number) { return static_cast<double>(number); }, value));
-  }
-  return numbers;
-}
-
 Result<EvalMethod> Model(const fs::path& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string identity, Identity(file));
   const auto network = std::make_shared<std::optional<AnyNetwork>>();  // loaded for the first object
@@ -156,7 +148,7 @@ Result<EvalMethod> Model(const fs::path& file) {
                       const double seconds = SecondsSince(begin);
                       MethodViews views = SplatViews(task.object, std::move(cloud));
                       views.seconds = seconds;
-                      views.facts = Numbers(report.facts);
+                      views.facts = std::move(report.facts);
                       return views;
                     }};
 }
@@ -306,7 +298,7 @@ EvalMethod Registered(const RegisteredMethod& method) {
             for (const StepReport& step : enhanced.report.steps) {
               // Of "A+B", B's facts are the result's; A's say whose they are.
               const bool last = &step == &enhanced.report.steps.back();
-              for (auto& [name, value] : Numbers(step.facts)) {
+              for (const auto& [name, value] : step.facts) {
                 views.facts.emplace_back(last ? name : Cat(step.method, "_", name), value);
               }
             }

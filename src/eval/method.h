@@ -11,6 +11,7 @@
 
 #include "core/image.h"
 #include "core/result.h"
+#include "enhance/enhance.h"
 #include "eval/benchmark.h"
 #include "eval/protocol.h"
 
@@ -28,9 +29,9 @@ struct MethodTask {
 struct MethodViews {
   // View `view` of the object as [3,H,W] at high resolution, neither clamped nor quantised.
   std::function<Result<Image>(size_t view)> render;
-  double seconds = 0;     // what making it took, without reading files and without rendering
-  int64_t gaussians = 0;  // 0: there is no splat
-  std::vector<std::pair<std::string, double>> facts;  // what else there is to tell, by name
+  double seconds = 0;       // what making it took, without reading files and without rendering
+  int64_t gaussians = 0;    // 0: there is no splat
+  std::vector<Fact> facts;  // what else there is to tell, by name
 };
 
 // One row of an evaluation.

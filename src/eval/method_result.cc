@@ -21,9 +21,7 @@ double Mean(const std::vector<ViewScore>& views, Member member) {
 }
 
 nlohmann::json ToJson(const ViewScore& view) {
-  // JSON has no infinity.
-  nlohmann::json json = {{"name", view.name}, {"ssim", view.ssim}};
-  json["psnr"] = std::isfinite(view.psnr) ? nlohmann::json(view.psnr) : nlohmann::json();
+  nlohmann::json json = {{"name", view.name}, {"ssim", view.ssim}, {"psnr", FiniteOrNull(view.psnr)}};
   if (view.lpips) json["lpips"] = *view.lpips;
   return json;
 }
@@ -43,6 +41,14 @@ Result<ViewScore> ReadView(const JsonValue& json) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(view.lpips, lpips->Number());
   }
   return view;
+}
+
+Result<FactValue> ReadFact(const JsonValue& json, const char* key) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, json.Get(key));
+  if (value.raw().is_boolean()) return FactValue(value.raw().get<bool>());
+  if (value.raw().is_number_integer()) return FactValue(value.raw().get<int64_t>());
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const double number, value.Number());
+  return FactValue(number);
 }
 
 Result<double> ReadNumber(const JsonValue& json, const char* key) {
@@ -75,7 +81,7 @@ Result<std::optional<MethodResult>> Read(const std::filesystem::path& path, cons
   if (result.views.empty()) return views.Complain("no views");
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue facts, root.Get("facts"));
   for (const auto& [name, value] : facts.raw().items()) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(result.facts[name], ReadNumber(facts, name.c_str()));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(result.facts[name], ReadFact(facts, name.c_str()));
   }
   return std::optional(std::move(result));
 }
@@ -111,7 +117,9 @@ Status WriteMethodResult(const std::filesystem::path& path, const std::string& k
                          {"gaussians", result.gaussians},
                          {"facts", nlohmann::json::object()},
                          {"views", nlohmann::json::array()}};
-  for (const auto& [name, value] : result.facts) json["facts"][name] = value;
+  for (const auto& [name, value] : result.facts) {
+    std::visit([&, &fact = name](auto told) { json["facts"][fact] = told; }, value);
+  }
   for (const ViewScore& view : result.views) json["views"].push_back(ToJson(view));
   return WriteWholeFile(path, json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n", true);
 }

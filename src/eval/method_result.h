@@ -5,12 +5,19 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "core/result.h"
+#include "enhance/enhance.h"
 #include "eval/comparison.h"
 
 namespace anchorsplat {
+
+// A fact to calculate with: 0 or 1 for what was so or not.
+inline double NumberOf(const FactValue& value) {
+  return std::visit([](auto told) { return static_cast<double>(told); }, value);
+}
 
 // What a method reached on one object.
 struct MethodResult {
@@ -20,7 +27,7 @@ struct MethodResult {
   double seconds = 0;            // of the method
   double render_seconds = 0;     // of all views
   int64_t gaussians = 0;         // 0: there is no splat
-  std::map<std::string, double> facts;
+  std::map<std::string, FactValue> facts;
 
   // Over the views; LPIPS only where every view has it.
   double MeanPsnr() const;

@@ -10,6 +10,7 @@
 #include "eval/contact_sheet.h"
 #include "images/image_io.h"
 #include "io/atomic_file.h"
+#include "io/json_file.h"
 
 namespace anchorsplat {
 
@@ -99,7 +100,7 @@ void AddObjectTable(const Evaluation& evaluation, const std::vector<MethodSummar
       row.push_back(result == nullptr ? "failed"
                                       : Cat(Fixed(result->MeanPsnr(), 2), " / ", Fixed(result->MeanSsim(), 4)));
       if (result != nullptr && result->facts.contains("pixel_size_ratio")) {
-        ratio = Fixed(result->facts.at("pixel_size_ratio"), 2);
+        ratio = Fixed(NumberOf(result->facts.at("pixel_size_ratio")), 2);
       }
     }
     if (sizes) row.push_back(ratio);
@@ -115,10 +116,10 @@ std::string CsvCell(const std::string& text) {
   return quoted + "\"";
 }
 
-nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(); }
-
 nlohmann::json ToJson(const Interval& interval) {
-  return {{"mean", Number(interval.mean)}, {"low", Number(interval.low)}, {"high", Number(interval.high)}};
+  return {{"mean", FiniteOrNull(interval.mean)},
+          {"low", FiniteOrNull(interval.low)},
+          {"high", FiniteOrNull(interval.high)}};
 }
 
 nlohmann::json ToJson(const MethodSummary& s) {
@@ -135,13 +136,15 @@ nlohmann::json ToJson(const MethodSummary& s) {
 
 nlohmann::json ToJson(const MethodResult& result) {
   nlohmann::json json = {
-      {"object", result.object},       {"method", result.method},           {"psnr", Number(result.MeanPsnr())},
+      {"object", result.object},       {"method", result.method},           {"psnr", FiniteOrNull(result.MeanPsnr())},
       {"ssim", result.MeanSsim()},     {"seconds", result.seconds},         {"render_seconds", result.render_seconds},
       {"gaussians", result.gaussians}, {"facts", nlohmann::json::object()}, {"views", nlohmann::json::array()}};
   if (const auto lpips = result.MeanLpips()) json["lpips"] = *lpips;
-  for (const auto& [name, value] : result.facts) json["facts"][name] = value;
+  for (const auto& [name, value] : result.facts) {
+    std::visit([&, &fact = name](auto told) { json["facts"][fact] = told; }, value);
+  }
   for (const ViewScore& view : result.views) {
-    json["views"].push_back({{"name", view.name}, {"psnr", Number(view.psnr)}, {"ssim", view.ssim}});
+    json["views"].push_back({{"name", view.name}, {"psnr", FiniteOrNull(view.psnr)}, {"ssim", view.ssim}});
     if (view.lpips) json["views"].back()["lpips"] = *view.lpips;
   }
   return json;
@@ -185,7 +188,8 @@ std::string ToCsv(const Evaluation& evaluation) {
                 Fixed(result.seconds, 3), ",", Fixed(result.render_seconds, 3), ",", result.gaussians);
     for (const std::string& fact : facts) {
       const auto found = result.facts.find(fact);
-      text += found == result.facts.end() ? std::string(",") : Cat(",", found->second);
+      text += ",";
+      if (found != result.facts.end()) text += std::visit([](auto told) { return Cat(told); }, found->second);
     }
     text += "\n";
   }

@@ -110,7 +110,7 @@ std::optional<PixelSizeError> SummarisePixelSizes(const Evaluation& evaluation) 
   std::vector<double> errors;
   for (const MethodResult& result : evaluation.results) {
     const auto ratio = result.facts.find("pixel_size_ratio");
-    if (ratio != result.facts.end()) errors.push_back(std::abs(ratio->second - 1));
+    if (ratio != result.facts.end()) errors.push_back(std::abs(NumberOf(ratio->second) - 1));
   }
   if (errors.empty()) return std::nullopt;
   std::sort(errors.begin(), errors.end());

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/finite.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
 #include "fit/nearest_neighbours.h"
@@ -24,9 +25,7 @@ Result<GaussianCloud> InitialCloud(const InitialPoints& points, double scene_sca
   if (points.positions.size() != points.colors.size() || points.positions.size() % 3 != 0) {
     return Bad("positions and colours do not agree");
   }
-  for (const float x : points.positions) {
-    if (!std::isfinite(x)) return Bad("a position is not finite");
-  }
+  if (!AllFinite(points.positions)) return Bad("a position is not finite");
   if (options.sh_degree < 0 || options.sh_degree > kMaxShDegree) return Bad("SH degree must be 0 to 3");
   if (!(options.opacity > 0 && options.opacity < 1)) return Bad("opacity must lie between 0 and 1");
   if (!(options.scale > 0)) return Bad("scale must be positive");

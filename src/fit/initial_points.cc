@@ -116,8 +116,8 @@ InitialPoints PointsOf(const GaussianCloud& cloud) {
   return points;
 }
 
-InitialPoints Thinned(const InitialPoints& points, int64_t count) {
-  const int64_t n = points.size();
+InitialPoints Thinned(const InitialPoints& points, std::optional<int64_t> wanted) {
+  const int64_t n = points.size(), count = wanted.value_or(n);
   if (count >= n) return points;
   InitialPoints out;
   for (int64_t i = 0; i < count; ++i) {

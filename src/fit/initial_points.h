@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -36,7 +37,7 @@ InitialPoints RandomPointsInView(int64_t count, const std::vector<Camera>& camer
 // Centres and constant colours of a splat, to begin another fit from; of rows that are finite.
 InitialPoints PointsOf(const GaussianCloud& cloud);
 
-// `count` of the points, evenly spread over their order; all of them when there are not as many.
-InitialPoints Thinned(const InitialPoints& points, int64_t count);
+// `count` of the points, evenly spread over their order; all of them when there are not as many, or nobody says.
+InitialPoints Thinned(const InitialPoints& points, std::optional<int64_t> count);
 
 }  // namespace anchorsplat

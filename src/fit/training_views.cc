@@ -154,4 +154,9 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
   return out;
 }
 
+InitialPoints UsualStart(const TrainingViews& views, std::optional<int64_t> count, uint64_t seed) {
+  if (views.points.size() > 0) return Thinned(views.points, count);
+  return RandomPointsInView(count.value_or(kRandomPoints), views.train, views.scene_scale, seed);
+}
+
 }  // namespace anchorsplat

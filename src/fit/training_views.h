@@ -41,6 +41,10 @@ struct ProjectOptions {
 // another shape than its camera; kBadArgument when hold_out leaves nothing to train on.
 Result<TrainingViews> OpenProject(const std::filesystem::path& project, const ProjectOptions& options = {});
 
+// Where a fit of these views begins when nobody says: their points, of which `count` are taken where that is said, or,
+// where they have none, `count` (kRandomPoints) that the cameras see.
+InitialPoints UsualStart(const TrainingViews& views, std::optional<int64_t> count, uint64_t seed);
+
 // 1.1 × the largest distance of a centre from their mean; 1 when all are in one place.
 double SceneScale(const std::vector<Camera>& cameras);
 

@@ -9,6 +9,7 @@
 #include "core/activations.h"
 #include "core/parallel.h"
 #include "core/spherical_harmonics.h"
+#include "core/statistics.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -59,7 +60,7 @@ double AngleBetween(const float* p, const float* q) {
   return 4 * std::asin(std::min(1.0, std::sqrt(std::min(minus, plus)) / 2));
 }
 
-void CompareRow(const GaussianCloud& a, int64_t i, const GaussianCloud& b, int64_t j, Sums& sums) {
+void CompareRow(const CloudView& a, int64_t i, const CloudView& b, int64_t j, Sums& sums) {
   double distance = 0;
   for (int k = 0; k < 3; ++k) {
     const double d = double{a.means[static_cast<size_t>(3 * i + k)]} - double{b.means[static_cast<size_t>(3 * j + k)]};
@@ -86,7 +87,7 @@ void CompareRow(const GaussianCloud& a, int64_t i, const GaussianCloud& b, int64
 
 }  // namespace
 
-Result<AttributeError> CompareAttributes(const GaussianCloud& a, const GaussianCloud& b, const Buffer<uint32_t>& rows) {
+Result<AttributeError> CompareAttributes(const CloudView& a, const CloudView& b, const Buffer<uint32_t>& rows) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(a));
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(b));
   if (a.size() != b.size() || (!rows.empty() && rows.size() != static_cast<size_t>(a.size()))) {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "core/buffer.h"
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 
 namespace anchorsplat {
@@ -27,8 +27,7 @@ struct AttributeError {
 };
 
 // Row i of `a` against row rows[i] of `b` (empty `rows`: row i). kBadArgument when the sizes differ.
-Result<AttributeError> CompareAttributes(const GaussianCloud& a, const GaussianCloud& b,
-                                         const Buffer<uint32_t>& rows = {});
+Result<AttributeError> CompareAttributes(const CloudView& a, const CloudView& b, const Buffer<uint32_t>& rows = {});
 
 // One line per attribute, for people.
 std::string FormatAttributeError(const AttributeError& error);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/activations.h"
 #include "core/parallel.h"
 #include "core/parallel_section.h"
 
@@ -74,11 +75,9 @@ Buffer<uint32_t> ImportanceOrder(const CloudView& cloud) {
   return OrderBy<float>(cloud.size(), [&](int64_t i) {
     const float* s = cloud.log_scales.data() + 3 * i;
     const float logit = cloud.opacity_logits[static_cast<size_t>(i)];
-    // ln sigmoid(x) = −ln(1 + e^−x), which for very negative x is x itself.
-    const float log_opacity = logit < -80 ? logit : -std::log1p(std::exp(-logit));
     // Flat Gaussians (a log-scale of −Inf) are seen all the same; NaN stays.
     const auto bounded = [](float log_scale) { return std::max(log_scale, -20.0f); };
-    const float importance = bounded(s[0]) + bounded(s[1]) + bounded(s[2]) + log_opacity;
+    const float importance = bounded(s[0]) + bounded(s[1]) + bounded(s[2]) + LogSigmoid(logit);
     return std::isnan(importance) ? std::numeric_limits<float>::infinity() : -importance;
   });
 }

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/text.h"
+#include "images/decode_image.h"
 #include "images/jpeg_file.h"
 #include "images/png_file.h"
 #include "io/atomic_file.h"
@@ -26,12 +27,25 @@ Result<PictureKind> DetectKind(const OpenedFile& file, const std::string& name) 
   return Error{ErrorCode::kBadFile, Cat(name, ": byte 0: neither a PNG nor a JPEG")};
 }
 
+Result<Image> Decode(const OpenedFile& file, const std::string& name) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureKind kind, DetectKind(file, name));
+  return (kind == PictureKind::kPng ? DecodePng : DecodeJpeg)(file.handle.get(), name, file.size);
+}
+
 }  // namespace
 
 Result<Image> ReadImage(const std::filesystem::path& path) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedFile file, OpenForReading(path));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureKind kind, DetectKind(file, path.string()));
-  return (kind == PictureKind::kPng ? DecodePng : DecodeJpeg)(file.handle.get(), path.string(), file.size);
+  return Decode(file, path.string());
+}
+
+Result<Image> DecodeImage(const std::string& name, std::string_view bytes) {
+  OpenedFile file;
+  file.size = bytes.size();
+  // Opened for reading only, so that nobody writes through the pointer. No bytes make no file everywhere.
+  if (!bytes.empty()) file.handle.reset(::fmemopen(const_cast<char*>(bytes.data()), bytes.size(), "rb"));
+  if (!file.handle) return Error{ErrorCode::kBadFile, Cat(name, ": byte 0: neither a PNG nor a JPEG")};
+  return Decode(file, name);
 }
 
 Result<ImageSize> ReadImageSize(const std::filesystem::path& path) {

@@ -6,21 +6,17 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
-#include <iterator>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "core/random.h"
+#include "images/decode_image.h"
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {
-
-std::string Bytes(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 void Write(const std::filesystem::path& path, const std::string& bytes) {
   std::filesystem::remove(path);  // some file systems flush a file that is emptied and written again
@@ -171,7 +167,7 @@ TEST(Png, InterlacedIsTheSamePicture) {
 TEST(Png, EveryTruncationIsAnError) {
   const TestFolder folder;
   ASSERT_TRUE(WritePng(folder / "whole.png", RandomImage(9, 7, 3, 6)).ok());
-  const std::string whole = Bytes(folder / "whole.png");
+  const std::string whole = FileBytes(folder / "whole.png");
   for (size_t length = 0; length < whole.size(); ++length) {
     Write(folder / "cut.png", whole.substr(0, length));
     const auto read = ReadImage(folder / "cut.png");
@@ -185,7 +181,7 @@ TEST(Png, EveryTruncationIsAnError) {
 TEST(Png, DamagedBytesAreErrorsOrHarmless) {
   const TestFolder folder;
   ASSERT_TRUE(WritePng(folder / "whole.png", RandomImage(9, 7, 3, 8)).ok());
-  const std::string whole = Bytes(folder / "whole.png");
+  const std::string whole = FileBytes(folder / "whole.png");
   int refused = 0;
   for (size_t at = 0; at < whole.size(); ++at) {
     std::string bytes = whole;
@@ -267,6 +263,28 @@ TEST(Png, ManyThreadsMayRead) {
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(right, std::vector<int>(4, 20));
+}
+
+TEST(DecodeImage, IsWhatTheFileSays) {
+  const TestFolder folder;
+  for (const int channels : {1, 3, 4}) {
+    const auto path = folder / (std::to_string(channels) + ".png");
+    ASSERT_TRUE(WritePng(path, RandomImage(13, 7, channels, 5)).ok());
+    const std::string bytes = FileBytes(path);
+    const auto decoded = DecodeImage("upload", bytes), read = ReadImage(path);
+    ASSERT_TRUE(decoded.ok()) << decoded.error().message;
+    EXPECT_EQ(decoded->channels, read->channels);
+    EXPECT_EQ(decoded->pixels, read->pixels);
+    const auto half = DecodeImage("upload", std::string_view(bytes).substr(0, bytes.size() / 2));
+    ASSERT_FALSE(half.ok());
+    EXPECT_EQ(half.error().code, ErrorCode::kBadFile);
+    EXPECT_TRUE(half.error().message.starts_with("upload: ")) << half.error().message;
+  }
+  for (const std::string& nothing : {std::string(), std::string("\xff\xd8\xff"), std::string(100, 'x')}) {
+    const auto decoded = DecodeImage("upload", nothing);
+    ASSERT_FALSE(decoded.ok());
+    EXPECT_EQ(decoded.error().code, ErrorCode::kBadFile);
+  }
 }
 
 TEST(ReadImage, OtherFilesAreErrors) {

@@ -7,21 +7,16 @@
 
 #include <csignal>
 #include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string Content(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 TEST(AtomicFile, AppearsOnCommitOnly) {
   const TestFolder folder;
@@ -36,7 +31,7 @@ TEST(AtomicFile, AppearsOnCommitOnly) {
     EXPECT_LE(folder.Entries(), 1);  // none where the system has files without names
     ASSERT_TRUE(file->Commit().ok());
   }
-  EXPECT_EQ(Content(path), "hello world");
+  EXPECT_EQ(FileBytes(path), "hello world");
   EXPECT_EQ(folder.Entries(), 1);
 }
 
@@ -48,7 +43,7 @@ TEST(AtomicFile, WritesAtOffsetsAndMoves) {
   ASSERT_TRUE(file->WriteAt(0, "abc", 3).ok());
   OutputFile moved = *std::move(file);
   ASSERT_TRUE(moved.Commit().ok());
-  EXPECT_EQ(Content(folder / "a.bin"), "abcdef");
+  EXPECT_EQ(FileBytes(folder / "a.bin"), "abcdef");
 }
 
 TEST(AtomicFile, WithoutCommitNothingStays) {
@@ -69,10 +64,10 @@ TEST(AtomicFile, RefusesToOverwriteUnlessTold) {
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().code, ErrorCode::kExists);
   EXPECT_NE(refused.error().message.find("a.bin"), std::string::npos);
-  EXPECT_EQ(Content(path), "one");
+  EXPECT_EQ(FileBytes(path), "one");
   fs::permissions(path, fs::perms::owner_read | fs::perms::owner_write);
   ASSERT_TRUE(WriteWholeFile(path, "three", true).ok());
-  EXPECT_EQ(Content(path), "three");
+  EXPECT_EQ(FileBytes(path), "three");
   EXPECT_EQ(fs::status(path).permissions(), fs::perms::owner_read | fs::perms::owner_write);
   EXPECT_EQ(folder.Entries(), 1);
 }
@@ -86,7 +81,7 @@ TEST(AtomicFile, SeesAFileThatAppearedMeanwhile) {
   const Status status = file->Commit();
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().code, ErrorCode::kExists);
-  EXPECT_EQ(Content(folder / "a.bin"), "theirs");
+  EXPECT_EQ(FileBytes(folder / "a.bin"), "theirs");
   EXPECT_EQ(folder.Entries(), 1);
 }
 
@@ -96,7 +91,7 @@ TEST(AtomicFile, ReplacesTheFileASymbolicLinkNames) {
   fs::create_symlink("real.bin", folder / "link.bin");
   ASSERT_TRUE(WriteWholeFile(folder / "link.bin", "new", true).ok());
   EXPECT_TRUE(fs::is_symlink(folder / "link.bin"));
-  EXPECT_EQ(Content(folder / "real.bin"), "new");
+  EXPECT_EQ(FileBytes(folder / "real.bin"), "new");
 }
 
 TEST(AtomicFile, NamesWhatIsWrongWithTheTarget) {
@@ -146,7 +141,7 @@ TEST(AtomicFile, AKilledProcessLeavesNoFileUnderTheName) {
   EXPECT_FALSE(fs::exists(folder / "a.bin"));
   // A later run is not in the way of what was left.
   EXPECT_TRUE(WriteWholeFile(folder / "a.bin", "whole", false).ok());
-  EXPECT_EQ(Content(folder / "a.bin"), "whole");
+  EXPECT_EQ(FileBytes(folder / "a.bin"), "whole");
 }
 
 TEST(AtomicFile, WritesTheFileThatALinkNamesAndIsNotThereYet) {
@@ -156,7 +151,7 @@ TEST(AtomicFile, WritesTheFileThatALinkNamesAndIsNotThereYet) {
   fs::create_symlink("link.bin", folder / "second.bin");
   ASSERT_TRUE(WriteWholeFile(folder / "second.bin", "new", false).ok());
   EXPECT_TRUE(fs::is_symlink(folder / "link.bin"));
-  EXPECT_EQ(Content(folder / "in" / "real.bin"), "new");
+  EXPECT_EQ(FileBytes(folder / "in" / "real.bin"), "new");
 }
 
 TEST(AtomicFile, ANameThatCannotBeIsKnownBeforeTheWork) {
@@ -181,7 +176,7 @@ TEST(AtomicFile, LeftoversOfTheSameNameAreNotInTheWay) {
   }
   const Status status = WriteWholeFile(folder / "a.bin", "new", true);
   ASSERT_TRUE(status.ok()) << status.error().message;
-  EXPECT_EQ(Content(folder / "a.bin"), "new");
+  EXPECT_EQ(FileBytes(folder / "a.bin"), "new");
   EXPECT_EQ(folder.Entries(), 1001);
 }
 
@@ -213,7 +208,7 @@ TEST_P(CommitOfThree, GivesTheNamesBackToTheFilesThatHadThem) {
   EXPECT_EQ(status.error().code, ErrorCode::kIo);
   for (const char* name : {"a", "b", "c"}) {
     if (folder_ / name == Failing()) continue;
-    EXPECT_EQ(Content(folder_ / name), std::string("old ") + name);
+    EXPECT_EQ(FileBytes(folder_ / name), std::string("old ") + name);
   }
   EXPECT_EQ(folder_.Entries(), 3);  // nothing is left aside
 }
@@ -231,7 +226,7 @@ TEST_P(CommitOfThree, LeavesLinksAndWhatTheyName) {
   for (const char* name : {"a", "b", "c"}) {
     EXPECT_TRUE(fs::is_symlink(folder_ / name));
     if (folder_ / name == Failing()) continue;
-    EXPECT_EQ(Content(folder_ / name), std::string("old ") + name);
+    EXPECT_EQ(FileBytes(folder_ / name), std::string("old ") + name);
   }
 }
 
@@ -241,7 +236,7 @@ TEST_P(CommitOfThree, TakesBackNamesThatNobodyHad) {
   const Status status = CommitTogether(files);
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().code, ErrorCode::kExists);
-  EXPECT_EQ(Content(Failing()), "theirs");
+  EXPECT_EQ(FileBytes(Failing()), "theirs");
   EXPECT_EQ(folder_.Entries(), 1);
 }
 
@@ -256,7 +251,7 @@ TEST(AtomicFile, FilesThatBelongTogetherReplaceOldOnes) {
     ASSERT_TRUE(files.back().Write("new").ok());
   }
   ASSERT_TRUE(CommitTogether(files).ok());
-  EXPECT_EQ(Content(folder / "a") + Content(folder / "b"), "newnew");
+  EXPECT_EQ(FileBytes(folder / "a") + FileBytes(folder / "b"), "newnew");
   EXPECT_EQ(folder.Entries(), 2);
 }
 
@@ -297,10 +292,10 @@ TEST(AtomicFile, KeepsAResultWhoseNameWasTaken) {
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().code, ErrorCode::kExists);
   EXPECT_NE(status.error().message.find("scan-3.compressed.ply"), std::string::npos) << status.error().message;
-  EXPECT_EQ(Content(folder / "scan.compressed.ply"), "theirs");
-  EXPECT_EQ(Content(folder / "scan-3.compressed.ply"), "mine");
+  EXPECT_EQ(FileBytes(folder / "scan.compressed.ply"), "theirs");
+  EXPECT_EQ(FileBytes(folder / "scan-3.compressed.ply"), "mine");
   ASSERT_TRUE(WriteOrKeep(folder / "scan.compressed.ply", true, write).ok());
-  EXPECT_EQ(Content(folder / "scan.compressed.ply"), "mine");
+  EXPECT_EQ(FileBytes(folder / "scan.compressed.ply"), "mine");
   EXPECT_EQ(folder.Entries(), 3);
 }
 

@@ -3,11 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <iterator>
 #include <string>
 
 #include "io/atomic_file.h"
 #include "io/file_bytes.h"
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 #include "io/input_file.h"
 #include "io/mapped_file.h"
@@ -16,11 +16,6 @@ namespace anchorsplat {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string Content(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);  // not through what records
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 void Make(const fs::path& path) { std::ofstream(path) << "old"; }
 
@@ -42,7 +37,7 @@ TEST(InputRecord, NothingThatWasReadIsReplaced) {
         EXPECT_NE(status.error().message.find("write to another name"), std::string::npos) << status.error().message;
       }
     }
-    EXPECT_EQ(Content(folder / name), "old");
+    EXPECT_EQ(FileBytes(folder / name), "old");
   }
   EXPECT_TRUE(WriteWholeFile(folder / "other", "new", false).ok());
 }
@@ -57,7 +52,7 @@ TEST(InputRecord, SeesWhatWasReadSinceTheOutputWasOpened) {
   const Status status = file->Commit();
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().code, ErrorCode::kBadArgument);
-  EXPECT_EQ(Content(folder / "a"), "old");
+  EXPECT_EQ(FileBytes(folder / "a"), "old");
   EXPECT_EQ(folder.Entries(), 1);
 }
 
@@ -96,7 +91,7 @@ TEST(InputRecord, OwnStateIsReadAndReplaced) {
   RecordOwnFile(folder / "not there yet");
   ASSERT_TRUE(ReadFileBytes(folder / "state", 100).ok());
   ASSERT_TRUE(WriteWholeFile(folder / "state", "new", false).ok());
-  EXPECT_EQ(Content(folder / "state"), "new");
+  EXPECT_EQ(FileBytes(folder / "state"), "new");
   // An input does not become state; a file that came into being meanwhile is not the one that was meant.
   Make(folder / "input");
   RecordInput(folder / "input");
@@ -116,7 +111,7 @@ TEST(InputRecord, OwnStateMakesRoomForNoOtherFile) {
   fs::rename(folder / "left", folder / "elsewhere");
   std::ofstream(folder / "left") << "theirs";
   EXPECT_EQ(file->Commit().error().code, ErrorCode::kExists);
-  EXPECT_EQ(Content(folder / "left"), "theirs");
+  EXPECT_EQ(FileBytes(folder / "left"), "theirs");
 }
 
 TEST(InputRecord, AFolderHoldsAnInput) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -41,6 +42,11 @@ class JsonValue {
   const nlohmann::json* value_;
   std::string path_;  // "" for the root
 };
+
+// JSON has neither infinity nor NaN: null stands for both.
+inline nlohmann::json FiniteOrNull(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json();
+}
 
 // A parsed JSON file. Errors: as ReadFileBytes; kBadFile with line and column of a syntax error, more than 256 MiB,
 // nesting deeper than 64, more than 2^24 values (bounds on the memory a hostile file can claim).

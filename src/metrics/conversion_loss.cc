@@ -19,7 +19,7 @@ constexpr double kFieldOfView = 0.8;  // radians
 
 }  // namespace
 
-Result<ConversionLoss> MeasureConversionLoss(const GaussianCloud& before, const GaussianCloud& after, int views) {
+Result<ConversionLoss> MeasureConversionLoss(const CloudView& before, const CloudView& after, int views) {
   const Framing framing = FrameCloud(before);
   const Pinhole intrinsics = PinholeFromFov(kSide, kSide, kFieldOfView);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraSet orbit,

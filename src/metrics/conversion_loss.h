@@ -1,6 +1,6 @@
 #pragma once
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 
 namespace anchorsplat {
@@ -15,6 +15,6 @@ struct ConversionLoss {
 // Renders both from `views` places around `before`, at the distance that frames it (core/framing.h), 400 × 400 pixels,
 // on black and clamped to 0–1, in the render mode that each cloud says or that of the other. The order of the Gaussians
 // does not matter. kBadArgument: views < 1, invalid clouds.
-Result<ConversionLoss> MeasureConversionLoss(const GaussianCloud& before, const GaussianCloud& after, int views);
+Result<ConversionLoss> MeasureConversionLoss(const CloudView& before, const CloudView& after, int views);
 
 }  // namespace anchorsplat

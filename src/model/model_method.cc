@@ -5,12 +5,14 @@
 #include <filesystem>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "core/activations.h"
 #include "core/log.h"
 #include "core/text.h"
+#include "io/file_version.h"
 #include "model/any_network.h"
 #include "model/compact/shipped_network.h"
 #include "model/kernels/bfloat16_tile.h"
@@ -86,15 +88,19 @@ Result<AnyNetwork> Load(const ModelSettings& model) {
   return AnyNetwork(std::move(network));
 }
 
-// The network that was used last, for all calls that ask for it; one that is in use stays with whoever uses it.
+// The network that was used last, for all calls that ask for it, runs side by side among them; one that is in use
+// stays with whoever uses it. A file that has changed under its name is another one.
 class LastNetwork {
  public:
   Result<std::shared_ptr<const AnyNetwork>> Get(const ModelSettings& model) {
     const std::lock_guard lock(mutex_);
-    if (network_ == nullptr || file_ != model.file || precision_ != model.precision) {
+    // Before it is read: what changes meanwhile is read again at the next call.
+    const std::optional<FileVersion> version = VersionOf(model.file);
+    if (network_ == nullptr || file_ != model.file || version_ != version || precision_ != model.precision) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(AnyNetwork network, Load(model));
       network_ = std::make_shared<const AnyNetwork>(std::move(network));
       file_ = model.file;
+      version_ = version;
       precision_ = model.precision;
     }
     return network_;
@@ -103,6 +109,7 @@ class LastNetwork {
  private:
   std::mutex mutex_;
   std::filesystem::path file_;
+  std::optional<FileVersion> version_;
   WeightPrecision precision_ = WeightPrecision::kFloat;
   std::shared_ptr<const AnyNetwork> network_;
 };

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <thread>
 #include <variant>
 #include <vector>
 
@@ -187,7 +188,7 @@ TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
   auto enhanced = registered.run(input, options, report);
   ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
   EXPECT_EQ(enhanced->size(), 600);
-  const std::map<std::string, std::variant<int64_t, double>> facts(report.facts.begin(), report.facts.end());
+  const std::map<std::string, FactValue> facts(report.facts.begin(), report.facts.end());
   EXPECT_EQ(std::get<int64_t>(facts.at("copies")), 3);
   EXPECT_EQ(std::get<int64_t>(facts.at("unlike_training")), 0);
 
@@ -211,6 +212,37 @@ TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
   for (const float logit : enhanced->opacity_logits) EXPECT_GE(1 / (1 + std::exp(-logit)), 0.3f);
   options.model.file = file();
   EXPECT_FALSE(*registered.needs_pixel_size(options));
+}
+
+// The last network is kept for the next call, and what asks for another one at the same time gets its own.
+TEST_F(SmallModel, ChangedFilesAndRunsSideBySideGetTheirNetworks) {
+  const fs::path two = folder_ / "two.safetensors", three = folder_ / "three.safetensors";
+  WriteCompact(two, {.copies = 2, .hidden = 16, .head_hidden = 16});
+  WriteCompact(three, {.copies = 3, .hidden = 16, .head_hidden = 16});
+  ASSERT_FALSE(HasFatalFailure());
+  RegisterModelMethod();
+  const EnhanceMethod registered = Registered();
+  EnhanceInput input;
+  input.cloud = SheetCloud(200);
+  input.pixel_sizes = {kSheetPixel};
+  input.filter_strength = 0.7;
+  const auto copies = [&](const fs::path& file) -> int64_t {
+    EnhanceOptions options;
+    options.model.file = file;
+    StepReport report;
+    const auto enhanced = registered.run(input, options, report);
+    return enhanced.ok() ? enhanced->size() / input.cloud.size() : -1;
+  };
+  int wrong = 0;
+  std::thread other([&] {
+    for (int i = 0; i < 10; ++i) wrong += copies(two) == 2 ? 0 : 1;
+  });
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(copies(three), 3);
+  other.join();
+  EXPECT_EQ(wrong, 0);
+
+  fs::rename(two, three);
+  EXPECT_EQ(copies(three), 2);
 }
 
 // What would change nothing is refused, with the words for where it would.

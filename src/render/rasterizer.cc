@@ -5,6 +5,7 @@
 #include <new>
 #include <numeric>
 
+#include "core/finite.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "render/bin.h"
@@ -29,10 +30,8 @@ Status CheckCamera(const Camera& camera) {
   if (!(k.fx > 0) || !(k.fy > 0) || !std::isfinite(k.fx) || !std::isfinite(k.fy)) {
     return BadArgument(Cat("camera focal length (", k.fx, ", ", k.fy, ") must be positive and finite"));
   }
-  const auto finite = [](double x) { return std::isfinite(x); };
   const Pose& pose = camera.world_to_camera;
-  if (!finite(k.cx) || !finite(k.cy) || !std::all_of(pose.rotation.begin(), pose.rotation.end(), finite) ||
-      !std::all_of(pose.translation.begin(), pose.translation.end(), finite)) {
+  if (!std::isfinite(k.cx) || !std::isfinite(k.cy) || !AllFinite(pose.rotation) || !AllFinite(pose.translation)) {
     return BadArgument("camera has a principal point or a pose that is not finite");
   }
   return {};

@@ -4,9 +4,9 @@
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <limits>
 
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 #include "scene/meshes_for_test.h"
 
@@ -54,8 +54,7 @@ TEST(MeshFile, ComesBackBitByBit) {
 TEST(MeshFile, DamageIsAnError) {
   const TestFolder folder;
   ASSERT_TRUE(WriteMeshFile(folder / "mesh.safetensors", Everything()).ok());
-  std::ifstream in(folder / "mesh.safetensors", std::ios::binary);
-  const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+  const std::string bytes = FileBytes(folder / "mesh.safetensors");
   const auto damaged = [&](const std::string& from, const std::string& to) {
     std::string changed = bytes;
     const size_t at = changed.find(from);

@@ -1,8 +1,9 @@
 #include "scene/raw_scene.h"
 
-#include <cmath>
 #include <cstring>
 #include <type_traits>
+
+#include "core/finite.h"
 
 namespace anchorsplat {
 
@@ -92,9 +93,7 @@ bool KeepsItsPromises(const RawScene& scene) {
     if (m < 0 || static_cast<size_t>(m) >= scene.materials.size()) return false;
   }
   for (size_t i = 0; i < corners; ++i) {
-    for (size_t k = 0; k < 3; ++k) {
-      if (!std::isfinite(c.positions[i][k]) || !std::isfinite(c.normals[i][k])) return false;
-    }
+    if (!AllFinite(c.positions[i]) || !AllFinite(c.normals[i])) return false;
   }
   for (const EmbeddedPicture& picture : scene.pictures) {
     // Both are 32 bits: the product fits, also times four when it is compared the other way round.

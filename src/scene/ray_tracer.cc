@@ -1,6 +1,5 @@
 #include "scene/ray_tracer.h"
 
-#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -190,10 +189,8 @@ Result<RayTracer> RayTracer::Create(Mesh mesh) {
     Part& part = scene->parts[with_holes ? 1 : 0];
     if (!part.triangles.empty() && !scene->Attach(part, with_holes)) return embree_error("does not take the triangles");
   }
-  {
-    const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
-    rtcCommitScene(scene->embree.get());
-  }
+  // An arena of one place, which Embree's tasks do not leave: other runs keep their threads meanwhile.
+  tbb::task_arena(1).execute([&] { rtcCommitScene(scene->embree.get()); });
   if (rtcGetDeviceError(scene->device.get()) != RTC_ERROR_NONE) return embree_error("does not build its tree");
   return RayTracer(std::move(scene));
 }

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "core/parallel.h"
+#include "core/vector3.h"
 #include "scene/camera_rig.h"
 #include "scene/meshes_for_test.h"
 #include "scene/surface_shader.h"
@@ -18,7 +19,6 @@ namespace {
 
 using Vec3 = std::array<double, 3>;
 
-double Dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 Vec3 Minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 Vec3 Cross(const Vec3& a, const Vec3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/vector3.h"
+
 namespace anchorsplat {
 
 namespace {
@@ -14,12 +16,7 @@ using Vec3d = std::array<double, 3>;
 constexpr size_t kMostMeeting = 512;
 
 Vec3d Minus(const Vec3& a, const Vec3& b) { return {double{a[0]} - b[0], double{a[1]} - b[1], double{a[2]} - b[2]}; }
-double Dot(const Vec3d& a, const Vec3d& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 double Length(const Vec3d& a) { return std::sqrt(Dot(a, a)); }
-
-Vec3d Cross(const Vec3d& a, const Vec3d& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 
 Vec3d UnitOrZero(const Vec3d& a) {
   const double length = Length(a);

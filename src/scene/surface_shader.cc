@@ -4,14 +4,13 @@
 #include <cmath>
 
 #include "core/finite.h"
+#include "core/vector3.h"
 
 namespace anchorsplat {
 
 namespace {
 
 using Vec3 = std::array<float, 3>;
-
-float Dot(const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // Unit length; `fallback` where there is no direction.
 Vec3 Normalized(const Vec3& a, const Vec3& fallback) {
@@ -24,9 +23,9 @@ Vec3 Normalized(const Vec3& a, const Vec3& fallback) {
 // Colours of a file may be anything.
 // Twice the area times the unit normal, in double: triangles may be tiny.
 std::array<double, 3> CrossOfEdges(const Vec3& a, const Vec3& b, const Vec3& c) {
-  const double e[3] = {double{b[0]} - a[0], double{b[1]} - a[1], double{b[2]} - a[2]};
-  const double f[3] = {double{c[0]} - a[0], double{c[1]} - a[1], double{c[2]} - a[2]};
-  return {e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]};
+  const std::array<double, 3> e = {double{b[0]} - a[0], double{b[1]} - a[1], double{b[2]} - a[2]};
+  const std::array<double, 3> f = {double{c[0]} - a[0], double{c[1]} - a[1], double{c[2]} - a[2]};
+  return Cross(e, f);
 }
 
 }  // namespace

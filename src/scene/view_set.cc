@@ -1,6 +1,5 @@
 #include "scene/view_set.h"
 
-#include <chrono>
 #include <cmath>
 #include <mutex>
 #include <string>
@@ -12,6 +11,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/run_context.h"
+#include "core/stopwatch.h"
 #include "core/text.h"
 #include "core/thread_clock.h"
 #include "images/image_io.h"
@@ -22,9 +22,6 @@ namespace anchorsplat {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
-
-double Since(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
 Status MakeFolder(const fs::path& folder) {
   std::error_code code;
@@ -103,7 +100,7 @@ Result<Image> RenderStoredView(const RayTracer& tracer, const Camera& camera, co
 }
 
 Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const fs::path& folder, const ViewSetOptions& options) {
-  const auto begin = Clock::now();
+  const Stopwatch watch;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewSetCameras cameras, MakeViewSetCameras(options));
   const WriteOptions write{.overwrite = options.overwrite};
   const fs::path low = folder / std::to_string(options.low_size), high = folder / std::to_string(options.high_size);
@@ -116,9 +113,9 @@ Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const fs::path& folder
   ANCHORSPLAT_RETURN_IF_ERROR(WriteColmapCameras(sparse, cameras.low, ColmapForm::kBinary, write));
 
   ViewSetCost cost;
-  const auto points_begin = Clock::now();
+  const Stopwatch points_watch;
   ANCHORSPLAT_RETURN_IF_ERROR(WritePoints(tracer, sparse, cameras.low, options, write));
-  cost.point_seconds = Since(points_begin);
+  cost.point_seconds = points_watch.Total();
 
   // Whole views side by side: nothing waits for anything, and each view is the same whoever makes it.
   const int64_t views = std::ssize(cameras.low.cameras);
@@ -151,7 +148,7 @@ Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const fs::path& folder
     progress.Advance();
   });
   ANCHORSPLAT_RETURN_IF_ERROR(failed);
-  cost.seconds = Since(begin);
+  cost.seconds = watch.Total();
   return cost;
 }
 

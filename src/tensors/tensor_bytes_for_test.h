@@ -1,8 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -10,13 +8,13 @@
 
 #include "core/buffer.h"
 #include "core/source_dir_for_test.h"
+#include "io/file_bytes_for_test.h"
 
 // Bytes for the tests of tensor files: files of the repository, and zip archives, pickles and safetensors made by hand.
 namespace anchorsplat::tensor_bytes {
 
 inline std::string ReadTestFile(const std::string& name) {
-  std::ifstream in(SourceDirForTest() / ("testdata/tensors/" + name), std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
+  return FileBytes(SourceDirForTest() / ("testdata/tensors/" + name));
 }
 
 inline Buffer<std::byte> ToBuffer(std::string_view bytes) {

@@ -3,11 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <iterator>
 #include <numeric>
 
 #include "core/parallel.h"
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 #include "io/little_endian.h"
 #include "tensors/safetensors.h"
@@ -17,11 +16,6 @@ namespace anchorsplat {
 namespace {
 
 using testing::HasSubstr;
-
-std::string WholeFile(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 std::string ProblemOf(const std::string& bytes) {
   const auto file = TensorFile::FromBytes(tensor_bytes::ToBuffer(bytes), "state");
@@ -39,7 +33,7 @@ TEST(TensorChecksum, FindsEveryFlippedBit) {
   const auto metadata = WithChecksum({{"step", "31"}, {"settings", R"({"seed":7})"}}, entries);
   ASSERT_TRUE(metadata.ok());
   ASSERT_TRUE(WriteSafetensors(folder / "state", entries, *metadata).ok());
-  const std::string whole = WholeFile(folder / "state");
+  const std::string whole = FileBytes(folder / "state");
   ASSERT_EQ(ProblemOf(whole), "");
   // What fills the header up to 64 bytes means nothing.
   const size_t data = 8 + LoadLittle<uint64_t>(reinterpret_cast<const std::byte*>(whole.data())),
@@ -58,7 +52,7 @@ TEST(TensorChecksum, FindsEveryFlippedBit) {
 TEST(TensorChecksum, FilesWithoutOneSaySo) {
   const TestFolder folder;
   ASSERT_TRUE(WriteSafetensors(folder / "state", {}, {{"step", "31"}}).ok());
-  EXPECT_THAT(ProblemOf(WholeFile(folder / "state")), HasSubstr("has no checksum"));
+  EXPECT_THAT(ProblemOf(FileBytes(folder / "state")), HasSubstr("has no checksum"));
 }
 
 // Of more than one chunk, of other strides, by any number of threads; and of a sum that is already there.

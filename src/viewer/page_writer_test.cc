@@ -12,6 +12,7 @@
 #include "core/text.h"
 #include "core/world_up.h"
 #include "images/image_io.h"
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 #include "render/constants.h"
 #include "viewer/fitted_cloud.h"
@@ -20,11 +21,6 @@
 
 namespace anchorsplat {
 namespace {
-
-std::string FileText(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 // The text of the element with this id, as a browser would find it: up to the next end tag.
 std::string ElementText(const std::string& page, const std::string& id) {
@@ -94,7 +90,7 @@ TEST(PageWriter, DataComesBackAsItWentIn) {
   const Status status = WriteViewerPage(folder / "page.html", page);
   ASSERT_TRUE(status.ok()) << status.error().message;
 
-  const std::string text = FileText(folder / "page.html");
+  const std::string text = FileBytes(folder / "page.html");
   const auto description = nlohmann::json::parse(ElementText(text, "description"));
   EXPECT_EQ(description["title"], "after.ply");
   EXPECT_EQ(description["after"]["fileBytes"], 12345);
@@ -122,7 +118,7 @@ TEST(PageWriter, SaysWhereUpIsAndHowLargeTheSplatIs) {
   GaussianCloud cloud = FittedLookingCloud(500, 0, 1);
   const auto description = [&](const ViewerPage& page) {
     EXPECT_TRUE(WriteViewerPage(folder / "page.html", page, {.overwrite = true}).ok());
-    return nlohmann::json::parse(ElementText(FileText(folder / "page.html"), "description"));
+    return nlohmann::json::parse(ElementText(FileBytes(folder / "page.html"), "description"));
   };
   ViewerPage page;
   page.after = {&cloud, "after.ply", {}};
@@ -155,7 +151,7 @@ TEST(PageWriter, NothingIsFetchedAndNoCodeIsMade) {
   ViewerPage page;
   page.after = {&cloud, "x", {}};
   ASSERT_TRUE(WriteViewerPage(folder / "page.html", page).ok());
-  const std::string text = FileText(folder / "page.html");
+  const std::string text = FileBytes(folder / "page.html");
   for (const char* word :
        {"http:", "https:", "ftp:", "@import", "url(", "fetch(", "XMLHttpRequest", "WebSocket", "EventSource",
         "sendBeacon", "importScripts", "eval(", "Function(", "innerHTML", "document.write", "javascript:", "{{"}) {
@@ -181,7 +177,7 @@ TEST(PageWriter, TheGuardComesFirstAndTheStartLast) {
   page.title = std::string(5000, 't');
   page.after = {&cloud, "x", {}};
   ASSERT_TRUE(WriteViewerPage(folder / "page.html", page).ok());
-  const std::string text = FileText(folder / "page.html");
+  const std::string text = FileBytes(folder / "page.html");
   const size_t guard = text.find("DOMContentLoaded"), guard_end = text.find("</script>");
   EXPECT_LT(text.find("<script>"), guard);
   EXPECT_LT(guard, guard_end);
@@ -224,7 +220,7 @@ TEST(PageWriter, HostileNamesStayText) {
     page.before = ViewerSplat{&cloud, name, {}};
     page.views = {View(name)};
     EXPECT_TRUE(WriteViewerPage(folder / "page.html", page, {.overwrite = true}).ok());
-    return FileText(folder / "page.html");
+    return FileBytes(folder / "page.html");
   };
   const std::string plain = write("plain");
   for (const std::string& name :
@@ -251,7 +247,7 @@ TEST(PageWriter, RenderModeAndDegreeAreTheClouds) {
   page.after = {&cloud, "x", {}};
   page.max_sh_degree = 1;
   ASSERT_TRUE(WriteViewerPage(folder / "page.html", page).ok());
-  const auto description = nlohmann::json::parse(ElementText(FileText(folder / "page.html"), "description"));
+  const auto description = nlohmann::json::parse(ElementText(FileBytes(folder / "page.html"), "description"));
   EXPECT_EQ(description["after"]["antialiased"], true);
   EXPECT_EQ(description["after"]["degree"], 1);
   EXPECT_EQ(description["after"]["fileDegree"], 3);
@@ -268,12 +264,12 @@ TEST(PageWriter, PicturesTravelAsTheyAre) {
   page.views = {View("none"), View("some")};
   page.views[1].picture = folder / "truth.png";
   ASSERT_TRUE(WriteViewerPage(folder / "page.html", page).ok());
-  const std::string text = FileText(folder / "page.html");
+  const std::string text = FileBytes(folder / "page.html");
   const auto views = nlohmann::json::parse(ElementText(text, "description"))["views"];
   EXPECT_TRUE(views[0]["picture"].is_null());
   EXPECT_EQ(views[1]["picture"]["type"], "image/png");
   const std::vector<uint8_t> bytes = FromBase64(ElementText(text, views[1]["picture"]["element"]));
-  EXPECT_EQ(std::string(bytes.begin(), bytes.end()), FileText(folder / "truth.png"));
+  EXPECT_EQ(std::string(bytes.begin(), bytes.end()), FileBytes(folder / "truth.png"));
 }
 
 TEST(PageWriter, ErrorsSayWhatToDoAndLeaveNothingBehind) {

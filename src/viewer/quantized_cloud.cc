@@ -77,7 +77,7 @@ struct MeanCode {
 };
 
 // Where the middle is and how far things go, of the Gaussians at `rows`.
-void MeasureMeans(const GaussianCloud& cloud, const std::vector<int64_t>& rows, QuantizedCloud& q) {
+void MeasureMeans(const CloudView& cloud, const std::vector<int64_t>& rows, QuantizedCloud& q) {
   std::vector<float> values(rows.size());
   double largest = 0;
   q.spread = 0;
@@ -97,7 +97,7 @@ void MeasureMeans(const GaussianCloud& cloud, const std::vector<int64_t>& rows, 
   q.reach = std::asinh(largest / q.spread);
 }
 
-void MeasureRanges(const GaussianCloud& cloud, const std::vector<int64_t>& rows, QuantizedCloud& q) {
+void MeasureRanges(const CloudView& cloud, const std::vector<int64_t>& rows, QuantizedCloud& q) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   q.log_scale = {kInfinity, -kInfinity};
   q.dc = {kInfinity, -kInfinity};
@@ -125,7 +125,7 @@ void MeasureRanges(const GaussianCloud& cloud, const std::vector<int64_t>& rows,
 
 }  // namespace
 
-Result<QuantizedCloud> Quantize(const GaussianCloud& cloud, int max_sh_degree) {
+Result<QuantizedCloud> Quantize(const CloudView& cloud, int max_sh_degree) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   QuantizedCloud q;
   q.sh_degree = std::clamp(max_sh_degree, 0, cloud.sh_degree);

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 
 namespace anchorsplat {
@@ -47,6 +47,6 @@ struct QuantizedCloud {
 constexpr int PlanesPerGaussian(int sh_degree) { return 3 * 3 + 7 * 2 + 4 + 3 * (ShCoefficients(sh_degree) - 1); }
 
 // Keeps SH up to `max_sh_degree`. kBadArgument: an invalid cloud, or one without any usable Gaussian.
-Result<QuantizedCloud> Quantize(const GaussianCloud& cloud, int max_sh_degree);
+Result<QuantizedCloud> Quantize(const CloudView& cloud, int max_sh_degree);
 
 }  // namespace anchorsplat

@@ -11,6 +11,7 @@
 #include "formats/compressed_ply/compressed_ply_writer.h"
 #include "formats/random_cloud_for_test.h"
 #include "formats/splat_order.h"
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 
 namespace anchorsplat {
@@ -20,8 +21,6 @@ Result<GaussianCloud> Read(const std::filesystem::path& path, const ReadLimits& 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
   return ReadCompressedPly(file, limits);
 }
-
-std::string Bytes(const std::filesystem::path& path) { return *InputFile::Open(path)->ReadAll(1 << 30); }
 
 std::string ErrorOf(std::string bytes) {
   const auto cloud = ReadCompressedPly(InputFile::FromBytes("a.compressed.ply", std::move(bytes)));
@@ -142,7 +141,7 @@ TEST(CompressedPly, ReadsFilesWithoutColourRanges) {
 TEST(CompressedPly, RefusesWhatDoesNotBelongTogether) {
   const TestFolder folder;
   ASSERT_TRUE(WriteCompressedPly(folder / "a.ply", RandomCloud(300, 1, 4)).ok());
-  const std::string good = Bytes(folder / "a.ply");
+  const std::string good = FileBytes(folder / "a.ply");
   EXPECT_EQ(ErrorOf(good), "accepted");
   const auto expect = [](const std::string& message, const std::string& part) {
     EXPECT_NE(message.find(part), std::string::npos) << message;

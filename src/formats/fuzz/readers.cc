@@ -4,7 +4,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <utility>
 
 #include "cameras/camera_io.h"
@@ -16,6 +15,7 @@
 #include "formats/fuzz/seeds.h"
 #include "formats/registry.h"
 #include "images/image_io.h"
+#include "io/file_bytes_for_test.h"
 #include "tensors/tensor_file.h"
 
 namespace anchorsplat {
@@ -93,8 +93,7 @@ void AddSplatFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
     if (format.write != nullptr) {
       for (int degree = 0; degree <= kMaxShDegree; ++degree) {
         (void)format.write(folder / file, SeedCloud(5, degree), {.overwrite = true});
-        std::ifstream in(folder / file, std::ios::binary);
-        reader.seeds.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+        reader.seeds.push_back(FileBytes(folder / file));
       }
     }
     if (format.name == "PLY") {
@@ -135,9 +134,8 @@ void AddSplatsOfSeveralFiles(const fs::path& folder, std::vector<FuzzReader>& re
     const fs::path own = folder / Cat("of_", part.damaged);
     fs::create_directories(own);
     (void)WriteCloud(own / part.main, SeedCloud(5, 1), {.overwrite = true});
-    std::ifstream in(own / part.damaged, std::ios::binary);
     FuzzReader reader{Cat(part.format, ", ", part.damaged),
-                      {{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}},
+                      {FileBytes(own / part.damaged)},
                       {},
                       [own, part](const std::string& bytes) -> Status {
                         Put(own / part.damaged, bytes);

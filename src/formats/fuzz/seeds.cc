@@ -6,9 +6,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <initializer_list>
-#include <iterator>
 
 // Behind <cstdio>: it needs FILE.
 #include <jpeglib.h>
@@ -19,6 +17,7 @@
 #include "core/text.h"
 #include "formats/spz/spz_writer.h"
 #include "images/image_io.h"
+#include "io/file_bytes_for_test.h"
 #include "tensors/safetensors.h"
 #include "tensors/tensor_entry.h"
 
@@ -126,15 +125,10 @@ std::string Jpeg(bool progressive) {
   return bytes;
 }
 
-std::string Content(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-}
-
 std::vector<std::string> TestFiles(std::initializer_list<const char*> names) {
   std::vector<std::string> files;
   for (const char* name : names) {
-    files.push_back(Content(SourceDirForTest() / "testdata/tensors" / name));
+    files.push_back(FileBytes(SourceDirForTest() / "testdata/tensors" / name));
   }
   return files;
 }
@@ -227,7 +221,7 @@ std::vector<std::string> KsplatSeeds() {
 
 std::string SpzContentSeed(const std::filesystem::path& folder, int sh_degree) {
   (void)WriteSpz(folder / "seed.spz", SeedCloud(5, sh_degree), {.overwrite = true, .spz_version = 3});
-  const std::string packed = Content(folder / "seed.spz");
+  const std::string packed = FileBytes(folder / "seed.spz");
   std::string content(4096, '\0');  // 5 Gaussians have less
   z_stream stream{};
   stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
@@ -296,7 +290,7 @@ std::vector<std::string> SafetensorsSeeds(const std::filesystem::path& folder) {
   const std::vector<TensorEntry> tensors = {MakeEntry("weights", {2, 3}, values), MakeEntry("steps", {2}, integers),
                                             MakeEntry("nothing", {0, 4}, std::span<const float>())};
   (void)WriteSafetensors(folder / "seed.safetensors", tensors, {{"format", "pt"}}, {.overwrite = true});
-  return {Content(folder / "seed.safetensors")};
+  return {FileBytes(folder / "seed.safetensors")};
 }
 
 std::vector<std::string> TransformsSeeds() {
@@ -391,7 +385,7 @@ std::vector<std::string> PngSeeds(const std::filesystem::path& folder) {
     Image image(7, 5, channels);
     for (size_t k = 0; k < image.pixels.size(); ++k) image.pixels[k] = static_cast<float>(k % 11) / 10;
     (void)WritePng(folder / "seed.png", image, {.overwrite = true});
-    seeds.push_back(Content(folder / "seed.png"));
+    seeds.push_back(FileBytes(folder / "seed.png"));
   }
   return seeds;
 }

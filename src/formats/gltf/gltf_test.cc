@@ -12,14 +12,13 @@
 #include "formats/gltf/gltf_writer.h"
 #include "formats/random_cloud_for_test.h"
 #include "io/atomic_file.h"
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {
 
 using Json = nlohmann::json;
-
-std::string Bytes(const std::filesystem::path& path) { return *InputFile::Open(path)->ReadAll(1 << 30); }
 
 Result<GaussianCloud> Read(std::string bytes, const ReadLimits& limits = {}) {
   return ReadGltf(InputFile::FromBytes("a.glb", std::move(bytes)), limits);
@@ -48,7 +47,7 @@ struct Glb {
 Glb Example(int64_t n, int degree) {
   const TestFolder folder;
   EXPECT_TRUE(WriteGlb(folder / "a.glb", RandomCloud(n, degree, 3)).ok());
-  return Glb::Of(Bytes(folder / "a.glb"));
+  return Glb::Of(FileBytes(folder / "a.glb"));
 }
 
 TEST(Gltf, RoundTripOfEveryDegree) {
@@ -56,7 +55,7 @@ TEST(Gltf, RoundTripOfEveryDegree) {
   for (int degree = 0; degree <= kMaxShDegree; ++degree) {
     const GaussianCloud cloud = RandomCloud(20'001, degree, 3);
     ASSERT_TRUE(WriteGlb(folder / "a.glb", cloud, {.overwrite = true}).ok());
-    const auto read = Read(Bytes(folder / "a.glb"));
+    const auto read = Read(FileBytes(folder / "a.glb"));
     ASSERT_TRUE(read.ok()) << read.error().message;
     const auto error = CompareAttributes(*read, cloud);
     EXPECT_EQ(error->compared, 20'001);
@@ -77,7 +76,7 @@ TEST(Gltf, WhatItsReadersExpect) {
   cloud.sh = {0, 5, -5};
   cloud.opacity_logits = {0};
   ASSERT_TRUE(WriteGlb(folder / "a.glb", cloud).ok());
-  const std::string bytes = Bytes(folder / "a.glb");
+  const std::string bytes = FileBytes(folder / "a.glb");
   const Glb glb = Glb::Of(bytes);
   EXPECT_EQ(bytes.size() % 4, 0u);
   uint32_t length;

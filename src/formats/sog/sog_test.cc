@@ -18,6 +18,7 @@
 #include "formats/sog/sog_writer.h"
 #include "formats/splat_order.h"
 #include "images/webp_image.h"
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 #include "io/zip_archive.h"
 
@@ -38,8 +39,6 @@ uint64_t BytesAskedFor() {
   EXPECT_EQ(name, "rchar:");
   return bytes;
 }
-
-std::string Bytes(const std::filesystem::path& path) { return *InputFile::Open(path)->ReadAll(1 << 30); }
 
 #define EXPECT_CONTAINS(text, part) EXPECT_NE((text).find(part), std::string::npos) << (text)
 
@@ -138,7 +137,7 @@ TEST(Sog, RefusesLiesAndOtherFolders) {
   ASSERT_TRUE(WriteSog(folder / "meta.json", cloud).ok());
   ASSERT_TRUE(WriteSog(folder / "a.sog", cloud).ok());
   EXPECT_EQ(WriteSog(folder / "a.sog", cloud).error().code, ErrorCode::kExists);
-  const nlohmann::json good = nlohmann::json::parse(Bytes(folder / "meta.json"));
+  const nlohmann::json good = nlohmann::json::parse(FileBytes(folder / "meta.json"));
   const auto error_of = [&](const nlohmann::json& meta) {
     EXPECT_TRUE(WriteWholeFile(folder / "meta.json", meta.dump(), true).ok());
     const auto read = Read(folder / "meta.json");
@@ -174,7 +173,7 @@ TEST(Sog, RefusesLiesAndOtherFolders) {
   EXPECT_CONTAINS(error_of(with("/sh0/files/0", "other.webp")), "other pictures have");
   EXPECT_CONTAINS(error_of(with("/shN/files/0", "quats.webp")), "expected 192, 512 or 960");
   EXPECT_CONTAINS(error_of(with("/shN/files/1", "quats.webp")), "labels beyond");
-  const std::string zip = Bytes(folder / "a.sog");
+  const std::string zip = FileBytes(folder / "a.sog");
   for (const size_t size : {size_t{3}, size_t{100}, zip.size() / 2, zip.size() - 10}) {
     EXPECT_FALSE(ReadSog(InputFile::FromBytes("a.sog", zip.substr(0, size))).ok()) << size;
   }

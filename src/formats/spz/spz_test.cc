@@ -16,6 +16,7 @@
 #include "formats/splat_order.h"
 #include "formats/spz/spz_reader.h"
 #include "formats/spz/spz_writer.h"
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 #include "io/little_endian.h"
 
@@ -26,8 +27,6 @@ Result<GaussianCloud> Read(const std::filesystem::path& path, const ReadLimits& 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
   return ReadSpz(file, limits);
 }
-
-std::string Bytes(const std::filesystem::path& path) { return *InputFile::Open(path)->ReadAll(1 << 30); }
 
 std::string ErrorOf(std::string bytes) {
   const auto cloud = ReadSpz(InputFile::FromBytes("a.spz", std::move(bytes)));
@@ -164,7 +163,7 @@ TEST(Spz, SameBytesForAnyNumberOfThreads) {
     SetThreadCount(3);
     ASSERT_TRUE(WriteSpz(folder / "three.spz", cloud, {.overwrite = true, .spz_version = version}).ok());
     SetThreadCount(0);
-    EXPECT_EQ(Bytes(folder / "one.spz"), Bytes(folder / "three.spz"));
+    EXPECT_EQ(FileBytes(folder / "one.spz"), FileBytes(folder / "three.spz"));
   }
 }
 
@@ -216,7 +215,7 @@ TEST(Spz, RefusesDamageLiesAndBombs) {
   const GaussianCloud cloud = Tame(3000, 1, 8);
   ASSERT_TRUE(WriteSpz(folder / "3.spz", cloud, {.spz_version = 3}).ok());
   ASSERT_TRUE(WriteSpz(folder / "4.spz", cloud, {.spz_version = 4}).ok());
-  const std::string v3 = Bytes(folder / "3.spz"), v4 = Bytes(folder / "4.spz");
+  const std::string v3 = FileBytes(folder / "3.spz"), v4 = FileBytes(folder / "4.spz");
   for (const std::string& good : {v3, v4}) {
     EXPECT_EQ(ErrorOf(good), "accepted");
     for (const size_t size : {size_t{0}, size_t{1}, size_t{5}, size_t{20}, good.size() / 2, good.size() - 40}) {

@@ -9,21 +9,19 @@
 #include <string>
 
 #include "formats/random_cloud_for_test.h"
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
-#include "io/input_file.h"
 #include "io/zip_archive.h"
 
 namespace anchorsplat {
 namespace {
-
-std::string Bytes(const std::filesystem::path& path) { return *InputFile::Open(path)->ReadAll(1 << 30); }
 
 TEST(TableWriters, CsvReadsBackAsTheSameFloats) {
   const TestFolder folder;
   GaussianCloud cloud = RandomCloud(10'000, 1, 3);
   cloud.opacity_logits[1] = -std::numeric_limits<float>::infinity();
   ASSERT_TRUE(WriteCsv(folder / "a.csv", cloud).ok());
-  std::istringstream text(Bytes(folder / "a.csv"));
+  std::istringstream text(FileBytes(folder / "a.csv"));
   std::string line;
   std::getline(text, line);
   EXPECT_EQ(line,
@@ -50,7 +48,7 @@ TEST(TableWriters, NpzHoldsTheArrays) {
     const GaussianCloud cloud = RandomCloud(123, degree, 3);
     ASSERT_TRUE(WriteNpz(folder / "a.npz", cloud, {.overwrite = true}).ok());
     EXPECT_EQ(std::filesystem::file_size(folder / "a.npz"), PredictedNpzSize(123, degree));
-    const auto zip = ZipReader::Open("a.npz", Bytes(folder / "a.npz"));
+    const auto zip = ZipReader::Open("a.npz", FileBytes(folder / "a.npz"));
     ASSERT_TRUE(zip.ok()) << zip.error().message;
     const std::string sh = *zip->Read("sh.npy", 1 << 20);
     EXPECT_EQ(sh.substr(0, 8), std::string("\x93NUMPY\x01\x00", 8));

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/vector3.h"
+
 namespace anchorsplat {
 
 namespace {
@@ -11,8 +13,6 @@ namespace {
 float HalfLog(float length_log, float pixel_log, float low, float high) {
   return std::clamp(0.5f * (length_log - pixel_log), low, high);
 }
-
-float Dot(const float* a, const float* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 float RootMeanSquare(const float* values, int64_t count) {
   float sum = 0;

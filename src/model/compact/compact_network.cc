@@ -232,13 +232,15 @@ float CompactNetwork::Fade(const float* node, const std::array<float, 3>& widths
   return std::clamp((kFadeEnd - farthest) / (kFadeEnd - kFadeBegin), 0.0f, 1.0f);
 }
 
-Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const CompactTask& task) const {
+namespace {
+
+Status CheckTask(const GaussianCloud& cloud, const CompactTask& task, int64_t copies) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   const int64_t n = cloud.size();
   if (n == 0) return Error{ErrorCode::kBadArgument, "the splat has no Gaussians"};
-  if (n >= kMostRows / config_.copies) {
+  if (n >= kMostRows / copies) {
     return Error{ErrorCode::kBadArgument,
-                 Cat(WithThousands(n), " Gaussians cannot become ", config_.copies, " each: more than 2^31 in all")};
+                 Cat(WithThousands(n), " Gaussians cannot become ", copies, " each: more than 2^31 in all")};
   }
   if (task.pixel_sizes.size() != 1 && task.pixel_sizes.size() != static_cast<size_t>(n)) {
     return Error{ErrorCode::kBadArgument,
@@ -253,28 +255,53 @@ Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const Co
     return Error{ErrorCode::kBadArgument, Cat("upscale ", task.upscale, " must be at least 1 and the filter strength ",
                                               task.strength, " not negative")};
   }
-  const CompactGraph graph = BuildCompactGraph(cloud, config_.neighbours, config_.context);
-  const CompactFeatures features(cloud, graph, task.pixel_sizes, task.upscale);
+  return {};
+}
 
-  // Where the copies of each go: those that are alone stand behind all others.
-  std::vector<float> fades(static_cast<size_t>(n));
-  ParallelFor(0, n, kRowsPerTask, [&](int64_t begin, int64_t end) {
+// Where the copies of each Gaussian go: those that are alone stand behind all others.
+struct CopyPlaces {
+  std::vector<int64_t> rows;  // of the first copy
+  int64_t inside = 0;         // Gaussians that have copies
+  int64_t copied = 0;         // their copies
+};
+
+CopyPlaces PlacesOfCopies(const std::vector<float>& fades, int64_t outside, int64_t copies) {
+  CopyPlaces places;
+  places.inside = std::ssize(fades) - outside;
+  places.copied = copies * places.inside;
+  places.rows.resize(fades.size());
+  int64_t next = 0, alone = places.copied;
+  for (size_t i = 0; i < fades.size(); ++i) places.rows[i] = fades[i] > 0 ? next++ : alone++;
+  return places;
+}
+
+}  // namespace
+
+std::vector<float> CompactNetwork::Fades(const CompactFeatures& features, int64_t count) const {
+  std::vector<float> fades(static_cast<size_t>(count));
+  ParallelFor(0, count, kRowsPerTask, [&](int64_t begin, int64_t end) {
     Buffer<float> nodes(static_cast<size_t>((end - begin) * kNodeFeatures));
     features.Nodes(begin, end, nodes.data());
     for (int64_t i = begin; i < end; ++i) {
       fades[static_cast<size_t>(i)] = Fade(nodes.data() + (i - begin) * kNodeFeatures, features.Widths(i));
     }
   });
+  return fades;
+}
+
+Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const CompactTask& task) const {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckTask(cloud, task, config_.copies));
+  const int64_t n = cloud.size();
+  const CompactGraph graph = BuildCompactGraph(cloud, config_.neighbours, config_.context);
+  const CompactFeatures features(cloud, graph, task.pixel_sizes, task.upscale);
+
+  const std::vector<float> fades = Fades(features, n);
   CompactResult result;
   for (const float fade : fades) {
     result.outside += fade == 0 ? 1 : 0;
     result.partly += fade > 0 && fade < 1 ? 1 : 0;
   }
-  const int64_t inside = n - result.outside, copied = config_.copies * inside;
-  std::vector<int64_t> rows(static_cast<size_t>(n));
-  for (int64_t i = 0, next = 0, alone = copied; i < n; ++i) {
-    rows[static_cast<size_t>(i)] = fades[static_cast<size_t>(i)] > 0 ? next++ : alone++;
-  }
+  const CopyPlaces places = PlacesOfCopies(fades, result.outside, config_.copies);
 
   CompactConfig single = config_;
   single.copies = 1;
@@ -284,28 +311,29 @@ Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const Co
   std::atomic<int64_t> not_finite = 0;
   const std::vector<float> nothing(static_cast<size_t>(CompactOutputs(config_)), 0.0f);
   try {
-    result.cloud.Resize(copied + result.outside, cloud.sh_degree);
+    result.cloud.Resize(places.copied + result.outside, cloud.sh_degree);
     const Buffer<float> states = States(features, graph);
     ParallelFor(0, n, kRowsPerTask, [&](int64_t begin, int64_t end) {
       Buffer<float> raw(static_cast<size_t>((end - begin) * out_.outputs()));
       Head(features, states, begin, end, raw.data());
       for (int64_t i = begin; i < end; ++i) {
         const float fade = fades[static_cast<size_t>(i)];
-        const int64_t row = rows[static_cast<size_t>(i)];
+        const int64_t row = places.rows[static_cast<size_t>(i)];
         if (fade > 0) {
           const float* said = raw.data() + (i - begin) * out_.outputs();
           if (!AllFinite(said, out_.outputs())) {
             said = nothing.data();
             ++not_finite;
           }
-          WriteCopies(config_, start, anchors, i, said, fade, row, inside, result.cloud);
+          WriteCopies(config_, start, anchors, i, said, fade, row, places.inside, result.cloud);
         } else {
           WriteCopies(single, single_start, anchors, i, nothing.data(), 0, row, 1, result.cloud);
         }
       }
     });
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::kBadArgument, Cat("no memory for ", WithThousands(copied + result.outside), " Gaussians")};
+    return Error{ErrorCode::kBadArgument,
+                 Cat("no memory for ", WithThousands(places.copied + result.outside), " Gaussians")};
   }
   result.not_finite = not_finite;
   result.cloud.render_mode = cloud.render_mode;

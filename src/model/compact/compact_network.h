@@ -74,6 +74,7 @@ class CompactNetwork {
   // States [N,H] of all Gaussians after all rounds.
   Buffer<float> States(const CompactFeatures& features, const CompactGraph& graph) const;
   void Head(const CompactFeatures& features, const Buffer<float>& states, int64_t begin, int64_t end, float* out) const;
+  std::vector<float> Fades(const CompactFeatures& features, int64_t count) const;
   float Fade(const float* node, const std::array<float, 3>& widths) const;
 
   CompactConfig config_;

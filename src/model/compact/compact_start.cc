@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/activations.h"
+
 namespace anchorsplat {
 
 namespace {
@@ -52,8 +54,7 @@ CopyStart::CopyStart(int64_t copies, double spread) : offsets_(static_cast<size_
 CopyStart::Shape CopyStart::ShapeOf(double opacity_logit) const {
   const auto copies = static_cast<double>(offsets_.size());
   if (offsets_.size() == 1) return {opacity_logit, {0, 0, 0}};
-  const double o =
-      opacity_logit < 0 ? std::exp(opacity_logit) / (1 + std::exp(opacity_logit)) : 1 / (1 + std::exp(-opacity_logit));
+  const double o = Sigmoid(opacity_logit);
   const double centre = o - 0.13 * (1 - std::pow(copies, -4.0 / 3)) * o * o * o;
   const double together = 1 - 0.23 * (1 - 1 / copies) * o - 0.05 * o * o;  // s₀²
   double opacity = -std::expm1(std::log1p(-centre) / copies);

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/activations.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
@@ -64,9 +65,7 @@ std::vector<int64_t> MostVisible(const GaussianCloud& cloud, std::vector<int64_t
   for (size_t j = 0; j < rows.size(); ++j) {
     const float* s = cloud.log_scales.data() + 3 * rows[j];
     const float logit = cloud.opacity_logits[static_cast<size_t>(rows[j])];
-    // ln of sigmoid without overflow
-    const float log_opacity = logit < 0 ? logit - std::log1p(std::exp(logit)) : -std::log1p(std::exp(-logit));
-    log_weight[j] = log_opacity + s[0] + s[1] + s[2] - std::min({s[0], s[1], s[2]});
+    log_weight[j] = LogSigmoid(logit) + s[0] + s[1] + s[2] - std::min({s[0], s[1], s[2]});
   }
   std::vector<size_t> order(rows.size());
   std::iota(order.begin(), order.end(), size_t{0});

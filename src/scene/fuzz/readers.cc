@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/text.h"
+#include "io/file_bytes_for_test.h"
 #include "scene/assets_for_test.h"
 #include "scene/furniture_catalog.h"
 #include "scene/mesh_import.h"
@@ -196,11 +197,7 @@ void AddLibraries(const fs::path& folder, std::vector<FuzzReader>& readers) {
                        return read();
                      }});
   write(list);
-  std::ifstream in(path, std::ios::binary);
-  readers.push_back({"library",
-                     {{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()}},
-                     {},
-                     [=](const std::string& bytes) {
+  readers.push_back({"library", {FileBytes(path)}, {}, [=](const std::string& bytes) {
                        fs::remove(path);
                        std::ofstream(path, std::ios::binary) << bytes;
                        return read();

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <array>
+
+namespace anchorsplat {
+
+// Products of two vectors of three, in their own precision. Sums from left to right, so that what is made of them is
+// the same everywhere.
+
+template <typename T>
+T Dot(const T* a, const T* b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+template <typename T>
+T Dot(const std::array<T, 3>& a, const std::array<T, 3>& b) {
+  return Dot(a.data(), b.data());
+}
+
+template <typename T>
+std::array<T, 3> Cross(const std::array<T, 3>& a, const std::array<T, 3>& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,144 @@
+#include "enhance/refine_plan.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/random.h"
+#include "enhance/enhance.h"
+#include "enhance/refinement_for_test.h"
+#include "fit/orbit_scene_for_test.h"
+#include "fit/pixel_model.h"
+#include "formats/random_cloud_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+// What a network knows more than the splat would be lost to what the splat shows.
+TEST_F(Refinement, OfANetworksResultIsGentle) {
+  options_ = {};
+  input_.start_has_detail = true;
+  auto refined = Refine(input_, options_, {});
+  ASSERT_TRUE(refined.ok()) << refined.error().message;
+  EXPECT_EQ(refined->report.steps, 100);
+  EXPECT_EQ(refined->report.copies, 1);
+  EXPECT_EQ(std::ssize(refined->cloud.means), std::ssize(input_.start.means));
+  options_.steps = 100;
+  options_.copies = 1;
+  options_.rate = 0.1;
+  input_.start_has_detail = false;
+  ExpectSameCloud(Refine(input_, options_, {})->cloud, refined->cloud);
+  // What is said counts.
+  input_.start_has_detail = true;
+  options_.steps = 3;
+  options_.copies = 2;
+  refined = Refine(input_, options_, {});
+  EXPECT_EQ(refined->report.steps, 3);
+  EXPECT_EQ(refined->report.copies, 2);
+  EXPECT_EQ(refined->report.plan.gaussians, 2 * input_.start.size());
+  // With pictures there is more to learn.
+  options_ = {};
+  options_.images = project();
+  options_.hold_out = 4;
+  options_.steps = 1;
+  EXPECT_EQ(Refine(input_, options_, {})->report.copies, 8);
+}
+
+// 20,000 Gaussians in pictures of 28² pixels, which are 84² when seen closer.
+TEST_F(Refinement, SplitsNothingThatNoPixelWouldShow) {
+  input_.cloud = orbit_scene::Ball(20'000, 1);
+  input_.start = input_.cloud;
+  for (float& s : input_.start.log_scales) s += 0.3f;
+  options_.images.clear();
+  options_.copies.reset();
+  options_.steps = 1;
+  auto refined = Refine(input_, options_, {});
+  ASSERT_TRUE(refined.ok()) << refined.error().message;
+  EXPECT_EQ(refined->report.copies, 1);
+  options_.copies = 3;
+  EXPECT_EQ(Refine(input_, options_, {})->report.copies, 3) << "what is said counts";
+}
+
+TEST_F(Refinement, MoreGaussiansHaveABound) {
+  options_.steps = 20;
+  const GaussianCloud one = Refine(input_, options_, {})->cloud;
+  options_.copies = 5;
+  options_.max_gaussians = 299;  // no room for two each
+  ExpectSameCloud(Refine(input_, options_, {})->cloud, one);
+}
+
+TEST_F(Refinement, WhatIsRightAlreadyStays) {
+  options_.images.clear();
+  options_.steps = 10;
+  options_.rate = 50;  // does harm
+  const auto refined = Refine(input_, options_, {});
+  ASSERT_TRUE(refined.ok());
+  EXPECT_TRUE(refined->report.kept_start);
+  ExpectSameCloud(refined->cloud, input_.start);
+}
+
+// What is right when seen closer comes back unharmed: as a fit to the areas of pixels makes it, as an antialiased one
+// makes it, and one of Gaussians that are wide anyway. 0.05 dB is the most that any of them may lose.
+TEST_F(Refinement, WhatIsFineAlreadyIsNotHarmed) {
+  EnhanceOptions options;
+  options.upscale = kUpscale;
+  options.refine = options_;
+  options.refine.copies.reset();
+  options.method = "refine";
+  const auto worse_by = [&](const GaussianCloud& fine, const GaussianCloud& enhanced) {
+    truth_ = fine;
+    const double psnr = PsnrCloser(enhanced);  // infinite when nothing has changed
+    return 10 * std::log10(1 + std::pow(10, (kGoodFit - psnr) / 10));
+  };
+  GaussianCloud area = truth_, wide = truth_, antialiased = truth_;
+  area.comments = {PixelAreaComment(kUpscale)};
+  for (float& s : wide.log_scales) s = std::max(s, static_cast<float>(std::log(6 * kPixel)));
+  antialiased.render_mode = RenderMode::kAntialiased;
+  for (const GaussianCloud& fine : {area, wide, antialiased}) {
+    const bool untold = fine.comments.empty() && !fine.render_mode;
+    options.refine.images.clear();
+    options.cameras = cameras_;
+    auto enhanced = Enhance(fine, options);
+    ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+    EXPECT_LT(worse_by(fine, enhanced->cloud), 0.05) << "without pictures";
+    if (!untold) ExpectSameCloud(enhanced->cloud, fine);
+  }
+  // With the pictures it was fitted to.
+  options.refine.images = project();
+  options.cameras.reset();
+  const GaussianCloud truth = truth_;
+  const auto enhanced = Enhance(area, options);
+  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+  EXPECT_LT(worse_by(truth, enhanced->cloud), 0.05);
+}
+
+// A splat that was trained on larger pictures agrees with the smaller ones when seen closer, and better than with any
+// width given to it. A little better is no reason to forget what they do not show.
+TEST_F(Refinement, WhatKnowsMoreThanThePicturesStays) {
+  Random random(4);
+  input_.cloud = truth_;
+  for (float& v : input_.cloud.means) v += static_cast<float>(0.01 * kPixel * random.Normal());
+  input_.start = input_.cloud;
+  for (float& s : input_.start.log_scales) s += 0.1f;  // as a filter would
+  options_.rate = 0.2;
+  const auto kept = Refine(input_, options_, {});
+  ASSERT_TRUE(kept.ok()) << kept.error().message;
+  EXPECT_TRUE(kept->report.kept_start);
+  EXPECT_TRUE(kept->report.plan.from_input);
+  EXPECT_EQ(kept->report.plan.least_gain, 2);
+  EXPECT_FALSE(kept->report.plan.why.empty());
+  ExpectSameCloud(kept->cloud, input_.cloud);
+  // A bad one has more to learn than to forget.
+  for (float& v : input_.cloud.means) v += static_cast<float>(0.3 * kPixel * random.Normal());
+  input_.start = input_.cloud;
+  for (float& s : input_.start.log_scales) s += 0.3f;
+  options_.rate = 1;
+  const auto refined = Refine(input_, options_, {});
+  ASSERT_TRUE(refined.ok()) << refined.error().message;
+  EXPECT_FALSE(refined->report.kept_start);
+  EXPECT_GT(refined->report.after, refined->report.before + 2);
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -12,8 +12,9 @@
 
 namespace anchorsplat {
 
-// How a splat wants to be drawn: as 3DGS (Kerbl et al. 2023) does it, or with Mip-Splatting's compensated opacity.
-enum class Rasterization { kClassic, kAntialiased };
+// How a splat wants to be drawn: as 3DGS (Kerbl et al. 2023) does it, where every Gaussian is widened by 0.3 px²; with
+// opacity compensated for that (gsplat's "antialiased"); or with opacity compensated for 0.1 px² (Mip-Splatting).
+enum class Rasterization { kClassic, kAntialiased, kMip };
 
 // Columns of N Gaussians that somebody else owns, row i of each belonging to Gaussian i: a Splat, NumPy arrays. Values
 // are *stored* ones, before activation, exactly as an INRIA PLY keeps them. Every function that only looks at a splat

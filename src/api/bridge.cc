@@ -78,12 +78,26 @@ SplatView ToView(const CloudView& cloud) {
 
 std::optional<RenderMode> ToMode(std::optional<Rasterization> rasterization) {
   if (!rasterization) return std::nullopt;
-  return *rasterization == Rasterization::kAntialiased ? RenderMode::kAntialiased : RenderMode::kClassic;
+  switch (*rasterization) {
+    case Rasterization::kAntialiased:
+      return RenderMode::kAntialiased;
+    case Rasterization::kMip:
+      return RenderMode::kMip;
+    default:
+      return RenderMode::kClassic;
+  }
 }
 
 std::optional<Rasterization> ToRasterization(std::optional<RenderMode> mode) {
   if (!mode) return std::nullopt;
-  return *mode == RenderMode::kAntialiased ? Rasterization::kAntialiased : Rasterization::kClassic;
+  switch (*mode) {
+    case RenderMode::kAntialiased:
+      return Rasterization::kAntialiased;
+    case RenderMode::kMip:
+      return Rasterization::kMip;
+    default:
+      return Rasterization::kClassic;
+  }
 }
 
 Camera ToCamera(const PinholeCamera& camera) {

@@ -30,11 +30,11 @@ TEST(Splat, OwnsAndLendsItsColumns) {
   EXPECT_EQ(splat.size(), 7);
   EXPECT_EQ(splat.sh().size(), 7u * 9 * 3);
   splat.set_comments({"of a test"});
-  splat.set_rasterization(Rasterization::kAntialiased);
+  splat.set_rasterization(Rasterization::kMip);
   const Splat copy = *Splat::CopyOf(splat);
   EXPECT_TRUE(SameBits(copy, splat));
   EXPECT_EQ(copy.view().comments.size(), 1u);
-  EXPECT_EQ(copy.view().rasterization, Rasterization::kAntialiased);
+  EXPECT_EQ(copy.view().rasterization, Rasterization::kMip);
   EXPECT_NE(copy.view().means.data(), splat.view().means.data());
 
   const float* const means = splat.view().means.data();

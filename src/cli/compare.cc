@@ -37,6 +37,7 @@ struct CompareFlags {
   std::string side_by_side;
   std::string lpips;
   std::string lpips_weights;
+  bool color_correct = false;
   ViewFlags views;
   std::vector<std::string> given;  // by their names on the command line
 };
@@ -103,13 +104,25 @@ Result<Sides> OpenSides(const CompareFlags& flags) {
   return sides;
 }
 
+ViewScore MeanOf(const Comparison& c) { return {"mean", c.mean_psnr, c.mean_ssim, c.mean_lpips, c.mean_corrected}; }
+
+// cc_psnr and the like: as gsplat and nerfstudio call them.
+nlohmann::json ToJson(const ViewScore& score) {
+  nlohmann::json json = {{"psnr", FiniteOrNull(score.psnr)}, {"ssim", score.ssim}};
+  if (score.lpips) json["lpips"] = *score.lpips;
+  if (score.corrected) {
+    json["cc_psnr"] = FiniteOrNull(score.corrected->psnr);
+    json["cc_ssim"] = score.corrected->ssim;
+    if (score.corrected->lpips) json["cc_lpips"] = *score.corrected->lpips;
+  }
+  return json;
+}
+
 nlohmann::json ToJson(const Comparison& comparison) {
-  nlohmann::json json = {{"mean", {{"psnr", FiniteOrNull(comparison.mean_psnr)}, {"ssim", comparison.mean_ssim}}},
-                         {"views", nlohmann::json::array()}};
-  if (comparison.mean_lpips) json["mean"]["lpips"] = *comparison.mean_lpips;
+  nlohmann::json json = {{"mean", ToJson(MeanOf(comparison))}, {"views", nlohmann::json::array()}};
   for (const ViewScore& view : comparison.views) {
-    json["views"].push_back({{"name", view.name}, {"psnr", FiniteOrNull(view.psnr)}, {"ssim", view.ssim}});
-    if (view.lpips) json["views"].back()["lpips"] = *view.lpips;
+    json["views"].push_back(ToJson(view));
+    json["views"].back()["name"] = view.name;
   }
   return json;
 }
@@ -117,36 +130,45 @@ nlohmann::json ToJson(const Comparison& comparison) {
 std::string Signed(double gain) { return (gain >= 0 ? "+" : "") + Fixed(gain, 2); }
 
 void PrintTable(const CompareFlags& flags, const std::vector<Comparison>& results) {
-  const bool lpips = results[0].mean_lpips.has_value();
+  const bool lpips = results[0].mean_lpips.has_value(), corrected = results[0].mean_corrected.has_value();
   std::vector<std::vector<std::string>> rows = {{"view"}};
   for (size_t k = 0; k < results.size(); ++k) {
     const std::string side = results.size() == 1 ? "" : k == 0 ? "A " : "B ";
-    for (const char* metric : {"PSNR", "SSIM", "LPIPS"}) {
-      if (lpips || metric != std::string("LPIPS")) rows[0].push_back(side + metric);
+    for (const char* kind : {"", "cc "}) {
+      if (*kind != 0 && !corrected) continue;
+      for (const char* metric : {"PSNR", "SSIM", "LPIPS"}) {
+        if (lpips || metric != std::string("LPIPS")) rows[0].push_back(Cat(side, kind, metric));
+      }
     }
   }
   if (results.size() == 2) {
     rows[0].push_back("gain dB");
+    if (corrected) rows[0].push_back("cc gain dB");
     std::cout << "A  " << OneLine(flags.a) << "\nB  " << OneLine(flags.b) << "\nboth against  " << OneLine(flags.truth)
               << "\n\n";
   }
   const auto add = [&](const std::string& name, const auto& score_of) {
     std::vector<std::string> row = {name};
-    std::vector<double> psnr;
-    for (const Comparison& result : results) {
-      const ViewScore score = score_of(result);
-      psnr.push_back(score.psnr);
+    std::vector<double> psnr, cc_psnr;
+    const auto add_score = [&](const auto& score, std::vector<double>& of_kind) {
+      of_kind.push_back(score.psnr);
       row.push_back(Fixed(score.psnr, 2));
       row.push_back(Fixed(score.ssim, 4));
       if (lpips) row.push_back(Fixed(score.lpips.value_or(0), 4));
+    };
+    for (const Comparison& result : results) {
+      const ViewScore score = score_of(result);
+      add_score(score, psnr);
+      if (corrected) add_score(*score.corrected, cc_psnr);
     }
     if (results.size() == 2) row.push_back(Signed(psnr[1] - psnr[0]));
+    if (results.size() == 2 && corrected) row.push_back(Signed(cc_psnr[1] - cc_psnr[0]));
     rows.push_back(row);
   };
   for (size_t v = 0; v < results[0].views.size(); ++v) {
     add(results[0].views[v].name, [v](const Comparison& c) { return c.views[v]; });
   }
-  add("mean", [](const Comparison& c) { return ViewScore{"mean", c.mean_psnr, c.mean_ssim, c.mean_lpips}; });
+  add("mean", MeanOf);
   std::cout << FormatTable(rows);
 }
 
@@ -200,13 +222,20 @@ Status RunCompare(const CompareFlags& flags, const SharedFlags& shared) {
     }
     ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(flags.side_by_side, shared.overwrite));
   }
+  const std::string& reference = flags.truth.empty() ? flags.b : flags.truth;
+  if (flags.color_correct && !LooksLikeImages(reference)) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--color-correct has no effect against ", reference,
+                     ", which is a splat; it has one against pictures (--truth, or B without it)")};
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(Sides sides, OpenSides(flags));
   if (!flags.side_by_side.empty()) ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(flags.side_by_side));
   std::vector<ViewSource*> sources = {sides.a.get()};
   if (sides.truth) sources.push_back(sides.b.get());
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Lpips> lpips, OpenLpipsOrWarn(flags.lpips, flags.lpips_weights));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto results, CompareToReference(sources, sides.truth ? *sides.truth : *sides.b,
-                                                                      lpips ? &*lpips : nullptr));
+                                                                      {.lpips = lpips ? &*lpips : nullptr,
+                                                                       .color_correct = flags.color_correct}));
   if (!flags.side_by_side.empty()) {
     ANCHORSPLAT_RETURN_IF_ERROR(WriteSideBySide(flags, sides, results, shared));
   }
@@ -235,6 +264,9 @@ void AddCompare(CLI::App& app, Program& program) {
   verb.add_option("--side-by-side", flags->side_by_side,
                   "Write a PNG of the view with the median score: pictures, zoomed crop, difference")
       ->check(NotEmpty());
+  verb.add_flag("--color-correct", flags->color_correct,
+                "Measure again after the affine map of each view's colours (3x3 and an offset) that brings it nearest "
+                "to the pictures: what is left of photographs' exposure and white balance is taken out");
   AddLpipsFlags(verb, flags->lpips, flags->lpips_weights);
   flags->views.AddTo(verb);
   verb.callback([flags, &verb, &program] {

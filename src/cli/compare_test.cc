@@ -66,6 +66,37 @@ TEST_F(CompareVerb, RefusesWhatCannotBeCompared) {
   ExpectRefused({"compare", scan_, folder_ / "none.ply", "--orbit", "1"}, ErrorCode::kNotFound, {"none.ply"});
 }
 
+// Photographs that were exposed otherwise: the plain values say so, the corrected ones do not.
+TEST_F(CompareVerb, ColorCorrection) {
+  fs::create_directory(folder_ / "photos");
+  for (const char* name : {"000.png", "001.png"}) {
+    Image picture = ReadImage(fs::path(views_) / name).value();
+    const float gain = name[2] == '0' ? 0.8f : 0.9f;
+    for (float& x : picture.pixels) x = gain * x + 0.02f;
+    ASSERT_TRUE(WritePng(folder_ / "photos" / name, picture).ok());
+  }
+  const std::string photos = folder_ / "photos";
+  const std::vector<std::string> views = {"--orbit", "2", "--size", "48x48", "--color-correct"};
+  const auto with = [&](std::vector<std::string> words) {
+    words.insert(words.end(), views.begin(), views.end());
+    return words;
+  };
+  const nlohmann::json one = ExpectJson(with({"compare", scan_, photos}));
+  EXPECT_LT(one["mean"]["psnr"], 40);
+  EXPECT_GT(one["mean"]["cc_psnr"], 45);
+  EXPECT_GT(one["mean"]["cc_ssim"], one["mean"]["ssim"]);
+  EXPECT_FALSE(one["mean"].contains("cc_lpips"));
+  EXPECT_EQ(one["views"][1]["name"], "001");
+  EXPECT_GT(one["views"][1]["cc_psnr"], one["views"][1]["psnr"]);
+  const std::vector<std::string> both = with({"compare", other_, scan_, "--truth", photos});
+  const nlohmann::json two = ExpectJson(both);
+  EXPECT_LT(two["a"]["mean"]["cc_psnr"], two["b"]["mean"]["cc_psnr"]);
+  EXPECT_THAT(ExpectDone(both).out,
+              AllOf(HasSubstr("A cc PSNR"), HasSubstr("B cc SSIM"), HasSubstr("cc gain dB"), HasSubstr("mean")));
+  EXPECT_TRUE(ExpectJson({"compare", views_, photos, "--color-correct"})["mean"].contains("cc_psnr"));
+  EXPECT_FALSE(ExpectJson({"compare", views_, photos})["mean"].contains("cc_psnr"));
+}
+
 // LPIPS is missing without its weights; the other metrics are there all the same.
 TEST_F(CompareVerb, LpipsWithoutItsWeights) {
   const std::string one = folder_ / "views/000.png", two = folder_ / "views/001.png";

@@ -10,6 +10,7 @@
 #include "cli/batch.h"
 #include "cli/choice.h"
 #include "cli/clean_output.h"
+#include "cli/mode_option.h"
 #include "cli/parse.h"
 #include "cli/verb.h"
 #include "core/file_system.h"
@@ -215,6 +216,15 @@ Status RunConvert(const ConvertFlags& flags, Program& program) {
   if (flags.spz_version_given && std::none_of(jobs.begin(), jobs.end(), is_spz)) {
     return Error{ErrorCode::kBadArgument, "--spz-version has no effect here; it has one where a .spz is written"};
   }
+  const auto says_mode = [](const Job& job) {
+    const SplatFormat* const format = FormatOfExtension(job.output);
+    return format != nullptr && format->mode_tag != ModeTag::kNone;
+  };
+  if (options.render_mode && std::none_of(jobs.begin(), jobs.end(), says_mode)) {
+    return Error{ErrorCode::kBadArgument,
+                 "--mode has no effect here; it has one where a file is written that has a place for it (.ply, "
+                 ".compressed.ply, .spz, .sog)"};
+  }
   std::vector<BatchItem> items;
   for (const Job& job : jobs) items.push_back({job.input.string(), job.output.string()});
   return RunBatch(
@@ -237,6 +247,8 @@ void AddConvert(CLI::App& app, Program& program) {
       ->capture_default_str()
       ->needs(out_dir);
   verb.add_option("--from", flags->from, kInputFormatHelp)->check(NotEmpty());
+  AddModeOption(verb, options.render_mode,
+                "How the splat is rasterized, for a tag in the output (default: as the input says)");
   verb.add_option("--sh-degree", options.sh_degree, "Spherical harmonics to keep, 0 to 3")->check(CLI::Range(0, 3));
   verb.add_option("--min-opacity", options.min_opacity, "Drop Gaussians that are fainter, 0 to 1")
       ->check(Fraction())

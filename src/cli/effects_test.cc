@@ -29,6 +29,9 @@ TEST_F(Effects, OfRenderingOnPictures) {
     ExpectNoEffect({"compare", views, views, option[0], option[1]}, option[0] + " has no effect on pictures");
   }
   ExpectDone({"compare", views, views});
+  ExpectNoEffect({"compare", scan_, scan_, "--orbit", "1", "--color-correct"}, "--color-correct has no effect");
+  ExpectNoEffect({"compare", views, views, "--truth", scan_, "--orbit", "1", "--size", "48x48", "--color-correct"},
+                 "it has one against pictures");
   ExpectRefused({"render", scan_, "-o", folder_ / "one.png", "--orbit", "1", "--transparent", "--background", "1,1,1"},
                 ErrorCode::kBadArgument, {"--transparent"});
 }
@@ -37,6 +40,7 @@ TEST_F(Effects, OfReportsAndFormats) {
   ExpectRefused({"convert", scan_, folder_ / "o.spz", "--report-views", "3"}, ErrorCode::kBadArgument, {"--report"});
   ExpectNoEffect({"convert", scan_, folder_ / "o.ply", "--spz-version", "3"}, "where a .spz is written");
   ExpectDone({"convert", scan_, folder_ / "o.spz", "--spz-version", "3", "-q"});
+  ExpectNoEffect({"convert", scan_, folder_ / "o.splat", "--mode", "mip"}, "--mode has no effect here");
   ExpectRefused({"view", scan_, "-o", folder_ / "o.html", "--views", "3"}, ErrorCode::kBadArgument, {"--cameras"});
 }
 

@@ -13,6 +13,7 @@
 #include "cli/before_after_page.h"
 #include "cli/choice.h"
 #include "cli/clean_output.h"
+#include "cli/mode_option.h"
 #include "cli/parse.h"
 #include "cli/refine_flags.h"
 #include "cli/stop_signal.h"
@@ -47,6 +48,7 @@ struct EnhanceFlags {
   std::string model_file;
   std::string shuffles = "identity";
   std::string compat;
+  std::optional<RenderMode> mode;  // in place of the files' tags
   bool view = false;
 };
 
@@ -222,6 +224,7 @@ Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(input));
   ExtraProperties extras;
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read({}, &extras));
+  if (flags.mode) cloud.render_mode = flags.mode;
   const Buffer<float> means = KeepUsable(extras, cloud);
   GaussianCloud before;
   if (flags.view) {
@@ -341,6 +344,7 @@ void AddPixelSizeFlags(CLI::App& verb, EnhanceFlags& flags) {
           "World size of one pixel of the training views (depth / focal length), or auto to estimate it from the "
           "splat; an estimate that its other features contradict is not acted on")
       ->capture_default_str();
+  AddModeOption(verb, flags.mode, "How the inputs were rasterized in training (default: a file's tag, else classic)");
   auto* cameras = verb.add_option("--cameras", flags.cameras, "Training cameras: exact pixel size for every Gaussian")
                       ->check(NotEmpty());
   verb.add_option("--train-width", options.train_width,

@@ -88,7 +88,8 @@ void FitFlags::AddTo(CLI::App& verb) {
       ->check(Fraction())
       ->capture_default_str();
   AddChoice(verb, "--mode", standard.objective.render.mode,
-            {{"classic", RenderMode::kClassic}, {"antialiased", RenderMode::kAntialiased}}, "Rasterization");
+            {{"classic", RenderMode::kClassic}, {"antialiased", RenderMode::kAntialiased}, {"mip", RenderMode::kMip}},
+            "Rasterization: antialiased and mip compensate opacity for a dilation of 0.3 and 0.1 px²");
   auto* pixel_option = AddChoice(
       verb, "--pixel", pixel, {{"point", FitPixel::kPoint}, {"area", FitPixel::kArea}},
       "point: what the ray through its centre meets, as 3DGS has it; area: the mean over the pixel, for splats that "

@@ -62,9 +62,8 @@ std::vector<std::string> Problems(const CloudStatistics& s) {
   return out;
 }
 
-const char* ModeName(const GaussianCloud& cloud) {
-  if (!cloud.render_mode) return "not said (classic is assumed)";
-  return *cloud.render_mode == RenderMode::kAntialiased ? "antialiased" : "classic";
+std::string_view ModeName(const GaussianCloud& cloud) {
+  return cloud.render_mode ? NameOf(*cloud.render_mode) : "not said (classic is assumed)";
 }
 
 std::string Number(double value) {

@@ -58,6 +58,45 @@ TEST_F(InfoVerb, OfASplatOfNaN) {
   EXPECT_EQ(json["pixel_size"], nullptr);
 }
 
+// What is understood of the tags, and what --mode says instead.
+TEST_F(InfoVerb, OfTheRenderMode) {
+  const std::string scan = WriteScan(folder_ / "modes.ply");
+  const auto mode_of = [](const std::string& file) { return ExpectJson({"info", file})["render_mode"]; };
+  EXPECT_EQ(mode_of(scan), nullptr);
+  for (const char* mode : {"classic", "antialiased", "mip"}) {
+    const std::string ply = folder_ / (std::string(mode) + ".ply");
+    EXPECT_THAT(ExpectDone({"convert", scan, ply, "--mode", mode}).err, Not(HasSubstr("warning")));
+    EXPECT_EQ(mode_of(ply), mode);
+    const std::string packed = folder_ / (std::string(mode) + ".compressed.ply");
+    ExpectDone({"convert", ply, packed});
+    EXPECT_EQ(mode_of(packed), mode);
+  }
+  const std::string mip = folder_ / "mip.ply", spz = folder_ / "mip.spz";
+  EXPECT_THAT(ExpectDone({"convert", mip, spz}).err, AllOf(HasSubstr("0.3 px²"), HasSubstr("--mode mip")));
+  EXPECT_EQ(mode_of(spz), "antialiased");
+  EXPECT_THAT(ExpectDone({"convert", mip, folder_ / "mip.splat"}).err, HasSubstr("no place for the render mode mip"));
+  EXPECT_EQ(
+      ExpectRefused({"convert", scan, folder_ / "x.ply", "--mode", "blurred"}, ErrorCode::kBadArgument, {"--mode"}).out,
+      "");
+
+  // Drawn in its own mode, and enhanced in the one that is said.
+  const auto psnr = [&](const std::string& a, const std::string& b) {
+    return ExpectJson({"compare", a, b, "--orbit", "1", "--size", "48x48"})["mean"]["psnr"];
+  };
+  EXPECT_EQ(psnr(scan, folder_ / "classic.ply"), nullptr);
+  EXPECT_LT(psnr(scan, mip), 60);
+  EXPECT_LT(psnr(folder_ / "antialiased.ply", mip), 60);
+  EXPECT_EQ(ExpectJson({"compare", scan, mip, "--orbit", "1", "--size", "48x48", "--mode", "mip"})["mean"]["psnr"],
+            nullptr);
+  const std::string out = folder_ / "enhanced.ply";
+  EXPECT_THAT(
+      ExpectDone({"enhance", scan, "-o", out, "--method", "filter", "--pixel-size", "0.02", "--mode", "mip"}).err,
+      HasSubstr("tagged mip"));
+  EXPECT_EQ(mode_of(out), "mip");
+  ExpectDone({"view", scan, "-o", folder_ / "page.html", "--mode", "mip"});
+  EXPECT_THAT(FileText(folder_ / "page.html"), HasSubstr("\"mode\":\"mip\""));
+}
+
 TEST_F(InfoVerb, OfANetwork) {
   const std::string weights = SourceDirForTest() / "testdata/compact/small.safetensors";
   EXPECT_THAT(ExpectDone({"info", weights}).out, AllOf(HasSubstr("anchorsplat-compact"), HasSubstr("4,675 in 40")));

@@ -8,6 +8,7 @@
 #include "cameras/camera_io.h"
 #include "cli/choice.h"
 #include "cli/clean_output.h"
+#include "cli/mode_option.h"
 #include "cli/parse.h"
 #include "cli/verb.h"
 #include "cli/views.h"
@@ -39,6 +40,7 @@ struct PageFlags {
   std::string pixel_size = "auto";
   int views = 10;
   int sh_degree = kMaxShDegree;
+  std::optional<RenderMode> mode;  // in place of the files' tags
 };
 
 // The picture of a camera in the folder: by name, whatever the folder the camera file has it in.
@@ -92,12 +94,13 @@ struct Shown {
 };
 
 // A splat to show: a file with nothing to see in it is a bad one.
-Result<Shown> ReadShown(const fs::path& path) {
+Result<Shown> ReadShown(const fs::path& path, const std::optional<RenderMode>& mode) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(path));
   // "scan/" is called scan.
   const fs::path named = path.has_filename() ? path : path.parent_path();
   Shown shown{{}, named.filename().string(), file.bytes()};
   ANCHORSPLAT_ASSIGN_OR_RETURN(shown.cloud, file.Read());
+  if (mode) shown.cloud.render_mode = mode;
   if (CountUnusable(shown.cloud) < shown.cloud.size()) {
     WarnOfUnusable(path.string(), shown.cloud);
     return shown;
@@ -137,7 +140,7 @@ Status RunView(const PageFlags& flags, const SharedFlags& shared) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(page.background, ParseColor("--background", flags.background));
   }
 
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown after, ReadShown(flags.after));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown after, ReadShown(flags.after, flags.mode));
   page.after = {&after.cloud, after.name, after.bytes};
   if (!page.views.empty()) {  // the first is where the page opens
     const std::string warning =
@@ -146,7 +149,7 @@ Status RunView(const PageFlags& flags, const SharedFlags& shared) {
   }
   Shown before;
   if (!flags.before.empty()) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(before, ReadShown(flags.before));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(before, ReadShown(flags.before, flags.mode));
     page.before = ViewerSplat{&before.cloud, before.name, before.bytes};
   }
   if (pixel_size) {
@@ -192,6 +195,7 @@ void AddView(CLI::App& app, Program& program) {
   verb.add_option("--sh-degree", flags->sh_degree, "Keep view-dependent colour up to this degree: 0 makes small pages")
       ->check(CLI::Range(0, kMaxShDegree))
       ->capture_default_str();
+  AddModeOption(verb, flags->mode, "Rasterization of both (default: each file's tag, else classic)");
   verb.add_option("--background", flags->background,
                   "R,G,B, each 0-1 (default: what the camera file says, else black)");
   verb.add_option("--title", flags->title, "Heading of the page (default: the file's name)");

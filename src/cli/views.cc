@@ -5,6 +5,7 @@
 
 #include "cameras/camera_io.h"
 #include "cli/choice.h"
+#include "cli/mode_option.h"
 #include "cli/parse.h"
 #include "core/framing.h"
 #include "core/log.h"
@@ -106,8 +107,7 @@ void ViewFlags::AddTo(CLI::App& verb) {
                   "World units in front of the camera where the picture begins (default: 0.01, or a thousandth of the "
                   "distance to the splat where that is nearer)");
   verb.add_option("--far", far_plane, "World units where it ends (default: nowhere)");
-  verb.add_option("--mode", mode, "Rasterization (default: the file's tag, else classic)")
-      ->check(CLI::IsMember({"classic", "antialiased"}));
+  AddModeOption(verb, mode, "Rasterization (default: the file's tag, else classic)");
   verb.add_option("--profile", profile, "Extent of a Gaussian: 3 sigma as gsplat 1.0-1.4, or opacity-aware as 1.5")
       ->check(CLI::IsMember({"gsplat14", "gsplat15"}))
       ->capture_default_str();
@@ -156,7 +156,7 @@ Result<RenderOptions> MakeRenderOptions(const ViewFlags& flags, const GaussianCl
     return Error{ErrorCode::kBadArgument,
                  Cat("--near ", options.near_plane, " does not lie before --far ", options.far_plane)};
   }
-  if (!flags.mode.empty()) options.mode = flags.mode == "classic" ? RenderMode::kClassic : RenderMode::kAntialiased;
+  options.mode = flags.mode.value_or(options.mode);
   options.profile = flags.profile == "gsplat15" ? RasterProfile::kGsplat15 : RasterProfile::kGsplat14;
   options.background = cameras.background.value_or(options.background);
   if (!flags.background.empty()) {

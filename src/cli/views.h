@@ -13,15 +13,15 @@ namespace anchorsplat {
 
 // The options of every verb that renders: from where, how large, on what background, in which mode.
 struct ViewFlags {
-  std::string cameras;     // file or folder; empty: an orbit
-  int orbit = 0;           // views on a sphere around the cloud
-  double radius = 0;       // of the orbit, world units; 0: what frames the cloud
-  std::string target;      // "X,Y,Z" the orbit looks at; empty: the cloud's middle
-  double fov = 45;         // horizontal, degrees, of the orbit
-  std::string size;        // "WxH"; empty: the cameras' own, 1024x1024 for an orbit
-  std::string background;  // "R,G,B"; empty: what the camera file says, else black
-  std::string mode;        // "classic" or "antialiased"; empty: the file's tag, else classic
-  std::string view;        // the only view wanted, by name; empty: all
+  std::string cameras;             // file or folder; empty: an orbit
+  int orbit = 0;                   // views on a sphere around the cloud
+  double radius = 0;               // of the orbit, world units; 0: what frames the cloud
+  std::string target;              // "X,Y,Z" the orbit looks at; empty: the cloud's middle
+  double fov = 45;                 // horizontal, degrees, of the orbit
+  std::string size;                // "WxH"; empty: the cameras' own, 1024x1024 for an orbit
+  std::string background;          // "R,G,B"; empty: what the camera file says, else black
+  std::string view;                // the only view wanted, by name; empty: all
+  std::optional<RenderMode> mode;  // nothing: the file's tag, else classic
   std::string profile = "gsplat14";
   std::string up;  // "X,Y,Z" or an axis, of an orbit; empty: what the cameras or the file say, else −y
   std::optional<double> near_plane, far_plane;  // world units; nothing: what render/shown_range.h says

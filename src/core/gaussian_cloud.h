@@ -8,13 +8,10 @@
 #include <vector>
 
 #include "core/buffer.h"
+#include "core/render_mode.h"
 #include "core/result.h"
 
 namespace anchorsplat {
-
-// How a splat wants to be rasterized. `kAntialiased` (Mip-Splatting, gsplat's "antialiased") scales opacity by
-// sqrt(det Σ₂ / det(Σ₂ + 0.3 I)), so its fit has not absorbed the 0.3 px² dilation.
-enum class RenderMode { kClassic, kAntialiased };
 
 inline constexpr int kMaxShDegree = 3;
 // Coefficients per colour channel, including the constant one: (degree + 1)².

@@ -183,10 +183,11 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
 // Of the filter. Splats that absorbed nothing have nothing to get back.
 double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud) {
   if (options.filter_strength) return *options.filter_strength;
-  if (cloud.render_mode == RenderMode::kAntialiased) {
-    LogWarning(
-        "the file is tagged antialiased: its fit did not absorb the 0.3 px² dilation, so there is no lost width to "
-        "give back and it stays as it is (--filter-strength F to enhance it all the same)");
+  if (IsCompensated(cloud.render_mode)) {
+    LogWarning(Cat("the file is tagged ", NameOf(*cloud.render_mode), ": its fit did not absorb the ",
+                   DilationOf(*cloud.render_mode),
+                   " px² dilation, so there is no lost width to give back and it stays as it is (--filter-strength F "
+                   "to enhance it all the same)"));
     return 0;
   }
   if (IsFittedToPixelAreas(cloud)) {

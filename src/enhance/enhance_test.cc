@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/random.h"
 #include "core/source_dir_for_test.h"
+#include "core/text.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
 #include "enhance/pixel_size_estimate.h"
@@ -142,18 +143,21 @@ TEST_F(EnhanceDoor, KeepsWhatIsOpaqueOrFlat) {
 }
 
 TEST_F(EnhanceDoor, LeavesAntialiasedSplatsAlone) {
-  GaussianCloud ball = Ball(0.01);
-  ball.render_mode = RenderMode::kAntialiased;
-  EnhanceOptions options;
-  options.pixel_size = 0.01;
-  auto enhanced = Enhance(ball, options);
-  ASSERT_TRUE(enhanced.ok());
-  EXPECT_EQ(enhanced->cloud.log_scales, ball.log_scales);
-  EXPECT_TRUE(log_->Says("antialiased")) << log_->text();
-  options.filter_strength = 0.7;
-  enhanced = Enhance(ball, options);
-  ASSERT_TRUE(enhanced.ok());
-  EXPECT_NE(enhanced->cloud.log_scales, ball.log_scales);
+  for (const RenderMode mode : {RenderMode::kAntialiased, RenderMode::kMip}) {
+    GaussianCloud ball = Ball(0.01);
+    ball.render_mode = mode;
+    EnhanceOptions options;
+    options.pixel_size = 0.01;
+    auto enhanced = Enhance(ball, options);
+    ASSERT_TRUE(enhanced.ok());
+    EXPECT_EQ(enhanced->cloud.log_scales, ball.log_scales);
+    EXPECT_EQ(enhanced->cloud.render_mode, mode);
+    EXPECT_TRUE(log_->Says(Cat("tagged ", NameOf(mode)))) << log_->text();
+    options.filter_strength = 0.7;
+    enhanced = Enhance(ball, options);
+    ASSERT_TRUE(enhanced.ok());
+    EXPECT_NE(enhanced->cloud.log_scales, ball.log_scales);
+  }
 }
 
 // Whoever enhances once more by mistake would lose what the first time brought.

@@ -39,7 +39,8 @@ Result<int64_t> ApplyFilter(GaussianCloud& cloud, std::span<const float> pixel_s
   }
 
   // In units of p_LR²: the same for every Gaussian.
-  const double gain = kDilation * (strength - 1 / (options.upscale * options.upscale));
+  const double shown = double{DilationOf(cloud.render_mode.value_or(RenderMode::kClassic))} / double{kDilation};
+  const double gain = kDilation * (strength - shown / (options.upscale * options.upscale));
   if (!(gain > 0)) return int64_t{0};
   std::atomic<int64_t> grown = 0;
   ParallelFor(0, cloud.size(), kRowsPerTask, [&](int64_t first, int64_t last) {

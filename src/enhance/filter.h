@@ -10,9 +10,10 @@ namespace anchorsplat {
 
 // The training-free filter. The standard rasterizer adds 0.3 px² to every projected variance and fits absorb it, so
 // each Gaussian comes out eroded by that much at the pixel size of its training views. The filter gives it back,
-//     Σ' = Σ + max(0, f·0.3·p_LR² − 0.3·p_HR²)·I,   p_HR = p_LR / upscale,
-// in world units, opacity unchanged (scaling it down to keep the integral costs 4 dB). Adding a multiple of I only
-// lengthens the three axes; the rotation stays. docs/method.md derives it and shows the curve over f.
+//     Σ' = Σ + max(0, f·0.3·p_LR² − d·p_HR²)·I,   p_HR = p_LR / upscale,
+// in world units, d the dilation of the splat's render mode (0.3; 0.1 of kMip), opacity unchanged (scaling it down to
+// keep the integral costs 4 dB). Adding a multiple of I only lengthens the three axes; the rotation stays.
+// docs/method.md derives it and shows the curve over f.
 struct FilterOptions {
   double upscale = 4;              // u ≥ 1: how many times closer the splat will be seen
   std::optional<double> strength;  // f, 0 to kMaxFilterStrength; DefaultFilterStrength(upscale) unless given

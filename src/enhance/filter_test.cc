@@ -78,6 +78,19 @@ TEST(Filter, AddsTheFormulaToEveryCovariance) {
   }
 }
 
+// The closer view widens by 0.1 px² of its own in that mode, so that is what is taken off.
+TEST(Filter, TakesOffTheDilationOfTheMode) {
+  GaussianCloud before = RandomCloud(20, 4);
+  before.render_mode = RenderMode::kMip;
+  GaussianCloud after = before;
+  ASSERT_TRUE(ApplyFilter(after, std::vector<float>{0.05f}, {.upscale = 2, .strength = 0.4}).ok());
+  const double added = 0.4 * 0.3 * 0.0025 - 0.1 * 0.0025 / 4;
+  for (size_t i = 0; i < 20; ++i) {
+    const auto a = Covariance(before, i), b = Covariance(after, i);
+    for (size_t k = 0; k < 9; k += 4) EXPECT_NEAR(b[k], a[k] + added, 1e-5 * (a[k] + added));
+  }
+}
+
 TEST(Filter, ChangesNothingWhereThereIsNothingToGive) {
   const GaussianCloud before = RandomCloud(10, 3);
   for (const FilterOptions options :

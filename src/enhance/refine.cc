@@ -33,6 +33,7 @@ Result<std::string> Settings(const RefineInput& input, const GaussianCloud& star
   json["upscale"] = input.upscale;
   json["seed"] = input.seed;
   json["background"] = views.render.background;
+  if (IsCompensated(views.render.mode)) json["mode"] = NameOf(views.render.mode);
   json["input"] = FingerprintOf(input.cloud);
   json["start"] = FingerprintOf(start);
   json["set of cameras"] = FingerprintOf(views.train.views(), views.scene_scale);

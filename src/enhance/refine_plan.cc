@@ -65,7 +65,7 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const RefineOptions&
   // A splat that was trained on larger pictures than these, or without dilation, knows details that these do not show;
   // learning them by heart costs it those. Measured with fits to views four times as large (docs/refine.md): one that
   // gained 1.5 dB at low resolution lost 0.5 dB at high resolution; one that gained 2.6 dB won there, too.
-  if (pictures && views.render.mode == RenderMode::kAntialiased) plan.least_gain = kGainOverFine;
+  if (pictures && IsCompensated(views.render.mode)) plan.least_gain = kGainOverFine;
   if (pictures) {
     // A splat that has lost no width is spoiled by what gives it back: the pictures tell.
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double as_it_is,

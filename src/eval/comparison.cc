@@ -1,7 +1,10 @@
 #include "eval/comparison.h"
 
+#include <utility>
+
 #include "core/log.h"
 #include "core/text.h"
+#include "metrics/color_correction.h"
 #include "metrics/compare.h"
 #include "metrics/image_metrics.h"
 
@@ -46,10 +49,38 @@ Status CheckSizes(std::span<ViewSource* const> sources, const std::vector<std::v
   return Error{ErrorCode::kBadArgument, Cat("pictures of different sizes: ", list, "; --size sets that of renders")};
 }
 
+Result<CorrectedScore> CorrectColors(Image image, const Image& truth, const Lpips* lpips) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ColorMap map, FitColors(image, truth));
+  ApplyColors(map, image);
+  CorrectedScore score;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(score.psnr, Psnr(image, truth));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(score.ssim, Ssim(image, truth));
+  if (lpips != nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, lpips->Distance(image, truth));
+  }
+  return score;
+}
+
+void TakeMeans(const CompareOptions& options, Comparison& comparison) {
+  const auto n = static_cast<double>(comparison.views.size());
+  if (options.lpips != nullptr) comparison.mean_lpips = 0;
+  if (options.color_correct) comparison.mean_corrected = CorrectedScore{0, 0, comparison.mean_lpips};
+  for (const ViewScore& view : comparison.views) {
+    if (view.lpips) *comparison.mean_lpips += *view.lpips / n;
+    comparison.mean_psnr += view.psnr / n;
+    comparison.mean_ssim += view.ssim / n;
+    if (!view.corrected) continue;
+    CorrectedScore& mean = *comparison.mean_corrected;
+    mean.psnr += view.corrected->psnr / n;
+    mean.ssim += view.corrected->ssim / n;
+    if (view.corrected->lpips) *mean.lpips += *view.corrected->lpips / n;
+  }
+}
+
 }  // namespace
 
 Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> sources, ViewSource& reference,
-                                                   const Lpips* lpips) {
+                                                   const CompareOptions& options) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto partners, MatchSources(sources, reference));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckSizes(sources, partners, reference));
   std::vector<Comparison> out(sources.size());
@@ -58,25 +89,21 @@ Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> 
     const std::string name = ViewLabel(reference.names()[r]);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Image truth, reference.Load(r));
     for (size_t s = 0; s < sources.size(); ++s) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const Image image, sources[s]->Load(partners[s][r]));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, sources[s]->Load(partners[s][r]));
       ViewScore score{name, 0, 0, std::nullopt};
       ANCHORSPLAT_ASSIGN_OR_RETURN(score.psnr, Psnr(image, truth));
       ANCHORSPLAT_ASSIGN_OR_RETURN(score.ssim, Ssim(image, truth));
-      if (lpips != nullptr) {
-        ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, lpips->Distance(image, truth));
+      if (options.lpips != nullptr) {
+        ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, options.lpips->Distance(image, truth));
+      }
+      if (options.color_correct) {
+        ANCHORSPLAT_ASSIGN_OR_RETURN(score.corrected, CorrectColors(std::move(image), truth, options.lpips));
       }
       out[s].views.push_back(score);
     }
     progress.Advance();
   }
-  for (Comparison& comparison : out) {
-    if (lpips != nullptr) comparison.mean_lpips = 0;
-    for (const ViewScore& view : comparison.views) {
-      if (view.lpips) *comparison.mean_lpips += *view.lpips / static_cast<double>(comparison.views.size());
-      comparison.mean_psnr += view.psnr / static_cast<double>(comparison.views.size());
-      comparison.mean_ssim += view.ssim / static_cast<double>(comparison.views.size());
-    }
-  }
+  for (Comparison& comparison : out) TakeMeans(options, comparison);
   return out;
 }
 

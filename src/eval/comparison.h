@@ -11,11 +11,20 @@
 
 namespace anchorsplat {
 
+// How near a picture is to the truth once the affine map of its colours that brings it nearest was applied
+// (metrics/color_correction.h).
+struct CorrectedScore {
+  double psnr = 0;
+  double ssim = 0;
+  std::optional<double> lpips;
+};
+
 struct ViewScore {
   std::string name;  // stem of the view
   double psnr = 0;   // dB; infinite for identical pictures
   double ssim = 0;
-  std::optional<double> lpips;  // where it was asked for
+  std::optional<double> lpips;                // where it was asked for
+  std::optional<CorrectedScore> corrected{};  // likewise
 };
 
 struct Comparison {
@@ -23,6 +32,13 @@ struct Comparison {
   double mean_psnr = 0;          // over the views; infinite when one of them is
   double mean_ssim = 0;
   std::optional<double> mean_lpips;
+  std::optional<CorrectedScore> mean_corrected;
+};
+
+// What is measured beside PSNR and SSIM.
+struct CompareOptions {
+  const Lpips* lpips = nullptr;
+  bool color_correct = false;  // of every source to the reference, view by view
 };
 
 // Which view of each source shows what view r of the reference shows: [source][r]. Names match by path without folder
@@ -32,8 +48,8 @@ Result<std::vector<std::vector<size_t>>> MatchSources(std::span<ViewSource* cons
                                                       const ViewSource& reference);
 
 // PSNR, SSIM and LPIPS of every source against the reference, view by view; one result per source. Pictures of
-// different sizes are an error that names them. `lpips` may be null. Shows progress.
+// different sizes are an error that names them. Shows progress.
 Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> sources, ViewSource& reference,
-                                                   const Lpips* lpips = nullptr);
+                                                   const CompareOptions& options = {});
 
 }  // namespace anchorsplat

@@ -34,7 +34,7 @@ double SecondsSince(Clock::time_point begin) { return std::chrono::duration<doub
 
 // A splat whose fit did not absorb the dilation has nothing to get back.
 double DefaultStrength(const BenchmarkObject& object) {
-  return object.low.render_mode == RenderMode::kAntialiased ? 0 : DefaultFilterStrength(object.upscale());
+  return IsCompensated(object.low.render_mode) ? 0 : DefaultFilterStrength(object.upscale());
 }
 
 EvalMethod Raw() {

@@ -101,7 +101,7 @@ std::string ToJsonText(const FitOptions& o) {
       {"background", render.background},
       {"near_plane", render.near_plane},
       {"far_plane", render.far_plane},
-      {"dilation", render.dilation},
+      {"dilation", DilationOf(render)},
       {"min_alpha", render.min_alpha},
       {"min_transmittance", render.min_transmittance},
       {"pixel_upscale", o.pixel.upscale},

@@ -77,13 +77,14 @@ RenderOptions RaysOf(const PixelModel& model, const RenderOptions& options) {
   RenderOptions rays = options;
   // Pixels of the closer view per ray, along a side.
   const double share = std::min(1.0, model.samples / model.upscale);
-  const double closer = options.dilation * share * share, box = (1 - share * share) / 12;
+  const double closer = DilationOf(options) * share * share, box = (1 - share * share) / 12;
   rays.dilation = static_cast<float>(closer + box);
   if (box <= 0) return rays;
-  // An antialiased splat keeps the integral that it has without any dilation, at every size.
-  rays.compensated_from =
-      options.mode == RenderMode::kAntialiased ? options.compensated_from : static_cast<float>(closer);
-  rays.mode = RenderMode::kAntialiased;
+  // Where opacity is compensated, a splat keeps the integral that it has without any dilation, at every size.
+  if (!IsCompensated(options.mode)) {
+    rays.compensated_from = static_cast<float>(closer);
+    rays.mode = RenderMode::kAntialiased;
+  }
   return rays;
 }
 

@@ -11,13 +11,13 @@
 namespace anchorsplat {
 
 // How a camera's pixel gets its value from a splat. Rasterizers sample: a pixel is what the ray through its centre
-// meets, of Gaussians widened by 0.3 px² of that very pixel. Cameras average over the pixel's area. A splat that will
-// be seen `upscale` times closer has to look right when its pictures at that resolution are averaged down to the pixels
-// of its training views: that is the area model, upscale² rays for each pixel.
+// meets, of Gaussians widened by d = 0.3 px² of that very pixel (DilationOf the render mode). Cameras average over the
+// pixel's area. A splat that will be seen `upscale` times closer has to look right when its pictures at that resolution
+// are averaged down to the pixels of its training views: that is the area model, upscale² rays for each pixel.
 //
 // Fewer rays, `samples`² of them, stand for that with wider Gaussians: each ray's share of the pixel holds upscale/
 // samples of the closer view's pixels per side, which as a box has the variance (1 − (samples/upscale)²)/12 of its
-// side. It is added to the dilation 0.3·(samples/upscale)² that the closer view's pixels have at this size, and opacity
+// side. It is added to the dilation d·(samples/upscale)² that the closer view's pixels have at this size, and opacity
 // is lowered so that every Gaussian keeps its integral. For one Gaussian that is right up to the shape of the box; for
 // Gaussians that hide each other it is an approximation, much cheaper, and exact where samples = upscale.
 struct PixelModel {

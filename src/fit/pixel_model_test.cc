@@ -75,11 +75,12 @@ TEST(SpreadToRays, StaysWithinItsBox) {
 TEST(PixelModel, AllRaysAreTheCloserViewItself) {
   const RenderOptions options;
   const RenderOptions rays = RaysOf(AreaModel(4), options);
-  EXPECT_EQ(rays.dilation, kDilation);
+  EXPECT_EQ(DilationOf(rays), kDilation);
   EXPECT_EQ(rays.mode, RenderMode::kClassic);
   EXPECT_EQ(AreaModel(4).samples, 4);
   EXPECT_EQ(AreaModel(2.5).samples, 3);
-  EXPECT_EQ(RaysOf(AreaModel(2.5), options).dilation, kDilation);
+  EXPECT_EQ(DilationOf(RaysOf(AreaModel(2.5), options)), kDilation);
+  EXPECT_EQ(DilationOf(RaysOf(AreaModel(4), RenderOptions{.mode = RenderMode::kMip})), kMipDilation);
   EXPECT_TRUE(AreaModel(1).IsPoint());
   EXPECT_EQ(RaysOf(PixelModel{}, options).mode, RenderMode::kClassic);
 }
@@ -90,7 +91,7 @@ TEST(PixelModel, FewerRaysHaveTheSameWidth) {
     const double expected = 0.3 / (upscale * upscale) + (1 - 1 / (upscale * upscale)) / 12;
     for (int samples = 1; samples <= upscale; ++samples) {
       const double square = samples * samples;
-      const double dilation = RaysOf(PixelModel{samples, upscale}, RenderOptions{}).dilation;
+      const double dilation = DilationOf(RaysOf(PixelModel{samples, upscale}, RenderOptions{}));
       EXPECT_NEAR(dilation / square + (1 - 1 / square) / 12, expected, 1e-7) << upscale << ", " << samples;
     }
   }
@@ -118,7 +119,7 @@ TEST(PixelModel, OneGaussianKeepsItsIntegral) {
   RenderOptions options;
   options.min_alpha = 1e-6f;
   std::array<double, 4> sums{};
-  for (const RenderMode mode : {RenderMode::kClassic, RenderMode::kAntialiased}) {
+  for (const RenderMode mode : kRenderModes) {
     options.mode = mode;
     for (int samples = 1; samples <= 4; ++samples) {
       const PixelModel model{samples, 4};

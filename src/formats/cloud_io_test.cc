@@ -39,7 +39,7 @@ TEST(CloudIo, PlyRoundTripOfEveryDegree) {
     for (const int64_t n : {1, 2, 1000, 20'000}) {
       GaussianCloud cloud = RandomCloud(n, degree, static_cast<uint64_t>(n));
       cloud.comments = {"made by a test", "second: ä"};
-      if (degree > 0) cloud.render_mode = degree == 1 ? RenderMode::kClassic : RenderMode::kAntialiased;
+      if (degree > 0) cloud.render_mode = kRenderModes[static_cast<size_t>(degree - 1)];
       const fs::path path = folder / "a.ply";
       const Status written = WriteCloud(path, cloud, {.overwrite = true});
       ASSERT_TRUE(written.ok()) << written.error().message;

@@ -127,6 +127,7 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
             " Gaussians have a position, scale, rotation or opacity that is NaN or infinite: no verb draws them"));
   }
 
+  if (options.render_mode) cloud.render_mode = options.render_mode;
   if (options.sh_degree) SetShDegree(cloud, *options.sh_degree);
   DropFaint(cloud, options.min_opacity, &extras);
   if (options.max_gaussians) KeepMostImportant(cloud, *options.max_gaussians, &extras);

@@ -18,10 +18,11 @@ struct ExtraProperties;
 struct SplatFormat;
 
 struct ConvertOptions {
-  const SplatFormat* input_format = nullptr;  // what the input is, whatever it looks like; null: found out
-  std::optional<int> sh_degree = {};          // higher coefficients are dropped, missing ones become zero
-  float min_opacity = 0;                      // Gaussians below are dropped; 0–1
-  std::optional<int64_t> max_gaussians = {};  // the ones of the largest size × opacity stay
+  const SplatFormat* input_format = nullptr;   // what the input is, whatever it looks like; null: found out
+  std::optional<RenderMode> render_mode = {};  // what the output says, whatever the input did
+  std::optional<int> sh_degree = {};           // higher coefficients are dropped, missing ones become zero
+  float min_opacity = 0;                       // Gaussians below are dropped; 0–1
+  std::optional<int64_t> max_gaussians = {};   // the ones of the largest size × opacity stay
   // What the axes of the files really are, where a program did not follow the format's own convention.
   std::optional<Axes> input_axes = {}, output_axes = {};
   CloudWriteOptions write = {};

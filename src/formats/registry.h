@@ -29,6 +29,13 @@ struct FormatRange {
   float harmonics = std::numeric_limits<float>::infinity();  // largest |coefficient| of degree 1–3
 };
 
+// What a file of the format says about the render mode.
+enum class ModeTag {
+  kNone,
+  kCompensated,  // whether opacity is compensated, and not for which dilation: read as kAntialiased
+  kEach,
+};
+
 // A splat format: how it is recognised, and a function for each direction that this version knows. A new format is one
 // file per direction and one row in registry.cc.
 struct SplatFormat {
@@ -63,6 +70,7 @@ struct SplatFormat {
   // What the axes of its files are by its own convention.
   Axes axes = kRdf;
   FormatRange range = {};
+  ModeTag mode_tag = ModeTag::kNone;
   // A sentence where `write` must round the means of this cloud more coarsely than is usual, else nothing. May be null.
   std::string (*mean_loss)(const CloudView& cloud) = nullptr;
 };

@@ -47,6 +47,20 @@ Clamped CountClamped(const FormatRange& range, const CloudView& cloud, int sh_de
   return sum;
 }
 
+// Without its tag a splat is drawn as a classic one.
+std::string ModeLoss(const SplatFormat& format, std::optional<RenderMode> mode) {
+  if (!IsCompensated(mode) || format.mode_tag == ModeTag::kEach) return {};
+  const std::string_view name = NameOf(*mode);
+  if (format.mode_tag == ModeTag::kNone) {
+    return Cat("a ", format.name, " file has no place for the render mode ", name,
+               ": the splat will be drawn as a classic one (--mode ", name, " where a verb has it)");
+  }
+  if (*mode == RenderMode::kAntialiased) return {};
+  return Cat("a ", format.name, " file only says that opacity is compensated, not that the render mode is ", name,
+             ": the splat will be drawn with a dilation of ", DilationOf(RenderMode::kAntialiased), " px² instead of ",
+             DilationOf(*mode), " (--mode ", name, " where a verb has it)");
+}
+
 }  // namespace
 
 std::vector<std::string> WriteLosses(const SplatFormat& format, const CloudView& cloud) {
@@ -67,6 +81,7 @@ std::vector<std::string> WriteLosses(const SplatFormat& format, const CloudView&
                               std::exp(range.log_scale_min), " to ", std::exp(range.log_scale_max), ")"));
   add(clamped.colors, Cat("f_dc beyond ±", range.dc));
   add(clamped.harmonics, Cat("spherical harmonics beyond ±", range.harmonics));
+  if (std::string loss = ModeLoss(format, cloud.render_mode); !loss.empty()) losses.push_back(std::move(loss));
   if (format.mean_loss != nullptr) {
     if (std::string loss = format.mean_loss(cloud); !loss.empty()) losses.push_back(std::move(loss));
   }

@@ -3,10 +3,11 @@
 #include <cstdint>
 #include <limits>
 
+#include "core/render_mode.h"
+
 namespace anchorsplat {
 
-// All numbers of the classic 3DGS rasterizer, in one place.
-inline constexpr float kDilation = 0.3f;  // px²: the low-pass of Kerbl et al. 2023; fits absorb it, see docs/method.md
+// All numbers of the 3DGS rasterizer, in one place; those of the render modes are in core/render_mode.h.
 inline constexpr float kMinAlpha = 1.0f / 255;     // smaller contributions are invisible at 8 bits
 inline constexpr float kMaxAlpha = 0.999f;         // keeps 1/(1−α) of the backward pass finite (gsplat ≤ 1.5)
 inline constexpr float kMinTransmittance = 1e-4f;  // stop *before* the Gaussian that would cross it

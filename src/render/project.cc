@@ -107,7 +107,7 @@ HWY_INLINE void ProjectLanes(const Frame& frame, RasterProfile profile, RenderMo
 
   // Opacity.
   V compensation = one;
-  if (mode == RenderMode::kAntialiased) {
+  if (IsCompensated(mode)) {
     const V kept_det = hn::Max(zero, covariance.from_det);
     compensation = hn::Sqrt(hn::Div(kept_det, safe_det));
   }

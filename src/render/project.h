@@ -29,7 +29,7 @@ struct ProjectParams {
   float near_plane = kNear;     // world units along z; nearer Gaussians are culled
   float far_plane = kFar;       // world units along z; farther Gaussians are culled
   float dilation = kDilation;   // px², added to both variances of the 2-D covariance
-  float compensated_from = 0;   // px², the dilation whose integral RenderMode::kAntialiased keeps
+  float compensated_from = 0;   // px², the dilation whose integral a mode that compensates keeps
   float min_alpha = kMinAlpha;  // > 0; Gaussians whose opacity is lower are culled
   // out
   ProjectedGaussian* projected;  // [N] all but rgb; rows of culled Gaussians are not written

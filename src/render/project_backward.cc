@@ -65,7 +65,7 @@ void ReadColumns(const ProjectBackwardParams& p, const int32_t* rows, size_t n, 
 
 // One register of Gaussians, columns j … j + lanes − 1: the gradients of what ProjectCpu calculates, in the opposite
 // order; g_x is ∂L/∂x.
-HWY_INLINE void BackwardLanes(const View& view, bool antialiased, const Columns& in, size_t j, Gradients& out) {
+HWY_INLINE void BackwardLanes(const View& view, bool compensated, const Columns& in, size_t j, Gradients& out) {
   const D d;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0), two = hn::Set(d, 2.0);
   const double* r = view.r;
@@ -89,7 +89,7 @@ HWY_INLINE void BackwardLanes(const View& view, bool antialiased, const Columns&
   V g_xx = hn::Mul(scale, hn::Mul(w_xx, hn::Mul(w_xx, quu)));
   V g_xy = hn::Mul(scale, hn::Mul(w_xx, left_x));  // of each of the two equal entries
   V g_yy = hn::Mul(scale, hn::MulAdd(w_xy, left_x, hn::Mul(w_yy, left_y)));
-  if (antialiased) {
+  if (compensated) {
     // o = sigmoid·sqrt(det Σ_from / det Σ₂), Σ_from with the lesser dilation:  ∂ln o/∂Σ = ½ (Σ_from⁻¹ − Σ₂⁻¹).
     const auto& [xx, xy, yy, det, from_xx, from_yy, from_det] = CovarianceOf(d, view, shape);
     // Where the determinant is 0, so was the opacity, and the Gaussian is not here.
@@ -171,7 +171,7 @@ void BackwardChunk(const ProjectBackwardParams& p, int64_t chunk) {
   std::fill_n(p.means2d + 2 * first, 2 * n_all, 0.0f);
 
   const View view = MakeView(p);
-  const bool antialiased = p.mode == RenderMode::kAntialiased;
+  const bool compensated = IsCompensated(p.mode);
   const size_t lanes = hn::Lanes(D());
   Columns in;
   Gradients out;
@@ -192,7 +192,7 @@ void BackwardChunk(const ProjectBackwardParams& p, int64_t chunk) {
     }
     if (n == 0) break;
     ReadColumns(p, rows, n, in);
-    for (size_t j = 0; j < n; j += lanes) BackwardLanes(view, antialiased, in, j, out);
+    for (size_t j = 0; j < n; j += lanes) BackwardLanes(view, compensated, in, j, out);
     for (size_t j = 0; j < n; ++j) {
       const int64_t i = rows[j];
       for (int a = 0; a < 3; ++a) p.mean_gradients[3 * i + a] = static_cast<float>(out.means[a][j]);

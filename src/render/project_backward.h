@@ -12,7 +12,7 @@ namespace anchorsplat {
 
 // From the sums of blending to the stored values of geometry and opacity: through the conic, the Jacobian (clamped
 // ratios are constants), the covariance, the quaternion's normalisation, exp and sigmoid, and the compensation of
-// RenderMode::kAntialiased.
+// modes that have one.
 struct ProjectBackwardParams {
   int64_t count;                // N Gaussians
   const float* means;           // [N,3] world

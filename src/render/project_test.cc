@@ -34,6 +34,7 @@ Projected Project(const GaussianCloud& cloud, const Camera& camera, const Render
   p.world_to_camera = camera.world_to_camera;
   p.profile = options.profile;
   p.mode = options.mode;
+  p.dilation = DilationOf(options);
   p.projected = out.gaussians.data();
   p.tiles = out.tiles.data();
   p.radii = out.radii.data();
@@ -52,7 +53,7 @@ TEST(Project, MatchesReference) {
     SCOPED_TRACE(seed);
     RenderOptions options;
     options.profile = seed % 2 == 0 ? RasterProfile::kGsplat14 : RasterProfile::kGsplat15;
-    options.mode = seed / 2 % 2 == 0 ? RenderMode::kClassic : RenderMode::kAntialiased;
+    options.mode = kRenderModes[seed / 2 % 3];
     // More than one chunk, and a last register that is not full.
     const GaussianCloud cloud = test::RandomCloud(seed, {.gaussians = 1237, .degree = 0});
     const Camera camera = test::RandomCamera(seed, 211, 97);

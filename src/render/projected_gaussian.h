@@ -15,7 +15,7 @@ struct alignas(64) ProjectedGaussian {
   float u_xx;          // 1/px, sqrt(½·log2 e)·sqrt(Σyy/det)
   float u_xy;          // 1/px, −sqrt(½·log2 e)·Σxy/sqrt(Σyy·det)
   float u_yy;          // 1/px, sqrt(½·log2 e)/sqrt(Σyy)
-  float log2_opacity;  // ≤ 0; includes the compensation of RenderMode::kAntialiased
+  float log2_opacity;  // ≤ 0; includes the compensation of modes that have one
   float rgb[3];        // ≥ 0; written by the spherical harmonics stage
   float depth;         // camera z, world units
   float compensation;  // of the opacity (RenderOptions::compensated_from), 1 in RenderMode::kClassic; for the backward

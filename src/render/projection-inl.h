@@ -142,8 +142,8 @@ HWY_INLINE Shape ShapeOf(D d, const View& view, const StoredColumns& in, size_t 
   return g;
 }
 
-// Σ₂ in pixels², as the Gaussian is (sharp), with the dilation (xx, yy) and with the lesser dilation that antialiased
-// opacities are compensated from.
+// Σ₂ in pixels², as the Gaussian is (sharp), with the dilation (xx, yy) and with the lesser dilation that opacities
+// are compensated from.
 struct Covariance {
   V xx, xy, yy, det;
   V from_xx, from_yy, from_det;

@@ -39,11 +39,12 @@ Status CheckCamera(const Camera& camera) {
 
 Status CheckOptions(const RenderOptions& o) {
   if (!(o.near_plane > 0)) return BadArgument(Cat("near plane ", o.near_plane, " must be positive"));
-  if (!(o.dilation >= 0) || !std::isfinite(o.dilation)) {
-    return BadArgument(Cat("dilation ", o.dilation, " must not be negative"));
+  const float dilation = DilationOf(o);
+  if (!(dilation >= 0) || !std::isfinite(dilation)) {
+    return BadArgument(Cat("dilation ", dilation, " must not be negative"));
   }
-  if (!(o.compensated_from >= 0 && o.compensated_from <= o.dilation)) {
-    return BadArgument(Cat("compensated_from ", o.compensated_from, " is not between 0 and the dilation ", o.dilation));
+  if (!(o.compensated_from >= 0 && o.compensated_from <= dilation)) {
+    return BadArgument(Cat("compensated_from ", o.compensated_from, " is not between 0 and the dilation ", dilation));
   }
   if (o.sh_degree < 0) return BadArgument(Cat("SH degree ", o.sh_degree, " must not be negative"));
   if (!(o.min_alpha > 0 && o.min_alpha < 1)) return BadArgument(Cat("min_alpha ", o.min_alpha, " is not in (0, 1)"));
@@ -82,7 +83,7 @@ int64_t Rasterizer::State::Project(const CloudView& cloud, const Camera& camera,
   project.mode = options.mode;
   project.near_plane = NearPlane(options, camera);
   project.far_plane = options.far_plane;
-  project.dilation = options.dilation;
+  project.dilation = DilationOf(options);
   project.compensated_from = options.compensated_from;
   project.min_alpha = options.min_alpha;
   project.projected = Room(projected, n);

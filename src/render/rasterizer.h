@@ -20,14 +20,14 @@ struct RenderOptions {
   RasterProfile profile = RasterProfile::kGsplat14;
   RenderMode mode = RenderMode::kClassic;
   std::array<float, 3> background = {0, 0, 0};
-  float near_plane = kNear;    // world units along z
-  float far_plane = kFar;      // world units along z
-  float dilation = kDilation;  // px²
+  float near_plane = kNear;                      // world units along z
+  float far_plane = kFar;                        // world units along z
+  std::optional<float> dilation = std::nullopt;  // px²; the mode's own otherwise
   // What is shown: no near plane lies farther than kNearShare of the distance to it (NearPlane in
   // render/shown_range.h). Fits have none and draw what gsplat does.
   std::optional<Framing> subject = std::nullopt;
-  // RenderMode::kAntialiased keeps the integral that a Gaussian has with this much dilation instead of `dilation`: its
-  // opacity becomes o·sqrt(det(Σ₂ + compensated_from·I) / det(Σ₂ + dilation·I)). 0 is Mip-Splatting's rule. Otherwise
+  // A mode that compensates keeps the integral that a Gaussian has with this much dilation instead of `dilation`: its
+  // opacity becomes o·sqrt(det(Σ₂ + compensated_from·I) / det(Σ₂ + dilation·I)). 0 is the modes' own rule. Otherwise
   // the picture shows what larger pixels would average of one with the smaller dilation, as far as every Gaussian for
   // itself is concerned.
   float compensated_from = 0;    // px², 0 to `dilation`
@@ -41,6 +41,8 @@ struct RenderOptions {
   int64_t max_pairs = kMaxPairs;
   bool gradient = false;  // keep what Backward needs of this picture: 8 bytes per pixel and Gaussian more
 };
+
+inline float DilationOf(const RenderOptions& options) { return options.dilation.value_or(DilationOf(options.mode)); }
 
 struct RenderOutput {
   Image color;  // [3,H,W], not clamped above 1, background included

@@ -104,7 +104,7 @@ void Rasterizer::State::ProjectBackward(const CloudView& cloud, CloudGradient& g
   project.intrinsics = kept->intrinsics;
   project.world_to_camera = kept->world_to_camera;
   project.mode = kept->options.mode;
-  project.dilation = kept->options.dilation;
+  project.dilation = DilationOf(kept->options);
   project.compensated_from = kept->options.compensated_from;
   project.projected = projected.data();
   project.gradients = gradients.data();

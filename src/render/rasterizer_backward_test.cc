@@ -32,10 +32,10 @@ RenderOptions Smooth() {
 }
 
 TEST(RasterizerBackward, MatchesDifferenceQuotientsWithoutCutOffs) {
-  for (uint64_t seed = 0; seed < 8; ++seed) {
+  for (uint64_t seed = 0; seed < 12; ++seed) {
     RenderOptions options = Smooth();
     options.profile = seed % 2 == 0 ? RasterProfile::kGsplat14 : RasterProfile::kGsplat15;
-    options.mode = seed / 2 % 2 == 0 ? RenderMode::kClassic : RenderMode::kAntialiased;
+    options.mode = kRenderModes[seed / 2 % 3];
     options.compensated_from = seed % 4 == 3 ? 0.05f : 0.0f;
     options.background = {0.3f, static_cast<float>(seed % 3) * 0.5f, 1.0f};
     const GaussianCloud cloud = RandomCloud(seed, {.gaussians = 12, .degree = static_cast<int>(seed % 4)});
@@ -49,7 +49,7 @@ TEST(RasterizerBackward, MatchesDifferenceQuotientsBetweenTheCutOffs) {
   for (uint64_t seed = 20; seed < 26; ++seed) {
     RenderOptions options;
     options.profile = seed % 2 == 0 ? RasterProfile::kGsplat14 : RasterProfile::kGsplat15;
-    options.mode = seed / 2 % 2 == 0 ? RenderMode::kClassic : RenderMode::kAntialiased;
+    options.mode = kRenderModes[seed / 2 % 3];
     options.compensated_from = seed % 4 == 3 ? 0.05f : 0.0f;
     options.background = {0.3f, 0.0f, 1.0f};
     const GaussianCloud cloud = RandomCloud(seed, {.gaussians = 150, .degree = 1, .largest = 0.5});

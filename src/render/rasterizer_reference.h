@@ -36,7 +36,7 @@ struct Splat {
   double x, y, z;             // mean in pixels; camera z
   double xx, xy, yy;          // 2-D covariance, dilated, px²
   double a, b, c;             // conic
-  double opacity;             // compensated in antialiased mode
+  double opacity;             // compensated in modes that do so
   double radius_x, radius_y;  // px
   int tile_x0, tile_y0, tile_x1, tile_y1;
   std::array<double, 3> rgb;
@@ -67,16 +67,16 @@ inline bool Project(const GaussianCloud& cloud, int64_t i, const Camera& camera,
   const Matrix3 image = Multiply(Multiply(jacobian, covariance), Transpose(jacobian));
   const double from = options.compensated_from;
   const double kept = (image[0] + from) * (image[4] + from) - image[1] * image[1];
-  out.xx = image[0] + options.dilation;
+  out.xx = image[0] + DilationOf(options);
   out.xy = image[1];
-  out.yy = image[4] + options.dilation;
+  out.yy = image[4] + DilationOf(options);
   const double det = out.xx * out.yy - out.xy * out.xy;
   if (!(det > 0) || !std::isfinite(det)) return false;
   out.a = out.yy / det;
   out.b = -out.xy / det;
   out.c = out.xx / det;
   out.opacity = 1 / (1 + std::exp(-double{cloud.opacity_logits[row]}));
-  if (options.mode == RenderMode::kAntialiased) out.opacity *= std::sqrt(std::max(0.0, kept / det));
+  if (IsCompensated(options.mode)) out.opacity *= std::sqrt(std::max(0.0, kept / det));
 
   if (options.profile == RasterProfile::kGsplat14) {
     const double half_trace = 0.5 * (out.xx + out.yy);

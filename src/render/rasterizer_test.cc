@@ -76,7 +76,7 @@ TEST(Rasterizer, MatchesReferenceOnRandomClouds) {
     const auto& size = sizes[seed % sizes.size()];
     RenderOptions options;
     options.profile = seed % 2 == 0 ? RasterProfile::kGsplat14 : RasterProfile::kGsplat15;
-    options.mode = seed / 2 % 2 == 0 ? RenderMode::kClassic : RenderMode::kAntialiased;
+    options.mode = kRenderModes[seed / 2 % 3];
     options.compensated_from = seed % 4 == 3 ? 0.05f : 0.0f;
     options.background = {0.3f, static_cast<float>(seed % 3) * 0.5f, 1.0f};
     options.sh_degree = static_cast<int>(seed / 3 % 4);
@@ -244,6 +244,22 @@ TEST(Rasterizer, AntialiasedDimsWhatTheDilationWidened) {
   EXPECT_NEAR(Render(cloud, FrontCamera(16, 16, 100), options).alpha.at(0, 8, 8), 0.6 * 0.35 / 0.65, 1e-5);
 }
 
+TEST(Rasterizer, MipWidensByATenthOfAPixel) {
+  const GaussianCloud cloud = OneGaussian(0.01, 0.01, 2, 0.01, 0.6);  // 0.25 px², on the centre of pixel (8, 8)
+  const Camera camera = FrontCamera(16, 16, 100);
+  RenderOptions options;
+  options.mode = RenderMode::kMip;
+  const RenderOutput output = Render(cloud, camera, options);
+  EXPECT_NEAR(output.alpha.at(0, 8, 8), 0.6 * 0.25 / 0.35, 1e-5);
+  EXPECT_NEAR(output.alpha.at(0, 8, 9), 0.6 * 0.25 / 0.35 * std::exp(-0.5 / 0.35), 1e-4);
+  // A dilation that was said counts in every mode.
+  options.dilation = kDilation;
+  const RenderOutput wide = Render(cloud, camera, options);
+  options.mode = RenderMode::kAntialiased;
+  options.dilation.reset();
+  EXPECT_EQ(Render(cloud, camera, options).alpha.pixels, wide.alpha.pixels);
+}
+
 TEST(Rasterizer, ProfilesDifferOnlyInTheTilesBeyondThreeSigma) {
   // Variance 36.3 px² at (40, 40): ceil(3σ) = 19 px ends at tile column 4 (64 px) exactly; 3.33σ = 20.06 → 21 px.
   const GaussianCloud cloud = OneGaussian(0, 0, 2, 0.12, 0.995);
@@ -363,8 +379,8 @@ TEST(Rasterizer, ExtremeValuesNeitherCrashNorSpread) {
   RenderOptions options;
   options.depth = true;
   for (const auto profile : {RasterProfile::kGsplat14, RasterProfile::kGsplat15}) {
-    for (const auto mode : {RenderMode::kClassic, RenderMode::kAntialiased}) {
-      for (const float dilation : {0.0f, 0.3f}) {
+    for (const RenderMode mode : kRenderModes) {
+      for (const std::optional<float> dilation : {std::optional(0.0f), std::optional<float>()}) {
         options.profile = profile;
         options.mode = mode;
         options.dilation = dilation;

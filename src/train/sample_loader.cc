@@ -96,7 +96,7 @@ Result<Chosen> ChoosePartOf(const TrainConfig& config, const SamplePlan& plan, T
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud others, Subset(object.cloud, where.others));
   scene.pixel_sizes = sizes_of(part->rows);
   const Buffer<float> sizes = sizes_of(where.others);
-  if (!others.empty() && object.cloud.render_mode != RenderMode::kAntialiased) {
+  if (!others.empty() && !IsCompensated(object.cloud.render_mode)) {
     const auto grown = ApplyFilter(others, sizes, {.upscale = object.upscale, .strength = {}});
     if (!grown.ok()) return grown.error();
   }

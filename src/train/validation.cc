@@ -134,7 +134,7 @@ Result<TrainQuality> Validation::Filter() {
                                    // A splat whose fit did not absorb the dilation has nothing to get back.
                                    FilterOptions options;
                                    options.upscale = object.data->upscale;
-                                   if (cloud.render_mode == RenderMode::kAntialiased) options.strength = 0;
+                                   if (IsCompensated(cloud.render_mode)) options.strength = 0;
                                    const auto grown = ApplyFilter(cloud, object.data->pixel_sizes, options);
                                    if (!grown.ok()) return grown.error();
                                    return ToTensors(cloud);

@@ -86,6 +86,7 @@ Result<Json> AddSplat(const ViewerSplat& splat, const std::string& id, int max_s
     }
   });
   const Framing framing = FrameCloud(*splat.cloud);
+  const RenderMode mode = splat.cloud->render_mode.value_or(RenderMode::kClassic);
   Json ids = Json::array();
   for (size_t k = 0; k < pieces; ++k) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::string text, *std::move(texts[k]));
@@ -98,7 +99,9 @@ Result<Json> AddSplat(const ViewerSplat& splat, const std::string& id, int max_s
               {"count", q.count},
               {"degree", q.sh_degree},
               {"fileDegree", splat.cloud->sh_degree},
-              {"antialiased", splat.cloud->render_mode == RenderMode::kAntialiased},
+              {"mode", NameOf(mode)},
+              {"compensated", IsCompensated(mode)},
+              {"dilation", DilationOf(mode)},
               {"center", q.center},
               {"spread", q.spread},
               {"reach", q.reach},
@@ -219,8 +222,7 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
                             {"up", WorldUpOf(page)},
                             // The page draws with the renderer's own numbers.
                             {"constants",
-                             {{"dilation", kDilation},
-                              {"minAlpha", kMinAlpha},
+                             {{"minAlpha", kMinAlpha},
                               {"maxAlpha", kMaxAlpha},
                               {"near", kNear},
                               {"nearShare", kNearShare},

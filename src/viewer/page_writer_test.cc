@@ -242,17 +242,29 @@ TEST(PageWriter, HostileNamesStayText) {
 TEST(PageWriter, RenderModeAndDegreeAreTheClouds) {
   TestFolder folder;
   GaussianCloud cloud = FittedLookingCloud(10, 3, 1);
-  cloud.render_mode = RenderMode::kAntialiased;
+  cloud.render_mode = RenderMode::kMip;
+  GaussianCloud antialiased = FittedLookingCloud(10, 0, 1), untold = antialiased;
+  antialiased.render_mode = RenderMode::kAntialiased;
   ViewerPage page;
   page.after = {&cloud, "x", {}};
   page.max_sh_degree = 1;
   ASSERT_TRUE(WriteViewerPage(folder / "page.html", page).ok());
   const auto description = nlohmann::json::parse(ElementText(FileBytes(folder / "page.html"), "description"));
-  EXPECT_EQ(description["after"]["antialiased"], true);
+  EXPECT_EQ(description["after"]["mode"], "mip");
+  EXPECT_EQ(description["after"]["compensated"], true);
+  EXPECT_NEAR(description["after"]["dilation"].get<double>(), 0.1, 1e-7);
   EXPECT_EQ(description["after"]["degree"], 1);
   EXPECT_EQ(description["after"]["fileDegree"], 3);
   EXPECT_TRUE(description["before"].is_null());
-  EXPECT_NEAR(description["constants"]["dilation"].get<double>(), 0.3, 1e-7);
+
+  page.after = {&antialiased, "x", {}};
+  page.before = ViewerSplat{&untold, "y", {}};
+  ASSERT_TRUE(WriteViewerPage(folder / "two.html", page).ok());
+  const auto two = nlohmann::json::parse(ElementText(FileText(folder / "two.html"), "description"));
+  EXPECT_EQ(two["after"]["mode"], "antialiased");
+  EXPECT_EQ(two["before"]["mode"], "classic");
+  EXPECT_EQ(two["before"]["compensated"], false);
+  for (const char* side : {"after", "before"}) EXPECT_NEAR(two[side]["dilation"].get<double>(), 0.3, 1e-7);
 }
 
 TEST(PageWriter, PicturesTravelAsTheyAre) {

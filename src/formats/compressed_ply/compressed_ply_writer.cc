@@ -15,6 +15,7 @@
 #include "formats/cloud_checks.h"
 #include "formats/compressed_ply/compressed_ply_reader.h"
 #include "formats/ply/ply_header.h"
+#include "formats/ply/render_mode_tag.h"
 #include "formats/quantize.h"
 #include "formats/splat_order.h"
 #include "formats/write_losses.h"
@@ -44,7 +45,9 @@ std::string Header(const CloudView& cloud, int64_t count, int sh_degree) {
         line, [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
     header += "comment " + line + "\n";
   }
-  if (cloud.render_mode) header += "comment " + CommentFromRenderMode(*cloud.render_mode) + "\n";
+  if (cloud.render_mode) {
+    for (const std::string& tag : CommentsOf(*cloud.render_mode)) header += "comment " + tag + "\n";
+  }
   header += Cat("element chunk ", Chunks(count), "\n");
   for (const char* what : {"", "scale_"}) {
     for (const char* end : {"min_", "max_"}) {

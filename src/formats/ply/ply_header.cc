@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <charconv>
 #include <limits>
 #include <unordered_set>
@@ -10,6 +9,7 @@
 
 #include "core/text.h"
 #include "core/words.h"
+#include "formats/ply/render_mode_tag.h"
 
 namespace anchorsplat {
 
@@ -39,12 +39,6 @@ std::optional<PlyType> TypeFromName(std::string_view name) {
   return std::nullopt;
 }
 
-std::string LowerCase(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return out;
-}
-
 class HeaderParser {
  public:
   explicit HeaderParser(std::string file) : file_(std::move(file)) {}
@@ -68,6 +62,7 @@ class HeaderParser {
 
   std::string file_;
   PlyHeader header_;
+  RenderModeTag mode_;
   std::unordered_set<std::string> names_;  // of the current element's properties
   bool has_format_ = false;
   bool done_ = false;
@@ -161,12 +156,8 @@ Status HeaderParser::Property(std::string_view rest) {
 }
 
 void HeaderParser::Comment(std::string_view rest) {
-  // The last one counts, as in other readers: tools that rewrite a file append their own.
-  if (const auto mode = RenderModeFromComment(rest)) {
-    header_.render_mode = mode;
-  } else {
-    header_.comments.emplace_back(rest);
-  }
+  if (!mode_.Take(rest)) header_.comments.emplace_back(rest);
+  header_.render_mode = mode_.mode();
 }
 
 }  // namespace
@@ -232,25 +223,6 @@ Result<PlyHeader> ReadPlyHeader(const InputFile& file) {
   return Error{ErrorCode::kBadFile,
                Cat(file.name(), ": line ", parser.header().lines + 1, ": the header has no \"end_header\" within ",
                    WithThousands(static_cast<int64_t>(bytes.size())), " bytes")};
-}
-
-std::optional<RenderMode> RenderModeFromComment(std::string_view comment) {
-  const std::string lower = LowerCase(comment);
-  std::string_view rest = Trimmed(lower);
-  constexpr std::string_view kBrush = "splatrendermode:";
-  if (rest.starts_with(kBrush)) {
-    rest = Trimmed(rest.substr(kBrush.size()));
-    if (rest == "mip") return RenderMode::kAntialiased;
-    if (rest == "default") return RenderMode::kClassic;
-  } else if (TakeWord(rest) == "antialiased") {
-    if (rest == "1") return RenderMode::kAntialiased;
-    if (rest == "0") return RenderMode::kClassic;
-  }
-  return std::nullopt;
-}
-
-std::string CommentFromRenderMode(RenderMode mode) {
-  return mode == RenderMode::kAntialiased ? "SplatRenderMode: mip" : "SplatRenderMode: default";
 }
 
 }  // namespace anchorsplat

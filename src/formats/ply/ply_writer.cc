@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "formats/ply/ply_header.h"
+#include "formats/ply/render_mode_tag.h"
 #include "io/atomic_file.h"
 
 namespace anchorsplat {
@@ -29,7 +30,9 @@ std::string Header(int64_t count, int sh_degree, std::optional<RenderMode> rende
     }
     header += "comment " + line + "\n";
   }
-  if (render_mode) header += "comment " + CommentFromRenderMode(*render_mode) + "\n";
+  if (render_mode) {
+    for (const std::string& tag : CommentsOf(*render_mode)) header += "comment " + tag + "\n";
+  }
   header += Cat("element vertex ", count, "\n");
   const auto property = [&header](const auto&... name) { header += Cat("property float ", name..., "\n"); };
   for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) property(name);

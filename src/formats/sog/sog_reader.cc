@@ -417,6 +417,9 @@ Result<GaussianCloud> ReadSog(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_RETURN_IF_ERROR(ReadScales(sog, cloud));
   ANCHORSPLAT_RETURN_IF_ERROR(ReadColors(sog, cloud));
   if (palette.degree > 0) ANCHORSPLAT_RETURN_IF_ERROR(ReadHarmonics(sog, *harmonics, palette, cloud));
+  if (const std::optional<JsonValue> model = meta.Find("model"); model && model->raw() == "antialiased") {
+    cloud.render_mode = RenderMode::kAntialiased;
+  }
   return cloud;
 }
 

@@ -18,6 +18,8 @@ namespace anchorsplat {
 //   shN_labels        16 bits, an entry of the palette
 //   shN_centroids     64 entries per row, a pixel per coefficient: indices into `codebook` or bytes in mins … maxs
 //
+// "model": "antialiased" becomes the render mode; without it nothing is said.
+//
 // Errors (kBadFile): a ZIP archive, JSON or picture that is none or damaged, members missing or of the wrong kind,
 // names that lead to another folder, pictures too small or far too large for the count, labels beyond the palette, more
 // than `limits.max_gaussians`, sizes that only a decompression bomb has.

@@ -46,13 +46,16 @@ TEST(Sog, RoundTripWithinTheStepsOfTheFormat) {
   const TestFolder folder;
   for (int degree = 0; degree <= kMaxShDegree; ++degree) {
     for (const int64_t n : {1, 5, 3000}) {
-      const GaussianCloud cloud = Clustered(n, degree, static_cast<uint64_t>(n));
+      GaussianCloud cloud = Clustered(n, degree, static_cast<uint64_t>(n));
+      cloud.render_mode = kRenderModes[static_cast<size_t>(degree) % 3];
       const std::filesystem::path path = degree == 2 ? folder / "meta.json" : folder / "a.sog";
       const Status written = WriteSog(path, cloud, {.overwrite = true});
       ASSERT_TRUE(written.ok()) << written.error().message;
       const auto read = Read(path);
       ASSERT_TRUE(read.ok()) << read.error().message;
       EXPECT_EQ(read->sh_degree, degree);
+      EXPECT_EQ(read->render_mode,
+                IsCompensated(cloud.render_mode) ? std::optional(RenderMode::kAntialiased) : std::nullopt);
       const auto error = CompareAttributes(*read, cloud, MortonOrder(cloud));
       ASSERT_TRUE(error.ok()) << error.error().message;
       EXPECT_EQ(error->compared, n);

@@ -227,6 +227,7 @@ Status WriteSog(const std::filesystem::path& path, const CloudView& cloud, const
                           static_cast<int>(height)};
   nlohmann::json meta = {
       {"version", 2}, {"asset", {{"generator", "anchorsplat " ANCHORSPLAT_VERSION}}}, {"count", cloud.size()}};
+  if (IsCompensated(cloud.render_mode)) meta["model"] = "antialiased";  // as splat-transform has it
   std::vector<Picture> drawn;
   if (cloud.sh_degree > 0) meta["shN"] = DrawHarmonics(pictures, drawn);
   meta["means"] = DrawMeans(pictures, drawn);

@@ -10,7 +10,7 @@ namespace anchorsplat {
 
 // Reads Niantic's SPZ, versions 1–3 (one gzip stream: a header of 16 bytes, then the sections of spz_sections.h) and 4
 // (a header of 32 bytes that begins "NGSP", records of extensions, a table of sizes, one zstd stream per section that
-// is not empty). Axes are RUB by the specification and become RDF. A set antialiased flag becomes the render mode; a
+// is not empty). Axes are RUB by the specification and become RDF. A set antialiased flag becomes kAntialiased; a
 // clear one says nothing, as most programs never set it. Degree 4 is read as 3; extensions are passed over.
 //
 // Errors (kBadFile): damaged or shorter than the header promises, another version, a fractional part of more than 24

@@ -76,7 +76,7 @@ std::string HeaderOf(const Packer& packer) {
   std::memcpy(header.data(), numbers, sizeof numbers);
   header[12] = static_cast<char>(packer.layout.sh_degree);
   header[13] = static_cast<char>(packer.layout.fractional_bits);
-  header[14] = packer.cloud.render_mode == RenderMode::kAntialiased ? static_cast<char>(kSpzAntialiased) : '\0';
+  header[14] = IsCompensated(packer.cloud.render_mode) ? static_cast<char>(kSpzAntialiased) : '\0';
   return header;
 }
 

@@ -171,7 +171,7 @@ function fillCard(description) {
     if (splat.fileBytes !== null) text.append(` · ${sizeText(splat.fileBytes)}`);
     const more = [splat.name, `SH degree ${splat.fileDegree}`];
     if (splat.degree < splat.fileDegree) more.push(`shown with degree ${splat.degree}`);
-    if (splat.antialiased) more.push('antialiased');
+    if (splat.mode !== 'classic') more.push(splat.mode);
     if (splat.count < splat.fileCount) more.push(`${splat.fileCount - splat.count} with values that are not finite`);
     text.title = term.title = more.join(', ');
     byId('facts').append(term, text);

@@ -156,11 +156,11 @@ class Renderer {
     gl.uniform2fv(u.uLogScale, d.logScale);
     gl.uniform2fv(u.uDc, d.dc);
     gl.uniform1f(u.uScalarTop, 2 ** d.scalarBits - 1);
-    gl.uniform1f(u.uDilation, this.constants.dilation);
+    gl.uniform1f(u.uDilation, d.dilation);
     gl.uniform1f(u.uMinAlpha, this.constants.minAlpha);
     gl.uniform1f(u.uMaxAlpha, this.constants.maxAlpha);
     gl.uniform1f(u.uNear, near);
-    gl.uniform1i(u.uAntialiased, d.antialiased ? 1 : 0);
+    gl.uniform1i(u.uCompensated, d.compensated ? 1 : 0);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     gl.bindVertexArray(splat.array);

@@ -52,7 +52,7 @@ uniform float uScalarTop;     // largest scalar code
 uniform float uDilation;      // px²
 uniform float uMinAlpha;
 uniform float uNear;
-uniform bool uAntialiased;
+uniform bool uCompensated;    // opacity, for the dilation
 
 layout(location = 0) in uint aIndex;
 out vec2 vOffset;             // from the mean, in standard deviations
@@ -109,7 +109,7 @@ void main() {
   float before = xx * yy - xy * xy;
   xx += uDilation;
   yy += uDilation;
-  if (uAntialiased) {
+  if (uCompensated) {
     opacity *= sqrt(max(0.0, before / (xx * yy - xy * xy)));
     if (opacity < uMinAlpha) return;
   }

@@ -1,0 +1,39 @@
+#include "formats/write_losses.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "formats/random_cloud_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+TEST(WriteLosses, NamesTheRenderModeThatAFormatCannotSay) {
+  GaussianCloud cloud = RandomCloud(10, 0, 1);
+  for (float& x : cloud.sh) x *= 0.1f;
+  const auto losses = [&](const char* format) { return WriteLosses(*FormatOfName(format), cloud); };
+  const auto all = {".ply", ".compressed.ply", ".spz", ".sog", ".splat", ".glb", ".csv"};
+  for (const char* format : all) EXPECT_THAT(losses(format), IsEmpty()) << format;
+  cloud.render_mode = RenderMode::kClassic;  // what is drawn where nothing is said
+  for (const char* format : all) EXPECT_THAT(losses(format), IsEmpty()) << format;
+
+  cloud.render_mode = RenderMode::kAntialiased;
+  for (const char* format : {".ply", ".compressed.ply", ".spz", ".sog"}) EXPECT_THAT(losses(format), IsEmpty());
+  for (const char* format : {".splat", ".glb", ".csv"}) {
+    EXPECT_THAT(losses(format), ElementsAre(AllOf(HasSubstr("antialiased"), HasSubstr("classic")))) << format;
+  }
+  cloud.render_mode = RenderMode::kMip;
+  for (const char* format : {".ply", ".compressed.ply"}) EXPECT_THAT(losses(format), IsEmpty());
+  for (const char* format : {".spz", ".sog"}) {
+    EXPECT_THAT(losses(format), ElementsAre(AllOf(HasSubstr("0.3 px²"), HasSubstr("0.1")))) << format;
+  }
+  EXPECT_THAT(losses(".splat"), ElementsAre(HasSubstr("mip")));
+}
+
+}  // namespace
+}  // namespace anchorsplat

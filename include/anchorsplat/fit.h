@@ -12,11 +12,20 @@
 
 namespace anchorsplat {
 
+// Which Gaussians come and go (docs/fit.md#strategies).
+enum class FitStrategy {
+  kDefault,  // Kerbl et al. 2023
+  kAbsgrad,  // the same by absolute gradients, for fine detail (Ye et al. 2024)
+  kMcmc,     // a number of Gaussians that move to where they are needed (Kheradmand et al. 2024)
+};
+
 // The standard 3DGS optimisation; `anchorsplat fit --help` and docs/fit.md say more. Schedules follow `steps`.
 struct FitSettings {
   int64_t steps = 15000;
   int sh_degree = 3;
-  int64_t max_gaussians = 0;  // growth stops there; 0: no bound
+  FitStrategy strategy = FitStrategy::kDefault;
+  bool mip_filter = false;    // Mip-Splatting's 3-D smoothing filter; the splat is for antialiased rendering
+  int64_t max_gaussians = 0;  // growth stops there; 0: no bound, or a million with kMcmc
   int hold_out = 8;           // every Nth view, by name, is not trained on; 0: all are
   std::optional<int64_t> initial_points =
       std::nullopt;  // thinned to as many, or random ones; 100,000 where there are none

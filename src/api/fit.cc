@@ -11,6 +11,17 @@ namespace anchorsplat {
 
 namespace {
 
+FitPreset PresetOf(FitStrategy strategy) {
+  switch (strategy) {
+    case FitStrategy::kAbsgrad:
+      return FitPreset::kAbsgrad;
+    case FitStrategy::kMcmc:
+      return FitPreset::kMcmc;
+    default:
+      return FitPreset::kDefault;
+  }
+}
+
 FitQuality ToQuality(const ViewQuality& quality) { return {quality.views, quality.psnr, quality.ssim}; }
 
 Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianCloud* start,
@@ -24,9 +35,11 @@ Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianClo
                  "a fit has at least one step and one Gaussian; max_gaussians and hold_out are not negative"};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(project, {.hold_out = settings.hold_out}));
-  FitOptions options = FitOptionsFor(settings.steps);
+  FitOptions options = FitOptionsFor(settings.steps, PresetOf(settings.strategy));
   options.seed = settings.seed;
   options.densification.max_gaussians = settings.max_gaussians;
+  if (settings.max_gaussians > 0) options.mcmc.cap_max = settings.max_gaussians;
+  if (settings.mip_filter) UseMipFilter(options);
   options.objective.render.sh_degree = settings.sh_degree;
   if (const auto background = settings.background ? settings.background : views.background) {
     options.objective.render.background = *background;
@@ -34,9 +47,7 @@ Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianClo
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options));
   const InitialPoints points = start != nullptr ? Thinned(PointsOf(*start), settings.initial_points)
                                                 : UsualStart(views, settings.initial_points, settings.seed);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(
-      GaussianCloud initial,
-      InitialCloud(points, views.scene_scale, {.sh_degree = settings.sh_degree, .seed = settings.seed}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial, InitialCloud(points, views.scene_scale, StartOptions(options)));
   FitControl control;
   control.checkpoint = settings.checkpoint;
   control.resume = settings.resume;

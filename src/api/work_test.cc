@@ -182,6 +182,11 @@ TEST(Fit, ComesCloserToThePictures) {
   ASSERT_TRUE(again.ok()) << again.failure().message;
   EXPECT_EQ(again->gaussians_in, fitted->splat.size());
   EXPECT_EQ(FitProject(folder.path(), {.steps = 0}).failure().kind, FailureKind::kBadArgument);
+  const auto mcmc = FitProject(
+      folder.path(), {.steps = 60, .strategy = FitStrategy::kMcmc, .max_gaussians = 420, .initial_points = 400});
+  ASSERT_TRUE(mcmc.ok()) << mcmc.failure().message;
+  EXPECT_EQ(mcmc->splat.size(), 420);
+  EXPECT_TRUE(FitProject(folder.path(), {.steps = 2, .mip_filter = true, .initial_points = 400}).ok());
   EXPECT_EQ(FitProject("/there/is/none").failure().kind, FailureKind::kNotFound);
 }
 

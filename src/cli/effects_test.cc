@@ -58,6 +58,31 @@ TEST_F(Effects, OfTheScheduleOfAFit) {
   ExpectNoEffect(fit({"--refine-stop", "1", "--refine-start", "5"}), "--refine-start has no effect here");
 }
 
+TEST_F(Effects, OfTheStrategyOfAFit) {
+  const std::string project = WriteProject(folder_ / "project");
+  const auto fit = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"fit", project, "-o", folder_ / "fit.ply", "--steps", "2", "--init-points", "50"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  };
+  for (const std::vector<std::string>& option : {std::vector<std::string>{"--grow-grad2d", "1"},
+                                                 {"--grow-scale3d", "1"},
+                                                 {"--prune-opa", "0.1"},
+                                                 {"--prune-scale3d", "1"},
+                                                 {"--reset-every", "3"},
+                                                 {"--opacity-reset", "never"},
+                                                 {"--revised-opacity"}}) {
+    std::vector<std::string> words = {"--strategy", "mcmc"};
+    words.insert(words.end(), option.begin(), option.end());
+    ExpectNoEffect(fit(words), option[0] + " has no effect here; it has one with --strategy default or absgrad");
+  }
+  ExpectNoEffect(fit({"--noise-lr", "1"}), "--noise-lr has no effect here; it has one with --strategy mcmc");
+  ExpectNoEffect(fit({"--strategy", "absgrad", "--min-opacity", "0.1"}), "it has one with --strategy mcmc");
+  ExpectNoEffect(fit({"--mip-filter", "--mode", "antialiased"}), "--mode has no effect here; it has one without");
+  ExpectNoEffect(fit({"--strategy", "mcmc", "--max-gaussians", "0"}), "say how many");
+  ExpectNoEffect(fit({"--mip-filter", "--pixel", "area"}), "the smoothing filter is for pixels that are points");
+}
+
 TEST_F(Effects, OfCamerasThatSeeNothing) {
   const std::string cameras = folder_ / "away.json";
   WriteText(cameras, R"({"w": 64, "h": 64, "fl_x": 60, "fl_y": 60, "cx": 32, "cy": 32, "frames": [{"file_path": "a",

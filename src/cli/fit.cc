@@ -94,7 +94,9 @@ nlohmann::json ToJson(const FitFlags& flags, const std::string& origin, const Fi
         {"out", r.gaussians_out},
         {"duplicated", r.duplicated},
         {"split", r.split},
-        {"pruned", r.pruned}}},
+        {"pruned", r.pruned},
+        {"relocated", r.relocated},
+        {"added", r.added}}},
       {"loss", r.loss},
       {"seconds", r.seconds},
       {"stages",
@@ -158,8 +160,7 @@ Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const FitOptions options, MakeFitOptions(flags, views.background, shared.seed));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Start start, ChooseStart(flags, views, shared.seed));
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial,
-                               InitialCloud(start.points, views.scene_scale,
-                                            {.sh_degree = options.objective.render.sh_degree, .seed = shared.seed}));
+                               InitialCloud(start.points, views.scene_scale, StartOptions(options)));
   LogInfo(Cat(views.train.size(), " training views, ", views.held_out.size(), " held out, scene scale ",
               Fixed(views.scene_scale, 3), ", ", WithThousands(initial.size()), " initial Gaussians"));
 

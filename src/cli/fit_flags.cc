@@ -13,7 +13,7 @@ namespace {
 constexpr int64_t kMostSteps = int64_t{1} << 40;
 
 void AddScheduleFlags(CLI::App& verb, FitFlags& f) {
-  const std::string group = "Densification (names of gsplat's DefaultStrategy; steps default to its schedule, scaled)";
+  const std::string group = "Densification (names of gsplat's strategies; steps default to their schedules, scaled)";
   DensificationOptions& d = f.standard.densification;
   const auto steps = [&](const char* name, std::optional<int64_t>& value, const char* help) {
     verb.add_option(name, value, help)->check(CLI::Range(int64_t{1}, kMostSteps))->group(group);
@@ -31,11 +31,21 @@ void AddScheduleFlags(CLI::App& verb, FitFlags& f) {
       {{"positive", OpacityReset::kPositive}, {"from-zero", OpacityReset::kFromZero}, {"never", OpacityReset::kNever}},
       "positive: gsplat's main branch; from-zero: up to 1.5.2, at step 0 too; never: 1.5.3")
       ->group(group);
-  number("--grow-grad2d", d.grow_grad2d, "Gradient in the picture above which a Gaussian grows");
+  verb.add_option("--grow-grad2d", f.grow_grad2d,
+                  "Gradient in the picture above which a Gaussian grows (default: 0.0002; 0.0008 with absgrad)")
+      ->check(NotNegative())
+      ->group(group);
   number("--grow-scale3d", d.grow_scale3d, "Size, in scene scales, above which it is split, not duplicated");
   number("--prune-opa", d.prune_opa, "Opacity below which it goes");
   number("--prune-scale3d", d.prune_scale3d, "Size, in scene scales, above which it goes");
   verb.add_flag("--revised-opacity", d.revised_opacity, "Halves of a split share its opacity")->group(group);
+  number("--min-opacity", f.standard.mcmc.min_opacity, "With mcmc: opacity up to which a Gaussian moves elsewhere");
+  number("--noise-lr", f.standard.mcmc.noise_lr, "With mcmc: noise of centres, times their learning rate");
+  const auto regularizer = [&](const char* name, std::optional<double>& value, const char* help) {
+    verb.add_option(name, value, help)->check(NotNegative())->group(group);
+  };
+  regularizer("--opacity-reg", f.opacity_reg, "Weight of the mean opacity in the loss (default: 0; 0.01 with mcmc)");
+  regularizer("--scale-reg", f.scale_reg, "Weight of the mean size in the loss (default: 0; 0.01 with mcmc)");
 }
 
 void AddRateFlags(CLI::App& verb, FitFlags& f) {
@@ -64,9 +74,14 @@ void FitFlags::AddTo(CLI::App& verb) {
   verb.add_option("--steps", steps, "Optimisation steps; all schedules follow")
       ->check(CLI::Range(int64_t{1}, kMostSteps))
       ->capture_default_str();
-  verb.add_option("--max-gaussians", standard.densification.max_gaussians, "Growth stops there; 0: no bound")
-      ->check(NotNegative())
-      ->capture_default_str();
+  verb.add_option("--max-gaussians", max_gaussians, "Growth stops there; 0: no bound (default: 0; 1000000 with mcmc)")
+      ->check(NotNegative());
+  AddChoice(verb, "--strategy", strategy,
+            {{"default", FitPreset::kDefault}, {"absgrad", FitPreset::kAbsgrad}, {"mcmc", FitPreset::kMcmc}},
+            "Who comes and goes: default: Kerbl et al.; absgrad: the same by absolute gradients, for fine detail "
+            "(AbsGS); mcmc: a number of Gaussians that move to where they are needed");
+  verb.add_flag("--mip-filter", mip_filter,
+                "Smooth every Gaussian by the pixel of the closest camera, as Mip-Splatting does; implies antialiased");
   verb.add_option("--hold-out", hold_out, "Hold out every Nth view, by name; 0: none")
       ->check(CLI::Range(0, 1 << 30))
       ->capture_default_str();
@@ -117,14 +132,28 @@ namespace {
 // kBadArgument: an option was given that changes nothing beside the others.
 Status CheckEffects(const FitFlags& flags, const FitOptions& options) {
   const DensificationOptions& d = options.densification;
-  const bool grows = d.refine_start_iter < std::min(d.refine_stop_iter, options.steps);
+  const bool mcmc = options.strategy == Strategy::kMcmc;
+  const int64_t start = mcmc ? options.mcmc.refine_start_iter : d.refine_start_iter;
+  const int64_t stop = mcmc ? options.mcmc.refine_stop_iter : d.refine_stop_iter;
+  const bool grows = start < std::min(stop, options.steps);
   struct Need {
     const char* option;
     bool met;
     const char* with;
   };
   const bool harmonics = options.objective.render.sh_degree > 0, resets = d.opacity_reset != OpacityReset::kNever;
+  constexpr const char* kOthers = "with --strategy default or absgrad";
   const Need needs[] = {
+      {"reset-every", !mcmc, kOthers},
+      {"opacity-reset", !mcmc, kOthers},
+      {"grow-grad2d", !mcmc, kOthers},
+      {"grow-scale3d", !mcmc, kOthers},
+      {"prune-opa", !mcmc, kOthers},
+      {"prune-scale3d", !mcmc, kOthers},
+      {"revised-opacity", !mcmc, kOthers},
+      {"min-opacity", mcmc, "with --strategy mcmc"},
+      {"noise-lr", mcmc, "with --strategy mcmc"},
+      {"mode", !options.mip_filter, "without --mip-filter"},
       {"upscale", flags.pixel == FitPixel::kArea, "with --pixel area"},
       {"rate-sh-rest", harmonics, "with --sh-degree above 0"},
       {"sh-degree-interval", harmonics, "with --sh-degree above 0"},
@@ -133,6 +162,7 @@ Status CheckEffects(const FitFlags& flags, const FitOptions& options) {
       {"refine-every", grows, "where --refine-start comes before --refine-stop and the last step"},
       {"grow-grad2d", grows, "where --refine-start comes before --refine-stop and the last step"},
       {"grow-scale3d", grows, "where --refine-start comes before --refine-stop and the last step"},
+      {"min-opacity", grows, "where --refine-start comes before --refine-stop and the last step"},
   };
   for (const Need& need : needs) {
     if (need.met || std::find(flags.given.begin(), flags.given.end(), need.option) == flags.given.end()) continue;
@@ -146,7 +176,7 @@ Status CheckEffects(const FitFlags& flags, const FitOptions& options) {
 Result<FitOptions> MakeFitOptions(const FitFlags& flags, const std::optional<std::array<float, 3>>& background,
                                   uint64_t seed) {
   FitOptions options = flags.standard;
-  const FitOptions scaled = FitOptionsFor(flags.steps);
+  const FitOptions scaled = FitOptionsFor(flags.steps, flags.strategy);
   options.steps = flags.steps;
   options.seed = seed;
   options.sh_degree_interval = flags.sh_degree_interval.value_or(scaled.sh_degree_interval);
@@ -155,6 +185,26 @@ Result<FitOptions> MakeFitOptions(const FitFlags& flags, const std::optional<std
   d.refine_stop_iter = flags.refine_stop.value_or(scaled.densification.refine_stop_iter);
   d.refine_every = flags.refine_every.value_or(scaled.densification.refine_every);
   d.reset_every = flags.reset_every.value_or(scaled.densification.reset_every);
+  d.absgrad = scaled.densification.absgrad;
+  d.grow_grad2d = flags.grow_grad2d.value_or(scaled.densification.grow_grad2d);
+  d.max_gaussians = flags.max_gaussians.value_or(scaled.densification.max_gaussians);
+  options.strategy = scaled.strategy;
+  McmcOptions& m = options.mcmc;
+  m.refine_start_iter = flags.refine_start.value_or(scaled.mcmc.refine_start_iter);
+  m.refine_stop_iter = flags.refine_stop.value_or(scaled.mcmc.refine_stop_iter);
+  m.refine_every = flags.refine_every.value_or(scaled.mcmc.refine_every);
+  m.cap_max = scaled.mcmc.cap_max;
+  if (options.strategy == Strategy::kMcmc) {
+    m.cap_max = flags.max_gaussians.value_or(m.cap_max);
+    if (m.cap_max < 1) {
+      return Error{ErrorCode::kBadArgument,
+                   "--max-gaussians 0: --strategy mcmc grows until it has as many, say how many"};
+    }
+  }
+  options.regularizers.opacity_reg = flags.opacity_reg.value_or(scaled.regularizers.opacity_reg);
+  options.regularizers.scale_reg = flags.scale_reg.value_or(scaled.regularizers.scale_reg);
+  options.mip_filter_every = scaled.mip_filter_every;
+  if (flags.mip_filter) UseMipFilter(options);
   options.objective.render.background = background.value_or(options.objective.render.background);
   if (!flags.background.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(options.objective.render.background, ParseColor("--background", flags.background));

@@ -36,13 +36,17 @@ struct FitFlags {
   std::string init_splat;
   std::optional<int64_t> init_points;
   std::string background;
+  FitPreset strategy = FitPreset::kDefault;
+  bool mip_filter = false;
   FitPixel pixel = FitPixel::kPoint;
   double upscale = 4;  // of FitPixel::kArea
 
-  // What becomes FitOptions. Those without a value keep what follows from the number of steps.
+  // What becomes FitOptions. Those without a value keep what follows from the number of steps and the strategy.
   int64_t steps = kDefaultFitSteps;
-  FitOptions standard = FitOptionsFor(kDefaultFitSteps);  // values whose default does not depend on the steps
+  FitOptions standard = FitOptionsFor(kDefaultFitSteps);  // values whose default depends on neither
   std::optional<int64_t> sh_degree_interval, refine_start, refine_stop, refine_every, reset_every;
+  std::optional<int64_t> max_gaussians;
+  std::optional<double> grow_grad2d, opacity_reg, scale_reg;
 
   std::vector<std::string> given;  // options, by their names on the command line
 

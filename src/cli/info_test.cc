@@ -94,7 +94,7 @@ TEST_F(InfoVerb, OfTheRenderMode) {
       HasSubstr("tagged mip"));
   EXPECT_EQ(mode_of(out), "mip");
   ExpectDone({"view", scan, "-o", folder_ / "page.html", "--mode", "mip"});
-  EXPECT_THAT(FileText(folder_ / "page.html"), HasSubstr("\"mode\":\"mip\""));
+  EXPECT_THAT(FileBytes(folder_ / "page.html"), HasSubstr("\"mode\":\"mip\""));
 }
 
 TEST_F(InfoVerb, OfANetwork) {

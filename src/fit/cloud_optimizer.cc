@@ -81,6 +81,14 @@ void CloudOptimizer::Apply(const RowChange& change) {
   }
 }
 
+void CloudOptimizer::ForgetRows(std::span<const int64_t> rows) {
+  for (Moments& m : moments_) {
+    for (Buffer<float>* moment : {&m.first, &m.second}) {
+      for (const int64_t row : rows) std::fill_n(moment->data() + row * m.width, m.width, 0.0f);
+    }
+  }
+}
+
 void CloudOptimizer::ForgetOpacities() {
   Moments& m = moments_[kOpacities];
   std::fill(m.first.begin(), m.first.end(), 0.0f);

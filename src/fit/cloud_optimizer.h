@@ -46,7 +46,8 @@ class CloudOptimizer {
             GaussianCloud& cloud);
 
   void Apply(const RowChange& change);
-  void ForgetOpacities();  // their moments become zero
+  void ForgetOpacities();                          // their moments become zero
+  void ForgetRows(std::span<const int64_t> rows);  // all moments of these Gaussians become zero
 
   int64_t steps() const { return steps_; }
 

@@ -177,7 +177,8 @@ void Densification::Clear(int64_t gaussians) {
   }
 }
 
-void Densification::Gather(int width, int height, const CloudGradient& gradient) {
+void Densification::Gather(bool absgrad, int width, int height, const CloudGradient& gradient) {
+  const Buffer<float>& means2d = absgrad ? gradient.means2d_abs : gradient.means2d;
   const float half_width = 0.5f * static_cast<float>(width), half_height = 0.5f * static_cast<float>(height);
   const float side = static_cast<float>(std::max(width, height));
   ParallelFor(0, static_cast<int64_t>(gathered_.count.size()), 8192, [&](int64_t begin, int64_t end) {
@@ -185,7 +186,7 @@ void Densification::Gather(int width, int height, const CloudGradient& gradient)
       const auto k = static_cast<size_t>(i);
       const int32_t rx = gradient.radii[2 * k], ry = gradient.radii[2 * k + 1];
       if (rx <= 0 || ry <= 0) continue;
-      const float gx = gradient.means2d[2 * k] * half_width, gy = gradient.means2d[2 * k + 1] * half_height;
+      const float gx = means2d[2 * k] * half_width, gy = means2d[2 * k + 1] * half_height;
       gathered_.grad2d[k] += std::sqrt(gx * gx + gy * gy);
       gathered_.count[k] += 1;
       gathered_.radii[k] = std::max(gathered_.radii[k], static_cast<float>(std::max(rx, ry)) / side);
@@ -234,16 +235,13 @@ DensificationChange Densification::AfterStep(const DensificationOptions& options
                                              GaussianCloud& cloud) {
   DensificationChange change;
   if (step >= options.refine_stop_iter) return change;
-  Gather(width, height, gradient);
+  Gather(options.absgrad, width, height, gradient);
   if (step > options.refine_start_iter && step % options.refine_every == 0 &&
       step % options.reset_every >= options.pause_refine_after_reset) {
     Refine(options, step, scene_scale, seed, cloud, change);
   }
-  if (options.opacity_reset != OpacityReset::kNever && step % options.reset_every == 0 &&
-      (step > 0 || options.opacity_reset == OpacityReset::kFromZero)) {
-    CapOpacities(cloud, 2 * options.prune_opa);
-    change.opacities_reset = true;
-  }
+  change.resets_opacities = options.opacity_reset != OpacityReset::kNever && step % options.reset_every == 0 &&
+                            (step > 0 || options.opacity_reset == OpacityReset::kFromZero);
   return change;
 }
 

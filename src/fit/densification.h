@@ -33,20 +33,26 @@ struct DensificationOptions {
   int64_t refine_every = 100;
   int64_t reset_every = 3000;
   int64_t pause_refine_after_reset = 0;
+  bool absgrad = false;  // the gradient is that of CloudGradient::means2d_abs (Ye et al. 2024); see kAbsgradGrowGrad2d
   bool revised_opacity = false;  // halves of a split get 1 − √(1 − o) (Rota Bulò et al. 2024)
   OpacityReset opacity_reset = OpacityReset::kPositive;
   int64_t max_gaussians = 0;  // growth stops there, Gaussians with the largest gradients first; 0 = no bound. Ours
 };
 
+// The threshold grow_grad2d that gsplat's DefaultStrategy recommends with absgrad.
+inline constexpr double kAbsgradGrowGrad2d = 0.0008;
+
 // The same schedule for another number of steps: what gsplat's steps_scaler = steps/30000 does, but never below 1
 // where a count divides.
 DensificationOptions ScaledTo(const DensificationOptions& options, int64_t steps);
 
-// What happened after a step. The caller changes the rows of everything else it keeps per Gaussian.
+// What a strategy did after a step. The caller changes the rows of everything else it keeps per Gaussian.
 struct DensificationChange {
   RowChange rows;
-  bool opacities_reset = false;
-  int64_t duplicated = 0, split = 0, pruned = 0;
+  bool resets_opacities = false;  // the caller has to (CapOpacities)
+  Buffer<int64_t> forgotten;      // rows before `rows` that stay and are somewhere else now: their moments are void
+  int64_t duplicated = 0, split = 0, pruned = 0;  // of Densification
+  int64_t relocated = 0, added = 0;               // of McmcAfterStep
 };
 
 class Densification {
@@ -55,9 +61,9 @@ class Densification {
   explicit Densification(int64_t gaussians) { Clear(gaussians); }
 
   // What DefaultStrategy does after the optimizer's step `step` (0, 1, …): gathers the gradients of the centres and,
-  // at its times, duplicates, splits and prunes `cloud` and takes opacities down. `gradient` is that of the step, for a
-  // picture of width × height pixels. Rows that are not finite (IsUsable) are pruned with the others. The noise of
-  // splits follows from seed and step.
+  // at its times, duplicates, splits and prunes `cloud` and says when opacities are to be taken down to twice
+  // prune_opa. `gradient` is that of the step, for a picture of width × height pixels. Rows that are not finite
+  // (IsUsable) are pruned with the others. The noise of splits follows from seed and step.
   DensificationChange AfterStep(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed,
                                 int width, int height, const CloudGradient& gradient, GaussianCloud& cloud);
 
@@ -72,14 +78,14 @@ class Densification {
 
  private:
   void Clear(int64_t gaussians);
-  void Gather(int width, int height, const CloudGradient& gradient);
+  void Gather(bool absgrad, int width, int height, const CloudGradient& gradient);
   void Refine(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed,
               GaussianCloud& cloud, DensificationChange& change);
 
   Gathered gathered_;
 };
 
-// Takes opacities down to at most `opacity`. Exposed for other loops.
+// Takes opacities down to at most `opacity`.
 void CapOpacities(GaussianCloud& cloud, double opacity);
 
 }  // namespace anchorsplat

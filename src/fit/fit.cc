@@ -81,6 +81,8 @@ Status MakeSteps(Fitter& fitter, const FitControl& control, KeptState& kept, Fit
     report.duplicated += step.change.duplicated;
     report.split += step.change.split;
     report.pruned += step.change.pruned;
+    report.relocated += step.change.relocated;
+    report.added += step.change.added;
     const int64_t done = fitter.state().step;
     if (done % kNoteEvery == 0 || fitter.done()) {
       Follow(psnr, fitter.LastPsnr());

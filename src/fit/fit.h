@@ -44,6 +44,7 @@ struct FitReport {
   int64_t gaussians_in = 0;  // that the fit (not its continuation) began with
   int64_t gaussians_out = 0;
   int64_t duplicated = 0, split = 0, pruned = 0;           // in this run
+  int64_t relocated = 0, added = 0;                        // in this run, of MCMC
   double loss = std::numeric_limits<double>::quiet_NaN();  // of the last step of this run, if it made any
   double scene_scale = 0;
   ViewQuality train, held_out;

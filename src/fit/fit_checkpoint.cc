@@ -1,5 +1,7 @@
 #include <sys/stat.h>
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cstdint>
 #include <map>
@@ -21,8 +23,13 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr const char* kFormat = "anchorsplat fit 2";
-constexpr const char* kFormatBefore = "anchorsplat fit 1";  // knew neither its pictures and start nor a checksum
+constexpr const char* kFormat = "anchorsplat fit 3";
+// 1 knew neither its pictures and start nor a checksum, 2 no strategies and no filters.
+constexpr std::array kFormatsBefore = {"anchorsplat fit 1", "anchorsplat fit 2"};
+
+bool IsFormatBefore(const std::string& format) {
+  return std::find(kFormatsBefore.begin(), kFormatsBefore.end(), format) != kFormatsBefore.end();
+}
 
 // An array of the state and what it is called in the file.
 template <typename Array>
@@ -30,6 +37,7 @@ struct Named {
   std::string name;
   std::vector<int64_t> shape;
   Array* values;
+  bool held = true;  // a state need not have it
 };
 
 // Which file has this name, and whether it has been written to since: a word that another file, or another version of
@@ -53,9 +61,10 @@ std::vector<Named<Array>> ArraysOf(State& state, int64_t n, int64_t coefficients
     arrays.push_back({Cat("adam.", moments.attribute, ".second"), {n, moments.width}, &moments.second});
   }
   auto& gathered = state.densification.gathered();
-  arrays.push_back({"densification.grad2d", {n}, &gathered.grad2d});
-  arrays.push_back({"densification.count", {n}, &gathered.count});
-  arrays.push_back({"densification.radii", {n}, &gathered.radii});
+  arrays.push_back({"densification.grad2d", {n}, &gathered.grad2d, !gathered.grad2d.empty()});
+  arrays.push_back({"densification.count", {n}, &gathered.count, !gathered.count.empty()});
+  arrays.push_back({"densification.radii", {n}, &gathered.radii, !gathered.radii.empty()});
+  arrays.push_back({"mip_filter", {n}, &state.mip_filter, !state.mip_filter.empty()});
   return arrays;
 }
 
@@ -84,7 +93,7 @@ Status WriteFitCheckpoint(const std::filesystem::path& path, const FitState& sta
   std::vector<TensorEntry> entries;
   for (const auto& array :
        ArraysOf<const FitState, const Buffer<float>>(state, state.cloud.size(), state.cloud.coefficients())) {
-    entries.push_back(MakeEntry(array.name, array.shape, *array.values));
+    if (array.held) entries.push_back(MakeEntry(array.name, array.shape, *array.values));
   }
   std::string left;
   for (const std::string& file : state.left) left += file + '\n';
@@ -99,7 +108,7 @@ bool IsFitCheckpoint(const std::filesystem::path& path) {
   const auto file = TensorFile::Open(path);
   if (!file.ok()) return false;
   const auto format = file->metadata().find("format");
-  return format != file->metadata().end() && (format->second == kFormat || format->second == kFormatBefore);
+  return format != file->metadata().end() && (format->second == kFormat || IsFormatBefore(format->second));
 }
 
 void RemoveFitCheckpoint(const std::filesystem::path& path) {
@@ -158,11 +167,8 @@ Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std:
     const auto found = file.metadata().find(key);
     return found == file.metadata().end() ? std::string() : found->second;
   };
-  if (text("format") == kFormatBefore) {
-    return bad(
-        "is a checkpoint of an earlier version, which noted neither what its pictures and its start were nor a "
-        "checksum; "
-        "-w begins anew");
+  if (IsFormatBefore(text("format"))) {
+    return bad("is a checkpoint of an earlier version, which noted less than this one needs; -w begins anew");
   }
   if (text("format") != kFormat) return bad("is not a checkpoint of a fit (metadata \"format\")");
   ANCHORSPLAT_RETURN_IF_ERROR(VerifyChecksum(file));
@@ -184,6 +190,10 @@ Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std:
   state.optimizer.set_steps(state.step);
   // Each array is as large as the file says only once the file has shown that it holds it.
   for (const auto& array : ArraysOf<FitState, Buffer<float>>(state, sh->shape[0], state.cloud.coefficients())) {
+    // What a strategy gathers is there as a whole or not at all, and who goes on knows which (Fitter::Begin).
+    const bool optional = array.name == "mip_filter" ||
+                          (array.name.starts_with("densification.") && file.Find("densification.count") == nullptr);
+    if (optional && file.Find(array.name) == nullptr) continue;
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values values, file.ReadFloat32(array.name, array.shape));
     array.values->assign(values.values().begin(), values.values().end());
   }

@@ -6,15 +6,50 @@
 #include <utility>
 
 #include "core/text.h"
+#include "fit/mip_filter.h"
 
 namespace anchorsplat {
 
-FitOptions FitOptionsFor(int64_t steps) {
+FitOptions FitOptionsFor(int64_t steps, FitPreset preset) {
+  const auto scaled = [&](int64_t count) { return std::max<int64_t>(1, count * steps / kStandardSteps); };
   FitOptions options;
   options.steps = steps;
-  options.sh_degree_interval = std::max<int64_t>(1, options.sh_degree_interval * steps / kStandardSteps);
+  options.sh_degree_interval = scaled(options.sh_degree_interval);
   options.densification = ScaledTo(options.densification, steps);
+  options.mcmc = ScaledTo(options.mcmc, steps);
+  options.mip_filter_every = scaled(options.mip_filter_every);
+  switch (preset) {
+    case FitPreset::kDefault:
+      break;
+    case FitPreset::kAbsgrad:
+      options.densification.absgrad = true;
+      options.densification.grow_grad2d = kAbsgradGrowGrad2d;
+      break;
+    case FitPreset::kMcmc:
+      options.strategy = Strategy::kMcmc;
+      options.regularizers = {.opacity_reg = 0.01, .scale_reg = 0.01};
+      break;
+  }
   return options;
+}
+
+void UseMipFilter(FitOptions& options) {
+  options.mip_filter = true;
+  options.objective.render = MipRendering(options.objective.render);
+}
+
+InitialCloudOptions StartOptions(const FitOptions& options) {
+  InitialCloudOptions start{.sh_degree = options.objective.render.sh_degree, .seed = options.seed};
+  if (options.strategy == Strategy::kMcmc) {
+    start.opacity = kMcmcInitialOpacity;
+    start.scale = kMcmcInitialScale;
+  }
+  return start;
+}
+
+double UnitOf(double scene_scale) {
+  constexpr double kSceneScaleOfUnitCameras = 1.1;  // as TrainingViews defines the scene scale
+  return scene_scale > 0 ? scene_scale / kSceneScaleOfUnitCameras : 1;
 }
 
 int ShDegreeAt(const FitOptions& options, int64_t step) {
@@ -56,6 +91,20 @@ Status Validate(const FitOptions& options) {
   const double ssim = options.objective.loss.ssim_weight;
   if (!(ssim >= 0 && ssim <= 1)) return bad("the weight of SSIM must lie in [0, 1]");
   if (d.max_gaussians < 0) return bad("max_gaussians must not be negative");
+  const McmcOptions& m = options.mcmc;
+  if (m.cap_max < 1) return bad("mcmc grows to a bound: cap_max must be at least 1");
+  if (m.refine_every < 1) return bad("refine_every must be at least 1");
+  if (!(m.noise_lr >= 0 && std::isfinite(m.noise_lr))) return bad("noise_lr must be a number and not negative");
+  if (!(m.min_opacity > 0 && m.min_opacity < 0.5)) return bad("min_opacity must lie between 0 and 0.5");
+  for (const auto& [name, value] :
+       {std::pair{"opacity_reg", options.regularizers.opacity_reg}, {"scale_reg", options.regularizers.scale_reg}}) {
+    if (!(value >= 0 && std::isfinite(value))) return bad(Cat(name, " must be a number and not negative"));
+  }
+  if (options.mip_filter_every < 1) return bad("mip_filter_every must be at least 1");
+  if (options.mip_filter && options.pixel.upscale > 1) return bad("the smoothing filter is for pixels that are points");
+  if (options.mip_filter && options.objective.render.mode != RenderMode::kAntialiased) {
+    return bad("the smoothing filter is for the antialiased mode");
+  }
   const int degree = options.objective.render.sh_degree;
   if (degree < 0 || degree > kMaxShDegree) return bad("SH degree must be 0 to 3");
   return {};
@@ -92,9 +141,21 @@ std::string ToJsonText(const FitOptions& o) {
       {"refine_every", d.refine_every},
       {"reset_every", d.reset_every},
       {"pause_refine_after_reset", d.pause_refine_after_reset},
+      {"absgrad", d.absgrad},
       {"revised_opacity", d.revised_opacity},
       {"opacity_reset", static_cast<int>(d.opacity_reset)},
       {"max_gaussians", d.max_gaussians},
+      {"strategy", static_cast<int>(o.strategy)},
+      {"cap_max", o.mcmc.cap_max},
+      {"noise_lr", o.mcmc.noise_lr},
+      {"mcmc_refine_start_iter", o.mcmc.refine_start_iter},
+      {"mcmc_refine_stop_iter", o.mcmc.refine_stop_iter},
+      {"mcmc_refine_every", o.mcmc.refine_every},
+      {"min_opacity", o.mcmc.min_opacity},
+      {"opacity_reg", o.regularizers.opacity_reg},
+      {"scale_reg", o.regularizers.scale_reg},
+      {"mip_filter", o.mip_filter},
+      {"mip_filter_every", o.mip_filter_every},
       {"sh_degree", render.sh_degree},
       {"profile", static_cast<int>(render.profile)},
       {"mode", static_cast<int>(render.mode)},

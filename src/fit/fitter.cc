@@ -13,6 +13,13 @@ Result<Fitter> Fitter::Begin(const FitOptions& options, PictureCache pictures, d
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(state.cloud));
   if (pictures.views().empty()) return Error{ErrorCode::kBadArgument, "fit: there are no views to train on"};
   if (state.cloud.empty()) return Error{ErrorCode::kBadArgument, "fit: there are no Gaussians to begin with"};
+  const auto n = static_cast<size_t>(state.cloud.size());
+  if (options.strategy == Strategy::kDefault && state.densification.gathered().count.size() != n) {
+    return Error{ErrorCode::kBadArgument, "fit: the state is that of a strategy which gathers nothing"};
+  }
+  if (options.mip_filter && state.step > 0 && state.mip_filter.size() != n) {
+    return Error{ErrorCode::kBadArgument, "fit: the state is that of a fit without a smoothing filter"};
+  }
   return Fitter(options, std::move(pictures), scene_scale, std::move(state));
 }
 
@@ -29,7 +36,10 @@ Fitter::Fitter(const FitOptions& options, PictureCache pictures, double scene_sc
       pictures_(std::move(pictures)),
       scene_scale_(scene_scale),
       state_(std::move(state)),
-      order_(static_cast<int64_t>(pictures_.views().size()), options.seed) {}
+      order_(static_cast<int64_t>(pictures_.views().size()), options.seed) {
+  if (options_.strategy == Strategy::kMcmc) state_.densification = Densification();
+  if (options_.mip_filter && state_.step == 0) MeasureMipFilter();
+}
 
 Result<FitStep> Fitter::Step() {
   Stopwatch watch;
@@ -44,17 +54,17 @@ Result<FitStep> Fitter::Step() {
   ObjectiveOptions objective = options_.objective;
   objective.render.sh_degree = degree;
   objective.pixel = PixelModelAt(options_, step);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Evaluate(objective, state_.cloud, camera, picture_, gradient_));
+  objective.render.absgrad = options_.strategy == Strategy::kDefault && options_.densification.absgrad;
+  const CloudView shown = options_.mip_filter ? filtered_.Of(state_.cloud, state_.mip_filter) : CloudView(state_.cloud);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Evaluate(objective, shown, camera, picture_, gradient_));
   watch.Lap();
+  if (options_.mip_filter) MipFilterBackward(state_.cloud, state_.mip_filter, gradient_);
+  AddRegularizers(options_.regularizers, UnitOf(scene_scale_), state_.cloud, gradient_);
   const double means_rate = MeansRate(options_.rates, scene_scale_, step, options_.steps);
   state_.optimizer.Step(options_.rates, means_rate, degree, gradient_, state_.cloud);
   times_.adam += watch.Lap();
 
-  const Pinhole rays = RaysOf(objective.pixel, camera).intrinsics;
-  out.change = state_.densification.AfterStep(options_.densification, step, scene_scale_, options_.seed, rays.width,
-                                              rays.height, gradient_, state_.cloud);
-  state_.optimizer.Apply(out.change.rows);
-  if (out.change.opacities_reset) state_.optimizer.ForgetOpacities();
+  out.change = ChangeGaussians(RaysOf(objective.pixel, camera));
   times_.densify += watch.Lap();
   ++state_.step;
   if (state_.cloud.empty()) {
@@ -62,6 +72,44 @@ Result<FitStep> Fitter::Step() {
                  "fit: pruning has left no Gaussian; do the pictures show anything but background?"};
   }
   return out;
+}
+
+DensificationChange Fitter::ChangeGaussians(const Camera& rays) {
+  const int64_t step = state_.step;
+  DensificationChange change;
+  if (options_.strategy == Strategy::kMcmc) {
+    // The trainer steps its schedule before its strategy: the rate is that of the next step.
+    change = McmcAfterStep(options_.mcmc,
+                           {.step = step,
+                            .means_rate = MeansRate(options_.rates, scene_scale_, step + 1, options_.steps),
+                            .unit = UnitOf(scene_scale_),
+                            .seed = options_.seed},
+                           state_.cloud);
+  } else {
+    change = state_.densification.AfterStep(options_.densification, step, scene_scale_, options_.seed,
+                                            rays.intrinsics.width, rays.intrinsics.height, gradient_, state_.cloud);
+  }
+  state_.optimizer.ForgetRows(change.forgotten);
+  state_.optimizer.Apply(change.rows);
+  if (options_.mip_filter) {
+    const int64_t done = step + 1;
+    const bool due = done % options_.mip_filter_every == 0 && done < options_.steps - options_.mip_filter_every;
+    if (due || change.rows.any || change.relocated > 0) MeasureMipFilter();
+  }
+  if (change.resets_opacities) {
+    const double cap = 2 * options_.densification.prune_opa;
+    if (options_.mip_filter) {
+      CapFilteredOpacities(state_.mip_filter, cap, state_.cloud);
+    } else {
+      CapOpacities(state_.cloud, cap);
+    }
+    state_.optimizer.ForgetOpacities();
+  }
+  return change;
+}
+
+void Fitter::MeasureMipFilter() {
+  state_.mip_filter = MipFilterSizes(state_.cloud.means, pictures_.views(), options_.objective.render.near_plane);
 }
 
 FitTimes Fitter::times() const {
@@ -76,7 +124,8 @@ double Fitter::LastPsnr() const {
 }
 
 GaussianCloud Fitter::UsableCloud() const {
-  const GaussianCloud& cloud = state_.cloud;
+  GaussianCloud cloud = state_.cloud;
+  if (options_.mip_filter) FuseMipFilter(state_.mip_filter, cloud);
   std::vector<int64_t> usable;
   for (int64_t i = 0; i < cloud.size(); ++i) {
     if (IsUsable(cloud, i)) usable.push_back(i);

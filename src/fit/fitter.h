@@ -12,6 +12,7 @@
 #include "fit/cloud_optimizer.h"
 #include "fit/densification.h"
 #include "fit/fit_options.h"
+#include "fit/mip_filter.h"
 #include "fit/picture_cache.h"
 #include "fit/view_objective.h"
 #include "fit/view_order.h"
@@ -23,7 +24,8 @@ struct FitState {
   int64_t step = 0;  // steps done
   GaussianCloud cloud;
   CloudOptimizer optimizer;
-  Densification densification;
+  Densification densification;  // of nothing where the strategy gathers nothing
+  Buffer<float> mip_filter;     // [N] world units, MipFilterSizes; empty where the fit has no such filter
   // Files that an interruption leaves besides its checkpoint, by their AbsoluteName: what goes on may replace them.
   std::vector<std::string> left;
 };
@@ -42,7 +44,7 @@ struct FitStep {
 struct FitTimes {
   double load = 0;  // pictures from the cache
   ObjectiveTimes objective;
-  double adam = 0, densify = 0;
+  double adam = 0, densify = 0;  // the latter with the measuring of filters
 };
 
 // The iterations of a fit, one at a time: view, objective, optimizer, densification. The state after k steps is the
@@ -50,7 +52,8 @@ struct FitTimes {
 class Fitter {
  public:
   // `pictures` are the training views (at least one). Begins at `state.step`.
-  // Errors (kBadArgument): options that cannot be run, no views, no Gaussians, an invalid cloud.
+  // Errors (kBadArgument): options that cannot be run, no views, no Gaussians, an invalid cloud, a state that lacks
+  // what the options need.
   static Result<Fitter> Begin(const FitOptions& options, PictureCache pictures, double scene_scale, FitState state);
   // A state at step 0.
   static FitState Fresh(GaussianCloud cloud);
@@ -66,11 +69,14 @@ class Fitter {
   FitTimes times() const;
   // Peak signal-to-noise ratio of the last step's picture, before the step.
   double LastPsnr() const;
-  // A copy of the cloud, without rows that are not finite.
+  // A copy of the cloud as it is rendered, the smoothing filter fused, without rows that are not finite.
   GaussianCloud UsableCloud() const;
 
  private:
   Fitter(const FitOptions& options, PictureCache pictures, double scene_scale, FitState state);
+
+  DensificationChange ChangeGaussians(const Camera& rays);
+  void MeasureMipFilter();
 
   FitOptions options_;
   PictureCache pictures_;
@@ -78,12 +84,14 @@ class Fitter {
   FitState state_;
   ViewOrder order_;
   ViewObjective objective_;
+  MipFiltered filtered_;
   CloudGradient gradient_;
   Image picture_;
   FitTimes times_;
 };
 
-// A state as a safetensors file: the cloud, Adam's moments and what densification gathered, exactly; in the metadata
+// A state as a safetensors file: the cloud, Adam's moments, what densification gathered and the filter, exactly where
+// there are any; in the metadata
 // the step, `settings`, a JSON object of what the fit depends on, and a checksum. Whole or not at all; replaces an
 // older one.
 Status WriteFitCheckpoint(const std::filesystem::path& path, const FitState& state, const std::string& settings);

@@ -16,6 +16,8 @@ enum class RandomPurpose : uint64_t {
   kCopies = 5,
   kPoses = 6,
   kCrop = 7,
+  kRelocation = 8,
+  kNoise = 9,
 };
 
 inline Random RandomStream(uint64_t seed, RandomPurpose purpose, int64_t index = 0) {

@@ -4,7 +4,7 @@
 
 namespace anchorsplat {
 
-Status ViewObjective::Show(const ObjectiveOptions& options, const GaussianCloud& cloud, const Camera& camera) {
+Status ViewObjective::Show(const ObjectiveOptions& options, const CloudView& cloud, const Camera& camera) {
   Stopwatch watch;
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options.pixel));
   RenderOptions render = RaysOf(options.pixel, options.render);
@@ -16,7 +16,7 @@ Status ViewObjective::Show(const ObjectiveOptions& options, const GaussianCloud&
   return {};
 }
 
-Result<PhotometricLossValue> ViewObjective::Compare(const ObjectiveOptions& options, const GaussianCloud& cloud,
+Result<PhotometricLossValue> ViewObjective::Compare(const ObjectiveOptions& options, const CloudView& cloud,
                                                     const Image& picture, CloudGradient& gradient) {
   Stopwatch watch;
   PhotometricLossValue value;
@@ -34,7 +34,7 @@ Result<PhotometricLossValue> ViewObjective::Compare(const ObjectiveOptions& opti
   return value;
 }
 
-Result<PhotometricLossValue> ViewObjective::Evaluate(const ObjectiveOptions& options, const GaussianCloud& cloud,
+Result<PhotometricLossValue> ViewObjective::Evaluate(const ObjectiveOptions& options, const CloudView& cloud,
                                                      const Camera& camera, const Image& picture,
                                                      CloudGradient& gradient) {
   ANCHORSPLAT_RETURN_IF_ERROR(Show(options, cloud, camera));

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "core/camera.h"
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "core/image.h"
 #include "core/result.h"
 #include "fit/pixel_model.h"
@@ -28,14 +28,14 @@ class ViewObjective {
  public:
   // Renders `cloud` through `camera` and compares with `picture` [3,H,W], which has the camera's size.
   // Errors: those of Rasterizer, PhotometricLoss and PixelModel.
-  Result<PhotometricLossValue> Evaluate(const ObjectiveOptions& options, const GaussianCloud& cloud,
-                                        const Camera& camera, const Image& picture, CloudGradient& gradient);
+  Result<PhotometricLossValue> Evaluate(const ObjectiveOptions& options, const CloudView& cloud, const Camera& camera,
+                                        const Image& picture, CloudGradient& gradient);
 
   // The two halves of it, for those who look at rendered() before they decide what to compare it with. Compare takes
   // the options and the cloud of the last Show.
-  Status Show(const ObjectiveOptions& options, const GaussianCloud& cloud, const Camera& camera);
-  Result<PhotometricLossValue> Compare(const ObjectiveOptions& options, const GaussianCloud& cloud,
-                                       const Image& picture, CloudGradient& gradient);
+  Status Show(const ObjectiveOptions& options, const CloudView& cloud, const Camera& camera);
+  Result<PhotometricLossValue> Compare(const ObjectiveOptions& options, const CloudView& cloud, const Image& picture,
+                                       CloudGradient& gradient);
 
   // What the camera sees of the cloud, of the last Evaluate or Show: [3,H,W].
   const Image& rendered() const { return averaged_ ? average_ : output_.color; }

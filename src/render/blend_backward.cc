@@ -52,6 +52,9 @@ struct Tile : TileBatch<kBatch> {
   alignas(64) float factors[kGroup + 3][2 * kPixels];
   size_t members[kGroup + 3];
   bool added[kGroup];
+
+  // Only where the absolute sums are wanted: of |∂L/∂mean2d|/(2 ln 2), x and y, over the pixels of each lane.
+  alignas(64) float absolute[kBatch][2][kLanesAtMost];
 };
 
 constexpr float kMiddle = 0.5f * kTile;
@@ -150,6 +153,7 @@ struct Limits {
 
 // The factors of the group's `count` Gaussians, from the farthest on, at as many of the block's pixels as a register
 // holds, from pixel `first` on. Says for each one whether a pixel added it.
+template <bool kAbsolute>
 HWY_INLINE void EvaluateLanes(const Limits& limits, size_t block, size_t first, size_t count, int32_t place, Tile& t) {
   const D d;
   const DI di;
@@ -167,7 +171,8 @@ HWY_INLINE void EvaluateLanes(const Limits& limits, size_t block, size_t first, 
   V behind = hn::Load(d, t.behind[block] + first);
   for (size_t k = 0; k < count; ++k) {
     const size_t j = t.members[k];
-    const V log2_alpha = Log2Alpha(t, j, hn::Sub(pixel_x, hn::Set(d, t.x[j])), hn::Sub(pixel_y, hn::Set(d, t.y[j])));
+    const V dx = hn::Sub(pixel_x, hn::Set(d, t.x[j])), dy = hn::Sub(pixel_y, hn::Set(d, t.y[j]));
+    const V log2_alpha = Log2Alpha(t, j, dx, dy);
     const VI own_place = hn::Set(di, place + static_cast<int32_t>(j));
     const M added = hn::And(hn::Ge(log2_alpha, log2_min_alpha), hn::RebindMask(d, hn::Gt(contributors, own_place)));
     float* factors = t.factors[k] + 2 * first;
@@ -188,6 +193,16 @@ HWY_INLINE void EvaluateLanes(const Limits& limits, size_t block, size_t first, 
     behind = hn::Add(behind, own);
     const V free_q = hn::IfThenElseZero(hn::Le(uncapped, max_alpha), q);  // and 0 where nothing was added
     StorePairs(free_q, weight, factors);
+    if constexpr (kAbsolute) {
+      // ∂L/∂mean2d = 2 ln 2·Wᵀ q·(u, v) as in ProjectBackwardCpu, but of every pixel by itself.
+      const V u_xx = hn::Set(d, t.u_xx[j]), u_xy = hn::Set(d, t.u_xy[j]), u_yy = hn::Set(d, t.u_yy[j]);
+      const V u = hn::MulAdd(u_xx, dx, hn::Mul(u_xy, dy)), v = hn::Mul(u_yy, dy);
+      const V along_x = hn::Mul(free_q, hn::Mul(u_xx, u));
+      const V along_y = hn::Mul(free_q, hn::MulAdd(u_xy, u, hn::Mul(u_yy, v)));
+      float *to_x = t.absolute[j][0], *to_y = t.absolute[j][1];
+      hn::Store(hn::Add(hn::Load(d, to_x), hn::Abs(along_x)), d, to_x);
+      hn::Store(hn::Add(hn::Load(d, to_y), hn::Abs(along_y)), d, to_y);
+    }
   }
   hn::Store(transmittance, d, t.transmittance[block] + first);
   hn::Store(behind, d, t.behind[block] + first);
@@ -195,6 +210,7 @@ HWY_INLINE void EvaluateLanes(const Limits& limits, size_t block, size_t first, 
 
 // Goes through a block's list from behind, in groups: first what every pixel contributes, then the sums over the
 // pixels.
+template <bool kAbsolute>
 void AddBlock(const Limits& limits, size_t block, int32_t place, Tile& t) {
   const int32_t* list = t.lists[block];
   size_t left = t.list_sizes[block];
@@ -204,7 +220,7 @@ void AddBlock(const Limits& limits, size_t block, int32_t place, Tile& t) {
     for (size_t k = 0; k < count; ++k) t.members[k] = static_cast<size_t>(list[left - 1 - k]);
     std::fill_n(t.added, count, false);
     for (size_t first = 0; first < kPixels; first += hn::Lanes(D())) {
-      EvaluateLanes(limits, block, first, count, place, t);
+      EvaluateLanes<kAbsolute>(limits, block, first, count, place, t);
     }
     uint8_t group[kGroup + 3];
     size_t found = 0;
@@ -313,6 +329,17 @@ HWY_INLINE void AddWhitened(const Tile& t, size_t j, BlendGradient& to) {
   to.rgb[2] += s[kBlue];
 }
 
+// The absolute sums of Gaussian j of the batch are added to `to` [2].
+HWY_INLINE void AddAbsolute(const Tile& t, size_t j, float* to) {
+  constexpr float kTwoLn2 = 1.38629436f;
+  for (size_t a = 0; a < 2; ++a) {
+    float sum = 0;
+    for (size_t lane = 0; lane < hn::Lanes(D()); ++lane) sum += t.absolute[j][a][lane];
+    to[a] += kTwoLn2 * sum;
+  }
+}
+
+template <bool kAbsolute>
 void BackwardTile(const BlendBackwardParams& p, int64_t tile, Tile& t) {
   const int tile_x = static_cast<int>(tile % p.tiles_x) * kTile, tile_y = static_cast<int>(tile / p.tiles_x) * kTile;
   const int64_t list_begin = p.tile_offsets[tile] - p.tile_offsets[p.first_tile];
@@ -324,6 +351,7 @@ void BackwardTile(const BlendBackwardParams& p, int64_t tile, Tile& t) {
   const int32_t last = outside ? 0 : StartTile(p, tile_x, tile_y, background_gradient, t);
   if (p.partial != nullptr) {
     std::fill_n(p.partial + list_begin + last, count - last, BlendGradient{});
+    if constexpr (kAbsolute) std::fill_n(p.partial_absolute + 2 * (list_begin + last), 2 * (count - last), 0.0f);
   }
   const Limits limits = {std::log2(p.min_alpha), p.max_alpha};
   constexpr int32_t kStep = static_cast<int32_t>(kBatch);
@@ -338,8 +366,9 @@ void BackwardTile(const BlendBackwardParams& p, int64_t tile, Tile& t) {
     ListBlocks(limits.log2_min_alpha, n, t.finished, t);
     std::fill_n(&t.sums[0][0], n * kSums, 0.0f);
     std::fill_n(t.touched, n, false);
+    if constexpr (kAbsolute) std::fill_n(&t.absolute[0][0][0], n * 2 * kLanesAtMost, 0.0f);
     for (size_t block = 0; block < kBlocks; ++block) {
-      if (t.list_sizes[block] > 0) AddBlock(limits, block, place, t);
+      if (t.list_sizes[block] > 0) AddBlock<kAbsolute>(limits, block, place, t);
     }
     if (p.partial != nullptr) {
       BlendGradient* partial = p.partial + list_begin + place;
@@ -352,13 +381,24 @@ void BackwardTile(const BlendBackwardParams& p, int64_t tile, Tile& t) {
         if (t.touched[j]) AddWhitened(t, j, p.gradients[rows[j]]);
       }
     }
+    if constexpr (kAbsolute) {
+      float* partial = p.partial == nullptr ? nullptr : p.partial_absolute + 2 * (list_begin + place);
+      if (partial != nullptr) std::fill_n(partial, 2 * n, 0.0f);
+      for (size_t j = 0; j < n; ++j) {
+        if (t.touched[j]) AddAbsolute(t, j, partial != nullptr ? partial + 2 * j : p.absolute + 2 * int64_t{rows[j]});
+      }
+    }
   }
 }
 
 void BackwardRange(const BlendBackwardParams& p, int64_t first, int64_t last) {
   Tile t;
   Prepare(t);
-  for (int64_t tile = first; tile < last; ++tile) BackwardTile(p, tile, t);
+  if (p.absolute != nullptr) {
+    for (int64_t tile = first; tile < last; ++tile) BackwardTile<true>(p, tile, t);
+  } else {
+    for (int64_t tile = first; tile < last; ++tile) BackwardTile<false>(p, tile, t);
+  }
 }
 
 }  // namespace
@@ -391,6 +431,8 @@ void AddPartial(const BlendBackwardParams& p) {
       to.quv += from.quv;
       to.qvv += from.qvv;
       for (int c = 0; c < 3; ++c) to.rgb[c] += from.rgb[c];
+      if (p.absolute == nullptr) continue;
+      for (int a = 0; a < 2; ++a) p.absolute[2 * int64_t{row} + a] += p.partial_absolute[2 * k + a];
     }
   });
 }

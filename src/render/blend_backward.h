@@ -46,10 +46,15 @@ struct BlendBackwardParams {
   // scratch
   BlendGradient*
       partial;  // [tile_offsets[last_tile] − tile_offsets[first_tile]] per pair; null = one tile after another
+  float* partial_absolute;   // [.., 2] beside `partial` where both it and `absolute` are wanted, else null
   double* tile_backgrounds;  // [last_tile − first_tile, 3]
   // in and out
   BlendGradient* gradients;     // [N] the run's sums are added to it
   double* background_gradient;  // [3] Σ T_end·∂L/∂C is added to it
+  // [N,2] Σ |∂L/∂x|, Σ |∂L/∂y| of the mean in the picture, per pixel, over the pixels: the run's sums are added to it.
+  // Where ∂L/∂mean2d of a large Gaussian adds up to nothing because its pixels pull in all directions, this does not
+  // (Ye et al. 2024, AbsGS, eq. 8; gsplat's absgrad). Null: not wanted, and costs nothing.
+  float* absolute;
 };
 
 void BlendBackwardCpu(const BlendBackwardParams& p);

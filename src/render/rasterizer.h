@@ -40,6 +40,7 @@ struct RenderOptions {
   // runs of tiles, without a difference in its pixels. Every run holds at least one tile, that is at most N pairs.
   int64_t max_pairs = kMaxPairs;
   bool gradient = false;  // keep what Backward needs of this picture: 8 bytes per pixel and Gaussian more
+  bool absgrad = false;   // Backward fills CloudGradient::means2d_abs, too (gsplat's name for it)
 };
 
 inline float DilationOf(const RenderOptions& options) { return options.dilation.value_or(DilationOf(options.mode)); }
@@ -69,6 +70,9 @@ struct CloudGradient {
 
   // What densification asks for.
   Buffer<float> means2d;  // [N,2] ∂L/∂(mean in the picture), per pixel
+  // [N,2] the same, but the absolute values of what every pixel contributes are added up (Ye et al. 2024, AbsGS). Empty
+  // unless RenderOptions::absgrad asks for it.
+  Buffer<float> means2d_abs;
   Buffer<int32_t> radii;  // [N,2] pixels, as the profile defines them; 0 = culled by its rules
 
   std::array<float, 3> background{};

@@ -41,7 +41,7 @@ constexpr int64_t kMaxPartial = int64_t{1} << 20;
 
 }  // namespace
 
-void Rasterizer::State::BlendBackward(const RenderGradient& output_gradient, std::array<float, 3>& background) {
+void Rasterizer::State::BlendBackward(const RenderGradient& output_gradient, CloudGradient& gradient) {
   const RenderOptions& options = kept->options;
   const BinParams bin = MakeBinParams(statistics.visible, kept->intrinsics, options.min_alpha);
   const int64_t tile_count = int64_t{bin.tiles_x} * bin.tiles_y;
@@ -67,6 +67,8 @@ void Rasterizer::State::BlendBackward(const RenderGradient& output_gradient, std
   p.gradients = Room(gradients, kept->count);
   double background_gradient[3] = {0, 0, 0};
   p.background_gradient = background_gradient;
+  gradient.means2d_abs.assign(options.absgrad ? 2 * static_cast<size_t>(kept->count) : 0, 0.0f);
+  p.absolute = options.absgrad ? gradient.means2d_abs.data() : nullptr;
   ParallelFor(0, kept->count, int64_t{1} << 14, [&](int64_t first, int64_t last) {
     std::fill(p.gradients + first, p.gradients + last, BlendGradient{});
   });
@@ -78,11 +80,13 @@ void Rasterizer::State::BlendBackward(const RenderGradient& output_gradient, std
     for (p.first_tile = listed_from; p.first_tile < listed_to; p.first_tile = p.last_tile) {
       p.last_tile = std::min(listed_to, EndOfRun(bin, p.first_tile, kMaxPartial));
       p.pairs = pairs.data() + pairs_before(p.first_tile);
-      p.partial = ThreadCount() > 1 ? Room(partial, pairs_before(p.last_tile) - pairs_before(p.first_tile)) : nullptr;
+      const int64_t apart = pairs_before(p.last_tile) - pairs_before(p.first_tile);
+      p.partial = ThreadCount() > 1 ? Room(partial, apart) : nullptr;
+      p.partial_absolute = ThreadCount() > 1 && options.absgrad ? Room(partial_absolute, 2 * apart) : nullptr;
       BlendBackwardCpu(p);
     }
   }
-  for (size_t c = 0; c < 3; ++c) background[c] = static_cast<float>(background_gradient[c]);
+  for (size_t c = 0; c < 3; ++c) gradient.background[c] = static_cast<float>(background_gradient[c]);
 }
 
 void Rasterizer::State::ProjectBackward(const CloudView& cloud, CloudGradient& gradient) {
@@ -147,7 +151,7 @@ Status Rasterizer::Backward(const CloudView& cloud, const RenderGradient& output
   ANCHORSPLAT_RETURN_IF_ERROR(CheckGradient(output_gradient, kept.intrinsics.width, kept.intrinsics.height));
   try {
     Stopwatch watch;
-    state_->BlendBackward(output_gradient, gradient.background);
+    state_->BlendBackward(output_gradient, gradient);
     state_->statistics.blend_backward = watch.Lap();
     state_->ProjectBackward(cloud, gradient);
     state_->statistics.project_backward = watch.Lap();

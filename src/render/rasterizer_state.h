@@ -47,6 +47,7 @@ struct Rasterizer::State {
   Buffer<float> transmittance;
   Buffer<int32_t> contributors, radii;
   Buffer<BlendGradient> gradients, partial;
+  Buffer<float> partial_absolute;
   Buffer<double> tile_backgrounds;
 
   int64_t Project(const CloudView& cloud, const Camera& camera, const RenderOptions& options, Stopwatch& watch);
@@ -54,7 +55,7 @@ struct Rasterizer::State {
   BinParams MakeBinParams(int64_t visible_total, const Pinhole& intrinsics, float min_alpha);
   void BinAndBlend(int64_t visible_total, const Camera& camera, const RenderOptions& options, RenderOutput& output,
                    Stopwatch& watch);
-  void BlendBackward(const RenderGradient& output_gradient, std::array<float, 3>& background);
+  void BlendBackward(const RenderGradient& output_gradient, CloudGradient& gradient);  // background and means2d_abs
   void ProjectBackward(const CloudView& cloud, CloudGradient& gradient);
 };
 

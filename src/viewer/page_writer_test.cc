@@ -260,7 +260,7 @@ TEST(PageWriter, RenderModeAndDegreeAreTheClouds) {
   page.after = {&antialiased, "x", {}};
   page.before = ViewerSplat{&untold, "y", {}};
   ASSERT_TRUE(WriteViewerPage(folder / "two.html", page).ok());
-  const auto two = nlohmann::json::parse(ElementText(FileText(folder / "two.html"), "description"));
+  const auto two = nlohmann::json::parse(ElementText(FileBytes(folder / "two.html"), "description"));
   EXPECT_EQ(two["after"]["mode"], "antialiased");
   EXPECT_EQ(two["before"]["mode"], "classic");
   EXPECT_EQ(two["before"]["compensated"], false);

@@ -1,0 +1,147 @@
+#include "fit/mip_filter.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/activations.h"
+#include "core/parallel.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr float kKernelSize = 0.1f;     // px², of the 2-D filter
+constexpr double kFilterMargin = 0.15;  // of the picture's sides
+constexpr int64_t kFilterRows = 4096;
+
+double LogSigmoid(double x) { return x < 0 ? x - std::log1p(std::exp(x)) : -std::log1p(std::exp(-x)); }
+
+// What the filter of size f > 0 does to a Gaussian. Logarithms throughout: s may be 0, and all of a flat Gaussian's
+// opacity may go.
+struct Smoothing {
+  std::array<double, 3> log_scales;  // ln s'
+  std::array<double, 3> shares;      // s²/s'²
+  double log_kept = 0;               // ln √(Π s²/Π s'²)
+};
+
+Smoothing SmoothingOf(const float* log_scales, double size) {
+  Smoothing out{};
+  const double log_size = std::log(size);
+  for (size_t a = 0; a < 3; ++a) {
+    const double s = log_scales[a];
+    out.log_scales[a] = std::max(s, log_size) + 0.5 * std::log1p(std::exp(-2 * std::abs(s - log_size)));
+    out.shares[a] = 1 / (1 + std::exp(2 * (log_size - s)));
+    out.log_kept += s - out.log_scales[a];
+  }
+  return out;
+}
+
+// 1 − o', without cancellation where o' is nearly 1.
+double LeftOpen(double logit, double log_kept) { return Sigmoid(-logit) + Sigmoid(logit) * -std::expm1(log_kept); }
+
+void Smooth(const GaussianCloud& cloud, std::span<const float> sizes, float* log_scales, float* logits) {
+  ParallelFor(0, cloud.size(), kFilterRows, [&](int64_t begin, int64_t end) {
+    for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      const float* s = cloud.log_scales.data() + 3 * i;
+      const double logit = cloud.opacity_logits[i];
+      if (!(sizes[i] > 0)) {
+        std::copy_n(s, 3, log_scales + 3 * i);
+        logits[i] = cloud.opacity_logits[i];
+        continue;
+      }
+      const Smoothing smoothing = SmoothingOf(s, double{sizes[i]});
+      const double left = LeftOpen(logit, smoothing.log_kept);
+      logits[i] = static_cast<float>(smoothing.log_kept + LogSigmoid(logit) - std::log(left));
+      for (size_t a = 0; a < 3; ++a) log_scales[3 * i + a] = static_cast<float>(smoothing.log_scales[a]);
+    }
+  });
+}
+
+}  // namespace
+
+RenderOptions MipRendering(RenderOptions render) {
+  render.mode = RenderMode::kAntialiased;
+  render.dilation = kKernelSize;
+  return render;
+}
+
+Buffer<float> MipFilterSizes(std::span<const float> means, std::span<const Camera> cameras, float near_plane) {
+  constexpr double kUnseen = std::numeric_limits<double>::infinity();
+  const auto n = static_cast<int64_t>(means.size() / 3);
+  Buffer<float> sizes(static_cast<size_t>(n));
+  ParallelFor(0, n, kFilterRows, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      const float* mean = means.data() + 3 * i;
+      double closest = kUnseen;
+      for (const Camera& camera : cameras) {
+        const auto p = camera.ToCamera({mean[0], mean[1], mean[2]});
+        if (!(p[2] > near_plane)) continue;
+        const Pinhole& k = camera.intrinsics;
+        const double x = (k.fx * p[0] / p[2] + k.cx) / k.width, y = (k.fy * p[1] / p[2] + k.cy) / k.height;
+        if (!(x >= -kFilterMargin && x <= 1 + kFilterMargin && y >= -kFilterMargin && y <= 1 + kFilterMargin)) continue;
+        closest = std::min(closest, p[2] / std::max(k.fx, k.fy));
+      }
+      sizes[static_cast<size_t>(i)] = static_cast<float>(std::sqrt(kMipVariance) * closest);
+    }
+  });
+  float largest = 0;
+  for (const float size : sizes) {
+    if (std::isfinite(size)) largest = std::max(largest, size);
+  }
+  for (float& size : sizes) {
+    if (!std::isfinite(size)) size = largest;
+  }
+  return sizes;
+}
+
+CloudView MipFiltered::Of(const GaussianCloud& cloud, std::span<const float> sizes) {
+  log_scales.resize(cloud.log_scales.size());
+  opacity_logits.resize(cloud.opacity_logits.size());
+  Smooth(cloud, sizes, log_scales.data(), opacity_logits.data());
+  CloudView view = cloud;
+  view.log_scales = log_scales;
+  view.opacity_logits = opacity_logits;
+  return view;
+}
+
+void MipFilterBackward(const GaussianCloud& cloud, std::span<const float> sizes, CloudGradient& gradient) {
+  ParallelFor(0, cloud.size(), kFilterRows, [&](int64_t begin, int64_t end) {
+    for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
+      if (!(sizes[i] > 0)) continue;
+      const Smoothing smoothing = SmoothingOf(cloud.log_scales.data() + 3 * i, double{sizes[i]});
+      const double logit = cloud.opacity_logits[i];
+      // With k the kept part and o' = k·o:  ∂logit o'/∂logit o = (1 − o)/(1 − o'),  ∂logit o'/∂ln k = 1/(1 − o'),
+      // ∂ln k/∂ln s = 1 − s²/s'²,  ∂ln s'/∂ln s = s²/s'².
+      const double left = LeftOpen(logit, smoothing.log_kept);
+      if (!(left > 0)) continue;  // infinitely opaque, and so large that the filter takes nothing: it stays what it is
+      const double g_logit = gradient.opacity_logits[i];
+      gradient.opacity_logits[i] = static_cast<float>(g_logit * Sigmoid(-logit) / left);
+      for (size_t a = 0; a < 3; ++a) {
+        float& g = gradient.log_scales[3 * i + a];
+        const double share = smoothing.shares[a];
+        g = static_cast<float>(double{g} * share + g_logit / left * (1 - share));
+      }
+    }
+  });
+}
+
+void FuseMipFilter(std::span<const float> sizes, GaussianCloud& cloud) {
+  MipFiltered filtered;
+  filtered.Of(cloud, sizes);
+  cloud.log_scales = std::move(filtered.log_scales);
+  cloud.opacity_logits = std::move(filtered.opacity_logits);
+}
+
+void CapFilteredOpacities(std::span<const float> sizes, double opacity, GaussianCloud& cloud) {
+  for (size_t i = 0; i < cloud.opacity_logits.size(); ++i) {
+    double kept = 1;
+    if (sizes[i] > 0) kept = std::exp(SmoothingOf(cloud.log_scales.data() + 3 * i, double{sizes[i]}).log_kept);
+    if (!(opacity < kept)) continue;  // o' < k can be no more than that
+    float& logit = cloud.opacity_logits[i];
+    logit = std::min(logit, static_cast<float>(std::log(opacity / (kept - opacity))));
+  }
+}
+
+}  // namespace anchorsplat

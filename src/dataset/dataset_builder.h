@@ -37,7 +37,8 @@ struct DatasetBuildReport {
 // Makes DATASET/NAME for every mesh (address of a file, of an object of a furniture library, or of a whole library; or
 // a folder of pictures with cameras) and every entry its recipe draws, and DATASET/manifest.jsonl and failures.jsonl,
 // which are right after every object. Each object is made by a process of its own (object_builder.h): one that fails,
-// crashes or hangs does not stop the others, nor does a library that cannot be read. Called again after whatever kind
+// crashes or hangs does not stop the others, nor does a library that cannot be read; one that is made from another
+// object (ObjectSettings::from) waits for all others, and fails where that failed. Called again after whatever kind
 // of end, it goes on where it was. job_list.h says how objects get their names.
 //
 // Errors: kBadArgument: no meshes; kExists: another build works on the folder; kIo.

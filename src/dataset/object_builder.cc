@@ -162,7 +162,7 @@ Status FitSplat(const ObjectJob& job, const fs::path& folder, ObjectRecord& reco
   if (views.points.size() == 0) {
     return Error{ErrorCode::kBadFile, Cat(job.source, ": no camera sees any of its surface")};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial, InitialCloudOf(job.settings, views));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial, InitialCloudOf(job.settings, options, views));
   record.initial_points = initial.size();
   FitControl control;
   control.checkpoint = folder / kFitCheckpoint;

@@ -22,19 +22,20 @@ Result<FitOptions> ToFitOptions(const ObjectSettings& settings, double upscale,
   return options;
 }
 
-Result<GaussianCloud> InitialCloudOf(const ObjectSettings& settings, const TrainingViews& views) {
+Result<GaussianCloud> InitialCloudOf(const ObjectSettings& settings, const FitOptions& options,
+                                     const TrainingViews& views) {
   const int64_t count = settings.init_points > 0 ? settings.init_points : kRandomPoints;
-  const InitialCloudOptions options{.sh_degree = settings.sh_degree, .seed = settings.seed};
+  const InitialCloudOptions start{.sh_degree = options.objective.render.sh_degree, .seed = options.seed};
   switch (settings.start) {
     case FitStart::kRandom:
-      return InitialCloud(RandomPoints(count, views.scene_scale, settings.seed), views.scene_scale, options);
+      return InitialCloud(RandomPoints(count, views.scene_scale, settings.seed), views.scene_scale, start);
     case FitStart::kView:
       return InitialCloud(RandomPointsInView(count, views.train, views.scene_scale, settings.seed), views.scene_scale,
-                          options);
+                          start);
     case FitStart::kSurface:
       break;
   }
-  return InitialCloud(views.points, views.scene_scale, options);
+  return InitialCloud(views.points, views.scene_scale, start);
 }
 
 }  // namespace anchorsplat

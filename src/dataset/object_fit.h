@@ -15,6 +15,7 @@ namespace anchorsplat {
 Result<FitOptions> ToFitOptions(const ObjectSettings& settings, double upscale, const std::array<float, 3>& background);
 
 // The Gaussians that it begins with. kBadArgument: no points.
-Result<GaussianCloud> InitialCloudOf(const ObjectSettings& settings, const TrainingViews& views);
+Result<GaussianCloud> InitialCloudOf(const ObjectSettings& settings, const FitOptions& options,
+                                     const TrainingViews& views);
 
 }  // namespace anchorsplat

@@ -225,6 +225,12 @@ Status Validate(const ObjectSettings& s) {
   if (s.init_points > kMostInitPoints) return bad(Cat("a fit begins with at most ", kMostInitPoints, " points"));
   if (s.sh_degree < 0 || s.sh_degree > kMaxShDegree) return bad(Cat("sh_degree ", s.sh_degree, " is not in 0 to 3"));
   if (!IsOneOf(s.strategy, kStrategyNames)) return bad(Cat("unknown strategy \"", Printable(s.strategy), "\""));
+  if (s.strategy == "mcmc" && s.max_gaussians == 0) {
+    return bad("strategy mcmc grows to a bound: max_gaussians says how many");
+  }
+  if (s.mip_filter && (s.pixel_area || s.mode != RenderMode::kClassic)) {
+    return bad("mip_filter has a rendering of its own: mode and pixel cannot be changed");
+  }
   if (s.from.empty() != s.after.empty()) return bad("from and after belong together");
   if (s.IsDerived() && !IsOneOf(s.after, kAfterNames)) {
     return bad(Cat("after is one of spz, sog, splat and enhanced, not \"", Printable(s.after), "\""));

@@ -141,8 +141,9 @@ void AddEval(CLI::App& app, Program& program) {
       ->capture_default_str();
   verb.add_option("--split", flags->split, "Only the objects of this split of the data set: train, validation or test");
   verb.add_option("--objects", flags->objects, "Only these, by name; separated by commas")->delimiter(',');
-  verb.add_option("--kinds", flags->kinds,
-                  "Only objects of these kinds, entries of the recipe that the data set was made by; separated by commas")
+  verb.add_option(
+          "--kinds", flags->kinds,
+          "Only objects of these kinds, entries of the recipe that the data set was made by; separated by commas")
       ->delimiter(',');
   verb.add_option("--max-views", flags->max_views, "At most so many views per object, for a quick look; 0: all")
       ->check(NotNegative())

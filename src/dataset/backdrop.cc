@@ -89,7 +89,8 @@ Texture WallPicture(uint64_t seed, int wall) {
   const Color dark = RandomColor(random, 0.15, 0.6), light = RandomColor(random, 0.5, 1);
   std::vector<std::pair<ValueNoise, float>> octaves;
   float weight = 0.5f;
-  for (int cells = 4; cells <= 256; cells *= 2, weight *= 0.75f) octaves.emplace_back(ValueNoise(cells, random), weight);
+  for (int cells = 4; cells <= 256; cells *= 2, weight *= 0.75f)
+    octaves.emplace_back(ValueNoise(cells, random), weight);
   float sum = 0;
   for (const auto& octave : octaves) sum += octave.second;
   const float tiles = static_cast<float>(8 + random.Below(9));

@@ -28,7 +28,8 @@ TEST(Backdrop, EveryRayMeetsAWallOrTheObject) {
   EXPECT_EQ(mesh.uvs.size(), mesh.positions.size());
   const auto tracer = RayTracer::Create(std::move(mesh));
   ASSERT_TRUE(tracer.ok()) << tracer.error().message;
-  for (const Camera& camera : OrbitCameras(4, 1.7, {0, 0, 0}, PinholeFromFov(32, 32, 0.8))->cameras) {
+  const CameraSet cameras = *OrbitCameras(4, 1.7, {0, 0, 0}, PinholeFromFov(32, 32, 0.8));
+  for (const Camera& camera : cameras.cameras) {
     const auto view = tracer->Render(camera);
     ASSERT_TRUE(view.ok());
     EXPECT_EQ(*std::min_element(view->channel(3), view->channel(3) + view->plane()), 1);

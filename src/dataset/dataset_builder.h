@@ -13,14 +13,14 @@ namespace anchorsplat {
 
 struct DatasetBuildOptions {
   Recipe recipe;
-  int jobs = 1;                             // objects at the same time, a process each
-  int threads = 1;                          // of each
-  double timeout_seconds = 0;               // of one object; 0: none
-  bool overwrite = false;                   // objects that are there are made again
-  bool retry = false;                       // objects that failed earlier are tried again
-  std::string licence;                      // of meshes that name none
-  std::string creator;                      // likewise
-  std::filesystem::path program;            // ours: runs `dataset object JOB -o DATASET`
+  int jobs = 1;                   // objects at the same time, a process each
+  int threads = 1;                // of each
+  double timeout_seconds = 0;     // of one object; 0: none
+  bool overwrite = false;         // objects that are there are made again
+  bool retry = false;             // objects that failed earlier are tried again
+  std::string licence;            // of meshes that name none
+  std::string creator;            // likewise
+  std::filesystem::path program;  // ours: runs `dataset object JOB -o DATASET`
 };
 
 struct DatasetBuildReport {

@@ -271,10 +271,9 @@ fs::path CheckpointPath(const fs::path& low_folder, int64_t steps) {
 }
 
 std::string ToJsonText(const ObjectJob& job) {
-  const Json json = {{"name", job.name},       {"source", job.source},
-                     {"recipe", job.recipe},   {"settings", ToJson(job.settings)},
-                     {"licence", job.licence}, {"creator", job.creator},
-                     {"base", job.base}};
+  const Json json = {
+      {"name", job.name},       {"source", job.source},   {"recipe", job.recipe}, {"settings", ToJson(job.settings)},
+      {"licence", job.licence}, {"creator", job.creator}, {"base", job.base}};
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

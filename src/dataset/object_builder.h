@@ -38,8 +38,9 @@ std::filesystem::path CheckpointPath(const std::filesystem::path& low_folder, in
 // Whatever an earlier attempt has finished there is kept if it was made by the same job: views as a whole, the
 // fit up to its last checkpoint. Deterministic but for the seconds in the record.
 //
-// Asked to stop (core/run_context.h), the fit ends in order (kInterrupted): the next attempt goes on from there. Other errors: kExists: a file, not
-// a folder, has the object's name; those of the mesh, the views and the fit; the file `stage` says which.
+// Asked to stop (core/run_context.h), the fit ends in order (kInterrupted): the next attempt goes on from there. Other
+// errors: kExists: a file, not a folder, has the object's name; those of the mesh, the views and the fit; the file
+// `stage` says which.
 Result<ObjectRecord> BuildObject(const ObjectJob& job, const std::filesystem::path& dataset,
                                  const std::filesystem::path& program = {});
 

@@ -204,7 +204,7 @@ TEST(ObjectBuilder, FitsOfOtherKindsSayWhatTheyAre) {
   ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
   job.settings.mode = RenderMode::kAntialiased;
   job.settings.sh_degree = 1;
-  job.settings.start = FitStart::kRandom;
+  job.settings.start = FitStart::kView;
   job.settings.init_points = 70;
   const auto record = BuildObject(job, folder / "set");
   ASSERT_TRUE(record.ok()) << record.error().message;

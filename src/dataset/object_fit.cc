@@ -14,8 +14,9 @@ Result<FitOptions> ToFitOptions(const ObjectSettings& settings, double upscale,
   options.objective.render.sh_degree = settings.sh_degree;
   options.objective.render.mode = settings.mode;
   options.pixel.upscale = settings.pixel_area ? upscale : 1;
-  if (settings.strategy != "default") {
-    return Error{ErrorCode::kBadArgument, Cat("fits know no strategy \"", settings.strategy, "\" yet")};
+  if (settings.strategy != FitStrategy::kDefault) {
+    const char* name = kStrategyNames[static_cast<size_t>(settings.strategy)];
+    return Error{ErrorCode::kBadArgument, Cat("fits know no strategy \"", name, "\" yet")};
   }
   if (settings.mip_filter) return Error{ErrorCode::kBadArgument, "fits know no mip_filter yet"};
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options));

@@ -21,6 +21,10 @@ enum class FitStart {
 };
 inline constexpr const char* kFitStartNames[] = {"surface", "random", "view"};  // by FitStart
 
+// What decides which Gaussians come and go in a fit (`fit --strategy`).
+enum class FitStrategy { kDefault, kMcmc, kAbsgrad };
+inline constexpr const char* kStrategyNames[] = {"default", "mcmc", "absgrad"};  // by FitStrategy
+
 // Everything an object of the data set is made with: equal settings and an equal mesh make equal files.
 struct ObjectSettings {
   ViewSetOptions views;
@@ -36,14 +40,14 @@ struct ObjectSettings {
   int64_t init_points = 0;  // of kRandom and kView; 0: kRandomPoints
   int sh_degree = kMaxShDegree;
   RenderMode mode = RenderMode::kClassic;
-  bool pixel_area = false;           // the fit's pixels are means over their area (fit/pixel_model.h)
-  std::string strategy = "default";  // of densification: one of kStrategyNames
-  bool mip_filter = false;           // Mip-Splatting's 3-D smoothing filter in training, fused on export
-  PictureDefects defects;            // of the pictures and poses that the fit sees
-  bool backdrop = false;             // the object stands in a textured room (backdrop.h); meshes only
+  bool pixel_area = false;  // the fit's pixels are means over their area (fit/pixel_model.h)
+  FitStrategy strategy = FitStrategy::kDefault;
+  bool mip_filter = false;  // Mip-Splatting's 3-D smoothing filter in training, fused on export
+  PictureDefects defects;   // of the pictures and poses that the fit sees
+  bool backdrop = false;    // the object stands in a textured room (backdrop.h); meshes only
 
-  // An object without a fit of its own: the splat of the same mesh's entry `from` of the recipe, passed through `after`,
-  // one of kAfterNames. Both empty or neither; all else are the settings of `from`.
+  // An object without a fit of its own: the splat of the same mesh's entry `from` of the recipe, passed through
+  // `after`, one of kAfterNames. Both empty or neither; all else are the settings of `from`.
   std::string from;
   std::string after;
 
@@ -52,7 +56,6 @@ struct ObjectSettings {
 
 inline constexpr const char* kFitModeNames[] = {"classic", "antialiased"};  // by RenderMode
 inline constexpr const char* kFitPixelNames[] = {"point", "area"};
-inline constexpr const char* kStrategyNames[] = {"default", "mcmc", "absgrad"};
 // The writer and reader of a format, which quantise, or `anchorsplat enhance`.
 inline constexpr const char* kAfterNames[] = {"spz", "sog", "splat", "enhanced"};
 

@@ -33,7 +33,7 @@ ObjectSettings Unusual() {
   s.sh_degree = 1;
   s.mode = RenderMode::kAntialiased;
   s.pixel_area = true;
-  s.strategy = "absgrad";
+  s.strategy = FitStrategy::kAbsgrad;
   s.defects = {.noise = 3.5, .jpeg = 70, .exposure = 0.1, .pose = 0.3, .mask = 1, .defocus = 0.75};
   s.backdrop = true;
   s.from = "standard";
@@ -61,8 +61,8 @@ TEST(ObjectSettings, ComeBackAsTheyWere) {
 TEST(ObjectSettings, EveryMemberIsNeededAndChecked) {
   const nlohmann::json good = ToJson(Unusual());
   // Which the first data sets do not have.
-  const std::set<std::string> newer = {"downscale", "init",       "init_points", "sh_degree", "mode", "pixel",
-                                       "strategy",  "mip_filter", "defects",     "backdrop"};
+  const std::set<std::string> newer = {"downscale", "init",     "init_points", "sh_degree", "mode",
+                                       "pixel",     "strategy", "mip_filter",  "defects",   "backdrop"};
   for (const auto& [key, value] : good.items()) {
     nlohmann::json missing = good;
     missing.erase(key);

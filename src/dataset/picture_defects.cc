@@ -161,9 +161,15 @@ Camera WithWrongAim(const Camera& camera, const PictureDefects& defects, uint64_
   const double angle = std::atan(defects.pose / camera.intrinsics.fx);
   // Rodrigues' formula for an axis in the plane of the picture.
   const double x = std::cos(phi), y = std::sin(phi), c = std::cos(angle), s = std::sin(angle);
-  const std::array<double, 9> turn = {c + x * x * (1 - c), x * y * (1 - c),     y * s,   //
-                                      x * y * (1 - c),     c + y * y * (1 - c), -x * s,  //
-                                      -y * s,              x * s,               c};
+  const std::array<double, 9> turn = {c + x * x * (1 - c),
+                                      x * y * (1 - c),
+                                      y * s,  //
+                                      x * y * (1 - c),
+                                      c + y * y * (1 - c),
+                                      -x * s,  //
+                                      -y * s,
+                                      x * s,
+                                      c};
   Camera out = camera;
   const Pose& from = camera.world_to_camera;
   for (size_t i = 0; i < 3; ++i) {

@@ -64,13 +64,15 @@ TEST(PictureDefects, NoiseAndExposureAreAsLargeAsTheySay) {
     const bool object = truth.channel(2)[i] != 1;
     for (int c = 0; c < 3; ++c) {
       const double off = static_cast<double>(noisy.channel(c)[i]) - static_cast<double>(truth.channel(c)[i]);
-      if (object) variance += off * off;
-      if (!object) EXPECT_EQ(off, 0);  // outside of the mask
+      if (object) {
+        variance += off * off;
+      } else {
+        EXPECT_EQ(off, 0);  // outside of the mask
+      }
     }
     inside += object ? 3 : 0;
     const float factor = exposed.channel(0)[i] / truth.channel(0)[i];
-    if (!object) EXPECT_EQ(factor, 1);
-    if (object) EXPECT_NEAR(factor, exposed.at(0, 20, 20) / truth.at(0, 20, 20), 1e-5);
+    EXPECT_NEAR(factor, object ? exposed.at(0, 20, 20) / truth.at(0, 20, 20) : 1.0f, 1e-5);
     EXPECT_LE(std::abs(factor - 1), 0.2001);
   }
   EXPECT_NEAR(255 * std::sqrt(variance / static_cast<double>(inside)), 10, 0.7);
@@ -98,9 +100,9 @@ TEST(PictureDefects, AimIsOffByThatManyPixelsAndThePlaceStays) {
 
 TEST(PictureDefects, WhatIsAbsurdIsRefused) {
   EXPECT_TRUE(Validate(PictureDefects{}).ok());
-  for (const PictureDefects& defects : {PictureDefects{.noise = -1}, PictureDefects{.jpeg = 101},
-                                        PictureDefects{.exposure = 2}, PictureDefects{.pose = std::nan("")},
-                                        PictureDefects{.mask = 1000}, PictureDefects{.defocus = -0.5}}) {
+  for (const PictureDefects& defects :
+       {PictureDefects{.noise = -1}, PictureDefects{.jpeg = 101}, PictureDefects{.exposure = 2},
+        PictureDefects{.pose = std::nan("")}, PictureDefects{.mask = 1000}, PictureDefects{.defocus = -0.5}}) {
     EXPECT_EQ(Validate(defects).error().code, ErrorCode::kBadArgument);
   }
 }

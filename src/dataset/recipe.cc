@@ -115,7 +115,7 @@ Status TakePixel(const Item& item, ObjectSettings& s) {
 
 Status TakeStrategy(const Item& item, ObjectSettings& s) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t name, ChooseName(item, kStrategyNames));
-  s.strategy = kStrategyNames[name];
+  s.strategy = static_cast<FitStrategy>(name);
   return {};
 }
 
@@ -317,8 +317,9 @@ Result<Recipe> RecipeFrom(const std::string& file, const toml::table& root, Obje
   }
   if (!recipe.draws_all && std::any_of(recipe.entries.begin(), recipe.entries.end(),
                                        [](const RecipeEntry& entry) { return entry.settings.IsDerived(); })) {
-    return Error{ErrorCode::kBadFile, Cat(file, ": entries with from need draws = \"all\", so that every object has "
-                                                "what they are made from")};
+    return Error{ErrorCode::kBadFile, Cat(file,
+                                          ": entries with from need draws = \"all\", so that every object has "
+                                          "what they are made from")};
   }
   return recipe;
 }

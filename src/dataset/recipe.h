@@ -58,9 +58,9 @@ Recipe SingleRecipe(const ObjectSettings& settings);
 // Errors: kNotFound, kIo; kBadFile with line: syntax, unknown keys, wrong types, settings that cannot be built.
 Result<Recipe> ReadRecipe(const std::filesystem::path& path, const ObjectSettings& defaults);
 
-// The entries (indices) that object `name`, the `place`-th of the list, from 0, draws: recipe.draws of those it may have,
-// without repetition, each with the probability its weight says; or all of them, in the recipe's order. Fewer, or none,
-// where it may not have as many.
+// The entries (indices) that object `name`, the `place`-th of the list, from 0, draws: recipe.draws of those it may
+// have, without repetition, each with the probability its weight says; or all of them, in the recipe's order. Fewer, or
+// none, where it may not have as many.
 std::vector<size_t> DrawEntries(const Recipe& recipe, const std::string& name, int64_t place = 0);
 
 }  // namespace anchorsplat

@@ -41,8 +41,8 @@ struct BenchmarkObject {
   // What the low-quality splat was fitted to, with its defects where it has some (Scene::fitted_project):
   // fit/training_views.h opens it …
   std::filesystem::path low_project;
-  int hold_out = 0;                   // … with this, and holds out the same views
-  std::filesystem::path mesh;         // what high views without a picture are rendered from; may be empty
+  int hold_out = 0;            // … with this, and holds out the same views
+  std::filesystem::path mesh;  // what high views without a picture are rendered from; may be empty
   // The high-resolution picture of a view, rgb or rgba, of its camera's size.
   std::function<Result<Image>(size_t view)> picture;
 

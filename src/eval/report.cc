@@ -94,7 +94,8 @@ std::string WithoutKind(const std::string& object, const std::string& kind) {
 void AddKindTable(const Evaluation& evaluation, const std::vector<KindSummary>& kinds, std::string& text) {
   std::vector<std::string> heading = {"kind", "method", "objects", "PSNR dB", "SSIM"};
   if (evaluation.lpips) heading.push_back(Cat("LPIPS (", LpipsNetName(*evaluation.lpips), ")"));
-  for (const char* name : {"gain over raw, dB", "gain over filter, dB", "Gaussians", "time per object", "worst object"}) {
+  for (const char* name :
+       {"gain over raw, dB", "gain over filter, dB", "Gaussians", "time per object", "worst object"}) {
     heading.emplace_back(name);
   }
   text += Row(heading) + Rule(heading.size());
@@ -196,8 +197,9 @@ std::string WorstSentence(const Evaluation& evaluation) {
   const auto worst = WorstOverRaw(evaluation);
   if (!worst) return {};
   const std::string who = Cat(worst->method, " on ", worst->object);
-  return worst->gain < 0 ? Cat("Worst loss over raw: ", Fixed(-worst->gain, 2), " dB, ", who, ".")
-                         : Cat("Nothing is worse than raw: the least gain is ", Fixed(worst->gain, 2), " dB, ", who, ".");
+  return worst->gain < 0
+             ? Cat("Worst loss over raw: ", Fixed(-worst->gain, 2), " dB, ", who, ".")
+             : Cat("Nothing is worse than raw: the least gain is ", Fixed(worst->gain, 2), " dB, ", who, ".");
 }
 
 std::string ToMarkdown(const Evaluation& evaluation, const std::vector<MethodSummary>& summaries,
@@ -238,7 +240,8 @@ std::string ToCsv(const Evaluation& evaluation) {
     const auto lpips = result.MeanLpips();
     text += Cat(CsvCell(result.object), ",", CsvCell(result.method), ",", result.views.size(), ",",
                 Fixed(result.MeanPsnr(), 4), ",", Fixed(result.MeanSsim(), 6), ",", lpips ? Fixed(*lpips, 6) : "", ",",
-                Fixed(result.seconds, 3), ",", Fixed(result.render_seconds, 3), ",", result.gaussians, ",", CsvCell(KindOf(evaluation, result.object)));
+                Fixed(result.seconds, 3), ",", Fixed(result.render_seconds, 3), ",", result.gaussians, ",",
+                CsvCell(KindOf(evaluation, result.object)));
     for (const std::string& fact : facts) {
       const auto found = result.facts.find(fact);
       text += found == result.facts.end() ? std::string(",") : Cat(",", found->second);
@@ -285,7 +288,8 @@ Status WriteReports(const std::filesystem::path& out, const Evaluation& evaluati
                     const std::vector<MethodSummary>& summaries, const std::string& title, uint64_t seed) {
   ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(out / "table.md", ToMarkdown(evaluation, summaries, title, seed), true));
   ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(out / "table.csv", ToCsv(evaluation), true));
-  const std::string json = ToJson(evaluation, summaries, seed).dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
+  const std::string json =
+      ToJson(evaluation, summaries, seed).dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
   ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(out / "results.json", json + "\n", true));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Image sheet, ContactSheet(out, evaluation));
   if (sheet.plane() == 0) return {};

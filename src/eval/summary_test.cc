@@ -127,8 +127,8 @@ TEST(Report, TablesSayEverything) {
   EXPECT_THAT(markdown, HasSubstr("* c, model: the   network failed"));
   EXPECT_THAT(markdown, Not(HasSubstr("LPIPS")));
   const std::string csv = ToCsv(e);
-  EXPECT_THAT(csv,
-              HasSubstr("object,method,views,psnr,ssim,lpips,seconds,render_seconds,gaussians,kind,pixel_size_ratio\n"));
+  EXPECT_THAT(
+      csv, HasSubstr("object,method,views,psnr,ssim,lpips,seconds,render_seconds,gaussians,kind,pixel_size_ratio\n"));
   EXPECT_THAT(csv, HasSubstr("\nb,raw,2,27.0000,0.900000,,2.000,0.000,0,,\n"));
   e.results[0].views[0].psnr = std::numeric_limits<double>::infinity();
   e.results[0].object = "a, \"b\"";

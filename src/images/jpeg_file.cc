@@ -152,7 +152,7 @@ struct JpegWriter {
   std::jmp_buf jump;
   char message[JMSG_LENGTH_MAX] = "";
   unsigned char* bytes = nullptr;
-  unsigned long size = 0;  // NOLINT(google-runtime-int): libjpeg's type
+  unsigned long size = 0;       // NOLINT(google-runtime-int): libjpeg's type
   std::vector<JSAMPLE> pixels;  // [H,W,3]
 
   JpegWriter() { info.err = jpeg_std_error(&errors); }

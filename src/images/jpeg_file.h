@@ -19,8 +19,8 @@ Result<ImageSize> DecodeJpegSize(std::FILE* file, const std::string& name, uint6
 Result<Image> DecodeJpegBytes(std::string_view bytes, const std::string& name);
 
 // A baseline JPEG as cameras write it, colours at half the resolution: values·255 rounded to nearest, clamped; 3
-// channels. Errors: kBadArgument: other channels, no pixels, sides above 65,500, a quality that is not 1 to 100; kIo: no
-// memory.
+// channels. Errors: kBadArgument: other channels, no pixels, sides above 65,500, a quality that is not 1 to 100; kIo:
+// no memory.
 Result<std::string> EncodeJpeg(const Image& image, int quality);
 
 }  // namespace anchorsplat

@@ -163,7 +163,8 @@ TEST(JpegFile, WhatIsEncodedComesBackNearly) {
   EXPECT_EQ(EncodeJpeg(image, 0).error().code, ErrorCode::kBadArgument);
   EXPECT_EQ(EncodeJpeg(Image(4, 4, 1), 90).error().code, ErrorCode::kBadArgument);
   const std::string bytes = *EncodeJpeg(image, 80);
-  EXPECT_EQ(DecodeJpegBytes(std::string_view(bytes).substr(0, bytes.size() / 2), "half").error().code, ErrorCode::kBadFile);
+  EXPECT_EQ(DecodeJpegBytes(std::string_view(bytes).substr(0, bytes.size() / 2), "half").error().code,
+            ErrorCode::kBadFile);
 }
 
 }  // namespace

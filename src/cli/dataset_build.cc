@@ -153,7 +153,7 @@ Status RunObject(const ObjectFlags& flags) {
   DieWithParent();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ObjectJob job, ReadObjectJob(flags.job));
   const StopSignal stop_signal;
-  const auto record = BuildObject(job, flags.output);
+  const auto record = BuildObject(job, flags.output, OwnProgram());
   return record.ok() ? Status() : Status(record.error());
 }
 

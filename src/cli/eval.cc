@@ -29,6 +29,7 @@ struct EvalFlags {
   MethodOptions method_options;
   std::string split;
   std::vector<std::string> objects;
+  std::vector<std::string> kinds;
   size_t max_views = 0;
   std::string lpips;
   std::string lpips_weights;
@@ -71,6 +72,7 @@ Status RunEval(const EvalFlags& flags, Program& program) {
   options.protocol = flags.protocol;
   options.split = flags.split;
   options.objects = flags.objects;
+  options.kinds = flags.kinds;
   options.max_views = flags.max_views;
   options.lpips = lpips ? &*lpips : nullptr;
   options.seed = shared.seed;
@@ -84,8 +86,8 @@ Status RunEval(const EvalFlags& flags, Program& program) {
   const fs::path folder(flags.benchmark);
   const std::string title =
       Cat("Evaluation of ", (folder.has_filename() ? folder : folder.parent_path()).filename().string());
-  ANCHORSPLAT_RETURN_IF_ERROR(WriteReports(flags.out, evaluation, summaries, title));
-  nlohmann::json json = ToJson(evaluation, summaries);
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteReports(flags.out, evaluation, summaries, title, shared.seed));
+  nlohmann::json json = ToJson(evaluation, summaries, shared.seed);
   std::string chosen;
   if (flags.choose_f) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double f, ChooseStrength(summaries));
@@ -95,7 +97,7 @@ Status RunEval(const EvalFlags& flags, Program& program) {
   if (shared.json) {
     PrintJson(json);
   } else {
-    std::cout << ToMarkdown(evaluation, summaries, title) << chosen;
+    std::cout << ToMarkdown(evaluation, summaries, title, shared.seed) << chosen;
     if (!shared.quiet) {
       std::cout << "\nWritten: " << OneLine(fs::path(flags.out) / "table.md")
                 << ", table.csv, results.json, contact_sheet.png\n";
@@ -139,6 +141,10 @@ void AddEval(CLI::App& app, Program& program) {
       ->capture_default_str();
   verb.add_option("--split", flags->split, "Only the objects of this split of the data set: train, validation or test");
   verb.add_option("--objects", flags->objects, "Only these, by name; separated by commas")->delimiter(',');
+  verb.add_option(
+          "--kinds", flags->kinds,
+          "Only objects of these kinds, entries of the recipe that the data set was made by; separated by commas")
+      ->delimiter(',');
   verb.add_option("--max-views", flags->max_views, "At most so many views per object, for a quick look; 0: all")
       ->check(NotNegative())
       ->capture_default_str();

@@ -13,6 +13,7 @@
 #include "core/text.h"
 #include "dataset/job_list.h"
 #include "dataset/object_builder.h"
+#include "dataset/process_log.h"
 #include "dataset/process_pool.h"
 #include "dataset/unfinished_objects.h"
 #include "io/atomic_file.h"
@@ -26,16 +27,6 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-// The last line of the process's log that says something: its error message.
-std::string LastWords(const fs::path& log) {
-  const auto text = ReadFileBytes(log, uint64_t{64} << 20);
-  if (!text.ok()) return {};
-  std::string_view rest = *text;
-  while (!rest.empty() && (rest.back() == '\n' || rest.back() == '\r')) rest.remove_suffix(1);
-  const size_t line = rest.rfind('\n');
-  return Printable(std::string(line == std::string_view::npos ? rest : rest.substr(line + 1)), 1000);
-}
-
 ObjectFailure DescribeFailure(const ObjectJob& job, const fs::path& folder, const ProcessEnd& end,
                               double timeout_seconds) {
   ObjectFailure failure{job.name, job.source, "mesh", {}};
@@ -47,12 +38,11 @@ ObjectFailure DescribeFailure(const ObjectJob& job, const fs::path& folder, cons
     failure.message = Cat("ended by signal ", end.signal, " (", strsignal(end.signal), "): see ", log.string());
   } else {
     failure.message = LastWords(log);
-    for (const std::string_view prefix : {"anchorsplat: ", "error: "}) {
-      if (failure.message.starts_with(prefix)) failure.message.erase(0, prefix.size());
-    }
   }
   return failure;
 }
+
+constexpr const char* kBaseStage = "base";  // of objects that are made from another one (object_builder.cc)
 
 bool SameSettings(const ObjectRecord& record, const ObjectJob& job) {
   ObjectJob there = job;
@@ -92,21 +82,13 @@ class DatasetBuild {
     return WriteLists();
   }
 
-  // Makes the wanted ones, a process each.
+  // Makes the wanted ones, a process each; those that are made from others when these are there.
   Status Run() {
     progress_.emplace("objects", std::ssize(wanted_));
-    Status lists;
-    ANCHORSPLAT_RETURN_IF_ERROR(RunProcesses(
-        std::ssize(wanted_), [&](int64_t i) { return Task(*wanted_[static_cast<size_t>(i)]); },
-        [&](int64_t i, const ProcessEnd& end) {
-          const std::string note = TakeResult(*wanted_[static_cast<size_t>(i)], end);
-          lists = WriteLists();
-          progress_->Advance(1, note);
-          return lists.ok();
-        },
-        {.jobs = options_.jobs, .timeout_seconds = options_.timeout_seconds}));
+    Status status = RunAll(Wanted(false));
+    if (status.ok() && !StopRequested()) status = RunAll(WithBase(Wanted(true)));
     progress_.reset();
-    return lists;
+    return status;
   }
 
   DatasetBuildReport Report() {
@@ -120,14 +102,59 @@ class DatasetBuild {
   }
 
  private:
+  std::vector<const ObjectJob*> Wanted(bool derived) const {
+    std::vector<const ObjectJob*> jobs;
+    for (const ObjectJob* job : wanted_) {
+      if (job->settings.IsDerived() == derived) jobs.push_back(job);
+    }
+    return jobs;
+  }
+
+  // Those of the jobs whose base is there; the others have failed.
+  std::vector<const ObjectJob*> WithBase(std::vector<const ObjectJob*> jobs) {
+    std::erase_if(jobs, [&](const ObjectJob* job) {
+      const bool remade = !options_.overwrite || unfinished_.count(job->base) == 0;
+      if (manifest_.count(job->base) > 0 && failures_.count(job->base) == 0 && remade) return false;
+      Fail({job->name, job->source, kBaseStage,
+            Cat("is made from ", job->base, ", which is not there",
+                failures_.count(job->base) > 0 ? " because it failed; --retry tries both again" : "")});
+      unfinished_.erase(job->name);
+      progress_->Advance(1, job->name);
+      return true;
+    });
+    return jobs;
+  }
+
+  Status RunAll(const std::vector<const ObjectJob*>& jobs) {
+    Status lists;
+    ANCHORSPLAT_RETURN_IF_ERROR(RunProcesses(
+        std::ssize(jobs), [&](int64_t i) { return Task(*jobs[static_cast<size_t>(i)]); },
+        [&](int64_t i, const ProcessEnd& end) {
+          const std::string note = TakeResult(*jobs[static_cast<size_t>(i)], end);
+          lists = WriteLists();
+          progress_->Advance(1, note);
+          return lists.ok();
+        },
+        {.jobs = options_.jobs, .timeout_seconds = options_.timeout_seconds}));
+    if (lists.ok() && jobs.empty()) lists = WriteLists();
+    return lists;
+  }
+
   // What failed before has failed still, unless it is tried again.
   void CarryFailures(const std::vector<std::string>& meshes, const std::vector<ObjectFailure>& earlier) {
     for (const ObjectFailure& failure : earlier) {
       // Libraries are looked into on every build.
       const bool asked_for = std::find(meshes.begin(), meshes.end(), failure.source) != meshes.end();
       if (failure.stage == kReadStage && asked_for) continue;
+      if (failure.stage == kBaseStage && manifest_.count(BaseOf(failure.name)) > 0) continue;  // by now it is there
       if (!options_.retry && manifest_.count(failure.name) == 0) failures_.emplace(failure.name, failure);
     }
+  }
+
+  // Of a job of this build; empty: none.
+  std::string BaseOf(const std::string& name) const {
+    const auto job = std::find_if(jobs_.begin(), jobs_.end(), [&](const ObjectJob& j) { return j.name == name; });
+    return job == jobs_.end() ? std::string() : job->base;
   }
 
   void Fail(ObjectFailure failure) {

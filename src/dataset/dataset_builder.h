@@ -13,14 +13,14 @@ namespace anchorsplat {
 
 struct DatasetBuildOptions {
   Recipe recipe;
-  int jobs = 1;                             // objects at the same time, a process each
-  int threads = 1;                          // of each
-  double timeout_seconds = 0;               // of one object; 0: none
-  bool overwrite = false;                   // objects that are there are made again
-  bool retry = false;                       // objects that failed earlier are tried again
-  std::string licence;                      // of meshes that name none
-  std::string creator;                      // likewise
-  std::filesystem::path program;            // ours: runs `dataset object JOB -o DATASET`
+  int jobs = 1;                   // objects at the same time, a process each
+  int threads = 1;                // of each
+  double timeout_seconds = 0;     // of one object; 0: none
+  bool overwrite = false;         // objects that are there are made again
+  bool retry = false;             // objects that failed earlier are tried again
+  std::string licence;            // of meshes that name none
+  std::string creator;            // likewise
+  std::filesystem::path program;  // ours: runs `dataset object JOB -o DATASET`
 };
 
 struct DatasetBuildReport {
@@ -37,7 +37,8 @@ struct DatasetBuildReport {
 // Makes DATASET/NAME for every mesh (address of a file, of an object of a furniture library, or of a whole library; or
 // a folder of pictures with cameras) and every entry its recipe draws, and DATASET/manifest.jsonl and failures.jsonl,
 // which are right after every object. Each object is made by a process of its own (object_builder.h): one that fails,
-// crashes or hangs does not stop the others, nor does a library that cannot be read. Called again after whatever kind
+// crashes or hangs does not stop the others, nor does a library that cannot be read; one that is made from another
+// object (ObjectSettings::from) waits for all others, and fails where that failed. Called again after whatever kind
 // of end, it goes on where it was. job_list.h says how objects get their names.
 //
 // Errors: kBadArgument: no meshes; kExists: another build works on the folder; kIo.

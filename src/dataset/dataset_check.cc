@@ -10,8 +10,10 @@
 #include "core/text.h"
 #include "dataset/dataset_split.h"
 #include "dataset/object_builder.h"
+#include "dataset/picture_defects.h"
 #include "dataset/scene_reader.h"
 #include "dataset/unfinished_objects.h"
+#include "fit/training_views.h"
 #include "formats/cloud_io.h"
 #include "images/image_io.h"
 #include "scene/mesh_file.h"
@@ -81,6 +83,18 @@ class ObjectCheck {
                    scene.low_views().size() == 1 ? " view, not " : " views, not ", record_.views));
     }
     for (const Camera& camera : scene.low_views()) CheckPicture(camera, scene.low_folder() / "images");
+    if (record_.settings.defects.Any()) {
+      const fs::path captured = folder_ / kCapturedName;
+      const auto project = OpenProject(captured, {.hold_out = 0});
+      if (!project.ok()) {
+        Complain(project.error().message);
+      } else {
+        for (const std::string& name : project->without_picture) {
+          Complain(Cat((captured / "images").string(), ": picture ", name, " is missing"));
+        }
+        for (const Camera& camera : project->train) CheckPicture(camera, captured / "images");
+      }
+    }
     if (views.store_high) {
       for (const Camera& camera : scene.high_views()) {
         CheckPicture(camera, folder_ / std::to_string(record_.high_size) / "images");

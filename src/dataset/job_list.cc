@@ -19,7 +19,7 @@ std::map<std::string, std::string> KnownNames(const Recipe& recipe, const Manife
   const auto learn = [&](std::string name, const std::string& source) {
     for (const RecipeEntry& entry : recipe.entries) {
       const std::string ending = "--" + entry.name;
-      if (recipe.draws > 1 && name.ends_with(ending)) {
+      if (recipe.NamesEntries() && name.ends_with(ending)) {
         name.resize(name.size() - ending.size());
         break;
       }
@@ -51,12 +51,15 @@ JobList ListJobs(const std::vector<std::string>& meshes, const Recipe& recipe, c
                  const std::vector<ObjectFailure>& failed) {
   JobList list;
   std::set<std::string> addresses;
+  std::map<std::string, int64_t> places;          // in the list, by address
   std::map<std::string, std::string> unreadable;  // why, by library
   for (std::string mesh : meshes) {
     while (mesh.size() > 1 && mesh.back() == '/') mesh.pop_back();  // a folder of pictures
     const auto expanded = ExpandMeshAddress(mesh);
     if (expanded.ok()) {
-      addresses.insert(expanded->begin(), expanded->end());
+      for (const std::string& address : *expanded) {
+        if (addresses.insert(address).second) places.emplace(address, std::ssize(places));
+      }
     } else {
       unreadable.emplace(mesh, expanded.error().message);
     }
@@ -87,13 +90,17 @@ JobList ListJobs(const std::vector<std::string>& meshes, const Recipe& recipe, c
 
   std::map<std::string, ObjectJob> jobs;
   for (const auto& [address, name] : names) {
-    for (const size_t drawn : DrawEntries(recipe, name)) {
+    const auto folder = [&](const std::string& entry) {
+      return recipe.NamesEntries() ? SafeName(Cat(name, "--", entry)) : name;
+    };
+    for (const size_t drawn : DrawEntries(recipe, name, places.at(address))) {
       const RecipeEntry& entry = recipe.entries[drawn];
       ObjectJob job;
-      job.name = recipe.draws > 1 ? SafeName(Cat(name, "--", entry.name)) : name;
+      job.name = folder(entry.name);
       job.source = address;
       job.recipe = entry.name;
       job.settings = entry.settings;
+      if (entry.settings.IsDerived()) job.base = folder(entry.settings.from);
       taken.insert(job.name);
       jobs.emplace(job.name, std::move(job));
     }

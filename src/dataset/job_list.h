@@ -24,7 +24,8 @@ inline constexpr const char* kReadStage = "read";
 //
 // Names are ObjectName's. Meshes of one name get their folder's in front ("chair/model.obj" and "table/model.obj":
 // chair-model and table-model); those that still share one are numbered in the order of their addresses ("-2", "-3").
-// The order in which meshes are given has no part in it. Meshes that `there` or `failed` know keep their names, so that
+// The order in which meshes are given has no part in names; it says which are the first for RecipeEntry::objects, the
+// objects of a library in the library's order. Meshes that `there` or `failed` know keep their names, so that
 // a list that has grown goes on with the same objects.
 JobList ListJobs(const std::vector<std::string>& meshes, const Recipe& recipe, const Manifest& there,
                  const std::vector<ObjectFailure>& failed);

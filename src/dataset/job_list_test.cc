@@ -74,5 +74,23 @@ TEST(JobList, ALibraryThatCannotBeReadIsAFailureAndTheOthersGoOn) {
 
 TEST(JobList, NothingGivesNothing) { EXPECT_TRUE(ListJobs({}, SingleRecipe({}), {}, {}).jobs.empty()); }
 
+TEST(JobList, TheFirstOfTheListHaveEntriesOfTheirOwn) {
+  Recipe recipe = SingleRecipe({});
+  recipe.draws_all = true;
+  recipe.entries[0].name = "a";
+  recipe.entries.push_back(recipe.entries[0]);
+  recipe.entries[1] = {"a-spz", 1, 1, recipe.entries[0].settings};
+  recipe.entries[1].settings.from = "a";
+  recipe.entries[1].settings.after = "spz";
+  const JobList list = ListJobs({"z.obj", "b.obj"}, recipe, {}, {});
+  std::vector<std::string> names, bases;
+  for (const ObjectJob& job : list.jobs) {
+    names.push_back(job.name);
+    bases.push_back(job.base);
+  }
+  EXPECT_EQ(names, (std::vector<std::string>{"b--a", "z--a", "z--a-spz"}));  // z is the first of the list
+  EXPECT_EQ(bases, (std::vector<std::string>{"", "", "z--a"}));
+}
+
 }  // namespace
 }  // namespace anchorsplat

@@ -8,11 +8,14 @@
 #include "core/log.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
+#include "dataset/backdrop.h"
+#include "dataset/derived_object.h"
+#include "dataset/object_fit.h"
 #include "dataset/object_name.h"
+#include "dataset/picture_defects.h"
 #include "dataset/picture_project.h"
 #include "dataset/scene_reader.h"
 #include "fit/fit.h"
-#include "fit/initial_cloud.h"
 #include "formats/cloud_io.h"
 #include "formats/gsplat_checkpoint/gsplat_checkpoint_writer.h"
 #include "io/atomic_file.h"
@@ -76,6 +79,10 @@ Result<RayTracer> PrepareMesh(const ObjectJob& job, ObjectRecord& record) {
   auto mesh = NormalizedToUnitCube(std::move(imported.mesh));
   if (!mesh.ok()) return Error{ErrorCode::kBadFile, Cat(job.source, ": ", mesh.error().message)};
   record.fingerprint = MeshFingerprint(*mesh);
+  if (job.settings.backdrop) {
+    const double half_side = kBackdropShare * job.settings.views.rig.radius;
+    ANCHORSPLAT_RETURN_IF_ERROR(AddBackdrop(*mesh, half_side, job.settings.seed));
+  }
   return RayTracer::Create(*std::move(mesh));
 }
 
@@ -105,6 +112,9 @@ Status MakeViews(const ObjectJob& job, const fs::path& folder, ObjectRecord& rec
 // The views of an object that comes as pictures.
 Status CopyViews(const ObjectJob& job, const fs::path& folder, ObjectRecord& record) {
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "views"));
+  if (job.settings.backdrop) {
+    return Error{ErrorCode::kBadArgument, Cat(job.source, ": a backdrop is for meshes; these are pictures")};
+  }
   PictureProjectOptions options;
   options.downscale = job.settings.downscale;
   options.background = job.settings.views.background;
@@ -120,21 +130,37 @@ Status CopyViews(const ObjectJob& job, const fs::path& folder, ObjectRecord& rec
   return {};
 }
 
+double Upscale(const ObjectRecord& record) { return static_cast<double>(record.high_size) / record.low_size; }
+
+// The low-quality splat where readers of the layout look for it, and as PLY.
+Status WriteSplats(const GaussianCloud& cloud, const fs::path& folder, const ObjectRecord& record) {
+  ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "files"));
+  const int64_t steps = record.settings.fit_steps;
+  const fs::path checkpoint = CheckpointPath(folder / std::to_string(record.low_size), steps);
+  ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(checkpoint.parent_path()));
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteGsplatCheckpoint(checkpoint, cloud, steps - 1, {.overwrite = true}));
+  return WriteCloud(folder / kSplatName, cloud, {.overwrite = true});
+}
+
+// What the fit gets to see instead of the low views.
+Status Capture(const ObjectJob& job, const fs::path& folder, const ObjectRecord& record) {
+  const ObjectSettings& s = job.settings;
+  return WriteCapturedProject(folder / std::to_string(record.low_size), folder / kCapturedName, s.defects,
+                              record.background, s.hold_out, s.seed);
+}
+
 Status FitSplat(const ObjectJob& job, const fs::path& folder, ObjectRecord& record) {
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "fit"));
   const fs::path low = folder / std::to_string(record.low_size);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(low, {.hold_out = job.settings.hold_out}));
-  FitOptions options = FitOptionsFor(job.settings.fit_steps);
-  options.seed = job.settings.seed;
-  options.densification.max_gaussians = job.settings.max_gaussians;
-  options.objective.render.background = record.background;
-  record.initial_points = views.points.size();
+  const fs::path project = job.settings.defects.Any() ? folder / kCapturedName : low;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(project, {.hold_out = job.settings.hold_out}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const FitOptions options,
+                               ToFitOptions(job.settings, Upscale(record), record.background));
   if (views.points.size() == 0) {
     return Error{ErrorCode::kBadFile, Cat(job.source, ": no camera sees any of its surface")};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial, InitialCloud(views.points, views.scene_scale,
-                                                                   {.sh_degree = options.objective.render.sh_degree,
-                                                                    .seed = job.settings.seed}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial, InitialCloudOf(job.settings, options, views));
+  record.initial_points = initial.size();
   FitControl control;
   control.checkpoint = folder / kFitCheckpoint;
   control.checkpoint_every = kCheckpointEvery;
@@ -143,12 +169,7 @@ Status FitSplat(const ObjectJob& job, const fs::path& folder, ObjectRecord& reco
   control.anew_if_unfit = true;
   control.deliver = [&](const Fitted& fitted) -> Status {
     if (fitted.report.interrupted) return {};
-    ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "files"));
-    const fs::path checkpoint = CheckpointPath(low, job.settings.fit_steps);
-    ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(checkpoint.parent_path()));
-    ANCHORSPLAT_RETURN_IF_ERROR(
-        WriteGsplatCheckpoint(checkpoint, fitted.cloud, job.settings.fit_steps - 1, {.overwrite = true}));
-    return WriteCloud(folder / kSplatName, fitted.cloud, {.overwrite = true});
+    return WriteSplats(fitted.cloud, folder, record);
   };
   const auto fitted = Fit(views, std::move(initial), options, control);
   if (!fitted.ok()) return fitted.error();
@@ -164,6 +185,25 @@ Status FitSplat(const ObjectJob& job, const fs::path& folder, ObjectRecord& reco
   record.held_out_ssim = report.held_out.ssim;
   record.fit_seconds = report.seconds;
   return {};
+}
+
+// A derived object: all of its base's but the splat.
+Status DeriveSplat(const ObjectJob& job, const fs::path& dataset, const fs::path& folder, const fs::path& program,
+                   ObjectRecord& record) {
+  ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "base"));
+  const auto begin = Clock::now();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ObjectRecord base, TakeViewsOfBase(job, dataset, folder));
+  ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, job.settings.after));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, PassSplat(job, base, dataset, folder, program));
+  base.name = record.name;
+  base.recipe = record.recipe;
+  base.stem = record.stem;
+  base.settings = record.settings;
+  record = std::move(base);
+  record.gaussians = cloud.size();
+  record.read_seconds = record.view_seconds = 0;
+  record.fit_seconds = Since(begin);
+  return WriteSplats(cloud, folder, record);
 }
 
 // What a stage found out, kept beside its files: the record so far.
@@ -228,9 +268,9 @@ fs::path CheckpointPath(const fs::path& low_folder, int64_t steps) {
 }
 
 std::string ToJsonText(const ObjectJob& job) {
-  const Json json = {{"name", job.name},       {"source", job.source},
-                     {"recipe", job.recipe},   {"settings", ToJson(job.settings)},
-                     {"licence", job.licence}, {"creator", job.creator}};
+  const Json json = {
+      {"name", job.name},       {"source", job.source},   {"recipe", job.recipe}, {"settings", ToJson(job.settings)},
+      {"licence", job.licence}, {"creator", job.creator}, {"base", job.base}};
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -245,7 +285,7 @@ Result<ObjectJob> ReadObjectJob(const fs::path& path) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue settings, json.root().Get("settings"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(job.settings, ObjectSettingsFrom(settings));
   for (const auto& [key, text] : std::initializer_list<std::pair<const char*, std::string*>>{
-           {"licence", &job.licence}, {"creator", &job.creator}}) {
+           {"licence", &job.licence}, {"creator", &job.creator}, {"base", &job.base}}) {
     if (const auto value = json.root().Find(key)) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(*text, value->Text());
     }
@@ -253,7 +293,38 @@ Result<ObjectJob> ReadObjectJob(const fs::path& path) {
   return job;
 }
 
-Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset) {
+namespace {
+
+// Views, and the fit of them.
+Status MakeObject(const ObjectJob& job, const fs::path& folder, ObjectRecord& record) {
+  if (IsFile(folder / kViewsDone)) {
+    ANCHORSPLAT_RETURN_IF_ERROR(Recall(folder / kViewsDone, record));
+  } else {
+    // Settings that no fit can have are known before the views are made.
+    const auto options = ToFitOptions(job.settings, 1, job.settings.views.background);
+    if (!options.ok()) return options.error();
+    const bool pictures = IsFolder(job.source);
+    ANCHORSPLAT_RETURN_IF_ERROR((pictures ? CopyViews : MakeViews)(job, folder, record));
+    if (job.settings.defects.Any()) ANCHORSPLAT_RETURN_IF_ERROR(Capture(job, folder, record));
+    if (record.origin.licence.empty() && !job.licence.empty()) {
+      record.origin.licence = job.licence;
+      record.origin.licence_source = "--licence";
+    }
+    if (record.origin.creator.empty()) record.origin.creator = job.creator;
+    ANCHORSPLAT_RETURN_IF_ERROR(Keep(folder / kViewsDone, record));
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(FitSplat(job, folder, record));
+  record.rejected = record.train_psnr < job.settings.min_train_psnr;
+  if (record.rejected) {
+    record.reason = Cat("PSNR on the fit's own training views is ", Fixed(record.train_psnr, 2), " dB, below ",
+                        Fixed(job.settings.min_train_psnr, 2));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset, const fs::path& program) {
   const fs::path folder = BuildingFolder(dataset, job.name);
   ANCHORSPLAT_RETURN_IF_ERROR(CheckPlace(job, dataset / job.name));  // before hours of work
   ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(folder.parent_path()));
@@ -266,27 +337,11 @@ Result<ObjectRecord> BuildObject(const ObjectJob& job, const fs::path& dataset) 
   record.recipe = job.recipe;
   record.stem = VariantStem(job.name);
   record.settings = job.settings;
-  if (IsFile(folder / kViewsDone)) {
-    ANCHORSPLAT_RETURN_IF_ERROR(Recall(folder / kViewsDone, record));
-  } else {
-    const bool pictures = IsFolder(job.source);
-    ANCHORSPLAT_RETURN_IF_ERROR((pictures ? CopyViews : MakeViews)(job, folder, record));
-    if (record.origin.licence.empty() && !job.licence.empty()) {
-      record.origin.licence = job.licence;
-      record.origin.licence_source = "--licence";
-    }
-    if (record.origin.creator.empty()) record.origin.creator = job.creator;
-    ANCHORSPLAT_RETURN_IF_ERROR(Keep(folder / kViewsDone, record));
-  }
   if (IsFile(folder / kRecordName)) {  // cut off while it got its name
     ANCHORSPLAT_RETURN_IF_ERROR(Recall(folder / kRecordName, record));
   } else {
-    ANCHORSPLAT_RETURN_IF_ERROR(FitSplat(job, folder, record));
-    record.rejected = record.train_psnr < job.settings.min_train_psnr;
-    if (record.rejected) {
-      record.reason = Cat("PSNR on the fit's own training views is ", Fixed(record.train_psnr, 2), " dB, below ",
-                          Fixed(job.settings.min_train_psnr, 2));
-    }
+    ANCHORSPLAT_RETURN_IF_ERROR(job.settings.IsDerived() ? DeriveSplat(job, dataset, folder, program, record)
+                                                         : MakeObject(job, folder, record));
     ANCHORSPLAT_RETURN_IF_ERROR(Keep(folder / kRecordName, record));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(Publish(job, folder, dataset / job.name));

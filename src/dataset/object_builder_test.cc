@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <iterator>
+
 #include "core/run_context.h"
 #include "dataset/scene_reader.h"
 #include "dataset/small_dataset_for_test.h"
+#include "formats/cloud_io.h"
 #include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 
@@ -169,6 +173,99 @@ TEST(ObjectBuilder, BadMeshesAreErrorsWithTheirStage) {
   EXPECT_EQ(FileBytes(BuildingFolder(folder / "set", "empty") / kStageName), "mesh");
   EXPECT_EQ(BuildObject(SmallJob((folder / "none.obj").string(), "none"), folder / "set").error().code,
             ErrorCode::kNotFound);
+}
+
+TEST(ObjectBuilder, DefectsAreInWhatTheFitSeesAndNowhereElse) {
+  const TestFolder folder;
+  ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
+  ASSERT_TRUE(BuildObject(job, folder / "set").ok());
+  job.name = "poor";
+  job.settings.defects = {.noise = 20, .pose = 1};
+  ASSERT_TRUE(BuildObject(job, folder / "set").ok());
+  const fs::path clean = folder / "set/tetra", poor = folder / "set/poor";
+  for (const char* name : {"12/images/003.png", "24/images/003.png", "12/sparse/0/images.bin"}) {
+    EXPECT_TRUE(Bytes(clean / name) == Bytes(poor / name)) << name;
+  }
+  EXPECT_FALSE(Bytes(clean / "splat.ply") == Bytes(poor / "splat.ply"));
+  EXPECT_FALSE(Bytes(poor / "12/images/003.png") == Bytes(poor / "captured/images/003.png"));
+  EXPECT_TRUE(Bytes(poor / "12/images/000.png") == Bytes(poor / "captured/images/000.png"));  // held out
+  const auto scene = Scene::Open({"poor", poor});
+  ASSERT_TRUE(scene.ok());
+  EXPECT_EQ(scene->fitted_project(), poor / "captured");
+  EXPECT_EQ(scene->low_views()[3].image, poor / "12/images/003.png");
+}
+
+TEST(ObjectBuilder, FitsOfOtherKindsSayWhatTheyAre) {
+  const TestFolder folder;
+  ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
+  job.settings.mode = RenderMode::kAntialiased;
+  job.settings.sh_degree = 1;
+  job.settings.start = FitStart::kView;
+  job.settings.init_points = 70;
+  const auto record = BuildObject(job, folder / "set");
+  ASSERT_TRUE(record.ok()) << record.error().message;
+  EXPECT_EQ(record->initial_points, 70);
+  const auto scene = Scene::Open({"tetra", folder / "set/tetra"});
+  ASSERT_TRUE(scene.ok());
+  const auto splat = scene->LowSplat();
+  ASSERT_TRUE(splat.ok());
+  EXPECT_EQ(splat->render_mode, RenderMode::kAntialiased);  // which no checkpoint says
+  EXPECT_EQ(splat->sh_degree, 1);
+}
+
+TEST(ObjectBuilder, ABackdropIsInEveryPixelOfBothResolutions) {
+  const TestFolder folder;
+  ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
+  job.settings.backdrop = true;
+  job.settings.views.store_high = false;
+  job.settings.views.rig.views = 3;
+  const auto record = BuildObject(job, folder / "set");
+  ASSERT_TRUE(record.ok()) << record.error().message;
+  EXPECT_EQ(record->triangles, 4);  // of the object
+  const auto scene = Scene::Open({"tetra", folder / "set/tetra"});
+  ASSERT_TRUE(scene.ok());
+  for (size_t view = 0; view < 3; ++view) {
+    for (const auto& picture : {scene->LowPicture(view), scene->HighPicture(view)}) {
+      ASSERT_TRUE(picture.ok()) << picture.error().message;
+      ASSERT_EQ(picture->channels, 4);
+      EXPECT_EQ(*std::min_element(picture->channel(3), picture->channel(3) + picture->plane()), 1);
+    }
+  }
+}
+
+TEST(ObjectBuilder, SplatsThroughAFormatKeepTheirViews) {
+  const TestFolder folder;
+  const ObjectJob base = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra--small");
+  ObjectJob job = base;
+  job.name = "tetra--splat";
+  job.base = base.name;
+  job.settings.from = "small";
+  job.settings.after = "splat";
+  const auto early = BuildObject(job, folder / "set");
+  ASSERT_FALSE(early.ok());
+  EXPECT_NE(early.error().message.find("tetra--small, which is not there"), std::string::npos);
+  const auto first = BuildObject(base, folder / "set");
+  ASSERT_TRUE(first.ok());
+  const auto record = BuildObject(job, folder / "set");
+  ASSERT_TRUE(record.ok()) << record.error().message;
+  EXPECT_EQ(record->name, "tetra--splat");
+  EXPECT_EQ(record->settings.after, "splat");
+  EXPECT_EQ(record->train_psnr, first->train_psnr);
+  EXPECT_GT(record->gaussians, 0);
+  const auto scene = Scene::Open({"tetra--splat", folder / "set/tetra--splat"});
+  ASSERT_TRUE(scene.ok()) << scene.error().message;
+  EXPECT_EQ(scene->LowSplat()->size(), record->gaussians);
+  EXPECT_EQ(ReadCloud(folder / "set/tetra--splat/splat.ply")->sh_degree, 0);  // .splat has no more
+  EXPECT_TRUE(scene->HighPicture(2).ok());
+  EXPECT_EQ(Bytes(folder / "set/tetra--splat/12/images/002.png"), Bytes(folder / "set/tetra--small/12/images/002.png"));
+  // Another recipe than the base was made by.
+  job.name = "tetra--other";
+  job.settings.fit_steps = 61;
+  EXPECT_EQ(BuildObject(job, folder / "set").error().code, ErrorCode::kBadArgument);
+  job.settings = base.settings;
+  job.settings.from = "small";
+  job.settings.after = "enhanced";
+  EXPECT_NE(BuildObject(job, folder / "set").error().message.find("no program"), std::string::npos);
 }
 
 TEST(ObjectBuilder, JobsComeBack) {

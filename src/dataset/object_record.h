@@ -64,7 +64,7 @@ Result<Manifest> CollectRecords(const std::filesystem::path& dataset);
 struct ObjectFailure {
   std::string name;
   std::string source;
-  std::string stage;    // "mesh", "views", "fit", "files"
+  std::string stage;    // "mesh", "views", "fit", "files"; of those made from another: "base" or what becomes of it
   std::string message;  // one sentence
 };
 Status WriteFailures(const std::filesystem::path& dataset, const std::vector<ObjectFailure>& failures);

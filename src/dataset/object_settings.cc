@@ -1,5 +1,6 @@
 #include "dataset/object_settings.h"
 
+#include <algorithm>
 #include <cstring>
 #include <iterator>
 #include <nlohmann/json.hpp>
@@ -10,6 +11,7 @@ namespace anchorsplat {
 
 namespace {
 
+constexpr int64_t kMostInitPoints = 100'000'000;
 constexpr double kMostWhole = 9007199254740992.0;  // 2⁵³: JSON's numbers are doubles
 
 Status TakeWhole(const JsonValue& json, const char* key, int64_t& out) {
@@ -41,6 +43,23 @@ Status TakeFlag(const JsonValue& json, const char* key, bool& out) {
   return {};
 }
 
+// The number of the name in `names`.
+template <size_t count>
+Status TakeNamed(const JsonValue& json, const char* key, const char* const (&names)[count], size_t& out) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, json.Get(key));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string name, value.Text());
+  for (out = 0; out < count; ++out) {
+    if (name == names[out]) return {};
+  }
+  return value.Complain(Cat("unknown ", key, " \"", Printable(name), "\""));
+}
+
+Status TakeWord(const JsonValue& json, const char* key, std::string& out) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, json.Get(key));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(out, value.Text());
+  return {};
+}
+
 // 64 bits do not fit into JSON's numbers.
 Status TakeSeed(const JsonValue& json, const char* key, uint64_t& out) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, json.Get(key));
@@ -51,6 +70,11 @@ Status TakeSeed(const JsonValue& json, const char* key, uint64_t& out) {
   out = 0;
   for (const char digit : text) out = out * 10 + static_cast<uint64_t>(digit - '0');
   return {};
+}
+
+template <size_t count>
+bool IsOneOf(const std::string& word, const char* const (&names)[count]) {
+  return std::find(std::begin(names), std::end(names), word) != std::end(names);
 }
 
 Status TakeRig(const JsonValue& json, CameraRig& rig) {
@@ -76,6 +100,50 @@ Status TakeRig(const JsonValue& json, CameraRig& rig) {
   return {};
 }
 
+nlohmann::json ToJson(const PictureDefects& d) {
+  return {{"noise", d.noise}, {"jpeg", d.jpeg}, {"exposure", d.exposure},
+          {"pose", d.pose},   {"mask", d.mask}, {"defocus", d.defocus}};
+}
+
+Status TakeDefects(const JsonValue& json, PictureDefects& d) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue defects, json.Get("defects"));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeSetting(defects, "noise", d.noise));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeInt(defects, "jpeg", 0, 100, d.jpeg));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeSetting(defects, "exposure", d.exposure));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeSetting(defects, "pose", d.pose));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeSetting(defects, "mask", d.mask));
+  return TakeSetting(defects, "defocus", d.defocus);
+}
+
+// What makes kinds; records of earlier versions have none of it.
+Status TakeKind(const JsonValue& json, ObjectSettings& s) {
+  size_t name = 0;
+  if (json.has("init")) {
+    ANCHORSPLAT_RETURN_IF_ERROR(TakeNamed(json, "init", kFitStartNames, name));
+    s.start = static_cast<FitStart>(name);
+  }
+  if (json.has("init_points")) ANCHORSPLAT_RETURN_IF_ERROR(TakeWhole(json, "init_points", s.init_points));
+  if (json.has("sh_degree")) ANCHORSPLAT_RETURN_IF_ERROR(TakeInt(json, "sh_degree", 0, kMaxShDegree, s.sh_degree));
+  if (json.has("mode")) {
+    ANCHORSPLAT_RETURN_IF_ERROR(TakeNamed(json, "mode", kFitModeNames, name));
+    s.mode = static_cast<RenderMode>(name);
+  }
+  if (json.has("pixel")) {
+    ANCHORSPLAT_RETURN_IF_ERROR(TakeNamed(json, "pixel", kFitPixelNames, name));
+    s.pixel_area = name == 1;
+  }
+  if (json.has("strategy")) {
+    ANCHORSPLAT_RETURN_IF_ERROR(TakeNamed(json, "strategy", kStrategyNames, name));
+    s.strategy = static_cast<FitStrategy>(name);
+  }
+  if (json.has("mip_filter")) ANCHORSPLAT_RETURN_IF_ERROR(TakeFlag(json, "mip_filter", s.mip_filter));
+  if (json.has("defects")) ANCHORSPLAT_RETURN_IF_ERROR(TakeDefects(json, s.defects));
+  if (json.has("backdrop")) ANCHORSPLAT_RETURN_IF_ERROR(TakeFlag(json, "backdrop", s.backdrop));
+  if (json.has("from")) ANCHORSPLAT_RETURN_IF_ERROR(TakeWord(json, "from", s.from));
+  if (json.has("after")) ANCHORSPLAT_RETURN_IF_ERROR(TakeWord(json, "after", s.after));
+  return {};
+}
+
 }  // namespace
 
 nlohmann::json ToJson(const ObjectSettings& s) {
@@ -97,7 +165,18 @@ nlohmann::json ToJson(const ObjectSettings& s) {
           {"hold_out", s.hold_out},
           {"max_gaussians", s.max_gaussians},
           {"min_train_psnr", s.min_train_psnr},
-          {"seed", std::to_string(s.seed)}};
+          {"seed", std::to_string(s.seed)},
+          {"init", kFitStartNames[static_cast<size_t>(s.start)]},
+          {"init_points", s.init_points},
+          {"sh_degree", s.sh_degree},
+          {"mode", kFitModeNames[static_cast<size_t>(s.mode)]},
+          {"pixel", kFitPixelNames[s.pixel_area ? 1 : 0]},
+          {"strategy", kStrategyNames[static_cast<size_t>(s.strategy)]},
+          {"mip_filter", s.mip_filter},
+          {"defects", ToJson(s.defects)},
+          {"backdrop", s.backdrop},
+          {"from", s.from},
+          {"after", s.after}};
 }
 
 Result<ObjectSettings> ObjectSettingsFrom(const JsonValue& json) {
@@ -120,6 +199,7 @@ Result<ObjectSettings> ObjectSettingsFrom(const JsonValue& json) {
   ANCHORSPLAT_RETURN_IF_ERROR(TakeSetting(json, "min_train_psnr", s.min_train_psnr));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeSeed(json, "seed", s.seed));
   v.seed = v.rig.seed = s.seed;
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeKind(json, s));
   if (const Status status = Validate(s); !status.ok()) return json.Complain(status.error().message);
   return s;
 }
@@ -139,7 +219,22 @@ Status Validate(const ObjectSettings& s) {
   for (const float x : s.views.background) {
     if (!(x >= 0 && x <= 1)) return bad(Cat("background ", x, " is not in 0 to 1"));
   }
-  return {};
+  if (s.init_points > 0 && s.start == FitStart::kSurface) {
+    return bad("init_points are those of init random and view; points says how many samples of the surface there are");
+  }
+  if (s.init_points > kMostInitPoints) return bad(Cat("a fit begins with at most ", kMostInitPoints, " points"));
+  if (s.sh_degree < 0 || s.sh_degree > kMaxShDegree) return bad(Cat("sh_degree ", s.sh_degree, " is not in 0 to 3"));
+  if (s.strategy == FitStrategy::kMcmc && s.max_gaussians == 0) {
+    return bad("strategy mcmc grows to a bound: max_gaussians says how many");
+  }
+  if (s.mip_filter && (s.pixel_area || s.mode != RenderMode::kClassic)) {
+    return bad("mip_filter has a rendering of its own: mode and pixel cannot be changed");
+  }
+  if (s.from.empty() != s.after.empty()) return bad("from and after belong together");
+  if (s.IsDerived() && !IsOneOf(s.after, kAfterNames)) {
+    return bad(Cat("after is one of spz, sog, splat and enhanced, not \"", Printable(s.after), "\""));
+  }
+  return Validate(s.defects);
 }
 
 }  // namespace anchorsplat

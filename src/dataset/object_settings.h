@@ -2,13 +2,28 @@
 
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
+#include <string>
 
+#include "core/gaussian_cloud.h"
 #include "core/result.h"
+#include "dataset/picture_defects.h"
 #include "fit/fit_options.h"
 #include "io/json_file.h"
 #include "scene/view_set.h"
 
 namespace anchorsplat {
+
+// Where a fit's first Gaussians stand (fit/initial_points.h).
+enum class FitStart {
+  kSurface,  // the points of the low views: samples of the visible surface, or those of a project of pictures
+  kRandom,   // gsplat's random cube
+  kView,     // random where many cameras look
+};
+inline constexpr const char* kFitStartNames[] = {"surface", "random", "view"};  // by FitStart
+
+// What decides which Gaussians come and go in a fit (`fit --strategy`).
+enum class FitStrategy { kDefault, kMcmc, kAbsgrad };
+inline constexpr const char* kStrategyNames[] = {"default", "mcmc", "absgrad"};  // by FitStrategy
 
 // Everything an object of the data set is made with: equal settings and an equal mesh make equal files.
 struct ObjectSettings {
@@ -18,8 +33,31 @@ struct ObjectSettings {
   int hold_out = 8;            // every n-th low view is not trained on; 0: none
   int64_t max_gaussians = 0;   // of the fit; 0: no bound
   double min_train_psnr = 34;  // dB on the fit's own training views, below which an object is rejected; 0: never
-  uint64_t seed = 0;           // of the surface samples and the fit
+  uint64_t seed = 0;           // of the surface samples, the fit, the defects and the backdrop
+
+  // What makes a splat one of another kind; the defaults are those of standard fits.
+  FitStart start = FitStart::kSurface;
+  int64_t init_points = 0;  // of kRandom and kView; 0: kRandomPoints
+  int sh_degree = kMaxShDegree;
+  RenderMode mode = RenderMode::kClassic;
+  bool pixel_area = false;  // the fit's pixels are means over their area (fit/pixel_model.h)
+  FitStrategy strategy = FitStrategy::kDefault;
+  bool mip_filter = false;  // Mip-Splatting's 3-D smoothing filter in training, fused on export
+  PictureDefects defects;   // of the pictures and poses that the fit sees
+  bool backdrop = false;    // the object stands in a textured room (backdrop.h); meshes only
+
+  // An object without a fit of its own: the splat of the same mesh's entry `from` of the recipe, passed through
+  // `after`, one of kAfterNames. Both empty or neither; all else are the settings of `from`.
+  std::string from;
+  std::string after;
+
+  bool IsDerived() const { return !from.empty(); }
 };
+
+inline constexpr const char* kFitModeNames[] = {"classic", "antialiased"};  // by RenderMode
+inline constexpr const char* kFitPixelNames[] = {"point", "area"};
+// The writer and reader of a format, which quantise, or `anchorsplat enhance`.
+inline constexpr const char* kAfterNames[] = {"spz", "sog", "splat", "enhanced"};
 
 nlohmann::json ToJson(const ObjectSettings& settings);
 // Errors (kBadFile) name the member.

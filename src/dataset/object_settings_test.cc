@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 namespace anchorsplat {
 namespace {
@@ -27,6 +28,16 @@ ObjectSettings Unusual() {
   s.max_gaussians = 12345;
   s.min_train_psnr = 30.5;
   s.seed = ~uint64_t{0};
+  s.start = FitStart::kView;
+  s.init_points = 1234;
+  s.sh_degree = 1;
+  s.mode = RenderMode::kAntialiased;
+  s.pixel_area = true;
+  s.strategy = FitStrategy::kAbsgrad;
+  s.defects = {.noise = 3.5, .jpeg = 70, .exposure = 0.1, .pose = 0.3, .mask = 1, .defocus = 0.75};
+  s.backdrop = true;
+  s.from = "standard";
+  s.after = "sog";
   return s;
 }
 
@@ -49,10 +60,14 @@ TEST(ObjectSettings, ComeBackAsTheyWere) {
 
 TEST(ObjectSettings, EveryMemberIsNeededAndChecked) {
   const nlohmann::json good = ToJson(Unusual());
+  // Which the first data sets do not have.
+  const std::set<std::string> newer = {"downscale", "init",     "init_points", "sh_degree", "mode",
+                                       "pixel",     "strategy", "mip_filter",  "defects",   "backdrop"};
   for (const auto& [key, value] : good.items()) {
     nlohmann::json missing = good;
     missing.erase(key);
-    EXPECT_EQ(Back(missing).ok(), key == "downscale") << key;  // which the first data sets do not have
+    if (key == "init") missing.erase("init_points");
+    EXPECT_EQ(Back(missing).ok(), newer.contains(key)) << key;
     nlohmann::json wrong = good;
     wrong[key] = nullptr;
     EXPECT_FALSE(Back(wrong).ok()) << key;
@@ -75,6 +90,21 @@ TEST(ObjectSettings, EveryMemberIsNeededAndChecked) {
   EXPECT_TRUE(refused("seed", "123456789012345678901"));
   EXPECT_TRUE(refused("background", {0, 0, 2}));
   EXPECT_TRUE(refused("views", 1e9));
+  EXPECT_TRUE(refused("init", "surface"));  // with init_points, which it has not
+  EXPECT_TRUE(refused("init", "cube"));
+  EXPECT_TRUE(refused("sh_degree", 4));
+  EXPECT_TRUE(refused("mode", "sharp"));
+  EXPECT_TRUE(refused("pixel", "disc"));
+  EXPECT_TRUE(refused("strategy", "magic"));
+  EXPECT_TRUE(refused("mip_filter", true));  // with a mode and pixels of another kind
+  EXPECT_TRUE(refused("defects", {{"noise", 1}}));
+  EXPECT_TRUE(refused("after", "zip"));
+  EXPECT_TRUE(refused("from", ""));  // without what after is about
+  nlohmann::json mcmc = ToJson(ObjectSettings());
+  mcmc["strategy"] = "mcmc";
+  EXPECT_FALSE(Back(mcmc).ok());
+  mcmc["max_gaussians"] = 20000;
+  EXPECT_TRUE(Back(mcmc).ok());
 }
 
 }  // namespace

@@ -84,6 +84,51 @@ Status TakeRig(const Item& item, ObjectSettings& s) {
   return item.Complain(Cat("unknown rig \"", Printable(name), "\"; known are sphere, rings and random"));
 }
 
+template <size_t count>
+Result<size_t> ChooseName(const Item& item, const char* const (&names)[count]) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string name, item.Text());
+  std::string known;
+  for (size_t k = 0; k < count; ++k) {
+    if (name == names[k]) return k;
+    known += Cat(k == 0 ? "" : k + 1 == count ? " and " : ", ", names[k]);
+  }
+  return item.Complain(Cat("\"", Printable(name), "\" is not known; known are ", known));
+}
+
+Status TakeStart(const Item& item, ObjectSettings& s) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t name, ChooseName(item, kFitStartNames));
+  s.start = static_cast<FitStart>(name);
+  return {};
+}
+
+Status TakeMode(const Item& item, ObjectSettings& s) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t name, ChooseName(item, kFitModeNames));
+  s.mode = static_cast<RenderMode>(name);
+  return {};
+}
+
+Status TakePixel(const Item& item, ObjectSettings& s) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t name, ChooseName(item, kFitPixelNames));
+  s.pixel_area = name == 1;
+  return {};
+}
+
+Status TakeStrategy(const Item& item, ObjectSettings& s) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t name, ChooseName(item, kStrategyNames));
+  s.strategy = static_cast<FitStrategy>(name);
+  return {};
+}
+
+Status TakeMipFilter(const Item& item, ObjectSettings& s) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(s.mip_filter, item.Flag());
+  return {};
+}
+
+Status TakeBackdrop(const Item& item, ObjectSettings& s) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(s.backdrop, item.Flag());
+  return {};
+}
+
 Status TakeBackground(const Item& item, ObjectSettings& s) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto rgb, item.Numbers());
   if (rgb.size() != 3) return item.Complain("expected three numbers");
@@ -127,6 +172,20 @@ const std::map<std::string, Take, std::less<>>& Keys() {
       {"hold_out", TakeWhole<[](ObjectSettings& s) -> int& { return s.hold_out; }>},
       {"max_gaussians", TakeWhole<[](ObjectSettings& s) -> int64_t& { return s.max_gaussians; }>},
       {"min_train_psnr", TakeNumber<[](ObjectSettings& s) -> double& { return s.min_train_psnr; }>},
+      {"init", TakeStart},
+      {"init_points", TakeWhole<[](ObjectSettings& s) -> int64_t& { return s.init_points; }>},
+      {"sh_degree", TakeWhole<[](ObjectSettings& s) -> int& { return s.sh_degree; }>},
+      {"mode", TakeMode},
+      {"pixel", TakePixel},
+      {"strategy", TakeStrategy},
+      {"mip_filter", TakeMipFilter},
+      {"noise", TakeNumber<[](ObjectSettings& s) -> double& { return s.defects.noise; }>},
+      {"jpeg", TakeWhole<[](ObjectSettings& s) -> int& { return s.defects.jpeg; }>},
+      {"exposure", TakeNumber<[](ObjectSettings& s) -> double& { return s.defects.exposure; }>},
+      {"pose", TakeNumber<[](ObjectSettings& s) -> double& { return s.defects.pose; }>},
+      {"mask", TakeNumber<[](ObjectSettings& s) -> double& { return s.defects.mask; }>},
+      {"defocus", TakeNumber<[](ObjectSettings& s) -> double& { return s.defects.defocus; }>},
+      {"backdrop", TakeBackdrop},
   };
   return keys;
 }
@@ -152,14 +211,41 @@ bool IsEntryName(const std::string& name) {
   });
 }
 
-Result<RecipeEntry> TakeEntry(const std::string& file, const toml::table& table, ObjectSettings settings) {
+// What is said about an entry besides its settings.
+const std::set<std::string_view> kEntryKeys = {"name", "weight", "objects"};
+const std::set<std::string_view> kDerivedKeys = {"name", "weight", "objects", "from", "after"};
+
+// `earlier`: the entries above it, one of which a derived one is made from.
+Result<RecipeEntry> TakeEntry(const std::string& file, const toml::table& table, ObjectSettings settings,
+                              const std::vector<RecipeEntry>& earlier) {
   const auto complain = [&](const std::string& sentence) {
     return Error{ErrorCode::kBadFile, Cat(file, ": line ", table.source().begin.line, ": [[mix]]: ", sentence)};
   };
   RecipeEntry entry;
-  ANCHORSPLAT_RETURN_IF_ERROR(TakeSettings(file, table, {"name", "weight"}, settings));
+  if (const toml::node* from = table.get("from")) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string base, (Item{file, "from", *from}.Text()));
+    const auto found =
+        std::find_if(earlier.begin(), earlier.end(), [&](const RecipeEntry& other) { return other.name == base; });
+    if (found == earlier.end()) return complain(Cat("from: there is no entry \"", Printable(base), "\" above"));
+    if (found->settings.IsDerived()) return complain(Cat("from: \"", base, "\" has no fit of its own"));
+    settings = found->settings;
+    settings.from = base;
+    entry.objects = found->objects;
+    for (const auto& [key, node] : table) {
+      if (kDerivedKeys.contains(key.str())) continue;
+      return Item{file, std::string(key.str()), node}.Complain("with from, all settings are those of that entry");
+    }
+    const toml::node* after = table.get("after");
+    if (after == nullptr) return complain("from needs after, which says what becomes of the splat");
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t how, ChooseName(Item{file, "after", *after}, kAfterNames));
+    settings.after = kAfterNames[how];
+    entry.name = Cat(base, "-", settings.after);
+  } else {
+    if (const toml::node* after = table.get("after")) return Item{file, "after", *after}.Complain("needs from");
+    ANCHORSPLAT_RETURN_IF_ERROR(TakeSettings(file, table, kEntryKeys, settings));
+    entry.name = Cat(settings.fit_steps, "-", settings.views.low_size);
+  }
   entry.settings = settings;
-  entry.name = Cat(settings.fit_steps, "-", settings.views.low_size);
   if (const toml::node* node = table.get("name")) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(entry.name, (Item{file, "name", *node}.Text()));
   }
@@ -168,8 +254,33 @@ Result<RecipeEntry> TakeEntry(const std::string& file, const toml::table& table,
     ANCHORSPLAT_ASSIGN_OR_RETURN(entry.weight, (Item{file, "weight", *node}.Number()));
     if (!(entry.weight > 0)) return complain("weight is not positive");
   }
+  if (const toml::node* node = table.get("objects")) {
+    const Item item{file, "objects", *node};
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t objects, item.Whole(1, INT64_MAX));
+    if (entry.objects > 0 && objects > entry.objects) {
+      return item.Complain(Cat("only ", entry.objects, " have the entry that it is made from"));
+    }
+    entry.objects = objects;
+  }
   if (const Status status = Validate(entry.settings); !status.ok()) return complain(status.error().message);
   return entry;
+}
+
+// How many entries an object draws.
+Status TakeDraws(const Item& item, Recipe& recipe) {
+  if (const auto word = item.node.value_exact<std::string>()) {
+    if (*word != "all") return item.Complain("expected a whole number or \"all\"");
+    recipe.draws_all = true;
+    return {};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t draws, item.Whole(1, INT64_MAX));
+  if (draws > std::ssize(recipe.entries)) {
+    return item.Complain(Cat("an object cannot be drawn ", draws, " times: the recipe has ", recipe.entries.size(),
+                             recipe.entries.size() == 1 ? " entry" : " entries",
+                             " ([[mix]]), and each is drawn once at most"));
+  }
+  recipe.draws = static_cast<int>(draws);
+  return {};
 }
 
 Result<Recipe> RecipeFrom(const std::string& file, const toml::table& root, ObjectSettings settings) {
@@ -187,7 +298,7 @@ Result<Recipe> RecipeFrom(const std::string& file, const toml::table& root, Obje
     for (const toml::node& node : *entries) {
       const toml::table* table = node.as_table();
       if (table == nullptr) return Item{file, "mix", node}.Complain("expected [[mix]] tables");
-      ANCHORSPLAT_ASSIGN_OR_RETURN(RecipeEntry entry, TakeEntry(file, *table, settings));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(RecipeEntry entry, TakeEntry(file, *table, settings, recipe.entries));
       for (const RecipeEntry& other : recipe.entries) {
         if (other.name == entry.name)
           return Item{file, "mix", node}.Complain(Cat("\"", entry.name, "\" is there twice"));
@@ -202,14 +313,13 @@ Result<Recipe> RecipeFrom(const std::string& file, const toml::table& root, Obje
     recipe.entries = SingleRecipe(settings).entries;
   }
   if (const toml::node* node = root.get("draws")) {
-    const Item item{file, "draws", *node};
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t draws, item.Whole(1, INT64_MAX));
-    if (draws > std::ssize(recipe.entries)) {
-      return item.Complain(Cat("an object cannot be drawn ", draws, " times: the recipe has ", recipe.entries.size(),
-                               recipe.entries.size() == 1 ? " entry" : " entries",
-                               " ([[mix]]), and each is drawn once at most"));
-    }
-    recipe.draws = static_cast<int>(draws);
+    ANCHORSPLAT_RETURN_IF_ERROR(TakeDraws(Item{file, "draws", *node}, recipe));
+  }
+  if (!recipe.draws_all && std::any_of(recipe.entries.begin(), recipe.entries.end(),
+                                       [](const RecipeEntry& entry) { return entry.settings.IsDerived(); })) {
+    return Error{ErrorCode::kBadFile, Cat(file,
+                                          ": entries with from need draws = \"all\", so that every object has "
+                                          "what they are made from")};
   }
   return recipe;
 }
@@ -219,7 +329,7 @@ Result<Recipe> RecipeFrom(const std::string& file, const toml::table& root, Obje
 Recipe SingleRecipe(const ObjectSettings& settings) {
   Recipe recipe;
   recipe.seed = settings.seed;
-  recipe.entries.push_back({Cat(settings.fit_steps, "-", settings.views.low_size), 1, settings});
+  recipe.entries.push_back({Cat(settings.fit_steps, "-", settings.views.low_size), 1, 0, settings});
   return recipe;
 }
 
@@ -233,15 +343,23 @@ Result<Recipe> ReadRecipe(const std::filesystem::path& path, const ObjectSetting
   }
 }
 
-std::vector<size_t> DrawEntries(const Recipe& recipe, const std::string& name) {
+std::vector<size_t> DrawEntries(const Recipe& recipe, const std::string& name, int64_t place) {
+  const auto may_have = [&](size_t i) { return recipe.entries[i].objects == 0 || place < recipe.entries[i].objects; };
+  std::vector<size_t> drawn;
+  if (recipe.draws_all) {
+    for (size_t i = 0; i < recipe.entries.size(); ++i) {
+      if (may_have(i)) drawn.push_back(i);
+    }
+    return drawn;
+  }
   // Efraimidis and Spirakis 2006: the largest u^(1/w) are a weighted sample without replacement.
   Random random(StableHash(name, recipe.seed));
   std::vector<std::pair<double, size_t>> keys;
   for (size_t i = 0; i < recipe.entries.size(); ++i) {
-    keys.emplace_back(std::log(1 - random.Uniform()) / recipe.entries[i].weight, i);
+    const double key = std::log(1 - random.Uniform()) / recipe.entries[i].weight;
+    if (may_have(i)) keys.emplace_back(key, i);
   }
   std::sort(keys.begin(), keys.end(), std::greater<>());
-  std::vector<size_t> drawn;
   for (int i = 0; i < recipe.draws && i < std::ssize(keys); ++i) drawn.push_back(keys[static_cast<size_t>(i)].second);
   return drawn;
 }

@@ -101,5 +101,75 @@ TEST(Recipe, DrawsFollowTheWeightsAndTheNameAlone) {
   EXPECT_EQ(std::set<size_t>(both.begin(), both.end()).size(), 2u);
 }
 
+TEST(Recipe, AllEntriesForTheFirstObjectsOfTheList) {
+  const auto recipe = Read(R"(
+draws = "all"
+[[mix]]
+name = "standard"
+[[mix]]
+name = "dense"
+objects = 2
+init = "random"
+init_points = 500
+mode = "antialiased"
+noise = 4
+jpeg = 80
+[[mix]]
+name = "dense-spz"
+from = "dense"
+after = "spz"
+[[mix]]
+from = "standard"
+after = "enhanced"
+objects = 1
+)");
+  ASSERT_TRUE(recipe.ok()) << recipe.error().message;
+  EXPECT_TRUE(recipe->NamesEntries());
+  using Entries = std::vector<size_t>;
+  EXPECT_EQ(DrawEntries(*recipe, "a", 0), (Entries{0, 1, 2, 3}));
+  EXPECT_EQ(DrawEntries(*recipe, "b", 1), (Entries{0, 1, 2}));
+  EXPECT_EQ(DrawEntries(*recipe, "c", 2), (Entries{0}));
+  const ObjectSettings &dense = recipe->entries[1].settings, &spz = recipe->entries[2].settings;
+  EXPECT_EQ(dense.start, FitStart::kRandom);
+  EXPECT_EQ(dense.mode, RenderMode::kAntialiased);
+  EXPECT_EQ(dense.defects, (PictureDefects{.noise = 4, .jpeg = 80}));
+  EXPECT_FALSE(dense.IsDerived());
+  EXPECT_EQ(spz.from, "dense");
+  EXPECT_EQ(spz.after, "spz");
+  EXPECT_EQ(spz.init_points, 500);  // all else is the base's
+  EXPECT_EQ(recipe->entries[3].name, "standard-enhanced");
+}
+
+TEST(Recipe, DrawsAmongWhatAnObjectMayHave) {
+  Recipe recipe = SingleRecipe({});
+  recipe.entries.push_back(recipe.entries[0]);
+  recipe.entries[0].objects = 1;
+  recipe.draws = 2;
+  EXPECT_EQ(DrawEntries(recipe, "chair", 0).size(), 2u);
+  EXPECT_EQ(DrawEntries(recipe, "chair", 1), (std::vector<size_t>{1}));
+  recipe.entries[1].objects = 1;
+  EXPECT_TRUE(DrawEntries(recipe, "chair", 1).empty());
+}
+
+TEST(Recipe, WhatIsMadeFromAnotherNeedsIt) {
+  const auto complaint = [](const std::string& entries) {
+    const auto recipe = Read("draws = \"all\"\n[[mix]]\nname = \"a\"\nobjects = 2\n[[mix]]\n" + entries);
+    return recipe.ok() ? std::string() : recipe.error().message;
+  };
+  const auto says = [&](const std::string& entries, const std::string& about) {
+    return complaint(entries).find(about) != std::string::npos;
+  };
+  EXPECT_EQ(complaint("from = \"a\"\nafter = \"splat\""), "");
+  EXPECT_TRUE(says("from = \"b\"\nafter = \"spz\"", "no entry \"b\""));
+  EXPECT_TRUE(says("from = \"a\"", "needs after"));
+  EXPECT_TRUE(says("after = \"spz\"", "needs from"));
+  EXPECT_TRUE(says("from = \"a\"\nafter = \"zip\"", "known are spz, sog, splat and enhanced"));
+  EXPECT_TRUE(says("from = \"a\"\nafter = \"spz\"\nsteps = 3", "settings are those of that entry"));
+  EXPECT_TRUE(says("from = \"a\"\nafter = \"spz\"\nobjects = 3", "only 2 have"));
+  EXPECT_TRUE(says("from = \"a\"\nafter = \"spz\"\n[[mix]]\nfrom = \"a-spz\"\nafter = \"sog\"", "no fit of its own"));
+  EXPECT_FALSE(Read("[[mix]]\nname = \"a\"\n[[mix]]\nfrom = \"a\"\nafter = \"spz\"").ok());  // one of them is drawn
+  EXPECT_FALSE(Read("draws = \"some\"\n[[mix]]").ok());
+}
+
 }  // namespace
 }  // namespace anchorsplat

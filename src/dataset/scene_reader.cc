@@ -10,6 +10,8 @@
 #include "core/file_system.h"
 #include "core/text.h"
 #include "dataset/dataset_split.h"
+#include "dataset/object_builder.h"
+#include "dataset/picture_defects.h"
 #include "formats/cloud_io.h"
 #include "images/image_io.h"
 #include "scene/mesh_file.h"
@@ -64,6 +66,11 @@ std::optional<int64_t> StepOf(const fs::path& checkpoint) {
 
 Error NotFound(std::string sentence) { return Error{ErrorCode::kNotFound, std::move(sentence)}; }
 
+// Whether the object's splat has a render mode other than the usual one or comments that tell readers something.
+bool SaysMoreThanACheckpoint(const ObjectSettings& s) {
+  return s.mode != RenderMode::kClassic || s.mip_filter || s.pixel_area || s.after == "enhanced";
+}
+
 Result<Image> ReadView(const Camera& camera) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, ReadImage(camera.image));
   if (image.width != camera.intrinsics.width || image.height != camera.intrinsics.height) {
@@ -82,7 +89,7 @@ Result<std::vector<SceneEntry>> ListScenes(const fs::path& dataset, const SceneL
   if (IsFile(dataset / kManifestName)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Manifest manifest, ReadManifest(dataset));
     for (const auto& [name, record] : manifest) {
-      if (!record.rejected || options.rejected) scenes.push_back({name, dataset / name});
+      if (!record.rejected || options.rejected) scenes.push_back({name, dataset / name, record.recipe});
     }
   } else if (Resolutions(dataset)) {
     scenes.push_back({RealPath(dataset).filename().string(), dataset});
@@ -145,7 +152,15 @@ Result<Scene> Scene::Open(const SceneEntry& entry) {
   return scene;
 }
 
+fs::path Scene::fitted_project() const {
+  const fs::path captured = folder_ / kCapturedName;
+  return record_ && record_->settings.defects.Any() && IsFolder(captured) ? captured : low_folder_;
+}
+
 Result<fs::path> Scene::LowSplatPath() const {
+  if (record_ && SaysMoreThanACheckpoint(record_->settings) && IsFile(folder_ / kSplatName)) {
+    return folder_ / kSplatName;
+  }
   const fs::path folder = low_folder_ / "gaussian_splatting" / "ckpts";
   fs::path last;
   int64_t most = -1;

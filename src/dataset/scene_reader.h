@@ -21,6 +21,7 @@ namespace anchorsplat {
 struct SceneEntry {
   std::string name;  // of the folder
   std::filesystem::path folder;
+  std::string kind = {};  // the recipe's entry it was made by, as the manifest says; empty where there is none
 };
 
 struct SceneListOptions {
@@ -45,14 +46,17 @@ class Scene {
   static Result<Scene> Open(const SceneEntry& entry);
 
   const std::string& name() const { return name_; }
-  const std::filesystem::path& low_folder() const { return low_folder_; }  // a project to fit (fit/training_views.h)
+  const std::filesystem::path& low_folder() const { return low_folder_; }
+  // What the splat was fitted to (fit/training_views.h): the low folder or, of an object with defects, captured/.
+  std::filesystem::path fitted_project() const;
   const std::vector<Camera>& low_views() const { return low_views_; }
   const std::vector<Camera>& high_views() const { return high_views_; }
   const std::vector<size_t>& held_out() const { return held_out_; }  // views the splat was not trained on
   const std::array<float, 3>& background() const { return background_; }
   const std::optional<ObjectRecord>& record() const { return record_; }  // of data sets we built
 
-  // The low-quality splat: the checkpoint of gsplat's trainer with the most steps.
+  // The low-quality splat: the checkpoint of gsplat's trainer with the most steps; splat.ply of an object whose splat
+  // says of itself what such a checkpoint has no place for, its render mode or comments.
   Result<GaussianCloud> LowSplat() const;
   Result<std::filesystem::path> LowSplatPath() const;  // its file
 

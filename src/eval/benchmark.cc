@@ -67,7 +67,7 @@ Status ReadScene(const BenchmarkEntry& entry, BenchmarkObject& object) {
   object.views = scene->high_views();
   object.held_out = scene->held_out();
   object.background = scene->background();
-  object.low_project = scene->low_folder();
+  object.low_project = scene->fitted_project();
   object.hold_out = scene->record() ? scene->record()->settings.hold_out : kHeldOutEvery;
   if (const fs::path mesh = entry.folder / kMeshName; IsFile(mesh)) object.mesh = mesh;
   object.picture = [scene](size_t view) { return scene->HighPicture(view); };
@@ -139,7 +139,9 @@ Result<std::vector<BenchmarkEntry>> ListBenchmark(const fs::path& folder, const 
   std::vector<BenchmarkEntry> entries;
   auto scenes = ListScenes(folder, {.split = split});
   if (scenes.ok()) {
-    for (SceneEntry& scene : *scenes) entries.push_back({std::move(scene.name), std::move(scene.folder)});
+    for (SceneEntry& scene : *scenes) {
+      entries.push_back({std::move(scene.name), std::move(scene.folder), std::move(scene.kind)});
+    }
   } else if (scenes.error().code != ErrorCode::kNotFound || !split.empty()) {
     return scenes.error();
   }

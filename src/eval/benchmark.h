@@ -18,6 +18,7 @@ namespace anchorsplat {
 struct BenchmarkEntry {
   std::string name;  // of the folder
   std::filesystem::path folder;
+  std::string kind = {};  // entry of the recipe that the data set's object was made by; empty where nothing says so
 };
 
 // The objects of a benchmark, in order of their names. The folder holds data sets as dataset/scene_reader.h reads them
@@ -37,9 +38,11 @@ struct BenchmarkObject {
   std::vector<Camera> views;     // of all high-resolution views, in order of their names
   std::vector<size_t> held_out;  // views the low-quality fit was not trained on
   std::array<float, 3> background{};
-  std::filesystem::path low_project;  // what the low-quality splat was fitted to: fit/training_views.h opens it …
-  int hold_out = 0;                   // … with this, and holds out the same views
-  std::filesystem::path mesh;         // what high views without a picture are rendered from; may be empty
+  // What the low-quality splat was fitted to, with its defects where it has some (Scene::fitted_project):
+  // fit/training_views.h opens it …
+  std::filesystem::path low_project;
+  int hold_out = 0;            // … with this, and holds out the same views
+  std::filesystem::path mesh;  // what high views without a picture are rendered from; may be empty
   // The high-resolution picture of a view, rgb or rgba, of its camera's size.
   std::function<Result<Image>(size_t view)> picture;
 

@@ -198,6 +198,24 @@ Status CheckMethods(const std::vector<EvalMethod>& methods) {
   return {};
 }
 
+Result<std::vector<BenchmarkEntry>> ChooseKinds(std::vector<BenchmarkEntry> entries,
+                                                const std::vector<std::string>& kinds) {
+  if (kinds.empty()) return entries;
+  std::set<std::string> known;
+  for (const BenchmarkEntry& entry : entries) known.insert(entry.kind);
+  for (const std::string& kind : kinds) {
+    if (!kind.empty() && known.contains(kind)) continue;
+    std::string list;
+    for (const std::string& word : known) list += Cat(list.empty() || word.empty() ? "" : ", ", word);
+    return Error{ErrorCode::kBadArgument, Cat("--kinds: no object is of kind '", Printable(kind), "'",
+                                              list.empty() ? "" : "; there are ", Printable(list))};
+  }
+  std::erase_if(entries, [&](const BenchmarkEntry& entry) {
+    return std::find(kinds.begin(), kinds.end(), entry.kind) == kinds.end();
+  });
+  return entries;
+}
+
 Result<std::vector<BenchmarkEntry>> ChooseObjects(std::vector<BenchmarkEntry> entries,
                                                   const std::vector<std::string>& names) {
   if (names.empty()) return entries;
@@ -237,6 +255,7 @@ Result<Evaluation> Evaluate(const fs::path& benchmark, const std::vector<EvalMet
                             const EvaluationOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckMethods(methods));
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<BenchmarkEntry> entries, ListBenchmark(benchmark, options.split));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(entries, ChooseKinds(std::move(entries), options.kinds));
   ANCHORSPLAT_ASSIGN_OR_RETURN(entries, ChooseObjects(std::move(entries), options.objects));
   std::error_code code;
   fs::create_directories(out / "objects", code);
@@ -249,6 +268,7 @@ Result<Evaluation> Evaluate(const fs::path& benchmark, const std::vector<EvalMet
   for (const EvalMethod& method : methods) evaluation.methods.push_back(method.name);
   for (size_t i = 0; i < entries.size(); ++i) {
     evaluation.objects.push_back(entries[i].name);
+    evaluation.kinds.push_back(entries[i].kind);
     const std::string place = Cat(entries[i].name, " (", i + 1, " of ", entries.size(), ")");
     const size_t before = evaluation.failures.size(), measured = evaluation.results.size();
     Status status;

@@ -17,6 +17,7 @@ struct EvaluationOptions {
   Protocol protocol = Protocol::kHeldOut;
   std::string split = {};                 // of the data set; empty: all objects
   std::vector<std::string> objects = {};  // names; empty: all
+  std::vector<std::string> kinds = {};    // of objects (BenchmarkEntry::kind); empty: all
   size_t max_views = 0;  // per object, evenly spread over the protocol's; 0: all, which the protocol means
   const Lpips* lpips = nullptr;
   uint64_t seed = 0;
@@ -42,6 +43,7 @@ struct Evaluation {
   std::optional<LpipsNet> lpips;
   std::vector<std::string> methods;   // in the order asked for
   std::vector<std::string> objects;   // in order of their names
+  std::vector<std::string> kinds;     // of each object; empty words where nothing says
   std::vector<MethodResult> results;  // object by object, method by method; those that failed are not there
   std::vector<EvaluationFailure> failures;
   EvaluationTimes times;
@@ -56,7 +58,7 @@ struct Evaluation {
 // again.
 //
 // An object or method that fails is listed in `failures` and does not stop the others. Errors: kNotFound, kBadArgument
-// (no objects, names that are not there, two methods of one name), kIo (`out` cannot be written).
+// (no objects, names or kinds that are not there, two methods of one name), kIo (`out` cannot be written).
 Result<Evaluation> Evaluate(const std::filesystem::path& benchmark, const std::vector<EvalMethod>& methods,
                             const std::filesystem::path& out, const EvaluationOptions& options);
 

@@ -5,6 +5,7 @@
 
 #include "core/text.h"
 #include "dataset/object_name.h"
+#include "dataset/picture_defects.h"
 
 namespace anchorsplat {
 
@@ -41,6 +42,14 @@ std::string ObjectState(const BenchmarkObject& object, const std::vector<size_t>
   for (const Camera& camera : object.low_cameras.cameras) {
     AddCamera(state, camera);
     if (!camera.image.empty()) AddFile(state, camera.image);
+  }
+  // Those of a fit that saw other pictures and poses: methods may read them.
+  if (const fs::path poses = object.low_project / "sparse" / "0" / "images.bin";
+      object.low_project.filename() == kCapturedName) {
+    AddFile(state, poses);
+    for (const Camera& camera : object.low_cameras.cameras) {
+      AddFile(state, object.low_project / "images" / camera.image.filename());
+    }
   }
   for (const size_t view : views) {
     AddCamera(state, object.views[view]);

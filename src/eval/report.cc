@@ -86,6 +86,35 @@ void AddSummaryTable(const Evaluation& evaluation, const std::vector<MethodSumma
   }
 }
 
+// An object's name without its kind, where that is a column.
+std::string WithoutKind(const std::string& object, const std::string& kind) {
+  const std::string ending = "--" + kind;
+  return object.ends_with(ending) ? object.substr(0, object.size() - ending.size()) : object;
+}
+
+void AddKindTable(const Evaluation& evaluation, const std::vector<KindSummary>& kinds, std::string& text) {
+  std::vector<std::string> heading = {"kind", "method", "objects", "PSNR dB", "SSIM"};
+  if (evaluation.lpips) heading.push_back(Cat("LPIPS (", LpipsNetName(*evaluation.lpips), ")"));
+  for (const char* name :
+       {"gain over raw, dB", "gain over filter, dB", "Gaussians", "time per object", "worst object"}) {
+    heading.emplace_back(name);
+  }
+  text += Row(heading) + Rule(heading.size());
+  for (const auto& [kind, s, worst] : kinds) {
+    std::vector<std::string> row = {kind.empty() ? "?" : Cell(kind), Cell(s.method), std::to_string(s.objects),
+                                    Fixed(s.psnr.mean, 2), Fixed(s.ssim.mean, 4)};
+    if (evaluation.lpips) row.push_back(s.lpips ? Fixed(s.lpips->mean, 4) : "");
+    row.push_back(s.gain_over_raw ? Signed(s.gain_over_raw->mean, 2) : "");
+    row.push_back(s.gain_over_filter ? Signed(s.gain_over_filter->mean, 2) : "");
+    row.push_back(s.gaussians > 0 ? WithThousands(std::llround(s.gaussians)) : "");
+    row.push_back(s.seconds > 0 ? HumanSeconds(s.seconds) : "");
+    row.push_back(worst ? Cat(Cell(WithoutKind(worst->object, kind)), " ", Signed(worst->gain, 2),
+                              worst->over == "raw" ? "" : Cat(" over ", worst->over))
+                        : "");
+    text += Row(row);
+  }
+}
+
 void AddObjectTable(const Evaluation& evaluation, const std::vector<MethodSummary>& summaries, std::string& text) {
   const bool sizes = SummarisePixelSizes(evaluation).has_value();
   std::vector<std::string> heading = {"object"};
@@ -134,6 +163,21 @@ nlohmann::json ToJson(const MethodSummary& s) {
   return json;
 }
 
+nlohmann::json ToJson(const WorstObject& worst) {
+  return {{"object", worst.object},
+          {"method", worst.method},
+          {"kind", worst.kind},
+          {"over", worst.over},
+          {"gain", Number(worst.gain)}};
+}
+
+nlohmann::json ToJson(const KindSummary& kind) {
+  nlohmann::json json = ToJson(kind.summary);
+  json["kind"] = kind.kind;
+  if (kind.worst) json["worst"] = ToJson(*kind.worst);
+  return json;
+}
+
 nlohmann::json ToJson(const MethodResult& result) {
   nlohmann::json json = {
       {"object", result.object},       {"method", result.method},           {"psnr", FiniteOrNull(result.MeanPsnr())},
@@ -152,11 +196,25 @@ nlohmann::json ToJson(const MethodResult& result) {
 
 }  // namespace
 
+std::string WorstSentence(const Evaluation& evaluation) {
+  const auto worst = WorstOverRaw(evaluation);
+  if (!worst) return {};
+  const std::string who = Cat(worst->method, " on ", worst->object);
+  return worst->gain < 0
+             ? Cat("Worst loss over raw: ", Fixed(-worst->gain, 2), " dB, ", who, ".")
+             : Cat("Nothing is worse than raw: the least gain is ", Fixed(worst->gain, 2), " dB, ", who, ".");
+}
+
 std::string ToMarkdown(const Evaluation& evaluation, const std::vector<MethodSummary>& summaries,
-                       const std::string& title) {
+                       const std::string& title, uint64_t seed) {
   std::string text = Cat("# ", Cell(title), "\n\n", ProtocolSentence(evaluation),
                          " In parentheses: 95 % confidence by bootstrap over the objects.\n\n");
   AddSummaryTable(evaluation, summaries, text);
+  if (const auto kinds = SummariseKinds(evaluation, seed); !kinds.empty()) {
+    text += "\nBy kind of splat; the worst object is the one with the least gain over raw, in dB:\n\n";
+    AddKindTable(evaluation, kinds, text);
+  }
+  if (const std::string worst = WorstSentence(evaluation); !worst.empty()) text += "\n" + Cell(worst) + "\n";
   if (const auto error = SummarisePixelSizes(evaluation)) {
     text += Cat("\nPixel size estimated from the splat alone (`filter-auto`): off by ", Fixed(100 * error->median, 1),
                 " % in the median, ", Fixed(100 * error->percentile95, 1), " % at the 95th percentile.\n");
@@ -178,14 +236,15 @@ std::string ToCsv(const Evaluation& evaluation) {
   for (const MethodResult& result : evaluation.results) {
     for (const auto& [name, value] : result.facts) facts.insert(name);
   }
-  std::string text = "object,method,views,psnr,ssim,lpips,seconds,render_seconds,gaussians";
+  std::string text = "object,method,views,psnr,ssim,lpips,seconds,render_seconds,gaussians,kind";
   for (const std::string& fact : facts) text += "," + CsvCell(fact);
   text += "\n";
   for (const MethodResult& result : evaluation.results) {
     const auto lpips = result.MeanLpips();
     text += Cat(CsvCell(result.object), ",", CsvCell(result.method), ",", result.views.size(), ",",
                 Fixed(result.MeanPsnr(), 4), ",", Fixed(result.MeanSsim(), 6), ",", lpips ? Fixed(*lpips, 6) : "", ",",
-                Fixed(result.seconds, 3), ",", Fixed(result.render_seconds, 3), ",", result.gaussians);
+                Fixed(result.seconds, 3), ",", Fixed(result.render_seconds, 3), ",", result.gaussians, ",",
+                CsvCell(KindOf(evaluation, result.object)));
     for (const std::string& fact : facts) {
       const auto found = result.facts.find(fact);
       text += ",";
@@ -196,7 +255,7 @@ std::string ToCsv(const Evaluation& evaluation) {
   return text;
 }
 
-nlohmann::json ToJson(const Evaluation& evaluation, const std::vector<MethodSummary>& summaries) {
+nlohmann::json ToJson(const Evaluation& evaluation, const std::vector<MethodSummary>& summaries, uint64_t seed) {
   nlohmann::json json = {{"protocol", ProtocolName(evaluation.protocol)},
                          {"objects", evaluation.objects},
                          {"methods", nlohmann::json::array()},
@@ -206,7 +265,14 @@ nlohmann::json ToJson(const Evaluation& evaluation, const std::vector<MethodSumm
   if (evaluation.max_views > 0) json["max_views"] = evaluation.max_views;
   if (evaluation.lpips) json["lpips"] = LpipsNetName(*evaluation.lpips);
   for (const MethodSummary& summary : summaries) json["methods"].push_back(ToJson(summary));
-  for (const MethodResult& result : evaluation.results) json["results"].push_back(ToJson(result));
+  for (const KindSummary& kind : SummariseKinds(evaluation, seed)) json["kinds"].push_back(ToJson(kind));
+  if (const auto worst = WorstOverRaw(evaluation)) json["worst_over_raw"] = ToJson(*worst);
+  for (const MethodResult& result : evaluation.results) {
+    json["results"].push_back(ToJson(result));
+    if (std::string kind = KindOf(evaluation, result.object); !kind.empty()) {
+      json["results"].back()["kind"] = std::move(kind);
+    }
+  }
   for (const EvaluationFailure& failure : evaluation.failures) {
     json["failures"].push_back({{"object", failure.object}, {"method", failure.method}, {"message", failure.message}});
   }
@@ -223,10 +289,11 @@ nlohmann::json ToJson(const Evaluation& evaluation, const std::vector<MethodSumm
 }
 
 Status WriteReports(const std::filesystem::path& out, const Evaluation& evaluation,
-                    const std::vector<MethodSummary>& summaries, const std::string& title) {
-  ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(out / "table.md", ToMarkdown(evaluation, summaries, title), true));
+                    const std::vector<MethodSummary>& summaries, const std::string& title, uint64_t seed) {
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(out / "table.md", ToMarkdown(evaluation, summaries, title, seed), true));
   ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(out / "table.csv", ToCsv(evaluation), true));
-  const std::string json = ToJson(evaluation, summaries).dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
+  const std::string json =
+      ToJson(evaluation, summaries, seed).dump(1, ' ', false, nlohmann::json::error_handler_t::replace);
   ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(out / "results.json", json + "\n", true));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Image sheet, ContactSheet(out, evaluation));
   if (sheet.plane() == 0) return {};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "core/random.h"
 
@@ -104,6 +105,73 @@ std::vector<MethodSummary> Summarise(const Evaluation& evaluation, uint64_t seed
     summaries.push_back(std::move(summary));
   }
   return summaries;
+}
+
+namespace {
+
+std::optional<WorstObject> WorstOver(const Evaluation& evaluation, const std::string& method, const std::string& over) {
+  std::optional<WorstObject> worst;
+  if (method == over) return worst;
+  for (const MethodResult& result : evaluation.results) {
+    const MethodResult* baseline = result.method == method ? evaluation.Find(result.object, over) : nullptr;
+    if (baseline == nullptr) continue;
+    const double gain = result.MeanPsnr() - baseline->MeanPsnr();
+    // Not the difference of two identical pictures' infinities.
+    if (std::isnan(gain) || (worst && gain >= worst->gain)) continue;
+    worst = WorstObject{result.object, method, KindOf(evaluation, result.object), over, gain};
+  }
+  return worst;
+}
+
+// The evaluation of the objects of one kind alone.
+Evaluation OfKind(const Evaluation& evaluation, const std::string& kind) {
+  Evaluation part;
+  part.protocol = evaluation.protocol;
+  part.max_views = evaluation.max_views;
+  part.lpips = evaluation.lpips;
+  part.methods = evaluation.methods;
+  for (size_t i = 0; i < evaluation.kinds.size(); ++i) {
+    if (evaluation.kinds[i] != kind) continue;
+    part.objects.push_back(evaluation.objects[i]);
+    part.kinds.push_back(kind);
+  }
+  for (const MethodResult& result : evaluation.results) {
+    if (KindOf(evaluation, result.object) == kind) part.results.push_back(result);
+  }
+  return part;
+}
+
+}  // namespace
+
+std::string KindOf(const Evaluation& evaluation, const std::string& object) {
+  const auto found = std::find(evaluation.objects.begin(), evaluation.objects.end(), object);
+  const size_t place = static_cast<size_t>(found - evaluation.objects.begin());
+  return place < evaluation.kinds.size() ? evaluation.kinds[place] : std::string();
+}
+
+std::vector<KindSummary> SummariseKinds(const Evaluation& evaluation, uint64_t seed) {
+  const std::set<std::string> kinds(evaluation.kinds.begin(), evaluation.kinds.end());
+  std::vector<KindSummary> summaries;
+  if (kinds.size() < 2) return summaries;
+  for (const std::string& kind : kinds) {
+    const Evaluation part = OfKind(evaluation, kind);
+    for (MethodSummary& summary : Summarise(part, seed)) {
+      std::optional<WorstObject> worst;
+      if (summary.method != "raw") worst = WorstOver(part, summary.method, "raw");
+      if (summary.method != "raw" && !worst) worst = WorstOver(part, summary.method, "filter");
+      summaries.push_back({kind, std::move(summary), std::move(worst)});
+    }
+  }
+  return summaries;
+}
+
+std::optional<WorstObject> WorstOverRaw(const Evaluation& evaluation) {
+  std::optional<WorstObject> worst;
+  for (const std::string& method : evaluation.methods) {
+    auto candidate = WorstOver(evaluation, method, "raw");
+    if (candidate && (!worst || candidate->gain < worst->gain)) worst = std::move(candidate);
+  }
+  return worst;
 }
 
 std::optional<PixelSizeError> SummarisePixelSizes(const Evaluation& evaluation) {

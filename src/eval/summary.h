@@ -36,6 +36,32 @@ struct MethodSummary {
 // alike, or every object alike. The same seed gives the same intervals.
 std::vector<MethodSummary> Summarise(const Evaluation& evaluation, uint64_t seed);
 
+// The object on which a method gained least over another one.
+struct WorstObject {
+  std::string object;
+  std::string method;
+  std::string kind;
+  std::string over;  // "raw", or "filter" where raw was not measured
+  double gain = 0;   // dB, of mean PSNRs; negative: it lost
+};
+
+// A method on the objects of one kind.
+struct KindSummary {
+  std::string kind;
+  MethodSummary summary;
+  std::optional<WorstObject> worst;  // nothing for "raw", and where there is nothing to compare with
+};
+
+// Kind by kind in the order of their names, method by method as Summarise. Nothing when the objects are of one kind, or
+// nothing says of which.
+std::vector<KindSummary> SummariseKinds(const Evaluation& evaluation, uint64_t seed);
+
+// Of all methods and objects the least gain over raw; nothing where raw or all else is missing.
+std::optional<WorstObject> WorstOverRaw(const Evaluation& evaluation);
+
+// Of the object, as `evaluation` has it; empty where nothing says.
+std::string KindOf(const Evaluation& evaluation, const std::string& object);
+
 // Mean of values with weights, and its bootstrap interval. At least one value, weights positive.
 Interval BootstrapMean(const std::vector<double>& values, const std::vector<double>& weights, uint64_t seed);
 

@@ -127,9 +127,9 @@ TEST(Report, TablesSayEverything) {
   EXPECT_THAT(markdown, HasSubstr("* c, model: the   network failed"));
   EXPECT_THAT(markdown, Not(HasSubstr("LPIPS")));
   const std::string csv = ToCsv(e);
-  EXPECT_THAT(csv,
-              HasSubstr("object,method,views,psnr,ssim,lpips,seconds,render_seconds,gaussians,pixel_size_ratio\n"));
-  EXPECT_THAT(csv, HasSubstr("\nb,raw,2,27.0000,0.900000,,2.000,0.000,0,\n"));
+  EXPECT_THAT(
+      csv, HasSubstr("object,method,views,psnr,ssim,lpips,seconds,render_seconds,gaussians,kind,pixel_size_ratio\n"));
+  EXPECT_THAT(csv, HasSubstr("\nb,raw,2,27.0000,0.900000,,2.000,0.000,0,,\n"));
   e.results[0].views[0].psnr = std::numeric_limits<double>::infinity();
   e.results[0].object = "a, \"b\"";
   EXPECT_THAT(ToCsv(e), HasSubstr("\n\"a, \"\"b\"\"\",raw,1,inf,"));
@@ -137,6 +137,45 @@ TEST(Report, TablesSayEverything) {
   EXPECT_TRUE(json["methods"][0]["psnr"]["mean"].is_null());
   EXPECT_EQ(json["failures"].size(), 1u);
   EXPECT_EQ(json["results"].size(), 8u);
+}
+
+TEST(Summary, KindsHaveTheirOwnRowsAndTheirWorstObject) {
+  Evaluation e = Small(Protocol::kHeldOut);
+  EXPECT_TRUE(SummariseKinds(e, 1).empty());  // nothing says
+  e.kinds = {"x", "x", "x"};
+  EXPECT_TRUE(SummariseKinds(e, 1).empty());  // all alike
+  e.kinds = {"x", "y", "x"};
+  e.results[5].views = {{"v0", 25, 0.9, std::nullopt}, {"v1", 26, 0.9, std::nullopt}};  // model on b
+  const auto rows = SummariseKinds(e, 1);
+  ASSERT_EQ(rows.size(), 6u);
+  EXPECT_EQ(rows[0].kind, "x");
+  EXPECT_EQ(rows[0].summary.method, "raw");
+  EXPECT_FALSE(rows[0].worst);
+  EXPECT_EQ(rows[1].summary.objects, 2);
+  EXPECT_NEAR(rows[1].summary.psnr.mean, (34 + 25) / 2.0, 1e-12);
+  EXPECT_EQ(rows[5].kind, "y");
+  EXPECT_EQ(rows[5].worst->object, "b");
+  EXPECT_NEAR(rows[5].worst->gain, 25.5 - 27, 1e-12);
+  EXPECT_EQ(rows[5].worst->over, "raw");
+  EXPECT_EQ(WorstOverRaw(e)->method, "model");
+  EXPECT_EQ(WorstSentence(e), "Worst loss over raw: 1.50 dB, model on b.");
+  const std::string markdown = ToMarkdown(e, Summarise(e, 1), "kinds");
+  EXPECT_THAT(markdown, HasSubstr("| y | model | 1 | 25.50 |"));
+  EXPECT_THAT(markdown, HasSubstr("b -1.50 |"));
+  EXPECT_THAT(markdown, HasSubstr("Worst loss over raw: 1.50 dB"));
+  EXPECT_THAT(ToCsv(e), HasSubstr(",0,y\n"));
+  const nlohmann::json json = ToJson(e, Summarise(e, 1));
+  EXPECT_EQ(json["kinds"].size(), 6u);
+  EXPECT_EQ(json["kinds"][5]["worst"]["object"], "b");
+  EXPECT_EQ(json["results"][5]["kind"], "y");
+  EXPECT_EQ(json["worst_over_raw"]["kind"], "y");
+
+  // Without raw the filter is what the worst is measured against.
+  std::erase_if(e.results, [](const MethodResult& result) { return result.method == "raw"; });
+  const auto without = SummariseKinds(e, 1);
+  EXPECT_EQ(without.back().worst->over, "filter");
+  EXPECT_FALSE(WorstOverRaw(e));
+  EXPECT_EQ(WorstSentence(e), "");
 }
 
 }  // namespace

@@ -5,7 +5,10 @@
 #include <jpeglib.h>
 
 #include <algorithm>
+#include <cmath>
 #include <csetjmp>
+#include <cstdlib>
+#include <memory>
 #include <new>
 #include <vector>
 
@@ -131,6 +134,83 @@ Result<Image> DecodeJpeg(std::FILE* file, const std::string& name, uint64_t byte
   }
   if (!ReadPixels(reader)) return JpegError(reader, name);
   return std::move(reader.image);
+}
+
+Result<Image> DecodeJpegBytes(std::string_view bytes, const std::string& name) {
+  // Only read from, whatever its signature says.
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(fmemopen(const_cast<char*>(bytes.data()), bytes.size(), "rb"),
+                                                       std::fclose);
+  if (file == nullptr) return Error{ErrorCode::kIo, Cat(name, ": cannot be read from memory")};
+  return DecodeJpeg(file.get(), name, bytes.size());
+}
+
+namespace {
+
+struct JpegWriter {
+  jpeg_compress_struct info{};
+  jpeg_error_mgr errors{};
+  std::jmp_buf jump;
+  char message[JMSG_LENGTH_MAX] = "";
+  unsigned char* bytes = nullptr;
+  unsigned long size = 0;       // NOLINT(google-runtime-int): libjpeg's type
+  std::vector<JSAMPLE> pixels;  // [H,W,3]
+
+  JpegWriter() { info.err = jpeg_std_error(&errors); }
+  ~JpegWriter() {
+    jpeg_destroy_compress(&info);
+    std::free(bytes);  // NOLINT(cppcoreguidelines-no-malloc): libjpeg's own
+  }
+  JpegWriter(const JpegWriter&) = delete;
+  JpegWriter& operator=(const JpegWriter&) = delete;
+};
+
+[[noreturn]] void FailToWrite(j_common_ptr info) {
+  auto* writer = static_cast<JpegWriter*>(info->client_data);
+  info->err->format_message(info, writer->message);
+  std::longjmp(writer->jump, 1);
+}
+
+bool WritePixels(JpegWriter& writer, const Image& image, int quality) {
+  writer.errors.error_exit = FailToWrite;
+  writer.info.client_data = &writer;
+  if (setjmp(writer.jump)) return false;  // NOLINT(cert-err52-cpp): libjpeg's way
+  jpeg_create_compress(&writer.info);
+  jpeg_mem_dest(&writer.info, &writer.bytes, &writer.size);
+  writer.info.image_width = static_cast<JDIMENSION>(image.width);
+  writer.info.image_height = static_cast<JDIMENSION>(image.height);
+  writer.info.input_components = 3;
+  writer.info.in_color_space = JCS_RGB;
+  jpeg_set_defaults(&writer.info);
+  jpeg_set_quality(&writer.info, quality, TRUE);
+  jpeg_start_compress(&writer.info, TRUE);
+  while (writer.info.next_scanline < writer.info.image_height) {
+    JSAMPROW row = writer.pixels.data() + size_t{3} * static_cast<size_t>(image.width) * writer.info.next_scanline;
+    jpeg_write_scanlines(&writer.info, &row, 1);
+  }
+  jpeg_finish_compress(&writer.info);
+  return true;
+}
+
+}  // namespace
+
+Result<std::string> EncodeJpeg(const Image& image, int quality) {
+  if (image.channels != 3 || image.plane() == 0 || std::max(image.width, image.height) > 65500 || quality < 1 ||
+      quality > 100) {
+    return Error{ErrorCode::kBadArgument, Cat("no JPEG of quality ", quality, " of ", image.channels, " channels of ",
+                                              image.width, " x ", image.height, " pixels")};
+  }
+  JpegWriter writer;
+  writer.pixels.resize(image.pixels.size());
+  for (int64_t i = 0; i < image.plane(); ++i) {
+    for (int c = 0; c < 3; ++c) {
+      const float value = std::clamp(image.channel(c)[i], 0.0f, 1.0f) * 255.0f;
+      writer.pixels[static_cast<size_t>(3 * i + c)] = static_cast<JSAMPLE>(std::lround(value));
+    }
+  }
+  if (!WritePixels(writer, image, quality)) {
+    return Error{ErrorCode::kIo, Cat("cannot write a JPEG: ", writer.message)};
+  }
+  return std::string(reinterpret_cast<const char*>(writer.bytes), writer.size);
 }
 
 }  // namespace anchorsplat

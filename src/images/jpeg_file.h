@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <string>
+#include <string_view>
 
 #include "core/image.h"
 #include "core/result.h"
@@ -14,5 +15,12 @@ namespace anchorsplat {
 // Pixels are as stored: an EXIF orientation is not applied, as camera files count in stored pixels.
 Result<Image> DecodeJpeg(std::FILE* file, const std::string& name, uint64_t bytes);
 Result<ImageSize> DecodeJpegSize(std::FILE* file, const std::string& name, uint64_t bytes);
+// The same of a file in memory.
+Result<Image> DecodeJpegBytes(std::string_view bytes, const std::string& name);
+
+// A baseline JPEG as cameras write it, colours at half the resolution: values·255 rounded to nearest, clamped; 3
+// channels. Errors: kBadArgument: other channels, no pixels, sides above 65,500, a quality that is not 1 to 100; kIo:
+// no memory.
+Result<std::string> EncodeJpeg(const Image& image, int quality);
 
 }  // namespace anchorsplat

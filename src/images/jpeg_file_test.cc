@@ -140,5 +140,32 @@ TEST(JpegFile, HugePromisesAreRefused) {
   EXPECT_NE(ReadImage(Written(folder, bytes)).error().message.find("cannot have only"), std::string::npos);
 }
 
+TEST(JpegFile, WhatIsEncodedComesBackNearly) {
+  Image image(37, 21, 3);
+  for (int c = 0; c < 3; ++c) {
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = 0; x < image.width; ++x) image.at(c, y, x) = static_cast<float>(Sample(x, y, c)) / 255.0f;
+    }
+  }
+  const auto distance = [&](int quality) {
+    const auto bytes = EncodeJpeg(image, quality);
+    EXPECT_TRUE(bytes.ok()) << bytes.error().message;
+    const auto back = DecodeJpegBytes(*bytes, "memory");
+    EXPECT_TRUE(back.ok()) << back.error().message;
+    double sum = 0;
+    for (size_t i = 0; i < image.pixels.size(); ++i) {
+      sum += std::abs(static_cast<double>(image.pixels[i]) - static_cast<double>(back->pixels[i]));
+    }
+    return sum / static_cast<double>(image.pixels.size());
+  };
+  EXPECT_LT(distance(95), 0.02);
+  EXPECT_GT(distance(5), 2 * distance(95));
+  EXPECT_EQ(EncodeJpeg(image, 0).error().code, ErrorCode::kBadArgument);
+  EXPECT_EQ(EncodeJpeg(Image(4, 4, 1), 90).error().code, ErrorCode::kBadArgument);
+  const std::string bytes = *EncodeJpeg(image, 80);
+  EXPECT_EQ(DecodeJpegBytes(std::string_view(bytes).substr(0, bytes.size() / 2), "half").error().code,
+            ErrorCode::kBadFile);
+}
+
 }  // namespace
 }  // namespace anchorsplat

@@ -24,6 +24,9 @@ struct FitState {
   GaussianCloud cloud;
   CloudOptimizer optimizer;
   Densification densification;
+  // [V,6] of refinements that align their views: how far each has moved from where its camera says (MotionBetween in
+  // fit/view_pose.h). Empty: they stay.
+  Buffer<float> motions;
   // Files that an interruption leaves besides its checkpoint, by their AbsoluteName: what goes on may replace them.
   std::vector<std::string> left;
 };

@@ -67,6 +67,7 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
   verb.add_flag("--exposure", options.exposure, "Pictures of --images differ in brightness and tint")->group(group);
   verb.add_flag("--robust", options.robust, "Ignore what differs grossly from --images: passers-by, flares")
       ->group(group);
+  verb.add_flag("--align", options.align, "Poses of --images are a little off: optimise them, too")->group(group);
   verb.add_option_function<std::string>("--checkpoint", path(control.checkpoint),
                                         "State to resume from (default: OUTPUT.checkpoint)")
       ->check(NotEmpty())

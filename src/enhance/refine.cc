@@ -161,7 +161,8 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud result, RunRefinement(input, start, resumes, control, views, report));
 
-  ANCHORSPLAT_ASSIGN_OR_RETURN(report.after, MeasureConsistency(result, input.upscale, input.cloud, views));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(report.after,
+                               MeasureConsistency(result, input.upscale, input.cloud, plan.options, views));
   if (!IsWorthIt(plan, report.after)) return timed(KeptStart(std::move(start), std::move(report)));
   return timed({std::move(result), std::move(report)});
 }

@@ -110,6 +110,7 @@ std::vector<MethodOption> RefinementOptions() {
       {"ssim-weight", {}},
       {"exposure", with_images},
       {"robust", with_images},
+      {"align", with_images},
       {"checkpoint", for_steps},
       {"resume", for_steps},
   };

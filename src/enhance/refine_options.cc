@@ -51,6 +51,7 @@ constexpr NamedOption kOptions[] = {
     {"ssim-weight", [](RefineOptions& o, double x) { return Assign(x, o.ssim_weight); }},
     {"exposure", [](RefineOptions& o, double x) { return Assign(x, o.exposure); }},
     {"robust", [](RefineOptions& o, double x) { return Assign(x, o.robust); }},
+    {"align", [](RefineOptions& o, double x) { return Assign(x, o.align); }},
 };
 
 }  // namespace
@@ -110,6 +111,7 @@ std::string ToJsonText(const RefineOptions& o) {
       {"ssim_weight", o.ssim_weight},
       {"exposure", o.exposure},
       {"robust", o.robust},
+      {"align", o.align},
   };
   if (!o.images.empty()) json["split"] = "by residual";
   return json.dump();

@@ -28,6 +28,7 @@ struct RefineOptions {
   double ssim_weight = 0.2;
   bool exposure = false;  // pictures may differ in brightness and tint
   bool robust = false;    // what differs grossly is not in the scene
+  bool align = false;     // the pictures' poses are a little off (fit/view_pose.h)
 };
 
 // How it is run.

@@ -43,8 +43,8 @@ void LimitCopies(int64_t gaussians, RefineOptions& options) {
 Result<RefineOptions> ChooseRefineOptions(const RefineInput& input, const RefineOptions& given) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(given));
   const bool pictures = HasPictures(given), gentle = IsGentle(input, given);
-  if (!pictures && (given.exposure || given.robust)) {
-    return Error{ErrorCode::kBadArgument, "exposure and robust are about photographs; they need --images"};
+  if (!pictures && (given.exposure || given.robust || given.align)) {
+    return Error{ErrorCode::kBadArgument, "exposure, robust and align are about photographs; they need --images"};
   }
   RefineOptions options = given;
   if (!options.seconds) {
@@ -60,7 +60,7 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const RefineOptions&
   RefinePlan plan;
   plan.options = chosen;
   const bool pictures = HasPictures(chosen);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(plan.before, MeasureConsistency(input.start, input.upscale, input.cloud, views));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(plan.before, MeasureConsistency(input.start, input.upscale, input.cloud, chosen, views));
 
   // A splat that was trained on larger pictures than these, or without dilation, knows details that these do not show;
   // learning them by heart costs it those. Measured with fits to views four times as large (docs/refine.md): one that
@@ -69,7 +69,7 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const RefineOptions&
   if (pictures) {
     // A splat that has lost no width is spoiled by what gives it back: the pictures tell.
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double as_it_is,
-                                 MeasureConsistency(input.cloud, input.upscale, input.cloud, views));
+                                 MeasureConsistency(input.cloud, input.upscale, input.cloud, chosen, views));
     if (as_it_is > plan.before) {
       plan.why = "the splat agrees better with the pictures as it is: the refinement begins with that";
       plan.before = as_it_is;

@@ -12,6 +12,8 @@
 #include "enhance/refine_poses.h"
 #include "enhance/refiner.h"
 #include "fit/training_views.h"
+#include "fit/view_exposure.h"
+#include "fit/view_pose.h"
 #include "metrics/image_metrics.h"
 #include "render/shown_range.h"
 
@@ -21,6 +23,7 @@ namespace {
 
 constexpr int64_t kCheckViews = 8;
 constexpr int64_t kResidualViews = 64;
+constexpr int kCheckAlignSteps = 4;
 constexpr double kPerfect = 100;  // dB that stand for identical pictures in means
 
 Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
@@ -76,9 +79,10 @@ Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOption
 }
 
 Result<double> MeasureConsistency(const GaussianCloud& cloud, double upscale, const GaussianCloud& input,
-                                  RefineViews& views) {
+                                  const RefineOptions& options, RefineViews& views) {
   RefineTargets& targets = views.check;
   ViewObjective objective;
+  PoseAligner aligner;
   RefineTarget target;
   double sum = 0;
   const auto count = static_cast<int64_t>(targets.views().size());
@@ -86,9 +90,18 @@ Result<double> MeasureConsistency(const GaussianCloud& cloud, double upscale, co
     const Camera& camera = targets.views()[static_cast<size_t>(view)];
     const PixelBox window = ChooseWindow(camera, input, 0, view);  // the same for whatever is measured
     ANCHORSPLAT_RETURN_IF_ERROR(targets.Load(view, window, target));
+    Camera seen = Crop(camera, window);
+    if (options.align) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(seen, aligner.Align(cloud, RaysOf(PixelModel{1, upscale}, views.render), seen, seen,
+                                                       target.picture, options.exposure, kCheckAlignSteps));
+    }
     ANCHORSPLAT_RETURN_IF_ERROR(
-        objective.Show({.render = views.render, .loss = {}, .pixel = AreaModel(upscale)}, cloud, Crop(camera, window)));
+        objective.Show({.render = views.render, .loss = {}, .pixel = AreaModel(upscale)}, cloud, seen));
     Image shown = objective.rendered();
+    if (options.exposure) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewExposure exposure, EstimateExposure(shown, target.picture));
+      RemoveExposure(exposure, target.picture);
+    }
     Clamp01(shown);
     for (size_t i = 0; i < target.ignored.size(); ++i) {
       if (target.ignored[i] == 0) continue;

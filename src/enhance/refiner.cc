@@ -1,6 +1,7 @@
 #include "enhance/refiner.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -16,7 +17,8 @@ namespace {
 // Of full scale, what detail that is still missing may differ by; in the beginning, when everything may be wrong,
 // nothing is an outlier.
 constexpr double kLeastOutlier = 0.1, kTrustFrom = 0.3;
-constexpr int kTries = 16;  // for a Gaussian that the camera sees
+constexpr int kFirstSteps = 3;  // of alignment, when a view is seen for the first time
+constexpr int kTries = 16;      // for a Gaussian that the camera sees
 
 LearningRates Scaled(LearningRates rates, double factor) {
   for (double* rate : {&rates.means, &rates.scales, &rates.opacities, &rates.quats, &rates.sh0, &rates.sh_rest}) {
@@ -82,6 +84,28 @@ void Refiner::AdjustTarget(double done) {
   }
 }
 
+// Where the view's picture was taken, as far as the candidate says now: a step nearer than the last time.
+Result<Camera> Refiner::AlignedView(int64_t view, const PixelBox& window) {
+  Buffer<float>& motions = state_.motions;
+  const Camera& origin = targets_.views()[static_cast<size_t>(view)];
+  if (motions.size() != 6 * targets_.views().size()) motions.assign(6 * targets_.views().size(), 0.0f);
+  float* motion = motions.data() + 6 * view;
+  const auto placed = [&] {
+    std::array<double, 6> at;
+    std::copy_n(motion, 6, at.begin());
+    return Moved(origin, at);
+  };
+  const bool first_time = state_.step < static_cast<int64_t>(targets_.views().size());
+  // One ray per pixel tells well enough where things are.
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      const Camera found,
+      aligner_.Align(state_.cloud, RaysOf(PixelModel{1, problem_.upscale}, problem_.render), Crop(origin, window),
+                     Crop(placed(), window), target_.picture, options_.exposure, first_time ? kFirstSteps : 1));
+  const std::array<double, 6> moved = MotionBetween(origin, found);
+  std::transform(moved.begin(), moved.end(), motion, [](double x) { return static_cast<float>(x); });
+  return placed();
+}
+
 Result<FitStep> Refiner::Step(double done) {
   Stopwatch watch;
   const int64_t step = state_.step;
@@ -96,7 +120,11 @@ Result<FitStep> Refiner::Step(double done) {
   objective.render = problem_.render;
   objective.loss.ssim_weight = options_.ssim_weight;
   objective.pixel = PixelModelAt({problem_.upscale, options_.half_from, options_.all_from}, done);
-  const Camera camera = Crop(view, window);
+  Camera camera = Crop(view, window);
+  if (options_.align) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Camera aligned, AlignedView(out.view, window));
+    camera = Crop(aligned, window);
+  }
   ANCHORSPLAT_RETURN_IF_ERROR(objective_.Show(objective, state_.cloud, camera));
   AdjustTarget(done);
   ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Compare(objective, state_.cloud, target_.picture, gradient_));

@@ -9,6 +9,7 @@
 #include "fit/fitter.h"
 #include "fit/view_objective.h"
 #include "fit/view_order.h"
+#include "fit/view_pose.h"
 
 namespace anchorsplat {
 
@@ -23,6 +24,8 @@ struct RefineProblem {
 // The iterations of a refinement, one at a time: a view and a window of it, what the candidate shows there when seen
 // `upscale` times closer and averaged down to the view's pixels, how far that is from the target, a step of Adam.
 // Learning rates are those of fits times options.rate (1 when it is not given), and fall to options.rate_decay of that.
+//
+// With options.align the pictures' cameras move while it runs, a step of fit/view_pose.h whenever a view is looked at.
 //
 // The state is that of a fit (fit/fitter.h) and is written and read like one. Same bits for any number of threads.
 class Refiner {
@@ -43,6 +46,7 @@ class Refiner {
  private:
   Refiner(const RefineOptions& options, const RefineProblem& problem, RefineTargets targets, FitState state);
   void AdjustTarget(double done);
+  Result<Camera> AlignedView(int64_t view, const PixelBox& window);
 
   RefineOptions options_;
   RefineProblem problem_;
@@ -52,6 +56,7 @@ class Refiner {
   ViewObjective objective_;
   CloudGradient gradient_;
   RefineTarget target_;
+  PoseAligner aligner_;
   FitTimes times_;
 };
 

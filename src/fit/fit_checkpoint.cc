@@ -31,6 +31,8 @@ bool IsFormatBefore(const std::string& format) {
   return std::find(kFormatsBefore.begin(), kFormatsBefore.end(), format) != kFormatsBefore.end();
 }
 
+constexpr const char* kMotions = "views.motions";
+
 // An array of the state and what it is called in the file.
 template <typename Array>
 struct Named {
@@ -94,6 +96,9 @@ Status WriteFitCheckpoint(const std::filesystem::path& path, const FitState& sta
   for (const auto& array :
        ArraysOf<const FitState, const Buffer<float>>(state, state.cloud.size(), state.cloud.coefficients())) {
     if (array.held) entries.push_back(MakeEntry(array.name, array.shape, *array.values));
+  }
+  if (!state.motions.empty()) {
+    entries.push_back(MakeEntry(kMotions, {static_cast<int64_t>(state.motions.size()) / 6, 6}, state.motions));
   }
   std::string left;
   for (const std::string& file : state.left) left += file + '\n';
@@ -196,6 +201,10 @@ Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std:
     if (optional && file.Find(array.name) == nullptr) continue;
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values values, file.ReadFloat32(array.name, array.shape));
     array.values->assign(values.values().begin(), values.values().end());
+  }
+  if (const TensorEntry* motions = file.Find(kMotions)) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values values, file.ReadFloat32(kMotions, motions->shape));
+    state.motions.assign(values.values().begin(), values.values().end());
   }
   return state;
 }

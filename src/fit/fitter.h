@@ -26,6 +26,9 @@ struct FitState {
   CloudOptimizer optimizer;
   Densification densification;  // of nothing where the strategy gathers nothing
   Buffer<float> mip_filter;     // [N] world units, MipFilterSizes; empty where the fit has no such filter
+  // [V,6] of refinements that align their views: how far each has moved from where its camera says (MotionBetween in
+  // fit/view_pose.h). Empty: they stay.
+  Buffer<float> motions;
   // Files that an interruption leaves besides its checkpoint, by their AbsoluteName: what goes on may replace them.
   std::vector<std::string> left;
 };

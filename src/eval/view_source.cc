@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "cameras/camera_checks.h"
+#include "core/credit.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
@@ -43,6 +44,7 @@ class SplatViewSource : public ViewSource {
     Clamp01(image);
     return image;
   }
+  std::vector<std::string> credits() const override { return CreditsOf(cloud_.comments); }
   void KeepOnly(size_t view) override {
     cameras_.cameras = {cameras_.cameras[view]};
     names_ = {names_[view]};

@@ -25,6 +25,8 @@ class ViewSource {
   virtual Result<ImageSize> SizeOf(size_t view) const = 0;  // without rendering or decoding
   // Three channels in 0–1: renders are clamped and not quantised, files are byte/255 over the background.
   virtual Result<Image> Load(size_t view) = 0;
+  // Whose what is shown is, as far as its file says so (core/credit.h).
+  virtual std::vector<std::string> credits() const { return {}; }
   // Forgets all views but this one.
   virtual void KeepOnly(size_t view) = 0;
 };

@@ -150,7 +150,7 @@ struct Layout {
   int margin;
   int line;  // a frame's thickness
   int caption_height;
-  int view_y, enlarged_y, difference_y, height;
+  int view_y, enlarged_y, difference_y, credit_y, height;
 
   int x(size_t column_index) const { return margin + static_cast<int>(column_index) * (column + margin); }
   int centred(const PanelSize& panel) const { return (column - panel.width) / 2; }
@@ -183,7 +183,8 @@ Layout Arrange(std::span<const LabelledImage> images, const SideBySideOptions& o
   const int enlarged_end = l.enlarged_y + l.enlarged.height;
   const bool maps = options.differences && images.size() > 1;
   l.difference_y = enlarged_end + l.margin + l.caption_height;
-  l.height = (maps ? l.difference_y + l.view.height : enlarged_end) + l.margin;
+  l.credit_y = (maps ? l.difference_y + l.view.height : enlarged_end) + l.margin;
+  l.height = l.credit_y + (options.credit.empty() ? 0 : l.caption_height + l.margin / 2);
   return l;
 }
 
@@ -304,6 +305,9 @@ Result<Image> SideBySide(std::span<const LabelledImage> images, const SideBySide
     } else {
       DrawHeatScale(canvas, options.gain, l, l.x(i));
     }
+  }
+  if (!options.credit.empty()) {
+    DrawCaption(canvas, l.margin, l.credit_y, canvas.width - 2 * l.margin, options.credit, l.scale, kDimText);
   }
   return canvas;
 }

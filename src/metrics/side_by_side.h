@@ -28,6 +28,7 @@ struct SideBySideOptions {
       std::nullopt;         // the part itself; chosen by MostDifferentRegion where it is not given
   bool differences = true;  // the row of difference maps
   float gain = 4;           // their brightest colour stands for a difference of 1 / gain
+  std::string credit = "";  // last line of the picture: whose the things shown are; may be empty
 };
 
 // The region of the given size where `a` and `b` differ most (sum of absolute differences); where they are equal, the

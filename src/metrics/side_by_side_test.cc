@@ -91,6 +91,26 @@ TEST(SideBySide, ShowsOriginalPixelsInTheEnlargedPart) {
   }
 }
 
+TEST(SideBySide, EndsWithTheCredit) {
+  const Image truth = NoiseImage(100, 80, 2);
+  const LabelledImage images[] = {{"before", "", &truth}, {"truth", "", &truth}};
+  const auto without = SideBySide(images), with = SideBySide(images, {.credit = "Mug by Ann, CC BY 4.0"});
+  ASSERT_TRUE(without.ok() && with.ok());
+  ASSERT_EQ(with->width, without->width);
+  ASSERT_GT(with->height, without->height + kCapitalHeight);
+  int letters = 0;
+  for (int y = 0; y < with->height; ++y) {
+    for (int x = 0; x < with->width; ++x) {
+      if (y < without->height - 4) {
+        ASSERT_EQ(with->at(0, y, x), without->at(0, y, x)) << x << ' ' << y;
+      } else {
+        letters += with->at(0, y, x) > 0.5f;
+      }
+    }
+  }
+  EXPECT_GT(letters, 100);
+}
+
 TEST(SideBySide, MapsAreProportionalToTheGain) {
   const Image a = Filled(64, 64, 3, 0.5f), b = Filled(64, 64, 3, 0.5f);
   const LabelledImage equal[] = {{"a", "1", &a}, {"b", "2", &b}};

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "core/credit.h"
 #include "core/framing.h"
 #include "core/parallel.h"
 #include "core/text.h"
@@ -157,6 +158,16 @@ std::array<double, 3> WorldUpOf(const ViewerPage& page) {
   return (page.before ? UpOf(page.before->cloud->comments) : std::nullopt).value_or(kUsualUp);
 }
 
+// Of both splats, each once.
+std::vector<std::string> CreditsOf(const ViewerPage& page) {
+  std::vector<std::string> credits = CreditsOf(page.after.cloud->comments);
+  if (!page.before) return credits;
+  for (std::string& credit : CreditsOf(page.before->cloud->comments)) {
+    if (std::find(credits.begin(), credits.end(), credit) == credits.end()) credits.push_back(std::move(credit));
+  }
+  return credits;
+}
+
 // Replaces the one occurrence of `mark`; the template is ours, so it is there.
 void Substitute(std::string& text, std::string_view mark, std::string_view value) {
   text.replace(text.find(mark), mark.size(), value);
@@ -220,6 +231,7 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
                             {"pixelSize", page.pixel_size ? Json(*page.pixel_size) : Json()},
                             {"background", page.background},
                             {"up", WorldUpOf(page)},
+                            {"credits", CreditsOf(page)},
                             // The page draws with the renderer's own numbers.
                             {"constants",
                              {{"minAlpha", kMinAlpha},

@@ -42,8 +42,8 @@ struct ViewerPage {
 };
 
 // One HTML file that shows the splats in any browser with WebGL 2, from disk, with no network: the clouds quantised
-// (quantized_cloud.h), deflated and in base64, the page's own code beside them. The modes of rendering
-// follow each cloud's `render_mode`.
+// (quantized_cloud.h), deflated and in base64, the page's own code beside them. The modes of rendering follow each
+// cloud's `render_mode`. Credits in the clouds' comments (core/credit.h) stand on the page.
 // Errors: kExists; kIo; kNotFound or kBadFile (a picture that is missing or neither PNG nor JPEG); kBadArgument: a
 // cloud without usable Gaussians, a pixel size that is not positive, a page above `max_bytes`.
 Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page, const WriteOptions& options = {});

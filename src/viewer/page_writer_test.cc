@@ -210,6 +210,21 @@ TEST(PageWriter, ItsOwnFilesStayInsideTheirElements) {
   EXPECT_TRUE(PageFile("nothing").empty());
 }
 
+TEST(PageWriter, CarriesTheCreditsOfItsSplats) {
+  TestFolder folder;
+  GaussianCloud before = FittedLookingCloud(10, 0, 1), after = before;
+  before.comments = {"credit: Mug by Ann, CC BY 4.0", "credit: </script><b>"};
+  after.comments = {"credit: Mug by Ann, CC BY 4.0"};
+  ViewerPage page;
+  page.after = {&after, "after", {}};
+  page.before = ViewerSplat{&before, "before", {}};
+  ASSERT_TRUE(WriteViewerPage(folder / "page.html", page).ok());
+  const std::string text = FileText(folder / "page.html");
+  EXPECT_EQ(nlohmann::json::parse(ElementText(text, "description"))["credits"],
+            (nlohmann::json{"Mug by Ann, CC BY 4.0", "</script><b>"}));
+  EXPECT_EQ(text.find("<b>"), std::string::npos);
+}
+
 TEST(PageWriter, HostileNamesStayText) {
   TestFolder folder;
   const GaussianCloud cloud = FittedLookingCloud(10, 0, 1);

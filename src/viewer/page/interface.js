@@ -176,6 +176,8 @@ function fillCard(description) {
     text.title = term.title = more.join(', ');
     byId('facts').append(term, text);
   }
+  byId('credits').textContent = description.credits.join('; ');
+  byId('credits').hidden = description.credits.length === 0;
 }
 
 function fillViews(names, pictures, viewer) {

@@ -30,6 +30,7 @@ nlohmann::json ToJson(const PixelSizeCheck& check) {
   for (const PixelSizeCheck::Sample& sample : check.samples) {
     json["samples"].push_back({{"size", sample.size}, {"features", sample.features}});
   }
+  if (!check.samples.empty()) json["best_strength"] = check.best_strength;
   return json;
 }
 

@@ -30,6 +30,11 @@ constexpr size_t kMostGaussians = 200'000;
 // middle and this small count, in units of the radius that frames the cloud.
 constexpr double kFarthest = 1.5;
 constexpr double kLargestAxis = 0.25;
+// Brightness, that of the constant colour's brightest channel, up to which a Gaussian counts as unseen over black, and
+// from which on as seen.
+constexpr float kUnseen = 0.02f, kSeen = 0.1f;
+constexpr float kConstantHarmonic = 0.28209479177387814f;
+constexpr std::array<double, 4> kSizeQuantiles = {0.1, 0.25, 0.5, 0.75};
 
 // Value at which `share` of the total weight is reached. `items` are (value, weight).
 double WeightedQuantile(std::vector<std::pair<float, double>>& items, double share) {
@@ -71,13 +76,16 @@ GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing, double
   std::sort(rows.begin(), rows.end());
   GaussianCloud out;
   out.Resize(static_cast<int64_t>(rows.size()), 0);
-  std::fill(out.sh.begin(), out.sh.end(), 0.0f);
   for (size_t k = 0; k < rows.size(); ++k) {
     const int64_t i = rows[k];
     std::copy_n(cloud.means.data() + 3 * i, 3, out.means.data() + 3 * k);
     std::copy_n(cloud.log_scales.data() + 3 * i, 3, out.log_scales.data() + 3 * k);
     std::copy_n(cloud.quats.data() + 4 * i, 4, out.quats.data() + 4 * k);
     out.opacity_logits[k] = cloud.opacity_logits[static_cast<size_t>(i)];
+    const float* sh = cloud.sh.data() + i * cloud.sh_stride();
+    const float brightness = 0.5f + kConstantHarmonic * std::max({sh[0], sh[1], sh[2]});
+    const float seen = std::clamp((brightness - kUnseen) / (kSeen - kUnseen), 0.0f, 1.0f);
+    std::fill_n(out.sh.data() + 3 * k, 3, (seen - 0.5f) / kConstantHarmonic);
   }
   return out;
 }
@@ -101,6 +109,32 @@ std::optional<double> AxisOfSmallGaussians(const GaussianCloud& cloud) {
   return std::sqrt(double{WeightedQuantile(middle, 0.1)} * double{WeightedQuantile(largest, 0.1)});
 }
 
+// SizeFeatures with d = 1.
+SizeFeatures SizesOf(const GaussianCloud& cloud) {
+  std::array<std::vector<std::pair<float, double>>, 4> values;  // the three axes, ascending, and opacity
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    const float opacity = Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]);
+    if (opacity < kVisibleOpacity) continue;
+    std::array<float, 3> axes;
+    for (size_t a = 0; a < 3; ++a) axes[a] = std::exp(cloud.log_scales[static_cast<size_t>(3 * i) + a]);
+    std::sort(axes.begin(), axes.end());
+    const double weight = double{opacity} * axes[1] * axes[2];
+    if (!(weight > 0)) continue;
+    for (size_t a = 0; a < 3; ++a) values[a].emplace_back(axes[a], weight);
+    values[3].emplace_back(opacity, weight);
+  }
+  SizeFeatures features{};
+  size_t next = 0;
+  for (size_t kind = 0; kind < values.size(); ++kind) {
+    for (const double quantile : kSizeQuantiles) {
+      const double value = values[kind].empty() ? 1 : WeightedQuantile(values[kind], quantile);
+      features[next++] = kind == 3 ? value : std::log(std::max(value, 1e-30));
+    }
+  }
+  features[next] = std::log(static_cast<double>(std::max<size_t>(1, values[0].size())));
+  return features;
+}
+
 }  // namespace
 
 Result<PixelSizeProbe> PixelSizeProbe::Make(const GaussianCloud& whole) {
@@ -114,6 +148,7 @@ Result<PixelSizeProbe> PixelSizeProbe::Make(const GaussianCloud& whole) {
                  Cat("fewer than ", kLeastGaussians, " visible Gaussians to estimate a pixel size from")};
   }
   probe.start_ = *start;
+  probe.sizes_ = SizesOf(probe.cloud_);
   const Pinhole intrinsics = PinholeFromFov(kRenderSize, kRenderSize, kFieldOfView);
   probe.distance_ = FramingDistance({framing.target, radius}, intrinsics);
   probe.farthest_pixel_ = probe.distance_ / intrinsics.fx;
@@ -121,45 +156,59 @@ Result<PixelSizeProbe> PixelSizeProbe::Make(const GaussianCloud& whole) {
   return probe;
 }
 
-Result<PixelSizeProbe::OutlineValues> PixelSizeProbe::AtStep(int step) {
-  if (const auto known = known_.find(step); known != known_.end()) return known->second;
+Result<PixelSizeProbe::OutlineValues> PixelSizeProbe::AtStep(int step, Look look) {
+  if (const auto known = known_.find({look, step}); known != known_.end()) return known->second;
   const double size = start_ * std::exp2(step * kOctavesPerStep);
   const double pixel = std::min(farthest_pixel_, size / kSamples);
   RenderOptions options;
   const double in_pixels = size / pixel;
   options.dilation = static_cast<float>(kDilation * in_pixels * in_pixels);
-  options.sh_degree = 0;                                            // only alpha is looked at
+  options.mode = look == Look::kAntialiased ? RenderMode::kAntialiased : RenderMode::kClassic;
   options.near_plane = static_cast<float>(kNearPlane * distance_);  // scales with the cloud, as all does
   options.far_plane = static_cast<float>(distance_ / kNearPlane);
-  OutlineProfile profile;
+  OutlineProfile alpha, over_black;
   for (Camera& camera : cameras_.cameras) {
     camera.intrinsics.fx = camera.intrinsics.fy = distance_ / pixel;
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud_, camera, options, output_));
-    profile.Add(output_.alpha, pixel / size);
+    alpha.Add(output_.alpha, pixel / size);
+    if (look == Look::kAntialiased) continue;
+    output_.color.pixels.resize(output_.alpha.pixels.size());  // all channels are equal
+    output_.color.channels = 1;
+    over_black.Add(output_.color, pixel / size);
   }
-  return known_[step] = profile.Values();
+  if (look == Look::kAntialiased) return known_[{look, step}] = alpha.Values();
+  // The classic picture shows both.
+  known_[{Look::kAlpha, step}] = alpha.Values();
+  known_[{Look::kOverBlack, step}] = over_black.Values();
+  return known_[{look, step}];
 }
 
-Result<PixelSizeProbe::OutlineValues> PixelSizeProbe::ProfileAt(double size) {
+Result<PixelSizeProbe::OutlineValues> PixelSizeProbe::ProfileAt(double size, Look look) {
   const double at = std::clamp(std::log2(size / start_) / kOctavesPerStep, -kMostSteps, kMostSteps);
   const double below = std::floor(at), part = at - below;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(OutlineValues values, AtStep(static_cast<int>(below)));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutlineValues values, AtStep(static_cast<int>(below), look));
   if (part == 0) return values;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const OutlineValues above, AtStep(static_cast<int>(below) + 1));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OutlineValues above, AtStep(static_cast<int>(below) + 1, look));
   for (size_t k = 0; k < kOutlineValues; ++k) values[k] += part * (above[k] - values[k]);
   return values;
 }
 
-Result<PixelSizeFeatures> PixelSizeProbe::At(double size) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const OutlineValues smaller, ProfileAt(size / std::numbers::sqrt2));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const OutlineValues middle, ProfileAt(size));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const OutlineValues larger, ProfileAt(size * std::numbers::sqrt2));
+Result<PixelSizeFeatures> PixelSizeProbe::At(double size, Look look) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OutlineValues smaller, ProfileAt(size / std::numbers::sqrt2, look));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OutlineValues middle, ProfileAt(size, look));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OutlineValues larger, ProfileAt(size * std::numbers::sqrt2, look));
   PixelSizeFeatures features{};
   for (size_t k = 0; k < kOutlineValues; ++k) {
     features[k] = middle[k];
     features[kOutlineValues + k] = larger[k] - smaller[k];
     features[2 * kOutlineValues + k] = larger[k] + smaller[k] - 2 * middle[k];
   }
+  return features;
+}
+
+SizeFeatures PixelSizeProbe::SizesAt(double size) const {
+  SizeFeatures features = sizes_;
+  for (size_t k = 0; k < 3 * kSizeQuantiles.size(); ++k) features[k] -= std::log(size);
   return features;
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <utility>
 
 #include "core/camera.h"
 #include "core/gaussian_cloud.h"
@@ -25,6 +26,18 @@ using PixelSizeFeatures = std::array<double, kPixelSizeFeatures>;  // natural lo
 
 inline constexpr int64_t kLeastGaussians = 16;
 
+// What is looked at. Alpha as the classic rasterizer and as the antialiased one draw it: they differ by what a fit of
+// the other kind has given up of its width or of its opacity. And what would be seen over black, the background of most
+// fits: Gaussians that are black themselves hide what is behind them and show nothing.
+enum class Look { kAlpha, kAntialiased, kOverBlack };
+inline constexpr size_t kLooks = 3;
+
+// Sizes, opacities and number of the Gaussians that show: natural logarithms of the 10, 25, 50 and 75 % quantiles of
+// the smallest, middle and largest axis in units of d, weighted by opacity × area; the quantiles of the opacity
+// (not logarithms), and ln of the number of Gaussians.
+inline constexpr size_t kSizeFeatures = 17;
+using SizeFeatures = std::array<double, kSizeFeatures>;
+
 class PixelSizeProbe {
  public:
   // Only Gaussians near the middle of the cloud and small beside it are looked at, and at most 200,000 of them.
@@ -37,13 +50,16 @@ class PixelSizeProbe {
   // The features of pixels of `size` (world units at the middle of the cloud). Pictures are made at half octaves from
   // start(), within six octaves, and only once; between them the logarithms are linear. Lengths scale with the cloud:
   // a cloud made c times as large has the same features at c times the size.
-  Result<PixelSizeFeatures> At(double size);
+  Result<PixelSizeFeatures> At(double size, Look look = Look::kAlpha);
+
+  // Of pixels of `size`.
+  SizeFeatures SizesAt(double size) const;
 
  private:
   using OutlineValues = std::array<double, kOutlineValues>;
   PixelSizeProbe() = default;
-  Result<OutlineValues> AtStep(int step);
-  Result<OutlineValues> ProfileAt(double size);
+  Result<OutlineValues> AtStep(int step, Look look);
+  Result<OutlineValues> ProfileAt(double size, Look look);
 
   GaussianCloud cloud_;
   CameraSet cameras_;
@@ -51,7 +67,8 @@ class PixelSizeProbe {
   double farthest_pixel_ = 0;  // world size of a picture's pixel where the whole cloud is in it; none is larger
   Rasterizer rasterizer_;
   RenderOutput output_;
-  std::map<int, OutlineValues> known_;
+  SizeFeatures sizes_{};  // with d = 1
+  std::map<std::pair<Look, int>, OutlineValues> known_;
 };
 
 }  // namespace anchorsplat

@@ -19,9 +19,10 @@ struct PixelSizeCheck {
   double seconds = 0;  // of the estimate
   struct Sample {
     double size = 0;
-    PixelSizeFeatures features{};
+    std::vector<double> features;  // of every Look, then SizeFeatures
   };
   std::vector<Sample> samples;  // at truth · 2^(k/4), |k| ≤ 5, in order; empty unless asked for
+  double best_strength = 0;     // of the filter, on a few held-out views; measured with the samples
 };
 
 Result<PixelSizeCheck> CheckPixelSize(const BenchmarkObject& object, bool with_samples);

@@ -125,7 +125,7 @@ TEST_F(Plan, WhatHasNoEffectIsRefused) {
 
 TEST_F(Plan, RefinementSaysWhatItsOptionsNeed) {
   options_.method = "refine";
-  for (const char* name : {"hold-out", "exposure", "robust"}) {
+  for (const char* name : {"hold-out", "exposure", "robust", "align"}) {
     EXPECT_THAT(Given(name), HasSubstr("it has one with --images")) << name;
   }
   EXPECT_EQ(Given("poses"), "");
@@ -145,7 +145,7 @@ TEST_F(Plan, RefinementSaysWhatItsOptionsNeed) {
   EXPECT_THAT(Given("checkpoint"), HasSubstr("without --seconds"));
   options_.refine.images = "pictures";
   options_.refine.copies.reset();
-  for (const char* name : {"hold-out", "exposure", "robust", "most-gaussians", "filter-strength"}) {
+  for (const char* name : {"hold-out", "exposure", "robust", "align", "most-gaussians", "filter-strength"}) {
     EXPECT_EQ(Given(name), "") << name;
   }
   EXPECT_THAT(Given("between"), HasSubstr("without --images"));

@@ -11,6 +11,7 @@
 #include "enhance/refinement_for_test.h"
 #include "fit/orbit_scene_for_test.h"
 #include "fit/training_views.h"
+#include "fit/view_pose.h"
 #include "images/image_io.h"
 
 namespace anchorsplat {
@@ -134,6 +135,24 @@ TEST_F(Refinement, PhotographsMayDifferInExposure) {
   const auto exposed = Refine(input_, options_, {});
   ASSERT_TRUE(plain.ok() && exposed.ok());
   EXPECT_GT(PsnrCloser(exposed->cloud), PsnrCloser(plain->cloud) + 1);
+  options_.images.clear();
+  EXPECT_FALSE(Refine(input_, options_, {}).ok());
+}
+
+TEST_F(Refinement, PosesOfPhotographsMayBeALittleOff) {
+  CameraSet said = cameras_;
+  Random random(9);
+  for (Camera& camera : said.cameras) {
+    const double pixel = 1 / camera.intrinsics.fx;
+    camera = Moved(camera, {random.Uniform(-1, 1) * pixel, random.Uniform(-1, 1) * pixel, 0, 0, 0, 0});
+  }
+  ASSERT_TRUE(WriteTransforms(project() / "transforms.json", said, {.overwrite = true}).ok());
+  const auto plain = Refine(input_, options_, {});
+  options_.align = true;
+  const auto aligned = Refine(input_, options_, {});
+  ASSERT_TRUE(plain.ok() && aligned.ok());
+  EXPECT_GT(PsnrCloser(aligned->cloud), PsnrCloser(plain->cloud) + 1);
+  EXPECT_GT(aligned->report.after, plain->report.after + 1) << "the verdict looks where the pictures were taken";
   options_.images.clear();
   EXPECT_FALSE(Refine(input_, options_, {}).ok());
 }

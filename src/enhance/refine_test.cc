@@ -83,6 +83,7 @@ TEST_F(Refinement, SameBitsForAnyNumberOfThreads) {
 }
 
 TEST_F(Refinement, GoesOnWhereItWasStopped) {
+  options_.align = true;  // more to remember
   const auto whole = Refine(input_, options_, {});
   ASSERT_TRUE(whole.ok());
   std::atomic<bool> stop{true};  // after the first step

@@ -1,24 +1,21 @@
 #include "dataset/object_fit.h"
 
-#include "core/text.h"
 #include "fit/initial_cloud.h"
 
 namespace anchorsplat {
 
 Result<FitOptions> ToFitOptions(const ObjectSettings& settings, double upscale,
                                 const std::array<float, 3>& background) {
-  FitOptions options = FitOptionsFor(settings.fit_steps);
+  constexpr FitPreset kPresets[] = {FitPreset::kDefault, FitPreset::kMcmc, FitPreset::kAbsgrad};  // by FitStrategy
+  FitOptions options = FitOptionsFor(settings.fit_steps, kPresets[static_cast<size_t>(settings.strategy)]);
   options.seed = settings.seed;
   options.densification.max_gaussians = settings.max_gaussians;
   options.objective.render.background = background;
   options.objective.render.sh_degree = settings.sh_degree;
   options.objective.render.mode = settings.mode;
   options.pixel.upscale = settings.pixel_area ? upscale : 1;
-  if (settings.strategy != FitStrategy::kDefault) {
-    const char* name = kStrategyNames[static_cast<size_t>(settings.strategy)];
-    return Error{ErrorCode::kBadArgument, Cat("fits know no strategy \"", name, "\" yet")};
-  }
-  if (settings.mip_filter) return Error{ErrorCode::kBadArgument, "fits know no mip_filter yet"};
+  if (options.strategy == Strategy::kMcmc) options.mcmc.cap_max = settings.max_gaussians;
+  if (settings.mip_filter) UseMipFilter(options);
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options));
   return options;
 }
@@ -26,7 +23,7 @@ Result<FitOptions> ToFitOptions(const ObjectSettings& settings, double upscale,
 Result<GaussianCloud> InitialCloudOf(const ObjectSettings& settings, const FitOptions& options,
                                      const TrainingViews& views) {
   const int64_t count = settings.init_points > 0 ? settings.init_points : kRandomPoints;
-  const InitialCloudOptions start{.sh_degree = options.objective.render.sh_degree, .seed = options.seed};
+  const InitialCloudOptions start = StartOptions(options);
   switch (settings.start) {
     case FitStart::kRandom:
       return InitialCloud(RandomPoints(count, views.scene_scale, settings.seed), views.scene_scale, start);

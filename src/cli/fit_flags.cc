@@ -81,7 +81,7 @@ void FitFlags::AddTo(CLI::App& verb) {
             "Who comes and goes: default: Kerbl et al.; absgrad: the same by absolute gradients, for fine detail "
             "(AbsGS); mcmc: a number of Gaussians that move to where they are needed");
   verb.add_flag("--mip-filter", mip_filter,
-                "Smooth every Gaussian by the pixel of the closest camera, as Mip-Splatting does; implies antialiased");
+                "Smooth every Gaussian by the pixel of the closest camera, as Mip-Splatting does; implies --mode mip");
   verb.add_option("--hold-out", hold_out, "Hold out every Nth view, by name; 0: none")
       ->check(CLI::Range(0, 1 << 30))
       ->capture_default_str();

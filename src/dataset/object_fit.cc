@@ -6,8 +6,7 @@ namespace anchorsplat {
 
 Result<FitOptions> ToFitOptions(const ObjectSettings& settings, double upscale,
                                 const std::array<float, 3>& background) {
-  constexpr FitPreset kPresets[] = {FitPreset::kDefault, FitPreset::kMcmc, FitPreset::kAbsgrad};  // by FitStrategy
-  FitOptions options = FitOptionsFor(settings.fit_steps, kPresets[static_cast<size_t>(settings.strategy)]);
+  FitOptions options = FitOptionsFor(settings.fit_steps, settings.strategy);
   options.seed = settings.seed;
   options.densification.max_gaussians = settings.max_gaussians;
   options.objective.render.background = background;

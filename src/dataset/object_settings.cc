@@ -134,7 +134,7 @@ Status TakeKind(const JsonValue& json, ObjectSettings& s) {
   }
   if (json.has("strategy")) {
     ANCHORSPLAT_RETURN_IF_ERROR(TakeNamed(json, "strategy", kStrategyNames, name));
-    s.strategy = static_cast<FitStrategy>(name);
+    s.strategy = static_cast<FitPreset>(name);
   }
   if (json.has("mip_filter")) ANCHORSPLAT_RETURN_IF_ERROR(TakeFlag(json, "mip_filter", s.mip_filter));
   if (json.has("defects")) ANCHORSPLAT_RETURN_IF_ERROR(TakeDefects(json, s.defects));
@@ -224,7 +224,7 @@ Status Validate(const ObjectSettings& s) {
   }
   if (s.init_points > kMostInitPoints) return bad(Cat("a fit begins with at most ", kMostInitPoints, " points"));
   if (s.sh_degree < 0 || s.sh_degree > kMaxShDegree) return bad(Cat("sh_degree ", s.sh_degree, " is not in 0 to 3"));
-  if (s.strategy == FitStrategy::kMcmc && s.max_gaussians == 0) {
+  if (s.strategy == FitPreset::kMcmc && s.max_gaussians == 0) {
     return bad("strategy mcmc grows to a bound: max_gaussians says how many");
   }
   if (s.mip_filter && (s.pixel_area || s.mode != RenderMode::kClassic)) {

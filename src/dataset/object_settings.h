@@ -22,8 +22,7 @@ enum class FitStart {
 inline constexpr const char* kFitStartNames[] = {"surface", "random", "view"};  // by FitStart
 
 // What decides which Gaussians come and go in a fit (`fit --strategy`).
-enum class FitStrategy { kDefault, kMcmc, kAbsgrad };
-inline constexpr const char* kStrategyNames[] = {"default", "mcmc", "absgrad"};  // by FitStrategy
+inline constexpr const char* kStrategyNames[] = {"default", "absgrad", "mcmc"};  // by FitPreset
 
 // Everything an object of the data set is made with: equal settings and an equal mesh make equal files.
 struct ObjectSettings {
@@ -41,7 +40,7 @@ struct ObjectSettings {
   int sh_degree = kMaxShDegree;
   RenderMode mode = RenderMode::kClassic;
   bool pixel_area = false;  // the fit's pixels are means over their area (fit/pixel_model.h)
-  FitStrategy strategy = FitStrategy::kDefault;
+  FitPreset strategy = FitPreset::kDefault;
   bool mip_filter = false;  // Mip-Splatting's 3-D smoothing filter in training, fused on export
   PictureDefects defects;   // of the pictures and poses that the fit sees
   bool backdrop = false;    // the object stands in a textured room (backdrop.h); meshes only

@@ -33,7 +33,7 @@ ObjectSettings Unusual() {
   s.sh_degree = 1;
   s.mode = RenderMode::kAntialiased;
   s.pixel_area = true;
-  s.strategy = FitStrategy::kAbsgrad;
+  s.strategy = FitPreset::kAbsgrad;
   s.defects = {.noise = 3.5, .jpeg = 70, .exposure = 0.1, .pose = 0.3, .mask = 1, .defocus = 0.75};
   s.backdrop = true;
   s.from = "standard";

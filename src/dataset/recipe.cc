@@ -115,7 +115,7 @@ Status TakePixel(const Item& item, ObjectSettings& s) {
 
 Status TakeStrategy(const Item& item, ObjectSettings& s) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t name, ChooseName(item, kStrategyNames));
-  s.strategy = static_cast<FitStrategy>(name);
+  s.strategy = static_cast<FitPreset>(name);
   return {};
 }
 

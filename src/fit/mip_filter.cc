@@ -12,7 +12,6 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr float kKernelSize = 0.1f;     // px², of the 2-D filter
 constexpr double kFilterMargin = 0.15;  // of the picture's sides
 constexpr int64_t kFilterRows = 4096;
 
@@ -62,8 +61,8 @@ void Smooth(const GaussianCloud& cloud, std::span<const float> sizes, float* log
 }  // namespace
 
 RenderOptions MipRendering(RenderOptions render) {
-  render.mode = RenderMode::kAntialiased;
-  render.dilation = kKernelSize;
+  render.mode = RenderMode::kMip;
+  render.dilation = std::nullopt;
   return render;
 }
 

@@ -22,7 +22,7 @@ namespace anchorsplat {
 inline constexpr double kMipVariance = 0.2;  // of the filter, pixels² of that camera
 
 // How such a fit is rendered while it is made and measured: its 2-D filter is 0.1 px², which opacity is compensated for
-// (section 5.2; the program's kernel_size). The one place that says so.
+// (section 5.2; the program's kernel_size): RenderMode::kMip.
 RenderOptions MipRendering(RenderOptions render);
 
 // f of every Gaussian: [N] world units, from means [N,3] world. A camera sees a mean beyond `near_plane` (world units

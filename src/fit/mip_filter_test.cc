@@ -147,8 +147,8 @@ TEST(MipFilter, GradientOfAPictureMatchesDifferenceQuotients) {
   FilteredScene s;
   const Camera camera = orbit_scene::Cameras(5, 24, 24).cameras[1];
   RenderOptions options = MipRendering({});
-  EXPECT_EQ(options.mode, RenderMode::kAntialiased);
-  EXPECT_EQ(options.dilation, 0.1f);
+  EXPECT_EQ(options.mode, RenderMode::kMip);
+  EXPECT_EQ(DilationOf(options), 0.1f);
   options.min_alpha = 1e-9f;  // no cut-offs: a difference quotient is wrong across one
   options.min_transmittance = 0;
   options.gradient = true;

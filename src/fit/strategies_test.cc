@@ -88,7 +88,7 @@ TEST_P(Strategies, LearnsAKnownSplat) {
   EXPECT_GT(fitted->report.train.psnr, GetParam().train);
   EXPECT_GT(fitted->report.held_out.psnr, GetParam().held_out);
   EXPECT_LE(fitted->cloud.size(), 150);
-  EXPECT_EQ(fitted->cloud.render_mode, GetParam().mip_filter ? RenderMode::kAntialiased : RenderMode::kClassic);
+  EXPECT_EQ(fitted->cloud.render_mode, GetParam().mip_filter ? RenderMode::kMip : RenderMode::kClassic);
   const bool mcmc = GetParam().preset == FitPreset::kMcmc;
   EXPECT_EQ(fitted->report.relocated > 0, mcmc);
   EXPECT_EQ(fitted->report.added > 0, mcmc);

@@ -1,4 +1,5 @@
-// The absolute gradients of the centres (RenderOptions::absgrad) against a loop over pixels that reads like the formula.
+// The absolute gradients of the centres (RenderOptions::absgrad) against a loop over pixels that reads like the
+// formula.
 
 #include <gtest/gtest.h>
 
@@ -116,7 +117,7 @@ TEST(Absgrad, EveryInstructionSetMatches) {
   SkipWhenOnlyOneSimdTarget();
 }
 
-// The case it is for (Ye et al. 2024, figure 3): pixels that pull apart cancel in the one and not in the other.
+// The case it is for: pixels that pull apart cancel in the one and not in the other.
 TEST(Absgrad, PixelsThatPullApartDoNotCancel) {
   const GaussianCloud cloud = OneGaussian(0, 0, 3, 0.6, 0.5);
   const Camera camera = FrontCamera(32, 32, 40);

@@ -53,7 +53,7 @@ struct BlendBackwardParams {
   double* background_gradient;  // [3] Σ T_end·∂L/∂C is added to it
   // [N,2] Σ |∂L/∂x|, Σ |∂L/∂y| of the mean in the picture, per pixel, over the pixels: the run's sums are added to it.
   // Where ∂L/∂mean2d of a large Gaussian adds up to nothing because its pixels pull in all directions, this does not
-  // (Ye et al. 2024, AbsGS, eq. 8; gsplat's absgrad). Null: not wanted, and costs nothing.
+  // (Ye et al. 2024, AbsGS; gsplat's absgrad). Null: not wanted, and costs nothing.
   float* absolute;
 };
 

@@ -42,6 +42,23 @@ says stdout '"unfinished": 0'
 expect 0 "evaluation of a data set" "$program" eval "$work/set" -o "$work/eval" --methods raw --json
 says stdout '"objects": 2'
 
+# Kinds: every entry for every mesh, one for the first alone, one made from the splat of another.
+printf 'draws = "all"\nmin_train_psnr = 0\n[[mix]]\nname = "plain"\n[[mix]]\nname = "noisy"\nobjects = 1\nnoise = 9\n[[mix]]\nname = "packed"\nfrom = "plain"\nafter = "splat"\n' >"$work/kinds.toml"
+kinds=("$program" dataset build "$work/mesh/ramp.obj" "$work/mesh/quad.obj" -o "$work/kinds" "${small[@]}" --recipe "$work/kinds.toml" --json)
+expect 0 "kinds of splats" "${kinds[@]}"
+says stdout '"built": 5'
+expect 0 "what the fit saw" test -s "$work/kinds/ramp--noisy/captured/images/003.png"
+expect 0 "check of kinds" "$program" dataset check "$work/kinds" --decode
+says stdout "everything is there"
+expect 0 "kinds again" "${kinds[@]}"
+says stdout '"there_already": 5'
+expect 0 "evaluation by kind" "$program" eval "$work/kinds" -o "$work/kinds-eval" --methods raw,filter --kinds plain,packed
+says stdout "| packed | filter | 2 |"
+expect 2 "a kind that is not there" "$program" eval "$work/kinds" -o "$work/kinds-eval" --methods raw --kinds enhanced
+says stderr "there are noisy, packed, plain"
+expect 1 "what is made from a splat that failed" "$program" dataset build "$work/mesh/point.obj" -o "$work/kinds" "${small[@]}" --recipe "$work/kinds.toml" --json
+expect 0 "says so" grep -q '"message":"is made from point--plain, which is not there.*"stage":"base"' "$work/kinds/failures.jsonl"
+
 mkdir "$work/mesh/copy" && cp "$work/mesh/quad.obj" "$work/mesh/copy/"
 echo "no archive" >"$work/mesh/bad.sh3f"
 cp "$work/mesh/quad.obj" "$work/mesh/manifest.jsonl.obj"

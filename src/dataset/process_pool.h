@@ -25,13 +25,14 @@ struct ProcessEnd {
 };
 
 struct ProcessPoolOptions {
-  int jobs = 1;                             // at the same time
-  double timeout_seconds = 0;               // of one process; 0: none
+  int jobs = 1;                // at the same time
+  double timeout_seconds = 0;  // of one process; 0: none
 };
 
 // Runs `count` processes, `task(i)` in order as places become free; `ended(i, end)` is called from the calling thread
 // as soon as one has ended. Each has a process group of its own, which a Ctrl-C at the terminal does not reach, and is
-// asked to end (SIGTERM, ten seconds later SIGKILL) when its time is up or the run is asked to stop (core/run_context.h).
+// asked to end (SIGTERM, ten seconds later SIGKILL) when its time is up or the run is asked to stop
+// (core/run_context.h).
 //
 // Errors: kIo when a process cannot be started at all; the others are ended first. `ended` may return false to stop.
 Status RunProcesses(int64_t count, const std::function<ProcessTask(int64_t)>& task,

@@ -191,7 +191,7 @@ Status FitSplat(const ObjectJob& job, const fs::path& folder, ObjectRecord& reco
 Status DeriveSplat(const ObjectJob& job, const fs::path& dataset, const fs::path& folder, const fs::path& program,
                    ObjectRecord& record) {
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "base"));
-  const auto begin = Clock::now();
+  const Stopwatch watch;
   ANCHORSPLAT_ASSIGN_OR_RETURN(ObjectRecord base, TakeViewsOfBase(job, dataset, folder));
   ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, job.settings.after));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, PassSplat(job, base, dataset, folder, program));
@@ -202,7 +202,7 @@ Status DeriveSplat(const ObjectJob& job, const fs::path& dataset, const fs::path
   record = std::move(base);
   record.gaussians = cloud.size();
   record.read_seconds = record.view_seconds = 0;
-  record.fit_seconds = Since(begin);
+  record.fit_seconds = watch.Total();
   return WriteSplats(cloud, folder, record);
 }
 

@@ -184,11 +184,11 @@ TEST(ObjectBuilder, DefectsAreInWhatTheFitSeesAndNowhereElse) {
   ASSERT_TRUE(BuildObject(job, folder / "set").ok());
   const fs::path clean = folder / "set/tetra", poor = folder / "set/poor";
   for (const char* name : {"12/images/003.png", "24/images/003.png", "12/sparse/0/images.bin"}) {
-    EXPECT_TRUE(Bytes(clean / name) == Bytes(poor / name)) << name;
+    EXPECT_TRUE(FileBytes(clean / name) == FileBytes(poor / name)) << name;
   }
-  EXPECT_FALSE(Bytes(clean / "splat.ply") == Bytes(poor / "splat.ply"));
-  EXPECT_FALSE(Bytes(poor / "12/images/003.png") == Bytes(poor / "captured/images/003.png"));
-  EXPECT_TRUE(Bytes(poor / "12/images/000.png") == Bytes(poor / "captured/images/000.png"));  // held out
+  EXPECT_FALSE(FileBytes(clean / "splat.ply") == FileBytes(poor / "splat.ply"));
+  EXPECT_FALSE(FileBytes(poor / "12/images/003.png") == FileBytes(poor / "captured/images/003.png"));
+  EXPECT_TRUE(FileBytes(poor / "12/images/000.png") == FileBytes(poor / "captured/images/000.png"));  // held out
   const auto scene = Scene::Open({"poor", poor});
   ASSERT_TRUE(scene.ok());
   EXPECT_EQ(scene->fitted_project(), poor / "captured");
@@ -257,7 +257,7 @@ TEST(ObjectBuilder, SplatsThroughAFormatKeepTheirViews) {
   EXPECT_EQ(scene->LowSplat()->size(), record->gaussians);
   EXPECT_EQ(ReadCloud(folder / "set/tetra--splat/splat.ply")->sh_degree, 0);  // .splat has no more
   EXPECT_TRUE(scene->HighPicture(2).ok());
-  EXPECT_EQ(Bytes(folder / "set/tetra--splat/12/images/002.png"), Bytes(folder / "set/tetra--small/12/images/002.png"));
+  EXPECT_EQ(FileBytes(folder / "set/tetra--splat/12/images/002.png"), FileBytes(folder / "set/tetra--small/12/images/002.png"));
   // Another recipe than the base was made by.
   job.name = "tetra--other";
   job.settings.fit_steps = 61;

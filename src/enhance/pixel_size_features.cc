@@ -9,6 +9,7 @@
 
 #include "core/activations.h"
 #include "core/framing.h"
+#include "core/spherical_harmonics.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -33,7 +34,6 @@ constexpr double kLargestAxis = 0.25;
 // Brightness, that of the constant colour's brightest channel, up to which a Gaussian counts as unseen over black, and
 // from which on as seen.
 constexpr float kUnseen = 0.02f, kSeen = 0.1f;
-constexpr float kConstantHarmonic = 0.28209479177387814f;
 constexpr std::array<double, 4> kSizeQuantiles = {0.1, 0.25, 0.5, 0.75};
 
 // Value at which `share` of the total weight is reached. `items` are (value, weight).
@@ -83,9 +83,9 @@ GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing, double
     std::copy_n(cloud.quats.data() + 4 * i, 4, out.quats.data() + 4 * k);
     out.opacity_logits[k] = cloud.opacity_logits[static_cast<size_t>(i)];
     const float* sh = cloud.sh.data() + i * cloud.sh_stride();
-    const float brightness = 0.5f + kConstantHarmonic * std::max({sh[0], sh[1], sh[2]});
+    const float brightness = 0.5f + kSh0 * std::max({sh[0], sh[1], sh[2]});
     const float seen = std::clamp((brightness - kUnseen) / (kSeen - kUnseen), 0.0f, 1.0f);
-    std::fill_n(out.sh.data() + 3 * k, 3, (seen - 0.5f) / kConstantHarmonic);
+    std::fill_n(out.sh.data() + 3 * k, 3, (seen - 0.5f) / kSh0);
   }
   return out;
 }

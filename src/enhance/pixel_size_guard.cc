@@ -10,6 +10,7 @@
 #include "core/activations.h"
 #include "core/framing.h"
 #include "core/parallel.h"
+#include "core/spherical_harmonics.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/pixel_size_features.h"
@@ -23,7 +24,6 @@ constexpr float kBlack = 0.04f;         // brightest channel of the constant col
 constexpr double kFewBlack = 0.01;      // share of the Gaussians below which black ones cannot move an outline
 constexpr double kGuardFarthest = 1.5;  // of the radius that frames the cloud, as the estimate looks
 constexpr size_t kGuardMostGaussians = 200'000;
-constexpr float kConstantHarmonic = 0.28209479177387814f;
 
 constexpr int64_t kNeighbours = 8;
 constexpr int64_t kGuardSamples = 256;  // of the spacing; its median is good to a few percent
@@ -49,7 +49,7 @@ struct Showing {
 
 bool IsBlack(const GaussianCloud& cloud, int64_t i) {
   const float* sh = cloud.sh.data() + i * cloud.sh_stride();
-  return 0.5f + kConstantHarmonic * std::max({sh[0], sh[1], sh[2]}) < kBlack;
+  return 0.5f + kSh0 * std::max({sh[0], sh[1], sh[2]}) < kBlack;
 }
 
 double SquaredDistance(const float* a, const float* b) {

@@ -159,7 +159,7 @@ std::array<double, 3> WorldUpOf(const ViewerPage& page) {
 }
 
 // Of both splats, each once.
-std::vector<std::string> CreditsOf(const ViewerPage& page) {
+std::vector<std::string> AllCredits(const ViewerPage& page) {
   std::vector<std::string> credits = CreditsOf(page.after.cloud->comments);
   if (!page.before) return credits;
   for (std::string& credit : CreditsOf(page.before->cloud->comments)) {
@@ -231,7 +231,7 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
                             {"pixelSize", page.pixel_size ? Json(*page.pixel_size) : Json()},
                             {"background", page.background},
                             {"up", WorldUpOf(page)},
-                            {"credits", CreditsOf(page)},
+                            {"credits", AllCredits(page)},
                             // The page draws with the renderer's own numbers.
                             {"constants",
                              {{"minAlpha", kMinAlpha},

@@ -219,7 +219,7 @@ TEST(PageWriter, CarriesTheCreditsOfItsSplats) {
   page.after = {&after, "after", {}};
   page.before = ViewerSplat{&before, "before", {}};
   ASSERT_TRUE(WriteViewerPage(folder / "page.html", page).ok());
-  const std::string text = FileText(folder / "page.html");
+  const std::string text = FileBytes(folder / "page.html");
   EXPECT_EQ(nlohmann::json::parse(ElementText(text, "description"))["credits"],
             (nlohmann::json{"Mug by Ann, CC BY 4.0", "</script><b>"}));
   EXPECT_EQ(text.find("<b>"), std::string::npos);

@@ -168,7 +168,7 @@ nlohmann::json ToJson(const WorstObject& worst) {
           {"method", worst.method},
           {"kind", worst.kind},
           {"over", worst.over},
-          {"gain", Number(worst.gain)}};
+          {"gain", FiniteOrNull(worst.gain)}};
 }
 
 nlohmann::json ToJson(const KindSummary& kind) {

@@ -69,7 +69,7 @@ TEST_F(FitVerb, KnowsItsStrategies) {
   EXPECT_EQ(mcmc["pruned"], 0);
   EXPECT_EQ(ExpectJson(Fit("absgrad.ply", {"--strategy", "absgrad"}))["gaussians"]["added"], 0);
   ExpectDone(Fit("mip.ply", {"--mip-filter"}));
-  EXPECT_EQ(ExpectJson({"info", folder_ / "mip.ply"})["render_mode"], "antialiased");
+  EXPECT_EQ(ExpectJson({"info", folder_ / "mip.ply"})["render_mode"], "mip");
   ExpectRefused(Fit("x.ply", {"--strategy", "best"}), ErrorCode::kBadArgument, {"--strategy"});
 }
 

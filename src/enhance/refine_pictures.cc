@@ -169,7 +169,7 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
   return agreement;
 }
 
-Status CheckAgreement(const PictureAgreement& agreement, double least_psnr) {
+Status CheckAgreement(const PictureAgreement& agreement, double least_psnr, bool aligned) {
   const std::string suspicions =
       "; are these the pictures it was fitted to, in the order of their cameras, and is the splat in the cameras' "
       "coordinates?";
@@ -192,12 +192,14 @@ Status CheckAgreement(const PictureAgreement& agreement, double least_psnr) {
   const std::string mismatched = Cat("--images: ", agreement.mismatched, " of ", agreement.views,
                                      " views look more like the picture of another view than like their own");
   if (4 * agreement.mismatched > agreement.views) return Error{ErrorCode::kBadArgument, mismatched + suspicions};
-  if (2 * agreement.misplaced > agreement.views) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("--images: ", agreement.misplaced, " of ", agreement.views,
-                     " pictures agree better with the splat, by ", Fixed(agreement.misplaced_gain, 1),
-                     " dB, when they are moved or enlarged by a pixel: these are not quite the cameras that it "
-                     "was fitted with (principal point, focal length, positions)")};
+  if (!aligned && 2 * agreement.misplaced > agreement.views) {
+    return Error{
+        ErrorCode::kBadArgument,
+        Cat("--images: ", agreement.misplaced, " of ", agreement.views, " pictures agree better with the splat, by ",
+            Fixed(agreement.misplaced_gain, 1),
+            " dB, when they are moved or enlarged by a pixel: these are not quite the cameras that it "
+            "was fitted with (principal point, focal length, positions); --align moves poses that are a little "
+            "off")};
   }
   if (agreement.mismatched > 0) LogWarning(mismatched + suspicions);
   if (!agreement.far_below.empty()) {

@@ -36,7 +36,7 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
                                           PictureCache& pictures);
 
 // kBadArgument with what to look for, when `agreement` says that pictures and splat do not belong together. Warns when
-// a few of them do not.
-Status CheckAgreement(const PictureAgreement& agreement, double least_psnr);
+// a few of them do not. `aligned`: their poses will be, and may be off.
+Status CheckAgreement(const PictureAgreement& agreement, double least_psnr, bool aligned = false);
 
 }  // namespace anchorsplat

@@ -40,7 +40,7 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement agreement, MeasureAgreement(input.cloud, render, pictures));
   LogInfo(Cat(project.train.size(), " views with pictures, ", project.held_out.size(),
               " held out; the splat's own renders agree with them to ", Fixed(agreement.psnr, 2), " dB"));
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckAgreement(agreement, kLeastInputPsnr));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckAgreement(agreement, kLeastInputPsnr, options.align));
   const auto& check = project.held_out.empty() ? project.train : project.held_out;
   return RefineViews{RefineTargets(std::move(pictures)),
                      RefineTargets(PictureCache(Thinned(check, kCheckViews), render.background)), agreement.psnr,

@@ -102,8 +102,8 @@ Status Validate(const FitOptions& options) {
   }
   if (options.mip_filter_every < 1) return bad("mip_filter_every must be at least 1");
   if (options.mip_filter && options.pixel.upscale > 1) return bad("the smoothing filter is for pixels that are points");
-  if (options.mip_filter && options.objective.render.mode != RenderMode::kAntialiased) {
-    return bad("the smoothing filter is for the antialiased mode");
+  if (options.mip_filter && options.objective.render.mode != RenderMode::kMip) {
+    return bad("the smoothing filter is for the mode mip");
   }
   const int degree = options.objective.render.sh_degree;
   if (degree < 0 || degree > kMaxShDegree) return bad("SH degree must be 0 to 3");

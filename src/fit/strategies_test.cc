@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <ostream>
 #include <string>
 #include <utility>
 
@@ -29,6 +30,7 @@ struct Kind {
   int64_t steps;           // MCMC begins with specks and needs more
   double train, held_out;  // dB that are reached at least
 };
+void PrintTo(const Kind& kind, std::ostream* out) { *out << kind.name; }
 
 class Strategies : public testing::TestWithParam<Kind> {
  protected:

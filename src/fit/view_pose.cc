@@ -13,7 +13,7 @@ namespace anchorsplat {
 namespace {
 
 constexpr int kPoseRowsPerTask = 16;
-constexpr float kSolid = 0.7f;  // alpha from which on the depth is that of a surface
+constexpr float kSolid = 0.1f;  // alpha from which on there is something whose depth is known
 // Per pixel that counts, of the mean squared gradient: what is told by less than this share of it stays.
 constexpr double kPoseRidge = 1e-3;
 constexpr double kMostStep = 1;       // pixels a step

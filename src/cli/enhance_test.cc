@@ -176,8 +176,8 @@ TEST_F(EnhanceVerb, Qualities) {
 }
 
 TEST_F(EnhanceVerb, Refinement) {
-  const nlohmann::json row =
-      ExpectJson(Enhance({"--method", "refine", "--upscale", "2", "--steps", "3", "--poses", "10", "--k", "2"}))[0];
+  const nlohmann::json row = ExpectJson(Enhance(
+      {"--method", "refine", "--upscale", "2", "--steps", "3", "--poses", "10", "--k", "2"}, "out.ply", "0.1"))[0];
   EXPECT_EQ(row["method"], "refine");
   EXPECT_TRUE(row["refine"].contains("consistency_after"));
   EXPECT_TRUE(row["refine"]["kept_start"].is_boolean());

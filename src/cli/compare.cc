@@ -211,13 +211,13 @@ Status WriteSideBySide(const CompareFlags& flags, Sides& sides, const std::vecto
   images.push_back(
       {sides.truth ? "ground truth" : ShortName(flags.b), "view " + results[0].views[view].name, &pictures.back()});
   sources.push_back(&reference);
-  std::string credits;
+  std::vector<std::string> credits;
   for (const ViewSource* source : sources) {
     for (const std::string& credit : source->credits()) {
-      if (credits.find(credit) == std::string::npos) credits += Cat(credits.empty() ? "" : "; ", credit);
+      if (std::ranges::find(credits, credit) == credits.end()) credits.push_back(credit);
     }
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Image picture, SideBySide(images, {.credit = credits}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Image picture, SideBySide(images, {.credits = credits}));
   return WritePng(flags.side_by_side, picture, WriteOptionsFrom(shared));
 }
 

@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "core/text.h"
+#include "fit/pixel_model.h"
 
 namespace anchorsplat {
 
@@ -20,6 +21,10 @@ std::string EnhancedComment(const std::string& method, double upscale) {
 bool IsMarkedEnhanced(const GaussianCloud& cloud) {
   return std::any_of(cloud.comments.begin(), cloud.comments.end(),
                      [](const std::string& comment) { return comment.starts_with(kEnhanced); });
+}
+
+bool HasLostNoWidth(const GaussianCloud& cloud) {
+  return IsCompensated(cloud.render_mode) || IsFittedToPixelAreas(cloud) || IsMarkedEnhanced(cloud);
 }
 
 }  // namespace anchorsplat

@@ -116,6 +116,7 @@ Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianClou
   }
   GaussianCloud result = Pruned(std::move(refiner.state().cloud), report);
   result.render_mode = input.cloud.render_mode;
+  result.comments = start.comments;  // a checkpoint has neither
   return result;
 }
 

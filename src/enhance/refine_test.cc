@@ -84,6 +84,7 @@ TEST_F(Refinement, SameBitsForAnyNumberOfThreads) {
 
 TEST_F(Refinement, GoesOnWhereItWasStopped) {
   options_.align = true;  // more to remember
+  input_.start.comments = input_.cloud.comments = {"credit: Ann"};
   const auto whole = Refine(input_, options_, {});
   ASSERT_TRUE(whole.ok());
   std::atomic<bool> stop{true};  // after the first step
@@ -105,6 +106,8 @@ TEST_F(Refinement, GoesOnWhereItWasStopped) {
   ASSERT_TRUE(second.ok()) << second.error().message;
   EXPECT_EQ(second->report.resumed_at, 1);
   ExpectSameCloud(second->cloud, whole->cloud);
+  EXPECT_EQ(second->cloud.comments, whole->cloud.comments);
+  EXPECT_EQ(second->cloud.comments, input_.start.comments);
   EXPECT_TRUE(std::filesystem::exists(control.checkpoint)) << "its owner removes it, once the result is safe";
 
   // The same counts are not the same run.

@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "enhance/enhance.h"
+#include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
 #include "enhance/pixel_size_guard.h"
 #include "eval/bicubic_fit.h"
@@ -32,9 +33,9 @@ using Clock = std::chrono::steady_clock;
 
 double SecondsSince(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
-// A splat whose fit did not absorb the dilation has nothing to get back.
+// As `enhance` has it.
 double DefaultStrength(const BenchmarkObject& object) {
-  return IsCompensated(object.low.render_mode) ? 0 : DefaultFilterStrength(object.upscale());
+  return HasLostNoWidth(object.low) ? 0 : DefaultFilterStrength(object.upscale());
 }
 
 EvalMethod Raw() {

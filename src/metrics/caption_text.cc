@@ -51,6 +51,36 @@ std::string FittingText(const std::string& text, int width, int scale, const std
   return cut + ending;
 }
 
+std::vector<std::string> WrappedText(const std::string& text, int width, int scale) {
+  std::vector<std::string> lines(1);
+  const auto fits = [&](const std::string& line) { return TextWidth(line, scale) <= width; };
+  std::string word;
+  const auto end_word = [&] {
+    if (word.empty()) return;
+    std::string& line = lines.back();
+    if (const std::string longer = line.empty() ? word : line + " " + word; fits(longer)) {
+      line = longer;
+    } else {
+      if (!line.empty()) lines.emplace_back();
+      for (const char c : word) {
+        if (!lines.back().empty() && !fits(lines.back() + c)) lines.emplace_back();
+        lines.back() += c;
+      }
+    }
+    word.clear();
+  };
+  for (const char c : text) {
+    if (c == ' ') {
+      end_word();
+    } else {
+      word += c;
+    }
+  }
+  end_word();
+  if (lines.back().empty()) lines.pop_back();
+  return lines;
+}
+
 void DrawText(Image& image, int x, int y, const std::string& text, int scale, const std::array<float, 3>& colour) {
   for (const Box& box : Letters(Printed(text))) {
     const auto [x0, x1] = std::pair(x + static_cast<int>(box[0].x) * scale, x + static_cast<int>(box[2].x) * scale);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "core/text.h"
@@ -151,6 +152,7 @@ struct Layout {
   int line;  // a frame's thickness
   int caption_height;
   int view_y, enlarged_y, difference_y, credit_y, height;
+  std::vector<std::string> credit_lines;
 
   int x(size_t column_index) const { return margin + static_cast<int>(column_index) * (column + margin); }
   int centred(const PanelSize& panel) const { return (column - panel.width) / 2; }
@@ -184,7 +186,12 @@ Layout Arrange(std::span<const LabelledImage> images, const SideBySideOptions& o
   const bool maps = options.differences && images.size() > 1;
   l.difference_y = enlarged_end + l.margin + l.caption_height;
   l.credit_y = (maps ? l.difference_y + l.view.height : enlarged_end) + l.margin;
-  l.height = l.credit_y + (options.credit.empty() ? 0 : l.caption_height + l.margin / 2);
+  const int width = l.x(images.size()) - 2 * l.margin;
+  for (const std::string& credit : options.credits) {
+    for (std::string& line : WrappedText(credit, width, l.scale)) l.credit_lines.push_back(std::move(line));
+  }
+  const auto lines = static_cast<int>(l.credit_lines.size());
+  l.height = l.credit_y + (lines == 0 ? 0 : lines * l.caption_height + l.margin / 2);
   return l;
 }
 
@@ -306,8 +313,9 @@ Result<Image> SideBySide(std::span<const LabelledImage> images, const SideBySide
       DrawHeatScale(canvas, options.gain, l, l.x(i));
     }
   }
-  if (!options.credit.empty()) {
-    DrawCaption(canvas, l.margin, l.credit_y, canvas.width - 2 * l.margin, options.credit, l.scale, kDimText);
+  for (size_t i = 0; i < l.credit_lines.size(); ++i) {
+    DrawText(canvas, l.margin, l.credit_y + static_cast<int>(i) * l.caption_height, l.credit_lines[i], l.scale,
+             kDimText);
   }
   return canvas;
 }

@@ -3,6 +3,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "core/image.h"
 #include "core/result.h"
@@ -25,10 +26,10 @@ struct ViewRegion {
 struct SideBySideOptions {
   double crop = 0.2;  // width of the enlarged part as a fraction of the view's, in (0, 1]
   std::optional<ViewRegion> region =
-      std::nullopt;         // the part itself; chosen by MostDifferentRegion where it is not given
-  bool differences = true;  // the row of difference maps
-  float gain = 4;           // their brightest colour stands for a difference of 1 / gain
-  std::string credit = "";  // last line of the picture: whose the things shown are; may be empty
+      std::nullopt;                       // the part itself; chosen by MostDifferentRegion where it is not given
+  bool differences = true;                // the row of difference maps
+  float gain = 4;                         // their brightest colour stands for a difference of 1 / gain
+  std::vector<std::string> credits = {};  // below all: whose the things shown are, each on lines of its own
 };
 
 // The region of the given size where `a` and `b` differ most (sum of absolute differences); where they are equal, the

@@ -91,10 +91,21 @@ TEST(SideBySide, ShowsOriginalPixelsInTheEnlargedPart) {
   }
 }
 
+TEST(CaptionText, IsWrappedBetweenWords) {
+  const std::string text = "Tankard of the Mary Rose; pictures changed";
+  const std::vector<std::string> lines = WrappedText(text, TextWidth("of the Mary Rose;", 2), 2);
+  EXPECT_EQ(lines, (std::vector<std::string>{"Tankard of the", "Mary Rose;", "pictures changed"}));
+  EXPECT_EQ(WrappedText(text, TextWidth(text, 1), 1), std::vector<std::string>{text});
+  for (const std::string& line : WrappedText(std::string(300, 'w') + "  a", 100, 1)) EXPECT_LE(TextWidth(line, 1), 100);
+  EXPECT_TRUE(WrappedText("", 100, 1).empty());
+  EXPECT_TRUE(WrappedText("   ", 100, 1).empty());
+  EXPECT_EQ(WrappedText("ab", 1, 1), (std::vector<std::string>{"a", "b"})) << "never stuck";
+}
+
 TEST(SideBySide, EndsWithTheCredit) {
   const Image truth = NoiseImage(100, 80, 2);
   const LabelledImage images[] = {{"before", "", &truth}, {"truth", "", &truth}};
-  const auto without = SideBySide(images), with = SideBySide(images, {.credit = "Mug by Ann, CC BY 4.0"});
+  const auto without = SideBySide(images), with = SideBySide(images, {.credits = {"Mug by Ann, CC BY 4.0"}});
   ASSERT_TRUE(without.ok() && with.ok());
   ASSERT_EQ(with->width, without->width);
   ASSERT_GT(with->height, without->height + kCapitalHeight);

@@ -182,15 +182,17 @@ TEST(Png, DamagedBytesAreErrorsOrHarmless) {
   const TestFolder folder;
   ASSERT_TRUE(WritePng(folder / "whole.png", RandomImage(9, 7, 3, 8)).ok());
   const std::string whole = FileBytes(folder / "whole.png");
-  int refused = 0;
+  // Every chunk of ours is critical and has a checksum. That of the last one, which is empty, newer libpngs (1.6.48)
+  // do not look at.
+  const size_t checked = whole.size() - sizeof(uint32_t);
   for (size_t at = 0; at < whole.size(); ++at) {
     std::string bytes = whole;
     bytes[at] = static_cast<char>(bytes[at] ^ 0x41);
     Write(folder / "bad.png", bytes);
-    refused += ReadImage(folder / "bad.png").ok() ? 0 : 1;
+    const bool read = ReadImage(folder / "bad.png").ok();
+    EXPECT_TRUE(!read || at >= checked) << "byte " << at;
     (void)ReadImageSize(folder / "bad.png").ok();
   }
-  EXPECT_EQ(refused, static_cast<int>(whole.size()));  // every chunk of ours is critical and has a checksum
 }
 
 uint32_t Crc(const std::string& bytes) {

@@ -183,13 +183,6 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
 // Of the filter. Splats that absorbed nothing have nothing to get back.
 double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud) {
   if (options.filter_strength) return *options.filter_strength;
-  if (IsCompensated(cloud.render_mode)) {
-    LogWarning(Cat("the file is tagged ", NameOf(*cloud.render_mode), ": its fit did not absorb the ",
-                   DilationOf(*cloud.render_mode),
-                   " px² dilation, so there is no lost width to give back and it stays as it is (--filter-strength F "
-                   "to enhance it all the same)"));
-    return 0;
-  }
   if (IsFittedToPixelAreas(cloud)) {
     LogWarning(
         "the splat was fitted to the areas of pixels: it has lost no width and none is given back (--filter-strength F "
@@ -201,6 +194,12 @@ double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud)
         "the splat says that it has been enhanced already: its lost width has been given back and none is given once "
         "more (--filter-strength F to enhance it all the same)");
     return 0;
+  }
+  if (IsCompensated(cloud.render_mode)) {
+    const double strength = DefaultFilterStrength(options.upscale, cloud.render_mode);
+    LogInfo(Cat("the splat is ", NameOf(*cloud.render_mode), ": its fit lost less width, and less is given back (",
+                Fixed(strength, 2), " of what a classic one could have lost)"));
+    return strength;
   }
   return DefaultFilterStrength(options.upscale);
 }
@@ -268,17 +267,19 @@ Result<SizedMethods> FindSizedMethods(const MethodPlan& plan, const EnhanceOptio
 }
 
 // More than what the closer view's own pixels add.
-bool GivesWidth(double strength, double upscale) { return strength * upscale * upscale > 1; }
+bool GivesWidth(double strength, const EnhanceOptions& options, std::optional<RenderMode> mode) {
+  return strength > ShownStrength(options.upscale, mode);
+}
 
 // The filter's strength and the pixel sizes, for methods that work with them.
 Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
   input.filter_strength = ChooseStrength(options, input.cloud);
   report.filter_strength = input.filter_strength;
-  const bool gives_width = GivesWidth(input.filter_strength, options.upscale);
+  const bool gives_width = GivesWidth(input.filter_strength, options, input.cloud.render_mode);
   if (input.filter_strength > 0 && !gives_width && options.upscale > 1) {
     LogWarning(Cat("a strength of ", input.filter_strength,
-                   " is no more than what the closer view's own pixels add (1/", options.upscale,
-                   "²): nothing changes"));
+                   " is no more than what the closer view's own pixels add (",
+                   ShownStrength(options.upscale, input.cloud.render_mode), "): nothing changes"));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(ChoosePixelSizes(options, plan.method->takes_start && !options.refine.images.empty(),
                                                gives_width, input, report));
@@ -333,7 +334,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   } else if (IsMarkedEnhanced(input.cloud)) {
     LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
   }
-  if (report.pixel_size_source == kCautiousPixelSize && GivesWidth(input.filter_strength, options.upscale)) {
+  if (report.pixel_size_source == kCautiousPixelSize && GivesWidth(input.filter_strength, options, input.cloud.render_mode)) {
     LeaveNetworksOut(plan);
   }
   report.method = plan.Name();
@@ -348,7 +349,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, RunPlan(plan, sized, std::move(input), options, report));
   report.seconds = watch.Total();
   report.gaussians_out = out.size();
-  if (!sized.any || GivesWidth(report.filter_strength, options.upscale)) {
+  if (!sized.any || GivesWidth(report.filter_strength, options, out.render_mode)) {
     out.comments.push_back(EnhancedComment(report.method, options.upscale));
   }
   return Enhanced{std::move(out), std::move(report)};

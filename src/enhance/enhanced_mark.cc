@@ -24,7 +24,7 @@ bool IsMarkedEnhanced(const GaussianCloud& cloud) {
 }
 
 bool HasLostNoWidth(const GaussianCloud& cloud) {
-  return IsCompensated(cloud.render_mode) || IsFittedToPixelAreas(cloud) || IsMarkedEnhanced(cloud);
+  return IsFittedToPixelAreas(cloud) || IsMarkedEnhanced(cloud);
 }
 
 }  // namespace anchorsplat

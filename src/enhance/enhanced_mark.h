@@ -14,8 +14,8 @@ namespace anchorsplat {
 std::string EnhancedComment(const std::string& method, double upscale);
 bool IsMarkedEnhanced(const GaussianCloud& cloud);
 
-// Whether there is nothing to give back, as far as the file says: its mode compensates, it was fitted to areas of
-// pixels or enhanced before.
+// Whether there is nothing to give back, as far as the file says: it was fitted to areas of pixels or enhanced
+// before.
 bool HasLostNoWidth(const GaussianCloud& cloud);
 
 }  // namespace anchorsplat

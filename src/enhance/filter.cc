@@ -12,10 +12,20 @@ namespace anchorsplat {
 
 namespace {
 constexpr int64_t kRowsPerTask = 16384;
+// f at an upscale without end.
+constexpr double kClassicShare = 1 - 1 / 3.6, kAntialiasedShare = 0.2, kMipShare = 0.2;
 
 }  // namespace
 
-double DefaultFilterStrength(double upscale) { return 1 - (1 - 1 / (upscale * upscale)) / 3.6; }
+double ShownStrength(double upscale, std::optional<RenderMode> mode) {
+  return double{DilationOf(mode.value_or(RenderMode::kClassic))} / double{kDilation} / (upscale * upscale);
+}
+
+double DefaultFilterStrength(double upscale, std::optional<RenderMode> mode) {
+  const double share = !IsCompensated(mode) ? kClassicShare : mode == RenderMode::kMip ? kMipShare : kAntialiasedShare;
+  return ShownStrength(upscale, mode) + share * (1 - 1 / (upscale * upscale));
+}
+
 
 Result<int64_t> ApplyFilter(GaussianCloud& cloud, std::span<const float> pixel_sizes, const FilterOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
@@ -23,7 +33,7 @@ Result<int64_t> ApplyFilter(GaussianCloud& cloud, std::span<const float> pixel_s
     return Error{ErrorCode::kBadArgument,
                  Cat("upscale ", options.upscale, " is below 1: the filter is for seeing a splat closer, not farther")};
   }
-  const double strength = options.strength.value_or(DefaultFilterStrength(options.upscale));
+  const double strength = options.strength.value_or(DefaultFilterStrength(options.upscale, cloud.render_mode));
   if (!(strength >= 0) || strength > kMaxFilterStrength) {
     return Error{ErrorCode::kBadArgument,
                  Cat("filter strength ", strength, " is not between 0 and ", kMaxFilterStrength)};
@@ -39,8 +49,7 @@ Result<int64_t> ApplyFilter(GaussianCloud& cloud, std::span<const float> pixel_s
   }
 
   // In units of p_LR²: the same for every Gaussian.
-  const double shown = double{DilationOf(cloud.render_mode.value_or(RenderMode::kClassic))} / double{kDilation};
-  const double gain = kDilation * (strength - shown / (options.upscale * options.upscale));
+  const double gain = kDilation * (strength - ShownStrength(options.upscale, cloud.render_mode));
   if (!(gain > 0)) return int64_t{0};
   std::atomic<int64_t> grown = 0;
   ParallelFor(0, cloud.size(), kRowsPerTask, [&](int64_t first, int64_t last) {

@@ -16,12 +16,16 @@ namespace anchorsplat {
 // docs/method.md derives it and shows the curve over f.
 struct FilterOptions {
   double upscale = 4;              // u ≥ 1: how many times closer the splat will be seen
-  std::optional<double> strength;  // f, 0 to kMaxFilterStrength; DefaultFilterStrength(upscale) unless given
+  std::optional<double> strength;  // f, 0 to kMaxFilterStrength; DefaultFilterStrength unless given
 };
 
 // f = 1 − (1 − 1/u²)/3.6: the box variance (1/12 px²) of the low-resolution pixel is taken out of the 0.3 px² and that
 // of the high-resolution pixel put back. 0.740 at u = 4, 1 at u = 1, where the filter changes nothing.
-double DefaultFilterStrength(double upscale);
+// That is for splats of kClassic. Of fits with another mode, which makes up for the widening by opacity, the share of
+// the width that is worth giving back is smaller (docs/method.md).
+double DefaultFilterStrength(double upscale, std::optional<RenderMode> mode = {});
+// The strength that the closer view's own pixels amount to, d / 0.3 / u²: no more than that changes nothing.
+double ShownStrength(double upscale, std::optional<RenderMode> mode);
 inline constexpr double kMaxFilterStrength = 100;  // far beyond anything sensible; keeps typing errors out
 
 // Applies the filter in place. `pixel_sizes` is p_LR in world units, one value for all Gaussians or one per Gaussian.

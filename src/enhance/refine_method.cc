@@ -53,12 +53,15 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
     if (!grown.ok()) return grown.error();
   }
   // No more than what the closer view's own pixels add.
-  const bool lost_none = input.filter_strength * options.upscale * options.upscale <= 1;
-  if (lost_none && options.refine.images.empty()) {
+  const std::optional<RenderMode> mode = input.cloud.render_mode;
+  const bool lost_none = input.filter_strength <= ShownStrength(options.upscale, mode);
+  if ((lost_none || IsCompensated(mode)) && options.refine.images.empty()) {
     RefinePlan& plan = report.plan.emplace();
     plan.options = options.refine;
     plan.nothing_to_do = true;
-    plan.why = "there is no lost width to give back, and without pictures nothing else to learn: the splat stays";
+    plan.why =
+        lost_none ? "there is no lost width to give back, and without pictures nothing else to learn: the splat stays"
+                  : Cat("without pictures there is nothing to learn about ", NameOf(*mode), " splats: filtered only");
     LogInfo(plan.why);
     report.facts.emplace_back("kept_start", true);
     return std::move(refine.start);

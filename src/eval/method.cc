@@ -35,7 +35,7 @@ double SecondsSince(Clock::time_point begin) { return std::chrono::duration<doub
 
 // As `enhance` has it.
 double DefaultStrength(const BenchmarkObject& object) {
-  return HasLostNoWidth(object.low) ? 0 : DefaultFilterStrength(object.upscale());
+  return HasLostNoWidth(object.low) ? 0 : DefaultFilterStrength(object.upscale(), object.low.render_mode);
 }
 
 EvalMethod Raw() {

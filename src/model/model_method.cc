@@ -12,6 +12,7 @@
 #include "core/activations.h"
 #include "core/log.h"
 #include "core/text.h"
+#include "enhance/filter.h"
 #include "io/file_version.h"
 #include "model/any_network.h"
 #include "model/compact/shipped_network.h"
@@ -118,9 +119,18 @@ class LastNetwork {
 
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
                                                 float prune_opacity, StepReport& report) {
-  if (input.filter_strength * upscale * upscale <= 1) {
+  if (input.filter_strength <= ShownStrength(upscale, input.cloud.render_mode)) {
     LogInfo(
         "the network's residuals are on top of the filter, and there is no lost width to give back: the splat stays");
+    report.facts = {{"copies", int64_t{1}}};
+    return std::move(input.cloud);
+  }
+  if (IsCompensated(input.cloud.render_mode) && !network.config().kind) {
+    LogInfo(Cat("the network has learned from classic splats: this ", NameOf(*input.cloud.render_mode),
+                " one is filtered only"));
+    const auto grown =
+        ApplyFilter(input.cloud, input.pixel_sizes, {.upscale = upscale, .strength = input.filter_strength});
+    if (!grown.ok()) return grown.error();
     report.facts = {{"copies", int64_t{1}}};
     return std::move(input.cloud);
   }

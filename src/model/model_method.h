@@ -13,8 +13,9 @@ void RegisterModelMethod();
 
 // Enhances by a compact network, with a word in the log and in report.facts ("copies", "unlike_training",
 // "partly_unlike_training", "output_not_finite", "pruned"). kBadFile: it says nothing finite about any Gaussian. A
-// strength of no more than 1/u² means that there is no lost width to build on (an antialiased splat, or one that is
-// seen no closer): it stays as it is.
+// strength of no more than the closer view's own pixels add means that there is no lost width to build on (a splat that
+// is seen no closer, or has its width): it stays as it is. A network that is not told the kind of splat knows classic
+// ones; others are filtered.
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
                                                 float prune_opacity, StepReport& report);
 

@@ -175,6 +175,9 @@ void Augment(const AugmentationConfig& config, Random& random, AugmentedScene& s
     const auto factor = static_cast<float>(std::exp(config.pixel_size_noise * std::clamp(random.Normal(), -3.0, 3.0)));
     for (float& p : scene.pixel_sizes) p *= factor;
   }
+  if (config.strength_noise > 0) {
+    scene.strength *= std::exp(config.strength_noise * std::clamp(random.Normal(), -3.0, 3.0));
+  }
 }
 
 }  // namespace anchorsplat

@@ -15,12 +15,13 @@ namespace anchorsplat {
 struct AugmentedScene {
   GaussianCloud cloud;
   Buffer<float> pixel_sizes;  // [N]
+  double strength = 0;        // f of the filter
   std::vector<Camera> cameras;
   std::vector<TrueView> truth;  // one per camera
 };
 
 // Changes splat and views together, so that a perfect splat stays perfect, except for Gaussians that are dropped and
-// noise on opacities and on p_LR: those are errors that the network should be able to live with. What is drawn depends
+// noise on opacities, on p_LR and on f: those are errors that the network should be able to live with. What is drawn depends
 // on `random` alone.
 void Augment(const AugmentationConfig& config, Random& random, AugmentedScene& scene);
 

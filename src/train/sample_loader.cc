@@ -57,6 +57,7 @@ Result<Chosen> ChooseWhole(const TrainConfig& config, const SamplePlan& plan, co
   }
   scene.cloud = object.cloud;
   scene.pixel_sizes = object.pixel_sizes;
+  scene.strength = object.strength;
   return chosen;
 }
 
@@ -65,7 +66,7 @@ Result<Chosen> ChooseWhole(const TrainConfig& config, const SamplePlan& plan, co
 Result<Chosen> ChoosePartOf(const TrainConfig& config, const SamplePlan& plan, TrainingObject& object,
                             TrainableNetwork& network, Random& random) {
   if (!object.survey) {
-    auto survey = network.Survey(MakeInput(object.cloud, object.pixel_sizes, object.upscale, torch::kCPU));
+    auto survey = network.Survey(MakeInput(object, torch::kCPU));
     if (!survey.ok()) return Error{survey.error().code, Cat("data.part: ", survey.error().message)};
     object.survey = *std::move(survey);
   }
@@ -95,9 +96,10 @@ Result<Chosen> ChoosePartOf(const TrainConfig& config, const SamplePlan& plan, T
   ANCHORSPLAT_ASSIGN_OR_RETURN(scene.cloud, Subset(object.cloud, part->rows));
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud others, Subset(object.cloud, where.others));
   scene.pixel_sizes = sizes_of(part->rows);
+  scene.strength = object.strength;
   const Buffer<float> sizes = sizes_of(where.others);
-  if (!others.empty() && !IsCompensated(object.cloud.render_mode)) {
-    const auto grown = ApplyFilter(others, sizes, {.upscale = object.upscale, .strength = {}});
+  if (!others.empty()) {
+    const auto grown = ApplyFilter(others, sizes, {.upscale = object.upscale, .strength = object.strength});
     if (!grown.ok()) return grown.error();
   }
   ANCHORSPLAT_RETURN_IF_ERROR(Append(scene.cloud, others));
@@ -139,15 +141,29 @@ SamplePlan PlanSample(const TrainConfig& config, int64_t index, size_t objects, 
   return plan;
 }
 
-NetworkInput MakeInput(const GaussianCloud& cloud, const Buffer<float>& pixel_sizes, double upscale,
-                       torch::Device device) {
+namespace {
+
+NetworkInput MakeInputOf(const TrainingObject& object, const GaussianCloud& cloud, const Buffer<float>& pixel_sizes,
+                         double strength, torch::Device device) {
   NetworkInput input;
   input.gaussians = ToTensors(cloud).To(device);
   torch::Tensor sizes = torch::empty({cloud.size()}, torch::kFloat32);
   std::copy(pixel_sizes.begin(), pixel_sizes.end(), sizes.mutable_data_ptr<float>());
   input.pixel_sizes = sizes.to(device);
-  input.upscale = upscale;
+  input.upscale = object.upscale;
+  input.strength = strength;
+  input.mode = object.cloud.render_mode;
   return input;
+}
+
+}  // namespace
+
+NetworkInput MakeInput(const TrainingObject& object, torch::Device device) {
+  return MakeInputOf(object, object.cloud, object.pixel_sizes, object.strength, device);
+}
+
+NetworkInput MakeInput(const TrainingObject& object, const AugmentedScene& scene, torch::Device device) {
+  return MakeInputOf(object, scene.cloud, scene.pixel_sizes, scene.strength, device);
 }
 
 Result<TrainingSample> MakeSample(const TrainConfig& config, int64_t index, ObjectStore& objects,
@@ -166,7 +182,7 @@ Result<TrainingSample> MakeSample(const TrainConfig& config, int64_t index, Obje
   sample.object = object->name;
   sample.render.mode = object->cloud.render_mode.value_or(RenderMode::kClassic);
   sample.render.background = scene.truth.empty() ? object->background : scene.truth[0].background;
-  sample.input = MakeInput(scene.cloud, scene.pixel_sizes, object->upscale, device);
+  sample.input = MakeInput(*object, scene, device);
   if (made->part) {
     const auto seen = static_cast<int64_t>(made->part->rows.size());
     sample.others = Rows(sample.input.gaussians, seen, scene.cloud.size()).To(torch::kCPU);
@@ -174,9 +190,10 @@ Result<TrainingSample> MakeSample(const TrainConfig& config, int64_t index, Obje
     sample.input.pixel_sizes = sample.input.pixel_sizes.narrow(0, 0, seen);
     sample.input.part = made->part;
   }
-  // Tables of the splat as it is serve every step, unless p_LR, which they may depend on, moves.
-  const bool reusable = !made->part && !config.augmentation.geometry() && config.augmentation.pixel_size_noise == 0 &&
-                        !config.augmentation.permute_colors && config.augmentation.gain == 0;
+  // Tables of the splat as it is serve every step, unless p_LR or f, which they may depend on, move.
+  const AugmentationConfig& changes = config.augmentation;
+  const bool reusable = !made->part && !changes.geometry() && changes.pixel_size_noise == 0 &&
+                        changes.strength_noise == 0 && !changes.permute_colors && changes.gain == 0;
   if (reusable && object->prepared) {
     sample.input.prepared = object->prepared;
   } else {

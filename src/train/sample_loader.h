@@ -12,6 +12,7 @@
 #include "model/shared/torch/render_op.h"
 #include "model/shared/torch/trainable_network.h"
 #include "render/rasterizer.h"
+#include "train/augmentation.h"
 #include "train/photometric_objective.h"
 #include "train/train_config.h"
 #include "train/training_object.h"
@@ -41,9 +42,9 @@ struct SamplePlan {
 size_t PlannedObject(uint64_t seed, int64_t index, size_t objects);
 SamplePlan PlanSample(const TrainConfig& config, int64_t index, size_t objects, const TrainingObject& object);
 
-// The network's input for a splat. `prepared` is left empty.
-NetworkInput MakeInput(const GaussianCloud& cloud, const Buffer<float>& pixel_sizes, double upscale,
-                       torch::Device device);
+// The network's input for a splat, or for one that was made of its Gaussians. `prepared` is left empty.
+NetworkInput MakeInput(const TrainingObject& object, torch::Device device);
+NetworkInput MakeInput(const TrainingObject& object, const AugmentedScene& scene, torch::Device device);
 
 // The sample itself.
 Result<TrainingSample> MakeSample(const TrainConfig& config, int64_t index, ObjectStore& objects,

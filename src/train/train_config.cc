@@ -208,6 +208,7 @@ Status TakeAugmentation(TableReader table, AugmentationConfig& a) {
   table.Number("drop", 0, 0.9, a.drop);
   table.Number("opacity_noise", 0, 10, a.opacity_noise);
   table.Number("pixel_size_noise", 0, 2, a.pixel_size_noise);
+  table.Number("strength_noise", 0, 2, a.strength_noise);
   return table.Finish();
 }
 
@@ -300,6 +301,8 @@ nlohmann::json Settings(const TrainConfig& c) {
                          {"augmentation.drop", c.augmentation.drop},
                          {"augmentation.opacity_noise", c.augmentation.opacity_noise},
                          {"augmentation.pixel_size_noise", c.augmentation.pixel_size_noise}};
+  // Trainings of before there was such a thing can go on.
+  if (c.augmentation.strength_noise > 0) json["augmentation.strength_noise"] = c.augmentation.strength_noise;
   for (const auto& [group, rate] : c.optimizer.groups) json[Cat("optimizer.groups.", group)] = rate;
   for (const auto& [key, value] : c.network) json[Cat("network.", key)] = ToJson(value);
   return json;

@@ -61,6 +61,7 @@ struct AugmentationConfig {
   double drop = 0;              // largest share of Gaussians left out
   double opacity_noise = 0;     // σ of what is added to opacity logits
   double pixel_size_noise = 0;  // σ of ln(factor) of p_LR, one factor per splat
+  double strength_noise = 0;    // σ of ln(factor) of the filter's strength
 
   bool geometry() const { return rotate || mirror || scale > 0 || drop > 0 || opacity_noise > 0; }
 };

@@ -7,6 +7,7 @@
 #include "core/random.h"
 #include "core/text.h"
 #include "dataset/object_name.h"
+#include "enhance/filter.h"
 #include "enhance/pixel_size.h"
 
 namespace anchorsplat {
@@ -56,6 +57,7 @@ Result<std::shared_ptr<TrainingObject>> OpenTrainingObject(const SceneEntry& ent
   object->upscale = static_cast<double>(scene.high_views()[0].intrinsics.width) /
                     static_cast<double>(scene.low_views()[0].intrinsics.width);
   if (!(object->upscale >= 1)) return bad("its high views are smaller than its low ones");
+  object->strength = DefaultFilterStrength(object->upscale, object->cloud.render_mode);
   CameraSet low;
   low.cameras = scene.low_views();
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes,

@@ -22,6 +22,7 @@ struct TrainingObject {
   GaussianCloud cloud;             // the low-quality splat, without rows that are not finite
   Buffer<float> pixel_sizes;       // [N] p_LR: the median over the low cameras that see a Gaussian, as eval's filter
   double upscale = 4;              // u: high pixels per low pixel
+  double strength = 0;             // f of the filter
   std::vector<Camera> views;       // high resolution
   std::vector<Camera> low_views;   // that the splat was fitted to, seen from the same places
   std::vector<size_t> training;    // which of them training may see

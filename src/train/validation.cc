@@ -64,7 +64,7 @@ Result<Validation::Object*> Validation::Open(size_t index) {
     auto object = std::make_shared<Object>();
     ANCHORSPLAT_ASSIGN_OR_RETURN(object->data, OpenTrainingObject(entries_[index], 1, cache_));
     object->views = EvenlySpread(object->data->validation, static_cast<size_t>(config_.views));
-    object->input = MakeInput(object->data->cloud, object->data->pixel_sizes, object->data->upscale, device_);
+    object->input = MakeInput(*object->data, device_);
     open_[index] = std::move(object);
   }
   return open_[index].get();
@@ -131,11 +131,9 @@ Result<TrainQuality> Validation::Filter() {
   if (!filter_) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto objects, MeasureClouds([](Object& object) -> Result<GaussianTensors> {
                                    GaussianCloud cloud = object.data->cloud;
-                                   // A splat whose fit did not absorb the dilation has nothing to get back.
-                                   FilterOptions options;
-                                   options.upscale = object.data->upscale;
-                                   if (IsCompensated(cloud.render_mode)) options.strength = 0;
-                                   const auto grown = ApplyFilter(cloud, object.data->pixel_sizes, options);
+                                   const auto grown = ApplyFilter(
+                                       cloud, object.data->pixel_sizes,
+                                       {.upscale = object.data->upscale, .strength = object.data->strength});
                                    if (!grown.ok()) return grown.error();
                                    return ToTensors(cloud);
                                  }));

@@ -137,6 +137,8 @@ int64_t ChannelsPerCopy(const CompactConfig& config) {
 
 int64_t CompactOutputs(const CompactConfig& config) { return 1 + config.copies * ChannelsPerCopy(config); }
 
+int64_t NodeFeatures(const CompactConfig& config) { return config.kind ? kMostNodeFeatures : kNodeFeatures; }
+
 std::vector<TensorSpec> CompactTensors(const CompactConfig& config) {
   std::vector<TensorSpec> tensors;
   const auto linear = [&](const std::string& name, int64_t outputs, int64_t inputs, bool bias = true) {
@@ -147,8 +149,8 @@ std::vector<TensorSpec> CompactTensors(const CompactConfig& config) {
     tensors.push_back({name + ".weight", {config.hidden}});
     tensors.push_back({name + ".bias", {config.hidden}});
   };
-  const int64_t h = config.hidden, g = config.head_hidden;
-  linear("embed.first", h, kNodeFeatures);
+  const int64_t h = config.hidden, g = config.head_hidden, told = NodeFeatures(config);
+  linear("embed.first", h, told);
   linear("embed.second", h, h);
   norm("embed.norm");
   for (int64_t r = 0; r < config.rounds; ++r) {
@@ -161,14 +163,14 @@ std::vector<TensorSpec> CompactTensors(const CompactConfig& config) {
     linear(round + "update_second", h, h);
     norm(round + "norm");
   }
-  linear("head.first", g, h + kNodeFeatures);
+  linear("head.first", g, h + told);
   linear("head.second", g, g);
   linear(std::string("out.") + kStrengthAttribute.name, 1, g);
   for (const CompactAttribute& attribute : CopyAttributes(config)) {
     linear(std::string("out.") + attribute.name, config.copies * attribute.channels, g);
   }
-  tensors.push_back({"domain.low", {kNodeFeatures}});
-  tensors.push_back({"domain.high", {kNodeFeatures}});
+  tensors.push_back({"domain.low", {told}});
+  tensors.push_back({"domain.high", {told}});
   return tensors;
 }
 

@@ -38,6 +38,7 @@ struct CompactConfig {
   bool prior = true;    // residuals are on top of the filter, with a learned f per Gaussian; else on the splat as it is
   bool anchors = true;  // offsets are bounded by ε
   bool sh = true;       // spherical harmonics of degree 1 to 3 change too
+  bool kind = false;    // Gaussians are told of their splat's kind: strength of the filter, render mode
   CompactContext context = CompactContext::kNearest;
   OffsetUnit offset_unit = OffsetUnit::kScale;
   double epsilon = 1;   // ε, in offset units
@@ -56,6 +57,7 @@ void VisitCompactOptions(CompactConfig& config, Visitor& visitor) {
   visitor.Flag("prior", config.prior);
   visitor.Flag("anchors", config.anchors);
   visitor.Flag("sh", config.sh);
+  visitor.Flag("kind", config.kind);
   const auto choose = [&](const std::string& key, const std::vector<std::string>& names, auto& value) {
     std::string name = names[static_cast<size_t>(value)];
     visitor.Text(key, names, name);
@@ -98,6 +100,9 @@ inline constexpr int64_t kAttributesWithoutSh = 5;
 std::span<const CompactAttribute> CopyAttributes(const CompactConfig& config);
 int64_t ChannelsPerCopy(const CompactConfig& config);
 int64_t CompactOutputs(const CompactConfig& config);  // 1 + K · ChannelsPerCopy
+
+// How many features of a Gaussian the network sees (model/compact/compact_features.h).
+int64_t NodeFeatures(const CompactConfig& config);
 
 // All tensors of a compact network's file: parameters, then the range of the training data ("domain.low" and
 // "domain.high").

@@ -34,12 +34,14 @@ constexpr float kSmallestPixel = 1e-20f, kLargestPixel = 1e20f;
 
 }  // namespace
 
-CompactFeatures::CompactFeatures(const GaussianCloud& cloud, const CompactGraph& graph,
-                                 std::span<const float> pixel_sizes, double upscale)
+CompactFeatures::CompactFeatures(const GaussianCloud& cloud, const CompactGraph& graph, const Task& task)
     : cloud_(cloud),
       graph_(graph),
-      pixel_sizes_(pixel_sizes),
-      upscale_feature_(static_cast<float>(0.5 * std::log2(upscale))) {}
+      pixel_sizes_(task.pixel_sizes),
+      node_features_(task.node_features),
+      upscale_feature_(static_cast<float>(0.5 * std::log2(task.upscale))),
+      kind_{static_cast<float>(task.strength), cloud.render_mode == RenderMode::kAntialiased ? 1.0f : 0.0f,
+            cloud.render_mode == RenderMode::kMip ? 1.0f : 0.0f} {}
 
 std::array<float, 3> CompactFeatures::Widths(int64_t i) const {
   const float log_p = std::log(std::clamp(static_cast<float>(pixel_size(i)), kSmallestPixel, kLargestPixel));
@@ -53,7 +55,7 @@ std::array<float, 3> CompactFeatures::Widths(int64_t i) const {
 
 void CompactFeatures::Nodes(int64_t begin, int64_t end, float* out) const {
   const int64_t m = graph_.neighbours;
-  for (int64_t i = begin; i < end; ++i, out += kNodeFeatures) {
+  for (int64_t i = begin; i < end; ++i, out += node_features_) {
     const float p = std::clamp(static_cast<float>(pixel_size(i)), kSmallestPixel, kLargestPixel);
     const float log_p = std::log(p);
     const std::array<float, 3> widths = Widths(i);
@@ -88,6 +90,7 @@ void CompactFeatures::Nodes(int64_t begin, int64_t end, float* out) const {
       out[20] = distance(m - 1);
     }
     std::copy_n(graph_.sidedness.data() + 3 * i, 3, out + 21);
+    std::copy_n(kind_.begin(), node_features_ - kNodeFeatures, out + kNodeFeatures);
   }
 }
 

@@ -23,7 +23,10 @@ namespace anchorsplat {
 //   18       log2(u)/2
 //   19, 20   ln(distance/p)/2 of the nearest and of the farthest neighbour, within −3 … 3; 3 without neighbours
 //   21 – 23  CompactGraph::sidedness
-inline constexpr int64_t kNodeFeatures = 24;
+// And of networks that are told the kind of splat, the same for all of its Gaussians:
+//   24       strength f of the filter
+//   25, 26   1 where the render mode is antialiased, mip
+inline constexpr int64_t kNodeFeatures = 24, kMostNodeFeatures = 27;
 inline constexpr int64_t kUpscaleFeature = 18;
 inline constexpr float kLowestWidth = -3, kHighestWidth = 2;
 
@@ -40,11 +43,17 @@ inline constexpr int64_t kEdgeFeatures = 18;
 // The cloud with what features are made of at hand. Refers to cloud and graph, which must outlive it.
 class CompactFeatures {
  public:
-  // `pixel_sizes`: p_LR, world units, one for all or one per Gaussian. See BuildCompactGraph about the cloud.
-  CompactFeatures(const GaussianCloud& cloud, const CompactGraph& graph, std::span<const float> pixel_sizes,
-                  double upscale);
+  // What features are asked for, and what the cloud does not say.
+  struct Task {
+    std::span<const float> pixel_sizes;   // p_LR, world units, one for all or one per Gaussian
+    double upscale = 4;                   // u
+    double strength = 0;                  // f of the filter
+    int64_t node_features = kNodeFeatures;  // or kMostNodeFeatures
+  };
+  // See BuildCompactGraph about the cloud.
+  CompactFeatures(const GaussianCloud& cloud, const CompactGraph& graph, const Task& task);
 
-  void Nodes(int64_t begin, int64_t end, float* out) const;  // [end − begin, kNodeFeatures]
+  void Nodes(int64_t begin, int64_t end, float* out) const;  // [end − begin, task.node_features]
   void Edges(int64_t begin, int64_t end, float* out) const;  // [(end − begin)·m, kEdgeFeatures]
 
   // The first three features of Gaussian i without their bounds; −Inf where a scale is 0.
@@ -56,7 +65,9 @@ class CompactFeatures {
   const GaussianCloud& cloud_;
   const CompactGraph& graph_;
   std::span<const float> pixel_sizes_;
+  int64_t node_features_;
   float upscale_feature_;
+  std::array<float, kMostNodeFeatures - kNodeFeatures> kind_;
 };
 
 }  // namespace anchorsplat

@@ -85,7 +85,7 @@ TEST(CompactFeatures, OfTwoGaussians) {
   cloud.sh[3 * 9] = 0.2f;  // degree 3
   const CompactGraph graph = BuildCompactGraph(cloud, 8);
   ASSERT_EQ(graph.neighbours, 1);
-  const CompactFeatures features(cloud, graph, {&p, 1}, 4);
+  const CompactFeatures features(cloud, graph, {.pixel_sizes = {&p, 1}, .upscale = 4});
   std::vector<float> node(kNodeFeatures), edge(kEdgeFeatures);
   features.Nodes(0, 1, node.data());
   features.Edges(0, 1, edge.data());
@@ -118,13 +118,28 @@ TEST(CompactFeatures, OfTwoGaussians) {
 
   features.Nodes(1, 2, node.data());
   EXPECT_EQ(node[3], -2);  // bounded
+
+  // A network that is told the kind of splat sees three more, and nothing else changes.
+  cloud.render_mode = RenderMode::kMip;
+  const CompactFeatures told(
+      cloud, graph,
+      {.pixel_sizes = {&p, 1}, .upscale = 4, .strength = 0.25, .node_features = kMostNodeFeatures});
+  std::vector<float> both(2 * kMostNodeFeatures);
+  told.Nodes(0, 2, both.data());
+  EXPECT_TRUE(std::equal(node.begin(), node.end(), both.begin() + kMostNodeFeatures));
+  for (const size_t row : {0u, 1u}) {
+    const float* kind = both.data() + row * kMostNodeFeatures + kNodeFeatures;
+    EXPECT_EQ(kind[0], 0.25f);
+    EXPECT_EQ(kind[1], 0.0f);
+    EXPECT_EQ(kind[2], 1.0f);
+  }
 }
 
 // The vector of degree 1 is where colours rise: ShBasis is the judge.
 TEST(CompactFeatures, LinearHarmonicsAreAVector) {
   GaussianCloud cloud = SheetCloud(1);
   const CompactGraph graph = BuildCompactGraph(cloud, 8);
-  const CompactFeatures features(cloud, graph, {&kPixel, 1}, 4);
+  const CompactFeatures features(cloud, graph, {.pixel_sizes = {&kPixel, 1}, .upscale = 4});
   std::vector<float> node(kNodeFeatures);
   features.Nodes(0, 1, node.data());
   for (int64_t a = 0; a < 3; ++a) {

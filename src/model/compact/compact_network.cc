@@ -157,7 +157,7 @@ Buffer<float> CompactNetwork::States(const CompactFeatures& features, const Comp
   };
   ParallelFor(0, n, kRowsPerTask, [&](int64_t begin, int64_t end) {
     const int64_t rows = end - begin;
-    Buffer<float> nodes(static_cast<size_t>(rows * kNodeFeatures)), first(static_cast<size_t>(rows * h));
+    Buffer<float> nodes(static_cast<size_t>(rows * NodeFeatures(config_))), first(static_cast<size_t>(rows * h));
     features.Nodes(begin, end, nodes.data());
     ApplyLinear(rows, nodes.data(), embed_first_, first.data(), Activation::kGelu);
     ApplyLinear(rows, first.data(), embed_second_, states.data() + begin * h);
@@ -200,13 +200,14 @@ Buffer<float> CompactNetwork::States(const CompactFeatures& features, const Comp
 
 void CompactNetwork::Head(const CompactFeatures& features, const Buffer<float>& states, int64_t begin, int64_t end,
                           float* out) const {
-  const int64_t rows = end - begin, h = config_.hidden, width = h + kNodeFeatures, g = config_.head_hidden;
-  Buffer<float> nodes(static_cast<size_t>(rows * kNodeFeatures)), input(static_cast<size_t>(rows * width)),
+  const int64_t rows = end - begin, h = config_.hidden, told = NodeFeatures(config_), width = h + told,
+                g = config_.head_hidden;
+  Buffer<float> nodes(static_cast<size_t>(rows * told)), input(static_cast<size_t>(rows * width)),
       first(static_cast<size_t>(rows * g)), second(static_cast<size_t>(rows * g));
   features.Nodes(begin, end, nodes.data());
   for (int64_t i = 0; i < rows; ++i) {
     std::copy_n(states.data() + (begin + i) * h, h, input.data() + i * width);
-    std::copy_n(nodes.data() + i * kNodeFeatures, kNodeFeatures, input.data() + i * width + h);
+    std::copy_n(nodes.data() + i * told, told, input.data() + i * width + h);
   }
   ApplyLinear(rows, input.data(), head_first_, first.data(), Activation::kGelu);
   ApplyLinear(rows, first.data(), head_second_, second.data(), Activation::kGelu);
@@ -221,7 +222,7 @@ void CompactNetwork::Outputs(const CompactFeatures& features, const CompactGraph
 
 float CompactNetwork::Fade(const float* node, const std::array<float, 3>& widths) const {
   float farthest = 0;
-  for (size_t c = 0; c < static_cast<size_t>(kNodeFeatures); ++c) {
+  for (size_t c = 0; c < low_.size(); ++c) {
     if (low_[c] > high_[c]) continue;
     float value = node[c];
     // A feature stops at its bounds, so the network cannot tell how far beyond a width lies. Where training had widths
@@ -279,11 +280,12 @@ CopyPlaces PlacesOfCopies(const std::vector<float>& fades, int64_t outside, int6
 
 std::vector<float> CompactNetwork::Fades(const CompactFeatures& features, int64_t count) const {
   std::vector<float> fades(static_cast<size_t>(count));
+  const int64_t told = NodeFeatures(config_);
   ParallelFor(0, count, kRowsPerTask, [&](int64_t begin, int64_t end) {
-    Buffer<float> nodes(static_cast<size_t>((end - begin) * kNodeFeatures));
+    Buffer<float> nodes(static_cast<size_t>((end - begin) * told));
     features.Nodes(begin, end, nodes.data());
     for (int64_t i = begin; i < end; ++i) {
-      fades[static_cast<size_t>(i)] = Fade(nodes.data() + (i - begin) * kNodeFeatures, features.Widths(i));
+      fades[static_cast<size_t>(i)] = Fade(nodes.data() + (i - begin) * told, features.Widths(i));
     }
   });
   return fades;
@@ -293,7 +295,11 @@ Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const Co
   ANCHORSPLAT_RETURN_IF_ERROR(CheckTask(cloud, task, config_.copies));
   const int64_t n = cloud.size();
   const CompactGraph graph = BuildCompactGraph(cloud, config_.neighbours, config_.context);
-  const CompactFeatures features(cloud, graph, task.pixel_sizes, task.upscale);
+  const CompactFeatures features(cloud, graph,
+                                 {.pixel_sizes = task.pixel_sizes,
+                                  .upscale = task.upscale,
+                                  .strength = task.strength,
+                                  .node_features = NodeFeatures(config_)});
 
   const std::vector<float> fades = Fades(features, n);
   CompactResult result;

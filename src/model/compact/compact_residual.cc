@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/widened.h"
+#include "enhance/filter.h"
 #include "model/shared/normalisation.h"
 #include "render/constants.h"
 
@@ -27,7 +28,8 @@ Vector FilteredLogScales(const CompactConfig& config, const CompactAnchors& anch
   for (size_t a = 0; a < 3; ++a) log_scale[a] = scales[stored[a]];
   if (config.prior) {
     const double f = anchors.strength + Bounded(kStrengthAttribute, y);
-    const double gain = std::max(kLeastGain, f - 1 / (anchors.upscale * anchors.upscale));
+    const double shown = ShownStrength(anchors.upscale, anchors.cloud->render_mode);
+    const double gain = std::max(kLeastGain, f - shown);
     const double log_variance = std::log(kDilation * gain) + 2 * std::log(p);
     for (double& s : log_scale) s = WidenedLogScale(s, log_variance);
   }

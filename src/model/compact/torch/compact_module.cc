@@ -61,7 +61,7 @@ CompactTrainable::CompactTrainable(const CompactConfig& config)
   register_module("head", head);
   register_module("out", out);
   register_module("domain", domain);
-  embed_first_ = embed->register_module("first", torch::nn::Linear(kNodeFeatures, h));
+  embed_first_ = embed->register_module("first", torch::nn::Linear(NodeFeatures(config), h));
   embed_second_ = embed->register_module("second", torch::nn::Linear(h, h));
   embed_norm_ = embed->register_module("norm", CompactLayerNorm(h));
   for (int64_t r = 0; r < config.rounds; ++r) {
@@ -76,7 +76,7 @@ CompactTrainable::CompactTrainable(const CompactConfig& config)
     round.update_second = group->register_module("update_second", torch::nn::Linear(h, h));
     round.norm = group->register_module("norm", CompactLayerNorm(h));
   }
-  head_first_ = head->register_module("first", torch::nn::Linear(h + kNodeFeatures, g));
+  head_first_ = head->register_module("first", torch::nn::Linear(h + NodeFeatures(config), g));
   head_second_ = head->register_module("second", torch::nn::Linear(g, g));
   out_strength_ = out->register_module(kStrengthAttribute.name, torch::nn::Linear(g, 1));
   for (const CompactAttribute& attribute : CopyAttributes(config)) {
@@ -85,8 +85,8 @@ CompactTrainable::CompactTrainable(const CompactConfig& config)
   // Training begins at the filter.
   const torch::NoGradGuard no_gradient;
   for (Tensor& parameter : out->parameters()) parameter.zero_();
-  low_ = domain->register_buffer("low", torch::full({kNodeFeatures}, kNoLimit));
-  high_ = domain->register_buffer("high", torch::full({kNodeFeatures}, -kNoLimit));
+  low_ = domain->register_buffer("low", torch::full({NodeFeatures(config)}, kNoLimit));
+  high_ = domain->register_buffer("high", torch::full({NodeFeatures(config)}, -kNoLimit));
 }
 
 Result<std::shared_ptr<void>> CompactTrainable::Prepare(const NetworkInput& input) {
@@ -130,8 +130,9 @@ void CompactTrainable::ShareMemory(const std::function<void(Tensor&)>& maximum) 
   const torch::NoGradGuard no_gradient;
   Tensor reach = torch::cat({-low_, high_});
   maximum(reach);
-  low_.copy_(-reach.narrow(0, 0, kNodeFeatures));
-  high_.copy_(reach.narrow(0, kNodeFeatures, kNodeFeatures));
+  const int64_t told = NodeFeatures(config_);
+  low_.copy_(-reach.narrow(0, 0, told));
+  high_.copy_(reach.narrow(0, told, told));
 }
 
 GaussianTensors CompactTrainable::Forward(const NetworkInput& input) {
@@ -146,8 +147,8 @@ GaussianTensors CompactTrainable::Forward(const NetworkInput& input) {
 
   Tensor log_scale = tables.log_scales;
   if (config_.prior) {
-    const Tensor f = DefaultFilterStrength(input.upscale) + Bounded(kStrengthAttribute, raw.narrow(1, 0, 1));
-    const Tensor gain = (f - 1 / (input.upscale * input.upscale)).clamp_min(kLeastGain);
+    const Tensor f = StrengthOf(input) + Bounded(kStrengthAttribute, raw.narrow(1, 0, 1));
+    const Tensor gain = (f - ShownStrength(input.upscale, input.mode)).clamp_min(kLeastGain);
     log_scale = 0.5 * torch::logaddexp(2 * log_scale, torch::log(kDilation * gain) + 2 * tables.log_pixel);
   }
   const Tensor scale = log_scale.exp();
@@ -280,6 +281,12 @@ Status CompactTrainable::InitialiseFrom(const std::filesystem::path& path) {
       times[0] = config_.copies;
       given = given.narrow(0, 0, channels).repeat(times);
     }
+    const bool reads_nodes = item.key() == "embed.first.weight" || item.key() == "head.first.weight";
+    const int64_t unheard = NodeFeatures(config_) - NodeFeatures(config);
+    if (reads_nodes && unheard > 0) given = torch::constant_pad_nd(given, {0, unheard});
+    // Of features that are new nobody knows the range yet.
+    if (item.key() == "domain.low" && unheard > 0) given = torch::constant_pad_nd(given, {0, unheard}, kNoLimit);
+    if (item.key() == "domain.high" && unheard > 0) given = torch::constant_pad_nd(given, {0, unheard}, -kNoLimit);
     if (given.sizes().vec() != shape) continue;
     item.value().copy_(given);
     ++taken;

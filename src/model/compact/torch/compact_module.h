@@ -53,7 +53,8 @@ class CompactTrainable : public TrainableNetwork {
   WeightSource Weights();
 
   // Begins with another network's weights and with the range of its training data: tensors of the same name and shape,
-  // and output layers of another number of copies, all of which then begin as its first. Errors: of reading the file;
+  // output layers of another number of copies, all of which then begin as its first, and layers that were told less,
+  // to which what is new says nothing yet. Errors: of reading the file;
   // kBadFile when it is no compact network or nothing of it fits.
   Status InitialiseFrom(const std::filesystem::path& path);
 

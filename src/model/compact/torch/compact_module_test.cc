@@ -60,7 +60,7 @@ void ExpectNear(const GaussianCloud& a, const GaussianCloud& b, double tolerance
 }
 
 std::vector<CompactConfig> Configs() {
-  std::vector<CompactConfig> configs(5);
+  std::vector<CompactConfig> configs(6);
   configs[0].copies = 1;
   configs[0].spread = 0;
   configs[1].offset_unit = OffsetUnit::kPixel;
@@ -76,6 +76,7 @@ std::vector<CompactConfig> Configs() {
   configs[4].hidden = 48;
   configs[4].head_hidden = 32;
   configs[4].context = CompactContext::kPatches;
+  configs[5].kind = true;
   return configs;
 }
 
@@ -120,6 +121,54 @@ Image Render(const GaussianCloud& cloud) {
   const Status status = rasterizer.Render(cloud, camera, {}, output);
   EXPECT_TRUE(status.ok());
   return output.color;
+}
+
+// Told of the render mode and of another strength, both forms hear the same, and what they hear matters.
+TEST(CompactModule, HearsTheKindOfSplat) {
+  CompactConfig config;
+  config.kind = true;
+  CompactTrainable network(config);
+  network.eval();
+  ASSERT_TRUE(network.SetWeights(OpenDomain()).ok());
+  const auto packed = CompactNetwork::Load(config, network.Weights());
+  ASSERT_TRUE(packed.ok()) << packed.error().message;
+  const torch::NoGradGuard no_gradient;
+  const float pixel = kSheetPixel;
+  GaussianCloud cloud = SheetCloud(100), last;
+  for (const RenderMode mode : kRenderModes) {
+    cloud.render_mode = mode;
+    NetworkInput input = InputOf(cloud);
+    input.mode = mode;
+    input.strength = 0.4;
+    const GaussianCloud expected = ToCloud(Copies(network, input));
+    const auto result = packed->Apply(cloud, {.pixel_sizes = {&pixel, 1}, .upscale = 4, .strength = 0.4});
+    ASSERT_TRUE(result.ok()) << result.error().message;
+    ExpectNear(result->cloud, expected, 1e-5);
+    EXPECT_EQ(result->cloud.render_mode, mode);
+    EXPECT_NE(result->cloud.means, last.means);
+    last = result->cloud;
+  }
+}
+
+// A network that was told less goes on with what it knows: what is new says nothing at first, and nobody knows its range.
+TEST(CompactModule, LearnsOfTheKindLater) {
+  const TestFolder folder;
+  CompactConfig config;
+  CompactTrainable before(config);
+  ASSERT_TRUE(before.SetWeights(OpenDomain()).ok());
+  const auto file = folder / "before.safetensors";
+  ASSERT_TRUE(before.Save(file, {}).ok());
+  config.kind = true;
+  CompactTrainable after(config);
+  ASSERT_TRUE(after.InitialiseFrom(file).ok());
+  const torch::NoGradGuard no_gradient;
+  before.eval();
+  after.eval();
+  NetworkInput input = InputOf(SheetCloud(100));
+  ExpectNear(ToCloud(Copies(after, input)), ToCloud(Copies(before, input)), 1e-6);
+  const auto packed = CompactNetwork::Load(config, after.Weights());
+  ASSERT_TRUE(packed.ok()) << packed.error().message;
+  EXPECT_FALSE(packed->KnowsItsDomain());
 }
 
 TEST(CompactModule, BeginsAtTheFilter) {

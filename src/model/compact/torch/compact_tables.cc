@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/text.h"
+#include "enhance/filter.h"
 #include "model/compact/compact_features.h"
 #include "model/compact/compact_graph.h"
 #include "model/compact/compact_residual.h"
@@ -56,6 +57,7 @@ struct UsableSplat {
 
 Result<UsableSplat> UsableSplatOf(const NetworkInput& input) {
   UsableSplat splat{ToCloud(input.gaussians), {}};
+  splat.cloud.render_mode = input.mode;
   const GaussianCloud& cloud = splat.cloud;
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   const int64_t n = cloud.size();
@@ -70,6 +72,13 @@ Result<UsableSplat> UsableSplatOf(const NetworkInput& input) {
     return Error{ErrorCode::kBadArgument, "a pixel size is not a positive length"};
   }
   return splat;
+}
+
+CompactFeatures::Task FeatureTask(const CompactConfig& config, const NetworkInput& input, const Buffer<float>& sizes) {
+  return {.pixel_sizes = sizes,
+          .upscale = input.upscale,
+          .strength = StrengthOf(input),
+          .node_features = NodeFeatures(config)};
 }
 
 // ±1, the sign of each frame's determinant.
@@ -87,6 +96,10 @@ Tensor Handedness(const CompactGraph& graph, int64_t n) {
 
 }  // namespace
 
+double StrengthOf(const NetworkInput& input) {
+  return input.strength.value_or(DefaultFilterStrength(input.upscale, input.mode));
+}
+
 Result<std::shared_ptr<const void>> SurveySplat(const CompactConfig& config, const NetworkInput& whole) {
   const torch::NoGradGuard no_gradient;
   if (config.offset_unit == OffsetUnit::kCube) {
@@ -94,8 +107,9 @@ Result<std::shared_ptr<const void>> SurveySplat(const CompactConfig& config, con
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const UsableSplat splat, UsableSplatOf(whole));
   CompactGraph graph = BuildCompactGraph(splat.cloud, config.neighbours, config.context);
-  const Tensor nodes = torch::empty({graph.count, kNodeFeatures});
-  CompactFeatures(splat.cloud, graph, splat.pixel_sizes, whole.upscale).Nodes(0, graph.count, nodes.data_ptr<float>());
+  const Tensor nodes = torch::empty({graph.count, NodeFeatures(config)});
+  CompactFeatures(splat.cloud, graph, FeatureTask(config, whole, splat.pixel_sizes))
+      .Nodes(0, graph.count, nodes.data_ptr<float>());
   const auto surveyed = std::make_shared<Surveyed>();
   surveyed->neighbours = graph.neighbours;
   surveyed->index = std::move(graph.index);
@@ -157,8 +171,8 @@ Result<std::shared_ptr<CompactTables>> MakeCompactTables(const CompactConfig& co
   const auto rounds = static_cast<size_t>(config.rounds);
   made->rings = tables != nullptr ? tables->rings : std::vector<int64_t>(rounds + 2, cloud.size());
   const int64_t n = made->rings[0], m = graph.neighbours;
-  const CompactFeatures features(cloud, graph, splat.pixel_sizes, input.upscale);
-  made->nodes = torch::empty({made->rings[rounds], kNodeFeatures});
+  const CompactFeatures features(cloud, graph, FeatureTask(config, input, splat.pixel_sizes));
+  made->nodes = torch::empty({made->rings[rounds], NodeFeatures(config)});
   features.Nodes(0, made->rings[rounds], made->nodes.data_ptr<float>());
   made->range = tables != nullptr ? tables->range : RangeOf(made->nodes);
   const int64_t readers = rounds > 0 ? made->rings[rounds - 1] : 0;

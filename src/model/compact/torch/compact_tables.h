@@ -15,7 +15,7 @@
 
 namespace anchorsplat {
 
-// What the features of a splat range over: quantiles of each, [kNodeFeatures].
+// What the features of a splat range over: quantiles of each, [NodeFeatures(config)].
 struct FeatureRange {
   torch::Tensor low, high;
 };
@@ -24,7 +24,7 @@ struct FeatureRange {
 // last one, of those whose copies are wanted. Of a whole splat all rings end at N.
 struct CompactTables {
   std::vector<int64_t> rings;
-  torch::Tensor nodes;            // [rings[rounds],kNodeFeatures]
+  torch::Tensor nodes;            // [rings[rounds],NodeFeatures(config)]
   torch::Tensor edges;            // [rings[rounds − 1]·m,kEdgeFeatures]
   std::vector<EdgeIndex> rounds;  // of each round's edges
   // Of the wanted rows, N from here on.
@@ -39,6 +39,9 @@ struct CompactTables {
   FeatureRange range;
   double offset_side = 0;  // of OffsetUnit::kCube
 };
+
+// f of the filter that residuals are added to.
+double StrengthOf(const NetworkInput& input);
 
 // Errors: those of CompactTrainable's methods, which these are.
 Result<std::shared_ptr<CompactTables>> MakeCompactTables(const CompactConfig& config, const CopyStart& start,

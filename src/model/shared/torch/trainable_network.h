@@ -6,11 +6,13 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "core/render_mode.h"
 #include "core/result.h"
 #include "model/shared/torch/gaussian_tensors.h"
 #include "model/shared/torch/network_options.h"
@@ -28,6 +30,8 @@ struct NetworkInput {
   GaussianTensors gaussians;  // the low-quality splat
   torch::Tensor pixel_sizes;  // [N] world units: what a low-resolution pixel covers at each Gaussian, p_LR
   double upscale = 4;         // u: high-resolution pixels per low-resolution pixel along a side
+  std::optional<double> strength;  // f of the filter; DefaultFilterStrength unless given
+  std::optional<RenderMode> mode;  // of the splat
   // What a network wants computed once per splat and kept between steps (neighbours, serialization, frames). Made by
   // Prepare.
   std::shared_ptr<void> prepared;

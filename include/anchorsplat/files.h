@@ -49,9 +49,10 @@ ANCHORSPLAT_PUBLIC Expected<Splat> ReadSplat(const std::filesystem::path& path, 
 ANCHORSPLAT_PUBLIC Expected<Splat> ReadSplat(std::span<const std::byte> bytes, std::string_view format = {},
                                              const RunSettings& run = {});
 
-// Writes a splat in the format of the extension. The file appears whole or not at all; what of the splat the format has
-// no place for is a message of the run. Failures: kExists; kNotFound (its folder); kIo; kBadArgument: no Gaussians,
-// CheckShape, an extension that is not written.
+// Writes a splat in the format of the extension. The file appears whole or not at all; what of harmonics, ranges,
+// render mode and credits (comments "credit: …") the format has no place for is a message of the run. Other comments
+// stay behind in silence where docs/formats.md says that a format has no place for them. Failures: kExists; kNotFound
+// (its folder); kIo; kBadArgument: no Gaussians, CheckShape, an extension that is not written.
 ANCHORSPLAT_PUBLIC Expected<void> WriteSplat(const std::filesystem::path& path, const SplatView& splat,
                                              const WriteSettings& settings = {}, const RunSettings& run = {});
 

@@ -19,14 +19,27 @@ enum class FitStrategy {
   kMcmc,     // a number of Gaussians that move to where they are needed (Kheradmand et al. 2024)
 };
 
+// Where the first Gaussians stand.
+enum class StartingPoints {
+  kAuto,     // kProject where the project has some, else kView
+  kProject,  // the project's points
+  kView,     // random points where many cameras look
+  kRandom,   // random points in a cube, as gsplat's
+};
+
 // The standard 3DGS optimisation; `anchorsplat fit --help` and docs/fit.md say more. Schedules follow `steps`.
 struct FitSettings {
   int64_t steps = 15000;
   int sh_degree = 3;
   FitStrategy strategy = FitStrategy::kDefault;
-  bool mip_filter = false;    // Mip-Splatting's 3-D smoothing filter; the splat is for antialiased rendering
-  int64_t max_gaussians = 0;  // growth stops there; 0: no bound, or a million with kMcmc
-  int hold_out = 8;           // every Nth view, by name, is not trained on; 0: all are
+  bool mip_filter = false;  // Mip-Splatting's 3-D smoothing filter; the splat is for Rasterization::kMip
+  Rasterization rasterization = Rasterization::kClassic;  // of the fit, and so of the splat; kMip with mip_filter
+  // Above 1 a pixel is the mean over its area and not what the ray through its centre meets: for a splat that will be
+  // seen as many times closer. Up to 16; not with mip_filter.
+  double area_pixels = 1;
+  int64_t max_gaussians = 0;                               // growth stops there; 0: no bound, or a million with kMcmc
+  int hold_out = 8;                                        // every Nth view, by name, is not trained on; 0: all are
+  StartingPoints starting_points = StartingPoints::kAuto;  // without a splat to begin at
   std::optional<int64_t> initial_points =
       std::nullopt;  // thinned to as many, or random ones; 100,000 where there are none
   std::optional<std::array<float, 3>> background =
@@ -56,7 +69,8 @@ struct FitOutcome {
 // scene. Begins at the project's points or, where it has none, at random ones that many cameras see; or, with `start`,
 // at the centres and colours of another splat.
 //
-// Failures: kNotFound; kIo; kBadFile; kBadArgument: settings out of range, a start without finite Gaussians.
+// Failures: kNotFound; kIo; kBadFile; kBadArgument: settings out of range or at odds, a start without finite
+// Gaussians, StartingPoints::kProject where the project has none.
 ANCHORSPLAT_PUBLIC Expected<FitOutcome> FitProject(const std::filesystem::path& project,
                                                    const FitSettings& settings = {}, const RunSettings& run = {});
 ANCHORSPLAT_PUBLIC Expected<FitOutcome> FitProject(const std::filesystem::path& project, const SplatView& start,

@@ -6,6 +6,7 @@
 #include "fit/checkpoint_guard.h"
 #include "fit/initial_cloud.h"
 #include "fit/initial_points.h"
+#include "fit/training_views.h"
 
 namespace anchorsplat {
 
@@ -19,6 +20,19 @@ FitPreset PresetOf(FitStrategy strategy) {
       return FitPreset::kMcmc;
     default:
       return FitPreset::kDefault;
+  }
+}
+
+FitInit InitOf(StartingPoints points) {
+  switch (points) {
+    case StartingPoints::kProject:
+      return FitInit::kPoints;
+    case StartingPoints::kView:
+      return FitInit::kView;
+    case StartingPoints::kRandom:
+      return FitInit::kRandom;
+    default:
+      return FitInit::kAuto;
   }
 }
 
@@ -39,14 +53,21 @@ Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianClo
   options.seed = settings.seed;
   options.densification.max_gaussians = settings.max_gaussians;
   if (settings.max_gaussians > 0) options.mcmc.cap_max = settings.max_gaussians;
+  options.objective.render.mode = *ToMode(settings.rasterization);
+  options.pixel.upscale = settings.area_pixels;
   if (settings.mip_filter) UseMipFilter(options);
   options.objective.render.sh_degree = settings.sh_degree;
   if (const auto background = settings.background ? settings.background : views.background) {
     options.objective.render.background = *background;
   }
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options));
-  const InitialPoints points = start != nullptr ? Thinned(PointsOf(*start), settings.initial_points)
-                                                : UsualStart(views, settings.initial_points, settings.seed);
+  InitialPoints points;
+  if (start != nullptr) {
+    points = Thinned(PointsOf(*start), settings.initial_points);
+  } else {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(
+        points, InitialPointsOf(InitOf(settings.starting_points), views, settings.initial_points, settings.seed));
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial, InitialCloud(points, views.scene_scale, StartOptions(options)));
   FitControl control;
   control.checkpoint = settings.checkpoint;

@@ -190,6 +190,34 @@ TEST(Fit, ComesCloserToThePictures) {
   EXPECT_EQ(FitProject("/there/is/none").failure().kind, FailureKind::kNotFound);
 }
 
+TEST(Fit, HasItsModePixelsAndStart) {
+  const TestFolder folder;
+  WriteProject(folder.path(), SmallSplat(80, 0, 5), 6, 40);
+  const FitSettings plain{.steps = 3, .hold_out = 0, .initial_points = 60};
+  const auto means_of = [&](const FitSettings& settings) {
+    const auto fitted = FitProject(folder.path(), settings);
+    EXPECT_TRUE(fitted.ok()) << fitted.failure().message;
+    const SplatView view = fitted->splat.view();
+    EXPECT_EQ(view.rasterization, settings.rasterization);
+    return std::vector<float>(view.means.begin(), view.means.end());
+  };
+  const std::vector<float> classic = means_of(plain);
+  EXPECT_EQ(means_of(plain), classic);
+  FitSettings other = plain;
+  other.rasterization = Rasterization::kAntialiased;
+  EXPECT_NE(means_of(other), classic);
+  other = plain;
+  other.area_pixels = 4;
+  EXPECT_NE(means_of(other), classic);
+  other.mip_filter = true;
+  EXPECT_EQ(FitProject(folder.path(), other).failure().kind, FailureKind::kBadArgument);
+  other = plain;
+  other.starting_points = StartingPoints::kRandom;
+  EXPECT_NE(means_of(other), classic);
+  other.starting_points = StartingPoints::kProject;
+  EXPECT_THAT(FitProject(folder.path(), other).failure().message, testing::HasSubstr("it has none"));
+}
+
 // A name given for the state of a fit by mistake costs nothing.
 TEST(Fit, TakesNoForeignFileForItsState) {
   const TestFolder folder;

@@ -60,6 +60,11 @@ TEST_F(CompareVerb, RefusesWhatCannotBeCompared) {
   ExpectRefused({"compare", scan_, other_}, ErrorCode::kBadArgument, {"--orbit"});
   ExpectRefused({"compare", "", scan_, "--orbit", "1"}, ErrorCode::kBadArgument, {"must not be empty"});
   ExpectRefused({"compare", scan_, views_, "--orbit", "2", "--size", "32x32"}, ErrorCode::kBadArgument, {"48x48"});
+  // Both sides differ from the truth in size: a view is named once.
+  EXPECT_THAT(ExpectRefused({"compare", scan_, other_, "--truth", views_, "--orbit", "2", "--size", "32x32"},
+                            ErrorCode::kBadArgument)
+                  .err,
+              HasSubstr("different sizes: 000 (32x32 and 48x48), 001 (32x32 and 48x48);"));
   ExpectRefused({"compare", scan_, views_, "--orbit", "3", "--size", "48x48"}, ErrorCode::kBadArgument, {"002"});
   fs::create_directory(folder_ / "empty");
   ExpectRefused({"compare", scan_, folder_ / "empty", "--orbit", "1"}, ErrorCode::kNotFound, {"no PNG or JPEG"});

@@ -80,7 +80,14 @@ TEST_F(Effects, OfTheStrategyOfAFit) {
   ExpectNoEffect(fit({"--strategy", "absgrad", "--min-opacity", "0.1"}), "it has one with --strategy mcmc");
   ExpectNoEffect(fit({"--mip-filter", "--mode", "antialiased"}), "--mode has no effect here; it has one without");
   ExpectNoEffect(fit({"--strategy", "mcmc", "--max-gaussians", "0"}), "say how many");
-  ExpectNoEffect(fit({"--mip-filter", "--pixel", "area"}), "the smoothing filter is for pixels that are points");
+  ExpectNoEffect(fit({"--mip-filter", "--pixel", "area"}), "--mip-filter and --pixel area");
+  // What has no meaning names the option as it is written.
+  for (const char* option : {"--prune-opa", "--grow-scale3d", "--prune-scale3d", "--rate-means-decay"}) {
+    ExpectNoEffect(fit({option, "0"}), option);
+  }
+  ExpectNoEffect(fit({"--prune-opa", "0"}), "above 0 and below 0.5");
+  ExpectNoEffect(fit({"--strategy", "mcmc", "--min-opacity", "0"}), "--min-opacity");
+  ExpectNoEffect(fit({"--rate-means-decay", "2"}), "--rate-means-decay");
 }
 
 TEST_F(Effects, OfCamerasThatSeeNothing) {

@@ -4,6 +4,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "cli/choice.h"
 #include "cli/clean_output.h"
@@ -15,11 +16,13 @@
 #include "core/text.h"
 #include "fit/checkpoint_guard.h"
 #include "fit/initial_cloud.h"
+#include "fit/training_views.h"
 #include "formats/cloud_io.h"
 #include "formats/cloud_output.h"
 #include "formats/gsplat_checkpoint/gsplat_checkpoint_writer.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
+#include "formats/write_losses.h"
 #include "io/atomic_file.h"
 #include "io/input_record.h"
 
@@ -66,21 +69,15 @@ Result<Start> ChooseStart(const FitFlags& flags, const TrainingViews& views, uin
   if (flags.init == FitInit::kPoints && views.points.size() == 0) {
     return Error{ErrorCode::kBadArgument, Cat(flags.project, ": --init points, but the project has none")};
   }
-  if (flags.init == FitInit::kRandom) {
-    return Start{RandomPoints(flags.init_points.value_or(kRandomPoints), views.scene_scale, seed), "random"};
-  }
-  if (flags.init == FitInit::kView) {
-    const int64_t count = flags.init_points.value_or(kRandomPoints);
-    return Start{RandomPointsInView(count, views.train, views.scene_scale, seed), "view"};
-  }
-  return Start{UsualStart(views, flags.init_points, seed), views.points.size() > 0 ? "points" : "view"};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(InitialPoints points, InitialPointsOf(flags.init, views, flags.init_points, seed));
+  return Start{std::move(points), NameOf(flags.init, views)};
 }
 
 nlohmann::json ToJson(const ViewQuality& quality) {
   return {{"views", quality.views}, {"psnr", quality.psnr}, {"ssim", quality.ssim}};
 }
 
-nlohmann::json ToJson(const FitFlags& flags, const std::string& origin, const FitReport& r) {
+nlohmann::json ToJson(const FitFlags& flags, const std::string& origin, const FitOptions& options, const FitReport& r) {
   const auto& t = r.times;
   nlohmann::json json = {
       {"project", flags.project},
@@ -88,6 +85,7 @@ nlohmann::json ToJson(const FitFlags& flags, const std::string& origin, const Fi
       {"steps", r.steps},
       {"resumed_at", r.resumed_at},
       {"initial_points", origin},
+      {"settings", nlohmann::json::parse(ToJsonText(options))},
       {"scene_scale", r.scene_scale},
       {"gaussians",
        {{"in", r.gaussians_in},
@@ -131,6 +129,11 @@ Status WriteResults(const FitFlags& flags, const Fitted& fitted, bool overwrite)
     return WriteGsplatCheckpoint(path, fitted.cloud, std::max<int64_t>(0, fitted.report.steps - 1),
                                  {.overwrite = replace});
   });
+  if (checkpoint.ok()) {
+    for (const std::string& loss : WriteLosses(*FormatOfName("pt"), fitted.cloud)) {
+      LogWarning(Cat(flags.gsplat_checkpoint, ": ", loss));
+    }
+  }
   if (splat.ok() || checkpoint.ok()) return splat.ok() ? checkpoint : splat;
   return Error{splat.error().code, Cat(splat.error().message, "; ", checkpoint.error().message)};
 }
@@ -170,7 +173,7 @@ Status RunFit(const FitFlags& flags, const SharedFlags& shared) {
   if (!fitted.ok()) return fitted.error();
   if (fitted->report.interrupted) return Interrupted(flags, fitted->report, options.steps, control.checkpoint);
   if (shared.json) {
-    PrintJson(ToJson(flags, start.origin, fitted->report));
+    PrintJson(ToJson(flags, start.origin, options, fitted->report));
   } else if (!shared.quiet) {
     PrintReport(flags, fitted->report);
   }

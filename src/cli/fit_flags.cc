@@ -12,14 +12,25 @@ namespace {
 
 constexpr int64_t kMostSteps = int64_t{1} << 40;
 
+// An opacity of what hardly shows; of none there is nothing below.
+CLI::Validator FaintOpacity() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        double value = 0;
+        const bool number = CLI::detail::lexical_cast(text, value);
+        return number && value > 0 && value < 0.5 ? "" : "must be a number above 0 and below 0.5, found '" + text + "'";
+      },
+      "");
+}
+
 void AddScheduleFlags(CLI::App& verb, FitFlags& f) {
   const std::string group = "Densification (names of gsplat's strategies; steps default to their schedules, scaled)";
   DensificationOptions& d = f.standard.densification;
   const auto steps = [&](const char* name, std::optional<int64_t>& value, const char* help) {
     verb.add_option(name, value, help)->check(CLI::Range(int64_t{1}, kMostSteps))->group(group);
   };
-  const auto number = [&](const char* name, double& value, const char* help) {
-    verb.add_option(name, value, help)->check(NotNegative())->capture_default_str()->group(group);
+  const auto number = [&](const char* name, double& value, const char* help, const CLI::Validator& check) {
+    verb.add_option(name, value, help)->check(check)->capture_default_str()->group(group);
   };
   steps("--refine-start", f.refine_start, "First growth after this step");
   steps("--refine-stop", f.refine_stop, "No growth from this step on");
@@ -35,12 +46,15 @@ void AddScheduleFlags(CLI::App& verb, FitFlags& f) {
                   "Gradient in the picture above which a Gaussian grows (default: 0.0002; 0.0008 with absgrad)")
       ->check(NotNegative())
       ->group(group);
-  number("--grow-scale3d", d.grow_scale3d, "Size, in scene scales, above which it is split, not duplicated");
-  number("--prune-opa", d.prune_opa, "Opacity below which it goes");
-  number("--prune-scale3d", d.prune_scale3d, "Size, in scene scales, above which it goes");
+  number("--grow-scale3d", d.grow_scale3d, "Size, in scene scales, above which it is split, not duplicated",
+         Positive());
+  number("--prune-opa", d.prune_opa, "Opacity below which it goes; 1e-9 keeps all", FaintOpacity());
+  number("--prune-scale3d", d.prune_scale3d, "Size, in scene scales, above which it goes", Positive());
   verb.add_flag("--revised-opacity", d.revised_opacity, "Halves of a split share its opacity")->group(group);
-  number("--min-opacity", f.standard.mcmc.min_opacity, "With mcmc: opacity up to which a Gaussian moves elsewhere");
-  number("--noise-lr", f.standard.mcmc.noise_lr, "With mcmc: noise of centres, times their learning rate");
+  number("--min-opacity", f.standard.mcmc.min_opacity,
+         "With mcmc: opacity up to which a Gaussian moves elsewhere; 1e-9 leaves all where they are", FaintOpacity());
+  number("--noise-lr", f.standard.mcmc.noise_lr, "With mcmc: noise of centres, times their learning rate",
+         NotNegative());
   const auto regularizer = [&](const char* name, std::optional<double>& value, const char* help) {
     verb.add_option(name, value, help)->check(NotNegative())->group(group);
   };
@@ -52,10 +66,12 @@ void AddRateFlags(CLI::App& verb, FitFlags& f) {
   const std::string group = "Learning rates";
   LearningRates& r = f.standard.rates;
   const auto rate = [&](const char* name, double& value, const char* help) {
-    verb.add_option(name, value, help)->check(NotNegative())->capture_default_str()->group(group);
+    return verb.add_option(name, value, help)->check(NotNegative())->capture_default_str()->group(group);
   };
   rate("--rate-means", r.means, "Of centres, in scene scales");
-  rate("--rate-means-decay", r.means_decay, "What is left of it at the last step");
+  rate("--rate-means-decay", r.means_decay, "What is left of it at the last step, up to 1")
+      ->check(Positive())
+      ->check(Fraction());
   rate("--rate-scales", r.scales, "Of log-scales");
   rate("--rate-quats", r.quats, "Of quaternions");
   rate("--rate-opacities", r.opacities, "Of opacity logits");
@@ -204,6 +220,10 @@ Result<FitOptions> MakeFitOptions(const FitFlags& flags, const std::optional<std
   options.regularizers.opacity_reg = flags.opacity_reg.value_or(scaled.regularizers.opacity_reg);
   options.regularizers.scale_reg = flags.scale_reg.value_or(scaled.regularizers.scale_reg);
   options.mip_filter_every = scaled.mip_filter_every;
+  if (flags.mip_filter && flags.pixel == FitPixel::kArea) {
+    return Error{ErrorCode::kBadArgument,
+                 "--mip-filter and --pixel area are two answers to one question, how large a pixel is; leave one out"};
+  }
   if (flags.mip_filter) UseMipFilter(options);
   options.objective.render.background = background.value_or(options.objective.render.background);
   if (!flags.background.empty()) {

@@ -9,16 +9,9 @@
 
 #include "core/result.h"
 #include "fit/fit_options.h"
+#include "fit/training_views.h"
 
 namespace anchorsplat {
-
-// Where a fit's Gaussians begin.
-enum class FitInit {
-  kAuto,    // the project's points, else kView
-  kPoints,  // the project's points
-  kView,    // random points where many cameras look
-  kRandom,  // random points in gsplat's cube
-};
 
 // What a pixel of the pictures is taken to be.
 enum class FitPixel { kPoint, kArea };

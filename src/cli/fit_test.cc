@@ -30,6 +30,9 @@ TEST_F(FitVerb, MakesASplat) {
   EXPECT_EQ(json["steps"], 12);
   EXPECT_EQ(json["resumed_at"], 0);
   EXPECT_EQ(json["initial_points"], "view");
+  EXPECT_EQ(json["settings"]["mode"], "classic");
+  EXPECT_EQ(json["settings"]["pixel"], "point");
+  EXPECT_EQ(json["settings"]["strategy"], "default");
   EXPECT_EQ(json["train"]["views"], 8);
   EXPECT_EQ(json["held_out"]["views"], 2);
   EXPECT_EQ(json["gaussians"]["in"], 200);
@@ -68,7 +71,8 @@ TEST_F(FitVerb, KnowsItsStrategies) {
   EXPECT_EQ(mcmc["added"], 30);
   EXPECT_EQ(mcmc["pruned"], 0);
   EXPECT_EQ(ExpectJson(Fit("absgrad.ply", {"--strategy", "absgrad"}))["gaussians"]["added"], 0);
-  ExpectDone(Fit("mip.ply", {"--mip-filter"}));
+  EXPECT_THAT(ExpectDone(Fit("mip.ply", {"--mip-filter", "--gsplat-checkpoint", folder_ / "mip.pt"})).err,
+              AllOf(HasSubstr("mip.pt: a gsplat checkpoint file has no place for the render mode mip")));
   EXPECT_EQ(ExpectJson({"info", folder_ / "mip.ply"})["render_mode"], "mip");
   ExpectRefused(Fit("x.ply", {"--strategy", "best"}), ErrorCode::kBadArgument, {"--strategy"});
 }

@@ -12,6 +12,7 @@
 #include "cli/parse.h"
 #include "cli/table.h"
 #include "cli/verb.h"
+#include "core/credit.h"
 #include "core/file_system.h"
 #include "core/statistics.h"
 #include "core/text.h"
@@ -73,12 +74,17 @@ std::string Number(double value) {
   return text;
 }
 
+constexpr size_t kMostCredit = 1000;  // bytes of one that are shown
+
 void PrintTable(const Findings& f) {
   const CloudStatistics& s = f.statistics;
   std::cout << OneLine(f.file) << "\n"
             << "  Gaussians    " << WithThousands(s.gaussians) << ", SH degree " << s.sh_degree << "\n"
             << "  file         " << HumanBytes(f.file_bytes) << (f.format.empty() ? "" : ", " + f.format) << "\n"
             << "  render mode  " << ModeName(f.cloud) << "\n";
+  for (const std::string& credit : CreditsOf(f.cloud.comments)) {
+    std::cout << "  credit       " << Printable(credit, kMostCredit) << "\n";
+  }
   for (const auto& [name, value] : f.facts.all()) std::cout << "  " << name << "  " << value << "\n";
   if (s.bounds) {
     std::cout << "  bounds      ";
@@ -139,6 +145,7 @@ nlohmann::json ToJson(const Findings& f) {
                          {"bounds", nullptr},
                          {"render_mode", nullptr},
                          {"comments", f.cloud.comments},
+                         {"credits", CreditsOf(f.cloud.comments)},
                          {"largest_axis", percentiles(s.largest_axis)},
                          {"smallest_axis", percentiles(s.smallest_axis)},
                          {"axis_ratio", percentiles(s.axis_ratio)},

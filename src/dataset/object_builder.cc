@@ -16,6 +16,8 @@
 #include "dataset/picture_project.h"
 #include "dataset/scene_reader.h"
 #include "fit/fit.h"
+#include "fit/picture_cache.h"
+#include "fit/view_quality.h"
 #include "formats/cloud_io.h"
 #include "formats/gsplat_checkpoint/gsplat_checkpoint_writer.h"
 #include "io/atomic_file.h"
@@ -149,11 +151,23 @@ Status Capture(const ObjectJob& job, const fs::path& folder, const ObjectRecord&
                               record.background, s.hold_out, s.seed);
 }
 
-Status FitSplat(const ObjectJob& job, const fs::path& folder, ObjectRecord& record) {
-  ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "fit"));
+// The views that the fit saw, and those that it did not.
+Result<TrainingViews> FittedViews(const ObjectJob& job, const fs::path& folder, const ObjectRecord& record) {
   const fs::path low = folder / std::to_string(record.low_size);
   const fs::path project = job.settings.defects.Any() ? folder / kCapturedName : low;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(project, {.hold_out = job.settings.hold_out}));
+  return OpenProject(project, {.hold_out = job.settings.hold_out});
+}
+
+void NoteQuality(const ViewQuality& train, const ViewQuality& held_out, ObjectRecord& record) {
+  record.train_psnr = train.psnr;
+  record.train_ssim = train.ssim;
+  record.held_out_psnr = held_out.psnr;
+  record.held_out_ssim = held_out.ssim;
+}
+
+Status FitSplat(const ObjectJob& job, const fs::path& folder, ObjectRecord& record) {
+  ANCHORSPLAT_RETURN_IF_ERROR(EnterStage(folder, "fit"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, FittedViews(job, folder, record));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const FitOptions options,
                                ToFitOptions(job.settings, Upscale(record), record.background));
   if (views.points.size() == 0) {
@@ -179,11 +193,22 @@ Status FitSplat(const ObjectJob& job, const fs::path& folder, ObjectRecord& reco
                  Cat(job.name, ": stopped after ", report.steps, " of ", options.steps, " steps")};
   }
   record.gaussians = fitted->cloud.size();
-  record.train_psnr = report.train.psnr;
-  record.train_ssim = report.train.ssim;
-  record.held_out_psnr = report.held_out.psnr;
-  record.held_out_ssim = report.held_out.ssim;
+  NoteQuality(report.train, report.held_out, record);
   record.fit_seconds = report.seconds;
+  return {};
+}
+
+// How well a splat that was not fitted to the views shows them, drawn as its file says.
+Status MeasureDerived(const ObjectJob& job, const fs::path& folder, const GaussianCloud& cloud, ObjectRecord& record) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, FittedViews(job, folder, record));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(FitOptions options, ToFitOptions(job.settings, Upscale(record), record.background));
+  RenderOptions& render = options.objective.render;
+  render.mode = cloud.render_mode.value_or(RenderMode::kClassic);
+  const PixelModel pixel = PixelModelAt(options, options.steps);
+  PictureCache train(views.train, render.background, 0), held_out(views.held_out, render.background, 0);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewQuality on_train, MeasureQuality(cloud, render, train, pixel));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewQuality on_others, MeasureQuality(cloud, render, held_out, pixel));
+  NoteQuality(on_train, on_others, record);
   return {};
 }
 
@@ -201,6 +226,7 @@ Status DeriveSplat(const ObjectJob& job, const fs::path& dataset, const fs::path
   base.settings = record.settings;
   record = std::move(base);
   record.gaussians = cloud.size();
+  ANCHORSPLAT_RETURN_IF_ERROR(MeasureDerived(job, folder, cloud, record));
   record.read_seconds = record.view_seconds = 0;
   record.fit_seconds = watch.Total();
   return WriteSplats(cloud, folder, record);

@@ -32,7 +32,7 @@ struct ObjectRecord {
   int64_t transparent_triangles = 0;  // left out
   int64_t initial_points = 0;
   int64_t gaussians = 0;
-  double train_psnr = 0;  // dB, of the fit on its own training views
+  double train_psnr = 0;  // dB, of the object's splat on the training views of its fit
   double train_ssim = 0;
   double held_out_psnr = 0;  // 0 when none are held out
   double held_out_ssim = 0;

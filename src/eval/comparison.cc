@@ -36,13 +36,17 @@ Status CheckSizes(std::span<ViewSource* const> sources, const std::vector<std::v
   int different = 0;
   for (size_t r = 0; r < reference.names().size(); ++r) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize truth, reference.SizeOf(r));
+    std::vector<std::string> others;  // each size once
     for (size_t s = 0; s < sources.size(); ++s) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize size, sources[s]->SizeOf(partners[s][r]));
       if (size.width == truth.width && size.height == truth.height) continue;
-      if (++different > kShown) continue;
-      list += Cat(list.empty() ? "" : ", ", ViewLabel(reference.names()[r]), " (", size.width, "x", size.height,
-                  " and ", truth.width, "x", truth.height, ")");
+      std::string text = Cat(size.width, "x", size.height);
+      if (std::ranges::find(others, text) == others.end()) others.push_back(std::move(text));
     }
+    if (others.empty() || ++different > kShown) continue;
+    list += Cat(list.empty() ? "" : ", ", ViewLabel(reference.names()[r]), " (");
+    for (size_t k = 0; k < others.size(); ++k) list += Cat(k == 0 ? "" : ", ", others[k]);
+    list += Cat(" and ", truth.width, "x", truth.height, ")");
   }
   if (different == 0) return {};
   if (different > kShown) list += Cat(" and ", different - kShown, " more");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/text.h"
@@ -48,6 +49,28 @@ void Paste(Image& canvas, const Image& tile, int left, int top) {
 // As much of a text as fits into a column.
 std::string Fitting(const std::string& text) { return FittingText(text, kTileSide, kTextScale, ""); }
 
+// Whose the objects are, in lines of at most `width` pixels: each text once, with the names of its objects where there
+// are several.
+std::vector<std::string> CreditLines(const Evaluation& evaluation, const std::vector<size_t>& rows, int width) {
+  std::vector<std::pair<std::string, std::string>> credits;  // and whose
+  for (const size_t row : rows) {
+    for (const std::string& credit : evaluation.credits[row]) {
+      const auto same = std::ranges::find(credits, credit, &std::pair<std::string, std::string>::first);
+      if (same == credits.end()) {
+        credits.emplace_back(credit, evaluation.objects[row]);
+      } else {
+        same->second += ", " + evaluation.objects[row];
+      }
+    }
+  }
+  std::vector<std::string> lines;
+  for (const auto& [credit, objects] : credits) {
+    const std::string text = rows.size() > 1 ? Cat(objects, ": ", credit) : credit;
+    for (std::string& line : WrappedText(text, width, kTextScale)) lines.push_back(std::move(line));
+  }
+  return lines;
+}
+
 }  // namespace
 
 Result<Image> ContactSheet(const fs::path& out, const Evaluation& evaluation) {
@@ -60,8 +83,11 @@ Result<Image> ContactSheet(const fs::path& out, const Evaluation& evaluation) {
   const std::vector<size_t> rows = Thinned(with_results, kMostSheetObjects);
   const int columns = static_cast<int>(evaluation.methods.size()) + 1;
   const int row_height = kTileSide + 2 * kLine + kGap;
-  const int64_t height = 2 * kGap + kLine + int64_t{row_height} * static_cast<int64_t>(rows.size());
-  Image canvas(kGap + columns * (kTileSide + kGap), static_cast<int>(height), 3);
+  const int width = kGap + columns * (kTileSide + kGap);
+  const std::vector<std::string> credits = CreditLines(evaluation, rows, width - 2 * kGap);
+  const int64_t height = 2 * kGap + kLine + int64_t{row_height} * static_cast<int64_t>(rows.size()) +
+                         int64_t{kLine} * static_cast<int64_t>(credits.size()) + (credits.empty() ? 0 : kGap);
+  Image canvas(width, static_cast<int>(height), 3);
   Fill(canvas);
   const auto left = [](int column) { return kGap + column * (kTileSide + kGap); };
   for (int column = 0; column < columns; ++column) {
@@ -86,6 +112,10 @@ Result<Image> ContactSheet(const fs::path& out, const Evaluation& evaluation) {
     }
     DrawText(canvas, left(0), top, Fitting(object), kTextScale, kInk);
     top += row_height;
+  }
+  for (const std::string& line : credits) {
+    DrawText(canvas, kGap, top, line, kTextScale, kDim);
+    top += kLine;
   }
   return canvas;
 }

@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 
+#include "core/credit.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
@@ -122,6 +123,7 @@ Status MeasureView(const BenchmarkObject& object, size_t view, const std::option
 Status EvaluateObject(const BenchmarkEntry& entry, const std::string& place, const std::vector<EvalMethod>& methods,
                       const fs::path& out, const EvaluationOptions& options, Evaluation& evaluation) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const BenchmarkObject object, OpenObject(entry));
+  evaluation.credits.back() = CreditsOf(object.low.comments);
   const std::vector<size_t> views =
       Thinned(options.protocol == Protocol::kUpstream ? UpstreamViews(object.views.size()) : object.held_out,
               options.max_views);
@@ -216,17 +218,28 @@ Result<std::vector<BenchmarkEntry>> ChooseKinds(std::vector<BenchmarkEntry> entr
   return entries;
 }
 
+// `all`: `entries` before kinds were chosen.
 Result<std::vector<BenchmarkEntry>> ChooseObjects(std::vector<BenchmarkEntry> entries,
-                                                  const std::vector<std::string>& names) {
+                                                  const std::vector<BenchmarkEntry>& all,
+                                                  const EvaluationOptions& options) {
+  const std::vector<std::string>& names = options.objects;
   if (names.empty()) return entries;
   std::vector<BenchmarkEntry> chosen;
   for (const BenchmarkEntry& entry : entries) {
     if (std::find(names.begin(), names.end(), entry.name) != names.end()) chosen.push_back(entry);
   }
   for (const std::string& name : names) {
-    if (std::none_of(chosen.begin(), chosen.end(), [&](const BenchmarkEntry& e) { return e.name == name; })) {
-      return Error{ErrorCode::kBadArgument, Cat("--objects: there is no object '", Printable(name), "'")};
-    }
+    const auto is_it = [&](const BenchmarkEntry& e) { return e.name == name; };
+    if (std::ranges::any_of(chosen, is_it)) continue;
+    const auto left_out = std::ranges::find_if(all, is_it);
+    return Error{
+        ErrorCode::kBadArgument,
+        left_out == all.end()
+            ? Cat("--objects: there is no object '", Printable(name), "'",
+                  options.split.empty() ? "" : Cat(" in the split ", Printable(options.split)))
+            : Cat("--objects: '", Printable(name), "' is of ",
+                  left_out->kind.empty() ? "no kind that is known" : Cat("the kind '", Printable(left_out->kind), "'"),
+                  ", which --kinds leaves out; give one of the two options, or a kind of all these objects")};
   }
   return chosen;
 }
@@ -254,9 +267,9 @@ std::string FileStem(const std::string& method) {
 Result<Evaluation> Evaluate(const fs::path& benchmark, const std::vector<EvalMethod>& methods, const fs::path& out,
                             const EvaluationOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckMethods(methods));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<BenchmarkEntry> entries, ListBenchmark(benchmark, options.split));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(entries, ChooseKinds(std::move(entries), options.kinds));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(entries, ChooseObjects(std::move(entries), options.objects));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<BenchmarkEntry> all, ListBenchmark(benchmark, options.split));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<BenchmarkEntry> entries, ChooseKinds(all, options.kinds));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(entries, ChooseObjects(std::move(entries), all, options));
   std::error_code code;
   fs::create_directories(out / "objects", code);
   if (code) return Error{ErrorCode::kIo, Cat(out.string(), ": cannot make this folder: ", code.message())};
@@ -269,6 +282,7 @@ Result<Evaluation> Evaluate(const fs::path& benchmark, const std::vector<EvalMet
   for (size_t i = 0; i < entries.size(); ++i) {
     evaluation.objects.push_back(entries[i].name);
     evaluation.kinds.push_back(entries[i].kind);
+    evaluation.credits.emplace_back();
     const std::string place = Cat(entries[i].name, " (", i + 1, " of ", entries.size(), ")");
     const size_t before = evaluation.failures.size(), measured = evaluation.results.size();
     Status status;

@@ -228,6 +228,32 @@ TEST(Evaluate, MeasuresResumesAndGoesOnAfterFailures) {
   EXPECT_EQ(Evaluate(folder.path(), Methods({"filter"}), out.path(), {.objects = {"a_published"}})->resumed, 0);
 }
 
+// Licences ask for it wherever an object is shown.
+TEST(Evaluate, ContactSheetsCarryCredits) {
+  const TestFolder folder, out;
+  GaussianCloud low = ThinBall();
+  MakeExampleObject(folder / "a_ball", low, Ball());
+  MakeExampleObject(folder / "b_ball", low, Ball());
+  const auto sheet_of = [&](const EvaluationOptions& options) {
+    const auto evaluation = Evaluate(folder.path(), Methods({"raw"}), out.path(), options);
+    EXPECT_TRUE(evaluation.ok() && evaluation->failures.empty());
+    return *ContactSheet(out.path(), *evaluation);
+  };
+  const Image plain = sheet_of({.objects = {"a_ball"}}), plain_both = sheet_of({});
+  low.comments = {"world up: 0 1 0", "credit: Ball by Ann, CC BY 4.0"};
+  for (const char* name : {"a_ball", "b_ball"}) {
+    ASSERT_TRUE(WriteCloud(folder / name / "input.ply", low, {.overwrite = true}).ok());
+  }
+  const Image one = sheet_of({.objects = {"a_ball"}}), both = sheet_of({});
+  const auto ink = [](const Image& image, int from) {
+    return std::count_if(&image.at(0, from, 0), image.channel(0) + image.plane(), [](float x) { return x > 0.5f; });
+  };
+  ASSERT_GT(one.height, plain.height);
+  EXPECT_GT(ink(one, plain.height), 100);
+  EXPECT_EQ(both.height - plain_both.height, one.height - plain.height) << "one text for both";
+  EXPECT_GT(ink(both, plain_both.height), ink(one, plain.height)) << "with the names of the objects";
+}
+
 TEST(EvalMethods, RefinementTakesOptions) {
   const TestFolder folder, out;
   MakePublishedObject(folder / "ball", ThinBall(), Ball());

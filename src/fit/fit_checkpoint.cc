@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/file_system.h"
+#include "core/fingerprint.h"
 #include "core/text.h"
 #include "fit/fitter.h"
 #include "io/input_record.h"
@@ -23,9 +24,9 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr const char* kFormat = "anchorsplat fit 3";
-// 1 knew neither its pictures and start nor a checksum, 2 no strategies and no filters.
-constexpr std::array kFormatsBefore = {"anchorsplat fit 1", "anchorsplat fit 2"};
+constexpr const char* kFormat = "anchorsplat fit 4";
+// 1 knew neither its pictures and start nor a checksum, 2 no strategies and no filters, 3 modes by numbers.
+constexpr std::array kFormatsBefore = {"anchorsplat fit 1", "anchorsplat fit 2", "anchorsplat fit 3"};
 
 bool IsFormatBefore(const std::string& format) {
   return std::find(kFormatsBefore.begin(), kFormatsBefore.end(), format) != kFormatsBefore.end();
@@ -70,6 +71,12 @@ std::vector<Named<Array>> ArraysOf(State& state, int64_t n, int64_t coefficients
   return arrays;
 }
 
+// A text that tells nobody anything.
+bool IsFingerprint(const nlohmann::json& value) {
+  return value.is_string() && value.get_ref<const std::string&>().size() == Fingerprint().text().size() &&
+         value.get_ref<const std::string&>().find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
 Status CompareSettings(const std::string& file, const std::string& theirs, const std::string& ours) {
   if (theirs == ours) return {};
   const auto a = nlohmann::json::parse(theirs, nullptr, false), b = nlohmann::json::parse(ours, nullptr, false);
@@ -80,9 +87,8 @@ Status CompareSettings(const std::string& file, const std::string& theirs, const
       if (found == a.end()) {
         return Error{ErrorCode::kBadFile, Cat(file, ": is a checkpoint of another version, which knew no ", key)};
       }
-      // Options are numbers; texts are fingerprints, which tell nobody anything.
       const std::string how =
-          value.is_string() ? "another one" : Cat(Printable(found->dump()), ", this one's is ", value.dump());
+          IsFingerprint(value) ? "another one" : Cat(Printable(found->dump()), ", this one's is ", value.dump());
       return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run: its ", key, " is ", how)};
     }
   }

@@ -93,7 +93,9 @@ void Relocate(const McmcOptions& options, Random& random, GaussianCloud& cloud, 
 
 void Grow(const McmcOptions& options, Random& random, GaussianCloud& cloud, DensificationChange& change) {
   const int64_t before = cloud.size();
-  const auto target = std::min(options.cap_max, static_cast<int64_t>(kGrowth * static_cast<double>(before)));
+  // One at least: 5 % of fewer than 20 are none.
+  const auto grown = std::max(before + 1, static_cast<int64_t>(kGrowth * static_cast<double>(before)));
+  const int64_t target = std::min(options.cap_max, grown);
   if (target <= before) return;
   std::vector<int64_t> rows;
   for (int64_t i = 0; i < before; ++i) {

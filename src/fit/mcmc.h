@@ -41,8 +41,8 @@ struct McmcStep {
 // nothing: seed and step say what is drawn, so that there is no state to keep, and the result has the same bits for any
 // number of threads.
 //
-// Ours: the moments of Gaussians that moved are void, too (gsplat forgets those of their new neighbours only), and a
-// Gaussian with a value that is not finite is dead.
+// Ours: the moments of Gaussians that moved are void, too (gsplat forgets those of their new neighbours only), a
+// Gaussian with a value that is not finite is dead, and fewer than 20, 5 % of which are none, grow by one.
 DensificationChange McmcAfterStep(const McmcOptions& options, const McmcStep& step, GaussianCloud& cloud);
 
 // What one of `ratio` Gaussians must be so that all of them in one place look like one of `opacity` did (eq. 9):

@@ -199,6 +199,19 @@ TEST(Mcmc, GrowsByAShareUpToTheCap) {
   EXPECT_EQ(cloud.size(), 225) << "growth has stopped";
 }
 
+TEST(Mcmc, AFewGrowByOne) {
+  GaussianCloud cloud = SomeCloud(3, 5);
+  for (float& logit : cloud.opacity_logits) logit = 1;
+  McmcOptions options = kQuiet;
+  options.cap_max = 6;
+  std::vector<int64_t> sizes;
+  for (int64_t step = 600; step <= 1000; step += 100) {
+    EXPECT_LE(McmcAfterStep(options, {.step = step, .seed = 1}, cloud).added, 1);
+    sizes.push_back(cloud.size());
+  }
+  EXPECT_EQ(sizes, (std::vector<int64_t>{4, 5, 6, 6, 6}));
+}
+
 TEST(Mcmc, NoiseFollowsSeedAndStepAndNotTheThreads) {
   const GaussianCloud before = SomeCloud(10000, 6);
   const McmcStep step = {.step = 17, .means_rate = 1e-4, .seed = 1};

@@ -1,12 +1,12 @@
 #include "fit/mip_filter.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 
 #include "core/activations.h"
 #include "core/parallel.h"
+#include "core/smoothing_filter.h"
 
 namespace anchorsplat {
 
@@ -14,49 +14,6 @@ namespace {
 
 constexpr double kFilterMargin = 0.15;  // of the picture's sides
 constexpr int64_t kFilterRows = 4096;
-
-double LogSigmoid(double x) { return x < 0 ? x - std::log1p(std::exp(x)) : -std::log1p(std::exp(-x)); }
-
-// What the filter of size f > 0 does to a Gaussian. Logarithms throughout: s may be 0, and all of a flat Gaussian's
-// opacity may go.
-struct Smoothing {
-  std::array<double, 3> log_scales;  // ln s'
-  std::array<double, 3> shares;      // s²/s'²
-  double log_kept = 0;               // ln √(Π s²/Π s'²)
-};
-
-Smoothing SmoothingOf(const float* log_scales, double size) {
-  Smoothing out{};
-  const double log_size = std::log(size);
-  for (size_t a = 0; a < 3; ++a) {
-    const double s = log_scales[a];
-    out.log_scales[a] = std::max(s, log_size) + 0.5 * std::log1p(std::exp(-2 * std::abs(s - log_size)));
-    out.shares[a] = 1 / (1 + std::exp(2 * (log_size - s)));
-    out.log_kept += s - out.log_scales[a];
-  }
-  return out;
-}
-
-// 1 − o', without cancellation where o' is nearly 1.
-double LeftOpen(double logit, double log_kept) { return Sigmoid(-logit) + Sigmoid(logit) * -std::expm1(log_kept); }
-
-void Smooth(const GaussianCloud& cloud, std::span<const float> sizes, float* log_scales, float* logits) {
-  ParallelFor(0, cloud.size(), kFilterRows, [&](int64_t begin, int64_t end) {
-    for (auto i = static_cast<size_t>(begin); i < static_cast<size_t>(end); ++i) {
-      const float* s = cloud.log_scales.data() + 3 * i;
-      const double logit = cloud.opacity_logits[i];
-      if (!(sizes[i] > 0)) {
-        std::copy_n(s, 3, log_scales + 3 * i);
-        logits[i] = cloud.opacity_logits[i];
-        continue;
-      }
-      const Smoothing smoothing = SmoothingOf(s, double{sizes[i]});
-      const double left = LeftOpen(logit, smoothing.log_kept);
-      logits[i] = static_cast<float>(smoothing.log_kept + LogSigmoid(logit) - std::log(left));
-      for (size_t a = 0; a < 3; ++a) log_scales[3 * i + a] = static_cast<float>(smoothing.log_scales[a]);
-    }
-  });
-}
 
 }  // namespace
 
@@ -113,7 +70,7 @@ void MipFilterBackward(const GaussianCloud& cloud, std::span<const float> sizes,
       const double logit = cloud.opacity_logits[i];
       // With k the kept part and o' = k·o:  ∂logit o'/∂logit o = (1 − o)/(1 − o'),  ∂logit o'/∂ln k = 1/(1 − o'),
       // ∂ln k/∂ln s = 1 − s²/s'²,  ∂ln s'/∂ln s = s²/s'².
-      const double left = LeftOpen(logit, smoothing.log_kept);
+      const double left = smoothing.LeftOpen(logit);
       if (!(left > 0)) continue;  // infinitely opaque, and so large that the filter takes nothing: it stays what it is
       const double g_logit = gradient.opacity_logits[i];
       gradient.opacity_logits[i] = static_cast<float>(g_logit * Sigmoid(-logit) / left);
@@ -127,10 +84,7 @@ void MipFilterBackward(const GaussianCloud& cloud, std::span<const float> sizes,
 }
 
 void FuseMipFilter(std::span<const float> sizes, GaussianCloud& cloud) {
-  MipFiltered filtered;
-  filtered.Of(cloud, sizes);
-  cloud.log_scales = std::move(filtered.log_scales);
-  cloud.opacity_logits = std::move(filtered.opacity_logits);
+  Smooth(cloud, sizes, cloud.log_scales.data(), cloud.opacity_logits.data());
 }
 
 void CapFilteredOpacities(std::span<const float> sizes, double opacity, GaussianCloud& cloud) {

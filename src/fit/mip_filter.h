@@ -14,7 +14,7 @@ namespace anchorsplat {
 
 // Mip-Splatting's 3-D smoothing filter (Yu et al. 2024, section 5.1): no Gaussian may hold detail that no training
 // camera resolves. Each is convolved with a Gaussian as wide as the pixel of the camera that sees it closest, and keeps
-// its integral:
+// its integral (core/smoothing_filter.h):
 //   s'² = s² + f²,   o' = o·√(Π s²/Π s'²),   f = √0.2 · min over cameras that see it of z/focal.
 // What is optimised, grown and pruned are s and o; what is rendered and exported is s' and o'. Constants and rules are
 // those of the authors' program (gaussian_model.py: compute_3D_filter, get_scaling_with_3D_filter,

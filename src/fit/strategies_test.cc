@@ -167,6 +167,22 @@ TEST(FitStrategies, AStateOfAnotherStrategyIsRefused) {
   FitOptions filtered = mcmc;
   UseMipFilter(filtered);
   EXPECT_FALSE(Fit(views, initial, filtered, control).ok());
+  // What differs is said in the words of the command line.
+  const auto refused = [&](auto change, const GaussianCloud& start) {
+    FitOptions other = mcmc;
+    change(other);
+    const auto resumed = Fit(views, start, other, control);
+    return resumed.ok() ? "accepted" : resumed.error().message;
+  };
+  EXPECT_THAT(refused([](FitOptions& o) { o.objective.render.mode = RenderMode::kAntialiased; }, initial),
+              HasSubstr("its mode is \"classic\", this one's is \"antialiased\""));
+  EXPECT_THAT(refused([](FitOptions& o) { o.pixel.upscale = 4; }, initial),
+              HasSubstr("its pixel is \"point\", this one's is \"area\""));
+  EXPECT_THAT(refused([](FitOptions& o) { o.strategy = Strategy::kDefault; }, initial),
+              HasSubstr("its strategy is \"mcmc\", this one's is \"default\""));
+  GaussianCloud elsewhere = initial;
+  elsewhere.means[0] += 1;
+  EXPECT_THAT(refused([](FitOptions&) {}, elsewhere), HasSubstr("its start is another one"));
 
   const auto begin = [&](const FitOptions& options, FitState state) {
     return Fitter::Begin(options, PictureCache(views.train, {0, 0, 0}), views.scene_scale, std::move(state));

@@ -154,9 +154,22 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
   return out;
 }
 
-InitialPoints UsualStart(const TrainingViews& views, std::optional<int64_t> count, uint64_t seed) {
-  if (views.points.size() > 0) return Thinned(views.points, count);
-  return RandomPointsInView(count.value_or(kRandomPoints), views.train, views.scene_scale, seed);
+const char* NameOf(FitInit init, const TrainingViews& views) {
+  if (init == FitInit::kAuto) init = views.points.size() > 0 ? FitInit::kPoints : FitInit::kView;
+  return init == FitInit::kPoints ? "points" : init == FitInit::kView ? "view" : "random";
+}
+
+Result<InitialPoints> InitialPointsOf(FitInit init, const TrainingViews& views, std::optional<int64_t> count,
+                                      uint64_t seed) {
+  const bool has_points = views.points.size() > 0;
+  if (init == FitInit::kPoints && !has_points) {
+    return Error{ErrorCode::kBadArgument,
+                 "the fit is to begin at the project's points, but it has none; random ones do without"};
+  }
+  if (init == FitInit::kPoints || (init == FitInit::kAuto && has_points)) return Thinned(views.points, count);
+  const int64_t random = count.value_or(kRandomPoints);
+  if (init == FitInit::kRandom) return RandomPoints(random, views.scene_scale, seed);
+  return RandomPointsInView(random, views.train, views.scene_scale, seed);
 }
 
 }  // namespace anchorsplat

@@ -41,9 +41,20 @@ struct ProjectOptions {
 // another shape than its camera; kBadArgument when hold_out leaves nothing to train on.
 Result<TrainingViews> OpenProject(const std::filesystem::path& project, const ProjectOptions& options = {});
 
-// Where a fit of these views begins when nobody says: their points, of which `count` are taken where that is said, or,
-// where they have none, `count` (kRandomPoints) that the cameras see.
-InitialPoints UsualStart(const TrainingViews& views, std::optional<int64_t> count, uint64_t seed);
+// Where a fit's first Gaussians stand.
+enum class FitInit {
+  kAuto,    // kPoints where the project has some, else kView
+  kPoints,  // the project's points
+  kView,    // random points where many cameras look
+  kRandom,  // random points in gsplat's cube
+};
+// The word of the command line and of records for what kAuto turns out to be, and for the others.
+const char* NameOf(FitInit init, const TrainingViews& views);
+
+// The points of the project, thinned to `count`, or as many random ones; all of them or kRandomPoints where nobody
+// says. kBadArgument: kPoints, and the project has none.
+Result<InitialPoints> InitialPointsOf(FitInit init, const TrainingViews& views, std::optional<int64_t> count,
+                                      uint64_t seed);
 
 // 1.1 × the largest distance of a centre from their mean; 1 when all are in one place.
 double SceneScale(const std::vector<Camera>& cameras);

@@ -46,8 +46,9 @@ Status WriteCloud(const std::filesystem::path& path, const CloudView& cloud, con
                   const ExtraProperties& extras) try {
   const SplatFormat* format = FormatOfExtension(path);
   if (format == nullptr || format->write == nullptr) {
-    const std::string what = format == nullptr ? Cat("has no extension of a splat format")
-                                               : Cat("is a ", format->name, " file, which this version does not write");
+    const std::string what =
+        format == nullptr ? Cat("has no extension of a splat format")
+                          : Cat("is ", format->article, " ", format->name, " file, which this version does not write");
     return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", what, "; it writes ", WrittenFormats())};
   }
   const bool keeps = format->write_with_extras != nullptr;

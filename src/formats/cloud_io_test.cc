@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "core/source_dir_for_test.h"
+#include "core/world_up.h"
 #include "formats/ply/ply_writer.h"
 #include "formats/random_cloud_for_test.h"
 #include "formats/registry.h"
@@ -196,6 +197,28 @@ TEST(Registry, ContentGoesBeforeExtension) {
   EXPECT_CONTAINS(ReadError(folder / "empty.ply"), "is empty");
 }
 
+// What people try all the same.
+TEST(CloudIo, SaysWhatSomethingElseIs) {
+  const TestFolder folder;
+  const GaussianCloud cloud = RandomCloud(10, 0, 1);
+  ASSERT_TRUE(WriteCloud(folder / "a.npz", cloud).ok());
+  fs::copy_file(folder / "a.npz", folder / "scan.bin");
+  for (const char* name : {"a.npz", "scan.bin"}) {
+    EXPECT_CONTAINS(ReadError(folder / name),
+                    "is an NPZ file, which this version writes for other programs and does not");
+    EXPECT_CONTAINS(ReadError(folder / name), "give the splat that it was made from, as compressed PLY");
+  }
+  ASSERT_TRUE(WriteCloud(folder / "a.csv", cloud).ok());
+  EXPECT_CONTAINS(ReadError(folder / "a.csv"), "is a CSV file");
+  const auto other = [&](const char* bytes) {
+    EXPECT_TRUE(WriteWholeFile(folder / "other", bytes, true).ok());
+    return ReadError(folder / "other");
+  };
+  EXPECT_CONTAINS(other("\x89PNG\r\n\x1a\n"), "is a PNG picture and no splat; expected compressed PLY");
+  EXPECT_CONTAINS(other("<!DOCTYPE html>"), "is a web page and no splat");
+  EXPECT_CONTAINS(other("x"), "byte 0: is no splat file of a known format: found \"x\"");
+}
+
 TEST(Registry, RowsAreConsistent) {
   for (const SplatFormat& format : Formats()) {
     EXPECT_FALSE(format.name.empty());
@@ -217,6 +240,12 @@ TEST(CloudIo, ReadsThePublishedExample) {
   ASSERT_TRUE(cloud.ok()) << cloud.error().message;
   EXPECT_EQ(cloud->size(), 20'000);
   EXPECT_EQ(cloud->sh_degree, 3);
+  // Each says where up is; the tankard lies in its photographs.
+  EXPECT_EQ(UpOf(cloud->comments), (std::array<double, 3>{0, 1, 0}));
+  const auto tankard = ReadCloud(SourceDirForTest() / "examples/tankard/input.ply");
+  ASSERT_TRUE(tankard.ok()) << tankard.error().message;
+  ASSERT_TRUE(UpOf(tankard->comments).has_value());
+  EXPECT_LT((*UpOf(tankard->comments))[0], -0.98);
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/log.h"
+#include "formats/messages_for_test.h"
 #include "formats/opened_splat.h"
 #include "formats/ply/ply_writer.h"
 #include "formats/random_cloud_for_test.h"
@@ -149,37 +149,16 @@ TEST(Convert, AxesOfFilesThatDoNotFollowTheirFormat) {
   for (const char* bad : {"", ":", "XYZ", "RDF:abc", "RDF:RUB:LUF"}) EXPECT_FALSE(ParseAxes(bad, options).ok()) << bad;
 }
 
-// Keeps warnings for as long as it lives.
-class Warnings {
- public:
-  Warnings() : sink_(std::make_shared<Sink>()), before_(SetLogSink(sink_)) {}
-  ~Warnings() { SetLogSink(before_); }
-  std::vector<std::string> Take() { return std::exchange(sink_->texts, {}); }
-
- private:
-  struct Sink : LogSink {
-    void Message(LogLevel level, const std::string& text) override {
-      if (level == LogLevel::kWarning) texts.push_back(text);
-    }
-    void TaskBegin(const std::string&, int64_t) override {}
-    void TaskProgress(int64_t, const std::string&) override {}
-    void TaskEnd() override {}
-    std::vector<std::string> texts;
-  };
-  std::shared_ptr<Sink> sink_;
-  std::shared_ptr<LogSink> before_;
-};
-
 TEST(Convert, SaysWhatHasNoPlaceInTheFormat) {
   const TestFolder folder;
-  Warnings warnings;
+  Messages messages;
   GaussianCloud tame = RandomCloud(2000, 1, 3);
   for (float& x : tame.log_scales) x = -5;
   for (float& x : tame.sh) x *= 0.1f;
   int written = 0;
   const auto warn = [&](const GaussianCloud& cloud, const char* extension) {
     EXPECT_TRUE(WriteCloud(folder / (std::to_string(++written) + extension), cloud).ok());
-    return warnings.Take();
+    return messages.TakeWarnings();
   };
   using testing::AllOf, testing::ElementsAre, testing::HasSubstr, testing::IsEmpty;
   for (const char* lossy : {".compressed.ply", ".spz", ".sog", ".glb", ".ply", ".csv", ".npz"}) {
@@ -318,12 +297,12 @@ TEST(Convert, TheFormatOfTheInputCanBeSaid) {
 
 TEST(Convert, SaysWhatIsNoNumber) {
   const TestFolder folder;
-  Warnings warnings;
+  Messages messages;
   GaussianCloud cloud = RandomCloud(300, 0, 3);
   cloud.log_scales[7] = -INFINITY;  // a length of zero
   const auto warn = [&] {
     EXPECT_TRUE(ConvertFile(Ply(folder, cloud), folder / "out.csv", {.write = {.overwrite = true}}).ok());
-    return warnings.Take();
+    return messages.TakeWarnings();
   };
   EXPECT_THAT(warn(), testing::IsEmpty());
   cloud.opacity_logits[9] = INFINITY;  // an opacity of one
@@ -337,9 +316,9 @@ TEST(Convert, SaysWhatIsNoNumber) {
   const size_t begin = bytes.find("end_header\n") + 11;
   std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(begin), 2 * 18 * 4, '\xff');
   ASSERT_TRUE(WriteWholeFile(folder / "a.compressed.ply", bytes, true).ok());
-  warnings.Take();
+  messages.TakeWarnings();
   ASSERT_TRUE(ConvertFile(folder / "a.compressed.ply", folder / "b.ply", {}).ok());
-  EXPECT_THAT(warnings.Take(), testing::ElementsAre(testing::HasSubstr("300 of 300 Gaussians")));
+  EXPECT_THAT(messages.TakeWarnings(), testing::ElementsAre(testing::HasSubstr("300 of 300 Gaussians")));
 }
 
 TEST(Convert, ErrorsOfBothSides) {

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "core/log.h"
 #include "core/text.h"
 #include "formats/convert.h"
+#include "formats/messages_for_test.h"
 #include "formats/opened_splat.h"
 #include "formats/ply/ply_reader.h"
 #include "formats/ply/ply_writer.h"
@@ -26,28 +26,6 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-// The warnings while it lives.
-class Warnings {
- public:
-  Warnings() { SetLogSink(sink_); }
-  ~Warnings() { SetLogSink(MakeTerminalSink(false)); }
-  Warnings(const Warnings&) = delete;
-  Warnings& operator=(const Warnings&) = delete;
-  const std::vector<std::string>& texts() const { return sink_->texts; }
-
- private:
-  struct Sink : LogSink {
-    void Message(LogLevel level, const std::string& text) override {
-      if (level == LogLevel::kWarning) texts.push_back(text);
-    }
-    void TaskBegin(const std::string&, int64_t) override {}
-    void TaskProgress(int64_t, const std::string&) override {}
-    void TaskEnd() override {}
-    std::vector<std::string> texts;
-  };
-  std::shared_ptr<Sink> sink_ = std::make_shared<Sink>();
-};
 
 // Values that tell the row: a label of 1 byte, an index of 4, a confidence of 8, and normals.
 uint8_t LabelOf(int64_t row) { return static_cast<uint8_t>(row % 251); }
@@ -138,7 +116,7 @@ TEST(ExtraProperties, StayWithTheirGaussiansFromPlyToPly) {
   const GaussianCloud cloud = RandomCloud(3000, 0, 3);
   for (const char* encoding : {"binary_little_endian", "binary_big_endian", "ascii"}) {
     SCOPED_TRACE(encoding);
-    const Warnings warnings;
+    const Messages messages;
     const auto input = Written(folder, FileWithExtras(cloud, encoding));
     ASSERT_TRUE(ConvertFile(input, folder / "all.ply", {.write = {.overwrite = true}}).ok());
     EXPECT_EQ(ExpectTheirOwn(folder / "all.ply", cloud).size(), 3000u);
@@ -146,7 +124,7 @@ TEST(ExtraProperties, StayWithTheirGaussiansFromPlyToPly) {
     some.write = {.overwrite = true, .order = SplatOrder::kMorton};
     ASSERT_TRUE(ConvertFile(input, folder / "some.ply", some).ok());
     EXPECT_EQ(ExpectTheirOwn(folder / "some.ply", cloud).size(), 500u);
-    EXPECT_THAT(warnings.texts(), IsEmpty());
+    EXPECT_THAT(messages.warnings(), IsEmpty());
   }
 }
 
@@ -169,16 +147,16 @@ TEST(ExtraProperties, WhatHasNoPlaceIsNamed) {
                                                     "property float size\n") +
                                          "3\n");
   {
-    const Warnings warnings;
+    const Messages messages;
     ASSERT_TRUE(ConvertFile(input, folder / "a.ply", {}).ok());
-    EXPECT_THAT(warnings.texts(),
+    EXPECT_THAT(messages.warnings(),
                 ElementsAre(HasSubstr("a.ply: other properties of the input are dropped: list \"neighbours\", element "
                                       "\"region\"")));
     ExpectTheirOwn(folder / "a.ply", cloud);
   }
-  const Warnings warnings;
+  const Messages messages;
   ASSERT_TRUE(ConvertFile(input, folder / "a.glb", {}).ok());
-  EXPECT_THAT(warnings.texts(),
+  EXPECT_THAT(messages.warnings(),
               ElementsAre(HasSubstr("a.glb: other properties of the input are dropped: label, index, confidence, "
                                     "normals, list \"neighbours\", element \"region\"")));
 }
@@ -200,13 +178,13 @@ TEST(ExtraProperties, NormalsFollowTheAxes) {
 TEST(ExtraProperties, NormalsOfZeroAreNone) {
   const TestFolder folder;
   ASSERT_TRUE(WritePly(folder / "in.ply", RandomCloud(10, 1, 3)).ok());
-  const Warnings warnings;
+  const Messages messages;
   ExtraProperties extras;
   ASSERT_TRUE(OpenedSplat::Open(folder / "in.ply")->Read({}, &extras).ok());
   EXPECT_TRUE(extras.empty());
   EXPECT_EQ(extras.lost(false), "");
   ASSERT_TRUE(ConvertFile(folder / "in.ply", folder / "a.glb", {}).ok());
-  EXPECT_THAT(warnings.texts(), IsEmpty());
+  EXPECT_THAT(messages.warnings(), IsEmpty());
 }
 
 TEST(ExtraProperties, OneNormalAloneHasTheOthersZero) {

@@ -2,7 +2,9 @@
 
 #include <new>
 #include <string>
+#include <string_view>
 #include <system_error>
+#include <utility>
 
 #include "core/file_system.h"
 #include "core/text.h"
@@ -22,6 +24,24 @@ std::string ReadFormats() {
     list += Cat(list.empty() ? "" : ", ", format.name, " (", format.extensions.front(), ")");
   }
   return list;
+}
+
+// What people take for a splat, by its first bytes: "a PNG picture"; empty for anything else.
+std::string OtherKind(std::string_view head) {
+  constexpr std::pair<std::string_view, const char*> kKinds[] = {{"\x89PNG", "a PNG picture"},
+                                                                 {"\xff\xd8\xff", "a JPEG picture"},
+                                                                 {"RIFF", "a WebP picture or a sound"},
+                                                                 {"GIF8", "a GIF picture"},
+                                                                 {"%PDF", "a PDF document"},
+                                                                 {"<!DOCTYPE", "a web page"},
+                                                                 {"<!doctype", "a web page"},
+                                                                 {"<html", "a web page"},
+                                                                 {"7z\xbc\xaf", "an archive to be unpacked first"},
+                                                                 {"Rar!", "an archive to be unpacked first"}};
+  for (const auto& [mark, kind] : kKinds) {
+    if (head.starts_with(mark)) return kind;
+  }
+  return {};
 }
 
 }  // namespace
@@ -56,13 +76,18 @@ uint64_t OpenedSplat::bytes() const {
 
 Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits, ExtraProperties* extras) const try {
   if (format_ == nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, input_.Head(8));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, input_.Head(16));
+    if (const std::string kind = OtherKind(head); !kind.empty()) {
+      return Error{ErrorCode::kBadFile, Cat(input_.name(), ": is ", kind, " and no splat; expected ", ReadFormats())};
+    }
     return Error{ErrorCode::kBadFile, Cat(input_.name(), ": byte 0: is no splat file of a known format: found \"",
-                                          Printable(head), "\", expected ", ReadFormats())};
+                                          Printable(head.substr(0, 8)), "\", expected ", ReadFormats())};
   }
   if (format_->read == nullptr) {
-    return Error{ErrorCode::kBadFile, Cat(input_.name(), ": is a ", format_->name,
-                                          " file, which this version does not read; it reads ", ReadFormats())};
+    return Error{ErrorCode::kBadFile,
+                 Cat(input_.name(), ": is ", format_->article, " ", format_->name, " file, which this version ",
+                     format_->write != nullptr ? "writes for other programs and " : "",
+                     "does not read; give the splat that it was made from, as ", ReadFormats())};
   }
   if (extras != nullptr && format_->read_with_extras != nullptr) {
     return format_->read_with_extras(input_, limits, *extras);

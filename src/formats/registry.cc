@@ -40,6 +40,14 @@ bool IsSog(std::string_view head) {
          (head.starts_with("{") && head.find("\"means\"") != head.npos && head.find("\"quats\"") != head.npos);
 }
 
+// NumPy's archive: a ZIP archive whose first member, whatever its name, is an array.
+bool IsNpz(std::string_view head) {
+  constexpr size_t kNameSize = 26, kName = 30;  // in the header of a member
+  if (!head.starts_with("PK\x03\x04") || head.size() < kName) return false;
+  const auto byte = [head](size_t at) { return static_cast<size_t>(static_cast<unsigned char>(head[at])); };
+  return head.substr(kName, byte(kNameSize) + 256 * byte(kNameSize + 1)).ends_with(".npy");
+}
+
 bool IsGltf(std::string_view head) { return head.starts_with("glTF"); }
 
 constexpr std::string_view kCompressedPlyExtensions[] = {".compressed.ply"};
@@ -70,6 +78,7 @@ constexpr SplatFormat kFormats[] = {
      .order = SplatOrder::kMorton,
      .range = kCompressedPlyRange,
      .mode_tag = ModeTag::kEach,
+     .comments = CommentPlace::kAll,
      .mean_loss = CompressedPlyMeanLoss},
     {.name = "PLY",
      .extensions = kPlyExtensions,
@@ -80,8 +89,10 @@ constexpr SplatFormat kFormats[] = {
      .write = WritePly,
      .write_with_extras = WritePlyWithExtras,
      .predicted_size = [](int64_t count, int sh_degree) { return PredictedPlySize(count, sh_degree); },
-     .mode_tag = ModeTag::kEach},
+     .mode_tag = ModeTag::kEach,
+     .comments = CommentPlace::kAll},
     {.name = "SPZ",
+     .article = "an",
      .extensions = kSpzExtensions,
      .sniff = IsSpz,
      .describe = DescribeSpz,
@@ -93,6 +104,12 @@ constexpr SplatFormat kFormats[] = {
      .range = kSpzRange,
      .mode_tag = ModeTag::kCompensated,
      .mean_loss = SpzMeanLoss},
+    {.name = "NPZ",
+     .article = "an",
+     .extensions = kNpzExtensions,
+     .sniff = IsNpz,
+     .write = WriteNpz,
+     .predicted_size = PredictedNpzSize},
     {.name = "gsplat checkpoint",
      .extensions = kGsplatExtensions,
      .sniff = IsTorchCheckpoint,
@@ -110,6 +127,7 @@ constexpr SplatFormat kFormats[] = {
      .order = SplatOrder::kMorton,
      .range = kSogRange,
      .mode_tag = ModeTag::kCompensated,
+     .comments = CommentPlace::kCredits,
      .mean_loss = SogMeanLoss},
     {.name = "splat",
      .extensions = kSplatExtensions,
@@ -127,7 +145,8 @@ constexpr SplatFormat kFormats[] = {
      .read = ReadGltf,
      .write = WriteGlb,
      .predicted_size = PredictedGlbSize,
-     .axes = kLuf},
+     .axes = kLuf,
+     .comments = CommentPlace::kCredits},
     {.name = "glTF as JSON",
      .extensions = kGltfJsonExtensions,
      .describe = DescribeGltf,
@@ -137,9 +156,9 @@ constexpr SplatFormat kFormats[] = {
      .written_beside = [](const std::filesystem::path& path, int) { return std::vector{GltfFileBeside(path)}; },
      .predicted_size = EstimatedGltfSize,
      .size_is_estimate = true,
-     .axes = kLuf},
+     .axes = kLuf,
+     .comments = CommentPlace::kCredits},
     {.name = "CSV", .extensions = kCsvExtensions, .write = WriteCsv},
-    {.name = "NPZ", .extensions = kNpzExtensions, .write = WriteNpz, .predicted_size = PredictedNpzSize},
 };
 
 }  // namespace

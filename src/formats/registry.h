@@ -36,10 +36,18 @@ enum class ModeTag {
   kEach,
 };
 
+// Which of a splat's comments go into a file of the format and come back.
+enum class CommentPlace {
+  kNone,
+  kCredits,  // those that say whose it is (core/credit.h)
+  kAll,
+};
+
 // A splat format: how it is recognised, and a function for each direction that this version knows. A new format is one
 // file per direction and one row in registry.cc.
 struct SplatFormat {
-  std::string_view name;  // "PLY", in messages: "is a … file"
+  std::string_view name;           // "PLY", in messages: "is a … file"
+  std::string_view article = "a";  // that goes before the name as it is spoken
   // Lower case; the longest match wins, so ".compressed.ply" goes before ".ply". Those without a dot in front are whole
   // names.
   std::span<const std::string_view> extensions;
@@ -71,6 +79,7 @@ struct SplatFormat {
   Axes axes = kRdf;
   FormatRange range = {};
   ModeTag mode_tag = ModeTag::kNone;
+  CommentPlace comments = CommentPlace::kNone;
   // A sentence where `write` must round the means of this cloud more coarsely than is usual, else nothing. May be null.
   std::string (*mean_loss)(const CloudView& cloud) = nullptr;
 };

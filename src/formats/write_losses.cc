@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <span>
 
+#include "core/credit.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
 #include "core/text.h"
@@ -47,16 +49,28 @@ Clamped CountClamped(const FormatRange& range, const CloudView& cloud, int sh_de
   return sum;
 }
 
+// "an SPZ file".
+std::string AFileOf(const SplatFormat& format) { return Cat(format.article, " ", format.name, " file"); }
+
+// Licences ask for credits wherever a splat goes; of other comments it is enough that the documentation says so.
+std::string CreditLoss(const SplatFormat& format, std::span<const std::string> comments) {
+  const std::vector<std::string> credits = CreditsOf(comments);
+  if (credits.empty() || format.comments != CommentPlace::kNone) return {};
+  std::string list;
+  for (const std::string& credit : credits) list += Cat(list.empty() ? "\"" : ", \"", Printable(credit), "\"");
+  return Cat(AFileOf(format), " has no place for credits: give ", list, " beside it");
+}
+
 // Without its tag a splat is drawn as a classic one.
 std::string ModeLoss(const SplatFormat& format, std::optional<RenderMode> mode) {
   if (!IsCompensated(mode) || format.mode_tag == ModeTag::kEach) return {};
   const std::string_view name = NameOf(*mode);
   if (format.mode_tag == ModeTag::kNone) {
-    return Cat("a ", format.name, " file has no place for the render mode ", name,
+    return Cat(AFileOf(format), " has no place for the render mode ", name,
                ": the splat will be drawn as a classic one (--mode ", name, " where a verb has it)");
   }
   if (*mode == RenderMode::kAntialiased) return {};
-  return Cat("a ", format.name, " file only says that opacity is compensated, not that the render mode is ", name,
+  return Cat(AFileOf(format), " only says that opacity is compensated, not that the render mode is ", name,
              ": the splat will be drawn with a dilation of ", DilationOf(RenderMode::kAntialiased), " px² instead of ",
              DilationOf(*mode), " (--mode ", name, " where a verb has it)");
 }
@@ -67,8 +81,8 @@ std::vector<std::string> WriteLosses(const SplatFormat& format, const CloudView&
   const FormatRange& range = format.range;
   std::vector<std::string> losses;
   if (cloud.sh_degree > range.sh_degree) {
-    losses.push_back(Cat("a ", format.name, " file has no place for spherical harmonics beyond degree ",
-                         range.sh_degree, ": those of degree ", range.sh_degree + 1, " to ", cloud.sh_degree,
+    losses.push_back(Cat(AFileOf(format), " has no place for spherical harmonics beyond degree ", range.sh_degree,
+                         ": those of degree ", range.sh_degree + 1, " to ", cloud.sh_degree,
                          " are dropped, so colours no longer change with the view"));
   }
   const Clamped clamped = CountClamped(range, cloud, std::min(cloud.sh_degree, range.sh_degree));
@@ -82,6 +96,7 @@ std::vector<std::string> WriteLosses(const SplatFormat& format, const CloudView&
   add(clamped.colors, Cat("f_dc beyond ±", range.dc));
   add(clamped.harmonics, Cat("spherical harmonics beyond ±", range.harmonics));
   if (std::string loss = ModeLoss(format, cloud.render_mode); !loss.empty()) losses.push_back(std::move(loss));
+  if (std::string loss = CreditLoss(format, cloud.comments); !loss.empty()) losses.push_back(std::move(loss));
   if (format.mean_loss != nullptr) {
     if (std::string loss = format.mean_loss(cloud); !loss.empty()) losses.push_back(std::move(loss));
   }

@@ -35,5 +35,24 @@ TEST(WriteLosses, NamesTheRenderModeThatAFormatCannotSay) {
   EXPECT_THAT(losses(".splat"), ElementsAre(HasSubstr("mip")));
 }
 
+TEST(WriteLosses, NamesTheCreditsThatAFormatCannotSay) {
+  GaussianCloud cloud = RandomCloud(10, 0, 1);
+  for (float& x : cloud.sh) x *= 0.1f;
+  cloud.comments = {"world up: 0 1 0", "made by a test"};
+  const auto losses = [&](const char* format) { return WriteLosses(*FormatOfName(format), cloud); };
+  for (const char* format : {".spz", ".splat", ".csv", ".npz", ".pt"}) EXPECT_THAT(losses(format), IsEmpty()) << format;
+  cloud.comments.insert(cloud.comments.end(), {"credit: Mug by Ann, CC BY 4.0", "credit: scanned by Bob"});
+  for (const char* format : {".ply", ".compressed.ply", ".sog", ".glb", ".gltf"}) {
+    EXPECT_THAT(losses(format), IsEmpty()) << format;
+  }
+  for (const char* format : {".spz", ".splat", ".csv", ".npz", ".pt"}) {
+    EXPECT_THAT(losses(format), ElementsAre(AllOf(HasSubstr("\"Mug by Ann, CC BY 4.0\", \"scanned by Bob\""),
+                                                  HasSubstr("no place for credits"))))
+        << format;
+  }
+  EXPECT_THAT(losses(".spz"), ElementsAre(HasSubstr("an SPZ file")));
+  EXPECT_THAT(losses(".npz"), ElementsAre(HasSubstr("an NPZ file")));
+}
+
 }  // namespace
 }  // namespace anchorsplat

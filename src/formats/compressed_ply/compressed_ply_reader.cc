@@ -210,6 +210,7 @@ Result<GaussianCloud> ReadCompressedPly(const InputFile& file, const ReadLimits&
   cloud.Resize(count, degree);
   ANCHORSPLAT_RETURN_IF_ERROR(ReadVertices(file, vertex_rows, chunks, cloud));
   if (degree > 0) ANCHORSPLAT_RETURN_IF_ERROR(ReadHarmonics(file, sh_rows, cloud));
+  WarnOfOddTags(file, header);
   cloud.render_mode = header.render_mode;
   cloud.comments = std::move(header.comments);
   return cloud;

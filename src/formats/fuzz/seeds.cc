@@ -150,7 +150,10 @@ GaussianCloud SeedCloud(int64_t count, int sh_degree) {
 }
 
 std::vector<std::string> PlySeeds() {
-  return {BinaryPly(false), BinaryPly(true), AsciiPly("\n"), AsciiPly("\r\n"), AsciiPly("\r")};
+  std::string filtered = AsciiPly("\n");
+  constexpr std::string_view kLabel = "uchar label";
+  filtered.replace(filtered.find(kLabel), kLabel.size(), "float filter_3D");
+  return {BinaryPly(false), BinaryPly(true), AsciiPly("\n"), AsciiPly("\r\n"), AsciiPly("\r"), filtered};
 }
 
 std::vector<std::string_view> PlyWords() {

@@ -14,6 +14,7 @@
 #include "formats/axes.h"
 #include "formats/cloud_checks.h"
 #include "formats/gltf/gltf_document.h"
+#include "formats/json_asset.h"
 #include "formats/record_blocks.h"
 #include "io/compression_ratio.h"
 
@@ -282,6 +283,7 @@ Result<GaussianCloud> ReadGltf(const InputFile& file, const ReadLimits& limits) 
     begin += primitive.means.count;
   }
   FlipAxes(cloud, FlipBetween(kLuf, kRdf));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(cloud.comments, CommentsOfAsset(document.root()));
   return cloud;
 }
 

@@ -95,6 +95,29 @@ TEST(Gltf, WhatItsReadersExpect) {
   EXPECT_THAT(color, testing::ElementsAre(14027, 65535, 0, 32768));  // sRGB ½ is 0.2140 of the light
 }
 
+TEST(Gltf, CreditsAreItsCopyright) {
+  const TestFolder folder;
+  GaussianCloud cloud = RandomCloud(10, 0, 3);
+  cloud.comments = {"credit: Becher, R\xc3\xb6mer, CC BY 4.0", "world up: 0 1 0", "credit: scanned by \xff"};
+  ASSERT_TRUE(WriteGlb(folder / "a.glb", cloud).ok());
+  const Glb glb = Glb::Of(FileBytes(folder / "a.glb"));
+  EXPECT_EQ(glb.json["asset"]["copyright"], "Becher, R\xc3\xb6mer, CC BY 4.0\nscanned by \xef\xbf\xbd");
+  const std::vector<std::string> credits = {cloud.comments[0], "credit: scanned by \xef\xbf\xbd"};
+  EXPECT_EQ(Read(glb.bytes())->comments, credits);
+  ASSERT_TRUE(WriteGltf(folder / "a.gltf", cloud).ok());
+  const auto json = InputFile::Open(folder / "a.gltf");
+  ASSERT_TRUE(json.ok());
+  EXPECT_EQ(ReadGltf(*json)->comments, credits);
+
+  Glb other = glb;
+  other.json["asset"]["copyright"] = 7;
+  EXPECT_TRUE(Read(other.bytes())->comments.empty());
+  other.json["asset"]["copyright"] = std::string(size_t{2} << 20, 'x');
+  EXPECT_NE(Read(other.bytes()).error().message.find("asset.copyright"), std::string::npos);
+  other.json["asset"].erase("copyright");
+  EXPECT_TRUE(Read(other.bytes())->comments.empty());
+}
+
 TEST(Gltf, NodesMoveAndScale) {
   Glb glb = Example(10, 1);
   const GaussianCloud plain = *Read(glb.bytes());

@@ -16,6 +16,7 @@
 #include "core/text.h"
 #include "formats/axes.h"
 #include "formats/cloud_checks.h"
+#include "formats/json_asset.h"
 #include "formats/quantize.h"
 #include "formats/record_blocks.h"
 #include "formats/splat_order.h"
@@ -103,7 +104,8 @@ uint64_t BytesOf(const std::vector<WrittenAttribute>& attributes, int64_t count)
   return size;
 }
 
-nlohmann::json JsonOf(int64_t count, const std::vector<WrittenAttribute>& attributes, const nlohmann::json& bounds) {
+nlohmann::json JsonOf(const CloudView& cloud, int64_t count, const std::vector<WrittenAttribute>& attributes,
+                      const nlohmann::json& bounds) {
   nlohmann::json views = nlohmann::json::array(), accessors = nlohmann::json::array(), names;
   uint64_t offset = 0;
   for (const WrittenAttribute& attribute : attributes) {
@@ -125,7 +127,9 @@ nlohmann::json JsonOf(int64_t count, const std::vector<WrittenAttribute>& attrib
                                     {"sortingMethod", "cameraDistance"}};
   const nlohmann::json primitive = {
       {"attributes", names}, {"mode", 0}, {"extensions", {{"KHR_gaussian_splatting", extension}}}};
-  return {{"asset", {{"version", "2.0"}, {"generator", "anchorsplat " ANCHORSPLAT_VERSION}}},
+  nlohmann::json asset = AssetOf(cloud.comments);
+  asset["version"] = "2.0";
+  return {{"asset", asset},
           {"extensionsUsed", {"KHR_gaussian_splatting"}},
           {"scene", 0},
           {"scenes", {{{"nodes", {0}}}}},
@@ -147,10 +151,10 @@ nlohmann::json BoundsOf(const CloudView& cloud, const AxisFlip& flip) {
   return {{"min", min}, {"max", max}};
 }
 
-// Of the JSON chunk: the same for all clouds of that size and degree, however many digits their bounds have.
-size_t JsonSize(int64_t count, const std::vector<WrittenAttribute>& attributes) {
+// Of the JSON chunk: the same for all clouds of that size, degree and credits, however many digits their bounds have.
+size_t JsonSize(const CloudView& cloud, int64_t count, const std::vector<WrittenAttribute>& attributes) {
   constexpr size_t kRoomForBounds = 2 * sizeof "\"min\":[,,]," + 6 * sizeof "-1.2345678901234567e-300";
-  return (JsonOf(count, attributes, nlohmann::json::object()).dump().size() + kRoomForBounds + 3) / 4 * 4;
+  return (JsonOf(cloud, count, attributes, nlohmann::json::object()).dump().size() + kRoomForBounds + 3) / 4 * 4;
 }
 
 // The values of all attributes, one attribute after the other, from byte `at` on.
@@ -194,15 +198,15 @@ uint64_t PredictedGlbSize(int64_t count, int sh_degree) {
   none.sh_degree = sh_degree;
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
   const std::vector<WrittenAttribute> attributes = Attributes(none, flip);
-  return kHeads + JsonSize(count, attributes) + BytesOf(attributes, count);
+  return kHeads + JsonSize(none, count, attributes) + BytesOf(attributes, count);
 }
 
 Status WriteGlb(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
   const std::vector<WrittenAttribute> attributes = Attributes(cloud, flip);
-  std::string json = JsonOf(cloud.size(), attributes, BoundsOf(cloud, flip)).dump();
-  json.resize(JsonSize(cloud.size(), attributes), ' ');
+  std::string json = JsonOf(cloud, cloud.size(), attributes, BoundsOf(cloud, flip)).dump();
+  json.resize(JsonSize(cloud, cloud.size(), attributes), ' ');
   const uint64_t binary = BytesOf(attributes, cloud.size());
   const uint64_t begin = kHeads + json.size();
   if (begin + binary > 0xffffffffu) {
@@ -227,7 +231,7 @@ uint64_t EstimatedGltfSize(int64_t count, int sh_degree) {
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
   const std::vector<WrittenAttribute> attributes = Attributes(none, flip);
   constexpr uint64_t kBoundsAndName = 250;
-  return JsonOf(count, attributes, nlohmann::json::object()).dump(2).size() + kBoundsAndName +
+  return JsonOf(none, count, attributes, nlohmann::json::object()).dump(2).size() + kBoundsAndName +
          BytesOf(attributes, count);
 }
 
@@ -240,7 +244,7 @@ Status WriteGltf(const std::filesystem::path& path, const CloudView& cloud, cons
   const std::filesystem::path beside = GltfFileBeside(path);
   const AxisFlip flip = FlipBetween(kRdf, kLuf);
   const std::vector<WrittenAttribute> attributes = Attributes(cloud, flip);
-  nlohmann::json json = JsonOf(cloud.size(), attributes, BoundsOf(cloud, flip));
+  nlohmann::json json = JsonOf(cloud, cloud.size(), attributes, BoundsOf(cloud, flip));
   json["buffers"][0]["uri"] = UriOf(beside.filename().string());
   std::vector<OutputFile> files;
   for (const std::filesystem::path& name : {beside, path}) {

@@ -7,6 +7,7 @@
 #include <unordered_set>
 #include <utility>
 
+#include "core/log.h"
 #include "core/text.h"
 #include "core/words.h"
 #include "formats/ply/render_mode_tag.h"
@@ -156,7 +157,10 @@ Status HeaderParser::Property(std::string_view rest) {
 }
 
 void HeaderParser::Comment(std::string_view rest) {
-  if (!mode_.Take(rest)) header_.comments.emplace_back(rest);
+  if (!mode_.Take(rest)) {
+    header_.comments.emplace_back(rest);
+    if (LooksLikeModeTag(rest)) header_.odd_tags.emplace_back(rest);
+  }
   header_.render_mode = mode_.mode();
 }
 
@@ -188,6 +192,17 @@ const PlyElement* PlyHeader::Find(std::string_view element) const {
     if (e.name == element) return &e;
   }
   return nullptr;
+}
+
+void WarnOfOddTags(const InputFile& file, const PlyHeader& header) {
+  if (header.odd_tags.empty()) return;
+  const int64_t more = std::ssize(header.odd_tags) - 1;
+  LogWarning(Cat(file.name(), ": comment \"", Printable(header.odd_tags.front()), "\"",
+                 more > 0 ? Cat(" (and ", more, " more)") : "",
+                 " says no render mode that this version knows (SplatRenderMode: default or mip, SplatRenderDilation: "
+                 "0.1 or 0.3, antialiased 0 or 1): the mode ",
+                 NameOf(header.render_mode.value_or(RenderMode::kClassic)),
+                 " is assumed; --mode says another, where a verb has it"));
 }
 
 Result<PlyHeader> ReadPlyHeader(const InputFile& file) {

@@ -42,8 +42,9 @@ struct PlyHeader {
   std::vector<PlyElement> elements;
   std::vector<std::string> comments;  // without the tags of the render mode; obj_info is not kept
   std::optional<RenderMode> render_mode;
-  uint64_t body = 0;  // byte where the data begins
-  int lines = 0;      // of the header, end_header included
+  std::vector<std::string> odd_tags;  // those of the comments that look like a tag of the mode and say no known one
+  uint64_t body = 0;                  // byte where the data begins
+  int lines = 0;                      // of the header, end_header included
 
   const PlyElement* Find(std::string_view element) const;
 };
@@ -52,5 +53,8 @@ struct PlyHeader {
 // a file of another kind is not searched to its end. Errors (kBadFile) name the line.
 inline constexpr size_t kMaxPlyHeader = size_t{1} << 20;
 Result<PlyHeader> ReadPlyHeader(const InputFile& file);
+
+// Says which of the header's tags are not understood, and what is taken instead. For who reads the Gaussians.
+void WarnOfOddTags(const InputFile& file, const PlyHeader& header);
 
 }  // namespace anchorsplat

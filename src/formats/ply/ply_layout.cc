@@ -141,6 +141,10 @@ Result<PlyLayout> PlanPly(const InputFile& file, const PlyHeader& header) {
     const int width = r.width > 0 ? r.width : 3 * ShCoefficients(layout.sh_degree);
     layout.targets[found->second] = PlyTarget{r.array, width, r.component};
   }
+  if (const auto found = by_name.find(kFilter3d); found != by_name.end()) {
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckFloating(file, vertex.properties[found->second]));
+    layout.filter = found->second;
+  }
   if (vertex.count == 0) {
     return Error{ErrorCode::kBadFile,
                  Cat(Where(file, vertex.line), "the file has no Gaussians (0 rows of \"vertex\")")};
@@ -153,7 +157,7 @@ ExtraProperties PlanExtras(const PlyHeader& header, const PlyLayout& layout) {
   const PlyElement& vertex = *layout.vertex;
   for (size_t p = 0; p < vertex.properties.size(); ++p) {
     const PlyProperty& property = vertex.properties[p];
-    if (layout.targets[p] || NormalAxis(property) >= 0) continue;
+    if (layout.targets[p] || layout.filter == p || NormalAxis(property) >= 0) continue;
     if (property.list_count) {
       extras.not_kept.push_back(Cat("list \"", Printable(property.name), "\""));
     } else {
@@ -170,7 +174,8 @@ ExtraProperties PlanExtras(const PlyHeader& header, const PlyLayout& layout) {
   return extras;
 }
 
-std::vector<PlyDestination> Destinations(const PlyLayout& layout, GaussianCloud& cloud, ExtraProperties* extras) {
+std::vector<PlyDestination> Destinations(const PlyLayout& layout, GaussianCloud& cloud, Buffer<float>& filter,
+                                         ExtraProperties* extras) {
   std::vector<PlyDestination> out(layout.targets.size());
   const PlyElement& vertex = *layout.vertex;
   const auto extra_row = static_cast<int64_t>(extras == nullptr ? 0 : extras->row_size());
@@ -179,6 +184,8 @@ std::vector<PlyDestination> Destinations(const PlyLayout& layout, GaussianCloud&
     const PlyProperty& property = vertex.properties[p];
     if (const auto& target = layout.targets[p]) {
       out[p] = {.number = (cloud.*(target->array)).data() + target->component, .stride = target->width};
+    } else if (layout.filter == p) {
+      out[p] = {.number = filter.data(), .stride = 1};
     } else if (extras == nullptr || property.list_count) {
       continue;
     } else if (const int axis = NormalAxis(property); axis >= 0) {

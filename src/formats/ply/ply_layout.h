@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "core/gaussian_cloud.h"
@@ -24,7 +25,11 @@ struct PlyLayout {
   const PlyElement* vertex = nullptr;  // of the header given to PlanPly
   int sh_degree = 0;
   std::vector<std::optional<PlyTarget>> targets;  // one per property of `vertex`; nothing: not of a Gaussian
+  // kFilter3d, where `vertex` has one: what Mip-Splatting's program keeps beside Gaussians that its 3-D smoothing
+  // filter is not yet a part of, a size each (core/smoothing_filter.h).
+  std::optional<size_t> filter;
 };
+inline constexpr std::string_view kFilter3d = "filter_3D";
 
 // Where the value of a property goes in memory, for row 0, and how far it is from there to row 1.
 struct PlyDestination {
@@ -35,15 +40,17 @@ struct PlyDestination {
 };
 
 // Finds the INRIA properties x y z, f_dc_0..2, f_rest_* (0, 9, 24 or 45, channel-major), opacity, scale_0..2, rot_0..3
-// by name and checks that they are float or double. Errors (kBadFile) say what is missing, or what the file is instead.
-// `header` must outlive the layout.
+// by name, and filter_3D, and checks that they are float or double. Errors (kBadFile) say what is missing, or what the
+// file is instead. `header` must outlive the layout.
 Result<PlyLayout> PlanPly(const InputFile& file, const PlyHeader& header);
 
 // What of the file is no part of Gaussians: scalars of "vertex" become properties with room for all rows, nx ny nz
 // become normals, its lists and other elements with rows are named in `not_kept`.
 ExtraProperties PlanExtras(const PlyHeader& header, const PlyLayout& layout);
 
-// One per property of `layout.vertex`. `cloud` has room for all rows; `extras` is of PlanExtras, or null: skipped.
-std::vector<PlyDestination> Destinations(const PlyLayout& layout, GaussianCloud& cloud, ExtraProperties* extras);
+// One per property of `layout.vertex`. `cloud` has room for all rows, as has `filter` where the layout has one;
+// `extras` is of PlanExtras, or null: skipped.
+std::vector<PlyDestination> Destinations(const PlyLayout& layout, GaussianCloud& cloud, Buffer<float>& filter,
+                                         ExtraProperties* extras);
 
 }  // namespace anchorsplat

@@ -67,6 +67,14 @@ std::optional<RenderMode> RenderModeTag::mode() const {
   }
 }
 
+bool LooksLikeModeTag(std::string_view comment) {
+  const std::string lower = LowerCase(comment);
+  std::string_view rest = Trimmed(lower);
+  if (rest.starts_with(kModeKey) || rest.starts_with(kDilationKey)) return true;
+  // More than one word is a sentence about something.
+  return TakeWord(rest) == "antialiased" && !rest.empty() && rest.find_first_of(" \t") == rest.npos;
+}
+
 std::vector<std::string> CommentsOf(RenderMode mode) {
   if (!IsCompensated(mode)) return {"SplatRenderMode: default"};
   return {"SplatRenderMode: mip", Cat("SplatRenderDilation: ", DilationOf(mode))};

@@ -33,6 +33,10 @@ class RenderModeTag {
   std::optional<double> dilation_;  // px²
 };
 
+// Whether a comment that Take() did not take begins as a tag does, so that its writer meant to say something about the
+// mode: "SplatRenderMode: 2dgs", "SplatRenderDilation: wide", "antialiased yes".
+bool LooksLikeModeTag(std::string_view comment);
+
 // The comments that say a mode, so that programs that know only Brush's or no dilation understand as much as they can.
 std::vector<std::string> CommentsOf(RenderMode mode);
 

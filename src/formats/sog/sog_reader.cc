@@ -15,6 +15,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
+#include "formats/json_asset.h"
 #include "formats/quantize.h"
 #include "images/webp_image.h"
 #include "io/compression_ratio.h"
@@ -420,6 +421,7 @@ Result<GaussianCloud> ReadSog(const InputFile& file, const ReadLimits& limits) {
   if (const std::optional<JsonValue> model = meta.Find("model"); model && model->raw() == "antialiased") {
     cloud.render_mode = RenderMode::kAntialiased;
   }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(cloud.comments, CommentsOfAsset(meta));
   return cloud;
 }
 

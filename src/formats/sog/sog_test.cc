@@ -69,6 +69,20 @@ TEST(Sog, RoundTripWithinTheStepsOfTheFormat) {
   }
 }
 
+TEST(Sog, CreditsAreItsCopyright) {
+  const TestFolder folder;
+  GaussianCloud cloud = Clustered(5, 0, 1);
+  cloud.comments = {"world up: 0 1 0", "credit: Mug by Ann, CC BY 4.0", "credit: scanned by Bob"};
+  for (const char* name : {"a.sog", "meta.json"}) {
+    ASSERT_TRUE(WriteSog(folder / name, cloud).ok());
+    const auto read = Read(folder / name);
+    ASSERT_TRUE(read.ok()) << read.error().message;
+    EXPECT_EQ(read->comments, std::vector<std::string>(cloud.comments.begin() + 1, cloud.comments.end()));
+  }
+  const nlohmann::json meta = nlohmann::json::parse(FileBytes(folder / "meta.json"));
+  EXPECT_EQ(meta["asset"]["copyright"], "Mug by Ann, CC BY 4.0\nscanned by Bob");
+}
+
 TEST(Sog, EdgeValuesStayDefined) {
   const TestFolder folder;
   GaussianCloud cloud = RandomCloud(30, 1, 5);

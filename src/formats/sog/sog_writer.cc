@@ -16,6 +16,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
+#include "formats/json_asset.h"
 #include "formats/quantize.h"
 #include "formats/sog/scalar_codebook.h"
 #include "formats/sog/sh_palette.h"
@@ -225,8 +226,7 @@ Status WriteSog(const std::filesystem::path& path, const CloudView& cloud, const
 
   const Pictures pictures{cloud, WriteOrder(cloud, options.order, SplatOrder::kMorton), static_cast<int>(width),
                           static_cast<int>(height)};
-  nlohmann::json meta = {
-      {"version", 2}, {"asset", {{"generator", "anchorsplat " ANCHORSPLAT_VERSION}}}, {"count", cloud.size()}};
+  nlohmann::json meta = {{"version", 2}, {"asset", AssetOf(cloud.comments)}, {"count", cloud.size()}};
   if (IsCompensated(cloud.render_mode)) meta["model"] = "antialiased";  // as splat-transform has it
   std::vector<Picture> drawn;
   if (cloud.sh_degree > 0) meta["shN"] = DrawHarmonics(pictures, drawn);

@@ -18,7 +18,8 @@ namespace anchorsplat {
 // (sh_palette.h), as many as other programs give: 1,024·2^⌊log₂(N/1024)⌋, at least 1,024.
 // Lost: means are rounded to 1/65535 of the range of sign(x)·ln(|x| + 1), quaternion components to 1/360, log-scales
 // and f_dc to one of 256 values, opacities to 1/255, SH to the palette; scales are clamped to e^±20. Of the render mode
-// only whether opacity is compensated is kept ("model": "antialiased"), comments have no place.
+// only whether opacity is compensated is kept ("model": "antialiased"), and of the comments the credits
+// ("asset.copyright").
 // The files of a folder appear when all of them are complete, meta.json last.
 // Errors: kExists (each file of a folder), kIo, kBadArgument (arrays that disagree, no Gaussians, more than fit a
 // picture).

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+#include "io/json_file.h"
+
+namespace anchorsplat {
+
+// The member "asset" of a file that is JSON, as glTF defines it and SOG took it over: what made the file, and whose it
+// is. `generator` is ours; `copyright` are the credits, a line each, and is not there where there are none.
+nlohmann::json AssetOf(std::span<const std::string> comments);
+
+// The credits that such a file says, as comments; none where it says nothing, or no text. kBadFile: a mebibyte of them.
+Result<std::vector<std::string>> CommentsOfAsset(const JsonValue& root);
+
+}  // namespace anchorsplat

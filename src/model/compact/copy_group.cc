@@ -151,7 +151,7 @@ void CopyGroup::FindCost(size_t a, size_t b) {
   // Which go without a merge.
   if (copies_[a].stored_opacity < invisible_ || copies_[b].stored_opacity < invisible_) return;
   const auto overlaps = Overlaps(first, second);
-  const MergedPair merged = MergePair(first, second, overlaps);
+  const MergedPair merged = MergePair(first, second, overlaps, /*for_cost=*/true);
   if (!merged.valid) return;
   const double found = MergeCost(first, second, overlaps, merged,
                                  {color_products_[At(a, a)], color_products_[At(a, b)], color_products_[At(b, b)]});
@@ -196,6 +196,7 @@ void CopyGroup::Do(const Step& step) {
   --alive_;
   if (step.keep == step.gone) return;
   const MergedPair merged = MergePair(keep.gaussian, gone.gaussian, Overlaps(keep.gaussian, gone.gaussian));
+  if (!merged.valid) return;  // as if it had been invisible
   keep.gaussian = merged.gaussian;
   keep.stored_opacity = std::max(keep.stored_opacity, gone.stored_opacity);
   keep.merged = true;

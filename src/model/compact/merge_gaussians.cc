@@ -120,7 +120,8 @@ std::array<double, 3> Overlaps(const MergeGaussian& a, const MergeGaussian& b) {
   return overlaps;
 }
 
-MergedPair MergePair(const MergeGaussian& a, const MergeGaussian& b, const std::array<double, 3>& overlaps) {
+MergedPair MergePair(const MergeGaussian& a, const MergeGaussian& b, const std::array<double, 3>& overlaps,
+                     bool for_cost) {
   MergedPair merged;
   const double of_views = a.area[0] + a.area[1] + a.area[2] + b.area[0] + b.area[1] + b.area[2];
   const double twice =
@@ -128,12 +129,12 @@ MergedPair MergePair(const MergeGaussian& a, const MergeGaussian& b, const std::
   const double mass = a.mass + b.mass - twice;
   if (!(mass > 0) || !std::isfinite(mass)) return merged;
   merged.share = (a.mass - twice / 2) / mass;
-  const Product product = ProductOf(a, b);
+  const Product product = for_cost ? Product() : ProductOf(a, b);
   MergeGaussian &out = merged.gaussian, &sum = merged.sum;
   const auto moments = [&](double both, MergeGaussian& of) {
     const double all = a.mass + b.mass - both;
     for (size_t c = 0; c < 3; ++c) {
-      of.mean[c] = (a.mass * a.mean[c] + b.mass * b.mean[c] - both * product.mean[c]) / all;
+      of.mean[c] = (a.mass * a.mean[c] + b.mass * b.mean[c] - (both > 0 ? both * product.mean[c] : 0)) / all;
     }
     of.covariance = {};
     AddMoment(a.mass / all, a.mean, a.covariance, of.mean, of.covariance);
@@ -145,9 +146,12 @@ MergedPair MergePair(const MergeGaussian& a, const MergeGaussian& b, const std::
   Measure(sum);
   sum.opacity = mass / sum.mean_area;
   Measure(sum);
+  merged.valid = std::isfinite(sum.mass) && std::isfinite(sum.mean[0] + sum.mean[1] + sum.mean[2]);
+  if (for_cost || !merged.valid) return merged;
   moments(twice, out);
   if (!IsPositive(out.covariance)) moments(0, out);  // Gaussians that cross at an angle
-  if (!IsPositive(out.covariance)) return merged;
+  merged.valid = IsPositive(out.covariance);
+  if (!merged.valid) return merged;
   out.thinnest = std::min(a.thinnest, b.thinnest);
   Measure(out);
   out.opacity = mass / out.mean_area;

@@ -46,7 +46,9 @@ struct MergedPair {
   double share = 0.5;  // of a's colour; b's is the rest
   bool valid = false;  // false: there is no finite Gaussian with these moments, or nothing that could be seen
 };
-MergedPair MergePair(const MergeGaussian& a, const MergeGaussian& b, const std::array<double, 3>& overlaps);
+// `for_cost`: `gaussian` stays as it is, which is quicker.
+MergedPair MergePair(const MergeGaussian& a, const MergeGaussian& b, const std::array<double, 3>& overlaps,
+                     bool for_cost = false);
 
 // Colours as inner products: the mean over all directions of products of the colours, summed over red, green and blue.
 struct MergeColors {

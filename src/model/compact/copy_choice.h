@@ -15,7 +15,8 @@ inline constexpr double kMergeCost = 2e-5;
 
 // How many of a network's copies live.
 struct CopyChoice {
-  std::optional<int64_t> copies;   // at most so many of each Gaussian; nothing: as many as cost more than `merge_cost`
+  std::optional<int64_t> copies =
+      std::nullopt;                // at most so many of each Gaussian; nothing: as many as cost more than `merge_cost`
   double merge_cost = kMergeCost;  // ≥ 0
   int64_t max_gaussians = 0;       // in all; 0: no bound
   float invisible = 0;             // copies of less opacity go first, and 1/255 at least

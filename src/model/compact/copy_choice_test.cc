@@ -74,7 +74,7 @@ TEST(CopyChoice, UntrainedCopiesMergeBackIntoTheFilteredSplat) {
       const auto at = static_cast<size_t>(i);
       const double before = Sigmoid(filtered.opacity_logits[at]), after = Sigmoid(merged.opacity_logits[at]);
       if (before < 0.1) continue;  // of whose copies little more than the limit of 1/255 is seen
-      EXPECT_NEAR(after, before, 0.12 * before) << copies << ' ' << i;  // same mass, another peak
+      EXPECT_NEAR(after, before, 0.15 * before) << copies << ' ' << i;  // same mass, another peak
       std::array<float, 3> was, is;
       for (size_t c = 0; c < 3; ++c) {
         EXPECT_NEAR(merged.means[3 * at + c], filtered.means[3 * at + c], 0.1 * kSheetPixel);

@@ -97,6 +97,8 @@ void CopyGroup::Load(const GaussianCloud& cloud, int64_t first, int64_t stride, 
   alive_ = copies;
   pixel_ = pixel;
   colors_ = colors;
+  // Modes that compensate draw the integral of the Gaussian as it is; a trace keeps flat ones from having none.
+  dilation_ = IsCompensated(cloud.render_mode) ? 1e-3 : double{kDilation};
   frame_ = RotationOf(cloud, first);
   for (size_t c = 0; c < 3; ++c) origin_[c] = cloud.means[static_cast<size_t>(3 * first) + c];
   std::fill(weights_.begin(), weights_.end(), 0.0);
@@ -118,7 +120,7 @@ void CopyGroup::Load(const GaussianCloud& cloud, int64_t first, int64_t stride, 
     size_t at = 0;
     for (size_t i = 0; i < 3; ++i) {
       for (size_t j = i; j < 3; ++j, ++at) {
-        g.covariance[at] = i == j ? double{kDilation} : 0;
+        g.covariance[at] = i == j ? dilation_ : 0;
         for (size_t c = 0; c < 3; ++c) g.covariance[at] += turn[3 * i + c] * variance[c] * turn[3 * j + c];
       }
     }
@@ -229,13 +231,13 @@ bool CopyGroup::WriteMerged(const Copy& copy, const double* weights, int64_t row
   const double seen = SeenVariance(high);
   std::array<double, 6> covariance = g.covariance;
   for (double& x : covariance) x /= seen;
-  for (const size_t diagonal : kDiagonal) covariance[diagonal] -= kDilation;
+  for (const size_t diagonal : kDiagonal) covariance[diagonal] -= dilation_;
   Ellipsoid ellipsoid = EllipsoidOf(covariance);
   // Nothing is thinner than the dilation: what has become longer by that absorbs less.
   MergeGaussian drawn;
   for (size_t c = 0; c < 3; ++c) {
     ellipsoid.variances[c] = std::max(ellipsoid.variances[c], g.thinnest);
-    drawn.covariance[kDiagonal[c]] = ellipsoid.variances[c] + kDilation;
+    drawn.covariance[kDiagonal[c]] = ellipsoid.variances[c] + dilation_;
   }
   Measure(drawn);
   const double opacity = std::min(kMinAlpha + g.mass / drawn.mean_area, kMostStoredOpacity);

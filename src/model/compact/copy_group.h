@@ -45,7 +45,7 @@ class CopyGroup {
   double invisible_;
   int64_t first_ = 0, stride_ = 1, alive_ = 0;
   bool colors_ = false;
-  double pixel_ = 1;
+  double pixel_ = 1, dilation_ = 0;
   std::array<double, 3> origin_{};
   std::array<double, 9> frame_{};  // columns: the axes
   std::vector<Copy> copies_;

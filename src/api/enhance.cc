@@ -29,6 +29,8 @@ Result<EnhanceOptions> ToOptions(const EnhanceSettings& settings) {
   options.pixel_size = settings.pixel_size;
   options.refine.images = settings.images;
   options.model.file = settings.model;
+  options.model.copies = settings.copies;
+  options.model.options.max_gaussians = settings.max_gaussians;
   options.seed = settings.seed;
   given(settings.upscale != EnhanceSettings().upscale, "upscale");
   given(settings.filter_strength.has_value(), "filter-strength");
@@ -36,6 +38,8 @@ Result<EnhanceOptions> ToOptions(const EnhanceSettings& settings) {
   given(!settings.cameras.empty(), "cameras");
   given(!settings.images.empty(), "images");
   given(!settings.model.empty(), "model");
+  given(settings.copies.has_value(), "copies");
+  given(settings.max_gaussians != 0, "max-gaussians");
   if (!settings.cameras.empty()) {
     options.cameras.emplace();
     for (const PinholeCamera& camera : settings.cameras) options.cameras->cameras.push_back(ToCamera(camera));

@@ -48,6 +48,7 @@ struct EnhanceFlags {
   std::string model_file;
   std::string shuffles = "identity";
   std::string compat;
+  std::string copies = "auto";
   std::optional<RenderMode> mode;  // in place of the files' tags
   bool view = false;
 };
@@ -194,6 +195,7 @@ Status FinishModelOptions(const EnhanceFlags& flags, ModelSettings& model) {
   }
   model.file = flags.model_file;
   model.options.upstream = flags.compat == "upstream";
+  ANCHORSPLAT_ASSIGN_OR_RETURN(model.copies, ParseCopies("--copies", flags.copies));
   ANCHORSPLAT_ASSIGN_OR_RETURN(model.options.shuffles, ParseShuffles(flags.shuffles));
   return {};
 }
@@ -394,8 +396,17 @@ void AddModelFlags(CLI::App& verb, EnhanceFlags& flags) {
       verb.add_option("--shuffles", flags.shuffles,
                       "Orders of the space-filling curves: identity, a seed of PyTorch's, or five permutations"))
       ->capture_default_str();
+  model_option(verb.add_option("--copies", flags.copies,
+                               "Gaussians that a compact network makes of each, at most; auto: merged where nobody "
+                               "would see the difference"))
+      ->capture_default_str();
+  model_option(verb.add_option("--merge-cost", flags.options.model.merge_cost,
+                               "Of --copies auto: what a merge may cost, in pixels of the closer view times the square "
+                               "of the difference; more is fewer Gaussians (default: 0.00002)"))
+      ->check(NotNegative());
   model_option(verb.add_option("--max-gaussians", model.max_gaussians,
-                               "Anchors at most, the largest by opacity x size; 0 is all"))
+                               "Budget of the result: copies are merged until it is kept. Of the published "
+                               "architecture: anchors at most, the largest by opacity x size. 0 is all"))
       ->check(NotNegative())
       ->capture_default_str();
   verb.add_option("--prune-opacity", model.prune_opacity,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -25,6 +26,8 @@ Result<std::array<double, 3>> ParseDirection(const std::string& option, const st
 Result<const SplatFormat*> ParseInputFormat(const std::string& option, const std::string& text);
 inline constexpr const char* kInputFormatHelp =
     "Format of the input by its extension, for what neither content nor name tells: .splat from a pipe";
+// A whole number of at least 1, or nothing for "auto".
+Result<std::optional<int64_t>> ParseCopies(const std::string& option, const std::string& text);
 // A positive number, or nothing for "auto".
 Result<std::optional<double>> ParsePixelSize(const std::string& option, const std::string& text);
 

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 
 #include "model/published/enhance_with_published.h"
 
@@ -12,8 +14,12 @@ struct ModelSettings {
   // is not ready when there is none.
   std::filesystem::path file;
   WeightPrecision precision = WeightPrecision::kFloat;  // fp32, with a warning, where bfloat16 would be slower
-  // Of the published architecture; of these, compact networks look at `prune_opacity` only.
+  // Of the published architecture; of these, compact networks look at `prune_opacity` and `max_gaussians`, which is
+  // about the result there (CopyChoice).
   PublishedOptions options;
+  // Of compact networks: see CopyChoice of model/compact/copy_choice.h.
+  std::optional<int64_t> copies;     // nothing: auto
+  std::optional<double> merge_cost;  // nothing: kMergeCost
 };
 
 }  // namespace anchorsplat

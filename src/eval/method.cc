@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <ctime>
 #include <memory>
 #include <set>
@@ -18,6 +19,7 @@
 #include "metrics/bicubic.h"
 #include "metrics/image_metrics.h"
 #include "model/any_network.h"
+#include "model/compact/copy_choice.h"
 #include "model/compact/shipped_network.h"
 #include "model/model_method.h"
 #include "model/published/enhance_with_published.h"
@@ -122,10 +124,19 @@ Result<std::string> Identity(const fs::path& path) {
   return Cat(path.string(), " ", size, " ", fs::last_write_time(path, code).time_since_epoch().count());
 }
 
+// What becomes of a network's copies.
+std::string ChoiceText(const ModelSettings& model) {
+  std::string text =
+      model.copies ? Cat(" copies ", *model.copies) : Cat(" cost ", model.merge_cost.value_or(kMergeCost));
+  if (model.options.max_gaussians > 0) text += Cat(" most ", model.options.max_gaussians);
+  return text;
+}
+
 Result<EvalMethod> Model(const fs::path& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string identity, Identity(file));
   const auto network = std::make_shared<std::optional<AnyNetwork>>();  // loaded for the first object
-  return EvalMethod{file.stem().string(), identity, [file, network](const MethodTask& task) -> Result<MethodViews> {
+  return EvalMethod{file.stem().string(), Cat(identity, ChoiceText({})),
+                    [file, network](const MethodTask& task) -> Result<MethodViews> {
                       if (!*network) {
                         ANCHORSPLAT_ASSIGN_OR_RETURN(*network, LoadAnyNetwork(file));
                       }
@@ -144,7 +155,7 @@ Result<EvalMethod> Model(const fs::path& file) {
                         input.filter_strength = DefaultStrength(task.object);
                         ANCHORSPLAT_ASSIGN_OR_RETURN(
                             cloud, EnhanceWithCompactNetwork(std::move(input), task.object.upscale(),
-                                                             std::get<CompactNetwork>(**network), 0, report));
+                                                             std::get<CompactNetwork>(**network), {}, report));
                       }
                       const double seconds = SecondsSince(begin);
                       MethodViews views = SplatViews(task.object, std::move(cloud));
@@ -172,6 +183,7 @@ struct RegisteredMethod {
   bool auto_pixel_size =
       false;  // NAME-auto: it gets no cameras and estimates p_LR, as for a user who has the splat alone
   RefineOptions refine;
+  ModelSettings model;
   std::optional<double> filter_strength;
 
   // What it depends on besides the object; nothing of it for other methods than refinement.
@@ -184,7 +196,9 @@ struct RegisteredMethod {
     if (filter_strength) settings += Cat(" f ", *filter_strength);
     if (auto_pixel_size) settings += " contradicted estimates are not acted on ";
     // Refinement with pictures begins with a network's result, too.
-    if (name.starts_with("model") || name == "refine-images") settings += ShippedNetworkIdentity();
+    if (name.starts_with("model") || name == "refine-images") {
+      settings += ShippedNetworkIdentity() + ChoiceText(model);
+    }
     return settings;
   }
 };
@@ -199,16 +213,38 @@ Result<double> ParseStrength(const std::string& word, std::string_view value) {
                Cat("--methods ", Printable(word), ": f is a number from 0 to ", kMaxFilterStrength)};
 }
 
+// What chooses among the copies of a network: a cost, or a whole number of at least 1.
+Result<double> ParseCount(const std::string& word, std::string_view key, std::string_view value) {
+  double number = 0;
+  const char* end = value.data() + value.size();
+  const auto [stop, code] = std::from_chars(value.data(), end, number);
+  const bool whole = number >= 1 && number <= 1e12 && number == std::floor(number);
+  if (code == std::errc() && stop == end && (key == "merge-cost" ? number >= 0 && std::isfinite(number) : whole)) {
+    return number;
+  }
+  return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(word), ": ", key, " is a ",
+                                            key == "merge-cost" ? "number of 0 or more" : "whole number of 1 or more")};
+}
+
 Status SetOption(RegisteredMethod& method, std::string_view key, std::string_view value) {
   if (key == "hold-out") {
     return Error{ErrorCode::kBadArgument,
                  Cat("--methods ", Printable(method.word), ": which views are held out is the benchmark's to say")};
   }
+  if (key == "copies" && value == "auto") return {};
+  if (key == "copies" || key == "max-gaussians" || key == "merge-cost") {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double number, ParseCount(method.word, key, value));
+    if (key == "copies") method.model.copies = static_cast<int64_t>(number);
+    if (key == "max-gaussians") method.model.options.max_gaussians = static_cast<int64_t>(number);
+    if (key == "merge-cost") method.model.merge_cost = number;
+    return {};
+  }
   if (key != "f") {
     const Status set = SetRefineOption(method.refine, key, value);
     if (set.ok()) return set;
     return Error{ErrorCode::kBadArgument,
-                 Cat("--methods ", Printable(method.word), ": ", set.error().message, "; f is that of the filter")};
+                 Cat("--methods ", Printable(method.word), ": ", set.error().message,
+                     "; f is that of the filter, copies, merge-cost and max-gaussians are the network's")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(method.filter_strength, ParseStrength(method.word, value));
   return {};
@@ -219,6 +255,7 @@ Status CheckGiven(const RegisteredMethod& method, const std::set<std::string>& k
   EnhanceOptions options;
   options.method = method.name;
   options.refine = method.refine;
+  options.model = method.model;
   if (method.name.ends_with("refine-images")) options.refine.images = "the object's";
   if (!method.auto_pixel_size) options.cameras.emplace();
   for (const std::string& key : keys) options.given.push_back(key == "f" ? "filter-strength" : key);
@@ -250,9 +287,9 @@ Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word)
     return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(word),
                                               ": the pictures' cameras say the pixel size, nothing is estimated")};
   }
-  if (word.size() > name_end && !method.name.ends_with("refine") && !method.name.ends_with("refine-images")) {
+  if (word.size() > name_end && method.name == "filter") {
     return Error{ErrorCode::kBadArgument,
-                 Cat("--methods ", Printable(word), ": only refine and refine-images have options")};
+                 Cat("--methods ", Printable(word), ": only networks, refine and refine-images have options")};
   }
   std::set<std::string> keys;
   for (size_t at = name_end; at < word.size();) {
@@ -285,6 +322,7 @@ EvalMethod Registered(const RegisteredMethod& method) {
             options.upscale = task.object.upscale();
             if (!method.auto_pixel_size) options.cameras = TrainingCameras(task.object);
             options.refine = method.refine;
+            options.model = method.model;
             options.filter_strength = method.filter_strength;
             if (method.name.ends_with("refine-images")) {
               options.refine.images = task.object.low_project;

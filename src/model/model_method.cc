@@ -15,6 +15,7 @@
 #include "enhance/filter.h"
 #include "io/file_version.h"
 #include "model/any_network.h"
+#include "model/compact/copy_choice.h"
 #include "model/compact/shipped_network.h"
 #include "model/kernels/bfloat16_tile.h"
 
@@ -44,10 +45,18 @@ std::vector<MethodOption> NetworkOptions() {
   });
   options.push_back({"model", {}});
   options.push_back({"prune-opacity", {}});
+  options.push_back({"max-gaussians", {}});
+  for (const char* name : {"copies", "merge-cost"}) {
+    options.push_back({name, [name = std::string(name)](const MethodUse& use) -> std::string {
+                         const ModelSettings& model = use.options.model;
+                         if (IsPublished(model)) return "with a compact network";
+                         return name == "merge-cost" && model.copies ? "with --copies auto" : "";
+                       }});
+  }
   const auto published = [](const MethodUse& use) {
     return IsCompact(use.options.model) ? "with a network of the published architecture (--model FILE)" : "";
   };
-  for (const char* name : {"compat", "normalisation", "precision", "curve-depth", "shuffles", "max-gaussians"}) {
+  for (const char* name : {"compat", "normalisation", "precision", "curve-depth", "shuffles"}) {
     options.push_back({name, published});
   }
   options.push_back({"attention-rounding", [published](const MethodUse& use) -> std::string {
@@ -118,12 +127,19 @@ class LastNetwork {
 }  // namespace
 
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
-                                                float prune_opacity, StepReport& report) {
+                                                const ModelSettings& model, StepReport& report) {
+  // Of what stays one Gaussian for one.
+  const auto within_budget = [&]() -> Result<GaussianCloud> {
+    report.facts = {{"copies", int64_t{1}}};
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const ChosenCopies kept,
+                                 ChooseCopies({}, {.max_gaussians = model.options.max_gaussians}, input.cloud));
+    if (kept.left_out > 0) report.facts.emplace_back("left_out", kept.left_out);
+    return std::move(input.cloud);
+  };
   if (input.filter_strength <= ShownStrength(upscale, input.cloud.render_mode)) {
     LogInfo(
         "the network's residuals are on top of the filter, and there is no lost width to give back: the splat stays");
-    report.facts = {{"copies", int64_t{1}}};
-    return std::move(input.cloud);
+    return within_budget();
   }
   if (IsCompensated(input.cloud.render_mode) && !network.config().kind) {
     LogInfo(Cat("the network has learned from classic splats: this ", NameOf(*input.cloud.render_mode),
@@ -131,8 +147,7 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
     const auto grown =
         ApplyFilter(input.cloud, input.pixel_sizes, {.upscale = upscale, .strength = input.filter_strength});
     if (!grown.ok()) return grown.error();
-    report.facts = {{"copies", int64_t{1}}};
-    return std::move(input.cloud);
+    return within_budget();
   }
   const auto n = static_cast<double>(input.cloud.size());
   ANCHORSPLAT_ASSIGN_OR_RETURN(CompactResult result, network.Apply(input.cloud, {.pixel_sizes = input.pixel_sizes,
@@ -159,6 +174,19 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
     LogWarning(Cat("the network says NaN or infinite values for ", WithThousands(result.not_finite),
                    " Gaussians: filtered only. Are its weights damaged?"));
   }
+  const float prune_opacity = model.options.prune_opacity;
+  const int64_t made = result.cloud.size();
+  std::vector<float> pixels;  // of the closer view
+  for (const int64_t i : result.anchors) {
+    const size_t at = input.pixel_sizes.size() == 1 ? 0 : static_cast<size_t>(i);
+    pixels.push_back(static_cast<float>(input.pixel_sizes[at] / upscale));
+    if (input.pixel_sizes.size() == 1) break;
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      const ChosenCopies chosen,
+      ChooseCopies({std::ssize(result.anchors), network.config().copies, pixels},
+                   {model.copies, model.merge_cost.value_or(kMergeCost), model.options.max_gaussians, prune_opacity},
+                   result.cloud));
   const int64_t before = result.cloud.size();
   if (prune_opacity > 0) {
     std::vector<int64_t> kept;
@@ -171,7 +199,10 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
                   {"unlike_training", result.outside},
                   {"partly_unlike_training", result.partly},
                   {"output_not_finite", result.not_finite},
-                  {"pruned", before - result.cloud.size()}};
+                  {"copies_made", made},
+                  {"merged", chosen.merged},
+                  {"pruned", before - result.cloud.size()},
+                  {"left_out", chosen.left_out}};
   return std::move(result.cloud);
 }
 
@@ -195,7 +226,10 @@ void RegisterModelMethod() {
            const int64_t most = options.model.options.max_gaussians;
            return published->config().copies * (most > 0 ? std::min(count, most) : count);
          }
-         return count * std::get<CompactNetwork>(**network).config().copies;
+         const int64_t copies = std::get<CompactNetwork>(**network).config().copies;
+         const int64_t all = count * std::clamp<int64_t>(options.model.copies.value_or(copies), 1, copies);
+         const int64_t most = options.model.options.max_gaussians;
+         return most > 0 ? std::min(all, most) : all;
        },
        .ready = [](const EnhanceOptions& options) -> Status {
          if (!options.model.file.empty() || HasShippedNetwork()) return {};
@@ -207,7 +241,7 @@ void RegisterModelMethod() {
            return EnhanceWithPublished(input, *published, options.model.options, report);
          }
          return EnhanceWithCompactNetwork(std::move(input), options.upscale, std::get<CompactNetwork>(*network),
-                                          options.model.options.prune_opacity, report);
+                                          options.model, report);
        }});
 }
 

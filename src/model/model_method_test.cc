@@ -185,6 +185,7 @@ TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
   input.cloud = SheetCloud(200);
   input.pixel_sizes = {kSheetPixel};
   input.filter_strength = 0.7;
+  options.model.copies = 3;
   auto enhanced = registered.run(input, options, report);
   ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
   EXPECT_EQ(enhanced->size(), 600);
@@ -214,6 +215,39 @@ TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
   EXPECT_FALSE(*registered.needs_pixel_size(options));
 }
 
+TEST_F(SmallModel, CopiesAndBudgetAreCounted) {
+  EnhanceOptions options;
+  options.model.file = folder_ / "compact.safetensors";
+  WriteCompact(options.model.file, {.copies = 3, .hidden = 16, .head_hidden = 16});
+  ASSERT_FALSE(HasFatalFailure());
+  RegisterModelMethod();
+  const EnhanceMethod registered = Registered();
+  EnhanceInput input;
+  input.cloud = SheetCloud(200);
+  input.pixel_sizes.assign(200, kSheetPixel);  // one each
+  input.filter_strength = 0.7;
+  const auto run = [&](std::optional<int64_t> copies, int64_t most) {
+    options.model.copies = copies;
+    options.model.options.max_gaussians = most;
+    StepReport report;
+    const auto enhanced = registered.run(input, options, report);
+    if (!enhanced.ok()) return int64_t{-1};
+    const std::map<std::string, FactValue> facts(report.facts.begin(), report.facts.end());
+    const auto fact = [&](const char* name) { return std::get<int64_t>(facts.at(name)); };
+    EXPECT_EQ(fact("copies_made"), 600);
+    EXPECT_EQ(enhanced->size(), 600 - fact("merged") - fact("left_out") - fact("pruned"));
+    return enhanced->size();
+  };
+  EXPECT_LT(run({}, 0), 600);
+  EXPECT_EQ(run(3, 0), 600);
+  EXPECT_LE(run(2, 0), 400);
+  EXPECT_EQ(run(1, 0), 200);
+  EXPECT_EQ(run(4, 0), -1);  // the network makes three
+  EXPECT_EQ(run(3, 450), 450);
+  EXPECT_EQ(run(3, 150), 150);
+  EXPECT_EQ(registered.expected(200, options), 150);
+}
+
 // The last network is kept for the next call, and what asks for another one at the same time gets its own.
 TEST_F(SmallModel, ChangedFilesAndRunsSideBySideGetTheirNetworks) {
   const fs::path two = folder_ / "two.safetensors", three = folder_ / "three.safetensors";
@@ -231,7 +265,9 @@ TEST_F(SmallModel, ChangedFilesAndRunsSideBySideGetTheirNetworks) {
     options.model.file = file;
     StepReport report;
     const auto enhanced = registered.run(input, options, report);
-    return enhanced.ok() ? enhanced->size() / input.cloud.size() : -1;
+    if (!enhanced.ok()) return -1;
+    const std::map<std::string, FactValue> facts(report.facts.begin(), report.facts.end());
+    return std::get<int64_t>(facts.at("copies_made")) / input.cloud.size();
   };
   int wrong = 0;
   std::thread other([&] {
@@ -261,16 +297,24 @@ TEST_F(SmallModel, EveryOptionBelongsToAnArchitecture) {
   for (const fs::path& weights : {fs::path(), compact, file()}) {
     enhance.model.file = weights;
     const bool published = weights == file();
-    for (const char* name : {"compat", "normalisation", "precision", "curve-depth", "shuffles", "max-gaussians",
-                             "attention-rounding", "block-gaussians"}) {
+    for (const char* name :
+         {"compat", "normalisation", "precision", "curve-depth", "shuffles", "attention-rounding", "block-gaussians"}) {
       EXPECT_EQ(lacks(name), published ? "" : "with a network of the published architecture (--model FILE)") << name;
     }
     for (const char* name : {"upscale", "pixel-size", "cameras", "filter-strength"}) {
       EXPECT_EQ(lacks(name), published ? "with a compact network, --method filter or refine" : "") << name;
     }
+    for (const char* name : {"copies", "merge-cost"}) {
+      EXPECT_EQ(lacks(name), published ? "with a compact network" : "") << name;
+    }
     EXPECT_EQ(lacks("prune-opacity"), "");
+    EXPECT_EQ(lacks("max-gaussians"), "");
     EXPECT_EQ(lacks("steps"), "no option");
   }
+  enhance.model.file = compact;
+  enhance.model.copies = 2;
+  EXPECT_EQ(lacks("merge-cost"), "with --copies auto");
+  enhance.model.file = file();
   enhance.model.options.upstream = true;
   EXPECT_EQ(lacks("block-gaussians"), "without --compat upstream");
   enhance.model.precision = WeightPrecision::kBFloat16;

@@ -308,6 +308,10 @@ Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const Co
     result.partly += fade > 0 && fade < 1 ? 1 : 0;
   }
   const CopyPlaces places = PlacesOfCopies(fades, result.outside, config_.copies);
+  result.anchors.reserve(static_cast<size_t>(places.inside));
+  for (int64_t i = 0; i < n; ++i) {
+    if (fades[static_cast<size_t>(i)] > 0) result.anchors.push_back(i);
+  }
 
   CompactConfig single = config_;
   single.copies = 1;

@@ -29,9 +29,10 @@ struct CompactTask {
 
 struct CompactResult {
   GaussianCloud cloud;  // copy k of all anchors before copy k + 1, then those that stayed alone; the input's metadata
-  int64_t outside = 0;  // Gaussians unlike the training data: filtered, and nothing else
-  int64_t partly = 0;   // Gaussians somewhat unlike it: a part of the residual
-  int64_t not_finite = 0;  // Gaussians for which the network says something that is not finite: its start
+  std::vector<int64_t> anchors;  // the Gaussians that have copies, in the order of these
+  int64_t outside = 0;           // Gaussians unlike the training data: filtered, and nothing else
+  int64_t partly = 0;            // Gaussians somewhat unlike it: a part of the residual
+  int64_t not_finite = 0;        // Gaussians for which the network says something that is not finite: its start
 };
 
 // A compact network for inference on the CPU, as a row of kernel calls on raw arrays. The torch module in torch/

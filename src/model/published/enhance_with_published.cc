@@ -4,17 +4,16 @@
 #include <cmath>
 #include <limits>
 #include <new>
-#include <numeric>
 #include <optional>
 #include <random>
 #include <utility>
 #include <vector>
 
-#include "core/activations.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "model/published/spatial_blocks.h"
+#include "model/shared/most_visible.h"
 
 namespace anchorsplat {
 
@@ -57,26 +56,6 @@ std::vector<int64_t> RandomChoice(std::vector<int64_t> rows, int64_t count) {
   for (size_t i = 0; i + 1 < n; ++i) std::swap(rows[i], rows[i + static_cast<size_t>(generator()) % (n - i)]);
   rows.resize(static_cast<size_t>(count));
   return rows;
-}
-
-// The `count` rows that cover most: opacity times the area of the ellipse of the two largest axes.
-std::vector<int64_t> MostVisible(const GaussianCloud& cloud, std::vector<int64_t> rows, int64_t count) {
-  std::vector<float> log_weight(rows.size());
-  for (size_t j = 0; j < rows.size(); ++j) {
-    const float* s = cloud.log_scales.data() + 3 * rows[j];
-    const float logit = cloud.opacity_logits[static_cast<size_t>(rows[j])];
-    log_weight[j] = LogSigmoid(logit) + s[0] + s[1] + s[2] - std::min({s[0], s[1], s[2]});
-  }
-  std::vector<size_t> order(rows.size());
-  std::iota(order.begin(), order.end(), size_t{0});
-  std::nth_element(order.begin(), order.begin() + count, order.end(), [&](size_t a, size_t b) {
-    return log_weight[a] != log_weight[b] ? log_weight[a] > log_weight[b] : a < b;
-  });
-  order.resize(static_cast<size_t>(count));
-  std::sort(order.begin(), order.end());
-  std::vector<int64_t> kept;
-  for (const size_t j : order) kept.push_back(rows[j]);
-  return kept;
 }
 
 // Adds a block's share of a Gaussian in normalised space to output row `row`, in world space.
@@ -234,7 +213,7 @@ Result<std::vector<int64_t>> ChooseAnchors(const GaussianCloud& cloud, const Pub
                    options.upstream ? "chosen at random" : "those with the most opacity × size",
                    "; the others are left out"));
     anchors = options.upstream ? RandomChoice(std::move(anchors), options.max_gaussians)
-                               : MostVisible(cloud, std::move(anchors), options.max_gaussians);
+                               : MostVisible(cloud, anchors, options.max_gaussians);
   }
   if (!anchors.empty()) return anchors;
   return Error{ErrorCode::kBadArgument,

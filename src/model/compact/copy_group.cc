@@ -1,0 +1,286 @@
+#include "model/compact/copy_group.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "core/activations.h"
+#include "core/rotation.h"
+#include "core/spherical_harmonics.h"
+#include "render/constants.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr std::array<size_t, 3> kDiagonal = {0, 3, 5};  // of xx xy xz yy yz zz
+constexpr float kBlack = -0.5f / kSh0;                  // below, there is nothing to see
+constexpr double kMostStoredOpacity = 0.99;
+
+// Eigenvalues of a symmetric matrix, and its eigenvectors as the columns of a rotation: Jacobi's method.
+struct Ellipsoid {
+  std::array<double, 3> variances;
+  std::array<double, 9> axes;
+};
+Ellipsoid EllipsoidOf(const std::array<double, 6>& s) {
+  double a[3][3] = {{s[0], s[1], s[2]}, {s[1], s[3], s[4]}, {s[2], s[4], s[5]}};
+  Ellipsoid out{{}, {1, 0, 0, 0, 1, 0, 0, 0, 1}};
+  for (int sweep = 0; sweep < 12; ++sweep) {
+    const double off = std::abs(a[0][1]) + std::abs(a[0][2]) + std::abs(a[1][2]);
+    if (!(off > 1e-15 * (std::abs(a[0][0]) + std::abs(a[1][1]) + std::abs(a[2][2])))) break;
+    for (const auto [p, q] : {std::array<size_t, 2>{0, 1}, {0, 2}, {1, 2}}) {
+      if (a[p][q] == 0) continue;
+      const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+      const double t = (theta < 0 ? -1 : 1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
+      const double c = 1 / std::sqrt(t * t + 1), sine = t * c;
+      for (size_t k = 0; k < 3; ++k) {
+        const double kp = a[k][p], kq = a[k][q];
+        a[k][p] = c * kp - sine * kq;
+        a[k][q] = sine * kp + c * kq;
+      }
+      for (size_t k = 0; k < 3; ++k) {
+        const double pk = a[p][k], qk = a[q][k];
+        a[p][k] = c * pk - sine * qk;
+        a[q][k] = sine * pk + c * qk;
+      }
+      for (size_t k = 0; k < 3; ++k) {
+        const double vp = out.axes[3 * k + p], vq = out.axes[3 * k + q];
+        out.axes[3 * k + p] = c * vp - sine * vq;
+        out.axes[3 * k + q] = sine * vp + c * vq;
+      }
+    }
+  }
+  for (size_t k = 0; k < 3; ++k) out.variances[k] = a[k][k];
+  return out;
+}
+
+std::array<double, 9> RotationOf(const GaussianCloud& cloud, int64_t row) {
+  const float* q = cloud.quats.data() + 4 * row;
+  return RotationFromQuaternion<double>(q[0], q[1], q[2], q[3]);
+}
+
+// aᵀ b
+std::array<double, 9> Relative(const std::array<double, 9>& a, const std::array<double, 9>& b) {
+  std::array<double, 9> out{};
+  for (size_t i = 0; i < 3; ++i) {
+    for (size_t j = 0; j < 3; ++j) out[3 * i + j] = a[i] * b[j] + a[3 + i] * b[3 + j] + a[6 + i] * b[6 + j];
+  }
+  return out;
+}
+
+// The mean over all directions of the product of two colours, summed over red, green and blue: the harmonics are
+// orthonormal. Below black there is nothing to see.
+double ColorProduct(const float* a, const float* b, int64_t floats) {
+  float sum = 0;
+  for (int64_t c = 0; c < 3; ++c) sum += std::max(a[c], kBlack) * std::max(b[c], kBlack);
+  for (int64_t c = 3; c < floats; ++c) sum += a[c] * b[c];
+  return sum / (4 * std::numbers::pi);
+}
+
+}  // namespace
+
+CopyGroup::CopyGroup(int64_t most, float invisible) : invisible_(std::max(invisible, kMinAlpha)) {
+  const auto count = static_cast<size_t>(most);
+  copies_.resize(count);
+  color_products_.resize(count * count);
+  weights_.resize(count * count);
+  costs_.resize(count * count);
+}
+
+void CopyGroup::Load(const GaussianCloud& cloud, int64_t first, int64_t stride, int64_t copies, double pixel,
+                     bool colors) {
+  copies_.resize(static_cast<size_t>(copies));
+  first_ = first;
+  stride_ = stride;
+  alive_ = copies;
+  pixel_ = pixel;
+  colors_ = colors;
+  // Modes that compensate draw the integral of the Gaussian as it is; a trace keeps flat ones from having none.
+  dilation_ = IsCompensated(cloud.render_mode) ? 1e-3 : double{kDilation};
+  frame_ = RotationOf(cloud, first);
+  for (size_t c = 0; c < 3; ++c) origin_[c] = cloud.means[static_cast<size_t>(3 * first) + c];
+  std::fill(weights_.begin(), weights_.end(), 0.0);
+  for (size_t k = 0; k < copies_.size(); ++k) {
+    const int64_t row = first + static_cast<int64_t>(k) * stride;
+    copies_[k] = {};
+    MergeGaussian& g = copies_[k].gaussian;
+    const std::array<double, 9> turn = Relative(frame_, RotationOf(cloud, row));
+    std::array<double, 3> shift, variance;
+    for (size_t c = 0; c < 3; ++c) {
+      shift[c] = (cloud.means[static_cast<size_t>(3 * row) + c] - origin_[c]) / pixel;
+      const double length = std::exp(double{cloud.log_scales[static_cast<size_t>(3 * row) + c]}) / pixel;
+      variance[c] = length * length;
+    }
+    g.thinnest = std::min({variance[0], variance[1], variance[2]});
+    for (size_t c = 0; c < 3; ++c) {
+      g.mean[c] = frame_[c] * shift[0] + frame_[3 + c] * shift[1] + frame_[6 + c] * shift[2];
+    }
+    size_t at = 0;
+    for (size_t i = 0; i < 3; ++i) {
+      for (size_t j = i; j < 3; ++j, ++at) {
+        g.covariance[at] = i == j ? dilation_ : 0;
+        for (size_t c = 0; c < 3; ++c) g.covariance[at] += turn[3 * i + c] * variance[c] * turn[3 * j + c];
+      }
+    }
+    const double opacity = Sigmoid(double{cloud.opacity_logits[static_cast<size_t>(row)]});
+    copies_[k].stored_opacity = opacity;
+    const double seen = SeenVariance(opacity);
+    for (double& x : g.covariance) x *= seen;
+    g.opacity = std::max(0.0, opacity - kMinAlpha) / seen;
+    Measure(g);
+    weights_[At(k, k)] = 1;
+  }
+  if (!colors) return;
+  const int64_t floats = cloud.sh_stride();
+  for (size_t a = 0; a < copies_.size(); ++a) {
+    const float* of_a = cloud.sh.data() + (first + static_cast<int64_t>(a) * stride) * floats;
+    for (size_t b = a; b < copies_.size(); ++b) {
+      const float* of_b = cloud.sh.data() + (first + static_cast<int64_t>(b) * stride) * floats;
+      color_products_[At(a, b)] = color_products_[At(b, a)] = ColorProduct(of_a, of_b, floats);
+    }
+  }
+  for (size_t a = 0; a < copies_.size(); ++a) {
+    for (size_t b = a + 1; b < copies_.size(); ++b) FindCost(a, b);
+  }
+}
+
+void CopyGroup::FindCost(size_t a, size_t b) {
+  const MergeGaussian &first = copies_[a].gaussian, &second = copies_[b].gaussian;
+  double& cost = costs_[At(a, b)];
+  cost = kInfinity;
+  // Which go without a merge.
+  if (copies_[a].stored_opacity < invisible_ || copies_[b].stored_opacity < invisible_) return;
+  const auto overlaps = Overlaps(first, second);
+  const MergedPair merged = MergePair(first, second, overlaps, /*for_cost=*/true);
+  if (!merged.valid) return;
+  const double found = MergeCost(first, second, overlaps, merged,
+                                 {color_products_[At(a, a)], color_products_[At(a, b)], color_products_[At(b, b)]});
+  if (found < kInfinity) cost = found;  // NaN is none
+}
+
+CopyGroup::Step CopyGroup::Next() const {
+  // The most opaque stays, however little that is.
+  size_t seen = copies_.size();
+  for (size_t k = 0; k < copies_.size(); ++k) {
+    if (!copies_[k].alive) continue;
+    if (seen == copies_.size() || copies_[k].stored_opacity > copies_[seen].stored_opacity) seen = k;
+  }
+  for (size_t k = 0; k < copies_.size(); ++k) {
+    if (copies_[k].alive && k != seen && !(copies_[k].stored_opacity >= invisible_)) {
+      return {0, static_cast<uint8_t>(k), static_cast<uint8_t>(k)};
+    }
+  }
+  double least = kInfinity;
+  size_t keep = 0, gone = 0;
+  for (size_t a = 0; a < copies_.size(); ++a) {
+    for (size_t b = a + 1; b < copies_.size(); ++b) {
+      if (!copies_[a].alive || !copies_[b].alive || !(costs_[At(a, b)] < least)) continue;
+      least = costs_[At(a, b)];
+      keep = a;
+      gone = b;
+    }
+  }
+  if (least < kInfinity) {
+    return {static_cast<float>(least), static_cast<uint8_t>(keep), static_cast<uint8_t>(gone)};
+  }
+  // What cannot be merged: the last one but the most opaque goes.
+  for (size_t k = copies_.size(); k-- > 0;) {
+    if (copies_[k].alive && k != seen) gone = k;
+  }
+  return {std::numeric_limits<float>::infinity(), static_cast<uint8_t>(gone), static_cast<uint8_t>(gone)};
+}
+
+void CopyGroup::Do(const Step& step) {
+  Copy &keep = copies_[step.keep], &gone = copies_[step.gone];
+  gone.alive = false;
+  --alive_;
+  if (step.keep == step.gone) return;
+  const MergedPair merged = MergePair(keep.gaussian, gone.gaussian, Overlaps(keep.gaussian, gone.gaussian));
+  if (!merged.valid) return;  // as if it had been invisible
+  keep.gaussian = merged.gaussian;
+  keep.stored_opacity = std::max(keep.stored_opacity, gone.stored_opacity);
+  keep.merged = true;
+  const double s = merged.share, t = 1 - s;
+  const size_t a = step.keep, b = step.gone;
+  for (size_t k = 0; k < copies_.size(); ++k) {
+    weights_[At(a, k)] = s * weights_[At(a, k)] + t * weights_[At(b, k)];
+  }
+  if (!colors_) return;
+  const double own =
+      s * s * color_products_[At(a, a)] + 2 * s * t * color_products_[At(a, b)] + t * t * color_products_[At(b, b)];
+  for (size_t k = 0; k < copies_.size(); ++k) {
+    color_products_[At(a, k)] = color_products_[At(k, a)] =
+        s * color_products_[At(a, k)] + t * color_products_[At(b, k)];
+  }
+  color_products_[At(a, a)] = own;
+  for (size_t k = 0; k < copies_.size(); ++k) {
+    if (k != a && copies_[k].alive) FindCost(std::min(a, k), std::max(a, k));
+  }
+}
+
+bool CopyGroup::WriteMerged(const Copy& copy, const double* weights, int64_t row, GaussianCloud& cloud) const {
+  const MergeGaussian& g = copy.gaussian;
+  // The Gaussian that has this part to be seen.
+  double low = kMinAlpha, high = 1;
+  for (int i = 0; i < 16; ++i) {
+    const double opacity = std::sqrt(low * high);
+    ((opacity - kMinAlpha) / SeenVariance(opacity) < g.opacity ? low : high) = opacity;
+  }
+  const double seen = SeenVariance(high);
+  std::array<double, 6> covariance = g.covariance;
+  for (double& x : covariance) x /= seen;
+  for (const size_t diagonal : kDiagonal) covariance[diagonal] -= dilation_;
+  Ellipsoid ellipsoid = EllipsoidOf(covariance);
+  // Nothing is thinner than the dilation: what has become longer by that absorbs less.
+  MergeGaussian drawn;
+  for (size_t c = 0; c < 3; ++c) {
+    ellipsoid.variances[c] = std::max(ellipsoid.variances[c], g.thinnest);
+    drawn.covariance[kDiagonal[c]] = ellipsoid.variances[c] + dilation_;
+  }
+  Measure(drawn);
+  const double opacity = std::min(kMinAlpha + g.mass / drawn.mean_area, kMostStoredOpacity);
+  std::array<float, 3> mean, log_scale;
+  std::array<double, 9> axes{};
+  for (size_t c = 0; c < 3; ++c) {
+    const double moved = frame_[3 * c] * g.mean[0] + frame_[3 * c + 1] * g.mean[1] + frame_[3 * c + 2] * g.mean[2];
+    mean[c] = static_cast<float>(origin_[c] + moved * pixel_);
+    log_scale[c] = static_cast<float>(0.5 * std::log(ellipsoid.variances[c]) + std::log(pixel_));
+    for (size_t a = 0; a < 3; ++a) {
+      for (size_t k = 0; k < 3; ++k) axes[3 * c + a] += frame_[3 * c + k] * ellipsoid.axes[3 * k + a];
+    }
+    if (!std::isfinite(mean[c]) || !(log_scale[c] < kInfinity)) return false;
+  }
+  const auto quat = QuaternionFromRotation(axes);
+  const int64_t floats = cloud.sh_stride();
+  std::array<double, 3 * ShCoefficients(kMaxShDegree)> sh{};
+  for (size_t k = 0; k < copies_.size(); ++k) {
+    if (weights[k] == 0) continue;
+    const float* from = cloud.sh.data() + (first_ + static_cast<int64_t>(k) * stride_) * floats;
+    for (int64_t c = 0; c < floats; ++c) {
+      sh[static_cast<size_t>(c)] += weights[k] * from[c];
+    }
+  }
+  std::copy(mean.begin(), mean.end(), cloud.means.data() + 3 * row);
+  std::copy(log_scale.begin(), log_scale.end(), cloud.log_scales.data() + 3 * row);
+  for (size_t c = 0; c < 4; ++c) cloud.quats[static_cast<size_t>(4 * row) + c] = static_cast<float>(quat[c]);
+  cloud.opacity_logits[static_cast<size_t>(row)] = static_cast<float>(std::log(opacity) - std::log1p(-opacity));
+  for (int64_t c = 0; c < floats; ++c)
+    cloud.sh.data()[row * floats + c] = static_cast<float>(sh[static_cast<size_t>(c)]);
+  return true;
+}
+
+void CopyGroup::Write(GaussianCloud& cloud, std::vector<char>& keep) const {
+  for (size_t k = 0; k < copies_.size(); ++k) {
+    const int64_t row = first_ + static_cast<int64_t>(k) * stride_;
+    if (!copies_[k].alive) {
+      keep[static_cast<size_t>(row)] = 0;
+    } else if (copies_[k].merged) {
+      // No Gaussian that floats hold: it stays as its first copy was.
+      (void)WriteMerged(copies_[k], weights_.data() + At(k, 0), row, cloud);
+    }
+  }
+}
+
+}  // namespace anchorsplat

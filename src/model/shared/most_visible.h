@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/gaussian_cloud.h"
+
+namespace anchorsplat {
+
+// The `count` of `rows` with the largest opacity × size (product of the two largest scales), in the order of `rows`; of
+// equal ones the first.
+std::vector<int64_t> MostVisible(const GaussianCloud& cloud, std::span<const int64_t> rows, int64_t count);
+// Of all rows.
+std::vector<int64_t> MostVisible(const GaussianCloud& cloud, int64_t count);
+
+}  // namespace anchorsplat

@@ -21,6 +21,9 @@ namespace {
 
 // Cameras and estimate further apart than this are worth a word: one of them does not belong to this splat.
 constexpr double kSuspiciousRatio = 1.5;
+// A splat whose outlines are so much sharper than its cameras' pixels make them has lost less width than a classic fit:
+// antialiased ones look like 0.44 to 0.86 of their pixels, classic ones of known pixels like 0.73 and more.
+constexpr double kSharperThanClassic = 0.65;
 // An estimate whose range is wider than this is a rough one.
 constexpr double kVague = 3;
 
@@ -97,8 +100,16 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
   }
   const auto found = FindPixelSize(input.cloud);
   if (found.ok() && !found->contradicted()) {
-    const double ratio = found->size / from_cameras.median;
-    if (ratio > kSuspiciousRatio || ratio < 1 / kSuspiciousRatio) {
+    const double ratio = found->size / from_cameras.median, most = found->largest / from_cameras.median;
+    if (!options.filter_strength && !input.cloud.render_mode && most < kSharperThanClassic) {
+      LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
+                     " (median), but the splat is sharper than a classic fit to such pixels: like one to pixels of ",
+                     found->largest,
+                     ", and only that much width is given back. Was it trained with antialiasing "
+                     "(--mode antialiased), or are these not its training cameras? --filter-strength F overrides it"));
+      for (float& size : from_cameras.sizes) size *= static_cast<float>(most);
+      from_cameras.median *= static_cast<float>(most);
+    } else if (ratio > kSuspiciousRatio || ratio < 1 / kSuspiciousRatio) {
       LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
                      " (median), the splat itself looks like ", found->size,
                      ": are these its training cameras, at the size it was trained at (--train-width)?"));
@@ -197,8 +208,14 @@ double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud)
   }
   if (IsCompensated(cloud.render_mode)) {
     const double strength = DefaultFilterStrength(options.upscale, cloud.render_mode);
-    LogInfo(Cat("the splat is ", NameOf(*cloud.render_mode), ": its fit lost less width, and less is given back (",
-                Fixed(strength, 2), " of what a classic one could have lost)"));
+    if (strength > ShownStrength(options.upscale, cloud.render_mode)) {
+      LogInfo(Cat("the splat is ", NameOf(*cloud.render_mode), ": its fit lost less width, and less is given back (",
+                  Fixed(strength, 2), " of what a classic one could have lost)"));
+    } else if (options.upscale > 1) {
+      LogWarning(Cat("the splat is ", NameOf(*cloud.render_mode),
+                     ": its fit has lost no width, and it stays as it is (--filter-strength F to enhance it all the "
+                     "same)"));
+    }
     return strength;
   }
   return DefaultFilterStrength(options.upscale);
@@ -277,8 +294,7 @@ Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, Enhan
   report.filter_strength = input.filter_strength;
   const bool gives_width = GivesWidth(input.filter_strength, options, input.cloud.render_mode);
   if (input.filter_strength > 0 && !gives_width && options.upscale > 1) {
-    LogWarning(Cat("a strength of ", input.filter_strength,
-                   " is no more than what the closer view's own pixels add (",
+    LogWarning(Cat("a strength of ", input.filter_strength, " is no more than what the closer view's own pixels add (",
                    ShownStrength(options.upscale, input.cloud.render_mode), "): nothing changes"));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(ChoosePixelSizes(options, plan.method->takes_start && !options.refine.images.empty(),
@@ -334,7 +350,8 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   } else if (IsMarkedEnhanced(input.cloud)) {
     LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
   }
-  if (report.pixel_size_source == kCautiousPixelSize && GivesWidth(input.filter_strength, options, input.cloud.render_mode)) {
+  if (report.pixel_size_source == kCautiousPixelSize &&
+      GivesWidth(input.filter_strength, options, input.cloud.render_mode)) {
     LeaveNetworksOut(plan);
   }
   report.method = plan.Name();

@@ -150,7 +150,7 @@ Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud) {
 }
 
 PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidence& evidence) {
-  PixelSizeFinding finding{estimate.size, estimate, {}};
+  PixelSizeFinding finding{estimate.size, std::max(estimate.size, evidence.without_black), estimate, {}};
   const double most = MostGaussiansPerPixel(evidence.gaussians);
   const double crowd = evidence.spacing > 0 ? std::pow(estimate.size / evidence.spacing, 2) : 0;
   if (crowd > most) {
@@ -171,8 +171,11 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
 }
 
 Result<PixelSizeFinding> FindPixelSize(const GaussianCloud& cloud) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEstimate estimate, EstimatePixelSize(cloud));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(PixelSizeEstimate estimate, EstimatePixelSize(cloud));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEvidence evidence, GatherPixelSizeEvidence(cloud));
+  if (cloud.render_mode == RenderMode::kAntialiased) {
+    for (double* size : {&estimate.size, &estimate.low, &estimate.high}) *size /= kAntialiasedLook;
+  }
   return Judge(estimate, evidence);
 }
 

@@ -78,8 +78,8 @@ TEST_F(Refinement, WhatIsRightAlreadyStays) {
   ExpectSameCloud(refined->cloud, input_.start);
 }
 
-// What is right when seen closer comes back unharmed: as a fit to the areas of pixels makes it, as an antialiased one
-// makes it, and one of Gaussians that are wide anyway. 0.05 dB is the most that any of them may lose.
+// What is right when seen closer comes back unharmed: as a fit to the areas of pixels makes it, as Mip-Splatting makes
+// it, and one of Gaussians that are wide anyway. 0.05 dB is the most that any of them may lose.
 TEST_F(Refinement, WhatIsFineAlreadyIsNotHarmed) {
   EnhanceOptions options;
   options.upscale = kUpscale;
@@ -91,11 +91,11 @@ TEST_F(Refinement, WhatIsFineAlreadyIsNotHarmed) {
     const double psnr = PsnrCloser(enhanced);  // infinite when nothing has changed
     return 10 * std::log10(1 + std::pow(10, (kGoodFit - psnr) / 10));
   };
-  GaussianCloud area = truth_, wide = truth_, antialiased = truth_;
+  GaussianCloud area = truth_, wide = truth_, mip = truth_;
   area.comments = {PixelAreaComment(kUpscale)};
   for (float& s : wide.log_scales) s = std::max(s, static_cast<float>(std::log(6 * kPixel)));
-  antialiased.render_mode = RenderMode::kAntialiased;
-  for (const GaussianCloud& fine : {area, wide, antialiased}) {
+  mip.render_mode = RenderMode::kMip;
+  for (const GaussianCloud& fine : {area, wide, mip}) {
     const bool untold = fine.comments.empty() && !fine.render_mode;
     options.refine.images.clear();
     options.cameras = cameras_;

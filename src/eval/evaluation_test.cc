@@ -246,7 +246,8 @@ TEST(Evaluate, ContactSheetsCarryCredits) {
   }
   const Image one = sheet_of({.objects = {"a_ball"}}), both = sheet_of({});
   const auto ink = [](const Image& image, int from) {
-    return std::count_if(&image.at(0, from, 0), image.channel(0) + image.plane(), [](float x) { return x > 0.5f; });
+    return std::count_if(image.channel(0) + int64_t{from} * image.width, image.channel(0) + image.plane(),
+                         [](float x) { return x > 0.5f; });
   };
   ASSERT_GT(one.height, plain.height);
   EXPECT_GT(ink(one, plain.height), 100);

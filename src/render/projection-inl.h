@@ -85,7 +85,10 @@ HWY_INLINE V ExpInDomain(D d, V x) { return hn::Exp(d, hn::Min(x, hn::Set(d, 690
 
 // One register of Gaussians. Names are those of the formulas: q the unit quaternion, R_q its rotation, s the lengths,
 // A = J·R (rows for image x and y), B = A·R_q·S.
+//
+// Constructors are written down because the compiler's own would not be of this target, which ARM's vectors insist on.
 struct Shape {
+  HWY_INLINE Shape() {}
   V inverse_z, ratio_x, ratio_y;  // 1/z, x/z, y/z
   V focal_x, focal_y;             // f/z
   V u, v;                         // the ratios within the view's limits
@@ -145,6 +148,7 @@ HWY_INLINE Shape ShapeOf(D d, const View& view, const StoredColumns& in, size_t 
 // Σ₂ in pixels², as the Gaussian is (sharp), with the dilation (xx, yy) and with the lesser dilation that opacities
 // are compensated from.
 struct Covariance {
+  HWY_INLINE Covariance() {}
   V xx, xy, yy, det;
   V from_xx, from_yy, from_det;
 };

@@ -55,8 +55,9 @@ says stdout '"there_already": 5'
 expect 0 "evaluation by kind" "$program" eval "$work/kinds" -o "$work/kinds-eval" --methods raw,filter --kinds plain,packed
 says stdout "| packed | filter | 2 |"
 expect 2 "a kind that is not there" "$program" eval "$work/kinds" -o "$work/kinds-eval" --methods raw --kinds enhanced
-expect 2 "an object of another kind" "$program" eval "$work/kinds" -o "$work/kinds-eval" --methods raw --kinds packed --objects ramp--plain
 says stderr "there are noisy, packed, plain"
+expect 2 "an object of another kind" "$program" eval "$work/kinds" -o "$work/kinds-eval" --methods raw --kinds packed --objects ramp--plain
+says stderr "of the kind 'plain', which --kinds leaves out"
 expect 1 "what is made from a splat that failed" "$program" dataset build "$work/mesh/point.obj" -o "$work/kinds" "${small[@]}" --recipe "$work/kinds.toml" --json
 expect 0 "says so" grep -q '"message":"is made from point--plain, which is not there.*"stage":"base"' "$work/kinds/failures.jsonl"
 

@@ -196,17 +196,17 @@ TEST_F(EnhanceDoor, LeavesWhatItMadeAlone) {
 
 TEST_F(EnhanceDoor, PixelSizeFromCameras) {
   EnhanceOptions options;
-  options.cameras = CamerasForPixel(0.01);
+  options.cameras = CamerasForPixel(0.005);  // as the ball looks to the estimate
   const auto enhanced = Enhance(Ball(0.01), options);
   ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
   EXPECT_EQ(enhanced->report.pixel_size_source, "cameras");
-  EXPECT_NEAR(enhanced->report.pixel_size, 0.0116, 0.0005);  // of the median view: they stand all around
+  EXPECT_NEAR(enhanced->report.pixel_size, 0.0066, 0.0003);  // of the median view: they stand all around
   EXPECT_EQ(enhanced->report.camera_rule, "median");
   EXPECT_TRUE(log_->Says("--camera-rule median: the cameras look at one thing")) << log_->text();
   options.camera_rule = CameraPixelRule::kSmallest;
   const auto smallest = Enhance(Ball(0.01), options);
   ASSERT_TRUE(smallest.ok()) << smallest.error().message;
-  EXPECT_NEAR(smallest->report.pixel_size, 0.0105, 0.0005);
+  EXPECT_NEAR(smallest->report.pixel_size, 0.0053, 0.0003);
   EXPECT_EQ(smallest->report.camera_rule, "smallest");
   options.pixel_size = 0.01;
   EXPECT_FALSE(Enhance(Ball(0.01), options).ok());  // both
@@ -215,8 +215,21 @@ TEST_F(EnhanceDoor, PixelSizeFromCameras) {
 TEST_F(EnhanceDoor, WarnsWhenCamerasAreNotThoseOfTheSplat) {
   EnhanceOptions options;
   options.cameras = CamerasForPixel(0.05);
-  ASSERT_TRUE(Enhance(Ball(0.01), options).ok());
+  const auto cautious = Enhance(Ball(0.01), options);
+  ASSERT_TRUE(cautious.ok());
   EXPECT_TRUE(log_->Says("not its training cameras")) << log_->text();
+  EXPECT_LT(cautious->report.pixel_size, 0.02) << "as it looks, so that nothing is blurred";
+  // Whoever says a strength, or the mode, means these cameras.
+  options.filter_strength = 0.7;
+  EXPECT_GT(Enhance(Ball(0.01), options)->report.pixel_size, 0.04);
+  options.filter_strength.reset();
+  GaussianCloud tagged = Ball(0.01);
+  tagged.render_mode = RenderMode::kClassic;
+  EXPECT_GT(Enhance(tagged, options)->report.pixel_size, 0.04);
+  // Larger than the cameras' pixels it may look: that is only said.
+  options.cameras = CamerasForPixel(0.001);
+  EXPECT_LT(Enhance(Ball(0.01), options)->report.pixel_size, 0.004);
+  EXPECT_TRUE(log_->Says("are these its training cameras")) << log_->text();
 }
 
 TEST_F(EnhanceDoor, SaysWhichTrainingWidthItAssumes) {

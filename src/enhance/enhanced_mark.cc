@@ -23,8 +23,6 @@ bool IsMarkedEnhanced(const GaussianCloud& cloud) {
                      [](const std::string& comment) { return comment.starts_with(kEnhanced); });
 }
 
-bool HasLostNoWidth(const GaussianCloud& cloud) {
-  return IsFittedToPixelAreas(cloud) || IsMarkedEnhanced(cloud);
-}
+bool HasLostNoWidth(const GaussianCloud& cloud) { return IsFittedToPixelAreas(cloud) || IsMarkedEnhanced(cloud); }
 
 }  // namespace anchorsplat

@@ -27,7 +27,6 @@ double DefaultFilterStrength(double upscale, std::optional<RenderMode> mode) {
   return ShownStrength(upscale, mode) + share * (1 - 1 / (upscale * upscale));
 }
 
-
 Result<int64_t> ApplyFilter(GaussianCloud& cloud, std::span<const float> pixel_sizes, const FilterOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   if (!(options.upscale >= 1) || !std::isfinite(options.upscale)) {

@@ -59,9 +59,9 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
     RefinePlan& plan = report.plan.emplace();
     plan.options = options.refine;
     plan.nothing_to_do = true;
-    plan.why =
-        lost_none ? "there is no lost width to give back, and without pictures nothing else to learn: the splat stays"
-                  : Cat("without pictures there is nothing to learn about ", NameOf(*mode), " splats: filtered only");
+    plan.why = lost_none
+                   ? "there is no lost width to give back, and without pictures nothing else to learn: the splat stays"
+                   : Cat("without pictures there is nothing to learn about ", NameOf(*mode), " splats: filtered only");
     LogInfo(plan.why);
     report.facts.emplace_back("kept_start", true);
     return std::move(refine.start);

@@ -52,8 +52,8 @@ Result<ViewSetCameras> MakeViewSetCameras(const ViewSetOptions& options);
 Result<Image> RenderStoredView(const RayTracer& tracer, const Camera& camera, const ViewSetOptions& options,
                                TraceCost* cost = nullptr);
 
-// Makes `folder` and fills it. When the run is asked to stop (core/run_context.h) it ends between two views (kInterrupted).
-// Errors: kExists unless options.overwrite; kIo; as MakeViewSetCameras.
+// Makes `folder` and fills it. When the run is asked to stop (core/run_context.h) it ends between two views
+// (kInterrupted). Errors: kExists unless options.overwrite; kIo; as MakeViewSetCameras.
 Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const std::filesystem::path& folder,
                                  const ViewSetOptions& options);
 

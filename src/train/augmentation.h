@@ -21,8 +21,8 @@ struct AugmentedScene {
 };
 
 // Changes splat and views together, so that a perfect splat stays perfect, except for Gaussians that are dropped and
-// noise on opacities, on p_LR and on f: those are errors that the network should be able to live with. What is drawn depends
-// on `random` alone.
+// noise on opacities, on p_LR and on f: those are errors that the network should be able to live with. What is drawn
+// depends on `random` alone.
 void Augment(const AugmentationConfig& config, Random& random, AugmentedScene& scene);
 
 // The parts of it.

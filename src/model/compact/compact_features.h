@@ -45,9 +45,9 @@ class CompactFeatures {
  public:
   // What features are asked for, and what the cloud does not say.
   struct Task {
-    std::span<const float> pixel_sizes;   // p_LR, world units, one for all or one per Gaussian
-    double upscale = 4;                   // u
-    double strength = 0;                  // f of the filter
+    std::span<const float> pixel_sizes;     // p_LR, world units, one for all or one per Gaussian
+    double upscale = 4;                     // u
+    double strength = 0;                    // f of the filter
     int64_t node_features = kNodeFeatures;  // or kMostNodeFeatures
   };
   // See BuildCompactGraph about the cloud.

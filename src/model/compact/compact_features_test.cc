@@ -122,8 +122,7 @@ TEST(CompactFeatures, OfTwoGaussians) {
   // A network that is told the kind of splat sees three more, and nothing else changes.
   cloud.render_mode = RenderMode::kMip;
   const CompactFeatures told(
-      cloud, graph,
-      {.pixel_sizes = {&p, 1}, .upscale = 4, .strength = 0.25, .node_features = kMostNodeFeatures});
+      cloud, graph, {.pixel_sizes = {&p, 1}, .upscale = 4, .strength = 0.25, .node_features = kMostNodeFeatures});
   std::vector<float> both(2 * kMostNodeFeatures);
   told.Nodes(0, 2, both.data());
   EXPECT_TRUE(std::equal(node.begin(), node.end(), both.begin() + kMostNodeFeatures));

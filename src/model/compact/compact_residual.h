@@ -24,7 +24,8 @@ struct CompactAnchors {
 // The cube's side for OffsetUnit::kCube: 1 in the units of NormalisationMode::kAuto. 0 where that is not defined.
 double CubeSide(std::span<const float> means);
 
-// The least that f less what the closer view's pixels add (ShownStrength) counts as, so that its logarithm is a number; nothing visible.
+// The least that f less what the closer view's pixels add (ShownStrength) counts as, so that its logarithm is a number;
+// nothing visible.
 inline constexpr double kLeastGain = 1e-8;
 
 // Copies of Gaussian i. `raw`: CompactOutputs(config) numbers, multiplied by `fade` (1: all of the residual, 0: none).

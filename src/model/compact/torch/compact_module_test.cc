@@ -150,7 +150,8 @@ TEST(CompactModule, HearsTheKindOfSplat) {
   }
 }
 
-// A network that was told less goes on with what it knows: what is new says nothing at first, and nobody knows its range.
+// A network that was told less goes on with what it knows: what is new says nothing at first, and nobody knows its
+// range.
 TEST(CompactModule, LearnsOfTheKindLater) {
   const TestFolder folder;
   CompactConfig config;

@@ -27,9 +27,9 @@ struct SplatPart {
 };
 
 struct NetworkInput {
-  GaussianTensors gaussians;  // the low-quality splat
-  torch::Tensor pixel_sizes;  // [N] world units: what a low-resolution pixel covers at each Gaussian, p_LR
-  double upscale = 4;         // u: high-resolution pixels per low-resolution pixel along a side
+  GaussianTensors gaussians;       // the low-quality splat
+  torch::Tensor pixel_sizes;       // [N] world units: what a low-resolution pixel covers at each Gaussian, p_LR
+  double upscale = 4;              // u: high-resolution pixels per low-resolution pixel along a side
   std::optional<double> strength;  // f of the filter; DefaultFilterStrength unless given
   std::optional<RenderMode> mode;  // of the splat
   // What a network wants computed once per splat and kept between steps (neighbours, serialization, frames). Made by

@@ -14,6 +14,9 @@ inline double Sigmoid(double logit) { return 1.0 / (1.0 + std::exp(-logit)); }
 inline float LogSigmoid(float logit) {
   return logit < 0 ? logit - std::log1p(std::exp(logit)) : -std::log1p(std::exp(-logit));
 }
+inline double LogSigmoid(double logit) {
+  return logit < 0 ? logit - std::log1p(std::exp(logit)) : -std::log1p(std::exp(-logit));
+}
 
 // Logit of an opacity stored in 0–1. The ends become ∓13.8 (opacity 1e-6 and 1 − 1e-6), as infinite logits trip other
 // programs and a byte cannot tell 1 from 0.999 anyway.

@@ -13,8 +13,6 @@ namespace {
 
 constexpr int64_t kSmoothedRows = 4096;
 
-double LogSigmoid(double x) { return x < 0 ? x - std::log1p(std::exp(x)) : -std::log1p(std::exp(-x)); }
-
 }  // namespace
 
 double Smoothing::LeftOpen(double opacity_logit) const {

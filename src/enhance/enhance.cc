@@ -206,8 +206,8 @@ double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud)
         "more (--filter-strength F to enhance it all the same)");
     return 0;
   }
+  const double strength = DefaultFilterStrength(options.upscale, cloud.render_mode);
   if (IsCompensated(cloud.render_mode)) {
-    const double strength = DefaultFilterStrength(options.upscale, cloud.render_mode);
     if (strength > ShownStrength(options.upscale, cloud.render_mode)) {
       LogInfo(Cat("the splat is ", NameOf(*cloud.render_mode), ": its fit lost less width, and less is given back (",
                   Fixed(strength, 2), " of what a classic one could have lost)"));
@@ -216,9 +216,8 @@ double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud)
                      ": its fit has lost no width, and it stays as it is (--filter-strength F to enhance it all the "
                      "same)"));
     }
-    return strength;
   }
-  return DefaultFilterStrength(options.upscale);
+  return strength;
 }
 
 // Runs one method and adds its report.
@@ -284,16 +283,16 @@ Result<SizedMethods> FindSizedMethods(const MethodPlan& plan, const EnhanceOptio
 }
 
 // More than what the closer view's own pixels add.
-bool GivesWidth(double strength, const EnhanceOptions& options, std::optional<RenderMode> mode) {
-  return strength > ShownStrength(options.upscale, mode);
+bool GivesWidth(double strength, double upscale, std::optional<RenderMode> mode) {
+  return strength > ShownStrength(upscale, mode);
 }
 
 // The filter's strength and the pixel sizes, for methods that work with them.
 Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
   input.filter_strength = ChooseStrength(options, input.cloud);
   report.filter_strength = input.filter_strength;
-  const bool gives_width = GivesWidth(input.filter_strength, options, input.cloud.render_mode);
-  if (input.filter_strength > 0 && !gives_width && options.upscale > 1) {
+  const bool gives_width = GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode);
+  if (options.filter_strength && *options.filter_strength > 0 && !gives_width && options.upscale > 1) {
     LogWarning(Cat("a strength of ", input.filter_strength, " is no more than what the closer view's own pixels add (",
                    ShownStrength(options.upscale, input.cloud.render_mode), "): nothing changes"));
   }
@@ -351,7 +350,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
     LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
   }
   if (report.pixel_size_source == kCautiousPixelSize &&
-      GivesWidth(input.filter_strength, options, input.cloud.render_mode)) {
+      GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode)) {
     LeaveNetworksOut(plan);
   }
   report.method = plan.Name();
@@ -366,7 +365,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, RunPlan(plan, sized, std::move(input), options, report));
   report.seconds = watch.Total();
   report.gaussians_out = out.size();
-  if (!sized.any || GivesWidth(report.filter_strength, options, out.render_mode)) {
+  if (!sized.any || GivesWidth(report.filter_strength, options.upscale, out.render_mode)) {
     out.comments.push_back(EnhancedComment(report.method, options.upscale));
   }
   return Enhanced{std::move(out), std::move(report)};

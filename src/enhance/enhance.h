@@ -31,7 +31,7 @@ struct EnhanceOptions {
   // that would change nothing.
   std::vector<std::string> given;
   double upscale = 4;                     // u ≥ 1: how many times closer the splat will be seen
-  std::optional<double> filter_strength;  // f of the filter; its default otherwise, 0 where opacity is compensated
+  std::optional<double> filter_strength;  // f of the filter; DefaultFilterStrength otherwise
   std::optional<double> pixel_size;       // p_LR for all Gaussians; from `cameras`, from the pictures to refine
                                           // against, or estimated otherwise
   std::optional<CameraSet> cameras;       // the training cameras

@@ -171,11 +171,8 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
 }
 
 Result<PixelSizeFinding> FindPixelSize(const GaussianCloud& cloud) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(PixelSizeEstimate estimate, EstimatePixelSize(cloud));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEstimate estimate, EstimatePixelSize(cloud));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEvidence evidence, GatherPixelSizeEvidence(cloud));
-  if (cloud.render_mode == RenderMode::kAntialiased) {
-    for (double* size : {&estimate.size, &estimate.low, &estimate.high}) *size /= kAntialiasedLook;
-  }
   return Judge(estimate, evidence);
 }
 

@@ -39,12 +39,7 @@ double MostGaussiansPerPixel(int64_t gaussians);
 // What to make of an estimate in the light of the evidence.
 PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidence& evidence);
 
-// Outlines of antialiased fits are narrower than those of the classic ones that the estimate learned from, and so is
-// the estimate, 0.44 to 0.86 times in eight fits: divided by this much it is too large by at most a tenth in all of
-// them.
-inline constexpr double kAntialiasedLook = 0.8;
-
-// Scales with the cloud, and makes up for its render mode. Errors: those of EstimatePixelSize.
+// Scales with the cloud. Errors: those of EstimatePixelSize.
 Result<PixelSizeFinding> FindPixelSize(const GaussianCloud& cloud);
 
 }  // namespace anchorsplat

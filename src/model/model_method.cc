@@ -177,10 +177,12 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
   const float prune_opacity = model.options.prune_opacity;
   const int64_t made = result.cloud.size();
   std::vector<float> pixels;  // of the closer view
-  for (const int64_t i : result.anchors) {
-    const size_t at = input.pixel_sizes.size() == 1 ? 0 : static_cast<size_t>(i);
-    pixels.push_back(static_cast<float>(input.pixel_sizes[at] / upscale));
-    if (input.pixel_sizes.size() == 1) break;
+  if (input.pixel_sizes.size() == 1) {
+    pixels = {static_cast<float>(input.pixel_sizes.front() / upscale)};
+  } else {
+    for (const int64_t i : result.anchors) {
+      pixels.push_back(static_cast<float>(input.pixel_sizes[static_cast<size_t>(i)] / upscale));
+    }
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(
       const ChosenCopies chosen,

@@ -15,6 +15,7 @@
 
 #include "core/log.h"
 #include "core/random.h"
+#include "core/text.h"
 #include "enhance/enhance.h"
 #include "model/compact/sheet_cloud_for_test.h"
 #include "model/compact/shipped_network.h"
@@ -45,6 +46,7 @@ PublishedConfig SmallConfig() {
 class SmallModel : public testing::Test {
  protected:
   void SetUp() override {
+    RegisterModelMethod();
     folder_ = fs::path(testing::TempDir()) /
               (std::string("anchorsplat_") + testing::UnitTest::GetInstance()->current_test_info()->name());
     fs::remove_all(folder_);
@@ -65,6 +67,23 @@ class SmallModel : public testing::Test {
   }
   void TearDown() override { fs::remove_all(folder_); }
   fs::path file() const { return folder_ / "small.safetensors"; }
+  // Beside it a compact network of made-up weights.
+  fs::path Compact(int64_t copies) const {
+    const fs::path path = folder_ / Cat("compact-", copies, ".safetensors");
+    const CompactConfig config{.copies = copies, .hidden = 16, .head_hidden = 16};
+    std::vector<std::vector<float>> values;
+    std::vector<TensorEntry> entries;
+    const auto specs = CompactTensors(config);
+    values.reserve(specs.size());
+    for (const TensorSpec& spec : specs) {
+      int64_t count = 1;
+      for (const int64_t side : spec.shape) count *= side;
+      EXPECT_TRUE(OpenDomain()(spec, values.emplace_back(static_cast<size_t>(count))).ok());
+      entries.push_back(MakeEntry(spec.name, spec.shape, values.back()));
+    }
+    EXPECT_TRUE(WriteSafetensors(path, entries, ToMetadata(config)).ok());
+    return path;
+  }
 
   fs::path folder_;
 };
@@ -157,34 +176,21 @@ TEST_F(SmallModel, BFloat16IsNeverChosenWhereItIsSlower) {
   EXPECT_EQ(testing::Value(warnings->texts, warned), !UsesBFloat16Dot());
 }
 
-// Writes a compact network of made-up weights.
-void WriteCompact(const fs::path& path, const CompactConfig& config) {
-  std::vector<std::vector<float>> values;
-  std::vector<TensorEntry> entries;
-  const auto specs = CompactTensors(config);
-  values.reserve(specs.size());
-  for (const TensorSpec& spec : specs) {
-    int64_t count = 1;
-    for (const int64_t side : spec.shape) count *= side;
-    ASSERT_TRUE(OpenDomain()(spec, values.emplace_back(static_cast<size_t>(count))).ok());
-    entries.push_back(MakeEntry(spec.name, spec.shape, values.back()));
-  }
-  ASSERT_TRUE(WriteSafetensors(path, entries, ToMetadata(config)).ok());
-}
-
-TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
-  EnhanceOptions options;
-  options.model.file = folder_ / "compact.safetensors";
-  WriteCompact(options.model.file, {.copies = 3, .hidden = 16, .head_hidden = 16});
-  ASSERT_FALSE(HasFatalFailure());
-  RegisterModelMethod();
-  const EnhanceMethod registered = Registered();
-  EXPECT_TRUE(*registered.needs_pixel_size(options));
-  StepReport report;
+EnhanceInput SheetInput() {
   EnhanceInput input;
   input.cloud = SheetCloud(200);
   input.pixel_sizes = {kSheetPixel};
   input.filter_strength = 0.7;
+  return input;
+}
+
+TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
+  EnhanceOptions options;
+  options.model.file = Compact(3);
+  const EnhanceMethod registered = Registered();
+  EXPECT_TRUE(*registered.needs_pixel_size(options));
+  StepReport report;
+  const EnhanceInput input = SheetInput();
   options.model.copies = 3;
   auto enhanced = registered.run(input, options, report);
   ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
@@ -217,15 +223,10 @@ TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
 
 TEST_F(SmallModel, CopiesAndBudgetAreCounted) {
   EnhanceOptions options;
-  options.model.file = folder_ / "compact.safetensors";
-  WriteCompact(options.model.file, {.copies = 3, .hidden = 16, .head_hidden = 16});
-  ASSERT_FALSE(HasFatalFailure());
-  RegisterModelMethod();
+  options.model.file = Compact(3);
   const EnhanceMethod registered = Registered();
-  EnhanceInput input;
-  input.cloud = SheetCloud(200);
+  EnhanceInput input = SheetInput();
   input.pixel_sizes.assign(200, kSheetPixel);  // one each
-  input.filter_strength = 0.7;
   const auto run = [&](std::optional<int64_t> copies, int64_t most) {
     options.model.copies = copies;
     options.model.options.max_gaussians = most;
@@ -250,16 +251,9 @@ TEST_F(SmallModel, CopiesAndBudgetAreCounted) {
 
 // The last network is kept for the next call, and what asks for another one at the same time gets its own.
 TEST_F(SmallModel, ChangedFilesAndRunsSideBySideGetTheirNetworks) {
-  const fs::path two = folder_ / "two.safetensors", three = folder_ / "three.safetensors";
-  WriteCompact(two, {.copies = 2, .hidden = 16, .head_hidden = 16});
-  WriteCompact(three, {.copies = 3, .hidden = 16, .head_hidden = 16});
-  ASSERT_FALSE(HasFatalFailure());
-  RegisterModelMethod();
+  const fs::path two = Compact(2), three = Compact(3);
   const EnhanceMethod registered = Registered();
-  EnhanceInput input;
-  input.cloud = SheetCloud(200);
-  input.pixel_sizes = {kSheetPixel};
-  input.filter_strength = 0.7;
+  const EnhanceInput input = SheetInput();
   const auto copies = [&](const fs::path& file) -> int64_t {
     EnhanceOptions options;
     options.model.file = file;
@@ -283,7 +277,6 @@ TEST_F(SmallModel, ChangedFilesAndRunsSideBySideGetTheirNetworks) {
 
 // What would change nothing is refused, with the words for where it would.
 TEST_F(SmallModel, EveryOptionBelongsToAnArchitecture) {
-  RegisterModelMethod();
   const std::vector<MethodOption> options = Registered().options;
   EnhanceOptions enhance;
   const auto lacks = [&](const std::string& name) -> std::string {
@@ -291,9 +284,7 @@ TEST_F(SmallModel, EveryOptionBelongsToAnArchitecture) {
     if (found == options.end()) return "no option";
     return found->lacks ? found->lacks({enhance}) : "";
   };
-  const fs::path compact = folder_ / "compact.safetensors";
-  WriteCompact(compact, {.copies = 3, .hidden = 16, .head_hidden = 16});
-  ASSERT_FALSE(HasFatalFailure());
+  const fs::path compact = Compact(3);
   for (const fs::path& weights : {fs::path(), compact, file()}) {
     enhance.model.file = weights;
     const bool published = weights == file();

@@ -23,9 +23,11 @@ struct PixelSizeFlags {
   bool features = false;
 };
 
-nlohmann::json ToJson(const PixelSizeCheck& check) {
-  nlohmann::json json = {{"object", check.object},          {"pixel_size", check.truth}, {"start", check.start},
-                         {"estimate", check.estimate.size}, {"low", check.estimate.low}, {"high", check.estimate.high},
+nlohmann::json ToJson(const PixelSizeCheck& check, const std::string& kind) {
+  nlohmann::json json = {{"object", check.object},     {"kind", kind},
+                         {"mode", NameOf(check.mode)}, {"pixel_size", check.truth},
+                         {"start", check.start},       {"estimate", check.estimate.size},
+                         {"low", check.estimate.low},  {"high", check.estimate.high},
                          {"seconds", check.seconds}};
   for (const PixelSizeCheck::Sample& sample : check.samples) {
     json["samples"].push_back({{"size", sample.size}, {"features", sample.features}});
@@ -45,7 +47,7 @@ Status RunPixelSize(const PixelSizeFlags& flags, const SharedFlags& shared) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeCheck check, CheckPixelSize(object, flags.features));
       const double ratio = check.estimate.size / check.truth;
       errors.push_back(static_cast<float>(std::abs(ratio - 1)));
-      json["objects"].push_back(ToJson(check));
+      json["objects"].push_back(ToJson(check, entry.kind));
       table.push_back(
           {check.object, Cat(check.truth), Cat(check.estimate.size), Fixed(ratio, 2),
            Cat(Fixed(check.estimate.low / check.truth, 2), "–", Fixed(check.estimate.high / check.truth, 2)),

@@ -146,10 +146,24 @@ Result<Scene> Scene::Open(const SceneEntry& entry) {
     view.image = FindPicture(pictures, camera.name);
     scene.high_views_.push_back(std::move(view));
   }
+  if (entry.high_size > 0) ANCHORSPLAT_RETURN_IF_ERROR(scene.ResizeHighViews(entry.high_size));
   scene.low_views_ = std::move(cameras.cameras);
   const size_t every = scene.record_ ? static_cast<size_t>(scene.record_->settings.hold_out) : kHoldOut;
   for (size_t i = 0; every > 0 && i < scene.low_views_.size(); i += every) scene.held_out_.push_back(i);
   return scene;
+}
+
+Status Scene::ResizeHighViews(int size) {
+  const bool stored = std::ranges::any_of(high_views_, [](const Camera& view) { return !view.image.empty(); });
+  if (!record_ || stored || !IsFile(folder_ / kMeshName)) {
+    return Error{ErrorCode::kBadArgument, Cat(folder_.string(), ": has no views of another size, as its pictures are ",
+                                              "stored and not made on demand (dataset build --hr on-demand)")};
+  }
+  for (Camera& view : high_views_) {
+    view.intrinsics = Scaled(view.intrinsics, static_cast<double>(size) / view.intrinsics.width);
+  }
+  record_->settings.views.high_size = size;
+  return {};
 }
 
 fs::path Scene::fitted_project() const {

@@ -22,6 +22,8 @@ struct SceneEntry {
   std::string name;  // of the folder
   std::filesystem::path folder;
   std::string kind = {};  // the recipe's entry it was made by, as the manifest says; empty where there is none
+  // Pixels a side of its high views instead of the data set's own; 0: those. Only where they are made on demand.
+  int high_size = 0;
 };
 
 struct SceneListOptions {
@@ -42,7 +44,8 @@ class Scene {
  public:
   // Reads cameras, nothing large. The lowest resolution's sparse/0 gives the poses, the highest one's cameras.txt the
   // only intrinsics of its pictures, as upstream's loader has it.
-  // Errors: kNotFound, kBadFile, kIo: no resolutions, cameras that cannot be read, more than one high camera.
+  // Errors: kNotFound, kBadFile, kIo: no resolutions, cameras that cannot be read, more than one high camera;
+  // kBadArgument: another high_size for views that are not made on demand.
   static Result<Scene> Open(const SceneEntry& entry);
 
   const std::string& name() const { return name_; }
@@ -67,6 +70,7 @@ class Scene {
 
  private:
   Scene() = default;
+  Status ResizeHighViews(int size);
   Result<Image> Rendered(size_t view) const;
 
   std::string name_;

@@ -19,6 +19,7 @@ constexpr size_t kStrengthViews = 3;
 Result<PixelSizeCheck> CheckPixelSize(const BenchmarkObject& object, bool with_samples) {
   PixelSizeCheck check;
   check.object = object.name;
+  check.mode = object.low.render_mode.value_or(RenderMode::kClassic);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraPixelSizes truth, TruePixelSizes(object));
   check.truth = truth.median;
   const auto begin = std::chrono::steady_clock::now();

@@ -13,6 +13,7 @@ namespace anchorsplat {
 // The estimate of an object's pixel size beside the true one, and what the estimate is made from.
 struct PixelSizeCheck {
   std::string object;
+  RenderMode mode = RenderMode::kClassic;  // its tag's
   double truth = 0;  // median over the Gaussians (eval/filter_sweep.h), world units
   double start = 0;  // what the search begins with
   PixelSizeEstimate estimate;

@@ -141,7 +141,7 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
         "the network's residuals are on top of the filter, and there is no lost width to give back: the splat stays");
     return within_budget();
   }
-  if (IsCompensated(input.cloud.render_mode) && !network.config().kind) {
+  if (IsCompensated(input.cloud.render_mode) && !network.config().knows_kind) {
     LogInfo(Cat("the network has learned from classic splats: this ", NameOf(*input.cloud.render_mode),
                 " one is filtered only"));
     const auto grown =

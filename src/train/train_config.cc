@@ -18,6 +18,7 @@ namespace {
 
 constexpr uint64_t kMaxBytes = uint64_t{1} << 20;
 constexpr int64_t kManySteps = 1'000'000'000;
+constexpr double kMostUpscale = 64;
 
 // Takes the keys of one table; what nobody took is an error. The first complaint is kept.
 class TableReader {
@@ -188,7 +189,7 @@ Status TakeOptimizer(const std::string& file, TableReader table, OptimizerConfig
   return table.Finish();
 }
 
-Status TakeData(TableReader table, DataConfig& data) {
+Status TakeData(const std::string& file, TableReader table, DataConfig& data) {
   table.Int("views_per_object", 0, 100000, data.views_per_object);
   table.Int("scenes_per_step", 1, 1024, data.scenes_per_step);
   table.Int("views_per_step", 1, 1024, data.views_per_step);
@@ -196,7 +197,15 @@ Status TakeData(TableReader table, DataConfig& data) {
   table.Int("part", 0, 1'000'000'000, data.part);
   table.Flag("fixed_views", data.fixed_views);
   table.Int("objects_in_memory", 1, 1'000'000, data.objects_in_memory);
-  return table.Finish();
+  table.Number("least_upscale", 0, kMostUpscale, data.least_upscale);
+  table.Number("greatest_upscale", 0, kMostUpscale, data.greatest_upscale);
+  ANCHORSPLAT_RETURN_IF_ERROR(table.Finish());
+  const bool range = data.least_upscale >= 1 && data.greatest_upscale >= data.least_upscale;
+  if (!range && (data.least_upscale > 0 || data.greatest_upscale > 0)) {
+    return Error{ErrorCode::kBadFile, Cat(file, ": data.least_upscale and greatest_upscale: expected 1 or more, the "
+                                          "second not below the first, or neither")};
+  }
+  return {};
 }
 
 Status TakeAugmentation(TableReader table, AugmentationConfig& a) {
@@ -235,7 +244,7 @@ Result<TrainConfig> ConfigFrom(const std::string& file, const toml::table& root)
   ANCHORSPLAT_RETURN_IF_ERROR(TakeNetwork(table.Table("network"), config));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeLoss(file, table.Table("loss"), config.loss));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeOptimizer(file, table.Table("optimizer"), config.optimizer));
-  ANCHORSPLAT_RETURN_IF_ERROR(TakeData(table.Table("data"), config.data));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeData(file, table.Table("data"), config.data));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeAugmentation(table.Table("augmentation"), config.augmentation));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeValidation(table.Table("validation"), config.validation));
   ANCHORSPLAT_RETURN_IF_ERROR(table.Finish());
@@ -303,6 +312,10 @@ nlohmann::json Settings(const TrainConfig& c) {
                          {"augmentation.pixel_size_noise", c.augmentation.pixel_size_noise}};
   // Trainings of before there was such a thing can go on.
   if (c.augmentation.strength_noise > 0) json["augmentation.strength_noise"] = c.augmentation.strength_noise;
+  if (c.data.least_upscale > 0) {
+    json["data.least_upscale"] = c.data.least_upscale;
+    json["data.greatest_upscale"] = c.data.greatest_upscale;
+  }
   for (const auto& [group, rate] : c.optimizer.groups) json[Cat("optimizer.groups.", group)] = rate;
   for (const auto& [key, value] : c.network) json[Cat("network.", key)] = ToJson(value);
   return json;

@@ -49,6 +49,9 @@ struct DataConfig {
   int64_t part = 0;
   bool fixed_views = false;  // always the first of an object's views instead of random ones
   int objects_in_memory = 64;
+  // How many times closer an object's views are, drawn by its name, evenly in the logarithm; 0: as the data set has
+  // them. Others than that are made on demand.
+  double least_upscale = 0, greatest_upscale = 0;
 };
 
 // What is drawn anew each time a splat is used. Standard deviations and largest values; 0: not at all.

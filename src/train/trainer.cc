@@ -156,6 +156,10 @@ Status Trainer::Begin() {
   at::globalContext().setDeterministicFillUninitializedMemory(false);
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(data_, FindTrainingData(request_));
+  if (config_.data.least_upscale > 0) {
+    ANCHORSPLAT_RETURN_IF_ERROR(
+        DrawUpscales(config_.data.least_upscale, config_.data.greatest_upscale, data_.training));
+  }
   const fs::path cache = request_.cache.empty() ? request_.out / "cache" : request_.cache;
   objects_ = std::make_unique<ObjectStore>(data_.training, config_.data.views_per_object, cache,
                                            static_cast<size_t>(config_.data.objects_in_memory));

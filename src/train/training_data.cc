@@ -1,12 +1,15 @@
 #include "train/training_data.h"
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "core/file_system.h"
 #include "core/log.h"
+#include "core/random.h"
 #include "core/text.h"
 #include "dataset/dataset_split.h"
+#include "dataset/object_name.h"
 
 namespace anchorsplat {
 
@@ -65,6 +68,19 @@ Result<TrainingData> FindTrainingData(const TrainRequest& request) {
   for (const SceneEntry& entry : data.training) names.push_back(entry.name);
   data.names = names.dump();
   return data;
+}
+
+Status DrawUpscales(double least, double greatest, std::vector<SceneEntry>& scenes) {
+  for (SceneEntry& entry : scenes) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Scene scene, Scene::Open(entry));
+    if (scene.low_views().empty()) continue;
+    Random random(StableHash(entry.name + " upscale"));
+    const double upscale = least * std::pow(greatest / least, random.Uniform(0, 1));
+    entry.high_size = static_cast<int>(std::lround(upscale * scene.low_views().front().intrinsics.width));
+    const auto there = Scene::Open(entry);
+    if (!there.ok()) return Error{there.error().code, Cat("data.least_upscale: ", there.error().message)};
+  }
+  return {};
 }
 
 }  // namespace anchorsplat

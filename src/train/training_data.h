@@ -20,4 +20,8 @@ struct TrainingData {
 // Objects without a splat are left out with a warning. Errors: those of ListScenes; kNotFound: nothing to train on.
 Result<TrainingData> FindTrainingData(const TrainRequest& request);
 
+// Draws SceneEntry::high_size of every object, by its name alone: `least` to `greatest` times the low views' pixels,
+// evenly in the logarithm. Errors: those of Scene::Open, which has to be able to make such views.
+Status DrawUpscales(double least, double greatest, std::vector<SceneEntry>& scenes);
+
 }  // namespace anchorsplat

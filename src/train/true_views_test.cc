@@ -6,6 +6,7 @@
 
 #include "dataset/small_dataset_for_test.h"
 #include "io/folder_for_test.h"
+#include "train/training_data.h"
 #include "train/training_object.h"
 
 namespace anchorsplat {
@@ -98,6 +99,40 @@ TEST(TrueViews, TheObjectsBoxOfPicturesWithAndWithoutAlpha) {
   std::fill(clear.pixels.begin(), clear.pixels.end(), 0.0f);
   clear.at(3, 5, 0) = 0.1f;  // black, but there
   EXPECT_EQ(ObjectBox(clear, {0, 0, 0}), (PixelBox{0, 5, 1, 6}));
+}
+
+TEST(TrainingObject, ViewsMadeOnDemandHaveTheSizeThatIsDrawn) {
+  const TestFolder folder;
+  ObjectJob job = SmallJob(WriteTetrahedron(folder.path(), "tetra"), "tetra");
+  ASSERT_TRUE(BuildObject(job, folder / "stored").ok());
+  job.settings.views.store_high = false;
+  ASSERT_TRUE(BuildObject(job, folder / "demand").ok());
+  job.settings.views.high_size = 60;
+  ASSERT_TRUE(BuildObject(job, folder / "larger").ok());
+  SceneEntry entry{"tetra", folder / "demand/tetra"};
+  entry.high_size = 60;
+  const auto object = OpenTrainingObject(entry, 0, folder / "cache"),
+             larger = OpenTrainingObject({"tetra", folder / "larger/tetra"}, 0, folder / "cache");
+  ASSERT_TRUE(object.ok() && larger.ok());
+  EXPECT_EQ((*object)->upscale, 5);
+  EXPECT_EQ((*object)->strength, (*larger)->strength);
+  EXPECT_NEAR((*object)->views[3].intrinsics.fx, (*larger)->views[3].intrinsics.fx, 1e-3);
+  const auto view = (*object)->truth->Load(3), expected = (*larger)->truth->Load(3);
+  ASSERT_TRUE(view.ok() && expected.ok());
+  ExpectSame(*view, *expected);
+
+  std::vector<SceneEntry> drawn(2, {"tetra", folder / "demand/tetra"});
+  drawn[1].name = "other";
+  ASSERT_TRUE(DrawUpscales(2, 8, drawn).ok());
+  EXPECT_NE(drawn[0].high_size, drawn[1].high_size);
+  for (const SceneEntry& scene : drawn) {
+    EXPECT_GE(scene.high_size, 24);
+    EXPECT_LE(scene.high_size, 96);
+  }
+  std::vector<SceneEntry> stored = {{"tetra", folder / "stored/tetra"}};
+  const Status refused = DrawUpscales(2, 8, stored);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().message.find("--hr on-demand"), std::string::npos) << refused.error().message;
 }
 
 TEST(TrainingObject, HeldOutViewsAreNeverTrainedOn) {

@@ -137,7 +137,7 @@ int64_t ChannelsPerCopy(const CompactConfig& config) {
 
 int64_t CompactOutputs(const CompactConfig& config) { return 1 + config.copies * ChannelsPerCopy(config); }
 
-int64_t NodeFeatures(const CompactConfig& config) { return config.kind ? kMostNodeFeatures : kNodeFeatures; }
+int64_t NodeFeatures(const CompactConfig& config) { return config.knows_kind ? kMostNodeFeatures : kNodeFeatures; }
 
 std::vector<TensorSpec> CompactTensors(const CompactConfig& config) {
   std::vector<TensorSpec> tensors;

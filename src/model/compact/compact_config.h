@@ -38,7 +38,7 @@ struct CompactConfig {
   bool prior = true;    // residuals are on top of the filter, with a learned f per Gaussian; else on the splat as it is
   bool anchors = true;  // offsets are bounded by ε
   bool sh = true;       // spherical harmonics of degree 1 to 3 change too
-  bool kind = false;    // Gaussians are told of their splat's kind: strength of the filter, render mode
+  bool knows_kind = false;  // Gaussians are told of their splat's kind: strength of the filter, render mode
   CompactContext context = CompactContext::kNearest;
   OffsetUnit offset_unit = OffsetUnit::kScale;
   double epsilon = 1;   // ε, in offset units
@@ -57,7 +57,7 @@ void VisitCompactOptions(CompactConfig& config, Visitor& visitor) {
   visitor.Flag("prior", config.prior);
   visitor.Flag("anchors", config.anchors);
   visitor.Flag("sh", config.sh);
-  visitor.Flag("kind", config.kind);
+  visitor.Flag("knows_kind", config.knows_kind);
   const auto choose = [&](const std::string& key, const std::vector<std::string>& names, auto& value) {
     std::string name = names[static_cast<size_t>(value)];
     visitor.Text(key, names, name);

@@ -76,7 +76,7 @@ std::vector<CompactConfig> Configs() {
   configs[4].hidden = 48;
   configs[4].head_hidden = 32;
   configs[4].context = CompactContext::kPatches;
-  configs[5].kind = true;
+  configs[5].knows_kind = true;
   return configs;
 }
 
@@ -126,7 +126,7 @@ Image Render(const GaussianCloud& cloud) {
 // Told of the render mode and of another strength, both forms hear the same, and what they hear matters.
 TEST(CompactModule, HearsTheKindOfSplat) {
   CompactConfig config;
-  config.kind = true;
+  config.knows_kind = true;
   CompactTrainable network(config);
   network.eval();
   ASSERT_TRUE(network.SetWeights(OpenDomain()).ok());
@@ -159,7 +159,7 @@ TEST(CompactModule, LearnsOfTheKindLater) {
   ASSERT_TRUE(before.SetWeights(OpenDomain()).ok());
   const auto file = folder / "before.safetensors";
   ASSERT_TRUE(before.Save(file, {}).ok());
-  config.kind = true;
+  config.knows_kind = true;
   CompactTrainable after(config);
   ASSERT_TRUE(after.InitialiseFrom(file).ok());
   const torch::NoGradGuard no_gradient;

@@ -1,16 +1,23 @@
 #!/usr/bin/env python3
-"""Fits the regression behind `--pixel-size auto` and writes src/enhance/pixel_size_coefficients.cc.
+"""Fits the regressions behind `--pixel-size auto` and writes their coefficients.
 
     anchorsplat bench pixel-size --features --json DATASET... > features.json
     scripts/train-pixel-size.py features.json [-o src/enhance/pixel_size_coefficients.cc]
+    scripts/train-pixel-size.py --kinds data/pixel-size-kinds.json.gz [-o src/enhance/pixel_size_kinds_coefficients.cc]
 
 Every object gives samples: the features of pixels 2^(k/4) times as large as the true ones. Ridge regression says from
 them how far off the tried size is; the estimate is where it says: not at all. Errors are those of cross-validation:
 objects of one mesh are left out together. With `--records DATASET` fits of less than `--long` iterations, as their
 records in the data set say, count `--short-weight` times. Needs numpy.
+
+With `--kinds` the regression is that for splats unlike standard fits. It looks at more features, and its ridge pulls
+towards the regression of standard fits instead of towards zero. What is printed is what both together say, as in
+src/enhance/pixel_size_estimate.cc, with all fits of a mesh left out and with all of a kind. Antialiased fits, for which
+their tag makes up, have no part in it. `--keep FILE` writes all features to one small file.
 """
 
 import argparse
+import gzip
 import json
 import pathlib
 import re
@@ -20,25 +27,46 @@ import numpy as np
 MOST_DEVIATIONS = 3.0  # as in pixel_size_estimate.cc
 SAME_MESH = {"biplane": "BlendSwap-CC-0-cartoon_biplane", "stone_lantern": "BlendSwap-CC-0-stoneLantern"}
 SAMPLE_WIDTH = 0.35  # ln: samples count by exp(-½ (ln(size / true) / SAMPLE_WIDTH)²)
+OUTLINE = 72  # features of one look
+ALPHA = np.arange(OUTLINE)
+KINDS = np.r_[np.arange(2 * OUTLINE), np.arange(3 * OUTLINE, 3 * OUTLINE + 16)]  # as kKindsPixelSize
+STANDARD_FILE = pathlib.Path(__file__).parent.parent / "src/enhance/pixel_size_coefficients.cc"
+STANDARD, OTHER = 0.6, 0.9  # kStandard, kOther in pixel_size_estimate.cc
 
 
 def load(files, weights=()):
     weights = dict(weights)
     objects = []
     for name in files:
-        with open(name, encoding="utf-8") as file:
+        with (gzip.open if name.endswith(".gz") else open)(name, "rt", encoding="utf-8") as file:
             for item in json.load(file)["objects"]:
                 samples = [s for s in item["samples"] if None not in s["features"]]
                 mesh = re.sub(r"--\d+-\d+.*$", "", item["object"])  # recipes put steps and size behind two hyphens
                 objects.append({
                     "name": item["object"],
+                    "kind": item.get("kind", ""),
+                    "mode": item.get("mode", "classic"),
                     "mesh": SAME_MESH.get(mesh, mesh),
                     "weight": float(weights.get(item["object"], 1)),
                     "offsets": np.log([s["size"] / item["pixel_size"] for s in samples]),
-                    "features": np.array([s["features"] for s in samples]),
+                    "all": np.array([s["features"] for s in samples]),
                     "start": np.log(item["start"] / item["pixel_size"]),
                 })
     return objects
+
+
+def keep(files, path):
+    """All features in one file, to four decimals, which is far below what they vary by."""
+    objects = []
+    for name in files:
+        with (gzip.open if name.endswith(".gz") else open)(name, "rt", encoding="utf-8") as file:
+            objects += json.load(file)["objects"]
+    for o in objects:
+        for sample in o["samples"]:
+            sample["features"] = [None if v is None else round(v, 4) for v in sample["features"]]
+    text = json.dumps({"objects": objects}, separators=(",", ":"))
+    with gzip.GzipFile(path, "wb", mtime=0) as out:  # the same bytes each time
+        out.write(text.encode())
 
 
 def weigh_short_fits(objects, datasets, long, weight):
@@ -53,7 +81,20 @@ def weigh_short_fits(objects, datasets, long, weight):
     print(f"{short} of {len(objects)} fits have less than {long} iterations and count {weight:g} times")
 
 
-def fit(objects, ridge):
+def select(objects, columns):
+    for o in objects:
+        o["features"] = o["all"][:, columns]
+
+
+def read_standard(path=STANDARD_FILE):
+    """The coefficients as they were written."""
+    text = path.read_text(encoding="utf-8")
+    array = {key: np.array([float(v) for v in re.search(rf"\.{key} = {{(.*?)}}", text, re.S)[1].split(",")])
+             for key in ("mean", "deviation", "weight")}
+    return array | {"intercept": float(re.search(r"\.intercept = ([-+.\de]+)", text)[1])}
+
+
+def fit(objects, ridge, prior=None):
     x = np.concatenate([o["features"] for o in objects])
     offsets = np.concatenate([o["offsets"] for o in objects])
     weights = np.exp(-0.5 * (offsets / SAMPLE_WIDTH) ** 2)
@@ -61,12 +102,18 @@ def fit(objects, ridge):
     weights /= weights.sum()
     mean = weights @ x
     deviation = np.sqrt(weights @ (x - mean) ** 2) + 1e-6
+    towards = np.zeros(x.shape[1])  # what the ridge pulls to: the first features' weights of `prior`, where they go on
+    if prior is not None:
+        n = len(prior["weight"])
+        deviation[:n] = np.maximum(deviation[:n], prior["deviation"])
+        towards[:n] = prior["weight"] * deviation[:n] / prior["deviation"]
     z = np.clip((x - mean) / deviation, -MOST_DEVIATIONS, MOST_DEVIATIONS)
-    z_mean, y_mean = weights @ z, weights @ -offsets
+    wanted = -offsets - z @ towards
+    z_mean, y_mean = weights @ z, weights @ wanted
     centred = z - z_mean
     normal = (centred * weights[:, None]).T @ centred + ridge * np.eye(x.shape[1])
-    weight = np.linalg.solve(normal, (centred * weights[:, None]).T @ (-offsets - y_mean))
-    return {"mean": mean, "deviation": deviation, "weight": weight, "intercept": y_mean - z_mean @ weight}
+    weight = np.linalg.solve(normal, (centred * weights[:, None]).T @ (wanted - y_mean))
+    return {"mean": mean, "deviation": deviation, "weight": weight + towards, "intercept": y_mean - z_mean @ weight}
 
 
 def estimate(model, item):
@@ -81,17 +128,55 @@ def estimate(model, item):
     return offsets[nearest] + steps[nearest]
 
 
-def cross_validate(objects, ridge, folds=40):
-    meshes = sorted({o["mesh"] for o in objects})
-    np.random.default_rng(1).shuffle(meshes)
+def cross_validate(objects, ridge, folds=40, by="mesh", prior=None):
+    groups = sorted({o[by] for o in objects})
+    np.random.default_rng(1).shuffle(groups)
     errors = np.zeros(len(objects))
-    for fold in range(min(folds, len(meshes))):
-        left_out = set(meshes[fold::folds])
-        model = fit([o for o in objects if o["mesh"] not in left_out], ridge)
+    for fold in range(min(folds, len(groups))):
+        left_out = set(groups[fold::folds])
+        model = fit([o for o in objects if o[by] not in left_out], ridge, prior)
         for k, o in enumerate(objects):
-            if o["mesh"] in left_out:
+            if o[by] in left_out:
                 errors[k] = estimate(model, o)
     return errors
+
+
+def believe_standard(objects, standard):
+    """Puts into every object what the standard regression says and how much the other one counts."""
+    for o in objects:
+        alpha = {"features": o["all"][:, ALPHA], "offsets": o["offsets"]}
+        o["said"] = estimate(standard, alpha)
+        at = [np.interp(o["said"], o["offsets"], column) for column in alpha["features"].T]
+        strangeness = np.sqrt(np.mean(((at - standard["mean"]) / standard["deviation"]) ** 2))
+        o["share"] = np.clip((strangeness - STANDARD) / (OTHER - STANDARD), 0, 1)
+
+
+def train_kinds(objects, arguments):
+    standard = read_standard()
+    believe_standard(objects, standard)
+    said, share = (np.array([o[key] for o in objects]) for key in ("said", "share"))
+    print(f"standard alone: {describe(said)}")
+    select(objects, KINDS)
+    results = {}
+    for ridge in arguments.ridge:
+        alone = cross_validate(objects, ridge, prior=standard)
+        results[ridge] = alone, (1 - share) * said + share * alone
+        print(f"ridge {ridge:g}: {describe(results[ridge][1])}")
+        alone = cross_validate(objects, ridge, by="kind", prior=standard)
+        print(f"  kinds left out: {describe((1 - share) * said + share * alone)}")
+    best = min(results, key=lambda r: np.sqrt(np.mean(results[r][1] ** 2)))
+    alone, both = results[best]
+    print(f"ridge {best:g} chosen; estimate / truth by kind:")
+    for kind in sorted({o["kind"] for o in objects}):
+        mine = [k for k, o in enumerate(objects) if o["kind"] == kind]
+        ratios = " ".join(f"{r:.2f}" for r in sorted(np.exp(both[mine])))
+        print(f"  {kind or 'others'}: {np.exp(said[mine]).min():.2f}–{np.exp(said[mine]).max():.2f} → {ratios}")
+    if arguments.list:
+        for o, s, e in zip(objects, said, both):
+            print(f"  {np.exp(s):.2f} → {np.exp(e):.2f}  {o['kind']} {o['name']}")
+    if arguments.output:
+        write(arguments.output, fit(objects, best, standard), np.sqrt(np.mean(alone[share > 0] ** 2)), len(objects),
+              "<kKindsPixelSizeFeatures> kKindsPixelSize")
 
 
 def describe(errors):
@@ -100,7 +185,7 @@ def describe(errors):
             f"95th percentile; mean of the logarithm {errors.mean():+.3f}, deviation {errors.std():.3f}")
 
 
-def write(path, model, error, count):
+def write(path, model, error, count, name="<kPixelSizeFeatures> kStandardPixelSize"):
     def numbers(values):
         text = ", ".join(f"{v:.6g}" for v in values)
         lines, line = [], "     "
@@ -117,7 +202,7 @@ def write(path, model, error, count):
 namespace anchorsplat {{
 
 // Written by scripts/train-pixel-size.py from {count} fits; not to be edited.
-const PixelSizeCoefficients kPixelSizeCoefficients = {{
+const PixelSizeCoefficients{name} = {{
     .mean = {{
 {numbers(model["mean"])}}},
     .deviation = {{
@@ -143,9 +228,17 @@ def main():
     parser.add_argument("--short-weight", type=float, default=1.0)
     parser.add_argument("--lean", type=float, default=0.0, help="ln, added to the estimate: negative is cautious")
     parser.add_argument("--list", action="store_true", help="the cross-validated error of every object")
+    parser.add_argument("--kinds", action="store_true", help="the regression for splats unlike standard fits")
+    parser.add_argument("--keep", metavar="FILE.json.gz", help="write the features to one file")
     arguments = parser.parse_args()
+    if arguments.keep:
+        keep(arguments.features, arguments.keep)
     objects = load(arguments.features, (w.split("=") for w in arguments.weight))
     print(f"{len(objects)} fits of {len({o['mesh'] for o in objects})} meshes")
+    if arguments.kinds:
+        train_kinds([o for o in objects if o["mode"] != "antialiased"], arguments)
+        return
+    select(objects, ALPHA)
     if arguments.records:
         weigh_short_fits(objects, arguments.records, arguments.long, arguments.short_weight)
     results = {}

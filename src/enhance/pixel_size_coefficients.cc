@@ -3,7 +3,7 @@
 namespace anchorsplat {
 
 // Written by scripts/train-pixel-size.py from 152 fits; not to be edited.
-const PixelSizeCoefficients kPixelSizeCoefficients = {
+const PixelSizeCoefficients<kPixelSizeFeatures> kStandardPixelSize = {
     .mean = {0.152582,    0.235238,   0.349464,   0.495457,   -0.0346132, 0.0426739,   0.146195,   0.281213,
              0.125528,    0.211456,   0.332726,   0.495706,   0.55664,    0.67305,     0.842529,   1.09799,
              1.3669,      0.361599,   -0.0369221, -0.0468216, 0.241059,   0.933388,    2.01662,    3.4398,

@@ -9,10 +9,18 @@ namespace anchorsplat {
 // ln(true pixel size / d) from the features of pixels of d, by ridge regression: intercept + Σ weight · (feature −
 // mean) / deviation. `error` is the standard deviation of the final estimate's logarithm on objects left out of the
 // regression. Written by scripts/train-pixel-size.py.
+template <size_t kFeatures>
 struct PixelSizeCoefficients {
-  std::array<double, kPixelSizeFeatures> mean, deviation, weight;
+  std::array<double, kFeatures> mean, deviation, weight;
   double intercept, error;
 };
-extern const PixelSizeCoefficients kPixelSizeCoefficients;
+
+// Of standard fits: the features of Look::kAlpha.
+extern const PixelSizeCoefficients<kPixelSizeFeatures> kStandardPixelSize;
+
+// Of fits of many kinds: the features of Look::kAlpha and Look::kAntialiased, and SizeFeatures without the number of
+// Gaussians, which says more about the picture's size than about its pixels.
+inline constexpr size_t kKindsPixelSizeFeatures = 2 * kPixelSizeFeatures + kSizeFeatures - 1;
+extern const PixelSizeCoefficients<kKindsPixelSizeFeatures> kKindsPixelSize;
 
 }  // namespace anchorsplat

@@ -1,6 +1,7 @@
 #include "enhance/pixel_size_estimate.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "enhance/pixel_size_coefficients.h"
@@ -21,6 +22,8 @@ constexpr double kInterval = 2;
 // Root mean square of the features' deviations from which on a splat counts as unlike those of the regression (they
 // have 1 on average), and how much wider the interval becomes for each one more.
 constexpr double kFamiliar = 1.4, kWidening = 0.25;
+// Strangeness up to which the regression of standard fits is believed, and from which on that of many kinds is alone.
+constexpr double kStandard = 0.6, kOther = 0.9;
 // Outlines of antialiased fits are narrower than those of the classic ones of the regression: it says 0.44 to 0.86 of
 // the truth for eight of them. Divided by this much it is too large by at most a tenth in all of them.
 constexpr double kAntialiasedLook = 0.8;
@@ -30,34 +33,70 @@ struct Guess {
   double strangeness = 0;  // root mean square of the deviations
 };
 
-Guess Regress(const PixelSizeFeatures& features) {
-  const PixelSizeCoefficients& c = kPixelSizeCoefficients;
+template <size_t kFeatures>
+Guess Regress(const PixelSizeCoefficients<kFeatures>& c, const std::array<double, kFeatures>& features) {
   Guess guess{c.intercept, 0};
-  for (size_t k = 0; k < features.size(); ++k) {
+  for (size_t k = 0; k < kFeatures; ++k) {
     const double z = (features[k] - c.mean[k]) / c.deviation[k];
     guess.step += c.weight[k] * std::clamp(z, -kMostDeviations, kMostDeviations);
     guess.strangeness += z * z;
   }
-  guess.strangeness = std::sqrt(guess.strangeness / static_cast<double>(features.size()));
+  guess.strangeness = std::sqrt(guess.strangeness / static_cast<double>(kFeatures));
   return guess;
+}
+
+// Where a regression ends.
+struct Settled {
+  double log_size = 0;
+  double half = 0;  // of the interval, ln
+  double strangeness = 0;
+};
+
+// `features_at` (size) → Result<std::array>.
+template <size_t kFeatures, typename FeaturesAt>
+Result<Settled> Settle(const PixelSizeCoefficients<kFeatures>& coefficients, double size, FeaturesAt&& features_at) {
+  Guess guess;
+  for (int round = 0; round < kMostRounds; ++round) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto features, features_at(size));
+    guess = Regress(coefficients, features);
+    const double most = kMostOctaves * std::log(2.0);
+    size *= std::exp(std::clamp(guess.step, -most, most));
+    if (std::abs(guess.step) < kSettled) break;
+  }
+  const double half = kInterval * coefficients.error + std::abs(guess.step) +
+                      kWidening * std::max(0.0, guess.strangeness - kFamiliar);
+  return Settled{std::log(size), half, guess.strangeness};
+}
+
+Result<std::array<double, kKindsPixelSizeFeatures>> KindsFeatures(PixelSizeProbe& probe, double size) {
+  std::array<double, kKindsPixelSizeFeatures> features;
+  auto out = features.begin();
+  for (const Look look : {Look::kAlpha, Look::kAntialiased}) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeFeatures of_look, probe.At(size, look));
+    out = std::ranges::copy(of_look, out).out;
+  }
+  const SizeFeatures sizes = probe.SizesAt(size);
+  std::copy_n(sizes.begin(), kSizeFeatures - 1, out);
+  return features;
 }
 
 }  // namespace
 
 Result<PixelSizeEstimate> EstimatePixelSize(const GaussianCloud& cloud) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(PixelSizeProbe probe, PixelSizeProbe::Make(cloud));
-  double size = probe.start();
-  Guess guess;
-  for (int round = 0; round < kMostRounds; ++round) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeFeatures features, probe.At(size));
-    guess = Regress(features);
-    const double most = kMostOctaves * std::log(2.0);
-    size *= std::exp(std::clamp(guess.step, -most, most));
-    if (std::abs(guess.step) < kSettled) break;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      Settled settled, Settle(kStandardPixelSize, probe.start(), [&](double size) { return probe.At(size); }));
+  const double share = std::clamp((settled.strangeness - kStandard) / (kOther - kStandard), 0.0, 1.0);
+  if (share > 0) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Settled kinds, Settle(kKindsPixelSize, probe.start(), [&](double size) {
+                                   return KindsFeatures(probe, size);
+                                 }));
+    settled.log_size = std::lerp(settled.log_size, kinds.log_size, share);
+    settled.half = std::lerp(settled.half, kinds.half, share);
   }
-  const double spread = std::exp(kInterval * kPixelSizeCoefficients.error + std::abs(guess.step) +
-                                 kWidening * std::max(0.0, guess.strangeness - kFamiliar));
+  double size = std::exp(settled.log_size);
   if (cloud.render_mode == RenderMode::kAntialiased) size /= kAntialiasedLook;
+  const double spread = std::exp(settled.half);
   return PixelSizeEstimate{size, size / spread, size * spread};
 }
 

@@ -41,7 +41,7 @@ def load(files, weights=()):
         with (gzip.open if name.endswith(".gz") else open)(name, "rt", encoding="utf-8") as file:
             for item in json.load(file)["objects"]:
                 samples = [s for s in item["samples"] if None not in s["features"]]
-                mesh = re.sub(r"--\d+-\d+.*$", "", item["object"])  # recipes put steps and size behind two hyphens
+                mesh = item["object"].split("--")[0]  # recipes put the entry behind two hyphens
                 objects.append({
                     "name": item["object"],
                     "kind": item.get("kind", ""),

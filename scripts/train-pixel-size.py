@@ -31,7 +31,9 @@ OUTLINE = 72  # features of one look
 ALPHA = np.arange(OUTLINE)
 KINDS = np.r_[np.arange(2 * OUTLINE), np.arange(3 * OUTLINE, 3 * OUTLINE + 16)]  # as kKindsPixelSize
 STANDARD_FILE = pathlib.Path(__file__).parent.parent / "src/enhance/pixel_size_coefficients.cc"
+SIZES, LENGTHS = slice(3 * OUTLINE, 3 * OUTLINE + 16), 12  # the first twelve of the sizes are in units of the pixel
 STANDARD, OTHER = 0.6, 0.9  # kStandard, kOther in pixel_size_estimate.cc
+PLAUSIBLE, IMPLAUSIBLE = 1.5, 2.2  # kPlausible, kImplausible
 
 
 def load(files, weights=()):
@@ -141,22 +143,26 @@ def cross_validate(objects, ridge, folds=40, by="mesh", prior=None):
     return errors
 
 
-def believe_standard(objects, standard):
+def believe_standard(objects, standard, kinds):
     """Puts into every object what the standard regression says and how much the other one counts."""
     for o in objects:
         alpha = {"features": o["all"][:, ALPHA], "offsets": o["offsets"]}
         o["said"] = estimate(standard, alpha)
         at = [np.interp(o["said"], o["offsets"], column) for column in alpha["features"].T]
         strangeness = np.sqrt(np.mean(((at - standard["mean"]) / standard["deviation"]) ** 2))
-        o["share"] = np.clip((strangeness - STANDARD) / (OTHER - STANDARD), 0, 1)
+        sizes = o["all"][0, SIZES].copy()
+        sizes[:LENGTHS] -= o["said"] - o["offsets"][0]
+        of_sizes = np.sqrt(np.mean(((sizes - kinds["mean"][-16:]) / kinds["deviation"][-16:]) ** 2))
+        share = max((strangeness - STANDARD) / (OTHER - STANDARD), (of_sizes - PLAUSIBLE) / (IMPLAUSIBLE - PLAUSIBLE))
+        o["share"] = np.clip(share, 0, 1)
 
 
 def train_kinds(objects, arguments):
     standard = read_standard()
-    believe_standard(objects, standard)
+    select(objects, KINDS)
+    believe_standard(objects, standard, fit(objects, arguments.ridge[0], standard))
     said, share = (np.array([o[key] for o in objects]) for key in ("said", "share"))
     print(f"standard alone: {describe(said)}")
-    select(objects, KINDS)
     results = {}
     for ridge in arguments.ridge:
         alone = cross_validate(objects, ridge, prior=standard)

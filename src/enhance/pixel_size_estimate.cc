@@ -24,6 +24,9 @@ constexpr double kInterval = 2;
 constexpr double kFamiliar = 1.4, kWidening = 0.25;
 // Strangeness up to which the regression of standard fits is believed, and from which on that of many kinds is alone.
 constexpr double kStandard = 0.6, kOther = 0.9;
+// The same of the Gaussians' sizes in units of the standard regression's estimate, by the deviations of fits of many
+// kinds with their true pixels: 1 on average, and much more where the estimate is several times too large.
+constexpr double kPlausible = 1.5, kImplausible = 2.2;
 // Outlines of antialiased fits are narrower than those of the classic ones of the regression: it says 0.44 to 0.86 of
 // the truth for eight of them. Divided by this much it is too large by at most a tenth in all of them.
 constexpr double kAntialiasedLook = 0.8;
@@ -63,8 +66,8 @@ Result<Settled> Settle(const PixelSizeCoefficients<kFeatures>& coefficients, dou
     size *= std::exp(std::clamp(guess.step, -most, most));
     if (std::abs(guess.step) < kSettled) break;
   }
-  const double half = kInterval * coefficients.error + std::abs(guess.step) +
-                      kWidening * std::max(0.0, guess.strangeness - kFamiliar);
+  const double half =
+      kInterval * coefficients.error + std::abs(guess.step) + kWidening * std::max(0.0, guess.strangeness - kFamiliar);
   return Settled{std::log(size), half, guess.strangeness};
 }
 
@@ -80,17 +83,32 @@ Result<std::array<double, kKindsPixelSizeFeatures>> KindsFeatures(PixelSizeProbe
   return features;
 }
 
+double StrangenessOfSizes(const PixelSizeProbe& probe, double size) {
+  const SizeFeatures sizes = probe.SizesAt(size);
+  constexpr size_t kFirst = 2 * kPixelSizeFeatures, kCount = kKindsPixelSizeFeatures - kFirst;
+  double sum = 0;
+  for (size_t k = 0; k < kCount; ++k) {
+    const double z = (sizes[k] - kKindsPixelSize.mean[kFirst + k]) / kKindsPixelSize.deviation[kFirst + k];
+    sum += z * z;
+  }
+  return std::sqrt(sum / static_cast<double>(kCount));
+}
+
+double Share(double strangeness, double none, double all) {
+  return std::clamp((strangeness - none) / (all - none), 0.0, 1.0);
+}
+
 }  // namespace
 
 Result<PixelSizeEstimate> EstimatePixelSize(const GaussianCloud& cloud) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(PixelSizeProbe probe, PixelSizeProbe::Make(cloud));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(
-      Settled settled, Settle(kStandardPixelSize, probe.start(), [&](double size) { return probe.At(size); }));
-  const double share = std::clamp((settled.strangeness - kStandard) / (kOther - kStandard), 0.0, 1.0);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Settled settled,
+                               Settle(kStandardPixelSize, probe.start(), [&](double size) { return probe.At(size); }));
+  const double share = std::max(Share(settled.strangeness, kStandard, kOther),
+                                Share(StrangenessOfSizes(probe, std::exp(settled.log_size)), kPlausible, kImplausible));
   if (share > 0) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const Settled kinds, Settle(kKindsPixelSize, probe.start(), [&](double size) {
-                                   return KindsFeatures(probe, size);
-                                 }));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Settled kinds, Settle(kKindsPixelSize, probe.start(),
+                                                             [&](double size) { return KindsFeatures(probe, size); }));
     settled.log_size = std::lerp(settled.log_size, kinds.log_size, share);
     settled.half = std::lerp(settled.half, kinds.half, share);
   }

@@ -8,8 +8,8 @@ namespace anchorsplat {
 // An estimate of p_LR, the world size of a training pixel, from the cloud alone: pixels of the size are looked for with
 // which the cloud's outlines are as soft as those of fits are with theirs (pixel_size_features.h), by a regression on
 // fits whose pixel size is known (docs/method.md says how good it is). The true value lies between `low` and `high` for
-// about 95 % of splats like those; they are further apart where outlines are unlike theirs. Where the cloud's render mode
-// is antialiased it is made up for.
+// about 95 % of splats like those; they are further apart where outlines are unlike theirs. Where the cloud's render
+// mode is antialiased it is made up for.
 struct PixelSizeEstimate {
   double size = 0;  // world units
   double low = 0;

@@ -14,8 +14,8 @@ namespace anchorsplat {
 struct PixelSizeCheck {
   std::string object;
   RenderMode mode = RenderMode::kClassic;  // its tag's
-  double truth = 0;  // median over the Gaussians (eval/filter_sweep.h), world units
-  double start = 0;  // what the search begins with
+  double truth = 0;                        // median over the Gaussians (eval/filter_sweep.h), world units
+  double start = 0;                        // what the search begins with
   PixelSizeEstimate estimate;
   double seconds = 0;  // of the estimate
   struct Sample {

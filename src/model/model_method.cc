@@ -92,9 +92,9 @@ WeightPrecision FastPrecision(WeightPrecision asked) {
   return WeightPrecision::kFloat;
 }
 
-Result<AnyNetwork> Load(const ModelSettings& model) {
+Result<AnyNetwork> Load(const ModelSettings& model, Shipped shipped) {
   if (!model.file.empty()) return LoadAnyNetwork(model.file, FastPrecision(model.precision));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(CompactNetwork network, LoadShippedNetwork());
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CompactNetwork network, LoadShippedNetwork(shipped));
   return AnyNetwork(std::move(network));
 }
 
@@ -102,14 +102,17 @@ Result<AnyNetwork> Load(const ModelSettings& model) {
 // stays with whoever uses it. A file that has changed under its name is another one.
 class LastNetwork {
  public:
-  Result<std::shared_ptr<const AnyNetwork>> Get(const ModelSettings& model) {
+  // `shipped`: where no file is named.
+  Result<std::shared_ptr<const AnyNetwork>> Get(const ModelSettings& model, Shipped shipped = Shipped::kClassic) {
     const std::lock_guard lock(mutex_);
     // Before it is read: what changes meanwhile is read again at the next call.
     const std::optional<FileVersion> version = VersionOf(model.file);
-    if (network_ == nullptr || file_ != model.file || version_ != version || precision_ != model.precision) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(AnyNetwork network, Load(model));
+    if (network_ == nullptr || file_ != model.file || shipped_ != shipped || version_ != version ||
+        precision_ != model.precision) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(AnyNetwork network, Load(model, shipped));
       network_ = std::make_shared<const AnyNetwork>(std::move(network));
       file_ = model.file;
+      shipped_ = shipped;
       version_ = version;
       precision_ = model.precision;
     }
@@ -119,6 +122,7 @@ class LastNetwork {
  private:
   std::mutex mutex_;
   std::filesystem::path file_;
+  Shipped shipped_ = Shipped::kClassic;
   std::optional<FileVersion> version_;
   WeightPrecision precision_ = WeightPrecision::kFloat;
   std::shared_ptr<const AnyNetwork> network_;
@@ -238,7 +242,9 @@ void RegisterModelMethod() {
          return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};
        },
        .run = [last](EnhanceInput input, const EnhanceOptions& options, StepReport& report) -> Result<GaussianCloud> {
-         ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const AnyNetwork> network, last->Get(options.model));
+         const Shipped shipped = IsCompensated(input.cloud.render_mode) ? Shipped::kKinds : Shipped::kClassic;
+         ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const AnyNetwork> network,
+                                      last->Get(options.model, shipped));
          if (const auto* published = std::get_if<PublishedNetwork>(network.get())) {
            return EnhanceWithPublished(input, *published, options.model.options, report);
          }

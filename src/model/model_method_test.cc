@@ -316,12 +316,47 @@ TEST_F(SmallModel, EveryOptionBelongsToAnArchitecture) {
   EXPECT_EQ(lacks("normalisation"), "");
 }
 
-TEST_F(SmallModel, TheShippedNetworkOpens) {
-  const auto shipped = LoadShippedNetwork();
-  EXPECT_EQ(shipped.ok(), HasShippedNetwork());
+TEST_F(SmallModel, TheShippedNetworksOpen) {
+  for (const Shipped which : {Shipped::kClassic, Shipped::kKinds}) {
+    const auto shipped = LoadShippedNetwork(which);
+    EXPECT_EQ(shipped.ok(), HasShippedNetwork());
+    if (shipped.ok()) {
+      EXPECT_EQ(shipped->config().knows_kind, which == Shipped::kKinds);
+    } else {
+      EXPECT_EQ(shipped.error().code, ErrorCode::kNotFound);
+    }
+  }
   EXPECT_EQ(ShippedNetworkIdentity().empty(), !HasShippedNetwork());
-  if (!shipped.ok()) {
-    EXPECT_EQ(shipped.error().code, ErrorCode::kNotFound);
+}
+
+// The default network knows classic splats only, a file of its kind filters others.
+TEST_F(SmallModel, AntialiasedSplatsGetTheirOwnShippedNetwork) {
+  const EnhanceMethod registered = Registered();
+  EnhanceInput input = SheetInput();
+  input.cloud.render_mode = RenderMode::kAntialiased;
+  input.filter_strength = 0.15;
+  EnhanceOptions options;
+  options.model.copies = 3;
+  options.model.file = Compact(3);
+  StepReport report;
+  auto enhanced = registered.run(input, options, report);
+  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+  EXPECT_EQ(enhanced->size(), input.cloud.size());
+  if (!HasShippedNetwork()) return;
+  options.model = {};
+  options.model.copies = 4;
+  // Between two classic ones: what is kept for the next call must not be taken for another.
+  for (const RenderMode mode : {RenderMode::kClassic, RenderMode::kAntialiased, RenderMode::kClassic}) {
+    EnhanceInput either = input;
+    either.cloud.render_mode = mode;
+    if (mode == RenderMode::kClassic) either.filter_strength = 0.74;
+    report = {};
+    enhanced = registered.run(either, options, report);
+    ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+    const std::map<std::string, FactValue> facts(report.facts.begin(), report.facts.end());
+    ASSERT_TRUE(facts.contains("copies_made")) << static_cast<int>(mode);
+    EXPECT_GT(std::get<int64_t>(facts.at("copies_made")), input.cloud.size());
+    EXPECT_EQ(enhanced->render_mode, mode);
   }
 }
 

@@ -202,7 +202,8 @@ Status TakeData(const std::string& file, TableReader table, DataConfig& data) {
   ANCHORSPLAT_RETURN_IF_ERROR(table.Finish());
   const bool range = data.least_upscale >= 1 && data.greatest_upscale >= data.least_upscale;
   if (!range && (data.least_upscale > 0 || data.greatest_upscale > 0)) {
-    return Error{ErrorCode::kBadFile, Cat(file, ": data.least_upscale and greatest_upscale: expected 1 or more, the "
+    return Error{ErrorCode::kBadFile, Cat(file,
+                                          ": data.least_upscale and greatest_upscale: expected 1 or more, the "
                                           "second not below the first, or neither")};
   }
   return {};

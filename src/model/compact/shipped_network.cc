@@ -9,23 +9,31 @@
 #include "core/text.h"
 #include "tensors/tensor_file.h"
 
-#ifdef ANCHORSPLAT_SHIPPED_NETWORK
-// The assembler copies the file into the constants of the program: both compilers know this, C++20 has nothing for it.
-asm(".section .rodata\n"
-    ".balign 64\n"
-    ".hidden anchorsplat_shipped_network\n"
-    ".hidden anchorsplat_shipped_network_end\n"
-    ".globl anchorsplat_shipped_network\n"
-    ".globl anchorsplat_shipped_network_end\n"
-    "anchorsplat_shipped_network:\n"
-    ".incbin \"" ANCHORSPLAT_SHIPPED_NETWORK
-    "\"\n"
-    "anchorsplat_shipped_network_end:\n"
-    ".byte 0\n"
-    ".text\n");
+#ifdef ANCHORSPLAT_SHIPPED_NETWORKS
+// The assembler copies a file into the constants of the program: both compilers know this, C++20 has nothing for it.
+#define ANCHORSPLAT_INCLUDE_BYTES(NAME, PATH) \
+  asm(".section .rodata\n"                    \
+      ".balign 64\n"                          \
+      ".hidden " NAME                         \
+      "\n"                                    \
+      ".hidden " NAME                         \
+      "_end\n"                                \
+      ".globl " NAME                          \
+      "\n"                                    \
+      ".globl " NAME "_end\n" NAME            \
+      ":\n"                                   \
+      ".incbin \"" PATH "\"\n" NAME           \
+      "_end:\n"                               \
+      ".byte 0\n"                             \
+      ".text\n")
+ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_classic",
+                          ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-compact.safetensors");
+ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_kinds", ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-kinds.safetensors");
 extern "C" {
-extern const std::byte anchorsplat_shipped_network[];
-extern const std::byte anchorsplat_shipped_network_end[];
+extern const std::byte anchorsplat_shipped_classic[];
+extern const std::byte anchorsplat_shipped_classic_end[];
+extern const std::byte anchorsplat_shipped_kinds[];
+extern const std::byte anchorsplat_shipped_kinds_end[];
 }
 #endif
 
@@ -33,9 +41,10 @@ namespace anchorsplat {
 
 namespace {
 
-std::span<const std::byte> ShippedBytes() {
-#ifdef ANCHORSPLAT_SHIPPED_NETWORK
-  return {anchorsplat_shipped_network, anchorsplat_shipped_network_end};
+std::span<const std::byte> ShippedBytes([[maybe_unused]] Shipped which) {
+#ifdef ANCHORSPLAT_SHIPPED_NETWORKS
+  if (which == Shipped::kKinds) return {anchorsplat_shipped_kinds, anchorsplat_shipped_kinds_end};
+  return {anchorsplat_shipped_classic, anchorsplat_shipped_classic_end};
 #else
   return {};
 #endif
@@ -43,20 +52,25 @@ std::span<const std::byte> ShippedBytes() {
 
 }  // namespace
 
-bool HasShippedNetwork() { return !ShippedBytes().empty(); }
+bool HasShippedNetwork() { return !ShippedBytes(Shipped::kClassic).empty(); }
 
 std::string ShippedNetworkIdentity() {
-  if (!HasShippedNetwork()) return "";
-  Fingerprint print;
-  print.Add(ShippedBytes());
-  return Cat(ShippedBytes().size(), " ", print.value());
+  std::string identity;
+  for (const Shipped which : {Shipped::kClassic, Shipped::kKinds}) {
+    if (!HasShippedNetwork()) break;
+    Fingerprint print;
+    print.Add(ShippedBytes(which));
+    identity += Cat(identity.empty() ? "" : " ", ShippedBytes(which).size(), " ", print.value());
+  }
+  return identity;
 }
 
-Result<CompactNetwork> LoadShippedNetwork() {
-  if (!HasShippedNetwork()) return Error{ErrorCode::kNotFound, "this program was built without weights of its own"};
+Result<CompactNetwork> LoadShippedNetwork(Shipped which) {
+  const std::span<const std::byte> bytes = ShippedBytes(which);
+  if (bytes.empty()) return Error{ErrorCode::kNotFound, "this program was built without weights of its own"};
   ANCHORSPLAT_ASSIGN_OR_RETURN(
       const TensorFile file,
-      TensorFile::FromBytes(Buffer<std::byte>(ShippedBytes().begin(), ShippedBytes().end()), "the built-in network"));
+      TensorFile::FromBytes(Buffer<std::byte>(bytes.begin(), bytes.end()), "the built-in network"));
   return LoadCompactNetwork(file);
 }
 

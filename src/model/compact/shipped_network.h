@@ -8,14 +8,18 @@
 
 namespace anchorsplat {
 
-// The compact network that is part of the program itself: models/anchorsplat-compact.safetensors of the source tree
-// when the program was built (docs/network.md). False when there was none.
+// The compact networks that are part of the program itself, of the folder models/ of the source tree when the program
+// was built (docs/network.md): anchorsplat-compact.safetensors for classic splats, which knows standard fits best, and
+// anchorsplat-kinds.safetensors, which knows antialiased ones, too. There are both or none.
+enum class Shipped { kClassic, kKinds };
+
 bool HasShippedNetwork();
 
-// Tells one shipped network from another: size and a hash of its bytes. Empty when there is none.
+// Tells the shipped networks of one program from those of another: sizes and hashes of their bytes. Empty when there
+// are none.
 std::string ShippedNetworkIdentity();
 
 // Errors: kNotFound when there is none; those of LoadCompactNetwork.
-Result<CompactNetwork> LoadShippedNetwork();
+Result<CompactNetwork> LoadShippedNetwork(Shipped which = Shipped::kClassic);
 
 }  // namespace anchorsplat

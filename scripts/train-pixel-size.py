@@ -166,10 +166,10 @@ def train_kinds(objects, arguments):
     results = {}
     for ridge in arguments.ridge:
         alone = cross_validate(objects, ridge, prior=standard)
-        results[ridge] = alone, (1 - share) * said + share * alone
+        results[ridge] = alone, np.minimum(said, (1 - share) * said + share * alone)
         print(f"ridge {ridge:g}: {describe(results[ridge][1])}")
         alone = cross_validate(objects, ridge, by="kind", prior=standard)
-        print(f"  kinds left out: {describe((1 - share) * said + share * alone)}")
+        print(f"  kinds left out: {describe(np.minimum(said, (1 - share) * said + share * alone))}")
     best = min(results, key=lambda r: np.sqrt(np.mean(results[r][1] ** 2)))
     alone, both = results[best]
     print(f"ridge {best:g} chosen; estimate / truth by kind:")

@@ -109,7 +109,9 @@ Result<PixelSizeEstimate> EstimatePixelSize(const GaussianCloud& cloud) {
   if (share > 0) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Settled kinds, Settle(kKindsPixelSize, probe.start(),
                                                              [&](double size) { return KindsFeatures(probe, size); }));
-    settled.log_size = std::lerp(settled.log_size, kinds.log_size, share);
+    // It may only lower the estimate. Splats that have lost less width than classic ones and do not say so, such as
+    // antialiased ones, look like fits of smaller pixels to the standard regression, which is what they need.
+    settled.log_size = std::min(settled.log_size, std::lerp(settled.log_size, kinds.log_size, share));
     settled.half = std::lerp(settled.half, kinds.half, share);
   }
   double size = std::exp(settled.log_size);

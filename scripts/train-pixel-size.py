@@ -163,13 +163,16 @@ def train_kinds(objects, arguments):
     believe_standard(objects, standard, fit(objects, arguments.ridge[0], standard))
     said, share = (np.array([o[key] for o in objects]) for key in ("said", "share"))
     print(f"standard alone: {describe(said)}")
+
+    def together(alone):  # it may only lower
+        return np.minimum(said, (1 - share) * said + share * alone)
+
     results = {}
     for ridge in arguments.ridge:
         alone = cross_validate(objects, ridge, prior=standard)
-        results[ridge] = alone, np.minimum(said, (1 - share) * said + share * alone)
+        results[ridge] = alone, together(alone)
         print(f"ridge {ridge:g}: {describe(results[ridge][1])}")
-        alone = cross_validate(objects, ridge, by="kind", prior=standard)
-        print(f"  kinds left out: {describe(np.minimum(said, (1 - share) * said + share * alone))}")
+        print(f"  kinds left out: {describe(together(cross_validate(objects, ridge, by='kind', prior=standard)))}")
     best = min(results, key=lambda r: np.sqrt(np.mean(results[r][1] ** 2)))
     alone, both = results[best]
     print(f"ridge {best:g} chosen; estimate / truth by kind:")

@@ -1,5 +1,6 @@
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <fstream>
@@ -119,12 +120,16 @@ std::string FetchCommand() {
 
 Finding FindModel() {
   if (!HasShippedNetwork()) {
-    return {"model", kMissing, "this program was built without models/anchorsplat-compact.safetensors",
+    return {"model", kMissing, "this program was built without the weights in models/",
             "anchorsplat enhance --model FILE, or --method filter"};
   }
-  const auto network = LoadShippedNetwork();
-  if (!network.ok()) return {"model", kBroken, network.error().message, "make build"};
-  return {"model", kReady, Cat("in the program, ", network->config().copies, " Gaussians for one"), ""};
+  int64_t copies = 0;
+  for (const Shipped which : {Shipped::kClassic, Shipped::kKinds}) {
+    const auto network = LoadShippedNetwork(which);
+    if (!network.ok()) return {"model", kBroken, network.error().message, "make build"};
+    copies = std::max(copies, network->config().copies);
+  }
+  return {"model", kReady, Cat("in the program, ", copies, " Gaussians for one"), ""};
 }
 
 Finding FindTraining() {

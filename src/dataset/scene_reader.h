@@ -63,6 +63,9 @@ class Scene {
   Result<GaussianCloud> LowSplat() const;
   Result<std::filesystem::path> LowSplatPath() const;  // its file
 
+  // High views of `size` pixels a side from now on. kBadArgument: they are not made on demand.
+  Status ResizeHighViews(int size);
+
   // Pictures as they are stored, rgb or rgba; high views that are not stored are rendered, which gives the same bits.
   // Errors: those of ReadImage; kNotFound: no picture and no mesh to make it from; kBadFile: another size.
   Result<Image> LowPicture(size_t view) const;
@@ -70,7 +73,6 @@ class Scene {
 
  private:
   Scene() = default;
-  Status ResizeHighViews(int size);
   Result<Image> Rendered(size_t view) const;
 
   std::string name_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "enhance/pixel_size_coefficients.h"
 #include "enhance/pixel_size_features.h"
@@ -32,19 +33,27 @@ constexpr double kPlausible = 1.5, kImplausible = 2.2;
 constexpr double kAntialiasedLook = 0.8;
 
 struct Guess {
-  double step = 0;         // ln(pixel size / d)
-  double strangeness = 0;  // root mean square of the deviations
+  double step = 0;  // ln(pixel size / d)
+  double strangeness = 0;
 };
+
+// Root mean square of the deviations.
+double Strangeness(std::span<const double> features, std::span<const double> mean, std::span<const double> deviation) {
+  double sum = 0;
+  for (size_t k = 0; k < features.size(); ++k) {
+    const double z = (features[k] - mean[k]) / deviation[k];
+    sum += z * z;
+  }
+  return std::sqrt(sum / static_cast<double>(features.size()));
+}
 
 template <size_t kFeatures>
 Guess Regress(const PixelSizeCoefficients<kFeatures>& c, const std::array<double, kFeatures>& features) {
-  Guess guess{c.intercept, 0};
+  Guess guess{c.intercept, Strangeness(features, c.mean, c.deviation)};
   for (size_t k = 0; k < kFeatures; ++k) {
     const double z = (features[k] - c.mean[k]) / c.deviation[k];
     guess.step += c.weight[k] * std::clamp(z, -kMostDeviations, kMostDeviations);
-    guess.strangeness += z * z;
   }
-  guess.strangeness = std::sqrt(guess.strangeness / static_cast<double>(kFeatures));
   return guess;
 }
 
@@ -86,12 +95,8 @@ Result<std::array<double, kKindsPixelSizeFeatures>> KindsFeatures(PixelSizeProbe
 double StrangenessOfSizes(const PixelSizeProbe& probe, double size) {
   const SizeFeatures sizes = probe.SizesAt(size);
   constexpr size_t kFirst = 2 * kPixelSizeFeatures, kCount = kKindsPixelSizeFeatures - kFirst;
-  double sum = 0;
-  for (size_t k = 0; k < kCount; ++k) {
-    const double z = (sizes[k] - kKindsPixelSize.mean[kFirst + k]) / kKindsPixelSize.deviation[kFirst + k];
-    sum += z * z;
-  }
-  return std::sqrt(sum / static_cast<double>(kCount));
+  return Strangeness(std::span(sizes).first(kCount), std::span(kKindsPixelSize.mean).subspan(kFirst),
+                     std::span(kKindsPixelSize.deviation).subspan(kFirst));
 }
 
 double Share(double strangeness, double none, double all) {

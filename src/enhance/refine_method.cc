@@ -61,7 +61,8 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
     plan.nothing_to_do = true;
     plan.why = lost_none
                    ? "there is no lost width to give back, and without pictures nothing else to learn: the splat stays"
-                   : Cat("without pictures there is nothing to learn about ", NameOf(*mode), " splats: filtered only");
+                   : Cat("without pictures there is nothing to learn about ", NameOf(*mode),
+                         refine.start_has_detail ? " splats: the network's result stays" : " splats: filtered only");
     LogInfo(plan.why);
     report.facts.emplace_back("kept_start", true);
     return std::move(refine.start);

@@ -42,6 +42,22 @@ PublishedConfig SmallConfig() {
   return config;
 }
 
+void WriteMadeUp(const fs::path& path, const std::vector<TensorSpec>& specs, const WeightSource& source,
+                 const std::map<std::string, std::string>& metadata) {
+  std::vector<std::vector<float>> values;
+  std::vector<TensorEntry> entries;
+  values.reserve(specs.size());
+  for (const TensorSpec& spec : specs) {
+    if (spec.counter) continue;
+    int64_t count = 1;
+    for (const int64_t side : spec.shape) count *= side;
+    std::vector<float>& array = values.emplace_back(static_cast<size_t>(count));
+    EXPECT_TRUE(source(spec, array).ok());
+    entries.push_back(MakeEntry(spec.name, spec.shape, array));
+  }
+  EXPECT_TRUE(WriteSafetensors(path, entries, metadata).ok());
+}
+
 // A folder of its own with a small checkpoint of made-up weights, small.safetensors.
 class SmallModel : public testing::Test {
  protected:
@@ -51,19 +67,7 @@ class SmallModel : public testing::Test {
               (std::string("anchorsplat_") + testing::UnitTest::GetInstance()->current_test_info()->name());
     fs::remove_all(folder_);
     fs::create_directories(folder_);
-    std::vector<std::vector<float>> values;
-    std::vector<TensorEntry> entries;
-    const auto specs = PublishedTensors(SmallConfig());
-    values.reserve(specs.size());
-    for (const TensorSpec& spec : specs) {
-      if (spec.counter) continue;
-      int64_t count = 1;
-      for (const int64_t side : spec.shape) count *= side;
-      std::vector<float>& array = values.emplace_back(static_cast<size_t>(count));
-      ASSERT_TRUE(HashWeights()(spec, array).ok());
-      entries.push_back(MakeEntry(spec.name, spec.shape, array));
-    }
-    ASSERT_TRUE(WriteSafetensors(file(), entries, {{"licence", "CC0"}}).ok());
+    WriteMadeUp(file(), PublishedTensors(SmallConfig()), HashWeights(), {{"licence", "CC0"}});
   }
   void TearDown() override { fs::remove_all(folder_); }
   fs::path file() const { return folder_ / "small.safetensors"; }
@@ -71,17 +75,7 @@ class SmallModel : public testing::Test {
   fs::path Compact(int64_t copies) const {
     const fs::path path = folder_ / Cat("compact-", copies, ".safetensors");
     const CompactConfig config{.copies = copies, .hidden = 16, .head_hidden = 16};
-    std::vector<std::vector<float>> values;
-    std::vector<TensorEntry> entries;
-    const auto specs = CompactTensors(config);
-    values.reserve(specs.size());
-    for (const TensorSpec& spec : specs) {
-      int64_t count = 1;
-      for (const int64_t side : spec.shape) count *= side;
-      EXPECT_TRUE(OpenDomain()(spec, values.emplace_back(static_cast<size_t>(count))).ok());
-      entries.push_back(MakeEntry(spec.name, spec.shape, values.back()));
-    }
-    EXPECT_TRUE(WriteSafetensors(path, entries, ToMetadata(config)).ok());
+    WriteMadeUp(path, CompactTensors(config), OpenDomain(), ToMetadata(config));
     return path;
   }
 

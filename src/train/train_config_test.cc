@@ -36,6 +36,8 @@ means = 3e-7
 [data]
 crop = 256
 fixed_views = true
+least_upscale = 2
+greatest_upscale = 8
 [augmentation]
 rotate = true
 [validation]
@@ -53,6 +55,8 @@ every = 100
   EXPECT_EQ(config->loss.lpips_net, LpipsNet::kAlex);
   EXPECT_EQ(config->optimizer.groups.at("means"), 3e-7);
   EXPECT_EQ(config->optimizer.schedule, Schedule::kConstant);
+  EXPECT_EQ(config->data.greatest_upscale, 8);
+  EXPECT_EQ(Settings(*config)["data.least_upscale"], 2.0);
   EXPECT_TRUE(config->augmentation.geometry());
   EXPECT_EQ(Settings(*config)["network.copies"], 4.0);
   const Error located = InNetworkTable(*config, {ErrorCode::kBadArgument, "copies: bad"});
@@ -74,6 +78,11 @@ TEST(TrainConfig, ComplaintsNameFileLineAndKey) {
             "x.toml: line 2: optimizer.groups.means: expected a number from 0 to 10");
   EXPECT_THAT(complaint("[data]\npart = 100\n[augmentation]\ndrop = 0.1\n"),
               HasSubstr("x.toml: data.part: not together with augmentation.drop"));
+  for (const char* range : {"least_upscale = 2", "greatest_upscale = 4", "least_upscale = 4\ngreatest_upscale = 2",
+                            "least_upscale = 0.5\ngreatest_upscale = 2"}) {
+    EXPECT_THAT(complaint(std::string("[data]\n") + range + "\n"), HasSubstr("x.toml: data.least_upscale and"))
+        << range;
+  }
   EXPECT_EQ(complaint("[loss]\nl1 = 0\n"), "x.toml: loss: all weights are 0, so there is nothing to learn");
   EXPECT_EQ(complaint("loss = 3\n"), "x.toml: line 1: loss: expected a table [loss]");
   EXPECT_THAT(complaint("steps = \n"), HasSubstr("x.toml: line 1: not TOML"));

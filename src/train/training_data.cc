@@ -72,13 +72,13 @@ Result<TrainingData> FindTrainingData(const TrainRequest& request) {
 
 Status DrawUpscales(double least, double greatest, std::vector<SceneEntry>& scenes) {
   for (SceneEntry& entry : scenes) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const Scene scene, Scene::Open(entry));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(Scene scene, Scene::Open(entry));
     if (scene.low_views().empty()) continue;
     Random random(StableHash(entry.name + " upscale"));
     const double upscale = least * std::pow(greatest / least, random.Uniform(0, 1));
     entry.high_size = static_cast<int>(std::lround(upscale * scene.low_views().front().intrinsics.width));
-    const auto there = Scene::Open(entry);
-    if (!there.ok()) return Error{there.error().code, Cat("data.least_upscale: ", there.error().message)};
+    const Status resized = scene.ResizeHighViews(entry.high_size);
+    if (!resized.ok()) return Error{resized.error().code, Cat("data.least_upscale: ", resized.error().message)};
   }
   return {};
 }

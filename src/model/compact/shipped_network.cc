@@ -55,14 +55,10 @@ std::span<const std::byte> ShippedBytes([[maybe_unused]] Shipped which) {
 bool HasShippedNetwork() { return !ShippedBytes(Shipped::kClassic).empty(); }
 
 std::string ShippedNetworkIdentity() {
-  std::string identity;
-  for (const Shipped which : {Shipped::kClassic, Shipped::kKinds}) {
-    if (!HasShippedNetwork()) break;
-    Fingerprint print;
-    print.Add(ShippedBytes(which));
-    identity += Cat(identity.empty() ? "" : " ", ShippedBytes(which).size(), " ", print.value());
-  }
-  return identity;
+  if (!HasShippedNetwork()) return "";
+  Fingerprint print;
+  for (const Shipped which : {Shipped::kClassic, Shipped::kKinds}) print.Add(ShippedBytes(which));
+  return Cat(ShippedBytes(Shipped::kClassic).size(), " ", ShippedBytes(Shipped::kKinds).size(), " ", print.value());
 }
 
 Result<CompactNetwork> LoadShippedNetwork(Shipped which) {

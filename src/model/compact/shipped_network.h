@@ -15,7 +15,7 @@ enum class Shipped { kClassic, kKinds };
 
 bool HasShippedNetwork();
 
-// Tells the shipped networks of one program from those of another: sizes and hashes of their bytes. Empty when there
+// Tells the shipped networks of one program from those of another: sizes and a hash of their bytes. Empty when there
 // are none.
 std::string ShippedNetworkIdentity();
 

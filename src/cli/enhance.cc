@@ -150,6 +150,7 @@ nlohmann::json ToJson(const std::string& input, const fs::path& output, const En
   if (!r.pixel_size_source.empty()) {
     json["upscale"] = r.upscale;
     json["filter_strength"] = r.filter_strength;
+    if (r.looks) json["looks"] = NameOf(*r.looks);
     json["pixel_size"] = {{"value", r.pixel_size}, {"source", r.pixel_size_source}};
     if (r.pixel_size_source == kUnknownPixelSize) json["pixel_size"]["value"] = nullptr;
     if (r.finding) {

@@ -16,7 +16,9 @@
 #include "core/file_system.h"
 #include "core/statistics.h"
 #include "core/text.h"
+#include "enhance/enhanced_mark.h"
 #include "enhance/pixel_size_guard.h"
+#include "enhance/trained_kind.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "io/input_file.h"
@@ -37,6 +39,7 @@ struct Findings {
   GaussianCloud cloud;
   CloudStatistics statistics;
   Result<PixelSizeFinding> pixel_size = Error{};
+  TrainedKind looks = TrainedKind::kClassic;
   std::vector<std::string> problems;  // sentences
 };
 
@@ -67,6 +70,19 @@ std::string_view ModeName(const GaussianCloud& cloud) {
   return cloud.render_mode ? NameOf(*cloud.render_mode) : "not said (classic is assumed)";
 }
 
+std::string_view InWords(TrainedKind kind) {
+  switch (kind) {
+    case TrainedKind::kAntialiased:
+      return "like an antialiased one: it has lost a little width, and enhance treats it as one";
+    case TrainedKind::kWidened:
+      return "like one of Mip-Splatting, or enhanced already: it has lost no width, and enhance leaves it alone";
+    case TrainedKind::kUnclear:
+      return "neither like a classic nor an antialiased one, or changed since: enhance gives back only a little width";
+    default:
+      return "like a classic one: enhance gives back the width that its fit has lost";
+  }
+}
+
 std::string Number(double value) {
   if (std::isnan(value)) return "-";  // of no Gaussian at all
   char text[32];
@@ -82,6 +98,7 @@ void PrintTable(const Findings& f) {
             << "  Gaussians    " << WithThousands(s.gaussians) << ", SH degree " << s.sh_degree << "\n"
             << "  file         " << HumanBytes(f.file_bytes) << (f.format.empty() ? "" : ", " + f.format) << "\n"
             << "  render mode  " << ModeName(f.cloud) << "\n";
+  if (!f.cloud.render_mode && !IsMarkedEnhanced(f.cloud)) std::cout << "  it looks     " << InWords(f.looks) << "\n";
   for (const std::string& credit : CreditsOf(f.cloud.comments)) {
     std::cout << "  credit       " << Printable(credit, kMostCredit) << "\n";
   }
@@ -144,6 +161,7 @@ nlohmann::json ToJson(const Findings& f) {
                          {"sh_degree", s.sh_degree},
                          {"bounds", nullptr},
                          {"render_mode", nullptr},
+                         {"looks", NameOf(f.looks)},
                          {"comments", f.cloud.comments},
                          {"credits", CreditsOf(f.cloud.comments)},
                          {"largest_axis", percentiles(s.largest_axis)},
@@ -267,6 +285,8 @@ Status RunInfo(const InfoFlags& flags, const SharedFlags& shared) {
   }
   findings.statistics = ComputeStatistics(findings.cloud);
   findings.pixel_size = FindPixelSize(findings.cloud);
+  if (!findings.cloud.render_mode && !IsMarkedEnhanced(findings.cloud))
+    findings.looks = FindTrainedKind(findings.cloud);
   findings.problems = Problems(findings.statistics);
   if (shared.json) {
     PrintJson(ToJson(findings));

@@ -32,6 +32,8 @@ TEST_F(InfoVerb, OfASplat) {
   EXPECT_EQ(json["bytes"], std::filesystem::file_size(input));
   EXPECT_NEAR(json["predicted_bytes"]["PLY"].get<double>(), json["bytes"].get<double>(), 1000);  // comments
   EXPECT_EQ(json["counts"]["not_finite"], 0);
+  EXPECT_EQ(json["looks"], "classic");
+  EXPECT_THAT(table.out, Not(HasSubstr("it looks"))) << "as the file says its render mode";
   EXPECT_EQ(json["pixel_size"]["contradictions"], nlohmann::json::array());
   EXPECT_NEAR(json["pixel_size"]["used"].get<double>(), 0.0055, 0.002);
 }
@@ -77,6 +79,17 @@ TEST_F(InfoVerb, OfASplatOfNaN) {
   EXPECT_EQ(json["counts"]["not_finite"], 2);
   EXPECT_EQ(json["bounds"], nullptr);
   EXPECT_EQ(json["pixel_size"], nullptr);
+}
+
+// How a splat was trained that does not say so.
+TEST_F(InfoVerb, OfUntaggedSplats) {
+  const std::string fit = folder_ / "fit.splat", filtered = folder_ / "filtered.splat";
+  ExpectDone({"convert", Biplane() / "input.ply", fit});  // has no place for tags
+  EXPECT_THAT(ExpectDone({"info", fit}).out, HasSubstr("it looks     like a classic one"));
+  ExpectDone({"enhance", fit, "-o", filtered, "--method", "filter", "--pixel-size", "0.0055"});
+  EXPECT_THAT(ExpectDone({"info", filtered}).out, HasSubstr("it looks     like one of Mip-Splatting, or enhanced"));
+  EXPECT_THAT(ExpectDone({"enhance", filtered, "-o", folder_ / "again.ply"}).err, HasSubstr("it stays as it is"));
+  EXPECT_EQ(ExpectJson({"info", filtered})["looks"], "widened");
 }
 
 // What is understood of the tags, and what --mode says instead.

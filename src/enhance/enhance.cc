@@ -191,8 +191,35 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
   return {};
 }
 
+// Splats of which neither file nor caller says how they were trained are looked at. An antialiased one becomes one.
+void RecogniseKind(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport& report) {
+  if (options.filter_strength || cloud.render_mode || IsMarkedEnhanced(cloud) || IsFittedToPixelAreas(cloud)) return;
+  report.looks = FindTrainedKind(cloud);
+  if (options.upscale == 1) return;  // there is nothing to do in any case
+  switch (*report.looks) {
+    case TrainedKind::kAntialiased:
+      cloud.render_mode = RenderMode::kAntialiased;
+      LogWarning(
+          "the splat does not say how it was trained; its thinnest Gaussians are like those of an antialiased "
+          "training, and it is enhanced and tagged as an antialiased splat (--mode classic if it is none)");
+      break;
+    case TrainedKind::kWidened:
+      LogWarning(
+          "even the thinnest Gaussians of the splat have a width, as Mip-Splatting and enhancing give them: it has "
+          "lost none, and it stays as it is (--mode classic if it was trained without such a width)");
+      break;
+    case TrainedKind::kUnclear:
+      LogWarning(
+          "it is unclear how the splat was trained, as its thinnest Gaussians are neither like those of classic nor "
+          "of antialiased ones: only a little width is given back (--mode classic or antialiased will do better)");
+      break;
+    case TrainedKind::kClassic:
+      break;
+  }
+}
+
 // Of the filter. Splats that absorbed nothing have nothing to get back.
-double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud) {
+double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud, std::optional<TrainedKind> looks) {
   if (options.filter_strength) return *options.filter_strength;
   if (IsFittedToPixelAreas(cloud)) {
     LogWarning(
@@ -206,16 +233,13 @@ double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud)
         "more (--filter-strength F to enhance it all the same)");
     return 0;
   }
+  if (looks == TrainedKind::kWidened) return 0;
+  // Too little harms none of them.
+  if (looks == TrainedKind::kUnclear) return DefaultFilterStrength(options.upscale, RenderMode::kAntialiased);
   const double strength = DefaultFilterStrength(options.upscale, cloud.render_mode);
-  if (IsCompensated(cloud.render_mode)) {
-    if (strength > ShownStrength(options.upscale, cloud.render_mode)) {
-      LogInfo(Cat("the splat is ", NameOf(*cloud.render_mode), ": its fit lost less width, and less is given back (",
-                  Fixed(strength, 2), " of what a classic one could have lost)"));
-    } else if (options.upscale > 1) {
-      LogWarning(Cat("the splat is ", NameOf(*cloud.render_mode),
-                     ": its fit has lost no width, and it stays as it is (--filter-strength F to enhance it all the "
-                     "same)"));
-    }
+  if (IsCompensated(cloud.render_mode) && options.upscale > 1) {
+    LogInfo(Cat("the splat is ", NameOf(*cloud.render_mode), ": its fit lost less width, and less is given back (",
+                Fixed(strength, 2), " of what a classic one could have lost)"));
   }
   return strength;
 }
@@ -289,7 +313,8 @@ bool GivesWidth(double strength, double upscale, std::optional<RenderMode> mode)
 
 // The filter's strength and the pixel sizes, for methods that work with them.
 Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
-  input.filter_strength = ChooseStrength(options, input.cloud);
+  RecogniseKind(options, input.cloud, report);
+  input.filter_strength = ChooseStrength(options, input.cloud, report.looks);
   report.filter_strength = input.filter_strength;
   const bool gives_width = GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode);
   if (options.filter_strength && *options.filter_strength > 0 && !gives_width && options.upscale > 1) {
@@ -302,15 +327,13 @@ Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, Enhan
   return {};
 }
 
-// Networks measure Gaussians in pixels: where the pixel is not known and nobody asked for one, the filter takes its
-// place.
-void LeaveNetworksOut(MethodPlan& plan) {
+// Networks measure Gaussians in pixels and have learned what splats of a kind have lost: where one of them is not known
+// and nobody asked for a network, the filter takes its place.
+void LeaveNetworksOut(MethodPlan& plan, const char* why) {
   const bool begins_with_network = plan.start != nullptr && plan.start->adds_detail;
   if (plan.chosen_by.empty() || !(plan.method->adds_detail || begins_with_network)) return;
   const std::string network = begins_with_network ? plan.start->name : plan.method->name;
-  LogInfo(Cat("the filter instead of '", network,
-              "', which measures Gaussians in pixels and goes wrong where the pixel is not known (--method ", network,
-              " takes it all the same)"));
+  LogInfo(Cat("the filter instead of '", network, "', which ", why, " (--method ", network, " takes it all the same)"));
   if (plan.method->adds_detail) {
     plan.method = &*std::ranges::find(EnhanceMethods(), std::string("filter"), &EnhanceMethod::name);
   }
@@ -349,9 +372,12 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   } else if (IsMarkedEnhanced(input.cloud)) {
     LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
   }
-  if (report.pixel_size_source == kCautiousPixelSize &&
-      GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode)) {
-    LeaveNetworksOut(plan);
+  if (GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode)) {
+    if (report.pixel_size_source == kCautiousPixelSize) {
+      LeaveNetworksOut(plan, "measures Gaussians in pixels and goes wrong where the pixel is not known");
+    } else if (report.looks == TrainedKind::kUnclear) {
+      LeaveNetworksOut(plan, "has learned what splats of known kinds have lost");
+    }
   }
   report.method = plan.Name();
 

@@ -16,6 +16,7 @@
 #include "enhance/pixel_size.h"
 #include "enhance/pixel_size_guard.h"
 #include "enhance/refine_options.h"
+#include "enhance/trained_kind.h"
 
 namespace anchorsplat {
 
@@ -75,6 +76,7 @@ struct EnhanceReport {
   // kUnknownPixelSize; empty for methods that need none.
   std::string pixel_size_source;
   std::optional<PixelSizeFinding> finding;  // where it was to be estimated
+  std::optional<TrainedKind> looks;         // where neither file nor caller said how the splat was trained
   std::string camera_rule;                  // "smallest" or "median" where it came from cameras
   std::optional<int> train_width;           // pixels, given or assumed; nothing when the cameras' own size was taken
   std::vector<StepReport> steps;            // in their order; none where the splat was left alone

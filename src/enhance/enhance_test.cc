@@ -69,7 +69,8 @@ GaussianCloud Ball(double pixel, int64_t n = 6000) {
     cloud.quats[4 * i + 2] = static_cast<float>(x * s);
     cloud.quats[4 * i + 3] = 0;
     const double width = 0.9 * spacing * (1 + 0.2 * random.Normal());
-    const double eroded = std::sqrt(std::max(0.01 * width * width, width * width - 0.3 * pixel * pixel));
+    double eroded = std::sqrt(std::max(0.01 * width * width, width * width - 0.3 * pixel * pixel));
+    if (i % 16 == 0) eroded *= random.Uniform(0.01, 1);  // fits shrink some to nothing
     cloud.log_scales[3 * i] = cloud.log_scales[3 * i + 1] = static_cast<float>(std::log(eroded));
     cloud.log_scales[3 * i + 2] = -9;
     cloud.opacity_logits[i] = 3;
@@ -142,7 +143,7 @@ TEST_F(EnhanceDoor, KeepsWhatIsOpaqueOrFlat) {
   EXPECT_NEAR(std::log2(flat->size / estimate->size), 0, 1);
 }
 
-// Their fits have lost less width, and get less back; those of Mip-Splatting none.
+// Their fits have lost less width, and get less back; those of Mip-Splatting next to nothing.
 TEST_F(EnhanceDoor, GivesAntialiasedSplatsLess) {
   for (const RenderMode mode : {RenderMode::kAntialiased, RenderMode::kMip}) {
     GaussianCloud ball = Ball(0.01);
@@ -159,8 +160,8 @@ TEST_F(EnhanceDoor, GivesAntialiasedSplatsLess) {
     EXPECT_TRUE(log_->Says(Cat("the splat is ", NameOf(mode)))) << log_->text();
     ASSERT_TRUE(ApplyFilter(ball, std::vector<float>{0.01f}, {.strength = strength}).ok());
     EXPECT_EQ(enhanced->cloud.log_scales, ball.log_scales);
-    EXPECT_EQ(ball.log_scales == before.log_scales, mode == RenderMode::kMip);
-    EXPECT_EQ(log_->Says("stays as it is"), mode == RenderMode::kMip) << log_->text();
+    const auto variance = [](const GaussianCloud& cloud) { return std::exp(2 * double{cloud.log_scales[0]}); };
+    EXPECT_NEAR((variance(ball) - variance(before)) / (0.01 * 0.01), mode == RenderMode::kMip ? 0.0028 : 0.0169, 1e-4);
     // Seen no closer nothing changes, and what has been enhanced is left alone.
     options.upscale = 1;
     EXPECT_EQ(Enhance(ball, options)->cloud.log_scales, ball.log_scales);

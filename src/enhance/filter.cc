@@ -12,9 +12,9 @@ namespace anchorsplat {
 
 namespace {
 constexpr int64_t kRowsPerTask = 16384;
-// f at an upscale without end. Of antialiased fits 0.15 at u = 4 is what harms none of those measured; those of
-// Mip-Splatting have their 3-D filter's width.
-constexpr double kClassicShare = 1 - 1 / 3.6, kAntialiasedShare = 0.0875 / 0.9375, kMipShare = 0;
+// f at an upscale without end. Antialiased fits get 0.12 at u = 4 (docs/results/antialiased.md). Those of Mip-Splatting
+// have their 3-D filter's width; what they get is next to nothing, and for networks to work with.
+constexpr double kClassicShare = 1 - 1 / 3.6, kAntialiasedShare = 0.06, kMipShare = 0.01;
 
 }  // namespace
 

@@ -7,23 +7,17 @@
 #include <numbers>
 #include <utility>
 
-#include "core/activations.h"
-#include "core/framing.h"
 #include "core/parallel.h"
-#include "core/spherical_harmonics.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/pixel_size_features.h"
+#include "enhance/showing_gaussians.h"
 
 namespace anchorsplat {
 
 namespace {
 
-constexpr float kGuardVisibleOpacity = 0.1f;
-constexpr float kBlack = 0.04f;         // brightest channel of the constant colour; ten steps of 255
-constexpr double kFewBlack = 0.01;      // share of the Gaussians below which black ones cannot move an outline
-constexpr double kGuardFarthest = 1.5;  // of the radius that frames the cloud, as the estimate looks
-constexpr size_t kGuardMostGaussians = 200'000;
+constexpr double kFewBlack = 0.01;  // share of the Gaussians below which black ones cannot move an outline
 
 constexpr int64_t kNeighbours = 8;
 constexpr int64_t kGuardSamples = 256;  // of the spacing; its median is good to a few percent
@@ -41,48 +35,6 @@ constexpr double kMoved = 1.5;
 // The filter's variance at the usual four times closer is 0.2 pixels²: with a pixel of this many widths it lengthens
 // the middle axis of three in four Gaussians by less than a twentieth.
 constexpr double kHarmless = 0.7;
-
-struct Showing {
-  std::vector<int64_t> rows;
-  std::vector<int64_t> not_black;  // of the whole cloud, visible or not
-};
-
-bool IsBlack(const GaussianCloud& cloud, int64_t i) {
-  const float* sh = cloud.sh.data() + i * cloud.sh_stride();
-  return 0.5f + kSh0 * std::max({sh[0], sh[1], sh[2]}) < kBlack;
-}
-
-double SquaredDistance(const float* a, const float* b) {
-  double sum = 0;
-  for (size_t k = 0; k < 3; ++k) sum += (double{a[k]} - double{b[k]}) * (double{a[k]} - double{b[k]});
-  return sum;
-}
-
-Showing ShowingGaussians(const GaussianCloud& cloud) {
-  const Framing framing = FrameCloud(cloud);
-  const std::array<float, 3> middle = {static_cast<float>(framing.target[0]), static_cast<float>(framing.target[1]),
-                                       static_cast<float>(framing.target[2])};
-  Showing showing;
-  std::vector<std::pair<double, int64_t>> bright, all;  // distance², row
-  for (int64_t i = 0; i < cloud.size(); ++i) {
-    if (!IsUsable(cloud, i)) continue;
-    const bool black = IsBlack(cloud, i);
-    if (!black) showing.not_black.push_back(i);
-    const float opacity = Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]);
-    const double distance = SquaredDistance(cloud.means.data() + 3 * i, middle.data());
-    if (opacity < kGuardVisibleOpacity || std::sqrt(distance) > kGuardFarthest * framing.radius) continue;
-    all.emplace_back(distance, i);
-    if (!black) bright.emplace_back(distance, i);
-  }
-  auto& chosen = static_cast<int64_t>(bright.size()) >= kLeastGaussians ? bright : all;
-  if (chosen.size() > kGuardMostGaussians) {
-    std::nth_element(chosen.begin(), chosen.begin() + static_cast<std::ptrdiff_t>(kGuardMostGaussians), chosen.end());
-    chosen.resize(kGuardMostGaussians);
-  }
-  for (const auto& item : chosen) showing.rows.push_back(item.second);
-  std::sort(showing.rows.begin(), showing.rows.end());
-  return showing;
-}
 
 // Side of the square that one Gaussian has for itself, where they lie on surfaces: kNeighbours others lie within π r².
 double Spacing(const GaussianCloud& cloud, const std::vector<int64_t>& rows) {
@@ -121,18 +73,18 @@ double MostGaussiansPerPixel(int64_t gaussians) {
 }
 
 Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud) {
-  const Showing showing = ShowingGaussians(cloud);
+  const ShowingGaussians showing = FindShowingGaussians(cloud);
   PixelSizeEvidence evidence;
-  evidence.gaussians = static_cast<int64_t>(showing.rows.size());
+  evidence.gaussians = static_cast<int64_t>(showing.bright.size());
   if (evidence.gaussians < kLeastGaussians) {
     return Error{ErrorCode::kBadArgument,
                  Cat("fewer than ", kLeastGaussians, " visible Gaussians to estimate a pixel size from")};
   }
-  evidence.spacing = Spacing(cloud, showing.rows);
+  evidence.spacing = Spacing(cloud, showing.bright);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeProbe probe, PixelSizeProbe::Make(cloud));
   evidence.small_axis = probe.start();
   Buffer<float> middle;
-  for (const int64_t i : showing.rows) {
+  for (const int64_t i : showing.bright) {
     std::array<float, 3> axes;
     for (size_t a = 0; a < 3; ++a) axes[a] = std::exp(cloud.log_scales[static_cast<size_t>(3 * i) + a]);
     std::sort(axes.begin(), axes.end());

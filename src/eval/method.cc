@@ -35,7 +35,7 @@ using Clock = std::chrono::steady_clock;
 
 double SecondsSince(Clock::time_point begin) { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
-// As `enhance` has it.
+// As `enhance` has it for splats that say how they were trained.
 double DefaultStrength(const BenchmarkObject& object) {
   return HasLostNoWidth(object.low) ? 0 : DefaultFilterStrength(object.upscale(), object.low.render_mode);
 }
@@ -58,25 +58,6 @@ EvalMethod Filter(const std::string& name, std::optional<double> strength) {
             MethodViews views = SplatViews(task.object, std::move(cloud));
             views.seconds = seconds;
             views.facts = {{"f", f}, {"pixel_size", static_cast<double>(sizes.median)}};
-            return views;
-          }};
-}
-
-EvalMethod FilterAuto() {
-  return {"filter-auto", "contradicted estimates are not acted on", [](const MethodTask& task) -> Result<MethodViews> {
-            const auto begin = Clock::now();
-            ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeFinding found, FindPixelSize(task.object.low));
-            GaussianCloud cloud = task.object.low;
-            const float size = static_cast<float>(found.size);
-            const auto grown = ApplyFilter(
-                cloud, {&size, 1}, {.upscale = task.object.upscale(), .strength = DefaultStrength(task.object)});
-            if (!grown.ok()) return grown.error();
-            const double seconds = SecondsSince(begin);
-            ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraPixelSizes truth, TruePixelSizes(task.object));
-            MethodViews views = SplatViews(task.object, std::move(cloud));
-            views.seconds = seconds;
-            views.facts = {{"pixel_size", found.size},
-                           {"pixel_size_ratio", found.size / static_cast<double>(truth.median)}};
             return views;
           }};
 }
@@ -315,10 +296,17 @@ Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word)
 // Of all threads, seconds.
 double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
+bool ChosenByItself(const std::string& name) {
+  const auto plan = PlanEnhancement({});
+  return plan.ok() && plan->Name() == name;
+}
+
 EvalMethod Registered(const RegisteredMethod& method) {
   return {method.word, method.Settings(), [method](const MethodTask& task) -> Result<MethodViews> {
             EnhanceOptions options;
             options.method = method.name;
+            // As for a user who has nothing else: where the program takes this method by itself, it may also leave it.
+            if (method.auto_pixel_size && ChosenByItself(method.name)) options.method = "auto";
             options.upscale = task.object.upscale();
             if (!method.auto_pixel_size) options.cameras = TrainingCameras(task.object);
             options.refine = method.refine;
@@ -384,7 +372,6 @@ MethodViews SplatViews(const BenchmarkObject& object, GaussianCloud cloud) {
 Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& options) {
   if (word == "raw") return Raw();
   if (word == "filter") return Filter(word, options.filter_strength);
-  if (word == "filter-auto") return FilterAuto();
   if (word == "filter-best") return FilterBest();
   if (word == "upsample") return Upsample();
   if (word == "bicubic") return Bicubic(options.fit_steps);

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "core/gaussian_cloud.h"
+
+namespace anchorsplat {
+
+// How a splat that does not say so was trained, by how thin its thinnest Gaussians are.
+//
+// A classic rasterizer draws a Gaussian of any size as wide as a pixel, so fits let some shrink to nothing: sizes have
+// a long tail. An antialiased one makes a Gaussian that is thinner than a pixel along two axes fainter, by the product
+// of both, until it is gone: middle axes end somewhat below the pixel. And where a width has been added to all axes, by
+// Mip-Splatting's 3-D filter or by enhancing, the smallest axes end at that width.
+enum class TrainedKind {
+  kClassic,
+  kAntialiased,
+  kWidened,  // Mip-Splatting, or enhanced: has all its width
+  kUnclear,  // between these: like a splat that a network has enhanced, or that another program has changed
+};
+
+// The words of `info` and of reports.
+std::string_view NameOf(TrainedKind kind);
+
+// How long the tail of an axis is: the mean of ln(q / x) over the Gaussians whose axis x is below the quantile q; the
+// geometric mean of that of the 2 % and that of the 5 % quantile. 0: they all end there. Does not depend on the unit.
+struct SizeTails {
+  int64_t gaussians = 0;  // that show (ShowingGaussians::all) and have three positive axes
+  double middle = 0;      // of the middle axis
+  double smallest = 0;    // of the smallest one
+  double roundness = 0;   // the 5 % quantile of the smallest axis over that of the middle one
+};
+SizeTails FindSizeTails(const GaussianCloud& cloud);
+
+// Too few Gaussians to tell count as classic. Looks at sizes only, not at what the cloud says of itself.
+TrainedKind Judge(const SizeTails& tails);
+TrainedKind FindTrainedKind(const GaussianCloud& cloud);
+
+}  // namespace anchorsplat

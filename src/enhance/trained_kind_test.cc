@@ -1,0 +1,180 @@
+#include "enhance/trained_kind.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "core/random.h"
+#include "core/source_dir_for_test.h"
+#include "enhance/enhance.h"
+#include "enhance/filter.h"
+#include "formats/cloud_io.h"
+
+namespace anchorsplat {
+namespace {
+
+constexpr double kPixel = 0.0055;  // of both examples, nearly
+
+GaussianCloud Example(const char* object) {
+  auto cloud = ReadCloud(SourceDirForTest() / "examples" / object / "input.ply");
+  EXPECT_TRUE(cloud.ok());
+  return cloud.ok() ? *std::move(cloud) : GaussianCloud{};
+}
+
+GaussianCloud Grey(int64_t n) {
+  GaussianCloud cloud;
+  cloud.Resize(n, 0);
+  std::ranges::fill(cloud.sh, 0.0f);
+  std::ranges::fill(cloud.means, 0.0f);
+  std::ranges::fill(cloud.quats, 0.5f);
+  std::ranges::fill(cloud.opacity_logits, 1.0f);
+  return cloud;
+}
+
+// Gaussians of axes whose logarithms are normal, those that are thinner than `least` along the two smaller axes taken
+// out, as an antialiased rasterizer makes them invisible, and `widened` by that much along all axes.
+GaussianCloud Made(double least, double widened, int64_t n = 8000, uint64_t seed = 3) {
+  GaussianCloud cloud = Grey(n);
+  Random random(seed);
+  for (size_t i = 0; i < static_cast<size_t>(n); ++i) {
+    std::array<double, 3> axes;
+    do {
+      for (double& axis : axes) axis = std::exp(2 * std::min(0.0, random.Normal()));
+      std::sort(axes.begin(), axes.end());
+    } while (axes[1] < least * random.Uniform(0.9, 1.1));
+    for (size_t a = 0; a < 3; ++a) {
+      cloud.means[3 * i + a] = static_cast<float>(random.Normal());
+      cloud.log_scales[3 * i + a] = static_cast<float>(std::log(std::hypot(axes[a], widened)) - 5);
+    }
+  }
+  return cloud;
+}
+
+TEST(TrainedKind, TailsAreTheMeanDistanceToTheirQuantiles) {
+  // ln of the smallest axis is −0.01 k, of the middle one −0.005 k, k = 0 … 999.
+  GaussianCloud cloud = Grey(1000);
+  for (size_t k = 0; k < 1000; ++k) {
+    const auto x = static_cast<float>(k);
+    cloud.means[3 * k] = 1e-3f * x;
+    cloud.log_scales[3 * k] = 1;
+    cloud.log_scales[3 * k + 1] = -0.005f * x;
+    cloud.log_scales[3 * k + 2] = -0.01f * x;
+  }
+  const SizeTails tails = FindSizeTails(cloud);
+  EXPECT_EQ(tails.gaussians, 1000);
+  // Quantiles lie at 19.98 and 49.95 steps from the smallest; below them are 20 and 50, 9.5 and 24.5 away in the mean.
+  const double steps = std::sqrt((19.98 - 9.5) * (49.95 - 24.5));
+  EXPECT_NEAR(tails.middle, 0.005 * steps, 1e-5);
+  EXPECT_NEAR(tails.smallest, 0.01 * steps, 1e-5);
+  EXPECT_NEAR(tails.roundness, std::exp((0.005 - 0.01) * 949), 1e-3);
+}
+
+TEST(TrainedKind, ExamplesAreClassic) {
+  for (const char* object : {"biplane", "stone_lantern", "tankard"}) {
+    EXPECT_EQ(FindTrainedKind(Example(object)), TrainedKind::kClassic) << object;
+  }
+}
+
+TEST(TrainedKind, WhatIsThinnerThanAPixelIsMissingInAntialiasedFits) {
+  EXPECT_EQ(FindTrainedKind(Made(0, 0)), TrainedKind::kClassic) << FindSizeTails(Made(0, 0)).middle;
+  EXPECT_EQ(FindTrainedKind(Made(0.3, 0)), TrainedKind::kAntialiased) << FindSizeTails(Made(0.3, 0)).middle;
+  EXPECT_EQ(FindTrainedKind(Made(0, 0.3)), TrainedKind::kWidened) << FindSizeTails(Made(0, 0.3)).smallest;
+}
+
+// Units, positions and order say nothing.
+TEST(TrainedKind, DoesNotDependOnTheUnit) {
+  GaussianCloud cloud = Made(0.3, 0);
+  const SizeTails one = FindSizeTails(cloud);
+  for (float& x : cloud.means) x *= 1000;
+  for (float& s : cloud.log_scales) s += std::log(1000.0f);
+  const SizeTails other = FindSizeTails(cloud);
+  EXPECT_NEAR(one.middle, other.middle, 1e-4);
+  EXPECT_NEAR(one.smallest, other.smallest, 1e-4);
+  EXPECT_EQ(one.gaussians, other.gaussians);
+}
+
+TEST(TrainedKind, WhatHasBeenFilteredHasItsWidth) {
+  GaussianCloud cloud = Example("biplane");
+  ASSERT_TRUE(ApplyFilter(cloud, std::vector<float>{static_cast<float>(kPixel)}, {}).ok());
+  EXPECT_EQ(FindTrainedKind(cloud), TrainedKind::kWidened);
+}
+
+TEST(TrainedKind, FlatGaussiansAreNotWidened) {
+  for (const float flat : {-20.0f, -std::numeric_limits<float>::infinity()}) {
+    GaussianCloud cloud = Made(0, 0);
+    for (size_t i = 0; i < cloud.log_scales.size(); i += 3) {
+      *std::min_element(cloud.log_scales.begin() + static_cast<std::ptrdiff_t>(i),
+                        cloud.log_scales.begin() + static_cast<std::ptrdiff_t>(i) + 3) = flat;
+    }
+    EXPECT_EQ(FindTrainedKind(cloud), TrainedKind::kClassic) << flat;
+  }
+}
+
+TEST(TrainedKind, TooFewOrBrokenOnesAreClassic) {
+  EXPECT_EQ(FindTrainedKind({}), TrainedKind::kClassic);
+  EXPECT_EQ(FindTrainedKind(Made(0, 0.3, 100)), TrainedKind::kClassic);
+  GaussianCloud cloud = Made(0.3, 0);
+  for (size_t i = 0; i < cloud.log_scales.size(); i += 30) cloud.log_scales[i] = std::nanf("");
+  EXPECT_EQ(FindTrainedKind(cloud), TrainedKind::kAntialiased);
+  for (float& s : cloud.log_scales) s = 1;
+  EXPECT_EQ(FindTrainedKind(cloud), TrainedKind::kWidened);
+}
+
+// What `enhance` makes of it, and that whoever says a mode is believed.
+TEST(TrainedKind, EnhanceActsOnIt) {
+  EnhanceOptions options;
+  options.method = "filter";
+  options.pixel_size = 0.01;
+  const auto run = [&](GaussianCloud cloud) {
+    auto enhanced = Enhance(std::move(cloud), options);
+    EXPECT_TRUE(enhanced.ok());
+    return *std::move(enhanced);
+  };
+  const Enhanced antialiased = run(Made(0.3, 0));
+  EXPECT_EQ(antialiased.report.looks, TrainedKind::kAntialiased);
+  EXPECT_EQ(antialiased.cloud.render_mode, RenderMode::kAntialiased);
+  EXPECT_EQ(antialiased.report.filter_strength, DefaultFilterStrength(4, RenderMode::kAntialiased));
+
+  const GaussianCloud wide = Made(0, 0.3);
+  const Enhanced widened = run(wide);
+  EXPECT_EQ(widened.report.looks, TrainedKind::kWidened);
+  EXPECT_EQ(widened.cloud.log_scales, wide.log_scales);
+  EXPECT_FALSE(widened.cloud.render_mode);
+
+  const Enhanced classic = run(Made(0, 0));
+  EXPECT_EQ(classic.report.looks, TrainedKind::kClassic);
+  EXPECT_EQ(classic.report.filter_strength, DefaultFilterStrength(4));
+
+  GaussianCloud said = wide;
+  said.render_mode = RenderMode::kClassic;
+  const Enhanced believed = run(said);
+  EXPECT_FALSE(believed.report.looks);
+  EXPECT_EQ(believed.report.filter_strength, DefaultFilterStrength(4));
+  options.filter_strength = 0.5;
+  EXPECT_FALSE(run(wide).report.looks);
+}
+
+// Between the kinds next to nothing can be wrong.
+TEST(TrainedKind, UnclearOnesGetLittle) {
+  SizeTails tails{.gaussians = 5000, .middle = 0.39, .smallest = 0.8, .roundness = 0.2};
+  EXPECT_EQ(Judge(tails), TrainedKind::kUnclear);
+  tails = {.gaussians = 5000, .middle = 0.6, .smallest = 0.2, .roundness = 0.5};
+  EXPECT_EQ(Judge(tails), TrainedKind::kUnclear);
+  tails.roundness = 0.1;
+  EXPECT_EQ(Judge(tails), TrainedKind::kClassic);
+  EnhanceOptions options;
+  options.pixel_size = 0.01;
+  const auto unclear = Enhance(Made(0, 0.04), options);
+  ASSERT_TRUE(unclear.ok());
+  EXPECT_EQ(unclear->report.looks, TrainedKind::kUnclear) << FindSizeTails(Made(0, 0.04)).smallest;
+  EXPECT_EQ(unclear->report.filter_strength, DefaultFilterStrength(4, RenderMode::kAntialiased));
+  EXPECT_FALSE(unclear->cloud.render_mode);
+}
+
+}  // namespace
+}  // namespace anchorsplat

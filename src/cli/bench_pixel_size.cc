@@ -28,7 +28,7 @@ nlohmann::json ToJson(const PixelSizeCheck& check, const std::string& kind) {
                          {"mode", NameOf(check.mode)}, {"pixel_size", check.truth},
                          {"start", check.start},       {"estimate", check.estimate.size},
                          {"low", check.estimate.low},  {"high", check.estimate.high},
-                         {"seconds", check.seconds}};
+                         {"seconds", check.seconds},   {"unlike_standard", check.estimate.unlike_standard}};
   for (const PixelSizeCheck::Sample& sample : check.samples) {
     json["samples"].push_back({{"size", sample.size}, {"features", sample.features}});
   }

@@ -99,6 +99,7 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
     LogInfo(Cat("--camera-rule ", report.camera_rule, ": ", from_cameras.why));
   }
   const auto found = FindPixelSize(input.cloud);
+  if (found.ok()) input.unlike_standard = found->estimate.unlike_standard;
   if (found.ok() && !found->contradicted()) {
     const double ratio = found->size / from_cameras.median, most = found->largest / from_cameras.median;
     if (!options.filter_strength && !input.cloud.render_mode && most < kSharperThanClassic) {
@@ -183,6 +184,7 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
       return {};
     }
     report.finding = *found;
+    input.unlike_standard = found->estimate.unlike_standard;
     report.pixel_size = found->size;
     report.pixel_size_source = found->contradicted() ? kCautiousPixelSize : "estimated";
     if (says) SayWhatWasFound(*found);

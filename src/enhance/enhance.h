@@ -87,8 +87,9 @@ struct EnhanceReport {
 // The cloud as methods get it: rows that are not finite are gone; p_LR is known to those that need it.
 struct EnhanceInput {
   GaussianCloud cloud;
-  Buffer<float> pixel_sizes;  // one for all, or one per Gaussian
-  double pixel_size = 0;      // their median
+  Buffer<float> pixel_sizes;   // one for all, or one per Gaussian
+  double pixel_size = 0;       // their median
+  double unlike_standard = 0;  // PixelSizeEstimate::unlike_standard; 0 where nothing was estimated
   double filter_strength = 0;
   GaussianCloud start;            // what the method before it made, of "A+B"; else empty
   bool start_has_detail = false;  // EnhanceMethod::adds_detail of that method

@@ -122,7 +122,7 @@ Result<PixelSizeEstimate> EstimatePixelSize(const GaussianCloud& cloud) {
   double size = std::exp(settled.log_size);
   if (cloud.render_mode == RenderMode::kAntialiased) size /= kAntialiasedLook;
   const double spread = std::exp(settled.half);
-  return PixelSizeEstimate{size, size / spread, size * spread};
+  return PixelSizeEstimate{size, size / spread, size * spread, share};
 }
 
 }  // namespace anchorsplat

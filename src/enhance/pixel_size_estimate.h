@@ -14,6 +14,9 @@ struct PixelSizeEstimate {
   double size = 0;  // world units
   double low = 0;
   double high = 0;
+  // 0: outlines and sizes are like those of standard fits, from surface points by Kerbl et al.'s densification; 1: they
+  // are unlike those, as of MCMC, random points, photographs.
+  double unlike_standard = 0;
 };
 
 // Scales with the cloud. Takes up to a second, for large clouds too, as only a part of them is looked at.

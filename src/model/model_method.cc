@@ -25,6 +25,8 @@ namespace {
 
 // Shares worth a word.
 constexpr double kNotable = 0.01, kMost = 0.5;
+// From here on a classic splat is enhanced by the network for all kinds, which is better on all but standard fits.
+constexpr double kUnlikeStandard = 0.75;
 
 // Whether it is certainly of that kind; what cannot be read is for loading to tell.
 bool IsCompact(const ModelSettings& model) {
@@ -242,7 +244,8 @@ void RegisterModelMethod() {
          return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};
        },
        .run = [last](EnhanceInput input, const EnhanceOptions& options, StepReport& report) -> Result<GaussianCloud> {
-         const Shipped shipped = IsCompensated(input.cloud.render_mode) ? Shipped::kKinds : Shipped::kClassic;
+         const bool standard = !IsCompensated(input.cloud.render_mode) && input.unlike_standard < kUnlikeStandard;
+         const Shipped shipped = standard ? Shipped::kClassic : Shipped::kKinds;
          ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const AnyNetwork> network,
                                       last->Get(options.model, shipped));
          if (const auto* published = std::get_if<PublishedNetwork>(network.get())) {

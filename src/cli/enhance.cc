@@ -50,6 +50,7 @@ struct EnhanceFlags {
   std::string compat;
   std::string copies = "auto";
   std::optional<RenderMode> mode;  // in place of the files' tags
+  std::string background;          // of --clean
   bool view = false;
 };
 
@@ -139,6 +140,10 @@ nlohmann::json ToJson(const std::string& input, const fs::path& output, const En
                          {"method", r.method},
                          {"gaussians", {{"in", r.gaussians_in}, {"dropped", r.dropped}, {"out", r.gaussians_out}}},
                          {"seconds", r.seconds}};
+  if (r.cleaned) {
+    json["cleaned"] = {{"gaussians", r.cleaned->rows.size()}, {"views", r.cleaned->views}, {"psnr", nullptr}};
+    if (std::isfinite(r.cleaned->psnr)) json["cleaned"]["psnr"] = r.cleaned->psnr;
+  }
   if (!r.quality.empty()) json["quality"] = r.quality;
   for (const StepReport& step : r.steps) {
     const std::string key = json.contains(step.method) ? step.method + " again" : step.method;
@@ -292,6 +297,9 @@ Status RunEnhance(const EnhanceFlags& flags, Program& program) {
   if (!flags.cameras.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(options.cameras, ReadCameras(flags.cameras));
   }
+  if (!flags.background.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(options.background, ParseColor("--background", flags.background));
+  }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto outputs, OutputPaths(flags));
   if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(CheckPages(outputs));
@@ -430,6 +438,13 @@ void AddEnhance(CLI::App& app, Program& program) {
   AddTaskFlags(verb, *flags);
   AddPixelSizeFlags(verb, *flags);
   verb.add_flag("--view", flags->view, "Also write an HTML page beside the output that shows before and after");
+  auto* clean = verb.add_flag(
+      "--clean", flags->options.clean,
+      "First take out Gaussians of the background's colour that no training view would miss, as black dust "
+      "around objects on black; dark parts of the object may go, too");
+  verb.add_option("--background", flags->background,
+                  "R,G,B from 0 to 1, of the training views (default: what the camera file says, else black)")
+      ->needs(clean);
   AddModelFlags(verb, *flags);
   AddRefineFlags(verb, flags->options.refine, flags->options.control);
   verb.callback([flags, &verb, &program] {

@@ -134,6 +134,43 @@ Status PixelSizesFromPictures(const EnhanceOptions& options, EnhanceInput& input
   return {};
 }
 
+// EnhanceOptions::clean.
+Status Clean(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport& report) {
+  CameraSet set;
+  if (options.cameras) {
+    set = *options.cameras;
+  } else if (!options.refine.images.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.refine.images, {.hold_out = 0}));
+    set.cameras = std::move(project.train);
+    set.background = project.background;
+  }
+  UnseenOptions unseen{.seed = options.seed};
+  unseen.background = options.background.value_or(set.background.value_or(unseen.background));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(report.cleaned, FindUnseen(cloud, set.cameras, unseen));
+  const UnseenGaussians& found = *report.cleaned;
+  const auto count = static_cast<int64_t>(found.rows.size());
+  LogInfo(Cat("cleaned: ", WithThousands(count), " of ", WithThousands(cloud.size()),
+              " Gaussians taken out, which have the background's colour and are missed in none of ", found.views,
+              " views over it"));
+  if (count == 0) return {};
+  if (count == cloud.size()) {
+    return Error{
+        ErrorCode::kBadArgument,
+        "--clean would take out every Gaussian: is the background another one than in training (--background)?"};
+  }
+  std::vector<int64_t> kept;
+  auto gone = found.rows.begin();
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    if (gone != found.rows.end() && *gone == i) {
+      ++gone;
+    } else {
+      kept.push_back(i);
+    }
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(cloud, Subset(cloud, kept));
+  return {};
+}
+
 void SayWhatWasFound(const PixelSizeFinding& found) {
   const PixelSizeEstimate& estimate = found.estimate;
   if (found.contradicted()) {
@@ -367,6 +404,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   input.cloud = std::move(cloud);
   ANCHORSPLAT_RETURN_IF_ERROR(DropUnusable(input.cloud));
   report.dropped = report.gaussians_in - input.cloud.size();
+  if (options.clean) ANCHORSPLAT_RETURN_IF_ERROR(Clean(options, input.cloud, report));
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SizedMethods sized, FindSizedMethods(plan, options));
   if (sized.any) {

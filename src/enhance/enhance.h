@@ -17,6 +17,7 @@
 #include "enhance/pixel_size_guard.h"
 #include "enhance/refine_options.h"
 #include "enhance/trained_kind.h"
+#include "enhance/unseen_gaussians.h"
 
 namespace anchorsplat {
 
@@ -41,6 +42,10 @@ struct EnhanceOptions {
   RefineOptions refine;
   RefineControl control;  // of methods that take long
   ModelSettings model;    // of networks
+  // Before all else: Gaussians that nobody misses over the training background are taken out. Of the views of `cameras`
+  // or of the pictures to refine against, else of views all around.
+  bool clean = false;
+  std::optional<std::array<float, 3>> background;  // for `clean`; what the cameras say otherwise, else black
   uint64_t seed = 0;
 };
 
@@ -67,7 +72,8 @@ struct EnhanceReport {
   std::string method;
   std::string quality;  // as it was asked for
   int64_t gaussians_in = 0;
-  int64_t dropped = 0;  // rows with values that are not finite, and what the steps dropped
+  int64_t dropped = 0;                     // rows with values that are not finite, and what the steps dropped
+  std::optional<UnseenGaussians> cleaned;  // of those that are not dropped
   int64_t gaussians_out = 0;
   double upscale = 1;
   double filter_strength = 0;

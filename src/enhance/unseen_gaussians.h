@@ -1,0 +1,38 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "core/camera.h"
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+
+namespace anchorsplat {
+
+// Gaussians that nobody misses over the background that a splat was trained on: black dust and veils around objects on
+// black, which come to light on any other background. They have the background's colour, within kLikeBackground of it
+// in every channel of the constant term, and renders of the training views without them agree with those with them.
+//
+// Of dark parts of an object on black the pictures say as little: they go, too, where nothing bright is behind them.
+struct UnseenOptions {
+  std::array<float, 3> background{};  // rgb 0–1, of the training views
+  double least_psnr = 50;             // dB of all views together, between the renders with and without them
+  uint64_t seed = 0;
+};
+inline constexpr float kLikeBackground = 0.1f;
+
+struct UnseenGaussians {
+  std::vector<int64_t> rows;  // ascending
+  double psnr = 0;            // of all views together, without them against with them; +Inf where no pixel changes
+  int64_t views = 0;          // that were looked at: at most 48, of at most 512 pixels a side
+};
+
+// Of `cameras`, or of views all around where there are none. What a Gaussian adds to a picture, T·α·(its colour − what
+// is behind it) summed in squares over the pixels, comes of one gradient per view with random signs: its expectation is
+// that sum. Those that add least are taken out, as many as least_psnr allows, found by bisection.
+// Errors: those of Rasterizer; kBadArgument: least_psnr is not positive.
+Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector<Camera>& cameras,
+                                   const UnseenOptions& options);
+
+}  // namespace anchorsplat

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """What `enhance --clean` does to outlines: splats of a data set on black, seen over black, grey and white.
 
-    scripts/measure-clean.py DATASET OBJECTS WORK [--program build/anchorsplat] [--views 12] [--method filter]
+    scripts/measure-clean.py DATASET WORK [--program build/anchorsplat] [--views 12] [--method filter]
 
-Every fit of DATASET (of `dataset build`, on black) is enhanced with its cameras, with --clean and without. OBJECTS has the
-meshes; WORK keeps views and splats. Printed: IoU of the outline (alpha of one half) with the mesh's true one, PSNR over
-the three backgrounds, and how many Gaussians went. Needs numpy and Pillow.
+Every fit of DATASET (of `dataset build`, on black) is enhanced with its cameras, with --clean and without. Its meshes
+must still be where they were; WORK keeps views and splats. Printed: IoU of the outline (alpha of one half) with the
+mesh's true one, PSNR over the three backgrounds, and how many Gaussians went. Needs numpy and Pillow.
 """
 
 import argparse
@@ -20,7 +20,7 @@ BACKGROUNDS = {"black": 0.0, "grey": 0.5, "white": 1.0}
 
 
 def run(*command):
-    return subprocess.run([str(c) for c in command], check=True, capture_output=True, text=True).stdout
+    return subprocess.run([str(c) for c in command], check=True, stdout=subprocess.PIPE, text=True).stdout
 
 
 def pictures(folder):
@@ -45,7 +45,6 @@ def score(views, truth):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("dataset", type=pathlib.Path)
-    parser.add_argument("objects")
     parser.add_argument("work", type=pathlib.Path)
     parser.add_argument("--program", default="build/anchorsplat")
     parser.add_argument("--views", default="12")
@@ -62,16 +61,16 @@ def main():
             run(arguments.program, "views", record["source"], "-o", mesh, "--views", arguments.views, "--size", 256,
                 "--low-size", 64, "-w")
         truth, cameras = pictures(mesh / "256/images"), mesh / "transforms_256.json"
-        lows = list(fit.glob(f"transforms_{record['low_size']}.json"))
-        scores, told = [], {}
+        low = fit / f"transforms_{record['low_size']}.json"
+        scores = []
         for clean in ([], ["--clean"]):
             out = work / ("cleaned.ply" if clean else "as-it-is.ply")
             out.parent.mkdir(parents=True, exist_ok=True)
-            told = json.loads(run(arguments.program, "enhance", fit / "splat.ply", "-o", out, "--cameras", lows[0],
-                                  "--method", arguments.method, "--json", "-w", *clean))
+            told = json.loads(run(arguments.program, "enhance", fit / "splat.ply", "-o", out, "--cameras", low,
+                                  "--method", arguments.method, "--json", "-q", "-w", *clean))
             run(arguments.program, "render", out, "-o", out.with_suffix(""), "--cameras", cameras, "--transparent", "-w")
             scores.append(score(pictures(out.with_suffix("")), truth))
-        gone = told[0]["cleaned"] if isinstance(told, list) else told["cleaned"]
+        gone = told[0]["cleaned"]
         share = 100 * gone["gaussians"] / record["gaussians"]
         print(f"{record['name']}, {record['recipe']}, {share:.1f} %, " + ", ".join(
             f"{a[k]:.3f}, {b[k]:.3f}" if k == "IoU" else f"{a[k]:.2f}, {b[k]:.2f}" for a, b in [scores] for k in a), flush=True)

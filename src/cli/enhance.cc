@@ -233,7 +233,7 @@ Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& 
   ExtraProperties extras;
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read({}, &extras));
   if (flags.mode) cloud.render_mode = flags.mode;
-  const Buffer<float> means = KeepUsable(extras, cloud);
+  Buffer<float> means = KeepUsable(extras, cloud);
   GaussianCloud before;
   if (flags.view) {
     ANCHORSPLAT_RETURN_IF_ERROR(CheckPageFits(output, cloud, options));
@@ -250,6 +250,12 @@ Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& 
   stop_signal.reset();
   if (!result.ok()) return result.error();
   Enhanced enhanced = *std::move(result);
+  if (!extras.empty() && enhanced.report.cleaned) {
+    std::vector<char> kept(means.size() / 3, 1);
+    for (const int64_t i : enhanced.report.cleaned->rows) kept[static_cast<size_t>(i)] = 0;
+    KeepRows(means, 3, kept);
+    KeepRows(extras, kept);
+  }
   if (!extras.empty() && enhanced.cloud.means != means) {
     LogWarning(Cat(input, ": other properties of its Gaussians are dropped, as those of the result are others: ",
                    extras.lost(/*writer_keeps=*/false)));
@@ -260,6 +266,7 @@ Result<nlohmann::json> EnhanceOne(const EnhanceFlags& flags, const SharedFlags& 
   }
   ANCHORSPLAT_RETURN_IF_ERROR(WriteCloudOrKeep(output, enhanced.cloud, write, extras));
   const EnhanceReport& r = enhanced.report;
+  if (r.looks == TrainedKind::kAntialiased) before.render_mode = enhanced.cloud.render_mode;  // both as it was trained
   if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(WritePage(input, before, output, enhanced, WriteOptionsFrom(shared)));
   const fs::path& checkpoint = options.control.checkpoint;
   if (r.interrupted) {
@@ -355,7 +362,8 @@ void AddPixelSizeFlags(CLI::App& verb, EnhanceFlags& flags) {
           "World size of one pixel of the training views (depth / focal length), or auto to estimate it from the "
           "splat; an estimate that its other features contradict is not acted on")
       ->capture_default_str();
-  AddModeOption(verb, flags.mode, "How the inputs were rasterized in training (default: a file's tag, else classic)");
+  AddModeOption(verb, flags.mode,
+                "How the inputs were rasterized in training (default: a file's tag, else as its Gaussians look)");
   auto* cameras = verb.add_option("--cameras", flags.cameras, "Training cameras: exact pixel size for every Gaussian")
                       ->check(NotEmpty());
   verb.add_option("--train-width", options.train_width,

@@ -1,6 +1,7 @@
 #include "cli/run_for_test.h"
 #include "cli/small_scan_for_test.h"
 #include "core/text.h"
+#include "formats/cloud_io.h"
 #include "io/folder_for_test.h"
 
 namespace anchorsplat {
@@ -252,6 +253,21 @@ TEST_F(EnhanceVerb, Batches) {
   ExpectRefused({"enhance", scan_}, ErrorCode::kBadArgument, {"say where to write"});
 }
 
+TEST_F(EnhanceVerb, Cleans) {
+  GaussianCloud cloud = SmallScan(200, 0), dust = SmallScan(100, 0);
+  for (float& c : dust.sh) c = -0.5f / 0.2820948f;  // black
+  for (float& x : dust.means) x *= 2;
+  ASSERT_TRUE(Append(cloud, dust).ok());
+  ASSERT_TRUE(WriteCloud(folder_ / "dusty.ply", cloud).ok());
+  const auto json = ExpectJson({"enhance", folder_ / "dusty.ply", "-o", folder_ / "clean.ply", "--clean", "--method",
+                                "filter", "--pixel-size", "0.01"});
+  const int64_t gone = json["cleaned"]["gaussians"];
+  EXPECT_GT(gone, 10);
+  EXPECT_EQ(json["cleaned"]["views"], 24);
+  EXPECT_TRUE(json["cleaned"]["psnr"].is_null() || json["cleaned"]["psnr"] >= 50);
+  EXPECT_EQ(ExpectJson({"info", folder_ / "clean.ply"})["gaussians"], 300 - gone);
+}
+
 TEST_F(EnhanceVerb, RefusesWhatMakesNoSense) {
   const auto refused = [&](const std::vector<std::string>& words, const std::string& why = "") {
     ExpectRefused(Enhance(words, "bad.ply", ""), ErrorCode::kBadArgument, {why});
@@ -264,6 +280,8 @@ TEST_F(EnhanceVerb, RefusesWhatMakesNoSense) {
   refused({"--cameras", ""}, "--cameras");
   refused({"--shuffles", "0123"}, "--shuffles");
   refused({"--camera-rule", "median"}, "--cameras");
+  refused({"--background", "1,1,1"}, "--clean");
+  refused({"--clean", "--background", "white"}, "--background");
   ExpectRefused({"enhance", folder_ / "nothing.ply", "-o", folder_ / "bad.ply"}, ErrorCode::kNotFound, {"nothing.ply"});
   // Before anything is read.
   ExpectRefused({"enhance", folder_ / "nothing.ply", "-o", folder_ / "bad.xyz"}, ErrorCode::kBadArgument, {"bad.xyz"});

@@ -39,7 +39,7 @@ struct Findings {
   GaussianCloud cloud;
   CloudStatistics statistics;
   Result<PixelSizeFinding> pixel_size = Error{};
-  TrainedKind looks = TrainedKind::kClassic;
+  std::optional<TrainedKind> looks;   // by its sizes, whatever the file says; nothing where there are too few Gaussians
   std::vector<std::string> problems;  // sentences
 };
 
@@ -67,11 +67,12 @@ std::vector<std::string> Problems(const CloudStatistics& s) {
 }
 
 std::string_view ModeName(const GaussianCloud& cloud) {
-  return cloud.render_mode ? NameOf(*cloud.render_mode) : "not said (classic is assumed)";
+  return cloud.render_mode ? NameOf(*cloud.render_mode) : "not said (render, compare and view take it for classic)";
 }
 
-std::string_view InWords(TrainedKind kind) {
-  switch (kind) {
+std::string_view InWords(const std::optional<TrainedKind>& kind) {
+  if (!kind) return "like nothing: too few Gaussians to tell";
+  switch (*kind) {
     case TrainedKind::kAntialiased:
       return "like an antialiased one: it has lost a little width, and enhance treats it as one";
     case TrainedKind::kWidened:
@@ -98,7 +99,9 @@ void PrintTable(const Findings& f) {
             << "  Gaussians    " << WithThousands(s.gaussians) << ", SH degree " << s.sh_degree << "\n"
             << "  file         " << HumanBytes(f.file_bytes) << (f.format.empty() ? "" : ", " + f.format) << "\n"
             << "  render mode  " << ModeName(f.cloud) << "\n";
-  if (!f.cloud.render_mode && !IsMarkedEnhanced(f.cloud)) std::cout << "  it looks     " << InWords(f.looks) << "\n";
+  if (!f.cloud.render_mode && !HasLostNoWidth(f.cloud)) {
+    std::cout << "  it looks     " << InWords(f.looks) << "\n";
+  }
   for (const std::string& credit : CreditsOf(f.cloud.comments)) {
     std::cout << "  credit       " << Printable(credit, kMostCredit) << "\n";
   }
@@ -161,7 +164,7 @@ nlohmann::json ToJson(const Findings& f) {
                          {"sh_degree", s.sh_degree},
                          {"bounds", nullptr},
                          {"render_mode", nullptr},
-                         {"looks", NameOf(f.looks)},
+                         {"looks", nullptr},
                          {"comments", f.cloud.comments},
                          {"credits", CreditsOf(f.cloud.comments)},
                          {"largest_axis", percentiles(s.largest_axis)},
@@ -185,6 +188,7 @@ nlohmann::json ToJson(const Findings& f) {
   for (const auto& [name, value] : f.facts.all()) json["facts"][name] = value;
   if (s.bounds) json["bounds"] = {{"min", s.bounds->min}, {"max", s.bounds->max}};
   if (f.cloud.render_mode) json["render_mode"] = ModeName(f.cloud);
+  if (f.looks) json["looks"] = NameOf(*f.looks);
   if (f.pixel_size.ok()) {
     json["pixel_size"] = {{"estimate", f.pixel_size->estimate.size},
                           {"low", f.pixel_size->estimate.low},
@@ -284,9 +288,13 @@ Status RunInfo(const InfoFlags& flags, const SharedFlags& shared) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(findings.facts, file.format()->describe(file.input()));
   }
   findings.statistics = ComputeStatistics(findings.cloud);
-  findings.pixel_size = FindPixelSize(findings.cloud);
-  if (!findings.cloud.render_mode && !IsMarkedEnhanced(findings.cloud))
-    findings.looks = FindTrainedKind(findings.cloud);
+  findings.looks = FindTrainedKind(findings.cloud);
+  // As `enhance` takes it.
+  GaussianCloud& cloud = findings.cloud;
+  const bool untold = !cloud.render_mode && !HasLostNoWidth(cloud);
+  if (untold && findings.looks == TrainedKind::kAntialiased) cloud.render_mode = RenderMode::kAntialiased;
+  findings.pixel_size = FindPixelSize(cloud);
+  if (untold) cloud.render_mode.reset();
   findings.problems = Problems(findings.statistics);
   if (shared.json) {
     PrintJson(ToJson(findings));

@@ -137,12 +137,16 @@ Status PixelSizesFromPictures(const EnhanceOptions& options, EnhanceInput& input
 // EnhanceOptions::clean.
 Status Clean(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport& report) {
   CameraSet set;
-  if (options.cameras) {
-    set = *options.cameras;
-  } else if (!options.refine.images.empty()) {
+  if (options.cameras) set = *options.cameras;
+  if (!options.refine.images.empty() && (set.cameras.empty() || !set.background)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.refine.images, {.hold_out = 0}));
-    set.cameras = std::move(project.train);
-    set.background = project.background;
+    if (set.cameras.empty()) set.cameras = std::move(project.train);
+    if (!set.background) set.background = project.background;
+  }
+  if (set.cameras.empty()) {
+    LogWarning(
+        "--clean looks from outside only, as there are no cameras; of a scene seen from within it may take what only "
+        "its training views show (--cameras)");
   }
   UnseenOptions unseen{.seed = options.seed};
   unseen.background = options.background.value_or(set.background.value_or(unseen.background));
@@ -211,6 +215,11 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
   if (options.pixel_size) {
     report.pixel_size = *options.pixel_size;
     report.pixel_size_source = "given";
+    // Networks are chosen by it.
+    if (says && !IsCompensated(input.cloud.render_mode)) {
+      const auto estimate = EstimatePixelSize(input.cloud);
+      if (estimate.ok()) input.unlike_standard = estimate->unlike_standard;
+    }
   } else if (pictures) {
     return PixelSizesFromPictures(options, input, report);
   } else {
@@ -232,12 +241,14 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
 
 // Splats of which neither file nor caller says how they were trained are looked at. An antialiased one becomes one.
 void RecogniseKind(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport& report) {
-  if (options.filter_strength || cloud.render_mode || IsMarkedEnhanced(cloud) || IsFittedToPixelAreas(cloud)) return;
+  if (options.filter_strength || cloud.render_mode || HasLostNoWidth(cloud)) return;
   report.looks = FindTrainedKind(cloud);
-  if (options.upscale == 1) return;  // there is nothing to do in any case
-  switch (*report.looks) {
+  if (report.looks == TrainedKind::kAntialiased) cloud.render_mode = RenderMode::kAntialiased;
+}
+
+void SayHowItLooks(TrainedKind looks) {
+  switch (looks) {
     case TrainedKind::kAntialiased:
-      cloud.render_mode = RenderMode::kAntialiased;
       LogWarning(
           "the splat does not say how it was trained; its thinnest Gaussians are like those of an antialiased "
           "training, and it is enhanced and tagged as an antialiased splat (--mode classic if it is none)");
@@ -245,12 +256,13 @@ void RecogniseKind(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceR
     case TrainedKind::kWidened:
       LogWarning(
           "even the thinnest Gaussians of the splat have a width, as Mip-Splatting and enhancing give them: it has "
-          "lost none, and it stays as it is (--mode classic if it was trained without such a width)");
+          "lost none, and none is given back (--mode classic if it was trained without such a width)");
       break;
     case TrainedKind::kUnclear:
       LogWarning(
           "it is unclear how the splat was trained, as its thinnest Gaussians are neither like those of classic nor "
-          "of antialiased ones: only a little width is given back (--mode classic or antialiased will do better)");
+          "of antialiased ones; it may have been enhanced. Only a little width is given back; --mode classic or "
+          "antialiased, where you know it, says more");
       break;
     case TrainedKind::kClassic:
       break;
@@ -322,6 +334,14 @@ Status CheckTask(const GaussianCloud& cloud, const EnhanceOptions& options) {
   if (!(options.upscale >= 1) || !std::isfinite(options.upscale)) {
     return Error{ErrorCode::kBadArgument, Cat("--upscale ", options.upscale, " must be at least 1")};
   }
+  for (const float channel : options.background.value_or(std::array<float, 3>{})) {
+    if (!(channel >= 0 && channel <= 1)) {
+      return Error{ErrorCode::kBadArgument, Cat("the background's ", channel, " is not from 0 to 1")};
+    }
+  }
+  if (options.background && !options.clean) {
+    return Error{ErrorCode::kBadArgument, "a background has no effect without cleaning (--clean)"};
+  }
   if (options.filter_strength && !(*options.filter_strength >= 0 && *options.filter_strength <= kMaxFilterStrength)) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--filter-strength ", *options.filter_strength, " is not between 0 and ", kMaxFilterStrength)};
@@ -352,7 +372,7 @@ bool GivesWidth(double strength, double upscale, std::optional<RenderMode> mode)
 
 // The filter's strength and the pixel sizes, for methods that work with them.
 Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
-  RecogniseKind(options, input.cloud, report);
+  if (report.looks && options.upscale > 1) SayHowItLooks(*report.looks);
   input.filter_strength = ChooseStrength(options, input.cloud, report.looks);
   report.filter_strength = input.filter_strength;
   const bool gives_width = GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode);
@@ -404,9 +424,10 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   input.cloud = std::move(cloud);
   ANCHORSPLAT_RETURN_IF_ERROR(DropUnusable(input.cloud));
   report.dropped = report.gaussians_in - input.cloud.size();
-  if (options.clean) ANCHORSPLAT_RETURN_IF_ERROR(Clean(options, input.cloud, report));
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SizedMethods sized, FindSizedMethods(plan, options));
+  if (sized.any || options.clean) RecogniseKind(options, input.cloud, report);
+  if (options.clean) ANCHORSPLAT_RETURN_IF_ERROR(Clean(options, input.cloud, report));
   if (sized.any) {
     ANCHORSPLAT_RETURN_IF_ERROR(ChooseWidths(plan, options, input, report));
   } else if (IsMarkedEnhanced(input.cloud)) {

@@ -73,7 +73,7 @@ GaussianCloud Ball(double pixel, int64_t n = 6000) {
     if (i % 16 == 0) eroded *= random.Uniform(0.01, 1);  // fits shrink some to nothing
     cloud.log_scales[3 * i] = cloud.log_scales[3 * i + 1] = static_cast<float>(std::log(eroded));
     cloud.log_scales[3 * i + 2] = -9;
-    cloud.opacity_logits[i] = 3;
+    cloud.opacity_logits[i] = 2.9f;  // 0.948
     for (size_t c = 0; c < 3; ++c) cloud.sh[3 * i + c] = static_cast<float>(random.Uniform(-1, 1));
   }
   return cloud;

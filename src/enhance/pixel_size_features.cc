@@ -11,12 +11,12 @@
 #include "core/framing.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
+#include "enhance/showing_gaussians.h"
 
 namespace anchorsplat {
 
 namespace {
 
-constexpr float kVisibleOpacity = 0.1f;
 constexpr int kViews = 6;         // all sides
 constexpr int kRenderSize = 512;  // px; enough samples of the outline, and quick
 constexpr double kFieldOfView = std::numbers::pi / 4;
@@ -24,12 +24,9 @@ constexpr double kNearPlane = 0.01;  // of the distance; everything lies behind
 constexpr double kSamples = 2;       // at least, per pixel of the size that is tried, along a side
 constexpr double kOctavesPerStep = 0.5;
 constexpr double kMostSteps = 12;  // either way from the start
-// Larger clouds are cut down to those nearest to the middle, so that the time is bounded: a part of a scene has
-// outlines enough, while every so many Gaussians of it would have gaps.
-constexpr size_t kMostGaussians = 200'000;
-// Sky shells, floaters and giants say nothing about pixels and would drown what does: only Gaussians this close to the
-// middle and this small count, in units of the radius that frames the cloud.
-constexpr double kFarthest = 1.5;
+// Larger clouds than kMostShowing are cut down to those nearest to the middle, so that the time is bounded: a part of a
+// scene has outlines enough, while every so many Gaussians of it would have gaps. Giants would drown what does say
+// something: only Gaussians this small count, in units of the radius that frames the cloud.
 constexpr double kLargestAxis = 0.25;
 // Brightness, that of the constant colour's brightest channel, up to which a Gaussian counts as unseen over black, and
 // from which on as seen.
@@ -61,12 +58,13 @@ GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing, double
     }
     const float* scales = cloud.log_scales.data() + 3 * i;
     const float longest = std::max({scales[0], scales[1], scales[2]});
-    if (std::sqrt(distance) <= kFarthest * framing.radius && longest <= std::log(kLargestAxis * framing.radius)) {
+    if (std::sqrt(distance) <= kShowingFarthest * framing.radius &&
+        longest <= std::log(kLargestAxis * framing.radius)) {
       near.emplace_back(distance, i);
     }
   }
-  if (near.size() > kMostGaussians) {
-    const auto last = near.begin() + static_cast<std::ptrdiff_t>(kMostGaussians);
+  if (near.size() > kMostShowing) {
+    const auto last = near.begin() + static_cast<std::ptrdiff_t>(kMostShowing);
     std::nth_element(near.begin(), last, near.end());
     radius = std::min(radius, std::sqrt(last->first));
     near.erase(last, near.end());
@@ -96,7 +94,7 @@ std::optional<double> AxisOfSmallGaussians(const GaussianCloud& cloud) {
   std::vector<std::pair<float, double>> largest, middle;
   for (int64_t i = 0; i < cloud.size(); ++i) {
     const float opacity = Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]);
-    if (opacity < kVisibleOpacity) continue;
+    if (opacity < kShowingOpacity) continue;
     std::array<float, 3> axes;
     for (size_t a = 0; a < 3; ++a) axes[a] = std::exp(cloud.log_scales[static_cast<size_t>(3 * i) + a]);
     std::sort(axes.begin(), axes.end());
@@ -114,7 +112,7 @@ SizeFeatures SizesOf(const GaussianCloud& cloud) {
   std::array<std::vector<std::pair<float, double>>, 4> values;  // the three axes, ascending, and opacity
   for (int64_t i = 0; i < cloud.size(); ++i) {
     const float opacity = Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]);
-    if (opacity < kVisibleOpacity) continue;
+    if (opacity < kShowingOpacity) continue;
     std::array<float, 3> axes;
     for (size_t a = 0; a < 3; ++a) axes[a] = std::exp(cloud.log_scales[static_cast<size_t>(3 * i) + a]);
     std::sort(axes.begin(), axes.end());

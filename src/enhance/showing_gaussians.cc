@@ -8,27 +8,24 @@
 #include "core/activations.h"
 #include "core/framing.h"
 #include "core/spherical_harmonics.h"
+#include "enhance/pixel_size_features.h"
 
 namespace anchorsplat {
 
 namespace {
 
-constexpr float kVisible = 0.1f;   // opacity
-constexpr float kBlack = 0.04f;    // brightest channel of the constant colour; ten steps of 255
-constexpr double kFarthest = 1.5;  // of the radius that frames the cloud, as the estimate of the pixel looks
-constexpr size_t kMost = 200'000;  // as it does
-constexpr size_t kLeastBright = 16;
+constexpr float kNearlyBlack = 0.04f;  // brightest channel of the constant colour; ten steps of 255
 
 bool IsBlack(const GaussianCloud& cloud, int64_t i) {
   const float* sh = cloud.sh.data() + i * cloud.sh_stride();
-  return 0.5f + kSh0 * std::max({sh[0], sh[1], sh[2]}) < kBlack;
+  return ColorFromDc(std::max({sh[0], sh[1], sh[2]})) < kNearlyBlack;
 }
 
 // Rows of (distance², row).
 std::vector<int64_t> Nearest(std::vector<std::pair<double, int64_t>> items) {
-  if (items.size() > kMost) {
-    std::nth_element(items.begin(), items.begin() + static_cast<std::ptrdiff_t>(kMost), items.end());
-    items.resize(kMost);
+  if (items.size() > kMostShowing) {
+    std::nth_element(items.begin(), items.begin() + static_cast<std::ptrdiff_t>(kMostShowing), items.end());
+    items.resize(kMostShowing);
   }
   std::vector<int64_t> rows;
   rows.reserve(items.size());
@@ -57,12 +54,12 @@ ShowingGaussians FindShowingGaussians(const GaussianCloud& cloud) {
     if (!black) showing.not_black.push_back(i);
     const float opacity = Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]);
     const double distance = SquaredDistance(cloud.means.data() + 3 * i, middle.data());
-    if (opacity < kVisible || std::sqrt(distance) > kFarthest * framing.radius) continue;
+    if (opacity < kShowingOpacity || std::sqrt(distance) > kShowingFarthest * framing.radius) continue;
     all.emplace_back(distance, i);
     if (!black) bright.emplace_back(distance, i);
   }
-  showing.bright = Nearest(bright.size() >= kLeastBright ? bright : all);
   showing.all = Nearest(std::move(all));
+  showing.bright = bright.size() >= static_cast<size_t>(kLeastGaussians) ? Nearest(std::move(bright)) : showing.all;
   return showing;
 }
 

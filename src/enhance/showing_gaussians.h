@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -7,12 +8,17 @@
 
 namespace anchorsplat {
 
-// The Gaussians of a cloud that say something about its fit: usable, of an opacity of 10 % or more and near the middle
-// of the cloud; those nearest to it where there are more than 200,000. Ascending rows.
+// Sky shells, floaters and giants say nothing about a fit, and time is bounded.
+inline constexpr float kShowingOpacity = 0.1f;
+inline constexpr double kShowingFarthest = 1.5;  // of the radius that frames the cloud
+inline constexpr size_t kMostShowing = 200'000;
+
+// The Gaussians of a cloud that say something about its fit: usable, of kShowingOpacity or more and near the middle of
+// the cloud; those nearest to it where there are more than kMostShowing. Ascending rows.
 struct ShowingGaussians {
   std::vector<int64_t> all;
   // Without those that are nearly black: fits on black keep black ones around the object that no picture shows. The
-  // same as `all` where fewer than 16 are not black.
+  // same as `all` where fewer than kLeastGaussians are not black.
   std::vector<int64_t> bright;
   std::vector<int64_t> not_black;  // of the whole cloud, usable, visible or not
 };

@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <span>
+#include <utility>
+#include <vector>
 
+#include "core/activations.h"
 #include "core/statistics.h"
 #include "enhance/showing_gaussians.h"
 
@@ -12,13 +16,15 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kFewest = 500;  // ten in the shorter tail
+constexpr int64_t kFewest = 400;  // eight in the shorter tail: enough to see where all end
+constexpr int64_t kFew = 1000;    // below, there is more doubt
 constexpr double kShorter = 0.02, kLonger = 0.05;
 
-// docs/results/recognised.md has the tails of fits: of middle axes 0.40 and more in classic ones, up to 0.37 in
-// antialiased ones; of smallest axes 0.30 and more in both, up to 0.08 in those of Mip-Splatting, 0.15 to 0.31 in what
-// the network makes.
-constexpr double kAntialiasedTail = 0.375, kClassicTail = 0.4;
+// docs/results/recognised.md has the tails of fits. Of middle axes, times exp(−opaque): 0.34 and more in classic ones,
+// up to 0.34 in antialiased ones. Of smallest axes: 0.30 and more in both, up to 0.08 in those of Mip-Splatting, 0.15
+// to 0.31 in what the network makes.
+constexpr double kAntialiasedTail = 0.335, kClassicTail = 0.36;
+constexpr double kAntialiasedTailOfFew = 0.28, kClassicTailOfFew = 0.42;
 constexpr double kWidenedTail = 0.12, kThinTail = 0.35;
 // A width that was added is in all axes: the smallest are nearly half as long as the middle ones then. Flat Gaussians,
 // whose third axis other programs write as nearly nothing, also end at one size.
@@ -27,13 +33,21 @@ constexpr double kRound = 0.4, kRatherRound = 0.3;
 double Tail(std::span<float> logarithms, double share) {
   const auto quantile = double{Quantile(logarithms, share)};
   double sum = 0;
-  int64_t count = 0;
-  for (const float x : logarithms) {
-    if (x > quantile) continue;
-    sum += quantile - double{x};
-    ++count;
-  }
-  return count > 0 ? sum / static_cast<double>(count) : 0;
+  for (const float x : logarithms) sum += std::max(0.0, quantile - double{x});
+  return sum / (share * static_cast<double>(logarithms.size()));
+}
+
+constexpr double kThinnest = 0.1;
+constexpr float kOpaque = 0.95f;
+
+// Of (ln(middle × largest axis), opacity).
+double OpaqueShare(std::vector<std::pair<float, float>>& items) {
+  const auto count = static_cast<std::ptrdiff_t>(kThinnest * static_cast<double>(items.size()));
+  if (count == 0) return 0;
+  std::nth_element(items.begin(), items.begin() + count, items.end());
+  const auto opaque =
+      std::count_if(items.begin(), items.begin() + count, [](const auto& item) { return item.second > kOpaque; });
+  return static_cast<double>(opaque) / static_cast<double>(count);
 }
 
 double MeanTail(std::span<float> logarithms) {
@@ -58,6 +72,7 @@ std::string_view NameOf(TrainedKind kind) {
 SizeTails FindSizeTails(const GaussianCloud& cloud) {
   SizeTails tails;
   Buffer<float> smallest, middle;
+  std::vector<std::pair<float, float>> areas;
   for (const int64_t i : FindShowingGaussians(cloud).all) {
     const float* scales = cloud.log_scales.data() + 3 * i;
     std::array<float, 3> axes = {scales[0], scales[1], scales[2]};
@@ -65,23 +80,27 @@ SizeTails FindSizeTails(const GaussianCloud& cloud) {
     if (!std::isfinite(axes[0])) continue;  // flat
     smallest.push_back(axes[0]);
     middle.push_back(axes[1]);
+    areas.emplace_back(axes[1] + axes[2], Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]));
   }
   tails.gaussians = static_cast<int64_t>(middle.size());
   if (middle.empty()) return tails;
   tails.smallest = MeanTail(smallest);
   tails.middle = MeanTail(middle);
   tails.roundness = std::exp(double{Quantile(smallest, kLonger)} - double{Quantile(middle, kLonger)});
+  tails.opaque = OpaqueShare(areas);
   return tails;
 }
 
-TrainedKind Judge(const SizeTails& tails) {
-  if (tails.gaussians < kFewest) return TrainedKind::kClassic;
+std::optional<TrainedKind> Judge(const SizeTails& tails) {
+  if (tails.gaussians < kFewest) return std::nullopt;
   if (tails.roundness > kRound && tails.smallest < kWidenedTail) return TrainedKind::kWidened;
   if (tails.roundness > kRatherRound && tails.smallest < kThinTail) return TrainedKind::kUnclear;
-  if (tails.middle < kAntialiasedTail) return TrainedKind::kAntialiased;
-  return tails.middle < kClassicTail ? TrainedKind::kUnclear : TrainedKind::kClassic;
+  const double tail = tails.middle * std::exp(-tails.opaque);
+  const bool few = tails.gaussians < kFew;
+  if (tail < (few ? kAntialiasedTailOfFew : kAntialiasedTail)) return TrainedKind::kAntialiased;
+  return tail < (few ? kClassicTailOfFew : kClassicTail) ? TrainedKind::kUnclear : TrainedKind::kClassic;
 }
 
-TrainedKind FindTrainedKind(const GaussianCloud& cloud) { return Judge(FindSizeTails(cloud)); }
+std::optional<TrainedKind> FindTrainedKind(const GaussianCloud& cloud) { return Judge(FindSizeTails(cloud)); }
 
 }  // namespace anchorsplat

@@ -1,18 +1,20 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
 #include "core/gaussian_cloud.h"
 
 namespace anchorsplat {
 
-// How a splat that does not say so was trained, by how thin its thinnest Gaussians are.
+// How a splat that does not say so was trained, by its thinnest Gaussians.
 //
 // A classic rasterizer draws a Gaussian of any size as wide as a pixel, so fits let some shrink to nothing: sizes have
 // a long tail. An antialiased one makes a Gaussian that is thinner than a pixel along two axes fainter, by the product
-// of both, until it is gone: middle axes end somewhat below the pixel. And where a width has been added to all axes, by
-// Mip-Splatting's 3-D filter or by enhancing, the smallest axes end at that width.
+// of both, until it is gone: middle axes end somewhat below the pixel, and the thinnest Gaussians are as opaque as can
+// be. Where a width has been added to all axes, by Mip-Splatting's 3-D filter or by enhancing, the smallest axes end at
+// that width.
 enum class TrainedKind {
   kClassic,
   kAntialiased,
@@ -23,18 +25,21 @@ enum class TrainedKind {
 // The words of `info` and of reports.
 std::string_view NameOf(TrainedKind kind);
 
-// How long the tail of an axis is: the mean of ln(q / x) over the Gaussians whose axis x is below the quantile q; the
-// geometric mean of that of the 2 % and that of the 5 % quantile. 0: they all end there. Does not depend on the unit.
+// How long the tail of an axis is: the mean of max(0, ln(q / x)) over the share of the Gaussians below the quantile q;
+// the geometric mean of that of the 2 % and that of the 5 % quantile. 0: they all end there. Does not depend on the
+// unit, and hardly on formats that keep logarithms in steps.
 struct SizeTails {
   int64_t gaussians = 0;  // that show (ShowingGaussians::all) and have three positive axes
   double middle = 0;      // of the middle axis
   double smallest = 0;    // of the smallest one
   double roundness = 0;   // the 5 % quantile of the smallest axis over that of the middle one
+  double opaque = 0;      // the share of opacities above 0.95 among the tenth of least middle × largest axis
 };
 SizeTails FindSizeTails(const GaussianCloud& cloud);
 
-// Too few Gaussians to tell count as classic. Looks at sizes only, not at what the cloud says of itself.
-TrainedKind Judge(const SizeTails& tails);
-TrainedKind FindTrainedKind(const GaussianCloud& cloud);
+// Looks at sizes only, not at what the cloud says of itself. Nothing: fewer than 200 Gaussians, too few to tell; below
+// 1000 there is more that is unclear.
+std::optional<TrainedKind> Judge(const SizeTails& tails);
+std::optional<TrainedKind> FindTrainedKind(const GaussianCloud& cloud);
 
 }  // namespace anchorsplat

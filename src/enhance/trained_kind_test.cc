@@ -14,6 +14,7 @@
 #include "enhance/enhance.h"
 #include "enhance/filter.h"
 #include "formats/cloud_io.h"
+#include "io/folder_for_test.h"
 
 namespace anchorsplat {
 namespace {
@@ -69,6 +70,7 @@ TEST(TrainedKind, TailsAreTheMeanDistanceToTheirQuantiles) {
   EXPECT_EQ(tails.gaussians, 1000);
   // Quantiles lie at 19.98 and 49.95 steps from the smallest; below them are 20 and 50, 9.5 and 24.5 away in the mean.
   const double steps = std::sqrt((19.98 - 9.5) * (49.95 - 24.5));
+  EXPECT_EQ(tails.opaque, 0);
   EXPECT_NEAR(tails.middle, 0.005 * steps, 1e-5);
   EXPECT_NEAR(tails.smallest, 0.01 * steps, 1e-5);
   EXPECT_NEAR(tails.roundness, std::exp((0.005 - 0.01) * 949), 1e-3);
@@ -86,7 +88,6 @@ TEST(TrainedKind, WhatIsThinnerThanAPixelIsMissingInAntialiasedFits) {
   EXPECT_EQ(FindTrainedKind(Made(0, 0.3)), TrainedKind::kWidened) << FindSizeTails(Made(0, 0.3)).smallest;
 }
 
-// Units, positions and order say nothing.
 TEST(TrainedKind, DoesNotDependOnTheUnit) {
   GaussianCloud cloud = Made(0.3, 0);
   const SizeTails one = FindSizeTails(cloud);
@@ -104,10 +105,28 @@ TEST(TrainedKind, WhatHasBeenFilteredHasItsWidth) {
   EXPECT_EQ(FindTrainedKind(cloud), TrainedKind::kWidened);
 }
 
+// Formats keep sizes in steps, and say nothing of how a splat was trained.
+TEST(TrainedKind, DoesNotDependOnTheFormat) {
+  const TestFolder folder;
+  for (const GaussianCloud& cloud : {Example("biplane"), Made(0, 0), Made(0.3, 0), Made(0, 0.3)}) {
+    const auto kind = FindTrainedKind(cloud);
+    const double tail = FindSizeTails(cloud).middle;
+    for (const char* name : {"a.spz", "a.sog", "a.splat", "a.compressed.ply"}) {
+      ASSERT_TRUE(WriteCloud(folder / name, cloud, {.overwrite = true}).ok()) << name;
+      const auto read = ReadCloud(folder / name);
+      ASSERT_TRUE(read.ok()) << name;
+      EXPECT_EQ(FindTrainedKind(*read), kind) << name;
+      if (tail < 0.9) {  // SPZ ends at exp(−10)
+        EXPECT_NEAR(FindSizeTails(*read).middle, tail, 0.05) << name;
+      }
+    }
+  }
+}
+
 TEST(TrainedKind, FlatGaussiansAreNotWidened) {
   for (const float flat : {-20.0f, -std::numeric_limits<float>::infinity()}) {
     GaussianCloud cloud = Made(0, 0);
-    for (size_t i = 0; i < cloud.log_scales.size(); i += 3) {
+    for (size_t i = 0; i < cloud.log_scales.size(); i += std::isinf(flat) ? 30 : 3) {
       *std::min_element(cloud.log_scales.begin() + static_cast<std::ptrdiff_t>(i),
                         cloud.log_scales.begin() + static_cast<std::ptrdiff_t>(i) + 3) = flat;
     }
@@ -115,9 +134,14 @@ TEST(TrainedKind, FlatGaussiansAreNotWidened) {
   }
 }
 
-TEST(TrainedKind, TooFewOrBrokenOnesAreClassic) {
-  EXPECT_EQ(FindTrainedKind({}), TrainedKind::kClassic);
-  EXPECT_EQ(FindTrainedKind(Made(0, 0.3, 100)), TrainedKind::kClassic);
+TEST(TrainedKind, TooFewOrBrokenOnes) {
+  EXPECT_EQ(FindTrainedKind({}), std::nullopt);
+  EXPECT_EQ(FindTrainedKind(Made(0, 0.3, 150)), std::nullopt);
+  EXPECT_EQ(FindTrainedKind(Made(0, 0.3, 600)), TrainedKind::kWidened);
+  SizeTails few{.gaussians = 900, .middle = 0.33, .smallest = 0.8, .roundness = 0.2, .opaque = 0};
+  EXPECT_EQ(Judge(few), TrainedKind::kUnclear);
+  few.gaussians = 2000;
+  EXPECT_EQ(Judge(few), TrainedKind::kAntialiased);
   GaussianCloud cloud = Made(0.3, 0);
   for (size_t i = 0; i < cloud.log_scales.size(); i += 30) cloud.log_scales[i] = std::nanf("");
   EXPECT_EQ(FindTrainedKind(cloud), TrainedKind::kAntialiased);
@@ -161,19 +185,43 @@ TEST(TrainedKind, EnhanceActsOnIt) {
 
 // Between the kinds next to nothing can be wrong.
 TEST(TrainedKind, UnclearOnesGetLittle) {
-  SizeTails tails{.gaussians = 5000, .middle = 0.39, .smallest = 0.8, .roundness = 0.2};
+  SizeTails tails{.gaussians = 5000, .middle = 0.35, .smallest = 0.8, .roundness = 0.2, .opaque = 0};
   EXPECT_EQ(Judge(tails), TrainedKind::kUnclear);
-  tails = {.gaussians = 5000, .middle = 0.6, .smallest = 0.2, .roundness = 0.5};
+  tails.opaque = 0.5;
+  EXPECT_EQ(Judge(tails), TrainedKind::kAntialiased) << "the thinnest are opaque";
+  tails = {.gaussians = 5000, .middle = 0.6, .smallest = 0.2, .roundness = 0.5, .opaque = 0};
   EXPECT_EQ(Judge(tails), TrainedKind::kUnclear);
   tails.roundness = 0.1;
   EXPECT_EQ(Judge(tails), TrainedKind::kClassic);
+  // Not by a network, unless one is asked for.
+  constexpr uint64_t kOnlyHere = 4712;
+  RegisterEnhanceMethod(
+      {.name = "network-of-kinds",
+       .summary = "of this test",
+       .rank = 100,
+       .adds_detail = true,
+       .options = WidthOptions(),
+       .ready =
+           [](const EnhanceOptions& o) {
+             return o.seed == kOnlyHere ? Status() : Status(Error{ErrorCode::kBadArgument, "not here"});
+           },
+       .run = [](EnhanceInput input, const EnhanceOptions&, StepReport&) -> Result<GaussianCloud> {
+         return std::move(input.cloud);
+       }});
   EnhanceOptions options;
+  options.seed = kOnlyHere;
   options.pixel_size = 0.01;
+  const auto classic = Enhance(Made(0, 0), options);
+  ASSERT_TRUE(classic.ok());
+  EXPECT_EQ(classic->report.method, "network-of-kinds");
   const auto unclear = Enhance(Made(0, 0.04), options);
   ASSERT_TRUE(unclear.ok());
   EXPECT_EQ(unclear->report.looks, TrainedKind::kUnclear) << FindSizeTails(Made(0, 0.04)).smallest;
   EXPECT_EQ(unclear->report.filter_strength, DefaultFilterStrength(4, RenderMode::kAntialiased));
   EXPECT_FALSE(unclear->cloud.render_mode);
+  EXPECT_EQ(unclear->report.method, "filter");
+  options.method = "network-of-kinds";
+  EXPECT_EQ(Enhance(Made(0, 0.04), options)->report.method, "network-of-kinds");
 }
 
 }  // namespace

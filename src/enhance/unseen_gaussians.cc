@@ -8,31 +8,45 @@
 #include <utility>
 
 #include "core/activations.h"
+#include "core/cloud_view.h"
 #include "core/framing.h"
+#include "core/log.h"
 #include "core/random.h"
+#include "core/run_context.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
 #include "metrics/image_metrics.h"
 #include "render/rasterizer.h"
+#include "render/shown_range.h"
 
 namespace anchorsplat {
 
 namespace {
 
-constexpr size_t kMostViews = 48;
-constexpr int kMostPixels = 512;  // a side
+constexpr size_t kMostCleanViews = 48;
+constexpr int kMostCleanPixels = 512;  // a side
 constexpr int kOrbitViews = 24;
-constexpr int kBisections = 8;
+constexpr int kMostTrials = 10;
+constexpr double kCloseEnough = 0.01;  // of the number that go
 // α is capped at 0.999, where no gradient flows. Opacities are lowered below that while gradients are taken.
 constexpr float kHighestOpacity = 0.98f;
 
-std::vector<Camera> ChooseViews(const std::vector<Camera>& cameras) {
+Result<std::vector<Camera>> ChooseViews(const GaussianCloud& cloud, const std::vector<Camera>& cameras) {
   std::vector<Camera> views;
-  const size_t count = std::min(kMostViews, cameras.size());
+  if (cameras.empty()) {
+    const Framing framing = FrameCloud(cloud);
+    const Pinhole intrinsics = PinholeFromFov(kMostCleanPixels, kMostCleanPixels, std::numbers::pi / 4);
+    ANCHORSPLAT_ASSIGN_OR_RETURN(
+        CameraSet orbit, OrbitCameras(kOrbitViews, FramingDistance(framing, intrinsics), framing.target, intrinsics));
+    return std::move(orbit.cameras);
+  }
+  const size_t count = std::min(kMostCleanViews, cameras.size());
   for (size_t k = 0; k < count; ++k) {
     Camera camera = cameras[k * cameras.size() / count];
     const int longest = std::max(camera.intrinsics.width, camera.intrinsics.height);
-    if (longest > kMostPixels) camera.intrinsics = Scaled(camera.intrinsics, double{kMostPixels} / longest);
+    if (longest > kMostCleanPixels) {
+      camera.intrinsics = Scaled(camera.intrinsics, double{kMostCleanPixels} / longest);
+    }
     views.push_back(std::move(camera));
   }
   return views;
@@ -41,34 +55,44 @@ std::vector<Camera> ChooseViews(const std::vector<Camera>& cameras) {
 bool IsLikeBackground(const GaussianCloud& cloud, int64_t i, const std::array<float, 3>& background) {
   const float* sh = cloud.sh.data() + i * cloud.sh_stride();
   for (size_t c = 0; c < 3; ++c) {
-    const float colour = std::max(0.0f, 0.5f + kSh0 * sh[c]);
+    const float colour = std::clamp(ColorFromDc(sh[c]), 0.0f, 1.0f);
     if (!(std::abs(colour - background[c]) <= kLikeBackground)) return false;
   }
   return true;
 }
 
-// What every Gaussian adds to the views, in squares, by the gradient of the picture times random signs.
-Result<std::vector<double>> Additions(GaussianCloud cloud, const std::vector<Camera>& views, RenderOptions options,
-                                      uint64_t seed) {
-  for (float& logit : cloud.opacity_logits) logit = std::min(logit, LogitFromOpacity(kHighestOpacity));
+Error Stopped() { return Error{ErrorCode::kInterrupted, "stopped while cleaning; nothing was written"}; }
+
+// What every Gaussian adds to the views, in squares, by the gradient of the picture times random signs; negative where
+// no view draws it.
+Result<std::vector<double>> Additions(const GaussianCloud& cloud, const std::vector<Camera>& views,
+                                      RenderOptions options, uint64_t seed) {
+  Buffer<float> logits = cloud.opacity_logits;
+  for (float& logit : logits) logit = std::min(logit, LogitFromOpacity(kHighestOpacity));
+  CloudView view(cloud);
+  view.opacity_logits = logits;
   options.gradient = true;
-  std::vector<double> additions(static_cast<size_t>(cloud.size()));
+  std::vector<double> additions(logits.size(), -1.0);
   Rasterizer rasterizer;
   RenderOutput output;
   RenderGradient signs;
   CloudGradient gradient;
   Random random(seed);
+  Progress progress("look for what nobody misses", static_cast<int64_t>(views.size()));
   for (const Camera& camera : views) {
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, camera, options, output));
+    if (StopRequested()) return Stopped();
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(view, camera, options, output));
     signs.color = output.color;
     signs.box = {0, 0, camera.intrinsics.width, camera.intrinsics.height};
     for (float& sign : signs.color.pixels) sign = random.Below(2) == 0 ? -1.0f : 1.0f;
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Backward(cloud, signs, gradient));
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Backward(view, signs, gradient));
     for (size_t i = 0; i < additions.size(); ++i) {
+      if (gradient.radii[2 * i] <= 0) continue;
       // o·∂L/∂o = ∂L/∂logit / (1 − o), the sum of sign·T·α·(colour − behind) over the pixels.
-      const double sum = gradient.opacity_logits[i] / (1 - double{Sigmoid(cloud.opacity_logits[i])});
-      additions[i] += sum * sum;
+      const double sum = gradient.opacity_logits[i] / (1 - Sigmoid(double{logits[i]}));
+      additions[i] = std::max(additions[i], 0.0) + sum * sum;
     }
+    progress.Advance();
   }
   return additions;
 }
@@ -79,54 +103,83 @@ class Comparison {
   static Result<Comparison> Make(const GaussianCloud& cloud, std::vector<Camera> views, const RenderOptions& options) {
     Comparison comparison(cloud, std::move(views), options);
     for (const Camera& camera : comparison.views_) {
+      if (StopRequested()) return Stopped();
       ANCHORSPLAT_RETURN_IF_ERROR(comparison.Render(camera));
       comparison.before_.push_back(comparison.output_.color);
+      comparison.values_ += static_cast<double>(comparison.output_.color.pixels.size());
     }
     return comparison;
   }
 
-  // PSNR of all views together without `gone` against with them.
-  Result<double> PsnrWithout(std::span<const int64_t> gone) {
-    Buffer<float> kept(gone.size());
-    for (size_t k = 0; k < gone.size(); ++k) {
-      kept[k] = std::exchange(cloud_.opacity_logits[static_cast<size_t>(gone[k])], kInvisible);
+  double values() const { return values_; }  // of all pictures
+
+  // Σ of the squared differences without `gone`.
+  Result<double> SquaresWithout(std::span<const int64_t> gone) {
+    for (const int64_t i : gone) logits_[static_cast<size_t>(i)] = -std::numeric_limits<float>::infinity();
+    const Result<double> squares = Squares();
+    for (const int64_t i : gone) {
+      logits_[static_cast<size_t>(i)] = cloud_->opacity_logits[static_cast<size_t>(i)];
     }
-    const Result<double> psnr = Together();
-    for (size_t k = 0; k < gone.size(); ++k) cloud_.opacity_logits[static_cast<size_t>(gone[k])] = kept[k];
-    return psnr;
+    return squares;
   }
 
  private:
-  static constexpr float kInvisible = -std::numeric_limits<float>::infinity();
-
   Comparison(const GaussianCloud& cloud, std::vector<Camera> views, const RenderOptions& options)
-      : cloud_(cloud), views_(std::move(views)), options_(options) {}
+      : cloud_(&cloud), logits_(cloud.opacity_logits), views_(std::move(views)), options_(options) {}
 
   Status Render(const Camera& camera) {
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud_, camera, options_, output_));
+    CloudView view(*cloud_);
+    view.opacity_logits = logits_;
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(view, camera, options_, output_));
     Clamp01(output_.color);
     return {};
   }
 
-  Result<double> Together() {
-    double squares = 0, values = 0;
+  Result<double> Squares() {
+    double squares = 0;
     for (size_t k = 0; k < views_.size(); ++k) {
+      if (StopRequested()) return Stopped();
       ANCHORSPLAT_RETURN_IF_ERROR(Render(views_[k]));
       ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, Psnr(before_[k], output_.color));
-      const auto count = static_cast<double>(output_.color.pixels.size());
-      squares += count * std::pow(10, -psnr / 10);
-      values += count;
+      squares += static_cast<double>(output_.color.pixels.size()) * std::pow(10, -psnr / 10);
     }
-    return -10 * std::log10(squares / values);
+    return squares;
   }
 
-  GaussianCloud cloud_;
+  const GaussianCloud* cloud_;
+  Buffer<float> logits_;
   std::vector<Camera> views_;
   RenderOptions options_;
   std::vector<Image> before_;
+  double values_ = 0;
   Rasterizer rasterizer_;
   RenderOutput output_;
 };
+
+// Usable Gaussians of the background's colour that some view draws; those that add least come first.
+std::vector<int64_t> Candidates(const GaussianCloud& cloud, const std::vector<double>& additions,
+                                const std::array<float, 3>& background) {
+  std::vector<int64_t> candidates;
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    const double addition = additions[static_cast<size_t>(i)];
+    if (!(addition >= 0) || !std::isfinite(addition) || !IsUsable(cloud, i)) continue;
+    if (IsLikeBackground(cloud, i, background)) candidates.push_back(i);
+  }
+  std::ranges::stable_sort(candidates, {}, [&](int64_t i) { return additions[static_cast<size_t>(i)]; });
+  return candidates;
+}
+
+// How many of them add up to `most`, were there no more to it than their sum.
+size_t Predicted(const std::vector<int64_t>& candidates, const std::vector<double>& additions, double most) {
+  double sum = 0;
+  size_t count = 0;
+  while (count < candidates.size()) {
+    sum += additions[static_cast<size_t>(candidates[count])];
+    if (sum > most) break;
+    ++count;
+  }
+  return count;
+}
 
 }  // namespace
 
@@ -135,38 +188,40 @@ Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector
   if (!(options.least_psnr > 0)) {
     return Error{ErrorCode::kBadArgument, Cat("a least PSNR of ", options.least_psnr, " dB is not positive")};
   }
-  std::vector<Camera> views = ChooseViews(cameras);
-  if (views.empty()) {
-    const Framing framing = FrameCloud(cloud);
-    const Pinhole intrinsics = PinholeFromFov(kMostPixels, kMostPixels, std::numbers::pi / 4);
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraSet orbit, OrbitCameras(kOrbitViews, FramingDistance(framing, intrinsics),
-                                                                     framing.target, intrinsics));
-    views = orbit.cameras;
+  for (const float channel : options.background) {
+    if (!(channel >= 0 && channel <= 1)) {
+      return Error{ErrorCode::kBadArgument, Cat("the background's ", channel, " is not from 0 to 1")};
+    }
   }
-  RenderOptions render;
-  render.mode = cloud.render_mode.value_or(RenderMode::kClassic);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views, ChooseViews(cloud, cameras));
+  RenderOptions render = OptionsFor(cloud);
   render.background = options.background;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> additions, Additions(cloud, views, render, options.seed));
+  if (std::ranges::none_of(additions, [](double addition) { return addition >= 0; })) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("cleaning: none of ", views.size(),
+                     " views shows anything of the splat: are the cameras of this splat, in its unit and axes?")};
+  }
+  const std::vector<int64_t> candidates = Candidates(cloud, additions, options.background);
   UnseenGaussians found;
   found.views = static_cast<int64_t>(views.size());
   found.psnr = std::numeric_limits<double>::infinity();
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> additions, Additions(cloud, views, render, options.seed));
-  std::vector<int64_t> candidates;
-  for (int64_t i = 0; i < cloud.size(); ++i) {
-    const bool counts = IsUsable(cloud, i) && std::isfinite(additions[static_cast<size_t>(i)]);
-    if (counts && IsLikeBackground(cloud, i, options.background)) candidates.push_back(i);
-  }
-  std::ranges::stable_sort(candidates, {}, [&](int64_t i) { return additions[static_cast<size_t>(i)]; });
   ANCHORSPLAT_ASSIGN_OR_RETURN(Comparison comparison, Comparison::Make(cloud, std::move(views), render));
-  // The most of them, in this order, without which the views change by no more.
-  size_t enough = 0, too_many = candidates.size() + 1, count = candidates.size();
-  for (int k = 0; k <= kBisections && enough + 1 < too_many; ++k, count = (enough + too_many) / 2) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, comparison.PsnrWithout(std::span(candidates).first(count)));
-    if (psnr >= options.least_psnr) {
+  const double most = comparison.values() * std::pow(10, -options.least_psnr / 10);
+  size_t enough = 0, too_many = candidates.size() + 1;
+  size_t count = Predicted(candidates, additions, most);
+  Progress progress("try without it", kMostTrials);
+  for (int trial = 0; trial < kMostTrials && enough + 1 < too_many; ++trial) {
+    if (static_cast<double>(too_many - enough) <= kCloseEnough * static_cast<double>(enough)) break;
+    if (count <= enough || count >= too_many) count = (enough + too_many) / 2;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double squares, comparison.SquaresWithout(std::span(candidates).first(count)));
+    if (squares <= most) {
       enough = count;
-      found.psnr = psnr;
+      found.psnr = -10 * std::log10(squares / comparison.values());
     } else {
       too_many = count;
     }
+    progress.Advance();
   }
   found.rows.assign(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(enough));
   std::ranges::sort(found.rows);

@@ -12,7 +12,8 @@ namespace anchorsplat {
 
 // Gaussians that nobody misses over the background that a splat was trained on: black dust and veils around objects on
 // black, which come to light on any other background. They have the background's colour, within kLikeBackground of it
-// in every channel of the constant term, and renders of the training views without them agree with those with them.
+// in every channel of the constant term, are drawn in some view, and renders of the views without them agree with those
+// with them.
 //
 // Of dark parts of an object on black the pictures say as little: they go, too, where nothing bright is behind them.
 struct UnseenOptions {
@@ -30,8 +31,10 @@ struct UnseenGaussians {
 
 // Of `cameras`, or of views all around where there are none. What a Gaussian adds to a picture, T·α·(its colour − what
 // is behind it) summed in squares over the pixels, comes of one gradient per view with random signs: its expectation is
-// that sum. Those that add least are taken out, as many as least_psnr allows, found by bisection.
-// Errors: those of Rasterizer; kBadArgument: least_psnr is not positive.
+// that sum. Those that add least are taken out, as many as least_psnr allows, within a hundredth. Memory: the gradient
+// of the cloud and of one picture, and the pictures. Shows progress.
+// Errors: those of Rasterizer; kBadArgument: least_psnr is not positive, the background is not from 0 to 1, no view
+// shows anything; kInterrupted: the user stopped it.
 Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector<Camera>& cameras,
                                    const UnseenOptions& options);
 

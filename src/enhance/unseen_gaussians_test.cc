@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "core/random.h"
-#include "core/source_dir_for_test.h"
+#include "core/spherical_harmonics.h"
 #include "enhance/enhance.h"
 #include "fit/orbit_scene_for_test.h"
-#include "formats/cloud_io.h"
 #include "metrics/image_metrics.h"
 #include "render/rasterizer.h"
 
@@ -19,9 +19,8 @@ namespace anchorsplat {
 namespace {
 
 constexpr int64_t kObject = 400, kDust = 300;
-constexpr float kC0 = 0.2820948f;
 
-void Paint(GaussianCloud& cloud, float level) { std::ranges::fill(cloud.sh, (level - 0.5f) / kC0); }
+void Paint(GaussianCloud& cloud, float level) { std::ranges::fill(cloud.sh, DcFromColor(level)); }
 
 // A bright ball, and around it dust of the brightness `level`.
 GaussianCloud Dusty(float level) {
@@ -63,7 +62,7 @@ TEST(Unseen, DustOfTheBackgroundsColourGoes) {
     ASSERT_TRUE(found.ok()) << found.error().message;
     EXPECT_EQ(found->views, 12);
     EXPECT_GT(std::ssize(found->rows), kDust / 10);
-    for (const int64_t i : found->rows) EXPECT_GE(i, level == 0 ? kObject : 0) << "a part of the object";
+    for (const int64_t i : found->rows) EXPECT_TRUE(level == 1 || i >= kObject) << "a part of the bright object";
     const double psnr = PsnrWithout(cloud, found->rows, {level, level, level});
     EXPECT_GE(psnr, 50);
     EXPECT_NEAR(psnr, found->psnr, 0.05);
@@ -117,6 +116,49 @@ TEST(Unseen, WithoutCamerasItLooksFromAllAround) {
   EXPECT_GT(std::ssize(found->rows), kDust / 10);
 }
 
+// In any unit, for any number of threads, in any mode and with harmonics.
+TEST(Unseen, TheSameInAnyUnit) {
+  for (const RenderMode mode : {RenderMode::kClassic, RenderMode::kAntialiased}) {
+    GaussianCloud cloud = Dusty(0);
+    cloud.render_mode = mode;
+    const auto found = FindUnseen(cloud, Views(), {});
+    ASSERT_TRUE(found.ok());
+    ASSERT_GT(std::ssize(found->rows), 10);
+    for (const double scale : {1e-4, 1e4}) {
+      GaussianCloud other = cloud;
+      std::vector<Camera> views = Views();
+      for (float& x : other.means) x *= static_cast<float>(scale);
+      for (float& s : other.log_scales) s += static_cast<float>(std::log(scale));
+      for (Camera& view : views) {
+        for (double& x : view.world_to_camera.translation) x *= scale;
+      }
+      const auto again = FindUnseen(other, views, {});
+      ASSERT_TRUE(again.ok());
+      EXPECT_NEAR(std::ssize(again->rows), std::ssize(found->rows), 0.1 * kDust) << scale;
+      const auto around = FindUnseen(other, {}, {});
+      ASSERT_TRUE(around.ok());
+      EXPECT_LT(std::ssize(around->rows), kDust) << "not all of it";
+    }
+  }
+}
+
+TEST(Unseen, WhatNoViewDrawsStays) {
+  const std::vector<Camera> views = {Views().front()};
+  GaussianCloud cloud = Dusty(0), behind = orbit_scene::Ball(50, 7);
+  Paint(behind, 0);
+  for (size_t i = 0; i < behind.means.size(); ++i) {
+    behind.means[i] += 5 * static_cast<float>(views.front().Center()[i % 3]);
+  }
+  ASSERT_TRUE(Append(cloud, behind).ok());
+  const auto found = FindUnseen(cloud, views, {});
+  ASSERT_TRUE(found.ok());
+  ASSERT_GT(std::ssize(found->rows), 10);
+  for (const int64_t i : found->rows) EXPECT_LT(i, kObject + kDust);
+  const auto nothing = FindUnseen(behind, views, {});
+  ASSERT_FALSE(nothing.ok());
+  EXPECT_NE(nothing.error().message.find("shows anything"), std::string::npos);
+}
+
 TEST(Unseen, EdgeCases) {
   EXPECT_FALSE(FindUnseen(Dusty(0), Views(), {.least_psnr = 0}).ok());
   GaussianCloud cloud = Dusty(0);
@@ -126,7 +168,10 @@ TEST(Unseen, EdgeCases) {
   cloud.opacity_logits[kObject + 2] = -std::numeric_limits<float>::infinity();
   const auto found = FindUnseen(cloud, Views(), {});
   ASSERT_TRUE(found.ok());
-  for (const int64_t i : found->rows) EXPECT_GT(i, kObject) << "usable ones only";
+  ASSERT_GT(std::ssize(found->rows), 10);
+  for (const int64_t i : found->rows) {
+    EXPECT_GT(i, kObject) << "usable ones only";
+  }
   const auto one = Subset(cloud, std::vector<int64_t>{kObject + 5});
   const auto alone = FindUnseen(*one, Views(), {});
   ASSERT_TRUE(alone.ok());
@@ -148,7 +193,13 @@ TEST(Unseen, EnhanceCleans) {
   options.background = {{1, 1, 1}};
   const auto kept = Enhance(Dusty(0), options);
   ASSERT_TRUE(kept.ok());
-  EXPECT_GE(kept->cloud.size(), kDust);
+  for (const int64_t i : kept->report.cleaned->rows) EXPECT_LT(i, kObject) << "black is seen on white";
+  options.background = {{0, 0, std::nanf("")}};
+  EXPECT_FALSE(Enhance(Dusty(0), options).ok());
+  options.background = {{0, 0, 0}};
+  options.clean = false;
+  EXPECT_FALSE(Enhance(Dusty(0), options).ok()) << "a background without cleaning";
+  options.clean = true;
   GaussianCloud black = orbit_scene::Ball(50, 5);
   Paint(black, 0);
   options.background.reset();

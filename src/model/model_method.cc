@@ -251,8 +251,10 @@ void RegisterModelMethod() {
          if (const auto* published = std::get_if<PublishedNetwork>(network.get())) {
            return EnhanceWithPublished(input, *published, options.model.options, report);
          }
-         return EnhanceWithCompactNetwork(std::move(input), options.upscale, std::get<CompactNetwork>(*network),
-                                          options.model, report);
+         Result<GaussianCloud> out = EnhanceWithCompactNetwork(
+             std::move(input), options.upscale, std::get<CompactNetwork>(*network), options.model, report);
+         if (options.model.file.empty()) report.facts.emplace_back("network_for_all_kinds", shipped == Shipped::kKinds);
+         return out;
        }});
 }
 

@@ -88,7 +88,7 @@ TEST_F(InfoVerb, OfUntaggedSplats) {
   EXPECT_THAT(ExpectDone({"info", fit}).out, HasSubstr("it looks     like a classic one"));
   ExpectDone({"enhance", fit, "-o", filtered, "--method", "filter", "--pixel-size", "0.0055"});
   EXPECT_THAT(ExpectDone({"info", filtered}).out, HasSubstr("it looks     like one of Mip-Splatting, or enhanced"));
-  EXPECT_THAT(ExpectDone({"enhance", filtered, "-o", folder_ / "again.ply"}).err, HasSubstr("it stays as it is"));
+  EXPECT_THAT(ExpectDone({"enhance", filtered, "-o", folder_ / "again.ply"}).err, HasSubstr("none is given back"));
   EXPECT_EQ(ExpectJson({"info", filtered})["looks"], "widened");
 }
 

@@ -172,9 +172,9 @@ struct Enhanced {
 };
 
 // Runs the method. Logs what it assumed: pixel size and how sure it is, training width, how a splat that does not say
-// so was trained, why one that was enhanced before is left alone, how many rows were dropped. A result that was given width back says so
-// in its comments (enhance/enhanced_mark.h). kBadArgument: that of CheckOptions, both pixel_size and cameras, upscale <
-// 1; kBadFile: no usable Gaussian; and whatever the method reports.
+// so was trained, why one that was enhanced before is left alone, how many rows were dropped. A result that was given
+// width back says so in its comments (enhance/enhanced_mark.h). kBadArgument: that of CheckOptions, both pixel_size and
+// cameras, upscale < 1; kBadFile: no usable Gaussian; and whatever the method reports.
 Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options);
 
 }  // namespace anchorsplat

@@ -26,20 +26,25 @@ namespace {
 constexpr size_t kMostCleanViews = 48;
 constexpr int kMostCleanPixels = 512;  // a side
 constexpr int kOrbitViews = 24;
+constexpr int kPredictingViews = 8, kPredictingPixels = 128;
+constexpr double kPredictedPsnr = 56;
+constexpr double kReachesViews = 0.01;  // of the squares that it would have with nothing in front of it
 constexpr int kMostTrials = 10;
 constexpr double kCloseEnough = 0.01;  // of the number that go
 // α is capped at 0.999, where no gradient flows. Opacities are lowered below that while gradients are taken.
 constexpr float kHighestOpacity = 0.98f;
 
+Result<std::vector<Camera>> ViewsAround(const GaussianCloud& cloud, int count, int pixels) {
+  const Framing framing = FrameCloud(cloud);
+  const Pinhole intrinsics = PinholeFromFov(pixels, pixels, std::numbers::pi / 4);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet orbit,
+                               OrbitCameras(count, FramingDistance(framing, intrinsics), framing.target, intrinsics));
+  return std::move(orbit.cameras);
+}
+
 Result<std::vector<Camera>> ChooseViews(const GaussianCloud& cloud, const std::vector<Camera>& cameras) {
+  if (cameras.empty()) return ViewsAround(cloud, kOrbitViews, kMostCleanPixels);
   std::vector<Camera> views;
-  if (cameras.empty()) {
-    const Framing framing = FrameCloud(cloud);
-    const Pinhole intrinsics = PinholeFromFov(kMostCleanPixels, kMostCleanPixels, std::numbers::pi / 4);
-    ANCHORSPLAT_ASSIGN_OR_RETURN(
-        CameraSet orbit, OrbitCameras(kOrbitViews, FramingDistance(framing, intrinsics), framing.target, intrinsics));
-    return std::move(orbit.cameras);
-  }
   const size_t count = std::min(kMostCleanViews, cameras.size());
   for (size_t k = 0; k < count; ++k) {
     Camera camera = cameras[k * cameras.size() / count];
@@ -63,16 +68,23 @@ bool IsLikeBackground(const GaussianCloud& cloud, int64_t i, const std::array<fl
 
 Error Stopped() { return Error{ErrorCode::kInterrupted, "stopped while cleaning; nothing was written"}; }
 
-// What every Gaussian adds to the views, in squares, by the gradient of the picture times random signs; negative where
-// no view draws it.
-Result<std::vector<double>> Additions(const GaussianCloud& cloud, const std::vector<Camera>& views,
-                                      RenderOptions options, uint64_t seed) {
-  Buffer<float> logits = cloud.opacity_logits;
+// Of every Gaussian, over the pixels of the views: in squares, by the gradient of the picture times random signs.
+struct Shown {
+  std::vector<double> additions;  // Σ (T·α·(its colour − what is behind it))²; negative where no view draws it
+  std::vector<double> reaches;    // Σ (T·α)²; 0 where its colour is clamped
+  std::vector<double>
+      footprints;  // Σ o² over its ellipse in the picture: about what `reaches` is without anything before it
+};
+
+Result<Shown> FindShown(CloudView cloud, const std::vector<Camera>& views, RenderOptions options, uint64_t seed) {
+  Buffer<float> logits(cloud.opacity_logits.begin(), cloud.opacity_logits.end());
   for (float& logit : logits) logit = std::min(logit, LogitFromOpacity(kHighestOpacity));
-  CloudView view(cloud);
-  view.opacity_logits = logits;
+  cloud.opacity_logits = logits;
   options.gradient = true;
-  std::vector<double> additions(logits.size(), -1.0);
+  const size_t stride = static_cast<size_t>(cloud.sh_stride());
+  Shown shown{.additions = std::vector<double>(logits.size(), -1.0),
+              .reaches = std::vector<double>(logits.size()),
+              .footprints = std::vector<double>(logits.size())};
   Rasterizer rasterizer;
   RenderOutput output;
   RenderGradient signs;
@@ -81,20 +93,25 @@ Result<std::vector<double>> Additions(const GaussianCloud& cloud, const std::vec
   Progress progress("look for what nobody misses", static_cast<int64_t>(views.size()));
   for (const Camera& camera : views) {
     if (StopRequested()) return Stopped();
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(view, camera, options, output));
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, camera, options, output));
     signs.color = output.color;
     signs.box = {0, 0, camera.intrinsics.width, camera.intrinsics.height};
     for (float& sign : signs.color.pixels) sign = random.Below(2) == 0 ? -1.0f : 1.0f;
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Backward(view, signs, gradient));
-    for (size_t i = 0; i < additions.size(); ++i) {
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Backward(cloud, signs, gradient));
+    for (size_t i = 0; i < logits.size(); ++i) {
       if (gradient.radii[2 * i] <= 0) continue;
+      const double opacity = Sigmoid(double{logits[i]});
       // o·∂L/∂o = ∂L/∂logit / (1 − o), the sum of sign·T·α·(colour − behind) over the pixels.
-      const double sum = gradient.opacity_logits[i] / (1 - Sigmoid(double{logits[i]}));
-      additions[i] = std::max(additions[i], 0.0) + sum * sum;
+      const double sum = gradient.opacity_logits[i] / (1 - opacity);
+      shown.additions[i] = std::max(shown.additions[i], 0.0) + sum * sum;
+      for (size_t c = 0; c < 3; ++c) shown.reaches[i] += std::pow(gradient.sh[stride * i + c] / kSh0, 2) / 3;
+      // ∫ exp(−r²/σ²) of radii of 3 σ.
+      shown.footprints[i] +=
+          opacity * opacity * std::numbers::pi * (gradient.radii[2 * i] / 3.0) * (gradient.radii[2 * i + 1] / 3.0);
     }
     progress.Advance();
   }
-  return additions;
+  return shown;
 }
 
 // How the views look without some of the Gaussians.
@@ -196,7 +213,8 @@ Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views, ChooseViews(cloud, cameras));
   RenderOptions render = OptionsFor(cloud);
   render.background = options.background;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> additions, Additions(cloud, views, render, options.seed));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown shown, FindShown(cloud, views, render, options.seed));
+  const std::vector<double>& additions = shown.additions;
   if (std::ranges::none_of(additions, [](double addition) { return addition >= 0; })) {
     return Error{ErrorCode::kBadArgument,
                  Cat("cleaning: none of ", views.size(),
@@ -226,6 +244,38 @@ Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector
   found.rows.assign(candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(enough));
   std::ranges::sort(found.rows);
   return found;
+}
+
+Result<std::vector<int64_t>> PredictUnseen(const GaussianCloud& cloud) {
+  constexpr std::array<float, 3> kBlack{};
+  const int64_t count = cloud.size();
+  int64_t dark = 0;
+  for (int64_t i = 0; i < count; ++i) dark += IsLikeBackground(cloud, i, kBlack);
+  if (dark == 0) return std::vector<int64_t>();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<Camera> views,
+                               ViewsAround(cloud, kPredictingViews, kPredictingPixels));
+  // A little brighter than black, where the gradient tells how much of them reaches the views.
+  Buffer<float> colours(3 * cloud.opacity_logits.size());
+  for (int64_t i = 0; i < count; ++i) {
+    for (int64_t c = 0; c < 3; ++c) {
+      colours[static_cast<size_t>(3 * i + c)] =
+          std::max(cloud.sh[static_cast<size_t>(i * cloud.sh_stride() + c)], DcFromColor(1e-4f));
+    }
+  }
+  CloudView view(cloud);
+  view.sh_degree = 0;
+  view.sh = colours;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown shown, FindShown(view, views, OptionsFor(cloud), /*seed=*/0));
+  std::vector<int64_t> rows = Candidates(cloud, shown.additions, kBlack);
+  double values = 0;
+  for (const Camera& camera : views) values += 3.0 * camera.intrinsics.width * camera.intrinsics.height;
+  rows.resize(Predicted(rows, shown.additions, values * std::pow(10, -kPredictedPsnr / 10)));
+  std::erase_if(rows, [&](int64_t i) {
+    const auto at = static_cast<size_t>(i);
+    return !(shown.reaches[at] > kReachesViews * shown.footprints[at]);
+  });
+  std::ranges::sort(rows);
+  return rows;
 }
 
 }  // namespace anchorsplat

@@ -160,6 +160,34 @@ TEST(Unseen, WhatNoViewDrawsStays) {
   EXPECT_NE(nothing.error().message.find("shows anything"), std::string::npos);
 }
 
+TEST(Unseen, PredictsDustWithoutTrying) {
+  const GaussianCloud cloud = Dusty(0);
+  const auto found = PredictUnseen(cloud);
+  ASSERT_TRUE(found.ok()) << found.error().message;
+  EXPECT_GT(std::ssize(*found), kDust / 20);
+  for (const int64_t i : *found) EXPECT_GE(i, kObject);
+  EXPECT_GE(PsnrWithout(cloud, *found, {}), 38);  // they add up, which the sum of squares does not know
+  // The same dust inside of an opaque bright shell reaches no view: who knows what is seen from within.
+  GaussianCloud within = orbit_scene::Ball(kDust, 6), shell = orbit_scene::Ball(2000, 5);
+  Paint(within, 0);
+  Paint(shell, 1);
+  for (size_t i = 0; i < 2000; ++i) {
+    const double norm = std::hypot(shell.means[3 * i], shell.means[3 * i + 1], shell.means[3 * i + 2]);
+    for (size_t c = 0; c < 3; ++c) {
+      shell.means[3 * i + c] *= static_cast<float>(3 / norm);
+      shell.log_scales[3 * i + c] = std::log(0.5f);
+    }
+    shell.opacity_logits[i] = 6;
+  }
+  ASSERT_TRUE(Append(within, shell).ok());
+  const auto hidden = PredictUnseen(within);
+  ASSERT_TRUE(hidden.ok());
+  EXPECT_TRUE(hidden->empty()) << hidden->size();
+  GaussianCloud bright = Dusty(1);
+  EXPECT_TRUE(PredictUnseen(bright)->empty());
+  EXPECT_TRUE(PredictUnseen({})->empty());
+}
+
 TEST(Unseen, EdgeCases) {
   EXPECT_FALSE(FindUnseen(Dusty(0), Views(), {.least_psnr = 0}).ok());
   GaussianCloud cloud = Dusty(0);

@@ -13,6 +13,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "enhance/filter.h"
+#include "enhance/unseen_gaussians.h"
 #include "io/file_version.h"
 #include "model/any_network.h"
 #include "model/compact/copy_choice.h"
@@ -156,6 +157,11 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
     return within_budget();
   }
   const auto n = static_cast<double>(input.cloud.size());
+  // Dust is not worth copies. Whoever asks for a number gets it.
+  std::vector<int64_t> dust;
+  if (!model.copies) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(dust, PredictUnseen(input.cloud));
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(CompactResult result, network.Apply(input.cloud, {.pixel_sizes = input.pixel_sizes,
                                                                                  .upscale = upscale,
                                                                                  .strength = input.filter_strength}));
@@ -190,9 +196,11 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
       pixels.push_back(static_cast<float>(input.pixel_sizes[static_cast<size_t>(i)] / upscale));
     }
   }
+  std::vector<char> single;
+  for (const int64_t i : result.anchors) single.push_back(std::ranges::binary_search(dust, i) ? 1 : 0);
   ANCHORSPLAT_ASSIGN_OR_RETURN(
       const ChosenCopies chosen,
-      ChooseCopies({std::ssize(result.anchors), network.config().copies, pixels},
+      ChooseCopies({std::ssize(result.anchors), network.config().copies, pixels, single},
                    {model.copies, model.merge_cost.value_or(kMergeCost), model.options.max_gaussians, prune_opacity},
                    result.cloud));
   const int64_t before = result.cloud.size();
@@ -209,6 +217,7 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
                   {"output_not_finite", result.not_finite},
                   {"copies_made", made},
                   {"merged", chosen.merged},
+                  {"unseen", std::ssize(dust)},
                   {"pruned", before - result.cloud.size()},
                   {"left_out", chosen.left_out}};
   return std::move(result.cloud);

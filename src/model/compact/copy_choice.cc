@@ -51,10 +51,11 @@ class MergePlan {
         float most = 0;
         int64_t& chosen = chosen_[static_cast<size_t>(g)];
         bool wanted = true;
+        const bool single = !groups_.single.empty() && groups_.single[static_cast<size_t>(g)] != 0;
         for (; group.alive() > 1; ++step) {
           *step = group.Next();
           step->cost = most = std::max(most, step->cost);
-          wanted = wanted && IsWanted(choice, group.alive(), step->cost);
+          wanted = wanted && (single || IsWanted(choice, group.alive(), step->cost));
           if (wanted) ++chosen;
           if (!wanted && choice.max_gaussians == 0) break;
           group.Do(*step);

@@ -27,6 +27,7 @@ struct CopyGroups {
   int64_t count = 0;
   int64_t copies = 1;                  // 1–64
   std::span<const float> pixel_sizes;  // of the closer view, world units, one for all or one per group
+  std::span<const char> single = {};   // not 0: all its copies are merged into one; one per group, empty: none
 };
 
 struct ChosenCopies {

@@ -116,6 +116,23 @@ TEST(CopyChoice, CostSaysHowManyStay) {
   }
 }
 
+TEST(CopyChoice, SomeGetNoCopies) {
+  const GaussianCloud made = Copies(500, 4, 0.2);
+  CopyGroups groups = Groups(500, 4);
+  std::vector<char> single(500, 0);
+  for (size_t g = 0; g < 500; g += 5) single[g] = 1;
+  groups.single = single;
+  GaussianCloud cloud = made;
+  const auto done = ChooseCopies(groups, {.merge_cost = 0}, cloud);
+  ASSERT_TRUE(done.ok());
+  EXPECT_GE(done->merged, 300);
+  GaussianCloud others = made;
+  const auto without = ChooseCopies(Groups(500, 4), {.merge_cost = 0}, others);
+  ASSERT_TRUE(without.ok());
+  EXPECT_GE(done->merged, without->merged + 200);
+  EXPECT_LE(done->merged, without->merged + 300);
+}
+
 TEST(CopyChoice, BudgetIsKeptExactlyAndByTheCheapest) {
   const GaussianCloud made = Copies(300, 4, 0.2);
   for (const int64_t most : {1199, 1000, 777, 301, 300, 299, 17, 1}) {

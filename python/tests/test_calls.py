@@ -88,7 +88,7 @@ def test_progress_as_a_function_and_as_bars(cloud):
 def test_messages_go_to_logging_and_warnings(cloud, caplog):
     caplog.set_level(logging.INFO, "anchorsplat")
     anchorsplat.enhance(cloud, method="filter")
-    assert any("pixel size" in record.message for record in caplog.records)
+    assert any("training pixel" in record.message for record in caplog.records)
     with pytest.warns(anchorsplat.SplatWarning, match="range of SPZ") as warned:
         anchorsplat.to_bytes(cloud, "spz")
     assert os.path.basename(warned[0].filename) == "test_calls.py"

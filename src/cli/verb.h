@@ -54,13 +54,11 @@ void AddDataset(CLI::App& app, Program& program);
 void AddTrain(CLI::App& app, Program& program);
 void AddBench(CLI::App& app, Program& program);
 void AddDoctor(CLI::App& app, Program& program);
+void AddPython(CLI::App& app, Program& program);
 void AddManual(CLI::App& app, Program& program);
 
 // All of them, in the order in which --help lists them.
 void AddVerbs(CLI::App& app, Program& program);
-
-// The options that the user gave, by their names without dashes.
-std::vector<std::string> GivenOptions(const CLI::App& verb);
 
 inline WriteOptions WriteOptionsFrom(const SharedFlags& flags) { return {.overwrite = flags.overwrite}; }
 

@@ -3,7 +3,8 @@
 # one for this machine's Python and, where that is older than 3.12, one for 3.12 and all after it (abi3). The libraries that
 # they need travel in them, with their notices. `make wheel` calls it, when the dependencies are there.
 #
-#   PYTHON=python3.13    another Python than python3
+#   PYTHON=python3.13       another Python than python3
+#   WHEEL_BUILD=FOLDER      builds there instead of in build/wheel/cmake, where what it has is used again
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=build/wheels
@@ -20,12 +21,13 @@ fail() { echo "build-wheel: $1" >&2; tail -n 20 "$log" >&2; exit 1; }
 export PATH=$PWD/$venv/bin:$PATH
 
 # Of Python 3.13 only the headers are needed, which Debian has in a package.
-settings=(--config-settings "build-dir=$work/cmake")
+build=${WHEEL_BUILD:-$work/cmake}
+settings=(--config-settings "build-dir=$build")
 headers=
 if python -c 'import sys; sys.exit(sys.version_info >= (3, 12))'; then
   headers=$PWD/$work/headers
   [ -e "$headers/usr/include/python3.13/Python.h" ] || scripts/fetch-python-headers.sh "$headers" >>"$log" 2>&1 ||
-    fail "the headers of Python 3.13 could not be had; NO_ABI3=1 does without them"
+    fail "the headers of Python 3.13 could not be had"
   include="$headers/usr/include/python3.13;$headers/usr/include"
   settings+=(--config-settings "cmake.define.ANCHORSPLAT_ABI3_HEADERS=$include")
 fi
@@ -35,11 +37,11 @@ mkdir -p "$folder" "$work/whole"
 python -m pip --disable-pip-version-check wheel . --no-deps --no-build-isolation -w "$work/raw" "${settings[@]}" >>"$log" 2>&1 ||
   fail "the wheel could not be built"
 if [ -n "$headers" ]; then
-  cmake --build "$work/cmake" -j "${JOBS:-$(nproc)}" --target anchorsplat_python_abi3 >>"$log" 2>&1 || fail "the module for abi3 could not be built"
+  cmake --build "$build" -j "${JOBS:-$(nproc)}" --target anchorsplat_python_abi3 >>"$log" 2>&1 || fail "the module for abi3 could not be built"
   python -m wheel unpack -d "$work/raw" "$work"/raw/anchorsplat-*.whl >>"$log"
   unpacked=$(ls -d "$work"/raw/anchorsplat-*/)
   rm "$unpacked"/anchorsplat/_core.cpython-*.so
-  cp "$work/cmake/python/_core.abi3.so" "$unpacked/anchorsplat/"
+  cp "$build/python/_core.abi3.so" "$unpacked/anchorsplat/"
   sed -i 's/^Tag: cp[0-9]*-cp[0-9]*-/Tag: cp312-abi3-/' "$unpacked"/anchorsplat-*.dist-info/WHEEL
   python -m wheel pack -d "$work/raw" "$unpacked" >>"$log"
   rm -r "$unpacked"

@@ -8,5 +8,9 @@ stamp=.venv/anchorsplat-python
 [ "$(cat "$stamp" 2>/dev/null)" = "${packages[*]}" ] && exit 0
 [ -x .venv/bin/python ] || python3 -m venv .venv
 echo "Installing what the Python package is built with into .venv"
-.venv/bin/python -m pip --disable-pip-version-check install --quiet "${packages[@]}"
+if ! .venv/bin/python -m pip --disable-pip-version-check install --quiet "${packages[@]}"; then
+  echo "anchorsplat: pip could not install ${packages[*]}, without which the Python package is neither built nor tested;" >&2
+  echo "'make build' builds the program alone." >&2
+  exit 1
+fi
 echo "${packages[*]}" >"$stamp"

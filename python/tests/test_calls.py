@@ -27,7 +27,7 @@ def test_several_threads_at_once_give_the_same_bits(cloud):
         lambda threads: anchorsplat.read(anchorsplat.to_bytes(cloud, "ply"), threads=threads).quats,
     ]
     alone = [call(0) for call in calls]
-    jobs = [(k, threads) for threads in (1, 2, 0, 1) for k in range(len(calls))]
+    jobs = [(k, threads) for threads in (1, 0) for k in range(len(calls))]
     begin = threading.Barrier(6)
     with ThreadPoolExecutor(6, initializer=begin.wait) as pool:
         together = list(pool.map(lambda job: calls[job[0]](job[1]), jobs))

@@ -19,6 +19,7 @@ struct SharedFlags {
   bool overwrite = false;
   bool quiet = false;
   bool json = false;  // stdout carries one JSON document and nothing else
+  bool json_progress = false;  // and stderr one for each event (json_sink.h)
   int threads = 0;    // 0: the whole machine
   uint64_t seed = 0;
 };
@@ -55,6 +56,8 @@ void AddTrain(CLI::App& app, Program& program);
 void AddBench(CLI::App& app, Program& program);
 void AddDoctor(CLI::App& app, Program& program);
 void AddManual(CLI::App& app, Program& program);
+// Those that are not in this program: they say where they are.
+void AddPythonVerbs(CLI::App& app, Program& program);
 
 // All of them, in the order in which --help lists them.
 void AddVerbs(CLI::App& app, Program& program);

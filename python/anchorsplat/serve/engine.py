@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import os
-import shutil
 import signal
 import subprocess
 from pathlib import Path
 
+from .._program import program as bundled_program
 from . import options as asked
 from .process import Limits, Outcome
 from .settings import Settings
@@ -22,13 +22,12 @@ class EngineMissing(Exception):
 
 
 def find_program() -> Path:
-    """ANCHORSPLAT_PROGRAM, else the program of this package, else the one on the PATH."""
+    """The one of this package, unless ANCHORSPLAT_PROGRAM names another."""
     named = os.environ.get("ANCHORSPLAT_PROGRAM")
-    candidates = [named] if named else [str(Path(__file__).parents[1] / "bin" / "anchorsplat"), shutil.which("anchorsplat")]
-    for candidate in candidates:
-        if candidate and os.access(candidate, os.X_OK) and os.path.isfile(candidate):
-            return Path(candidate).absolute()
-    raise EngineMissing(f"the native program is missing: looked for {', '.join(c for c in candidates if c)}")
+    candidate = named or bundled_program()
+    if os.access(candidate, os.X_OK) and os.path.isfile(candidate):
+        return Path(candidate).resolve()
+    raise EngineMissing(f"{candidate}: the native program is missing or cannot be run")
 
 
 def fingerprint_of(program: Path) -> str:

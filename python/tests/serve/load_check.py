@@ -1,0 +1,104 @@
+"""200 requests, 20 at once: none lost, memory bounded. Prints the figures of docs/serve.md (`make serve-test`)."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from pathlib import Path
+
+import httpx
+from conftest import PATIENCE, Server, small_ply
+
+REQUESTS, AT_ONCE = 200, 20
+MOST_GROWTH = 64 * 2**20  # bytes of the service while it answers all of them
+
+
+def resident(server: Server) -> int:
+    for line in Path(f"/proc/{server.process.pid}/status").read_text().splitlines():
+        if line.startswith("VmRSS:"):
+            return int(line.split()[1]) * 1024
+    raise AssertionError("no VmRSS")
+
+
+def peak(server: Server) -> int:
+    lines = Path(f"/proc/{server.process.pid}/status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM:")) * 1024
+
+
+async def one(client: httpx.AsyncClient, splat: bytes) -> tuple[bytes, float]:
+    """Sent, waited for by its events, fetched. Told that too many wait it comes back."""
+    begin = time.monotonic()
+    while (answer := await client.post("/v1/enhance", files={"file": ("a.ply", splat)})).status_code == 429:
+        await asyncio.sleep(float(answer.headers["retry-after"]))
+    assert answer.status_code in (200, 202), answer.text
+    job = answer.json()
+    async with client.stream("GET", job["links"]["events"]) as events:
+        async for line in events.aiter_lines():
+            last = line or last if line else last if "last" in locals() else ""
+    assert '"state": "done"' in last, last
+    result = await client.get(f"{job['links']['self']}/result")
+    assert result.status_code == 200
+    return result.content, time.monotonic() - begin
+
+
+async def all_of(server: Server, splats: list[bytes]) -> list[tuple[bytes, float]]:
+    gate = asyncio.Semaphore(AT_ONCE)
+    limits = httpx.Limits(max_connections=2 * AT_ONCE)
+    async with httpx.AsyncClient(base_url=server.url, timeout=PATIENCE, trust_env=False, limits=limits) as client:
+
+        async def gated(splat: bytes) -> tuple[bytes, float]:
+            async with gate:
+                return await one(client, splat)
+
+        return await asyncio.gather(*(gated(splat) for splat in splats))
+
+
+def test_two_hundred_requests(serve, capsys) -> None:
+    server = serve("--workers", "2", "--threads", "1")
+    splats = [small_ply(2000, seed) for seed in range(REQUESTS)]
+    server.wait(server.submit(small_ply(2000, REQUESTS)))  # what is loaded at the first request is there
+    before = resident(server)
+    begin = time.monotonic()
+    answers = asyncio.run(all_of(server, splats))
+    seconds = time.monotonic() - begin
+    assert len(answers) == REQUESTS
+    assert len({answer for answer, _ in answers}) == REQUESTS  # each its own
+    assert peak(server) - before < MOST_GROWTH, (before, peak(server))
+
+    again = time.monotonic()
+    repeated = asyncio.run(all_of(server, splats))
+    repeated_seconds = time.monotonic() - again
+    assert [answer for answer, _ in repeated] == [answer for answer, _ in answers]
+    waits = sorted(wait for _, wait in answers)
+    with capsys.disabled():
+        print(f"\n{REQUESTS} splats of 2,000 Gaussians, {AT_ONCE} at once: {seconds:.1f} s, {REQUESTS / seconds:.1f} a second, "
+              f"median {waits[REQUESTS // 2]:.2f} s, slowest {waits[-1]:.2f} s")
+        print(f"the same again, from what is there: {repeated_seconds:.1f} s, {REQUESTS / repeated_seconds:.0f} a second")
+        print(f"memory of the service: {before / 2**20:.0f} MiB before, {peak(server) / 2**20:.0f} MiB at most")
+
+
+def test_what_a_request_costs(serve, capsys) -> None:
+    """One after the other: what the service adds to the program's own time."""
+    import subprocess
+    import tempfile
+
+    from anchorsplat._program import program
+
+    server = serve("--workers", "1", "--threads", "1")
+    count = 30
+    with tempfile.TemporaryDirectory() as folder:
+        paths = []
+        for seed in range(count):
+            paths.append(Path(folder, f"{seed}.ply"))
+            paths[-1].write_bytes(small_ply(2000, seed))
+        begin = time.monotonic()
+        for path in paths:
+            subprocess.run([program(), "enhance", path, "-o", f"{path}.out.ply", "--threads", "1", "-q"], check=True)
+        alone = (time.monotonic() - begin) / count
+        begin = time.monotonic()
+        for path in paths:
+            job = server.wait(server.submit(path.read_bytes()))
+            assert server.http.get(job["links"]["result"]).content == Path(f"{path}.out.ply").read_bytes()
+        served = (time.monotonic() - begin) / count
+    with capsys.disabled():
+        print(f"\none after the other: {1000 * served:.0f} ms each, {1000 * alone:.0f} ms by the command line: {1000 * (served - alone):.0f} ms more")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import logging
+import signal
 import socket
 import sys
 
@@ -16,6 +18,16 @@ from .store import DataInUse
 
 
 class _Server(uvicorn.Server):
+    @contextlib.contextmanager
+    def capture_signals(self):
+        """To be asked to end is no failure: uvicorn's own way ends the process by the signal."""
+        before = {number: signal.signal(number, self.handle_exit) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
     def handle_exit(self, sig, frame) -> None:
         # Those who watch a job would keep their connections, and so the service, for as long as it runs.
         self.config.app.service.scheduler.begin_to_stop()

@@ -56,6 +56,7 @@ class Store:
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
+            self._lock.close()
             raise DataInUse(f"{folder}: another 'anchorsplat serve' works in this folder; end it, or give --data another one") from None
         self._db = sqlite3.connect(folder / "jobs.sqlite3", isolation_level=None)
         self._db.row_factory = sqlite3.Row
@@ -65,6 +66,7 @@ class Store:
         if version == 0:
             self._db.executescript(f"BEGIN; {_SCHEMA} PRAGMA user_version={_SCHEMA_VERSION}; COMMIT;")
         elif version != _SCHEMA_VERSION:
+            self.close()
             raise DataInUse(f"{folder}: made by another version of anchorsplat (schema {version}); give --data another folder")
         self._begin()
 

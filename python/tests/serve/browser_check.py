@@ -54,8 +54,10 @@ class Tab:
 
     def close(self, allowed: tuple[str, ...] = ()) -> None:
         self.context.close()
-        # The software renderer warns that reading a canvas is slow there.
-        bad = [text for text in self.complaints if not any(part in text for part in (*allowed, "GPU stall"))]
+        # The software renderer warns that reading a canvas is slow there; the viewer's closed dialog has a button that
+        # would be focused.
+        allowed = (*allowed, "GPU stall", "Blocked autofocusing on a <button> element in a cross-origin subframe")
+        bad = [text for text in self.complaints if not any(part in text for part in allowed)]
         assert not bad, bad
 
 
@@ -69,6 +71,7 @@ def drop(page: Page, path: Path) -> None:
 
 
 def viewer_ready(page: Page) -> None:
+    page.locator("#viewer").scroll_into_view_if_needed()  # browsers draw no frame of another origin that is out of sight
     frame = page.frame_locator("#viewer")
     expect(frame.locator("html")).to_have_attribute("data-state", "ready", timeout=PATIENCE_MS)
     expect(frame.locator("html")).to_have_attribute("data-settled", "true", timeout=PATIENCE_MS)
@@ -165,7 +168,6 @@ def test_files_that_are_no_splats(browser: Browser, serve, tmp_path: Path) -> No
     page.locator("#file").set_input_files(large)
     expect(page.locator("#refused")).to_contain_text("this service takes 1.00 MB")
     expect(page.locator("#start")).to_be_disabled()
-    page.locator("#file").set_input_files(EXAMPLE.parent / "none" if False else bad)
     page.goto(f"{server.url}/#gone")
     expect(page.locator("#job")).to_be_hidden()
     tab.close(allowed=("status of 400", "status of 404", "EventSource"))
@@ -215,7 +217,7 @@ def test_the_page_of_the_api(browser: Browser, serve) -> None:
     server = serve()
     tab = Tab(browser, server)
     tab.page.goto(f"{server.url}/docs")
-    expect(tab.page.locator(".card")).to_have_count(10)
+    expect(tab.page.locator(".card")).to_have_count(11)
     expect(tab.page.locator("#operations")).to_contain_text("/v1/enhance")
     tab.picture("api", full=False)
     tab.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,22 @@ def clock() -> Clock:
     return Clock()
 
 
+@pytest.fixture
+def open_store(tmp_path: Path, clock: Clock) -> Iterator[Callable[[], Store]]:
+    """Opens the folder of the test, after whoever had it has gone."""
+    opened: list[Store] = []
+
+    def open_again() -> Store:
+        for store in opened:
+            store.close()
+        opened.append(Store(tmp_path, clock))
+        return opened[-1]
+
+    yield open_again
+    for store in opened:
+        store.close()
+
+
 def add(store: Store, number: int, size: int = 100) -> str:
     """An input with a job of its own; the key of its work."""
     upload = store.new_upload()
@@ -40,8 +57,8 @@ def finish(store: Store, key: str, size: int = 100) -> None:
     store.finish(key, {})
 
 
-def test_results_go_by_age(tmp_path: Path, clock: Clock) -> None:
-    store = Store(tmp_path, clock)
+def test_results_go_by_age(open_store, tmp_path: Path, clock: Clock) -> None:
+    store = open_store()
     old, new = add(store, 1), add(store, 2)
     finish(store, old)
     clock.now += 5 * DAY
@@ -53,8 +70,8 @@ def test_results_go_by_age(tmp_path: Path, clock: Clock) -> None:
     assert store.result_folder(new).exists() and store.input_path("input2").exists()
 
 
-def test_being_asked_for_keeps_a_result(tmp_path: Path, clock: Clock) -> None:
-    store = Store(tmp_path, clock)
+def test_being_asked_for_keeps_a_result(open_store, tmp_path: Path, clock: Clock) -> None:
+    store = open_store()
     first, second = add(store, 1), add(store, 2)
     finish(store, first)
     clock.now += 1
@@ -67,8 +84,8 @@ def test_being_asked_for_keeps_a_result(tmp_path: Path, clock: Clock) -> None:
     assert store.work(first) is not None and store.work(second) is None
 
 
-def test_what_waits_or_runs_stays(tmp_path: Path, clock: Clock) -> None:
-    store = Store(tmp_path, clock)
+def test_what_waits_or_runs_stays(open_store, tmp_path: Path, clock: Clock) -> None:
+    store = open_store()
     running, waiting = add(store, 1), add(store, 2)
     assert store.next_work()["key"] == running
     clock.now += 100 * DAY
@@ -76,8 +93,8 @@ def test_what_waits_or_runs_stays(tmp_path: Path, clock: Clock) -> None:
     assert store.work(waiting)["state"] == states.QUEUED and store.input_path("input1").exists()
 
 
-def test_what_a_killed_service_leaves(tmp_path: Path, clock: Clock) -> None:
-    store = Store(tmp_path, clock)
+def test_what_a_killed_service_leaves(open_store, tmp_path: Path, clock: Clock) -> None:
+    store = open_store()
     ran, done = add(store, 1), add(store, 2)
     assert store.next_work()["key"] == ran
     store.work_folder(ran).mkdir()
@@ -86,8 +103,7 @@ def test_what_a_killed_service_leaves(tmp_path: Path, clock: Clock) -> None:
     (tmp_path / "work" / "other").mkdir()
     (tmp_path / "results" / "half").mkdir()
     (tmp_path / "inputs" / "nobodys").write_bytes(b"x")
-    store.close()
-    store = Store(tmp_path, clock)
+    store = open_store()
     assert store.work(ran)["state"] == states.QUEUED and store.work(done)["state"] == states.DONE
     assert [p.name for p in (tmp_path / "results").iterdir()] == [done]
     assert [p.name for p in (tmp_path / "work").iterdir()] == [ran]  # it may hold a state to go on from
@@ -103,8 +119,8 @@ def test_a_folder_is_one_services(tmp_path: Path) -> None:
     Store(tmp_path).close()
 
 
-def test_oldest_first(tmp_path: Path, clock: Clock) -> None:
-    store = Store(tmp_path, clock)
+def test_oldest_first(open_store, tmp_path: Path, clock: Clock) -> None:
+    store = open_store()
     keys = []
     for number in range(5):
         clock.now += 1

@@ -209,6 +209,7 @@ $('form').onsubmit = async (event) => {
   $('job-facts').textContent = '';
   for (const id of ['result', 'cancel', 'failed']) $(id).hidden = true;
   $('working').hidden = false;
+  $('job').scrollIntoView({block: 'nearest'});
   let answer;
   for (;;) {
     setBar(0);

@@ -55,9 +55,8 @@ void AddDataset(CLI::App& app, Program& program);
 void AddTrain(CLI::App& app, Program& program);
 void AddBench(CLI::App& app, Program& program);
 void AddDoctor(CLI::App& app, Program& program);
+void AddPython(CLI::App& app, Program& program);
 void AddManual(CLI::App& app, Program& program);
-// Those that are not in this program: they say where they are.
-void AddPythonVerbs(CLI::App& app, Program& program);
 
 // All of them, in the order in which --help lists them.
 void AddVerbs(CLI::App& app, Program& program);

@@ -134,8 +134,8 @@ TEST(CommandLine, ProgressAsJson) {
 }
 
 TEST(CommandLine, VerbsOfThePythonPackageSayWhereTheyAre) {
-  ExpectRefused({"serve"}, ErrorCode::kBadArgument, {"pip install \"anchorsplat[serve]\""});
-  ExpectRefused({"serve", "--port", "1", "x"}, ErrorCode::kBadArgument, {"pip install \"anchorsplat[serve]\""});
+  ExpectRefused({"serve"}, ErrorCode::kBadArgument, {"pip install 'anchorsplat[serve]'"});
+  ExpectRefused({"serve", "--port", "1", "x"}, ErrorCode::kBadArgument, {"pip install 'anchorsplat[serve]'"});
   ExpectRefused({"batch", "enhance", "a.ply", "--out", "b"}, ErrorCode::kBadArgument, {"anchorsplat[batch]"});
 }
 

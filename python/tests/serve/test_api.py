@@ -9,10 +9,11 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from conftest import Server, small_ply
 
 import anchorsplat
 from anchorsplat._program import program
+
+from .service import Server, small_ply
 
 SPLAT = small_ply()
 

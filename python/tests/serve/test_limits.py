@@ -9,11 +9,12 @@ from pathlib import Path
 
 import httpx
 import pytest
-from conftest import GatedProgram, Server, small_ply, until
 
 from anchorsplat.serve import upload
 from anchorsplat.serve.app import make_app
 from anchorsplat.serve.settings import Settings
+
+from .service import GatedProgram, Server, small_ply, until
 
 SPLAT = small_ply()
 

@@ -7,7 +7,8 @@ import os
 import random
 
 import httpx
-from conftest import PATIENCE, Server, small_ply
+
+from .service import PATIENCE, Server, small_ply
 
 COUNT = int(os.environ.get("ANCHORSPLAT_MALFORMED", "100"))  # 1,000 in `make serve-test`
 AT_ONCE = 8

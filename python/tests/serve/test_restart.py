@@ -7,9 +7,10 @@ import signal
 import subprocess
 import sys
 
-from conftest import GatedProgram, Server, small_ply, until
 
 import anchorsplat
+
+from .service import GatedProgram, Server, small_ply, until
 
 SPLAT = small_ply()
 

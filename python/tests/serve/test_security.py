@@ -7,10 +7,11 @@ import re
 
 import httpx
 import pytest
-from conftest import Server, small_ply
 
 from anchorsplat.serve.security import is_session, session
 from anchorsplat.serve.settings import UsageError, parse
+
+from .service import Server, small_ply
 
 TOKEN = "correct-horse-battery-staple"
 

@@ -7,7 +7,8 @@ import time
 from pathlib import Path
 
 import httpx
-from conftest import PATIENCE, Server, small_ply
+
+from .service import PATIENCE, Server, small_ply
 
 REQUESTS, AT_ONCE = 200, 20
 MOST_GROWTH = 64 * 2**20  # bytes of the service while it answers all of them

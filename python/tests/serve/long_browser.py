@@ -10,10 +10,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from conftest import GatedProgram, Server, small_ply
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 import anchorsplat
+
+from .service import GatedProgram, Server, small_ply
 
 PICTURES = Path(os.environ.get("ANCHORSPLAT_PICTURES", "."))
 EXAMPLE = Path(os.environ["ANCHORSPLAT_EXAMPLE"])

@@ -10,9 +10,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from conftest import GatedProgram, small_ply, until
 
 import anchorsplat
+
+from .service import GatedProgram, small_ply, until
 
 SPLAT = small_ply()
 

@@ -68,8 +68,11 @@ def _job(task: Task, stdin: bytes | None, links: dict[str, bytes], state: bytes 
 
 class RayRunner:
     def __init__(self, address: str, threads: int, fingerprint: str):
-        if not ray.is_initialized():
-            ray.init(address=None if address == "local" else address, include_dashboard=False, log_to_driver=False)
+        where = {"address": "local", "include_dashboard": False} if address == "local" else {"address": address}
+        try:
+            ray.init(**where, log_to_driver=False)
+        except (ConnectionError, RuntimeError, ValueError) as error:
+            raise ConnectionError(f"no Ray cluster at {address}: {str(error).strip().splitlines()[0]}") from None
         self._fingerprint = fingerprint
         self._threads = threads
         self._remote = ray.remote(_job)

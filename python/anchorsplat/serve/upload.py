@@ -217,6 +217,9 @@ async def _chunks(request: Request, stall_seconds: float):
 async def drain(request: Request) -> None:
     """Reads what is left of a small body, so that the client hears the answer and not a broken connection."""
     received = 0
+    announced = request.headers.get("content-length", "0")
+    if not announced.isdigit() or int(announced) > _DRAIN_BYTES:
+        return
     try:
         async for chunk in _chunks(request, 5.0):
             received += len(chunk)

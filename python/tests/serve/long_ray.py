@@ -19,33 +19,69 @@ SPLAT = small_ply()
 
 
 @pytest.fixture(scope="module")
-def cluster() -> Iterator[str]:
-    """A head node with two CPUs, on loopback."""
-    ray = [sys.executable, "-m", "ray.scripts.scripts"]
-    environment = os.environ | {"PYTHONPATH": str(Path(anchorsplat.__file__).parents[1]), "RAY_DISABLE_IMPORT_WARNING": "1"}
+def everywhere(tmp_path_factory: pytest.TempPathFactory) -> GatedProgram:
+    """The program of the service and of the nodes."""
+    return GatedProgram(tmp_path_factory.mktemp("ray") / "gated")
+
+
+@pytest.fixture(scope="module")
+def cluster(everywhere: GatedProgram) -> Iterator[str]:
+    """The address of a head node with two CPUs, on loopback."""
+    ray = [sys.executable, "-c", "from ray.scripts.scripts import main; main()"]
+    environment = os.environ | everywhere.environment | {"PYTHONPATH": str(Path(anchorsplat.__file__).parents[1])}
     start = ["start", "--head", "--node-ip-address=127.0.0.1", "--port=0", "--num-cpus=2", "--include-dashboard=false",
              "--object-store-memory=200000000", "--disable-usage-stats"]
     said = subprocess.run([*ray, *start], env=environment, check=True, capture_output=True, text=True).stdout
-    address = next(word.strip("'\"") for line in said.splitlines() if "--address=" in line for word in line.split("=")[1:])
-    yield address
+    yield next(line.split("--address=")[1].strip("' ") for line in said.splitlines() if "--address=" in line)
     subprocess.run([*ray, "stop", "--force"], env=environment, check=False, capture_output=True)
 
 
-def test_jobs_on_ray(serve, cluster: str, tmp_path) -> None:
-    local, server = serve(data="local"), serve("--ray", cluster, "--workers", "2", "--threads", "1", data="ray")
-    here, there = (s.wait(s.submit(SPLAT, upscale=3)) for s in (local, server))
+def test_jobs_on_ray(serve, cluster: str, everywhere: GatedProgram) -> None:
+    words = ("--ray", cluster, "--workers", "1", "--threads", "1")
+    server = serve(*words, environment=everywhere.environment)
+    # What does not need the gate: the same bits as here.
+    local = serve("--threads", "1", data="local", environment=everywhere.environment)
+    here, there = (s.wait(s.submit(SPLAT, "render", orbit=2, size="32x32")) for s in (local, server))
     assert there["state"] == "done", there
     results = [s.http.get(job["links"]["result"]).content for s, job in ((local, here), (server, there))]
-    assert results[0] == results[1]
-    views = server.wait(server.submit(SPLAT, "render", orbit=2, size="32x32"))
-    assert views["state"] == "done" and server.http.get(views["links"]["result"]).content[:2] == b"PK"
-    assert server.http.get(there["links"]["view"]).status_code == 200
+    assert results[0][:2] == results[1][:2] == b"PK" and len(results[0]) == len(results[1])
+
+    # Progress, and being cancelled.
+    cancelled = server.submit(SPLAT, upscale=2)
+    next(e for e in server.events(cancelled) if e.get("progress") == {"task": "gate", "done": 1, "total": 2})
+    server.http.delete(cancelled["links"]["self"])
+    assert server.wait(cancelled)["state"] == "cancelled"
+    until(lambda: not everywhere.running(), "the end of the cancelled process")
+
+    # A process that is killed is tried again, also there.
+    job = server.submit(SPLAT, upscale=3)
+    next(e for e in server.events(job) if e.get("progress"))
+    first = everywhere.running()[0]
+    os.kill(first, signal.SIGKILL)
+    until(lambda: [pid for pid in everywhere.running() if pid != first], "the second attempt")
+
+    # The service ends in the middle, its jobs on the nodes with it; started again it goes on.
     assert server.stop() == 0
+    until(lambda: not everywhere.running(), "the end of a stopped service's process")
+    server.start()
+    everywhere.open()
+    done = server.wait(job)
+    assert done["state"] == "done", done
+    assert server.http.get(done["links"]["view"]).status_code == 200
+    same = local.wait(local.submit(SPLAT, upscale=3))
+    assert server.http.get(done["links"]["result"]).content == local.http.get(same["links"]["result"]).content
 
 
-def test_progress_cancelling_and_a_killed_process(serve, cluster: str, gated: GatedProgram) -> None:
-    server = serve("--ray", cluster, "--workers", "1", "--threads", "1", environment=gated.environment)
-    # Nodes have the same build: here the cluster was started without the gate's program, which is said.
+def test_a_node_with_another_build(serve, cluster: str) -> None:
+    server = serve("--ray", cluster, "--workers", "1", "--threads", "1", data="other")
     failed = server.wait(server.submit(SPLAT))
     assert failed["state"] == "failed" and "another build" in failed["error"]["message"], failed
-    assert signal.SIGKILL and until
+
+
+def test_a_cluster_that_is_not_there(tmp_path: Path) -> None:
+    package = str(Path(anchorsplat.__file__).parents[1])
+    tried = subprocess.run(
+        [sys.executable, "-m", "anchorsplat", "serve", "--port", "0", "--data", str(tmp_path), "--ray", "127.0.0.1:1"],
+        env={"PATH": os.environ["PATH"], "PYTHONPATH": package, "HOME": str(tmp_path)}, capture_output=True, text=True, timeout=300, check=False,
+    )
+    assert tried.returncode == 6 and "error: no Ray cluster at 127.0.0.1:1" in tried.stderr, tried.stderr

@@ -18,7 +18,15 @@ from pydantic import ValidationError
 from . import store as states
 from .cameras import BadCameras, plain_cameras
 from .metrics import CONTENT_TYPE, Metrics
-from .options import FORMATS, KINDS, ConvertOptions, EnhanceOptions, Format, Options, RenderOptions
+from .options import (
+    FORMATS,
+    KINDS,
+    ConvertOptions,
+    EnhanceOptions,
+    Format,
+    Options,
+    RenderOptions,
+)
 from .scheduler import Refused, Scheduler
 from .security import COOKIE, PAGE_POLICY, VIEWER_POLICY, same, session
 from .settings import Settings
@@ -26,12 +34,22 @@ from .store import Store
 from .upload import BadUpload, Upload, receive
 
 _KEEP_ALIVE_SECONDS = 15
-_STATUS = {"bad_file": 400, "memory": 413, "too_large": 413, "timeout": 413, "disk_full": 507, "bad_option": 422, "interrupted": 503}
+_STATUS = {
+    "bad_file": 400,
+    "memory": 413,
+    "too_large": 413,
+    "timeout": 413,
+    "disk_full": 507,
+    "bad_option": 422,
+    "interrupted": 503,
+}
 _VIEWABLE = ("ply", "compressed.ply", "spz", "sog", "splat", "glb")
 
 
 class ApiError(Exception):
-    def __init__(self, status: int, code: str, message: str, headers: dict[str, str] | None = None, details: list | None = None):
+    def __init__(
+        self, status: int, code: str, message: str, headers: dict[str, str] | None = None, details: list | None = None
+    ):
         super().__init__(message)
         self.status, self.code, self.headers, self.details = status, code, headers or {}, details
 
@@ -56,6 +74,7 @@ def disk_full(error: BaseException) -> bool:
 class Service:
     def __init__(self, settings: Settings, store: Store, scheduler: Scheduler, metrics: Metrics):
         self.settings, self.store, self.scheduler, self.metrics = settings, store, scheduler, metrics
+        self._one_at_a_time = asyncio.Lock()
 
     async def submit(self, kind: str, request: Request) -> JSONResponse:
         """Takes an upload in: 202 with a job that waits, 200 where its result is there already."""
@@ -71,7 +90,9 @@ class Service:
             options = validate(kind, pairs + upload.fields)
             cameras = await self._cameras(kind, options, upload)
             input_id, facts = await self._known_input(upload)
-            job_id = store.add_job(kind, options.canonical(), input_id, cameras, scheduler.engine.fingerprint, upload.name)
+            job_id = store.add_job(
+                kind, options.canonical(), input_id, cameras, scheduler.engine.fingerprint, upload.name
+            )
         except Refused as error:
             raise ApiError(_STATUS.get(error.code, 400), error.code, str(error)) from None
         except BadCameras as error:
@@ -86,7 +107,9 @@ class Service:
         answer = self.describe(job)
         if answer["state"] == states.DONE:
             self.metrics.answered.inc()
-        return JSONResponse(answer, 200 if answer["state"] == states.DONE else 202, {"location": answer["links"]["self"]})
+        return JSONResponse(
+            answer, 200 if answer["state"] == states.DONE else 202, {"location": answer["links"]["self"]}
+        )
 
     async def _known_input(self, upload: Upload) -> tuple[str, dict]:
         # Only this format cannot be told by its content; that it is one is then a matter of the name.
@@ -96,7 +119,10 @@ class Service:
         if facts is None:
             facts = await self.scheduler.check(upload.path, hint, upload.name)
         if facts["gaussians"] > self.settings.max_gaussians:
-            raise Refused("too_large", f"{upload.name} has {facts['gaussians']:,} Gaussians; this service takes {self.settings.max_gaussians:,}.")
+            raise Refused(
+                "too_large",
+                f"{upload.name} has {facts['gaussians']:,} Gaussians; this service takes {self.settings.max_gaussians:,}.",
+            )
         if facts["gaussians"] == 0:
             raise Refused("bad_file", f"{upload.name} has no Gaussians.")
         if not self.store.input_path(input_id).exists():
@@ -110,7 +136,8 @@ class Service:
             return None
         if kind != "enhance":
             raise ApiError(422, "bad_option", f"cameras: have no effect on {kind}")
-        plain = await asyncio.to_thread(plain_cameras, upload.cameras)
+        async with self._one_at_a_time:  # numbers as Python has them take ten times the memory
+            plain = await asyncio.to_thread(plain_cameras, upload.cameras)
         path = self.store.new_upload()
         await asyncio.to_thread(path.write_bytes, plain)
         cameras_id = hashlib.sha256(plain).hexdigest()
@@ -130,8 +157,13 @@ class Service:
         link = f"/v1/jobs/{job['id']}"
         facts = self.store.input_facts(work["input"]) or {}
         out = {
-            "id": job["id"], "kind": work["kind"], "name": job["name"], "state": state, "created": job["created"],
-            "options": json.loads(work["options"]), "input": facts | {"cameras": work["cameras"] is not None},
+            "id": job["id"],
+            "kind": work["kind"],
+            "name": job["name"],
+            "state": state,
+            "created": job["created"],
+            "options": json.loads(work["options"]),
+            "input": facts | {"cameras": work["cameras"] is not None},
             "links": {"self": link, "events": f"{link}/events"},
         }
         if state == states.QUEUED:
@@ -153,7 +185,9 @@ class Service:
     def done(self, job_id: str) -> tuple[sqlite3.Row, sqlite3.Row]:
         job, work = self.find(job_id)
         if job["cancelled"] or work["state"] != states.DONE:
-            raise ApiError(409, "not_done", f"The job is {'cancelled' if job['cancelled'] else work['state']}; there is no result.")
+            raise ApiError(
+                409, "not_done", f"The job is {'cancelled' if job['cancelled'] else work['state']}; there is no result."
+            )
         return job, work
 
     async def events(self, job_id: str):
@@ -164,7 +198,7 @@ class Service:
             change = changes.next()
             job = self.store.job(job_id)
             if job is None or self.store.work(job["key"]) is None:
-                yield 'event: gone\ndata: {}\n\n'
+                yield "event: gone\ndata: {}\n\n"
                 return
             now = self.describe(job)
             yield f"data: {json.dumps(now)}\n\n" if now != last else ": still here\n\n"
@@ -219,15 +253,30 @@ def router(service: Service, static: dict[str, tuple[bytes, str]]) -> APIRouter:
         found, _ = service.find(job_id)
         return service.describe(found)
 
-    @api.get("/v1/jobs/{job_id}/events", tags=["jobs"], summary="The same whenever it changes, as server-sent events",
-             response_class=StreamingResponse)
+    @api.get(
+        "/v1/jobs/{job_id}/events",
+        tags=["jobs"],
+        summary="The same whenever it changes, as server-sent events",
+        response_class=StreamingResponse,
+    )
     async def events(job_id: str) -> StreamingResponse:
         service.find(job_id)
-        return StreamingResponse(service.events(job_id), media_type="text/event-stream", headers={"x-accel-buffering": "no"})
+        return StreamingResponse(
+            service.events(job_id), media_type="text/event-stream", headers={"x-accel-buffering": "no"}
+        )
 
-    @api.get("/v1/jobs/{job_id}/result", tags=["jobs"], summary="The result, an enhanced splat in any format",
-             response_class=FileResponse)
-    async def result(job_id: str, format: Format | Literal["png", "zip"] | None = Query(None, description="default: ply of an enhanced splat, else what was asked for")) -> FileResponse:
+    @api.get(
+        "/v1/jobs/{job_id}/result",
+        tags=["jobs"],
+        summary="The result, an enhanced splat in any format",
+        response_class=FileResponse,
+    )
+    async def result(
+        job_id: str,
+        format: Format | Literal["png", "zip"] | None = Query(
+            None, description="default: ply of an enhanced splat, else what was asked for"
+        ),
+    ) -> FileResponse:
         found, work = service.done(job_id)
         known = formats_of(work)
         wanted = format or known[0]
@@ -244,7 +293,12 @@ def router(service: Service, static: dict[str, tuple[bytes, str]]) -> APIRouter:
         media = {"png": "image/png", "zip": "application/zip"}.get(wanted) or FORMATS[wanted]
         return FileResponse(path, media_type=media, filename=f"{_stem(found['name'])}{suffix}.{ending}")
 
-    @api.get("/v1/jobs/{job_id}/view", tags=["jobs"], summary="A page that shows before and after", response_class=FileResponse)
+    @api.get(
+        "/v1/jobs/{job_id}/view",
+        tags=["jobs"],
+        summary="A page that shows before and after",
+        response_class=FileResponse,
+    )
     async def view(job_id: str) -> FileResponse:
         _, work = service.done(job_id)
         if not viewable(work):
@@ -252,10 +306,18 @@ def router(service: Service, static: dict[str, tuple[bytes, str]]) -> APIRouter:
         options = json.loads(work["options"])
         title = f"Seen {options['upscale']:g} times closer" if work["kind"] == "enhance" else f"As {options['to']}"
         path = await scheduler.page(work, f"result.{formats_of(work)[0]}", title)
-        return FileResponse(path, media_type="text/html", headers={"content-security-policy": VIEWER_POLICY, "x-frame-options": "SAMEORIGIN"})
+        return FileResponse(
+            path,
+            media_type="text/html",
+            headers={"content-security-policy": VIEWER_POLICY, "x-frame-options": "SAMEORIGIN"},
+        )
 
-    @api.delete("/v1/jobs/{job_id}", tags=["jobs"], summary="Cancel a job that is not over (200); forget one that is (204)",
-                responses={200: {"description": "Cancelled"}, 204: {"description": "Forgotten, and its result"}})
+    @api.delete(
+        "/v1/jobs/{job_id}",
+        tags=["jobs"],
+        summary="Cancel a job that is not over (200); forget one that is (204)",
+        responses={200: {"description": "Cancelled"}, 204: {"description": "Forgotten, and its result"}},
+    )
     async def delete(job_id: str) -> Response:
         found, work = service.find(job_id)
         if not found["cancelled"] and work["state"] not in states.ENDED:
@@ -267,8 +329,12 @@ def router(service: Service, static: dict[str, tuple[bytes, str]]) -> APIRouter:
     @api.get("/v1/limits", tags=["service"], summary="What this service takes, and what it makes")
     async def limits() -> dict:
         return {
-            "version": scheduler.engine.version, "max_upload": settings.max_upload, "max_gaussians": settings.max_gaussians,
-            "max_seconds": settings.max_seconds, "keep_days": settings.keep_days, "formats": list(FORMATS),
+            "version": scheduler.engine.version,
+            "max_upload": settings.max_upload,
+            "max_gaussians": settings.max_gaussians,
+            "max_seconds": settings.max_seconds,
+            "keep_days": settings.keep_days,
+            "formats": list(FORMATS),
         }
 
     @api.get("/metrics", tags=["service"], summary="For Prometheus", response_class=Response)
@@ -297,8 +363,14 @@ def router(service: Service, static: dict[str, tuple[bytes, str]]) -> APIRouter:
             page = static["login.html"][0].replace(b'<p id="wrong" hidden>', b'<p id="wrong">')
             return page_response(page, 401)
         answer = Response(status_code=303, headers={"location": "/"})
-        answer.set_cookie(COOKIE, session(settings.token), max_age=30 * 86400, httponly=True, samesite="strict",
-                          secure=request.url.scheme == "https")
+        answer.set_cookie(
+            COOKIE,
+            session(settings.token),
+            max_age=30 * 86400,
+            httponly=True,
+            samesite="strict",
+            secure=request.url.scheme == "https",
+        )
         return answer
 
     return api

@@ -24,7 +24,12 @@ from .store import Store
 from .upload import drain
 
 log = logging.getLogger("anchorsplat.serve")
-_TYPES = {".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8", ".js": "text/javascript; charset=utf-8", ".svg": "image/svg+xml"}
+_TYPES = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".svg": "image/svg+xml",
+}
 _PAGES = {"/": "index.html", "/docs": "api.html"}
 _SUMMARIES = {
     "enhance": "Make a splat hold up when seen closer",
@@ -63,7 +68,11 @@ def make_app(settings: Settings):
         store.close()
 
     app = FastAPI(
-        title="anchorsplat", version=engine.version, lifespan=lifespan, docs_url=None, redoc_url=None,
+        title="anchorsplat",
+        version=engine.version,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
         description="Makes 3D Gaussian splats hold up when seen closer.",
     )
     for kind in KINDS:
@@ -107,17 +116,32 @@ def _add_submission(app: FastAPI, service: Service, kind: str) -> None:
         {"name": name, "in": "query", "required": False, "description": value.pop("description", ""), "schema": value}
         for name, value in schema["properties"].items()
     ]
-    parameters.append({"name": "name", "in": "query", "required": False, "schema": {"type": "string"},
-                       "description": "of the file, where the body is the file itself; .splat files need it"})
+    parameters.append(
+        {
+            "name": "name",
+            "in": "query",
+            "required": False,
+            "schema": {"type": "string"},
+            "description": "of the file, where the body is the file itself; .splat files need it",
+        }
+    )
     binary = {"type": "string", "format": "binary"}
     form = {"type": "object", "required": ["file"], "properties": {"file": binary}}
     if kind == "enhance":
-        form["properties"]["cameras"] = binary | {"description": "transforms.json or cameras.json of the training views"}
-    body = {"required": True, "content": {"multipart/form-data": {"schema": form}, "application/octet-stream": {"schema": binary}}}
+        form["properties"]["cameras"] = binary | {
+            "description": "transforms.json or cameras.json of the training views"
+        }
+    body = {
+        "required": True,
+        "content": {"multipart/form-data": {"schema": form}, "application/octet-stream": {"schema": binary}},
+    }
     responses = {
-        200: {"description": "The result is there already"}, 202: {"description": "The job waits or runs"},
-        400: {"description": "Not a splat, or a malformed request"}, 413: {"description": "Too large for this service"},
-        422: {"description": "An option that is not known or makes no sense"}, 429: {"description": "Too many jobs wait; see Retry-After"},
+        200: {"description": "The result is there already"},
+        202: {"description": "The job waits or runs"},
+        400: {"description": "Not a splat, or a malformed request"},
+        413: {"description": "Too large for this service"},
+        422: {"description": "An option that is not known or makes no sense"},
+        429: {"description": "Too many jobs wait; see Retry-After"},
     }
 
     async def submit(request: Request) -> JSONResponse:
@@ -128,9 +152,17 @@ def _add_submission(app: FastAPI, service: Service, kind: str) -> None:
             raise
 
     app.add_api_route(
-        f"/v1/{kind}", submit, methods=["POST"], name=kind, summary=_SUMMARIES[kind], tags=["jobs"], status_code=202,
+        f"/v1/{kind}",
+        submit,
+        methods=["POST"],
+        name=kind,
+        summary=_SUMMARIES[kind],
+        tags=["jobs"],
+        status_code=202,
         description="Options as query or form fields. Nothing that a file names is opened.",
-        responses=responses, openapi_extra={"parameters": parameters, "requestBody": body}, response_class=JSONResponse,
+        responses=responses,
+        openapi_extra={"parameters": parameters, "requestBody": body},
+        response_class=JSONResponse,
     )
 
 
@@ -150,7 +182,9 @@ def _add_errors(app: FastAPI, scheduler: Scheduler) -> None:
     @app.exception_handler(RequestValidationError)
     async def invalid(_: Request, error: RequestValidationError) -> JSONResponse:
         details = [{"option": str(e["loc"][-1]), "message": e["msg"]} for e in error.errors()]
-        return ApiError(422, "bad_option", "; ".join(f"{d['option']}: {d['message']}" for d in details), details=details).response()
+        return ApiError(
+            422, "bad_option", "; ".join(f"{d['option']}: {d['message']}" for d in details), details=details
+        ).response()
 
     @app.exception_handler(HTTPException)
     async def http(_: Request, error: HTTPException) -> JSONResponse:
@@ -160,7 +194,9 @@ def _add_errors(app: FastAPI, scheduler: Scheduler) -> None:
     async def broken(_: Request, error: Exception) -> JSONResponse:
         if disk_full(error):
             scheduler.make_room()
-            return ApiError(507, "disk_full", "The disk of this service is full. Old results were deleted; please try again.").response()
+            return ApiError(
+                507, "disk_full", "The disk of this service is full. Old results were deleted; please try again."
+            ).response()
         log.error("a request failed", exc_info=error)
         return ApiError(500, "failed", "The service failed; its log says why.").response()
 

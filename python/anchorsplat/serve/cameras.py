@@ -7,9 +7,26 @@ from __future__ import annotations
 
 import json
 
-MOST_BYTES = 32 * 2**20
+MOST_BYTES = 4 * 2**20  # some thousand views; held in memory
 _MOST_VIEWS = 50_000
-_NUMBERS = ("w", "h", "fl_x", "fl_y", "cx", "cy", "camera_angle_x", "camera_angle_y", "k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2")
+_NUMBERS = (
+    "w",
+    "h",
+    "fl_x",
+    "fl_y",
+    "cx",
+    "cy",
+    "camera_angle_x",
+    "camera_angle_y",
+    "k1",
+    "k2",
+    "k3",
+    "k4",
+    "k5",
+    "k6",
+    "p1",
+    "p2",
+)
 _MODELS = ("PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV")
 
 
@@ -51,7 +68,11 @@ def _list(value: object, where: str) -> list:
 
 
 def _matrix(rows: object, heights: tuple[int, ...], width: int, where: str) -> list:
-    if not isinstance(rows, list) or len(rows) not in heights or any(not isinstance(r, list) or len(r) != width for r in rows):
+    if (
+        not isinstance(rows, list)
+        or len(rows) not in heights
+        or any(not isinstance(r, list) or len(r) != width for r in rows)
+    ):
         raise BadCameras(f"cameras: {where}: expected {heights[0]} rows of {width} numbers")
     return [[_number(value, where) for value in row] for row in rows]
 
@@ -61,8 +82,10 @@ def _lens(level: dict, where: str) -> dict:
     model = level.get("camera_model")
     if model is not None and model not in _MODELS:
         raise BadCameras(f"cameras: {where}: not a pinhole camera; undistort the pictures first")
-    if level.get("is_fisheye") is True or level.get("distortion_params") not in (None, []) and any(
-        _number(value, f"{where}, distortion_params") for value in _list(level["distortion_params"], where)
+    if (
+        level.get("is_fisheye") is True
+        or level.get("distortion_params") not in (None, [])
+        and any(_number(value, f"{where}, distortion_params") for value in _list(level["distortion_params"], where))
     ):
         raise BadCameras(f"cameras: {where}: lens distortion is not supported; undistort the pictures first")
     return out
@@ -79,7 +102,9 @@ def _transforms(root: dict) -> dict:
             raise BadCameras(f"cameras: {where}: expected an object")
         plain = _lens(frame, where)
         if not all(side in plain or side in out for side in ("w", "h")):
-            raise BadCameras(f'cameras: {where}: neither "w" and "h" here nor for the whole file; pictures are not here to take them from')
+            raise BadCameras(
+                f'cameras: {where}: neither "w" and "h" here nor for the whole file; pictures are not here to take them from'
+            )
         plain["file_path"] = f"{index:06}"
         plain["transform_matrix"] = _matrix(frame.get("transform_matrix"), (4, 3), 4, f"{where}, transform_matrix")
         frames.append(plain)

@@ -56,7 +56,15 @@ class Engine:
 
     def check(self, source: str, hint: str) -> list[str]:
         """Reads all of a splat and writes one Gaussian of it: whether it is one, of what format and size."""
-        return ["convert", source, "one.ply", "--max-gaussians", "1", *(["--from", hint] if hint else []), *self._shared()]
+        return [
+            "convert",
+            source,
+            "one.ply",
+            "--max-gaussians",
+            "1",
+            *(["--from", hint] if hint else []),
+            *self._shared(),
+        ]
 
     def job(self, kind: str, options: asked.Options, source: str, hint: str, cameras: bool) -> list[str]:
         """Words for a job. Its files get names of ours only, in the folder that it runs in."""
@@ -101,7 +109,10 @@ class Engine:
             return "killed", "The job's process was killed, perhaps because the machine ran out of memory."
         if outcome.code < 0:
             name_of = signal.Signals(-outcome.code).name
-            return "crashed", f"The job's process ended by {name_of}; it may use {memory} of memory. Please report this."
+            return (
+                "crashed",
+                f"The job's process ended by {name_of}; it may use {memory} of memory. Please report this.",
+            )
         return "failed", message or f"The job's process ended with code {outcome.code} and no message."
 
 

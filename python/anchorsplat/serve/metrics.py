@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, PlatformCollector, ProcessCollector, generate_latest
+from prometheus_client import (
+    CollectorRegistry,
+    Counter,
+    Gauge,
+    Histogram,
+    PlatformCollector,
+    ProcessCollector,
+    generate_latest,
+)
 
 from .process import Outcome
 
@@ -14,12 +22,17 @@ class Metrics:
         self._registry = registry = CollectorRegistry()
         ProcessCollector(registry=registry)
         PlatformCollector(registry=registry)
-        self.requests = Counter("anchorsplat_requests", "HTTP requests", ["method", "route", "status"], registry=registry)
+        self.requests = Counter(
+            "anchorsplat_requests", "HTTP requests", ["method", "route", "status"], registry=registry
+        )
         self.uploaded = Counter("anchorsplat_uploaded_bytes", "Bytes of uploads", registry=registry)
         self.answered = Counter("anchorsplat_answered", "Jobs answered by a result that was there", registry=registry)
         self._ended = Counter("anchorsplat_jobs", "Jobs that ended", ["kind", "state"], registry=registry)
         self._seconds = Histogram(
-            "anchorsplat_job_seconds", "Of jobs that ran", ["kind"], registry=registry,
+            "anchorsplat_job_seconds",
+            "Of jobs that ran",
+            ["kind"],
+            registry=registry,
             buckets=(0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 300, 1800),
         )
         self._peak = Gauge("anchorsplat_job_peak_bytes", "Most resident memory of a job so far", registry=registry)

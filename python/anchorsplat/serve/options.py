@@ -35,16 +35,26 @@ class Options(BaseModel):
 
 
 class EnhanceOptions(Options):
-    quality: Literal["fast", "good"] = Field("fast", description="fast: a second; good: the network, then a little refinement, several seconds")
+    quality: Literal["fast", "good"] = Field(
+        "fast", description="fast: a second; good: the network, then a little refinement, several seconds"
+    )
     upscale: float = Field(4.0, ge=1, le=64, description="how many times closer it will be seen")
     pixel_size: Union[Literal["auto"], Annotated[float, Field(gt=0, lt=1e9)]] = Field(
         "auto", description="world size of one pixel of the training views; auto: estimated, or of the cameras"
     )
-    mode: Mode | None = Field(None, description="how it was rasterized in training; default: the file's tag, else as its Gaussians look")
-    copies: Union[Literal["auto"], Annotated[int, Field(ge=1, le=4)]] = Field("auto", description="Gaussians made of each, at most")
+    mode: Mode | None = Field(
+        None, description="how it was rasterized in training; default: the file's tag, else as its Gaussians look"
+    )
+    copies: Union[Literal["auto"], Annotated[int, Field(ge=1, le=4)]] = Field(
+        "auto", description="Gaussians made of each, at most"
+    )
     max_gaussians: int = Field(0, ge=0, le=2**31 - 1, description="budget of the result; 0: none")
-    train_width: int | None = Field(None, ge=1, le=65535, description="of the training pictures, where it was less than the cameras say")
-    clean: bool = Field(False, description="first take out Gaussians of the background's colour that no training view would miss")
+    train_width: int | None = Field(
+        None, ge=1, le=65535, description="of the training pictures, where it was less than the cameras say"
+    )
+    clean: bool = Field(
+        False, description="first take out Gaussians of the background's colour that no training view would miss"
+    )
     background: str | None = Field(None, pattern=_COLOR, description="R,G,B from 0 to 1, of the training views")
 
     @model_validator(mode="after")
@@ -76,14 +86,23 @@ class EnhanceOptions(Options):
 
 class ConvertOptions(Options):
     to: Format = Field("spz", description="format of the result")
-    mode: Mode | None = Field(None, description="how the splat is rasterized, for a tag in the result; default: as the input says")
+    mode: Mode | None = Field(
+        None, description="how the splat is rasterized, for a tag in the result; default: as the input says"
+    )
     sh_degree: int | None = Field(None, ge=0, le=3, description="spherical harmonics to keep")
     min_opacity: float = Field(0.0, ge=0, le=1, description="drop Gaussians that are fainter")
-    max_gaussians: int | None = Field(None, ge=1, le=2**31 - 1, description="keep at most so many, those of the largest size x opacity")
-    sort: Literal["format", "keep", "morton", "importance"] = Field("format", description="order of the Gaussians in the file")
+    max_gaussians: int | None = Field(
+        None, ge=1, le=2**31 - 1, description="keep at most so many, those of the largest size x opacity"
+    )
+    sort: Literal["format", "keep", "morton", "importance"] = Field(
+        "format", description="order of the Gaussians in the file"
+    )
     spz_version: Literal[3, 4] = Field(4, description="3 for programs that only know gzip")
-    coords: str | None = Field(None, pattern=r"^([LRUDFB]{3})?:([LRUDFB]{3})?$",
-                               description="what the axes really are where they do not follow the format, as IN:OUT")
+    coords: str | None = Field(
+        None,
+        pattern=r"^([LRUDFB]{3})?:([LRUDFB]{3})?$",
+        description="what the axes really are where they do not follow the format, as IN:OUT",
+    )
 
     @field_validator("spz_version", mode="before")
     @classmethod
@@ -111,10 +130,15 @@ class RenderOptions(Options):
     orbit: int = Field(1, ge=1, le=120, description="views on a sphere around the splat")
     size: str = Field("1024x1024", description="WxH in pixels, at most 4096x4096")
     fov: float = Field(45.0, ge=1, le=170, description="horizontal field of view, degrees")
-    radius: float | None = Field(None, gt=0, lt=1e9, description="distance in world units; default: what frames the splat")
+    radius: float | None = Field(
+        None, gt=0, lt=1e9, description="distance in world units; default: what frames the splat"
+    )
     target: str | None = Field(None, pattern=_VECTOR, description="X,Y,Z to look at; default: the splat's middle")
-    up: str | None = Field(None, pattern=r"^(-?[xyz]|[-+]?\d{1,9}(\.\d{1,9})?(,[-+]?\d{1,9}(\.\d{1,9})?){2})$",
-                           description="where up is: X,Y,Z or an axis such as -z")
+    up: str | None = Field(
+        None,
+        pattern=r"^(-?[xyz]|[-+]?\d{1,9}(\.\d{1,9})?(,[-+]?\d{1,9}(\.\d{1,9})?){2})$",
+        description="where up is: X,Y,Z or an axis such as -z",
+    )
     background: str | None = Field(None, pattern=_COLOR, description="R,G,B from 0 to 1; default black")
     transparent: bool = Field(False, description="an alpha channel instead of a background")
     mode: Mode | None = Field(None, description="rasterization; default: the file's tag, else classic")

@@ -6,6 +6,7 @@ Nodes need the same build of this package. A node that is lost is tried once mor
 from __future__ import annotations
 
 import queue
+import socket
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
@@ -17,13 +18,16 @@ import ray
 from .process import Outcome
 from .runner import STATE, Task, clear, run_in_folder
 
+_CONNECT_SECONDS = 10
 _MORE_MEMORY = 256 * 2**20  # of a job, beside what its input takes
 _MEMORY_PER_INPUT_BYTE = 16
 
 
-def _job(task: Task, stdin: bytes | None, links: dict[str, bytes], state: bytes | None, fingerprint: str) -> Iterator[object]:
+def _job(
+    task: Task, stdin: bytes | None, links: dict[str, bytes], state: bytes | None, fingerprint: str
+) -> Iterator[object]:
     """On a node: yields progress, then the outcome with the files that it left. Paths of `task` are the service's."""
-    from .engine import fingerprint_of, find_program
+    from .engine import find_program, fingerprint_of
 
     program = find_program()
     here = fingerprint_of(program)
@@ -66,8 +70,20 @@ def _job(task: Task, stdin: bytes | None, links: dict[str, bytes], state: bytes 
         yield event, {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+def _look_for(address: str) -> None:
+    """Ray itself tries for minutes. Raises ConnectionError."""
+    host, _, port = address.rpartition(":")
+    if not host or not port.isdigit():
+        return
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), _CONNECT_SECONDS).close()
+    except (OSError, OverflowError) as error:
+        raise ConnectionError(f"no Ray cluster at {address}: {error}") from None
+
+
 class RayRunner:
     def __init__(self, address: str, threads: int, fingerprint: str):
+        _look_for(address)
         where = {"address": "local", "include_dashboard": False} if address == "local" else {"address": address}
         try:
             ray.init(**where, log_to_driver=False)

@@ -10,7 +10,6 @@ import shutil
 import signal
 import sqlite3
 import threading
-import time
 import weakref
 import zipfile
 from collections.abc import Callable
@@ -137,7 +136,12 @@ class Scheduler:
         if not outcome.done:
             raise Refused(*self.engine.explain(outcome, name))
         row = outcome.document[0]
-        return {"format": row["formats"][0], "gaussians": row["gaussians"]["in"], "bytes": row["bytes"]["in"], "sh_degree": row["sh_degree"]["in"]}
+        return {
+            "format": row["formats"][0],
+            "gaussians": row["gaussians"]["in"],
+            "bytes": row["bytes"]["in"],
+            "sh_degree": row["sh_degree"]["in"],
+        }
 
     def submitted(self, key: str) -> None:
         self._work_there.release()
@@ -169,15 +173,22 @@ class Scheduler:
                 raise Busy(1 + self._small_waiting // 4)
             deriving = asyncio.create_task(self._derive(key, name, task(self.store.work_folder(f"{key}.{name}"))))
             self._deriving[key, name] = deriving
-            deriving.add_done_callback(lambda _: self._deriving.pop((key, name), None))
+            deriving.add_done_callback(lambda task: self._derived(key, name, task))
         # Whoever goes away does not take it from the others.
         return await asyncio.shield(self._deriving[key, name])
+
+    def _derived(self, key: str, name: str, task: asyncio.Task) -> None:
+        self._deriving.pop((key, name), None)
+        if not task.cancelled():
+            task.exception()  # all who asked may have gone away
 
     async def other_format(self, key: str, to: str) -> Path:
         """Of the PLY that a result is."""
         source = self.store.result_folder(key) / "result.ply"
         name = "result.gltf.zip" if to == "gltf" else f"result.{to}"
-        return await self.derived(key, name, lambda folder: Task(self.engine.derive("-", to), self.engine.limits(), folder, source, {}))
+        return await self.derived(
+            key, name, lambda folder: Task(self.engine.derive("-", to), self.engine.limits(), folder, source, {})
+        )
 
     async def page(self, work: sqlite3.Row, result: str, title: str) -> Path:
         """Before and after."""
@@ -185,7 +196,9 @@ class Scheduler:
         after = f"after{result.removeprefix('result')}"
         links = before.links | {after: self.store.result_folder(work["key"]) / result}
         words = self.engine.page(after, before.word, title)
-        return await self.derived(work["key"], "view.html", lambda folder: Task(words, self.engine.limits(), folder, before.stdin, links))
+        return await self.derived(
+            work["key"], "view.html", lambda folder: Task(words, self.engine.limits(), folder, before.stdin, links)
+        )
 
     # The work itself
 
@@ -269,6 +282,10 @@ class Scheduler:
             self._seconds += 0.2 * (outcome.seconds - self._seconds)
             if self.store.stored_bytes() > self.settings.keep_bytes:
                 self.sweep()
+        elif cancelled and self.store.is_wanted(key):  # by somebody who came while it was being ended
+            self.store.requeue(key)
+            self._work_there.release()
+            return
         elif cancelled:
             state = states.CANCELLED
             self.store.fail(key, state, "cancelled", "The job was cancelled.")

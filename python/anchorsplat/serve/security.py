@@ -95,8 +95,12 @@ class Guard:
         hosts = headers.getlist("host")
         host = hosts[0].lower() if len(hosts) == 1 else ""
         if not self._knows(host):
-            return 403, "bad_host", (
-                "This service does not go by that name. Open it as http://127.0.0.1:PORT, or start it with --allow-host NAME."
+            return (
+                403,
+                "bad_host",
+                (
+                    "This service does not go by that name. Open it as http://127.0.0.1:PORT, or start it with --allow-host NAME."
+                ),
             )
         origin = headers.get("origin")
         if origin is not None and urlsplit(origin).netloc.lower() != host:
@@ -132,8 +136,10 @@ class Guard:
     async def _refuse(self, scope, headers: Headers, send, status: int, code: str, message: str) -> None:
         page = status == 401 and scope["method"] == "GET" and scope["path"] in ("/", "/docs")
         body = self._login_page if page else json.dumps({"error": {"code": code, "message": message}}).encode()
-        out = [(b"content-type", b"text/html; charset=utf-8" if page else b"application/json"),
-               (b"content-length", str(len(body)).encode())]
+        out = [
+            (b"content-type", b"text/html; charset=utf-8" if page else b"application/json"),
+            (b"content-length", str(len(body)).encode()),
+        ]
         if page:
             out.append((b"content-security-policy", PAGE_POLICY.encode()))
         if status == 401:

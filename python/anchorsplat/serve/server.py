@@ -52,7 +52,10 @@ def run(settings: Settings) -> int:
     try:
         sock = listen(settings.host, settings.port)
     except OSError as error:
-        print(f"error: cannot listen at {settings.host}, port {settings.port}: {error.strerror or error}; --port takes another", file=sys.stderr)
+        print(
+            f"error: cannot listen at {settings.host}, port {settings.port}: {error.strerror or error}; --port takes another",
+            file=sys.stderr,
+        )
         return 6
     settings = dataclasses.replace(settings, port=sock.getsockname()[1])
     try:
@@ -68,8 +71,13 @@ def run(settings: Settings) -> int:
         flush=True,
     )
     config = uvicorn.Config(
-        app, log_level="warning", access_log=False, server_header=False, timeout_graceful_shutdown=5,
-        limit_concurrency=1000, h11_max_incomplete_event_size=64 * 1024,
+        app,
+        log_level="warning",
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=5,
+        limit_concurrency=1000,
+        h11_max_incomplete_event_size=64 * 1024,
     )
     server = _Server(config)
     server.run(sockets=[sock])

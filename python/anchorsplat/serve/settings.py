@@ -54,7 +54,7 @@ def is_loopback(host: str) -> bool:
 
 
 def parse_bytes(text: str) -> int:
-    """"500 MB", "2GiB" or a plain number of bytes."""
+    """ "500 MB", "2GiB" or a plain number of bytes."""
     match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*([A-Za-z]*)\s*", text)
     if not match or match[2].upper() not in _UNITS:
         raise argparse.ArgumentTypeError(f"'{text}' is no size such as 500MB or 2GiB")
@@ -101,26 +101,67 @@ def _parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     add = parser.add_argument
-    add("--host", default="127.0.0.1", help="address to listen at; any but this machine's own needs a token (%(default)s)")
+    add(
+        "--host",
+        default="127.0.0.1",
+        help="address to listen at; any but this machine's own needs a token (%(default)s)",
+    )
     add("--port", type=_number(0, 65535), default=7860, help="0 takes a free one and says which (%(default)s)")
     add("--data", type=Path, default=_data_folder(), metavar="DIR", help="jobs, uploads and results (%(default)s)")
     add("--token", help="who knows it may use the service; better as ANCHORSPLAT_TOKEN, which other users cannot see")
-    add("--allow-host", action="append", default=[], metavar="NAME",
-        help="another name under which a proxy on this machine forwards to the service; needs a token (repeatable)")
+    add(
+        "--allow-host",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="another name under which a proxy on this machine forwards to the service; needs a token (repeatable)",
+    )
     add("--max-upload", type=parse_bytes, default=Settings.max_upload, metavar="SIZE", help="of one file (2GB)")
-    add("--max-gaussians", type=_number(1, 2**31 - 1), default=Settings.max_gaussians, metavar="N",
-        help="of one splat (%(default)s)")
-    add("--max-seconds", type=_number(0.1, 1e6, float), default=Settings.max_seconds, metavar="S", help="of one job (%(default)s)")
-    add("--max-memory", type=parse_bytes, metavar="SIZE", help="of one job (3/4 of the machine, shared among --workers)")
-    add("--queue", type=_number(1, 100_000), default=Settings.queue, metavar="N",
-        help="jobs that may wait; more are answered with 429 (%(default)s)")
+    add(
+        "--max-gaussians",
+        type=_number(1, 2**31 - 1),
+        default=Settings.max_gaussians,
+        metavar="N",
+        help="of one splat (%(default)s)",
+    )
+    add(
+        "--max-seconds",
+        type=_number(0.1, 1e6, float),
+        default=Settings.max_seconds,
+        metavar="S",
+        help="of one job (%(default)s)",
+    )
+    add(
+        "--max-memory", type=parse_bytes, metavar="SIZE", help="of one job (3/4 of the machine, shared among --workers)"
+    )
+    add(
+        "--queue",
+        type=_number(1, 100_000),
+        default=Settings.queue,
+        metavar="N",
+        help="jobs that may wait; more are answered with 429 (%(default)s)",
+    )
     add("--workers", type=_number(1, 256), metavar="N", help="jobs at the same time (1 for each 4 processors)")
     add("--threads", type=_number(1, 1024), metavar="N", help="of each job (the processors, shared among --workers)")
-    add("--keep-days", type=_number(0, 36500, float), default=Settings.keep_days, metavar="D",
-        help="results that nobody asked for so long are deleted (%(default)s)")
-    add("--keep-bytes", type=parse_bytes, default=Settings.keep_bytes, metavar="SIZE",
-        help="of all uploads and results; the oldest go first (20GB)")
-    add("--ray", metavar="ADDRESS", help="send jobs to this Ray cluster (host:port, auto, or local) and not to processes of this machine")
+    add(
+        "--keep-days",
+        type=_number(0, 36500, float),
+        default=Settings.keep_days,
+        metavar="D",
+        help="results that nobody asked for so long are deleted (%(default)s)",
+    )
+    add(
+        "--keep-bytes",
+        type=parse_bytes,
+        default=Settings.keep_bytes,
+        metavar="SIZE",
+        help="of all uploads and results; the oldest go first (20GB)",
+    )
+    add(
+        "--ray",
+        metavar="ADDRESS",
+        help="send jobs to this Ray cluster (host:port, auto, or local) and not to processes of this machine",
+    )
     return parser
 
 
@@ -128,7 +169,9 @@ def parse(argv: list[str]) -> Settings:
     """Raises UsageError. --help prints and raises SystemExit, as argparse has it."""
     given = _parser().parse_args(argv)
     token = given.token if given.token is not None else os.environ.get("ANCHORSPLAT_TOKEN")
-    if token is not None and (len(token) < _LEAST_TOKEN or not token.isascii() or not token.isprintable() or " " in token):
+    if token is not None and (
+        len(token) < _LEAST_TOKEN or not token.isascii() or not token.isprintable() or " " in token
+    ):
         raise UsageError(
             f"the token must be at least {_LEAST_TOKEN} printable ASCII characters without spaces; "
             "python3 -c 'import secrets; print(secrets.token_urlsafe())' makes one"

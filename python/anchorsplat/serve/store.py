@@ -57,7 +57,9 @@ class Store:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             self._lock.close()
-            raise DataInUse(f"{folder}: another 'anchorsplat serve' works in this folder; end it, or give --data another one") from None
+            raise DataInUse(
+                f"{folder}: another 'anchorsplat serve' works in this folder; end it, or give --data another one"
+            ) from None
         self._db = sqlite3.connect(folder / "jobs.sqlite3", isolation_level=None)
         self._db.row_factory = sqlite3.Row
         self._db.execute("PRAGMA journal_mode=WAL")
@@ -67,7 +69,9 @@ class Store:
             self._db.executescript(f"BEGIN; {_SCHEMA} PRAGMA user_version={_SCHEMA_VERSION}; COMMIT;")
         elif version != _SCHEMA_VERSION:
             self.close()
-            raise DataInUse(f"{folder}: made by another version of anchorsplat (schema {version}); give --data another folder")
+            raise DataInUse(
+                f"{folder}: made by another version of anchorsplat (schema {version}); give --data another folder"
+            )
         self._begin()
 
     def close(self) -> None:
@@ -78,7 +82,13 @@ class Store:
         """What ran when the last service ended is queued again; what it left half-done is cleared away."""
         self._db.execute(
             "UPDATE works SET state=?, finished=?, error_code='killed', error=? WHERE state=? AND attempts>=?",
-            (FAILED, self._now(), "The service ended every time while this ran, so it is not tried again.", RUNNING, _MOST_STARTS),
+            (
+                FAILED,
+                self._now(),
+                "The service ended every time while this ran, so it is not tried again.",
+                RUNNING,
+                _MOST_STARTS,
+            ),
         )
         self._db.execute("UPDATE works SET state=?, started=NULL WHERE state=?", (QUEUED, RUNNING))
         for path in (self.folder / "uploads").iterdir():
@@ -183,7 +193,8 @@ class Store:
     def position(self, work: sqlite3.Row) -> int:
         """Works that are taken before this one, and it."""
         return self._db.execute(
-            "SELECT count(*) FROM works WHERE state=? AND (created, key) <= (?, ?)", (QUEUED, work["created"], work["key"])
+            "SELECT count(*) FROM works WHERE state=? AND (created, key) <= (?, ?)",
+            (QUEUED, work["created"], work["key"]),
         ).fetchone()[0]
 
     # Jobs
@@ -215,13 +226,22 @@ class Store:
     def cancel_job(self, job_id: str, key: str) -> bool:
         """True where nobody else waits for the work, so that it is to be ended too."""
         self._db.execute("UPDATE jobs SET cancelled=1 WHERE id=?", (job_id,))
-        return not self._db.execute("SELECT 1 FROM jobs WHERE key=? AND NOT cancelled LIMIT 1", (key,)).fetchone()
+        return not self.is_wanted(key)
+
+    def is_wanted(self, key: str) -> bool:
+        return (
+            self._db.execute("SELECT 1 FROM jobs WHERE key=? AND NOT cancelled LIMIT 1", (key,)).fetchone() is not None
+        )
 
     def forget_job(self, job_id: str, key: str) -> None:
         """And its result, where no other job has it."""
         self._db.execute("DELETE FROM jobs WHERE id=?", (job_id,))
         work = self.work(key)
-        if work and work["state"] in ENDED and not self._db.execute("SELECT 1 FROM jobs WHERE key=? LIMIT 1", (key,)).fetchone():
+        if (
+            work
+            and work["state"] in ENDED
+            and not self._db.execute("SELECT 1 FROM jobs WHERE key=? LIMIT 1", (key,)).fetchone()
+        ):
             self._forget_work(key)
         self._forget_inputs(older_than=self._now() - 60)
 

@@ -42,11 +42,15 @@ def _count(n: object) -> str:
 def _enhanced(row: dict) -> list[str]:
     gaussians = row.get("gaussians", {})
     method = row.get("method", "")
-    out = [f"{_count(gaussians.get('in'))} Gaussians in, {_count(gaussians.get('out'))} out, by {_METHODS.get(method, method)}."]
+    out = [
+        f"{_count(gaussians.get('in'))} Gaussians in, {_count(gaussians.get('out'))} out, by {_METHODS.get(method, method)}."
+    ]
     if gaussians.get("dropped"):
         out.append(f"{_count(gaussians['dropped'])} Gaussians were dropped: they hold numbers that cannot be drawn.")
     if row.get("looks"):
-        out.append(f"The file does not say how it was trained; it looks trained {_MODES.get(row['looks'], row['looks'])}.")
+        out.append(
+            f"The file does not say how it was trained; it looks trained {_MODES.get(row['looks'], row['looks'])}."
+        )
     out += _pixel_size(row)
     cleaned = row.get("cleaned") or {}
     if "gaussians" in cleaned:
@@ -54,7 +58,11 @@ def _enhanced(row: dict) -> list[str]:
     refine = row.get("refine") or {}
     if refine.get("kept_start"):
         out.append("Refinement found nothing better than what it began with, which was kept.")
-    elif "consistency_after" in refine and refine["consistency_before"] is not None and refine["consistency_after"] is not None:
+    elif (
+        "consistency_after" in refine
+        and refine["consistency_before"] is not None
+        and refine["consistency_after"] is not None
+    ):
         out.append(
             f"Refinement: agreement with the splat's own views {refine['consistency_before']:.1f} dB before, "
             f"{refine['consistency_after']:.1f} dB after."

@@ -9,10 +9,9 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+import anchorsplat
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
-
-import anchorsplat
 
 from .service import GatedProgram, Server, small_ply
 
@@ -27,8 +26,17 @@ def browser() -> Iterator[Browser]:
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(
             executable_path=os.environ.get("CHROMIUM", "/usr/bin/chromium"),
-            args=["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox", "--disable-gpu-sandbox",
-                  "--disable-background-networking", "--disable-component-update", "--disable-sync", "--no-first-run"],
+            args=[
+                "--use-gl=angle",
+                "--use-angle=swiftshader",
+                "--enable-unsafe-swiftshader",
+                "--no-sandbox",
+                "--disable-gpu-sandbox",
+                "--disable-background-networking",
+                "--disable-component-update",
+                "--disable-sync",
+                "--no-first-run",
+            ],
         )
         yield chromium
         chromium.close()
@@ -42,7 +50,10 @@ class Tab:
         self.context.set_default_timeout(PATIENCE_MS)
         self.page: Page = self.context.new_page()
         self.complaints: list[str] = []
-        self.page.on("console", lambda message: self.complaints.append(message.text) if message.type in ("error", "warning") else None)
+        self.page.on(
+            "console",
+            lambda message: self.complaints.append(message.text) if message.type in ("error", "warning") else None,
+        )
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
         self.page.on("request", lambda request: self._asked(request.url, server.url))
 
@@ -72,7 +83,9 @@ def drop(page: Page, path: Path) -> None:
 
 
 def viewer_ready(page: Page) -> None:
-    page.locator("#viewer").scroll_into_view_if_needed()  # browsers draw no frame of another origin that is out of sight
+    page.locator(
+        "#viewer"
+    ).scroll_into_view_if_needed()  # browsers draw no frame of another origin that is out of sight
     frame = page.frame_locator("#viewer")
     expect(frame.locator("html")).to_have_attribute("data-state", "ready", timeout=PATIENCE_MS)
     expect(frame.locator("html")).to_have_attribute("data-settled", "true", timeout=PATIENCE_MS)
@@ -135,7 +148,9 @@ def test_progress_and_a_reload_in_the_middle(browser: Browser, serve, gated: Gat
     page.locator("#jobs button").click()
     expect(page.locator("#past")).to_be_hidden()
     expect(page.locator("#job")).to_be_hidden()
-    tab.close(allowed=("ERR_CONNECTION_REFUSED", "ERR_INCOMPLETE_CHUNKED", "ERR_CONNECTION_RESET", "ERR_EMPTY_RESPONSE"))
+    tab.close(
+        allowed=("ERR_CONNECTION_REFUSED", "ERR_INCOMPLETE_CHUNKED", "ERR_CONNECTION_RESET", "ERR_EMPTY_RESPONSE")
+    )
 
 
 def test_cancelling(browser: Browser, serve, gated: GatedProgram, tmp_path: Path) -> None:
@@ -176,7 +191,9 @@ def test_files_that_are_no_splats(browser: Browser, serve, tmp_path: Path) -> No
 
 def test_a_phone(browser: Browser, serve) -> None:
     server = serve()
-    tab = Tab(browser, server, viewport={"width": 390, "height": 844}, device_scale_factor=2, has_touch=True, is_mobile=True)
+    tab = Tab(
+        browser, server, viewport={"width": 390, "height": 844}, device_scale_factor=2, has_touch=True, is_mobile=True
+    )
     page = tab.page
     page.goto(server.url)
     tab.picture("phone-empty")
@@ -206,7 +223,11 @@ def test_keys_and_names(browser: Browser, serve, tmp_path: Path) -> None:
     order = []
     for _ in range(8):
         page.keyboard.press("Tab")
-        order.append(page.evaluate("document.activeElement.id || document.activeElement.name || document.activeElement.textContent.trim()"))
+        order.append(
+            page.evaluate(
+                "document.activeElement.id || document.activeElement.name || document.activeElement.textContent.trim()"
+            )
+        )
     assert order[:7] == ["Skip to the upload", "anchorsplat", "API", "file", "quality", "upscale", "start"], order
     page.locator("input[name=quality][value=fast]").focus()
     page.keyboard.press("ArrowRight")

@@ -20,7 +20,9 @@ def test_the_lines_for_a_shell(server: Server, tmp_path: Path) -> None:
         command = line.split("   #")[0].replace("http://127.0.0.1:7860", server.url)
         if job:
             command = command.replace("2vK…", job["id"])
-        said = subprocess.run(["bash", "-c", command + " --fail-with-body -sS"], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        said = subprocess.run(
+            ["bash", "-c", command + " --fail-with-body -sS"], cwd=tmp_path, capture_output=True, text=True, timeout=120
+        )
         assert said.returncode == 0, (command, said)
         job = job or json.loads(said.stdout)
     assert len(anchorsplat.read(tmp_path / "scan-4x.spz")) >= 60

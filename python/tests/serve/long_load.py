@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import json
+import subprocess
 import time
 from pathlib import Path
 
 import httpx
+from anchorsplat._program import program
 
-from .service import PATIENCE, Server, small_ply
+from .service import PATIENCE, GatedProgram, Server, small_ply, until
 
 REQUESTS, AT_ONCE = 200, 20
 MOST_GROWTH = 64 * 2**20  # bytes of the service while it answers all of them
@@ -34,9 +37,8 @@ async def one(client: httpx.AsyncClient, splat: bytes) -> tuple[bytes, float]:
     assert answer.status_code in (200, 202), answer.text
     job = answer.json()
     async with client.stream("GET", job["links"]["events"]) as events:
-        async for line in events.aiter_lines():
-            last = line or last if line else last if "last" in locals() else ""
-    assert '"state": "done"' in last, last
+        said = [line async for line in events.aiter_lines() if line.startswith("data: ")]
+    assert json.loads(said[-1].removeprefix("data: "))["state"] == "done", said
     result = await client.get(f"{job['links']['self']}/result")
     assert result.status_code == 200
     return result.content, time.monotonic() - begin
@@ -72,34 +74,49 @@ def test_two_hundred_requests(serve, capsys) -> None:
     assert [answer for answer, _ in repeated] == [answer for answer, _ in answers]
     waits = sorted(wait for _, wait in answers)
     with capsys.disabled():
-        print(f"\n{REQUESTS} splats of 2,000 Gaussians, {AT_ONCE} at once: {seconds:.1f} s, {REQUESTS / seconds:.1f} a second, "
-              f"median {waits[REQUESTS // 2]:.2f} s, slowest {waits[-1]:.2f} s")
-        print(f"the same again, from what is there: {repeated_seconds:.1f} s, {REQUESTS / repeated_seconds:.0f} a second")
+        print(
+            f"\n{REQUESTS} splats of 2,000 Gaussians, {AT_ONCE} at once: {seconds:.1f} s, {REQUESTS / seconds:.1f} a second, "
+            f"median {waits[REQUESTS // 2]:.2f} s, slowest {waits[-1]:.2f} s"
+        )
+        print(
+            f"the same again, from what is there: {repeated_seconds:.1f} s, {REQUESTS / repeated_seconds:.0f} a second"
+        )
         print(f"memory of the service: {before / 2**20:.0f} MiB before, {peak(server) / 2**20:.0f} MiB at most")
 
 
-def test_what_a_request_costs(serve, capsys) -> None:
+def test_what_a_request_costs(serve, capsys, tmp_path: Path) -> None:
     """One after the other: what the service adds to the program's own time."""
-    import subprocess
-    import tempfile
-
-    from anchorsplat._program import program
-
     server = serve("--workers", "1", "--threads", "1")
     count = 30
-    with tempfile.TemporaryDirectory() as folder:
-        paths = []
-        for seed in range(count):
-            paths.append(Path(folder, f"{seed}.ply"))
-            paths[-1].write_bytes(small_ply(2000, seed))
-        begin = time.monotonic()
-        for path in paths:
-            subprocess.run([program(), "enhance", path, "-o", f"{path}.out.ply", "--threads", "1", "-q"], check=True)
-        alone = (time.monotonic() - begin) / count
-        begin = time.monotonic()
-        for path in paths:
-            job = server.wait(server.submit(path.read_bytes()))
-            assert server.http.get(job["links"]["result"]).content == Path(f"{path}.out.ply").read_bytes()
-        served = (time.monotonic() - begin) / count
+    paths = []
+    for seed in range(count):
+        paths.append(tmp_path / f"{seed}.ply")
+        paths[-1].write_bytes(small_ply(2000, seed))
+    begin = time.monotonic()
+    for path in paths:
+        subprocess.run([program(), "enhance", path, "-o", f"{path}.out.ply", "--threads", "1", "-q"], check=True)
+    alone = (time.monotonic() - begin) / count
+    begin = time.monotonic()
+    for path in paths:
+        job = server.wait(server.submit(path.read_bytes()))
+        assert server.http.get(job["links"]["result"]).content == Path(f"{path}.out.ply").read_bytes()
+    served = (time.monotonic() - begin) / count
     with capsys.disabled():
-        print(f"\none after the other: {1000 * served:.0f} ms each, {1000 * alone:.0f} ms by the command line: {1000 * (served - alone):.0f} ms more")
+        print(
+            f"\none after the other: {1000 * served:.0f} ms each, {1000 * alone:.0f} ms by the command line: {1000 * (served - alone):.0f} ms more"
+        )
+
+
+def test_coming_back_while_it_is_being_ended(serve, gated: GatedProgram) -> None:
+    """A job is cancelled, its process takes its time to end, and somebody wants the same: it is done for them."""
+    gated.path.write_text(gated.path.read_text().replace("#!/bin/sh\n", "#!/bin/sh\ntrap '' TERM\n"))
+    server = serve("--workers", "1", environment=gated.environment)
+    splat = small_ply()
+    mine = server.submit(splat)
+    next(e for e in server.events(mine) if e.get("progress"))
+    server.http.delete(mine["links"]["self"])
+    yours = server.submit(splat)
+    until(lambda: len(gated.pids()) == 2, "the second attempt")
+    gated.open()
+    assert server.wait(yours)["state"] == "done"
+    assert server.wait(mine)["state"] == "cancelled"

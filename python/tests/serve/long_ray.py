@@ -9,13 +9,16 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 import anchorsplat
+import pytest
+from ray.cluster_utils import Cluster
 
 from .service import GatedProgram, small_ply, until
 
 SPLAT = small_ply()
+PACKAGE = str(Path(anchorsplat.__file__).parents[1])
+# Nobody else reaches this cluster, and the service has another home folder than it, so they share no token of Ray's.
+ENVIRONMENT = {"RAY_AUTH_MODE": "disabled"}
 
 
 @pytest.fixture(scope="module")
@@ -26,21 +29,27 @@ def everywhere(tmp_path_factory: pytest.TempPathFactory) -> GatedProgram:
 
 @pytest.fixture(scope="module")
 def cluster(everywhere: GatedProgram) -> Iterator[str]:
-    """The address of a head node with two CPUs, on loopback."""
-    ray = [sys.executable, "-c", "from ray.scripts.scripts import main; main()"]
-    environment = os.environ | everywhere.environment | {"PYTHONPATH": str(Path(anchorsplat.__file__).parents[1])}
-    start = ["start", "--head", "--node-ip-address=127.0.0.1", "--port=0", "--num-cpus=2", "--include-dashboard=false",
-             "--object-store-memory=200000000", "--disable-usage-stats"]
-    said = subprocess.run([*ray, *start], env=environment, check=True, capture_output=True, text=True).stdout
-    yield next(line.split("--address=")[1].strip("' ") for line in said.splitlines() if "--address=" in line)
-    subprocess.run([*ray, "stop", "--force"], env=environment, check=False, capture_output=True)
+    """The address of a head node with two CPUs, on this machine. Its processes are this test's and end with it."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in (ENVIRONMENT | everywhere.environment | {"PYTHONPATH": PACKAGE}).items():
+            patch.setenv(name, value)
+        nodes = Cluster(
+            initialize_head=True,
+            head_node_args={
+                "num_cpus": 2,
+                "include_dashboard": False,
+                "object_store_memory": 200_000_000,
+            },
+        )
+        yield nodes.address
+        nodes.shutdown()
 
 
 def test_jobs_on_ray(serve, cluster: str, everywhere: GatedProgram) -> None:
     words = ("--ray", cluster, "--workers", "1", "--threads", "1")
-    server = serve(*words, environment=everywhere.environment)
+    server = serve(*words, environment=ENVIRONMENT | everywhere.environment)
     # What does not need the gate: the same bits as here.
-    local = serve("--threads", "1", data="local", environment=everywhere.environment)
+    local = serve("--threads", "1", data="local", environment=ENVIRONMENT | everywhere.environment)
     here, there = (s.wait(s.submit(SPLAT, "render", orbit=2, size="32x32")) for s in (local, server))
     assert there["state"] == "done", there
     results = [s.http.get(job["links"]["result"]).content for s, job in ((local, here), (server, there))]
@@ -73,15 +82,18 @@ def test_jobs_on_ray(serve, cluster: str, everywhere: GatedProgram) -> None:
 
 
 def test_a_node_with_another_build(serve, cluster: str) -> None:
-    server = serve("--ray", cluster, "--workers", "1", "--threads", "1", data="other")
+    server = serve("--ray", cluster, "--workers", "1", "--threads", "1", data="other", environment=ENVIRONMENT)
     failed = server.wait(server.submit(SPLAT))
     assert failed["state"] == "failed" and "another build" in failed["error"]["message"], failed
 
 
 def test_a_cluster_that_is_not_there(tmp_path: Path) -> None:
-    package = str(Path(anchorsplat.__file__).parents[1])
     tried = subprocess.run(
         [sys.executable, "-m", "anchorsplat", "serve", "--port", "0", "--data", str(tmp_path), "--ray", "127.0.0.1:1"],
-        env={"PATH": os.environ["PATH"], "PYTHONPATH": package, "HOME": str(tmp_path)}, capture_output=True, text=True, timeout=300, check=False,
+        env={"PATH": os.environ["PATH"], "PYTHONPATH": PACKAGE, "HOME": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
     )
     assert tried.returncode == 6 and "error: no Ray cluster at 127.0.0.1:1" in tried.stderr, tried.stderr

@@ -13,9 +13,8 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import httpx
-
 import anchorsplat
+import httpx
 from anchorsplat._program import program
 
 _FIELDS = "x y z nx ny nz f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3".split()
@@ -33,8 +32,19 @@ def small_ply(gaussians: int = 60, seed: int = 0) -> bytes:
         r = math.sqrt(1 - u * u)
         place = [r * math.cos(angle), r * math.sin(angle), u]
         scale = [draw.uniform(-3.5, -2.5), draw.uniform(-3.5, -2.5), draw.uniform(-7, -6)]
-        rows.append(struct.pack("<17f", *place, 0, 0, 0, *(draw.uniform(-1, 1) for _ in range(3)), draw.uniform(0, 4), *scale,
-                                *(draw.gauss(0, 1) for _ in range(4))))
+        rows.append(
+            struct.pack(
+                "<17f",
+                *place,
+                0,
+                0,
+                0,
+                *(draw.uniform(-1, 1) for _ in range(3)),
+                draw.uniform(0, 4),
+                *scale,
+                *(draw.gauss(0, 1) for _ in range(4)),
+            )
+        )
     return header.encode() + b"".join(rows)
 
 
@@ -68,14 +78,26 @@ class Server:
         self.log = open(f"{self.data}.log", "a+")
         self.process = subprocess.Popen(
             [sys.executable, "-m", "anchorsplat", "serve", "--port", "0", "--data", str(self.data), *self._words],
-            env=known | self._environment, stdout=subprocess.PIPE, stderr=self.log, text=True,
+            env=known | self._environment,
+            stdout=subprocess.PIPE,
+            stderr=self.log,
+            text=True,
         )
         first = self.process.stdout.readline()
-        assert first.startswith("anchorsplat serves http://"), first + Path(self.log.name).read_text()
+        if not first.startswith("anchorsplat serves http://"):
+            said = first + self.logged()
+            self.process.kill()
+            self.process.wait()
+            self.process.stdout.close()
+            self.log.close()
+            raise AssertionError(f"the service did not start: {said}")
         self.url = first.split()[-1]
         token = self._environment.get("ANCHORSPLAT_TOKEN")
         self.http = httpx.Client(
-            base_url=self.url, timeout=PATIENCE, headers={"authorization": f"Bearer {token}"} if token else {}, trust_env=False
+            base_url=self.url,
+            timeout=PATIENCE,
+            headers={"authorization": f"Bearer {token}"} if token else {},
+            trust_env=False,
         )
 
     def stop(self) -> int:
@@ -97,7 +119,9 @@ class Server:
         return Path(self.log.name).read_text()
 
     def submit(self, data: bytes, kind: str = "enhance", name: str = "scan.ply", **options: object) -> dict:
-        answer = self.http.post(f"/v1/{kind}", files={"file": (name, data)}, data={k: str(v) for k, v in options.items()})
+        answer = self.http.post(
+            f"/v1/{kind}", files={"file": (name, data)}, data={k: str(v) for k, v in options.items()}
+        )
         assert answer.status_code in (200, 202), answer.text
         return answer.json()
 

@@ -8,9 +8,8 @@ import subprocess
 import zipfile
 from pathlib import Path
 
-import pytest
-
 import anchorsplat
+import pytest
 from anchorsplat._program import program
 
 from .service import Server, small_ply
@@ -47,7 +46,9 @@ def test_an_enhanced_splat_in_every_format(server: Server) -> None:
 def test_the_same_bits_as_the_command_line(server: Server, tmp_path: Path) -> None:
     done = server.wait(server.submit(SPLAT, upscale=8))
     (tmp_path / "in.ply").write_bytes(SPLAT)
-    subprocess.run([program(), "enhance", tmp_path / "in.ply", "-o", tmp_path / "out.ply", "--upscale", "8", "-q"], check=True)
+    subprocess.run(
+        [program(), "enhance", tmp_path / "in.ply", "-o", tmp_path / "out.ply", "--upscale", "8", "-q"], check=True
+    )
     assert result(server, done) == (tmp_path / "out.ply").read_bytes()
 
 
@@ -116,21 +117,28 @@ def test_the_page_of_a_result(server: Server) -> None:
     page = server.http.get(done["links"]["view"])
     assert page.headers["content-type"].startswith("text/html") and 'id="before-0"' in page.text
     policy = page.headers["content-security-policy"]
-    assert policy.startswith("sandbox allow-scripts;") and "allow-same-origin" not in policy and "connect-src" not in policy
+    assert (
+        policy.startswith("sandbox allow-scripts;")
+        and "allow-same-origin" not in policy
+        and "connect-src" not in policy
+    )
 
 
-@pytest.mark.parametrize("options, says", [
-    ({"colour": "red"}, "colour"),
-    ({"upscale": "0.5"}, "upscale"),
-    ({"upscale": "nan"}, "upscale"),
-    ({"quality": "best"}, "quality"),
-    ({"output": "/etc/passwd"}, "output"),
-    ({"model": "/etc/passwd"}, "model"),
-    ({"background": "1,1,1"}, "clean"),
-    ({"background": "1,1,1 -o x", "clean": "true"}, "background"),
-    ({"train_width": "64"}, "cameras"),
-    ({"pixel_size": "-1"}, "pixel_size"),
-])
+@pytest.mark.parametrize(
+    "options, says",
+    [
+        ({"colour": "red"}, "colour"),
+        ({"upscale": "0.5"}, "upscale"),
+        ({"upscale": "nan"}, "upscale"),
+        ({"quality": "best"}, "quality"),
+        ({"output": "/etc/passwd"}, "output"),
+        ({"model": "/etc/passwd"}, "model"),
+        ({"background": "1,1,1"}, "clean"),
+        ({"background": "1,1,1 -o x", "clean": "true"}, "background"),
+        ({"train_width": "64"}, "cameras"),
+        ({"pixel_size": "-1"}, "pixel_size"),
+    ],
+)
 def test_options_that_make_no_sense(server: Server, options: dict, says: str) -> None:
     for answer in (
         server.http.post("/v1/enhance", params=options, content=SPLAT),
@@ -148,7 +156,14 @@ def test_options_said_twice(server: Server) -> None:
 
 
 def test_what_is_not_there(server: Server) -> None:
-    for path in ("/v1/jobs/none", "/v1/jobs/none/result", "/v1/jobs/none/view", "/v1/jobs/none/events", "/none", "/static/none"):
+    for path in (
+        "/v1/jobs/none",
+        "/v1/jobs/none/result",
+        "/v1/jobs/none/view",
+        "/v1/jobs/none/events",
+        "/none",
+        "/static/none",
+    ):
         answer = server.http.get(path)
         assert answer.status_code == 404 and answer.json()["error"]["code"] == "not_found", path
     assert server.http.delete("/v1/jobs/none").status_code == 404
@@ -171,7 +186,12 @@ def test_what_the_service_says_about_itself(server: Server) -> None:
     assert limits["version"] == anchorsplat.__version__ and "spz" in limits["formats"]
     server.wait(server.submit(SPLAT))
     metrics = server.http.get("/metrics").text
-    for name in ("anchorsplat_jobs_total", "anchorsplat_queued", "anchorsplat_stored_bytes", "process_resident_memory_bytes"):
+    for name in (
+        "anchorsplat_jobs_total",
+        "anchorsplat_queued",
+        "anchorsplat_stored_bytes",
+        "process_resident_memory_bytes",
+    ):
         assert f"\n{name}" in metrics
     described = server.http.get("/openapi.json").json()
     assert {"/v1/enhance", "/v1/convert", "/v1/render", "/v1/jobs/{job_id}/result"} <= set(described["paths"])

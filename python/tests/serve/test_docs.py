@@ -24,7 +24,9 @@ def test_the_lines_of_python(server: Server, tmp_path: Path) -> None:
     (tmp_path / "scan.ply").write_bytes(small_ply())
     (code,) = snippets("python")
     program = f"service = {server.url!r}\n{code}"
-    subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=True, timeout=120, env={"PATH": os.environ["PATH"]})
+    subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, check=True, timeout=120, env={"PATH": os.environ["PATH"]}
+    )
     assert len(anchorsplat.read(tmp_path / "scan-4x.ply")) >= 60
 
 

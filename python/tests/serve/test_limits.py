@@ -9,7 +9,6 @@ from pathlib import Path
 
 import httpx
 import pytest
-
 from anchorsplat.serve import upload
 from anchorsplat.serve.app import make_app
 from anchorsplat.serve.settings import Settings
@@ -26,7 +25,9 @@ def test_files_that_are_too_large(serve) -> None:
     answers = [
         server.http.post("/v1/enhance", files={"file": ("a.ply", large)}),
         server.http.post("/v1/enhance", content=large),
-        server.http.post("/v1/enhance", content=iter([large[:5000], large[5000:]])),  # chunked: its size is not announced
+        server.http.post(
+            "/v1/enhance", content=iter([large[:5000], large[5000:]])
+        ),  # chunked: its size is not announced
         server.http.post("/v1/enhance", content=small_ply(61)),
     ]
     for answer in answers:
@@ -68,9 +69,15 @@ def test_memory_ends_for_one_job_only(serve) -> None:
     small = server.wait(server.submit(SPLAT, "convert", to="spz"))
     assert small["state"] == "done"
     refused = server.http.post("/v1/convert", content=small_ply(2000))
-    large = b"ply\nformat binary_little_endian 1.0\nelement vertex 1500000\n" + b"".join(
-        f"property float {name}\n".encode() for name in "x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3".split()
-    ) + b"end_header\n" + bytes(1_500_000 * 14 * 4)
+    large = (
+        b"ply\nformat binary_little_endian 1.0\nelement vertex 1500000\n"
+        + b"".join(
+            f"property float {name}\n".encode()
+            for name in "x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3".split()
+        )
+        + b"end_header\n"
+        + bytes(1_500_000 * 14 * 4)
+    )
     assert refused.status_code == 202, refused.text
     refused = server.http.post("/v1/convert", content=large)
     assert refused.status_code == 413 and refused.json()["error"]["code"] == "memory", refused.text
@@ -110,7 +117,9 @@ def test_an_upload_that_stops(serve) -> None:
     server = serve("--queue", "1")
     port = server.http.base_url.port
     with socket.create_connection(("127.0.0.1", port)) as connection:
-        connection.sendall(f"POST /v1/enhance HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Length: 5000\r\n\r\nply".encode())
+        connection.sendall(
+            f"POST /v1/enhance HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Length: 5000\r\n\r\nply".encode()
+        )
         until(lambda: list((server.data / "uploads").iterdir()), "the upload's file")
         assert server.http.post("/v1/enhance", content=SPLAT).status_code == 429  # it counts as one that waits
     until(lambda: not list((server.data / "uploads").iterdir()), "the end of the upload's file")
@@ -154,5 +163,10 @@ def test_old_results_go_by_size(serve) -> None:
     assert all(job["state"] == "done" for job in jobs)
     until(lambda: server.http.get(jobs[0]["links"]["self"]).status_code == 404, "the end of the oldest")
     assert server.http.get(jobs[-1]["links"]["result"]).status_code == 200
-    kept = sum(path.stat().st_size for place in ("inputs", "results") for path in (server.data / place).rglob("*") if path.is_file())
+    kept = sum(
+        path.stat().st_size
+        for place in ("inputs", "results")
+        for path in (server.data / place).rglob("*")
+        if path.is_file()
+    )
     assert kept <= 40_000

@@ -31,7 +31,9 @@ def malformed(draw: random.Random, seeds: list[bytes]) -> bytes:
     if kind == 1:
         return draw.randbytes(draw.randrange(1, 400))
     if kind == 2:
-        return draw.choice([b"ply\n", b"PK\x03\x04", b"glTF", b"\x1f\x8b", b"NGSP", b"{", b"\x89PNG\r\n"]) + draw.randbytes(draw.randrange(100))
+        return draw.choice(
+            [b"ply\n", b"PK\x03\x04", b"glTF", b"\x1f\x8b", b"NGSP", b"{", b"\x89PNG\r\n"]
+        ) + draw.randbytes(draw.randrange(100))
     for k in range(4):
         seed[k] ^= draw.randrange(1, 256)
     return bytes(seed)

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 
-
 import anchorsplat
 
 from .service import GatedProgram, Server, small_ply, until
@@ -91,7 +90,10 @@ def test_two_services_in_one_folder(serve, tmp_path) -> None:
     package = os.path.dirname(os.path.dirname(anchorsplat.__file__))
     second = subprocess.run(
         [sys.executable, "-m", "anchorsplat", "serve", "--port", "0", "--data", str(server.data)],
-        env={"PATH": os.environ["PATH"], "PYTHONPATH": package, "HOME": str(tmp_path)}, capture_output=True, text=True, timeout=120,
+        env={"PATH": os.environ["PATH"], "PYTHONPATH": package, "HOME": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
     )
     assert second.returncode == 6 and "another 'anchorsplat serve' works in this folder" in second.stderr
 
@@ -100,7 +102,19 @@ def test_a_port_that_is_taken(serve, tmp_path) -> None:
     server = serve()
     package = os.path.dirname(os.path.dirname(anchorsplat.__file__))
     second = subprocess.run(
-        [sys.executable, "-m", "anchorsplat", "serve", "--port", str(server.http.base_url.port), "--data", str(tmp_path / "other")],
-        env={"PATH": os.environ["PATH"], "PYTHONPATH": package, "HOME": str(tmp_path)}, capture_output=True, text=True, timeout=120,
+        [
+            sys.executable,
+            "-m",
+            "anchorsplat",
+            "serve",
+            "--port",
+            str(server.http.base_url.port),
+            "--data",
+            str(tmp_path / "other"),
+        ],
+        env={"PATH": os.environ["PATH"], "PYTHONPATH": package, "HOME": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
     )
     assert second.returncode == 6 and "--port takes another" in second.stderr

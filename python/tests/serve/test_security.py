@@ -7,7 +7,6 @@ import re
 
 import httpx
 import pytest
-
 from anchorsplat.serve.security import is_session, session
 from anchorsplat.serve.settings import UsageError, parse
 
@@ -33,7 +32,14 @@ def test_names_of_others_are_refused(server: Server) -> None:
     port = server.http.base_url.port
     for host in (f"127.0.0.1:{port}", f"localhost:{port}", f"LOCALHOST:{port}"):
         assert ask(server, Host=host)[0] == 200, host
-    for host in ("evil.example", f"evil.example:{port}", "127.0.0.1", f"127.0.0.1.evil.example:{port}", f"127.0.0.1:{port}@evil", ""):
+    for host in (
+        "evil.example",
+        f"evil.example:{port}",
+        "127.0.0.1",
+        f"127.0.0.1.evil.example:{port}",
+        f"127.0.0.1:{port}@evil",
+        "",
+    ):
         status, body = ask(server, Host=host)
         assert status in (400, 403), host
     assert ask(server)[0] == 400  # without any
@@ -41,20 +47,60 @@ def test_names_of_others_are_refused(server: Server) -> None:
 
 def test_pages_of_other_origins_are_refused(server: Server) -> None:
     host = f"127.0.0.1:{server.http.base_url.port}"
-    assert ask(server, "POST", "/v1/enhance", Host=host, Origin=f"http://{host}", Content_Length="0")[0] == 400  # an empty file
-    for origin in ("http://evil.example", "null", f"http://localhost:{server.http.base_url.port}", "https://", "http://127.0.0.1"):
+    assert (
+        ask(server, "POST", "/v1/enhance", Host=host, Origin=f"http://{host}", Content_Length="0")[0] == 400
+    )  # an empty file
+    for origin in (
+        "http://evil.example",
+        "null",
+        f"http://localhost:{server.http.base_url.port}",
+        "https://",
+        "http://127.0.0.1",
+    ):
         for method in ("POST", "GET", "DELETE"):
             status, body = ask(server, method, "/v1/limits", Host=host, Origin=origin, Content_Length="0")
             assert (status, b"bad_origin" in body) == (403, True), (origin, method)
     assert ask(server, "GET", "/v1/limits", Host=host, Sec_Fetch_Site="cross-site", Sec_Fetch_Mode="no-cors")[0] == 403
-    assert ask(server, "GET", "/", Host=host, Sec_Fetch_Site="cross-site", Sec_Fetch_Mode="navigate", Sec_Fetch_Dest="document")[0] == 200
-    assert ask(server, "GET", "/", Host=host, Sec_Fetch_Site="cross-site", Sec_Fetch_Mode="navigate", Sec_Fetch_Dest="iframe")[0] == 403
+    assert (
+        ask(
+            server,
+            "GET",
+            "/",
+            Host=host,
+            Sec_Fetch_Site="cross-site",
+            Sec_Fetch_Mode="navigate",
+            Sec_Fetch_Dest="document",
+        )[0]
+        == 200
+    )
+    assert (
+        ask(
+            server,
+            "GET",
+            "/",
+            Host=host,
+            Sec_Fetch_Site="cross-site",
+            Sec_Fetch_Mode="navigate",
+            Sec_Fetch_Dest="iframe",
+        )[0]
+        == 403
+    )
 
 
-@pytest.mark.parametrize("path", [
-    "/static/../api.py", "/static/..%2fapi.py", "/static/%2e%2e/%2e%2e/store.py", "/static/%2fetc%2fpasswd", "//etc/passwd",
-    "/v1/jobs/../../jobs.sqlite3", "/v1/jobs/%2e%2e%2fjobs.sqlite3/result", "/v1/jobs/..%5c..%5cx/view", "/static/style.css%00",
-])
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/static/../api.py",
+        "/static/..%2fapi.py",
+        "/static/%2e%2e/%2e%2e/store.py",
+        "/static/%2fetc%2fpasswd",
+        "//etc/passwd",
+        "/v1/jobs/../../jobs.sqlite3",
+        "/v1/jobs/%2e%2e%2fjobs.sqlite3/result",
+        "/v1/jobs/..%5c..%5cx/view",
+        "/static/style.css%00",
+    ],
+)
 def test_paths_that_climb(server: Server, path: str) -> None:
     host = f"127.0.0.1:{server.http.base_url.port}"
     status, body = ask(server, "GET", path, Host=host)
@@ -73,14 +119,18 @@ def test_what_browsers_are_told(server: Server) -> None:
     for path in ("/", "/docs"):
         headers = server.http.get(path).headers
         policy = dict(part.strip().split(" ", 1) for part in headers["content-security-policy"].split(";"))
-        assert policy["default-src"] == "'none'" and policy["script-src"] == "'self'" and policy["style-src"] == "'self'"
+        assert (
+            policy["default-src"] == "'none'" and policy["script-src"] == "'self'" and policy["style-src"] == "'self'"
+        )
         assert policy["frame-ancestors"] == "'none'" and "unsafe" not in headers["content-security-policy"]
         assert headers["x-frame-options"] == "DENY"
         html = server.http.get(path).text
         assert not re.search(r"<script(?![^>]*\bsrc=)|<style|\son\w+=|\sstyle=|https?://", html)
     for path in ("/v1/limits", "/none", "/static/app.js"):
         headers = server.http.get(path).headers
-        assert headers["x-content-type-options"] == "nosniff" and headers["content-security-policy"].startswith("default-src 'none'")
+        assert headers["x-content-type-options"] == "nosniff" and headers["content-security-policy"].startswith(
+            "default-src 'none'"
+        )
         assert "server" not in headers
     assert server.http.get("/v1/limits").headers["cache-control"] == "no-store"
     assert not [name for name in server.http.options("/v1/limits").headers if name.startswith("access-control")]
@@ -94,7 +144,10 @@ def test_ids_cannot_be_guessed(server: Server) -> None:
 def test_a_token(serve) -> None:
     server = serve("--host", "0.0.0.0", environment={"ANCHORSPLAT_TOKEN": TOKEN})
     url = f"http://127.0.0.1:{server.http.base_url.port}"
-    with httpx.Client(base_url=url, trust_env=False) as stranger, httpx.Client(base_url=url, trust_env=False) as browser:
+    with (
+        httpx.Client(base_url=url, trust_env=False) as stranger,
+        httpx.Client(base_url=url, trust_env=False) as browser,
+    ):
         for path in ("/v1/limits", "/v1/jobs/x", "/metrics", "/openapi.json", "/v1/jobs/x/view"):
             assert stranger.get(path).status_code == 401, path
         assert stranger.get("/healthz").status_code == 200
@@ -114,7 +167,9 @@ def test_a_token(serve) -> None:
         assert "httponly" in cookie and "samesite=strict" in cookie and TOKEN not in cookie
         assert browser.get("/v1/limits").status_code == 200
         assert browser.get("/v1/limits", headers={"origin": "http://evil.example"}).status_code == 403
-        assert stranger.post("/login", data={"token": TOKEN}, headers={"origin": "http://evil.example"}).status_code == 403
+        assert (
+            stranger.post("/login", data={"token": TOKEN}, headers={"origin": "http://evil.example"}).status_code == 403
+        )
     assert server.stop() == 0
     assert TOKEN not in server.logged()
 
@@ -137,18 +192,21 @@ def test_a_proxy(serve) -> None:
     assert ask(server, "GET", "/v1/limits", Host="other.example.org", Authorization=bearer)[0] == 403
 
 
-@pytest.mark.parametrize("words, says", [
-    (["--host", "0.0.0.0"], "needs a token"),
-    (["--host", "192.168.1.7"], "needs a token"),
-    (["--allow-host", "splats.example.org"], "needs a token"),
-    (["--token", "short"], "at least 16"),
-    (["--token", ""], "at least 16"),
-    (["--max-upload", "many"], "no size"),
-    (["--max-upload", "0"], "at least one byte"),
-    (["--port", "70000"], "65,535"),
-    (["--max-seconds", "nan"], "must be from"),
-    (["--colour"], "--help"),
-])
+@pytest.mark.parametrize(
+    "words, says",
+    [
+        (["--host", "0.0.0.0"], "needs a token"),
+        (["--host", "192.168.1.7"], "needs a token"),
+        (["--allow-host", "splats.example.org"], "needs a token"),
+        (["--token", "short"], "at least 16"),
+        (["--token", ""], "at least 16"),
+        (["--max-upload", "many"], "no size"),
+        (["--max-upload", "0"], "at least one byte"),
+        (["--port", "70000"], "65,535"),
+        (["--max-seconds", "nan"], "must be from"),
+        (["--colour"], "--help"),
+    ],
+)
 def test_command_lines_that_make_no_sense(words: list[str], says: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ANCHORSPLAT_TOKEN", raising=False)
     with pytest.raises(UsageError, match=re.escape(says)):

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-
 from anchorsplat.serve import store as states
 from anchorsplat.serve.options import ConvertOptions, EnhanceOptions
 from anchorsplat.serve.store import DataInUse, Store
@@ -131,7 +130,11 @@ def test_oldest_first(open_store, tmp_path: Path, clock: Clock) -> None:
 
 
 def test_the_same_wish_has_the_same_words() -> None:
-    same = [EnhanceOptions(), EnhanceOptions.model_validate({"upscale": "4"}), EnhanceOptions(quality="fast", pixel_size="auto")]
+    same = [
+        EnhanceOptions(),
+        EnhanceOptions.model_validate({"upscale": "4"}),
+        EnhanceOptions(quality="fast", pixel_size="auto"),
+    ]
     assert len({options.canonical() for options in same}) == 1
     assert EnhanceOptions(upscale=4.5).canonical() not in {options.canonical() for options in same}
     assert ConvertOptions.model_validate({"to": "spz", "spz_version": "3"}).spz_version == 3

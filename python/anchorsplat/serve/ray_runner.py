@@ -60,7 +60,7 @@ def _job(
         thread = threading.Thread(target=work)
         thread.start()
         try:
-            while isinstance(event := events.get(), dict):
+            while isinstance(event := _next(events), dict):
                 yield event
         finally:  # also when Ray cancels the task
             ended.set()
@@ -68,6 +68,15 @@ def _job(
         if isinstance(event, BaseException):
             raise event
         yield event, {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def _next(events: queue.SimpleQueue) -> object:
+    """Looks up from waiting: only then Ray's way to cancel a task reaches it."""
+    while True:
+        try:
+            return events.get(timeout=0.1)
+        except queue.Empty:
+            pass
 
 
 def _look_for(address: str) -> None:

@@ -1,4 +1,4 @@
-"""200 requests, 20 at once: none lost, memory bounded. Prints the figures of docs/serve.md (`make serve-test`)."""
+"""200 requests, 20 at once: none lost, memory bounded. Conversions, so that it is the service that is measured. Prints the figures of docs/serve.md (`make serve-test`)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,9 @@ def peak(server: Server) -> int:
 async def one(client: httpx.AsyncClient, splat: bytes) -> tuple[bytes, float]:
     """Sent, waited for by its events, fetched. Told that too many wait it comes back."""
     begin = time.monotonic()
-    while (answer := await client.post("/v1/enhance", files={"file": ("a.ply", splat)})).status_code == 429:
+    while (
+        answer := await client.post("/v1/convert", files={"file": ("a.ply", splat)}, data={"to": "spz"})
+    ).status_code == 429:
         await asyncio.sleep(float(answer.headers["retry-after"]))
     assert answer.status_code in (200, 202), answer.text
     job = answer.json()
@@ -59,7 +61,9 @@ async def all_of(server: Server, splats: list[bytes]) -> list[tuple[bytes, float
 def test_two_hundred_requests(serve, capsys) -> None:
     server = serve("--workers", "2", "--threads", "1")
     splats = [small_ply(2000, seed) for seed in range(REQUESTS)]
-    server.wait(server.submit(small_ply(2000, REQUESTS)))  # what is loaded at the first request is there
+    server.wait(
+        server.submit(small_ply(2000, REQUESTS), "convert", to="spz")
+    )  # what is loaded at the first request is there
     before = resident(server)
     begin = time.monotonic()
     answers = asyncio.run(all_of(server, splats))
@@ -94,12 +98,12 @@ def test_what_a_request_costs(serve, capsys, tmp_path: Path) -> None:
         paths[-1].write_bytes(small_ply(2000, seed))
     begin = time.monotonic()
     for path in paths:
-        subprocess.run([program(), "enhance", path, "-o", f"{path}.out.ply", "--threads", "1", "-q"], check=True)
+        subprocess.run([program(), "convert", path, f"{path}.spz", "--threads", "1", "-q"], check=True)
     alone = (time.monotonic() - begin) / count
     begin = time.monotonic()
     for path in paths:
-        job = server.wait(server.submit(path.read_bytes()))
-        assert server.http.get(job["links"]["result"]).content == Path(f"{path}.out.ply").read_bytes()
+        job = server.wait(server.submit(path.read_bytes(), "convert", to="spz"))
+        assert server.http.get(job["links"]["result"]).content == Path(f"{path}.spz").read_bytes()
     served = (time.monotonic() - begin) / count
     with capsys.disabled():
         print(

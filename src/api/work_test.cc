@@ -271,6 +271,17 @@ TEST(RunSettings, TwoLongCallsSideBySide) {
   EXPECT_TRUE(SameBits(whole.splat, alone->splat));  // neither threads nor neighbours change a bit
 }
 
+TEST(RunSettings, AnAbandonedCallHasNoResult) {
+  const std::atomic<bool> abandon{true};
+  const auto splat = ReadSplat(Biplane());
+  ASSERT_TRUE(splat.ok()) << splat.failure().message;
+  const RunSettings run{.abandon = &abandon};
+  const auto enhanced = Enhance(*splat, {.method = "filter", .pixel_size = 0.005}, run);
+  ASSERT_FALSE(enhanced.ok());
+  EXPECT_EQ(enhanced.failure().kind, FailureKind::kStopped);
+  EXPECT_EQ(ReadSplat(Biplane(), run).failure().kind, FailureKind::kStopped);
+}
+
 TEST(Library, SaysItsVersion) { EXPECT_THAT(LibraryVersion(), testing::MatchesRegex("[0-9]+\\.[0-9]+\\.[0-9]+")); }
 
 }  // namespace

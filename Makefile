@@ -10,6 +10,7 @@
 #   make fuzz     mutated files against all readers, SECONDS=60 by default
 #   make realdata DATA=DIR   checks on splats of your own
 #   make viewer-test   the page of `anchorsplat view` in headless Chromium (installs a browser)
+#   make serve-test    the page and the API of `anchorsplat serve` in headless Chromium, under load and on Ray
 #   make interop  files of ours read by other programs and theirs by us (scripts/interop.py says what it needs)
 #   make lpips-check  LPIPS with its trained weights (fetched once, 64 MB) against the published values
 #   make bench    measured ratios and figures
@@ -94,6 +95,16 @@ test-all: torch python-dependencies
 
 viewer-test: build
 	@scripts/viewer_test.sh build/anchorsplat
+
+# The page in a browser, 1,000 malformed uploads, 200 requests, Ray: the service's tests that take minutes. PYTHON has the
+# packages (pip install ".[serve,batch]" pytest httpx playwright), build/lean the package.
+PYTHON ?= python3
+serve-test: test-dependencies
+	@cmake --preset lean -DANCHORSPLAT_PYTHON=ON -DPython_EXECUTABLE="$(shell command -v $(PYTHON))" $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
+	@rm -f build-configure.log
+	@cmake --build --preset lean -j $(JOBS) --target anchorsplat_python_package
+	@scripts/serve_test.sh $(PYTHON) build/lean/python
+.PHONY: serve-test
 
 bench: program
 	@build/anchorsplat bench render

@@ -16,6 +16,7 @@ import anchorsplat
 SHARED = {
     "quiet": "messages go to logging and warnings",
     "json": "results are values",
+    "progress": "a callback or a bar of tqdm",
 }
 OUTPUT = {"output": "results are values"}
 FILES = {**OUTPUT, "out-dir": "results are values"}

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/clean_output.h"
+#include "cli/json_sink.h"
 #include "cli/verb_tree.h"
 #include "cli/verb_words.h"
 #include "core/log.h"
@@ -39,6 +40,9 @@ CLI::App& AddVerb(CLI::App& app, Program& program, const std::string& name, cons
   verb.add_flag("-w,--overwrite", flags.overwrite, "Replace files that exist (else refuse)")->group(group);
   verb.add_flag("-q,--quiet", flags.quiet, "Only warnings and errors on stderr")->group(group);
   verb.add_flag("--json", flags.json, "Results as one JSON document on stdout")->group(group);
+  AddChoice(verb, "--progress", flags.json_progress, {{"bar", false}, {"json", true}},
+            "bar: messages to read and bars on a terminal; json: a line of JSON on stderr for each message and step")
+      ->group(group);
   verb.add_option("--threads", flags.threads, "Threads to use; 0 is the whole machine")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str()
@@ -102,7 +106,7 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
   // A limit on the size of files is an error of the write that meets it, not the end of the program.
   std::signal(SIGXFSZ, SIG_IGN);
   const SharedFlags& flags = program.flags;
-  SetLogSink(MakeTerminalSink(flags.quiet));
+  SetLogSink(flags.json_progress ? MakeJsonSink(flags.quiet) : MakeTerminalSink(flags.quiet));
   SetThreadCount(flags.threads);
   const RunScope run({});  // what is put down here is known in the runs that verbs begin to be stopped (stop_signal.h)
   const InputRecord record;  // nothing that the verb reads is overwritten by it

@@ -1,6 +1,7 @@
 #include "cli/verb.h"
 
 #include <fstream>
+#include <sstream>
 
 #include "cli/run_for_test.h"
 #include "cli/small_scan_for_test.h"
@@ -103,6 +104,39 @@ TEST(CommandLine, QuietSaysNothingAndJsonNothingElse) {
   EXPECT_TRUE(ExpectJson({"convert", scan, folder / "b.ply"}).is_array());
   // Warnings are said all the same.
   EXPECT_THAT(ExpectDone({"convert", scan, folder / "c.splat", "-q"}).err, HasSubstr("warning: "));
+}
+
+// For programs that start this one: nothing but lines of JSON on stderr, steps among them.
+TEST(CommandLine, ProgressAsJson) {
+  const TestFolder folder;
+  const std::string scan = WriteScan(folder / "scan.ply");
+  const auto events = [](const ProgramRun& run) {
+    std::vector<nlohmann::json> lines;
+    std::istringstream text(run.err);
+    for (std::string line; std::getline(text, line);) {
+      lines.push_back(nlohmann::json::parse(line, nullptr, /*allow_exceptions=*/false));
+      EXPECT_TRUE(lines.back().is_object()) << line;
+    }
+    return lines;
+  };
+  const auto steps = events(
+      ExpectDone({"render", scan, "-o", folder / "views", "--orbit", "3", "--size", "32x32", "--progress", "json"}));
+  ASSERT_GE(steps.size(), 2u);
+  EXPECT_EQ(steps.front(), (nlohmann::json{{"task", "render"}, {"done", 0}, {"total", 3}}));
+  EXPECT_EQ(steps.back()["done"], 3);
+  const auto warned = events(ExpectDone({"convert", scan, folder / "c.splat", "-q", "--progress", "json"}));
+  ASSERT_FALSE(warned.empty());
+  EXPECT_EQ(warned[0]["level"], "warning");
+  const auto failed =
+      events(ExpectRefused({"info", folder / "none\x1b.ply", "--progress", "json"}, ErrorCode::kNotFound, {"u001b"}));
+  ASSERT_EQ(failed.size(), 1u);
+  EXPECT_EQ(failed[0]["level"], "error");
+}
+
+TEST(CommandLine, VerbsOfThePythonPackageSayWhereTheyAre) {
+  ExpectRefused({"serve"}, ErrorCode::kBadArgument, {"pip install 'anchorsplat[serve]'"});
+  ExpectRefused({"serve", "--port", "1", "x"}, ErrorCode::kBadArgument, {"pip install 'anchorsplat[serve]'"});
+  ExpectRefused({"batch", "enhance", "a.ply", "--out", "b"}, ErrorCode::kBadArgument, {"anchorsplat[batch]"});
 }
 
 TEST(CommandLine, ErrorsAreDocumentsToo) {

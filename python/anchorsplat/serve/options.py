@@ -1,0 +1,171 @@
+"""What may be asked of a job: names, ranges and defaults are the command line's (docs/cli.md). Unknown names are refused."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Annotated, Literal, Union
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+#: Formats that results come in, and the type that HTTP knows them by.
+FORMATS = {
+    "ply": "application/octet-stream",
+    "compressed.ply": "application/octet-stream",
+    "spz": "application/octet-stream",
+    "sog": "application/zip",
+    "splat": "application/octet-stream",
+    "glb": "model/gltf-binary",
+    "gltf": "application/zip",  # its numbers are in a file of their own
+    "npz": "application/octet-stream",
+    "csv": "text/csv",
+}
+Format = Literal["ply", "compressed.ply", "spz", "sog", "splat", "glb", "gltf", "npz", "csv"]
+Mode = Literal["classic", "antialiased", "mip"]
+_COLOR = r"^(0(\.\d+)?|1(\.0+)?|\.\d+)(,(0(\.\d+)?|1(\.0+)?|\.\d+)){2}$"
+_VECTOR = r"^[-+]?\d{1,9}(\.\d{1,9})?(,[-+]?\d{1,9}(\.\d{1,9})?){2}$"
+
+
+class Options(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=False)
+
+    def canonical(self) -> str:
+        """The same text for the same wish: what was said and what goes without saying are one."""
+        return json.dumps(self.model_dump(exclude_none=True), sort_keys=True)
+
+
+class EnhanceOptions(Options):
+    quality: Literal["fast", "good"] = Field(
+        "fast", description="fast: a second; good: the network, then a little refinement, several seconds"
+    )
+    upscale: float = Field(4.0, ge=1, le=64, description="how many times closer it will be seen")
+    pixel_size: Union[Literal["auto"], Annotated[float, Field(gt=0, lt=1e9)]] = Field(
+        "auto", description="world size of one pixel of the training views; auto: estimated, or of the cameras"
+    )
+    mode: Mode | None = Field(
+        None, description="how it was rasterized in training; default: the file's tag, else as its Gaussians look"
+    )
+    copies: Union[Literal["auto"], Annotated[int, Field(ge=1, le=4)]] = Field(
+        "auto", description="Gaussians made of each, at most"
+    )
+    max_gaussians: int = Field(0, ge=0, le=2**31 - 1, description="budget of the result; 0: none")
+    train_width: int | None = Field(
+        None, ge=1, le=65535, description="of the training pictures, where it was less than the cameras say"
+    )
+    clean: bool = Field(
+        False, description="first take out Gaussians of the background's colour that no training view would miss"
+    )
+    background: str | None = Field(None, pattern=_COLOR, description="R,G,B from 0 to 1, of the training views")
+
+    @model_validator(mode="after")
+    def _belongs_together(self):
+        if self.background is not None and not self.clean:
+            raise ValueError("background has an effect with clean only")
+        return self
+
+    def words(self, cameras: bool) -> list[str]:
+        out = ["--quality", self.quality, "--upscale", repr(self.upscale)]
+        if self.pixel_size != "auto":
+            out += ["--pixel-size", repr(self.pixel_size)]
+        if self.mode:
+            out += ["--mode", self.mode]
+        if self.copies != "auto":
+            out += ["--copies", str(self.copies)]
+        if self.max_gaussians:
+            out += ["--max-gaussians", str(self.max_gaussians)]
+        if cameras:
+            out += ["--cameras", "cameras.json"]
+        if self.train_width is not None:
+            out += ["--train-width", str(self.train_width)]
+        if self.clean:
+            out += ["--clean"]
+        if self.background is not None:
+            out += ["--background", self.background]
+        return out
+
+
+class ConvertOptions(Options):
+    to: Format = Field("spz", description="format of the result")
+    mode: Mode | None = Field(
+        None, description="how the splat is rasterized, for a tag in the result; default: as the input says"
+    )
+    sh_degree: int | None = Field(None, ge=0, le=3, description="spherical harmonics to keep")
+    min_opacity: float = Field(0.0, ge=0, le=1, description="drop Gaussians that are fainter")
+    max_gaussians: int | None = Field(
+        None, ge=1, le=2**31 - 1, description="keep at most so many, those of the largest size x opacity"
+    )
+    sort: Literal["format", "keep", "morton", "importance"] = Field(
+        "format", description="order of the Gaussians in the file"
+    )
+    spz_version: Literal[3, 4] = Field(4, description="3 for programs that only know gzip")
+    coords: str | None = Field(
+        None,
+        pattern=r"^([LRUDFB]{3})?:([LRUDFB]{3})?$",
+        description="what the axes really are where they do not follow the format, as IN:OUT",
+    )
+
+    @field_validator("spz_version", mode="before")
+    @classmethod
+    def _digit(cls, value):
+        return int(value) if isinstance(value, str) and value in ("3", "4") else value
+
+    def words(self) -> list[str]:
+        out = ["--sort", self.sort]
+        if self.to == "spz":
+            out += ["--spz-version", str(self.spz_version)]
+        if self.mode:
+            out += ["--mode", self.mode]
+        if self.sh_degree is not None:
+            out += ["--sh-degree", str(self.sh_degree)]
+        if self.min_opacity:
+            out += ["--min-opacity", repr(self.min_opacity)]
+        if self.max_gaussians is not None:
+            out += ["--max-gaussians", str(self.max_gaussians)]
+        if self.coords is not None:
+            out += ["--coords", self.coords]
+        return out
+
+
+class RenderOptions(Options):
+    orbit: int = Field(1, ge=1, le=120, description="views on a sphere around the splat")
+    size: str = Field("1024x1024", description="WxH in pixels, at most 4096x4096")
+    fov: float = Field(45.0, ge=1, le=170, description="horizontal field of view, degrees")
+    radius: float | None = Field(
+        None, gt=0, lt=1e9, description="distance in world units; default: what frames the splat"
+    )
+    target: str | None = Field(None, pattern=_VECTOR, description="X,Y,Z to look at; default: the splat's middle")
+    up: str | None = Field(
+        None,
+        pattern=r"^(-?[xyz]|[-+]?\d{1,9}(\.\d{1,9})?(,[-+]?\d{1,9}(\.\d{1,9})?){2})$",
+        description="where up is: X,Y,Z or an axis such as -z",
+    )
+    background: str | None = Field(None, pattern=_COLOR, description="R,G,B from 0 to 1; default black")
+    transparent: bool = Field(False, description="an alpha channel instead of a background")
+    mode: Mode | None = Field(None, description="rasterization; default: the file's tag, else classic")
+
+    @field_validator("size")
+    @classmethod
+    def _bounded(cls, text: str) -> str:
+        match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text)
+        if not match or not all(1 <= int(side) <= 4096 for side in match.groups()):
+            raise ValueError("must be WxH, each from 1 to 4096, such as 800x600")
+        return text
+
+    @model_validator(mode="after")
+    def _belongs_together(self):
+        if self.transparent and self.background is not None:
+            raise ValueError("a background has no effect on transparent pictures")
+        return self
+
+    def words(self) -> list[str]:
+        out = ["--orbit", str(self.orbit), "--size", self.size, "--fov", repr(self.fov)]
+        for name in ("radius", "target", "up", "background", "mode"):
+            value = getattr(self, name)
+            if value is not None:
+                out += [f"--{name}={value}"]  # one word: a value may begin with a minus
+        if self.transparent:
+            out += ["--transparent"]
+        return out
+
+
+KINDS: dict[str, type[Options]] = {"enhance": EnhanceOptions, "convert": ConvertOptions, "render": RenderOptions}

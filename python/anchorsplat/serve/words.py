@@ -1,0 +1,103 @@
+"""What was found, assumed and done, in sentences for people. The numbers are in the report's `details`."""
+
+from __future__ import annotations
+
+_METHODS = {
+    "model": "the filter and the network",
+    "filter": "the filter",
+    "model+refine": "the network, then refinement",
+    "filter+refine": "the filter, then refinement",
+    "refine": "refinement",
+}
+_MODES = {
+    "classic": "as a standard fit (classic rasterization)",
+    "antialiased": "with antialiasing",
+    "mip": "with Mip-Splatting's filter",
+}
+
+
+def report_of(kind: str, document: object, messages: list[tuple[str, str]], seconds: float) -> dict:
+    """The report of a job that is done, of what the program printed."""
+    row = document[0] if isinstance(document, list) and document else document
+    row = row if isinstance(row, dict) else {}
+    sentences = {"enhance": _enhanced, "convert": _converted, "render": _rendered}[kind](row)
+    details = {key: value for key, value in row.items() if key not in ("input", "output", "view", "views")}
+    return {
+        "sentences": sentences,
+        "warnings": [_named(text) for level, text in messages if level == "warning"],
+        "notes": [_named(text) for level, text in messages if level == "info"],
+        "details": details,
+        "seconds": round(seconds, 3),
+    }
+
+
+def _named(text: str) -> str:
+    return "the splat" + text[1:] if text.startswith("-:") else text
+
+
+def _count(n: object) -> str:
+    return f"{n:,}" if isinstance(n, int) else str(n)
+
+
+def _enhanced(row: dict) -> list[str]:
+    gaussians = row.get("gaussians", {})
+    method = row.get("method", "")
+    out = [
+        f"{_count(gaussians.get('in'))} Gaussians in, {_count(gaussians.get('out'))} out, by {_METHODS.get(method, method)}."
+    ]
+    if gaussians.get("dropped"):
+        out.append(f"{_count(gaussians['dropped'])} Gaussians were dropped: they hold numbers that cannot be drawn.")
+    if row.get("looks"):
+        out.append(
+            f"The file does not say how it was trained; it looks trained {_MODES.get(row['looks'], row['looks'])}."
+        )
+    out += _pixel_size(row)
+    cleaned = row.get("cleaned") or {}
+    if "gaussians" in cleaned:
+        out.append(f"Cleaning took out {_count(cleaned['gaussians'])} Gaussians of the background's colour.")
+    refine = row.get("refine") or {}
+    if refine.get("kept_start"):
+        out.append("Refinement found nothing better than what it began with, which was kept.")
+    elif (
+        "consistency_after" in refine
+        and refine["consistency_before"] is not None
+        and refine["consistency_after"] is not None
+    ):
+        out.append(
+            f"Refinement: agreement with the splat's own views {refine['consistency_before']:.1f} dB before, "
+            f"{refine['consistency_after']:.1f} dB after."
+        )
+    return out
+
+
+def _pixel_size(row: dict) -> list[str]:
+    size = row.get("pixel_size") or {}
+    value, source = size.get("value"), size.get("source")
+    if not source:
+        return []
+    if value is None:
+        return ["How large a training pixel was is in doubt, so the width that the fit absorbed was not given back."]
+    known = {
+        "estimated": f"The size of a training pixel was estimated from the splat: {value:.4g} world units. Cameras make it exact.",
+        "cameras": f"The size of a training pixel is that of the cameras: {value:.4g} world units in the middle.",
+    }
+    out = [known.get(source, f"The size of a training pixel is {value:.4g} world units ({source}).")]
+    for contradiction in size.get("contradictions") or []:
+        out.append(f"But {contradiction}.")
+    return out
+
+
+def _converted(row: dict) -> list[str]:
+    formats, gaussians = row.get("formats") or ["?", "?"], row.get("gaussians", {})
+    sizes, degrees = row.get("bytes", {}), row.get("sh_degree", {})
+    out = [f"{formats[0]} to {formats[1]}: {_count(sizes.get('in'))} bytes became {_count(sizes.get('out'))}."]
+    if gaussians.get("in") != gaussians.get("out"):
+        out.append(f"{_count(gaussians.get('out'))} of {_count(gaussians.get('in'))} Gaussians were kept.")
+    if degrees.get("in") != degrees.get("out"):
+        out.append(f"Spherical harmonics of degree {degrees.get('in')} became degree {degrees.get('out')}.")
+    return out
+
+
+def _rendered(row: dict) -> list[str]:
+    views = row.get("views") or []
+    return [f"{len(views)} {'picture' if len(views) == 1 else 'pictures'} of {_count(row.get('gaussians'))} Gaussians."]

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <memory>
+
+#include "core/log.h"
+
+namespace anchorsplat {
+
+// Of --progress json, for programs that start this one: every event is a line of JSON on stderr, one of
+//
+//   {"level": "info" | "warning" | "error", "message": TEXT}
+//   {"task": NAME, "done": N, "total": N, "note": TEXT}   (total 0: unknown; no note where there is none; at most ten a
+//                                                          second, and the last one)
+//
+// quiet: warnings, errors and progress only.
+std::shared_ptr<LogSink> MakeJsonSink(bool quiet);
+
+}  // namespace anchorsplat

@@ -23,7 +23,8 @@ set(FLOOR_train 10)
 set(FLOOR_eval 10)
 set(FLOOR_bench 10)
 set(FLOOR_api 11)
-set(FLOOR_cli 11)
+set(FLOOR_request 11)
+set(FLOOR_cli 12)
 
 # Of model/ every folder is a room of its own.
 function(room_of path room)

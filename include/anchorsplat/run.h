@@ -30,8 +30,11 @@ struct RunSettings {
   std::function<void(MessageLevel, const std::string& sentence)> message = {};  // may be empty
   std::function<void(const TaskProgress&)> progress = {};                       // may be empty
   // Becomes true when the call is to end: optimisations return what they have so far and say so, others a
-  // FailureKind::kStopped. Must outlive the call.
+  // FailureKind::kStopped, those that cannot tell go on. Must outlive the call.
   const std::atomic<bool>* stop = nullptr;
+  // Becomes true when nothing of the call is wanted any more: it ends at once and without a result, whatever it is
+  // about, as a FailureKind::kStopped. Files appear whole or not at all. Must outlive the call.
+  const std::atomic<bool>* abandon = nullptr;
 };
 
 // "0.1.0", of the library that is loaded.

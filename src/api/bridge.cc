@@ -138,7 +138,8 @@ Picture ToPicture(const Image& image) {
 }
 
 RunContext ToContext(const RunSettings& run) {
-  return {.threads = run.threads, .sink = std::make_shared<CallbackSink>(run), .stop = run.stop};
+  return {
+      .threads = run.threads, .sink = std::make_shared<CallbackSink>(run), .stop = run.stop, .abandon = run.abandon};
 }
 
 const char* LibraryVersion() { return ANCHORSPLAT_VERSION; }

@@ -57,6 +57,8 @@ Expected<T> InRun(const RunSettings& run, Call&& call) try {
   } else {
     return *std::move(result);
   }
+} catch (const RunAbandoned&) {
+  return Failure{FailureKind::kStopped, "stopped"};
 } catch (const std::bad_alloc&) {
   return Failure{FailureKind::kIo, "there is not enough memory"};
 } catch (const std::exception& error) {

@@ -9,7 +9,6 @@
 #include "bench/network_bench.h"
 #include "bench/render_bench.h"
 #include "cli/bench_pixel_size.h"
-#include "cli/choice.h"
 #include "cli/table.h"
 #include "cli/verb.h"
 #include "core/parallel.h"
@@ -17,6 +16,7 @@
 #include "formats/cloud_io.h"
 #include "model/published/published_checkpoint.h"
 #include "model/shared/weights.h"
+#include "request/choice.h"
 
 namespace anchorsplat {
 

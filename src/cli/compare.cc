@@ -8,13 +8,10 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "cli/choice.h"
 #include "cli/clean_output.h"
 #include "cli/lpips_flags.h"
-#include "cli/parse.h"
 #include "cli/table.h"
 #include "cli/verb.h"
-#include "cli/views.h"
 #include "core/text.h"
 #include "eval/comparison.h"
 #include "eval/view_source.h"
@@ -23,6 +20,10 @@
 #include "io/input_record.h"
 #include "io/json_file.h"
 #include "metrics/side_by_side.h"
+#include "request/choice.h"
+#include "request/parse.h"
+#include "request/views.h"
+#include "request/words.h"
 
 namespace anchorsplat {
 

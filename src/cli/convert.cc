@@ -8,10 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/batch.h"
-#include "cli/choice.h"
 #include "cli/clean_output.h"
-#include "cli/mode_option.h"
-#include "cli/parse.h"
 #include "cli/verb.h"
 #include "core/file_system.h"
 #include "core/log.h"
@@ -23,6 +20,10 @@
 #include "io/input_record.h"
 #include "metrics/conversion_loss.h"
 #include "model/published/published_checkpoint_writer.h"
+#include "request/choice.h"
+#include "request/mode_option.h"
+#include "request/parse.h"
+#include "request/write_flags.h"
 
 namespace anchorsplat {
 
@@ -259,15 +260,7 @@ void AddConvert(CLI::App& app, Program& program) {
                   "What the files' axes really are where they do not follow their format, as IN:OUT, for example RUB: "
                   "for a PLY with y up, :RDF for an SPZ as careless programs expect it")
       ->check(NotEmpty());
-  AddChoice(verb, "--sort", options.write.order,
-            {{"format", SplatOrder::kFormat},
-             {"keep", SplatOrder::kKeep},
-             {"morton", SplatOrder::kMorton},
-             {"importance", SplatOrder::kImportance}},
-            "Order of the Gaussians in the file");
-  auto* spz_version =
-      verb.add_option("--spz-version", options.write.spz_version, "4, or 3 for programs that only know gzip");
-  spz_version->check(CLI::IsMember({3, 4}))->capture_default_str();
+  auto* spz_version = AddWriteFlags(verb, options.write);
   auto* report =
       verb.add_flag("--report", flags->report, "Read the output back: attribute errors, and PSNR of pictures of both");
   verb.add_option("--report-views", flags->views, "Views around the splat for the PSNR")

@@ -4,7 +4,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "cli/choice.h"
 #include "cli/clean_output.h"
 #include "cli/table.h"
 #include "cli/verb.h"
@@ -12,6 +11,7 @@
 #include "dataset/dataset_check.h"
 #include "dataset/dataset_split.h"
 #include "io/atomic_file.h"
+#include "request/choice.h"
 
 namespace anchorsplat {
 

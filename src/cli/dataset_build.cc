@@ -3,7 +3,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "cli/choice.h"
 #include "cli/clean_output.h"
 #include "cli/dataset.h"
 #include "cli/mesh_views.h"
@@ -16,6 +15,7 @@
 #include "dataset/object_builder.h"
 #include "dataset/process_pool.h"
 #include "dataset/recipe.h"
+#include "request/choice.h"
 
 namespace anchorsplat {
 

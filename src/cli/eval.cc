@@ -3,7 +3,6 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "cli/choice.h"
 #include "cli/clean_output.h"
 #include "cli/lpips_flags.h"
 #include "cli/verb.h"
@@ -14,6 +13,7 @@
 #include "eval/filter_sweep.h"
 #include "eval/report.h"
 #include "eval/summary.h"
+#include "request/choice.h"
 
 namespace anchorsplat {
 

@@ -6,10 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "cli/choice.h"
 #include "cli/clean_output.h"
-#include "cli/fit_flags.h"
-#include "cli/parse.h"
 #include "cli/stop_signal.h"
 #include "cli/verb.h"
 #include "core/log.h"
@@ -25,6 +22,10 @@
 #include "formats/write_losses.h"
 #include "io/atomic_file.h"
 #include "io/input_record.h"
+#include "request/choice.h"
+#include "request/fit_flags.h"
+#include "request/parse.h"
+#include "request/words.h"
 
 namespace anchorsplat {
 

@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "cli/choice.h"
 #include "core/log.h"
+#include "request/choice.h"
 
 namespace anchorsplat {
 

@@ -4,12 +4,12 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "cli/choice.h"
 #include "cli/clean_output.h"
-#include "cli/parse.h"
 #include "cli/verb.h"
 #include "core/log.h"
 #include "core/text.h"
+#include "request/choice.h"
+#include "request/parse.h"
 #include "scene/mesh_reader.h"
 
 namespace anchorsplat {

@@ -6,11 +6,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "cli/choice.h"
 #include "cli/clean_output.h"
-#include "cli/parse.h"
 #include "cli/verb.h"
-#include "cli/views.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
@@ -18,6 +15,9 @@
 #include "io/input_record.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
+#include "request/choice.h"
+#include "request/parse.h"
+#include "request/views.h"
 
 namespace anchorsplat {
 
@@ -63,19 +63,6 @@ Result<std::vector<fs::path>> OutputPaths(const std::string& output, const Camer
     if (code) return Error{ErrorCode::kIo, Cat(output, ": cannot make this folder: ", code.message())};
   }
   return paths;
-}
-
-// Colour over black divided by coverage: what a picture with an alpha channel stores.
-Image WithAlpha(const RenderOutput& render) {
-  Image out(render.color.width, render.color.height, 4);
-  for (int c = 0; c < 3; ++c) {
-    for (int64_t i = 0; i < out.plane(); ++i) {
-      const float alpha = render.alpha.pixels[static_cast<size_t>(i)];
-      out.channel(c)[i] = alpha > 0 ? render.color.channel(c)[i] / alpha : 0;
-    }
-  }
-  std::copy_n(render.alpha.pixels.data(), out.plane(), out.channel(3));
-  return out;
 }
 
 Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {

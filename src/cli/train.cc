@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "cli/choice.h"
 #include "cli/clean_output.h"
 #include "cli/stop_signal.h"
 #include "cli/table.h"
@@ -14,6 +13,7 @@
 #include "core/companion.h"
 #include "core/file_system.h"
 #include "core/text.h"
+#include "request/choice.h"
 
 namespace anchorsplat {
 

@@ -7,7 +7,6 @@
 #include <new>
 #include <nlohmann/json.hpp>
 
-#include "cli/choice.h"
 #include "cli/clean_output.h"
 #include "cli/verb_tree.h"
 #include "cli/verb_words.h"
@@ -17,6 +16,7 @@
 #include "core/text.h"
 #include "io/input_record.h"
 #include "model/model_method.h"
+#include "request/choice.h"
 
 namespace anchorsplat {
 
@@ -66,14 +66,6 @@ void AddVerbs(CLI::App& app, Program& program) {
   AddDoctor(app, program);
   AddManual(app, program);
   CheckNumbers(app);
-}
-
-std::vector<std::string> GivenOptions(const CLI::App& verb) {
-  std::vector<std::string> given;
-  for (const CLI::Option* option : verb.get_options()) {
-    if (option->count() > 0) given.push_back(option->get_single_name());
-  }
-  return given;
 }
 
 void PrintJson(const nlohmann::json& json) {

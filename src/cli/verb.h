@@ -59,9 +59,6 @@ void AddManual(CLI::App& app, Program& program);
 // All of them, in the order in which --help lists them.
 void AddVerbs(CLI::App& app, Program& program);
 
-// The options that the user gave, by their names without dashes.
-std::vector<std::string> GivenOptions(const CLI::App& verb);
-
 inline WriteOptions WriteOptionsFrom(const SharedFlags& flags) { return {.overwrite = flags.overwrite}; }
 
 // Prints a JSON document to stdout. Numbers that are not finite become null.

@@ -6,12 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "cameras/camera_io.h"
-#include "cli/choice.h"
 #include "cli/clean_output.h"
-#include "cli/mode_option.h"
-#include "cli/parse.h"
 #include "cli/verb.h"
-#include "cli/views.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/statistics.h"
@@ -21,6 +17,10 @@
 #include "io/atomic_file.h"
 #include "io/input_record.h"
 #include "render/shown_range.h"
+#include "request/choice.h"
+#include "request/mode_option.h"
+#include "request/parse.h"
+#include "request/views.h"
 #include "viewer/page_writer.h"
 
 namespace anchorsplat {

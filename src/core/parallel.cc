@@ -50,6 +50,7 @@ void ParallelRanges(int64_t begin, int64_t end, int64_t grain, RangeFunction fun
   if (begin >= end) return;
   grain = std::max<int64_t>(1, grain);
   const int64_t chunks = (end - begin + grain - 1) / grain;
+  LeaveIfAbandoned();
   if (chunks == 1) {
     function(context, begin, end);
     return;
@@ -64,6 +65,7 @@ void ParallelRanges(int64_t begin, int64_t end, int64_t grain, RangeFunction fun
           int64_t{0}, chunks,
           [&](int64_t chunk) {
             const TakePart part(run);
+            LeaveIfAbandoned();
             one(chunk);
           },
           tbb::simple_partitioner());

@@ -31,6 +31,7 @@ RunScope::RunScope(RunContext context) : before_(internal::CurrentRun()) {
     if (context.threads <= 0) context.threads = before_->context.threads;
     if (!context.sink) context.sink = before_->context.sink;
     if (context.stop == nullptr) context.stop = before_->context.stop;
+    if (context.abandon == nullptr) context.abandon = before_->context.abandon;
   }
   run->context = std::move(context);
   run->storage = before_ ? before_->storage : std::make_shared<internal::RunStorage>();
@@ -43,6 +44,13 @@ RunScope::~RunScope() { internal::current_run = std::move(before_); }
 bool StopRequested() {
   const auto& run = internal::CurrentRun();
   return run && run->context.stop != nullptr && run->context.stop->load(std::memory_order_relaxed);
+}
+
+void LeaveIfAbandoned() {
+  const auto& run = internal::CurrentRun();
+  if (run && run->context.abandon != nullptr && run->context.abandon->load(std::memory_order_relaxed)) {
+    throw RunAbandoned();
+  }
 }
 
 }  // namespace anchorsplat

@@ -25,7 +25,13 @@ struct RunContext {
   int threads = 0;                          // at most; 0: no limit of its own
   std::shared_ptr<LogSink> sink = nullptr;  // its events are serialised
   const std::atomic<bool>* stop = nullptr;  // must outlive the scope
+  // Becomes true when nothing of the run is wanted any more: its next parallel loop, or the next part of the one that
+  // runs, throws RunAbandoned, whatever it is about. Must outlive the scope.
+  const std::atomic<bool>* abandon = nullptr;
 };
+
+// Ends a run from inside. What a run holds is given back on the way, and files that are not whole are never named.
+struct RunAbandoned {};
 
 namespace internal {
 
@@ -66,5 +72,8 @@ class RunScope {
 
 // Whether the run that this thread takes part in is asked to end. Cheap: long loops ask at every step.
 bool StopRequested();
+
+// Throws RunAbandoned when the run is. For what takes long without parallel loops; these ask by themselves.
+void LeaveIfAbandoned();
 
 }  // namespace anchorsplat

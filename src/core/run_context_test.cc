@@ -90,6 +90,29 @@ TEST(RunContext, ALimitIsKept) {
   EXPECT_EQ(ThreadCount(), 1);
 }
 
+TEST(RunContext, AnAbandonedOneLeavesItsLoopsAndNobodyElses) {
+  std::atomic<bool> abandon{false};
+  std::atomic<int64_t> done{0};
+  constexpr int64_t kLoop = 100'000;
+  const auto work = [&] {
+    const RunScope run({.threads = 2, .abandon = &abandon});
+    ParallelFor(0, kLoop, 1, [&](int64_t first, int64_t) {
+      if (first == 1000) abandon = true;
+      ++done;
+    });
+  };
+  EXPECT_THROW(work(), RunAbandoned);
+  EXPECT_LT(done, kLoop);
+  {
+    const RunScope outer({.abandon = &abandon});
+    const RunScope inner({});
+    EXPECT_THROW(LeaveIfAbandoned(), RunAbandoned) << "of the run around";
+    EXPECT_THROW(ParallelFor(0, 10, 1, [](int64_t, int64_t) {}), RunAbandoned);
+  }
+  LeaveIfAbandoned();
+  ParallelFor(0, 10, 1, [&](int64_t, int64_t) {});
+}
+
 TEST(RunContext, WhatIsLeftOutIsThatOfTheRunAround) {
   const auto outer = std::make_shared<CountingSink>(), inner = std::make_shared<CountingSink>();
   std::atomic<bool> stop{true};

@@ -1,4 +1,4 @@
-#include "cli/choice.h"
+#include "request/choice.h"
 
 #include <cerrno>
 #include <cmath>

@@ -1,6 +1,6 @@
-#include "cli/refine_flags.h"
+#include "request/refine_flags.h"
 
-#include "cli/choice.h"
+#include "request/choice.h"
 
 namespace anchorsplat {
 

@@ -1,4 +1,4 @@
-#include "cli/parse.h"
+#include "request/parse.h"
 
 #include <algorithm>
 #include <cctype>

@@ -1,12 +1,10 @@
-#include "cli/views.h"
+#include "request/views.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "cameras/camera_io.h"
-#include "cli/choice.h"
-#include "cli/mode_option.h"
-#include "cli/parse.h"
 #include "core/framing.h"
 #include "core/log.h"
 #include "core/statistics.h"
@@ -15,6 +13,9 @@
 #include "eval/view_source.h"
 #include "formats/cloud_io.h"
 #include "render/shown_range.h"
+#include "request/choice.h"
+#include "request/mode_option.h"
+#include "request/parse.h"
 
 namespace anchorsplat {
 
@@ -23,14 +24,14 @@ namespace {
 constexpr int kOrbitSize = 1024;
 
 // Of an orbit: what was said, what the cameras say, what the splat says, what is usual.
-Result<std::array<double, 3>> ChooseUp(const ViewFlags& flags, const GaussianCloud& cloud, const CameraSet& cameras) {
+Result<std::array<double, 3>> ChooseUp(const ViewFlags& flags, const CloudView& cloud, const CameraSet& cameras) {
   if (!flags.up.empty()) return ParseDirection("--up", flags.up);
   if (const auto up = WorldUp(cameras.cameras)) return *up;
-  return UpOf(cloud.comments).value_or(kUsualUp);
+  return UpOf({cloud.comments.begin(), cloud.comments.end()}).value_or(kUsualUp);
 }
 
 // `cameras` may be none; from those that there are an orbit takes what they know about the world.
-Result<CameraSet> OrbitViews(const ViewFlags& flags, const GaussianCloud& cloud, const CameraSet& cameras) {
+Result<CameraSet> OrbitViews(const ViewFlags& flags, const CloudView& cloud, const CameraSet& cameras) {
   SizeOption size{kOrbitSize, kOrbitSize};
   if (!flags.size.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(size, ParseSize("--size", flags.size));
@@ -126,9 +127,11 @@ Result<GaussianCloud> ReadToShow(const std::string& path) {
   return cloud;
 }
 
-Result<CameraSet> MakeViews(const ViewFlags& flags, const GaussianCloud& cloud) {
+Result<CameraSet> MakeViews(const ViewFlags& flags, const CloudView& cloud, const CameraSet* given) {
   CameraSet cameras;
-  if (!flags.cameras.empty()) {
+  if (given != nullptr) {
+    cameras = *given;
+  } else if (!flags.cameras.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, ReadCameras(flags.cameras));
   }
   if (flags.cameras.empty() || flags.orbit > 0) {
@@ -141,7 +144,7 @@ Result<CameraSet> MakeViews(const ViewFlags& flags, const GaussianCloud& cloud) 
   return KeepView(std::move(cameras), flags.view);
 }
 
-Result<RenderOptions> MakeRenderOptions(const ViewFlags& flags, const GaussianCloud& cloud, const CameraSet& cameras) {
+Result<RenderOptions> MakeRenderOptions(const ViewFlags& flags, const CloudView& cloud, const CameraSet& cameras) {
   RenderOptions options = OptionsFor(cloud);
   const auto beyond = [](const std::optional<double>& plane) { return plane && !(*plane > 0 && *plane <= kNoFar); };
   if (beyond(flags.near_plane) || beyond(flags.far_plane)) {
@@ -163,6 +166,18 @@ Result<RenderOptions> MakeRenderOptions(const ViewFlags& flags, const GaussianCl
     ANCHORSPLAT_ASSIGN_OR_RETURN(options.background, ParseColor("--background", flags.background));
   }
   return options;
+}
+
+Image WithAlpha(const RenderOutput& render) {
+  Image out(render.color.width, render.color.height, 4);
+  for (int c = 0; c < 3; ++c) {
+    for (int64_t i = 0; i < out.plane(); ++i) {
+      const float alpha = render.alpha.pixels[static_cast<size_t>(i)];
+      out.channel(c)[i] = alpha > 0 ? render.color.channel(c)[i] / alpha : 0;
+    }
+  }
+  std::copy_n(render.alpha.pixels.data(), out.plane(), out.channel(3));
+  return out;
 }
 
 }  // namespace anchorsplat

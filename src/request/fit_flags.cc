@@ -1,10 +1,10 @@
-#include "cli/fit_flags.h"
+#include "request/fit_flags.h"
 
 #include <algorithm>
 
-#include "cli/choice.h"
-#include "cli/parse.h"
 #include "core/text.h"
+#include "request/choice.h"
+#include "request/parse.h"
 
 namespace anchorsplat {
 

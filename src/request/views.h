@@ -5,7 +5,9 @@
 #include <string>
 
 #include "core/camera.h"
+#include "core/cloud_view.h"
 #include "core/gaussian_cloud.h"
+#include "core/image.h"
 #include "core/result.h"
 #include "render/rasterizer.h"
 
@@ -34,11 +36,14 @@ Result<GaussianCloud> ReadToShow(const std::string& path);
 void WarnOfUnusable(const std::string& path, const GaussianCloud& cloud);
 
 // The views to render, all or the one of --view. An orbit is laid around `cloud`, upright. `--size` must keep the
-// cameras' aspect ratio. Errors name the option.
-Result<CameraSet> MakeViews(const ViewFlags& flags, const GaussianCloud& cloud);
+// cameras' aspect ratio. `given`: those of --cameras, where the caller has them. Errors name the option.
+Result<CameraSet> MakeViews(const ViewFlags& flags, const CloudView& cloud, const CameraSet* given = nullptr);
 
 // Mode (flags, else the file's tag, else classic), profile, background (flags, else the cameras', else black), and what
 // is in range.
-Result<RenderOptions> MakeRenderOptions(const ViewFlags& flags, const GaussianCloud& cloud, const CameraSet& cameras);
+Result<RenderOptions> MakeRenderOptions(const ViewFlags& flags, const CloudView& cloud, const CameraSet& cameras);
+
+// Colour over black divided by coverage: what a picture with an alpha channel stores.
+Image WithAlpha(const RenderOutput& render);
 
 }  // namespace anchorsplat

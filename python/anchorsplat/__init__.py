@@ -1,0 +1,50 @@
+"""anchorsplat: makes a low-quality 3D Gaussian splat hold up when seen closer. docs/python.md is a page of examples.
+
+    import anchorsplat
+    sharp, report = anchorsplat.enhance(anchorsplat.read("scan.ply"), upscale=4)
+    anchorsplat.write("scan-4x.ply", sharp)
+"""
+
+from . import _core
+from ._cameras import Cameras
+from ._cloud import Cloud
+from ._enhance import enhance, methods
+from ._errors import (
+    BadArgumentError,
+    BadFileError,
+    Error,
+    ExistsError,
+    IoError,
+    NotFoundError,
+    SplatWarning,
+    StoppedError,
+)
+from ._files import Format, formats, read, to_bytes, write
+from ._info import info
+from ._report import Report
+from ._run import Progress
+
+__version__: str = _core.version
+
+__all__ = [
+    "BadArgumentError",
+    "BadFileError",
+    "Cameras",
+    "Cloud",
+    "Error",
+    "ExistsError",
+    "Format",
+    "IoError",
+    "NotFoundError",
+    "Progress",
+    "Report",
+    "SplatWarning",
+    "StoppedError",
+    "enhance",
+    "formats",
+    "info",
+    "methods",
+    "read",
+    "to_bytes",
+    "write",
+]

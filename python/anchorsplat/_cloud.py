@@ -1,0 +1,190 @@
+"""Gaussians in memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from ._errors import BadArgumentError
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    FloatArray = npt.NDArray[np.float32]
+
+#: How a splat wants to be drawn: as 3DGS does it (Kerbl et al. 2023), where every Gaussian is widened by 0.3 px²; with
+#: opacity compensated for that (gsplat's "antialiased"); or compensated for 0.1 px² (Mip-Splatting).
+RenderMode = Literal["classic", "antialiased", "mip"]
+
+_MODES = (None, "classic", "antialiased", "mip")
+
+
+def _column(name: str, values: Any, shape: tuple[int | None, ...]) -> FloatArray:
+    if hasattr(values, "detach"):  # a tensor of torch's
+        values = values.detach().cpu()
+    array = np.asarray(values)
+    if array.dtype.kind not in "fiu":
+        raise BadArgumentError(f"{name}: expected numbers, found {array.dtype}")
+    array = np.ascontiguousarray(array, dtype=np.float32)
+    if name == "opacity_logits" and array.ndim == 2 and array.shape[1] == 1:
+        array = array[:, 0]
+    fits = array.ndim == len(shape) and all(want in (None, has) for want, has in zip(shape, array.shape))
+    if not fits:
+        wanted = ", ".join("N" if side is None else str(side) for side in shape)
+        raise BadArgumentError(f"{name}: expected an array [{wanted}], found {list(array.shape)}")
+    return array
+
+
+class Cloud:
+    """A splat: N Gaussians as five NumPy arrays of float32, row i of each belonging to Gaussian i.
+
+    Values are *stored* ones, before activation, exactly as an INRIA PLY keeps them. The arrays of what this package returns
+    are views of the engine's buffers, without a copy, and keep them alive; values may be changed in place, the number of
+    Gaussians and the degree are fixed. Everything that speaks DLPack shares their memory:
+    ``torch.from_dlpack(cloud.means)``.
+
+    A Cloud of your own arrays borrows those that are float32 and C-contiguous in the CPU's memory and copies the others. No
+    array may be changed while a call works with it; any number of calls may look at it at the same time.
+
+    Raises BadArgumentError for arrays that do not fit together.
+    """
+
+    __slots__ = ("_means", "_log_scales", "_quats", "_opacity_logits", "_sh", "_render_mode", "_comments", "__weakref__")
+
+    def __init__(
+        self,
+        means: npt.ArrayLike,
+        log_scales: npt.ArrayLike,
+        quats: npt.ArrayLike,
+        opacity_logits: npt.ArrayLike,
+        sh: npt.ArrayLike,
+        *,
+        render_mode: RenderMode | None = None,
+        comments: Sequence[str] = (),
+    ) -> None:
+        self._means = _column("means", means, (None, 3))
+        self._log_scales = _column("log_scales", log_scales, (None, 3))
+        self._quats = _column("quats", quats, (None, 4))
+        self._opacity_logits = _column("opacity_logits", opacity_logits, (None,))
+        self._sh = _column("sh", sh, (None, None, 3))
+        count = len(self._means)
+        for name in ("log_scales", "quats", "opacity_logits", "sh"):
+            rows = len(getattr(self, name))
+            if rows != count:
+                raise BadArgumentError(f"{name}: {rows} rows, and means has {count}")
+        if self._sh.shape[1] not in (1, 4, 9, 16):
+            raise BadArgumentError(
+                f"sh: {self._sh.shape[1]} coefficients; expected 1, 4, 9 or 16, those of degree 0 to 3"
+            )
+        self.render_mode = render_mode
+        self._comments = tuple(comments)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        means: npt.ArrayLike,
+        log_scales: npt.ArrayLike,
+        quats: npt.ArrayLike,
+        opacity_logits: npt.ArrayLike,
+        sh: npt.ArrayLike,
+        *,
+        render_mode: RenderMode | None = None,
+        comments: Sequence[str] = (),
+    ) -> Cloud:
+        """A Cloud of your own arrays: what ``Cloud(...)`` is, too."""
+        return cls(means, log_scales, quats, opacity_logits, sh, render_mode=render_mode, comments=comments)
+
+    @classmethod
+    def _of(cls, parts: tuple[Any, ...]) -> Cloud:
+        """Of what the engine returns, which fits together."""
+        cloud = cls.__new__(cls)
+        (_, cloud._means, cloud._log_scales, cloud._quats, cloud._opacity_logits, cloud._sh) = parts[:6]
+        cloud._render_mode = parts[6]
+        cloud._comments = tuple(parts[7])
+        return cloud
+
+    @property
+    def means(self) -> FloatArray:
+        """[N,3] centres, world units."""
+        return self._means
+
+    @property
+    def log_scales(self) -> FloatArray:
+        """[N,3] ln(world units), one per axis of the rotation. −inf is legal: flat."""
+        return self._log_scales
+
+    @property
+    def quats(self) -> FloatArray:
+        """[N,4] rotations, wxyz, of any norm."""
+        return self._quats
+
+    @property
+    def opacity_logits(self) -> FloatArray:
+        """[N] ln(o / (1 − o))."""
+        return self._opacity_logits
+
+    @property
+    def sh(self) -> FloatArray:
+        """[N,(sh_degree+1)²,3] spherical harmonics, coefficient-major, rgb fastest; ``sh[:, 0]`` is f_dc."""
+        return self._sh
+
+    @property
+    def sh_degree(self) -> int:
+        """0 to 3."""
+        return {1: 0, 4: 1, 9: 2, 16: 3}[self._sh.shape[1]]
+
+    @property
+    def render_mode(self) -> RenderMode | None:
+        """How it wants to be drawn; None where nobody said. May be set."""
+        return self._render_mode
+
+    @render_mode.setter
+    def render_mode(self, mode: RenderMode | None) -> None:
+        if mode not in _MODES:
+            raise BadArgumentError(f"render_mode: {mode!r} is none of classic, antialiased, mip or None")
+        self._render_mode = mode
+
+    @property
+    def comments(self) -> tuple[str, ...]:
+        """Of the file, and of what was done to the splat."""
+        return self._comments
+
+    @property
+    def nbytes(self) -> int:
+        """Of the five arrays."""
+        return sum(a.nbytes for a in (self._means, self._log_scales, self._quats, self._opacity_logits, self._sh))
+
+    def __len__(self) -> int:
+        return len(self._means)
+
+    def __getitem__(self, rows: Any) -> Cloud:
+        """Some of the Gaussians: a slice (a view), a mask or indices (copies)."""
+        if isinstance(rows, (int, np.integer)):
+            rows = slice(int(rows), int(rows) + 1 or None)
+        return Cloud(
+            self._means[rows],
+            self._log_scales[rows],
+            self._quats[rows],
+            self._opacity_logits[rows],
+            self._sh[rows],
+            render_mode=self._render_mode,
+            comments=self._comments,
+        )
+
+    def copy(self) -> Cloud:
+        """The same with arrays of its own."""
+        return Cloud(
+            self._means.copy(),
+            self._log_scales.copy(),
+            self._quats.copy(),
+            self._opacity_logits.copy(),
+            self._sh.copy(),
+            render_mode=self._render_mode,
+            comments=self._comments,
+        )
+
+    def __repr__(self) -> str:
+        mode = f", {self._render_mode}" if self._render_mode else ""
+        return f"<anchorsplat.Cloud: {len(self):,} Gaussians of SH degree {self.sh_degree}{mode}>"

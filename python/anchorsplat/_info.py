@@ -1,0 +1,26 @@
+"""What is in a file."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import Any
+
+from . import _core
+from ._cloud import Cloud
+from ._files import PathLike
+from ._run import ProgressLike, run
+
+
+def info(
+    source: PathLike | Cloud, *, format: str | None = None, threads: int = 0, progress: ProgressLike = None
+) -> dict[str, Any]:
+    """What is in a splat, its file or the weights of a network, and what is wrong with it: what ``anchorsplat info --json``
+    prints. Of a Cloud "file", "format" and "bytes" are None.
+
+    Raises as ``read``.
+    """
+    with run(threads, progress) as how:
+        if isinstance(source, Cloud):
+            return dict(json.loads(_core.info_cloud(source, how)))
+        return dict(json.loads(_core.info_path(os.fsencode(source), format or "", how)))

@@ -1,0 +1,109 @@
+"""How calls of the engine are run: threads, progress, messages."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple, Union
+
+from . import _core
+from ._errors import SplatWarning
+
+LOGGER = logging.getLogger("anchorsplat")
+_HERE = os.path.dirname(__file__) + os.sep
+
+
+class Progress(NamedTuple):
+    """How far a task of a call has come. The tasks of a call follow each other."""
+
+    task: str  #: "fit"
+    done: int  #: steps
+    total: int  #: 0: not known
+    note: str  #: "27.31 dB, 84,120 Gaussians"
+    ended: bool
+
+
+#: ``True``: a bar by tqdm; a class such as ``tqdm.tqdm``, of which each task gets one, or one bar for all of them; a function
+#: that is called with a :class:`Progress`; ``None``, ``False``: nothing.
+ProgressLike = Union[None, bool, Callable[[Progress], object], Any]
+
+
+def warn(sentence: str) -> None:
+    """A warning at the line of the user's that called this package."""
+    level, frame = 1, sys._getframe(0)
+    while frame is not None and frame.f_code.co_filename.startswith(_HERE):
+        level, frame = level + 1, frame.f_back  # type: ignore[assignment]
+    warnings.warn(sentence, SplatWarning, stacklevel=level)
+
+
+class _Bars:
+    """Progress as a bar of tqdm's kind."""
+
+    def __init__(self, kind: Any) -> None:
+        self._make = kind if isinstance(kind, type) else None
+        self._bar: Any = None if self._make else kind
+        self._task: str | None = None
+
+    def __call__(self, progress: Progress) -> None:
+        if self._task is None:
+            self._task = progress.task
+            if self._make:
+                self._bar = self._make(total=progress.total or None, desc=progress.task)
+            else:
+                if hasattr(self._bar, "reset"):
+                    self._bar.reset(total=progress.total or None)
+                if hasattr(self._bar, "set_description_str"):
+                    self._bar.set_description_str(progress.task)
+        if progress.note and hasattr(self._bar, "set_postfix_str"):
+            self._bar.set_postfix_str(progress.note, refresh=False)
+        self._bar.update(progress.done - self._bar.n)
+        if progress.ended:
+            self.close()
+
+    def close(self) -> None:
+        if self._make and self._bar is not None:
+            self._bar.close()
+            self._bar = None
+        self._task = None
+
+
+def _shower(progress: ProgressLike) -> Callable[[Progress], object] | None:
+    if progress is None or progress is False:
+        return None
+    if progress is True:
+        try:
+            from tqdm.auto import tqdm
+        except ImportError:
+            raise ImportError("progress=True shows bars by tqdm, which is not installed: pip install tqdm") from None
+        return _Bars(tqdm)
+    if hasattr(progress, "update"):
+        return _Bars(progress)
+    if callable(progress):
+        return progress
+    raise TypeError("progress: expected True, a bar of tqdm's kind or a function, found " + type(progress).__name__)
+
+
+@contextlib.contextmanager
+def run(threads: int = 0, progress: ProgressLike = None, *, patient: bool = False) -> Iterator[_core.RunArguments]:
+    """The arguments of one call of the engine. Messages go to the logger "anchorsplat", warnings to ``warnings``."""
+    show = _shower(progress)
+
+    def tell(events: list[tuple[Any, ...]]) -> None:
+        for event in events:
+            if event[0] == "task":
+                if show is not None:
+                    show(Progress(*event[1:]))
+            elif event[0] == "info":
+                LOGGER.info("%s", event[1])
+            else:
+                warn(event[1])
+
+    try:
+        yield _core.RunArguments(threads, tell, patient)
+    finally:
+        if isinstance(show, _Bars):
+            show.close()

@@ -1,0 +1,22 @@
+#include "bindings.h"
+#include "model/model_method.h"
+#include "run.h"
+
+std::vector<std::string> anchorsplat::python::WordsOf(const nanobind::list& words) {
+  std::vector<std::string> out;
+  for (const nanobind::handle word : words) out.push_back(PathOf(nanobind::cast<nanobind::bytes>(word)));
+  return out;
+}
+
+NB_MODULE(_core, module) {
+  using namespace anchorsplat::python;
+  module.doc() = "The engine. For anchorsplat's own modules: it may change in every version.";
+  module.attr("version") = ANCHORSPLAT_VERSION;
+  anchorsplat::RegisterModelMethod();  // beside the methods that enhance/ has itself
+  BindRun(module);
+  BindFiles(module);
+  BindEnhance(module);
+  BindCameras(module);
+  BindRender(module);
+  BindInfo(module);
+}

@@ -1,0 +1,199 @@
+#include "run.h"
+
+#include <nanobind/stl/string.h>
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <string>
+#include <thread>
+#include <variant>
+
+#include "core/log.h"
+#include "core/run_context.h"
+#include "io/input_record.h"
+
+namespace anchorsplat::python {
+
+namespace {
+
+struct Said {
+  LogLevel level;
+  std::string text;
+};
+
+struct TaskState {
+  std::string name;
+  int64_t done = 0, total = 0;
+  std::string note;
+  bool ended = false;
+};
+
+// Keeps events until the calling thread asks. Of a task only the newest state is kept: a step may take microseconds.
+class EventQueue : public LogSink {
+ public:
+  using Event = std::variant<Said, TaskState>;
+
+  void Message(LogLevel level, const std::string& text) override {
+    const std::lock_guard lock(mutex_);
+    events_.emplace_back(Said{level, text});
+  }
+  void TaskBegin(const std::string& name, int64_t total) override {
+    const std::lock_guard lock(mutex_);
+    task_ = {.name = name, .done = 0, .total = total, .note = {}, .ended = false};
+    Put();
+  }
+  void TaskProgress(int64_t done, const std::string& note) override {
+    const std::lock_guard lock(mutex_);
+    task_.done = done;
+    task_.note = note;
+    Put();
+  }
+  void TaskEnd() override {
+    const std::lock_guard lock(mutex_);
+    task_.ended = true;
+    Put();
+  }
+
+  std::deque<Event> Take() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(events_, {});
+  }
+
+ private:
+  void Put() {
+    if (!events_.empty()) {
+      if (auto* last = std::get_if<TaskState>(&events_.back()); last != nullptr && !last->ended) {
+        if (last->name == task_.name && last->total == task_.total && task_.done >= last->done) {
+          *last = task_;
+          return;
+        }
+      }
+    }
+    events_.emplace_back(task_);
+  }
+
+  std::mutex mutex_;
+  std::deque<Event> events_;
+  TaskState task_;
+};
+
+// What the library says is UTF-8 but for file names, which are bytes.
+nb::object Text(const std::string& text) {
+  PyObject* decoded = PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()), "replace");
+  if (decoded == nullptr) throw nb::python_error();
+  return nb::steal(decoded);
+}
+
+void Tell(const nb::object& tell, EventQueue& queue) {
+  const auto events = queue.Take();
+  if (events.empty() || tell.is_none()) return;
+  nb::list list;
+  for (const EventQueue::Event& event : events) {
+    if (const auto* said = std::get_if<Said>(&event)) {
+      list.append(nb::make_tuple(said->level == LogLevel::kInfo ? "info" : "warning", Text(said->text)));
+    } else {
+      const auto& task = std::get<TaskState>(event);
+      list.append(nb::make_tuple("task", Text(task.name), task.done, task.total, Text(task.note), task.ended));
+    }
+  }
+  tell(list);
+}
+
+Status WithoutExceptions(const std::function<Status()>& work) try { return work(); } catch (const RunAbandoned&) {
+  return Error{ErrorCode::kInterrupted, "stopped"};
+} catch (const std::bad_alloc&) {
+  return Error{ErrorCode::kIo, "there is not enough memory"};
+} catch (const std::exception& error) {
+  return Error{ErrorCode::kIo, std::string("unexpected: ") + error.what() + " (please report this)"};
+}
+
+const char* ClassOf(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kBadArgument:
+      return "BadArgumentError";
+    case ErrorCode::kNotFound:
+      return "NotFoundError";
+    case ErrorCode::kBadFile:
+      return "BadFileError";
+    case ErrorCode::kExists:
+      return "ExistsError";
+    case ErrorCode::kIo:
+      return "IoError";
+    default:
+      return "StoppedError";
+  }
+}
+
+void Raise(const std::exception_ptr& thrown, void*) {
+  try {
+    std::rethrow_exception(thrown);
+  } catch (const EngineError& failed) {
+    const nb::object type = nb::module_::import_("anchorsplat._errors").attr(ClassOf(failed.error.code));
+    PyErr_SetObject(type.ptr(), Text(failed.error.message).ptr());
+  }
+}
+
+}  // namespace
+
+void RunEngine(const RunArguments& run, const std::function<Status()>& work) {
+  const auto queue = std::make_shared<EventQueue>();
+  std::atomic<bool> stop{false}, abandon{false};
+  std::mutex mutex;
+  std::condition_variable changed;
+  bool done = false;
+  Status status;
+  std::thread worker([&] {
+    {
+      const RunScope scope({.threads = run.threads, .sink = queue, .stop = &stop, .abandon = &abandon});
+      const InputRecord record;
+      status = WithoutExceptions(work);
+    }
+    const std::lock_guard lock(mutex);
+    done = true;
+    changed.notify_one();
+  });
+  std::optional<nb::python_error> raised;
+  for (bool over = false; !over;) {
+    {
+      const nb::gil_scoped_release others_go_on;
+      std::unique_lock lock(mutex);
+      over = changed.wait_for(lock, std::chrono::milliseconds(50), [&] { return done; });
+    }
+    try {
+      if (PyErr_CheckSignals() != 0) throw nb::python_error();
+      if (!raised) Tell(run.tell, *queue);
+    } catch (nb::python_error& error) {
+      abandon = !run.patient || raised || stop;
+      stop = true;
+      if (!raised) raised.emplace(std::move(error));
+    }
+  }
+  {
+    const nb::gil_scoped_release others_go_on;
+    worker.join();
+  }
+  if (raised) throw nb::python_error(std::move(*raised));
+  OrThrow(status);
+}
+
+void BindRun(nb::module_& module) {
+  nb::class_<RunArguments>(module, "RunArguments")
+      .def(
+          "__init__",
+          [](RunArguments* self, int threads, nb::object tell, bool patient) {
+            if (threads < 0 || threads > 1024) {
+              throw EngineError(
+                  {ErrorCode::kBadArgument, "--threads: must be 0 to 1024, found " + std::to_string(threads)});
+            }
+            new (self) RunArguments{threads, std::move(tell), patient};
+          },
+          nb::arg("threads"), nb::arg("tell").none(), nb::arg("patient") = false);
+  nb::register_exception_translator(Raise);
+}
+
+}  // namespace anchorsplat::python

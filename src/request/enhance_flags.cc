@@ -1,0 +1,231 @@
+#include "request/enhance_flags.h"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <tuple>
+
+#include "cameras/camera_io.h"
+#include "core/text.h"
+#include "request/choice.h"
+#include "request/mode_option.h"
+#include "request/parse.h"
+#include "request/refine_flags.h"
+
+namespace anchorsplat {
+
+namespace {
+
+nlohmann::json ToJson(const RefinePlan& plan) {
+  nlohmann::json json = {
+      {"from_input", plan.from_input}, {"nothing_to_do", plan.nothing_to_do}, {"least_gain", plan.least_gain}};
+  if (!plan.why.empty()) json["why"] = plan.why;
+  if (plan.nothing_to_do) return json;
+  const RefineOptions& options = plan.options;
+  if (options.steps) json["steps"] = *options.steps;
+  if (options.seconds) json["seconds"] = *options.seconds;
+  if (options.copies) json["k"] = *options.copies;
+  if (options.rate) json["rate"] = *options.rate;
+  if (plan.gaussians > 0) json["gaussians"] = plan.gaussians;
+  return json;
+}
+
+// "identity", the seed of PyTorch's generator, or five permutations such as 1230,0321,1023,3102,0321.
+Result<Shuffles> ParseShuffles(const std::string& text) {
+  if (text == "identity") return kNoShuffles;
+  Shuffles shuffles;
+  constexpr size_t kWidth = std::tuple_size_v<Shuffle> + 1;  // digits and a comma
+  if (text.size() + 1 == kWidth * shuffles.size()) {
+    bool well_formed = true;
+    for (size_t i = 0; i < text.size(); ++i) {
+      const bool comma = i % kWidth == kWidth - 1;
+      well_formed &= comma ? text[i] == ',' : text[i] >= '0' && text[i] <= '9';
+      if (!comma) shuffles[i / kWidth][i % kWidth] = static_cast<uint8_t>(text[i] - '0');
+    }
+    if (well_formed && Validate(shuffles).ok()) return shuffles;
+  }
+  uint64_t seed = 0;
+  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), seed);
+  if (code == std::errc() && end == text.data() + text.size()) return ShufflesFromSeed(seed);
+  return Error{ErrorCode::kBadArgument,
+               Cat("--shuffles: '", Printable(text),
+                   "' is neither 'identity', nor a seed, nor five permutations such as 1230,0321,1023,3102,0321")};
+}
+
+// Of networks.
+Status FinishModelOptions(const EnhanceFlags& flags, ModelSettings& model) {
+  model.file = flags.model_file;
+  model.options.upstream = flags.compat == "upstream";
+  ANCHORSPLAT_ASSIGN_OR_RETURN(model.copies, ParseCopies("--copies", flags.copies));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(model.options.shuffles, ParseShuffles(flags.shuffles));
+  return {};
+}
+
+std::string MethodHelp() {
+  std::string text = "auto: the best one available without further input";
+  for (const EnhanceMethod& method : EnhanceMethods()) text += "; " + method.name + ": " + method.summary;
+  return text;
+}
+
+void AddMethodFlags(CLI::App& verb, EnhanceFlags& flags) {
+  EnhanceOptions& options = flags.options;
+  verb.add_option("--method", options.method, MethodHelp())->capture_default_str();
+  verb.add_option(
+          "--quality", options.quality,
+          "Instead of a method, by the time there is. fast: the filter and the network, as auto, a second; good: "
+          "the network, then a little refinement, several seconds; best: refinement with the pictures of "
+          "--images, minutes, and good where there are none")
+      ->check(CLI::IsMember({"fast", "good", "best"}));
+  verb.add_option("--upscale", options.upscale, "How many times closer it will be seen; at least 1")
+      ->capture_default_str();
+}
+
+void AddPixelSizeFlags(CLI::App& verb, EnhanceFlags& flags) {
+  EnhanceOptions& options = flags.options;
+  verb.add_option(
+          "--pixel-size", flags.pixel_size,
+          "World size of one pixel of the training views (depth / focal length), or auto to estimate it from the "
+          "splat; an estimate that its other features contradict is not acted on")
+      ->capture_default_str();
+  AddModeOption(verb, flags.mode,
+                "How the inputs were rasterized in training (default: a file's tag, else as its Gaussians look)");
+  auto* cameras = verb.add_option("--cameras", flags.cameras, "Training cameras: exact pixel size for every Gaussian")
+                      ->check(NotEmpty());
+  verb.add_option("--train-width", options.train_width,
+                  "Image width in training where it was less than the cameras say")
+      ->check(Positive())
+      ->needs(cameras);
+  AddChoice(verb, "--camera-rule", options.camera_rule,
+            {{"auto", CameraPixelRule::kAuto},
+             {"smallest", CameraPixelRule::kSmallest},
+             {"median", CameraPixelRule::kMedian}},
+            "Which of the views that hold a Gaussian says its pixel size: the smallest never blurs, the median suits "
+            "objects seen from all around; auto: by where the cameras stand and look")
+      ->needs(cameras);
+  verb.add_option("--filter-strength", options.filter_strength,
+                  "Share of the absorbed 0.3 px² to give back (default: 1 - (1 - 1/upscale²)/3.6)");
+}
+
+void AddModelFlags(CLI::App& verb, EnhanceFlags& flags) {
+  const std::string group = "Model";
+  PublishedOptions& model = flags.options.model.options;
+  verb.add_option("--model", flags.model_file,
+                  "Weights of an AnchorSplat network or of a compact one, .pth or .safetensors")
+      ->check(NotEmpty())
+      ->group(group);
+  const auto model_option = [&](CLI::Option* option) { return option->group(group); };
+  model_option(verb.add_option("--compat", flags.compat,
+                               "upstream: do what the published script does, quirks included (its fp16 attention by "
+                               "--attention-rounding fp16)"))
+      ->check(CLI::IsMember({"upstream"}));
+  model_option(AddChoice(verb, "--normalisation", model.normalisation,
+                         {{"auto", NormalisationMode::kAuto},
+                          {"centered", NormalisationMode::kCentered},
+                          {"bbox", NormalisationMode::kBbox},
+                          {"unit", NormalisationMode::kUnit}},
+                         "How the splat is brought into the network's cube"));
+  model_option(AddChoice(verb, "--precision", flags.options.model.precision,
+                         {{"fp32", WeightPrecision::kFloat}, {"bf16", WeightPrecision::kBFloat16}},
+                         "Of matrix products, convolutions and attention; bf16 only where the processor has products "
+                         "of it (`doctor` says), else fp32"));
+  model_option(AddChoice(verb, "--attention-rounding", model.rounding,
+                         {{"none", Rounding::kNone}, {"fp16", Rounding::kHalf}, {"bf16", Rounding::kBFloat16}},
+                         "Of queries, keys, values and probabilities; the release: fp16"));
+  model_option(AddChoice(verb, "--curve-depth", model.depth_rule,
+                         {{"v1.5", DepthRule::kLargest}, {"v1.6", DepthRule::kLargestPlusOne}},
+                         "Bits of the space-filling curves as Pointcept's release counted them"));
+  model_option(
+      verb.add_option("--shuffles", flags.shuffles,
+                      "Orders of the space-filling curves: identity, a seed of PyTorch's, or five permutations"))
+      ->capture_default_str();
+  model_option(verb.add_option("--copies", flags.copies,
+                               "Gaussians that a compact network makes of each, at most; auto: merged where nobody "
+                               "would see the difference"))
+      ->capture_default_str();
+  model_option(verb.add_option("--merge-cost", flags.options.model.merge_cost,
+                               "Of --copies auto: what a merge may cost, in pixels of the closer view times the square "
+                               "of the difference; more is fewer Gaussians (default: 0.00002)"))
+      ->check(NotNegative());
+  model_option(verb.add_option("--max-gaussians", model.max_gaussians,
+                               "Budget of the result: copies are merged until it is kept. Of the published "
+                               "architecture: anchors at most, the largest by opacity x size. 0 is all"))
+      ->check(NotNegative())
+      ->capture_default_str();
+  verb.add_option("--prune-opacity", model.prune_opacity,
+                  "Leave Gaussians of less opacity out of what the model makes; 1/255 = 0.0039 is invisible")
+      ->check(Fraction())
+      ->group(group)
+      ->capture_default_str();
+  model_option(verb.add_option("--block-gaussians", model.block_gaussians,
+                               "Larger splats are enhanced in overlapping blocks of this many"))
+      ->check(CLI::Range(int64_t{1000}, int64_t{100'000'000}))
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void EnhanceFlags::AddTo(CLI::App& verb) {
+  AddMethodFlags(verb, *this);
+  AddPixelSizeFlags(verb, *this);
+  auto* clean_option = verb.add_flag(
+      "--clean", options.clean,
+      "First take out Gaussians of the background's colour that no training view would miss, as black dust "
+      "around objects on black; dark parts of the object may go, too");
+  verb.add_option("--background", background,
+                  "R,G,B from 0 to 1, of the training views (default: what the camera file says, else black)")
+      ->needs(clean_option);
+  AddModelFlags(verb, *this);
+  AddRefineFlags(verb, options.refine, options.control);
+}
+
+Result<EnhanceOptions> MakeEnhanceOptions(const EnhanceFlags& flags, uint64_t seed, const CameraSet* cameras) {
+  EnhanceOptions options = flags.options;
+  ANCHORSPLAT_RETURN_IF_ERROR(FinishModelOptions(flags, options.model));
+  options.seed = seed;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(options.pixel_size, ParsePixelSize("--pixel-size", flags.pixel_size));
+  if (cameras != nullptr) {
+    options.cameras = *cameras;
+  } else if (!flags.cameras.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(options.cameras, ReadCameras(flags.cameras));
+  }
+  if (!flags.background.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(options.background, ParseColor("--background", flags.background));
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
+  return options;
+}
+
+nlohmann::json ToJson(const EnhanceReport& r) {
+  nlohmann::json json = {{"method", r.method},
+                         {"gaussians", {{"in", r.gaussians_in}, {"dropped", r.dropped}, {"out", r.gaussians_out}}},
+                         {"seconds", r.seconds}};
+  if (r.cleaned) {
+    json["cleaned"] = {{"gaussians", r.cleaned->rows.size()}, {"views", r.cleaned->views}, {"psnr", nullptr}};
+    if (std::isfinite(r.cleaned->psnr)) json["cleaned"]["psnr"] = r.cleaned->psnr;
+  }
+  if (!r.quality.empty()) json["quality"] = r.quality;
+  for (const StepReport& step : r.steps) {
+    const std::string key = json.contains(step.method) ? step.method + " again" : step.method;
+    for (const auto& [name, value] : step.facts) {
+      std::visit([&, &fact = name](auto told) { json[key][fact] = told; }, value);
+    }
+    if (step.plan) json[key]["plan"] = ToJson(*step.plan);
+  }
+  if (!r.pixel_size_source.empty()) {
+    json["upscale"] = r.upscale;
+    json["filter_strength"] = r.filter_strength;
+    if (r.looks) json["looks"] = NameOf(*r.looks);
+    json["pixel_size"] = {{"value", r.pixel_size}, {"source", r.pixel_size_source}};
+    if (r.pixel_size_source == kUnknownPixelSize) json["pixel_size"]["value"] = nullptr;
+    if (r.finding) {
+      json["pixel_size"]["estimate"] = r.finding->estimate.size;
+      json["pixel_size"]["contradictions"] = r.finding->contradictions;
+    }
+    if (!r.camera_rule.empty()) json["camera_rule"] = r.camera_rule;
+    if (r.train_width) json["train_width"] = *r.train_width;
+  }
+  return json;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,191 @@
+#include "request/findings.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <utility>
+
+#include "core/credit.h"
+#include "core/file_system.h"
+#include "core/text.h"
+#include "enhance/enhanced_mark.h"
+#include "formats/registry.h"
+#include "io/input_file.h"
+#include "model/compact/compact_network.h"
+#include "model/published/published_checkpoint_writer.h"
+#include "tensors/tensor_file.h"
+
+namespace anchorsplat {
+
+namespace {
+
+std::string Rows(int64_t count, int64_t of) {
+  return Cat(WithThousands(count), " of ", WithThousands(of), count == 1 ? " Gaussian" : " Gaussians");
+}
+
+std::vector<std::string> Problems(const CloudStatistics& s) {
+  std::vector<std::string> out;
+  const auto add = [&](int64_t count, const char* what) {
+    if (count > 0) out.push_back(Rows(count, s.gaussians) + " " + what);
+  };
+  add(s.not_finite, "with NaN or infinite values; no verb draws them, and enhance drops them");
+  add(s.zero_quaternions, "with a zero quaternion; rendered without rotation");
+  add(s.zero_scales, "with a scale of zero (log-scale -Inf) on some axis; legal, flat or a point");
+  add(s.outliers, "more than ten times farther out than the middle 98 %");
+  add(s.unnormalised_quaternions, "with quaternions that are not normalised; legal, as trainers leave them so");
+  add(s.implausible, "farther out or longer than a million units: is the file damaged, or of another kind?");
+  add(s.invisible, "with an opacity below 1/255; never drawn");
+  if (s.linear_looking_scales)
+    out.push_back("scales look like lengths, not logarithms: was the file converted wrongly?");
+  if (s.linear_looking_opacities)
+    out.push_back("opacities look like 0 to 1, not logits: was the file converted wrongly?");
+  return out;
+}
+
+void LookAt(SplatFindings& findings) {
+  findings.statistics = ComputeStatistics(findings.cloud);
+  findings.looks = FindTrainedKind(findings.cloud);
+  // As `enhance` takes it.
+  GaussianCloud& cloud = findings.cloud;
+  const bool untold = !cloud.render_mode && !HasLostNoWidth(cloud);
+  if (untold && findings.looks == TrainedKind::kAntialiased) cloud.render_mode = RenderMode::kAntialiased;
+  findings.pixel_size = FindPixelSize(cloud);
+  if (untold) cloud.render_mode.reset();
+  findings.problems = Problems(findings.statistics);
+}
+
+struct ModelFindings {
+  std::map<std::string, std::string> facts;
+  std::vector<TensorSpec> learned;  // tensors of parameters
+  size_t tensors = 0;               // all
+};
+
+Result<ModelFindings> LookAtCompactNetwork(const TensorFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const CompactNetwork network, LoadCompactNetwork(file));
+  ModelFindings found{file.metadata(), CompactTensors(network.config()), file.tensors().size()};
+  std::erase_if(found.learned, [](const TensorSpec& tensor) { return tensor.name.starts_with("domain."); });
+  for (const auto& [key, value] : ToMetadata(network.config())) found.facts[key] = value;
+  return found;
+}
+
+Result<ModelFindings> LookAtCheckpoint(const std::string& path) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Checkpoint checkpoint, Checkpoint::Open(path));
+  ModelFindings found{checkpoint.file().metadata(), PublishedTensors(checkpoint.config()),
+                      checkpoint.file().tensors().size()};
+  std::erase_if(found.learned, [](const TensorSpec& tensor) {
+    return tensor.counter || tensor.name.ends_with("running_mean") || tensor.name.ends_with("running_var");
+  });
+  for (const auto& [key, value] : ArchitectureMetadata(checkpoint.config())) found.facts[key] = value;
+  return found;
+}
+
+}  // namespace
+
+Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& name) {
+  SplatFindings findings;
+  findings.file = name;
+  findings.file_bytes = file.bytes();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(findings.cloud, file.Read());
+  findings.format = file.format()->name;
+  if (file.format()->describe != nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(findings.facts, file.format()->describe(file.input()));
+  }
+  LookAt(findings);
+  return findings;
+}
+
+SplatFindings InspectSplat(GaussianCloud cloud) {
+  SplatFindings findings;
+  findings.cloud = std::move(cloud);
+  LookAt(findings);
+  return findings;
+}
+
+nlohmann::json ToJson(const SplatFindings& f) {
+  const CloudStatistics& s = f.statistics;
+  const auto percentiles = [](const Percentiles& values) {
+    nlohmann::json out;
+    for (size_t k = 0; k < values.size(); ++k) out[Cat("p", std::lround(100 * kPercentiles[k]))] = values[k];
+    return out;
+  };
+  nlohmann::json json = {{"file", f.file.empty() ? nlohmann::json() : nlohmann::json(f.file)},
+                         {"format", f.file.empty() ? nlohmann::json() : nlohmann::json(f.format)},
+                         {"facts", nlohmann::json::object()},
+                         {"bytes", f.file.empty() ? nlohmann::json() : nlohmann::json(f.file_bytes)},
+                         {"gaussians", s.gaussians},
+                         {"sh_degree", s.sh_degree},
+                         {"bounds", nullptr},
+                         {"render_mode", nullptr},
+                         {"looks", nullptr},
+                         {"comments", f.cloud.comments},
+                         {"credits", CreditsOf(f.cloud.comments)},
+                         {"largest_axis", percentiles(s.largest_axis)},
+                         {"smallest_axis", percentiles(s.smallest_axis)},
+                         {"axis_ratio", percentiles(s.axis_ratio)},
+                         {"opacity", percentiles(s.opacity)},
+                         {"pixel_size", nullptr},
+                         {"counts",
+                          {{"not_finite", s.not_finite},
+                           {"zero_quaternions", s.zero_quaternions},
+                           {"unnormalised_quaternions", s.unnormalised_quaternions},
+                           {"zero_scales", s.zero_scales},
+                           {"invisible", s.invisible},
+                           {"implausible", s.implausible},
+                           {"outliers", s.outliers}}},
+                         {"linear_looking_scales", s.linear_looking_scales},
+                         {"linear_looking_opacities", s.linear_looking_opacities},
+                         {"problems", f.problems},
+                         {"predicted_bytes", nlohmann::json::object()},
+                         {"predicted_roughly", nlohmann::json::array()}};
+  for (const auto& [name, value] : f.facts.all()) json["facts"][name] = value;
+  if (s.bounds) json["bounds"] = {{"min", s.bounds->min}, {"max", s.bounds->max}};
+  if (f.cloud.render_mode) json["render_mode"] = NameOf(*f.cloud.render_mode);
+  if (f.looks) json["looks"] = NameOf(*f.looks);
+  if (f.pixel_size.ok()) {
+    json["pixel_size"] = {{"estimate", f.pixel_size->estimate.size},
+                          {"low", f.pixel_size->estimate.low},
+                          {"high", f.pixel_size->estimate.high},
+                          {"contradictions", f.pixel_size->contradictions},
+                          {"used", f.pixel_size->size}};
+  }
+  for (const SplatFormat& format : Formats()) {
+    if (format.write == nullptr || format.predicted_size == nullptr) continue;
+    json["predicted_bytes"][std::string(format.name)] = format.predicted_size(s.gaussians, s.sh_degree);
+    if (format.size_is_estimate) json["predicted_roughly"].push_back(format.name);
+  }
+  return json;
+}
+
+bool LooksLikeNetwork(const std::filesystem::path& path) {
+  if (!IsFile(path)) return false;  // a pipe can be read only once
+  const auto in = InputFile::Open(path);
+  const auto beginning = in.ok() ? in->Head(16) : Result<std::string>(in.error());
+  if (!beginning.ok() || !LooksLikeTensorFile(std::as_bytes(std::span(*beginning)))) return false;
+  const auto file = TensorFile::Open(path);
+  if (file.ok()) return file->Find("splats.means") == nullptr;
+  const std::filesystem::path extension = path.extension();
+  return extension == ".pth" || extension == ".safetensors";  // a broken one
+}
+
+Result<NetworkFindings> InspectNetwork(const std::string& path) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorFile file, TensorFile::Open(path));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ModelFindings found,
+                               IsCompactNetwork(file) ? LookAtCompactNetwork(file) : LookAtCheckpoint(path));
+  NetworkFindings findings{path, std::move(found.facts), found.tensors, 0};
+  for (const TensorSpec& tensor : found.learned) {
+    int64_t size = 1;
+    for (const int64_t side : tensor.shape) size *= side;
+    findings.parameters += size;
+  }
+  return findings;
+}
+
+nlohmann::json ToJson(const NetworkFindings& findings) {
+  return {{"file", findings.file},
+          {"kind", "model"},
+          {"tensors", findings.tensors},
+          {"parameters", findings.parameters},
+          {"metadata", findings.facts}};
+}
+
+}  // namespace anchorsplat

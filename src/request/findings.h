@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "core/statistics.h"
+#include "enhance/pixel_size_guard.h"
+#include "enhance/trained_kind.h"
+#include "formats/opened_splat.h"
+
+namespace anchorsplat {
+
+// What `info` tells, once for people and once as JSON.
+struct SplatFindings {
+  std::string file;    // empty: a splat in memory
+  std::string format;  // by content
+  FormatFacts facts;
+  uint64_t file_bytes = 0;
+  GaussianCloud cloud;
+  CloudStatistics statistics;
+  Result<PixelSizeFinding> pixel_size = Error{};
+  std::optional<TrainedKind> looks;   // by its sizes, whatever the file says; nothing where there are too few Gaussians
+  std::vector<std::string> problems;  // sentences
+};
+
+// `name` is the file's, for people. Errors: of reading.
+Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& name);
+// Of a splat in memory: without format and size of a file.
+SplatFindings InspectSplat(GaussianCloud cloud);
+nlohmann::json ToJson(const SplatFindings& findings);
+
+// What is in a network's weights.
+struct NetworkFindings {
+  std::string file;
+  std::map<std::string, std::string> facts;  // the file's metadata and the architecture
+  size_t tensors = 0;
+  int64_t parameters = 0;  // learned numbers
+};
+
+// By content: gsplat keeps splats in files of the same kind, and other formats are zip archives too.
+bool LooksLikeNetwork(const std::filesystem::path& path);
+Result<NetworkFindings> InspectNetwork(const std::string& path);
+nlohmann::json ToJson(const NetworkFindings& findings);
+
+}  // namespace anchorsplat

@@ -28,6 +28,7 @@ CODES = {
 INTERRUPTED = 130
 
 _WAIT_TO_STOP = 30.0  # seconds: a refinement writes its checkpoint first
+_LOOK_UP = 0.25  # seconds: Ray's cancellation is seen by Python code only, not by a system call that waits
 _KEPT_MESSAGES = 16_000  # characters of stderr that a row may hold
 _PR_SET_PDEATHSIG = 1
 _libc = ctypes.CDLL(None, use_errno=True)
@@ -119,10 +120,14 @@ def run(arguments: list[str], *, memory_limit: int = 0, timeout: float = 0, log:
     try:
         if memory_limit:
             resource.prlimit(process.pid, resource.RLIMIT_DATA, (memory_limit, memory_limit))
-        out, err = process.communicate(timeout=timeout or None)
-    except subprocess.TimeoutExpired:
-        _stop(process)
-        return Ended(6, 0, time.perf_counter() - begin, None, [f"took longer than {timeout:g} seconds"])
+        while True:
+            try:
+                out, err = process.communicate(timeout=_LOOK_UP)
+                break
+            except subprocess.TimeoutExpired:
+                if timeout and time.perf_counter() - begin > timeout:
+                    _stop(process)
+                    return Ended(6, 0, time.perf_counter() - begin, None, [f"took longer than {timeout:g} seconds"])
     except BaseException:
         _stop(process)
         raise

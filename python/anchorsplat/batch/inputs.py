@@ -52,7 +52,7 @@ def expand(words: Iterable[str], lists: Iterable[str] = (), *, root: str | None 
     plain: dict[str, str] = {}
     for word in wanted:
         literal = storage.is_local(word) and storage.stat(storage.absolute(word)) is not None
-        if _WILD.search(word) and not literal:
+        if _wild(word) and not literal:
             matches = _matches(word)
             if not matches:
                 raise NotFoundError(f"{word}: no file matches")
@@ -75,6 +75,11 @@ def expand(words: Iterable[str], lists: Iterable[str] = (), *, root: str | None 
         inputs.append(Input(uri, name, size, storage.identity(info) if info else "", info is not None))
     _refuse_same_names(inputs)
     return inputs
+
+
+def _wild(word: str) -> bool:
+    """In URLs of the web, what follows a ? is a query."""
+    return bool(_WILD.search(word.partition("?")[0] if word.startswith(("http://", "https://")) else word))
 
 
 def _matches(pattern: str) -> dict[str, dict]:

@@ -143,6 +143,8 @@ class _File:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._descriptor = self._open_locked()
+        except ExistsError:
+            raise
         except OSError as error:
             raise IoError(f"{path}: {error.strerror}") from error
 

@@ -38,11 +38,9 @@ def in_driver_only(uri: str) -> bool:
 
 
 def absolute(uri: str) -> str:
-    """Local paths without protocol and absolute, so that a worker elsewhere means the same; URLs as they are."""
-    if not is_local(uri):
-        return uri.rstrip("/")
-    _, path = url_to_fs(uri)
-    return os.path.abspath(path)
+    """Local paths without protocol and absolute, so that a worker elsewhere means the same; URLs as listings have them."""
+    fs, path = open_place(uri)
+    return os.path.abspath(path) if is_local(uri) else fs.unstrip_protocol(path)
 
 
 def join(folder: str, name: str) -> str:

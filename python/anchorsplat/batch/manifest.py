@@ -82,6 +82,8 @@ class Manifest:
     def _take(self, where: str, text: str) -> None:
         try:
             line = json.loads(text)
+            if not isinstance(line, dict):
+                raise ValueError(text)
             self._lines += 1
             if "claim" in line:
                 for name in line["claim"]:

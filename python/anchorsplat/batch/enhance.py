@@ -66,6 +66,7 @@ class SplatBatch:
         self.counts = Counts()
         self.failures: list[dict[str, Any]] = []
         self.gaussians = [0, 0]
+        self.start_seconds = 0.0
         self.manifest = Manifest(self.manifest_uri)
         self.progress = Progress("batch", self.counts, quiet=how.quiet, bar=how.bar)
 
@@ -164,6 +165,7 @@ class SplatBatch:
 
     def report(self, seconds: float) -> BatchReport:
         report = report_of(self.counts, seconds, self.manifest_uri, self.failures)
+        report.start_seconds = round(self.start_seconds, 3)
         report.gaussians_in, report.gaussians_out = self.gaussians
         return report
 
@@ -244,7 +246,9 @@ def run_splats(
     try:
         jobs = batch.plan(inputs, overwrite=overwrite, verify=verify)
         if jobs:
+            asked = time.monotonic()
             with cluster.connected(how.ray, how.cpus) as ray, signals_interrupt():
+                batch.start_seconds = time.monotonic() - asked
                 batch.run(ray, jobs)
     except Stopped:
         batch.manifest.close()

@@ -20,6 +20,7 @@ class BatchReport:
     seconds: float
     manifest: str
     failures: list[dict[str, Any]] = field(default_factory=list, repr=False)
+    start_seconds: float = 0.0  # of `seconds`, those until Ray was there
     gaussians_in: int = 0
     gaussians_out: int = 0
 

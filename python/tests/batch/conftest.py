@@ -19,12 +19,14 @@ from anchorsplat.batch.engine import engine, program
 # Between the batch and the program: writes down every splat it is asked for, and kills the worker that asks when told.
 _WRAPPER = """#!/bin/sh
 control={control}
-if [ "$1" = enhance ] && [ "${{2##*/}}" != none.ply ] && [ "${{2##*/}}" != one.ply ]; then
+case "$1 ${{2##*/}}" in
+"enhance --help" | "enhance none.ply" | "enhance one.ply") ;;  # how the batch asks about options
+"enhance "*)
   name="${{2##*/}}"
   echo "$name" >> "$control/calls"
   if rm "$control/kill-$name" 2>/dev/null || [ -e "$control/always-kill-$name" ]; then kill -9 $PPID; exit 1; fi
-  if [ -e "$control/hold-$name" ]; then echo $$ > "$control/held-$name"; read -r _ < "$control/hold-$name"; fi
-fi
+  if [ -e "$control/hold-$name" ]; then echo $$ > "$control/held-$name"; read -r _ < "$control/hold-$name"; fi ;;
+esac
 exec {program} "$@"
 """
 

@@ -7,6 +7,7 @@ import http.server
 import json
 import os
 import signal
+import subprocess
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,8 +18,13 @@ import pytest
 from .conftest import Control, command_line, enhanced_by_hand, splat
 
 
-def finish(process, seconds: float = 300) -> tuple[int, str, str]:
-    out, err = process.communicate(timeout=seconds)
+def finish(process, seconds: float = 120) -> tuple[int, str, str]:
+    try:
+        out, err = process.communicate(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
+        raise
     return process.returncode, out, err
 
 

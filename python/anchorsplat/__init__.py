@@ -8,7 +8,9 @@
 from . import _core
 from ._cameras import Cameras
 from ._cloud import Cloud
-from ._enhance import enhance, methods
+from ._compare import compare, psnr, sheet, ssim
+from ._convert import convert
+from ._enhance import enhance, methods, refine
 from ._errors import (
     BadArgumentError,
     BadFileError,
@@ -20,9 +22,12 @@ from ._errors import (
     StoppedError,
 )
 from ._files import Format, formats, read, to_bytes, write
+from ._fit import fit
 from ._info import info
+from ._render import render
 from ._report import Report
 from ._run import Progress
+from ._view import Page, view
 
 __version__: str = _core.version
 
@@ -36,15 +41,25 @@ __all__ = [
     "Format",
     "IoError",
     "NotFoundError",
+    "Page",
     "Progress",
     "Report",
     "SplatWarning",
     "StoppedError",
+    "compare",
+    "convert",
     "enhance",
+    "fit",
     "formats",
     "info",
     "methods",
+    "psnr",
     "read",
+    "refine",
+    "render",
+    "sheet",
+    "ssim",
     "to_bytes",
+    "view",
     "write",
 ]

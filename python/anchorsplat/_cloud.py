@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -184,6 +184,27 @@ class Cloud:
             render_mode=self._render_mode,
             comments=self._comments,
         )
+
+    @classmethod
+    def from_gsplat(cls, params: Mapping[str, Any]) -> Cloud:
+        """Of gsplat's parameters, as its trainer and its checkpoints have them: tensors or arrays "means" [N,3], "scales" [N,3]
+        (logarithms), "quats" [N,4] (wxyz), "opacities" [N] (logits), "sh0" [N,1,3] and "shN" [N,K−1,3], or a dictionary with
+        them under "splats". Shares memory where it can; harmonics are copied. Raises BadArgumentError."""
+        from ._gsplat import from_gsplat
+
+        return from_gsplat(params)
+
+    def to_gsplat(self, arrays: Literal["torch", "numpy"] = "torch") -> dict[str, Any]:
+        """The parameters of gsplat's trainer, by its names and in its layout (see :meth:`from_gsplat`): tensors that share this
+        Cloud's memory, or NumPy's arrays. To train, make them parameters of their own: ``torch.nn.Parameter(t.clone())``."""
+        from ._gsplat import to_gsplat
+
+        return to_gsplat(self, arrays)
+
+    def _repr_html_(self) -> str:
+        from ._view import view
+
+        return view(self)._repr_html_()
 
     def __repr__(self) -> str:
         mode = f", {self._render_mode}" if self._render_mode else ""

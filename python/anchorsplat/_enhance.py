@@ -67,12 +67,84 @@ def enhance(
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> tuple[Cloud, Report]:
-    """Makes a splat that was trained on small pictures hold up when it is seen closer.
+    """Makes a splat that was trained on small pictures hold up when it is seen closer. `cloud` stays as it is.
 
-    Keywords are the options of ``anchorsplat enhance``, whose ``--help`` says more about each. `cloud` stays as it is.
+    method: "auto", the best that is ready; one of :func:`methods`; or two, "model+refine".
+    quality: instead of a method, by the time there is: "fast", a second; "good", several; "best", minutes with `images`.
+    upscale: how many times closer it will be seen, at least 1.
+
+    pixel_size: world size of a pixel of the training views, or "auto": from the cameras, the pictures or the splat.
+    mode: how the splat was rasterized in training; otherwise as it says, else as its Gaussians look.
+    cameras: the training cameras: exact pixel size for every Gaussian.
+    train_width: pixels of the pictures in training where they were smaller than the cameras say.
+    camera_rule: which of the views that hold a Gaussian says its pixel size.
+    filter_strength: share of the absorbed 0.3 px² to give back; otherwise 1 − (1 − 1/upscale²)/3.6.
+    clean: first takes out Gaussians of the colour of `background` (r, g, b from 0 to 1; otherwise what the camera file says,
+        else black) that no training view would miss.
+
+    model: weights of a network, .pth or .safetensors; otherwise the one in the box.
+    copies, merge_cost: Gaussians that a compact network makes of each, at most, or "auto"; what a merge may cost then.
+    max_gaussians: budget of a network's result; 0: none. prune_opacity: fainter Gaussians are left out of it.
+    block_gaussians: larger splats are enhanced in overlapping blocks of this many.
+    precision: of the network's arithmetic.
+    compat, normalisation, attention_rounding, curve_depth, shuffles: of the published architecture (docs/network.md).
+
+    Of refinement: images: the project with the pictures it was fitted to. hold_out: every Nth view is not trained on. steps or
+    seconds: how long. k: Gaussians that each becomes at first, most_gaussians bounds that. poses, between: where to look from
+    without pictures. half_from, all_from: parts of the run from which on more rays are rendered. rate, rate_decay: learning
+    rates, as a part of those of ``fit``. ssim_weight: of the loss. exposure, robust, align: pictures that differ in brightness,
+    show what is not in the scene, or whose poses are a little off. checkpoint, resume: file for the state when it is stopped
+    (Ctrl-C: it is written, then KeyboardInterrupt), and going on from it.
+
+    seed: of everything random. threads: at most; 0: all of the machine; the result does not depend on it.
+
+    Returns the splat and a :class:`Report`. What was assumed is told by the logger "anchorsplat" and by SplatWarning. Raises
+    BadArgumentError: keywords out of range or without effect, a method that is not ready; BadFileError: no Gaussian is usable,
+    and files that keywords name; NotFoundError; IoError.
     """
     words = words_of(enhance, locals(), besides=("cameras",))
     given = camera_words(cameras, words)
     with run(threads, progress, patient=checkpoint is not None) as how:
         parts, report = _core.enhance(cloud, words, given, seed, how)
     return Cloud._of(parts), Report._of(report)
+
+
+def refine(
+    cloud: Cloud,
+    images: PathLike | None = None,
+    *,
+    upscale: float = 4,
+    pixel_size: float | Literal["auto"] = "auto",
+    mode: RenderMode | None = None,
+    cameras: CamerasLike | None = None,
+    train_width: int | None = None,
+    camera_rule: Literal["auto", "smallest", "median"] = "auto",
+    filter_strength: float | None = None,
+    hold_out: int = 8,
+    steps: int | None = None,
+    seconds: float | None = None,
+    k: int | None = None,
+    most_gaussians: int = 0,
+    poses: int = 128,
+    between: int = 1,
+    half_from: float = 0.3,
+    all_from: float = 0.7,
+    rate: float | None = None,
+    rate_decay: float = 0.1,
+    ssim_weight: float = 0.2,
+    exposure: bool = False,
+    robust: bool = False,
+    align: bool = False,
+    checkpoint: PathLike | None = None,
+    resume: bool = False,
+    seed: int = 0,
+    threads: int = 0,
+    progress: ProgressLike = None,
+) -> tuple[Cloud, Report]:
+    """Optimises a splat for a closer look, against the pictures it was fitted to or, without them, against itself:
+    ``enhance(cloud, method="refine", …)``, whose keywords these are.
+
+    images: project with the pictures, as of ``fit``.
+    """
+    given = {name: value for name, value in locals().items() if name != "cloud"}
+    return enhance(cloud, method="refine", **given)

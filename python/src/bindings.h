@@ -13,6 +13,11 @@ void BindFiles(nanobind::module_& module);
 void BindEnhance(nanobind::module_& module);
 void BindCameras(nanobind::module_& module);
 void BindRender(nanobind::module_& module);
+void BindFit(nanobind::module_& module);
+void BindConvert(nanobind::module_& module);
+void BindView(nanobind::module_& module);
+void BindCompare(nanobind::module_& module);
+void BindRasterizer(nanobind::module_& module);
 void BindInfo(nanobind::module_& module);
 
 // Words as os.fsencode gives them: they may hold paths, which are any bytes.

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "bindings.h"
@@ -13,6 +14,7 @@
 #include "formats/cloud_io.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
+#include "io/atomic_file.h"
 #include "request/parse.h"
 #include "request/words.h"
 #include "request/write_flags.h"
@@ -78,6 +80,12 @@ nb::bytes WriteBytes(const std::string& format, nb::handle cloud, const nb::list
   return nb::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
 }
 
+void WriteFile(const nb::bytes& path, const nb::bytes& bytes, bool overwrite, const RunArguments& run) {
+  const std::filesystem::path name = PathOf(path);
+  const std::string_view content(bytes.c_str(), bytes.size());
+  RunEngine(run, [&] { return WriteWholeFile(name, content, overwrite); });
+}
+
 // (name, extensions, is read, is written) of every format.
 nb::list ListFormats() {
   nb::list formats;
@@ -104,6 +112,7 @@ void BindFiles(nb::module_& module) {
   module.def("write_path", &WritePath, nb::arg("path"), nb::arg("cloud"), nb::arg("words"), nb::arg("overwrite"),
              nb::arg("run"));
   module.def("write_bytes", &WriteBytes, nb::arg("format"), nb::arg("cloud"), nb::arg("words"), nb::arg("run"));
+  module.def("write_file", &WriteFile, nb::arg("path"), nb::arg("bytes"), nb::arg("overwrite"), nb::arg("run"));
   module.def("formats", &ListFormats);
   module.def("check_cloud", &CheckCloud, nb::arg("cloud"));
 }

@@ -18,5 +18,10 @@ NB_MODULE(_core, module) {
   BindEnhance(module);
   BindCameras(module);
   BindRender(module);
+  BindFit(module);
+  BindConvert(module);
+  BindView(module);
+  BindCompare(module);
+  BindRasterizer(module);
   BindInfo(module);
 }

@@ -13,7 +13,6 @@
 #include "cli/table.h"
 #include "cli/verb.h"
 #include "core/text.h"
-#include "eval/comparison.h"
 #include "eval/view_source.h"
 #include "images/image_io.h"
 #include "io/atomic_file.h"
@@ -21,8 +20,8 @@
 #include "io/json_file.h"
 #include "metrics/side_by_side.h"
 #include "request/choice.h"
+#include "request/compare_flags.h"
 #include "request/parse.h"
-#include "request/views.h"
 #include "request/words.h"
 
 namespace anchorsplat {
@@ -31,106 +30,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct CompareFlags {
+struct CompareWords {
   std::string a;
   std::string b;
   std::string truth;
   std::string side_by_side;
   std::string lpips;
   std::string lpips_weights;
-  bool color_correct = false;
-  ViewFlags views;
-  std::vector<std::string> given;  // by their names on the command line
+  CompareFlags how;
 };
-
-// The two things compared and, with --truth, what both are compared with.
-struct Sides {
-  std::unique_ptr<ViewSource> a;
-  std::unique_ptr<ViewSource> b;
-  std::unique_ptr<ViewSource> truth;
-};
-
-Result<std::unique_ptr<ViewSource>> OpenSide(const std::string& path, const GaussianCloud* cloud,
-                                             const std::optional<CameraSet>& cameras, const RenderOptions& options) {
-  if (cloud == nullptr) return OpenImageViews(path, options.background);
-  return MakeSplatViews(*cloud, *cameras, options);
-}
-
-// Of pictures alone: what says how splats are rendered has no effect.
-Status CheckNothingIsRendered(const CompareFlags& flags) {
-  for (const std::string& option : flags.given) {
-    for (const char* name : {"orbit", "radius", "target", "fov", "size", "near", "far", "mode", "up", "profile"}) {
-      if (option == name) {
-        return Error{ErrorCode::kBadArgument, Cat("--", name, " has no effect on pictures; it has one on splats")};
-      }
-    }
-  }
-  return {};
-}
-
-Result<Sides> OpenSides(const CompareFlags& flags) {
-  const std::array<const std::string*, 3> paths = {&flags.a, &flags.b, &flags.truth};
-  std::array<std::optional<GaussianCloud>, 3> clouds;
-  const GaussianCloud* first = nullptr;
-  for (size_t k = 0; k < 3; ++k) {
-    if (paths[k]->empty() || LooksLikeImages(*paths[k])) continue;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(clouds[k], ReadToShow(*paths[k]));
-    if (first == nullptr) first = &*clouds[k];
-  }
-  if (first == nullptr) ANCHORSPLAT_RETURN_IF_ERROR(CheckNothingIsRendered(flags));
-  std::optional<CameraSet> cameras;
-  if (first != nullptr) {
-    if (flags.views.cameras.empty() && flags.views.orbit == 0) {
-      return Error{ErrorCode::kBadArgument,
-                   "comparing a splat needs views: --cameras FILE, or --orbit N for views around it"};
-    }
-    ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, MakeViews(flags.views, *first));
-  } else if (!flags.views.cameras.empty()) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, MakeViews(flags.views, GaussianCloud{}));  // for its background
-  }
-  Sides sides;
-  const std::array<std::unique_ptr<ViewSource>*, 3> out = {&sides.a, &sides.b, &sides.truth};
-  for (size_t k = 0; k < 3; ++k) {
-    if (paths[k]->empty()) continue;
-    const GaussianCloud* cloud = clouds[k] ? &*clouds[k] : nullptr;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(
-        const RenderOptions options,
-        MakeRenderOptions(flags.views, cloud != nullptr ? *cloud : GaussianCloud{}, cameras.value_or(CameraSet{})));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(*out[k], OpenSide(*paths[k], cloud, cameras, options));
-    if (cloud == nullptr && !flags.views.view.empty()) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t kept, FindView((*out[k])->names(), flags.views.view));
-      (*out[k])->KeepOnly(kept);
-    }
-  }
-  return sides;
-}
-
-ViewScore MeanOf(const Comparison& c) { return {"mean", c.mean_psnr, c.mean_ssim, c.mean_lpips, c.mean_corrected}; }
-
-// cc_psnr and the like: as gsplat and nerfstudio call them.
-nlohmann::json ToJson(const ViewScore& score) {
-  nlohmann::json json = {{"psnr", FiniteOrNull(score.psnr)}, {"ssim", score.ssim}};
-  if (score.lpips) json["lpips"] = *score.lpips;
-  if (score.corrected) {
-    json["cc_psnr"] = FiniteOrNull(score.corrected->psnr);
-    json["cc_ssim"] = score.corrected->ssim;
-    if (score.corrected->lpips) json["cc_lpips"] = *score.corrected->lpips;
-  }
-  return json;
-}
-
-nlohmann::json ToJson(const Comparison& comparison) {
-  nlohmann::json json = {{"mean", ToJson(MeanOf(comparison))}, {"views", nlohmann::json::array()}};
-  for (const ViewScore& view : comparison.views) {
-    json["views"].push_back(ToJson(view));
-    json["views"].back()["name"] = view.name;
-  }
-  return json;
-}
 
 std::string Signed(double gain) { return (gain >= 0 ? "+" : "") + Fixed(gain, 2); }
 
-void PrintTable(const CompareFlags& flags, const std::vector<Comparison>& results) {
+void PrintTable(const CompareWords& flags, const std::vector<Comparison>& results) {
   const bool lpips = results[0].mean_lpips.has_value(), corrected = results[0].mean_corrected.has_value();
   std::vector<std::vector<std::string>> rows = {{"view"}};
   for (size_t k = 0; k < results.size(); ++k) {
@@ -189,7 +101,7 @@ std::string ShortName(const fs::path& path) {
   return (parent / (path.has_filename() ? path.filename() : path.parent_path().filename())).string();
 }
 
-Status WriteSideBySide(const CompareFlags& flags, Sides& sides, const std::vector<Comparison>& results,
+Status WriteSideBySide(const CompareWords& flags, Sides& sides, const std::vector<Comparison>& results,
                        const SharedFlags& shared) {
   std::vector<ViewSource*> sources = {sides.a.get()};
   ViewSource& reference = sides.truth ? *sides.truth : *sides.b;
@@ -222,7 +134,7 @@ Status WriteSideBySide(const CompareFlags& flags, Sides& sides, const std::vecto
   return WritePng(flags.side_by_side, picture, WriteOptionsFrom(shared));
 }
 
-Status RunCompare(const CompareFlags& flags, const SharedFlags& shared) {
+Status RunCompare(const CompareWords& flags, const SharedFlags& shared) {
   if (!flags.side_by_side.empty()) {
     if (!IsPngName(flags.side_by_side)) {
       return Error{ErrorCode::kBadArgument,
@@ -230,20 +142,15 @@ Status RunCompare(const CompareFlags& flags, const SharedFlags& shared) {
     }
     ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(flags.side_by_side, shared.overwrite));
   }
-  const std::string& reference = flags.truth.empty() ? flags.b : flags.truth;
-  if (flags.color_correct && !LooksLikeImages(reference)) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("--color-correct has no effect against ", reference,
-                     ", which is a splat; it has one against pictures (--truth, or B without it)")};
-  }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Sides sides, OpenSides(flags));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Sides sides, OpenSides(flags.how, {flags.a, nullptr, nullptr},
+                                                      {flags.b, nullptr, nullptr}, {flags.truth, nullptr, nullptr}));
   if (!flags.side_by_side.empty()) ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(flags.side_by_side));
   std::vector<ViewSource*> sources = {sides.a.get()};
   if (sides.truth) sources.push_back(sides.b.get());
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Lpips> lpips, OpenLpipsOrWarn(flags.lpips, flags.lpips_weights));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto results, CompareToReference(sources, sides.truth ? *sides.truth : *sides.b,
                                                                       {.lpips = lpips ? &*lpips : nullptr,
-                                                                       .color_correct = flags.color_correct}));
+                                                                       .color_correct = flags.how.color_correct}));
   if (!flags.side_by_side.empty()) {
     ANCHORSPLAT_RETURN_IF_ERROR(WriteSideBySide(flags, sides, results, shared));
   }
@@ -262,7 +169,7 @@ void AddCompare(CLI::App& app, Program& program) {
   CLI::App& verb =
       AddVerb(app, program, "compare", "PSNR, SSIM and LPIPS of two splats, folders of pictures or pictures",
               "anchorsplat compare before.ply after.ply --truth photos/ --cameras transforms.json");
-  const auto flags = std::make_shared<CompareFlags>();
+  const auto flags = std::make_shared<CompareWords>();
   verb.add_option("a", flags->a, "Splat, folder of pictures or picture")->required()->check(NotEmpty());
   verb.add_option("b", flags->b, "The same; what A is compared with, unless there is a --truth")
       ->required()
@@ -272,13 +179,10 @@ void AddCompare(CLI::App& app, Program& program) {
   verb.add_option("--side-by-side", flags->side_by_side,
                   "Write a PNG of the view with the median score: pictures, zoomed crop, difference")
       ->check(NotEmpty());
-  verb.add_flag("--color-correct", flags->color_correct,
-                "Measure again after the affine map of each view's colours (3x3 and an offset) that brings it nearest "
-                "to the pictures: what is left of photographs' exposure and white balance is taken out");
   AddLpipsFlags(verb, flags->lpips, flags->lpips_weights);
-  flags->views.AddTo(verb);
+  flags->how.AddTo(verb);
   verb.callback([flags, &verb, &program] {
-    flags->given = GivenOptions(verb);
+    flags->how.given = GivenOptions(verb);
     program.run = [flags, &program] { return RunCompare(*flags, program.flags); };
   });
 }

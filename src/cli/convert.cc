@@ -18,12 +18,9 @@
 #include "formats/registry.h"
 #include "io/atomic_file.h"
 #include "io/input_record.h"
-#include "metrics/conversion_loss.h"
 #include "model/published/published_checkpoint_writer.h"
 #include "request/choice.h"
-#include "request/mode_option.h"
-#include "request/parse.h"
-#include "request/write_flags.h"
+#include "request/convert_flags.h"
 
 namespace anchorsplat {
 
@@ -31,16 +28,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct ConvertFlags {
-  bool spz_version_given = false;
+struct ConvertWords {
   std::vector<std::string> paths;  // inputs, and the output as the last one without --out-dir
   std::string out_dir;
   std::string to = ".ply";
-  std::string from;
-  std::optional<std::string> axes;
-  int views = 8;
-  bool report = false;
-  ConvertOptions options;
+  ConvertFlags how;
 };
 
 // "scan.compressed.ply" without the extension of its format; "scan/meta.json", or "scan" where that is in it, is the
@@ -73,7 +65,7 @@ struct Job {
   fs::path input, output;
 };
 
-Result<std::vector<Job>> Jobs(const ConvertFlags& flags, bool overwrite) {
+Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
   std::vector<Job> jobs;
   if (flags.out_dir.empty()) {
     if (flags.paths.size() != 2) {
@@ -125,30 +117,6 @@ Result<std::vector<Job>> Jobs(const ConvertFlags& flags, bool overwrite) {
   return jobs;
 }
 
-nlohmann::json ToJson(const Deviation& deviation) { return {{"rms", deviation.rms}, {"max", deviation.max}}; }
-
-nlohmann::json ToJson(const Job& job, const ConvertReport& r, const std::optional<ConversionLoss>& loss) {
-  nlohmann::json json = {{"input", job.input.string()},
-                         {"output", job.output.string()},
-                         {"formats", {r.input_format, r.output_format}},
-                         {"gaussians", {{"in", r.gaussians_read}, {"out", r.gaussians_written}}},
-                         {"sh_degree", {{"in", r.sh_degree_read}, {"out", r.sh_degree_written}}},
-                         {"bytes", {{"in", r.input_bytes}, {"out", r.output_bytes}}},
-                         {"seconds", {{"read", r.read_seconds}, {"write", r.write_seconds}}}};
-  if (r.predicted_bytes) {
-    json["bytes"]["predicted"] = *r.predicted_bytes;
-    json["bytes"]["predicted_roughly"] = r.predicted_roughly;
-  }
-  if (r.error) {
-    json["error"] = {{"compared", r.error->compared},           {"left_out", r.error->left_out},
-                     {"means", ToJson(r.error->means)},         {"log_scales", ToJson(r.error->log_scales)},
-                     {"rotations", ToJson(r.error->rotations)}, {"opacities", ToJson(r.error->opacities)},
-                     {"colors", ToJson(r.error->colors)},       {"harmonics", ToJson(r.error->harmonics)}};
-  }
-  if (loss) json["psnr"] = {{"mean", loss->mean_psnr}, {"min", loss->min_psnr}, {"views", loss->views}};
-  return json;
-}
-
 void Print(const Job& job, const ConvertReport& r, const std::optional<ConversionLoss>& loss) {
   std::cout << OneLine(job.input) << " (" << r.input_format << ", " << HumanBytes(r.input_bytes) << ") -> "
             << OneLine(job.output) << " (" << r.output_format << ", " << HumanBytes(r.output_bytes);
@@ -166,7 +134,7 @@ void Print(const Job& job, const ConvertReport& r, const std::optional<Conversio
 }
 
 // A network's weights, which only become .safetensors.
-Status ConvertModel(const ConvertFlags& flags, const SharedFlags& shared) {
+Status ConvertModel(const ConvertWords& flags, const SharedFlags& shared) {
   const fs::path from = flags.paths[0], to = flags.paths[1];
   RecordInput(from);
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(to, shared.overwrite));
@@ -184,52 +152,28 @@ Status ConvertModel(const ConvertFlags& flags, const SharedFlags& shared) {
 
 // One file: converted, measured where asked for, told. A row of the JSON document.
 Result<nlohmann::json> RunJob(const Job& job, const ConvertOptions& options, int views, const SharedFlags& shared) {
-  GaussianCloud cloud;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const ConvertReport report,
-                               ConvertFile(job.input, job.output, options, options.measure ? &cloud : nullptr));
-  std::optional<ConversionLoss> loss;
-  if (report.error) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadCloud(job.output));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(loss, MeasureConversionLoss(cloud, back, views));
-  } else if (options.measure) {
-    LogWarning(Cat(job.output.string(), ": ", report.output_format,
-                   " is only written, not read: --report has nothing to compare"));
-  }
-  if (!shared.json && !shared.quiet) Print(job, report, loss);
-  return ToJson(job, report, loss);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Converted done, ConvertAndMeasure(job.input, job.output, options, views));
+  if (!shared.json && !shared.quiet) Print(job, done.report, done.loss);
+  nlohmann::json json = ToJson(done);
+  json["input"] = job.input.string();
+  json["output"] = job.output.string();
+  return json;
 }
 
-Status RunConvert(const ConvertFlags& flags, Program& program) {
+Status RunConvert(const ConvertWords& flags, Program& program) {
   const SharedFlags& shared = program.flags;
   if (flags.out_dir.empty() && flags.paths.size() == 2 && fs::path(flags.paths[1]).extension() == ".safetensors") {
     return ConvertModel(flags, shared);
   }
-  ConvertOptions options = flags.options;
-  options.write.overwrite = shared.overwrite;
-  options.measure = flags.report;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(options.input_format, ParseInputFormat("--from", flags.from));
-  if (flags.axes) {
-    const Status axes = ParseAxes(*flags.axes, options);
-    if (!axes.ok()) return Error{axes.error().code, Cat("--coords: ", axes.error().message)};
-  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ConvertOptions options, MakeConvertOptions(flags.how, shared.overwrite));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto jobs, Jobs(flags, shared.overwrite));
-  const auto is_spz = [](const Job& job) { return job.output.extension() == ".spz"; };
-  if (flags.spz_version_given && std::none_of(jobs.begin(), jobs.end(), is_spz)) {
-    return Error{ErrorCode::kBadArgument, "--spz-version has no effect here; it has one where a .spz is written"};
-  }
-  const auto says_mode = [](const Job& job) {
-    const SplatFormat* const format = FormatOfExtension(job.output);
-    return format != nullptr && format->mode_tag != ModeTag::kNone;
-  };
-  if (options.render_mode && std::none_of(jobs.begin(), jobs.end(), says_mode)) {
-    return Error{ErrorCode::kBadArgument,
-                 "--mode has no effect here; it has one where a file is written that has a place for it (.ply, "
-                 ".compressed.ply, .spz, .sog)"};
-  }
+  std::vector<fs::path> outputs;
+  for (const Job& job : jobs) outputs.push_back(job.output);
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckConvertEffects(flags.how, outputs));
   std::vector<BatchItem> items;
   for (const Job& job : jobs) items.push_back({job.input.string(), job.output.string()});
   return RunBatch(
-      items, [&](size_t k) { return RunJob(jobs[k], options, flags.views, shared); }, program);
+      items, [&](size_t k) { return RunJob(jobs[k], options, flags.how.views, shared); }, program);
 }
 
 }  // namespace
@@ -237,8 +181,7 @@ Status RunConvert(const ConvertFlags& flags, Program& program) {
 void AddConvert(CLI::App& app, Program& program) {
   CLI::App& verb = AddVerb(app, program, "convert", "Change the format of a splat, its size, its order",
                            "anchorsplat convert scan.ply scan.spz --report");
-  const auto flags = std::make_shared<ConvertFlags>();
-  ConvertOptions& options = flags->options;
+  const auto flags = std::make_shared<ConvertWords>();
   verb.add_option("paths", flags->paths,
                   Cat("IN OUT, or inputs for --out-dir; - is standard input. Written: ", WrittenFormats(),
                       ", and .safetensors of a network's weights"))
@@ -247,30 +190,8 @@ void AddConvert(CLI::App& app, Program& program) {
   verb.add_option("--to", flags->to, "Extension of the files in --out-dir; meta.json makes a folder of each")
       ->capture_default_str()
       ->needs(out_dir);
-  verb.add_option("--from", flags->from, kInputFormatHelp)->check(NotEmpty());
-  AddModeOption(verb, options.render_mode,
-                "How the splat is rasterized, for a tag in the output (default: as the input says)");
-  verb.add_option("--sh-degree", options.sh_degree, "Spherical harmonics to keep, 0 to 3")->check(CLI::Range(0, 3));
-  verb.add_option("--min-opacity", options.min_opacity, "Drop Gaussians that are fainter, 0 to 1")
-      ->check(Fraction())
-      ->capture_default_str();
-  verb.add_option("--max-gaussians", options.max_gaussians, "Keep at most so many, those of the largest size x opacity")
-      ->check(AtLeastOne());
-  verb.add_option("--coords", flags->axes,
-                  "What the files' axes really are where they do not follow their format, as IN:OUT, for example RUB: "
-                  "for a PLY with y up, :RDF for an SPZ as careless programs expect it")
-      ->check(NotEmpty());
-  auto* spz_version = AddWriteFlags(verb, options.write);
-  auto* report =
-      verb.add_flag("--report", flags->report, "Read the output back: attribute errors, and PSNR of pictures of both");
-  verb.add_option("--report-views", flags->views, "Views around the splat for the PSNR")
-      ->check(CLI::Range(1, 1000))
-      ->needs(report)
-      ->capture_default_str();
-  verb.callback([flags, spz_version, &program] {
-    flags->spz_version_given = spz_version->count() > 0;
-    program.run = [flags, &program] { return RunConvert(*flags, program); };
-  });
+  flags->how.AddTo(verb);
+  verb.callback([flags, &program] { program.run = [flags, &program] { return RunConvert(*flags, program); }; });
 }
 
 }  // namespace anchorsplat

@@ -64,6 +64,7 @@ void AddVerbs(CLI::App& app, Program& program) {
   AddTrain(app, program);
   AddBench(app, program);
   AddDoctor(app, program);
+  AddPython(app, program);
   AddManual(app, program);
   CheckNumbers(app);
 }

@@ -54,6 +54,7 @@ void AddDataset(CLI::App& app, Program& program);
 void AddTrain(CLI::App& app, Program& program);
 void AddBench(CLI::App& app, Program& program);
 void AddDoctor(CLI::App& app, Program& program);
+void AddPython(CLI::App& app, Program& program);
 void AddManual(CLI::App& app, Program& program);
 
 // All of them, in the order in which --help lists them.

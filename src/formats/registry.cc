@@ -53,7 +53,7 @@ bool IsGltf(std::string_view head) { return head.starts_with("glTF"); }
 constexpr std::string_view kCompressedPlyExtensions[] = {".compressed.ply"};
 constexpr std::string_view kPlyExtensions[] = {".ply"};
 constexpr std::string_view kSpzExtensions[] = {".spz"};
-constexpr std::string_view kGsplatExtensions[] = {".pt", ".pth"};
+constexpr std::string_view kGsplatExtensions[] = {".pt", ".pth", ".ckpt"};
 constexpr std::string_view kSogExtensions[] = {".sog", "meta.json"};
 constexpr std::string_view kSplatExtensions[] = {".splat"};
 constexpr std::string_view kKsplatExtensions[] = {".ksplat"};

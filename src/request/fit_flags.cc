@@ -82,11 +82,6 @@ void AddRateFlags(CLI::App& verb, FitFlags& f) {
 }  // namespace
 
 void FitFlags::AddTo(CLI::App& verb) {
-  verb.add_option("project", project,
-                  "Folder with pictures and cameras: COLMAP, NeRF-synthetic, transforms.json, our data sets")
-      ->required()
-      ->check(NotEmpty());
-  verb.add_option("-o,--output", output, "Splat to write")->required()->check(NotEmpty());
   verb.add_option("--steps", steps, "Optimisation steps; all schedules follow")
       ->check(CLI::Range(int64_t{1}, kMostSteps))
       ->capture_default_str();
@@ -132,8 +127,6 @@ void FitFlags::AddTo(CLI::App& verb) {
   AddChoice(verb, "--profile", standard.objective.render.profile,
             {{"gsplat14", RasterProfile::kGsplat14}, {"gsplat15", RasterProfile::kGsplat15}},
             "Extent of a Gaussian: 3 sigma as gsplat 1.0-1.4, or opacity-aware as 1.5");
-  verb.add_option("--gsplat-checkpoint", gsplat_checkpoint, "Also write a checkpoint as gsplat's trainer does (.pt)")
-      ->check(NotEmpty());
   verb.add_option("--checkpoint", checkpoint, "State to resume from (default: OUTPUT.checkpoint)")->check(NotEmpty());
   verb.add_option("--checkpoint-every", checkpoint_every, "Steps between checkpoints; 0: only when interrupted")
       ->check(CLI::Range(int64_t{0}, kMostSteps))

@@ -3,12 +3,16 @@
 #include <CLI/CLI.hpp>
 #include <array>
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "core/gaussian_cloud.h"
 #include "core/result.h"
+#include "fit/fit.h"
 #include "fit/fit_options.h"
+#include "fit/initial_points.h"
 #include "fit/training_views.h"
 
 namespace anchorsplat {
@@ -16,11 +20,8 @@ namespace anchorsplat {
 // What a pixel of the pictures is taken to be.
 enum class FitPixel { kPoint, kArea };
 
-// The options of `fit`.
+// The options of `fit` that say how, not where from and where to.
 struct FitFlags {
-  std::string project;
-  std::string output;
-  std::string gsplat_checkpoint;
   std::string checkpoint;
   int64_t checkpoint_every = 0;
   bool resume = false;
@@ -49,5 +50,19 @@ struct FitFlags {
 // The options for a project whose pictures have `background`, where it says so. Errors (kBadArgument) name the option.
 Result<FitOptions> MakeFitOptions(const FitFlags& flags, const std::optional<std::array<float, 3>>& background,
                                   uint64_t seed);
+
+// Where the Gaussians begin, and in words.
+struct ChosenStart {
+  InitialPoints points;
+  std::string origin;
+};
+
+// `splat`: that of --init-splat where the caller has it. `project` is for messages. Errors: of reading; kBadArgument:
+// points of a project that has none.
+Result<ChosenStart> ChooseFitStart(const FitFlags& flags, const TrainingViews& views, const std::string& project,
+                                   uint64_t seed, const GaussianCloud* splat = nullptr);
+
+// What was done, as --json and Python say it.
+nlohmann::json ToJson(const FitOptions& options, const std::string& origin, const FitReport& report);
 
 }  // namespace anchorsplat

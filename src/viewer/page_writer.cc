@@ -211,7 +211,7 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
   at_least *= kLeastBytes;
   if (at_least > page.max_bytes) return TooLarge(path, at_least, page);
 
-  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, page.memory));
   std::vector<DataElement> elements;
   ANCHORSPLAT_ASSIGN_OR_RETURN(Json after, AddSplat(page.after, "after", page.max_sh_degree, elements));
   Json before;

@@ -14,6 +14,8 @@
 
 namespace anchorsplat {
 
+struct OutputMemory;
+
 struct ViewerSplat {
   const GaussianCloud* cloud = nullptr;  // read only while the page is written
   std::string name;                      // as people know it ("input.ply"); any bytes
@@ -38,6 +40,7 @@ struct ViewerPage {
   std::array<float, 3> background{};  // rgb 0–1
   int max_sh_degree = kMaxShDegree;   // higher coefficients are left out: they are most of the page
   uint64_t max_bytes = kMaxPageBytes;
+  OutputMemory* memory = nullptr;               // the page goes there instead of a folder (io/output_memory.h)
   std::string smaller = "leave something out";  // what to do about a page above it, in the words of who asks for it
 };
 

@@ -4,8 +4,11 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "core/activations.h"
 #include "core/parallel.h"
+#include "core/spherical_harmonics.h"
 #include "core/text.h"
 #include "tensors/tensor_file.h"
 
@@ -18,6 +21,32 @@ std::optional<int> DegreeOf(int64_t rest_coefficients) {
     if (rest_coefficients == ShCoefficients(degree) - 1) return degree;
   }
   return std::nullopt;
+}
+
+// How a trainer calls the tensors of Gaussians, and where their shapes differ.
+struct Names {
+  const char* prefix;
+  const char* constant;  // of spherical harmonics
+  const char* rest;
+  bool flat_opacities;      // [N], not [N,1]
+  bool flat_constant;       // [N,3], not [N,1,3]
+  bool degree_0_is_logits;  // without view-dependent colour the constant is the colour's logit
+};
+constexpr Names kNames[] = {
+    {"splats.", "sh0", "shN", true, false, false},
+    {"pipeline._model.gauss_params.", "features_dc", "features_rest", false, true, true},
+    {"pipeline._model.", "features_dc", "features_rest", false, true, true},  // nerfstudio before 1.0
+};
+
+// Null: of none of them.
+const Names* NamesIn(const TensorFile& file) {
+  for (const Names& names : kNames) {
+    const std::string means = std::string(names.prefix) + "means";
+    if (file.Find(means) != nullptr &&
+        (file.Find(std::string(names.prefix) + names.rest) != nullptr || names.flat_opacities))
+      return &names;
+  }
+  return nullptr;
 }
 
 void Copy(const Float32Values& from, Buffer<float>& to) {
@@ -37,33 +66,41 @@ Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& input, const ReadLim
   ANCHORSPLAT_RETURN_IF_ERROR(input.ReadAt(0, bytes.data(), bytes.size()));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorFile file, TensorFile::FromBytes(std::move(bytes), input.name()));
 
-  const TensorEntry* means = file.Find("splats.means");
-  if (means == nullptr) {
-    return bad("is a PyTorch checkpoint, but not one of gsplat with Gaussians (no tensor \"means\" in \"splats\")");
+  const Names* const names = NamesIn(file);
+  if (names == nullptr) {
+    return bad(
+        "is a PyTorch checkpoint, but neither one of gsplat with Gaussians (no tensor \"means\" in \"splats\") nor one "
+        "of "
+        "nerfstudio's splatfacto");
   }
+  const auto called = [&](const char* name) { return Cat(names->prefix, name); };
+  const TensorEntry* const means = file.Find(called("means"));
   const int64_t n = means->shape.empty() ? 0 : means->shape[0];
   if (n == 0) return bad("holds no Gaussians");
   if (n > limits.max_gaussians) {
     return bad(
         Cat("holds ", WithThousands(n), " Gaussians, more than the limit of ", WithThousands(limits.max_gaussians)));
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorEntry* rest, file.Require("splats.shN"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorEntry* rest, file.Require(called(names->rest)));
   const std::optional<int> degree = rest->shape.size() == 3 ? DegreeOf(rest->shape[1]) : std::nullopt;
   if (!degree) {
-    return bad(Cat("tensor \"splats.shN\" has shape ", rest->ShapeText(),
+    return bad(Cat("tensor \"", called(names->rest), "\" has shape ", rest->ShapeText(),
                    ", expected [N, 0, 3], [N, 3, 3], [N, 8, 3] or [N, 15, 3] (SH degree 0 to 3)"));
   }
 
   // All shapes are checked before the cloud is allocated: N is only believed when six tensors really have it.
-  using Shape = const int64_t[];
+  using Shape = std::vector<int64_t>;
   const int64_t rest_coefficients = ShCoefficients(*degree) - 1;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values centres, file.ReadFloat32("splats.means", Shape{n, 3}));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values scales, file.ReadFloat32("splats.scales", Shape{n, 3}));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values quats, file.ReadFloat32("splats.quats", Shape{n, 4}));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values opacities, file.ReadFloat32("splats.opacities", Shape{n}));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values sh0, file.ReadFloat32("splats.sh0", Shape{n, 1, 3}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values centres, file.ReadFloat32(called("means"), Shape{n, 3}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values scales, file.ReadFloat32(called("scales"), Shape{n, 3}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values quats, file.ReadFloat32(called("quats"), Shape{n, 4}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values opacities,
+                               file.ReadFloat32(called("opacities"), names->flat_opacities ? Shape{n} : Shape{n, 1}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      const Float32Values sh0,
+      file.ReadFloat32(called(names->constant), names->flat_constant ? Shape{n, 3} : Shape{n, 1, 3}));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values sh_n,
-                               file.ReadFloat32("splats.shN", Shape{n, rest_coefficients, 3}));
+                               file.ReadFloat32(called(names->rest), Shape{n, rest_coefficients, 3}));
 
   GaussianCloud cloud;
   cloud.Resize(n, *degree);
@@ -83,6 +120,9 @@ Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& input, const ReadLim
       higher += rest_stride;
     }
   });
+  if (*degree == 0 && names->degree_0_is_logits) {
+    for (float& value : cloud.sh) value = DcFromColor(Sigmoid(value));
+  }
   return cloud;
 }
 

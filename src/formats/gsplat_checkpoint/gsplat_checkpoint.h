@@ -18,6 +18,10 @@ bool IsTorchCheckpoint(std::string_view head);
 // (logits), sh0 [N,1,3] and shN [N,(degree+1)²−1,3], which is our stored space; other members are left alone. Of a run
 // on several processors each file holds its own part of the Gaussians.
 //
+// Or those of a checkpoint of nerfstudio's splatfacto (step-000029999.ckpt): the same under "pipeline" with the names
+// _model.gauss_params.means, scales, quats, opacities [N,1], features_dc [N,3], features_rest; of SH degree 0 its
+// features_dc are logits of colours and become f_dc. Centres stay in the space that nerfstudio's data parser made.
+//
 // The file is read into memory, not mapped: its values are copied once, and splats may come through a pipe.
 // Errors (kBadFile): as for TensorFile; a tensor missing, of another shape, or not of floating-point numbers; an SH
 // degree above 3; no Gaussians, or more than limits.max_gaussians.

@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "core/source_dir_for_test.h"
+#include "core/spherical_harmonics.h"
 #include "tensors/tensor_bytes_for_test.h"
 #include "tensors/tensor_entry.h"
 
@@ -51,6 +54,44 @@ TEST(GsplatCheckpoint, ReadsEveryDegreeThroughTheDoor) {
   }
 }
 
+TEST(GsplatCheckpoint, ReadsSplatfactos) {
+  for (const std::string prefix : {"_model.gauss_params.", "_model."}) {
+    for (const int64_t rest : {0, 3}) {
+      // Every tensor begins at a number of its own in a storage of 64 ramping ones.
+      std::vector<std::pair<std::string, std::string>> members;
+      int64_t at = 0;
+      for (const auto& [name, shape] :
+           std::vector<std::pair<std::string, std::vector<int64_t>>>{{"means", {1, 3}},
+                                                                     {"scales", {1, 3}},
+                                                                     {"quats", {1, 4}},
+                                                                     {"features_dc", {1, 3}},
+                                                                     {"features_rest", {1, rest, 3}},
+                                                                     {"opacities", {1, 1}}}) {
+        members.emplace_back(prefix + name, Tensor(shape, RowMajorStrides(shape), at, 64));
+        at += 3;
+      }
+      std::string storage;
+      for (int i = 0; i < 64; ++i) {
+        const float value = Ramp(0, i);
+        storage.append(reinterpret_cast<const char*>(&value), sizeof value);
+      }
+      const auto cloud = Read(MakeCheckpoint(Pickle(Dict({{"pipeline", Dict(members)}})), storage));
+      ASSERT_TRUE(cloud.ok()) << cloud.error().message;
+      EXPECT_EQ(cloud->sh_degree, rest == 0 ? 0 : 1);
+      EXPECT_THAT(cloud->means, ElementsAre(Ramp(0, 0), Ramp(0, 1), Ramp(0, 2)));
+      EXPECT_THAT(cloud->log_scales, ElementsAre(Ramp(0, 3), Ramp(0, 4), Ramp(0, 5)));
+      EXPECT_EQ(cloud->quats[0], Ramp(0, 6));
+      EXPECT_EQ(cloud->opacity_logits[0], Ramp(0, 15));
+      if (rest == 0) {
+        EXPECT_NEAR(ColorFromDc(cloud->sh[0]), 1 / (1 + std::exp(-Ramp(0, 9))), 1e-6) << "the logit of a colour";
+      } else {
+        EXPECT_EQ(cloud->sh[0], Ramp(0, 9));
+        EXPECT_EQ(cloud->sh[3], Ramp(0, 12));
+      }
+    }
+  }
+}
+
 TEST(GsplatCheckpoint, MessagesNameTheTensor) {
   const std::vector<std::pair<std::string, std::vector<int64_t>>> good = {{"means", {1, 3}},  {"scales", {1, 3}},
                                                                           {"quats", {1, 4}},  {"opacities", {1}},
@@ -74,7 +115,7 @@ TEST(GsplatCheckpoint, MessagesNameTheTensor) {
   EXPECT_THAT(Read(OneGaussian(wide)).error().message, HasSubstr("has shape [1, 9, 3], expected [N, 0, 3], [N, 3, 3]"));
   EXPECT_THAT(Read(ReadTestFile("ckpt_degree1.pt"), {.max_gaussians = 4}).error().message,
               HasSubstr("holds 5 Gaussians, more than the limit of 4"));
-  EXPECT_THAT(Read(ReadTestFile("state_dict.pth")).error().message, HasSubstr("but not one of gsplat"));
+  EXPECT_THAT(Read(ReadTestFile("state_dict.pth")).error().message, HasSubstr("but neither one of gsplat"));
 }
 
 TEST(GsplatCheckpoint, AClaimedNumberOfGaussiansIsNotBelieved) {

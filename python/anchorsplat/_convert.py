@@ -1,0 +1,52 @@
+"""From one format to another."""
+
+from __future__ import annotations
+
+import os
+
+from . import _core
+from ._cloud import RenderMode
+from ._files import Order, PathLike
+from ._report import Report
+from ._run import ProgressLike, run
+from ._words import words_of
+
+
+def convert(
+    source: PathLike,
+    target: PathLike,
+    *,
+    format: str | None = None,
+    mode: RenderMode | None = None,
+    sh_degree: int | None = None,
+    min_opacity: float = 0,
+    max_gaussians: int | None = None,
+    coords: str | None = None,
+    sort: Order = "format",
+    spz_version: int = 4,
+    report: bool = False,
+    report_views: int = 8,
+    overwrite: bool = False,
+    threads: int = 0,
+    progress: ProgressLike = None,
+) -> Report:
+    """Changes the format of a splat's file, its size, its order. Other properties of its Gaussians come along where the format
+    has a place for them, which ``write(target, read(source))`` would lose.
+
+    format: of the input by its extension, for what neither content nor name tells (the command line's --from).
+    mode: how the splat is rasterized, for a tag in the output; otherwise as the input says.
+    sh_degree: spherical harmonics to keep, 0 to 3.
+    min_opacity: drops Gaussians that are fainter, 0 to 1.
+    max_gaussians: keeps at most so many, those of the largest size × opacity.
+    coords: what the files' axes really are where they do not follow their format, as "IN:OUT", for example "RUB:".
+    sort: order of the Gaussians in the file. spz_version: 4, or 3 for programs that only know gzip.
+    report: reads the output back: attribute errors, and PSNR of pictures of both, of `report_views` views.
+    overwrite: replaces a file that exists.
+
+    Raises as ``read`` and ``write``.
+    """
+    words = words_of(convert, locals(), besides=("format",))
+    if format is not None:
+        words.append(b"--from=" + os.fsencode(format))
+    with run(threads, progress) as how:
+        return Report._of(_core.convert(os.fsencode(source), os.fsencode(target), words, overwrite, how))

@@ -1,0 +1,79 @@
+"""The page that shows a splat."""
+
+from __future__ import annotations
+
+import html
+import os
+from typing import Literal
+
+from . import _core
+from ._cameras import CamerasLike, Color, camera_words
+from ._cloud import Cloud, RenderMode
+from ._files import PathLike
+from ._run import ProgressLike, run
+from ._words import words_of
+
+
+class Page:
+    """One HTML file that shows a splat in any browser with WebGL 2, without a network. A notebook shows it inline."""
+
+    __slots__ = ("_bytes",)
+
+    def __init__(self, data: bytes) -> None:
+        self._bytes = data
+
+    def __bytes__(self) -> bytes:
+        return self._bytes
+
+    @property
+    def html(self) -> str:
+        """The whole of it."""
+        return self._bytes.decode()
+
+    def save(self, path: PathLike, *, overwrite: bool = False) -> None:
+        """Writes it, whole or not at all. Raises ExistsError unless `overwrite`, NotFoundError (the folder), IoError."""
+        with run() as how:
+            _core.write_file(os.fsencode(path), self._bytes, overwrite, how)
+
+    def _repr_html_(self, height: int = 480) -> str:
+        return (
+            f'<iframe srcdoc="{html.escape(self.html)}" style="width:100%;height:{height}px;border:0" '
+            'sandbox="allow-scripts allow-downloads"></iframe>'
+        )
+
+    def __repr__(self) -> str:
+        return f"<anchorsplat.Page: {len(self._bytes) / 1e6:.1f} MB of HTML; save() writes it>"
+
+
+def view(
+    after: Cloud,
+    before: Cloud | None = None,
+    *,
+    cameras: CamerasLike | None = None,
+    truth: PathLike | None = None,
+    views: int = 10,
+    pixel_size: float | Literal["auto"] = "auto",
+    sh_degree: int = 3,
+    mode: RenderMode | None = None,
+    background: Color | None = None,
+    title: str | None = None,
+    threads: int = 0,
+    progress: ProgressLike = None,
+) -> Page:
+    """A page that shows a splat, and what it looked like before.
+
+    before: a splat to compare with.
+    cameras: views to jump to, at most `views` of them, evenly chosen; the first one opens the page.
+    truth: folder of true pictures with the cameras' names.
+    pixel_size: world units of a training pixel, for the scale bar; "auto": estimated from `before`.
+    sh_degree: keeps view-dependent colour up to this degree; 0 makes small pages.
+    mode: how both are rasterized; otherwise as each says, else classic.
+    background: r, g, b from 0 to 1; otherwise what the camera file says, else black.
+    title: heading of the page.
+
+    Raises BadArgumentError: nothing to show, a page above 300 MB; NotFoundError, BadFileError: true pictures.
+    """
+    words = words_of(view, locals(), besides=("cameras",))
+    given = camera_words(cameras, words)
+    with run(threads, progress) as how:
+        return Page(_core.view(after, before, words, given, title or "splat", how))

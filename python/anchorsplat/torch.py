@@ -1,0 +1,108 @@
+"""The rasterizer as a differentiable function of PyTorch's, on the CPU. Needs torch, which this package does not install."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import torch
+
+from . import _core
+from ._cameras import Cameras
+from ._cloud import Cloud, RenderMode
+from ._errors import BadArgumentError
+from ._run import run
+
+__all__ = ["rasterize"]
+
+
+def _array(name: str, tensor: torch.Tensor) -> Any:
+    if not isinstance(tensor, torch.Tensor) or tensor.dtype != torch.float32 or tensor.device.type != "cpu":
+        raise BadArgumentError(f"{name}: expected a float32 tensor on the CPU")
+    return tensor.detach().contiguous().numpy()
+
+
+class _Rasterize(torch.autograd.Function):
+    @staticmethod
+    def forward(  # type: ignore[override]
+        ctx: Any,
+        means: torch.Tensor,
+        log_scales: torch.Tensor,
+        quats: torch.Tensor,
+        opacity_logits: torch.Tensor,
+        sh: torch.Tensor,
+        background: torch.Tensor,
+        cameras: Cameras,
+        options: dict[str, Any],
+        threads: int,
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        # An optimizer changes parameters in place before the next step, autograd looks that it does not before backward.
+        ctx.save_for_backward(means, log_scales, quats, opacity_logits, sh)
+        columns = [
+            _array(name, tensor)
+            for name, tensor in (
+                ("means", means),
+                ("log_scales", log_scales),
+                ("quats", quats),
+                ("opacity_logits", opacity_logits),
+                ("sh", sh),
+            )
+        ]
+        color = tuple(float(c) for c in background.detach())
+        ctx.views = _core.DifferentiableViews(Cloud(*columns), cameras._set, background=color, **options)
+        ctx.threads = threads
+        with run(threads) as how:
+            colors, alphas = ctx.views.forward(how)
+        return torch.from_numpy(colors), torch.from_numpy(alphas)
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable  # type: ignore[misc]
+    def backward(ctx: Any, colors: torch.Tensor, alphas: torch.Tensor) -> tuple[Any, ...]:  # type: ignore[override]
+        _ = ctx.saved_tensors  # raises where one was changed in place since
+        with run(ctx.threads) as how:
+            *gradients, background = ctx.views.backward(_array("gradient", colors), _array("gradient", alphas), how)
+        return (*(torch.from_numpy(g) for g in gradients), torch.tensor(background), None, None, None)
+
+
+def rasterize(
+    means: torch.Tensor,
+    log_scales: torch.Tensor,
+    quats: torch.Tensor,
+    opacity_logits: torch.Tensor,
+    sh: torch.Tensor,
+    cameras: Cameras,
+    *,
+    background: torch.Tensor | Sequence[float] | None = None,
+    mode: RenderMode = "classic",
+    sh_degree: int = 3,
+    near: float = 0.01,
+    far: float = 1e10,
+    profile: Literal["gsplat14", "gsplat15"] = "gsplat14",
+    threads: int = 0,
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Draws N Gaussians through V cameras of one size; gradients flow to all six tensors.
+
+    means: [N,3] world units; log_scales: [N,3] ln(world units); quats: [N,4] wxyz, any norm; opacity_logits: [N];
+    sh: [N,(degree+1)²,3] coefficient-major. All stored values, before activation, float32 on the CPU.
+    background: [3] r, g, b; black otherwise.
+    mode: how it is rasterized, "classic", "antialiased" or "mip".
+    sh_degree: highest degree in use.
+    near, far: world units in front of the camera, as gsplat's planes.
+
+    Returns colours [V,H,W,3], background included and not clamped above 1, and coverage [V,H,W,1]. The same bits for any
+    number of threads, forward and backward. Gradients are exact for what is calculated: cut-offs and the order of depths count
+    as constant. No second derivatives. Needs 8 bytes per pixel and Gaussian under it, per view, until backward is done.
+
+    Raises BadArgumentError: another type, device or shape, cameras of different sizes.
+    """
+    if background is None:
+        background = torch.zeros(3)
+    elif not isinstance(background, torch.Tensor):
+        background = torch.tensor([float(c) for c in background])
+    if background.shape != (3,):
+        raise BadArgumentError(f"background: expected [3], found {list(background.shape)}")
+    options = {"mode": mode, "sh_degree": sh_degree, "near_plane": near, "far_plane": far, "profile": profile}
+    colors, alphas = _Rasterize.apply(  # type: ignore[no-untyped-call]
+        means, log_scales, quats, opacity_logits, sh, background, cameras, options, threads
+    )
+    return colors, alphas

@@ -1,0 +1,113 @@
+#include "request/convert_flags.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "core/log.h"
+#include "core/text.h"
+#include "formats/cloud_io.h"
+#include "formats/registry.h"
+#include "request/choice.h"
+#include "request/mode_option.h"
+#include "request/parse.h"
+#include "request/write_flags.h"
+
+namespace anchorsplat {
+
+namespace {
+
+nlohmann::json ToJson(const Deviation& deviation) { return {{"rms", deviation.rms}, {"max", deviation.max}}; }
+
+}  // namespace
+
+void ConvertFlags::AddTo(CLI::App& verb) {
+  verb.add_option("--from", from, kInputFormatHelp)->check(NotEmpty());
+  AddModeOption(verb, options.render_mode,
+                "How the splat is rasterized, for a tag in the output (default: as the input says)");
+  verb.add_option("--sh-degree", options.sh_degree, "Spherical harmonics to keep, 0 to 3")->check(CLI::Range(0, 3));
+  verb.add_option("--min-opacity", options.min_opacity, "Drop Gaussians that are fainter, 0 to 1")
+      ->check(Fraction())
+      ->capture_default_str();
+  verb.add_option("--max-gaussians", options.max_gaussians, "Keep at most so many, those of the largest size x opacity")
+      ->check(AtLeastOne());
+  verb.add_option("--coords", axes,
+                  "What the files' axes really are where they do not follow their format, as IN:OUT, for example RUB: "
+                  "for a PLY with y up, :RDF for an SPZ as careless programs expect it")
+      ->check(NotEmpty());
+  spz_version = AddWriteFlags(verb, options.write);
+  auto* report_option =
+      verb.add_flag("--report", report, "Read the output back: attribute errors, and PSNR of pictures of both");
+  verb.add_option("--report-views", views, "Views around the splat for the PSNR")
+      ->check(CLI::Range(1, 1000))
+      ->needs(report_option)
+      ->capture_default_str();
+}
+
+Result<ConvertOptions> MakeConvertOptions(const ConvertFlags& flags, bool overwrite) {
+  ConvertOptions options = flags.options;
+  options.write.overwrite = overwrite;
+  options.measure = flags.report;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(options.input_format, ParseInputFormat("--from", flags.from));
+  if (flags.axes) {
+    const Status axes = ParseAxes(*flags.axes, options);
+    if (!axes.ok()) return Error{axes.error().code, Cat("--coords: ", axes.error().message)};
+  }
+  return options;
+}
+
+Status CheckConvertEffects(const ConvertFlags& flags, std::span<const std::filesystem::path> outputs) {
+  const auto is_spz = [](const std::filesystem::path& output) { return output.extension() == ".spz"; };
+  if (flags.spz_version->count() > 0 && std::ranges::none_of(outputs, is_spz)) {
+    return Error{ErrorCode::kBadArgument, "--spz-version has no effect here; it has one where a .spz is written"};
+  }
+  const auto says_mode = [](const std::filesystem::path& output) {
+    const SplatFormat* const format = FormatOfExtension(output);
+    return format != nullptr && format->mode_tag != ModeTag::kNone;
+  };
+  if (flags.options.render_mode && std::ranges::none_of(outputs, says_mode)) {
+    return Error{ErrorCode::kBadArgument,
+                 "--mode has no effect here; it has one where a file is written that has a place for it (.ply, "
+                 ".compressed.ply, .spz, .sog)"};
+  }
+  return {};
+}
+
+Result<Converted> ConvertAndMeasure(const std::filesystem::path& input, const std::filesystem::path& output,
+                                    const ConvertOptions& options, int views) {
+  GaussianCloud cloud;
+  Converted done;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(done.report, ConvertFile(input, output, options, options.measure ? &cloud : nullptr));
+  if (done.report.error) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadCloud(output));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(done.loss, MeasureConversionLoss(cloud, back, views));
+  } else if (options.measure) {
+    LogWarning(Cat(output.string(), ": ", done.report.output_format,
+                   " is only written, not read: --report has nothing to compare"));
+  }
+  return done;
+}
+
+nlohmann::json ToJson(const Converted& converted) {
+  const ConvertReport& r = converted.report;
+  nlohmann::json json = {{"formats", {r.input_format, r.output_format}},
+                         {"gaussians", {{"in", r.gaussians_read}, {"out", r.gaussians_written}}},
+                         {"sh_degree", {{"in", r.sh_degree_read}, {"out", r.sh_degree_written}}},
+                         {"bytes", {{"in", r.input_bytes}, {"out", r.output_bytes}}},
+                         {"seconds", {{"read", r.read_seconds}, {"write", r.write_seconds}}}};
+  if (r.predicted_bytes) {
+    json["bytes"]["predicted"] = *r.predicted_bytes;
+    json["bytes"]["predicted_roughly"] = r.predicted_roughly;
+  }
+  if (r.error) {
+    json["error"] = {{"compared", r.error->compared},           {"left_out", r.error->left_out},
+                     {"means", ToJson(r.error->means)},         {"log_scales", ToJson(r.error->log_scales)},
+                     {"rotations", ToJson(r.error->rotations)}, {"opacities", ToJson(r.error->opacities)},
+                     {"colors", ToJson(r.error->colors)},       {"harmonics", ToJson(r.error->harmonics)}};
+  }
+  if (const auto& loss = converted.loss)
+    json["psnr"] = {{"mean", loss->mean_psnr}, {"min", loss->min_psnr}, {"views", loss->views}};
+  return json;
+}
+
+}  // namespace anchorsplat

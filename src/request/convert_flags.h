@@ -1,0 +1,45 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "core/result.h"
+#include "formats/convert.h"
+#include "metrics/conversion_loss.h"
+
+namespace anchorsplat {
+
+// The options of `convert` that say how, not where from and where to.
+struct ConvertFlags {
+  std::string from;  // name of a format; empty: found out
+  std::optional<std::string> axes;
+  int views = 8;
+  bool report = false;
+  ConvertOptions options;
+  CLI::Option* spz_version = nullptr;  // of the verb
+
+  void AddTo(CLI::App& verb);
+};
+
+// Errors: kBadArgument with the option.
+Result<ConvertOptions> MakeConvertOptions(const ConvertFlags& flags, bool overwrite);
+
+// kBadArgument: an option was given that changes none of these files.
+Status CheckConvertEffects(const ConvertFlags& flags, std::span<const std::filesystem::path> outputs);
+
+// One file, converted and, with ConvertOptions::measure, compared in pictures of so many views.
+struct Converted {
+  ConvertReport report;
+  std::optional<ConversionLoss> loss;
+};
+Result<Converted> ConvertAndMeasure(const std::filesystem::path& input, const std::filesystem::path& output,
+                                    const ConvertOptions& options, int views);
+
+// What was done, as --json and Python say it, without the names of the files.
+nlohmann::json ToJson(const Converted& converted);
+
+}  // namespace anchorsplat

@@ -1,0 +1,120 @@
+#include "request/page_flags.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+#include <vector>
+
+#include "cameras/camera_io.h"
+#include "core/file_system.h"
+#include "core/log.h"
+#include "core/text.h"
+#include "enhance/pixel_size_guard.h"
+#include "io/input_record.h"
+#include "render/shown_range.h"
+#include "request/choice.h"
+#include "request/mode_option.h"
+#include "request/parse.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// The picture of a camera in the folder: by name, whatever the folder the camera file has it in.
+std::optional<fs::path> FindPicture(const fs::path& folder, const Camera& camera) {
+  for (const fs::path& name : {camera.image, fs::path(camera.name)}) {
+    const std::string stem = name.stem().string();
+    if (stem.empty()) continue;
+    for (const char* extension : {".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
+      fs::path path = folder / (stem + extension);
+      if (!IsFile(path)) continue;
+      RecordInput(path);
+      return path;
+    }
+  }
+  return std::nullopt;
+}
+
+// At most `--views` of the cameras, evenly over their order; with --truth only those that have a picture there.
+Result<std::vector<ViewerView>> ChooseViews(const PageFlags& flags, const CameraSet& cameras) {
+  std::vector<ViewerView> all;
+  for (const Camera& camera : cameras.cameras) {
+    ViewerView view{camera, {}};
+    if (!flags.truth.empty()) {
+      const auto picture = FindPicture(flags.truth, camera);
+      if (!picture) continue;
+      view.picture = *picture;
+    }
+    all.push_back(std::move(view));
+  }
+  if (all.empty() && !flags.truth.empty()) {
+    return Error{ErrorCode::kNotFound,
+                 Cat(flags.truth, ": no PNG or JPEG has the name of a camera in ", flags.cameras)};
+  }
+  const size_t count = std::min(all.size(), static_cast<size_t>(flags.views));
+  std::vector<ViewerView> chosen;
+  for (size_t k = 0; k < count; ++k) chosen.push_back(all[k * all.size() / count]);
+  return chosen;
+}
+
+}  // namespace
+
+void PageFlags::AddTo(CLI::App& verb) {
+  auto* cameras_option = verb.add_option("--cameras", cameras, "Views to jump to; the first one opens the page");
+  verb.add_option("--truth", truth, "Folder of true pictures with the cameras' names")->needs(cameras_option);
+  verb.add_option("--views", views, "How many of the cameras at most, evenly chosen")
+      ->check(AtLeastOne())
+      ->capture_default_str()
+      ->needs(cameras_option);
+  verb.add_option("--pixel-size", pixel_size,
+                  "World size of one training pixel, for the scale bar; auto: estimated from BEFORE")
+      ->capture_default_str();
+  verb.add_option("--sh-degree", sh_degree, "Keep view-dependent colour up to this degree: 0 makes small pages")
+      ->check(CLI::Range(0, kMaxShDegree))
+      ->capture_default_str();
+  AddModeOption(verb, mode, "Rasterization of both (default: each file's tag, else classic)");
+  verb.add_option("--background", background, "R,G,B, each 0-1 (default: what the camera file says, else black)");
+  verb.add_option("--title", title, "Heading of the page (default: the file's name)");
+}
+
+Result<ViewerPage> MakePage(const PageFlags& flags, const CameraSet* given) {
+  if (!flags.truth.empty() && !IsFolder(flags.truth)) {
+    return Error{ErrorCode::kNotFound, Cat("--truth: ", flags.truth, ": no such folder")};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto pixel_size, ParsePixelSize("--pixel-size", flags.pixel_size));
+  CameraSet cameras;
+  if (given != nullptr) {
+    cameras = *given;
+  } else if (!flags.cameras.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, ReadCameras(flags.cameras));
+  }
+  ViewerPage page;
+  if (pixel_size) page.pixel_size = static_cast<float>(*pixel_size);
+  page.title = flags.title;
+  page.max_sh_degree = flags.sh_degree;
+  page.smaller =
+      "leave out view-dependent colour (--sh-degree 0), --before or the true pictures, or show a part of the scene";
+  ANCHORSPLAT_ASSIGN_OR_RETURN(page.views, ChooseViews(flags, cameras));
+  if (cameras.background) page.background = *cameras.background;
+  if (!flags.background.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(page.background, ParseColor("--background", flags.background));
+  }
+  return page;
+}
+
+void LookAtSplats(ViewerPage& page) {
+  if (!page.views.empty()) {  // the first is where the page opens
+    const GaussianCloud& after = *page.after.cloud;
+    const std::string warning = NothingToSee(after, page.views.front().camera, OptionsFor(after), std::nullopt);
+    if (!warning.empty()) LogWarning(warning);
+  }
+  if (page.pixel_size || !page.before) return;
+  // Of what was trained; what came out of it says less. A splat with too little to say gets no scale bar.
+  if (const auto found = FindPixelSize(*page.before->cloud); found.ok() && !found->contradicted()) {
+    page.pixel_size = static_cast<float>(found->size);
+  }
+}
+
+}  // namespace anchorsplat

@@ -9,6 +9,7 @@
 #   make fuzz     mutated files against all readers, SECONDS=60 by default
 #   make realdata DATA=DIR   checks on splats of your own
 #   make viewer-test   the page of `anchorsplat view` in headless Chromium (installs a browser)
+#   make batch-test    `anchorsplat batch` with kills, an S3 and a cluster on this machine, four minutes (PYTHON=..., docs/batch.md)
 #   make interop  files of ours read by other programs and theirs by us (scripts/interop.py says what it needs)
 #   make lpips-check  LPIPS with its trained weights (fetched once, 64 MB) against the published values
 #   make bench    measured ratios and figures
@@ -98,6 +99,12 @@ fuzz: debug
 
 realdata: program
 	@scripts/realdata.sh "$(DATA)"
+
+# Of a Python that has the package with its extras batch and s3, pytest and moto[server].
+PYTHON ?= python3
+batch-test:
+	@$(PYTHON) -m pytest -q python/tests/batch/long_machines.py python/tests/batch/long_folders.py
+.PHONY: batch-test
 
 interop: build
 	@scripts/interop.py build/anchorsplat examples/biplane/input.ply

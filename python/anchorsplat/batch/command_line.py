@@ -15,7 +15,6 @@ from .enhance import How, run_splats
 from .inputs import FORMATS
 from .progress import printable
 from .report import BatchReport
-from .scheduler import Stopped
 from .settings import OWN
 
 _VERBS = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
 import hashlib
@@ -105,18 +106,14 @@ def run(arguments: list[str], *, memory_limit: int = 0, timeout: float = 0, log:
             os._exit(1)
 
     begin = time.perf_counter()
-    output = open(log, "wb") if log else subprocess.PIPE
-    try:
+    with contextlib.ExitStack() as opened:
         process = subprocess.Popen(
             [str(program()), *arguments],
             stdin=subprocess.DEVNULL,
-            stdout=output,
+            stdout=opened.enter_context(open(log, "wb")) if log else subprocess.PIPE,
             stderr=subprocess.STDOUT if log else subprocess.PIPE,
             preexec_fn=die_with_parent,
         )
-    finally:
-        if log:
-            output.close()
     try:
         if memory_limit:
             resource.prlimit(process.pid, resource.RLIMIT_DATA, (memory_limit, memory_limit))

@@ -92,14 +92,11 @@ class SplatBatch:
                 self._fail(item, {"code": "not_found", "message": f"{item.uri}: {error}"})
                 continue
             known = self.manifest.known.get(item.name)
-            stands = (
-                known is not None
-                and known.state == "done"
-                and not overwrite
-                and known.fingerprint == fingerprint
-                and sizes.get(item.name) == known.output_size
-            )
-            if stands and item.identity and item.identity == known.identity and not verify:
+            if known is None or overwrite or known.state != "done" or known.fingerprint != fingerprint:
+                stands = None
+            else:
+                stands = known if sizes.get(item.name) == known.output_size else None
+            if stands and item.identity and item.identity == stands.identity and not verify:
                 self.counts.skipped += 1
                 continue
             jobs.append(
@@ -116,8 +113,8 @@ class SplatBatch:
                     fingerprint=fingerprint,
                     work=self._state("work") if self.local else None,
                     checkpoint=self._checkpoint(item, fingerprint) if self.settings.resumes else None,
-                    known_sha256=known.sha256 if stands else "",
-                    known_output_sha256=known.output_sha256 if stands else "",
+                    known_sha256=stands.sha256 if stands else "",
+                    known_output_sha256=stands.output_sha256 if stands else "",
                     verify=verify,
                 )
             )

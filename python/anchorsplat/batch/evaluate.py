@@ -39,7 +39,7 @@ def evaluate(benchmark: str, out: str, options: Sequence[str], how: How, *, over
 
     with SharedFolder(target) as shared:
         jobs = []
-        for number, name in enumerate(plan["objects"]):
+        for name in plan["objects"]:
             results = Path(target) / "objects" / name
             results.mkdir(parents=True, exist_ok=True)
             for method in plan["methods"]:

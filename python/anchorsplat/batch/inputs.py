@@ -6,6 +6,7 @@ import posixpath
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from .._errors import BadArgumentError, NotFoundError
 from . import storage
@@ -48,7 +49,7 @@ def expand(words: Iterable[str], lists: Iterable[str] = (), *, root: str | None 
     if not wanted:
         raise BadArgumentError("no inputs: give paths, patterns, URLs, or --list FILE")
 
-    found: dict[str, tuple[str, dict | None]] = {}  # address: root, what its file system says
+    found: dict[str, tuple[str, dict[str, Any] | None]] = {}  # address: root, what its file system says
     plain: dict[str, str] = {}
     for word in wanted:
         literal = storage.is_local(word) and storage.stat(storage.absolute(word)) is not None
@@ -56,8 +57,8 @@ def expand(words: Iterable[str], lists: Iterable[str] = (), *, root: str | None 
             matches = _matches(word)
             if not matches:
                 raise NotFoundError(f"{word}: no file matches")
-            for uri, info in matches.items():
-                found.setdefault(uri, (_before_wild(word), info))
+            for uri, told in matches.items():
+                found.setdefault(uri, (_before_wild(word), told))
         else:
             uri = storage.absolute(word)
             plain.setdefault(uri, posixpath.dirname(uri))
@@ -82,7 +83,7 @@ def _wild(word: str) -> bool:
     return bool(_WILD.search(word.partition("?")[0] if word.startswith(("http://", "https://")) else word))
 
 
-def _matches(pattern: str) -> dict[str, dict]:
+def _matches(pattern: str) -> dict[str, dict[str, Any]]:
     address = storage.absolute(pattern)
     fs, path = storage.open_place(address)
     listing = fs.glob(path, detail=True)

@@ -19,6 +19,7 @@ import os
 import sys
 import time
 import uuid
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -166,7 +167,7 @@ class _File:
                 pass
             os.close(descriptor)
 
-    def read(self):
+    def read(self) -> Iterator[tuple[str, str]]:
         whole = 0
         with open(self._path, "rb") as file:
             for number, line in enumerate(file, 1):
@@ -238,7 +239,7 @@ class _Segments:
             raise storage.filesystem_error(self._uri, error) from error
         return sorted(name for name in found if name.endswith(".jsonl"))
 
-    def read(self):
+    def read(self) -> Iterator[tuple[str, str]]:
         for name in self._names():
             try:
                 text = self._fs.cat_file(name).decode("utf-8", "replace")

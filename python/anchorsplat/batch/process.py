@@ -14,7 +14,7 @@ from typing import Any
 
 from .._errors import BadArgumentError, BadFileError, Error, ExistsError, IoError
 from . import cluster, storage
-from .engine import Engine, Ended, engine, run
+from .engine import Ended, Engine, engine, run
 from .enhance import STATE_FOLDER, How
 from .progress import Counts, Progress
 from .scheduler import run_tasks, signals_interrupt

@@ -102,7 +102,8 @@ def _row_of(ray: Any, ref: Any) -> dict[str, Any] | None:
     """None: it was cancelled."""
     errors = ray.exceptions
     try:
-        return ray.get(ref)
+        row: dict[str, Any] = ray.get(ref)
+        return row
     except errors.TaskCancelledError:
         return None
     except errors.OutOfMemoryError:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import hashlib
 import os
 import shutil
@@ -29,12 +28,12 @@ class TransientError(Exception):
 
 
 def is_local(uri: str) -> bool:
-    return get_protocol(uri) in ("file", "local")
+    return str(get_protocol(uri)) in ("file", "local")
 
 
 def in_driver_only(uri: str) -> bool:
     """memory:// is in the memory of one process: its bytes travel with the tasks."""
-    return get_protocol(uri) == "memory"
+    return bool(get_protocol(uri) == "memory")
 
 
 def absolute(uri: str) -> str:
@@ -55,7 +54,8 @@ def same_file_system(uri: str, fs: Any, path: str) -> str:
 def open_place(uri: str) -> tuple[Any, str]:
     """The file system and the path on it. Errors: NotFoundError, with the package that has the protocol."""
     try:
-        return url_to_fs(uri)
+        fs, path = url_to_fs(uri)
+        return fs, path
     except (ImportError, ValueError) as error:
         raise NotFoundError(f"{uri}: {error}") from error
 
@@ -105,7 +105,7 @@ def stat_many(uris: list[str]) -> dict[str, dict[str, Any] | None]:
         found.update((uri, stat(uri)) for uri in single)
     else:
         with ThreadPoolExecutor(16) as pool:
-            found.update(zip(single, pool.map(stat, single)))
+            found.update(zip(single, pool.map(stat, single), strict=True))
     return found
 
 
@@ -140,7 +140,7 @@ def fetch(uri: str, to: Path) -> None:
         raise NotFoundError(f"{uri}: no such file") from error
     except PermissionError as error:
         raise IoError(f"{uri}: not allowed: {error}") from error
-    except (OSError, asyncio.TimeoutError) as error:
+    except (TimeoutError, OSError) as error:
         raise TransientError(f"{uri}: could not be read: {error}") from error
     except Exception as error:  # what clients of object stores raise is of no common family
         raise TransientError(f"{uri}: could not be read: {type(error).__name__}: {error}") from error
@@ -169,10 +169,10 @@ def put(file: Path, uri: str) -> None:
         if get_protocol(uri) in _PUTS_WHOLE:
             fs.put_file(str(file), path)
         else:
-            near = f"{path}.{uuid.uuid4().hex[:8]}.part"
+            part = f"{path}.{uuid.uuid4().hex[:8]}.part"
             fs.makedirs(path.rsplit("/", 1)[0], exist_ok=True)
-            fs.put_file(str(file), near)
-            fs.mv(near, path)
+            fs.put_file(str(file), part)
+            fs.mv(part, path)
     except PermissionError as error:
         raise IoError(f"{uri}: not allowed: {error}") from error
     except NotImplementedError as error:
@@ -208,7 +208,7 @@ def read_text(uri: str) -> str:
     """Errors: NotFoundError, IoError."""
     try:
         with fsspec.open(uri, "rt", encoding="utf-8") as file:
-            return file.read()
+            return str(file.read())
     except FileNotFoundError as error:
         raise NotFoundError(f"{uri}: no such file") from error
     except Exception as error:

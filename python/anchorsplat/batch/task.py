@@ -15,7 +15,7 @@ from typing import Any
 
 from .._errors import Error, IoError
 from . import storage
-from .engine import Engine, Ended, engine, run
+from .engine import Ended, Engine, engine, run
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,25 @@ def tree_memory(root: int) -> int:
     return total
 
 
+def tree_processor_time(root: int) -> float:
+    """Seconds of processor that a process and those below it have used, without the splats' own programs."""
+    stats = {}
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            name, fields = (process / "stat").read_text().split("(", 1)[1].rsplit(")", 1)
+            stats[int(process.name)] = (name, fields.split())
+        except OSError:
+            continue
+    total = 0.0
+    for process, (name, fields) in stats.items():
+        above = process
+        while above in stats and above != root:
+            above = int(stats[above][1][1])
+        if above == root and name != program().name:
+            total += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return total
+
+
 def loop(inputs: Path, out: Path, options: list[str]) -> float:
     out.mkdir()
     words = " ".join(options)
@@ -61,11 +80,14 @@ def batch(inputs: Path, out: Path, workers: int, options: list[str]) -> dict:
     words = ["enhance", f"{inputs}/*.ply", "-o", str(out), "--workers", str(workers), "--json", "-q", *options]
     process = subprocess.Popen([sys.executable, "-c", code, *words], stdout=subprocess.PIPE)
     most = [0]
+    used = [0.0]
 
     def watch() -> None:
         while process.poll() is None:
             most[0] = max(most[0], tree_memory(process.pid))
-            time.sleep(2)
+            for _ in range(8):
+                used[0] = max(used[0], tree_processor_time(process.pid))
+                time.sleep(0.25)
 
     watcher = threading.Thread(target=watch)
     watcher.start()
@@ -76,7 +98,7 @@ def batch(inputs: Path, out: Path, workers: int, options: list[str]) -> dict:
     if told["failed"] or len(rows) != told["total"]:
         sys.exit(f"not all were made: {told}")
     beside = sorted(row["seconds"] - row["engine_seconds"] for row in rows)
-    return {"start": told["start_seconds"], "work": told["seconds"] - told["start_seconds"], "memory": most[0],
+    return {"start": told["start_seconds"], "work": told["seconds"] - told["start_seconds"], "memory": most[0], "used": used[0],
             "beside": beside[len(beside) // 2], "rows": len((out / "manifest.jsonl").read_bytes()) / len(rows)}  # fmt: skip
 
 
@@ -116,6 +138,11 @@ def main() -> None:
         inputs.mkdir()
         for number in range(asked.splats):
             shutil.copy(asked.splat, inputs / f"{number:05d}.ply")
+        few = Path(folder, "few")
+        few.mkdir()
+        for number in range(2):
+            shutil.copy(asked.splat, few / f"{number}.ply")
+        idle = batch(few, Path(folder, "few-out"), 2, options)["used"]
         for _ in range(asked.repeat):
             for measured, run in (
                 (loops, lambda out: loop(inputs, out, options)),
@@ -132,6 +159,8 @@ def main() -> None:
     for name, run in (("batch, one worker", one), ("batch, two workers", two)):
         print(f"{name:<18} {run['work']:8.2f} s  {run['work'] / asked.splats * 1e3:8.1f} ms each, {best / run['work']:.2f} times the loop, "
               f"start {run['start']:.1f} s, {run['memory'] / 1e6:.0f} MB")  # fmt: skip
+    processor = (min(run["used"] for run in twos) - idle) / (asked.splats - 2)
+    print(f"processor time beside the program, of driver, workers and Ray: {processor * 1e3:.1f} ms a splat")
     print(f"overhead of a splat: {(one['work'] - best) / asked.splats * 1e3:.1f} ms, "
           f"of these in the worker {one['beside'] * 1e3:.1f} ms; {one['rows']:.0f} bytes of manifest")  # fmt: skip
 

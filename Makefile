@@ -5,6 +5,7 @@
 #   make test-all the same with every room under sanitizers (half an hour more)
 #   make build    the program (build/anchorsplat) and its tests
 #   make install PREFIX=/usr/local   program, manual page, completions; make deb: build/anchorsplat_VERSION_ARCHITECTURE.deb
+#   make wheel    build/wheels/anchorsplat-*.whl, the Python package with all that it needs; make python: one to import, for tests
 #   make lint     clang-tidy and clang-format
 #   make fuzz     mutated files against all readers, SECONDS=60 by default
 #   make realdata DATA=DIR   checks on splats of your own
@@ -27,6 +28,8 @@ TORCH_FLAGS = -DANCHORSPLAT_TORCH=OFF
 else
 TORCH_FLAGS = -DANCHORSPLAT_TORCH=$(if $(wildcard .venv/anchorsplat-torch),ON,OFF)
 endif
+# The Python package is built, and tested, where .venv has what that takes, which `make test` puts there.
+PYTHON_FLAGS = $(if $(wildcard .venv/anchorsplat-python),-DANCHORSPLAT_PYTHON=ON -DPython_EXECUTABLE=$(CURDIR)/.venv/bin/python)
 
 .PHONY: dependencies test-dependencies torch
 dependencies:
@@ -41,8 +44,20 @@ ifndef LEAN
 	@scripts/install-torch.sh
 endif
 
+.PHONY: python-dependencies python wheel
+python-dependencies:
+	@scripts/install-dependencies.sh --with-python
+	@scripts/install-python.sh
+
+python: python-dependencies
+	@$(MAKE) --no-print-directory build
+
+wheel: dependencies
+	@scripts/install-dependencies.sh --with-python --with-packaging
+	@JOBS=$(JOBS) scripts/build-wheel.sh
+
 build: test-dependencies
-	@cmake --preset release -DANCHORSPLAT_TESTS=ON $(TORCH_FLAGS) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
+	@cmake --preset release -DANCHORSPLAT_TESTS=ON $(TORCH_FLAGS) $(PYTHON_FLAGS) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
 	@rm -f build-configure.log
 	@cmake --build --preset release -j $(JOBS)
 
@@ -67,12 +82,12 @@ debug-all: test-dependencies
 	@cmake --build --preset debug-all -j $(JOBS)
 
 # A second make, because .venv decides the flags of the first when it starts.
-test: torch
+test: torch python-dependencies
 	@$(MAKE) --no-print-directory build debug
 	@ctest --preset release -j $(JOBS)
 	@ctest --preset debug -j $(JOBS)
 
-test-all: torch
+test-all: torch python-dependencies
 	@$(MAKE) --no-print-directory build debug-all
 	@ctest --preset release -j $(JOBS)
 	@ctest --preset debug-all -j $(JOBS)
@@ -92,7 +107,7 @@ lint:
 	@scripts/lint.sh
 
 format:
-	@git ls-files 'src/*.h' 'src/*.cc' 'include/*.h' 'examples/*.cc' | xargs clang-format -i
+	@git ls-files 'src/*.h' 'src/*.cc' 'python/*.h' 'python/*.cc' 'include/*.h' 'examples/*.cc' | xargs clang-format -i
 
 fuzz: debug
 	@scripts/fuzz.sh $(SECONDS)

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Makes sure that everything the build needs is there: on Debian and its relatives by apt (sudo only when not root),
 # elsewhere it says what is missing. Quick when nothing is missing. With --with-tests also what the tests take, with
-# --with-torch what installing LibTorch takes, with --with-packaging what `make deb` takes; --list only names the packages.
+# --with-torch what installing LibTorch takes, with --with-python what the Python package takes, with --with-packaging what
+# `make deb` takes; --list only names the packages.
 # They are called the same in Debian 12 and 13.
 set -euo pipefail
 
@@ -12,6 +13,8 @@ headers=(hwy/highway.h tbb/parallel_for.h CLI/CLI.hpp nlohmann/json.hpp png.h jp
   assimp/scene.h stb/stb_image.h toml++/toml.h)
 list=
 with_torch=
+with_python=
+[ ! -e "$(dirname "$0")/../.venv/anchorsplat-python" ] || with_python=1
 [ ! -e "$(dirname "$0")/../.venv/anchorsplat-torch" ] || with_torch=1
 for option in "$@"; do
   case "$option" in
@@ -20,6 +23,7 @@ for option in "$@"; do
       headers+=(gtest/gtest.h gmock/gmock.h)
       ;;
     --with-torch) with_torch=1 ;;
+    --with-python) with_python=1 ;;
     --with-packaging) packages+=(dpkg-dev file) ;;  # by which `make deb` reads the libraries of the program
     --list) list=1 ;;
     *)
@@ -33,6 +37,9 @@ done
 # machines needs.
 if [ -n "$with_torch" ]; then
   packages+=(python3-venv python3-pip libgloo-dev)
+fi
+if [ -n "$with_python" ]; then
+  packages+=(python3-venv python3-pip python3-dev)
 fi
 if [ -n "$list" ]; then
   printf '%s\n' "${packages[@]}"

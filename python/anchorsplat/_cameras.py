@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any, Union, cast
 
 import numpy as np
 
@@ -140,12 +140,12 @@ class Cameras:
     @property
     def intrinsics(self) -> npt.NDArray[np.float64]:
         """[V,3,3] pixels, a copy."""
-        return self._set.intrinsics()
+        return cast("npt.NDArray[np.float64]", self._set.intrinsics())
 
     @property
     def world_to_camera(self) -> npt.NDArray[np.float64]:
         """[V,4,4] p_camera = M·p_world, a copy."""
-        return self._set.poses()
+        return cast("npt.NDArray[np.float64]", self._set.poses())
 
     @property
     def background(self) -> tuple[float, float, float] | None:

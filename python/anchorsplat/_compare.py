@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, Union
+from typing import Any, Literal, Union, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -66,7 +66,7 @@ def sheet(pictures: Mapping[str, npt.ArrayLike], *, threads: int = 0) -> npt.NDA
     the differences to the last one. Raises BadArgumentError: none, or different sizes."""
     arrays = [_pictures(name, picture)[:1] for name, picture in pictures.items()]
     with run(threads) as how:
-        made: npt.NDArray[np.float32] = _core.sheet(list(pictures), arrays, how)
+        made = cast("npt.NDArray[np.float32]", _core.sheet(list(pictures), arrays, how))
     return made
 
 
@@ -125,4 +125,4 @@ def compare(
                 raise BadArgumentError(f"{len(array)} pictures and {len(names)} views")
     given = camera_words(cameras, words)
     with run(threads, progress) as how:
-        return Report._of(_core.compare(*sides, names, words, given, how))
+        return Report._of(_core.compare(sides[0], sides[1], sides[2], names, words, given, how))

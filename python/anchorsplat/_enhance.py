@@ -44,7 +44,7 @@ def enhance(
     merge_cost: float | None = None,
     max_gaussians: int = 0,
     prune_opacity: float = 0,
-    block_gaussians: int = 300_000,
+    block_gaussians: int = 200_000,
     images: PathLike | None = None,
     hold_out: int = 8,
     steps: int | None = None,

@@ -15,8 +15,8 @@ from ._run import ProgressLike, run
 def info(
     source: PathLike | Cloud, *, format: str | None = None, threads: int = 0, progress: ProgressLike = None
 ) -> dict[str, Any]:
-    """What is in a splat, its file or the weights of a network, and what is wrong with it: what ``anchorsplat info --json``
-    prints. Of a Cloud "file", "format" and "bytes" are None.
+    """What is in `source`, a Cloud, a splat's file or the weights of a network, and what is wrong with it: what
+    ``anchorsplat info --json`` prints. `format` as of ``read``. Of a Cloud "file", "format" and "bytes" are None.
 
     Raises as ``read``.
     """

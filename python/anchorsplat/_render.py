@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 
@@ -59,5 +59,4 @@ def render(
     words = words_of(render, locals(), besides=("transparent",))
     given = camera_words(cameras, words)
     with run(threads, progress) as how:
-        pictures: npt.NDArray[np.float32] = _core.render(cloud, words, transparent, given, how)
-    return pictures
+        return cast("npt.NDArray[np.float32]", _core.render(cloud, words, transparent, given, how))

@@ -60,7 +60,7 @@ def view(
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> Page:
-    """A page that shows a splat, and what it looked like before.
+    """A page that shows a splat, `after`, and what it looked like before.
 
     before: a splat to compare with.
     cameras: views to jump to, at most `views` of them, evenly chosen; the first one opens the page.

@@ -40,5 +40,6 @@ def words_of(function: Callable[..., Any], given: Mapping[str, Any], *, besides:
                 raise BadArgumentError(f"{name}: must be True or False, found {value!r}")
             words.append(option)
         else:
-            words.append(option + b"=" + os.fsencode(_text(name, value)))
+            text = os.fsencode(_text(name, value))
+            words += [option + b"=" + text] if text else [option, text]
     return words

@@ -24,7 +24,7 @@ def _array(name: str, tensor: torch.Tensor) -> Any:
 
 class _Rasterize(torch.autograd.Function):
     @staticmethod
-    def forward(  # type: ignore[override]
+    def forward(
         ctx: Any,
         means: torch.Tensor,
         log_scales: torch.Tensor,
@@ -56,8 +56,8 @@ class _Rasterize(torch.autograd.Function):
         return torch.from_numpy(colors), torch.from_numpy(alphas)
 
     @staticmethod
-    @torch.autograd.function.once_differentiable  # type: ignore[misc]
-    def backward(ctx: Any, colors: torch.Tensor, alphas: torch.Tensor) -> tuple[Any, ...]:  # type: ignore[override]
+    @torch.autograd.function.once_differentiable
+    def backward(ctx: Any, colors: torch.Tensor, alphas: torch.Tensor) -> tuple[Any, ...]:
         _ = ctx.saved_tensors  # raises where one was changed in place since
         with run(ctx.threads) as how:
             *gradients, background = ctx.views.backward(_array("gradient", colors), _array("gradient", alphas), how)
@@ -95,14 +95,14 @@ def rasterize(
 
     Raises BadArgumentError: another type, device or shape, cameras of different sizes.
     """
-    if background is None:
-        background = torch.zeros(3)
-    elif not isinstance(background, torch.Tensor):
-        background = torch.tensor([float(c) for c in background])
-    if background.shape != (3,):
-        raise BadArgumentError(f"background: expected [3], found {list(background.shape)}")
+    if isinstance(background, torch.Tensor):
+        behind = background
+    else:
+        behind = torch.zeros(3) if background is None else torch.tensor([float(c) for c in background])
+    if behind.shape != (3,):
+        raise BadArgumentError(f"background: expected [3], found {list(behind.shape)}")
     options = {"mode": mode, "sh_degree": sh_degree, "near_plane": near, "far_plane": far, "profile": profile}
-    colors, alphas = _Rasterize.apply(  # type: ignore[no-untyped-call]
-        means, log_scales, quats, opacity_logits, sh, background, cameras, options, threads
+    colors, alphas = _Rasterize.apply(
+        means, log_scales, quats, opacity_logits, sh, behind, cameras, options, threads
     )
     return colors, alphas

@@ -129,7 +129,7 @@ void BindCameras(nb::module_& module) {
   module.def("read_cameras", &ReadSet, nb::arg("path"), nb::arg("run"));
   module.def("cameras_of", &SetOf, nb::arg("names"), nb::arg("sizes"), nb::arg("intrinsics"), nb::arg("poses"),
              nb::arg("background").none());
-  module.def("views", &Views, nb::arg("cloud"), nb::arg("words"), nb::arg("cameras").none(), nb::arg("run"));
+  module.def("views", &Views, nb::arg("cloud").none(), nb::arg("words"), nb::arg("cameras").none(), nb::arg("run"));
 }
 
 }  // namespace anchorsplat::python

@@ -88,6 +88,7 @@ struct Side {
     SideInput input;
     input.path = path;
     if (pictures) input.pictures = std::make_unique<ArrayViews>(*pictures, names);
+    LeaveIfAbandoned();
     if (cloud) input.cloud = std::make_unique<GaussianCloud>(CopyOf(cloud->view()));
     return input;
   }

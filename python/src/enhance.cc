@@ -64,8 +64,8 @@ nb::tuple EnhanceCloud(nb::handle cloud, const nb::list& words, const CameraSet*
 }  // namespace
 
 void BindEnhance(nb::module_& module) {
-  module.def("enhance", &EnhanceCloud, nb::arg("cloud"), nb::arg("words"), nb::arg("cameras").none(), nb::arg("seed"),
-             nb::arg("run"));
+  module.def("enhance", &EnhanceCloud, nb::arg("cloud").none(), nb::arg("words"), nb::arg("cameras").none(),
+             nb::arg("seed"), nb::arg("run"));
   module.def("enhance_methods", [] {
     std::vector<std::pair<std::string, std::string>> methods;
     for (const EnhanceMethod& method : EnhanceMethods()) methods.emplace_back(method.name, method.summary);

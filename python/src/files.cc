@@ -109,12 +109,12 @@ void CheckCloud(nb::handle cloud) {
 void BindFiles(nb::module_& module) {
   module.def("read_path", &ReadPath, nb::arg("path"), nb::arg("format"), nb::arg("run"));
   module.def("read_bytes", &ReadBytes, nb::arg("buffer"), nb::arg("format"), nb::arg("run"));
-  module.def("write_path", &WritePath, nb::arg("path"), nb::arg("cloud"), nb::arg("words"), nb::arg("overwrite"),
+  module.def("write_path", &WritePath, nb::arg("path"), nb::arg("cloud").none(), nb::arg("words"), nb::arg("overwrite"),
              nb::arg("run"));
-  module.def("write_bytes", &WriteBytes, nb::arg("format"), nb::arg("cloud"), nb::arg("words"), nb::arg("run"));
+  module.def("write_bytes", &WriteBytes, nb::arg("format"), nb::arg("cloud").none(), nb::arg("words"), nb::arg("run"));
   module.def("write_file", &WriteFile, nb::arg("path"), nb::arg("bytes"), nb::arg("overwrite"), nb::arg("run"));
   module.def("formats", &ListFormats);
-  module.def("check_cloud", &CheckCloud, nb::arg("cloud"));
+  module.def("check_cloud", &CheckCloud, nb::arg("cloud").none());
 }
 
 }  // namespace anchorsplat::python

@@ -44,7 +44,7 @@ std::string InfoCloud(nb::handle cloud, const RunArguments& run) {
 
 void BindInfo(nb::module_& module) {
   module.def("info_path", &InfoPath, nb::arg("path"), nb::arg("format"), nb::arg("run"));
-  module.def("info_cloud", &InfoCloud, nb::arg("cloud"), nb::arg("run"));
+  module.def("info_cloud", &InfoCloud, nb::arg("cloud").none(), nb::arg("run"));
 }
 
 }  // namespace anchorsplat::python

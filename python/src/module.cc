@@ -12,6 +12,7 @@ NB_MODULE(_core, module) {
   using namespace anchorsplat::python;
   module.doc() = "The engine. For anchorsplat's own modules: it may change in every version.";
   module.attr("version") = ANCHORSPLAT_VERSION;
+  nanobind::set_leak_warnings(false);  // what a program still holds when it ends is its own affair
   anchorsplat::RegisterModelMethod();  // beside the methods that enhance/ has itself
   BindRun(module);
   BindFiles(module);

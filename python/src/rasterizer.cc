@@ -162,7 +162,7 @@ void BindRasterizer(nb::module_& module) {
             options.profile = profile == "gsplat15" ? RasterProfile::kGsplat15 : RasterProfile::kGsplat14;
             new (self) DifferentiableViews(std::move(cloud), cameras, options);
           },
-          nb::arg("cloud"), nb::arg("cameras"), nb::arg("mode"), nb::arg("background"), nb::arg("sh_degree"),
+          nb::arg("cloud").none(), nb::arg("cameras"), nb::arg("mode"), nb::arg("background"), nb::arg("sh_degree"),
           nb::arg("near_plane"), nb::arg("far_plane"), nb::arg("profile"))
       .def("forward", &Forward, nb::arg("run"))
       .def("backward", &Backward, nb::arg("color"), nb::arg("alpha"), nb::arg("run"));

@@ -93,8 +93,8 @@ nb::object Render(nb::handle cloud, const nb::list& words, bool transparent, con
 }  // namespace
 
 void BindRender(nb::module_& module) {
-  module.def("render", &Render, nb::arg("cloud"), nb::arg("words"), nb::arg("transparent"), nb::arg("cameras").none(),
-             nb::arg("run"));
+  module.def("render", &Render, nb::arg("cloud").none(), nb::arg("words"), nb::arg("transparent"),
+             nb::arg("cameras").none(), nb::arg("run"));
 }
 
 }  // namespace anchorsplat::python

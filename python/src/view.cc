@@ -55,8 +55,8 @@ nb::bytes View(nb::handle after, nb::handle before, const nb::list& words, const
 }  // namespace
 
 void BindView(nb::module_& module) {
-  module.def("view", &View, nb::arg("after"), nb::arg("before").none(), nb::arg("words"), nb::arg("cameras").none(),
-             nb::arg("name"), nb::arg("run"));
+  module.def("view", &View, nb::arg("after").none(), nb::arg("before").none(), nb::arg("words"),
+             nb::arg("cameras").none(), nb::arg("name"), nb::arg("run"));
 }
 
 }  // namespace anchorsplat::python

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/log.h"
+#include "core/run_context.h"
 #include "core/statistics.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
@@ -49,6 +50,7 @@ std::vector<EnhanceMethod>& Registry() {
 
 // Drops the rows no method and no viewer can use; says how many.
 Status DropUnusable(GaussianCloud& cloud) {
+  LeaveIfAbandoned();
   std::vector<int64_t> kept;
   for (int64_t i = 0; i < cloud.size(); ++i) {
     if (IsUsable(cloud, i)) kept.push_back(i);
@@ -448,6 +450,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
     return Enhanced{std::move(input.cloud), std::move(report)};
   }
 
+  LeaveIfAbandoned();
   const Stopwatch watch;
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, RunPlan(plan, sized, std::move(input), options, report));
   report.seconds = watch.Total();

@@ -9,6 +9,7 @@
 
 #include "core/activations.h"
 #include "core/framing.h"
+#include "core/run_context.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
 #include "enhance/showing_gaussians.h"
@@ -35,6 +36,7 @@ constexpr std::array<double, 4> kSizeQuantiles = {0.1, 0.25, 0.5, 0.75};
 
 // Value at which `share` of the total weight is reached. `items` are (value, weight).
 double WeightedQuantile(std::vector<std::pair<float, double>>& items, double share) {
+  LeaveIfAbandoned();
   std::sort(items.begin(), items.end());
   double total = 0;
   for (const auto& item : items) total += item.second;
@@ -48,6 +50,7 @@ double WeightedQuantile(std::vector<std::pair<float, double>>& items, double sha
 
 // The part of the cloud that says something, without its colours. `radius` becomes that of the part where it is cut.
 GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing, double& radius) {
+  LeaveIfAbandoned();
   std::vector<std::pair<double, int64_t>> near;  // distance², row
   for (int64_t i = 0; i < cloud.size(); ++i) {
     if (!IsUsable(cloud, i)) continue;
@@ -69,6 +72,7 @@ GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing, double
     radius = std::min(radius, std::sqrt(last->first));
     near.erase(last, near.end());
   }
+  LeaveIfAbandoned();
   std::vector<int64_t> rows;
   for (const auto& item : near) rows.push_back(item.second);
   std::sort(rows.begin(), rows.end());
@@ -91,6 +95,7 @@ GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing, double
 // √(largest × middle axis) of their 10 % quantiles over the visible Gaussians, weighted by opacity × area (product of
 // the two): within a factor of three of the pixel size for most fits. Nothing when there are too few Gaussians.
 std::optional<double> AxisOfSmallGaussians(const GaussianCloud& cloud) {
+  LeaveIfAbandoned();
   std::vector<std::pair<float, double>> largest, middle;
   for (int64_t i = 0; i < cloud.size(); ++i) {
     const float opacity = Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]);
@@ -109,6 +114,7 @@ std::optional<double> AxisOfSmallGaussians(const GaussianCloud& cloud) {
 
 // SizeFeatures with d = 1.
 SizeFeatures SizesOf(const GaussianCloud& cloud) {
+  LeaveIfAbandoned();
   std::array<std::vector<std::pair<float, double>>, 4> values;  // the three axes, ascending, and opacity
   for (int64_t i = 0; i < cloud.size(); ++i) {
     const float opacity = Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/parallel.h"
+#include "core/run_context.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/pixel_size_features.h"
@@ -83,6 +84,7 @@ Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud) {
   evidence.spacing = Spacing(cloud, showing.bright);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeProbe probe, PixelSizeProbe::Make(cloud));
   evidence.small_axis = probe.start();
+  LeaveIfAbandoned();
   Buffer<float> middle;
   for (const int64_t i : showing.bright) {
     std::array<float, 3> axes;

@@ -7,6 +7,7 @@
 
 #include "core/activations.h"
 #include "core/framing.h"
+#include "core/run_context.h"
 #include "core/spherical_harmonics.h"
 #include "enhance/pixel_size_features.h"
 
@@ -43,7 +44,9 @@ double SquaredDistance(const float* a, const float* b) {
 }
 
 ShowingGaussians FindShowingGaussians(const GaussianCloud& cloud) {
+  LeaveIfAbandoned();
   const Framing framing = FrameCloud(cloud);
+  LeaveIfAbandoned();
   const std::array<float, 3> middle = {static_cast<float>(framing.target[0]), static_cast<float>(framing.target[1]),
                                        static_cast<float>(framing.target[2])};
   ShowingGaussians showing;
@@ -58,7 +61,9 @@ ShowingGaussians FindShowingGaussians(const GaussianCloud& cloud) {
     all.emplace_back(distance, i);
     if (!black) bright.emplace_back(distance, i);
   }
+  LeaveIfAbandoned();
   showing.all = Nearest(std::move(all));
+  LeaveIfAbandoned();
   showing.bright = bright.size() >= static_cast<size_t>(kLeastGaussians) ? Nearest(std::move(bright)) : showing.all;
   return showing;
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/activations.h"
+#include "core/run_context.h"
 #include "core/statistics.h"
 #include "enhance/showing_gaussians.h"
 
@@ -84,8 +85,11 @@ SizeTails FindSizeTails(const GaussianCloud& cloud) {
   }
   tails.gaussians = static_cast<int64_t>(middle.size());
   if (middle.empty()) return tails;
+  LeaveIfAbandoned();
   tails.smallest = MeanTail(smallest);
+  LeaveIfAbandoned();
   tails.middle = MeanTail(middle);
+  LeaveIfAbandoned();
   tails.roundness = std::exp(double{Quantile(smallest, kLonger)} - double{Quantile(middle, kLonger)});
   tails.opaque = OpaqueShare(areas);
   return tails;

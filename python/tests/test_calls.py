@@ -1,0 +1,176 @@
+"""What all long calls have in common: threads, progress, messages, Ctrl-C."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import threading
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from conftest import same
+
+import anchorsplat
+
+
+def test_several_threads_at_once_give_the_same_bits(cloud):
+    cameras = anchorsplat.Cameras.orbit(cloud, 3, size=(48, 40))
+    calls = [
+        lambda threads: anchorsplat.enhance(cloud, method="filter", pixel_size=0.005, threads=threads)[0].log_scales,
+        lambda threads: anchorsplat.enhance(cloud, pixel_size=0.005, threads=threads)[0].means,
+        lambda threads: anchorsplat.refine(cloud, pixel_size=0.005, steps=3, poses=4, threads=threads)[0].sh,
+        lambda threads: anchorsplat.render(cloud, cameras, threads=threads),
+        lambda threads: np.frombuffer(anchorsplat.to_bytes(cloud, "ply", threads=threads), np.uint8),
+        lambda threads: anchorsplat.read(anchorsplat.to_bytes(cloud, "ply"), threads=threads).quats,
+    ]
+    alone = [call(0) for call in calls]
+    jobs = [(k, threads) for threads in (1, 2, 0, 1) for k in range(len(calls))]
+    begin = threading.Barrier(6)
+    with ThreadPoolExecutor(6, initializer=begin.wait) as pool:
+        together = list(pool.map(lambda job: calls[job[0]](job[1]), jobs))
+    for (k, threads), result in zip(jobs, together):
+        assert np.array_equal(result, alone[k]), (k, threads)
+
+
+def test_the_interpreter_goes_on_meanwhile(cloud):
+    """The call waits for what only another thread of Python's can do."""
+    told, done = threading.Event(), threading.Event()
+
+    def other() -> None:
+        told.wait()
+        done.set()
+
+    thread = threading.Thread(target=other)
+    thread.start()
+
+    def progress(_: anchorsplat.Progress) -> None:
+        told.set()
+        assert done.wait(60)
+
+    anchorsplat.render(cloud, orbit=2, size=(16, 16), progress=progress)
+    thread.join()
+
+
+def test_progress_as_a_function_and_as_bars(cloud):
+    seen: list[anchorsplat.Progress] = []
+    anchorsplat.render(cloud, orbit=5, size=(16, 16), progress=seen.append)
+    assert seen[-1] == ("render", 5, 5, "", True)
+    assert [p.done for p in seen] == sorted(p.done for p in seen)
+    threads = {threading.get_ident()}
+    anchorsplat.render(cloud, orbit=2, size=(16, 16), progress=lambda _: threads.add(threading.get_ident()))
+    assert len(threads) == 1, "callbacks come in the calling thread"
+
+    made = []
+
+    class Bar:
+        def __init__(self, total: int | None = None, desc: str | None = None) -> None:
+            self.total, self.desc, self.n, self.closed = total, desc, 0, False
+            made.append(self)
+
+        def update(self, n: int) -> None:
+            self.n += n
+
+        def close(self) -> None:
+            self.closed = True
+
+    anchorsplat.render(cloud, orbit=4, size=(16, 16), progress=Bar)
+    assert [(b.total, b.desc, b.n, b.closed) for b in made] == [(4, "render", 4, True)]
+    mine = Bar(1)
+    anchorsplat.render(cloud, orbit=4, size=(16, 16), progress=mine)
+    assert mine.n == 4 and not mine.closed
+    with pytest.raises(TypeError, match="progress: expected"):
+        anchorsplat.render(cloud, orbit=4, size=(16, 16), progress=3)
+
+
+def test_messages_go_to_logging_and_warnings(cloud, caplog):
+    caplog.set_level(logging.INFO, "anchorsplat")
+    anchorsplat.enhance(cloud, method="filter")
+    assert any("training pixel" in record.message for record in caplog.records)
+    with pytest.warns(anchorsplat.SplatWarning, match="range of SPZ") as warned:
+        anchorsplat.to_bytes(cloud, "spz")
+    assert os.path.basename(warned[0].filename) == "test_calls.py"
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", anchorsplat.SplatWarning)
+        with pytest.raises(anchorsplat.SplatWarning):
+            anchorsplat.to_bytes(cloud, "spz")
+
+
+class Enough(Exception):
+    pass
+
+
+def test_what_a_callback_raises_ends_the_call(cloud):
+    def enough(progress: anchorsplat.Progress) -> None:
+        raise Enough(progress.task)
+
+    with pytest.raises(Enough, match="render"):
+        anchorsplat.render(cloud, orbit=100_000, size=(64, 64), progress=enough)
+    with pytest.raises(Enough):
+        anchorsplat.refine(cloud, pixel_size=0.005, steps=10**9, poses=4, progress=enough)
+
+
+def test_ctrl_c_ends_every_long_call_and_leaves_nothing(cloud, tmp_path):
+    """Each would take hours; the signal comes when it has begun."""
+
+    def press(_: anchorsplat.Progress) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    for call in (
+        lambda: anchorsplat.render(cloud, orbit=100_000, size=(64, 64), progress=press),
+        lambda: anchorsplat.refine(cloud, pixel_size=0.005, steps=10**9, poses=4, progress=press),
+        lambda: anchorsplat.enhance(cloud, quality="best", pixel_size=0.005, steps=10**9, progress=press),
+        lambda: anchorsplat.compare(cloud, cloud, orbit=100_000, size=(64, 64), progress=press),
+    ):
+        with pytest.raises(KeyboardInterrupt):
+            call()
+    assert os.listdir(tmp_path) == []
+
+
+def test_ctrl_c_without_progress_ends_what_never_says_a_word(whole, tmp_path):
+    """A signal that comes while a file is written: by a timer, at times that go on until one is written whole."""
+    target = tmp_path / "big.ply"
+    big = whole[np.tile(np.arange(len(whole)), 20)]
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        seconds = 0.001
+        while not target.exists():
+            signal.setitimer(signal.ITIMER_REAL, seconds)
+            try:
+                anchorsplat.write(target, big)
+            except KeyboardInterrupt:
+                assert set(os.listdir(tmp_path)) <= {"big.ply"}
+            finally:
+                signal.setitimer(signal.ITIMER_REAL, 0)
+            seconds *= 2
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert same(anchorsplat.read(target), big)
+
+
+def test_a_refinement_with_a_checkpoint_goes_on_where_it_was(cloud, tmp_path):
+    state = tmp_path / "state"
+    options = {"pixel_size": 0.005, "steps": 30, "poses": 4, "seed": 3}
+    straight, _ = anchorsplat.refine(cloud, **options)
+    steps = []
+
+    def press(progress: anchorsplat.Progress) -> None:
+        if progress.task == "refine" and progress.done >= 5 and not steps:
+            steps.append(progress.done)
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        anchorsplat.refine(cloud, checkpoint=state, progress=press, **options)
+    if not state.exists():
+        pytest.fail(f"nothing was kept at step {steps}")
+    with pytest.raises(anchorsplat.ExistsError):
+        anchorsplat.refine(cloud, checkpoint=state, **options)
+    resumed, report = anchorsplat.refine(cloud, checkpoint=state, resume=True, **options)
+    assert report["refine"]["resumed_at"] >= 5 and same(resumed, straight)
+    assert not state.exists()

@@ -10,7 +10,7 @@
 #   make fuzz     mutated files against all readers, SECONDS=60 by default
 #   make realdata DATA=DIR   checks on splats of your own
 #   make viewer-test   the page of `anchorsplat view` in headless Chromium (installs a browser)
-#   make batch-test    `anchorsplat batch` with kills, an S3 and a cluster on this machine, four minutes (PYTHON=..., docs/batch.md)
+#   make batch-test    `anchorsplat batch` with kills, an S3 and a cluster on this machine, four minutes
 #   make interop  files of ours read by other programs and theirs by us (scripts/interop.py says what it needs)
 #   make lpips-check  LPIPS with its trained weights (fetched once, 64 MB) against the published values
 #   make bench    measured ratios and figures
@@ -115,10 +115,9 @@ fuzz: debug
 realdata: program
 	@scripts/realdata.sh "$(DATA)"
 
-# Of a Python that has the package with its extras batch and s3, pytest and moto[server].
-PYTHON ?= python3
-batch-test:
-	@$(PYTHON) -m pytest -q python/tests/batch/long_machines.py python/tests/batch/long_folders.py
+batch-test: python
+	@.venv/bin/python -m pip --disable-pip-version-check install --quiet 's3fs>=2023.12' 'moto[server]>=5'
+	@PYTHONPATH=build/release/python .venv/bin/python -m pytest -q python/tests/batch/long_machines.py python/tests/batch/long_folders.py
 .PHONY: batch-test
 
 interop: build

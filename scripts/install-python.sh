@@ -3,7 +3,7 @@
 # there already.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-packages=('nanobind>=2.9' 'numpy>=1.26' 'pytest>=8')
+packages=('nanobind>=2.9' 'numpy>=1.26' 'pytest>=8' 'ray>=2.40' 'fsspec>=2023.12')
 stamp=.venv/anchorsplat-python
 [ "$(cat "$stamp" 2>/dev/null)" = "${packages[*]}" ] && exit 0
 [ -x .venv/bin/python ] || python3 -m venv .venv

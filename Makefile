@@ -11,6 +11,7 @@
 #   make realdata DATA=DIR   checks on splats of your own
 #   make viewer-test   the page of `anchorsplat view` in headless Chromium (installs a browser)
 #   make serve-test    the page and the API of `anchorsplat serve` in headless Chromium, under load and on Ray
+#   make batch-test    `anchorsplat batch` with kills, an S3 and a cluster on this machine, four minutes
 #   make interop  files of ours read by other programs and theirs by us (scripts/interop.py says what it needs)
 #   make lpips-check  LPIPS with its trained weights (fetched once, 64 MB) against the published values
 #   make bench    measured ratios and figures
@@ -124,6 +125,11 @@ fuzz: debug
 
 realdata: program
 	@scripts/realdata.sh "$(DATA)"
+
+batch-test: python
+	@.venv/bin/python -m pip --disable-pip-version-check install --quiet 's3fs>=2023.12' 'moto[server]>=5'
+	@PYTHONPATH=build/release/python .venv/bin/python -m pytest -q python/tests/batch/long_machines.py python/tests/batch/long_folders.py
+.PHONY: batch-test
 
 interop: build
 	@scripts/interop.py build/anchorsplat examples/biplane/input.ply

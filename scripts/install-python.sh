@@ -4,7 +4,8 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 packages=('nanobind>=2.9' 'numpy>=1.26' 'pytest>=8'
-  'fastapi>=0.115' 'uvicorn>=0.30' 'python-multipart>=0.0.18' 'prometheus-client>=0.20' 'httpx>=0.27')  # of serve
+  'fastapi>=0.115' 'uvicorn>=0.30' 'python-multipart>=0.0.18' 'prometheus-client>=0.20' 'httpx>=0.27'  # of serve
+  'ray>=2.40' 'fsspec>=2023.12')  # of batch
 stamp=.venv/anchorsplat-python
 [ "$(cat "$stamp" 2>/dev/null)" = "${packages[*]}" ] && exit 0
 [ -x .venv/bin/python ] || python3 -m venv .venv

@@ -34,6 +34,7 @@ struct BuildFlags {
   bool retry = false;
   std::string licence;
   std::string creator;
+  bool plan = false;
 };
 
 Result<Recipe> MakeRecipe(const BuildFlags& flags, const SharedFlags& shared) {
@@ -44,6 +45,21 @@ Result<Recipe> MakeRecipe(const BuildFlags& flags, const SharedFlags& shared) {
   if (!flags.recipe.empty()) return ReadRecipe(flags.recipe, settings);
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(settings));
   return SingleRecipe(settings);
+}
+
+void PrintPlan(const DatasetPlan& plan, const std::string& dataset) {
+  nlohmann::json wanted = nlohmann::json::array();
+  for (const PlannedObject& o : plan.wanted) {
+    wanted.push_back({{"name", o.name}, {"source", o.source}, {"base", o.base}, {"job", o.job.string()}});
+  }
+  const DatasetBuildReport& r = plan.report;
+  PrintJson({{"dataset", dataset},
+             {"wanted", wanted},
+             {"objects", r.objects},
+             {"there_already", r.there_already},
+             {"other_settings", r.other_settings},
+             {"failed", r.failed},
+             {"rejected", r.rejected}});
 }
 
 Status RunBuild(const BuildFlags& flags, Program& program) {
@@ -65,6 +81,11 @@ Status RunBuild(const BuildFlags& flags, Program& program) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto listed, ReadAddressList(flags.list));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto resolved, ResolveAddresses(listed, flags.objects));
     meshes.insert(meshes.end(), resolved.begin(), resolved.end());
+  }
+  if (flags.plan) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const DatasetPlan plan, PlanDataset(meshes, flags.output, options));
+    PrintPlan(plan, flags.output);
+    return {};
   }
   std::optional<StopSignal> stop_signal(std::in_place);
   auto built = BuildDataset(meshes, flags.output, options);
@@ -137,6 +158,9 @@ void AddDatasetBuild(CLI::App& parent, Program& program) {
       ->check(NotEmpty());
   verb.add_option("--creator", flags->creator, "Creator of meshes that name none")->check(NotEmpty());
   verb.add_flag("--retry", flags->retry, "Try again what failed in an earlier run");
+  verb.add_flag("--plan", flags->plan,
+                "Make nothing: bring the lists up to date, write a job per object that is wanted, and print them as JSON "
+                "(`anchorsplat batch dataset` runs them on many machines)");
   flags->views.AddTo(verb);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunBuild(*flags, program); }; });
 }

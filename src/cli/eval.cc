@@ -34,6 +34,7 @@ struct EvalFlags {
   std::string lpips;
   std::string lpips_weights;
   bool choose_f = false;
+  bool plan = false;
 };
 
 Result<std::vector<EvalMethod>> MakeMethods(const EvalFlags& flags) {
@@ -77,6 +78,15 @@ Status RunEval(const EvalFlags& flags, Program& program) {
   options.lpips = lpips ? &*lpips : nullptr;
   options.seed = shared.seed;
   options.again = shared.overwrite;
+  if (flags.plan) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<std::string> objects, ObjectsToEvaluate(flags.benchmark, options));
+    nlohmann::json words = nlohmann::json::array();
+    for (size_t k = 0; k < methods.size(); ++k) {
+      words.push_back({{"word", flags.choose_f ? methods[k].name : flags.methods[k]}, {"file", FileStem(methods[k].name)}});
+    }
+    PrintJson({{"objects", objects}, {"methods", words}});
+    return {};
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Evaluation evaluation, Evaluate(flags.benchmark, methods, flags.out, options));
   if (!evaluation.failures.empty()) program.exit_code = kPartialExitCode;
   if (evaluation.results.empty()) {
@@ -148,6 +158,9 @@ void AddEval(CLI::App& app, Program& program) {
   verb.add_option("--max-views", flags->max_views, "At most so many views per object, for a quick look; 0: all")
       ->check(NotNegative())
       ->capture_default_str();
+  verb.add_flag("--plan", flags->plan,
+                "Measure nothing: print the objects and methods as JSON (`anchorsplat batch eval` runs them on many "
+                "machines)");
   AddLpipsFlags(verb, flags->lpips, flags->lpips_weights);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunEval(*flags, program); }; });
 }

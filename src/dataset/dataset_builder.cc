@@ -91,6 +91,21 @@ class DatasetBuild {
     return status;
   }
 
+  // The wanted ones as files, for processes that others start.
+  Result<std::vector<PlannedObject>> WriteJobs() const {
+    std::vector<PlannedObject> planned;
+    for (const bool derived : {false, true}) {
+      for (const ObjectJob* job : Wanted(derived)) {
+        std::error_code ignored;
+        if (options_.overwrite) fs::remove_all(BuildingFolder(dataset_, job->name), ignored);
+        const fs::path file = BuildingFolder(dataset_, job->name).string() + ".job";
+        ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(file, ToJsonText(*job), true));
+        planned.push_back({job->name, job->source, job->base, file});
+      }
+    }
+    return planned;
+  }
+
   DatasetBuildReport Report() {
     for (const ObjectJob& job : jobs_) {
       report_.failed += static_cast<int64_t>(failures_.count(job.name));
@@ -231,22 +246,36 @@ class DatasetBuild {
   DatasetBuildReport report_;
 };
 
-}  // namespace
-
-Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, const fs::path& dataset,
-                                        const DatasetBuildOptions& options) {
-  const auto begin = Clock::now();
+Result<FileLock> TakeDataset(const std::vector<std::string>& meshes, const fs::path& dataset) {
   if (meshes.empty()) return Error{ErrorCode::kBadArgument, "no meshes to build a data set of"};
   const fs::path building = dataset / kBuildingName;
   std::error_code code;
   fs::create_directories(building, code);
   if (code) return Error{ErrorCode::kIo, Cat(building.string(), ": cannot make this folder: ", code.message())};
-  const auto lock = FileLock::Take(building / "lock", false);
+  auto lock = FileLock::Take(building / "lock", false);
   if (!lock.ok() && lock.error().code == ErrorCode::kExists) {
     return Error{ErrorCode::kExists, Cat(dataset.string(), ": another build is at work here")};
   }
-  if (!lock.ok()) return lock.error();
+  return lock;
+}
 
+}  // namespace
+
+Result<DatasetPlan> PlanDataset(const std::vector<std::string>& meshes, const fs::path& dataset,
+                                const DatasetBuildOptions& options) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const FileLock lock, TakeDataset(meshes, dataset));
+  DatasetBuild build(dataset, options);
+  ANCHORSPLAT_RETURN_IF_ERROR(build.Plan(meshes));
+  DatasetPlan plan;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(plan.wanted, build.WriteJobs());
+  plan.report = build.Report();
+  return plan;
+}
+
+Result<DatasetBuildReport> BuildDataset(const std::vector<std::string>& meshes, const fs::path& dataset,
+                                        const DatasetBuildOptions& options) {
+  const auto begin = Clock::now();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const FileLock lock, TakeDataset(meshes, dataset));
   DatasetBuild build(dataset, options);
   ANCHORSPLAT_RETURN_IF_ERROR(build.Plan(meshes));
   ANCHORSPLAT_RETURN_IF_ERROR(build.Run());

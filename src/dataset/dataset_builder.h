@@ -34,6 +34,23 @@ struct DatasetBuildReport {
   double seconds = 0;
 };
 
+// Objects that BuildDataset would make now, for those who run the processes elsewhere.
+struct PlannedObject {
+  std::string name;
+  std::string source;
+  std::string base;           // of objects that are made from another one: its name; else empty
+  std::filesystem::path job;  // file to be given to `dataset object JOB -o DATASET`
+};
+
+struct DatasetPlan {
+  std::vector<PlannedObject> wanted;  // by name, bases before what is made from them
+  DatasetBuildReport report;          // what would be, were the wanted ones never made
+};
+
+// Writes the lists of DATASET as they are now, and a job for every object that is wanted; makes none. Errors: as below.
+Result<DatasetPlan> PlanDataset(const std::vector<std::string>& meshes, const std::filesystem::path& dataset,
+                                const DatasetBuildOptions& options);
+
 // Makes DATASET/NAME for every mesh (address of a file, of an object of a furniture library, or of a whole library; or
 // a folder of pictures with cameras) and every entry its recipe draws, and DATASET/manifest.jsonl and failures.jsonl,
 // which are right after every object. Each object is made by a process of its own (object_builder.h): one that fails,

@@ -244,6 +244,12 @@ Result<std::vector<BenchmarkEntry>> ChooseObjects(std::vector<BenchmarkEntry> en
   return chosen;
 }
 
+Result<std::vector<BenchmarkEntry>> ChooseEntries(const fs::path& benchmark, const EvaluationOptions& options) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<BenchmarkEntry> all, ListBenchmark(benchmark, options.split));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<BenchmarkEntry> entries, ChooseKinds(all, options.kinds));
+  return ChooseObjects(std::move(entries), all, options);
+}
+
 }  // namespace
 
 const MethodResult* Evaluation::Find(const std::string& object, const std::string& method) const {
@@ -264,12 +270,18 @@ std::string FileStem(const std::string& method) {
   return stem;
 }
 
+Result<std::vector<std::string>> ObjectsToEvaluate(const fs::path& benchmark, const EvaluationOptions& options) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<BenchmarkEntry> entries, ChooseEntries(benchmark, options));
+  std::vector<std::string> names;
+  names.reserve(entries.size());
+  for (const BenchmarkEntry& entry : entries) names.push_back(entry.name);
+  return names;
+}
+
 Result<Evaluation> Evaluate(const fs::path& benchmark, const std::vector<EvalMethod>& methods, const fs::path& out,
                             const EvaluationOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckMethods(methods));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<BenchmarkEntry> all, ListBenchmark(benchmark, options.split));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<BenchmarkEntry> entries, ChooseKinds(all, options.kinds));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(entries, ChooseObjects(std::move(entries), all, options));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<BenchmarkEntry> entries, ChooseEntries(benchmark, options));
   std::error_code code;
   fs::create_directories(out / "objects", code);
   if (code) return Error{ErrorCode::kIo, Cat(out.string(), ": cannot make this folder: ", code.message())};

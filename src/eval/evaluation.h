@@ -63,6 +63,10 @@ struct Evaluation {
 Result<Evaluation> Evaluate(const std::filesystem::path& benchmark, const std::vector<EvalMethod>& methods,
                             const std::filesystem::path& out, const EvaluationOptions& options);
 
+// The objects that Evaluate would measure, by name. Errors: its kNotFound and kBadArgument, about objects.
+Result<std::vector<std::string>> ObjectsToEvaluate(const std::filesystem::path& benchmark,
+                                                   const EvaluationOptions& options);
+
 // out/objects/OBJECT/, and the name of a method's files in it.
 std::filesystem::path ObjectFolder(const std::filesystem::path& out, const std::string& object);
 std::string FileStem(const std::string& method);

@@ -1,0 +1,77 @@
+"""Many splats on many cores and machines, by Ray. docs/batch.md is a page of examples.
+
+    from anchorsplat import batch
+    report = batch.enhance("s3://scans/**/*.ply", out="s3://sharp", upscale=4, format="spz")
+    report.done, report.failed, report.skipped
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from os import PathLike, fspath
+from typing import Any
+
+from .command_line import main
+from .enhance import How, run_splats
+from .report import BatchReport
+from .scheduler import Stopped
+from .settings import as_arguments
+
+__all__ = ["BatchReport", "Stopped", "enhance", "main", "refine"]
+
+Inputs = str | PathLike[str] | Iterable[str | PathLike[str]]
+
+
+def enhance(
+    inputs: Inputs,
+    out: str | PathLike[str],
+    *,
+    lists: Inputs = (),
+    root: str | None = None,
+    format: str | None = None,
+    manifest: str | PathLike[str] | None = None,
+    overwrite: bool = False,
+    verify: bool = False,
+    ray: str | None = None,
+    workers: int | None = None,
+    threads: int = 1,
+    in_flight: int | None = None,
+    retries: int = 3,
+    progress: Any = False,
+    **options: Any,
+) -> BatchReport:
+    """Enhances every input into the folder `out`, and says in the manifest what became of it. Called again it makes what
+    is missing or has changed.
+
+    `inputs` are paths, URLs of fsspec or patterns; `lists` are text files of them. `options` are those of
+    ``anchorsplat enhance``, as keywords: ``upscale=4``, ``cameras="{folder}/transforms.json"``, ``clean=True``. The rest is
+    the same as on the command line (``anchorsplat batch enhance --help``). `progress`: True for lines on stderr, or
+    something like a tqdm, which is told.
+
+    What goes wrong with an input is no exception but a row: ``report.failures``. Raises BadArgumentError for options and
+    inputs that make no sense, before any work; ExistsError where results would replace files that no batch made;
+    NotFoundError for a pattern that nothing matches; IoError when the manifest or the cluster is lost; Stopped, a
+    KeyboardInterrupt, on Ctrl-C.
+    """
+    return run_splats(
+        _words(inputs),
+        fspath(out),
+        as_arguments(options),
+        How(ray, workers, threads, in_flight, retries, progress is False, progress if hasattr(progress, "update") else None),
+        lists=_words(lists),
+        root=root,
+        format=format,
+        manifest=fspath(manifest) if manifest is not None else None,
+        overwrite=overwrite,
+        verify=verify,
+    )
+
+
+def refine(inputs: Inputs, out: str | PathLike[str], *, method: str = "refine", **options: Any) -> BatchReport:
+    """enhance() by optimisation: minutes for each splat. One that Ctrl-C interrupts goes on from its checkpoint the next time,
+    where `out` is a folder."""
+    return enhance(inputs, out, method=method, **options)
+
+
+def _words(inputs: Inputs) -> list[str]:
+    return [fspath(inputs)] if isinstance(inputs, (str, PathLike)) else [fspath(word) for word in inputs]

@@ -1,0 +1,118 @@
+"""Ray: of its own on this machine, by default, or one that runs already."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import secrets
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from typing import Any
+
+from .._errors import BadArgumentError, IoError, NotFoundError
+
+_OBJECT_STORE = 80 << 20  # bytes: results of tasks are rows; Ray takes no less
+_PRIVATE = {
+    # Every process listens on 127.0.0.1 and nowhere else. (The variable is named after where that is Ray's default.)
+    "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
+    "RAY_USAGE_STATS_ENABLED": "0",
+    "RAY_AUTH_MODE": "token",
+    # Workers are as nice as this process, not 15 more, which on a busy machine makes them several times as slow.
+    "RAY_worker_niceness": "0",
+}
+
+
+def ray_module() -> Any:
+    try:
+        import ray
+    except ImportError as error:
+        raise NotFoundError("batches run on Ray, which is not installed: pip install 'anchorsplat[batch]'") from error
+    return ray
+
+
+def cores() -> int:
+    return len(os.sched_getaffinity(0))
+
+
+@contextlib.contextmanager
+def connected(address: str | None, cpus: int | None) -> Iterator[Any]:
+    """Ray, connected. One that is connected already is used and stays; what is begun here ends here.
+
+    `address`: of a cluster ("auto", "HOST:PORT"); None: a Ray on this machine, for as long as this lasts, that listens
+    on 127.0.0.1 only and asks for a token that is made anew each time.
+    """
+    if address is not None and "://" in address:
+        raise BadArgumentError(
+            f"--ray {address}: give HOST:PORT of the cluster's head, or auto, on a machine of the cluster, "
+            "or hand the whole command to `ray job submit`"
+        )
+    if address is None and "ray" in sys.modules and sys.modules["ray"].is_initialized():
+        yield sys.modules["ray"]
+        return
+    quiet = {"logging_level": logging.ERROR, "log_to_driver": False}
+    if address is not None:
+        ray = ray_module()
+        try:
+            ray.init(address=address, **quiet)
+        except (ConnectionError, ValueError, RuntimeError) as error:
+            raise IoError(f"--ray {address}: {error}") from error
+        try:
+            yield ray
+        finally:
+            ray.shutdown()
+        return
+    with _environment({**_PRIVATE, "RAY_AUTH_TOKEN": secrets.token_hex(32)}):
+        ray = ray_module()
+        with contextlib.suppress(AttributeError):  # read when Ray was imported, which may have been earlier
+            ray._private.ray_constants.ENABLE_RAY_CLUSTER = False
+        # Unix sockets, whose paths have 107 bytes at most, are in there.
+        folder = tempfile.mkdtemp(prefix="anchorsplat-ray-", dir="/tmp" if len(tempfile.gettempdir()) > 30 else None)
+        try:
+            ray.init(
+                address="local",
+                num_cpus=cpus or cores(),
+                include_dashboard=False,
+                object_store_memory=_OBJECT_STORE,
+                _temp_dir=folder,
+                **quiet,
+            )
+            try:
+                yield ray
+            finally:
+                ray.shutdown()
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def _environment(values: dict[str, str]) -> Iterator[None]:
+    """Ray's processes and its C++ core read these when they start."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def memory_of_largest_machine(ray: Any) -> int:
+    """Bytes that Ray may give to tasks there."""
+    return int(max((node["Resources"].get("memory", 0) for node in ray.nodes() if node["Alive"]), default=0))
+
+
+def cpus_of_largest_machine(ray: Any) -> int:
+    return int(max((node["Resources"].get("CPU", 0) for node in ray.nodes() if node["Alive"]), default=0))
+
+
+def slots(ray: Any, cpus_per_task: int) -> int:
+    """How many tasks can run at a time, as the cluster is now."""
+    return sum(
+        int(node["Resources"].get("CPU", 0)) // cpus_per_task for node in ray.nodes() if node["Alive"]
+    )

@@ -1,0 +1,172 @@
+"""The native program as batches run it: a process per splat, so that no file can take a worker down with it."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import functools
+import hashlib
+import json
+import os
+import re
+import resource
+import signal
+import subprocess
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from .._errors import BadArgumentError, BadFileError, Error, ExistsError, IoError, NotFoundError
+
+#: What the program's exit codes mean (docs/cli.md): the name in rows, and the exception of this package.
+CODES = {
+    2: ("bad_argument", BadArgumentError),
+    3: ("not_found", NotFoundError),
+    4: ("bad_file", BadFileError),
+    5: ("exists", ExistsError),
+    6: ("io", IoError),
+}
+INTERRUPTED = 130
+
+_WAIT_TO_STOP = 30.0  # seconds: a refinement writes its checkpoint first
+_LOOK_UP = 0.25  # seconds: Ray's cancellation is seen by Python code only, not by a system call that waits
+_KEPT_MESSAGES = 16_000  # characters of stderr that a row may hold
+_PR_SET_PDEATHSIG = 1
+_libc = ctypes.CDLL(None, use_errno=True)
+
+
+def program() -> Path:
+    """The native program that came with this package; ANCHORSPLAT_PROGRAM names another."""
+    named = os.environ.get("ANCHORSPLAT_PROGRAM")
+    path = Path(named) if named else Path(os.path.abspath(__file__)).parent.parent / "_bin" / "anchorsplat"
+    if not os.access(path, os.X_OK):
+        why = "ANCHORSPLAT_PROGRAM names it" if named else "install the package again"
+        raise NotFoundError(f"{path}: the program of this package is not there; {why}")
+    return path
+
+
+@dataclass(frozen=True)
+class Engine:
+    """Which program makes the results: its version, and the hash of its bytes, which hold the built-in network, too."""
+
+    version: str
+    digest: str
+
+
+@functools.cache
+def engine() -> Engine:
+    path = program()
+    version = subprocess.run([path, "--version"], capture_output=True, text=True, check=True).stdout.split()[-1]
+    with open(path, "rb") as file:
+        return Engine(version, hashlib.file_digest(file, "sha256").hexdigest()[:16])
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a process of the program ended. `signal` is what killed it; `document` is its --json, None where it has none."""
+
+    code: int
+    signal: int
+    seconds: float
+    document: object
+    messages: list[str]
+
+    def error(self) -> dict[str, str]:
+        """Code and message for a row."""
+        if self.signal:
+            said = "; it said: " + " / ".join(self.messages[-3:]) if self.messages else ""
+            name = signal.strsignal(self.signal)
+            return {"code": "crash", "message": f"the program was ended by signal {self.signal} ({name}){said}"}
+        document = self.document
+        if isinstance(document, list) and document and isinstance(document[0], dict):
+            document = {"error": document[0].get("failure")}
+        told = document.get("error") if isinstance(document, dict) else None
+        if isinstance(told, dict) and "message" in told:
+            return {"code": str(told.get("code", "io")), "message": str(told["message"])}
+        name = CODES.get(self.code, ("io", Error))[0]
+        return {"code": name, "message": " / ".join(self.messages[-3:]) or f"the program ended with code {self.code}"}
+
+    def raise_for_code(self) -> None:
+        if self.code in CODES:
+            raise CODES[self.code][1](self.error()["message"])
+        if self.code or self.signal:
+            raise Error(self.error()["message"])
+
+
+def run(arguments: list[str], *, memory_limit: int = 0, timeout: float = 0, log: Path | None = None) -> Ended:
+    """Runs the program. It dies with this process, however that ends; KeyboardInterrupt stops it in good order first.
+
+    `memory_limit`: bytes that it may allocate, 0: any. `timeout`: seconds, 0: any. `log`: takes its stdout and stderr.
+    """
+    parent = os.getpid()
+
+    def die_with_parent() -> None:
+        _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != parent:
+            os._exit(1)
+
+    begin = time.perf_counter()
+    with contextlib.ExitStack() as opened:
+        process = subprocess.Popen(
+            [str(program()), *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=opened.enter_context(open(log, "wb")) if log else subprocess.PIPE,
+            stderr=subprocess.STDOUT if log else subprocess.PIPE,
+            preexec_fn=die_with_parent,
+        )
+    try:
+        if memory_limit:
+            resource.prlimit(process.pid, resource.RLIMIT_DATA, (memory_limit, memory_limit))
+        while True:
+            try:
+                out, err = process.communicate(timeout=_LOOK_UP)
+                break
+            except subprocess.TimeoutExpired:
+                if timeout and time.perf_counter() - begin > timeout:
+                    _stop(process)
+                    return Ended(6, 0, time.perf_counter() - begin, None, [f"took longer than {timeout:g} seconds"])
+    except BaseException:
+        _stop(process)
+        raise
+    text = (err or b"").decode("utf-8", "replace")[-_KEPT_MESSAGES:]
+    try:
+        document = json.loads(out) if out else None
+    except ValueError:
+        document = None
+    code = process.returncode
+    return Ended(max(code, 0), max(-code, 0), time.perf_counter() - begin, document, text.splitlines())
+
+
+def _stop(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.communicate(timeout=_WAIT_TO_STOP)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
+
+
+@dataclass(frozen=True)
+class Option:
+    """An option of a verb, as the program's --help has it."""
+
+    name: str  # "--pixel-size"
+    short: str  # "-w" or ""
+    kind: str  # "TEXT", "INT", "FLOAT"; "": a flag
+    several: bool  # takes more than one value
+
+
+_OPTION = re.compile(r"^ {2}(?:(-\w),)?(--[a-z][a-z0-9-]*)(?: (TEXT|INT|UINT|FLOAT)(\S*.*))?")
+
+
+@functools.cache
+def options(*verb: str) -> dict[str, Option]:
+    """What `anchorsplat VERB` takes, from its own --help: the one description of it."""
+    told = subprocess.run([program(), *verb, "--help"], capture_output=True, text=True, check=True).stdout
+    found = {}
+    for line in told.splitlines():
+        match = _OPTION.match(line)
+        if match and match[2] != "--help":
+            several = "..." in (match[4] or "")
+            found[match[2]] = Option(match[2], match[1] or "", match[3] or "", several)
+    return found

@@ -220,7 +220,15 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
     // Networks are chosen by it.
     if (says && !IsCompensated(input.cloud.render_mode)) {
       const auto estimate = EstimatePixelSize(input.cloud);
-      if (estimate.ok()) input.unlike_standard = estimate->unlike_standard;
+      if (estimate.ok()) {
+        input.unlike_standard = estimate->unlike_standard;
+        if (report.pixel_size > kSuspiciousRatio * estimate->high ||
+            report.pixel_size * kSuspiciousRatio < estimate->low) {
+          LogWarning(Cat("a training pixel of ", report.pixel_size, " was given, the splat itself looks like ",
+                         estimate->size, " (likely ", estimate->low, " to ", estimate->high,
+                         "): is it the world size of a pixel of the training views, in the splat's unit?"));
+        }
+      }
     }
   } else if (pictures) {
     return PixelSizesFromPictures(options, input, report);
@@ -243,12 +251,26 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
 
 // Splats of which neither file nor caller says how they were trained are looked at. An antialiased one becomes one.
 void RecogniseKind(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport& report) {
-  if (options.filter_strength || cloud.render_mode || HasLostNoWidth(cloud)) return;
+  if (options.filter_strength || HasLostNoWidth(cloud)) return;
+  if (cloud.render_mode) {
+    // Formats that have no word for Mip-Splatting tag its splats as antialiased.
+    const bool said = std::ranges::find(options.given, "mode") != options.given.end();
+    if (said || cloud.render_mode != RenderMode::kAntialiased) return;
+    if (FindTrainedKind(cloud) == TrainedKind::kWidened) report.looks = TrainedKind::kWidened;
+    return;
+  }
   report.looks = FindTrainedKind(cloud);
   if (report.looks == TrainedKind::kAntialiased) cloud.render_mode = RenderMode::kAntialiased;
 }
 
-void SayHowItLooks(TrainedKind looks) {
+void SayHowItLooks(TrainedKind looks, bool tagged) {
+  if (tagged) {
+    LogWarning(
+        "the splat is tagged antialiased, but even its thinnest Gaussians have a width, as Mip-Splatting and enhancing "
+        "give them: it has lost none, and none is given back (--mode mip if it is of Mip-Splatting, --mode antialiased "
+        "to enhance it as it is tagged)");
+    return;
+  }
   switch (looks) {
     case TrainedKind::kAntialiased:
       LogWarning(
@@ -374,7 +396,9 @@ bool GivesWidth(double strength, double upscale, std::optional<RenderMode> mode)
 
 // The filter's strength and the pixel sizes, for methods that work with them.
 Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
-  if (report.looks && options.upscale > 1) SayHowItLooks(*report.looks);
+  if (report.looks && options.upscale > 1) {
+    SayHowItLooks(*report.looks, report.looks == TrainedKind::kWidened && input.cloud.render_mode.has_value());
+  }
   input.filter_strength = ChooseStrength(options, input.cloud, report.looks);
   report.filter_strength = input.filter_strength;
   const bool gives_width = GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode);

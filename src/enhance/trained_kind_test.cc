@@ -179,6 +179,18 @@ TEST(TrainedKind, EnhanceActsOnIt) {
   const Enhanced believed = run(said);
   EXPECT_FALSE(believed.report.looks);
   EXPECT_EQ(believed.report.filter_strength, DefaultFilterStrength(4));
+  // Formats without a word for Mip-Splatting tag it antialiased. What the user says is believed.
+  said.render_mode = RenderMode::kAntialiased;
+  const Enhanced mistagged = run(said);
+  EXPECT_EQ(mistagged.report.looks, TrainedKind::kWidened);
+  EXPECT_EQ(mistagged.cloud.log_scales, wide.log_scales);
+  EXPECT_EQ(mistagged.cloud.render_mode, RenderMode::kAntialiased);
+  GaussianCloud thin = Made(0.3, 0);
+  thin.render_mode = RenderMode::kAntialiased;
+  EXPECT_FALSE(run(thin).report.looks);
+  options.given = {"mode"};
+  EXPECT_FALSE(run(said).report.looks);
+  options.given.clear();
   options.filter_strength = 0.5;
   EXPECT_FALSE(run(wide).report.looks);
 }

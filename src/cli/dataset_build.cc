@@ -158,9 +158,10 @@ void AddDatasetBuild(CLI::App& parent, Program& program) {
       ->check(NotEmpty());
   verb.add_option("--creator", flags->creator, "Creator of meshes that name none")->check(NotEmpty());
   verb.add_flag("--retry", flags->retry, "Try again what failed in an earlier run");
-  verb.add_flag("--plan", flags->plan,
-                "Make nothing: bring the lists up to date, write a job per object that is wanted, and print them as JSON "
-                "(`anchorsplat batch dataset` runs them on many machines)");
+  verb.add_flag(
+      "--plan", flags->plan,
+      "Make nothing: bring the lists up to date, write a job per object that is wanted, and print them as JSON "
+      "(`anchorsplat batch dataset` runs them on many machines)");
   flags->views.AddTo(verb);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunBuild(*flags, program); }; });
 }

@@ -82,7 +82,8 @@ Status RunEval(const EvalFlags& flags, Program& program) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<std::string> objects, ObjectsToEvaluate(flags.benchmark, options));
     nlohmann::json words = nlohmann::json::array();
     for (size_t k = 0; k < methods.size(); ++k) {
-      words.push_back({{"word", flags.choose_f ? methods[k].name : flags.methods[k]}, {"file", FileStem(methods[k].name)}});
+      words.push_back(
+          {{"word", flags.choose_f ? methods[k].name : flags.methods[k]}, {"file", FileStem(methods[k].name)}});
     }
     PrintJson({{"objects", objects}, {"methods", words}});
     return {};

@@ -44,8 +44,7 @@ class JsonSink : public LogSink {
  private:
   // One write each, so that lines stay whole.
   static void Line(const nlohmann::json& line) {
-    const std::string text =
-        CleanJson(line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)) + "\n";
+    const std::string text = CleanJson(line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)) + "\n";
     std::fwrite(text.data(), 1, text.size(), stderr);
     std::fflush(stderr);
   }

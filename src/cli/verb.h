@@ -18,9 +18,9 @@ namespace anchorsplat {
 struct SharedFlags {
   bool overwrite = false;
   bool quiet = false;
-  bool json = false;  // stdout carries one JSON document and nothing else
+  bool json = false;           // stdout carries one JSON document and nothing else
   bool json_progress = false;  // and stderr one for each event (json_sink.h)
-  int threads = 0;    // 0: the whole machine
+  int threads = 0;             // 0: the whole machine
   uint64_t seed = 0;
 };
 

@@ -41,7 +41,7 @@ def test_the_console_script_is_the_native_program(python, biplane, program, tmp_
 def test_the_native_program_says_where_python_verbs_come_from(program):
     for verb in ("serve", "batch"):
         said = program(verb, "--any", "thing", code=2).stderr
-        assert f"pip install 'anchorsplat[{verb}]'" in said
+        assert f"pip install '.[{verb}]'" in said
 
 
 def test_a_verb_whose_packages_are_missing_says_so(python):

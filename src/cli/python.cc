@@ -17,8 +17,8 @@ void AddPython(CLI::App& app, Program& program) {
     verb.callback([verb_name = std::string(name), &program] {
       program.run = [verb_name]() -> Status {
         return Error{ErrorCode::kBadArgument,
-                     Cat(verb_name, " is part of the Python package: pip install 'anchorsplat[", verb_name,
-                         "]', and the anchorsplat that this installs has it")};
+                     Cat(verb_name, " is part of the Python package: pip install '.[", verb_name,
+                         "]' in the sources, and the anchorsplat that this installs has it (docs/python.md)")};
       };
     });
   }

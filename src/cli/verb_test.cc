@@ -134,9 +134,9 @@ TEST(CommandLine, ProgressAsJson) {
 }
 
 TEST(CommandLine, VerbsOfThePythonPackageSayWhereTheyAre) {
-  ExpectRefused({"serve"}, ErrorCode::kBadArgument, {"pip install 'anchorsplat[serve]'"});
-  ExpectRefused({"serve", "--port", "1", "x"}, ErrorCode::kBadArgument, {"pip install 'anchorsplat[serve]'"});
-  ExpectRefused({"batch", "enhance", "a.ply", "--out", "b"}, ErrorCode::kBadArgument, {"anchorsplat[batch]"});
+  ExpectRefused({"serve"}, ErrorCode::kBadArgument, {"pip install '.[serve]'"});
+  ExpectRefused({"serve", "--port", "1", "x"}, ErrorCode::kBadArgument, {"pip install '.[serve]'"});
+  ExpectRefused({"batch", "enhance", "a.ply", "--out", "b"}, ErrorCode::kBadArgument, {"'.[batch]'"});
 }
 
 TEST(CommandLine, ErrorsAreDocumentsToo) {

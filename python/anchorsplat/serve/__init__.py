@@ -21,12 +21,12 @@ def main(argv: list[str] | None = None) -> int:
     missing = [name for name in _NEEDED if importlib.util.find_spec(name) is None]
     if missing:
         print(
-            f"error: 'serve' needs {', '.join(missing)}: pip install \"anchorsplat[serve]\" brings all of it",
+            f"error: 'serve' needs {', '.join(missing)}: pip install 'anchorsplat[serve]' brings all of it",
             file=sys.stderr,
         )
         return 2
     if settings.ray is not None and importlib.util.find_spec("ray") is None:
-        print('error: --ray needs Ray: pip install "anchorsplat[batch]" brings it', file=sys.stderr)
+        print("error: --ray needs Ray: pip install 'anchorsplat[batch]' brings it", file=sys.stderr)
         return 2
     from .server import run
 

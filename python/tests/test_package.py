@@ -46,8 +46,9 @@ def test_the_native_program_says_where_python_verbs_come_from(program):
 
 def test_a_verb_whose_packages_are_missing_says_so(python):
     hide = "import sys; sys.modules.update(dict.fromkeys(['fastapi', 'uvicorn', 'ray', 'fsspec', 'prometheus_client'])); "
-    for verb in ("serve", "batch"):
-        done = python(hide + f"from anchorsplat._program import main; sys.exit(main(['{verb}', 'x']))")
+    for words in (["serve"], ["batch", "enhance", "a.ply", "--out", "b"]):
+        verb = words[0]
+        done = python(hide + f"from anchorsplat._program import main; sys.exit(main({words}))")
         assert done.returncode == 2, done.stderr
         assert f"pip install 'anchorsplat[{verb}]'" in done.stderr
 

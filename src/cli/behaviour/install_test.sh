@@ -76,7 +76,7 @@ for verb in enhance info render convert compare eval view views fit train doctor
   expect 0 "help of $verb" "$program" $verb --help
   section=$(awk -v title=".SH \"anchorsplat $verb\"" '$0 == title {on = 1; next} /^\.SH/ {on = 0} on' <<<"$page")
   for option in $(grep -oE '^  (-[a-zA-Z],)?--[a-z0-9-]+' "$work/stdout" | grep -oE -- '--[a-z0-9-]+' | sort -u); do
-    case "$option" in --help | --overwrite | --quiet | --json | --threads | --seed) continue ;; esac
+    case "$option" in --help | --overwrite | --quiet | --json | --progress | --threads | --seed) continue ;; esac
     expect 0 "$option of $verb in the manual page" grep -qF -- "$option" <(printf '%s' "$section")
   done
 done

@@ -222,8 +222,8 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
       const auto estimate = EstimatePixelSize(input.cloud);
       if (estimate.ok()) {
         input.unlike_standard = estimate->unlike_standard;
-        if (report.pixel_size > kSuspiciousRatio * estimate->high ||
-            report.pixel_size * kSuspiciousRatio < estimate->low) {
+        // Too small ones harm nobody.
+        if (report.pixel_size > kSuspiciousRatio * estimate->high) {
           LogWarning(Cat("a training pixel of ", report.pixel_size, " was given, the splat itself looks like ",
                          estimate->size, " (likely ", estimate->low, " to ", estimate->high,
                          "): is it the world size of a pixel of the training views, in the splat's unit?"));

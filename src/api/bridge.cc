@@ -104,7 +104,8 @@ Camera ToCamera(const PinholeCamera& camera) {
   return {.name = camera.name,
           .image = {},
           .intrinsics = {camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy},
-          .world_to_camera = {camera.rotation, camera.translation}};
+          .world_to_camera = {camera.rotation, camera.translation},
+          .photograph = {}};
 }
 
 PinholeCamera ToPinhole(const Camera& camera) {

@@ -73,4 +73,19 @@ std::filesystem::path FindPicture(std::span<const std::filesystem::path> folders
   return {};
 }
 
+std::filesystem::path FindMask(std::span<const std::filesystem::path> folders, const std::string& relative) {
+  for (const auto& folder : folders) {
+    for (const auto& masks : {folder.parent_path() / "masks", folder / "masks"}) {
+      if (!IsFolder(masks)) continue;
+      for (const std::string& name : {relative + ".png", ViewName(relative) + ".png"}) {
+        auto path = (masks / name).lexically_normal();
+        if (!IsFile(path)) continue;
+        RecordInput(path);
+        return path;
+      }
+    }
+  }
+  return {};
+}
+
 }  // namespace anchorsplat

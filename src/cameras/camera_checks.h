@@ -30,4 +30,8 @@ std::string ViewName(const std::string& image_path);
 // if there is none at all.
 std::filesystem::path FindPicture(std::span<const std::filesystem::path> folders, const std::string& relative);
 
+// The mask of a picture: `masks` beside the folder that pictures are looked for in, or within it, holds NAME.EXT.png as
+// COLMAP has it, or NAME.png; empty if there is none.
+std::filesystem::path FindMask(std::span<const std::filesystem::path> folders, const std::string& relative);
+
 }  // namespace anchorsplat

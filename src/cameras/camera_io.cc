@@ -8,6 +8,7 @@
 #include "cameras/colmap_model.h"
 #include "cameras/inria_cameras.h"
 #include "cameras/parse_cameras.h"
+#include "cameras/poses_bounds.h"
 #include "cameras/transforms_json.h"
 #include "core/file_system.h"
 #include "core/text.h"
@@ -51,10 +52,12 @@ Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder) {
     candidates.push_back(model);
     break;
   }
+  // LLFF makes its file from a COLMAP model, which knows the lens and the points, too.
+  if (candidates.empty() && Exists(folder / "poses_bounds.npy")) return ReadPosesBounds(folder / "poses_bounds.npy");
   if (candidates.empty()) {
     return Error{ErrorCode::kNotFound,
                  Cat(folder.string(),
-                     ": no cameras here: expected transforms.json, cameras.json or a COLMAP model "
+                     ": no cameras here: expected transforms.json, cameras.json, poses_bounds.npy or a COLMAP model "
                      "(cameras and images as .bin or .txt, also in sparse/0 or sparse)")};
   }
   if (candidates.size() > 1) {
@@ -83,7 +86,7 @@ Result<CameraSet> ReadCameras(const std::filesystem::path& path) {
     return Error{ErrorCode::kNotFound,
                  Cat(folder.string(), ": a COLMAP model needs both cameras and images, as .bin or .txt")};
   }
-  return ReadCameraJson(path);
+  return path.extension() == ".npy" ? ReadPosesBounds(path) : ReadCameraJson(path);
 }
 
 }  // namespace anchorsplat

@@ -114,9 +114,9 @@ Result<ColmapCameras> ReadColmapCamerasBinary(const std::filesystem::path& path)
     ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(height, "a camera's height"));
     std::vector<double> params(model->params);
     for (double& param : params) ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(param, "a camera's parameters"));
-    auto pinhole = PinholeFromColmap(*model, width, height, params);
-    if (!pinhole.ok()) return stream.Complain(Cat("camera ", id, ": ", pinhole.error().message));
-    if (!cameras.emplace(id, *std::move(pinhole)).second) return stream.Complain(Cat("camera ", id, " is there twice"));
+    auto camera = CameraFromColmap(*model, width, height, params);
+    if (!camera.ok()) return stream.Complain(Cat("camera ", id, ": ", camera.error().message));
+    if (!cameras.emplace(id, *std::move(camera)).second) return stream.Complain(Cat("camera ", id, " is there twice"));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(ExpectEnd(stream));
   return cameras;
@@ -139,7 +139,7 @@ Result<std::vector<Camera>> ReadColmapImagesBinary(const std::filesystem::path& 
     for (double& x : image.translation) ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(x, "an image's translation"));
     ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(image.camera, "an image's camera"));
     ANCHORSPLAT_RETURN_IF_ERROR(stream.ReadName(image.name));
-    auto camera = CameraFromColmap(image, cameras, picture_folders);
+    auto camera = ViewFromColmap(image, cameras, picture_folders);
     if (!camera.ok()) return stream.Complain(camera.error().message);
     views.push_back(*std::move(camera));
     ANCHORSPLAT_RETURN_IF_ERROR(stream.ReadCount(points, kPoint, "an image's number of points"));

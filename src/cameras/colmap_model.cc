@@ -5,7 +5,9 @@
 #include <system_error>
 
 #include "cameras/camera_checks.h"
+#include "cameras/undistortion.h"
 #include "core/file_system.h"
+#include "core/finite.h"
 #include "core/text.h"
 #include "images/image_io.h"
 
@@ -15,18 +17,18 @@ namespace {
 
 // COLMAP's src/colmap/sensor/models.h.
 constexpr ColmapCameraModel kModels[] = {
-    {0, "SIMPLE_PINHOLE", 1, 3, false},
-    {1, "PINHOLE", 2, 4, false},
-    {2, "SIMPLE_RADIAL", 1, 4, false},
-    {3, "RADIAL", 1, 5, false},
-    {4, "OPENCV", 2, 8, false},
-    {5, "OPENCV_FISHEYE", 2, 8, true},
-    {6, "FULL_OPENCV", 2, 12, false},
-    {7, "FOV", 2, 5, false},
-    {8, "SIMPLE_RADIAL_FISHEYE", 1, 4, true},
-    {9, "RADIAL_FISHEYE", 1, 5, true},
-    {10, "THIN_PRISM_FISHEYE", 2, 12, true},
-    {11, "RAD_TAN_THIN_PRISM_FISHEYE", 2, 16, true},
+    {0, "SIMPLE_PINHOLE", 1, 3, LensModel::kStraight, true},
+    {1, "PINHOLE", 2, 4, LensModel::kStraight, true},
+    {2, "SIMPLE_RADIAL", 1, 4, LensModel::kRadial, true},
+    {3, "RADIAL", 1, 5, LensModel::kRadial, true},
+    {4, "OPENCV", 2, 8, LensModel::kRadial, true},
+    {5, "OPENCV_FISHEYE", 2, 8, LensModel::kFisheye, true},
+    {6, "FULL_OPENCV", 2, 12, LensModel::kRadial, true},
+    {7, "FOV", 2, 5, LensModel::kRadial, false},
+    {8, "SIMPLE_RADIAL_FISHEYE", 1, 4, LensModel::kFisheye, true},
+    {9, "RADIAL_FISHEYE", 1, 5, LensModel::kFisheye, true},
+    {10, "THIN_PRISM_FISHEYE", 2, 12, LensModel::kFisheye, false},
+    {11, "RAD_TAN_THIN_PRISM_FISHEYE", 2, 16, LensModel::kFisheye, false},
 };
 
 Error BadModel(std::string sentence) { return Error{ErrorCode::kBadFile, std::move(sentence)}; }
@@ -44,12 +46,16 @@ const ColmapCameraModel* FindColmapCameraModel(const std::string& name) {
   return found == std::end(kModels) ? nullptr : found;
 }
 
-Result<Pinhole> PinholeFromColmap(const ColmapCameraModel& model, uint64_t width, uint64_t height,
-                                  std::span<const double> params) {
+Result<ColmapCamera> CameraFromColmap(const ColmapCameraModel& model, uint64_t width, uint64_t height,
+                                      std::span<const double> params) {
   const std::string undistort = "; undistort the images first, e.g. colmap image_undistorter";
-  if (model.fisheye) return BadModel(Cat("camera model ", model.name, " is not a pinhole camera", undistort));
-  for (const double distortion : params.subspan(model.focals + 2)) {
-    if (distortion != 0) {
+  const std::span<const double> bent = params.subspan(model.focals + 2);
+  if (!model.undone) {
+    if (model.lens == LensModel::kFisheye) {
+      return BadModel(Cat("camera model ", model.name, " is not a lens that is known here", undistort));
+    }
+    for (const double distortion : bent) {
+      if (distortion == 0) continue;
       return BadModel(
           Cat("lens distortion ", distortion, " of camera model ", model.name, " is not supported", undistort));
     }
@@ -60,18 +66,40 @@ Result<Pinhole> PinholeFromColmap(const ColmapCameraModel& model, uint64_t width
   const Pinhole c{static_cast<int>(width),  static_cast<int>(height), params[0],
                   params[model.focals - 1], params[model.focals],     params[model.focals + 1]};
   ANCHORSPLAT_RETURN_IF_ERROR(CheckIntrinsics(c));
-  return c;
+  if (!model.undone) return ColmapCamera{c, {}};
+  Lens lens{.model = model.lens};
+  const bool tangential = model.lens == LensModel::kRadial && bent.size() >= 4;  // OPENCV, FULL_OPENCV: k1 k2 p1 p2 …
+  for (size_t i = 0; i < bent.size(); ++i) {
+    if (!tangential || i < 2) {
+      lens.radial[i] = bent[i];
+    } else if (i < 4) {
+      lens.tangential[i - 2] = bent[i];
+    } else if (i == 4) {
+      lens.radial[2] = bent[i];
+    } else {
+      lens.denominator[i - 5] = bent[i];
+    }
+  }
+  if (lens.IsStraight()) return ColmapCamera{c, {}};
+  if (!AllFinite(lens.radial) || !AllFinite(lens.denominator) || !AllFinite(lens.tangential)) {
+    return BadModel("lens distortion is not finite");
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Pinhole straight, StraightPinhole(lens, c));
+  return ColmapCamera{straight, {.lens = lens, .intrinsics = c, .mask = {}}};
 }
 
-Result<Camera> CameraFromColmap(const ColmapImage& image, const ColmapCameras& cameras,
-                                std::span<const std::filesystem::path> picture_folders) {
+Result<Camera> ViewFromColmap(const ColmapImage& image, const ColmapCameras& cameras,
+                              std::span<const std::filesystem::path> picture_folders) {
   const std::string who = Cat("image \"", Printable(image.name), "\": ");
   if (ViewName(image.name).empty()) return BadModel("image without a name");
-  const auto intrinsics = cameras.find(image.camera);
-  if (intrinsics == cameras.end()) return BadModel(Cat(who, "camera ", image.camera, " is not in the list of cameras"));
+  const auto camera = cameras.find(image.camera);
+  if (camera == cameras.end()) return BadModel(Cat(who, "camera ", image.camera, " is not in the list of cameras"));
   auto pose = PoseFromUnitQuaternion(image.quaternion, image.translation);
   if (!pose.ok()) return BadModel(who + pose.error().message);
-  return Camera{ViewName(image.name), FindPicture(picture_folders, image.name), intrinsics->second, *std::move(pose)};
+  Camera view{ViewName(image.name), FindPicture(picture_folders, image.name), camera->second.straight, *std::move(pose),
+              camera->second.photograph};
+  view.photograph.mask = FindMask(picture_folders, image.name);
+  return view;
 }
 
 bool IsColmapModel(const std::filesystem::path& folder) {

@@ -20,13 +20,19 @@ struct ColmapCameraModel {
   const char* name;
   size_t focals;
   size_t params;
-  bool fisheye;  // not a pinhole even where every distortion parameter is zero
+  LensModel lens;
+  bool undone;  // whether its distortion is known here; else it must be zero, and the lens no fisheye
 };
 const ColmapCameraModel* FindColmapCameraModel(int id);  // nullptr: unknown
 const ColmapCameraModel* FindColmapCameraModel(const std::string& name);
 
-// Cameras of a sparse model by their COLMAP id.
-using ColmapCameras = std::map<uint32_t, Pinhole>;
+// A camera of a sparse model: the pinhole that its pictures are undone to, and how they come.
+struct ColmapCamera {
+  Pinhole straight;
+  Photograph photograph;
+};
+// By their COLMAP id.
+using ColmapCameras = std::map<uint32_t, ColmapCamera>;
 
 // A registered image as its file gives it.
 struct ColmapImage {
@@ -37,16 +43,17 @@ struct ColmapImage {
 };
 
 // The two below give sentences without file and place, which their callers know. Errors: kBadFile.
-Result<Pinhole> PinholeFromColmap(const ColmapCameraModel& model, uint64_t width, uint64_t height,
-                                  std::span<const double> params);
-Result<Camera> CameraFromColmap(const ColmapImage& image, const ColmapCameras& cameras,
-                                std::span<const std::filesystem::path> picture_folders);
+Result<ColmapCamera> CameraFromColmap(const ColmapCameraModel& model, uint64_t width, uint64_t height,
+                                      std::span<const double> params);
+Result<Camera> ViewFromColmap(const ColmapImage& image, const ColmapCameras& cameras,
+                              std::span<const std::filesystem::path> picture_folders);
 
 // Whether the folder holds cameras.bin and images.bin, or the two as .txt.
 bool IsColmapModel(const std::filesystem::path& folder);
 
 // A sparse model: binary where both kinds are there, as COLMAP itself prefers it. Pictures are looked for in `images`
-// beside the model and up to two folders above it (PROJECT/sparse/0 → PROJECT/images). Order as in the file.
+// beside the model and up to two folders above it (PROJECT/sparse/0 → PROJECT/images), masks in `masks` beside
+// `images`: a picture's name with .png behind it, as COLMAP has it, or in place of its extension. Order as in the file.
 // Errors: kNotFound, kIo; kBadFile with byte or line.
 Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder);
 

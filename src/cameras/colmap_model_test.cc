@@ -9,6 +9,7 @@
 #include <fstream>
 #include <limits>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -135,16 +136,39 @@ TEST(Colmap, StraightModelsArePinholes) {
   }
 }
 
-TEST(Colmap, BentModelsAreRefusedByName) {
+// Parameters go where COLMAP's models have them.
+TEST(Colmap, LensesAreRead) {
+  const Lens radial{.model = LensModel::kRadial}, fisheye{.model = LensModel::kFisheye};
+  const auto lens = [](Lens l, std::array<double, 4> k, std::array<double, 2> p, std::array<double, 3> d) {
+    l.radial = k, l.tangential = p, l.denominator = d;
+    return l;
+  };
+  const std::tuple<const char*, const char*, Lens> models[] = {
+      {"SIMPLE_RADIAL", "50 21 14 0.01", lens(radial, {0.01}, {}, {})},
+      {"RADIAL", "50 21 14 0.01 -0.02", lens(radial, {0.01, -0.02}, {}, {})},
+      {"OPENCV", "50 60 21 14 0.01 0.02 0.003 -0.004", lens(radial, {0.01, 0.02}, {0.003, -0.004}, {})},
+      {"FULL_OPENCV", "50 60 21 14 .01 .02 .003 .004 .05 .06 .07 .08",
+       lens(radial, {0.01, 0.02, 0.05}, {0.003, 0.004}, {0.06, 0.07, 0.08})},
+      {"OPENCV_FISHEYE", "50 60 21 14 0.01 0.02 0.03 0.04", lens(fisheye, {0.01, 0.02, 0.03, 0.04}, {}, {})},
+      {"SIMPLE_RADIAL_FISHEYE", "50 21 14 0.01", lens(fisheye, {0.01}, {}, {})},
+      {"RADIAL_FISHEYE", "50 21 14 0 0", fisheye},
+  };
+  for (const auto& [model, params, expected] : models) {
+    const TestFolder folder;
+    const auto set = ReadText(folder, std::string("7 ") + model + " 40 30 " + params, "1 1 0 0 0 0 0 0 7 a.png\n\n");
+    ASSERT_TRUE(set.ok()) << set.error().message;
+    const Camera& camera = set->cameras[0];
+    EXPECT_EQ(camera.photograph.lens, expected) << model;
+    const Pinhole& bent = camera.photograph.intrinsics;
+    EXPECT_EQ(bent.width, 40);
+    EXPECT_EQ(bent.cx, 21);
+    EXPECT_EQ(camera.intrinsics.fx, bent.fx) << "the pinhole keeps the focal length";
+  }
+}
+
+TEST(Colmap, UnknownLensesAreRefusedByName) {
   const std::pair<const char*, const char*> models[] = {
-      {"SIMPLE_RADIAL", "50 21 14 0.01"},
-      {"RADIAL", "50 21 14 0 1e-12"},
-      {"OPENCV", "50 50 21 14 0 0 0 -0.1"},
-      {"FULL_OPENCV", "50 50 21 14 0 0 0 0 0 0 0 1"},
       {"FOV", "50 50 21 14 0.9"},
-      {"OPENCV_FISHEYE", "50 50 21 14 0 0 0 0"},
-      {"SIMPLE_RADIAL_FISHEYE", "50 21 14 0"},
-      {"RADIAL_FISHEYE", "50 21 14 0 0"},
       {"THIN_PRISM_FISHEYE", "50 50 21 14 0 0 0 0 0 0 0 0"},
       {"RAD_TAN_THIN_PRISM_FISHEYE", "50 50 21 14 0 0 0 0 0 0 0 0 0 0 0 0"},
   };

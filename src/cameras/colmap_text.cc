@@ -1,10 +1,10 @@
-#include <charconv>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "cameras/colmap_model.h"
 #include "core/finite.h"
+#include "core/number_text.h"
 #include "core/text.h"
 #include "core/words.h"
 #include "io/file_bytes.h"
@@ -53,7 +53,7 @@ class Lines {
 template <typename T>
 Status TakeNumber(const Lines& lines, std::string_view& line, const char* what, T& out) {
   const std::string_view word = TakeWord(line);
-  const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), out);
+  const auto [end, code] = FromChars(word.data(), word.data() + word.size(), out);
   if (word.empty()) return lines.Complain(Cat("ends before ", what));
   if (code != std::errc() || end != word.data() + word.size()) {
     return lines.Complain(Cat("expected ", what, ", found \"", Printable(std::string(word)), "\""));
@@ -68,7 +68,7 @@ Status CheckPoints(const Lines& lines, std::string_view line) {
   for (std::string_view word = TakeWord(line); !word.empty(); word = TakeWord(line)) {
     ++count;
     double number = 0;
-    const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), number);
+    const auto [end, code] = FromChars(word.data(), word.data() + word.size(), number);
     if (code == std::errc::invalid_argument || end != word.data() + word.size()) {
       return lines.Complain(Cat("expected the image's points (X Y POINT3D_ID), found \"", Printable(std::string(word)),
                                 "\"; every image has two lines, the second of which may be empty"));
@@ -101,9 +101,9 @@ Result<ColmapCameras> ReadColmapCamerasText(const std::filesystem::path& path) {
       ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(lines, line, Cat(model->params, " parameters of ", name).c_str(), param));
     }
     if (!TakeWord(line).empty()) return lines.Complain(Cat(name, " has ", model->params, " parameters, found more"));
-    auto pinhole = PinholeFromColmap(*model, width, height, params);
-    if (!pinhole.ok()) return lines.Complain(Cat("camera ", id, ": ", pinhole.error().message));
-    if (!cameras.emplace(id, *std::move(pinhole)).second) return lines.Complain(Cat("camera ", id, " is there twice"));
+    auto camera = CameraFromColmap(*model, width, height, params);
+    if (!camera.ok()) return lines.Complain(Cat("camera ", id, ": ", camera.error().message));
+    if (!cameras.emplace(id, *std::move(camera)).second) return lines.Complain(Cat("camera ", id, " is there twice"));
   }
   return cameras;
 }
@@ -127,7 +127,7 @@ Result<std::vector<Camera>> ReadColmapImagesText(const std::filesystem::path& pa
     ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(lines, line, "the camera's id", image.camera));
     // The rest of the line: names may have spaces inside.
     image.name = Trimmed(line);
-    auto camera = CameraFromColmap(image, cameras, picture_folders);
+    auto camera = ViewFromColmap(image, cameras, picture_folders);
     if (!camera.ok()) return lines.Complain(camera.error().message);
     views.push_back(*std::move(camera));
     if (lines.Next(line)) ANCHORSPLAT_RETURN_IF_ERROR(CheckPoints(lines, line));

@@ -18,6 +18,7 @@ Result<Camera> ReadCamera(const JsonValue& entry, std::span<const std::filesyste
   camera.name = ViewName(name);
   if (camera.name.empty() || name.find('\0') != std::string::npos) return img_name.Complain("expected an image's name");
   camera.image = FindPicture(picture_folders, name);
+  camera.photograph.mask = FindMask(picture_folders, name);
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue width, entry.Get("width"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue height, entry.Get("height"));

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "cameras/camera_checks.h"
+#include "cameras/undistortion.h"
+#include "core/file_system.h"
 #include "core/text.h"
 #include "images/image_io.h"
 
@@ -42,39 +44,63 @@ Result<std::optional<double>> FindFocal(const JsonValue& frame, const JsonValue&
   return std::optional<double>();
 }
 
-// Only straight lenses: a renderer that ignored the distortion would compare every pixel with its neighbour.
-Status RefuseDistortion(const JsonValue& frame, const JsonValue& root) {
-  std::string model = "OPENCV";
+// A frame's own number, else the file's; 0 where neither has it.
+Result<double> NumberOrZero(const JsonValue& frame, const JsonValue& root, const char* key) {
+  const auto value = FindEither(frame, root, key);
+  if (!value || value->raw().is_null()) return 0.0;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const double number, value->Number());
+  if (!std::isfinite(number)) return value->Complain(Cat("lens distortion ", number, ", expected a finite number"));
+  return number;
+}
+
+// The lens by `camera_model` (OPENCV where nobody says), nerfstudio's k1 … k4, p1, p2 or its list `distortion_params`
+// of the same six, which wins as there; and FULL_OPENCV's k5, k6, which make k4 … k6 the terms of its denominator.
+Result<Lens> ReadLens(const JsonValue& frame, const JsonValue& root) {
+  Lens lens{.model = LensModel::kRadial};
+  bool full = false;
   if (const auto value = FindEither(frame, root, "camera_model")) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(model, value->Text());
-    bool straight = false;
-    for (const char* known : {"PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV"}) {
-      straight = straight || model == known;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string model, value->Text());
+    full = model == "FULL_OPENCV";
+    bool known = full;
+    for (const char* name : {"PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "PERSPECTIVE"}) {
+      known = known || model == name;
     }
-    if (!straight) return value->Complain(Cat("camera model ", Printable(model), " is not a pinhole camera"));
+    if (model == "OPENCV_FISHEYE" || model == "FISHEYE" || model == "SIMPLE_RADIAL_FISHEYE" ||
+        model == "RADIAL_FISHEYE") {
+      lens.model = LensModel::kFisheye;
+    } else if (!known) {
+      return value->Complain(
+          Cat("camera model ", Printable(model), " is not a lens that is known here; undistort the images first"));
+    }
   }
   if (const auto value = FindEither(frame, root, "is_fisheye"); value && value->raw() == true) {
-    return value->Complain("a fisheye lens is not a pinhole camera");
+    lens.model = LensModel::kFisheye;
   }
-  const auto refuse = [&model](const JsonValue& value, double number) {
-    return value.Complain(Cat("lens distortion ", number, " (camera model ", model,
-                              ") is not supported; undistort the images first, e.g. colmap image_undistorter"));
-  };
-  // nerfstudio's list of all of them.
+  std::array<double, 8> k{};  // k1 … k6, p1, p2
+  constexpr std::array<const char*, 8> kNames = {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"};
+  for (size_t i = 0; i < kNames.size(); ++i) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(k[i], NumberOrZero(frame, root, kNames[i]));
+  }
   if (const auto list = FindEither(frame, root, "distortion_params"); list && !list->raw().is_null()) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> numbers, list->Elements());
-    for (const JsonValue& value : numbers) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const double number, value.Number());
-      if (number != 0) return refuse(value, number);
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> values, list->Elements());
+    if (values.size() > 6) return list->Complain(Cat("expected k1, k2, k3, k4, p1, p2, found ", values.size()));
+    k = {};
+    for (size_t i = 0; i < values.size(); ++i) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const double number, values[i].Number());
+      if (!std::isfinite(number)) return values[i].Complain("lens distortion is not finite");
+      k[i < 4 ? i : i + 2] = number;
     }
   }
-  for (const char* key : {"k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"}) {
-    const auto value = FindEither(frame, root, key);
-    if (!value) continue;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double number, value->Number());
-    if (number != 0) return refuse(*value, number);
+  full = full || k[4] != 0 || k[5] != 0;
+  lens.radial = {k[0], k[1], k[2], full ? 0 : k[3]};
+  if (full) lens.denominator = {k[3], k[4], k[5]};
+  lens.tangential = {k[6], k[7]};
+  if (lens.model == LensModel::kFisheye) {
+    if (full || k[6] != 0 || k[7] != 0) {
+      return frame.Complain("a fisheye lens with k5, k6, p1 or p2; only k1 to k4 are known of it");
+    }
   }
-  return {};
+  return lens.IsStraight() ? Lens{} : lens;
 }
 
 Result<Pinhole> ReadIntrinsics(const JsonValue& frame, const JsonValue& root, const std::filesystem::path& picture) {
@@ -122,7 +148,46 @@ Result<Pose> ReadPose(const JsonValue& matrix) {
   return pose;
 }
 
-Result<Camera> ReadFrame(const JsonValue& frame, const JsonValue& root, const std::filesystem::path& folder) {
+// The frame's `mask_path`, else what lies in the folder `masks`.
+Result<std::filesystem::path> FindMaskOf(const JsonValue& frame, const std::filesystem::path& folder,
+                                         const std::string& picture) {
+  const auto value = frame.Find("mask_path");
+  if (!value || value->raw().is_null()) {
+    const std::filesystem::path relative(picture);
+    const std::filesystem::path pictures = (folder / relative).lexically_normal().parent_path();
+    return FindMask({&pictures, 1}, relative.filename().string());
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string path, value->Text());
+  if (path.empty() || path.find('\0') != std::string::npos) return value->Complain("expected the path of a mask");
+  auto found = FindPicture({&folder, 1}, path);
+  // Without its mask a picture would be taken for right where it is said to be wrong.
+  if (found.empty() && IsFolder(folder)) {
+    return value->Complain(Cat("there is no mask ", Printable(path), " in ", folder.string()));
+  }
+  return found;
+}
+
+// Frames mostly share one lens, and to find its pinhole takes a while.
+class StraightPinholes {
+ public:
+  Result<Pinhole> Of(const Lens& lens, const Pinhole& bent, const JsonValue& frame) {
+    if (last_ && last_->lens == lens && last_->bent == bent) return last_->straight;
+    auto straight = StraightPinhole(lens, bent);
+    if (!straight.ok()) return frame.Complain(straight.error().message);
+    last_ = {lens, bent, *straight};
+    return *straight;
+  }
+
+ private:
+  struct Known {
+    Lens lens;
+    Pinhole bent, straight;
+  };
+  std::optional<Known> last_;
+};
+
+Result<Camera> ReadFrame(const JsonValue& frame, const JsonValue& root, const std::filesystem::path& folder,
+                         StraightPinholes& straight) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue file_path, frame.Get("file_path"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string path, file_path.Text());
   if (ViewName(path).empty() || path.find('\0') != std::string::npos) {
@@ -131,8 +196,14 @@ Result<Camera> ReadFrame(const JsonValue& frame, const JsonValue& root, const st
   Camera camera;
   camera.name = ViewName(path);
   camera.image = FindPicture({&folder, 1}, path);
-  ANCHORSPLAT_RETURN_IF_ERROR(RefuseDistortion(frame, root));
   ANCHORSPLAT_ASSIGN_OR_RETURN(camera.intrinsics, ReadIntrinsics(frame, root, camera.image));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Lens lens, ReadLens(frame, root));
+  if (!lens.IsStraight()) {
+    camera.photograph.lens = lens;
+    camera.photograph.intrinsics = camera.intrinsics;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(camera.intrinsics, straight.Of(lens, camera.intrinsics, frame));
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(camera.photograph.mask, FindMaskOf(frame, folder, path));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue matrix, frame.Get("transform_matrix"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(camera.world_to_camera, ReadPose(matrix));
   return camera;
@@ -150,11 +221,17 @@ Result<CameraSet> CamerasFromTransforms(const JsonValue& root, const std::filesy
     }
     set.background = {static_cast<float>(rgb[0]), static_cast<float>(rgb[1]), static_cast<float>(rgb[2])};
   }
+  if (const auto points = root.Find("ply_file_path"); points && !points->raw().is_null()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string path, points->Text());
+    if (path.find('\0') != std::string::npos) return points->Complain("expected the path of a PLY");
+    if (!path.empty()) set.points = (folder / path).lexically_normal();
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue frames, root.Get("frames"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> elements, frames.Elements());
   if (elements.empty()) return frames.Complain("expected at least one frame");
+  StraightPinholes straight;
   for (const JsonValue& frame : elements) {
-    auto camera = ReadFrame(frame, root, folder);
+    auto camera = ReadFrame(frame, root, folder, straight);
     if (!camera.ok()) return frame.Named(camera.error(), "file_path");
     set.cameras.push_back(*std::move(camera));
   }

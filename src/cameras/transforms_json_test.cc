@@ -108,6 +108,35 @@ TEST(TransformsJson, FramesOverrideTheFile) {
   EXPECT_TRUE(set->cameras[0].image.empty());
 }
 
+TEST(TransformsJson, LensesMasksAndPoints) {
+  const TestFolder folder;
+  std::filesystem::create_directories(folder / "masks");
+  ASSERT_TRUE(WritePng(folder / "m.png", Image(8, 8, 1)).ok());
+  const auto lens_of = [&](const std::string& words) {
+    const auto set = ReadText(folder, OneFrame(R"("w": 8, "h": 8, "fl_x": 10, )" + words));
+    EXPECT_TRUE(set.ok()) << set.error().message;
+    return set->cameras[0].photograph.lens;
+  };
+  Lens lens{.model = LensModel::kRadial, .radial = {0.1, 0.2, 0.3, 0.4}, .tangential = {0.01, 0.02}};
+  EXPECT_EQ(lens_of(R"("k1": 0.1, "k2": 0.2, "k3": 0.3, "k4": 0.4, "p1": 0.01, "p2": 0.02)"), lens);
+  EXPECT_EQ(lens_of(R"("k1": 9, "distortion_params": [0.1, 0.2, 0.3, 0.4, 0.01, 0.02])"), lens);
+  EXPECT_EQ(lens_of(R"("camera_model": "PINHOLE", "k1": 0)"), Lens{});
+  const Lens full{.model = LensModel::kRadial, .radial = {0.1, 0, 0, 0}, .denominator = {0.4, 0, 0.5}};
+  EXPECT_EQ(lens_of(R"("camera_model": "FULL_OPENCV", "k1": 0.1, "k4": 0.4, "k6": 0.5)"), full);
+  lens = {.model = LensModel::kFisheye, .radial = {0.1, 0, 0, 0.4}};
+  EXPECT_EQ(lens_of(R"("camera_model": "OPENCV_FISHEYE", "k1": 0.1, "k4": 0.4)"), lens);
+  EXPECT_EQ(lens_of(R"("is_fisheye": true, "k1": 0.1, "k4": 0.4)"), lens);
+  EXPECT_EQ(lens_of(R"("camera_model": "OPENCV_FISHEYE")"), Lens{.model = LensModel::kFisheye});
+
+  const std::string good = R"("w": 8, "h": 8, "fl_x": 10, "ply_file_path": "sparse_pc.ply")";
+  auto set = ReadText(folder, OneFrame(good, R"("mask_path": "./m.png")"));
+  ASSERT_TRUE(set.ok()) << set.error().message;
+  EXPECT_EQ(set->cameras[0].photograph.mask, folder / "m.png");
+  EXPECT_EQ(set->points, folder / "sparse_pc.ply");
+  set = ReadText(folder, OneFrame(good));
+  EXPECT_TRUE(set->cameras[0].photograph.mask.empty());
+}
+
 TEST(TransformsJson, MalformedFilesSayWhatIsWrong) {
   const TestFolder folder;
   const std::string good = R"("w": 8, "h": 8, "fl_x": 10)";
@@ -143,15 +172,16 @@ TEST(TransformsJson, MalformedFilesSayWhatIsWrong) {
       {OneFrame(good, R"("fl_x": NaN)"), "line 1"},
       {OneFrame(good, R"("fl_x": null)"), "expected a number, found null"},
       {OneFrame(R"("w": 8, "h": 8, "camera_angle_x": 3.2)"), "camera_angle_x: field of view"},
-      {OneFrame(good, R"("k1": 0.01)"), "OPENCV"},
-      {OneFrame(good, R"("p2": -1e-9)"), "distortion"},
-      {OneFrame(good, R"("distortion_params": [0, 0, 0, 0.1, 0, 0])"),
-       "frames[0].distortion_params[3]: lens distortion"},
-      {OneFrame(good + R"(, "distortion_params": [0.2])"), "lens distortion 0.2"},
+      {OneFrame(good, R"("k1": "x")"), "frames[0].k1"},
+      {OneFrame(good, R"("k1": 1e999)"), "1e999"},
+      {OneFrame(good, R"("distortion_params": [0, 0, 0, "x", 0, 0])"), "frames[0].distortion_params[3]"},
+      {OneFrame(good, R"("distortion_params": [0, 0, 0, 0, 0, 0, 1])"), "found 7"},
+      {OneFrame(good, R"("mask_path": "missing.png")"), "no mask missing.png"},
+      {OneFrame(good, R"("mask_path": 3)"), "mask_path: expected a string"},
+      {OneFrame(good + R"(, "ply_file_path": 3)"), "ply_file_path: expected a string"},
       {OneFrame(good, R"("distortion_params": 0.1)"), "distortion_params: expected an array"},
-      {OneFrame(good + R"(, "camera_model": "OPENCV_FISHEYE")"), "OPENCV_FISHEYE"},
       {OneFrame(good + R"(, "camera_model": "EQUIRECTANGULAR")"), "EQUIRECTANGULAR"},
-      {OneFrame(good + R"(, "is_fisheye": true)"), "fisheye"},
+      {OneFrame(good + R"(, "is_fisheye": true, "p1": 0.1)"), "fisheye"},
       {OneFrame(good + R"(, "background": [0, 0])"), "background: expected 3 numbers"},
       {OneFrame(good + R"(, "background": [0, 0, 255])"), "background"},
       {OneFrame(good + R"(, "background": "black")"), "background"},

@@ -5,6 +5,7 @@
 
 #include "cameras/camera_checks.h"
 #include "cameras/camera_io.h"
+#include "core/number_text.h"
 #include "core/text.h"
 #include "io/atomic_file.h"
 
@@ -38,7 +39,7 @@ double ShortestDouble(float value) {
   char text[64];
   const auto written = std::to_chars(text, text + sizeof text, value);
   double out = 0;
-  std::from_chars(text, written.ptr, out);
+  FromChars(text, written.ptr, out);
   return out;
 }
 

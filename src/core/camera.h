@@ -7,11 +7,12 @@
 #include <vector>
 
 #include "core/image.h"
+#include "core/lens.h"
 #include "core/result.h"
 
 namespace anchorsplat {
 
-// Pinhole intrinsics in pixels; pixel (0,0) covers [0,1)², its centre is at 0.5. No distortion.
+// Pinhole intrinsics in pixels; pixel (0,0) covers [0,1)², its centre is at 0.5.
 struct Pinhole {
   int width = 0;
   int height = 0;
@@ -19,6 +20,8 @@ struct Pinhole {
   double fy = 0;
   double cx = 0;
   double cy = 0;
+
+  friend bool operator==(const Pinhole&, const Pinhole&) = default;
 };
 
 // Rigid world-to-camera transform in OpenCV axes (x right, y down, z forward): p_camera = R·p_world + t.
@@ -27,23 +30,35 @@ struct Pose {
   std::array<double, 3> translation = {0, 0, 0};
 };
 
+// How the file of a view's picture becomes that picture, where it is more than decoding: turned as EXIF says, through
+// the lens, averaged, masked (cameras/photograph.h).
+struct Photograph {
+  Lens lens;
+  Pinhole intrinsics;          // of the file's picture, upright, behind the lens; width 0: the camera's own
+  int orientation = 1;         // EXIF's, 1 to 8: how the file's rows and columns are turned before all else
+  int downscale = 1;           // pixels of the picture per side that become one of the view
+  std::filesystem::path mask;  // picture that is black where nothing is to be compared; may be empty
+};
+
 struct Camera {
   std::string name;             // image path without extension, as the camera file gives it ("lr/001")
   std::filesystem::path image;  // the view's picture where the camera file knows one; may be empty
-  Pinhole intrinsics;
+  Pinhole intrinsics;           // of the view: what is rendered and compared
   Pose world_to_camera;
+  Photograph photograph;
 
   std::array<double, 3> Center() const;                                  // −Rᵀt, world
   std::array<double, 3> ToCamera(const std::array<double, 3>& p) const;  // R·p + t
 };
 
 // Which program's conventions a set of cameras came with; they differ in whether the size is the one trained at.
-enum class CameraSource { kUnknown, kTransforms, kInria, kColmap };
+enum class CameraSource { kUnknown, kTransforms, kInria, kColmap, kLlff };
 
 struct CameraSet {
   CameraSource source = CameraSource::kUnknown;
   std::vector<Camera> cameras;
   std::optional<std::array<float, 3>> background;  // rgb 0–1, where the file says which one the views have
+  std::filesystem::path points;                    // a PLY with points of the scene, where the file names one
 };
 
 // The same view with `factor` times as many pixels per side (width and height rounded, at least 1); the rays through

@@ -11,6 +11,7 @@
 
 #include "cameras/camera_io.h"
 #include "cameras/colmap_writer.h"
+#include "cameras/photograph.h"
 #include "core/parallel.h"
 #include "core/run_context.h"
 #include "core/text.h"
@@ -104,6 +105,7 @@ Result<ProjectCameras> MakeCameras(const fs::path& project, const std::vector<Ca
     Camera camera = view;
     camera.name = fs::path(view.name).filename().string();
     camera.image.clear();
+    camera.photograph = {};
     if (const auto [other, fresh] = taken.emplace(camera.name, view.name); !fresh) {
       return bad(Cat("views ", other->second, " and ", view.name, " would both become ", camera.name));
     }
@@ -124,11 +126,18 @@ Status WriteCameras(const fs::path& folder, const CameraSet& cameras, const Writ
   return WriteTransforms(folder / Cat("transforms_", size, ".json"), named, write);
 }
 
-// The high picture is the project's own where it is a PNG of the camera's size, so that no bit changes.
+// The high picture is the project's own where it is a PNG that the camera sees as it is, so that no bit changes.
 Status WritePictures(const Camera& source, const fs::path& high, const fs::path& low, const Pinhole& low_camera,
                      const WriteOptions& write) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Image image, ReadImage(source.image));
-  if (source.image.extension() == ".png") {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewPicture picture, ReadPhotograph(source));
+  if (!picture.ignored.empty()) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat(source.image.string(),
+                     ": a mask or a lens leaves out a part of the picture; data sets have no place "
+                     "for that")};
+  }
+  const Image& image = picture.image;
+  if (source.image.extension() == ".png" && source.photograph.lens.IsStraight() && source.photograph.orientation == 1) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(source.image, kMaxPictureBytes));
     ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(high, bytes, write.overwrite));
   } else {

@@ -7,6 +7,7 @@
 
 #include "cameras/camera_checks.h"
 #include "cameras/colmap_model.h"
+#include "cameras/photograph.h"
 #include "core/file_system.h"
 #include "core/text.h"
 #include "dataset/dataset_split.h"
@@ -72,13 +73,14 @@ bool SaysMoreThanACheckpoint(const ObjectSettings& s) {
 }
 
 Result<Image> ReadView(const Camera& camera) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, ReadImage(camera.image));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ViewPicture picture, ReadPhotograph(camera));
+  Image& image = picture.image;
   if (image.width != camera.intrinsics.width || image.height != camera.intrinsics.height) {
     return Error{ErrorCode::kBadFile,
                  Cat(camera.image.string(), ": has ", image.width, " x ", image.height, " pixels, its camera ",
                      camera.intrinsics.width, " x ", camera.intrinsics.height)};
   }
-  return image;
+  return std::move(image);
 }
 
 }  // namespace
@@ -142,7 +144,8 @@ Result<Scene> Scene::Open(const SceneEntry& entry) {
   const std::vector<fs::path> pictures = {high / "images"};
   for (const Camera& camera : cameras.cameras) {
     Camera view = camera;
-    view.intrinsics = intrinsics.begin()->second;
+    view.intrinsics = intrinsics.begin()->second.straight;
+    view.photograph = intrinsics.begin()->second.photograph;
     view.image = FindPicture(pictures, camera.name);
     scene.high_views_.push_back(std::move(view));
   }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "cameras/camera_io.h"
+#include "cameras/photograph.h"
 #include "core/file_system.h"
 #include "core/text.h"
 #include "dataset/scene_reader.h"
@@ -94,7 +95,10 @@ Status ReadExample(const fs::path& folder, BenchmarkObject& object) {
     if (!trained.contains(label(camera))) object.held_out.push_back(i);
   }
   object.views = std::move(high.cameras);
-  object.picture = [views = object.views](size_t view) { return ReadImage(views.at(view).image); };
+  object.picture = [views = object.views](size_t view) -> Result<Image> {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(ViewPicture picture, ReadPhotograph(views.at(view)));
+    return std::move(picture.image);
+  };
   return {};
 }
 

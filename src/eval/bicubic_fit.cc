@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "cameras/photograph.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/stopwatch.h"
@@ -32,7 +33,8 @@ constexpr int64_t kCheckpointEvery = 500;  // steps: about half a minute at 1024
 Status Enlarge(const Camera& camera, const Pinhole& high, const std::array<float, 3>& background,
                const fs::path& file) {
   if (Exists(file)) return {};
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Image image, ReadImage(camera.image));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewPicture picture, ReadPhotograph(camera));
+  const Image& image = picture.image;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Image large,
                                EnlargeBicubic(CompositeOver(image, background), high.width, high.height));
   return WritePng(file, large);
@@ -101,6 +103,7 @@ Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
     const fs::path file = pictures / Cat(i, ".png");
     ANCHORSPLAT_RETURN_IF_ERROR(Enlarge(camera, high, object.background, file));
     camera.image = file;
+    camera.photograph = {};
     camera.intrinsics = high;
   }
   views.held_out.clear();  // they have no enlarged pictures; the evaluation measures

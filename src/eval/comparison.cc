@@ -1,5 +1,7 @@
 #include "eval/comparison.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/log.h"
@@ -53,12 +55,33 @@ Status CheckSizes(std::span<ViewSource* const> sources, const std::vector<std::v
   return Error{ErrorCode::kBadArgument, Cat("pictures of different sizes: ", list, "; --size sets that of renders")};
 }
 
-Result<CorrectedScore> CorrectColors(Image image, const Image& truth, const Lpips* lpips) {
+// Makes both pictures the same where there is nothing to compare. The part of the pixels that is left, by which means
+// over all of them have to be divided.
+double LeaveOut(const Buffer<uint8_t>& ignored, const Image& truth, Image& image) {
+  int64_t left = truth.plane();
+  for (size_t i = 0; i < ignored.size(); ++i) {
+    if (ignored[i] == 0) continue;
+    --left;
+    for (int c = 0; c < 3; ++c) image.channel(c)[i] = truth.channel(c)[i];
+  }
+  return static_cast<double>(std::max<int64_t>(left, 1)) / static_cast<double>(truth.plane());
+}
+
+Status Measure(const Image& image, const Image& truth, double share, double& psnr, double& ssim) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(psnr, Psnr(image, truth));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ssim, Ssim(image, truth));
+  psnr += 10 * std::log10(share);
+  ssim = 1 - (1 - ssim) / share;
+  return {};
+}
+
+template <typename Function>
+Result<CorrectedScore> CorrectColors(Image image, const Image& truth, const Lpips* lpips, const Function& leave_out) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ColorMap map, FitColors(image, truth));
   ApplyColors(map, image);
+  const double share = leave_out(image);
   CorrectedScore score;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(score.psnr, Psnr(image, truth));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(score.ssim, Ssim(image, truth));
+  ANCHORSPLAT_RETURN_IF_ERROR(Measure(image, truth, share, score.psnr, score.ssim));
   if (lpips != nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, lpips->Distance(image, truth));
   }
@@ -95,13 +118,15 @@ Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> 
     for (size_t s = 0; s < sources.size(); ++s) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, sources[s]->Load(partners[s][r]));
       ViewScore score{name, 0, 0, std::nullopt};
-      ANCHORSPLAT_ASSIGN_OR_RETURN(score.psnr, Psnr(image, truth));
-      ANCHORSPLAT_ASSIGN_OR_RETURN(score.ssim, Ssim(image, truth));
+      const auto leave_out = [&](Image& shown) {
+        return LeaveOut(reference.ignored(), truth, shown) * LeaveOut(sources[s]->ignored(), truth, shown);
+      };
+      ANCHORSPLAT_RETURN_IF_ERROR(Measure(image, truth, leave_out(image), score.psnr, score.ssim));
       if (options.lpips != nullptr) {
         ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, options.lpips->Distance(image, truth));
       }
       if (options.color_correct) {
-        ANCHORSPLAT_ASSIGN_OR_RETURN(score.corrected, CorrectColors(std::move(image), truth, options.lpips));
+        ANCHORSPLAT_ASSIGN_OR_RETURN(score.corrected, CorrectColors(std::move(image), truth, options.lpips, leave_out));
       }
       out[s].views.push_back(score);
     }

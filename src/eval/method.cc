@@ -212,6 +212,10 @@ Status SetOption(RegisteredMethod& method, std::string_view key, std::string_vie
     return Error{ErrorCode::kBadArgument,
                  Cat("--methods ", Printable(method.word), ": which views are held out is the benchmark's to say")};
   }
+  if (key == "downscale") {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--methods ", Printable(method.word), ": how large pictures are is the benchmark's to say")};
+  }
   if (key == "copies" && value == "auto") return {};
   if (key == "copies" || key == "max-gaussians" || key == "merge-cost") {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double number, ParseCount(method.word, key, value));

@@ -2,14 +2,18 @@
 
 #include <algorithm>
 #include <cctype>
+#include <map>
+#include <system_error>
 #include <utility>
 
 #include "cameras/camera_checks.h"
+#include "cameras/photograph.h"
 #include "core/credit.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "images/image_io.h"
+#include "images/orientation.h"
 #include "io/input_record.h"
 #include "metrics/compare.h"
 #include "metrics/image_metrics.h"
@@ -62,27 +66,55 @@ class SplatViewSource : public ViewSource {
 
 class ImageViews : public ViewSource {
  public:
-  ImageViews(std::vector<fs::path> files, const std::array<float, 3>& background)
-      : files_(std::move(files)), background_(background) {
-    for (const fs::path& file : files_) names_.push_back(file.string());
+  // A file, and the camera whose picture it is; one without pixels where none is known.
+  struct View {
+    fs::path file;
+    Camera camera;
+  };
+  ImageViews(std::vector<View> views, const std::array<float, 3>& background)
+      : views_(std::move(views)), background_(background) {
+    for (const View& view : views_) names_.push_back(view.file.string());
   }
   const std::vector<std::string>& names() const override { return names_; }
   bool is_pictures() const override { return true; }
-  Result<ImageSize> SizeOf(size_t view) const override { return ReadImageSize(files_[view]); }
-  Result<Image> Load(size_t view) override {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const Image image, ReadImage(files_[view]));
-    return CompositeOver(image, background_);
+  Result<ImageSize> SizeOf(size_t view) const override {
+    const Pinhole& k = views_[view].camera.intrinsics;
+    if (k.width > 0) return ImageSize{k.width, k.height};
+    ANCHORSPLAT_ASSIGN_OR_RETURN(ImageSize size, ReadImageSize(views_[view].file));
+    if (SwapsSides(size.orientation)) std::swap(size.width, size.height);
+    return size;
   }
+  Result<Image> Load(size_t view) override {
+    ignored_.clear();
+    const View& wanted = views_[view];
+    if (wanted.camera.intrinsics.width > 0) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(ViewPicture picture, ReadPhotograph(wanted.camera));
+      ignored_ = std::move(picture.ignored);
+      return CompositeOver(picture.image, background_);
+    }
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize size, ReadImageSize(wanted.file));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, ReadImage(wanted.file));
+    return CompositeOver(Upright(std::move(image), size.orientation), background_);
+  }
+  const Buffer<uint8_t>& ignored() const override { return ignored_; }
   void KeepOnly(size_t view) override {
-    files_ = {files_[view]};
+    views_ = {views_[view]};
     names_ = {names_[view]};
   }
 
  private:
-  std::vector<fs::path> files_;
+  std::vector<View> views_;
   std::array<float, 3> background_;
   std::vector<std::string> names_;
+  Buffer<uint8_t> ignored_;
 };
+
+// One spelling for a file, however it was reached.
+std::string PlaceOf(const fs::path& file) {
+  std::error_code code;
+  const fs::path place = fs::weakly_canonical(file, code);
+  return code ? file.lexically_normal().string() : place.string();
+}
 
 }  // namespace
 
@@ -103,15 +135,28 @@ std::unique_ptr<ViewSource> MakeSplatViews(GaussianCloud cloud, CameraSet camera
   return std::make_unique<SplatViewSource>(std::move(cloud), std::move(cameras), options);
 }
 
-Result<std::unique_ptr<ViewSource>> OpenImageViews(const fs::path& path, const std::array<float, 3>& background) {
+Result<std::unique_ptr<ViewSource>> OpenImageViews(const fs::path& path, const std::array<float, 3>& background,
+                                                   const CameraSet& cameras) {
   std::vector<fs::path> files = {path};
   if (IsFolder(path)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(files, ListPictures(path));
   } else if (!Exists(path)) {
     return Error{ErrorCode::kNotFound, Cat(path.string(), ": no such file or folder")};
   }
-  for (const fs::path& file : files) RecordInput(file);
-  return std::unique_ptr<ViewSource>(std::make_unique<ImageViews>(std::move(files), background));
+  std::map<std::string, const Camera*> owners;
+  for (const Camera& camera : cameras.cameras) {
+    if (!camera.image.empty()) owners[PlaceOf(camera.image)] = &camera;
+  }
+  std::vector<ImageViews::View> views;
+  for (const fs::path& file : files) {
+    RecordInput(file);
+    ImageViews::View& view = views.emplace_back(ImageViews::View{file, {}});
+    const auto owner = owners.find(PlaceOf(file));
+    if (owner == owners.end()) continue;
+    view.camera = *owner->second;
+    ANCHORSPLAT_RETURN_IF_ERROR(MatchPhotograph(view.camera));
+  }
+  return std::unique_ptr<ViewSource>(std::make_unique<ImageViews>(std::move(views), background));
 }
 
 bool LooksLikeImages(const fs::path& path) {

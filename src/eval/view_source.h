@@ -25,6 +25,11 @@ class ViewSource {
   virtual Result<ImageSize> SizeOf(size_t view) const = 0;  // without rendering or decoding
   // Three channels in 0–1: renders are clamped and not quantised, files are byte/255 over the background.
   virtual Result<Image> Load(size_t view) = 0;
+  // Of the view that was loaded last: [H,W], 1 where a mask or a lens leaves nothing to compare; empty for nowhere.
+  virtual const Buffer<uint8_t>& ignored() const {
+    static const Buffer<uint8_t> nowhere;
+    return nowhere;
+  }
   // Whose what is shown is, as far as its file says so (core/credit.h).
   virtual std::vector<std::string> credits() const { return {}; }
   // Forgets all views but this one.
@@ -40,9 +45,12 @@ Result<size_t> FindView(const std::vector<std::string>& names, const std::string
 // Renders `cloud` through `cameras`; warns of the first view with nothing in it (render/shown_range.h).
 std::unique_ptr<ViewSource> MakeSplatViews(GaussianCloud cloud, CameraSet cameras, const RenderOptions& options);
 
-// A folder of PNG and JPEG pictures, or a single one. Errors: kNotFound, kBadFile (no pictures in the folder).
+// A folder of PNG and JPEG pictures, or a single one. Those that are the files of `cameras`' own pictures come as these
+// cameras see them: without the lens, with their masks (cameras/photograph.h); others upright as their EXIF says.
+// Errors: kNotFound, kBadFile (no pictures in the folder); those of MatchPhotograph.
 Result<std::unique_ptr<ViewSource>> OpenImageViews(const std::filesystem::path& path,
-                                                   const std::array<float, 3>& background);
+                                                   const std::array<float, 3>& background,
+                                                   const CameraSet& cameras = {});
 
 // True for a folder of pictures and for a file named .png, .jpg or .jpeg: what OpenImageViews takes.
 bool LooksLikeImages(const std::filesystem::path& path);

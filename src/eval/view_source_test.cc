@@ -2,11 +2,17 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "cameras/camera_io.h"
+#include "cameras/undistortion.h"
 #include "core/source_dir_for_test.h"
+#include "eval/comparison.h"
 #include "formats/cloud_io.h"
+#include "images/image_io.h"
+#include "io/folder_for_test.h"
 #include "metrics/image_metrics.h"
 #include "render/shown_range.h"
 
@@ -36,6 +42,50 @@ TEST(ViewSource, ShowsTheSameInAnyUnit) {
       EXPECT_GT(*psnr, 60) << unit;
     }
   }
+}
+
+// What the cameras' own pictures leave out does not count, whatever is there.
+TEST(ViewSource, CamerasOwnPicturesComeWithoutLensAndMasked) {
+  const TestFolder folder;
+  std::filesystem::create_directories(folder / "images");
+  Image picture(40, 30, 3), mask(40, 30, 1);
+  std::fill(picture.pixels.begin(), picture.pixels.end(), 0.25f);
+  std::fill(mask.pixels.begin(), mask.pixels.end(), 1.0f);
+  for (int x = 0; x < 40; ++x) {
+    for (int y = 0; y < 15; ++y) {
+      mask.at(0, y, x) = 0;
+      picture.at(0, y, x) = 1;
+    }
+  }
+  ASSERT_TRUE(WritePng(folder / "images/a.png", picture).ok());
+  ASSERT_TRUE(WritePng(folder / "mask.png", mask).ok());
+  Camera camera;
+  camera.name = "a";
+  camera.image = folder / "images/a.png";
+  camera.photograph.lens = {.model = LensModel::kRadial, .radial = {-0.1, 0, 0, 0}};
+  camera.photograph.intrinsics = {40, 30, 40, 40, 20, 15};
+  camera.photograph.mask = folder / "mask.png";
+  camera.intrinsics = *StraightPinhole(camera.photograph.lens, camera.photograph.intrinsics);
+  CameraSet cameras;
+  cameras.cameras = {camera};
+  const auto own = OpenImageViews(folder / "images" / ".." / "images", {0, 0, 0}, cameras);
+  ASSERT_TRUE(own.ok()) << own.error().message;
+  const auto size = (*own)->SizeOf(0);
+  ASSERT_TRUE(size.ok());
+  EXPECT_EQ(size->width, camera.intrinsics.width);
+  ASSERT_TRUE((*own)->Load(0).ok());
+  EXPECT_FALSE((*own)->ignored().empty());
+
+  Image shown(camera.intrinsics.width, camera.intrinsics.height, 3);
+  std::fill(shown.pixels.begin(), shown.pixels.end(), 0.35f);
+  std::filesystem::create_directories(folder / "shown");
+  ASSERT_TRUE(WritePng(folder / "shown/a.png", shown).ok());
+  const auto other = OpenImageViews(folder / "shown", {0, 0, 0}, cameras);
+  ASSERT_TRUE(other.ok());
+  ViewSource* const sources[] = {other->get()};
+  const auto compared = CompareToReference(sources, **own);
+  ASSERT_TRUE(compared.ok()) << compared.error().message;
+  EXPECT_NEAR((*compared)[0].mean_psnr, 20, 0.2) << "0.1 everywhere that is asked, in steps of 1/255";
 }
 
 }  // namespace

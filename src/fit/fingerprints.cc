@@ -24,6 +24,17 @@ std::string FingerprintOf(const std::vector<Camera>& cameras, double scene_scale
     print.Add(c.world_to_camera.rotation);
     print.Add(c.world_to_camera.translation);
     print.Add(std::array{k.fx, k.fy, k.cx, k.cy, static_cast<double>(k.width), static_cast<double>(k.height)});
+    const Photograph& photograph = c.photograph;
+    if (photograph.orientation != 1 || photograph.downscale != 1) {
+      print.Add(std::array{photograph.orientation, photograph.downscale});
+    }
+    if (photograph.lens.IsStraight()) continue;
+    const Pinhole& b = photograph.intrinsics;
+    print.Add(std::array{b.fx, b.fy, b.cx, b.cy, static_cast<double>(b.width), static_cast<double>(b.height)});
+    print.Add(std::array{static_cast<int>(photograph.lens.model)});
+    print.Add(photograph.lens.radial);
+    print.Add(photograph.lens.denominator);
+    print.Add(photograph.lens.tangential);
   }
   print.Add(std::array{scene_scale});
   return print.text();
@@ -41,6 +52,14 @@ Result<std::string> FingerprintOfPictures(const std::vector<Camera>& cameras) {
       }
       Fingerprint print;
       print.Add(file->bytes());
+      if (!cameras[i].photograph.mask.empty()) {
+        const auto mask = MappedFile::Open(cameras[i].photograph.mask);
+        if (!mask.ok()) {
+          read[i] = mask.error();
+          continue;
+        }
+        print.Add(mask->bytes());
+      }
       prints[i] = print.value();
     }
   });

@@ -48,7 +48,7 @@ Result<FitStep> Fitter::Step() {
   FitStep out;
   out.view = order_.At(step);
   const Camera& camera = pictures_.views()[static_cast<size_t>(out.view)];
-  ANCHORSPLAT_RETURN_IF_ERROR(pictures_.Load(out.view, picture_));
+  ANCHORSPLAT_RETURN_IF_ERROR(pictures_.Load(out.view, picture_, ignored_));
   times_.load += watch.Lap();
 
   ObjectiveOptions objective = options_.objective;
@@ -56,7 +56,9 @@ Result<FitStep> Fitter::Step() {
   objective.pixel = PixelModelAt(options_, step);
   objective.render.absgrad = options_.strategy == Strategy::kDefault && options_.densification.absgrad;
   const CloudView shown = options_.mip_filter ? filtered_.Of(state_.cloud, state_.mip_filter) : CloudView(state_.cloud);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Evaluate(objective, shown, camera, picture_, gradient_));
+  ANCHORSPLAT_RETURN_IF_ERROR(objective_.Show(objective, shown, camera));
+  FillIgnored(ignored_, objective_.rendered(), picture_);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Compare(objective, shown, picture_, gradient_));
   watch.Lap();
   if (options_.mip_filter) MipFilterBackward(state_.cloud, state_.mip_filter, gradient_);
   AddRegularizers(options_.regularizers, UnitOf(scene_scale_), state_.cloud, gradient_);

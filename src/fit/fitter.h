@@ -90,6 +90,7 @@ class Fitter {
   MipFiltered filtered_;
   CloudGradient gradient_;
   Image picture_;
+  Buffer<uint8_t> ignored_;  // of it
   FitTimes times_;
 };
 

@@ -2,10 +2,10 @@
 
 #include <utility>
 
+#include "cameras/photograph.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "formats/quantize.h"
-#include "images/image_io.h"
 
 namespace anchorsplat {
 
@@ -17,20 +17,22 @@ constexpr float kByte = 1.0f / 255;
 PictureCache::PictureCache(std::vector<Camera> views, const std::array<float, 3>& background, int64_t budget)
     : views_(std::move(views)), background_(background), left_(budget), stored_(views_.size()) {}
 
-Status PictureCache::Load(int64_t view, Image& picture) {
+Status PictureCache::Load(int64_t view, Image& picture, Buffer<uint8_t>& ignored) {
   Stored& kept = stored_[static_cast<size_t>(view)];
   const Camera& camera = views_[static_cast<size_t>(view)];
   const Pinhole& size = camera.intrinsics;
   if (kept.channels == 0) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const Image image, ReadImage(camera.image));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(ViewPicture read, ReadPhotograph(camera));
+    const Image& image = read.image;
     if (image.width != size.width || image.height != size.height) {
       return Error{ErrorCode::kBadFile, Cat(camera.image.string(), ": ", image.width, "x", image.height,
                                             " pixels, expected ", size.width, "x", size.height)};
     }
-    Stored fresh{image.channels, Buffer<uint8_t>(image.pixels.size())};
+    Stored fresh{image.channels, Buffer<uint8_t>(image.pixels.size()), std::move(read.ignored)};
     for (size_t i = 0; i < image.pixels.size(); ++i) fresh.pixels[i] = QuantizeByte(image.pixels[i] * 255);
     Unpack(fresh, size, picture);
-    const auto bytes = static_cast<int64_t>(fresh.pixels.size());
+    ignored = fresh.ignored;
+    const auto bytes = static_cast<int64_t>(fresh.pixels.size() + fresh.ignored.size());
     if (bytes <= left_) {
       left_ -= bytes;
       kept = std::move(fresh);
@@ -38,7 +40,15 @@ Status PictureCache::Load(int64_t view, Image& picture) {
     return {};
   }
   Unpack(kept, size, picture);
+  ignored = kept.ignored;
   return {};
+}
+
+void FillIgnored(const Buffer<uint8_t>& ignored, const Image& shown, Image& picture) {
+  for (size_t i = 0; i < ignored.size(); ++i) {
+    if (ignored[i] == 0) continue;
+    for (int c = 0; c < picture.channels; ++c) picture.channel(c)[i] = shown.channel(c)[i];
+  }
 }
 
 void PictureCache::Unpack(const Stored& stored, const Pinhole& size, Image& picture) const {

@@ -11,9 +11,9 @@
 
 namespace anchorsplat {
 
-// The pictures of views, decoded when first asked for and kept as bytes while they fit into `budget`. What does not fit
-// is decoded each time: with views in random order no other choice of what to keep would be asked for more often. One
-// object per thread of control.
+// The pictures of views, decoded and undone of their lens when first asked for (cameras/photograph.h) and kept as bytes
+// while they fit into `budget`. What does not fit is made each time: with views in random order no other choice of what
+// to keep would be asked for more often. One object per thread of control.
 class PictureCache {
  public:
   static constexpr int64_t kDefaultBudget = int64_t{4} << 30;  // bytes: 20,000 pictures of 256², 1,300 of 1024²
@@ -23,14 +23,15 @@ class PictureCache {
 
   const std::vector<Camera>& views() const { return views_; }
 
-  // The picture of views()[view] as [3,H,W] in 0–1. Errors: those of ReadImage; kBadFile when the picture has not its
-  // camera's size.
-  Status Load(int64_t view, Image& picture);
+  // The picture of views()[view] as [3,H,W] in 0–1, and where it says nothing: [H,W], 1 there, empty for nowhere.
+  // Errors: those of ReadPhotograph; kBadFile when the picture has not its camera's size.
+  Status Load(int64_t view, Image& picture, Buffer<uint8_t>& ignored);
 
  private:
   struct Stored {
     int channels = 0;        // 3, or 4 with alpha; 0: not kept
     Buffer<uint8_t> pixels;  // [C,H,W]
+    Buffer<uint8_t> ignored;
   };
   void Unpack(const Stored& stored, const Pinhole& size, Image& picture) const;
 
@@ -39,5 +40,8 @@ class PictureCache {
   int64_t left_;  // bytes of the budget
   std::vector<Stored> stored_;
 };
+
+// Takes what `shown` has where nothing is asked of `picture`, so that the two do not differ there.
+void FillIgnored(const Buffer<uint8_t>& ignored, const Image& shown, Image& picture);
 
 }  // namespace anchorsplat

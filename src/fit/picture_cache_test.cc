@@ -41,21 +41,36 @@ TEST(PictureCache, KeepsWhatFitsAndGivesTheSameEitherWay) {
   const std::vector<Camera> views = {ViewOf(folder / "a.png", 17, 9), ViewOf(folder / "b.png", 13, 11)};
   PictureCache all(views, background), one(views, background, 17 * 9 * 3 + 100), none(views, background, 0);
   Image picture;
+  Buffer<uint8_t> ignored;
   for (PictureCache* cache : {&all, &one, &none}) {
     for (int round = 0; round < 2; ++round) {
-      ASSERT_TRUE(cache->Load(0, picture).ok());
+      ASSERT_TRUE(cache->Load(0, picture, ignored).ok());
       ExpectSamePicture(picture, plain);
-      ASSERT_TRUE(cache->Load(1, picture).ok());
+      ASSERT_TRUE(cache->Load(1, picture, ignored).ok());
       ExpectSamePicture(picture, CompositeOver(covered, background));
     }
   }
   // Without their files, only those can be had that are kept.
   std::filesystem::remove(folder / "a.png");
   std::filesystem::remove(folder / "b.png");
-  EXPECT_TRUE(all.Load(0, picture).ok() && all.Load(1, picture).ok());
-  EXPECT_TRUE(one.Load(0, picture).ok());
-  EXPECT_EQ(one.Load(1, picture).error().code, ErrorCode::kNotFound);
-  EXPECT_EQ(none.Load(0, picture).error().code, ErrorCode::kNotFound);
+  EXPECT_TRUE(all.Load(0, picture, ignored).ok() && all.Load(1, picture, ignored).ok());
+  EXPECT_TRUE(one.Load(0, picture, ignored).ok());
+  EXPECT_EQ(one.Load(1, picture, ignored).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(none.Load(0, picture, ignored).error().code, ErrorCode::kNotFound);
+}
+
+TEST(PictureCache, WhatIsIgnoredDoesNotDiffer) {
+  Image picture(3, 1, 3), shown(3, 1, 3);
+  std::fill(picture.pixels.begin(), picture.pixels.end(), 0.0f);
+  std::fill(shown.pixels.begin(), shown.pixels.end(), 0.5f);
+  FillIgnored({}, shown, picture);
+  EXPECT_EQ(picture.at(0, 0, 1), 0);
+  Buffer<uint8_t> ignored(3, 0);
+  ignored[1] = 1;
+  FillIgnored(ignored, shown, picture);
+  for (int c = 0; c < 3; ++c) {
+    for (int x = 0; x < 3; ++x) EXPECT_EQ(picture.at(c, 0, x), x == 1 ? 0.5f : 0);
+  }
 }
 
 TEST(PictureCache, APictureOfAnotherSizeIsAnError) {
@@ -63,7 +78,8 @@ TEST(PictureCache, APictureOfAnotherSizeIsAnError) {
   ASSERT_TRUE(WritePng(folder / "a.png", RandomBytes(5, 4, 3, 1)).ok());
   PictureCache cache({ViewOf(folder / "a.png", 4, 5)}, {0, 0, 0});
   Image picture;
-  const Status status = cache.Load(0, picture);
+  Buffer<uint8_t> ignored;
+  const Status status = cache.Load(0, picture, ignored);
   EXPECT_EQ(status.error().code, ErrorCode::kBadFile);
   EXPECT_NE(status.error().message.find("5x4 pixels, expected 4x5"), std::string::npos) << status.error().message;
 }

@@ -7,10 +7,12 @@
 #include <utility>
 
 #include "cameras/camera_io.h"
+#include "cameras/photograph.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
-#include "images/image_io.h"
+#include "formats/ply/ply_points.h"
+#include "io/input_file.h"
 
 namespace anchorsplat {
 
@@ -20,7 +22,7 @@ namespace fs = std::filesystem;
 
 // Whether a folder is a project by itself, not only a folder of them.
 bool HasCameras(const fs::path& folder) {
-  for (const char* name : {"transforms.json", "transforms_train.json", "cameras.json"}) {
+  for (const char* name : {"transforms.json", "transforms_train.json", "cameras.json", "poses_bounds.npy"}) {
     if (Exists(folder / name)) return true;
   }
   return IsColmapModel(folder / "sparse" / "0") || IsColmapModel(folder / "sparse") || IsColmapModel(folder);
@@ -43,22 +45,9 @@ fs::path SmallestResolution(const fs::path& folder) {
   return found;
 }
 
-// A camera for the picture as it is.
-Status MatchPicture(Camera& camera) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize size, ReadImageSize(camera.image));
-  Pinhole& k = camera.intrinsics;
-  if (size.width == k.width && size.height == k.height) return {};
-  const double x = static_cast<double>(size.width) / k.width, y = static_cast<double>(size.height) / k.height;
-  if (std::abs(k.width * y - size.width) >= 1 && std::abs(k.height * x - size.height) >= 1) {
-    return Error{ErrorCode::kBadFile, Cat(camera.image.string(), ": the picture has ", size.width, "x", size.height,
-                                          " pixels, its camera ", k.width, "x", k.height, ", which is another shape")};
-  }
-  k = {size.width, size.height, k.fx * x, k.fy * y, k.cx * x, k.cy * y};
-  return {};
-}
-
 // The set's cameras with pictures, by name; the names of the others are added to `without`.
-Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source, std::vector<std::string>& without) {
+Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source, int downscale,
+                                         std::vector<std::string>& without) {
   std::vector<Camera> views;
   for (Camera& camera : set.cameras) {
     if (!camera.image.empty()) {
@@ -76,7 +65,7 @@ Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source, 
                    " views have no picture and are left out"));
   }
   std::stable_sort(views.begin(), views.end(), [](const Camera& a, const Camera& b) { return a.name < b.name; });
-  for (Camera& view : views) ANCHORSPLAT_RETURN_IF_ERROR(MatchPicture(view));
+  for (Camera& view : views) ANCHORSPLAT_RETURN_IF_ERROR(MatchPhotograph(view, downscale));
   return views;
 }
 
@@ -87,6 +76,27 @@ fs::path ModelFolder(const fs::path& project) {
     if (IsColmapModel(model)) return model;
   }
   return {};
+}
+
+// A PLY of points; of an empty path there are none.
+Status ReadPoints(const fs::path& path, InitialPoints& points) {
+  if (path.empty()) return {};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(PlyPoints read, ReadPlyPoints(file));
+  points = {std::move(read.positions), std::move(read.colors)};
+  return {};
+}
+
+// Those of a sparse model as COLMAP writes it, else as 3DGS leaves them beside it. There may be none.
+Status ReadPointsOfModel(const fs::path& model, InitialPoints& points) {
+  const auto read = ReadColmapPoints(model);
+  if (read.ok()) {
+    points = PointsOf(*read);
+    return {};
+  }
+  if (read.error().code != ErrorCode::kNotFound) return read.error();
+  const fs::path ply = model / "points3D.ply";
+  return Exists(ply) ? ReadPoints(ply, points) : Status();
 }
 
 void HoldOut(int every, std::vector<Camera> views, TrainingViews& out) {
@@ -121,31 +131,30 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
   if (Exists(train_file)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(train_file));
     out.background = set.background;
+    const fs::path points = set.points;
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views,
-                                 WithPictures(std::move(set), train_file, out.without_picture));
+                                 WithPictures(std::move(set), train_file, options.downscale, out.without_picture));
     out.scene_scale = SceneScale(views);
     if (Exists(test_file)) {
       out.train = std::move(views);
       ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet test, ReadCameras(test_file));
-      ANCHORSPLAT_ASSIGN_OR_RETURN(out.held_out, WithPictures(std::move(test), test_file, out.without_picture));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(out.held_out,
+                                   WithPictures(std::move(test), test_file, options.downscale, out.without_picture));
     } else {
       HoldOut(options.hold_out, std::move(views), out);
     }
+    ANCHORSPLAT_RETURN_IF_ERROR(ReadPoints(points, out.points));
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(source));
     out.background = set.background;
     const bool colmap = set.source == CameraSource::kColmap;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views, WithPictures(std::move(set), source, out.without_picture));
+    const fs::path points = set.points;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views,
+                                 WithPictures(std::move(set), source, options.downscale, out.without_picture));
     out.scene_scale = SceneScale(views);
     HoldOut(options.hold_out, std::move(views), out);
-    if (colmap) {
-      const auto points = ReadColmapPoints(ModelFolder(source));
-      if (points.ok()) {
-        out.points = PointsOf(*points);
-      } else if (points.error().code != ErrorCode::kNotFound) {
-        return points.error();
-      }
-    }
+    ANCHORSPLAT_RETURN_IF_ERROR(colmap ? ReadPointsOfModel(ModelFolder(source), out.points)
+                                       : ReadPoints(points, out.points));
   }
   if (out.train.empty()) {
     return Error{ErrorCode::kBadArgument,

@@ -28,17 +28,20 @@ struct ProjectOptions {
   // Views whose place in the order of names is a multiple of this are held out; 0: none are. Projects with a
   // transforms_test.json hold out those instead.
   int hold_out = 8;
+  int downscale = 1;  // pixels of a picture per side that become one, their mean; 1 to kMostDownscale
 };
 
 // Opens a project: a folder with transforms_train.json and perhaps transforms_test.json (NeRF-synthetic), a COLMAP
-// project (sparse/0, images), a transforms.json or cameras.json or its folder, or a folder of such folders named by
-// resolution (256/ and 1024/, or 200/ and 800/), of which the smallest is taken. Views of the camera file without a
-// picture are left out with a warning.
+// project (sparse/0, images), a transforms.json, cameras.json or poses_bounds.npy or its folder, or a folder of such
+// folders named by resolution (256/ and 1024/, or 200/ and 800/), of which the smallest is taken. Views of the camera
+// file without a picture are left out with a warning.
 //
-// Pictures of another size than the camera file says are taken as scaled ones when the shape agrees.
+// Cameras are those of the pictures that PictureCache gives: upright, without the lens, averaged down
+// (cameras/photograph.h). Pictures of another size than the camera file says are taken as scaled ones when the shape
+// agrees. Points are those of a COLMAP model (points3D.bin, .txt or .ply), or of the PLY that a transforms.json names.
 //
-// Errors: those of ReadCameras and ReadColmapPoints; kNotFound when no view has a picture; kBadFile for a picture of
-// another shape than its camera; kBadArgument when hold_out leaves nothing to train on.
+// Errors: those of ReadCameras, ReadColmapPoints, ReadPlyPoints and MatchPhotograph; kNotFound when no view has a
+// picture, or when the PLY is missing; kBadArgument when hold_out leaves nothing to train on.
 Result<TrainingViews> OpenProject(const std::filesystem::path& project, const ProjectOptions& options = {});
 
 // Where a fit's first Gaussians stand.

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "fit/orbit_scene_for_test.h"
+#include "fit/picture_cache.h"
 #include "io/folder_for_test.h"
 
 namespace anchorsplat {
@@ -54,6 +55,45 @@ TEST(TrainingViews, ColmapProject) {
   EXPECT_EQ(OpenProject(folder.path()).error().code, ErrorCode::kBadFile);
   fs::remove(folder / "sparse/0/points3D.txt");
   EXPECT_EQ(OpenProject(folder.path())->points.size(), 0);
+}
+
+TEST(TrainingViews, LensMaskPointsAndDownscale) {
+  const TestFolder folder;
+  WriteColmap(folder.path(), 4);
+  fs::remove(folder / "sparse/0/cameras.txt");
+  Put(folder / "sparse/0/cameras.txt", "1 OPENCV 8 6 10 11 4 3 -0.1 0.01 0 0\n");
+  Image mask(8, 6, 1);
+  std::fill(mask.pixels.begin(), mask.pixels.end(), 0.0f);
+  std::fill(mask.pixels.begin(), mask.pixels.begin() + 16, 1.0f);  // the two upper rows are shown
+  fs::create_directories(folder / "masks");
+  ASSERT_TRUE(WritePng(folder / "masks/v11.png.png", mask).ok());
+  Put(folder / "sparse/0/points3D.ply",
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
+      "1 2 3 255 0 51\nnan 0 0 0 0 0\n4 5 6 0 255 0\n");
+  const auto views = OpenProject(folder.path(), {.hold_out = 0});
+  ASSERT_TRUE(views.ok()) << views.error().message;
+  EXPECT_EQ(views->points.size(), 2);
+  EXPECT_NEAR(views->points.colors[2], 0.2, 1e-6);
+  const Pinhole& k = views->train[0].intrinsics;
+  EXPECT_EQ(k.fx, 10);
+  PictureCache cache(views->train, {0, 0, 0});
+  Image picture;
+  Buffer<uint8_t> ignored;
+  ASSERT_TRUE(cache.Load(0, picture, ignored).ok());
+  EXPECT_EQ(picture.width, k.width);
+  EXPECT_TRUE(ignored.empty());
+  for (int round = 0; round < 2; ++round) {  // made, and kept
+    ASSERT_TRUE(cache.Load(1, picture, ignored).ok());
+    ASSERT_EQ(ignored.size(), static_cast<size_t>(k.width * k.height));
+    EXPECT_EQ(ignored.front(), 0);
+    EXPECT_EQ(ignored.back(), 1);
+  }
+  const auto half = OpenProject(folder.path(), {.hold_out = 0, .downscale = 2});
+  ASSERT_TRUE(half.ok()) << half.error().message;
+  EXPECT_EQ(half->train[0].intrinsics, (Pinhole{k.width / 2, k.height / 2, k.fx / 2, k.fy / 2, k.cx / 2, k.cy / 2}));
+  Put(folder / "sparse/0/points3D.ply", "ply\n");
+  EXPECT_TRUE(OpenProject(folder.path()).ok() == false);
 }
 
 TEST(TrainingViews, SmallestResolutionOfADataset) {

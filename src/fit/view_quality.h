@@ -17,7 +17,8 @@ struct ViewQuality {
   double ssim = 0;  // of metrics/image_metrics.h
 };
 
-// Over all views of `pictures`, pixels as `pixel` says. Errors: those of Rasterizer and PictureCache.
+// Over all views of `pictures`, pixels as `pixel` says; ignored ones do not count. Errors: those of Rasterizer and
+// PictureCache.
 Result<ViewQuality> MeasureQuality(const GaussianCloud& cloud, const RenderOptions& options, PictureCache& pictures,
                                    const PixelModel& pixel = {});
 

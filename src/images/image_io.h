@@ -11,13 +11,16 @@
 namespace anchorsplat {
 
 // Reads a PNG or JPEG (found by content) as floats value/255 (16-bit: /65535): 3 channels, or 4 where the file has
-// alpha. Grey becomes rgb. Errors: kNotFound, kIo, kBadFile.
+// alpha. Grey becomes rgb, a palette the colours in it, CMYK of a JPEG rgb without a profile: (1 − c)·(1 − k). Rows and
+// columns are those of the file: an EXIF orientation is for the caller to apply (images/orientation.h).
+// Errors: kNotFound, kIo, kBadFile.
 Result<Image> ReadImage(const std::filesystem::path& path);
 
-// Width and height without decoding the pixels.
+// Width and height as stored, without decoding the pixels, and EXIF's orientation, 1 to 8, where the file has one.
 struct ImageSize {
   int width = 0;
   int height = 0;
+  int orientation = 1;
 };
 Result<ImageSize> ReadImageSize(const std::filesystem::path& path);
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/text.h"
+#include "images/orientation.h"
 
 namespace anchorsplat {
 
@@ -56,7 +57,7 @@ void OnProgress(j_common_ptr info) {
   std::longjmp(reader->jump, 1);
 }
 
-bool ReadHeader(JpegReader& reader, std::FILE* file) {
+bool ReadHeader(JpegReader& reader, std::FILE* file, bool keep_exif = false) {
   reader.errors.error_exit = Fail;
   reader.errors.emit_message = OnMessage;
   reader.progress.progress_monitor = OnProgress;
@@ -65,8 +66,29 @@ bool ReadHeader(JpegReader& reader, std::FILE* file) {
   jpeg_create_decompress(&reader.info);
   reader.info.progress = &reader.progress;
   jpeg_stdio_src(&reader.info, file);
+  if (keep_exif) jpeg_save_markers(&reader.info, JPEG_APP0 + 1, 0xFFFF);
   jpeg_read_header(&reader.info, TRUE);
   return true;
+}
+
+// Without inks' profile. Adobe's programs store how much of an ink is left out.
+void StoreCmyk(const JSAMPLE* row, int64_t y, bool inverted, Image& image) {
+  for (int c = 0; c < 3; ++c) {
+    float* out = image.channel(c) + y * image.width;
+    for (int x = 0; x < image.width; ++x) {
+      const int ink = row[int64_t{x} * 4 + c], black = row[int64_t{x} * 4 + 3];
+      out[x] = static_cast<float>(inverted ? ink * black : (255 - ink) * (255 - black)) / (255.0f * 255.0f);
+    }
+  }
+}
+
+int OrientationOf(const jpeg_decompress_struct& info) {
+  constexpr std::string_view kExif("Exif\0\0", 6);
+  for (const jpeg_marker_struct* marker = info.marker_list; marker != nullptr; marker = marker->next) {
+    const std::string_view data(reinterpret_cast<const char*>(marker->data), marker->data_length);
+    if (data.starts_with(kExif)) return OrientationOfExif(data.substr(kExif.size()));
+  }
+  return 1;
 }
 
 bool ReadPixels(JpegReader& reader) {
@@ -78,6 +100,10 @@ bool ReadPixels(JpegReader& reader) {
     const int64_t y = reader.info.output_scanline;
     JSAMPROW row = reader.row.data();
     jpeg_read_scanlines(&reader.info, &row, 1);
+    if (samples == 4) {
+      StoreCmyk(row, y, reader.info.saw_Adobe_marker != 0, image);
+      continue;
+    }
     for (int c = 0; c < 3; ++c) {
       float* out = image.channel(c) + y * image.width;
       const JSAMPLE* in = row + (samples == 1 ? 0 : c);
@@ -104,9 +130,6 @@ Status CheckHeader(const JpegReader& reader, const std::string& name, uint64_t b
     return Error{ErrorCode::kBadFile, Cat(name, ": a JPEG of ", info.image_width, " x ", info.image_height,
                                           " cannot have only ", WithThousands(static_cast<int64_t>(bytes)), " bytes")};
   }
-  if (info.jpeg_color_space == JCS_CMYK || info.jpeg_color_space == JCS_YCCK) {
-    return Error{ErrorCode::kBadFile, Cat(name, ": CMYK JPEG; convert it to RGB first")};
-  }
   return {};
 }
 
@@ -114,9 +137,10 @@ Status CheckHeader(const JpegReader& reader, const std::string& name, uint64_t b
 
 Result<ImageSize> DecodeJpegSize(std::FILE* file, const std::string& name, uint64_t bytes) {
   JpegReader reader;
-  if (!ReadHeader(reader, file)) return JpegError(reader, name);
+  if (!ReadHeader(reader, file, /*keep_exif=*/true)) return JpegError(reader, name);
   ANCHORSPLAT_RETURN_IF_ERROR(CheckHeader(reader, name, bytes));
-  return ImageSize{static_cast<int>(reader.info.image_width), static_cast<int>(reader.info.image_height)};
+  return ImageSize{static_cast<int>(reader.info.image_width), static_cast<int>(reader.info.image_height),
+                   OrientationOf(reader.info)};
 }
 
 Result<Image> DecodeJpeg(std::FILE* file, const std::string& name, uint64_t bytes) {
@@ -124,11 +148,12 @@ Result<Image> DecodeJpeg(std::FILE* file, const std::string& name, uint64_t byte
   if (!ReadHeader(reader, file)) return JpegError(reader, name);
   ANCHORSPLAT_RETURN_IF_ERROR(CheckHeader(reader, name, bytes));
   const bool grey = reader.info.jpeg_color_space == JCS_GRAYSCALE;
-  reader.info.out_color_space = grey ? JCS_GRAYSCALE : JCS_RGB;
+  const bool inks = reader.info.jpeg_color_space == JCS_CMYK || reader.info.jpeg_color_space == JCS_YCCK;
+  reader.info.out_color_space = grey ? JCS_GRAYSCALE : inks ? JCS_CMYK : JCS_RGB;
   const int width = static_cast<int>(reader.info.image_width), height = static_cast<int>(reader.info.image_height);
   try {
     reader.image = Image(width, height, 3);
-    reader.row.resize(static_cast<size_t>(width) * (grey ? 1 : 3));
+    reader.row.resize(static_cast<size_t>(width) * (grey ? 1 : inks ? 4 : 3));
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kBadFile, Cat(name, ": does not fit into memory")};
   }

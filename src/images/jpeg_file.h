@@ -12,7 +12,7 @@
 namespace anchorsplat {
 
 // The JPEG side of image_io.h. `file` stands at its first byte; `name` is for messages, `bytes` the file's length.
-// Pixels are as stored: an EXIF orientation is not applied, as camera files count in stored pixels.
+// Pixels are as stored; the size comes with EXIF's orientation.
 Result<Image> DecodeJpeg(std::FILE* file, const std::string& name, uint64_t bytes);
 Result<ImageSize> DecodeJpegSize(std::FILE* file, const std::string& name, uint64_t bytes);
 // The same of a file in memory.

@@ -86,12 +86,49 @@ TEST(JpegFile, ReadsColourAndGrey) {
   }
 }
 
-TEST(JpegFile, CmykIsRefused) {
+// libjpeg marks inks as Adobe's programs do: what is stored is how much of each is left out.
+TEST(JpegFile, InksBecomeColours) {
   const TestFolder folder;
-  const auto image = ReadImage(Written(folder, Jpeg(16, 16, 4)));
-  ASSERT_FALSE(image.ok());
-  EXPECT_EQ(image.error().code, ErrorCode::kBadFile);
-  EXPECT_NE(image.error().message.find("CMYK"), std::string::npos) << image.error().message;
+  const auto image = ReadImage(Written(folder, Jpeg(29, 21, 4)));
+  ASSERT_TRUE(image.ok()) << image.error().message;
+  ASSERT_EQ(image->channels, 3);
+  for (int c = 0; c < 3; ++c) {
+    for (int y = 0; y < 21; ++y) {
+      for (int x = 0; x < 29; ++x) {
+        EXPECT_NEAR(image->at(c, y, x), Sample(x, y, c) * Sample(x, y, 3) / (255.0 * 255.0), 0.06);
+      }
+    }
+  }
+}
+
+// The APP1 of a JPEG with one entry, in either order of bytes.
+std::string WithExif(const std::string& jpeg, int orientation, bool little) {
+  const auto number = [&](int value, int bytes) {
+    std::string text;
+    for (int i = 0; i < bytes; ++i) text += static_cast<char>(value >> (8 * (little ? i : bytes - 1 - i)));
+    return text;
+  };
+  const std::string tiff = (little ? "II" : "MM") + number(42, 2) + number(8, 4) + number(1, 2) + number(0x0112, 2) +
+                           number(3, 2) + number(1, 4) + number(orientation, 2) + number(0, 2) + number(0, 4);
+  const std::string exif = std::string("Exif\0\0", 6) + tiff;
+  const auto length = static_cast<int>(exif.size()) + 2;
+  std::string marker = "\xff\xe1";
+  marker += static_cast<char>(length >> 8);
+  marker += static_cast<char>(length);
+  return jpeg.substr(0, 2) + marker + exif + jpeg.substr(2);
+}
+
+TEST(JpegFile, SaysItsOrientation) {
+  const TestFolder folder;
+  EXPECT_EQ(ReadImageSize(Written(folder, Jpeg(29, 21, 3)))->orientation, 1);
+  for (const bool little : {false, true}) {
+    for (int orientation = 0; orientation <= 9; ++orientation) {
+      const auto size = ReadImageSize(Written(folder, WithExif(Jpeg(29, 21, 3), orientation, little)));
+      ASSERT_TRUE(size.ok()) << size.error().message;
+      EXPECT_EQ(size->width, 29) << "as stored";
+      EXPECT_EQ(size->orientation, orientation >= 1 && orientation <= 8 ? orientation : 1);
+    }
+  }
 }
 
 TEST(JpegFile, EveryTruncationIsAnError) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/text.h"
+#include "images/orientation.h"
 
 namespace anchorsplat {
 
@@ -198,8 +199,16 @@ Result<ImageSize> DecodePngSize(std::FILE* file, const std::string& name, uint64
   reader.file_bytes = bytes;
   if (!ReadHeader(reader)) return PngError(reader, name);
   ANCHORSPLAT_RETURN_IF_ERROR(CheckSize(reader, name));
-  return ImageSize{static_cast<int>(png_get_image_width(reader.png, reader.info)),
-                   static_cast<int>(png_get_image_height(reader.png, reader.info))};
+  ImageSize size{static_cast<int>(png_get_image_width(reader.png, reader.info)),
+                 static_cast<int>(png_get_image_height(reader.png, reader.info))};
+#ifdef PNG_eXIf_SUPPORTED
+  png_bytep exif = nullptr;
+  png_uint_32 exif_bytes = 0;
+  if (png_get_eXIf_1(reader.png, reader.info, &exif_bytes, &exif) != 0 && exif != nullptr) {
+    size.orientation = OrientationOfExif({reinterpret_cast<const char*>(exif), exif_bytes});
+  }
+#endif
+  return size;
 }
 
 Result<Image> DecodePng(std::FILE* file, const std::string& name, uint64_t bytes) {

@@ -1,0 +1,84 @@
+#include "formats/ply/ply_points.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "core/text.h"
+#include "formats/ply/ply_body.h"
+#include "formats/ply/ply_header.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// What stands for full intensity.
+float FullOf(PlyType type) {
+  switch (type) {
+    case PlyType::kInt8:
+      return 127;
+    case PlyType::kUint8:
+      return 255;
+    case PlyType::kInt16:
+      return 32767;
+    case PlyType::kUint16:
+      return 65535;
+    case PlyType::kInt32:
+      return 2147483647.0f;
+    case PlyType::kUint32:
+      return 4294967295.0f;
+    default:
+      return 1;
+  }
+}
+
+}  // namespace
+
+Result<PlyPoints> ReadPlyPoints(const InputFile& file, const ReadLimits& limits) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyHeader header, ReadPlyHeader(file));
+  const PlyElement* vertex = header.Find("vertex");
+  const auto index = [&](const char* name) {
+    const PlyProperty* property = vertex == nullptr ? nullptr : vertex->Find(name);
+    const bool scalar = property != nullptr && !property->list_count;
+    return scalar ? property - vertex->properties.data() : ptrdiff_t{-1};
+  };
+  const std::array<ptrdiff_t, 6> columns = {index("x"),   index("y"),     index("z"),
+                                            index("red"), index("green"), index("blue")};
+  if (std::any_of(columns.begin(), columns.begin() + 3, [](ptrdiff_t i) { return i < 0; })) {
+    return Error{ErrorCode::kBadFile,
+                 Cat(file.name(), ": no points: element \"vertex\" needs the properties x y z (and red green blue)")};
+  }
+  if (vertex->count > limits.max_gaussians) {
+    return Error{ErrorCode::kBadFile, Cat(file.name(), ": line ", vertex->line, ": has ", WithThousands(vertex->count),
+                                          " points, more than the limit of ", WithThousands(limits.max_gaussians))};
+  }
+  const bool colored = std::all_of(columns.begin(), columns.end(), [](ptrdiff_t i) { return i >= 0; });
+  PlyPoints read;
+  ANCHORSPLAT_RETURN_IF_ERROR(ReadPlyBody(file, header, *vertex, [&] {
+    const auto floats = static_cast<size_t>(3 * vertex->count);
+    read.positions.resize(floats);
+    read.colors.resize(floats);
+    if (!colored) std::fill(read.colors.begin(), read.colors.end(), 0.5f);
+    std::vector<PlyDestination> to(vertex->properties.size());
+    for (size_t k = 0; k < (colored ? 6u : 3u); ++k) {
+      to[static_cast<size_t>(columns[k])] = {
+          .number = (k < 3 ? read.positions.data() : read.colors.data()) + k % 3, .bytes = nullptr, .stride = 3};
+    }
+    return to;
+  }));
+  PlyPoints points;
+  for (size_t i = 0; i < read.positions.size(); i += 3) {
+    const float* p = read.positions.data() + i;
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) continue;
+    for (size_t k = 0; k < 3; ++k) {
+      points.positions.push_back(p[k]);
+      float color = read.colors[i + k];
+      if (colored) color /= FullOf(vertex->properties[static_cast<size_t>(columns[3 + k])].type);
+      points.colors.push_back(color > 0 ? std::min(color, 1.0f) : 0.0f);  // NaN is 0
+    }
+  }
+  return points;
+}
+
+}  // namespace anchorsplat

@@ -9,9 +9,12 @@
 
 #include "cli/batch.h"
 #include "cli/clean_output.h"
+#include "cli/output_plan.h"
 #include "cli/verb.h"
 #include "core/file_system.h"
 #include "core/log.h"
+#include "core/memory_limit.h"
+#include "core/parallel.h"
 #include "core/text.h"
 #include "formats/cloud_output.h"
 #include "formats/opened_splat.h"
@@ -28,11 +31,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kSecondsToRead = 2e-7;  // a Gaussian, on one core
+
 struct ConvertWords {
   std::vector<std::string> paths;  // inputs, and the output as the last one without --out-dir
   std::string out_dir;
   std::string to = ".ply";
   ConvertFlags how;
+  SizeFlags size;
 };
 
 // "scan.compressed.ply" without the extension of its format; "scan/meta.json", or "scan" where that is in it, is the
@@ -150,6 +156,22 @@ Status ConvertModel(const ConvertWords& flags, const SharedFlags& shared) {
   return {};
 }
 
+// Says what will come out, as far as the header tells.
+Status AnnounceConversion(const ConvertWords& flags, const SharedFlags& shared, const ConvertOptions& options,
+                          const Job& job) {
+  const std::optional<CloudExtent> extent = ExtentOf(job.input, options.input_format);
+  const SplatFormat* const to = FormatOfExtension(job.output);
+  if (!extent || to == nullptr || to->predicted_size == nullptr) return {};
+  OutputPlan plan{.input = job.input.string(), .output = job.output, .gaussians_in = extent->gaussians};
+  plan.gaussians = std::min(extent->gaussians, options.max_gaussians.value_or(extent->gaussians));
+  const int degree = options.sh_degree.value_or(extent->sh_degree);
+  plan.bytes = to->predicted_size(plan.gaussians, degree);
+  plan.roughly = to->size_is_estimate;
+  plan.needed = static_cast<uint64_t>(extent->gaussians) * RowBytes(extent->sh_degree);
+  plan.seconds = static_cast<double>(plan.gaussians) * (to->seconds_per_gaussian + kSecondsToRead) / ThreadCount();
+  return SayAndAsk(plan, flags.size, shared);
+}
+
 // One file: converted, measured where asked for, told. A row of the JSON document.
 Result<nlohmann::json> RunJob(const Job& job, const ConvertOptions& options, int views, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Converted done, ConvertAndMeasure(job.input, job.output, options, views));
@@ -172,8 +194,12 @@ Status RunConvert(const ConvertWords& flags, Program& program) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckConvertEffects(flags.how, outputs));
   std::vector<BatchItem> items;
   for (const Job& job : jobs) items.push_back({job.input.string(), job.output.string()});
-  return RunBatch(
-      items, [&](size_t k) { return RunJob(jobs[k], options, flags.how.views, shared); }, program);
+  for (const Job& job : jobs) ANCHORSPLAT_RETURN_IF_ERROR(AnnounceConversion(flags, shared, options, job));
+  const auto run = [&](size_t k) {
+    const MemoryLimit limit(flags.size.arrays(), jobs[k].output.parent_path());
+    return RunJob(jobs[k], options, flags.how.views, shared);
+  };
+  return RunBatch(items, run, program);
 }
 
 }  // namespace
@@ -191,6 +217,7 @@ void AddConvert(CLI::App& app, Program& program) {
       ->capture_default_str()
       ->needs(out_dir);
   flags->how.AddTo(verb);
+  flags->size.AddTo(verb);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunConvert(*flags, program); }; });
 }
 

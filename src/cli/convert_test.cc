@@ -41,6 +41,24 @@ TEST_F(ConvertVerb, SaysWhatItDid) {
   EXPECT_THAT(run.err, IsEmpty());
 }
 
+TEST_F(ConvertVerb, AsksBeforeLargeFiles) {
+  const std::string huge = WriteHugeScan(folder_ / "huge.ply", 20'000'000);
+  const ProgramRun run = ExpectRefused({"convert", huge, folder_ / "out.ply"}, ErrorCode::kBadArgument,
+                                       {"20,000,000 Gaussians", "out.ply takes 5.0 GB", "more than 4.0 GB", "--yes"});
+  EXPECT_EQ(folder_.Entries(), 2);
+  // One of several is enough: nothing is begun that will not be ended.
+  ExpectRefused({"convert", scan_, huge, "--out-dir", folder_ / "out"}, ErrorCode::kBadArgument, {"--yes"});
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out/scan.ply"));
+  // What a header promises and the file has not is an error of the file, --yes or not.
+  std::filesystem::resize_file(huge, 100'000);
+  ExpectRefused({"convert", huge, folder_ / "out.ply"}, ErrorCode::kBadFile, {"ends too early"});
+}
+
+TEST_F(ConvertVerb, MaxMemoryIsASize) {
+  ExpectDone({"convert", scan_, folder_ / "out.spz", "--max-memory", "500M"});
+  ExpectRefused({"convert", scan_, folder_ / "two.spz", "--max-memory", "much"}, ErrorCode::kBadArgument, {"much"});
+}
+
 TEST_F(ConvertVerb, SaysWhatIsLost) {
   const ProgramRun dull = ExpectDone({"convert", scan_, folder_ / "dull.splat"});
   EXPECT_THAT(dull.err, HasSubstr("harmonics beyond degree 0"));

@@ -83,6 +83,33 @@ TEST_F(DatasetVerb, RefusesWhatIsNoDataSet) {
   ExpectRefused({"dataset"}, ErrorCode::kBadArgument, {"needs a verb"});
 }
 
+// What another scheduler needs: a job for every object that is wanted, which `dataset object` makes.
+TEST_F(DatasetVerb, Plan) {
+  const std::string other = WriteTetrahedron(folder_.path(), "other");
+  const std::vector<std::string> small = {"--views",         "9",  "--size",  "24", "--low-size", "12",
+                                          "--points",        "60", "--steps", "60", "--min-psnr", "1",
+                                          "--max-gaussians", "300"};
+  std::vector<std::string> words = {"dataset", "build", mesh_, other, "-o", set_, "--plan"};
+  words.insert(words.end(), small.begin(), small.end());
+  const nlohmann::json plan = ExpectJson(words);
+  EXPECT_EQ(plan["objects"], 2);
+  ASSERT_EQ(plan["wanted"].size(), 2u);
+  EXPECT_EQ(plan["wanted"][0]["name"], "other");
+  EXPECT_EQ(plan["wanted"][1]["name"], "tetra");
+  EXPECT_FALSE(fs::exists(fs::path(set_) / "tetra")) << "a plan makes nothing";
+  const auto record = ReadObjectJob(plan["wanted"][1]["job"].get<std::string>());
+  ASSERT_TRUE(record.ok()) << record.error().message;
+  EXPECT_EQ(record->name, "tetra");
+  EXPECT_EQ(record->settings.fit_steps, 60);
+
+  // What is there is not wanted any more.
+  ExpectDone({"dataset", "object", plan["wanted"][1]["job"].get<std::string>(), "-o", set_});
+  const nlohmann::json rest = ExpectJson(words);
+  EXPECT_EQ(rest["there_already"], 1);
+  ASSERT_EQ(rest["wanted"].size(), 1u);
+  EXPECT_EQ(rest["wanted"][0]["name"], "other");
+}
+
 // Before a process is started.
 TEST_F(DatasetVerb, BuildsThatMakeNoSense) {
   const auto refused = [&](std::vector<std::string> words, ErrorCode code, const std::string& why) {

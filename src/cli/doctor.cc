@@ -16,6 +16,7 @@
 #include "cli/verb.h"
 #include "core/companion.h"
 #include "core/file_system.h"
+#include "core/memory_limit.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "model/compact/shipped_network.h"
@@ -42,14 +43,6 @@ struct Finding {
 };
 
 // The kernel's files say that they are empty, so that io/'s readers would take them for that.
-
-std::string FirstLine(const fs::path& path) {
-  std::ifstream file(path);
-  std::string line;
-  std::getline(file, line);
-  return line;
-}
-
 std::string ProcessorName() {
   std::ifstream file("/proc/cpuinfo");
   for (std::string line; std::getline(file, line);) {
@@ -68,13 +61,10 @@ uint64_t MemoryOf(const std::string& what) {
   return 0;
 }
 
-// What a container may use, by its control group; nothing where it is not limited.
-std::optional<uint64_t> MemoryLimit() {
-  for (const char* path : {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"}) {
-    const uint64_t limit = std::strtoull(FirstLine(path).c_str(), nullptr, 10);
-    if (limit > 0 && limit < MemoryOf("MemTotal")) return limit;
-  }
-  return std::nullopt;
+// What a container may use; nothing where it is not limited.
+std::optional<uint64_t> MemoryOfContainer() {
+  const uint64_t most = MachineMemory();
+  return most < MemoryOf("MemTotal") ? std::optional(most) : std::nullopt;
 }
 
 struct Machine {
@@ -85,7 +75,7 @@ struct Machine {
   int threads = ThreadCount();
   uint64_t memory = MemoryOf("MemTotal");
   uint64_t available = MemoryOf("MemAvailable");
-  std::optional<uint64_t> limit = MemoryLimit();
+  std::optional<uint64_t> limit = MemoryOfContainer();
 };
 
 Machine LookAtMachine() {

@@ -9,10 +9,13 @@
 #include "cli/batch.h"
 #include "cli/before_after_page.h"
 #include "cli/clean_output.h"
+#include "cli/output_plan.h"
 #include "cli/stop_signal.h"
 #include "cli/verb.h"
 #include "core/file_system.h"
 #include "core/log.h"
+#include "core/memory_limit.h"
+#include "core/parallel.h"
 #include "core/text.h"
 #include "core/world_up.h"
 #include "fit/checkpoint_guard.h"
@@ -39,8 +42,19 @@ struct EnhanceWords {
   std::string output;
   std::string out_dir;
   EnhanceFlags how;
+  SizeFlags size;
   bool view = false;
 };
+
+// Of neighbours, their frames and the choice of copies, per Gaussian of the input; measured (docs/benchmarks.md).
+constexpr uint64_t kWorkingBytes = 300;
+
+// Arrays that are there at the same time.
+uint64_t NeededBytes(int64_t in, int64_t out, int sh_degree) {
+  const uint64_t own = static_cast<uint64_t>(in) * RowBytes(sh_degree);
+  if (out <= in) return own;  // changed in place
+  return own + static_cast<uint64_t>(in) * kWorkingBytes + static_cast<uint64_t>(out) * RowBytes(sh_degree);
+}
 
 // What can be known to fail before anything is read.
 Status CheckOutput(const fs::path& output, bool overwrite) {
@@ -108,10 +122,26 @@ Status MakeOutDir(const EnhanceWords& flags) {
   return {};
 }
 
+// What will come out. A Gaussian of the output has all harmonics where a network of the published architecture makes
+// it.
+Status AnnounceResult(const EnhanceWords& flags, const SharedFlags& shared, const EnhanceOptions& options,
+                      const std::string& input, const fs::path& output, const CloudExtent& extent) {
+  const SplatFormat& to = *FormatOfExtension(output);
+  OutputPlan plan{.input = input, .output = output, .gaussians_in = extent.gaussians};
+  plan.gaussians = std::max<int64_t>(0, ExpectedGaussians(extent.gaussians, options));
+  if (to.predicted_size != nullptr) plan.bytes = to.predicted_size(plan.gaussians, extent.sh_degree);
+  plan.roughly = to.size_is_estimate;
+  plan.needed = NeededBytes(extent.gaussians, plan.gaussians, extent.sh_degree);
+  plan.seconds = ExpectedSeconds(extent.gaussians, options, ThreadCount());
+  if (plan.seconds) *plan.seconds += static_cast<double>(plan.gaussians) * to.seconds_per_gaussian;
+  return SayAndAsk(plan, flags.size, shared);
+}
+
 // What the method worked with, where it is the filter's business.
 std::string Details(const EnhanceReport& r) {
   if (r.pixel_size_source.empty()) return "";
   if (r.pixel_size_source == kUnknownPixelSize) return " not applied";
+  if (r.filter_strength == 0) return Cat(" x", r.upscale, ", no width given back");
   return Cat(" x", r.upscale, ", strength ", Fixed(r.filter_strength, 3), ", pixel size ", r.pixel_size, " (",
              r.pixel_size_source, ")");
 }
@@ -129,11 +159,16 @@ Buffer<float> KeepUsable(ExtraProperties& extras, const GaussianCloud& cloud) {
 }
 
 // From one file to another; its entry of the results.
+// `said`: what will come out.
 Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& shared, EnhanceOptions options,
-                                  const std::string& input, const fs::path& output) {
+                                  const std::string& input, const fs::path& output, bool said) {
+  const MemoryLimit limit(flags.size.arrays(), output.parent_path());
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(input));
   ExtraProperties extras;
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read({}, &extras));
+  if (!said) {
+    ANCHORSPLAT_RETURN_IF_ERROR(AnnounceResult(flags, shared, options, input, output, {cloud.size(), cloud.sh_degree}));
+  }
   if (flags.how.mode) cloud.render_mode = flags.how.mode;
   Buffer<float> means = KeepUsable(extras, cloud);
   GaussianCloud before;
@@ -230,9 +265,17 @@ Status RunEnhance(const EnhanceWords& flags, Program& program) {
   }
 
   std::vector<BatchItem> items;
-  for (size_t i = 0; i < outputs.size(); ++i) items.push_back({flags.inputs[i], outputs[i].string()});
+  std::vector<bool> said;
+  for (size_t i = 0; i < outputs.size(); ++i) {
+    items.push_back({flags.inputs[i], outputs[i].string()});
+    const std::optional<CloudExtent> extent = ExtentOf(flags.inputs[i]);
+    said.push_back(extent.has_value());
+    if (!extent) continue;
+    ANCHORSPLAT_RETURN_IF_ERROR(AnnounceResult(flags, shared, options, flags.inputs[i], outputs[i], *extent));
+  }
   return RunBatch(
-      items, [&](size_t i) { return EnhanceOne(flags, shared, options, flags.inputs[i], outputs[i]); }, program);
+      items, [&](size_t i) { return EnhanceOne(flags, shared, options, flags.inputs[i], outputs[i], said[i]); },
+      program);
 }
 
 }  // namespace
@@ -246,6 +289,7 @@ void AddEnhance(CLI::App& app, Program& program) {
   verb.add_option("--out-dir", flags->out_dir, "Folder to write to, under the inputs' names")->excludes(output);
   verb.add_flag("--view", flags->view, "Also write an HTML page beside the output that shows before and after");
   flags->how.AddTo(verb);
+  flags->size.AddTo(verb);
   verb.callback([flags, &verb, &program] {
     flags->how.options.given = GivenOptions(verb);
     program.run = [flags, &program] { return RunEnhance(*flags, program); };

@@ -50,6 +50,13 @@ TEST_F(EnhanceVerb, Filter) {
   EXPECT_EQ(folder_.Entries(), 3);
 }
 
+TEST_F(EnhanceVerb, AsksBeforeLargeFiles) {
+  const std::string huge = WriteHugeScan(folder_ / "huge.ply", 10'000'000);
+  const std::vector<std::string> enhance = {"enhance", huge, "-o", folder_ / "out.ply", "--model", compact_};
+  ExpectRefused(enhance, ErrorCode::kBadArgument, {"10,000,000 Gaussians become up to 20,000,000", "5.0 GB", "--yes"});
+  EXPECT_EQ(folder_.Entries(), 2);
+}
+
 TEST_F(EnhanceVerb, OverwritesOnlyWhenTold) {
   ExpectDone(Enhance({"--method", "filter"}));
   const std::string before = FileBytes(folder_ / "out.ply");

@@ -40,6 +40,18 @@ TEST_F(EvalVerb, WritesTablesAndGoesOn) {
               AllOf(HasSubstr("Evaluation of examples"), HasSubstr("Written: ")));
 }
 
+// What another scheduler needs: every object, and every method with the name of its file.
+TEST_F(EvalVerb, Plan) {
+  const nlohmann::json plan = ExpectJson(
+      {"eval", SourceDirForTest() / "examples", "-o", folder_ / "out", "--methods", "raw,filter@0.15", "--plan"});
+  EXPECT_THAT(plan["objects"].get<std::vector<std::string>>(), testing::IsSupersetOf({"biplane", "stone_lantern"}));
+  ASSERT_EQ(plan["methods"].size(), 2u);
+  EXPECT_EQ(plan["methods"][0], nlohmann::json({{"word", "raw"}, {"file", "raw"}}));
+  EXPECT_EQ(plan["methods"][1]["word"], "filter@0.15");
+  EXPECT_EQ(plan["methods"][1]["file"].get<std::string>().find_first_of("/ "), std::string::npos);
+  EXPECT_FALSE(fs::exists(folder_ / "out")) << "a plan measures nothing";
+}
+
 // By 0.5 dB in every example: what a change of the program or of the weights must not lose.
 TEST_F(EvalVerb, ShippedNetworkBeatsTheFilter) {
   const nlohmann::json json = ExpectJson({"eval", SourceDirForTest() / "examples", "-o", folder_ / "out", "--max-views",

@@ -2,13 +2,13 @@
 
 #include <span>
 
+#include "core/error_name.h"
 #include "core/result.h"
 
 namespace anchorsplat {
 
 // What the program returns to the shell; each kind of failure has a number of its own (docs/cli.md). 0 is success.
 int ExitCode(ErrorCode code);
-const char* CodeName(ErrorCode code);  // the same in JSON: "not_found"
 
 inline constexpr int kPartialExitCode = 1;  // done, but not for all inputs; messages and results say for which
 inline constexpr int kUsageExitCode = 2;

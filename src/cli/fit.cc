@@ -110,7 +110,9 @@ Status RunFit(const FitWords& flags, const SharedFlags& shared) {
   control.deliver = [&](const Fitted& fitted) { return WriteResults(flags, fitted, shared.overwrite); };
   control.outputs = OutputFiles(flags);
   if (!flags.how.init_splat.empty()) RecordSplat(flags.how.init_splat);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(flags.project, {.hold_out = flags.how.hold_out}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      const TrainingViews views,
+      OpenProject(flags.project, {.hold_out = flags.how.hold_out, .downscale = flags.how.downscale}));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOutputs(flags, control, shared.overwrite));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto lock, HoldCheckpoint(control.checkpoint));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const FitOptions options, MakeFitOptions(flags.how, views.background, shared.seed));

@@ -27,20 +27,6 @@ std::string_view ModeName(const GaussianCloud& cloud) {
   return cloud.render_mode ? NameOf(*cloud.render_mode) : "not said (render, compare and view take it for classic)";
 }
 
-std::string_view InWords(const std::optional<TrainedKind>& kind) {
-  if (!kind) return "like nothing: too few Gaussians to tell";
-  switch (*kind) {
-    case TrainedKind::kAntialiased:
-      return "like an antialiased one: it has lost a little width, and enhance treats it as one";
-    case TrainedKind::kWidened:
-      return "like one of Mip-Splatting, or enhanced already: it has lost no width, and enhance leaves it alone";
-    case TrainedKind::kUnclear:
-      return "neither like a classic nor an antialiased one, or changed since: enhance gives back only a little width";
-    default:
-      return "like a classic one: enhance gives back the width that its fit has lost";
-  }
-}
-
 std::string Number(double value) {
   if (std::isnan(value)) return "-";  // of no Gaussian at all
   char text[32];
@@ -59,6 +45,7 @@ void PrintTable(const SplatFindings& f) {
   if (!f.cloud.render_mode && !HasLostNoWidth(f.cloud)) {
     std::cout << "  it looks     " << InWords(f.looks) << "\n";
   }
+  std::cout << "  lost width   " << InWords(f.lost_width, f.pixel_size.ok() && f.pixel_size->contradicted()) << "\n";
   for (const std::string& credit : CreditsOf(f.cloud.comments)) {
     std::cout << "  credit       " << Printable(credit, kMostCredit) << "\n";
   }
@@ -80,7 +67,8 @@ void PrintTable(const SplatFindings& f) {
     for (const std::string& contradiction : f.pixel_size->contradictions)
       std::cout << "    but " << contradiction << "\n";
     if (f.pixel_size->contradicted()) {
-      std::cout << "    so enhance would take the smallest plausible pixel, " << Number(f.pixel_size->size) << "\n";
+      std::cout << "    so enhance would take the smallest plausible pixel, " << Number(f.pixel_size->size)
+                << ", and no network; --cameras or --pixel-size would tell\n";
     }
   } else {
     std::cout << "  training pixel  no estimate: " << f.pixel_size.error().message << "\n";

@@ -34,6 +34,10 @@ TEST_F(InfoVerb, OfASplat) {
   EXPECT_EQ(json["counts"]["not_finite"], 0);
   EXPECT_EQ(json["looks"], "classic");
   EXPECT_THAT(table.out, Not(HasSubstr("it looks"))) << "as the file says its render mode";
+  EXPECT_THAT(table.out, HasSubstr("lost width   0.74 of 0.3 px² at 4x (likely)\n"));
+  EXPECT_NEAR(json["lost_width"]["strength"].get<double>(), 0.74, 0.001);
+  EXPECT_EQ(json["lost_width"]["likely"], true);
+  EXPECT_EQ(json["lost_width"]["because"], "tagged");
   EXPECT_EQ(json["pixel_size"]["contradictions"], nlohmann::json::array());
   EXPECT_NEAR(json["pixel_size"]["used"].get<double>(), 0.0055, 0.002);
 }
@@ -90,6 +94,13 @@ TEST_F(InfoVerb, OfUntaggedSplats) {
   EXPECT_THAT(ExpectDone({"info", filtered}).out, HasSubstr("it looks     like one of Mip-Splatting, or enhanced"));
   EXPECT_THAT(ExpectDone({"enhance", filtered, "-o", folder_ / "again.ply"}).err, HasSubstr("none is given back"));
   EXPECT_EQ(ExpectJson({"info", filtered})["looks"], "widened");
+  EXPECT_EQ(ExpectJson({"info", filtered})["lost_width"]["because"], "widened");
+  EXPECT_THAT(
+      ExpectDone({"enhance", fit, "-o", folder_ / "filtered.ply", "--method", "filter", "--pixel-size", "0.0055"}).out,
+      HasSubstr("strength 0.740"));
+  EXPECT_THAT(ExpectDone({"info", folder_ / "filtered.ply"}).out, HasSubstr("lost width   none any more"));
+  EXPECT_THAT(ExpectDone({"enhance", folder_ / "filtered.ply", "-o", folder_ / "twice.ply"}).out,
+              HasSubstr("no width given back"));
 }
 
 // What is understood of the tags, and what --mode says instead.

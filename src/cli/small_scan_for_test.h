@@ -12,6 +12,7 @@
 #include "core/source_dir_for_test.h"
 #include "fit/orbit_scene_for_test.h"
 #include "formats/cloud_io.h"
+#include "io/file_bytes_for_test.h"
 
 namespace anchorsplat {
 
@@ -38,6 +39,18 @@ inline GaussianCloud SmallScan(int64_t n, int degree) {
 
 inline std::string WriteScan(const std::filesystem::path& path, int64_t n = 200, int degree = 1) {
   EXPECT_TRUE(WriteCloud(path, SmallScan(n, degree)).ok()) << path;
+  return path;
+}
+
+// A file whose header promises `n` Gaussians of degree 3 and that is as long as that; it takes no room on disk.
+inline std::string WriteHugeScan(const std::filesystem::path& path, int64_t n) {
+  WriteScan(path, 1, 3);
+  std::string text = FileBytes(path);
+  const std::string one = "element vertex 1\n";
+  text.replace(text.find(one), one.size(), "element vertex " + std::to_string(n) + "\n");
+  text.resize(text.find("end_header\n") + 11);
+  std::ofstream(path, std::ios::binary) << text;
+  std::filesystem::resize_file(path, text.size() + 248 * static_cast<uint64_t>(n));
   return path;
 }
 

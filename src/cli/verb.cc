@@ -12,6 +12,7 @@
 #include "cli/verb_tree.h"
 #include "cli/verb_words.h"
 #include "core/log.h"
+#include "core/memory_limit.h"
 #include "core/parallel.h"
 #include "core/run_context.h"
 #include "core/text.h"
@@ -116,6 +117,8 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
     std::cout.flush();
     if (!std::cout) return Fail(flags, {ErrorCode::kIo, "standard output could not be written"});
     return program.exit_code;
+  } catch (const NoDiskRoom& none) {
+    return Fail(flags, {ErrorCode::kIo, none.what()});
   } catch (const std::bad_alloc&) {
     return Fail(flags, {ErrorCode::kIo, "out of memory"});
   } catch (const std::exception& error) {

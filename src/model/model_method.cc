@@ -248,6 +248,7 @@ void RegisterModelMethod() {
          const int64_t most = options.model.options.max_gaussians;
          return most > 0 ? std::min(all, most) : all;
        },
+       .seconds = [](const EnhanceOptions& options) { return IsPublished(options.model) ? 2e-4 : 2.5e-5; },
        .ready = [](const EnhanceOptions& options) -> Status {
          if (!options.model.file.empty() || HasShippedNetwork()) return {};
          return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};

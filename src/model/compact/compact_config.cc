@@ -5,6 +5,7 @@
 #include <set>
 #include <span>
 
+#include "core/number_text.h"
 #include "core/text.h"
 #include "model/compact/compact_features.h"
 
@@ -85,7 +86,7 @@ class MetadataReader {
     if (text == nullptr) return;
     T parsed{};
     const char* end = text->data() + text->size();
-    const auto [stop, code] = std::from_chars(text->data(), end, parsed);
+    const auto [stop, code] = FromChars(text->data(), end, parsed);
     if (code != std::errc() || stop != end || !(parsed >= low && parsed <= high)) {
       return Complain(key, Cat(kind, " from ", low, " to ", high));
     }

@@ -53,8 +53,13 @@ class CompactFeatures {
   // See BuildCompactGraph about the cloud.
   CompactFeatures(const GaussianCloud& cloud, const CompactGraph& graph, const Task& task);
 
-  void Nodes(int64_t begin, int64_t end, float* out) const;  // [end − begin, task.node_features]
-  void Edges(int64_t begin, int64_t end, float* out) const;  // [(end − begin)·m, kEdgeFeatures]
+  void Node(int64_t i, float* out) const;   // [task.node_features]
+  void Edges(int64_t i, float* out) const;  // [m, kEdgeFeatures]
+  // Of many, one after the other.
+  void Nodes(std::span<const int32_t> rows, float* out) const;
+  void Edges(std::span<const int32_t> rows, float* out) const;
+  void Nodes(int64_t begin, int64_t end, float* out) const;
+  void Edges(int64_t begin, int64_t end, float* out) const;
 
   // The first three features of Gaussian i without their bounds; −Inf where a scale is 0.
   std::array<float, 3> Widths(int64_t i) const;

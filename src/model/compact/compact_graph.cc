@@ -59,6 +59,10 @@ void FindFrames(const GaussianCloud& cloud, CompactGraph& graph) {
 
 void FindNearest(const GaussianCloud& cloud, CompactGraph& graph) {
   const KdTree tree(cloud.means);
+  graph.near_order.resize(static_cast<size_t>(graph.count));
+  for (int64_t place = 0; place < graph.count; ++place) {
+    graph.near_order[static_cast<size_t>(place)] = static_cast<int32_t>(tree.PointAt(place));
+  }
   ParallelFor(0, graph.count, 512, [&](int64_t begin, int64_t end) {
     std::vector<KdTree::Neighbour> nearest(static_cast<size_t>(graph.neighbours));
     for (int64_t place = begin; place < end; ++place) {
@@ -76,16 +80,17 @@ void FindPatches(const GaussianCloud& cloud, CompactGraph& graph) {
   const Bounds box = *ComputeBounds(cloud);
   double side = 0;
   for (size_t c = 0; c < 3; ++c) side = std::max(side, double{box.max[c]} - box.min[c]);
-  std::vector<int32_t> voxels(static_cast<size_t>(3 * n), 0);
+  Buffer<int32_t> voxels(static_cast<size_t>(3 * n), 0);
   if (side > 0) {
     constexpr double kLargest = (1 << kMaxCurveDepth) - 1;
     for (size_t k = 0; k < voxels.size(); ++k) {
       voxels[k] = static_cast<int32_t>((double{cloud.means[k]} - box.min[k % 3]) / side * kLargest);
     }
   }
-  std::vector<int64_t> codes(static_cast<size_t>(n));
+  Buffer<int64_t> codes(static_cast<size_t>(n));
   CurveCodes(Curve::kHilbert, kMaxCurveDepth, voxels, codes);
-  const Buffer<int32_t> order = OrderOfCodes(codes);
+  graph.near_order = OrderOfCodes(codes);
+  const Buffer<int32_t>& order = graph.near_order;
   ParallelFor(0, n, 512, [&](int64_t begin, int64_t end) {
     std::vector<std::pair<double, int32_t>> others;
     for (int64_t place = begin; place < end; ++place) {

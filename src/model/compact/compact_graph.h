@@ -23,6 +23,7 @@ struct CompactGraph {
   Buffer<float> axes;           // [N,3,3] axis a of Gaussian i as a unit vector, world
   Buffer<uint8_t> stored_axis;  // [N,3] which axis of the stored scales and of the quaternion it is
   Buffer<float> sidedness;      // [N,3] mean of the unit vectors to the neighbours along each axis, 0–1
+  Buffer<int32_t> near_order;   // [N] an order in which near ones are near; empty: as they are
 
   const float* axis(int64_t i, int64_t a) const { return axes.data() + 9 * i + 3 * a; }
 };

@@ -9,7 +9,9 @@
 
 #include "core/finite.h"
 #include "core/log.h"
+#include "core/memory_limit.h"
 #include "core/parallel.h"
+#include "core/run_context.h"
 #include "core/text.h"
 #include "model/compact/compact_residual.h"
 #include "model/compact/compact_start.h"
@@ -143,8 +145,8 @@ std::pair<double, double> CompactNetwork::TrainedUpscales() const {
   return {upscale(low_[kUpscaleFeature]), upscale(high_[kUpscaleFeature])};
 }
 
-Buffer<float> CompactNetwork::States(const CompactFeatures& features, const CompactGraph& graph) const {
-  const int64_t n = graph.count, h = config_.hidden, m = graph.neighbours;
+Buffer<float> CompactNetwork::States(const CompactFeatures& features, const CompactBlock& block, int64_t m) const {
+  const int64_t n = block.reach.back(), h = config_.hidden;
   Buffer<float> states(static_cast<size_t>(n * h)), others(rounds_.empty() ? 0 : static_cast<size_t>(n * h));
   const auto normalise = [&](int64_t rows, const Norm& norm, float* x) {
     LayerNormCpu({.rows = rows,
@@ -155,31 +157,37 @@ Buffer<float> CompactNetwork::States(const CompactFeatures& features, const Comp
                   .epsilon = static_cast<float>(kLayerNormEpsilon),
                   .out = x});
   };
+  const auto rows_of = [&](int64_t begin, int64_t end) {
+    return std::span(block.rows).subspan(static_cast<size_t>(begin), static_cast<size_t>(end - begin));
+  };
   ParallelFor(0, n, kRowsPerTask, [&](int64_t begin, int64_t end) {
     const int64_t rows = end - begin;
     Buffer<float> nodes(static_cast<size_t>(rows * NodeFeatures(config_))), first(static_cast<size_t>(rows * h));
-    features.Nodes(begin, end, nodes.data());
+    features.Nodes(rows_of(begin, end), nodes.data());
     ApplyLinear(rows, nodes.data(), embed_first_, first.data(), Activation::kGelu);
     ApplyLinear(rows, first.data(), embed_second_, states.data() + begin * h);
     normalise(rows, embed_norm_, states.data() + begin * h);
   });
-  for (const Round& round : rounds_) {
-    ApplyLinear(n, states.data(), round.other, others.data());
-    ParallelFor(0, n, kRowsPerTask, [&](int64_t begin, int64_t end) {
+  for (size_t r = 0; r < rounds_.size(); ++r) {
+    const Round& round = rounds_[r];
+    // What is heard in later rounds only counts among those that the block's own hear from until then.
+    const int64_t listeners = block.reach[rounds_.size() - 1 - r], heard = block.reach[rounds_.size() - r];
+    ApplyLinear(heard, states.data(), round.other, others.data());
+    ParallelFor(0, listeners, kRowsPerTask, [&](int64_t begin, int64_t end) {
       const int64_t rows = end - begin;
       float* own_states = states.data() + begin * h;
       Buffer<float> own(static_cast<size_t>(rows * h)),
           features_of_edges(static_cast<size_t>(rows * m * kEdgeFeatures)), edges(static_cast<size_t>(rows * m * h)),
           messages(edges.size()), pooled(static_cast<size_t>(rows * 3 * h));
       ApplyLinear(rows, own_states, round.own, own.data());
-      features.Edges(begin, end, features_of_edges.data());
+      features.Edges(rows_of(begin, end), features_of_edges.data());
       ApplyLinear(rows * m, features_of_edges.data(), round.edge, edges.data());
       EdgeSumGeluCpu({.points = rows,
                       .neighbours = m,
                       .channels = h,
                       .own = own.data(),
                       .other = others.data(),
-                      .index = graph.index.data() + begin * m,
+                      .index = block.index.data() + begin * m,
                       .edges = edges.data()});
       ApplyLinear(rows * m, edges.data(), round.message, messages.data());
       for (int64_t i = 0; i < rows; ++i) std::copy_n(own_states + i * h, h, pooled.data() + i * 3 * h);
@@ -198,13 +206,13 @@ Buffer<float> CompactNetwork::States(const CompactFeatures& features, const Comp
   return states;
 }
 
-void CompactNetwork::Head(const CompactFeatures& features, const Buffer<float>& states, int64_t begin, int64_t end,
-                          float* out) const {
+void CompactNetwork::Head(const CompactFeatures& features, const CompactBlock& block, const Buffer<float>& states,
+                          int64_t begin, int64_t end, float* out) const {
   const int64_t rows = end - begin, h = config_.hidden, told = NodeFeatures(config_), width = h + told,
                 g = config_.head_hidden;
   Buffer<float> nodes(static_cast<size_t>(rows * told)), input(static_cast<size_t>(rows * width)),
       first(static_cast<size_t>(rows * g)), second(static_cast<size_t>(rows * g));
-  features.Nodes(begin, end, nodes.data());
+  features.Nodes(std::span(block.rows).subspan(static_cast<size_t>(begin), static_cast<size_t>(rows)), nodes.data());
   for (int64_t i = 0; i < rows; ++i) {
     std::copy_n(states.data() + (begin + i) * h, h, input.data() + i * width);
     std::copy_n(nodes.data() + i * told, told, input.data() + i * width + h);
@@ -215,9 +223,19 @@ void CompactNetwork::Head(const CompactFeatures& features, const Buffer<float>& 
 }
 
 void CompactNetwork::Outputs(const CompactFeatures& features, const CompactGraph& graph, float* out) const {
-  const Buffer<float> states = States(features, graph);
-  ParallelFor(0, graph.count, kRowsPerTask,
-              [&](int64_t begin, int64_t end) { Head(features, states, begin, end, out + begin * out_.outputs()); });
+  CompactBlocks blocks(graph, config_.rounds, kCompactBlock);
+  for (int64_t b = 0; b < blocks.count(); ++b) {
+    const CompactBlock& block = blocks.Find(b);
+    const Buffer<float> states = States(features, block, graph.neighbours);
+    ParallelFor(0, block.own(), kRowsPerTask, [&](int64_t begin, int64_t end) {
+      Buffer<float> raw(static_cast<size_t>((end - begin) * out_.outputs()));
+      Head(features, block, states, begin, end, raw.data());
+      for (int64_t i = begin; i < end; ++i) {
+        std::copy_n(raw.data() + (i - begin) * out_.outputs(), out_.outputs(),
+                    out + int64_t{block.rows[static_cast<size_t>(i)]} * out_.outputs());
+      }
+    });
+  }
 }
 
 float CompactNetwork::Fade(const float* node, const std::array<float, 3>& widths) const {
@@ -252,6 +270,7 @@ Status CheckTask(const GaussianCloud& cloud, const CompactTask& task, int64_t co
       return Error{ErrorCode::kBadArgument, Cat("pixel size ", p, " is not a positive length")};
     }
   }
+  if (task.block_gaussians < 1) return Error{ErrorCode::kBadArgument, "a block of no Gaussians"};
   if (!(task.upscale >= 1) || !std::isfinite(task.upscale) || !(task.strength >= 0) || !std::isfinite(task.strength)) {
     return Error{ErrorCode::kBadArgument, Cat("upscale ", task.upscale, " must be at least 1 and the filter strength ",
                                               task.strength, " not negative")};
@@ -261,12 +280,12 @@ Status CheckTask(const GaussianCloud& cloud, const CompactTask& task, int64_t co
 
 // Where the copies of each Gaussian go: those that are alone stand behind all others.
 struct CopyPlaces {
-  std::vector<int64_t> rows;  // of the first copy
-  int64_t inside = 0;         // Gaussians that have copies
-  int64_t copied = 0;         // their copies
+  Buffer<int64_t> rows;  // of the first copy
+  int64_t inside = 0;    // Gaussians that have copies
+  int64_t copied = 0;    // their copies
 };
 
-CopyPlaces PlacesOfCopies(const std::vector<float>& fades, int64_t outside, int64_t copies) {
+CopyPlaces PlacesOfCopies(const Buffer<float>& fades, int64_t outside, int64_t copies) {
   CopyPlaces places;
   places.inside = std::ssize(fades) - outside;
   places.copied = copies * places.inside;
@@ -278,8 +297,8 @@ CopyPlaces PlacesOfCopies(const std::vector<float>& fades, int64_t outside, int6
 
 }  // namespace
 
-std::vector<float> CompactNetwork::Fades(const CompactFeatures& features, int64_t count) const {
-  std::vector<float> fades(static_cast<size_t>(count));
+Buffer<float> CompactNetwork::Fades(const CompactFeatures& features, int64_t count) const {
+  Buffer<float> fades(static_cast<size_t>(count));
   const int64_t told = NodeFeatures(config_);
   ParallelFor(0, count, kRowsPerTask, [&](int64_t begin, int64_t end) {
     Buffer<float> nodes(static_cast<size_t>((end - begin) * told));
@@ -301,7 +320,7 @@ Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const Co
                                   .strength = task.strength,
                                   .node_features = NodeFeatures(config_)});
 
-  const std::vector<float> fades = Fades(features, n);
+  const Buffer<float> fades = Fades(features, n);
   CompactResult result;
   for (const float fade : fades) {
     result.outside += fade == 0 ? 1 : 0;
@@ -322,25 +341,35 @@ Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const Co
   const std::vector<float> nothing(static_cast<size_t>(CompactOutputs(config_)), 0.0f);
   try {
     result.cloud.Resize(places.copied + result.outside, cloud.sh_degree);
-    const Buffer<float> states = States(features, graph);
-    ParallelFor(0, n, kRowsPerTask, [&](int64_t begin, int64_t end) {
-      Buffer<float> raw(static_cast<size_t>((end - begin) * out_.outputs()));
-      Head(features, states, begin, end, raw.data());
-      for (int64_t i = begin; i < end; ++i) {
-        const float fade = fades[static_cast<size_t>(i)];
-        const int64_t row = places.rows[static_cast<size_t>(i)];
-        if (fade > 0) {
-          const float* said = raw.data() + (i - begin) * out_.outputs();
-          if (!AllFinite(said, out_.outputs())) {
-            said = nothing.data();
-            ++not_finite;
+    CompactBlocks blocks(graph, config_.rounds, task.block_gaussians);
+    Progress progress("Network", n);
+    for (int64_t b = 0; b < blocks.count(); ++b) {
+      if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped"};
+      const CompactBlock& block = blocks.Find(b);
+      const Buffer<float> states = States(features, block, graph.neighbours);
+      ParallelFor(0, block.own(), kRowsPerTask, [&](int64_t begin, int64_t end) {
+        Buffer<float> raw(static_cast<size_t>((end - begin) * out_.outputs()));
+        Head(features, block, states, begin, end, raw.data());
+        for (int64_t place = begin; place < end; ++place) {
+          const int64_t i = block.rows[static_cast<size_t>(place)];
+          const float fade = fades[static_cast<size_t>(i)];
+          const int64_t row = places.rows[static_cast<size_t>(i)];
+          if (fade > 0) {
+            const float* said = raw.data() + (place - begin) * out_.outputs();
+            if (!AllFinite(said, out_.outputs())) {
+              said = nothing.data();
+              ++not_finite;
+            }
+            WriteCopies(config_, start, anchors, i, said, fade, row, places.inside, result.cloud);
+          } else {
+            WriteCopies(single, single_start, anchors, i, nothing.data(), 0, row, 1, result.cloud);
           }
-          WriteCopies(config_, start, anchors, i, said, fade, row, places.inside, result.cloud);
-        } else {
-          WriteCopies(single, single_start, anchors, i, nothing.data(), 0, row, 1, result.cloud);
         }
-      }
-    });
+      });
+      progress.Advance(block.own());
+    }
+  } catch (const NoDiskRoom& none) {
+    return Error{ErrorCode::kIo, none.what()};
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kBadArgument,
                  Cat("no memory for ", WithThousands(places.copied + result.outside), " Gaussians")};

@@ -12,6 +12,7 @@
 #include "core/buffer.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
+#include "model/compact/compact_blocks.h"
 #include "model/compact/compact_config.h"
 #include "model/compact/compact_features.h"
 #include "model/kernels/packed_weights.h"
@@ -20,11 +21,16 @@
 
 namespace anchorsplat {
 
+// States of so many and of those around them stay in the caches of most machines.
+inline constexpr int64_t kCompactBlock = 65'536;
+
 // What a compact network is asked for.
 struct CompactTask {
   std::span<const float> pixel_sizes;  // p_LR, world units, one for all or one per Gaussian
   double upscale = 4;                  // u ≥ 1
   double strength = 0;                 // f of the filter that residuals are added to, > 0
+  // Gaussians whose states are kept at a time, besides those that they hear from; > 0. Changes no bit of the result.
+  int64_t block_gaussians = kCompactBlock;
 };
 
 struct CompactResult {
@@ -54,9 +60,9 @@ class CompactNetwork {
   std::pair<double, double> TrainedUpscales() const;
 
   // Enhances a cloud of finite values (log-scales and opacity logits may be −Inf). The same bits for any number of
-  // threads. Needs about 4·(2·H + 60) bytes per Gaussian besides the result.
-  // Errors (kBadArgument): of Validate(cloud); no Gaussians or 2^31 rows; a wrong number of pixel sizes, one that is
-  // not positive and finite; upscale below 1; a strength that is negative; more output than memory holds.
+  // threads. Needs about 0.5 KB per Gaussian of a block, and 250 bytes of Buffers per Gaussian of the cloud, besides
+  // the result. Errors (kBadArgument): of Validate(cloud); no Gaussians or 2^31 rows; a wrong number of pixel sizes,
+  // one that is not positive and finite; upscale below 1; a strength that is negative; more output than memory holds.
   Result<CompactResult> Apply(const GaussianCloud& cloud, const CompactTask& task) const;
 
   // The raw outputs [N, CompactOutputs(config())] for the features of a cloud, before bounds and fading.
@@ -72,10 +78,12 @@ class CompactNetwork {
   };
   class Loader;
 
-  // States [N,H] of all Gaussians after all rounds.
-  Buffer<float> States(const CompactFeatures& features, const CompactGraph& graph) const;
-  void Head(const CompactFeatures& features, const Buffer<float>& states, int64_t begin, int64_t end, float* out) const;
-  std::vector<float> Fades(const CompactFeatures& features, int64_t count) const;
+  // States [rows,H] of a block's Gaussians; those of its own are after all rounds.
+  Buffer<float> States(const CompactFeatures& features, const CompactBlock& block, int64_t neighbours) const;
+  // Of the block's own Gaussians begin to end.
+  void Head(const CompactFeatures& features, const CompactBlock& block, const Buffer<float>& states, int64_t begin,
+            int64_t end, float* out) const;
+  Buffer<float> Fades(const CompactFeatures& features, int64_t count) const;
   float Fade(const float* node, const std::array<float, 3>& widths) const;
 
   CompactConfig config_;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/memory_limit.h"
 #include "core/parallel.h"
 #include "enhance/filter.h"
 #include "io/folder_for_test.h"
@@ -61,6 +62,51 @@ TEST(CompactNetwork, FarAwayGaussiansMakeNoDifference) {
                 together->cloud.means[static_cast<size_t>(k * 3 * both.size() + 3 * far.size() + c)]);
     }
   }
+}
+
+void ExpectSameBits(const CompactResult& a, const CompactResult& b) {
+  EXPECT_EQ(a.anchors, b.anchors);
+  EXPECT_EQ(a.cloud.means, b.cloud.means);
+  EXPECT_EQ(a.cloud.log_scales, b.cloud.log_scales);
+  EXPECT_EQ(a.cloud.quats, b.cloud.quats);
+  EXPECT_EQ(a.cloud.opacity_logits, b.cloud.opacity_logits);
+  EXPECT_EQ(a.cloud.sh, b.cloud.sh);
+}
+
+TEST(CompactNetwork, BlocksOfAnySizeSayTheSameBits) {
+  const GaussianCloud cloud = SheetCloud(1500);
+  for (const CompactConfig& config : {CompactConfig{}, CompactConfig{.rounds = 3, .neighbours = 5},
+                                      CompactConfig{.rounds = 0}, CompactConfig{.context = CompactContext::kPatches}}) {
+    const CompactNetwork network = Network(config);
+    const auto whole = network.Apply(cloud, Task());
+    ASSERT_TRUE(whole.ok());
+    for (const int64_t block : {1, 37, 128, 1000, 1499}) {
+      if (block == 1 && config.rounds != 0) continue;  // takes long
+      CompactTask task = Task();
+      task.block_gaussians = block;
+      const auto cut = network.Apply(cloud, task);
+      ASSERT_TRUE(cut.ok());
+      SCOPED_TRACE(block);
+      ExpectSameBits(*whole, *cut);
+    }
+  }
+  CompactTask none = Task();
+  none.block_gaussians = 0;
+  EXPECT_FALSE(Network({}).Apply(cloud, none).ok());
+}
+
+TEST(CompactNetwork, ArraysOnDiskSayTheSameBits) {
+  const GaussianCloud cloud = SheetCloud(12'000);
+  const CompactNetwork network = Network({});
+  const auto in_memory = network.Apply(cloud, Task());
+  ASSERT_TRUE(in_memory.ok());
+  const TestFolder folder;
+  const MemoryLimit limit(0, folder.path());
+  const auto on_disk = network.Apply(cloud, Task());
+  ASSERT_TRUE(on_disk.ok());
+  EXPECT_GT(limit.most_on_disk(), 9'000'000u);
+  EXPECT_EQ(folder.Entries(), 0);
+  ExpectSameBits(*in_memory, *on_disk);
 }
 
 TEST(CompactNetwork, OddCloudsStayFinite) {

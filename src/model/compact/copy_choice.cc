@@ -42,7 +42,7 @@ class MergePlan {
   MergePlan(const CopyGroups& groups, const CopyChoice& choice, const GaussianCloud& cloud)
       : groups_(groups),
         steps_(static_cast<size_t>(groups.count * (groups.copies - 1))),
-        chosen_(static_cast<size_t>(groups.count)) {
+        chosen_(static_cast<size_t>(groups.count), 0) {
     ParallelFor(0, groups.count, kGroupsPerTask, [&](int64_t begin, int64_t end) {
       CopyGroup group(groups.copies, choice.invisible);
       for (int64_t g = begin; g < end; ++g) {
@@ -114,8 +114,8 @@ class MergePlan {
   CopyGroup::Step* StepsOf(int64_t g) { return steps_.data() + g * (groups_.copies - 1); }
 
   CopyGroups groups_;
-  std::vector<CopyGroup::Step> steps_;
-  std::vector<int64_t> chosen_;  // steps of each group that are done
+  Buffer<CopyGroup::Step> steps_;
+  Buffer<int64_t> chosen_;  // steps of each group that are done
 };
 
 void KeepMarked(const std::vector<char>& keep, GaussianCloud& cloud) {

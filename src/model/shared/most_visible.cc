@@ -20,7 +20,7 @@ std::vector<int64_t> MostVisible(const GaussianCloud& cloud, std::span<const int
   const auto more = [&](size_t a, size_t b) {
     return log_weight[a] != log_weight[b] ? log_weight[a] > log_weight[b] : a < b;
   };
-  count = std::min(count, std::ssize(rows));
+  count = std::min(count, int64_t{std::ssize(rows)});
   std::nth_element(order.begin(), order.begin() + count, order.end(), more);
   order.resize(static_cast<size_t>(count));
   std::sort(order.begin(), order.end());

@@ -11,6 +11,7 @@
 #include "core/text.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
+#include "enhance/lost_width.h"
 #include "enhance/pixel_size_guard.h"
 #include "enhance/refine_method.h"
 #include "fit/pixel_model.h"
@@ -34,6 +35,7 @@ std::vector<EnhanceMethod>& Registry() {
        .summary = "give the width back that the fit absorbed; instant, no weights",
        .rank = 0,
        .options = WidthOptions(),
+       .seconds = [](const EnhanceOptions&) { return 4e-7; },
        .ready = [](const EnhanceOptions&) { return Status(); },
        .run = [](EnhanceInput input, const EnhanceOptions& options, StepReport&) -> Result<GaussianCloud> {
          ANCHORSPLAT_RETURN_IF_ERROR([&]() -> Status {
@@ -50,7 +52,7 @@ std::vector<EnhanceMethod>& Registry() {
 
 // Drops the rows no method and no viewer can use; says how many.
 Status DropUnusable(GaussianCloud& cloud) {
-  LeaveIfAbandoned();
+  if (CountUnusable(cloud) == 0) return {};
   std::vector<int64_t> kept;
   for (int64_t i = 0; i < cloud.size(); ++i) {
     if (IsUsable(cloud, i)) kept.push_back(i);
@@ -127,7 +129,9 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
 
 // Pictures to refine against come with the cameras that took them, and are as large as they were in training.
 Status PixelSizesFromPictures(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.refine.images, {.hold_out = 0}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      TrainingViews project,
+      OpenProject(options.refine.images, {.hold_out = 0, .downscale = options.refine.downscale}));
   EnhanceOptions with_cameras = options;
   with_cameras.cameras.emplace().cameras = std::move(project.train);
   with_cameras.camera_rule = CameraPixelRule::kMedian;
@@ -141,7 +145,9 @@ Status Clean(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport&
   CameraSet set;
   if (options.cameras) set = *options.cameras;
   if (!options.refine.images.empty() && (set.cameras.empty() || !set.background)) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.refine.images, {.hold_out = 0}));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(
+        TrainingViews project,
+        OpenProject(options.refine.images, {.hold_out = 0, .downscale = options.refine.downscale}));
     if (set.cameras.empty()) set.cameras = std::move(project.train);
     if (!set.background) set.background = project.background;
   }
@@ -296,27 +302,20 @@ void SayHowItLooks(TrainedKind looks, bool tagged) {
 // Of the filter. Splats that absorbed nothing have nothing to get back.
 double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud, std::optional<TrainedKind> looks) {
   if (options.filter_strength) return *options.filter_strength;
-  if (IsFittedToPixelAreas(cloud)) {
+  const LostWidth lost = FindLostWidth(cloud, looks, options.upscale);
+  if (lost.reason == LostWidthReason::kFittedToAreas) {
     LogWarning(
         "the splat was fitted to the areas of pixels: it has lost no width and none is given back (--filter-strength F "
         "to enhance it all the same)");
-    return 0;
-  }
-  if (IsMarkedEnhanced(cloud)) {
+  } else if (lost.reason == LostWidthReason::kMarkedEnhanced) {
     LogWarning(
         "the splat says that it has been enhanced already: its lost width has been given back and none is given once "
         "more (--filter-strength F to enhance it all the same)");
-    return 0;
-  }
-  if (looks == TrainedKind::kWidened) return 0;
-  // Too little harms none of them.
-  if (looks == TrainedKind::kUnclear) return DefaultFilterStrength(options.upscale, RenderMode::kAntialiased);
-  const double strength = DefaultFilterStrength(options.upscale, cloud.render_mode);
-  if (IsCompensated(cloud.render_mode) && options.upscale > 1) {
+  } else if (lost.strength > 0 && IsCompensated(cloud.render_mode) && options.upscale > 1) {
     LogInfo(Cat("the splat is ", NameOf(*cloud.render_mode), ": its fit lost less width, and less is given back (",
-                Fixed(strength, 2), " of what a classic one could have lost)"));
+                Fixed(lost.strength, 2), " of what a classic one could have lost)"));
   }
-  return strength;
+  return lost.strength;
 }
 
 // Runs one method and adds its report.
@@ -348,6 +347,13 @@ int64_t ExpectedGaussians(int64_t count, const EnhanceOptions& options) {
   if (!plan.ok()) return count;
   if (plan->start != nullptr) count = plan->start->expected(count, options);
   return plan->method->expected(count, options);
+}
+
+std::optional<double> ExpectedSeconds(int64_t count, const EnhanceOptions& options, int threads) {
+  const Result<MethodPlan> plan = PlanEnhancement(options);
+  if (!plan.ok() || plan->start != nullptr) return std::nullopt;
+  const double each = plan->method->seconds(options);
+  return each > 0 ? std::optional(static_cast<double>(count) * each / std::max(1, threads)) : std::nullopt;
 }
 
 namespace {
@@ -405,6 +411,12 @@ Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, Enhan
   if (options.filter_strength && *options.filter_strength > 0 && !gives_width && options.upscale > 1) {
     LogWarning(Cat("a strength of ", input.filter_strength, " is no more than what the closer view's own pixels add (",
                    ShownStrength(options.upscale, input.cloud.render_mode), "): nothing changes"));
+  }
+  if (gives_width && plan.chosen_by.empty() && plan.Name() == "filter" && !options.filter_strength &&
+      input.cloud.render_mode == RenderMode::kAntialiased) {
+    LogWarning(
+        "the filter alone can take more than it gives from an antialiased splat of many Gaussians that overlap (up to "
+        "3.5 dB were seen); the default, with a network, makes up for it");
   }
   ANCHORSPLAT_RETURN_IF_ERROR(ChoosePixelSizes(options, plan.method->takes_start && !options.refine.images.empty(),
                                                gives_width, input, report));

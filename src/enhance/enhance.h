@@ -135,6 +135,8 @@ struct EnhanceMethod {
   std::function<int64_t(int64_t count, const EnhanceOptions&)> expected = [](int64_t count, const EnhanceOptions&) {
     return count;
   };
+  // Of one Gaussian on one core, about; 0: nobody knows before the work.
+  std::function<double(const EnhanceOptions&)> seconds = [](const EnhanceOptions&) { return 0.0; };
   std::function<Status(const EnhanceOptions&)> ready;
   std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&, StepReport&)> run;
 };
@@ -165,6 +167,9 @@ Status CheckOptions(const EnhanceOptions& options);
 
 // About how many Gaussians Enhance() makes of `count`; `count` where no method can be chosen.
 int64_t ExpectedGaussians(int64_t count, const EnhanceOptions& options);
+
+// About how long it takes on `threads` cores; nothing where that depends on more than their number, as of refinements.
+std::optional<double> ExpectedSeconds(int64_t count, const EnhanceOptions& options, int threads);
 
 struct Enhanced {
   GaussianCloud cloud;

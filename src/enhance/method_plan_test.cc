@@ -125,7 +125,7 @@ TEST_F(Plan, WhatHasNoEffectIsRefused) {
 
 TEST_F(Plan, RefinementSaysWhatItsOptionsNeed) {
   options_.method = "refine";
-  for (const char* name : {"hold-out", "exposure", "robust", "align"}) {
+  for (const char* name : {"hold-out", "downscale", "exposure", "robust", "align"}) {
     EXPECT_THAT(Given(name), HasSubstr("it has one with --images")) << name;
   }
   EXPECT_EQ(Given("poses"), "");

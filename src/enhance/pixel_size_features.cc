@@ -51,9 +51,9 @@ double WeightedQuantile(std::vector<std::pair<float, double>>& items, double sha
 // The part of the cloud that says something, without its colours. `radius` becomes that of the part where it is cut.
 GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing, double& radius) {
   LeaveIfAbandoned();
-  std::vector<std::pair<double, int64_t>> near;  // distance², row
-  for (int64_t i = 0; i < cloud.size(); ++i) {
-    if (!IsUsable(cloud, i)) continue;
+  using Near = std::pair<double, int64_t>;  // distance², row
+  const double longest_allowed = std::log(kLargestAxis * framing.radius);
+  std::vector<Near> near = CollectRows<Near>(cloud.size(), [&](int64_t i, std::vector<Near>& out) {
     double distance = 0;
     for (size_t a = 0; a < 3; ++a) {
       const double d = cloud.means[static_cast<size_t>(3 * i) + a] - framing.target[a];
@@ -61,11 +61,10 @@ GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing, double
     }
     const float* scales = cloud.log_scales.data() + 3 * i;
     const float longest = std::max({scales[0], scales[1], scales[2]});
-    if (std::sqrt(distance) <= kShowingFarthest * framing.radius &&
-        longest <= std::log(kLargestAxis * framing.radius)) {
-      near.emplace_back(distance, i);
+    if (std::sqrt(distance) <= kShowingFarthest * framing.radius && longest <= longest_allowed && IsUsable(cloud, i)) {
+      out.emplace_back(distance, i);
     }
-  }
+  });
   if (near.size() > kMostShowing) {
     const auto last = near.begin() + static_cast<std::ptrdiff_t>(kMostShowing);
     std::nth_element(near.begin(), last, near.end());

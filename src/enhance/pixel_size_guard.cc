@@ -65,6 +65,25 @@ double Spacing(const GaussianCloud& cloud, const std::vector<int64_t>& rows) {
   return double{Quantile(farthest, 0.5)} * std::sqrt(std::numbers::pi / static_cast<double>(kNeighbours));
 }
 
+// Usable rows of a cloud, as far as an estimate looks at them.
+GaussianCloud WithoutHarmonics(const GaussianCloud& cloud, const std::vector<int64_t>& rows) {
+  GaussianCloud out;
+  out.Resize(std::ssize(rows), 0);
+  out.render_mode = cloud.render_mode;
+  out.comments = cloud.comments;
+  ParallelFor(0, out.size(), 1 << 14, [&](int64_t first, int64_t last) {
+    for (int64_t k = first; k < last; ++k) {
+      const int64_t i = rows[static_cast<size_t>(k)];
+      std::copy_n(cloud.means.data() + 3 * i, 3, out.means.data() + 3 * k);
+      std::copy_n(cloud.log_scales.data() + 3 * i, 3, out.log_scales.data() + 3 * k);
+      std::copy_n(cloud.quats.data() + 4 * i, 4, out.quats.data() + 4 * k);
+      out.opacity_logits[static_cast<size_t>(k)] = cloud.opacity_logits[static_cast<size_t>(i)];
+      std::copy_n(cloud.sh.data() + i * cloud.sh_stride(), 3, out.sh.data() + 3 * k);
+    }
+  });
+  return out;
+}
+
 std::string Number(double value) { return Fixed(value, value < 10 ? 1 : 0); }
 
 }  // namespace
@@ -96,8 +115,7 @@ Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud) {
 
   const auto black = static_cast<double>(cloud.size()) - static_cast<double>(showing.not_black.size());
   if (black > kFewBlack * static_cast<double>(cloud.size())) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud coloured, Subset(cloud, showing.not_black));
-    const auto without = EstimatePixelSize(coloured);
+    const auto without = EstimatePixelSize(WithoutHarmonics(cloud, showing.not_black));
     if (without.ok()) evidence.without_black = without->size;
   }
   return evidence;

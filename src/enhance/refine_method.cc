@@ -93,6 +93,7 @@ std::vector<MethodOption> RefinementOptions() {
       {"filter-strength", filtered},
       {"images", {}},
       {"hold-out", with_images},
+      {"downscale", with_images},
       {"steps", {}},
       {"seconds", {}},
       {"k", {}},

@@ -1,12 +1,13 @@
 #include "enhance/refine_options.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <type_traits>
 
+#include "cameras/photograph.h"
+#include "core/number_text.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -42,6 +43,7 @@ constexpr NamedOption kOptions[] = {
     {"k", [](RefineOptions& o, double x) { return Assign(x, o.copies); }},
     {"most-gaussians", [](RefineOptions& o, double x) { return Assign(x, o.max_gaussians); }},
     {"hold-out", [](RefineOptions& o, double x) { return Assign(x, o.hold_out); }},
+    {"downscale", [](RefineOptions& o, double x) { return Assign(x, o.downscale); }},
     {"poses", [](RefineOptions& o, double x) { return Assign(x, o.poses); }},
     {"between", [](RefineOptions& o, double x) { return Assign(x, o.between); }},
     {"half-from", [](RefineOptions& o, double x) { return Assign(x, o.half_from); }},
@@ -61,7 +63,7 @@ Status SetRefineOption(RefineOptions& options, std::string_view key, std::string
     if (option.key != key) continue;
     double number = 0;
     const char* end = value.data() + value.size();
-    const auto [stop, code] = std::from_chars(value.data(), end, number);
+    const auto [stop, code] = FromChars(value.data(), end, number);
     if (code == std::errc() && stop == end && option.set(options, number)) return {};
     return Error{ErrorCode::kBadArgument, Cat("refine: ", key, " cannot be '", Printable(std::string(value)), "'")};
   }
@@ -82,6 +84,7 @@ Status Validate(const RefineOptions& o) {
   if (o.seconds && !(*o.seconds > 0 && std::isfinite(*o.seconds))) return bad("seconds must be positive");
   if (o.copies && (*o.copies < 1 || *o.copies > kMostCopies)) return bad(Cat("K must be 1 to ", kMostCopies));
   if (o.max_gaussians < 0) return bad("the bound of Gaussians must not be negative");
+  if (o.downscale < 1 || o.downscale > kMostDownscale) return bad(Cat("downscale must be 1 to ", kMostDownscale));
   if (o.hold_out < 0) return bad("hold-out must not be negative");
   if (o.poses < 1) return bad("there must be at least one pose");
   if (o.between < 0) return bad("poses between cameras must not be negative");
@@ -113,6 +116,7 @@ std::string ToJsonText(const RefineOptions& o) {
       {"robust", o.robust},
       {"align", o.align},
   };
+  if (o.downscale > 1) json["downscale"] = o.downscale;
   if (!o.images.empty()) json["split"] = "by residual";
   return json.dump();
 }

@@ -16,6 +16,7 @@ namespace anchorsplat {
 struct RefineOptions {
   std::filesystem::path images;  // project with the training pictures (fit/training_views.h); empty: without any
   int hold_out = 8;              // every Nth view is not trained on, as in fits; 0: all are
+  int downscale = 1;             // pixels of a picture per side that become one, as in fits
   std::optional<int64_t> steps;
   std::optional<double> seconds;           // instead of steps: as many as there are in that time. Not reproducible
   std::optional<int> copies;               // K that every Gaussian is split into at the beginning

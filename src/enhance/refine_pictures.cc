@@ -132,13 +132,15 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
   RenderOutput output;
   std::vector<Image> shown(static_cast<size_t>(agreement.views)), truth(shown.size());
   std::vector<Camera> cameras;
+  Buffer<uint8_t> ignored;
   for (size_t i = 0; i < shown.size(); ++i) {
     const int64_t view = static_cast<int64_t>(i) * count / agreement.views;
     const Camera& camera = cameras.emplace_back(pictures.views()[static_cast<size_t>(view)]);
-    ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(view, truth[i]));
+    ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(view, truth[i], ignored));
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, camera, render, output));
     Clamp01(output.color);
     shown[i] = output.color;
+    FillIgnored(ignored, shown[i], truth[i]);
   }
   std::vector<double> each;
   for (size_t i = 0; i < shown.size(); ++i) {

@@ -58,10 +58,17 @@ Status RefineTargets::Load(int64_t view, const PixelBox& window, RefineTarget& t
   const Camera& camera = views()[static_cast<size_t>(view)];
   const bool whole = IsWhole(window, camera.intrinsics);
   if (pictures_) {
-    target.ignored.clear();
-    if (whole) return pictures_->Load(view, target.picture);
-    ANCHORSPLAT_RETURN_IF_ERROR(pictures_->Load(view, whole_));
+    if (whole) return pictures_->Load(view, target.picture, target.ignored);
+    Buffer<uint8_t> ignored;
+    ANCHORSPLAT_RETURN_IF_ERROR(pictures_->Load(view, whole_, ignored));
     CropInto(whole_, window, target.picture);
+    target.ignored.clear();
+    if (ignored.empty()) return {};
+    target.ignored.resize(static_cast<size_t>(target.picture.plane()));
+    for (int y = 0; y < target.picture.height; ++y) {
+      std::copy_n(ignored.data() + int64_t{window.y0 + y} * whole_.width + window.x0, target.picture.width,
+                  target.ignored.data() + int64_t{y} * target.picture.width);
+    }
     return {};
   }
   RefineTarget& kept = kept_[static_cast<size_t>(view)];

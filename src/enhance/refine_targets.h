@@ -18,7 +18,7 @@ namespace anchorsplat {
 // What a low-resolution view should show.
 struct RefineTarget {
   Image picture;            // [3,H,W] of the window
-  Buffer<uint8_t> ignored;  // [H,W] 1 where nothing is asked; empty: nowhere
+  Buffer<uint8_t> ignored;  // [H,W] 1 where nothing is asked, as masks have it; empty: nowhere
 };
 
 // The views that a refinement compares with: pictures, or what a splat itself shows through cameras, rendered in the

@@ -27,7 +27,8 @@ constexpr int kCheckAlignSteps = 4;
 constexpr double kPerfect = 100;  // dB that stand for identical pictures in means
 
 Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.images, {.hold_out = options.hold_out}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.images, {.hold_out = options.hold_out,
+                                                                                   .downscale = options.downscale}));
   if (!project.without_picture.empty()) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--images ", options.images.string(), ": ", project.without_picture.size(), " of its ",
@@ -91,13 +92,18 @@ Result<double> MeasureConsistency(const GaussianCloud& cloud, double upscale, co
     const PixelBox window = ChooseWindow(camera, input, 0, view);  // the same for whatever is measured
     ANCHORSPLAT_RETURN_IF_ERROR(targets.Load(view, window, target));
     Camera seen = Crop(camera, window);
+    const ObjectiveOptions as_seen{.render = views.render, .loss = {}, .pixel = AreaModel(upscale)};
     if (options.align) {
+      if (!target.ignored.empty()) {
+        ANCHORSPLAT_RETURN_IF_ERROR(objective.Show(as_seen, cloud, seen));
+        FillIgnored(target.ignored, objective.rendered(), target.picture);
+      }
       ANCHORSPLAT_ASSIGN_OR_RETURN(seen, aligner.Align(cloud, RaysOf(PixelModel{1, upscale}, views.render), seen, seen,
                                                        target.picture, options.exposure, kCheckAlignSteps));
     }
-    ANCHORSPLAT_RETURN_IF_ERROR(
-        objective.Show({.render = views.render, .loss = {}, .pixel = AreaModel(upscale)}, cloud, seen));
+    ANCHORSPLAT_RETURN_IF_ERROR(objective.Show(as_seen, cloud, seen));
     Image shown = objective.rendered();
+    FillIgnored(target.ignored, shown, target.picture);
     if (options.exposure) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewExposure exposure, EstimateExposure(shown, target.picture));
       RemoveExposure(exposure, target.picture);

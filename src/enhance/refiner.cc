@@ -70,6 +70,7 @@ Refiner::Refiner(const RefineOptions& options, const RefineProblem& problem, Ref
 void Refiner::AdjustTarget(double done) {
   const Image& rendered = objective_.rendered();
   Image& picture = target_.picture;
+  FillIgnored(target_.ignored, rendered, picture);  // which are not to weigh in what follows
   if (options_.exposure) {
     const auto exposure = EstimateExposure(rendered, picture);
     if (exposure.ok()) RemoveExposure(*exposure, picture);
@@ -78,10 +79,7 @@ void Refiner::AdjustTarget(double done) {
     const double least = std::max(kLeastOutlier, 1 - done / kTrustFrom);
     (void)IgnoreOutliers(rendered, static_cast<float>(least), picture);
   }
-  for (size_t i = 0; i < target_.ignored.size(); ++i) {
-    if (target_.ignored[i] == 0) continue;
-    for (int c = 0; c < 3; ++c) picture.channel(c)[i] = rendered.channel(c)[i];
-  }
+  FillIgnored(target_.ignored, rendered, picture);
 }
 
 // Where the view's picture was taken, as far as the candidate says now: a step nearer than the last time.
@@ -95,6 +93,11 @@ Result<Camera> Refiner::AlignedView(int64_t view, const PixelBox& window) {
     std::copy_n(motion, 6, at.begin());
     return Moved(origin, at);
   };
+  if (!target_.ignored.empty()) {  // what a mask leaves out pulls at no pose
+    ANCHORSPLAT_RETURN_IF_ERROR(objective_.Show({.render = problem_.render, .loss = {}, .pixel = {1, problem_.upscale}},
+                                                state_.cloud, Crop(placed(), window)));
+    FillIgnored(target_.ignored, objective_.rendered(), target_.picture);
+  }
   const bool first_time = state_.step < static_cast<int64_t>(targets_.views().size());
   // One ray per pixel tells well enough where things are.
   ANCHORSPLAT_ASSIGN_OR_RETURN(

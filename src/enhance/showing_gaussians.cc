@@ -50,16 +50,20 @@ ShowingGaussians FindShowingGaussians(const GaussianCloud& cloud) {
   const std::array<float, 3> middle = {static_cast<float>(framing.target[0]), static_cast<float>(framing.target[1]),
                                        static_cast<float>(framing.target[2])};
   ShowingGaussians showing;
-  std::vector<std::pair<double, int64_t>> bright, all;  // distance², row
-  for (int64_t i = 0; i < cloud.size(); ++i) {
-    if (!IsUsable(cloud, i)) continue;
-    const bool black = IsBlack(cloud, i);
-    if (!black) showing.not_black.push_back(i);
+  showing.not_black = CollectRows<int64_t>(cloud.size(), [&](int64_t i, std::vector<int64_t>& out) {
+    if (!IsBlack(cloud, i) && IsUsable(cloud, i)) out.push_back(i);
+  });
+  using Near = std::pair<double, int64_t>;  // distance², row
+  std::vector<Near> all = CollectRows<Near>(cloud.size(), [&](int64_t i, std::vector<Near>& out) {
     const float opacity = Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]);
     const double distance = SquaredDistance(cloud.means.data() + 3 * i, middle.data());
-    if (opacity < kShowingOpacity || std::sqrt(distance) > kShowingFarthest * framing.radius) continue;
-    all.emplace_back(distance, i);
-    if (!black) bright.emplace_back(distance, i);
+    if (opacity < kShowingOpacity || std::sqrt(distance) > kShowingFarthest * framing.radius) return;
+    if (IsUsable(cloud, i)) out.emplace_back(distance, i);
+  });
+  LeaveIfAbandoned();
+  std::vector<Near> bright;
+  for (const Near& item : all) {
+    if (!IsBlack(cloud, item.second)) bright.push_back(item);
   }
   LeaveIfAbandoned();
   showing.all = Nearest(std::move(all));

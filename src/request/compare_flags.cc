@@ -90,7 +90,8 @@ Result<Sides> OpenSides(const CompareFlags& flags, SideInput a, SideInput b, Sid
     } else if (side.pictures) {
       *out[k] = std::move(side.pictures);
     } else {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(*out[k], OpenImageViews(side.path, options.background));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(*out[k],
+                                   OpenImageViews(side.path, options.background, cameras.value_or(CameraSet{})));
     }
     if (!is_splat && !flags.views.view.empty()) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t kept, FindView((*out[k])->names(), flags.views.view));

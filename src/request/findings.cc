@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <string_view>
 #include <utility>
 
 #include "core/credit.h"
@@ -51,6 +52,7 @@ void LookAt(SplatFindings& findings) {
   if (untold && findings.looks == TrainedKind::kAntialiased) cloud.render_mode = RenderMode::kAntialiased;
   findings.pixel_size = FindPixelSize(cloud);
   if (untold) cloud.render_mode.reset();
+  findings.lost_width = FindLostWidth(cloud, findings.looks, kInfoUpscale);
   findings.problems = Problems(findings.statistics);
 }
 
@@ -80,6 +82,43 @@ Result<ModelFindings> LookAtCheckpoint(const std::string& path) {
 }
 
 }  // namespace
+
+std::string_view InWords(const std::optional<TrainedKind>& kind) {
+  if (!kind) return "like nothing: too few Gaussians to tell";
+  switch (*kind) {
+    case TrainedKind::kAntialiased:
+      return "like an antialiased one";
+    case TrainedKind::kWidened:
+      return "like one of Mip-Splatting, or enhanced already";
+    case TrainedKind::kUnclear:
+      return "neither like a classic nor an antialiased one, or changed since";
+    default:
+      return "like a classic one";
+  }
+}
+
+// What `enhance` would do about it.
+std::string InWords(const LostWidth& lost, bool pixel_doubted) {
+  const auto share = [&] {
+    return Cat(Fixed(lost.strength, 2), " of 0.3 px² at ", kInfoUpscale, "x",
+               lost.likely() ? " (likely)" : " (unsure, so little)");
+  };
+  switch (lost.reason) {
+    case LostWidthReason::kFittedToAreas:
+      return "none: the file says that it was fitted to the areas of pixels; enhance leaves it alone";
+    case LostWidthReason::kMarkedEnhanced:
+      return "none any more: the file says that it has been enhanced; enhance leaves it alone";
+    case LostWidthReason::kWidened:
+      return "none (likely): even the thinnest Gaussians have a width; enhance leaves it alone";
+    case LostWidthReason::kWidenedButTagged:
+      return "none (likely): tagged antialiased, but even the thinnest Gaussians have a width; enhance leaves it alone";
+    case LostWidthReason::kTooFew:
+      return Cat(Fixed(lost.strength, 2), " of 0.3 px² at ", kInfoUpscale, "x (unsure: taken for a classic one)");
+    default:
+      break;
+  }
+  return share() + (pixel_doubted ? ", but of a pixel whose size is doubtful: see below" : "");
+}
 
 Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& name) {
   SplatFindings findings;
@@ -117,6 +156,11 @@ nlohmann::json ToJson(const SplatFindings& f) {
                          {"bounds", nullptr},
                          {"render_mode", nullptr},
                          {"looks", nullptr},
+                         {"lost_width",
+                          {{"strength", f.lost_width.strength},
+                           {"upscale", kInfoUpscale},
+                           {"likely", f.lost_width.likely()},
+                           {"because", NameOf(f.lost_width.reason)}}},
                          {"comments", f.cloud.comments},
                          {"credits", CreditsOf(f.cloud.comments)},
                          {"largest_axis", percentiles(s.largest_axis)},

@@ -6,11 +6,13 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "core/statistics.h"
+#include "enhance/lost_width.h"
 #include "enhance/pixel_size_guard.h"
 #include "enhance/trained_kind.h"
 #include "formats/opened_splat.h"
@@ -27,8 +29,16 @@ struct SplatFindings {
   CloudStatistics statistics;
   Result<PixelSizeFinding> pixel_size = Error{};
   std::optional<TrainedKind> looks;   // by its sizes, whatever the file says; nothing where there are too few Gaussians
+  LostWidth lost_width;               // at kInfoUpscale, as `enhance` gives it back
   std::vector<std::string> problems;  // sentences
 };
+
+inline constexpr double kInfoUpscale = 4;  // the default zoom of `enhance`
+
+// Ends of sentences. "It looks like a classic one"; "lost width: 0.73 of 0.3 px² at 4x (likely)", with what `enhance`
+// would do about it. `pixel_doubted`: the size of a training pixel is contradicted.
+std::string_view InWords(const std::optional<TrainedKind>& looks);
+std::string InWords(const LostWidth& lost, bool pixel_doubted);
 
 // `name` is the file's, for people. Errors: of reading.
 Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& name);

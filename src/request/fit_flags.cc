@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "cameras/photograph.h"
 #include "core/text.h"
 #include "request/choice.h"
 #include "request/parse.h"
@@ -95,6 +96,9 @@ void FitFlags::AddTo(CLI::App& verb) {
                 "Smooth every Gaussian by the pixel of the closest camera, as Mip-Splatting does; implies --mode mip");
   verb.add_option("--hold-out", hold_out, "Hold out every Nth view, by name; 0: none")
       ->check(CLI::Range(0, 1 << 30))
+      ->capture_default_str();
+  verb.add_option("--downscale", downscale, "N x N pixels of the pictures become one, their mean")
+      ->check(CLI::Range(1, kMostDownscale))
       ->capture_default_str();
   auto* init_option = AddChoice(
       verb, "--init", init,

@@ -26,6 +26,7 @@ struct FitFlags {
   int64_t checkpoint_every = 0;
   bool resume = false;
   int hold_out = 8;
+  int downscale = 1;
   FitInit init = FitInit::kAuto;
   std::string init_splat;
   std::optional<int64_t> init_points;

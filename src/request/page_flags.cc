@@ -45,6 +45,12 @@ Result<std::vector<ViewerView>> ChooseViews(const PageFlags& flags, const Camera
     if (!flags.truth.empty()) {
       const auto picture = FindPicture(flags.truth, camera);
       if (!picture) continue;
+      if (!camera.photograph.lens.IsStraight()) {
+        return Error{ErrorCode::kBadArgument,
+                     Cat("--truth: the pictures of ", flags.cameras,
+                         " were taken through a lens, and the page shows pictures as they are; give undistorted ones "
+                         "with their cameras")};
+      }
       view.picture = *picture;
     }
     all.push_back(std::move(view));

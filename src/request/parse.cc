@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <set>
 
 #include "core/image.h"
+#include "core/number_text.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -17,7 +17,7 @@ namespace {
 // The whole of `text` as a finite number.
 std::optional<double> ParseNumber(std::string_view text) {
   double value = 0;
-  const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const auto [end, code] = FromChars(text.data(), text.data() + text.size(), value);
   if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
   return value;
 }

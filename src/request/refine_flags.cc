@@ -1,5 +1,6 @@
 #include "request/refine_flags.h"
 
+#include "cameras/photograph.h"
 #include "request/choice.h"
 
 namespace anchorsplat {
@@ -14,6 +15,11 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
       ->group(group);
   verb.add_option("--hold-out", options.hold_out, "Of --images: every Nth view is not trained on; 0: all are")
       ->check(CLI::Range(0, 1 << 30))
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--downscale", options.downscale,
+                  "Of --images: N x N pixels become one, where the splat was fitted to smaller pictures")
+      ->check(CLI::Range(1, kMostDownscale))
       ->capture_default_str()
       ->group(group);
   auto* steps = verb.add_option("--steps", options.steps,

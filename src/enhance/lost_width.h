@@ -1,0 +1,37 @@
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include "core/gaussian_cloud.h"
+#include "enhance/trained_kind.h"
+
+namespace anchorsplat {
+
+// What `enhance` gives back to a splat, and why.
+enum class LostWidthReason {
+  kTagged,            // the file says how it was trained
+  kLooks,             // its sizes say it
+  kUnclear,           // they are like those of no kind: only a little, which harms none of them
+  kTooFew,            // too few Gaussians to tell: taken for a classic one
+  kFittedToAreas,     // nothing was lost
+  kMarkedEnhanced,    // nothing is lost any more
+  kWidened,           // the same, by its sizes
+  kWidenedButTagged,  // by its sizes, although it is tagged antialiased: formats have no word for Mip-Splatting
+};
+
+// The words of `info`'s JSON.
+std::string_view NameOf(LostWidthReason reason);
+
+struct LostWidth {
+  double strength = 0;  // f of enhance/filter.h, at the zoom that was asked for
+  LostWidthReason reason = LostWidthReason::kLooks;
+
+  // Of what is called likely nine in ten hold on every kind of fit (docs/results/recognised.md).
+  bool likely() const { return reason != LostWidthReason::kUnclear && reason != LostWidthReason::kTooFew; }
+};
+
+// `looks`: FindTrainedKind of the cloud; nothing where the tag is to be believed. upscale ≥ 1.
+LostWidth FindLostWidth(const GaussianCloud& cloud, std::optional<TrainedKind> looks, double upscale);
+
+}  // namespace anchorsplat

@@ -1,0 +1,56 @@
+#include "enhance/lost_width.h"
+
+#include <gtest/gtest.h>
+
+#include "enhance/enhanced_mark.h"
+#include "enhance/filter.h"
+
+namespace anchorsplat {
+namespace {
+
+constexpr double kUpscale = 4;
+
+GaussianCloud Tagged(std::optional<RenderMode> mode) {
+  GaussianCloud cloud;
+  cloud.render_mode = mode;
+  return cloud;
+}
+
+TEST(LostWidth, IsWhatTheTagSays) {
+  for (const RenderMode mode : {RenderMode::kClassic, RenderMode::kAntialiased, RenderMode::kMip}) {
+    const LostWidth lost = FindLostWidth(Tagged(mode), TrainedKind::kClassic, kUpscale);
+    EXPECT_EQ(lost.strength, DefaultFilterStrength(kUpscale, mode));
+    EXPECT_EQ(lost.reason, LostWidthReason::kTagged);
+    EXPECT_TRUE(lost.likely());
+  }
+}
+
+TEST(LostWidth, IsThatOfItsKindWithoutATag) {
+  const LostWidth classic = FindLostWidth(Tagged({}), TrainedKind::kClassic, kUpscale);
+  const LostWidth antialiased = FindLostWidth(Tagged({}), TrainedKind::kAntialiased, kUpscale);
+  EXPECT_EQ(classic.strength, DefaultFilterStrength(kUpscale));
+  EXPECT_EQ(antialiased.strength, DefaultFilterStrength(kUpscale, RenderMode::kAntialiased));
+  EXPECT_TRUE(classic.likely() && antialiased.likely());
+  // Cautious where it is not known.
+  const LostWidth unclear = FindLostWidth(Tagged({}), TrainedKind::kUnclear, kUpscale);
+  EXPECT_EQ(unclear.strength, antialiased.strength);
+  EXPECT_FALSE(unclear.likely());
+  const LostWidth few = FindLostWidth(Tagged({}), {}, kUpscale);
+  EXPECT_EQ(few.strength, classic.strength);
+  EXPECT_FALSE(few.likely());
+}
+
+TEST(LostWidth, IsNoneWhereItHasBeenGivenBack) {
+  EXPECT_EQ(FindLostWidth(Tagged({}), TrainedKind::kWidened, kUpscale).strength, 0);
+  const LostWidth tagged = FindLostWidth(Tagged(RenderMode::kAntialiased), TrainedKind::kWidened, kUpscale);
+  EXPECT_EQ(tagged.strength, 0);
+  EXPECT_EQ(tagged.reason, LostWidthReason::kWidenedButTagged);
+  // A classic tag is believed: classic fits of few, large Gaussians look widened.
+  EXPECT_GT(FindLostWidth(Tagged(RenderMode::kClassic), TrainedKind::kWidened, kUpscale).strength, 0);
+  GaussianCloud enhanced = Tagged(RenderMode::kClassic);
+  enhanced.comments = {EnhancedComment("filter", kUpscale)};
+  EXPECT_EQ(FindLostWidth(enhanced, TrainedKind::kClassic, kUpscale).strength, 0);
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -1,4 +1,7 @@
 # Fails when a file includes a room that stands on its own floor or above (see docs/architecture.md).
+if(NOT IS_DIRECTORY "${SOURCE_DIR}")
+  message(FATAL_ERROR "cmake -DSOURCE_DIR=/PATH/TO/src -P cmake/CheckFloors.cmake")
+endif()
 set(FLOOR_core 0)
 set(FLOOR_io 1)
 set(FLOOR_render 1)
@@ -25,6 +28,7 @@ set(FLOOR_bench 10)
 set(FLOOR_api 11)
 set(FLOOR_request 11)
 set(FLOOR_cli 12)
+set(FLOOR_web 12)
 
 # Of model/ every folder is a room of its own.
 function(room_of path room)

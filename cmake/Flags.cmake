@@ -4,8 +4,8 @@ target_include_directories(anchorsplat_flags INTERFACE "${CMAKE_SOURCE_DIR}/src"
 target_compile_definitions(anchorsplat_flags INTERFACE ANCHORSPLAT_VERSION="${PROJECT_VERSION}")
 target_compile_options(anchorsplat_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wnon-virtual-dtor
-  # Calls within a shared library stay direct.
-  -fno-semantic-interposition
+  # Calls within a shared library stay direct; WebAssembly has none.
+  $<$<NOT:$<BOOL:${EMSCRIPTEN}>>:-fno-semantic-interposition>
   # a*b+c must round twice unless a kernel asks for FMA by name: row counts of the network's input depend on it, and
   # results must not change with the compiler's mood.
   -ffp-contract=off)

@@ -44,8 +44,9 @@ function(anchorsplat_room name)
     return()
   endif()
   add_library(anchorsplat_${name} STATIC ${sources})
-  # Every room may become part of a shared library.
-  set_target_properties(anchorsplat_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  if(NOT EMSCRIPTEN)  # every room may become part of a shared library
+    set_target_properties(anchorsplat_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  endif()
   anchorsplat_unity(anchorsplat_${name})
   target_link_libraries(anchorsplat_${name} PUBLIC anchorsplat_flags ${ROOM_LIBRARIES})
   foreach(used IN LISTS ROOM_USES)
@@ -55,6 +56,10 @@ function(anchorsplat_room name)
   endforeach()
   if(tests AND ANCHORSPLAT_TESTS)
     add_executable(${name}_test ${tests})
+    if(EMSCRIPTEN)  # run by Node, on the files of this machine
+      target_link_options(${name}_test PRIVATE -sNODERAWFS=1 -sENVIRONMENT=node -sEXIT_RUNTIME=1 -sALLOW_MEMORY_GROWTH=1
+                          -sMAXIMUM_MEMORY=4GB -sSTACK_SIZE=4MB -sINITIAL_MEMORY=64MB)
+    endif()
     if(NOT name MATCHES "^(bench|cameras|cli|dataset|formats|images|io|metrics|model.*|render|tensors)$")  # their tests call what they compare alike
       anchorsplat_unity(${name}_test)
     endif()

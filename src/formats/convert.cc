@@ -12,6 +12,7 @@
 
 #include "core/activations.h"
 #include "core/log.h"
+#include "core/memory_limit.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "formats/extra_properties.h"
@@ -171,6 +172,8 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   }
   if (kept != nullptr) *kept = std::move(cloud);
   return report;
+} catch (const NoDiskRoom& none) {
+  return Error{ErrorCode::kIo, Cat(input.string(), ": ", none.what())};
 } catch (const std::bad_alloc&) {
   return Error{ErrorCode::kIo, Cat(input.string(), ": there is not enough memory for its Gaussians")};
 }

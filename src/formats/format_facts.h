@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -7,6 +8,12 @@
 #include "core/text.h"
 
 namespace anchorsplat {
+
+// How much a file holds, as its header says: known before anything else of it is read, and not checked yet.
+struct CloudExtent {
+  int64_t gaussians = 0;
+  int sh_degree = 0;
+};
 
 // What a file says about itself beside its Gaussians, for `info`: version, bits, flags. Name and value, in an order for
 // people; text from the file is escaped.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/file_system.h"
+#include "core/memory_limit.h"
 #include "core/text.h"
 #include "formats/extra_properties.h"
 #include "io/input_record.h"
@@ -74,6 +75,12 @@ uint64_t OpenedSplat::bytes() const {
   return format_ != nullptr && format_->size != nullptr ? format_->size(input_) : input_.size();
 }
 
+std::optional<CloudExtent> OpenedSplat::Extent() const {
+  if (format_ == nullptr || format_->extent == nullptr) return std::nullopt;
+  const Result<CloudExtent> extent = format_->extent(input_);
+  return extent.ok() ? std::optional(*extent) : std::nullopt;
+}
+
 Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits, ExtraProperties* extras) const try {
   if (format_ == nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, input_.Head(16));
@@ -93,8 +100,16 @@ Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits, ExtraPropertie
     return format_->read_with_extras(input_, limits, *extras);
   }
   return format_->read(input_, limits);
+} catch (const NoDiskRoom& none) {
+  return Error{ErrorCode::kIo, Cat(input_.name(), ": ", none.what())};
 } catch (const std::bad_alloc&) {
   return Error{ErrorCode::kIo, Cat(input_.name(), ": there is not enough memory for its Gaussians")};
+}
+
+std::optional<CloudExtent> ExtentOf(const fs::path& path, const SplatFormat* format) {
+  if (path == "-" || !IsFile(SplatPath(path))) return std::nullopt;
+  const Result<OpenedSplat> file = OpenedSplat::Open(path, format);
+  return file.ok() ? file->Extent() : std::nullopt;
 }
 
 void RecordSplat(const fs::path& path) {

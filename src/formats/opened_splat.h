@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <utility>
 
 #include "core/gaussian_cloud.h"
@@ -25,6 +26,8 @@ class OpenedSplat {
   const InputFile& input() const { return input_; }
   const SplatFormat* format() const { return format_; }  // null: not known, Read() will fail
   uint64_t bytes() const;                                // with the files beside it that belong to it
+  // How much it holds, by its header; nothing where that is not known before it is read, or where reading will fail.
+  std::optional<CloudExtent> Extent() const;
   // Errors: see ReadCloud. `extras` gets what the file says beside its Gaussians, if not null.
   Result<GaussianCloud> Read(const ReadLimits& limits = {}, ExtraProperties* extras = nullptr) const;
 
@@ -37,6 +40,9 @@ class OpenedSplat {
 
 // What OpenedSplat opens for a path: the meta.json of a folder, other paths as they are.
 std::filesystem::path SplatPath(const std::filesystem::path& path);
+
+// OpenedSplat::Extent of a file that can be opened again afterwards; nothing for pipes and for what cannot be opened.
+std::optional<CloudExtent> ExtentOf(const std::filesystem::path& path, const SplatFormat* format = nullptr);
 
 // Puts a splat that will be read later down as an input, with the files beside it that belong to it (input_record.h).
 void RecordSplat(const std::filesystem::path& path);

@@ -54,6 +54,8 @@ struct SplatFormat {
   // Whether a file that begins with `head` (its first kSniffBytes bytes, or all) is of this format. Null where the
   // format has no mark of its own: then the extension decides.
   bool (*sniff)(std::string_view head) = nullptr;
+  // How many Gaussians there are, by the header alone. Null where that is not known before the file is read.
+  Result<CloudExtent> (*extent)(const InputFile& file) = nullptr;
   // What the file says about itself beside its Gaussians. Null where there is nothing.
   Result<FormatFacts> (*describe)(const InputFile& file) = nullptr;
   // Bytes of the file and of those beside it that belong to it. Null: its own.
@@ -73,6 +75,8 @@ struct SplatFormat {
   uint64_t (*predicted_size)(int64_t count, int sh_degree) = nullptr;
   // The prediction is what real splats take; values that compress better or worse take less or more.
   bool size_is_estimate = false;
+  // Of writing one with SH of degree 3 on one core, about: for what is said before the work begins.
+  double seconds_per_gaussian = 2e-7;
   // The order in which `write` puts Gaussians by default.
   SplatOrder order = SplatOrder::kKeep;
   // What the axes of its files are by its own convention.

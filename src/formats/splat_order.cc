@@ -1,14 +1,12 @@
 #include "formats/splat_order.h"
 
-#include <tbb/parallel_sort.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "core/activations.h"
 #include "core/parallel.h"
-#include "core/parallel_section.h"
+#include "core/parallel_sort.h"
 
 namespace anchorsplat {
 
@@ -30,7 +28,7 @@ Buffer<uint32_t> OrderBy(int64_t count, KeyOf&& key_of) {
   ParallelFor(0, count, kOrderGrain, [&](int64_t first, int64_t last) {
     for (int64_t i = first; i < last; ++i) keyed[static_cast<size_t>(i)] = {key_of(i), static_cast<uint32_t>(i)};
   });
-  ParallelSection([&] { tbb::parallel_sort(keyed.begin(), keyed.end()); });
+  ParallelSort(keyed.begin(), keyed.end());
   Buffer<uint32_t> rows(keyed.size());
   ParallelFor(0, count, kOrderGrain, [&](int64_t first, int64_t last) {
     for (int64_t i = first; i < last; ++i) rows[static_cast<size_t>(i)] = keyed[static_cast<size_t>(i)].row;

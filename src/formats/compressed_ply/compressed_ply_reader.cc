@@ -74,6 +74,18 @@ Result<Rows> Locate(const InputFile& file, const PlyHeader& header, std::string_
   return Rows{};
 }
 
+// Of the harmonics; 0 where there is no element for them.
+Result<int> HarmonicsDegree(const InputFile& file, const PlyElement* sh) {
+  if (sh == nullptr) return 0;
+  const auto rest = std::ranges::count_if(
+      sh->properties, [](const PlyProperty& property) { return property.name.starts_with("f_rest_"); });
+  for (int degree = 1; degree <= kMaxShDegree; ++degree) {
+    if (rest == 3 * (ShCoefficients(degree) - 1)) return degree;
+  }
+  return BadHeader(file,
+                   Cat("line ", sh->line, ": element \"sh\" has ", rest, " properties f_rest_*, expected 9, 24 or 45"));
+}
+
 Result<std::vector<ChunkRanges>> ReadChunks(const InputFile& file, const Rows& rows) {
   const PlyElement& element = *rows.element;
   const bool has_colors = element.Find("min_r") != nullptr;
@@ -171,6 +183,17 @@ Status ReadHarmonics(const InputFile& file, const Rows& rows, GaussianCloud& clo
 
 }  // namespace
 
+Result<CloudExtent> ExtentOfCompressedPly(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyHeader header, ReadPlyHeader(file));
+  const PlyElement* const vertex = header.Find("vertex");
+  if (vertex == nullptr) return BadHeader(file, "it has no element \"vertex\"");
+  if (static_cast<uint64_t>(vertex->count) > file.size()) {
+    return BadHeader(file, Cat("line ", vertex->line, ": it has fewer bytes than Gaussians"));
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const int degree, HarmonicsDegree(file, header.Find("sh")));
+  return CloudExtent{vertex->count, degree};
+}
+
 Result<GaussianCloud> ReadCompressedPly(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(PlyHeader header, ReadPlyHeader(file));
   if (header.encoding != PlyEncoding::kLittleEndian) return BadHeader(file, "it is not binary little-endian");
@@ -187,20 +210,11 @@ Result<GaussianCloud> ReadCompressedPly(const InputFile& file, const ReadLimits&
     return BadHeader(file, Cat("line ", chunk_rows.element->line, ": has ", WithThousands(chunk_rows.element->count),
                                " chunks for ", WithThousands(count), " Gaussians, expected one for 256"));
   }
-  int degree = 0;
-  if (sh_rows.element != nullptr) {
-    if (sh_rows.element->count != count) {
-      return BadHeader(file, Cat("line ", sh_rows.element->line, ": has ", WithThousands(sh_rows.element->count),
-                                 " rows of \"sh\" for ", WithThousands(count), " Gaussians"));
-    }
-    const auto rest = std::ranges::count_if(
-        sh_rows.element->properties, [](const PlyProperty& property) { return property.name.starts_with("f_rest_"); });
-    for (degree = 1; degree <= kMaxShDegree && rest != 3 * (ShCoefficients(degree) - 1);) ++degree;
-    if (degree > kMaxShDegree) {
-      return BadHeader(file, Cat("line ", sh_rows.element->line, ": element \"sh\" has ", rest,
-                                 " properties f_rest_*, expected 9, 24 or 45"));
-    }
+  if (sh_rows.element != nullptr && sh_rows.element->count != count) {
+    return BadHeader(file, Cat("line ", sh_rows.element->line, ": has ", WithThousands(sh_rows.element->count),
+                               " rows of \"sh\" for ", WithThousands(count), " Gaussians"));
   }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const int degree, HarmonicsDegree(file, sh_rows.element));
   // Rows of no bytes would let the header promise any number of them.
   for (const std::string_view name : kVertexProperties) {
     ANCHORSPLAT_RETURN_IF_ERROR(OffsetOf(file, *vertex_rows.element, name, PlyType::kUint32));

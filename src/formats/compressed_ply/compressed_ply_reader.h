@@ -24,6 +24,9 @@ inline constexpr int64_t kCompressedPlyChunk = 256;
 // belong together, fewer bytes than the header promises, more than `limits.max_gaussians`.
 Result<GaussianCloud> ReadCompressedPly(const InputFile& file, const ReadLimits& limits = {});
 
+// What the header says. Errors as ReadCompressedPly.
+Result<CloudExtent> ExtentOfCompressedPly(const InputFile& file);
+
 // Chunks, their colour ranges and the element for SH. Errors as ReadCompressedPly.
 Result<FormatFacts> DescribeCompressedPly(const InputFile& file);
 

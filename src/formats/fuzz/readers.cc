@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <optional>
 #include <utility>
 
 #include "cameras/camera_io.h"
@@ -44,10 +45,21 @@ Status ReadAsCloud(const std::string& file, const std::string& bytes) {
     const auto facts = format->describe(input);
     if (!facts.ok()) (void)CheckError(facts.error(), file);
   }
+  std::optional<CloudExtent> extent;
+  if (format != nullptr && format->extent != nullptr) {
+    const auto said = format->extent(input);
+    if (said.ok()) {
+      extent = *said;
+    } else {
+      (void)CheckError(said.error(), file);
+    }
+  }
   if (format == nullptr || format->read == nullptr) return Error{ErrorCode::kBadFile, "no format that is read"};
   const auto cloud = format->read(input, {});
   if (!cloud.ok()) return CheckError(cloud.error(), file);
   Require(!cloud->empty(), "an empty cloud");
+  Require(!extent || (extent->gaussians == cloud->size() && extent->sh_degree == cloud->sh_degree),
+          "another number of Gaussians or degree than the header says");
   Require(Validate(*cloud).ok(), "a cloud whose arrays disagree");
   if (format->read_with_extras == nullptr) return {};
   ExtraProperties extras;
@@ -77,6 +89,8 @@ Status ReadAsImage(const fs::path& file, const std::string& bytes) {
   Put(file, bytes);
   const auto image = ReadImage(file);
   if (!image.ok()) return CheckError(image.error(), file.filename().string());
+  const auto size = ReadImageSize(file);
+  Require(size.ok() && size->orientation >= 1 && size->orientation <= 8, "a picture without a size");
   Require(image->width > 0 && image->height > 0 && (image->channels == 3 || image->channels == 4), "no picture");
   Require(static_cast<int64_t>(image->pixels.size()) == image->plane() * image->channels, "an image of another size");
   return {};
@@ -179,6 +193,7 @@ void AddCameraFormats(const fs::path& folder, std::vector<FuzzReader>& readers) 
   };
   add("transforms.json", TransformsSeeds(), JsonWords());
   add("cameras.json", InriaCamerasSeeds(), JsonWords());
+  add("poses_bounds.npy", {PosesBoundsSeed()}, {"'<f4'", "True", "(2, 17)"});
   // A COLMAP model is two files: one is damaged, the other stays good.
   const auto add_colmap = [&](const char* kind, const char* damaged, const ColmapSeeds& good, bool cameras) {
     const fs::path model = folder / Cat("colmap_", kind, "_", cameras ? "cameras" : "images");

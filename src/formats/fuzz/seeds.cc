@@ -297,11 +297,12 @@ std::vector<std::string> SafetensorsSeeds(const std::filesystem::path& folder) {
 }
 
 std::vector<std::string> TransformsSeeds() {
-  return {Cat(R"({"camera_angle_x": 0.7, "w": 40, "h": 30, "background": [0, 0.5, 1],)", "\n",
-              R"("frames": [{"file_path": "a", "transform_matrix": )", kMatrix, "},\n",
-              R"({"file_path": "b/c.png", "transform_matrix": )", kMatrix, "}]}\n"),
-          Cat(R"({"fl_x": 50.5, "fl_y": 49, "cx": 20, "cy": 15, "w": 40, "h": 30, "camera_model": "OPENCV", "k1": 0,)",
-              "\n", R"("frames": [{"file_path": "a", "fl_x": 10, "transform_matrix": )", kMatrix, "}]}\n")};
+  return {
+      Cat(R"({"camera_angle_x": 0.7, "w": 40, "h": 30, "background": [0, 0.5, 1],)", "\n",
+          R"("frames": [{"file_path": "a", "transform_matrix": )", kMatrix, "},\n",
+          R"({"file_path": "b/c.png", "transform_matrix": )", kMatrix, "}]}\n"),
+      Cat(R"({"fl_x": 50.5, "fl_y": 49, "cx": 20, "cy": 15, "w": 40, "h": 30, "camera_model": "OPENCV", "k1": 0.1,)",
+          "\n", R"("frames": [{"file_path": "a", "fl_x": 10, "transform_matrix": )", kMatrix, "}]}\n")};
 }
 
 std::vector<std::string> InriaCamerasSeeds() {
@@ -376,8 +377,20 @@ ColmapSeeds ColmapBinarySeeds() {
   return {cameras.bytes(), images.bytes(), points.bytes()};
 }
 
+std::string PosesBoundsSeed() {
+  std::string header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1, 17), }";
+  header.resize(117, ' ');
+  header += '\n';
+  std::string bytes("\x93NUMPY\x01\0\x76\0", 10);
+  bytes += header;
+  for (const double value : {0., 0., -1., 1., 30., 0., -1., 0., 2., 40., -1., 0., 0., 3., 50., 0.5, 9.}) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  return bytes;
+}
+
 ColmapSeeds ColmapTextSeeds() {
-  return {"# Camera list\n7 PINHOLE 40 30 50 60 21 14\n9 SIMPLE_PINHOLE 40 30 50 21 14\n",
+  return {"# Camera list\n7 PINHOLE 40 30 50 60 21 14\n9 OPENCV 40 30 50 50 21 14 -0.1 0.01 0.001 0\n",
           "# Image list\n1 1 0 0 0 0.5 -1 2 7 a.png\n1.5 2.5 -1 3 4 12\n2 0.6 0 0 -0.8 0.5 -1 2 9 b c.png\n\n",
           "# Points\n3 0.5 -1 2 1 128 255 0.25 7 7 7 7\n4 0.5 -1 2 1 128 255 0.25\n"};
 }

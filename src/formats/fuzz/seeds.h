@@ -30,6 +30,7 @@ std::vector<std::string> SafetensorsSeeds(const std::filesystem::path& folder);
 
 std::vector<std::string> TransformsSeeds();
 std::vector<std::string> InriaCamerasSeeds();
+std::string PosesBoundsSeed();  // LLFF's, of one view
 std::vector<std::string_view> JsonWords();
 
 struct ColmapSeeds {

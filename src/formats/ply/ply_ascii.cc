@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -9,6 +8,7 @@
 #include <string_view>
 #include <type_traits>
 
+#include "core/number_text.h"
 #include "core/text.h"
 #include "formats/ply/ply_rows.h"
 
@@ -82,11 +82,11 @@ Result<std::string_view> WordReader::NextWord() {
 bool ParseFloat(std::string_view word, float& value) {
   if (!word.empty() && word.front() == '+') word.remove_prefix(1);
   const char* const end = word.data() + word.size();
-  auto result = std::from_chars(word.data(), end, value);
+  auto result = FromChars(word.data(), end, value);
   if (result.ec == std::errc::result_out_of_range) {
     // Too large or too small for a float: round as binary doubles are, to infinity or towards zero.
     double wide = 0;
-    result = std::from_chars(word.data(), end, wide);
+    result = FromChars(word.data(), end, wide);
     // Too small for a double, too: zero. A word is too short to get there without an exponent.
     const size_t exponent = std::min(word.find_first_of("eE"), word.size() - 1);
     if (result.ec == std::errc::result_out_of_range && word.substr(exponent + 1).starts_with('-')) {
@@ -103,7 +103,7 @@ template <typename T>
 bool ParseAs(std::string_view word, std::byte* out) {
   double number = 0;
   if (!word.empty() && word.front() == '+') word.remove_prefix(1);
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+  const auto [end, error] = FromChars(word.data(), word.data() + word.size(), number);
   if (error == std::errc::invalid_argument || end != word.data() + word.size()) return false;
   if (error == std::errc::result_out_of_range) number = std::strtod(std::string(word).c_str(), nullptr);  // 0 or ∞
   if (std::is_integral_v<T> && !(number >= double{std::numeric_limits<T>::min()} &&
@@ -185,7 +185,7 @@ Status RowReader::Read(const PlyElement& element, int64_t row, const Store& stor
       continue;
     }
     int64_t count = 0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), count);
+    const auto [end, error] = FromChars(word.data(), word.data() + word.size(), count);
     if (error != std::errc{} || end != word.data() + word.size() || count < 0) {
       return Bad(Cat("list property \"", Printable(property.name), "\": expected a count, found \"",
                      Printable(std::string(word)), "\""));

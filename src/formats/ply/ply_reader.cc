@@ -7,27 +7,13 @@
 #include "core/log.h"
 #include "core/smoothing_filter.h"
 #include "core/text.h"
+#include "formats/ply/ply_body.h"
 #include "formats/ply/ply_header.h"
 #include "formats/ply/ply_layout.h"
-#include "formats/ply/ply_rows.h"
 
 namespace anchorsplat {
 
 namespace {
-
-std::string Thousands(uint64_t n) { return WithThousands(static_cast<int64_t>(n)); }
-
-// `count` rows of at least `row_size` bytes must fit into `available` bytes: a header may promise anything, and what it
-// promises becomes an allocation.
-Status CheckPromise(const InputFile& file, const PlyElement& element, uint64_t row_size, uint64_t begin) {
-  const uint64_t available = file.size() - begin;
-  if (row_size == 0 || static_cast<uint64_t>(element.count) <= available / row_size) return {};
-  return Error{ErrorCode::kBadFile,
-               Cat(file.name(), ": byte ", Thousands(file.size()), ": the file ends too early: element \"",
-                   Printable(element.name), "\" has ", WithThousands(element.count), " rows of ",
-                   element.has_lists() ? "at least " : "", Thousands(row_size), " bytes, ", Thousands(available),
-                   " bytes are left for them")};
-}
 
 // For as many Gaussians as the file is known to hold. What goes where.
 std::vector<PlyDestination> MakeRoom(const PlyHeader& header, const PlyLayout& layout, GaussianCloud& cloud,
@@ -36,27 +22,6 @@ std::vector<PlyDestination> MakeRoom(const PlyHeader& header, const PlyLayout& l
   if (layout.filter) filter.resize(static_cast<size_t>(layout.vertex->count));
   if (extras != nullptr) *extras = PlanExtras(header, layout);
   return Destinations(layout, cloud, filter, extras);
-}
-
-Status ReadBinaryBody(const InputFile& file, const PlyHeader& header, const PlyLayout& layout, GaussianCloud& cloud,
-                      Buffer<float>& filter, ExtraProperties* extras) {
-  uint64_t begin = header.body;
-  const PlyElement& vertex = *layout.vertex;
-  for (const PlyElement& element : header.elements) {
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckPromise(file, element, element.row_size(), begin));
-    if (&element == &vertex) break;
-    if (element.has_lists()) {
-      SequentialReader reader(file, begin);
-      ANCHORSPLAT_RETURN_IF_ERROR(SkipRowsWithLists(reader, file, element, header.encoding));
-      begin = reader.position();
-    } else {
-      begin += static_cast<uint64_t>(element.count) * element.row_size();
-    }
-  }
-  const std::vector<PlyDestination> to = MakeRoom(header, layout, cloud, filter, extras);
-  if (!vertex.has_lists()) return ReadFixedRows(file, vertex, header.encoding, begin, to);
-  SequentialReader reader(file, begin);
-  return ReadRowsWithLists(reader, file, vertex, header.encoding, to);
 }
 
 // Makes the smoothing filter a part of the Gaussians, as the "fused" file of Mip-Splatting's program has it: every
@@ -85,15 +50,8 @@ Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, Extr
   }
   GaussianCloud cloud;
   Buffer<float> filter;
-  if (header.encoding == PlyEncoding::kAscii) {
-    // A value is at least one digit and a blank; the very last line end may be missing.
-    if ((file.size() - header.body + 1) / 2 / vertex.properties.size() < static_cast<uint64_t>(vertex.count)) {
-      return CheckPromise(file, vertex, 2 * vertex.properties.size(), header.body).error();
-    }
-    ANCHORSPLAT_RETURN_IF_ERROR(ReadAsciiBody(file, header, vertex, MakeRoom(header, layout, cloud, filter, extras)));
-  } else {
-    ANCHORSPLAT_RETURN_IF_ERROR(ReadBinaryBody(file, header, layout, cloud, filter, extras));
-  }
+  ANCHORSPLAT_RETURN_IF_ERROR(
+      ReadPlyBody(file, header, vertex, [&] { return MakeRoom(header, layout, cloud, filter, extras); }));
   // Trainers write normals of zero: there is nothing in them to keep.
   if (extras != nullptr && std::ranges::all_of(extras->normals, [](float x) { return x == 0; })) {
     extras->normals = {};
@@ -111,6 +69,18 @@ Result<GaussianCloud> ReadPly(const InputFile& file, const ReadLimits& limits) {
 
 Result<GaussianCloud> ReadPlyWithExtras(const InputFile& file, const ReadLimits& limits, ExtraProperties& extras) {
   return Read(file, limits, &extras);
+}
+
+Result<CloudExtent> ExtentOfPly(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyHeader header, ReadPlyHeader(file));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyLayout layout, PlanPly(file, header));
+  const PlyElement& vertex = *layout.vertex;
+  const uint64_t row = header.encoding == PlyEncoding::kAscii ? 2 * vertex.properties.size() : vertex.row_size();
+  if (static_cast<uint64_t>(vertex.count) > file.size() / std::max<uint64_t>(1, row)) {
+    return Error{ErrorCode::kBadFile, Cat(file.name(), ": line ", vertex.line, ": there are fewer bytes than ",
+                                          WithThousands(vertex.count), " Gaussians take")};
+  }
+  return CloudExtent{vertex.count, layout.sh_degree};
 }
 
 Result<FormatFacts> DescribePly(const InputFile& file) {

@@ -28,6 +28,9 @@ Result<GaussianCloud> ReadPly(const InputFile& file, const ReadLimits& limits = 
 // ReadPly.
 Result<GaussianCloud> ReadPlyWithExtras(const InputFile& file, const ReadLimits& limits, ExtraProperties& extras);
 
+// What the header says. Errors as ReadPly.
+Result<CloudExtent> ExtentOfPly(const InputFile& file);
+
 // The encoding, and what a file has beside its Gaussians. Errors as ReadPly.
 Result<FormatFacts> DescribePly(const InputFile& file);
 

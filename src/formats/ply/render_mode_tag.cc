@@ -1,9 +1,9 @@
 #include "formats/ply/render_mode_tag.h"
 
 #include <cctype>
-#include <charconv>
 #include <cmath>
 
+#include "core/number_text.h"
 #include "core/text.h"
 #include "core/words.h"
 
@@ -23,7 +23,7 @@ std::string LowerCase(std::string_view text) {
 
 std::optional<double> PositiveNumber(std::string_view text) {
   double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const auto [end, error] = FromChars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !(value > 0) || !std::isfinite(value)) return {};
   return value;
 }

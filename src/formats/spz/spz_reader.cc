@@ -145,9 +145,7 @@ Result<GaussianCloud> ReadStreams(const InputFile& file, const ReadLimits& limit
 
 bool IsGzip(const std::string& head) { return head == "\x1f\x8b"; }
 
-}  // namespace
-
-Result<FormatFacts> DescribeSpz(const InputFile& file) {
+Result<SpzHeader> ReadHeader(const InputFile& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
   SpzHeader header;
   if (IsGzip(head)) {
@@ -155,6 +153,22 @@ Result<FormatFacts> DescribeSpz(const InputFile& file) {
   } else {
     ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(0, &header, sizeof header));
   }
+  return header;
+}
+
+}  // namespace
+
+Result<CloudExtent> ExtentOfSpz(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzHeader header, ReadHeader(file));
+  ANCHORSPLAT_RETURN_IF_ERROR([&]() -> Status {
+    const auto layout = CheckHeader(file, header, {});
+    return layout.ok() ? Status() : Status(layout.error());
+  }());
+  return CloudExtent{header.count, std::min<int>(header.sh_degree, kMaxShDegree)};
+}
+
+Result<FormatFacts> DescribeSpz(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzHeader header, ReadHeader(file));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzLayout layout, CheckHeader(file, header, {}));
   FormatFacts facts;
   facts.Add("version", layout.version, layout.version < 4 ? ", one gzip stream" : ", a zstd stream per attribute");

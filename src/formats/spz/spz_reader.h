@@ -17,6 +17,9 @@ namespace anchorsplat {
 // bits, more than `limits.max_gaussians`, sizes that only a decompression bomb has.
 Result<GaussianCloud> ReadSpz(const InputFile& file, const ReadLimits& limits = {});
 
+// What the header says of its Gaussians. Errors as ReadSpz.
+Result<CloudExtent> ExtentOfSpz(const InputFile& file);
+
 // What the header says: version, fractional bits, flags. Errors as ReadSpz.
 Result<FormatFacts> DescribeSpz(const InputFile& file);
 

@@ -42,6 +42,7 @@ class Viewer {
       if (!this.backgrounds.some((b) => same(b, color))) this.backgrounds.push(color);
     }
     this.backgroundIndex = 0;
+    this.widening = 0;    // of `after`, beside itself as `before`: the filter, while a person looks for its width
     this.frameRequested = false;
     this.ready = false;
   }
@@ -131,6 +132,31 @@ class Viewer {
     this.mode = 'slider';
     this.split = Math.max(0, Math.min(1, split));
     this.draw();
+  }
+
+  // Shows the only splat of a page with this variance added to its Gaussians, beside itself as it is.
+  preview(widening) {
+    if (!this.splats.before) {
+      this.splats.before = this.splats.after;
+      this.pairs = [['before', 'after']];
+      this.pair = 0;
+    }
+    this.widening = widening;
+    document.documentElement.dataset.widening = String(widening);
+    this.draw();
+  }
+
+  // Where one looks from and how, for a page that takes over from another one.
+  get look() {
+    const {axes, frame, target, distance, up} = this.camera;
+    return {axes, frame, target, distance, up, mode: this.mode, side: this.side, split: this.split,
+      background: this.backgroundIndex};
+  }
+
+  set look({axes, frame, target, distance, up, mode, side, split, background}) {
+    Object.assign(this.camera, {axes, frame, target, distance, up});
+    Object.assign(this, {mode, side, split, backgroundIndex: Math.min(background, this.backgrounds.length - 1), view: null});
+    this.cameraChanged();
   }
 
   setPair(k) {
@@ -301,7 +327,8 @@ class Viewer {
       if (texture) this.renderer.drawPicture(k, texture, intrinsics);
     } else {
       const splat = this.splats[name];
-      this.renderer.drawSplat(k, splat, this.camera.axes, this.camera.eye, intrinsics, tangents, this.near(splat));
+      this.renderer.drawSplat(k, splat, this.camera.axes, this.camera.eye, intrinsics, tangents, this.near(splat),
+        name === 'after' ? this.widening : 0);
     }
   }
 
@@ -438,6 +465,18 @@ function fail(error) {
   setState('error', `This page cannot be shown. ${error.message || error}`);
 }
 
+// The page that has this one as its stage (web/), if there is one: {widening} and {look} set these, {tell: 'look'} asks.
+function listenToParent(viewer) {
+  if (window.parent === window) return;
+  addEventListener('message', ({source, data}) => {
+    if (source !== window.parent || typeof data !== 'object' || data === null) return;
+    if (typeof data.widening === 'number') viewer.preview(data.widening);
+    if (data.look) viewer.look = data.look;
+    if (data.tell === 'look') window.parent.postMessage({look: viewer.look}, '*');
+  });
+  window.parent.postMessage({ready: true}, '*');
+}
+
 async function main() {
   byId('reload').addEventListener('click', () => location.reload());
   addEventListener('error', (event) => fail(event.error || new Error(event.message)));
@@ -459,6 +498,7 @@ async function main() {
     listenToKeys(viewer);
     listenToDivider(viewer);
     listenToButtons(viewer);
+    listenToParent(viewer);
   } catch (error) {
     fail(error);
   }

@@ -128,8 +128,9 @@ class Renderer {
       Math.ceil(region.width), Math.ceil(region.height));
   }
 
-  // `intrinsics` in pixels of the target; `tangents` as the shader wants them; nothing is drawn before camera z `near`.
-  drawSplat(k, splat, axes, eye, intrinsics, tangents, near) {
+  // `intrinsics` in pixels of the target; `tangents` as the shader wants them; nothing is drawn before camera z `near`;
+  // `widening` as the smoothing filter adds it to variances.
+  drawSplat(k, splat, axes, eye, intrinsics, tangents, near, widening) {
     const gl = this.gl;
     const d = splat.description;
     const {program, uniforms: u} = this.splatPrograms.get(d.degree);
@@ -154,6 +155,7 @@ class Renderer {
     gl.uniform4fv(u.uClip, target.clip);
     gl.uniform4fv(u.uTangents, tangents);
     gl.uniform2fv(u.uLogScale, d.logScale);
+    gl.uniform1f(u.uWidening, widening);
     gl.uniform2fv(u.uDc, d.dc);
     gl.uniform1f(u.uScalarTop, 2 ** d.scalarBits - 1);
     gl.uniform1f(u.uDilation, d.dilation);

@@ -45,6 +45,7 @@ uniform vec2 uSize;           // of the target, pixels
 uniform vec4 uClip;           // left, top, right, bottom of what is drawn, pixels
 uniform vec4 uTangents;       // limits of x/z (min, max) and y/z (min, max) in the Jacobian
 uniform vec2 uLogScale;       // min, max
+uniform float uWidening;      // variance added to every axis, world units²
 uniform vec2 uDc;             // min, max
 uniform vec3 uHarmonicMax;    // per degree
 uniform float uHarmonicTop;   // largest code of a harmonic
@@ -97,6 +98,7 @@ void main() {
 
   vec3 s = exp(mix(vec3(uLogScale.x), vec3(uLogScale.y),
                    vec3(g1.x & 65535u, g1.x >> 16, g1.y & 65535u) / uScalarTop));
+  s = sqrt(s * s + uWidening);
   mat3 m = uRotation * rotation(g0.w);
   m = mat3(m[0] * s.x, m[1] * s.y, m[2] * s.z);
   vec2 tangent = clamp(p.xy / p.z, uTangents.xz, uTangents.yw);

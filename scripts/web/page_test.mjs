@@ -1,0 +1,186 @@
+// The page in a real browser: page_test.mjs DIST SPLAT OUT
+//
+// DIST  build/web/dist    SPLAT  a splat file    OUT  folder for screenshots
+// Prints what it measured and every failed expectation; exit code 1 if there is one.
+import fs from 'node:fs';
+import http from 'node:http';
+import path from 'node:path';
+import {pathToFileURL} from 'node:url';
+import {createRequire} from 'node:module';
+
+const {chromium} = createRequire(path.join(process.env.NODE_FOLDER, 'package.json'))('playwright-core');
+const [dist, splat, out] = process.argv.slice(2).map((p) => path.resolve(p));
+let passed = 0;
+let failed = 0;
+function expect(name, condition, detail = '') {
+  if (condition) return void ++passed;
+  ++failed;
+  console.log(`FAILED ${name} ${detail}`);
+}
+
+const browser = await chromium.launch({
+  executablePath: process.env.CHROMIUM || '/usr/bin/chromium',
+  args: ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--no-sandbox',
+    '--disable-gpu-sandbox', '--disable-background-networking', '--disable-component-update', '--disable-sync',
+    '--no-first-run'],
+});
+
+async function openPage(url, allowed, {width = 1200, height = 800, scheme = 'dark'} = {}) {
+  const context = await browser.newContext({viewport: {width, height}, colorScheme: scheme, acceptDownloads: true});
+  const tab = await context.newPage();
+  tab.setDefaultTimeout(300000);  // a software renderer on a busy machine
+  tab.on('console', (message) => {
+    // The viewer's help has a button that wants the focus, which a frame does not get.
+    if (/autofocus/.test(message.text())) return;
+    if (message.type() === 'error' || message.type() === 'warning') expect('a silent console', false, message.text());
+  });
+  tab.on('pageerror', (error) => expect('no uncaught error', false, error.message));
+  tab.on('request', (request) => {
+    expect('no request to the network', allowed.test(request.url()), request.url().slice(0, 100));
+  });
+  await tab.goto(url);
+  await state(tab, 'ready');
+  return {tab, context};
+}
+const state = (tab, wanted) => tab.waitForFunction((name) =>
+  document.documentElement.dataset.state === name || document.documentElement.dataset.trouble, wanted);
+const troubles = (tab) => tab.evaluate(() => document.documentElement.dataset.trouble || '');
+const stageOf = (tab) => tab.frames().find((frame) => frame !== tab.mainFrame());
+const settled = (tab) => stageOf(tab).waitForFunction(() => document.documentElement.dataset.settled === 'true');
+
+// From a folder, as a file: everything.
+{
+  const {tab} = await openPage(pathToFileURL(path.join(dist, 'index.html')).href, /^(file|blob|data):/);
+  const readyAfter = Number(await tab.evaluate(() => document.documentElement.dataset.readyAfter));
+  console.log(`the page can be used after ${readyAfter} ms`);
+  await tab.screenshot({path: path.join(out, 'welcome.png')});
+  await tab.setInputFiles('#file', splat);
+  await state(tab, 'shown');
+  expect('a splat is shown', (await troubles(tab)) === '', await troubles(tab));
+  expect('it is described', /Gaussians/.test(await tab.locator('#about').innerText()), await tab.locator('#about').innerText());
+  await settled(tab);
+  await tab.screenshot({path: path.join(out, 'shown.png')});
+
+  // The slider: every step is a new width on the stage.
+  const steps = await tab.evaluate(async () => {
+    const slider = document.getElementById('pixel');
+    const frame = document.getElementById('viewer');
+    const times = [];
+    for (let k = 0; k < 10; ++k) {
+      const began = performance.now();
+      slider.value = String(-1 + 0.2 * k);
+      slider.dispatchEvent(new Event('input', {bubbles: true}));
+      times.push(performance.now() - began);
+      await new Promise((resolve) => setTimeout(resolve, 20));
+    }
+    return {times, hidden: frame.hidden};
+  });
+  console.log(`a step of the slider: ${Math.max(...steps.times).toFixed(1)} ms of the page at most`);
+  expect('a step of the slider is quick', Math.max(...steps.times) <= 50, String(steps.times));
+  const widening = () => stageOf(tab).evaluate(() => document.documentElement.dataset.widening || '');
+  await settled(tab);
+  const first = await widening();
+  await tab.locator('#pixel').focus();
+  await tab.keyboard.press('ArrowRight');
+  await tab.waitForTimeout(200);
+  expect('the stage follows the slider', Number(first) > 0 && Number(await widening()) > Number(first), `${first} ${await widening()}`);
+  await settled(tab);
+  await tab.screenshot({path: path.join(out, 'preview.png')});
+  await tab.locator('#pixel-auto').click();
+
+  // Stop, then to the end.
+  await tab.selectOption('#quality', 'good');
+  await tab.locator('#enhance').click();
+  await tab.locator('#stop').waitFor({state: 'visible'});
+  await tab.locator('#stop').click();
+  await tab.waitForFunction(() => /Stopped/.test(document.getElementById('done').textContent));
+  await tab.selectOption('#quality', 'fast');
+  const began = Date.now();
+  await tab.locator('#enhance').click();
+  await state(tab, 'enhanced');
+  expect('it is enhanced', (await troubles(tab)) === '', await troubles(tab));
+  console.log(`enhanced and shown after ${((Date.now() - began) / 1000).toFixed(1)} s: ${await tab.locator('#done').innerText()}`);
+  await settled(tab);
+  await tab.screenshot({path: path.join(out, 'enhanced.png')});
+
+  for (const format of await tab.locator('#format option').evaluateAll((all) => all.map((o) => o.value))) {
+    await tab.selectOption('#format', format);
+    const [download] = await Promise.all([tab.waitForEvent('download'), tab.locator('#download').click()]);
+    const file = path.join(out, download.suggestedFilename());
+    await download.saveAs(file);
+    expect(`it is saved as ${format}`, fs.statSync(file).size > 10000 && file.endsWith(`-4x.${format}`), file);
+    fs.rmSync(file);
+  }
+
+  // A file that is none is an error with a sentence, and the page goes on.
+  await tab.setInputFiles('#file', {name: 'broken.ply', mimeType: 'application/octet-stream', buffer: Buffer.from('ply\nformat ascii 1.0\n')});
+  await tab.waitForFunction(() => document.documentElement.dataset.trouble);
+  expect('a broken file is named', /broken\.ply/.test(await troubles(tab)), await troubles(tab));
+  await tab.setInputFiles('#file', splat);
+  await tab.waitForFunction(() => !document.documentElement.dataset.trouble && document.documentElement.dataset.state === 'shown');
+  await tab.close();
+}
+
+// On a phone, light.
+{
+  const {tab} = await openPage(pathToFileURL(path.join(dist, 'index.html')).href, /^(file|blob|data):/,
+    {width: 390, height: 780, scheme: 'light'});
+  await tab.setInputFiles('#file', splat);
+  await state(tab, 'shown');
+  await settled(tab);
+  expect('nothing is wider than a phone', await tab.evaluate(() => document.documentElement.scrollWidth <= innerWidth));
+  await tab.screenshot({path: path.join(out, 'phone.png')});
+  await tab.close();
+}
+
+// Hosted: only its own files are asked for, and it opens again without a network.
+{
+  const server = http.createServer((request, response) => {
+    const file = path.join(dist, request.url === '/' ? 'index.html' : path.basename(request.url));
+    if (!fs.existsSync(file)) return response.writeHead(404).end();
+    response.writeHead(200, {'content-type': file.endsWith('.js') ? 'text/javascript' : 'text/html'}).end(fs.readFileSync(file));
+  });
+  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+  const home = `http://127.0.0.1:${server.address().port}/`;
+  const {tab, context} = await openPage(home, new RegExp(`^(blob:|data:|${home}(sw\\.js)?$)`));
+  await tab.evaluate(() => navigator.serviceWorker.ready);
+  await tab.waitForFunction(() => caches.keys().then((names) => names.length > 0));
+  server.close();
+  server.closeAllConnections();
+  await context.setOffline(true);
+  await tab.reload();
+  await state(tab, 'ready');
+  await tab.setInputFiles('#file', splat);
+  await state(tab, 'shown');
+  expect('it works offline', (await troubles(tab)) === '', await troubles(tab));
+  await context.close();
+}
+
+// The package in a page of somebody else's, with a viewer from npm (examples/web).
+{
+  const modules = path.join(process.env.NODE_FOLDER, 'node_modules');
+  const types = {'.html': 'text/html', '.js': 'text/javascript', '.mjs': 'text/javascript', '.wasm': 'application/wasm'};
+  const server = http.createServer((request, response) => {
+    const name = new URL(request.url, 'http://x').pathname;
+    const file = name === '/' ? path.resolve('examples/web/index.html') : name === '/splat.ply' ? splat
+      : name.startsWith('/node_modules/anchorsplat/') ? path.join(dist, '../npm', path.basename(name))
+      : name.startsWith('/node_modules/') && !name.includes('..') ? path.join(modules, name.slice(14)) : '';
+    if (!fs.existsSync(file)) return response.writeHead(404).end();
+    response.writeHead(200, {'content-type': types[path.extname(file)] ?? 'application/octet-stream'}).end(fs.readFileSync(file));
+  });
+  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+  const tab = await browser.newPage({viewport: {width: 700, height: 500}});
+  tab.setDefaultTimeout(300000);
+  tab.on('pageerror', (error) => expect('no uncaught error', false, error.message));
+  await tab.goto(`http://127.0.0.1:${server.address().port}/`);
+  await tab.waitForFunction(() => document.documentElement.dataset.state);
+  const told = await tab.locator('#told').innerText();
+  expect('a viewer from npm shows an enhanced splat', /^20,000 Gaussians became/.test(told), told);
+  await tab.waitForTimeout(3000);  // until it has sorted
+  await tab.screenshot({path: path.join(out, 'example.png')});
+  server.close();
+}
+
+await browser.close();
+console.log(`${passed} passed, ${failed} failed`);
+process.exit(failed === 0 ? 0 : 1);

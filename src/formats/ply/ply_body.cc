@@ -1,0 +1,53 @@
+#include "formats/ply/ply_body.h"
+
+#include "core/text.h"
+#include "formats/ply/ply_rows.h"
+
+namespace anchorsplat {
+
+namespace {
+
+std::string Thousands(uint64_t n) { return WithThousands(static_cast<int64_t>(n)); }
+
+// `count` rows of at least `row_size` bytes must fit into `available` bytes: a header may promise anything, and what it
+// promises becomes an allocation.
+Status CheckPromise(const InputFile& file, const PlyElement& element, uint64_t row_size, uint64_t begin) {
+  const uint64_t available = file.size() - begin;
+  if (row_size == 0 || static_cast<uint64_t>(element.count) <= available / row_size) return {};
+  return Error{ErrorCode::kBadFile,
+               Cat(file.name(), ": byte ", Thousands(file.size()), ": the file ends too early: element \"",
+                   Printable(element.name), "\" has ", WithThousands(element.count), " rows of ",
+                   element.has_lists() ? "at least " : "", Thousands(row_size), " bytes, ", Thousands(available),
+                   " bytes are left for them")};
+}
+
+}  // namespace
+
+Status ReadPlyBody(const InputFile& file, const PlyHeader& header, const PlyElement& vertex,
+                   const std::function<std::vector<PlyDestination>()>& make_room) {
+  if (header.encoding == PlyEncoding::kAscii) {
+    // A value is at least one digit and a blank; the very last line end may be missing.
+    if ((file.size() - header.body + 1) / 2 / vertex.properties.size() < static_cast<uint64_t>(vertex.count)) {
+      return CheckPromise(file, vertex, 2 * vertex.properties.size(), header.body).error();
+    }
+    return ReadAsciiBody(file, header, vertex, make_room());
+  }
+  uint64_t begin = header.body;
+  for (const PlyElement& element : header.elements) {
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckPromise(file, element, element.row_size(), begin));
+    if (&element == &vertex) break;
+    if (element.has_lists()) {
+      SequentialReader reader(file, begin);
+      ANCHORSPLAT_RETURN_IF_ERROR(SkipRowsWithLists(reader, file, element, header.encoding));
+      begin = reader.position();
+    } else {
+      begin += static_cast<uint64_t>(element.count) * element.row_size();
+    }
+  }
+  const std::vector<PlyDestination> to = make_room();
+  if (!vertex.has_lists()) return ReadFixedRows(file, vertex, header.encoding, begin, to);
+  SequentialReader reader(file, begin);
+  return ReadRowsWithLists(reader, file, vertex, header.encoding, to);
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "core/result.h"
+#include "formats/ply/ply_header.h"
+#include "formats/ply/ply_layout.h"
+#include "io/input_file.h"
+
+namespace anchorsplat {
+
+// The rows of `vertex`, an element of `header`, in whatever encoding. `make_room` is called once the file is known to
+// have the bytes for them, and gives one destination per property. Errors (kBadFile): the file is shorter than its
+// header promises, rows that are no numbers.
+Status ReadPlyBody(const InputFile& file, const PlyHeader& header, const PlyElement& vertex,
+                   const std::function<std::vector<PlyDestination>()>& make_room);
+
+}  // namespace anchorsplat

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/camera.h"
+#include "core/gaussian_cloud.h"
+#include "core/result.h"
+#include "formats/format_facts.h"
+
+namespace anchorsplat::web {
+
+// What a call answers: an object in JSON, and bytes that belong to it, in blocks. Blocks are valid until the next call.
+struct Reply {
+  std::string json;
+  std::vector<std::span<const std::byte>> blocks;
+};
+
+// How far a long call has come: the task's name, steps done and in all (0: unknown), a short note.
+using ProgressListener = std::function<void(std::string_view task, int64_t done, int64_t total, std::string_view note)>;
+
+// The program as a page or a script of Node calls it: splats by numbers, requests and answers in JSON, large data as
+// blocks of bytes. Nothing is read from or written to disk but what Cameras() puts into a temporary folder.
+//
+//   {"verb": "open", "name": "scan.ply"} + the file         → {"cloud": 1, "gaussians": …, …}
+//   {"verb": "info", "cloud": 1}                            → what `anchorsplat info --json` says
+//   {"verb": "enhance", "cloud": 1, "words": ["--upscale=4"], "seed": 0, "cameras": 1}  → {"cloud": 2, "report": {…}}
+//   {"verb": "filter", "cloud": 1, "upscale": 4}            → {"gain": g}: variance that the filter adds, training
+//   pixels²
+//   {"verb": "write", "cloud": 2, "format": "spz", "words": []}  → one block: the file
+//   {"verb": "page", "after": 2, "before": 1, "name": "…", "words": []}  → one block: the page of `anchorsplat view`
+//   {"verb": "render", "cloud": 2, "words": ["--size=512x512"], "transparent": false, "cameras": 1}
+//        → {"views": V, "height": H, "width": W, "channels": C}, one block: float32 [V,H,W,C]
+//   {"verb": "columns", "cloud": 2}                         → five blocks: means, log_scales, quats, opacity_logits, sh
+//   {"verb": "put", "gaussians": N, "sh_degree": 3, "render_mode": null, "comments": []} + the five, one after the
+//   other
+//        → as open
+//   {"verb": "cameras", "files": [{"name": "transforms.json", "bytes": 12}]} + the files, one after the other
+//        → {"cameras": 1, "views": 100}
+//   {"verb": "release", "cloud": 1} or {"verb": "release", "cameras": 1}
+//   {"verb": "formats"}                                     → {"formats": [{"name", "extensions", "reads", "writes"}]}
+//
+// `words` are options of the command line, with its checks and in its words. Every answer has "messages": [{"level",
+// "text"}]; one that failed has "error": {"code", "message"} instead of its result, and whatever was wrong, the engine
+// goes on.
+class Engine {
+ public:
+  explicit Engine(ProgressListener listener);
+
+  Reply Call(std::string_view request, std::span<const std::byte> data);
+
+ private:
+  struct OpenCloud {
+    GaussianCloud cloud;
+    std::string name;    // of its file, for people; empty: none
+    std::string format;  // of its file
+    FormatFacts facts;   // that it says about itself
+    uint64_t bytes = 0;  // of its file
+  };
+  struct Answer;
+
+  Result<Answer> Run(const nlohmann::json& request, std::span<const std::byte> data);
+  Result<Answer> Open(const nlohmann::json& request, std::span<const std::byte> data);
+  Result<Answer> Put(const nlohmann::json& request, std::span<const std::byte> data);
+  Result<Answer> Info(const nlohmann::json& request);
+  Result<Answer> Enhance(const nlohmann::json& request);
+  Result<Answer> Filter(const nlohmann::json& request);
+  Result<Answer> Write(const nlohmann::json& request);
+  Result<Answer> Page(const nlohmann::json& request);
+  Result<Answer> Render(const nlohmann::json& request);
+  Result<Answer> Columns(const nlohmann::json& request);
+  Result<Answer> ReadCameraFiles(const nlohmann::json& request, std::span<const std::byte> data);
+  Result<Answer> Release(const nlohmann::json& request);
+
+  Answer Keep(OpenCloud open);
+  Result<OpenCloud*> FindCloud(const nlohmann::json& request, const char* key);
+  Result<const CameraSet*> FindCameras(const nlohmann::json& request);
+
+  ProgressListener listener_;
+  std::map<int64_t, std::unique_ptr<OpenCloud>> clouds_;
+  std::map<int64_t, CameraSet> cameras_;
+  int64_t last_ = 0;              // handle that was given
+  std::vector<std::byte> bytes_;  // of the last answer
+  std::vector<float> floats_;
+};
+
+}  // namespace anchorsplat::web

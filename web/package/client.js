@@ -1,0 +1,255 @@
+// Splats for programs in JavaScript: the engine lives in a worker, and this is what asks it. Nothing here knows whether it
+// runs in a browser or in Node: `platform` does.
+//
+//   platform.compile() → Promise<WebAssembly.Module>
+//   platform.spawn()   → {post(message, transfer), onMessage(f), onFailure(f), end(), hold(), release()}
+
+export class AnchorsplatError extends Error {
+  constructor({code, message}) {
+    super(message);
+    this.name = 'AnchorsplatError';
+    this.code = code;
+  }
+}
+
+const crashed = (why) => new AnchorsplatError({
+  code: 'crashed', message: `the engine stopped (${why}); a new one has been started: open the splat again`});
+const stopped = () => new AnchorsplatError({code: 'interrupted', message: 'stopped, as it was asked to'});
+
+// One worker with an engine in it.
+class EngineWorker {
+  constructor(platform, compiled) {
+    this.waiting = new Map();
+    this.last = 0;
+    this.gone = null;
+    this.worker = platform.spawn();
+    this.worker.onMessage((message) => this.receive(message));
+    this.worker.onFailure((why) => this.end(crashed(why)));
+    this.worker.post({module: compiled}, []);
+  }
+
+  ask(request, {data = [], transfer = [], onProgress} = {}) {
+    if (this.gone) return Promise.reject(this.gone);
+    const id = ++this.last;
+    return new Promise((resolve, reject) => {
+      if (this.waiting.size === 0) this.worker.hold();
+      this.waiting.set(id, {resolve, reject, onProgress});
+      this.worker.post({id, request, data}, transfer);
+    });
+  }
+
+  receive(message) {
+    if (message.crash !== undefined) return this.end(crashed(message.crash));
+    const call = this.waiting.get(message.id);
+    if (!call) return;
+    if (message.progress) {
+      if (call.onProgress) call.onProgress(message.progress);
+      return;
+    }
+    this.waiting.delete(message.id);
+    if (this.waiting.size === 0) this.worker.release();
+    const {answer, blocks} = message;
+    if (answer.error) call.reject(new AnchorsplatError(answer.error));
+    else call.resolve({answer, blocks});
+  }
+
+  // Ends it at once, whatever it is about.
+  end(why) {
+    if (this.gone) return;
+    this.gone = why;
+    this.worker.end();
+    for (const call of this.waiting.values()) call.reject(why);
+    this.waiting.clear();
+  }
+}
+
+// Options as the words of the command line, which the engine checks: {pixelSize: 0.01, clean: true} → --pixel-size=0.01 --clean.
+export function wordsOf(options, besides = []) {
+  const words = [];
+  for (const [key, value] of Object.entries(options)) {
+    if (besides.includes(key) || value === undefined || value === null || value === false) continue;
+    const option = `--${key.replace(/[A-Z]/g, (letter) => `-${letter.toLowerCase()}`)}`;
+    const text = Array.isArray(value) ? value.join(key === 'size' ? 'x' : ',') : String(value);
+    words.push(...(value === true ? [option] : text === '' ? [option, ''] : [`${option}=${text}`]));
+  }
+  return words;
+}
+
+const bytesOf = (data) => {
+  if (data instanceof Uint8Array) return data;
+  if (data instanceof ArrayBuffer) return new Uint8Array(data);
+  if (ArrayBuffer.isView(data)) return new Uint8Array(data.buffer, data.byteOffset, data.byteLength);
+  if (data && typeof data.arrayBuffer === 'function') return data;  // a Blob is read in the worker
+  throw new TypeError('a splat is a Uint8Array, an ArrayBuffer or a Blob');
+};
+
+const COLUMNS = ['means', 'logScales', 'quats', 'opacityLogits', 'sh'];
+
+// One engine and all that is opened with it.
+export class Engine {
+  constructor(platform) {
+    this.platform = platform;
+    this.compiled = null;
+    this.worker = null;
+  }
+
+  async newWorker() {
+    this.compiled ??= this.platform.compile();
+    return new EngineWorker(this.platform, await this.compiled);
+  }
+
+  async home() {
+    if (!this.worker) this.worker = this.newWorker();
+    let worker = await this.worker;
+    if (worker.gone) {
+      this.worker = this.newWorker();
+      worker = await this.worker;
+    }
+    return worker;
+  }
+
+  async open(data, {name, format, onMessage} = {}) {
+    const bytes = bytesOf(data);
+    const worker = await this.home();
+    const {answer} = await worker.ask({verb: 'open', name: name ?? data.name ?? '', format: format ?? ''}, {data: [bytes]});
+    tellMessages(answer, onMessage);
+    return new Splat(this, worker, answer);
+  }
+
+  async fromColumns(columns) {
+    const blocks = COLUMNS.map((name) => columns[name]);
+    if (!blocks.every((block) => block instanceof Float32Array)) {
+      throw new TypeError(`a splat's columns are Float32Arrays: ${COLUMNS.join(', ')}`);
+    }
+    const worker = await this.home();
+    const {answer} = await put(worker, blocks, {gaussians: columns.count ?? blocks[3].length, sh_degree: columns.shDegree ?? 0,
+      render_mode: columns.renderMode ?? null, comments: columns.comments ?? []});
+    return new Splat(this, worker, answer);
+  }
+
+  async readCameras(files) {
+    const list = Array.isArray(files) ? files : [files];
+    const parts = await Promise.all(list.map(async ({name, data}) => {
+      const bytes = bytesOf(data);
+      return {name, bytes: bytes instanceof Uint8Array ? bytes : new Uint8Array(await bytes.arrayBuffer())};
+    }));
+    const worker = await this.home();
+    const {answer} = await worker.ask({verb: 'cameras', files: parts.map(({name, bytes}) => ({name, bytes: bytes.length}))},
+      {data: parts.map(({bytes}) => bytes)});
+    return {worker, handle: answer.cameras, count: answer.views, parts};
+  }
+
+  async formats() { return (await (await this.home()).ask({verb: 'formats'})).answer.formats; }
+
+  async close() {
+    if (!this.worker) return;
+    const worker = await this.worker;
+    this.worker = null;
+    worker.end(stopped());
+  }
+}
+
+function tellMessages(answer, onMessage) {
+  if (onMessage) for (const message of answer.messages) onMessage(message);
+}
+
+// `blocks`: the five columns. Those that came from an engine are moved, a program's own are copied.
+function put(worker, blocks, described, transfer = []) {
+  const data = blocks.map((block) => (block instanceof ArrayBuffer ? new Uint8Array(block) : bytesOf(block)));
+  return worker.ask({verb: 'put', ...described}, {data, transfer});
+}
+
+const describedBy = ({gaussians, sh_degree, render_mode, comments}) => ({gaussians, sh_degree, render_mode, comments});
+
+// A splat that the engine holds. It does not change: what makes another one returns it.
+export class Splat {
+  constructor(engine, worker, answer) {
+    this.engine = engine;
+    this.worker = worker;
+    this.handle = answer.cloud;
+    this.count = answer.gaussians;
+    this.shDegree = answer.sh_degree;
+    this.renderMode = answer.render_mode;
+    this.comments = answer.comments;
+    this.format = answer.format;
+  }
+
+  async ask(request, options) {
+    if (this.handle === null) throw new AnchorsplatError({code: 'bad_argument', message: 'this splat has been closed'});
+    return this.worker.ask({cloud: this.handle, ...request}, options);
+  }
+
+  async info() { return (await this.ask({verb: 'info'})).answer; }
+
+  // In a worker of its own: `signal` ends it at once, and its memory goes back when it is done.
+  async enhance(options = {}) {
+    const {cameras, seed = 0, signal, onProgress, onMessage, ...rest} = options;
+    if (signal && signal.aborted) throw stopped();
+    const columns = await this.ask({verb: 'columns'});
+    const work = await this.engine.newWorker();
+    const stop = () => work.end(stopped());
+    if (signal) signal.addEventListener('abort', stop);
+    if (signal && signal.aborted) stop();
+    try {
+      const {answer: there} = await put(work, columns.blocks, describedBy(columns.answer), columns.blocks);
+      const request = {verb: 'enhance', cloud: there.cloud, words: wordsOf(rest), seed};
+      if (cameras) {
+        const files = cameras.parts.map(({name, bytes}) => ({name, bytes: bytes.length}));
+        const {answer} = await work.ask({verb: 'cameras', files}, {data: cameras.parts.map(({bytes}) => bytes)});
+        request.cameras = answer.cameras;
+      }
+      const {answer} = await work.ask(request, {onProgress});
+      tellMessages(answer, onMessage);
+      const made = await work.ask({verb: 'columns', cloud: answer.cloud});
+      const {answer: kept} = await put(this.worker, made.blocks, describedBy(made.answer), made.blocks);
+      return {splat: new Splat(this.engine, this.worker, kept), report: answer.report};
+    } finally {
+      if (signal) signal.removeEventListener('abort', stop);
+      work.end(stopped());
+    }
+  }
+
+  // Variance that the filter adds to a Gaussian whose training pixel has the size 1: world units², times that size squared.
+  async filterGain(upscale = 4) {
+    return (await this.ask({verb: 'filter', upscale})).answer.gain;
+  }
+
+  async write(format, {onMessage, ...options} = {}) {
+    const {answer, blocks} = await this.ask({verb: 'write', format, words: wordsOf(options)});
+    tellMessages(answer, onMessage);
+    return new Uint8Array(blocks[0]);
+  }
+
+  // The page of `anchorsplat view`: one HTML file.
+  async page({before, name = '', cameras, onMessage, ...options} = {}) {
+    const request = {verb: 'page', after: this.handle, name, words: wordsOf(options)};
+    if (before) request.before = before.handle;
+    if (cameras) request.cameras = cameras.handle;
+    const {answer, blocks} = await this.ask(request);
+    tellMessages(answer, onMessage);
+    return new Uint8Array(blocks[0]);
+  }
+
+  async render({cameras, transparent = false, onProgress, onMessage, ...options} = {}) {
+    const request = {verb: 'render', transparent, words: wordsOf(options)};
+    if (cameras) request.cameras = cameras.handle;
+    const {answer, blocks} = await this.ask(request, {onProgress});
+    tellMessages(answer, onMessage);
+    const {views, height, width, channels} = answer;
+    return {views, height, width, channels, pixels: new Float32Array(blocks[0])};
+  }
+
+  async columns() {
+    const {blocks} = await this.ask({verb: 'columns'});
+    const columns = {count: this.count, shDegree: this.shDegree, renderMode: this.renderMode, comments: this.comments};
+    COLUMNS.forEach((name, k) => { columns[name] = new Float32Array(blocks[k]); });
+    return columns;
+  }
+
+  async close() {
+    if (this.handle === null) return;
+    const cloud = this.handle;
+    this.handle = null;
+    if (!this.worker.gone) await this.worker.ask({verb: 'release', cloud});
+  }
+}

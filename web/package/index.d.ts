@@ -1,0 +1,157 @@
+/** What went wrong: a sentence to show, and a word to tell kinds apart. */
+export class AnchorsplatError extends Error {
+  code: 'bad_argument' | 'bad_file' | 'not_found' | 'exists' | 'io' | 'interrupted' | 'crashed';
+}
+
+export interface Message {
+  level: 'info' | 'warning' | 'error';
+  text: string;
+}
+
+export interface Progress {
+  task: string;
+  done: number;
+  /** Steps in all; 0: unknown. */
+  total: number;
+  note: string;
+}
+
+type RenderMode = 'classic' | 'antialiased' | 'mip';
+type Bytes = Uint8Array | ArrayBuffer | ArrayBufferView | Blob;
+
+export interface OpenOptions {
+  /** The file's name: formats without a mark of their own are found by its extension. */
+  name?: string;
+  /** What the file is, whatever its name and content say: "spz". */
+  format?: string;
+  onMessage?: (message: Message) => void;
+}
+
+/** Rows belong to Gaussians. Values as an INRIA PLY has them: log-scales, opacity logits, quaternions wxyz of any norm. */
+export interface Columns {
+  count?: number;
+  shDegree?: 0 | 1 | 2 | 3;
+  /** [N,3] */
+  means: Float32Array;
+  /** [N,3] */
+  logScales: Float32Array;
+  /** [N,4] */
+  quats: Float32Array;
+  /** [N] */
+  opacityLogits: Float32Array;
+  /** [N,(shDegree+1)²,3], coefficient-major */
+  sh: Float32Array;
+  renderMode?: RenderMode | null;
+  comments?: string[];
+}
+
+/** Cameras that readCameras() has read. */
+export interface Cameras {
+  readonly count: number;
+}
+
+export interface CameraFile {
+  name: string;
+  data: Bytes;
+}
+
+/** The options of `anchorsplat enhance`; defaults are those of the command line. */
+export interface EnhanceOptions {
+  method?: string;
+  quality?: 'fast' | 'good' | 'best';
+  /** How many times closer it will be seen; 4. */
+  upscale?: number;
+  /** World size of one training pixel, or "auto". */
+  pixelSize?: number | 'auto';
+  mode?: RenderMode;
+  cameras?: Cameras;
+  trainWidth?: number;
+  cameraRule?: 'auto' | 'smallest' | 'median';
+  filterStrength?: number;
+  clean?: boolean;
+  background?: [number, number, number];
+  copies?: 'auto' | number;
+  mergeCost?: number;
+  maxGaussians?: number;
+  pruneOpacity?: number;
+  blockGaussians?: number;
+  refine?: string;
+  seed?: number;
+  /** Stops it at once; the promise is rejected with the code "interrupted". */
+  signal?: AbortSignal;
+  onProgress?: (progress: Progress) => void;
+  onMessage?: (message: Message) => void;
+}
+
+export interface WriteOptions {
+  sort?: 'format' | 'keep' | 'morton' | 'importance';
+  spzVersion?: 3 | 4;
+  onMessage?: (message: Message) => void;
+}
+
+export interface RenderOptions {
+  cameras?: Cameras;
+  /** Views around the splat, where there are no cameras. */
+  orbit?: number;
+  radius?: number;
+  target?: [number, number, number];
+  fov?: number;
+  up?: string | [number, number, number];
+  view?: string;
+  size?: [number, number];
+  background?: [number, number, number];
+  near?: number;
+  far?: number;
+  mode?: RenderMode;
+  profile?: 'gsplat14' | 'gsplat15';
+  transparent?: boolean;
+  onProgress?: (progress: Progress) => void;
+  onMessage?: (message: Message) => void;
+}
+
+export interface PageOptions {
+  before?: Splat;
+  name?: string;
+  cameras?: Cameras;
+  title?: string;
+  views?: number;
+  pixelSize?: number | 'auto';
+  shDegree?: 0 | 1 | 2 | 3;
+  mode?: RenderMode;
+  background?: [number, number, number];
+  onMessage?: (message: Message) => void;
+}
+
+/** A splat that the engine holds; it does not change. */
+export class Splat {
+  private constructor();
+  readonly count: number;
+  readonly shDegree: 0 | 1 | 2 | 3;
+  readonly renderMode: RenderMode | null;
+  readonly comments: string[];
+  /** Of its file; null: it came from no file. */
+  readonly format: string | null;
+  /** What `anchorsplat info --json` says. */
+  info(): Promise<Record<string, unknown>>;
+  enhance(options?: EnhanceOptions): Promise<{splat: Splat; report: Record<string, unknown>}>;
+  /** Variance that the filter adds to every axis, for a training pixel of size 1. */
+  filterGain(upscale?: number): Promise<number>;
+  /** The bytes of a file: "ply", "compressed.ply", "spz", "sog", "splat", "glb", … */
+  write(format: string, options?: WriteOptions): Promise<Uint8Array>;
+  /** The page of `anchorsplat view`: one HTML file that opens anywhere. */
+  page(options?: PageOptions): Promise<Uint8Array>;
+  /** float32 [views, height, width, channels], from 0 to 1. */
+  render(options?: RenderOptions): Promise<{views: number; height: number; width: number; channels: 3 | 4; pixels: Float32Array}>;
+  columns(): Promise<Required<Columns>>;
+  /** Gives its memory back. */
+  close(): Promise<void>;
+}
+
+export function open(data: Bytes, options?: OpenOptions): Promise<Splat>;
+export function fromColumns(columns: Columns): Promise<Splat>;
+/** transforms.json, cameras.json, or the files of a COLMAP model. */
+export function readCameras(files: CameraFile | CameraFile[]): Promise<Cameras>;
+export function formats(): Promise<{name: string; extensions: string[]; reads: boolean; writes: boolean}[]>;
+export function convert(data: Bytes, options: {to: string; from?: string; name?: string} & WriteOptions): Promise<Uint8Array>;
+/** Ends the engine: all splats that are open are gone. */
+export function close(): Promise<void>;

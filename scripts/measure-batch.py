@@ -21,6 +21,7 @@ from pathlib import Path
 from anchorsplat.batch.engine import program
 from anchorsplat.batch.manifest import Manifest
 
+_WATCHED = 100  # splats of the runs that are watched for memory and processor time
 EXAMPLE = Path(__file__).resolve().parent.parent / "examples/biplane/input.ply"
 
 
@@ -75,7 +76,8 @@ def loop(inputs: Path, out: Path, options: list[str]) -> float:
     return time.perf_counter() - begin
 
 
-def batch(inputs: Path, out: Path, workers: int, options: list[str]) -> dict:
+def batch(inputs: Path, out: Path, workers: int, options: list[str], *, watched: bool = False) -> dict:
+    """`watched`: also memory and processor time, which costs the machine some percent of a core."""
     code = "import sys; from anchorsplat.batch import main; sys.exit(main(sys.argv[1:]))"
     words = ["enhance", f"{inputs}/*.ply", "-o", str(out), "--workers", str(workers), "--json", "-q", *options]
     process = subprocess.Popen([sys.executable, "-c", code, *words], stdout=subprocess.PIPE)
@@ -90,16 +92,19 @@ def batch(inputs: Path, out: Path, workers: int, options: list[str]) -> dict:
                 time.sleep(0.25)
 
     watcher = threading.Thread(target=watch)
-    watcher.start()
+    if watched:
+        watcher.start()
     told = json.loads(process.communicate()[0])
-    watcher.join()
+    if watched:
+        watcher.join()
     rows = [json.loads(line) for line in (out / "manifest.jsonl").read_text().splitlines()]
     rows = [row for row in rows if "output" in row]
     if told["failed"] or len(rows) != told["total"]:
         sys.exit(f"not all were made: {told}")
+    between = sorted(b["time"] - a["time"] - b["seconds"] for a, b in zip(rows, rows[1:]))  # of one worker
     beside = sorted(row["seconds"] - row["engine_seconds"] for row in rows)
     return {"start": told["start_seconds"], "work": told["seconds"] - told["start_seconds"], "memory": most[0], "used": used[0],
-            "beside": beside[len(beside) // 2], "rows": len((out / "manifest.jsonl").read_bytes()) / len(rows)}  # fmt: skip
+            "beside": beside[len(beside) // 2], "between": between[len(between) // 2], "rows": len((out / "manifest.jsonl").read_bytes()) / len(rows)}  # fmt: skip
 
 
 def read_manifest(count: int) -> None:
@@ -142,7 +147,12 @@ def main() -> None:
         few.mkdir()
         for number in range(2):
             shutil.copy(asked.splat, few / f"{number}.ply")
-        idle = batch(few, Path(folder, "few-out"), 2, options)["used"]
+        idle = batch(few, Path(folder, "few-out"), 2, options, watched=True)["used"]
+        some = Path(folder, "some")
+        some.mkdir()
+        for path in sorted(inputs.iterdir())[:_WATCHED]:
+            shutil.copy(path, some)
+        memory = [batch(some, Path(folder, f"some-{n}"), n, options, watched=True) for n in (1, 2)]
         for _ in range(asked.repeat):
             for measured, run in (
                 (loops, lambda out: loop(inputs, out, options)),
@@ -156,13 +166,13 @@ def main() -> None:
     best = min(loops)
     print(f"{asked.splats} splats of {asked.splat.stat().st_size / 1e6:.1f} MB, --method {asked.method}, shortest of {asked.repeat}")
     print(f"shell loop         {best:8.2f} s  {best / asked.splats * 1e3:8.1f} ms each")
-    for name, run in (("batch, one worker", one), ("batch, two workers", two)):
+    for name, run, watched in (("batch, one worker", one, memory[0]), ("batch, two workers", two, memory[1])):
         print(f"{name:<18} {run['work']:8.2f} s  {run['work'] / asked.splats * 1e3:8.1f} ms each, {best / run['work']:.2f} times the loop, "
-              f"start {run['start']:.1f} s, {run['memory'] / 1e6:.0f} MB")  # fmt: skip
-    processor = (min(run["used"] for run in twos) - idle) / (asked.splats - 2)
+              f"start {run['start']:.1f} s, {watched['memory'] / 1e6:.0f} MB")  # fmt: skip
+    processor = (memory[1]["used"] - idle) / (min(_WATCHED, asked.splats) - 2)
     print(f"processor time beside the program, of driver, workers and Ray: {processor * 1e3:.1f} ms a splat")
-    print(f"overhead of a splat: {(one['work'] - best) / asked.splats * 1e3:.1f} ms, "
-          f"of these in the worker {one['beside'] * 1e3:.1f} ms; {one['rows']:.0f} bytes of manifest")  # fmt: skip
+    print(f"overhead of a splat, medians: in the worker beside its program {one['beside'] * 1e3:.1f} ms, "
+          f"between two tasks {one['between'] * 1e3:.1f} ms; {one['rows']:.0f} bytes of manifest")  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -16,20 +16,7 @@ out=${3:-$PWD/build/serve-test}
 mkdir -p "$out"
 
 export CHROMIUM=${CHROMIUM:-/usr/bin/chromium}
-missing=()
-[ -x "$CHROMIUM" ] || missing+=(chromium)
-command -v curl >/dev/null || missing+=(curl)
-if [ ${#missing[@]} -gt 0 ]; then
-  if ! command -v apt-get >/dev/null; then
-    echo "serve-test: please install ${missing[*]} (CHROMIUM=PATH names a browser elsewhere)" >&2
-    exit 1
-  fi
-  sudo=()
-  [ "$(id -u)" -eq 0 ] || sudo=(sudo)
-  export DEBIAN_FRONTEND=noninteractive
-  "${sudo[@]}" apt-get update -qq
-  "${sudo[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}"
-fi
+scripts/install-missing.sh serve-test "$CHROMIUM=chromium" curl=curl
 
 export PYTHONPATH=$package ANCHORSPLAT_PICTURES=$out ANCHORSPLAT_EXAMPLE=$PWD/examples/biplane/input.ply ANCHORSPLAT_MALFORMED=1000
 tests=python/tests/serve

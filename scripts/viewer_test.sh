@@ -10,21 +10,7 @@ out=${2:-$tools/pictures}
 mkdir -p "$tools" "$out"
 
 export CHROMIUM=${CHROMIUM:-/usr/bin/chromium}
-missing=()
-[ -x "$CHROMIUM" ] || missing+=(chromium)
-command -v node >/dev/null || missing+=(nodejs)
-command -v npm >/dev/null || missing+=(npm)
-if [ ${#missing[@]} -gt 0 ]; then
-  if ! command -v apt-get >/dev/null; then
-    echo "viewer-test: please install ${missing[*]} (CHROMIUM=PATH names a browser elsewhere)" >&2
-    exit 1
-  fi
-  sudo=()
-  [ "$(id -u)" -eq 0 ] || sudo=(sudo)
-  export DEBIAN_FRONTEND=noninteractive
-  "${sudo[@]}" apt-get update -qq
-  "${sudo[@]}" apt-get install -y -qq --no-install-recommends "${missing[@]}"
-fi
+scripts/install-missing.sh viewer-test "$CHROMIUM=chromium" node=nodejs npm=npm
 export NODE_FOLDER=$tools
 if [ ! -d "$tools/node_modules/playwright-core" ]; then
   echo '{"private": true}' >"$tools/package.json"

@@ -31,7 +31,8 @@ def _numbers(name: str, values: Any) -> npt.NDArray[np.float64]:
 
 
 class Cameras:
-    """V cameras without distortion in OpenCV axes (x right, y down, z forward), which do not change.
+    """V cameras without distortion in OpenCV axes (x right, y down, z forward), which do not change. Of a file with a lens they
+    are those of the pinholes that its pictures are undone to (docs/cameras.md).
 
     Pixel (0,0) covers [0,1)², its centre is at 0.5. ``cameras[3]`` and ``cameras[::8]`` are cameras, too.
     """
@@ -39,8 +40,8 @@ class Cameras:
     __slots__ = ("_set",)
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Those of a transforms.json, an INRIA cameras.json or a COLMAP model, or of a folder with one of them, in their
-        order. Raises NotFoundError, IoError, BadFileError; BadArgumentError: a folder with several."""
+        """Those of a transforms.json, an INRIA cameras.json, a poses_bounds.npy or a COLMAP model, or of a folder with one of them,
+        in their order. Raises NotFoundError, IoError, BadFileError; BadArgumentError: a folder with several."""
         with run() as how:
             self._set = _core.read_cameras(os.fsencode(path), how)
 

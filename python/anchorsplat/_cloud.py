@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -162,7 +162,8 @@ class Cloud:
     def __getitem__(self, rows: Any) -> Cloud:
         """Some of the Gaussians: a slice (a view), a mask or indices (copies)."""
         if isinstance(rows, (int, np.integer)):
-            rows = slice(int(rows), int(rows) + 1 or None)
+            row = range(len(self))[int(rows)]  # IndexError, where there is none
+            rows = slice(row, row + 1)
         return Cloud(
             self._means[rows],
             self._log_scales[rows],
@@ -172,6 +173,13 @@ class Cloud:
             render_mode=self._render_mode,
             comments=self._comments,
         )
+
+    def __iter__(self) -> Iterator[Cloud]:
+        """Gaussian by Gaussian, each a Cloud of one. The arrays are the fast way."""
+        return (self[row] for row in range(len(self)))
+
+    def __array__(self, *_: Any, **__: Any) -> Any:
+        raise TypeError("a Cloud is five arrays: cloud.means, log_scales, quats, opacity_logits and sh")
 
     def copy(self) -> Cloud:
         """The same with arrays of its own."""

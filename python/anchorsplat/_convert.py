@@ -6,6 +6,7 @@ import os
 
 from . import _core
 from ._cloud import RenderMode
+from ._errors import BadArgumentError
 from ._files import Order, PathLike
 from ._report import Report
 from ._run import ProgressLike, run
@@ -45,6 +46,10 @@ def convert(
 
     Raises as ``read`` and ``write``.
     """
+    if isinstance(source, (bytes, bytearray, memoryview)) or isinstance(target, (bytes, bytearray, memoryview)):
+        raise BadArgumentError(
+            "convert: expected paths, found bytes: anchorsplat.to_bytes(anchorsplat.read(data), 'spz') makes bytes of bytes"
+        )
     words = words_of(convert, locals(), besides=("format",))
     if format is not None:
         words.append(b"--from=" + os.fsencode(format))

@@ -22,6 +22,7 @@ def fit(
     strategy: Literal["default", "absgrad", "mcmc"] = "default",
     mip_filter: bool = False,
     hold_out: int = 8,
+    downscale: int = 1,
     init: Literal["auto", "points", "view", "random"] = "auto",
     init_splat: Cloud | PathLike | None = None,
     init_points: int | None = None,
@@ -69,6 +70,7 @@ def fit(
     strategy: who comes and goes: Kerbl et al.; the same by absolute gradients; a number of Gaussians that move.
     mip_filter: smooths every Gaussian by the pixel of the closest camera, as Mip-Splatting does; implies mode="mip".
     hold_out: every Nth view, by name, is not trained on; 0: all are.
+    downscale: N × N pixels of the pictures become one, their mean.
     init: first Gaussians: the project's points, random where many cameras look, random in gsplat's cube.
     init_splat: a Cloud or a file: first Gaussians at the centres of this splat.
     init_points: how many first Gaussians; otherwise all points, 100,000 random ones.

@@ -8,6 +8,7 @@ from typing import Any
 
 from . import _core
 from ._cloud import Cloud
+from ._errors import BadArgumentError
 from ._files import PathLike
 from ._run import ProgressLike, run
 
@@ -20,6 +21,8 @@ def info(
 
     Raises as ``read``.
     """
+    if isinstance(source, (bytes, bytearray, memoryview)):
+        raise BadArgumentError("info: expected a path or a Cloud, found bytes: anchorsplat.info(anchorsplat.read(data))")
     with run(threads, progress) as how:
         if isinstance(source, Cloud):
             return dict(json.loads(_core.info_cloud(source, how)))

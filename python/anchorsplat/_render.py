@@ -43,7 +43,8 @@ def render(
     colour space), not clamped above 1. The same bits for any number of threads.
 
     `cameras`: :class:`Cameras`, or a file or folder with them. Otherwise views all around: `orbit` says how many, `radius`
-    (world units), `target` (x, y, z), `fov` (horizontal, degrees) and `up` (x, y, z or an axis) from where.
+    (world units), `target` (x, y, z), `fov` (horizontal, degrees) and `up` (x, y, z or an axis) from where. Of both, the
+    cameras only say where up is, and the background.
 
     view: only the one of this name.
     size: width and height in pixels; of cameras their ratio has to stay.

@@ -71,7 +71,7 @@ class _Bars:
         self._task = None
 
 
-def _shower(progress: ProgressLike) -> Callable[[Progress], object] | None:
+def shower(progress: ProgressLike) -> Callable[[Progress], object] | None:
     if progress is None or progress is False:
         return None
     if progress is True:
@@ -90,7 +90,7 @@ def _shower(progress: ProgressLike) -> Callable[[Progress], object] | None:
 @contextlib.contextmanager
 def run(threads: int = 0, progress: ProgressLike = None, *, patient: bool = False) -> Iterator[_core.RunArguments]:
     """The arguments of one call of the engine. Messages go to the logger "anchorsplat", warnings to ``warnings``."""
-    show = _shower(progress)
+    show = shower(progress)
 
     def tell(events: list[tuple[Any, ...]]) -> None:
         for event in events:

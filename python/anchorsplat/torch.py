@@ -99,6 +99,16 @@ def rasterize(
         behind = background
     else:
         behind = torch.zeros(3) if background is None else torch.tensor([float(c) for c in background])
+    if not isinstance(cameras, Cameras):
+        raise BadArgumentError(f"cameras: expected anchorsplat.Cameras (of a file: Cameras({cameras!r})), found {type(cameras).__name__}")
+    if profile not in ("gsplat14", "gsplat15"):
+        raise BadArgumentError(f"profile: {profile!r} is none of gsplat14, gsplat15")
+    if not 0 <= sh_degree <= 3:
+        raise BadArgumentError(f"sh_degree: {sh_degree} is not 0 to 3")
+    if isinstance(opacity_logits, torch.Tensor) and opacity_logits.dim() != 1:
+        raise BadArgumentError(f"opacity_logits: expected [N], found {list(opacity_logits.shape)}")
+    if not bool(torch.isfinite(behind.detach()).all()):
+        raise BadArgumentError("background: not finite")
     if behind.shape != (3,):
         raise BadArgumentError(f"background: expected [3], found {list(behind.shape)}")
     options = {"mode": mode, "sh_degree": sh_degree, "near_plane": near, "far_plane": far, "profile": profile}

@@ -37,7 +37,8 @@ Result<Outcome> FitTo(const std::string& project, const FitFlags& flags, const G
     return Error{ErrorCode::kBadArgument, Cat(flags.resume ? "--resume" : "--checkpoint-every",
                                               " has no effect here; it has one with --checkpoint")};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(project, {.hold_out = flags.hold_out}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views,
+                               OpenProject(project, {.hold_out = flags.hold_out, .downscale = flags.downscale}));
   if (!control.checkpoint.empty()) {
     ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(control.checkpoint, {}, control.resume, /*overwrite=*/false));
   }

@@ -9,7 +9,9 @@
 #include <memory>
 #include <mutex>
 #include <new>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <variant>
 
@@ -129,12 +131,57 @@ const char* ClassOf(ErrorCode code) {
   }
 }
 
+// Messages name the command line's way to replace a file.
+std::string InPython(std::string message) {
+  for (const std::string_view flag : {"-w replaces", "-w begins"}) {
+    const size_t at = message.find(flag);
+    if (at != std::string::npos) message.replace(at, 2, "overwrite=True");
+  }
+  return message;
+}
+
+// The interpreter ends, and with it every daemon thread that asks for the GIL, in a way that C++ takes for an exception
+// which nobody may catch. Calls of such threads end before that, by this, and their threads ask for nothing any more.
+struct Ending {
+  std::mutex mutex;
+  std::condition_variable changed;
+  int calls = 0;  // in the engine
+  std::optional<std::thread::id> by;
+
+  bool MustPark() {
+    const std::lock_guard lock(mutex);
+    return by && *by != std::this_thread::get_id();
+  }
+  void Count(int more) {
+    const std::lock_guard lock(mutex);
+    calls += more;
+    changed.notify_all();
+  }
+};
+Ending& TheEnding() {
+  static auto* ending = new Ending;  // never destroyed: parked threads outlive static objects
+  return *ending;
+}
+
+// By atexit, before threads are ended.
+void EndCalls() {
+  Ending& ending = TheEnding();
+  const nb::gil_scoped_release others_go_on;
+  std::unique_lock lock(ending.mutex);
+  ending.by = std::this_thread::get_id();
+  ending.changed.wait(lock, [&] { return ending.calls == 0; });
+}
+
+[[noreturn]] void Park() {
+  for (;;) std::this_thread::sleep_for(std::chrono::hours(1));
+}
+
 void Raise(const std::exception_ptr& thrown, void*) {
   try {
     std::rethrow_exception(thrown);
   } catch (const EngineError& failed) {
     const nb::object type = nb::module_::import_("anchorsplat._errors").attr(ClassOf(failed.error.code));
-    PyErr_SetObject(type.ptr(), Text(failed.error.message).ptr());
+    PyErr_SetObject(type.ptr(), Text(InPython(failed.error.message)).ptr());
   }
 }
 
@@ -157,12 +204,20 @@ void RunEngine(const RunArguments& run, const std::function<Status()>& work) {
     done = true;
     changed.notify_one();
   });
+  TheEnding().Count(1);
   std::optional<nb::python_error> raised;
   for (bool over = false; !over;) {
     {
       const nb::gil_scoped_release others_go_on;
       std::unique_lock lock(mutex);
       over = changed.wait_for(lock, std::chrono::milliseconds(50), [&] { return done; });
+      if (TheEnding().MustPark()) {
+        abandon = stop = true;
+        lock.unlock();
+        worker.join();
+        TheEnding().Count(-1);
+        Park();
+      }
     }
     try {
       if (PyErr_CheckSignals() != 0) throw nb::python_error();
@@ -176,6 +231,7 @@ void RunEngine(const RunArguments& run, const std::function<Status()>& work) {
   {
     const nb::gil_scoped_release others_go_on;
     worker.join();
+    TheEnding().Count(-1);
   }
   if (raised) throw nb::python_error(std::move(*raised));
   OrThrow(status);
@@ -194,6 +250,7 @@ void BindRun(nb::module_& module) {
           },
           nb::arg("threads"), nb::arg("tell").none(), nb::arg("patient") = false);
   nb::register_exception_translator(Raise);
+  nb::module_::import_("atexit").attr("register")(nb::cpp_function(&EndCalls));
 }
 
 }  // namespace anchorsplat::python

@@ -129,6 +129,20 @@ def test_ctrl_c_ends_every_long_call_and_leaves_nothing(cloud, tmp_path):
     assert os.listdir(tmp_path) == []
 
 
+def test_the_end_of_the_program_ends_calls_of_daemon_threads(python):
+    """In the middle of a call that would take hours."""
+    done = python(
+        "import threading, numpy as np, anchorsplat\n"
+        "one = np.zeros((1, 3), np.float32)\n"
+        "cloud = anchorsplat.Cloud(one, one - 2, np.ones((1, 4), np.float32), one[:, 0], one[:, None])\n"
+        "begun = threading.Event()\n"
+        "call = lambda: anchorsplat.render(cloud, orbit=100_000, size=(64, 64), progress=lambda _: begun.set())\n"
+        "threading.Thread(target=call, daemon=True).start()\n"
+        "begun.wait()\n"
+    )
+    assert done.returncode == 0 and done.stderr == ""
+
+
 def test_ctrl_c_without_progress_ends_what_never_says_a_word(whole, tmp_path):
     """A signal that comes while a file is written: by a timer, at times that go on until one is written whole."""
     target = tmp_path / "big.ply"

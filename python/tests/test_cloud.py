@@ -96,6 +96,25 @@ def test_rows_copies_and_pickles(cloud):
     assert same(back, cloud) and back.render_mode == cloud.render_mode and back.comments == cloud.comments
 
 
+def test_gaussian_by_gaussian(cloud):
+    few = cloud[:3]
+    assert [len(one) for one in few] == [1, 1, 1] and same(list(few)[2], cloud[2:3])
+    assert same(cloud[-1], cloud[len(cloud) - 1])
+    for row in (3, -4, 10**9):
+        with pytest.raises(IndexError):
+            few[row]
+    with pytest.raises(TypeError, match="five arrays"):
+        np.asarray(few)
+
+
+def test_bytes_are_no_paths(cloud):
+    data = anchorsplat.to_bytes(cloud, "ply")
+    for call in (lambda: anchorsplat.info(data), lambda: anchorsplat.convert(data, "x.spz")):
+        with pytest.raises(anchorsplat.BadArgumentError, match="found bytes") as refused:
+            call()
+        assert len(str(refused.value)) < 200
+
+
 def test_the_engine_checks_what_it_is_given(cloud):
     with pytest.raises(TypeError, match="expected an anchorsplat.Cloud"):
         anchorsplat.render("scan.ply")

@@ -22,7 +22,7 @@ def scan(whole, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     anchorsplat.write("scan.ply", whole[:1500])
     os.mkdir("capture")
-    project(tmp_path / "capture", whole[:1500], views=6, side=48)
+    project(tmp_path / "capture", whole[:1500], views=6, side=48, images="images")
     warnings.simplefilter("ignore", anchorsplat.SplatWarning)  # of a splat that is a torso of one
     return tmp_path
 

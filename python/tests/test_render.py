@@ -24,16 +24,17 @@ def png(picture: np.ndarray) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", data) + chunk(b"IEND", b"")
 
 
-def project(folder, cloud, views=4, side=32) -> Cameras:
+def project(folder, cloud, views=4, side=32, images=".") -> Cameras:
     """Pictures of a splat, as a project to fit to."""
     cameras = Cameras.orbit(cloud, views, size=(side, side))
     frames = []
+    (folder / images).mkdir(exist_ok=True)
     poses, pictures = cameras.world_to_camera, anchorsplat.render(cloud, cameras)
     for name, picture, pose, k in zip(cameras.names, pictures, poses, cameras.intrinsics):
-        (folder / f"{name}.png").write_bytes(png(picture))
+        (folder / images / f"{name}.png").write_bytes(png(picture))
         turned = np.linalg.inv(pose) @ np.diag([1.0, -1, -1, 1])
         frames.append(
-            {"file_path": f"{name}.png", "transform_matrix": turned.tolist(), "fl_x": k[0, 0], "fl_y": k[1, 1]}
+            {"file_path": f"{images}/{name}.png", "transform_matrix": turned.tolist(), "fl_x": k[0, 0], "fl_y": k[1, 1]}
         )
     camera_file = {"w": side, "h": side, "cx": side / 2, "cy": side / 2, "frames": frames}
     (folder / "transforms.json").write_text(json.dumps(camera_file))

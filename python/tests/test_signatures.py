@@ -19,7 +19,8 @@ SHARED = {
     "progress": "a callback or a bar of tqdm",
 }
 OUTPUT = {"output": "results are values"}
-FILES = {**OUTPUT, "out-dir": "results are values"}
+SIZE = {"max-memory": "arrays are in memory already", "yes": "nobody is asked"}
+FILES = {**OUTPUT, **SIZE, "out-dir": "results are values"}
 FUNCTIONS = {
     "enhance": ("enhance", None, {}, {"view": "anchorsplat.view", "overwrite": "nothing is written", **FILES}),
     "fit": (
@@ -51,7 +52,7 @@ FUNCTIONS = {
         "convert",
         None,
         {"from": "format"},
-        {"to": "the target's name says it", "out-dir": "one at a time", "seed": "nothing is random"},
+        {**SIZE, "to": "the target's name says it", "out-dir": "one at a time", "seed": "nothing is random"},
     ),
     "info": ("info", None, {"from": "format"}, {"overwrite": "nothing is written", "seed": "nothing is random"}),
     "refine": (

@@ -121,6 +121,17 @@ def test_what_cannot_be_differentiated_is_refused(few, cameras):
         rasterize(*values[:2], values[2][:59], *values[3:], cameras)
     with pytest.raises(anchorsplat.BadArgumentError, match="background"):
         rasterize(*values, cameras, background=[1, 2])
+    for because, how in {
+        "background: not finite": {"background": [0, float("nan"), 1]},
+        "profile: 'foo' is none of": {"profile": "foo"},
+        "sh_degree: 9 is not 0 to 3": {"sh_degree": 9},
+    }.items():
+        with pytest.raises(anchorsplat.BadArgumentError, match=because):
+            rasterize(*values, cameras, **how)
+    with pytest.raises(anchorsplat.BadArgumentError, match=r"opacity_logits: expected \[N\], found \[60, 1\]"):
+        rasterize(*values[:3], values[3][:, None], values[4], cameras)
+    with pytest.raises(anchorsplat.BadArgumentError, match=r"Cameras\('capture'\)"):
+        rasterize(*values, "capture")
     colors, _ = rasterize(*values, cameras)
     with torch.no_grad():
         values[0] += 1

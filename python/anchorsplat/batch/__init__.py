@@ -11,8 +11,10 @@ from collections.abc import Iterable
 from os import PathLike, fspath
 from typing import Any
 
+from .._run import ProgressLike, shower
 from .command_line import main
 from .enhance import How, run_splats
+from .progress import Show
 from .report import BatchReport
 from .scheduler import Stopped
 from .settings import as_arguments
@@ -37,7 +39,7 @@ def enhance(
     threads: int = 1,
     in_flight: int | None = None,
     retries: int = 3,
-    progress: Any = False,
+    progress: ProgressLike = False,
     **options: Any,
 ) -> BatchReport:
     """Enhances every input into the folder `out`, and says in the manifest what became of it. Called again it makes what
@@ -46,7 +48,8 @@ def enhance(
     `inputs` are paths, URLs of fsspec or patterns; `lists` are text files of them. `options` are those of
     ``anchorsplat enhance``, as keywords: ``upscale=4``, ``cameras="{folder}/transforms.json"``, ``clean=True``. The rest is
     the same as on the command line (``anchorsplat batch enhance --help``). `progress`: True for lines on stderr, or
-    something like a tqdm, which is told.
+    what other functions take: a class such as tqdm.tqdm, a bar, a function that is called with a
+    :class:`anchorsplat.Progress`.
 
     What goes wrong with an input is no exception but a row: ``report.failures``. Raises BadArgumentError for options and
     inputs that make no sense, before any work; ExistsError where results would replace files that no batch made;
@@ -57,7 +60,7 @@ def enhance(
         _words(inputs),
         fspath(out),
         as_arguments(options),
-        How(ray, workers, threads, in_flight, retries, progress is False, progress if hasattr(progress, "update") else None),
+        How(ray, workers, threads, in_flight, retries, progress in (None, False), _show(progress)),
         lists=_words(lists),
         root=root,
         format=format,
@@ -71,6 +74,10 @@ def refine(inputs: Inputs, out: str | PathLike[str], *, method: str = "refine", 
     """enhance() by optimisation: minutes for each splat. One that Ctrl-C interrupts goes on from its checkpoint the next time,
     where `out` is a folder."""
     return enhance(inputs, out, method=method, **options)
+
+
+def _show(progress: ProgressLike) -> Show | None:
+    return None if progress is True else shower(progress)
 
 
 def _words(inputs: Inputs) -> list[str]:

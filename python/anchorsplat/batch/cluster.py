@@ -10,8 +10,10 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+from .._cluster_address import look_for
 from .._errors import BadArgumentError, IoError, NotFoundError
 
 _OBJECT_STORE = 80 << 20  # bytes: results of tasks are rows; Ray takes no less
@@ -23,6 +25,11 @@ _PRIVATE = {
     # Workers are as nice as this process, not 15 more, which on a busy machine makes them several times as slow.
     "RAY_worker_niceness": "0",
 }
+
+
+# Ray's C++ core keeps the first one that a process gives it.
+_TOKEN = secrets.token_hex(32)
+_PREFIX = "anchorsplat-ray-"
 
 
 def ray_module() -> Any:
@@ -42,7 +49,7 @@ def connected(address: str | None, cpus: int | None) -> Iterator[Any]:
     """Ray, connected. One that is connected already is used and stays; what is begun here ends here.
 
     `address`: of a cluster ("auto", "HOST:PORT"); None: a Ray on this machine, for as long as this lasts, that listens
-    on 127.0.0.1 only and asks for a token that is made anew each time.
+    on 127.0.0.1 only and asks for a token that only this process knows.
     """
     if address is not None and "://" in address:
         raise BadArgumentError(
@@ -56,6 +63,7 @@ def connected(address: str | None, cpus: int | None) -> Iterator[Any]:
     if address is not None:
         ray = ray_module()
         try:
+            look_for(address)
             ray.init(address=address, **quiet)
         except (ConnectionError, ValueError, RuntimeError) as error:
             raise IoError(f"--ray {address}: {error}") from error
@@ -64,12 +72,14 @@ def connected(address: str | None, cpus: int | None) -> Iterator[Any]:
         finally:
             ray.shutdown()
         return
-    with _environment({**_PRIVATE, "RAY_AUTH_TOKEN": secrets.token_hex(32)}):
+    with _environment({**_PRIVATE, "RAY_AUTH_TOKEN": _TOKEN}):
         ray = ray_module()
         with contextlib.suppress(AttributeError):  # read when Ray was imported, which may have been earlier
             ray._private.ray_constants.ENABLE_RAY_CLUSTER = False
         # Unix sockets, whose paths have 107 bytes at most, are in there.
-        folder = tempfile.mkdtemp(prefix="anchorsplat-ray-", dir="/tmp" if len(tempfile.gettempdir()) > 30 else None)
+        place = Path("/tmp" if len(tempfile.gettempdir()) > 30 else tempfile.gettempdir())
+        _sweep(place)
+        folder = tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-", dir=place)
         try:
             ray.init(
                 address="local",
@@ -85,6 +95,17 @@ def connected(address: str | None, cpus: int | None) -> Iterator[Any]:
                 ray.shutdown()
         finally:
             shutil.rmtree(folder, ignore_errors=True)
+
+
+def _sweep(place: Path) -> None:
+    """Takes away what a process of ours left that was killed (-9)."""
+    for folder in place.glob(_PREFIX + "*"):
+        owner = folder.name.removeprefix(_PREFIX).partition("-")[0]
+        try:
+            if owner.isdigit() and folder.stat().st_uid == os.getuid() and not Path("/proc", owner).exists():
+                shutil.rmtree(folder, ignore_errors=True)
+        except OSError:
+            pass
 
 
 @contextlib.contextmanager

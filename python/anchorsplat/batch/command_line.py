@@ -7,7 +7,7 @@ import dataclasses
 import json
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 from .._errors import Error
 from .engine import CODES, INTERRUPTED, options
@@ -67,8 +67,15 @@ def _usage() -> None:
     print("\nExample:\n  anchorsplat batch enhance 'scans/**/*.ply' --out sharp --format spz")
 
 
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """Two lines, as the program itself says it; not all of the options."""
+        print(f"error: {printable(message)}\nTry: {self.prog} --help", file=sys.stderr)
+        raise SystemExit(2)
+
+
 def _parser(verb: str) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(f"anchorsplat batch {verb}", allow_abbrev=False, description=f"Makes {_VERBS[verb]}.")
+    parser = _Parser(f"anchorsplat batch {verb}", allow_abbrev=False, description=f"Makes {_VERBS[verb]}.")
     add = parser.add_argument
     if verb in ("enhance", "refine"):
         add("inputs", nargs="*", metavar="IN", help="paths, URLs (s3://, gs://, http://) or patterns of them; ** is any folders")

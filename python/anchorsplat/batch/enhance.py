@@ -17,7 +17,7 @@ from .._errors import BadArgumentError, Error, ExistsError, NotFoundError
 from . import cluster, storage
 from .inputs import Input, expand
 from .manifest import Manifest
-from .progress import Counts, Progress
+from .progress import Counts, Progress, Show
 from .report import BatchReport, report_of
 from .scheduler import Stopped, run_tasks, signals_interrupt
 from .settings import Settings, files_of, settings_of
@@ -38,7 +38,7 @@ class How:
     in_flight: int | None = None
     retries: int = 3
     quiet: bool = False
-    bar: Any = None
+    show: Show | None = None
 
     def check(self) -> None:
         for name, value, least in (("workers", self.workers, 1), ("threads", self.threads, 1),
@@ -68,7 +68,7 @@ class SplatBatch:
         self.gaussians = [0, 0]
         self.start_seconds = 0.0
         self.manifest = Manifest(self.manifest_uri)
-        self.progress = Progress("batch", self.counts, quiet=how.quiet, bar=how.bar)
+        self.progress = Progress("batch", self.counts, quiet=how.quiet, show=how.show)
 
     def plan(self, inputs: Sequence[Input], *, overwrite: bool, verify: bool) -> list[SplatJob]:
         """Jobs for what is missing or has changed. Errors: ExistsError: results would replace files of others."""

@@ -175,7 +175,7 @@ class _File:
                     break
                 whole += len(line)
                 if line.strip():
-                    yield f"{self._path}: line {number}", line.decode("utf-8", "replace")
+                    yield f"{self._path}: line {number}", line.decode("utf-8", "surrogateescape")
         if os.fstat(self._descriptor).st_size > whole:  # the end of a line that was never finished
             os.ftruncate(self._descriptor, whole)
 
@@ -242,7 +242,7 @@ class _Segments:
     def read(self) -> Iterator[tuple[str, str]]:
         for name in self._names():
             try:
-                text = self._fs.cat_file(name).decode("utf-8", "replace")
+                text = self._fs.cat_file(name).decode("utf-8", "surrogateescape")
             except Exception as error:
                 raise storage.filesystem_error(name, error) from error
             for number, line in enumerate(text.splitlines(), 1):

@@ -132,7 +132,7 @@ def run_processes(
     """Runs lists of jobs one after the other, as the generator `stages` gives them: each list when the one before it has
     ended. Jobs of the same list run side by side, and those that failed are said."""
     counts = Counts(total)
-    progress = Progress(what, counts, quiet=how.quiet, bar=how.bar)
+    progress = Progress(what, counts, quiet=how.quiet, show=how.show)
 
     def take(job: ProcessJob, row: dict[str, Any]) -> None:
         row = {"name": job.name, **row}

@@ -5,7 +5,12 @@ from __future__ import annotations
 import sys
 import time
 from dataclasses import dataclass
-from typing import Any, TextIO
+from collections.abc import Callable
+from typing import TextIO
+
+from .._run import Progress as Told
+
+Show = Callable[[Told], object]
 
 _ON_TERMINAL = 0.2  # seconds between two states of the line
 _IN_LOG = 15.0
@@ -35,9 +40,9 @@ def duration(seconds: float) -> str:
 
 
 class Progress:
-    def __init__(self, what: str, counts: Counts, *, quiet: bool = False, stream: TextIO | None = None, bar: Any = None):
-        """`bar`: something like tqdm's, which is told instead of the stream."""
-        self._what, self._counts, self._quiet, self._bar = what, counts, quiet, bar
+    def __init__(self, what: str, counts: Counts, *, quiet: bool = False, stream: TextIO | None = None, show: Show | None = None):
+        """`show` is called instead of writing to the stream."""
+        self._what, self._counts, self._quiet, self._show_to = what, counts, quiet, show
         self._stream = stream or sys.stderr
         self._terminal = self._stream.isatty()
         self._begin = self._said = time.monotonic()
@@ -60,15 +65,18 @@ class Progress:
         return text
 
     def step(self) -> None:
-        if self._bar is not None:
-            self._bar.total = self._counts.total
-            self._bar.update(self._counts.total - self._counts.left - self._bar.n)
+        if self._show_to is not None:
+            self._show_to(self._state(ended=False))
             return
         now = time.monotonic()
         if self._quiet or now - self._said < (_ON_TERMINAL if self._terminal else _IN_LOG):
             return
         self._said = now
         self._show(self.line())
+
+    def _state(self, ended: bool) -> Told:
+        c = self._counts
+        return Told(self._what, c.total - c.left, c.total, f"{c.failed:,} failed" if c.failed else "", ended)
 
     def message(self, text: str) -> None:
         """A line that stays."""
@@ -79,8 +87,8 @@ class Progress:
         self._stream.flush()
 
     def close(self) -> None:
-        if self._bar is not None:
-            self.step()
+        if self._show_to is not None:
+            self._show_to(self._state(ended=True))
         elif not self._quiet and self._terminal and self._shown:
             self._stream.write("\r\x1b[K")
             self._stream.flush()

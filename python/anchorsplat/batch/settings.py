@@ -113,6 +113,9 @@ def _per_input(value: str) -> bool:
     return "{" in value
 
 
+_OF_CAMERAS = {"--train-width", "--camera-rule"}
+
+
 def _check(plain: list[str], files: list[tuple[str, str]], format: str | None) -> None:
     """Lets the program look at the options before any splat is fetched. It complains of some before it misses the input,
     and of others, as values out of range, with a splat at hand. Errors: BadArgumentError, in its words."""
@@ -124,9 +127,14 @@ def _check(plain: list[str], files: list[tuple[str, str]], format: str | None) -
             ended.raise_for_code()
         if any(method in " ".join(plain) for method in ("refine", "--quality=good", "--quality=best")):
             return  # takes long, whatever the splat
+        # A Gaussian is in no camera's view, and weights belong to options of their own: without the files, then, and
+        # without what has an effect with them only.
+        if not {name for name, _ in files} <= {"--cameras"}:
+            return
+        alone = [word for word in out if word.partition("=")[0] not in _OF_CAMERAS]
         splat = Path(folder, "one.ply")
         splat.write_bytes(_one_gaussian())
-        ended = run(["enhance", str(splat), *out, "--threads", "1"])
+        ended = run(["enhance", str(splat), *alone, "--threads", "1"])
         if ended.code == 2:
             ended.raise_for_code()
 

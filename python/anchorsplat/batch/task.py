@@ -9,6 +9,7 @@ import socket
 import tempfile
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -82,15 +83,17 @@ def _enhance(job: SplatJob) -> dict[str, Any]:
             f"this machine has anchorsplat {here.version} ({here.digest}), the batch was begun by "
             f"{job.engine.version} ({job.engine.digest}); install the same package everywhere",
         )
-    with _work_folder(job.work) as folder:
-        source, sha256, size = _input(job, folder)
-        if job.known_sha256 == sha256 and _result_stands(job, folder):
-            return {"state": "done", "unchanged": True, "size": size, "sha256": sha256}
+    with _work_folder(job.work) as folder, ThreadPoolExecutor(1) as beside:
+        source = _input(job, folder)
+        size = source.stat().st_size
+        hashing = beside.submit(storage.sha256, source)  # while the program works
+        if job.known_sha256 and job.known_sha256 == hashing.result() and _result_stands(job, folder):
+            return {"state": "done", "unchanged": True, "size": size, "sha256": job.known_sha256}
         result = folder / "result" / Path(job.output).name
         result.parent.mkdir()
         ended = run(_arguments(job, source, result), memory_limit=max(_LEAST_MEMORY, _MEMORY_SLACK * job.memory))
         named = [m.replace(str(source), job.input).replace(str(result), job.output) for m in ended.messages]
-        told = {"size": size, "sha256": sha256, "engine_seconds": round(ended.seconds, 4), "messages": named}
+        told = {"size": size, "sha256": hashing.result(), "engine_seconds": round(ended.seconds, 4), "messages": named}
         if ended.code or ended.signal:
             error = ended.error()
             error["message"] = error["message"].replace(str(source), job.input).replace(str(result), job.output)
@@ -107,8 +110,8 @@ def _identity(uri: str) -> str:
     return storage.identity(info) if info else ""
 
 
-def _input(job: SplatJob, folder: Path) -> tuple[Path, str, int]:
-    """The input as a file of this machine, its hash and its size."""
+def _input(job: SplatJob, folder: Path) -> Path:
+    """The input as a file of this machine."""
     if job.content is None and storage.is_local(job.input):
         path = Path(job.input)
     else:
@@ -118,7 +121,7 @@ def _input(job: SplatJob, folder: Path) -> tuple[Path, str, int]:
             path.write_bytes(job.content)
         else:
             storage.fetch(job.input, path)
-    return path, storage.sha256(path), path.stat().st_size
+    return path
 
 
 def _result_stands(job: SplatJob, folder: Path) -> bool:

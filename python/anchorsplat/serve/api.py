@@ -46,6 +46,10 @@ _STATUS = {
 _VIEWABLE = ("ply", "compressed.ply", "spz", "sog", "splat", "glb")
 
 
+def _no_such_job() -> ApiError:
+    return ApiError(404, "not_found", "There is no such job. Old ones are deleted with their results.")
+
+
 class ApiError(Exception):
     def __init__(
         self, status: int, code: str, message: str, headers: dict[str, str] | None = None, details: list | None = None
@@ -86,7 +90,7 @@ class Service:
         path = store.new_upload()
         try:
             upload = await receive(request, path, self.settings.max_upload, self.settings.stall_seconds)
-            self.metrics.uploaded.inc(upload.bytes)
+            self.metrics.uploaded.inc(upload.size)
             options = validate(kind, pairs + upload.fields)
             cameras = await self._cameras(kind, options, upload)
             input_id, facts = await self._known_input(upload)
@@ -102,7 +106,7 @@ class Service:
         finally:
             scheduler.uploading -= 1
             path.unlink(missing_ok=True)
-        job = store.job(job_id)
+        job, _ = self.find(job_id)
         scheduler.submitted(job["key"])
         answer = self.describe(job)
         if answer["state"] == states.DONE:
@@ -146,13 +150,18 @@ class Service:
 
     def find(self, job_id: str) -> tuple[sqlite3.Row, sqlite3.Row]:
         job = self.store.job(job_id) if len(job_id) < 100 else None
-        work = self.store.work(job["key"]) if job else None
+        if job is None:
+            raise _no_such_job()
+        return job, self._work_of(job)
+
+    def _work_of(self, job: sqlite3.Row) -> sqlite3.Row:
+        work = self.store.work(job["key"])
         if work is None:
-            raise ApiError(404, "not_found", "There is no such job. Old ones are deleted with their results.")
-        return job, work
+            raise _no_such_job()
+        return work
 
     def describe(self, job: sqlite3.Row) -> dict:
-        work = self.store.work(job["key"])
+        work = self._work_of(job)
         state = states.CANCELLED if job["cancelled"] else work["state"]
         link = f"/v1/jobs/{job['id']}"
         facts = self.store.input_facts(work["input"]) or {}
@@ -196,11 +205,11 @@ class Service:
         last = None
         while True:
             change = changes.next()
-            job = self.store.job(job_id)
-            if job is None or self.store.work(job["key"]) is None:
+            try:
+                now = self.describe(self.find(job_id)[0])
+            except ApiError:
                 yield "event: gone\ndata: {}\n\n"
                 return
-            now = self.describe(job)
             yield f"data: {json.dumps(now)}\n\n" if now != last else ": still here\n\n"
             if now["state"] in states.ENDED or self.scheduler.stopping:
                 return
@@ -322,7 +331,7 @@ def router(service: Service, static: dict[str, tuple[bytes, str]]) -> APIRouter:
         found, work = service.find(job_id)
         if not found["cancelled"] and work["state"] not in states.ENDED:
             scheduler.cancel(found)
-            return JSONResponse(service.describe(service.store.job(job_id)))
+            return JSONResponse(service.describe(service.find(job_id)[0]))
         service.store.forget_job(job_id, work["key"])
         return Response(status_code=204)
 

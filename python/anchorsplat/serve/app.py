@@ -6,6 +6,7 @@ import contextlib
 import logging
 import sqlite3
 from pathlib import Path
+from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
@@ -94,8 +95,7 @@ def make_app(settings: Settings):
         route = getattr(scope.get("route"), "path", "other")
         metrics.requests.labels(_method(scope["method"]), route, status).inc()
 
-    guarded = Guard(app, settings, static["login.html"][0], count)
-    guarded.service = service
+    guarded = Guard(app, settings, static["login.html"][0], count, service)
     return guarded
 
 
@@ -126,7 +126,7 @@ def _add_submission(app: FastAPI, service: Service, kind: str) -> None:
         }
     )
     binary = {"type": "string", "format": "binary"}
-    form = {"type": "object", "required": ["file"], "properties": {"file": binary}}
+    form: dict[str, Any] = {"type": "object", "required": ["file"], "properties": {"file": binary}}
     if kind == "enhance":
         form["properties"]["cameras"] = binary | {
             "description": "transforms.json or cameras.json of the training views"
@@ -135,7 +135,7 @@ def _add_submission(app: FastAPI, service: Service, kind: str) -> None:
         "required": True,
         "content": {"multipart/form-data": {"schema": form}, "application/octet-stream": {"schema": binary}},
     }
-    responses = {
+    responses: dict[int | str, dict[str, Any]] = {
         200: {"description": "The result is there already"},
         202: {"description": "The job waits or runs"},
         400: {"description": "Not a splat, or a malformed request"},

@@ -6,6 +6,7 @@ transforms.json (NeRF, nerfstudio) and INRIA's cameras.json. A COLMAP model is a
 from __future__ import annotations
 
 import json
+from typing import Any
 
 MOST_BYTES = 4 * 2**20  # some thousand views; held in memory
 _MOST_VIEWS = 50_000
@@ -27,7 +28,7 @@ _NUMBERS = (
     "p1",
     "p2",
 )
-_MODELS = ("PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV")
+_MODELS = ("PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "FULL_OPENCV", "OPENCV_FISHEYE")
 
 
 class BadCameras(Exception):
@@ -41,7 +42,7 @@ def plain_cameras(data: bytes) -> bytes:
     except (ValueError, RecursionError) as error:
         raise BadCameras(f"cameras: no JSON ({error}); expected a transforms.json or a cameras.json") from None
     if isinstance(root, dict) and isinstance(root.get("frames"), list):
-        plain = _transforms(root)
+        plain: dict[str, Any] | list[dict[str, Any]] = _transforms(root)
     elif isinstance(root, list):
         plain = [_inria(index, entry) for index, entry in enumerate(_views(root))]
     else:
@@ -80,14 +81,16 @@ def _matrix(rows: object, heights: tuple[int, ...], width: int, where: str) -> l
 def _lens(level: dict, where: str) -> dict:
     out = {key: _number(level[key], f"{where}, {key}") for key in _NUMBERS if key in level}
     model = level.get("camera_model")
-    if model is not None and model not in _MODELS:
-        raise BadCameras(f"cameras: {where}: not a pinhole camera; undistort the pictures first")
-    if (
-        level.get("is_fisheye") is True
-        or level.get("distortion_params") not in (None, [])
-        and any(_number(value, f"{where}, distortion_params") for value in _list(level["distortion_params"], where))
-    ):
-        raise BadCameras(f"cameras: {where}: lens distortion is not supported; undistort the pictures first")
+    if model is not None:
+        if model not in _MODELS:
+            raise BadCameras(f"cameras: {where}: a lens that is not known here; undistort the pictures first")
+        out["camera_model"] = model
+    if level.get("is_fisheye") is True:
+        out["is_fisheye"] = True
+    if level.get("distortion_params") is not None:
+        values = _list(level["distortion_params"], where)
+        numbers: dict[str, Any] = out
+        numbers["distortion_params"] = [_number(value, f"{where}, distortion_params") for value in values]
     return out
 
 
@@ -115,7 +118,7 @@ def _inria(index: int, entry: object) -> dict:
     where = f"camera {index}"
     if not isinstance(entry, dict):
         raise BadCameras(f"cameras: {where}: expected an object")
-    out = {key: _number(entry.get(key), f"{where}, {key}") for key in ("width", "height", "fx", "fy")}
+    out: dict[str, Any] = {key: _number(entry.get(key), f"{where}, {key}") for key in ("width", "height", "fx", "fy")}
     out["position"] = _matrix([entry.get("position")], (1,), 3, f"{where}, position")[0]
     out["rotation"] = _matrix(entry.get("rotation"), (3,), 3, f"{where}, rotation")
     return out | {"id": index, "img_name": f"{index:06}"}

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 _LAUNCH = Path(__file__).with_name("launch.py")
 _MOST_OUTPUT = 8 * 2**20  # bytes of stdout that are kept
@@ -35,7 +36,7 @@ class Outcome:
 
     code: int
     why: str | None = None
-    document: object = None  # what it printed as JSON
+    document: Any = None  # what it printed as JSON
     messages: list[tuple[str, str]] = field(default_factory=list)  # (level, text)
     seconds: float = 0.0
     peak_bytes: int = 0  # resident
@@ -82,7 +83,7 @@ class _Events:
             self.messages.append((str(event.get("level")), event["message"]) if known else ("info", text))
 
 
-def _document(output: bytes) -> object:
+def _document(output: bytes) -> Any:
     try:
         return json.loads(output)
     except ValueError:
@@ -129,6 +130,7 @@ def _follow(process: subprocess.Popen, begin: float, limits: Limits, on_progress
     output = bytearray()
     why = None
     kill_at = begin + limits.seconds
+    assert process.stdout is not None and process.stderr is not None  # both are pipes
     with selectors.DefaultSelector() as selector, process.stdout, process.stderr:
         selector.register(process.stdout, selectors.EVENT_READ, "out")
         selector.register(process.stderr, selectors.EVENT_READ, "err")

@@ -6,7 +6,6 @@ Nodes need the same build of this package. A node that is lost is tried once mor
 from __future__ import annotations
 
 import queue
-import socket
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
@@ -15,10 +14,10 @@ from pathlib import Path
 
 import ray
 
+from .._cluster_address import look_for
 from .process import Outcome
 from .runner import STATE, Task, clear, run_in_folder
 
-_CONNECT_SECONDS = 10
 _MORE_MEMORY = 256 * 2**20  # of a job, beside what its input takes
 _MEMORY_PER_INPUT_BYTE = 16
 
@@ -40,8 +39,9 @@ def _job(
         folder.mkdir()
         local = replace(task, folder=folder, stdin=None, links={})
         if stdin is not None:
-            local = replace(local, stdin=Path(place, "stdin"))
-            local.stdin.write_bytes(stdin)
+            whole = Path(place, "stdin")
+            whole.write_bytes(stdin)
+            local = replace(local, stdin=whole)
         for name, data in links.items():
             local.links[name] = Path(place, name)
             local.links[name].write_bytes(data)
@@ -79,20 +79,9 @@ def _next(events: queue.SimpleQueue) -> object:
             pass
 
 
-def _look_for(address: str) -> None:
-    """Ray itself tries for minutes. Raises ConnectionError."""
-    host, _, port = address.rpartition(":")
-    if not host or not port.isdigit():
-        return
-    try:
-        socket.create_connection((host.strip("[]"), int(port)), _CONNECT_SECONDS).close()
-    except (OSError, OverflowError) as error:
-        raise ConnectionError(f"no Ray cluster at {address}: {error}") from None
-
-
 class RayRunner:
     def __init__(self, address: str, threads: int, fingerprint: str):
-        _look_for(address)
+        look_for(address)
         where = {"address": "local", "include_dashboard": False} if address == "local" else {"address": address}
         try:
             ray.init(**where, log_to_driver=False)

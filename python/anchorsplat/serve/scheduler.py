@@ -151,6 +151,8 @@ class Scheduler:
         key = job["key"]
         if self.store.cancel_job(job["id"], key):
             work = self.store.work(key)
+            if work is None:
+                return
             if work["state"] == states.RUNNING and key in self._ends:
                 self._ends[key].set()
             elif work["state"] == states.QUEUED:

@@ -63,7 +63,8 @@ def is_session(value: str, token: str) -> bool:
 
 
 class Guard:
-    def __init__(self, app, settings: Settings, login_page: bytes, count: Callable[[dict, int], None]):
+    def __init__(self, app, settings: Settings, login_page: bytes, count: Callable[[dict, int], None], service):
+        self.service = service  # for who ends it
         self._app, self._settings, self._login_page, self._count = app, settings, login_page, count
         self._hosts = {f"{name}:{settings.port}" for name in ("127.0.0.1", "localhost", "[::1]")}
         if settings.host not in ("127.0.0.1", "localhost", "::1"):
@@ -123,7 +124,7 @@ class Guard:
         return host in self._hosts or host.rsplit(":", 1)[0] in self._settings.allow_hosts
 
     def _is_known(self, headers: Headers) -> bool:
-        token = self._settings.token
+        token = self._settings.token or ""
         kind, _, given = headers.get("authorization", "").partition(" ")
         if kind.lower() == "bearer" and same(given.strip(), token):
             return True

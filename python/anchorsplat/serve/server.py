@@ -11,6 +11,7 @@ import sys
 
 import uvicorn
 
+from .api import Service
 from .app import make_app
 from .engine import EngineMissing
 from .settings import Settings
@@ -18,6 +19,10 @@ from .store import DataInUse
 
 
 class _Server(uvicorn.Server):
+    def __init__(self, config: uvicorn.Config, service: Service):
+        super().__init__(config)
+        self._service = service
+
     @contextlib.contextmanager
     def capture_signals(self):
         """To be asked to end is no failure: uvicorn's own way ends the process by the signal."""
@@ -30,7 +35,7 @@ class _Server(uvicorn.Server):
 
     def handle_exit(self, sig, frame) -> None:
         # Those who watch a job would keep their connections, and so the service, for as long as it runs.
-        self.config.app.service.scheduler.begin_to_stop()
+        self._service.scheduler.begin_to_stop()
         super().handle_exit(sig, frame)
 
 
@@ -79,6 +84,6 @@ def run(settings: Settings) -> int:
         limit_concurrency=1000,
         h11_max_incomplete_event_size=64 * 1024,
     )
-    server = _Server(config)
+    server = _Server(config, app.service)
     server.run(sockets=[sock])
     return 0

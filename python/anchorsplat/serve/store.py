@@ -60,6 +60,17 @@ class Store:
             raise DataInUse(
                 f"{folder}: another 'anchorsplat serve' works in this folder; end it, or give --data another one"
             ) from None
+        try:
+            self._open()
+        except sqlite3.DatabaseError as error:
+            self.close()
+            raise DataInUse(
+                f"{folder / 'jobs.sqlite3'}: cannot be read ({error}); give --data another folder, or move this file away "
+                "to begin with no jobs"
+            ) from None
+
+    def _open(self) -> None:
+        folder = self.folder
         self._db = sqlite3.connect(folder / "jobs.sqlite3", isolation_level=None)
         self._db.row_factory = sqlite3.Row
         self._db.execute("PRAGMA journal_mode=WAL")
@@ -91,23 +102,23 @@ class Store:
             ),
         )
         self._db.execute("UPDATE works SET state=?, started=NULL WHERE state=?", (QUEUED, RUNNING))
-        for path in (self.folder / "uploads").iterdir():
-            path.unlink()
+        for path in (self.folder / "uploads").iterdir():  # and the folders in which they were looked at
+            _remove(path)
         queued = {row[0] for row in self._db.execute("SELECT key FROM works WHERE state=?", (QUEUED,))}
         for path in (self.folder / "work").iterdir():
             if path.name not in queued:  # what is queued may go on from the state in its folder
-                shutil.rmtree(path)
+                _remove(path)
         known = {row[0] for row in self._db.execute("SELECT key FROM works WHERE state=?", (DONE,))}
         for path in (self.folder / "results").iterdir():
             if path.name not in known:
-                shutil.rmtree(path)
+                _remove(path)
         for key in known:  # somebody deleted a folder by hand
             if not self.result_folder(key).is_dir():
                 self._db.execute("DELETE FROM works WHERE key=?", (key,))
         inputs = {row[0] for row in self._db.execute("SELECT id FROM inputs")}
         for path in (self.folder / "inputs").iterdir():
             if path.name not in inputs:
-                path.unlink()
+                _remove(path)
 
     # Inputs
 
@@ -293,6 +304,13 @@ class _Transaction:
 
     def __exit__(self, kind, *_) -> None:
         self._db.execute("COMMIT" if kind is None else "ROLLBACK")
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink()
 
 
 def _size(folder: Path) -> int:

@@ -35,7 +35,7 @@ class BadUpload(Exception):
 class Upload:
     path: Path
     name: str = ""  # as the client calls it; never a path
-    bytes: int = 0
+    size: int = 0
     sha256: str = ""
     fields: list[tuple[str, str]] = field(default_factory=list)
     cameras: bytes | None = None
@@ -185,7 +185,7 @@ async def receive(request: Request, path: Path, limit: int, stall_seconds: float
                 raise BadUpload(400, "bad_request", "The form has no 'file'.")
         if sink.bytes == 0:
             raise BadUpload(400, "bad_file", f"{upload.name}: the file is empty.")
-        upload.bytes, upload.sha256 = sink.bytes, await sink.end()
+        upload.size, upload.sha256 = sink.bytes, await sink.end()
         return upload
     except FormParserError as error:
         raise BadUpload(400, "bad_request", f"The form is malformed: {plain_name(str(error))}") from None

@@ -7,6 +7,7 @@ import http.server
 import json
 import signal
 import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -48,6 +49,14 @@ def wait_for(path: Path, process) -> None:
     while not path.exists():
         assert process.poll() is None, process.communicate()
         threading.Event().wait(0.05)
+
+
+def test_one_batch_after_the_other_in_one_process(scans: Path, tmp_path: Path) -> None:
+    code = (
+        "from anchorsplat import batch\n"
+        f"for k in range(2): assert batch.enhance({str(scans / 'a.ply')!r}, {str(tmp_path)!r} + f'/out{{k}}', method='filter').done\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=200)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

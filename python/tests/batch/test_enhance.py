@@ -11,7 +11,7 @@ import fsspec
 import pytest
 
 from anchorsplat import batch
-from anchorsplat._errors import BadArgumentError, ExistsError, NotFoundError
+from anchorsplat._errors import BadArgumentError, ExistsError, IoError, NotFoundError
 from anchorsplat.batch.enhance import How
 from anchorsplat.batch.settings import settings_of
 
@@ -183,6 +183,10 @@ def test_files_that_options_name(control: Control, scans: Path, tmp_path: Path) 
     (scans / "b.json").write_text((scans / "b.json").read_text().replace("60", "50"))
     batch.enhance(f"{scans}/[abd].ply", tmp_path / "out", **how)
     assert control.calls() == ["b.ply"]
+    shared = {"cameras": str(scans / "a.json"), "train_width": 32, "camera_rule": "median", "method": "filter"}
+    assert batch.enhance(f"{scans}/*.ply", tmp_path / "shared", **shared).done == 4
+    with pytest.raises(BadArgumentError, match="upscale 0.5 must be at least 1"):
+        batch.enhance(f"{scans}/*.ply", tmp_path / "no", **{**shared, "upscale": 0.5})
     with pytest.raises(BadArgumentError, match="only {folder}, {stem} and {name}"):
         batch.enhance(f"{scans}/*.ply", tmp_path / "out", cameras="{home}/x.json")
     with pytest.raises(NotFoundError, match="none.safetensors: no such file"):
@@ -204,6 +208,42 @@ def test_what_makes_no_sense_is_said_before_any_work(control: Control, scans: Pa
     refused("no machine here has more than 2 cores", threads=64)
     refused("ray job submit", ray="ray://127.0.0.1:1")
     assert control.calls() == [] and not list((tmp_path / "out").glob("*.ply"))
+
+
+def test_names_that_are_no_text(control: Control, tmp_path: Path) -> None:
+    splat(Path(os.fsdecode(os.fsencode(tmp_path / "in") + b"\xff.ply")))
+    for skipped in (0, 1):
+        report = batch.enhance(f"{tmp_path}/in*.ply", tmp_path / "out", method="filter")
+        assert (report.failed, report.skipped) == (0, skipped)
+
+
+def test_progress_as_a_class_and_as_a_function(control: Control, scans: Path, tmp_path: Path) -> None:
+    bars: list[Bar] = []
+
+    class Bar:
+        def __init__(self, total: int, desc: str):
+            self.n, self.total, self.closed = 0, total, False
+            bars.append(self)
+
+        def update(self, more: int) -> None:
+            self.n += more
+
+        def close(self) -> None:
+            self.closed = True
+
+    batch.enhance(f"{scans}/*.ply", tmp_path / "out", method="filter", progress=Bar)
+    assert [(bar.n, bar.total, bar.closed) for bar in bars] == [(4, 4, True)]
+    seen: list[tuple] = []
+    batch.enhance(f"{scans}/*.ply", tmp_path / "again", method="filter", progress=seen.append)
+    assert seen[-1] == ("batch", 4, 4, "", True)
+
+
+def test_a_cluster_that_is_not_there(scans: Path, tmp_path: Path) -> None:
+    with socket.socket() as taken:  # bound, and nobody listens
+        taken.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{taken.getsockname()[1]}"
+        with pytest.raises(IoError, match=f"no Ray cluster at {address}"):
+            batch.enhance(f"{scans}/*.ply", tmp_path / "out", method="filter", ray=address)
 
 
 def test_memory_file_system(control: Control, scans: Path, tmp_path: Path, native: Path) -> None:

@@ -118,6 +118,24 @@ def test_a_folder_is_one_services(tmp_path: Path) -> None:
     Store(tmp_path).close()
 
 
+def test_a_start_clears_away_what_a_kill_left(tmp_path: Path) -> None:
+    """Whatever stands where: a service that does not start again has lost all."""
+    Store(tmp_path).close()
+    for place in ("uploads", "inputs", "results", "work"):
+        (tmp_path / place / "0123.check" / "deeper").mkdir(parents=True)
+        (tmp_path / place / "stray").write_text("x")
+    Store(tmp_path).close()
+    for place in ("uploads", "inputs", "results", "work"):
+        assert list((tmp_path / place).iterdir()) == []
+
+
+def test_a_damaged_list_of_jobs_has_a_sentence(tmp_path: Path) -> None:
+    Store(tmp_path).close()
+    (tmp_path / "jobs.sqlite3").write_bytes(b"no data base " * 100)
+    with pytest.raises(DataInUse, match=r"jobs\.sqlite3: cannot be read .* --data"):
+        Store(tmp_path)
+
+
 def test_oldest_first(open_store, tmp_path: Path, clock: Clock) -> None:
     store = open_store()
     keys = []

@@ -12,6 +12,8 @@
 #   make viewer-test   the page of `anchorsplat view` in headless Chromium (installs a browser)
 #   make serve-test    the page and the API of `anchorsplat serve` in headless Chromium, under load and on Ray
 #   make batch-test    `anchorsplat batch` with kills, an S3 and a cluster on this machine, four minutes
+#   make web      the program in a browser: build/web/dist, a page; make npm: build/web/npm, the package (docs/web.md; half an hour)
+#   make web-test the package under Node beside the native program and under damaged files, the page in headless Chromium
 #   make interop  files of ours read by other programs and theirs by us (scripts/interop.py says what it needs)
 #   make lpips-check  LPIPS with its trained weights (fetched once, 64 MB) against the published values
 #   make bench    measured ratios and figures
@@ -106,6 +108,19 @@ serve-test: test-dependencies
 	@cmake --build --preset lean -j $(JOBS) --target anchorsplat_python_package
 	@scripts/serve_test.sh $(PYTHON) build/lean/python
 .PHONY: serve-test
+
+# Compiled to WebAssembly in a Debian 13 of its own, which is kept in build/web/root.
+web:
+	@JOBS=$(JOBS) scripts/web/build.sh
+
+# As `npm pack` makes it, which need not be here.
+npm: web
+	@name=build/web/anchorsplat-$$(sed -n 's/^project(anchorsplat VERSION \([0-9.]*\).*/\1/p' CMakeLists.txt).tgz && \
+	  tar -C build/web --transform 's,^npm,package,' --sort=name --owner=0 --group=0 --numeric-owner --mtime=@0 -czf $$name npm && ls $$name
+
+web-test: build
+	@JOBS=$(JOBS) scripts/web/test.sh build/release
+.PHONY: web npm web-test
 
 bench: program
 	@build/anchorsplat bench render

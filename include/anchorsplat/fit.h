@@ -39,6 +39,7 @@ struct FitSettings {
   double area_pixels = 1;
   int64_t max_gaussians = 0;                               // growth stops there; 0: no bound, or a million with kMcmc
   int hold_out = 8;                                        // every Nth view, by name, is not trained on; 0: all are
+  int downscale = 1;                                       // N × N pixels of the pictures become one
   StartingPoints starting_points = StartingPoints::kAuto;  // without a splat to begin at
   std::optional<int64_t> initial_points =
       std::nullopt;  // thinned to as many, or random ones; 100,000 where there are none

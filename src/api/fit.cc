@@ -3,6 +3,8 @@
 #include <anchorsplat/fit.h>
 
 #include "api/bridge.h"
+#include "cameras/photograph.h"
+#include "core/text.h"
 #include "fit/checkpoint_guard.h"
 #include "fit/initial_cloud.h"
 #include "fit/initial_points.h"
@@ -48,7 +50,11 @@ Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianClo
     return Error{ErrorCode::kBadArgument,
                  "a fit has at least one step and one Gaussian; max_gaussians and hold_out are not negative"};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views, OpenProject(project, {.hold_out = settings.hold_out}));
+  if (settings.downscale < 1 || settings.downscale > kMostDownscale) {
+    return Error{ErrorCode::kBadArgument, Cat("the downscale of a fit is 1 to ", kMostDownscale)};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views,
+                               OpenProject(project, {.hold_out = settings.hold_out, .downscale = settings.downscale}));
   FitOptions options = FitOptionsFor(settings.steps, PresetOf(settings.strategy));
   options.seed = settings.seed;
   options.densification.max_gaussians = settings.max_gaussians;

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <new>
 
 #include "core/cloud_view.h"
 #include "core/finite.h"
@@ -32,6 +34,8 @@ int64_t GaussianCloud::bytes() const {
 
 void GaussianCloud::Resize(int64_t n, int degree) {
   sh_degree = degree;
+  // Where addresses have 32 bits a count that passed all checks may still be more floats than there are addresses.
+  if (static_cast<uint64_t>(n) > sh.max_size() / static_cast<size_t>(sh_stride())) throw std::bad_alloc();
   const size_t count = static_cast<size_t>(n);
   means.resize(3 * count);
   log_scales.resize(3 * count);

@@ -23,7 +23,7 @@ double SquaredDistance(const std::array<double, 3>& a, const std::array<double, 
 
 KdTree::KdTree(std::span<const float> positions) {
   const size_t n = positions.size() / 3;
-  std::vector<Point> points(n);
+  Buffer<Point> points(n);
   for (size_t i = 0; i < n; ++i) {
     for (size_t k = 0; k < 3; ++k) points[i][k] = positions[3 * i + k];
   }

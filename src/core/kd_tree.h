@@ -3,7 +3,8 @@
 #include <array>
 #include <cstdint>
 #include <span>
-#include <vector>
+
+#include "core/buffer.h"
 
 namespace anchorsplat {
 
@@ -37,9 +38,9 @@ class KdTree {
   void Build(std::span<const Point> points, int64_t begin, int64_t end);
 
   // In the order of the tree: the middle of every range divides it along its widest side, which `axis_` keeps there.
-  std::vector<Point> points_;
-  std::vector<int64_t> index_;
-  std::vector<uint8_t> axis_;
+  Buffer<Point> points_;
+  Buffer<int64_t> index_;
+  Buffer<uint8_t> axis_;
 };
 
 }  // namespace anchorsplat

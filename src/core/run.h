@@ -1,11 +1,10 @@
 #pragma once
 
-#include <tbb/task_arena.h>
-
 #include <memory>
 #include <mutex>
 
 #include "core/run_context.h"
+#include "core/task_arena.h"
 
 namespace anchorsplat::internal {
 
@@ -14,7 +13,7 @@ struct Run {
   RunContext context;  // complete: what was left out is filled in, as far as an outer run has it
   std::mutex log_mutex;
   std::shared_ptr<RunStorage> storage;
-  tbb::task_arena arena;  // loops of two runs do not wait for each other's work
+  TaskArena arena;  // loops of two runs do not wait for each other's work
 };
 
 // Makes a thread take part in a run.

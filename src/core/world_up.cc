@@ -1,10 +1,10 @@
 #include "core/world_up.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <string_view>
 
+#include "core/number_text.h"
 #include "core/text.h"
 #include "core/vector3.h"
 
@@ -31,7 +31,7 @@ std::optional<Vec3> ParseComment(std::string_view text) {
   Vec3 up{};
   for (double& x : up) {
     text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
-    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), x);
+    const auto [end, code] = FromChars(text.data(), text.data() + text.size(), x);
     if (code != std::errc()) return std::nullopt;
     text.remove_prefix(static_cast<size_t>(end - text.data()));
   }

@@ -188,7 +188,7 @@ Status OutputFile::Reserve(uint64_t bytes) {
     bytes_->Reserve(bytes);
     return {};
   }
-#ifdef FALLOC_FL_KEEP_SIZE
+#if defined(FALLOC_FL_KEEP_SIZE) && !defined(__EMSCRIPTEN__)  // which names it and has none
   if (::fallocate(descriptor_, FALLOC_FL_KEEP_SIZE, 0, static_cast<off_t>(bytes)) != 0 && errno == ENOSPC) {
     return Error{ErrorCode::kIo,
                  Cat(path_.string(), ": cannot write ", HumanBytes(bytes), ": no space left on the device")};

@@ -36,7 +36,7 @@ Result<std::string> ReadPipe(int descriptor, const std::string& name) {
     bytes.resize(had + static_cast<size_t>(std::max<ssize_t>(n, 0)));
     if (n == 0) return bytes;
     if (n < 0 && errno != EINTR) return Error{ErrorCode::kIo, Cat(name, ": cannot read: ", SystemReason(errno))};
-    if (bytes.size() > kMaxPipe) {
+    if (uint64_t{bytes.size()} > kMaxPipe) {
       return Error{ErrorCode::kIo, Cat(name, ": a pipe with more than ", HumanBytes(kMaxPipe), "; save it to a file")};
     }
   }

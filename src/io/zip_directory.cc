@@ -73,7 +73,7 @@ class DirectoryReader {
   uint32_t U32(uint64_t at) const { return LoadLittle<uint32_t>(archive_.data() + at); }
   uint64_t U64(uint64_t at) const { return LoadLittle<uint64_t>(archive_.data() + at); }
   std::string_view Text(uint64_t at, uint64_t bytes) const {
-    return {reinterpret_cast<const char*>(archive_.data()) + at, bytes};
+    return {reinterpret_cast<const char*>(archive_.data()) + at, static_cast<size_t>(bytes)};
   }
 
   Result<Directory> FindDirectory() const {

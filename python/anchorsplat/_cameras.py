@@ -11,7 +11,7 @@ import numpy as np
 from . import _core
 from ._errors import BadArgumentError
 from ._run import run
-from ._words import words_of
+from ._words import path_bytes, whole_number, words_of
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -43,7 +43,7 @@ class Cameras:
         """Those of a transforms.json, an INRIA cameras.json, a poses_bounds.npy or a COLMAP model, or of a folder with one of them,
         in their order. Raises NotFoundError, IoError, BadFileError; BadArgumentError: a folder with several."""
         with run() as how:
-            self._set = _core.read_cameras(os.fsencode(path), how)
+            self._set = _core.read_cameras(path_bytes(path), how)
 
     @classmethod
     def _of(cls, cameras: _core.CameraSet) -> Cameras:
@@ -123,6 +123,10 @@ class Cameras:
         otherwise from where the splat fills the picture; `target`: x, y, z to look at; `up`: x, y, z or an axis such as "-z".
         """
         words = words_of(cls.orbit.__func__, locals())  # type: ignore[attr-defined]
+        if isinstance(size, (str, bytes)) or not hasattr(size, "__len__") or len(size) != 2:
+            raise TypeError(f"size: expected (width, height), found {size!r}")
+        size = whole_number("size", size[0]), whole_number("size", size[1])
+        count = whole_number("count", count)
         size_word = os.fsencode(f"--size={size[0]}x{size[1]}")
         words = [word for word in words if not word.startswith(b"--size=")] + [size_word]
         with run() as how:
@@ -191,5 +195,5 @@ def camera_words(cameras: CamerasLike | None, words: list[bytes]) -> _core.Camer
     if isinstance(cameras, Cameras):
         words.append(b"--cameras=cameras in memory")
         return cameras._set
-    words.append(b"--cameras=" + os.fsencode(cameras))
+    words.append(b"--cameras=" + path_bytes(cameras))
     return None

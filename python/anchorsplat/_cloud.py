@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ._errors import BadArgumentError
+from ._errors import BadArgumentError, Error
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 #: How a splat wants to be drawn: as 3DGS does it (Kerbl et al. 2023), where every Gaussian is widened by 0.3 px²; with
 #: opacity compensated for that (gsplat's "antialiased"); or compensated for 0.1 px² (Mip-Splatting).
 RenderMode = Literal["classic", "antialiased", "mip"]
+
+_MOST_SHOWN = 500_000  # Gaussians in a notebook that nobody asked to show them: 3.5 MB
 
 _MODES = (None, "classic", "antialiased", "mip")
 
@@ -212,7 +215,12 @@ class Cloud:
     def _repr_html_(self) -> str:
         from ._view import view
 
-        return view(self)._repr_html_()
+        if len(self) > _MOST_SHOWN:
+            return f"<p>{html.escape(repr(self))}, too many to show unasked: <code>anchorsplat.view(cloud)</code> does.</p>"
+        try:
+            return view(self)._repr_html_()
+        except Error as error:  # there is nothing to be seen of it
+            return f"<p>{html.escape(repr(self))}: {html.escape(str(error))}</p>"
 
     def __repr__(self) -> str:
         mode = f", {self._render_mode}" if self._render_mode else ""

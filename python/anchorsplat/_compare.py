@@ -16,7 +16,7 @@ from ._errors import BadArgumentError
 from ._files import PathLike
 from ._report import Report
 from ._run import ProgressLike, run
-from ._words import words_of
+from ._words import path_bytes, words_of
 
 #: A splat, pictures [V,H,W,C] or [H,W,C], or a path: a splat's file, a folder of pictures or a picture.
 Comparable = Union[Cloud, PathLike, "npt.ArrayLike"]
@@ -74,7 +74,7 @@ def _side(name: str, of: Any) -> Any:
     if of is None or isinstance(of, Cloud):
         return of
     if isinstance(of, (str, os.PathLike)):
-        return os.fsencode(of)
+        return path_bytes(of)
     return _pictures(name, of)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 
 from . import _core
 from ._cloud import RenderMode
@@ -10,7 +9,7 @@ from ._errors import BadArgumentError
 from ._files import Order, PathLike
 from ._report import Report
 from ._run import ProgressLike, run
-from ._words import words_of
+from ._words import path_bytes, words_of
 
 
 def convert(
@@ -52,6 +51,6 @@ def convert(
         )
     words = words_of(convert, locals(), besides=("format",))
     if format is not None:
-        words.append(b"--from=" + os.fsencode(format))
+        words.append(b"--from=" + path_bytes(format))
     with run(threads, progress) as how:
-        return Report._of(_core.convert(os.fsencode(source), os.fsencode(target), words, overwrite, how))
+        return Report._of(_core.convert(path_bytes(source), path_bytes(target), words, overwrite, how))

@@ -11,7 +11,7 @@ from ._cloud import Cloud, RenderMode
 from ._files import PathLike
 from ._report import Report
 from ._run import ProgressLike, run
-from ._words import words_of
+from ._words import natural, words_of
 
 
 def methods() -> dict[str, str]:
@@ -106,7 +106,7 @@ def enhance(
     words = words_of(enhance, locals(), besides=("cameras",))
     given = camera_words(cameras, words)
     with run(threads, progress, patient=checkpoint is not None) as how:
-        parts, report = _core.enhance(cloud, words, given, seed, how)
+        parts, report = _core.enhance(cloud, words, given, natural("seed", seed), how)
     return Cloud._of(parts), Report._of(report)
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import os
 from typing import IO, Any, Literal, NamedTuple, Union
 
 from . import _core
 from ._cloud import Cloud
-from ._errors import BadArgumentError
+from ._errors import BadArgumentError, IoError
 from ._run import ProgressLike, run
-from ._words import words_of
+from ._words import path_bytes, words_of
 
 PathLike = Union[str, "os.PathLike[str]"]
 Order = Literal["format", "keep", "morton", "importance"]
@@ -50,7 +51,7 @@ def read(
     """
     with run(threads, progress) as how:
         if isinstance(source, (str, os.PathLike)):
-            return Cloud._of(_core.read_path(os.fsencode(source), format or "", how))
+            return Cloud._of(_core.read_path(path_bytes(source), format or "", how))
         if hasattr(source, "read"):
             source = source.read()
         if not is_buffer(source):
@@ -82,7 +83,7 @@ def write(
         if format is not None:
             raise BadArgumentError("format: the extension of a path says it")
         with run(threads, progress) as how:
-            _core.write_path(os.fsencode(target), cloud, words, overwrite, how)
+            _core.write_path(path_bytes(target), cloud, words, overwrite, how)
         return
     if not hasattr(target, "write"):
         raise TypeError("write: expected a path or a file opened for bytes, found " + type(target).__name__)
@@ -91,7 +92,19 @@ def write(
     data: bytes = to_bytes(
         cloud, format, sort=sort, spz_version=spz_version, threads=threads, progress=progress
     )
-    target.write(data)
+    _write_all(target, data)
+
+
+def _write_all(target: IO[bytes], data: bytes) -> None:
+    """A file without a buffer may take a part and say how much."""
+    rest = memoryview(data)
+    while rest:
+        written = target.write(rest)
+        if written is None and not isinstance(target, io.RawIOBase):  # of a kind of file that does not say
+            return
+        if not written:
+            raise IoError(f"the file took only {len(data) - len(rest):,} of {len(data):,} bytes")
+        rest = rest[written:]
 
 
 def to_bytes(

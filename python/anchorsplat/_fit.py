@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import Literal
 
 from . import _core
@@ -11,7 +10,7 @@ from ._cloud import Cloud, RenderMode
 from ._files import PathLike
 from ._report import Report
 from ._run import ProgressLike, run
-from ._words import words_of
+from ._words import natural, path_bytes, words_of
 
 
 def fit(
@@ -96,7 +95,7 @@ def fit(
         start = init_splat
         words.append(b"--init-splat=splat in memory")
     elif init_splat is not None:
-        words.append(b"--init-splat=" + os.fsencode(init_splat))
+        words.append(b"--init-splat=" + path_bytes(init_splat))
     with run(threads, progress, patient=checkpoint is not None) as how:
-        parts, report = _core.fit(os.fsencode(project), words, start, seed, how)
+        parts, report = _core.fit(path_bytes(project), words, start, natural("seed", seed), how)
     return Cloud._of(parts), Report._of(report)

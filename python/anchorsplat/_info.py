@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from typing import Any
 
 from . import _core
@@ -11,6 +10,7 @@ from ._cloud import Cloud
 from ._errors import BadArgumentError
 from ._files import PathLike
 from ._run import ProgressLike, run
+from ._words import path_bytes
 
 
 def info(
@@ -26,4 +26,4 @@ def info(
     with run(threads, progress) as how:
         if isinstance(source, Cloud):
             return dict(json.loads(_core.info_cloud(source, how)))
-        return dict(json.loads(_core.info_path(os.fsencode(source), format or "", how)))
+        return dict(json.loads(_core.info_path(path_bytes(source), format or "", how)))

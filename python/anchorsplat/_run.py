@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, Union
 
 from . import _core
 from ._errors import SplatWarning
+from ._words import whole_number
 
 LOGGER = logging.getLogger("anchorsplat")
 _HERE = os.path.dirname(__file__) + os.sep
@@ -103,7 +104,7 @@ def run(threads: int = 0, progress: ProgressLike = None, *, patient: bool = Fals
                 warn(event[1])
 
     try:
-        yield _core.RunArguments(threads, tell, patient)
+        yield _core.RunArguments(whole_number("threads", threads), tell, patient)
     finally:
         if isinstance(show, _Bars):
             show.close()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import os
 from typing import Literal
 
 from . import _core
@@ -11,7 +10,7 @@ from ._cameras import CamerasLike, Color, camera_words
 from ._cloud import Cloud, RenderMode
 from ._files import PathLike
 from ._run import ProgressLike, run
-from ._words import words_of
+from ._words import path_bytes, words_of
 
 
 class Page:
@@ -33,7 +32,7 @@ class Page:
     def save(self, path: PathLike, *, overwrite: bool = False) -> None:
         """Writes it, whole or not at all. Raises ExistsError unless `overwrite`, NotFoundError (the folder), IoError."""
         with run() as how:
-            _core.write_file(os.fsencode(path), self._bytes, overwrite, how)
+            _core.write_file(path_bytes(path), self._bytes, overwrite, how)
 
     def _repr_html_(self, height: int = 480) -> str:
         return (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import os
 from collections.abc import Collection, Mapping
 from typing import Any, Callable
@@ -12,7 +13,31 @@ from ._errors import BadArgumentError
 NO_WORDS = ("threads", "seed", "progress", "overwrite")
 
 
-def _text(name: str, value: Any) -> str | bytes:
+def path_bytes(path: str | os.PathLike[str]) -> bytes:
+    """As the system takes it. Raises BadArgumentError for a NUL, where it would end."""
+    name = os.fsencode(path)
+    if b"\0" in name:
+        raise BadArgumentError(f"{os.fsdecode(name)!r}: there is a NUL in this path")
+    return name
+
+
+def whole_number(name: str, value: Any) -> int:
+    """Raises TypeError for what is none."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name}: expected a whole number, found {value!r}") from None
+
+
+def natural(name: str, value: Any) -> int:
+    """Raises TypeError for what is no whole number, BadArgumentError for one below 0 or above 2⁶⁴ − 1."""
+    number = whole_number(name, value)
+    if not 0 <= number < 1 << 64:
+        raise BadArgumentError(f"{name}: must be 0 to 2^64 - 1, found {number}")
+    return number
+
+
+def text_of(name: str, value: Any) -> str | bytes:
     if isinstance(value, bytes):
         return value
     if isinstance(value, (str, os.PathLike)):
@@ -40,6 +65,8 @@ def words_of(function: Callable[..., Any], given: Mapping[str, Any], *, besides:
                 raise BadArgumentError(f"{name}: must be True or False, found {value!r}")
             words.append(option)
         else:
-            text = os.fsencode(_text(name, value))
+            text = os.fsencode(text_of(name, value))
+            if b"\0" in text:
+                raise BadArgumentError(f"{name}: there is a NUL in {value!r}")
             words += [option + b"=" + text] if text else [option, text]
     return words

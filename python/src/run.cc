@@ -1,6 +1,7 @@
 #include "run.h"
 
 #include <nanobind/stl/string.h>
+#include <pthread.h>
 
 #include <atomic>
 #include <chrono>
@@ -158,10 +159,12 @@ struct Ending {
     changed.notify_all();
   }
 };
-Ending& TheEnding() {
-  static auto* ending = new Ending;  // never destroyed: parked threads outlive static objects
-  return *ending;
-}
+Ending* the_ending = new Ending;  // never destroyed: parked threads outlive static objects
+
+Ending& TheEnding() { return *the_ending; }
+
+// The child of a fork has none of the threads that calls are in.
+void BeginAfterFork() { the_ending = new Ending; }
 
 // By atexit, before threads are ended.
 void EndCalls() {
@@ -251,6 +254,7 @@ void BindRun(nb::module_& module) {
           nb::arg("threads"), nb::arg("tell").none(), nb::arg("patient") = false);
   nb::register_exception_translator(Raise);
   nb::module_::import_("atexit").attr("register")(nb::cpp_function(&EndCalls));
+  ::pthread_atfork(nullptr, nullptr, BeginAfterFork);
 }
 
 }  // namespace anchorsplat::python

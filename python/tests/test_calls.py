@@ -188,3 +188,61 @@ def test_a_refinement_with_a_checkpoint_goes_on_where_it_was(cloud, tmp_path):
     resumed, report = anchorsplat.refine(cloud, checkpoint=state, resume=True, **options)
     assert report["refine"]["resumed_at"] >= 5 and same(resumed, straight)
     assert not state.exists()
+
+
+def test_ctrl_c_ends_waiting_for_a_pipe(tmp_path):
+    """To which nobody writes."""
+    pipe = tmp_path / "pipe.ply"
+    os.mkfifo(pipe)
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        for call in (anchorsplat.read, anchorsplat.info, anchorsplat.Cameras):
+            signal.setitimer(signal.ITIMER_REAL, 0.05)
+            with pytest.raises(KeyboardInterrupt):
+                call(pipe)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def test_a_fork_does_not_wait_for_calls_of_its_parent(python):
+    done = python(
+        "import os, sys, threading, numpy as np, anchorsplat\n"
+        "one = np.zeros((1, 3), np.float32)\n"
+        "cloud = anchorsplat.Cloud(one, one - 2, np.ones((1, 4), np.float32), one[:, 0], one[:, None])\n"
+        "begun = threading.Event()\n"
+        "call = lambda: anchorsplat.render(cloud, orbit=100_000, size=(64, 64), progress=lambda _: begun.set())\n"
+        "threading.Thread(target=call, daemon=True).start()\n"
+        "begun.wait()\n"
+        "child = os.fork()\n"
+        "if child == 0: sys.exit(7)\n"
+        "assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7\n"
+    )
+    assert done.returncode == 0 and "Error" not in done.stderr
+
+
+def test_numbers_that_are_none_are_said(cloud):
+    for given in ({"threads": "2"}, {"threads": None}, {"seed": None}, {"seed": 1.5}):
+        with pytest.raises(TypeError, match=f"{next(iter(given))}: expected a whole number, found"):
+            anchorsplat.enhance(cloud, **given)
+    with pytest.raises(anchorsplat.BadArgumentError, match="seed: must be 0 to"):
+        anchorsplat.enhance(cloud, seed=-1)
+    for size in ("64x48", 64, (64, 48, 3), (64.5, 48)):
+        with pytest.raises(TypeError, match="size: expected"):
+            anchorsplat.Cameras.orbit(cloud, 2, size=size)
+    with pytest.raises(TypeError, match="count: expected a whole number"):
+        anchorsplat.Cameras.orbit(cloud, 2.5)
+
+
+def test_more_threads_than_the_machine_has_are_no_message(python):
+    done = python(
+        "import numpy as np, anchorsplat\n"
+        "one = np.zeros((5000, 3), np.float32)\n"
+        "cloud = anchorsplat.Cloud(one, one - 2, np.ones((5000, 4), np.float32), one[:, 0], one[:, None])\n"
+        "anchorsplat.render(cloud, orbit=4, size=(256, 256), threads=64)\n"
+    )
+    assert done.returncode == 0 and done.stderr == ""

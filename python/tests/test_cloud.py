@@ -139,3 +139,10 @@ def test_gsplats_parameters(cloud):
         Cloud.from_gsplat({name: values for name, values in params.items() if name != "sh0"})
     with pytest.raises(anchorsplat.BadArgumentError, match=r"sh0: expected \[N, 1, 3\], found \[1500, 15, 3\]"):
         Cloud.from_gsplat({**params, "sh0": params["shN"]})
+
+
+def test_notebooks_show_what_there_is_to_see(cloud):
+    assert "<iframe" in cloud._repr_html_()
+    assert "0 Gaussians" in cloud[:0]._repr_html_()
+    many = cloud[np.zeros(500_001, np.int64)]
+    assert "anchorsplat.view(cloud)" in many._repr_html_()

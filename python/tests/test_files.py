@@ -101,3 +101,35 @@ def test_networks_are_told_about(sources):
     weights = next((sources / "models").glob("*.safetensors"))
     found = anchorsplat.info(weights)
     assert found["kind"] == "model" and found["parameters"] > 1000
+
+
+class TakesParts(io.RawIOBase):
+    """A file without a buffer, on a disk that is full after so many bytes."""
+
+    def __init__(self, room: int) -> None:
+        self.taken = b""
+        self._room = room
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: object) -> int:
+        part = bytes(data)[: min(1000, self._room - len(self.taken))]
+        self.taken += part
+        return len(part)
+
+
+def test_files_without_a_buffer_get_all_of_it(cloud):
+    whole = anchorsplat.to_bytes(cloud, "ply")
+    file = TakesParts(len(whole))
+    anchorsplat.write(file, cloud, format="ply")
+    assert file.taken == whole
+    with pytest.raises(anchorsplat.IoError, match="the file took only 5,000 of"):
+        anchorsplat.write(TakesParts(5000), cloud, format="ply")
+
+
+def test_a_name_ends_at_no_nul(cloud, tmp_path):
+    for call in (anchorsplat.read, anchorsplat.info, anchorsplat.Cameras, lambda path: anchorsplat.write(path, cloud)):
+        with pytest.raises(anchorsplat.BadArgumentError, match="NUL"):
+            call(f"{tmp_path}/scan.ply\0.spz")
+    assert os.listdir(tmp_path) == []

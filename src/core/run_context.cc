@@ -35,8 +35,8 @@ RunScope::RunScope(RunContext context) : before_(internal::CurrentRun()) {
   }
   run->context = std::move(context);
   run->storage = before_ ? before_->storage : std::make_shared<internal::RunStorage>();
-  if (run->context.threads > 0) run->arena.initialize(run->context.threads);
-  internal::current_run = std::move(run);
+  internal::current_run = run;
+  if (run->context.threads > 0) run->arena.initialize(ThreadCount());  // oneTBB complains of more than the machine has
 }
 
 RunScope::~RunScope() { internal::current_run = std::move(before_); }

@@ -54,19 +54,21 @@ Status MakeSteps(Refiner& refiner, const RefineOptions& options, RefineReport& r
   Progress progress("refine", total);
   int64_t shown = 0;
   double psnr = 0;
+  std::string note;
   for (double part = done(); part < 1; part = done()) {
     ANCHORSPLAT_RETURN_IF_ERROR(refiner.Step(part));
     if (refiner.state().step % kNoteEvery == 0) {
       const double last = refiner.LastPsnr();
       psnr = psnr == 0 ? last : 0.9 * psnr + 0.1 * last;  // single views differ by several dB
       const auto now = static_cast<int64_t>(std::min(1.0, done()) * static_cast<double>(total));
-      progress.Advance(now - shown, Cat(Fixed(psnr, 2), " dB at low resolution, ",
-                                        WithThousands(refiner.state().cloud.size()), " Gaussians"));
+      note = Cat(Fixed(psnr, 2), " dB at low resolution, ", WithThousands(refiner.state().cloud.size()), " Gaussians");
+      progress.Advance(now - shown, note);
       shown = now;
     }
     report.interrupted = StopRequested() && done() < 1;
-    if (report.interrupted) break;
+    if (report.interrupted) return {};
   }
+  if (shown < total) progress.Advance(total - shown, note);
   return {};
 }
 

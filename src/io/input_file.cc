@@ -1,6 +1,7 @@
 #include "io/input_file.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -10,6 +11,7 @@
 #include <system_error>
 #include <utility>
 
+#include "core/run_context.h"
 #include "core/text.h"
 #include "io/input_record.h"
 
@@ -19,6 +21,7 @@ namespace {
 
 constexpr uint64_t kMaxPipe = uint64_t{4} << 30;  // a pipe that never ends must not take all memory
 constexpr size_t kBlock = size_t{256} << 10;      // half of a usual L2 cache
+constexpr int kLookMilliseconds = 50;
 
 std::string SystemReason(int error) { return std::generic_category().message(error); }
 
@@ -27,9 +30,18 @@ Error EndsBefore(const std::string& name, uint64_t end) {
           Cat(name, ": byte ", WithThousands(static_cast<int64_t>(end)), ": the file ends before its data does")};
 }
 
+// Waits for bytes, for the end, or for the run to be stopped: nobody may ever write.
+void AwaitPipe(int descriptor) {
+  struct pollfd one = {.fd = descriptor, .events = POLLIN, .revents = 0};
+  while (::poll(&one, 1, kLookMilliseconds) == 0) {
+    LeaveIfAbandoned();
+  }
+}
+
 Result<std::string> ReadPipe(int descriptor, const std::string& name) {
   std::string bytes;
   for (;;) {
+    AwaitPipe(descriptor);
     const size_t had = bytes.size();
     bytes.resize(had + kBlock);
     const ssize_t n = ::read(descriptor, bytes.data() + had, kBlock);
@@ -49,10 +61,10 @@ Result<InputFile> InputFile::Open(const std::filesystem::path& path) {
   file.path_ = path;
   file.has_folder_ = true;
   const std::string name = path.string();
-  // Opening a pipe without a writer would wait for one, so look before (O_NONBLOCK would then break its reading).
+  // Opening a pipe without a writer would wait for one without an end; its reading looks up meanwhile.
   do {
-    file.descriptor_ =
-        path == "-" ? ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0) : ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY);
+    file.descriptor_ = path == "-" ? ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)
+                                   : ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK);
   } while (file.descriptor_ < 0 && errno == EINTR);
   if (file.descriptor_ < 0) {
     const int error = errno;
@@ -65,6 +77,7 @@ Result<InputFile> InputFile::Open(const std::filesystem::path& path) {
   }
   if (S_ISDIR(info.st_mode)) return Error{ErrorCode::kIo, Cat(name, ": is a folder, expected a file")};
   if (S_ISFIFO(info.st_mode) || S_ISSOCK(info.st_mode)) {
+    if (path != "-") ::fcntl(file.descriptor_, F_SETFL, ::fcntl(file.descriptor_, F_GETFL) & ~O_NONBLOCK);
     ANCHORSPLAT_ASSIGN_OR_RETURN(file.owned_, ReadPipe(file.descriptor_, name));
     ::close(std::exchange(file.descriptor_, -1));
     file.size_ = file.owned_.size();

@@ -53,7 +53,7 @@ def enhance(
 
     What goes wrong with an input is no exception but a row: ``report.failures``. Raises BadArgumentError for options and
     inputs that make no sense, before any work; ExistsError where results would replace files that no batch made;
-    NotFoundError for a pattern that nothing matches; IoError when the manifest or the cluster is lost; Stopped, a
+    NotFoundError for a pattern that nothing matches; IoError when the manifest is lost or the cluster is not there; Stopped, a
     KeyboardInterrupt, on Ctrl-C.
     """
     return run_splats(

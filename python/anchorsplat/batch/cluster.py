@@ -21,14 +21,13 @@ _PRIVATE = {
     # Every process listens on 127.0.0.1 and nowhere else. (The variable is named after where that is Ray's default.)
     "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
     "RAY_USAGE_STATS_ENABLED": "0",
-    "RAY_AUTH_MODE": "token",
     # Workers are as nice as this process, not 15 more, which on a busy machine makes them several times as slow.
     "RAY_worker_niceness": "0",
 }
 
 
-# Ray's C++ core keeps the first one that a process gives it.
-_TOKEN = secrets.token_hex(32)
+# One for the whole process, as older Rays keep what they were told first.
+_TOKEN = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(32)}
 _PREFIX = "anchorsplat-ray-"
 
 
@@ -42,6 +41,26 @@ def ray_module() -> Any:
 
 def cores() -> int:
     return len(os.sched_getaffinity(0))
+
+
+@contextlib.contextmanager
+def _token_read_again() -> Iterator[None]:
+    """Ray's core keeps the token that it was given first: the user's of an earlier Ray in this process, or ours. Where the
+    user has switched tokens off in this process, ours cannot be on."""
+
+    def forget() -> None:
+        with contextlib.suppress(AttributeError):
+            ray_module()._raylet.AuthenticationTokenLoader.instance().reset_cache()
+
+    forget()
+    with contextlib.suppress(AttributeError):
+        core = ray_module()._raylet
+        if core.get_authentication_mode() != core.AuthenticationMode.TOKEN:
+            os.environ["RAY_AUTH_MODE"] = "disabled"
+    try:
+        yield
+    finally:
+        forget()
 
 
 @contextlib.contextmanager
@@ -72,7 +91,7 @@ def connected(address: str | None, cpus: int | None) -> Iterator[Any]:
         finally:
             ray.shutdown()
         return
-    with _environment({**_PRIVATE, "RAY_AUTH_TOKEN": _TOKEN}):
+    with _environment({**_PRIVATE, **_TOKEN}), _token_read_again():
         ray = ray_module()
         with contextlib.suppress(AttributeError):  # read when Ray was imported, which may have been earlier
             ray._private.ray_constants.ENABLE_RAY_CLUSTER = False

@@ -99,7 +99,7 @@ def _parser(verb: str) -> argparse.ArgumentParser:
     add("--workers", type=int, metavar="N", help="tasks at a time on this machine (default: as many as it has cores for)")
     add("--threads", type=int, default=1, metavar="N", help="cores of one task (default: 1)")
     add("--in-flight", type=int, metavar="N", help="tasks that Ray knows of at a time (default: twice as many as can run)")
-    add("--retries", type=int, default=3, metavar="N", help="of a task whose worker died or whose storage failed (default: 3)")
+    add("--retries", type=int, default=3, metavar="N", help="of a task whose worker or program was killed or whose storage failed (default: 3)")
     add("-w", "--overwrite", action="store_true", help="make all again")
     add("-q", "--quiet", action="store_true", help="only errors on stderr, no summary")
     add("--json", action="store_true", help="the result as one JSON document on stdout")

@@ -114,6 +114,6 @@ def _row_of(ray: Any, ref: Any) -> dict[str, Any] | None:
         cause = error.cause if error.cause is not None else error
         if isinstance(cause, KeyboardInterrupt):
             return None
-        return failed("io", str(cause))
+        return failed(getattr(cause, "code", "io"), str(cause))
     except errors.RayError as error:
         raise IoError(f"the Ray cluster is lost: {str(error).splitlines()[0]}") from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import os
 import posixpath
 import struct
 import tempfile
@@ -14,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from .._errors import BadArgumentError, NotFoundError
+from .._words import text_of
 from . import storage
 from .engine import Engine, engine, options, run
 from .inputs import Input
@@ -45,8 +47,14 @@ def as_arguments(words: Mapping[str, Any]) -> dict[str, Any]:
             continue
         if (value is True) != (known[name].kind == ""):
             raise BadArgumentError(f"{word}={value!r}: " + ("expected True or False" if value is not True else "expected a value"))
-        given[name] = value
+        given[name] = value if value is True else _word(word, value)
     return given
+
+
+def _word(name: str, value: Any) -> str:
+    if name in ("cameras", "images", "model") and not isinstance(value, (str, os.PathLike)):
+        raise BadArgumentError(f"{name}: batches take a file or a folder here, found {type(value).__name__}")
+    return os.fsdecode(text_of(name, value))
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,9 @@ _MARKS = ("ETag", "etag", "generation", "md5Hash", "LastModified", "last_modifie
 
 
 class TransientError(Exception):
-    """Storage failed in a way that may pass: the task is tried again, elsewhere or here."""
+    """Something failed in a way that may pass, as storage does: the task is tried again, elsewhere or here."""
+
+    code = "io"  # of the row, when that was in vain
 
 
 def is_local(uri: str) -> bool:

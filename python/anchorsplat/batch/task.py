@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import signal
 import socket
 import tempfile
 import time
@@ -44,6 +45,12 @@ class SplatJob:
         return {"output": self.output, "input": self.input, "identity": self.identity, "fingerprint": self.fingerprint}
 
 
+class ProgramKilledError(storage.TransientError):
+    """Somebody killed the program, as a system does that is short of memory."""
+
+    code = "killed"
+
+
 # A result may take so much more than expected before the system refuses it memory.
 _MEMORY_SLACK = 4
 _LEAST_MEMORY = 2 << 30
@@ -52,7 +59,7 @@ _LEAST_MEMORY = 2 << 30
 def enhance_one(job: SplatJob) -> dict[str, Any]:
     """Fetches the input, runs the program and puts the result in its place. A row of the manifest, whatever happens.
 
-    Raises only TransientError, when storage failed in a way that may pass.
+    Raises only TransientError, when storage failed in a way that may pass or the program was killed.
     """
     begin = time.time()
     row = {**job.base_row(), "worker": f"{socket.gethostname()}:{os.getpid()}"}
@@ -85,6 +92,8 @@ def _enhance(job: SplatJob) -> dict[str, Any]:
         )
     with _work_folder(job.work) as folder, ThreadPoolExecutor(1) as beside:
         source = _input(job, folder)
+        if source.is_fifo() or source.is_socket() or source.is_char_device():  # which may never end
+            return failed("io", f"{job.input}: is no file that can be read twice")
         size = source.stat().st_size
         hashing = beside.submit(storage.sha256, source)  # while the program works
         if job.known_sha256 and job.known_sha256 == hashing.result() and _result_stands(job, folder):
@@ -96,6 +105,8 @@ def _enhance(job: SplatJob) -> dict[str, Any]:
         told = {"size": size, "sha256": hashing.result(), "engine_seconds": round(ended.seconds, 4), "messages": named}
         if ended.code or ended.signal:
             error = ended.error()
+            if ended.signal == signal.SIGKILL:
+                raise ProgramKilledError(f"every program that tried it was killed: {error['message']}")
             error["message"] = error["message"].replace(str(source), job.input).replace(str(result), job.output)
             return {**told, "state": "failed", "error": error}
         if storage.is_local(job.input) and _identity(job.input) != job.identity:

@@ -167,10 +167,6 @@ async def receive(request: Request, path: Path, limit: int, stall_seconds: float
             if not 1 <= len(params.get(b"boundary", b"")) <= 70:
                 raise BadUpload(400, "bad_request", "The form's content type has no boundary.")
             form = _Form(params[b"boundary"], upload, sink)
-        elif kind == b"application/x-www-form-urlencoded":
-            raise BadUpload(
-                415, "bad_request", "Send the file as it is or as multipart/form-data (curl -F file=@scan.ply)."
-            )
         async for chunk in _chunks(request, stall_seconds):
             if form is None:
                 sink.add(chunk)

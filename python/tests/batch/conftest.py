@@ -25,6 +25,7 @@ case "$1 ${{2##*/}}" in
   name="${{2##*/}}"
   echo "$name" >> "$control/calls"
   if rm "$control/kill-$name" 2>/dev/null || [ -e "$control/always-kill-$name" ]; then kill -9 $PPID; exit 1; fi
+  if rm "$control/end-$name" 2>/dev/null || [ -e "$control/always-end-$name" ]; then kill -9 $$; fi
   if [ -e "$control/hold-$name" ]; then echo $$ > "$control/held-$name"; read -r _ < "$control/hold-$name"; fi ;;
 esac
 exec {program} "$@"
@@ -52,6 +53,9 @@ class Control:
 
     def kill_worker_of(self, name: str, *, always: bool = False) -> None:
         (self.folder / f"{'always-' if always else ''}kill-{name}").touch()
+
+    def kill_program_of(self, name: str, *, always: bool = False) -> None:
+        (self.folder / f"{'always-' if always else ''}end-{name}").touch()
 
     def hold(self, name: str) -> Path:
         """The program stops at this input until somebody writes to the pipe."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import http.server
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -57,6 +58,18 @@ def test_one_batch_after_the_other_in_one_process(scans: Path, tmp_path: Path) -
         f"for k in range(2): assert batch.enhance({str(scans / 'a.ply')!r}, {str(tmp_path)!r} + f'/out{{k}}', method='filter').done\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=200)
+
+
+@pytest.mark.parametrize("mode", ["token", "disabled"])
+@pytest.mark.parametrize("earlier", [False, True])
+def test_a_ray_of_the_users_own_beside_batches(mode: str, earlier: bool, scans: Path, tmp_path: Path) -> None:
+    """Ray's core keeps what it was told about tokens first."""
+    own = "ray.init(num_cpus=1); assert ray.get(ray.remote(lambda: 7).remote()) == 7; ray.shutdown()\n"
+    code = "import sys, ray; from anchorsplat import batch\n" + (own if earlier else "")
+    code += f"report = batch.enhance({str(scans / 'a.ply')!r}, {str(tmp_path / 'out')!r}, method='filter')\n" + own
+    code += "sys.exit(report.failed)\n"
+    environment = {**os.environ, "RAY_AUTH_MODE": mode, "HOME": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -121,6 +121,30 @@ def test_a_splat_that_kills_every_worker_is_a_row(control: Control, scans: Path,
     assert control.calls().count("c.ply") == 2
 
 
+def test_a_killed_program_is_started_again(control: Control, scans: Path, tmp_path: Path) -> None:
+    control.kill_program_of("b.ply")
+    control.kill_program_of("c.ply", always=True)
+    report = batch.enhance(f"{scans}/*.ply", tmp_path / "out", method="filter", retries=1)
+    assert (report.done, report.failed) == (3, 1)
+    assert report.failures[0]["output"] == "c.ply" and report.failures[0]["error"]["code"] == "killed"
+    assert control.calls() == ["a.ply", "b.ply", "b.ply", "c.ply", "c.ply", "d.ply"]
+
+
+def test_keywords_are_those_of_the_function_for_one(control: Control, scans: Path, tmp_path: Path, native: Path) -> None:
+    report = batch.enhance(scans / "a.ply", tmp_path / "out", method="filter", clean=True, background=(1, 1, 1))
+    assert report.done == 1
+    by_hand = enhanced_by_hand(native, scans / "a.ply", tmp_path / "a.ply", "--method=filter", "--clean", "--background=1,1,1")
+    assert (tmp_path / "out/a.ply").read_bytes() == by_hand
+    with pytest.raises(BadArgumentError, match="cameras: batches take a file"):
+        batch.enhance(scans / "a.ply", tmp_path / "two", cameras=object())
+
+
+def test_a_pipe_is_a_row(control: Control, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.ply")
+    report = batch.enhance(tmp_path / "pipe.ply", tmp_path / "out")
+    assert "is no file" in report.failures[0]["error"]["message"]
+
+
 class StopsAfter:
     """A progress bar at which somebody presses Ctrl-C."""
 

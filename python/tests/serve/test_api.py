@@ -67,6 +67,9 @@ def test_a_raw_body(server: Server) -> None:
     assert answer.status_code == 202
     splat = result(server, server.wait(answer.json()))
     assert len(splat) == 60 * 32
+    curl = {"content-type": "application/x-www-form-urlencoded"}  # of --data-binary, whatever the data
+    same = server.http.post("/v1/convert?to=splat&name=scan.ply", content=SPLAT, headers=curl)
+    assert result(server, server.wait(same.json())) == splat
     # A .splat can be told by its name only.
     assert server.http.post("/v1/convert?to=ply", content=splat).status_code == 400
     named = server.http.post("/v1/convert?to=ply&name=scan.splat", content=splat)

@@ -1,0 +1,40 @@
+#include "io/input_file.h"
+
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <thread>
+
+#include "core/run_context.h"
+#include "io/folder_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+TEST(InputFile, ReadsAPipeWhoseWriterComesLater) {
+  const TestFolder folder;
+  const std::filesystem::path pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const std::string text(300'000, 'x');  // more than a pipe holds
+  std::thread writer([&] { std::ofstream(pipe, std::ios::binary) << text; });
+  const auto file = InputFile::Open(pipe);
+  writer.join();
+  ASSERT_TRUE(file.ok()) << file.error().message;
+  EXPECT_EQ(file->size(), text.size());
+}
+
+TEST(InputFile, AbandonsAPipeWithoutAWriter) {
+  const TestFolder folder;
+  const std::filesystem::path pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const std::atomic<bool> abandon{true};
+  const RunScope scope({.abandon = &abandon});
+  EXPECT_THROW({ const auto file = InputFile::Open(pipe); }, RunAbandoned);
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -15,7 +15,8 @@ struct FitBenchOptions {
   double radius = 1.7;                    // world units
   double fov_degrees = 45;                // horizontal; square pictures
   int repeats = 10;                       // over all poses, after one that warms up; per pose the fastest counts
-  uint64_t seed = 1;                      // of what has to be learnt
+  int split = 1;      // > 1: dense, every Gaussian becomes so many smaller and fainter ones at places within it
+  uint64_t seed = 1;  // of what has to be learnt, and of the places
 };
 
 // One iteration of a fit: picture, loss, gradient, a step of Adam and what densification gathers. Means over the poses.

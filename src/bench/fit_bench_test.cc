@@ -40,6 +40,14 @@ TEST(FitBench, StagesAddUpToTheIteration) {
   EXPECT_EQ((*rows)[1].width, 64);
 }
 
+TEST(FitBench, MeasuresADenseSplat) {
+  const auto rows = BenchFit(SmallCloud(), "small", {.widths = {32}, .poses = 1, .repeats = 1, .split = 8});
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  EXPECT_EQ((*rows)[0].scene, "small x8");
+  EXPECT_EQ((*rows)[0].gaussians, 2400);
+  EXPECT_GT((*rows)[0].visible, 1500);  // they are faint, but there
+}
+
 TEST(FitBench, RefusesWhatCannotBeMeasured) {
   GaussianCloud nothing;
   nothing.Resize(0, 0);
@@ -47,6 +55,7 @@ TEST(FitBench, RefusesWhatCannotBeMeasured) {
   EXPECT_FALSE(BenchFit(SmallCloud(), "small", {.poses = 0}).ok());
   EXPECT_FALSE(BenchFit(SmallCloud(), "small", {.repeats = 0}).ok());
   EXPECT_FALSE(BenchFit(SmallCloud(), "small", {.radius = -1}).ok());
+  EXPECT_FALSE(BenchFit(SmallCloud(), "small", {.split = 0}).ok());
   EXPECT_FALSE(BenchFit(SmallCloud(), "small", {.fov_degrees = 180}).ok());
   EXPECT_FALSE(BenchFit(SmallCloud(), "small", {.widths = {10}}).ok());
 }

@@ -290,6 +290,9 @@ void AddFitBench(CLI::App& parent, Program& program) {
   fit.add_option("--repeats", fit_flags->options.repeats, "The fastest counts")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
+  fit.add_option("--split", fit_flags->options.split, "Dense splats: smaller and fainter Gaussians made of each")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
   fit.callback([fit_flags, &program] {
     program.run = [fit_flags, &program] { return RunFitBench(*fit_flags, program.flags); };
   });

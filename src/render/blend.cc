@@ -61,7 +61,7 @@ HWY_INLINE bool BlendLanes(const Limits& limits, size_t block, size_t first, int
   bool finished = false;
   for (; list != end; ++list) {
     const size_t j = static_cast<size_t>(*list);
-    const V dx = hn::Sub(pixel_x, hn::Set(d, t.x[j])), dy = hn::Sub(pixel_y, hn::Set(d, t.y[j]));
+    const V dx = hn::Sub(pixel_x, hn::Set(d, t.at[j][0])), dy = hn::Sub(pixel_y, hn::Set(d, t.at[j][1]));
     const V log2_alpha = Log2Alpha(t, j, dx, dy);
     const M seen = hn::Ge(log2_alpha, log2_min_alpha);
     const V alpha = hn::Min(Exp2(log2_alpha), max_alpha);
@@ -73,11 +73,11 @@ HWY_INLINE bool BlendLanes(const Limits& limits, size_t block, size_t first, int
     const M open = hn::Gt(passed, min_transmittance);
     const M added = hn::And(seen, open);
     const V w = hn::IfThenElseZero(added, weight);
-    red = hn::MulAdd(w, hn::Set(d, t.red[j]), red);
-    green = hn::MulAdd(w, hn::Set(d, t.green[j]), green);
-    blue = hn::MulAdd(w, hn::Set(d, t.blue[j]), blue);
+    red = hn::MulAdd(w, hn::Set(d, t.seen[j][0]), red);
+    green = hn::MulAdd(w, hn::Set(d, t.seen[j][1]), green);
+    blue = hn::MulAdd(w, hn::Set(d, t.seen[j][2]), blue);
     if constexpr (kDepth) {
-      depth = hn::MulAdd(w, hn::Set(d, t.depth[j]), depth);
+      depth = hn::MulAdd(w, hn::Set(d, t.seen[j][3]), depth);
       weights = hn::Add(weights, w);
     }
     if constexpr (kContributors) {
@@ -199,6 +199,8 @@ void BlendTile(const BlendParams& p, int64_t tile) {
     for (int64_t place = 0; place < count; place += static_cast<int64_t>(kBatch)) {
       const size_t n = static_cast<size_t>(std::min<int64_t>(kBatch, count - place));
       ReadBatch(p.projected, pairs + place, n, tile_x, tile_y, t);
+      const int64_t left = count - place - static_cast<int64_t>(n);
+      Fetch(p.projected, pairs + place + n, static_cast<size_t>(std::min<int64_t>(kBatch, left)));
       ListBlocks(limits.log2_min_alpha, n, t.finished, t);
       for (const size_t size : t.list_sizes) evaluations += static_cast<int64_t>(size);
       BlendBlocks<kDepth, kContributors>(limits, static_cast<int32_t>(place), t);

@@ -22,8 +22,9 @@ namespace HWY_NAMESPACE {
 namespace {
 
 constexpr size_t kBatch = 128;
-constexpr size_t kGroup = 32;  // Gaussians of a block between the two steps of AddBlock
-constexpr size_t kSums = 16;   // floats per Gaussian of a batch: one sum per feature
+constexpr size_t kGroup = 32;      // Gaussians of a block between the two steps of AddBlock
+constexpr size_t kSumsAhead = 16;  // Gaussians whose sums are fetched before they are added to
+constexpr size_t kSums = 16;       // floats per Gaussian of a batch: one sum per feature
 
 // The sums over a block's pixels are a small matrix product: per Gaussian and pixel there are two numbers, q and the
 // weight w = α·T, and every pixel has features that do not depend on the Gaussian. Even ones are multiplied by q: 1, x,
@@ -171,7 +172,7 @@ HWY_INLINE void EvaluateLanes(const Limits& limits, size_t block, size_t first, 
   V behind = hn::Load(d, t.behind[block] + first);
   for (size_t k = 0; k < count; ++k) {
     const size_t j = t.members[k];
-    const V dx = hn::Sub(pixel_x, hn::Set(d, t.x[j])), dy = hn::Sub(pixel_y, hn::Set(d, t.y[j]));
+    const V dx = hn::Sub(pixel_x, hn::Set(d, t.at[j][0])), dy = hn::Sub(pixel_y, hn::Set(d, t.at[j][1]));
     const V log2_alpha = Log2Alpha(t, j, dx, dy);
     const VI own_place = hn::Set(di, place + static_cast<int32_t>(j));
     const M added = hn::And(hn::Ge(log2_alpha, log2_min_alpha), hn::RebindMask(d, hn::Gt(contributors, own_place)));
@@ -186,8 +187,8 @@ HWY_INLINE void EvaluateLanes(const Limits& limits, size_t block, size_t first, 
     const V inverse = hn::Div(one, hn::Sub(one, alpha));  // 1 where nothing was added
     transmittance = hn::Mul(transmittance, inverse);
     const V weight = hn::Mul(alpha, transmittance);
-    const V along = hn::MulAdd(red, hn::Set(d, t.red[j]),
-                               hn::MulAdd(green, hn::Set(d, t.green[j]), hn::Mul(blue, hn::Set(d, t.blue[j]))));
+    const V along = hn::MulAdd(red, hn::Set(d, t.seen[j][0]),
+                               hn::MulAdd(green, hn::Set(d, t.seen[j][1]), hn::Mul(blue, hn::Set(d, t.seen[j][2]))));
     const V own = hn::Mul(weight, along);
     const V q = hn::NegMulAdd(behind, hn::Mul(alpha, inverse), own);
     behind = hn::Add(behind, own);
@@ -195,7 +196,7 @@ HWY_INLINE void EvaluateLanes(const Limits& limits, size_t block, size_t first, 
     StorePairs(free_q, weight, factors);
     if constexpr (kAbsolute) {
       // ∂L/∂mean2d = 2 ln 2·Wᵀ q·(u, v) as in ProjectBackwardCpu, but of every pixel by itself.
-      const V u_xx = hn::Set(d, t.u_xx[j]), u_xy = hn::Set(d, t.u_xy[j]), u_yy = hn::Set(d, t.u_yy[j]);
+      const V u_xx = hn::Set(d, t.shape[j][0]), u_xy = hn::Set(d, t.shape[j][1]), u_yy = hn::Set(d, t.shape[j][2]);
       const V u = hn::MulAdd(u_xx, dx, hn::Mul(u_xy, dy)), v = hn::Mul(u_yy, dy);
       const V along_x = hn::Mul(free_q, hn::Mul(u_xx, u));
       const V along_y = hn::Mul(free_q, hn::MulAdd(u_xy, u, hn::Mul(u_yy, v)));
@@ -308,8 +309,8 @@ int32_t StartTile(const BlendBackwardParams& p, int tile_x, int tile_y, double* 
 // From the sums about the middle of the tile to those of BlendGradient, which are added to `to`.
 HWY_INLINE void AddWhitened(const Tile& t, size_t j, BlendGradient& to) {
   const float* s = t.sums[j];
-  const float xx = t.u_xx[j], xy = t.u_xy[j], yy = t.u_yy[j];
-  const float dx = kMiddle - t.x[j], dy = kMiddle - t.y[j];
+  const float xx = t.shape[j][0], xy = t.shape[j][1], yy = t.shape[j][2];
+  const float dx = kMiddle - t.at[j][0], dy = kMiddle - t.at[j][1];
   // The middle's own u and v. Where a pixel adds the Gaussian, u and v are at most 2.9; a tile is 16 px wide and the
   // factors at most 1.6 per pixel: all terms are small numbers, even if the mean is far away.
   const float u = xx * dx + xy * dy, v = yy * dy;
@@ -359,9 +360,7 @@ void BackwardTile(const BlendBackwardParams& p, int64_t tile, Tile& t) {
     const size_t n = static_cast<size_t>(std::min(kStep, last - place));
     const int32_t* rows = p.pairs + list_begin + place;
     ReadBatch(p.projected, rows, n, tile_x, tile_y, t);
-    if (p.partial == nullptr) {
-      for (size_t j = 0; j < n; ++j) hwy::Prefetch(p.gradients + rows[j]);
-    }
+    Fetch(p.projected, p.pairs + list_begin + std::max(place - kStep, 0), static_cast<size_t>(place == 0 ? 0 : kStep));
     for (size_t block = 0; block < kBlocks; ++block) t.finished[block] = t.last[block] <= place;
     ListBlocks(limits.log2_min_alpha, n, t.finished, t);
     std::fill_n(&t.sums[0][0], n * kSums, 0.0f);
@@ -377,7 +376,13 @@ void BackwardTile(const BlendBackwardParams& p, int64_t tile, Tile& t) {
         if (t.touched[j]) AddWhitened(t, j, partial[j]);
       }
     } else {
+      for (size_t j = 0; j < std::min(n, kSumsAhead); ++j) hwy::Prefetch(p.gradients + rows[j]);
       for (size_t j = 0; j < n; ++j) {
+        if (j + kSumsAhead < n) {
+          const float* to = &p.gradients[rows[j + kSumsAhead]].q;
+          hwy::Prefetch(to);
+          hwy::Prefetch(to + sizeof(BlendGradient) / sizeof(float) - 1);  // most lie in two lines of the cache
+        }
         if (t.touched[j]) AddWhitened(t, j, p.gradients[rows[j]]);
       }
     }

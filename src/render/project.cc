@@ -51,7 +51,7 @@ Frame MakeFrame(const ProjectParams& p) {
 }
 
 void ReadColumns(const ProjectParams& p, int64_t first, size_t n, StoredColumns& c) {
-  for (size_t j = 0; j < n; ++j) {
+  for (size_t j = ReadWholeRegisters(p, first, n, c); j < n; ++j) {
     const int64_t i = first + static_cast<int64_t>(j);
     for (int a = 0; a < 3; ++a) c.means[a][j] = p.means[3 * i + a];
     for (int a = 0; a < 3; ++a) c.log_scales[a][j] = p.log_scales[3 * i + a];

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <numbers>
 
-#include "core/parallel.h"
 #include "render/project.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -25,30 +24,39 @@ namespace anchorsplat {
 namespace HWY_NAMESPACE {
 namespace {
 
-constexpr ptrdiff_t kAhead = 24;  // Gaussians that are fetched ahead: rows are large and not all of them are needed
+constexpr size_t kAhead = 24;  // Gaussians that are fetched ahead: rows are large and not all of them are needed
 
 struct Columns {
   StoredColumns stored;
-  alignas(64) double u_xx[kBatch], u_xy[kBatch], u_yy[kBatch];
-  alignas(64) double q[kBatch], qu[kBatch], qv[kBatch], quu[kBatch], quv[kBatch], qvv[kBatch];
+  alignas(64) float u_xx[kBatch], u_xy[kBatch], u_yy[kBatch];
+  alignas(64) float q[kBatch], qu[kBatch], qv[kBatch], quu[kBatch], quv[kBatch], qvv[kBatch];
 };
 
 struct Gradients {
-  alignas(64) double means[3][kBatch];
-  alignas(64) double log_scales[3][kBatch];
-  alignas(64) double quats[4][kBatch];
-  alignas(64) double logits[kBatch];
-  alignas(64) double means2d[2][kBatch];
+  alignas(64) float means[3][kBatch];
+  alignas(64) float log_scales[3][kBatch];
+  alignas(64) float quats[4][kBatch];
+  alignas(64) float logits[kBatch];
+  alignas(64) float means2d[2][kBatch];
 };
 
-void ReadColumns(const ProjectBackwardParams& p, const int32_t* rows, size_t n, Columns& c) {
+using FloatTag = hn::Rebind<float, D>;  // as many floats as there are doubles in a register
+
+HWY_INLINE V LoadWidened(const float* from) { return hn::PromoteTo(D(), hn::Load(FloatTag(), from)); }
+HWY_INLINE void StoreNarrowed(V value, float* to) { hn::Store(hn::DemoteTo(FloatTag(), value), FloatTag(), to); }
+
+// `contiguous`: each row is the one behind the row before it.
+void ReadColumns(const ProjectBackwardParams& p, const int32_t* rows, size_t n, bool contiguous, Columns& c) {
   const size_t end = std::min(kBatch, (n + 7) / 8 * 8);
-  for (size_t j = 0; j < end; ++j) {
+  for (size_t j = contiguous ? ReadWholeRegisters(p, rows[0], n, c.stored) : 0; j < end; ++j) {
     const int64_t i = rows[std::min(j, n - 1)];  // the last register is filled up with one that is not written
     for (int a = 0; a < 3; ++a) c.stored.means[a][j] = p.means[3 * i + a];
     for (int a = 0; a < 3; ++a) c.stored.log_scales[a][j] = p.log_scales[3 * i + a];
     for (int a = 0; a < 4; ++a) c.stored.quats[a][j] = p.quats[4 * i + a];
     c.stored.logits[j] = p.opacity_logits[i];
+  }
+  for (size_t j = 0; j < end; ++j) {
+    const int64_t i = rows[std::min(j, n - 1)];
     const ProjectedGaussian& g = p.projected[i];
     c.u_xx[j] = g.u_xx;
     c.u_xy[j] = g.u_xy;
@@ -77,13 +85,13 @@ HWY_INLINE void BackwardLanes(const View& view, bool compensated, const Columns&
   // ln α = ln o − ½ dᵀΣ₂⁻¹d, and with W the factor that gives (u, v) = W·d, Σ₂⁻¹ = 2 ln 2·WᵀW. So
   //   ∂L/∂mean2d = Σ q·Σ₂⁻¹d = 2 ln 2·Wᵀ Σ q·(u, v),   ∂L/∂Σ₂ = ½ Σ q·Σ₂⁻¹d dᵀΣ₂⁻¹ = 2 ln²2·Wᵀ(Σ q·(u, v)(u, v)ᵀ)W.
   constexpr double kTwoLn2 = 2 * std::numbers::ln2, kTwoLn2Squared = 2 * std::numbers::ln2 * std::numbers::ln2;
-  const V w_xx = hn::Load(d, in.u_xx + j), w_xy = hn::Load(d, in.u_xy + j), w_yy = hn::Load(d, in.u_yy + j);
-  const V q = hn::Load(d, in.q + j), qu = hn::Load(d, in.qu + j), qv = hn::Load(d, in.qv + j);
+  const V w_xx = LoadWidened(in.u_xx + j), w_xy = LoadWidened(in.u_xy + j), w_yy = LoadWidened(in.u_yy + j);
+  const V q = LoadWidened(in.q + j), qu = LoadWidened(in.qu + j), qv = LoadWidened(in.qv + j);
   const V g_px = hn::Mul(hn::Set(d, kTwoLn2), hn::Mul(w_xx, qu));
   const V g_py = hn::Mul(hn::Set(d, kTwoLn2), hn::MulAdd(w_xy, qu, hn::Mul(w_yy, qv)));
-  hn::Store(g_px, d, out.means2d[0] + j);
-  hn::Store(g_py, d, out.means2d[1] + j);
-  const V quu = hn::Load(d, in.quu + j), quv = hn::Load(d, in.quv + j), qvv = hn::Load(d, in.qvv + j);
+  StoreNarrowed(g_px, out.means2d[0] + j);
+  StoreNarrowed(g_py, out.means2d[1] + j);
+  const V quu = LoadWidened(in.quu + j), quv = LoadWidened(in.quv + j), qvv = LoadWidened(in.qvv + j);
   const V left_x = hn::MulAdd(w_xy, quu, hn::Mul(w_yy, quv)), left_y = hn::MulAdd(w_xy, quv, hn::Mul(w_yy, qvv));
   const V scale = hn::Set(d, kTwoLn2Squared);
   V g_xx = hn::Mul(scale, hn::Mul(w_xx, hn::Mul(w_xx, quu)));
@@ -108,9 +116,9 @@ HWY_INLINE void BackwardLanes(const View& view, bool compensated, const Columns&
     g_b4 = hn::Mul(two, hn::MulAdd(g_xy, b1, hn::Mul(g_yy, b4)));
   V g_b2 = hn::Mul(two, hn::MulAdd(g_xx, b2, hn::Mul(g_xy, b5))),
     g_b5 = hn::Mul(two, hn::MulAdd(g_xy, b2, hn::Mul(g_yy, b5)));
-  hn::Store(hn::MulAdd(g_b0, b0, hn::Mul(g_b3, b3)), d, out.log_scales[0] + j);
-  hn::Store(hn::MulAdd(g_b1, b1, hn::Mul(g_b4, b4)), d, out.log_scales[1] + j);
-  hn::Store(hn::MulAdd(g_b2, b2, hn::Mul(g_b5, b5)), d, out.log_scales[2] + j);
+  StoreNarrowed(hn::MulAdd(g_b0, b0, hn::Mul(g_b3, b3)), out.log_scales[0] + j);
+  StoreNarrowed(hn::MulAdd(g_b1, b1, hn::Mul(g_b4, b4)), out.log_scales[1] + j);
+  StoreNarrowed(hn::MulAdd(g_b2, b2, hn::Mul(g_b5, b5)), out.log_scales[2] + j);
   const V e0 = hn::Mul(g_b0, s0), e1 = hn::Mul(g_b1, s1), e2 = hn::Mul(g_b2, s2);
   const V e3 = hn::Mul(g_b3, s0), e4 = hn::Mul(g_b4, s1), e5 = hn::Mul(g_b5, s2);
 
@@ -135,10 +143,10 @@ HWY_INLINE void BackwardLanes(const View& view, bool compensated, const Columns&
                       hn::NegMulAdd(hn::Mul(two, qz), hn::Add(g00, g11), hn::MulAdd(qx, sum_xz, hn::Mul(qy, sum_yz)))));
   const V radial = hn::MulAdd(qw, g_w, Dot3(qx, qy, qz, g_x, g_y, g_z));
   const V along = hn::IfThenZeroElse(zero_quat, inverse_norm);
-  hn::Store(hn::Mul(along, hn::NegMulAdd(radial, qw, g_w)), d, out.quats[0] + j);
-  hn::Store(hn::Mul(along, hn::NegMulAdd(radial, qx, g_x)), d, out.quats[1] + j);
-  hn::Store(hn::Mul(along, hn::NegMulAdd(radial, qy, g_y)), d, out.quats[2] + j);
-  hn::Store(hn::Mul(along, hn::NegMulAdd(radial, qz, g_z)), d, out.quats[3] + j);
+  StoreNarrowed(hn::Mul(along, hn::NegMulAdd(radial, qw, g_w)), out.quats[0] + j);
+  StoreNarrowed(hn::Mul(along, hn::NegMulAdd(radial, qx, g_x)), out.quats[1] + j);
+  StoreNarrowed(hn::Mul(along, hn::NegMulAdd(radial, qy, g_y)), out.quats[2] + j);
+  StoreNarrowed(hn::Mul(along, hn::NegMulAdd(radial, qz, g_z)), out.quats[3] + j);
 
   // ∂L/∂A = ∂L/∂E·R_qᵀ. A is f/z·(R_x − u·R_z): through z, and through u where it is not clamped.
   const V g_a0 = Dot3(e0, e1, e2, r00, r01, r02), g_a1 = Dot3(e0, e1, e2, r10, r11, r12),
@@ -154,11 +162,41 @@ HWY_INLINE void BackwardLanes(const View& view, bool compensated, const Columns&
   const V through_a = hn::Add(Dot3(g_a0, g_a1, g_a2, a0, a1, a2), Dot3(g_a3, g_a4, g_a5, a3, a4, a5));
   const V g_cz = hn::Neg(hn::MulAdd(through_a, inverse_z, hn::MulAdd(g_cx, ratio_x, hn::Mul(g_cy, ratio_y))));
   for (size_t a = 0; a < 3; ++a) {
-    hn::Store(Dot3(hn::Set(d, r[a]), hn::Set(d, r[3 + a]), hn::Set(d, r[6 + a]), g_cx, g_cy, g_cz), d,
-              out.means[a] + j);
+    StoreNarrowed(Dot3(hn::Set(d, r[a]), hn::Set(d, r[3 + a]), hn::Set(d, r[6 + a]), g_cx, g_cy, g_cz),
+                  out.means[a] + j);
   }
   // ∂ln sigmoid(x)/∂x = 1/(1 + e^x).
-  hn::Store(hn::Div(q, hn::Add(one, ExpInDomain(d, hn::Load(d, in.stored.logits + j)))), d, out.logits + j);
+  StoreNarrowed(hn::Div(q, hn::Add(one, ExpInDomain(d, hn::Load(d, in.stored.logits + j)))), out.logits + j);
+}
+
+// Columns [begin, n).
+void WriteRows(const Gradients& g, const int32_t* rows, size_t begin, size_t n, const ProjectBackwardParams& p) {
+  for (size_t j = begin; j < n; ++j) {
+    const int64_t i = rows[j];
+    for (int a = 0; a < 3; ++a) p.mean_gradients[3 * i + a] = g.means[a][j];
+    for (int a = 0; a < 3; ++a) p.log_scale_gradients[3 * i + a] = g.log_scales[a][j];
+    for (int a = 0; a < 4; ++a) p.quat_gradients[4 * i + a] = g.quats[a][j];
+    p.opacity_logit_gradients[i] = g.logits[j];
+    for (int a = 0; a < 2; ++a) p.means2d[2 * i + a] = g.means2d[a][j];
+  }
+}
+
+// Rows one behind the other, by whole registers.
+void WriteContiguous(const Gradients& g, const int32_t* rows, size_t n, const ProjectBackwardParams& p) {
+  const FloatTag d;
+  const size_t lanes = hn::Lanes(d), whole = n / lanes * lanes;
+  for (size_t j = 0; j < whole; j += lanes) {
+    const int64_t i = rows[0] + static_cast<int64_t>(j);
+    hn::StoreInterleaved3(hn::Load(d, g.means[0] + j), hn::Load(d, g.means[1] + j), hn::Load(d, g.means[2] + j), d,
+                          p.mean_gradients + 3 * i);
+    hn::StoreInterleaved3(hn::Load(d, g.log_scales[0] + j), hn::Load(d, g.log_scales[1] + j),
+                          hn::Load(d, g.log_scales[2] + j), d, p.log_scale_gradients + 3 * i);
+    hn::StoreInterleaved4(hn::Load(d, g.quats[0] + j), hn::Load(d, g.quats[1] + j), hn::Load(d, g.quats[2] + j),
+                          hn::Load(d, g.quats[3] + j), d, p.quat_gradients + 4 * i);
+    hn::StoreU(hn::Load(d, g.logits + j), d, p.opacity_logit_gradients + i);
+    hn::StoreInterleaved2(hn::Load(d, g.means2d[0] + j), hn::Load(d, g.means2d[1] + j), d, p.means2d + 2 * i);
+  }
+  WriteRows(g, rows, whole, n, p);
 }
 
 // Gaussians of one chunk.
@@ -179,28 +217,29 @@ void BackwardChunk(const ProjectBackwardParams& p, int64_t chunk) {
   const int32_t* visible = p.visible + first;
   const int32_t* end = visible + p.visible_counts[chunk];
   while (visible != end) {
+    const size_t most = std::min(kBatch, static_cast<size_t>(end - visible));
     size_t n = 0;
-    for (; visible != end && n < kBatch; ++visible) {
-      if (visible + kAhead < end) {
-        hwy::Prefetch(p.gradients + visible[kAhead]);
-        hwy::Prefetch(p.projected + visible[kAhead]);
+    for (size_t k = 0; k < most; ++k) {
+      if (visible + k + kAhead < end) {
+        hwy::Prefetch(p.gradients + visible[k + kAhead]);
+        hwy::Prefetch(p.projected + visible[k + kAhead]);
       }
-      const BlendGradient& b = p.gradients[*visible];
-      rows[n] = *visible;
-      // Hidden ones have no gradient, and they are many.
+      const BlendGradient& b = p.gradients[visible[k]];
+      rows[n] = visible[k];
+      // Hidden ones have no gradient, and in pictures of objects they are many.
       n += !(b.q == 0 && b.qu == 0 && b.qv == 0 && b.quu == 0 && b.quv == 0 && b.qvv == 0);
     }
-    if (n == 0) break;
-    ReadColumns(p, rows, n, in);
-    for (size_t j = 0; j < n; j += lanes) BackwardLanes(view, compensated, in, j, out);
-    for (size_t j = 0; j < n; ++j) {
-      const int64_t i = rows[j];
-      for (int a = 0; a < 3; ++a) p.mean_gradients[3 * i + a] = static_cast<float>(out.means[a][j]);
-      for (int a = 0; a < 3; ++a) p.log_scale_gradients[3 * i + a] = static_cast<float>(out.log_scales[a][j]);
-      for (int a = 0; a < 4; ++a) p.quat_gradients[4 * i + a] = static_cast<float>(out.quats[a][j]);
-      p.opacity_logit_gradients[i] = static_cast<float>(out.logits[j]);
-      for (int a = 0; a < 2; ++a) p.means2d[2 * i + a] = static_cast<float>(out.means2d[a][j]);
+    // Where they are few, it is quicker to take them along than to leave them out.
+    const bool contiguous = visible[most - 1] - visible[0] == static_cast<int32_t>(most) - 1 && 4 * n >= 3 * most;
+    if (contiguous) {
+      n = most;
+      std::copy_n(visible, n, rows);
     }
+    visible += most;
+    if (n == 0) continue;
+    ReadColumns(p, rows, n, contiguous, in);
+    for (size_t j = 0; j < n; j += lanes) BackwardLanes(view, compensated, in, j, out);
+    contiguous ? WriteContiguous(out, rows, n, p) : WriteRows(out, rows, 0, n, p);
   }
 }
 
@@ -214,10 +253,8 @@ namespace anchorsplat {
 
 HWY_EXPORT(BackwardChunk);
 
-void ProjectBackwardCpu(const ProjectBackwardParams& p) {
-  ParallelFor(0, ProjectChunks(p.count), 1, [&p](int64_t first, int64_t last) {
-    for (int64_t chunk = first; chunk < last; ++chunk) HWY_DYNAMIC_DISPATCH(BackwardChunk)(p, chunk);
-  });
+void ProjectBackwardCpu(const ProjectBackwardParams& p, int64_t chunk) {
+  HWY_DYNAMIC_DISPATCH(BackwardChunk)(p, chunk);
 }
 
 }  // namespace anchorsplat

@@ -36,6 +36,7 @@ struct ProjectBackwardParams {
   float* means2d;                  // [N,2] ∂L/∂(mean in the picture), per pixel
 };
 
-void ProjectBackwardCpu(const ProjectBackwardParams& p);
+// Gaussians of one chunk, [chunk·kProjectChunk, …).
+void ProjectBackwardCpu(const ProjectBackwardParams& p, int64_t chunk);
 
 }  // namespace anchorsplat

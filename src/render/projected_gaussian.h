@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 namespace anchorsplat {
@@ -22,6 +23,9 @@ struct alignas(64) ProjectedGaussian {
                        // pass
 };
 static_assert(sizeof(ProjectedGaussian) == 64);
+// Blending copies them by fours.
+static_assert(offsetof(ProjectedGaussian, log2_opacity) == offsetof(ProjectedGaussian, u_xx) + 12);
+static_assert(offsetof(ProjectedGaussian, depth) == offsetof(ProjectedGaussian, rgb) + 12);
 
 // Tiles that a Gaussian may touch, half-open: columns [x0, x1), rows [y0, y1). All 0 where it is culled.
 struct TileRect {

@@ -39,6 +39,35 @@ struct StoredColumns {
   alignas(64) double logits[kBatch];
 };
 
+// Rows of the cloud from `first` on to columns, as many whole registers as there are in `n`. Returns how many rows that
+// are; the others go one by one.
+template <typename Params>
+HWY_INLINE size_t ReadWholeRegisters(const Params& p, int64_t first, size_t n, StoredColumns& c) {
+  const D d;
+  const hn::Rebind<float, D> df;
+  using F = hn::Vec<decltype(df)>;
+  const size_t lanes = hn::Lanes(d), whole = n / lanes * lanes;
+  for (size_t j = 0; j < whole; j += lanes) {
+    const int64_t i = first + static_cast<int64_t>(j);
+    F x, y, z, w;
+    hn::LoadInterleaved3(df, p.means + 3 * i, x, y, z);
+    hn::Store(hn::PromoteTo(d, x), d, c.means[0] + j);
+    hn::Store(hn::PromoteTo(d, y), d, c.means[1] + j);
+    hn::Store(hn::PromoteTo(d, z), d, c.means[2] + j);
+    hn::LoadInterleaved3(df, p.log_scales + 3 * i, x, y, z);
+    hn::Store(hn::PromoteTo(d, x), d, c.log_scales[0] + j);
+    hn::Store(hn::PromoteTo(d, y), d, c.log_scales[1] + j);
+    hn::Store(hn::PromoteTo(d, z), d, c.log_scales[2] + j);
+    hn::LoadInterleaved4(df, p.quats + 4 * i, w, x, y, z);
+    hn::Store(hn::PromoteTo(d, w), d, c.quats[0] + j);
+    hn::Store(hn::PromoteTo(d, x), d, c.quats[1] + j);
+    hn::Store(hn::PromoteTo(d, y), d, c.quats[2] + j);
+    hn::Store(hn::PromoteTo(d, z), d, c.quats[3] + j);
+    hn::Store(hn::PromoteTo(d, hn::LoadU(df, p.opacity_logits + i)), d, c.logits + j);
+  }
+  return whole;
+}
+
 // What does not depend on the Gaussian.
 struct View {
   double r[9], t[3];

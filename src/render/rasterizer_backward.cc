@@ -119,7 +119,6 @@ void Rasterizer::State::ProjectBackward(const CloudView& cloud, CloudGradient& g
   project.quat_gradients = gradient.quats.data();
   project.opacity_logit_gradients = gradient.opacity_logits.data();
   project.means2d = gradient.means2d.data();
-  ProjectBackwardCpu(project);
 
   SphericalHarmonicsBackwardParams sh{};
   sh.count = kept->count;
@@ -134,7 +133,14 @@ void Rasterizer::State::ProjectBackward(const CloudView& cloud, CloudGradient& g
   sh.visible_counts = visible_counts.data();
   sh.mean_gradients = gradient.means.data();
   sh.sh_gradients = gradient.sh.data();
-  SphericalHarmonicsBackwardCpu(sh);
+
+  // Both of a chunk while it is in the cache.
+  ParallelFor(0, ProjectChunks(kept->count), 1, [&](int64_t first, int64_t last) {
+    for (int64_t chunk = first; chunk < last; ++chunk) {
+      ProjectBackwardCpu(project, chunk);
+      SphericalHarmonicsBackwardCpu(sh, chunk);
+    }
+  });
 }
 
 Status Rasterizer::Backward(const CloudView& cloud, const RenderGradient& output_gradient, CloudGradient& gradient) {

@@ -6,7 +6,6 @@
 #include <cstddef>
 
 #include "core/gaussian_cloud.h"
-#include "core/parallel.h"
 #include "core/spherical_harmonics.h"
 #include "render/project.h"
 
@@ -140,10 +139,6 @@ void BackwardChunk(const SphericalHarmonicsBackwardParams& p, int64_t chunk) {
       n += !(row.g[0] == 0 && row.g[1] == 0 && row.g[2] == 0);
     }
     if (n == 0) break;
-    for (size_t j = 0; j < n; ++j) {
-      const float* sh = p.sh + batch[j].row * p.stride;
-      for (int k = 0; k < 3 * coefficients; k += kFloatsPerLine) hwy::Prefetch(sh + k);
-    }
     LoadDirections(
         n, [&](size_t j) { return p.means + 3 * batch[j].row; }, p.center, b);
     for (size_t j = 0; j < n; j += lanes) {
@@ -152,6 +147,13 @@ void BackwardChunk(const SphericalHarmonicsBackwardParams& p, int64_t chunk) {
     }
     for (size_t j = 0; j < n; ++j) {
       const auto& [i, g] = batch[j];
+      // Of dense splats nearly all are needed; fetched one by one, as many at once wait for each other.
+      if (const int64_t next = i + kAhead; next < p.count) {
+        for (int k = 0; k < 3 * coefficients; k += kFloatsPerLine) {
+          hwy::Prefetch(p.sh + next * p.stride + k);
+          hwy::Prefetch(p.sh_gradients + next * p.stride + k);
+        }
+      }
       std::fill(p.sh_gradients + written * p.stride, p.sh_gradients + i * p.stride, 0.0f);
       written = i + 1;
       float* out = p.sh_gradients + i * p.stride;
@@ -182,10 +184,8 @@ namespace anchorsplat {
 
 HWY_EXPORT(BackwardChunk);
 
-void SphericalHarmonicsBackwardCpu(const SphericalHarmonicsBackwardParams& p) {
-  ParallelFor(0, ProjectChunks(p.count), 1, [&p](int64_t first, int64_t last) {
-    for (int64_t chunk = first; chunk < last; ++chunk) HWY_DYNAMIC_DISPATCH(BackwardChunk)(p, chunk);
-  });
+void SphericalHarmonicsBackwardCpu(const SphericalHarmonicsBackwardParams& p, int64_t chunk) {
+  HWY_DYNAMIC_DISPATCH(BackwardChunk)(p, chunk);
 }
 
 }  // namespace anchorsplat

@@ -27,6 +27,7 @@ struct SphericalHarmonicsBackwardParams {
   float* sh_gradients;  // [N,stride/3,3]
 };
 
-void SphericalHarmonicsBackwardCpu(const SphericalHarmonicsBackwardParams& p);
+// Gaussians of one chunk, [chunk·kProjectChunk, …).
+void SphericalHarmonicsBackwardCpu(const SphericalHarmonicsBackwardParams& p, int64_t chunk);
 
 }  // namespace anchorsplat

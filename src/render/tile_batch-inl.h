@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 
 #include "render/constants.h"
 #include "render/projected_gaussian.h"
@@ -39,9 +40,11 @@ constexpr size_t kLanesAtMost = 16;
 // to the tile's upper left corner, so floats are fine enough on any image.
 template <size_t kSize>
 struct TileBatch {
-  // Column by column.
-  alignas(64) float x[kSize], y[kSize], u_xx[kSize], u_xy[kSize], u_yy[kSize], log2_opacity[kSize];
-  alignas(64) float red[kSize], green[kSize], blue[kSize], depth[kSize];
+  // Gaussian by Gaussian, in pieces that are copied whole: to fetch them costs more than to blend a few pixels.
+  // Blending takes one number for all of its pixels, which is as quick from here as from columns.
+  alignas(64) float at[kSize][2];     // x, y
+  alignas(64) float shape[kSize][4];  // u_xx, u_xy, u_yy, log2_opacity
+  alignas(64) float seen[kSize][4];   // red, green, blue, depth
   // Which of the batch each block looks at, in order; room for the register that is stored at the end.
   alignas(64) int32_t lists[kBlocks][kSize + kLanesAtMost];
   size_t list_sizes[kBlocks];
@@ -77,7 +80,12 @@ HWY_INLINE V Exp2(V x) {
   return hn::BitCast(d, hn::Add(hn::BitCast(di, p), hn::ShiftLeft<23>(hn::BitCast(di, shifted))));
 }
 
-// Copies the Gaussians of rows[0, n) into columns and fills the last register up with ones that hit nothing.
+// Asks for the Gaussians of rows[0, n), which are next, while those before them are at work.
+HWY_INLINE void Fetch(const ProjectedGaussian* projected, const int32_t* rows, size_t n) {
+  for (size_t j = 0; j < n; ++j) hwy::Prefetch(projected + rows[j]);
+}
+
+// Copies the Gaussians of rows[0, n) and fills the last register up with ones that hit nothing.
 template <size_t kSize>
 void ReadBatch(const ProjectedGaussian* projected, const int32_t* rows, size_t n, double tile_x, double tile_y,
                TileBatch<kSize>& t) {
@@ -86,21 +94,16 @@ void ReadBatch(const ProjectedGaussian* projected, const int32_t* rows, size_t n
   for (size_t j = 0; j < n; ++j) {
     if (j + kAhead < n) hwy::Prefetch(projected + rows[j + kAhead]);
     const ProjectedGaussian& g = projected[rows[j]];
-    t.x[j] = static_cast<float>(g.x - tile_x);
-    t.y[j] = static_cast<float>(g.y - tile_y);
-    t.u_xx[j] = g.u_xx;
-    t.u_xy[j] = g.u_xy;
-    t.u_yy[j] = g.u_yy;
-    t.log2_opacity[j] = g.log2_opacity;
-    t.red[j] = g.rgb[0];
-    t.green[j] = g.rgb[1];
-    t.blue[j] = g.rgb[2];
-    t.depth[j] = g.depth;
+    t.at[j][0] = static_cast<float>(g.x - tile_x);
+    t.at[j][1] = static_cast<float>(g.y - tile_y);
+    const std::byte* record = reinterpret_cast<const std::byte*>(&g);
+    std::memcpy(t.shape[j], record + offsetof(ProjectedGaussian, u_xx), sizeof(t.shape[j]));
+    std::memcpy(t.seen[j], record + offsetof(ProjectedGaussian, rgb), sizeof(t.seen[j]));
   }
   for (size_t j = n; j < (n + kLanesAtMost - 1) / kLanesAtMost * kLanesAtMost; ++j) {
-    t.x[j] = t.y[j] = 0;
-    t.u_xx[j] = t.u_xy[j] = t.u_yy[j] = 1;
-    t.log2_opacity[j] = -1e30f;
+    t.at[j][0] = t.at[j][1] = 0;
+    t.shape[j][0] = t.shape[j][1] = t.shape[j][2] = 1;
+    t.shape[j][3] = -1e30f;
   }
 }
 
@@ -109,9 +112,9 @@ void ReadBatch(const ProjectedGaussian* projected, const int32_t* rows, size_t n
 template <size_t kSize>
 HWY_INLINE V Log2Alpha(const TileBatch<kSize>& t, size_t j, V dx, V dy) {
   const D d;
-  const V u = hn::MulAdd(hn::Set(d, t.u_xx[j]), dx, hn::Mul(hn::Set(d, t.u_xy[j]), dy));
-  const V v = hn::Mul(hn::Set(d, t.u_yy[j]), dy);
-  return hn::NegMulAdd(u, u, hn::NegMulAdd(v, v, hn::Set(d, t.log2_opacity[j])));
+  const V u = hn::MulAdd(hn::Set(d, t.shape[j][0]), dx, hn::Mul(hn::Set(d, t.shape[j][1]), dy));
+  const V v = hn::Mul(hn::Set(d, t.shape[j][2]), dy);
+  return hn::NegMulAdd(u, u, hn::NegMulAdd(v, v, hn::Set(d, t.shape[j][3])));
 }
 
 HWY_INLINE V ClampTo(V x, V low, V high) { return hn::Min(hn::Max(x, low), high); }
@@ -126,10 +129,11 @@ void ListBlocks(float log2_min_alpha, size_t n, const bool* finished, TileBatch<
   const V zero = hn::Zero(d);
   std::fill_n(t.list_sizes, kBlocks, size_t{0});
   for (size_t j = 0; j < n; j += lanes) {
-    const V x = hn::Load(d, t.x + j), y = hn::Load(d, t.y + j);
-    const V u_xx = hn::Load(d, t.u_xx + j), u_xy = hn::Load(d, t.u_xy + j), u_yy = hn::Load(d, t.u_yy + j);
+    V x, y, u_xx, u_xy, u_yy, log2_opacity;
+    hn::LoadInterleaved2(d, t.at[j], x, y);
+    hn::LoadInterleaved4(d, t.shape[j], u_xx, u_xy, u_yy, log2_opacity);
     // u² + v² ≤ reach², so at height dy:  dx ∈ shear·dy ± half·sqrt(reach² − v²).
-    const V reach2 = hn::Sub(hn::Load(d, t.log2_opacity + j), hn::Set(d, log2_min_alpha));
+    const V reach2 = hn::Sub(log2_opacity, hn::Set(d, log2_min_alpha));
     const V half = hn::Div(hn::Set(d, 1.0f), u_xx);
     const V shear = hn::Neg(hn::Mul(u_xy, half));
     const V height = hn::Div(hn::Sqrt(hn::Max(reach2, zero)), u_yy);

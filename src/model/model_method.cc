@@ -14,6 +14,7 @@
 #include "core/stopwatch.h"
 #include "core/text.h"
 #include "enhance/filter.h"
+#include "enhance/gaussian_budget.h"
 #include "enhance/unseen_gaussians.h"
 #include "io/file_version.h"
 #include "model/any_network.h"
@@ -75,8 +76,9 @@ std::vector<MethodOption> NetworkOptions() {
   return options;
 }
 
-Result<GaussianCloud> EnhanceWithPublished(const EnhanceInput& input, const PublishedNetwork& network,
+Result<GaussianCloud> EnhanceWithPublished(EnhanceInput input, const PublishedNetwork& network,
                                            const PublishedOptions& options, StepReport& report) {
+  LeaveRegion(input);
   ANCHORSPLAT_ASSIGN_OR_RETURN(PublishedResult result, EnhanceWithPublishedNetwork(input.cloud, network, options));
   const PublishedReport& r = result.report;
   report.dropped += r.not_finite + r.outside;
@@ -141,6 +143,7 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
                              model.options.prune_opacity};
   const auto within_budget = [&]() -> Result<GaussianCloud> {
     ANCHORSPLAT_RETURN_IF_ERROR(Validate(CopyChoice{.max_gaussians = choice.max_gaussians}, 1));
+    LeaveRegion(input);
     report.facts = {{"copies", int64_t{1}}};
     const int64_t left_out = LeaveOutLeastVisible(model.options.max_gaussians, input.cloud);
     if (left_out > 0) report.facts.emplace_back("left_out", left_out);
@@ -159,7 +162,7 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
     if (!grown.ok()) return grown.error();
     return within_budget();
   }
-  const int64_t count = input.cloud.size();
+  const int64_t count = input.inside.empty() ? input.cloud.size() : std::ranges::count(input.inside, 1);
   const auto n = static_cast<double>(count);
   // Dust is not worth copies. Whoever asks for a number gets it.
   std::vector<int64_t> dust;
@@ -173,7 +176,8 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
                                                                       .upscale = upscale,
                                                                       .strength = input.filter_strength,
                                                                       .choice = choice,
-                                                                      .single = dust}));
+                                                                      .single = dust,
+                                                                      .inside = input.inside}));
   const auto outside = static_cast<double>(result.outside), partly = static_cast<double>(result.partly);
   if (outside + partly > kNotable * n) {
     const auto [least, greatest] = network.TrainedUpscales();
@@ -256,7 +260,7 @@ void RegisterModelMethod() {
          ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const AnyNetwork> network,
                                       last->Get(options.model, shipped));
          if (const auto* published = std::get_if<PublishedNetwork>(network.get())) {
-           return EnhanceWithPublished(input, *published, options.model.options, report);
+           return EnhanceWithPublished(std::move(input), *published, options.model.options, report);
          }
          Result<GaussianCloud> out = EnhanceWithCompactNetwork(
              std::move(input), options.upscale, std::get<CompactNetwork>(*network), options.model, report);

@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "enhance/gaussian_budget.h"
 #include "model/compact/compact_output.h"
 #include "model/compact/copy_choice.h"
 

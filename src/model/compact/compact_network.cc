@@ -316,11 +316,15 @@ NearCloud BringTogether(GaussianCloud cloud, const CompactTask& task, const Comp
   return near;
 }
 
+// In the place of a fade, of Gaussians of which nothing comes out.
+constexpr float kLeftOut = -1;
+
 // Where a block's Gaussians go in its part of the output: those that have copies before all others.
 struct BlockPlaces {
   Buffer<int32_t> rows;   // of the input, in this order
   Buffer<int64_t> first;  // of each of the block's own, the row of its first copy
   int64_t inside = 0;     // Gaussians that have copies
+  int64_t alone = 0;      // Gaussians that have none
   int64_t made = 0;       // rows
 };
 
@@ -328,11 +332,13 @@ BlockPlaces PlacesOf(const CompactBlock& block, const Buffer<float>& fades, cons
                      int64_t copies) {
   BlockPlaces places;
   places.inside = std::ranges::count_if(fades, [](float fade) { return fade > 0; });
-  places.made = copies * places.inside + (block.own() - places.inside);
-  places.rows.resize(fades.size());
+  places.alone = std::ranges::count(fades, 0.0f);
+  places.made = copies * places.inside + places.alone;
+  places.rows.resize(static_cast<size_t>(places.inside + places.alone));
   places.first.resize(fades.size());
   int64_t inside = 0, alone = places.inside;
   for (size_t i = 0; i < fades.size(); ++i) {
+    if (fades[i] == kLeftOut) continue;
     const bool copied = fades[i] > 0;
     const int64_t at = copied ? inside++ : alone++;
     places.rows[static_cast<size_t>(at)] = rows[static_cast<size_t>(block.rows[i])];
@@ -401,9 +407,15 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
     for (int64_t b = 0; b < blocks.count(); ++b) {
       if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped"};
       const CompactBlock& block = blocks.Find(b);
-      const Buffer<float> fades = Fades(features, block);
+      Buffer<float> fades = Fades(features, block);
+      for (size_t i = 0; i < fades.size() && !task.inside.empty(); ++i) {
+        const int32_t row = near.rows[static_cast<size_t>(block.rows[i])];
+        if (task.inside[static_cast<size_t>(row)] == 0) fades[i] = kLeftOut;
+      }
       const BlockPlaces places = PlacesOf(block, fades, near.rows, copies);
-      result.outside += block.own() - places.inside;
+      progress.Advance(block.own());
+      if (places.made == 0) continue;
+      result.outside += places.alone;
       result.partly += std::ranges::count_if(fades, [](float fade) { return fade > 0 && fade < 1; });
       result.made += places.made;
       made.Resize(places.made, near.cloud.sh_degree);
@@ -415,6 +427,7 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
           const int64_t i = block.rows[static_cast<size_t>(place)];
           const float fade = fades[static_cast<size_t>(place)];
           const int64_t row = places.first[static_cast<size_t>(place)];
+          if (fade == kLeftOut) continue;
           if (fade > 0) {
             const float* said = raw.data() + (place - begin) * out_.outputs();
             if (!AllFinite(said, out_.outputs())) {
@@ -430,7 +443,6 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
       result.times.network += watch.Lap();
       output.Add(places.rows, GroupsOf(task, places, copies), made);
       result.times.copies += watch.Lap();
-      progress.Advance(block.own());
     }
     near = {};
     made = {};

@@ -37,6 +37,8 @@ struct CompactTask {
   std::optional<CopyChoice> choice = std::nullopt;
   // Gaussians of which one copy stays where costs choose, ascending.
   std::span<const int64_t> single = {};
+  // 0: a Gaussian that others hear from and of which nothing comes out; one per Gaussian, empty: none.
+  std::span<const char> inside = {};
 };
 
 struct CompactResult {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/row_scatter.h"
+#include "enhance/gaussian_budget.h"
 #include "formats/row_arrays.h"
 
 namespace anchorsplat {

@@ -103,6 +103,33 @@ TEST(CompactOutput, BlocksAreChosenAsTheWhole) {
   }
 }
 
+// Those of a region are what they are in the whole.
+TEST(CompactOutput, OnlyThoseInsideComeOut) {
+  const GaussianCloud cloud = Sheet();
+  const CompactNetwork network = Network();
+  const float pixel = kSheetPixel;
+  CompactTask task{.pixel_sizes = {&pixel, 1}, .upscale = 4, .strength = DefaultFilterStrength(4)};
+  const auto all = network.Apply(cloud, task);
+  ASSERT_TRUE(all.ok());
+  std::vector<char> inside(static_cast<size_t>(kCount));
+  std::vector<int64_t> rows;  // of the whole result
+  for (int64_t k = 0, row = 0; k < 5; ++k) {
+    for (int64_t i = 0; i < kCount; ++i) {
+      if ((i % 50 == 5) != (k == 4)) continue;  // those that stay alone stand behind
+      inside[static_cast<size_t>(i)] = cloud.means[static_cast<size_t>(3 * i)] < 0.1f ? 1 : 0;
+      if (inside[static_cast<size_t>(i)] != 0) rows.push_back(row);
+      ++row;
+    }
+  }
+  task.inside = inside;
+  for (const int64_t block : {int64_t{97}, kCount}) {
+    task.block_gaussians = block;
+    const auto part = network.Apply(cloud, task);
+    ASSERT_TRUE(part.ok());
+    ExpectSameValues(part->cloud, Subset(all->cloud, rows).value());
+  }
+}
+
 TEST(CompactOutput, RefusesAChoiceWithoutMeaning) {
   const float pixel = kSheetPixel;
   const auto result = Network().Apply(Sheet(), {.pixel_sizes = {&pixel, 1}, .choice = CopyChoice{.copies = 5}});

@@ -72,11 +72,4 @@ class CopyPlan {
 // Gaussian stays. Of equally cheap ones those of the first Gaussians, by row(plan, group), which is unique.
 void MergeMore(std::span<CopyPlan> plans, int64_t more, const std::function<int64_t(size_t plan, int64_t group)>& row);
 
-// Leaves the `most` of the largest opacity × size, in their order, with a warning. How many are gone; 0 without a
-// bound.
-int64_t LeaveOutLeastVisible(int64_t most, GaussianCloud& cloud);
-
-// Closes up the rows for which keep[i] is set.
-void KeepMarked(const std::vector<char>& keep, GaussianCloud& cloud);
-
 }  // namespace anchorsplat

@@ -42,7 +42,7 @@ struct EnhanceSettings {
   std::filesystem::path model = {};  // weights of a network; empty: the one that is part of the library
   // Of a compact network: Gaussians that it makes of each, at most; nothing: merged where nobody would see it.
   std::optional<int64_t> copies = std::nullopt;
-  int64_t max_gaussians = 0;  // of a network's result at most, as --max-gaussians; 0: no bound
+  int64_t max_gaussians = 0;  // of the result at most, as --max-gaussians; 0: no bound
   uint64_t seed = 0;
 };
 

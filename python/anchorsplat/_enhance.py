@@ -25,6 +25,9 @@ def enhance(
     method: str = "auto",
     quality: Literal["fast", "good", "best"] | None = None,
     upscale: float = 4,
+    max_gaussians: int = 0,
+    most_gaussians: int = 0,
+    region: Sequence[float] | None = None,
     pixel_size: float | Literal["auto"] = "auto",
     mode: RenderMode | None = None,
     cameras: CamerasLike | None = None,
@@ -42,7 +45,6 @@ def enhance(
     shuffles: str | int = "identity",
     copies: int | Literal["auto"] = "auto",
     merge_cost: float | None = None,
-    max_gaussians: int = 0,
     prune_opacity: float = 0,
     block_gaussians: int = 200_000,
     images: PathLike | None = None,
@@ -51,7 +53,6 @@ def enhance(
     steps: int | None = None,
     seconds: float | None = None,
     k: int | None = None,
-    most_gaussians: int = 0,
     poses: int = 128,
     between: int = 1,
     half_from: float = 0.3,
@@ -73,6 +74,9 @@ def enhance(
     method: "auto", the best that is ready; one of :func:`methods`; or two, "model+refine".
     quality: instead of a method, by the time there is: "fast", a second; "good", several; "best", minutes with `images`.
     upscale: how many times closer it will be seen, at least 1.
+    max_gaussians: of the result at most, spent where the closer view shows it; 0: no bound. most_gaussians: its old name.
+    region: only what lies in there is enhanced, the rest stays bit by bit: a box (x0, y0, z0, x1, y1, z1) or a sphere
+        (x, y, z, radius) in the splat's unit.
 
     pixel_size: world size of a pixel of the training views, or "auto": from the cameras, the pictures or the splat.
     mode: how the splat was rasterized in training; otherwise as it says, else as its Gaussians look.
@@ -85,13 +89,13 @@ def enhance(
 
     model: weights of a network, .pth or .safetensors; otherwise the one in the box.
     copies, merge_cost: Gaussians that a compact network makes of each, at most, or "auto"; what a merge may cost then.
-    max_gaussians: budget of a network's result; 0: none. prune_opacity: fainter Gaussians are left out of it.
+    prune_opacity: fainter Gaussians are left out of a network's result.
     block_gaussians: larger splats are enhanced in overlapping blocks of this many.
     precision: of the network's arithmetic.
     compat, normalisation, attention_rounding, curve_depth, shuffles: of the published architecture (docs/network.md).
 
     Of refinement: images: the project with the pictures it was fitted to. hold_out: every Nth view is not trained on. downscale:
-    N × N pixels of the pictures become one. steps or seconds: how long. k: Gaussians that each becomes at first, most_gaussians bounds that. poses, between: where to look from
+    N × N pixels of the pictures become one. steps or seconds: how long. k: Gaussians that each becomes at first. poses, between: where to look from
     without pictures. half_from, all_from: parts of the run from which on more rays are rendered. rate, rate_decay: learning
     rates, as a part of those of ``fit``. ssim_weight: of the loss. exposure, robust, align: pictures that differ in brightness,
     show what is not in the scene, or whose poses are a little off. checkpoint, resume: file for the state when it is stopped
@@ -115,6 +119,9 @@ def refine(
     images: PathLike | None = None,
     *,
     upscale: float = 4,
+    max_gaussians: int = 0,
+    most_gaussians: int = 0,
+    region: Sequence[float] | None = None,
     pixel_size: float | Literal["auto"] = "auto",
     mode: RenderMode | None = None,
     cameras: CamerasLike | None = None,
@@ -126,7 +133,6 @@ def refine(
     steps: int | None = None,
     seconds: float | None = None,
     k: int | None = None,
-    most_gaussians: int = 0,
     poses: int = 128,
     between: int = 1,
     half_from: float = 0.3,

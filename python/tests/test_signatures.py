@@ -83,8 +83,9 @@ def options_of(declared, verb, groups):
     found = {}
     for option in declared[verb]["options"]:
         long = [name[2:] for name in option["names"] if name.startswith("--")]
-        if long and (groups is None or option["group"] in groups):
-            found[long[0]] = option
+        for name in long:  # and its old names
+            if groups is None or option["group"] in groups:
+                found[name] = option
     return found
 
 

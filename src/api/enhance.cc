@@ -30,7 +30,7 @@ Result<EnhanceOptions> ToOptions(const EnhanceSettings& settings) {
   options.refine.images = settings.images;
   options.model.file = settings.model;
   options.model.copies = settings.copies;
-  options.model.options.max_gaussians = settings.max_gaussians;
+  SetBudget(options, settings.max_gaussians);
   options.seed = settings.seed;
   given(settings.upscale != EnhanceSettings().upscale, "upscale");
   given(settings.filter_strength.has_value(), "filter-strength");

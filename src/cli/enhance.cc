@@ -1,5 +1,6 @@
 #include "enhance/enhance.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -53,7 +54,8 @@ constexpr uint64_t kWorkingBytes = 300;
 uint64_t NeededBytes(int64_t in, int64_t out, int sh_degree) {
   const uint64_t own = static_cast<uint64_t>(in) * RowBytes(sh_degree);
   if (out <= in) return own;  // changed in place
-  return own + static_cast<uint64_t>(in) * kWorkingBytes + static_cast<uint64_t>(out) * RowBytes(sh_degree);
+  const uint64_t made = static_cast<uint64_t>(out) * RowBytes(sh_degree);
+  return std::max(own + static_cast<uint64_t>(in) * kWorkingBytes + made, 2 * made);  // it is put in order at the end
 }
 
 // What can be known to fail before anything is read.

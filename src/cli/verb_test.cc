@@ -1,5 +1,6 @@
 #include "cli/verb.h"
 
+#include <algorithm>
 #include <fstream>
 #include <sstream>
 
@@ -72,7 +73,8 @@ TEST(CommandLine, NumbersAreNumbers) {
     for (const DeclaredOption& option : verb.options) {
       if (option.value != "FLOAT" && option.value != "INT" && option.value != "UINT") continue;
       ++options;
-      const std::string name = option.names.empty() ? option.positional : option.names.back();
+      const auto by_name = std::ranges::find_if(option.names, [](const auto& n) { return n.starts_with("--"); });
+      const std::string name = by_name == option.names.end() ? option.positional : *by_name;  // old names stand behind
       ASSERT_TRUE(name.starts_with("--")) << verb.name() << ' ' << name;
       const std::vector<std::string> values =
           option.value == "FLOAT" ? std::vector<std::string>{"nan", "inf", "-inf", "1e39", "-nan"}

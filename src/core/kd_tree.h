@@ -20,26 +20,30 @@ class KdTree {
   // Positions [N,3], all finite.
   explicit KdTree(std::span<const float> positions);
 
-  int64_t size() const { return static_cast<int64_t>(index_.size()); }
+  int64_t size() const { return static_cast<int64_t>(points_.size()); }
 
   // The point at a place of the tree, 0 ≤ place < size(). Points whose places are close lie close together, so that
   // searches in this order find what they need in the cache.
-  int64_t PointAt(int64_t place) const { return index_[static_cast<size_t>(place)]; }
+  int64_t PointAt(int64_t place) const { return points_[static_cast<size_t>(place)].index; }
 
   // The points nearest to that at `place`, without itself, by rising distance, as many as fit into `nearest`. Returns
   // how many there are: fewer than asked for when the tree has no more. Which of several equally far ones are taken
   // depends on the order of the positions alone, and many points at one place cost no more than others.
   int64_t Nearest(int64_t place, std::span<Neighbour> nearest) const;
+  // The same with the points' places in the place of their indices.
+  int64_t NearestPlaces(int64_t place, std::span<Neighbour> nearest) const;
 
  private:
-  using Point = std::array<double, 3>;
+  struct Point {
+    std::array<float, 3> position;
+    int64_t index;
+  };
   struct Search;
 
-  void Build(std::span<const Point> points, int64_t begin, int64_t end);
+  void Build(int64_t begin, int64_t end);
 
   // In the order of the tree: the middle of every range divides it along its widest side, which `axis_` keeps there.
   Buffer<Point> points_;
-  Buffer<int64_t> index_;
   Buffer<uint8_t> axis_;
 };
 

@@ -9,8 +9,11 @@
 #include "core/statistics.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
+#include "enhance/clean.h"
+#include "enhance/enhance_region.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
+#include "enhance/gaussian_budget.h"
 #include "enhance/lost_width.h"
 #include "enhance/pixel_size_guard.h"
 #include "enhance/refine_method.h"
@@ -34,10 +37,19 @@ std::vector<EnhanceMethod>& Registry() {
       {.name = "filter",
        .summary = "give the width back that the fit absorbed; instant, no weights",
        .rank = 0,
-       .options = WidthOptions(),
+       .options =
+           [] {
+             std::vector<MethodOption> options = WidthOptions();
+             options.push_back({"max-gaussians", {}});
+             return options;
+           }(),
+       .expected = [](int64_t count, const EnhanceOptions& options) -> int64_t {
+         return options.max_gaussians > 0 ? std::min(count, options.max_gaussians) : count;
+       },
        .seconds = [](const EnhanceOptions&) { return 4e-7; },
        .ready = [](const EnhanceOptions&) { return Status(); },
        .run = [](EnhanceInput input, const EnhanceOptions& options, StepReport&) -> Result<GaussianCloud> {
+         LeaveRegion(input);
          ANCHORSPLAT_RETURN_IF_ERROR([&]() -> Status {
            const auto grown = ApplyFilter(input.cloud, input.pixel_sizes,
                                           {.upscale = options.upscale, .strength = input.filter_strength});
@@ -137,49 +149,6 @@ Status PixelSizesFromPictures(const EnhanceOptions& options, EnhanceInput& input
   with_cameras.camera_rule = CameraPixelRule::kMedian;
   ANCHORSPLAT_RETURN_IF_ERROR(PixelSizesFromTrainingCameras(with_cameras, input, report));
   report.pixel_size_source = "pictures";
-  return {};
-}
-
-// EnhanceOptions::clean.
-Status Clean(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport& report) {
-  CameraSet set;
-  if (options.cameras) set = *options.cameras;
-  if (!options.refine.images.empty() && (set.cameras.empty() || !set.background)) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(
-        TrainingViews project,
-        OpenProject(options.refine.images, {.hold_out = 0, .downscale = options.refine.downscale}));
-    if (set.cameras.empty()) set.cameras = std::move(project.train);
-    if (!set.background) set.background = project.background;
-  }
-  if (set.cameras.empty()) {
-    LogWarning(
-        "--clean looks from outside only, as there are no cameras; of a scene seen from within it may take what only "
-        "its training views show (--cameras)");
-  }
-  UnseenOptions unseen{.seed = options.seed};
-  unseen.background = options.background.value_or(set.background.value_or(unseen.background));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(report.cleaned, FindUnseen(cloud, set.cameras, unseen));
-  const UnseenGaussians& found = *report.cleaned;
-  const auto count = static_cast<int64_t>(found.rows.size());
-  LogInfo(Cat("cleaned: ", WithThousands(count), " of ", WithThousands(cloud.size()),
-              " Gaussians taken out, which have the background's colour and are missed in none of ", found.views,
-              " views over it"));
-  if (count == 0) return {};
-  if (count == cloud.size()) {
-    return Error{
-        ErrorCode::kBadArgument,
-        "--clean would take out every Gaussian: is the background another one than in training (--background)?"};
-  }
-  std::vector<int64_t> kept;
-  auto gone = found.rows.begin();
-  for (int64_t i = 0; i < cloud.size(); ++i) {
-    if (gone != found.rows.end() && *gone == i) {
-      ++gone;
-    } else {
-      kept.push_back(i);
-    }
-  }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(cloud, Subset(cloud, kept));
   return {};
 }
 
@@ -488,9 +457,15 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
 
   LeaveIfAbandoned();
   const Stopwatch watch;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, RunPlan(plan, sized, std::move(input), options, report));
+  EnhanceOptions within = options;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud rest, SetRestAside(options, input, within, report));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, RunPlan(plan, sized, std::move(input), within, report));
+  // Methods that make no copies, and what a region's border leaves of them.
+  (void)LeaveOutLeastVisible(within.max_gaussians, out);
+  if (options.region) ANCHORSPLAT_RETURN_IF_ERROR(Append(out, rest));
   report.seconds = watch.Total();
   report.gaussians_out = out.size();
+  if (options.region) return Enhanced{std::move(out), std::move(report)};
   if (!sized.any || GivesWidth(report.filter_strength, options.upscale, out.render_mode)) {
     out.comments.push_back(EnhancedComment(report.method, options.upscale));
   }

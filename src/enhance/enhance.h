@@ -11,6 +11,7 @@
 
 #include "core/camera.h"
 #include "core/gaussian_cloud.h"
+#include "core/region.h"
 #include "core/result.h"
 #include "enhance/model_settings.h"
 #include "enhance/pixel_size.h"
@@ -45,9 +46,16 @@ struct EnhanceOptions {
   // Before all else: Gaussians that nobody misses over the training background are taken out. Of the views of `cameras`
   // or of the pictures to refine against, else of views all around.
   bool clean = false;
+  // Gaussians of the result at most; 0: no bound. SetBudget tells the methods' own options.
+  int64_t max_gaussians = 0;
+  // Only what lies in there is enhanced. The rest stays bit by bit, behind it, and a splat of which only a part was is
+  // not marked as enhanced.
+  std::optional<Region> region;
   std::optional<std::array<float, 3>> background;  // for `clean`; what the cameras say otherwise, else black
   uint64_t seed = 0;
 };
+
+void SetBudget(EnhanceOptions& options, int64_t max_gaussians);
 
 // The splat says nothing about its pixels, so that no method can know what to do: it has been left as it is.
 inline constexpr const char* kUnknownPixelSize = "unknown";
@@ -75,6 +83,8 @@ struct EnhanceReport {
   int64_t dropped = 0;                     // rows with values that are not finite, and what the steps dropped
   std::optional<UnseenGaussians> cleaned;  // of those that are not dropped
   int64_t gaussians_out = 0;
+  int64_t region_in = 0;                // Gaussians in the region, where there is one …
+  std::optional<int64_t> kept_outside;  // … and those outside, which are part of the result
   double upscale = 1;
   double filter_strength = 0;
   double pixel_size = 0;  // p_LR, the median when there is one per Gaussian
@@ -97,9 +107,13 @@ struct EnhanceInput {
   double pixel_size = 0;       // their median
   double unlike_standard = 0;  // PixelSizeEstimate::unlike_standard; 0 where nothing was estimated
   double filter_strength = 0;
+  std::vector<char> inside;       // which of the cloud's Gaussians are enhanced: results are of these; empty: all
   GaussianCloud start;            // what the method before it made, of "A+B"; else empty
   bool start_has_detail = false;  // EnhanceMethod::adds_detail of that method
 };
+
+// For methods that look at no others: leaves those inside.
+void LeaveRegion(EnhanceInput& input);
 
 struct EnhanceMethod;
 

@@ -95,8 +95,8 @@ TEST_F(Plan, AutoIsInstantUnlessThereArePictures) {
 
 // Of all that methods look at, what the chosen one does not look at is refused, and nothing else is.
 TEST_F(Plan, WhatHasNoEffectIsRefused) {
-  const std::set<std::string> of_filter = {"upscale",     "pixel-size",  "cameras",
-                                           "train-width", "camera-rule", "filter-strength"};
+  const std::set<std::string> of_filter = {"upscale",     "pixel-size",      "cameras",      "train-width",
+                                           "camera-rule", "filter-strength", "max-gaussians"};
   std::set<std::string> all;
   for (const EnhanceMethod& method : EnhanceMethods()) {
     for (const MethodOption& option : method.options) all.insert(option.name);
@@ -133,9 +133,7 @@ TEST_F(Plan, RefinementSaysWhatItsOptionsNeed) {
   options_.cameras.emplace();
   EXPECT_EQ(Given("between"), "");
   EXPECT_THAT(Given("poses"), HasSubstr("without --images and --cameras"));
-  EXPECT_EQ(Given("most-gaussians"), "");
-  options_.refine.copies = 1;
-  EXPECT_THAT(Given("most-gaussians"), HasSubstr("with --k above 1"));
+  EXPECT_EQ(Given("max-gaussians"), "");
   EXPECT_EQ(Given("half-from"), "");
   options_.upscale = 1;
   EXPECT_THAT(Given("half-from"), HasSubstr("with --upscale above 1"));
@@ -145,7 +143,7 @@ TEST_F(Plan, RefinementSaysWhatItsOptionsNeed) {
   EXPECT_THAT(Given("checkpoint"), HasSubstr("without --seconds"));
   options_.refine.images = "pictures";
   options_.refine.copies.reset();
-  for (const char* name : {"hold-out", "exposure", "robust", "align", "most-gaussians", "filter-strength"}) {
+  for (const char* name : {"hold-out", "exposure", "robust", "align", "max-gaussians", "filter-strength"}) {
     EXPECT_EQ(Given(name), "") << name;
   }
   EXPECT_THAT(Given("between"), HasSubstr("without --images"));
@@ -154,7 +152,7 @@ TEST_F(Plan, RefinementSaysWhatItsOptionsNeed) {
   options_.seed = kWithNetwork;
   options_.method = "sharpen+refine";
   EXPECT_FALSE(Given("filter-strength").empty());
-  EXPECT_FALSE(Given("most-gaussians").empty());
+  EXPECT_EQ(Given("max-gaussians"), "");
   options_.method = "filter+refine";
   EXPECT_EQ(Given("filter-strength"), "");
 }

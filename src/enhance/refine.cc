@@ -32,6 +32,7 @@ Result<std::string> Settings(const RefineInput& input, const GaussianCloud& star
   nlohmann::json json = nlohmann::json::parse(ToJsonText(options));
   json["upscale"] = input.upscale;
   json["seed"] = input.seed;
+  if (input.fixed > 0) json["fixed"] = input.fixed;
   json["background"] = views.render.background;
   if (IsCompensated(views.render.mode)) json["mode"] = NameOf(views.render.mode);
   json["input"] = FingerprintOf(input.cloud);
@@ -43,8 +44,26 @@ Result<std::string> Settings(const RefineInput& input, const GaussianCloud& star
   return json.dump();
 }
 
-// Steps until they are done, the time is over or the user stops it.
-Status MakeSteps(Refiner& refiner, const RefineOptions& options, RefineReport& report) {
+// The last rows of `cloud` as they are in `from`.
+void PutBack(const GaussianCloud& from, int64_t rows, GaussianCloud& cloud) {
+  const auto copy = [&](const Buffer<float>& source, int64_t width, Buffer<float>& target) {
+    std::copy(source.end() - rows * width, source.end(), target.end() - rows * width);
+  };
+  copy(from.means, 3, cloud.means);
+  copy(from.log_scales, 3, cloud.log_scales);
+  copy(from.quats, 4, cloud.quats);
+  copy(from.opacity_logits, 1, cloud.opacity_logits);
+  copy(from.sh, from.sh_stride(), cloud.sh);
+}
+
+GaussianCloud WithoutLast(GaussianCloud cloud, int64_t rows) {
+  if (rows > 0) cloud.Resize(cloud.size() - rows, cloud.sh_degree);
+  return cloud;
+}
+
+// Steps until they are done, the time is over or the user stops it. The last `fixed` Gaussians stay those of `start`.
+Status MakeSteps(Refiner& refiner, const RefineOptions& options, const GaussianCloud& start, int64_t fixed,
+                 RefineReport& report) {
   const Stopwatch watch;
   const auto done = [&] {
     if (!options.seconds) return static_cast<double>(refiner.state().step) / static_cast<double>(*options.steps);
@@ -57,6 +76,7 @@ Status MakeSteps(Refiner& refiner, const RefineOptions& options, RefineReport& r
   std::string note;
   for (double part = done(); part < 1; part = done()) {
     ANCHORSPLAT_RETURN_IF_ERROR(refiner.Step(part));
+    if (fixed > 0) PutBack(start, fixed, refiner.state().cloud);
     if (refiner.state().step % kNoteEvery == 0) {
       const double last = refiner.LastPsnr();
       psnr = psnr == 0 ? last : 0.9 * psnr + 0.1 * last;  // single views differ by several dB
@@ -72,12 +92,13 @@ Status MakeSteps(Refiner& refiner, const RefineOptions& options, RefineReport& r
   return {};
 }
 
-// Without what nobody sees and what is not finite.
-GaussianCloud Pruned(GaussianCloud cloud, RefineReport& report) {
+// Without what nobody sees and what is not finite, but for the last `fixed`.
+GaussianCloud Pruned(GaussianCloud cloud, int64_t fixed, RefineReport& report) {
   const auto least = static_cast<float>(std::log(kInvisible / (1 - kInvisible)));
   std::vector<int64_t> kept;
   for (int64_t i = 0; i < cloud.size(); ++i) {
-    if (IsUsable(cloud, i) && cloud.opacity_logits[static_cast<size_t>(i)] >= least) kept.push_back(i);
+    const bool seen = IsUsable(cloud, i) && cloud.opacity_logits[static_cast<size_t>(i)] >= least;
+    if (seen || i >= cloud.size() - fixed) kept.push_back(i);
   }
   const int64_t pruned = cloud.size() - static_cast<int64_t>(kept.size());
   if (pruned == 0 || kept.empty()) return cloud;
@@ -108,7 +129,7 @@ Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianClou
   const RefineProblem problem{views.render, input.upscale, views.scene_scale, input.seed};
   ANCHORSPLAT_ASSIGN_OR_RETURN(Refiner refiner,
                                Refiner::Begin(plan.options, problem, std::move(views.train), std::move(state)));
-  ANCHORSPLAT_RETURN_IF_ERROR(MakeSteps(refiner, plan.options, report));
+  ANCHORSPLAT_RETURN_IF_ERROR(MakeSteps(refiner, plan.options, start, input.fixed, report));
   report.steps = refiner.state().step;
   report.times = refiner.times();
   if (report.interrupted && !control.checkpoint.empty() && !plan.options.seconds) {
@@ -116,7 +137,7 @@ Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianClou
     const Status written = WriteFitCheckpoint(control.checkpoint, refiner.state(), settings);
     if (!written.ok()) LogWarning(Cat("there is nothing to resume from: ", written.error().message));
   }
-  GaussianCloud result = Pruned(std::move(refiner.state().cloud), report);
+  GaussianCloud result = Pruned(std::move(refiner.state().cloud), input.fixed, report);
   result.render_mode = input.cloud.render_mode;
   result.comments = start.comments;  // a checkpoint has neither
   return result;
@@ -150,6 +171,7 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
   };
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const RefineOptions options, ChooseRefineOptions(input, given));
+  KeepToBudget(options.max_gaussians, input.fixed, input.start);
   ANCHORSPLAT_ASSIGN_OR_RETURN(RefineViews views, OpenRefineViews(input, options));
   const bool resumes = control.resume && Exists(control.checkpoint);
   ANCHORSPLAT_ASSIGN_OR_RETURN(report.plan, PlanRefinement(input, options, resumes, views));
@@ -159,15 +181,18 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
   report.input_psnr = views.input_psnr;
   report.before = plan.before;
   GaussianCloud start = plan.from_input ? input.cloud : std::move(input.start);
-  if (plan.nothing_to_do) return timed(KeptStart(std::move(start), std::move(report)));
+  if (plan.from_input) KeepToBudget(options.max_gaussians, input.fixed, start);
+  if (plan.nothing_to_do) return timed(KeptStart(WithoutLast(std::move(start), input.fixed), std::move(report)));
   report.copies = *plan.options.copies;
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud result, RunRefinement(input, start, resumes, control, views, report));
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(report.after,
                                MeasureConsistency(result, input.upscale, input.cloud, plan.options, views));
-  if (!IsWorthIt(plan, report.after)) return timed(KeptStart(std::move(start), std::move(report)));
-  return timed({std::move(result), std::move(report)});
+  if (!IsWorthIt(plan, report.after)) {
+    return timed(KeptStart(WithoutLast(std::move(start), input.fixed), std::move(report)));
+  }
+  return timed({WithoutLast(std::move(result), input.fixed), std::move(report)});
 }
 
 }  // namespace anchorsplat

@@ -22,6 +22,7 @@ namespace anchorsplat {
 struct RefineInput {
   GaussianCloud cloud;               // the splat as it was fitted; rows that are not finite are gone
   GaussianCloud start;               // where to begin: the filter's result, or a network's
+  int64_t fixed = 0;                 // last Gaussians of both: they are drawn with the others and stay as they are
   bool start_has_detail = false;     // a network's: it shows more than the splat itself does
   double upscale = 4;                // u, 1 to kMostSamples
   double pixel_size = 0;             // world units; only needed without pictures and cameras
@@ -48,7 +49,7 @@ struct RefineReport {
 };
 
 struct Refined {
-  GaussianCloud cloud;
+  GaussianCloud cloud;  // without RefineInput::fixed
   RefineReport report;
 };
 

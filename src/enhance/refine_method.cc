@@ -6,6 +6,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "enhance/filter.h"
+#include "enhance/gaussian_budget.h"
 #include "enhance/refine.h"
 #include "fit/pixel_model.h"
 
@@ -46,8 +47,15 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
   refine.seed = options.seed;
   refine.start_has_detail = input.start_has_detail;
   refine.start = std::move(input.start);
+  const int64_t inside = input.inside.empty() ? input.cloud.size() : std::ranges::count(input.inside, 1);
   if (refine.start.empty()) {
-    refine.start = input.cloud;
+    EnhanceInput filtered;
+    filtered.cloud = input.cloud;
+    filtered.pixel_sizes = std::move(input.pixel_sizes);
+    filtered.inside = input.inside;
+    LeaveRegion(filtered);
+    input.pixel_sizes = std::move(filtered.pixel_sizes);
+    refine.start = std::move(filtered.cloud);
     const auto grown =
         ApplyFilter(refine.start, input.pixel_sizes, {.upscale = options.upscale, .strength = input.filter_strength});
     if (!grown.ok()) return grown.error();
@@ -67,7 +75,18 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
     report.facts.emplace_back("kept_start", true);
     return std::move(refine.start);
   }
+  refine.fixed = input.cloud.size() - inside;
   refine.cloud = std::move(input.cloud);
+  if (refine.fixed > 0) {
+    // What stays goes behind what is refined, in both.
+    std::vector<char> outside = input.inside;
+    for (char& flag : outside) flag = flag == 0 ? 1 : 0;
+    GaussianCloud rest = refine.cloud;
+    KeepMarked(outside, rest);
+    KeepMarked(input.inside, refine.cloud);
+    ANCHORSPLAT_RETURN_IF_ERROR(Append(refine.cloud, rest));
+    ANCHORSPLAT_RETURN_IF_ERROR(Append(refine.start, rest));
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(Refined refined, Refine(std::move(refine), options.refine, options.control));
   AddFacts(refined.report, report);
   return std::move(refined.cloud);
@@ -97,11 +116,7 @@ std::vector<MethodOption> RefinementOptions() {
       {"steps", {}},
       {"seconds", {}},
       {"k", {}},
-      {"most-gaussians",
-       [](const MethodUse& use) {
-         const bool gentle = use.start != nullptr && use.start->adds_detail && !HasImages(use);
-         return use.options.refine.copies.value_or(gentle ? 1 : 2) > 1 ? "" : "with --k above 1";
-       }},
+      {"max-gaussians", {}},
       {"poses",
        [](const MethodUse& use) { return HasImages(use) || HasCameras(use) ? "without --images and --cameras" : ""; }},
       {"between",
@@ -124,7 +139,10 @@ std::vector<MethodOption> RefinementOptions() {
 bool WithPictures(const EnhanceOptions& options) { return !options.refine.images.empty(); }
 
 // At least; without --k it depends on what there is to see.
-int64_t Expected(int64_t count, const EnhanceOptions& options) { return count * options.refine.copies.value_or(1); }
+int64_t Expected(int64_t count, const EnhanceOptions& options) {
+  const int64_t wanted = count * options.refine.copies.value_or(1), most = options.refine.max_gaussians;
+  return most > 0 ? std::min(wanted, most) : wanted;
+}
 
 }  // namespace
 

@@ -41,7 +41,8 @@ constexpr NamedOption kOptions[] = {
     {"steps", [](RefineOptions& o, double x) { return Assign(x, o.steps); }},
     {"seconds", [](RefineOptions& o, double x) { return Assign(x, o.seconds); }},
     {"k", [](RefineOptions& o, double x) { return Assign(x, o.copies); }},
-    {"most-gaussians", [](RefineOptions& o, double x) { return Assign(x, o.max_gaussians); }},
+    {"max-gaussians", [](RefineOptions& o, double x) { return Assign(x, o.max_gaussians); }},
+    {"most-gaussians", [](RefineOptions& o, double x) { return Assign(x, o.max_gaussians); }},  // its old name
     {"hold-out", [](RefineOptions& o, double x) { return Assign(x, o.hold_out); }},
     {"downscale", [](RefineOptions& o, double x) { return Assign(x, o.downscale); }},
     {"poses", [](RefineOptions& o, double x) { return Assign(x, o.poses); }},

@@ -20,7 +20,7 @@ struct RefineOptions {
   std::optional<int64_t> steps;
   std::optional<double> seconds;           // instead of steps: as many as there are in that time. Not reproducible
   std::optional<int> copies;               // K that every Gaussian is split into at the beginning
-  int64_t max_gaussians = 0;               // that splitting may reach; 0: no bound
+  int64_t max_gaussians = 0;               // of the result at most; 0: no bound
   int poses = 128;                         // without pictures and cameras: places to look from
   int between = 1;                         // without pictures: poses between each camera and its neighbours
   double half_from = 0.3, all_from = 0.7;  // see PixelSchedule

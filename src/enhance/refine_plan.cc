@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/log.h"
+#include "core/most_visible.h"
 #include "core/text.h"
 #include "enhance/refine_copies.h"
 #include "enhance/split_gaussians.h"
@@ -27,18 +28,37 @@ bool IsGentle(const RefineInput& input, const RefineOptions& options) {
   return !HasPictures(options) && input.start_has_detail;
 }
 
-// K as `max_gaussians` allows it.
-void LimitCopies(int64_t gaussians, RefineOptions& options) {
-  if (options.max_gaussians == 0) return;
-  options.copies = static_cast<int>(
-      std::clamp<int64_t>(options.max_gaussians / std::max<int64_t>(1, gaussians), 1, *options.copies));
-  if (gaussians > options.max_gaussians) {
-    LogWarning(Cat("there are ", WithThousands(gaussians), " Gaussians before any is split, more than ",
-                   WithThousands(options.max_gaussians), ": none is split, and none is left out"));
+// What becomes of a splat within `max_gaussians`: the last `fixed` stay one, and what is left of it goes to the largest
+// opacity × size. Nothing where there is room for all.
+std::vector<int> CopiesWithin(const GaussianCloud& start, int64_t fixed, RefineOptions& options) {
+  const int64_t n = start.size() - fixed, most = options.max_gaussians;
+  const bool bound = most > 0 && n * *options.copies > most;
+  if (bound) options.copies = static_cast<int>(std::max<int64_t>(1, most / std::max<int64_t>(1, n)));
+  if (!bound && fixed == 0) return {};
+  std::vector<int> each(static_cast<size_t>(start.size()), 1);
+  std::fill_n(each.begin(), n, *options.copies);
+  if (!bound) return each;
+  std::vector<int64_t> rows(static_cast<size_t>(n));
+  std::iota(rows.begin(), rows.end(), int64_t{0});
+  for (const int64_t row : MostVisible(start, rows, std::max<int64_t>(0, most - n * *options.copies))) {
+    ++each[static_cast<size_t>(row)];
   }
+  return each;
 }
 
 }  // namespace
+
+void KeepToBudget(int64_t max_gaussians, int64_t fixed, GaussianCloud& start) {
+  if (max_gaussians == 0 || start.size() - fixed <= max_gaussians) return;
+  std::vector<int64_t> rows(static_cast<size_t>(start.size() - fixed));
+  std::iota(rows.begin(), rows.end(), int64_t{0});
+  LogWarning(Cat("--max-gaussians ", WithThousands(max_gaussians),
+                 " are fewer than there are before any is split: the ",
+                 WithThousands(start.size() - fixed - max_gaussians), " of the least opacity × size are left out"));
+  rows = MostVisible(start, rows, max_gaussians);
+  for (int64_t row = start.size() - fixed; row < start.size(); ++row) rows.push_back(row);
+  start = Subset(start, rows).value();
+}
 
 Result<RefineOptions> ChooseRefineOptions(const RefineInput& input, const RefineOptions& given) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(given));
@@ -68,8 +88,16 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const RefineOptions&
   if (pictures && IsCompensated(views.render.mode)) plan.least_gain = kGainOverFine;
   if (pictures) {
     // A splat that has lost no width is spoiled by what gives it back: the pictures tell.
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double as_it_is,
-                                 MeasureConsistency(input.cloud, input.upscale, input.cloud, chosen, views));
+    const auto measure = [&](const GaussianCloud& cloud) {
+      return MeasureConsistency(cloud, input.upscale, input.cloud, chosen, views);
+    };
+    const bool too_many = chosen.max_gaussians > 0 && input.cloud.size() - input.fixed > chosen.max_gaussians;
+    GaussianCloud less;
+    if (too_many) {
+      less = input.cloud;
+      KeepToBudget(chosen.max_gaussians, input.fixed, less);
+    }
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double as_it_is, measure(too_many ? less : input.cloud));
     if (as_it_is > plan.before) {
       plan.why = "the splat agrees better with the pictures as it is: the refinement begins with that";
       plan.before = as_it_is;
@@ -89,15 +117,24 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const RefineOptions&
     plan.options.copies = ChooseCopies(density, input.upscale, pictures ? kCopiesWithPictures : kCopiesWithout,
                                        input.cloud.size(), start.size());
   }
-  LimitCopies(start.size(), plan.options);
-  if (resumes) return plan;
+  plan.each = CopiesWithin(start, input.fixed, plan.options);
   const int copies = *plan.options.copies;
-  plan.gaussians = start.size() * copies;
+  const int64_t changing = start.size() - input.fixed;
+  plan.gaussians =
+      plan.each.empty() ? start.size() * copies : std::accumulate(plan.each.begin(), plan.each.end(), int64_t{0});
+  const int64_t wanted = plan.gaussians - input.fixed;
+  if (resumes) {
+    plan.each.clear();
+    plan.gaussians = 0;
+    return plan;
+  }
   // More where the pictures find more wrong. Without pictures the differences are what the fit itself got wrong; copies
   // do not help there.
-  if (pictures && copies > 1) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> residuals, Residuals(start, input.upscale, views));
-    plan.each = CopiesByResidual(residuals, copies);
+  if (pictures && wanted > changing) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<double> residuals, Residuals(start, input.upscale, views));
+    residuals.resize(static_cast<size_t>(changing));
+    plan.each = CopiesByResidual(residuals, copies, wanted);
+    plan.each.resize(static_cast<size_t>(start.size()), 1);
     plan.gaussians = std::accumulate(plan.each.begin(), plan.each.end(), int64_t{0});
   }
   return plan;

@@ -10,6 +10,10 @@ namespace anchorsplat {
 // photographs without photographs.
 Result<RefineOptions> ChooseRefineOptions(const RefineInput& input, const RefineOptions& given);
 
+// Leaves as many of all but the last `fixed` Gaussians as there may be, those of the largest opacity × size, with a
+// warning; 0: no bound.
+void KeepToBudget(int64_t max_gaussians, int64_t fixed, GaussianCloud& start);
+
 // The rest: looks at the views. What `resumes` is not split, so that nothing is measured for that. Errors: those of
 // MeasureConsistency, MeasureDensity and Residuals.
 Result<RefinePlan> PlanRefinement(const RefineInput& input, const RefineOptions& chosen, bool resumes,

@@ -60,14 +60,6 @@ TEST_F(Refinement, SplitsNothingThatNoPixelWouldShow) {
   EXPECT_EQ(Refine(input_, options_, {})->report.copies, 3) << "what is said counts";
 }
 
-TEST_F(Refinement, MoreGaussiansHaveABound) {
-  options_.steps = 20;
-  const GaussianCloud one = Refine(input_, options_, {})->cloud;
-  options_.copies = 5;
-  options_.max_gaussians = 299;  // no room for two each
-  ExpectSameCloud(Refine(input_, options_, {})->cloud, one);
-}
-
 TEST_F(Refinement, WhatIsRightAlreadyStays) {
   options_.images.clear();
   options_.steps = 10;

@@ -70,8 +70,7 @@ Result<GaussianCloud> SplitGaussians(const GaussianCloud& cloud, const SplitOpti
   return out;
 }
 
-std::vector<int> CopiesByResidual(std::span<const double> residuals, int copies) {
-  const auto n = static_cast<int64_t>(residuals.size());
+std::vector<int> CopiesByResidual(std::span<const double> residuals, int copies, int64_t all) {
   std::vector<int> each(residuals.size(), copies);
   const auto fill = [&](double factor) {
     int64_t sum = 0;
@@ -87,10 +86,10 @@ std::vector<int> CopiesByResidual(std::span<const double> residuals, int copies)
   for (const double residual : residuals) largest = std::max(largest, residual);
   if (!(largest > 0) || !std::isfinite(largest)) return each;
   double low = 0, high = 1 / std::sqrt(largest);
-  for (int i = 0; i < kDoublings && fill(high) < copies * n; ++i) high *= 2;
+  for (int i = 0; i < kDoublings && fill(high) < all; ++i) high *= 2;
   for (int i = 0; i < kHalvings; ++i) {
     const double middle = 0.5 * (low + high);
-    (fill(middle) > copies * n ? high : low) = middle;
+    (fill(middle) > all ? high : low) = middle;
   }
   fill(low);
   return each;

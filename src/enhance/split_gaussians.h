@@ -29,10 +29,10 @@ struct SplitOptions {
 // `each` that is not that of the Gaussians, a negative spread or shrink.
 Result<GaussianCloud> SplitGaussians(const GaussianCloud& cloud, const SplitOptions& options);
 
-// How many copies each Gaussian is to have, `copies` · N in all or, where bounds forbid it, nearly so: in proportion to
+// How many copies each Gaussian is to have, `all` together or, where bounds forbid it, nearly so: in proportion to
 // the square root of its `residual` (≥ 0), at least 1 and at most kMostShare · copies. Where what is there is right
 // already, more Gaussians have nothing to draw.
 inline constexpr int kMostShare = 4;
-std::vector<int> CopiesByResidual(std::span<const double> residuals, int copies);
+std::vector<int> CopiesByResidual(std::span<const double> residuals, int copies, int64_t all);
 
 }  // namespace anchorsplat

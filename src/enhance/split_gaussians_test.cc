@@ -77,16 +77,17 @@ TEST(SplitGaussians, EveryGaussianHasItsOwnNumber) {
 TEST(CopiesByResidual, FollowItsRoot) {
   std::vector<double> residuals;
   for (int i = 0; i < 1000; ++i) residuals.push_back(i % 4 == 0 ? 9e-5 : 1e-5);
-  const std::vector<int> each = CopiesByResidual(residuals, 8);
+  const std::vector<int> each = CopiesByResidual(residuals, 8, 8 * std::ssize(residuals));
   int64_t sum = 0;
   for (const int copies : each) sum += copies;
   EXPECT_LE(sum, 8000);
   EXPECT_GT(sum, 7000);
   EXPECT_NEAR(each[0], 3.0 * each[1], 2);
   for (const auto& odd : {std::vector<double>{0, 0}, {NAN, 1}, {1e300, 1e-300}, {-1, 5}, {INFINITY, 1}}) {
-    for (const int copies : CopiesByResidual(odd, 3)) EXPECT_TRUE(copies >= 1 && copies <= 12) << odd[0];
+    for (const int copies : CopiesByResidual(odd, 3, 3 * std::ssize(odd)))
+      EXPECT_TRUE(copies >= 1 && copies <= 12) << odd[0];
   }
-  EXPECT_TRUE(CopiesByResidual({}, 3).empty());
+  EXPECT_TRUE(CopiesByResidual({}, 3, 0).empty());
 }
 
 TEST(SplitGaussians, Edges) {

@@ -220,16 +220,17 @@ Status SetOption(RegisteredMethod& method, std::string_view key, std::string_vie
   if (key == "copies" || key == "max-gaussians" || key == "merge-cost") {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double number, ParseCount(method.word, key, value));
     if (key == "copies") method.model.copies = static_cast<int64_t>(number);
-    if (key == "max-gaussians") method.model.options.max_gaussians = static_cast<int64_t>(number);
+    if (key == "max-gaussians") {
+      method.model.options.max_gaussians = method.refine.max_gaussians = static_cast<int64_t>(number);
+    }
     if (key == "merge-cost") method.model.merge_cost = number;
     return {};
   }
   if (key != "f") {
     const Status set = SetRefineOption(method.refine, key, value);
     if (set.ok()) return set;
-    return Error{ErrorCode::kBadArgument,
-                 Cat("--methods ", Printable(method.word), ": ", set.error().message,
-                     "; f is that of the filter, copies, merge-cost and max-gaussians are the network's")};
+    return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(method.word), ": ", set.error().message,
+                                              "; f is that of the filter, copies and merge-cost are the network's")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(method.filter_strength, ParseStrength(method.word, value));
   return {};
@@ -315,6 +316,7 @@ EvalMethod Registered(const RegisteredMethod& method) {
             if (!method.auto_pixel_size) options.cameras = TrainingCameras(task.object);
             options.refine = method.refine;
             options.model = method.model;
+            options.max_gaussians = method.refine.max_gaussians;
             options.filter_strength = method.filter_strength;
             if (method.name.ends_with("refine-images")) {
               options.refine.images = task.object.low_project;

@@ -11,8 +11,10 @@
 
 #include "core/activations.h"
 #include "core/log.h"
+#include "core/stopwatch.h"
 #include "core/text.h"
 #include "enhance/filter.h"
+#include "enhance/gaussian_budget.h"
 #include "enhance/unseen_gaussians.h"
 #include "io/file_version.h"
 #include "model/any_network.h"
@@ -74,8 +76,9 @@ std::vector<MethodOption> NetworkOptions() {
   return options;
 }
 
-Result<GaussianCloud> EnhanceWithPublished(const EnhanceInput& input, const PublishedNetwork& network,
+Result<GaussianCloud> EnhanceWithPublished(EnhanceInput input, const PublishedNetwork& network,
                                            const PublishedOptions& options, StepReport& report) {
+  LeaveRegion(input);
   ANCHORSPLAT_ASSIGN_OR_RETURN(PublishedResult result, EnhanceWithPublishedNetwork(input.cloud, network, options));
   const PublishedReport& r = result.report;
   report.dropped += r.not_finite + r.outside;
@@ -136,11 +139,14 @@ class LastNetwork {
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
                                                 const ModelSettings& model, StepReport& report) {
   // Of what stays one Gaussian for one.
+  const CopyChoice choice = {model.copies, model.merge_cost.value_or(kMergeCost), model.options.max_gaussians,
+                             model.options.prune_opacity};
   const auto within_budget = [&]() -> Result<GaussianCloud> {
+    ANCHORSPLAT_RETURN_IF_ERROR(Validate(CopyChoice{.max_gaussians = choice.max_gaussians}, 1));
+    LeaveRegion(input);
     report.facts = {{"copies", int64_t{1}}};
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const ChosenCopies kept,
-                                 ChooseCopies({}, {.max_gaussians = model.options.max_gaussians}, input.cloud));
-    if (kept.left_out > 0) report.facts.emplace_back("left_out", kept.left_out);
+    const int64_t left_out = LeaveOutLeastVisible(model.options.max_gaussians, input.cloud);
+    if (left_out > 0) report.facts.emplace_back("left_out", left_out);
     return std::move(input.cloud);
   };
   if (input.filter_strength <= ShownStrength(upscale, input.cloud.render_mode)) {
@@ -156,15 +162,22 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
     if (!grown.ok()) return grown.error();
     return within_budget();
   }
-  const auto n = static_cast<double>(input.cloud.size());
+  const int64_t count = input.inside.empty() ? input.cloud.size() : std::ranges::count(input.inside, 1);
+  const auto n = static_cast<double>(count);
   // Dust is not worth copies. Whoever asks for a number gets it.
   std::vector<int64_t> dust;
+  const Stopwatch watch;
   if (!model.copies) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(dust, PredictUnseen(input.cloud));
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(CompactResult result, network.Apply(input.cloud, {.pixel_sizes = input.pixel_sizes,
-                                                                                 .upscale = upscale,
-                                                                                 .strength = input.filter_strength}));
+  const double seconds_unseen = watch.Total();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CompactResult result,
+                               network.Apply(std::move(input.cloud), {.pixel_sizes = input.pixel_sizes,
+                                                                      .upscale = upscale,
+                                                                      .strength = input.filter_strength,
+                                                                      .choice = choice,
+                                                                      .single = dust,
+                                                                      .inside = input.inside}));
   const auto outside = static_cast<double>(result.outside), partly = static_cast<double>(result.partly);
   if (outside + partly > kNotable * n) {
     const auto [least, greatest] = network.TrainedUpscales();
@@ -178,7 +191,7 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
                           : "");
     outside + partly > kMost* n ? LogWarning(text) : LogInfo(text);
   }
-  if (result.not_finite > 0 && result.not_finite == input.cloud.size() - result.outside) {
+  if (result.not_finite > 0 && result.not_finite == count - result.outside) {
     return Error{ErrorCode::kBadFile,
                  "the network says NaN or infinite values for every Gaussian: its weights are damaged"};
   }
@@ -186,40 +199,28 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
     LogWarning(Cat("the network says NaN or infinite values for ", WithThousands(result.not_finite),
                    " Gaussians: filtered only. Are its weights damaged?"));
   }
-  const float prune_opacity = model.options.prune_opacity;
-  const int64_t made = result.cloud.size();
-  std::vector<float> pixels;  // of the closer view
-  if (input.pixel_sizes.size() == 1) {
-    pixels = {static_cast<float>(input.pixel_sizes.front() / upscale)};
-  } else {
-    for (const int64_t i : result.anchors) {
-      pixels.push_back(static_cast<float>(input.pixel_sizes[static_cast<size_t>(i)] / upscale));
-    }
-  }
-  std::vector<char> single;
-  for (const int64_t i : result.anchors) single.push_back(std::ranges::binary_search(dust, i) ? 1 : 0);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(
-      const ChosenCopies chosen,
-      ChooseCopies({std::ssize(result.anchors), network.config().copies, pixels, single},
-                   {model.copies, model.merge_cost.value_or(kMergeCost), model.options.max_gaussians, prune_opacity},
-                   result.cloud));
   const int64_t before = result.cloud.size();
-  if (prune_opacity > 0) {
-    std::vector<int64_t> kept;
-    for (int64_t i = 0; i < before; ++i) {
-      if (Sigmoid(result.cloud.opacity_logits[static_cast<size_t>(i)]) >= prune_opacity) kept.push_back(i);
+  if (choice.invisible > 0) {
+    std::vector<char> keep(static_cast<size_t>(before));
+    for (size_t i = 0; i < keep.size(); ++i) {
+      keep[i] = Sigmoid(result.cloud.opacity_logits[i]) >= choice.invisible ? 1 : 0;
     }
-    ANCHORSPLAT_ASSIGN_OR_RETURN(result.cloud, Subset(result.cloud, kept));
+    KeepMarked(keep, result.cloud);
   }
   report.facts = {{"copies", network.config().copies},
                   {"unlike_training", result.outside},
                   {"partly_unlike_training", result.partly},
                   {"output_not_finite", result.not_finite},
-                  {"copies_made", made},
-                  {"merged", chosen.merged},
+                  {"copies_made", result.made},
+                  {"merged", result.chosen.merged},
                   {"unseen", std::ssize(dust)},
                   {"pruned", before - result.cloud.size()},
-                  {"left_out", chosen.left_out}};
+                  {"left_out", result.chosen.left_out},
+                  {"seconds_unseen", seconds_unseen},
+                  {"seconds_neighbours", result.times.neighbours},
+                  {"seconds_network", result.times.network},
+                  {"seconds_copies", result.times.copies},
+                  {"seconds_order", result.times.order}};
   return std::move(result.cloud);
 }
 
@@ -259,7 +260,7 @@ void RegisterModelMethod() {
          ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const AnyNetwork> network,
                                       last->Get(options.model, shipped));
          if (const auto* published = std::get_if<PublishedNetwork>(network.get())) {
-           return EnhanceWithPublished(input, *published, options.model.options, report);
+           return EnhanceWithPublished(std::move(input), *published, options.model.options, report);
          }
          Result<GaussianCloud> out = EnhanceWithCompactNetwork(
              std::move(input), options.upscale, std::get<CompactNetwork>(*network), options.model, report);

@@ -79,6 +79,15 @@ void AddMethodFlags(CLI::App& verb, EnhanceFlags& flags) {
       ->check(CLI::IsMember({"fast", "good", "best"}));
   verb.add_option("--upscale", options.upscale, "How many times closer it will be seen; at least 1")
       ->capture_default_str();
+  verb.add_option("--max-gaussians,--most-gaussians", options.max_gaussians,
+                  "Budget of the result, spent where the closer view shows it: the cheapest copies of a network are "
+                  "merged, refinement splits what is seen most. Of the published architecture: anchors at most, the "
+                  "largest by opacity x size. 0 is all")
+      ->check(NotNegative())
+      ->capture_default_str();
+  verb.add_option("--region", flags.region,
+                  "Only what lies in there is enhanced, the rest stays as it is: a box X0,Y0,Z0,X1,Y1,Z1 or a sphere "
+                  "X,Y,Z,RADIUS, in the splat's unit");
 }
 
 void AddPixelSizeFlags(CLI::App& verb, EnhanceFlags& flags) {
@@ -147,11 +156,6 @@ void AddModelFlags(CLI::App& verb, EnhanceFlags& flags) {
                                "Of --copies auto: what a merge may cost, in pixels of the closer view times the square "
                                "of the difference; more is fewer Gaussians (default: 0.00002)"))
       ->check(NotNegative());
-  model_option(verb.add_option("--max-gaussians", model.max_gaussians,
-                               "Budget of the result: copies are merged until it is kept. Of the published "
-                               "architecture: anchors at most, the largest by opacity x size. 0 is all"))
-      ->check(NotNegative())
-      ->capture_default_str();
   verb.add_option("--prune-opacity", model.prune_opacity,
                   "Leave Gaussians of less opacity out of what the model makes; 1/255 = 0.0039 is invisible")
       ->check(Fraction())
@@ -182,6 +186,10 @@ void EnhanceFlags::AddTo(CLI::App& verb) {
 Result<EnhanceOptions> MakeEnhanceOptions(const EnhanceFlags& flags, uint64_t seed, const CameraSet* cameras) {
   EnhanceOptions options = flags.options;
   ANCHORSPLAT_RETURN_IF_ERROR(FinishModelOptions(flags, options.model));
+  SetBudget(options, options.max_gaussians);
+  if (!flags.region.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(options.region, ParseRegion("--region", flags.region));
+  }
   options.seed = seed;
   ANCHORSPLAT_ASSIGN_OR_RETURN(options.pixel_size, ParsePixelSize("--pixel-size", flags.pixel_size));
   if (cameras != nullptr) {
@@ -204,6 +212,7 @@ nlohmann::json ToJson(const EnhanceReport& r) {
     json["cleaned"] = {{"gaussians", r.cleaned->rows.size()}, {"views", r.cleaned->views}, {"psnr", nullptr}};
     if (std::isfinite(r.cleaned->psnr)) json["cleaned"]["psnr"] = r.cleaned->psnr;
   }
+  if (r.kept_outside) json["region"] = {{"gaussians", r.region_in}, {"kept_outside", *r.kept_outside}};
   if (!r.quality.empty()) json["quality"] = r.quality;
   for (const StepReport& step : r.steps) {
     const std::string key = json.contains(step.method) ? step.method + " again" : step.method;

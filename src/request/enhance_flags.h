@@ -24,6 +24,7 @@ struct EnhanceFlags {
   std::string copies = "auto";
   std::optional<RenderMode> mode;  // in place of the splat's own
   std::string background;          // of --clean
+  std::string region;
 
   // `options.given` is left to the caller, once the verb was parsed.
   void AddTo(CLI::App& verb);

@@ -86,6 +86,31 @@ Result<std::array<double, 3>> ParsePoint(const std::string& option, const std::s
   return ParseTriple(option, text, "X,Y,Z in world units, such as 0,0.5,0");
 }
 
+Result<Region> ParseRegion(const std::string& option, const std::string& text) {
+  std::vector<double> numbers;
+  for (size_t begin = 0; begin <= text.size();) {
+    const size_t end = std::min(text.find(',', begin), text.size());
+    const auto number = ParseNumber(std::string_view(text).substr(begin, end - begin));
+    if (!number || !std::isfinite(*number)) break;
+    numbers.push_back(*number);
+    begin = end + 1;
+    if (end == text.size()) {
+      Region region;
+      if (numbers.size() == 4 && numbers[3] > 0) region.radius = numbers[3];
+      if (numbers.size() != 6 && !region.radius) break;
+      for (size_t c = 0; c < 3; ++c) {
+        const double other = region.radius ? numbers[c] : numbers[c + 3];
+        region.low[c] = std::min(numbers[c], other);
+        region.high[c] = std::max(numbers[c], other);
+      }
+      return region;
+    }
+  }
+  return Error{ErrorCode::kBadArgument,
+               Cat(option, ": '", Printable(text),
+                   "' is neither a box X0,Y0,Z0,X1,Y1,Z1 nor a sphere X,Y,Z,RADIUS, such as 0,0.5,0,2")};
+}
+
 Result<std::array<double, 3>> ParseDirection(const std::string& option, const std::string& text) {
   constexpr const char* kForm = "a direction: X,Y,Z such as 0,0,1, or an axis such as z or -y";
   const bool negative = text.starts_with('-');

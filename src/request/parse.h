@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "core/region.h"
 #include "core/result.h"
 #include "formats/registry.h"
 
@@ -20,6 +21,8 @@ struct SizeOption {
 Result<SizeOption> ParseSize(const std::string& option, const std::string& text);              // "1024x768"
 Result<std::array<float, 3>> ParseColor(const std::string& option, const std::string& text);   // "R,G,B", each 0–1
 Result<std::array<double, 3>> ParsePoint(const std::string& option, const std::string& text);  // "X,Y,Z"
+// A box "X0,Y0,Z0,X1,Y1,Z1" by any two corners across, or a sphere "X,Y,Z,RADIUS".
+Result<Region> ParseRegion(const std::string& option, const std::string& text);
 // "X,Y,Z", not all 0, or "x", "-z" and the like.
 Result<std::array<double, 3>> ParseDirection(const std::string& option, const std::string& text);
 // A format that is read, by an extension of it with or without its dot; null for "".

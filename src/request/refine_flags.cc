@@ -37,10 +37,6 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
           "result without; fewer where a closer view has no room for more)")
       ->check(CLI::Range(1, kMostCopies))
       ->group(group);
-  verb.add_option("--most-gaussians", options.max_gaussians, "Bound for --k; 0: none")
-      ->check(NotNegative())
-      ->capture_default_str()
-      ->group(group);
   verb.add_option("--poses", options.poses, "Without --images and --cameras: places around the object to look from")
       ->check(CLI::Range(1, 1 << 20))
       ->capture_default_str()

@@ -21,9 +21,7 @@ const CompactBlock& CompactBlocks::Find(int64_t block) {
   block_.rows.clear();
   block_.reach.clear();
   const int64_t m = graph_.neighbours, begin = block * most_, end = std::min(begin + most_, graph_.count);
-  for (int64_t k = begin; k < end; ++k) {
-    Add(graph_.near_order.empty() ? static_cast<int32_t>(k) : graph_.near_order[static_cast<size_t>(k)]);
-  }
+  for (int64_t k = begin; k < end; ++k) Add(static_cast<int32_t>(k));
   block_.reach.push_back(end - begin);
   for (int64_t round = 0; round < rounds_; ++round) {
     const int64_t heard = block_.reach.back();

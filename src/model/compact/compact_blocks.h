@@ -18,7 +18,8 @@ struct CompactBlock {
   int64_t own() const { return reach.front(); }
 };
 
-// Cuts a graph into blocks of Gaussians that are near each other, one after the other.
+// Cuts a graph into blocks of Gaussians that follow each other. They should be in an order in which near ones are near
+// (CompactNeighbours): otherwise a block hears from much of the cloud.
 class CompactBlocks {
  public:
   // `most`: Gaussians of a block, > 0. The graph must outlive it.

@@ -57,25 +57,24 @@ void FindFrames(const GaussianCloud& cloud, CompactGraph& graph) {
   });
 }
 
-void FindNearest(const GaussianCloud& cloud, CompactGraph& graph) {
+void FindNearest(const GaussianCloud& cloud, CompactNeighbours& near) {
   const KdTree tree(cloud.means);
-  graph.near_order.resize(static_cast<size_t>(graph.count));
-  for (int64_t place = 0; place < graph.count; ++place) {
-    graph.near_order[static_cast<size_t>(place)] = static_cast<int32_t>(tree.PointAt(place));
+  for (int64_t place = 0; place < tree.size(); ++place) {
+    near.rows[static_cast<size_t>(place)] = static_cast<int32_t>(tree.PointAt(place));
   }
-  ParallelFor(0, graph.count, 512, [&](int64_t begin, int64_t end) {
-    std::vector<KdTree::Neighbour> nearest(static_cast<size_t>(graph.neighbours));
+  ParallelFor(0, tree.size(), 512, [&](int64_t begin, int64_t end) {
+    std::vector<KdTree::Neighbour> nearest(static_cast<size_t>(near.neighbours));
     for (int64_t place = begin; place < end; ++place) {
-      tree.Nearest(place, nearest);
-      int32_t* out = graph.index.data() + tree.PointAt(place) * graph.neighbours;
+      tree.NearestPlaces(place, nearest);
+      int32_t* out = near.index.data() + place * near.neighbours;
       for (const KdTree::Neighbour& neighbour : nearest) *out++ = static_cast<int32_t>(neighbour.index);
     }
   });
 }
 
 // Along the Hilbert curve through the cloud's box; a last patch that is not full borrows the Gaussians before it.
-void FindPatches(const GaussianCloud& cloud, CompactGraph& graph) {
-  const int64_t n = graph.count, m = graph.neighbours;
+void FindPatches(const GaussianCloud& cloud, CompactNeighbours& near) {
+  const int64_t n = cloud.size(), m = near.neighbours;
   if (n == 0) return;
   const Bounds box = *ComputeBounds(cloud);
   double side = 0;
@@ -89,43 +88,59 @@ void FindPatches(const GaussianCloud& cloud, CompactGraph& graph) {
   }
   Buffer<int64_t> codes(static_cast<size_t>(n));
   CurveCodes(Curve::kHilbert, kMaxCurveDepth, voxels, codes);
-  graph.near_order = OrderOfCodes(codes);
-  const Buffer<int32_t>& order = graph.near_order;
+  near.rows = OrderOfCodes(codes);
   ParallelFor(0, n, 512, [&](int64_t begin, int64_t end) {
-    std::vector<std::pair<double, int32_t>> others;
+    struct Other {
+      double square;
+      int32_t row;
+      int64_t place;
+    };
+    std::vector<Other> others;
     for (int64_t place = begin; place < end; ++place) {
       const int64_t first = std::min(place / (m + 1) * (m + 1), n - (m + 1));
-      const int32_t i = order[static_cast<size_t>(place)];
+      const int32_t i = near.rows[static_cast<size_t>(place)];
       others.clear();
       for (int64_t other = first; other <= first + m; ++other) {
         if (other == place) continue;
-        const int32_t j = order[static_cast<size_t>(other)];
+        const int32_t j = near.rows[static_cast<size_t>(other)];
         double square = 0;
         for (int64_t c = 0; c < 3; ++c) {
           const double d = double{cloud.means[static_cast<size_t>(3 * int64_t{j} + c)]} -
                            cloud.means[static_cast<size_t>(3 * int64_t{i} + c)];
           square += d * d;
         }
-        others.emplace_back(square, j);
+        others.push_back({square, j, other});
       }
-      std::sort(others.begin(), others.end());
-      for (int64_t k = 0; k < m; ++k)
-        graph.index[static_cast<size_t>(i * m + k)] = others[static_cast<size_t>(k)].second;
+      std::ranges::sort(others, {}, [](const Other& o) { return std::pair(o.square, o.row); });
+      for (int64_t k = 0; k < m; ++k) {
+        near.index[static_cast<size_t>(place * m + k)] = static_cast<int32_t>(others[static_cast<size_t>(k)].place);
+      }
     }
   });
 }
 
 }  // namespace
 
-CompactGraph BuildCompactGraph(const GaussianCloud& cloud, int64_t neighbours, CompactContext context) {
-  CompactGraph graph;
+CompactNeighbours FindCompactNeighbours(const GaussianCloud& cloud, int64_t neighbours, CompactContext context) {
+  CompactNeighbours near;
   const int64_t n = cloud.size();
-  graph.count = n;
-  graph.neighbours = std::clamp<int64_t>(n - 1, 0, neighbours);
-  graph.index.resize(static_cast<size_t>(n * graph.neighbours));
-  context == CompactContext::kPatches ? FindPatches(cloud, graph) : FindNearest(cloud, graph);
-  FindFrames(cloud, graph);
-  return graph;
+  near.neighbours = std::clamp<int64_t>(n - 1, 0, neighbours);
+  near.rows.resize(static_cast<size_t>(n));
+  near.index.resize(static_cast<size_t>(n * near.neighbours));
+  context == CompactContext::kPatches ? FindPatches(cloud, near) : FindNearest(cloud, near);
+  return near;
+}
+
+CompactGraph BuildCompactGraph(const GaussianCloud& cloud, int64_t neighbours, CompactContext context) {
+  const CompactNeighbours near = FindCompactNeighbours(cloud, neighbours, context);
+  const int64_t m = near.neighbours;
+  Buffer<int32_t> index(near.index.size());
+  for (int64_t place = 0; place < cloud.size(); ++place) {
+    const int32_t* from = near.index.data() + place * m;
+    int32_t* out = index.data() + near.rows[static_cast<size_t>(place)] * m;
+    for (int64_t k = 0; k < m; ++k) out[k] = near.rows[static_cast<size_t>(from[k])];
+  }
+  return GraphOfNeighbours(cloud, m, std::move(index));
 }
 
 CompactGraph GraphOfNeighbours(const GaussianCloud& cloud, int64_t neighbours, Buffer<int32_t> index) {

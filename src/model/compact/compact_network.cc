@@ -11,7 +11,9 @@
 #include "core/log.h"
 #include "core/memory_limit.h"
 #include "core/parallel.h"
+#include "core/row_scatter.h"
 #include "core/run_context.h"
+#include "core/stopwatch.h"
 #include "core/text.h"
 #include "model/compact/compact_residual.h"
 #include "model/compact/compact_start.h"
@@ -145,9 +147,12 @@ std::pair<double, double> CompactNetwork::TrainedUpscales() const {
   return {upscale(low_[kUpscaleFeature]), upscale(high_[kUpscaleFeature])};
 }
 
-Buffer<float> CompactNetwork::States(const CompactFeatures& features, const CompactBlock& block, int64_t m) const {
+void CompactNetwork::FindStates(const CompactFeatures& features, const CompactBlock& block, int64_t m,
+                                States& of_block) const {
   const int64_t n = block.reach.back(), h = config_.hidden;
-  Buffer<float> states(static_cast<size_t>(n * h)), others(rounds_.empty() ? 0 : static_cast<size_t>(n * h));
+  Buffer<float>&states = of_block.own, &others = of_block.others;
+  states.resize(static_cast<size_t>(n * h));
+  others.resize(rounds_.empty() ? 0 : static_cast<size_t>(n * h));
   const auto normalise = [&](int64_t rows, const Norm& norm, float* x) {
     LayerNormCpu({.rows = rows,
                   .channels = h,
@@ -203,10 +208,9 @@ Buffer<float> CompactNetwork::States(const CompactFeatures& features, const Comp
       normalise(rows, round.norm, own_states);
     });
   }
-  return states;
 }
 
-void CompactNetwork::Head(const CompactFeatures& features, const CompactBlock& block, const Buffer<float>& states,
+void CompactNetwork::Head(const CompactFeatures& features, const CompactBlock& block, const States& states,
                           int64_t begin, int64_t end, float* out) const {
   const int64_t rows = end - begin, h = config_.hidden, told = NodeFeatures(config_), width = h + told,
                 g = config_.head_hidden;
@@ -214,7 +218,7 @@ void CompactNetwork::Head(const CompactFeatures& features, const CompactBlock& b
       first(static_cast<size_t>(rows * g)), second(static_cast<size_t>(rows * g));
   features.Nodes(std::span(block.rows).subspan(static_cast<size_t>(begin), static_cast<size_t>(rows)), nodes.data());
   for (int64_t i = 0; i < rows; ++i) {
-    std::copy_n(states.data() + (begin + i) * h, h, input.data() + i * width);
+    std::copy_n(states.own.data() + (begin + i) * h, h, input.data() + i * width);
     std::copy_n(nodes.data() + i * told, told, input.data() + i * width + h);
   }
   ApplyLinear(rows, input.data(), head_first_, first.data(), Activation::kGelu);
@@ -224,9 +228,10 @@ void CompactNetwork::Head(const CompactFeatures& features, const CompactBlock& b
 
 void CompactNetwork::Outputs(const CompactFeatures& features, const CompactGraph& graph, float* out) const {
   CompactBlocks blocks(graph, config_.rounds, kCompactBlock);
+  States states;
   for (int64_t b = 0; b < blocks.count(); ++b) {
     const CompactBlock& block = blocks.Find(b);
-    const Buffer<float> states = States(features, block, graph.neighbours);
+    FindStates(features, block, graph.neighbours, states);
     ParallelFor(0, block.own(), kRowsPerTask, [&](int64_t begin, int64_t end) {
       Buffer<float> raw(static_cast<size_t>((end - begin) * out_.outputs()));
       Head(features, block, states, begin, end, raw.data());
@@ -270,6 +275,7 @@ Status CheckTask(const GaussianCloud& cloud, const CompactTask& task, int64_t co
       return Error{ErrorCode::kBadArgument, Cat("pixel size ", p, " is not a positive length")};
     }
   }
+  if (task.choice) ANCHORSPLAT_RETURN_IF_ERROR(Validate(*task.choice, copies));
   if (task.block_gaussians < 1) return Error{ErrorCode::kBadArgument, "a block of no Gaussians"};
   if (!(task.upscale >= 1) || !std::isfinite(task.upscale) || !(task.strength >= 0) || !std::isfinite(task.strength)) {
     return Error{ErrorCode::kBadArgument, Cat("upscale ", task.upscale, " must be at least 1 and the filter strength ",
@@ -278,105 +284,177 @@ Status CheckTask(const GaussianCloud& cloud, const CompactTask& task, int64_t co
   return {};
 }
 
-// Where the copies of each Gaussian go: those that are alone stand behind all others.
-struct CopyPlaces {
-  Buffer<int64_t> rows;  // of the first copy
-  int64_t inside = 0;    // Gaussians that have copies
-  int64_t copied = 0;    // their copies
+// Gaussians in the order of their places, with all that belongs to them.
+struct NearCloud {
+  Buffer<int32_t> rows;  // of the input
+  GaussianCloud cloud;
+  Buffer<float> pixel_sizes;
+  CompactGraph graph;
 };
 
-CopyPlaces PlacesOfCopies(const Buffer<float>& fades, int64_t outside, int64_t copies) {
-  CopyPlaces places;
-  places.inside = std::ssize(fades) - outside;
-  places.copied = copies * places.inside;
-  places.rows.resize(fades.size());
-  int64_t next = 0, alone = places.copied;
-  for (size_t i = 0; i < fades.size(); ++i) places.rows[i] = fades[i] > 0 ? next++ : alone++;
+NearCloud BringTogether(GaussianCloud cloud, const CompactTask& task, const CompactConfig& config) {
+  NearCloud near;
+  CompactNeighbours neighbours = FindCompactNeighbours(cloud, config.neighbours, config.context);
+  Buffer<int32_t> places(neighbours.rows.size());
+  for (size_t place = 0; place < places.size(); ++place) {
+    places[static_cast<size_t>(neighbours.rows[place])] = static_cast<int32_t>(place);
+  }
+  const auto order = [&](Buffer<float>& array, int64_t width) {
+    const std::span<const float> all(array);
+    array = ScatterRows({&all, 1}, width, places);
+  };
+  order(cloud.means, 3);
+  order(cloud.log_scales, 3);
+  order(cloud.quats, 4);
+  order(cloud.opacity_logits, 1);
+  order(cloud.sh, cloud.sh_stride());
+  near.pixel_sizes.assign(task.pixel_sizes.begin(), task.pixel_sizes.end());
+  if (near.pixel_sizes.size() > 1) order(near.pixel_sizes, 1);
+  near.graph = GraphOfNeighbours(cloud, neighbours.neighbours, std::move(neighbours.index));
+  near.rows = std::move(neighbours.rows);
+  near.cloud = std::move(cloud);
+  return near;
+}
+
+// In the place of a fade, of Gaussians of which nothing comes out.
+constexpr float kLeftOut = -1;
+
+// Where a block's Gaussians go in its part of the output: those that have copies before all others.
+struct BlockPlaces {
+  Buffer<int32_t> rows;   // of the input, in this order
+  Buffer<int64_t> first;  // of each of the block's own, the row of its first copy
+  int64_t inside = 0;     // Gaussians that have copies
+  int64_t alone = 0;      // Gaussians that have none
+  int64_t made = 0;       // rows
+};
+
+BlockPlaces PlacesOf(const CompactBlock& block, const Buffer<float>& fades, const Buffer<int32_t>& rows,
+                     int64_t copies) {
+  BlockPlaces places;
+  places.inside = std::ranges::count_if(fades, [](float fade) { return fade > 0; });
+  places.alone = std::ranges::count(fades, 0.0f);
+  places.made = copies * places.inside + places.alone;
+  places.rows.resize(static_cast<size_t>(places.inside + places.alone));
+  places.first.resize(fades.size());
+  int64_t inside = 0, alone = places.inside;
+  for (size_t i = 0; i < fades.size(); ++i) {
+    if (fades[i] == kLeftOut) continue;
+    const bool copied = fades[i] > 0;
+    const int64_t at = copied ? inside++ : alone++;
+    places.rows[static_cast<size_t>(at)] = rows[static_cast<size_t>(block.rows[i])];
+    places.first[i] = copied ? at : at + (copies - 1) * places.inside;
+  }
   return places;
+}
+
+// What the choice among a block's copies is told.
+CopyGroups GroupsOf(const CompactTask& task, const BlockPlaces& places, int64_t copies) {
+  CopyGroups groups{.count = places.inside, .copies = copies, .pixel_sizes = {}};
+  const auto closer = [&](float pixel) { return static_cast<float>(pixel / task.upscale); };
+  if (task.pixel_sizes.size() == 1) groups.pixel_sizes = {closer(task.pixel_sizes.front())};
+  for (int64_t g = 0; g < places.inside; ++g) {
+    const int32_t row = places.rows[static_cast<size_t>(g)];
+    if (task.pixel_sizes.size() > 1) groups.pixel_sizes.push_back(closer(task.pixel_sizes[static_cast<size_t>(row)]));
+    if (!task.single.empty()) groups.single.push_back(std::ranges::binary_search(task.single, row) ? 1 : 0);
+  }
+  return groups;
 }
 
 }  // namespace
 
-Buffer<float> CompactNetwork::Fades(const CompactFeatures& features, int64_t count) const {
-  Buffer<float> fades(static_cast<size_t>(count));
+Buffer<float> CompactNetwork::Fades(const CompactFeatures& features, const CompactBlock& block) const {
+  Buffer<float> fades(static_cast<size_t>(block.own()));
   const int64_t told = NodeFeatures(config_);
-  ParallelFor(0, count, kRowsPerTask, [&](int64_t begin, int64_t end) {
+  ParallelFor(0, block.own(), kRowsPerTask, [&](int64_t begin, int64_t end) {
     Buffer<float> nodes(static_cast<size_t>((end - begin) * told));
-    features.Nodes(begin, end, nodes.data());
+    features.Nodes(std::span(block.rows).subspan(static_cast<size_t>(begin), static_cast<size_t>(end - begin)),
+                   nodes.data());
     for (int64_t i = begin; i < end; ++i) {
-      fades[static_cast<size_t>(i)] = Fade(nodes.data() + (i - begin) * told, features.Widths(i));
+      fades[static_cast<size_t>(i)] =
+          Fade(nodes.data() + (i - begin) * told, features.Widths(block.rows[static_cast<size_t>(i)]));
     }
   });
   return fades;
 }
 
-Result<CompactResult> CompactNetwork::Apply(const GaussianCloud& cloud, const CompactTask& task) const {
+Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTask& task) const {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckTask(cloud, task, config_.copies));
-  const int64_t n = cloud.size();
-  const CompactGraph graph = BuildCompactGraph(cloud, config_.neighbours, config_.context);
-  const CompactFeatures features(cloud, graph,
-                                 {.pixel_sizes = task.pixel_sizes,
-                                  .upscale = task.upscale,
-                                  .strength = task.strength,
-                                  .node_features = NodeFeatures(config_)});
-
-  const Buffer<float> fades = Fades(features, n);
-  CompactResult result;
-  for (const float fade : fades) {
-    result.outside += fade == 0 ? 1 : 0;
-    result.partly += fade > 0 && fade < 1 ? 1 : 0;
-  }
-  const CopyPlaces places = PlacesOfCopies(fades, result.outside, config_.copies);
-  result.anchors.reserve(static_cast<size_t>(places.inside));
-  for (int64_t i = 0; i < n; ++i) {
-    if (fades[static_cast<size_t>(i)] > 0) result.anchors.push_back(i);
-  }
-
+  const int64_t n = cloud.size(), copies = config_.copies;
   CompactConfig single = config_;
   single.copies = 1;
-  const CopyStart start(config_.copies, config_.spread), single_start(1, 0);
-  CompactAnchors anchors{&cloud, &graph, task.pixel_sizes, task.upscale, task.strength, 0};
-  if (config_.offset_unit == OffsetUnit::kCube) anchors.offset_side = CubeSide(cloud.means);
-  std::atomic<int64_t> not_finite = 0;
+  const CopyStart start(copies, config_.spread), single_start(1, 0);
+  const double offset_side = config_.offset_unit == OffsetUnit::kCube ? CubeSide(cloud.means) : 0;
   const std::vector<float> nothing(static_cast<size_t>(CompactOutputs(config_)), 0.0f);
+  CompactResult result;
+  Stopwatch watch;
+  std::vector<std::string> comments = std::move(cloud.comments);
+  std::atomic<int64_t> not_finite = 0;
   try {
-    result.cloud.Resize(places.copied + result.outside, cloud.sh_degree);
-    CompactBlocks blocks(graph, config_.rounds, task.block_gaussians);
+    NearCloud near = BringTogether(std::move(cloud), task, config_);
+    const CompactFeatures features(near.cloud, near.graph,
+                                   {.pixel_sizes = near.pixel_sizes,
+                                    .upscale = task.upscale,
+                                    .strength = task.strength,
+                                    .node_features = NodeFeatures(config_)});
+    const CompactAnchors anchors{&near.cloud, &near.graph, near.pixel_sizes, task.upscale, task.strength, offset_side};
+    CompactOutput output(n, copies, task.choice.value_or(CopyChoice{.copies = copies}));
+    GaussianCloud made;
+    made.render_mode = near.cloud.render_mode;
+    CompactBlocks blocks(near.graph, config_.rounds, task.block_gaussians);
+    States states;
+    result.times.neighbours = watch.Lap();
     Progress progress("Network", n);
     for (int64_t b = 0; b < blocks.count(); ++b) {
       if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped"};
       const CompactBlock& block = blocks.Find(b);
-      const Buffer<float> states = States(features, block, graph.neighbours);
+      Buffer<float> fades = Fades(features, block);
+      for (size_t i = 0; i < fades.size() && !task.inside.empty(); ++i) {
+        const int32_t row = near.rows[static_cast<size_t>(block.rows[i])];
+        if (task.inside[static_cast<size_t>(row)] == 0) fades[i] = kLeftOut;
+      }
+      const BlockPlaces places = PlacesOf(block, fades, near.rows, copies);
+      progress.Advance(block.own());
+      if (places.made == 0) continue;
+      result.outside += places.alone;
+      result.partly += std::ranges::count_if(fades, [](float fade) { return fade > 0 && fade < 1; });
+      result.made += places.made;
+      made.Resize(places.made, near.cloud.sh_degree);
+      FindStates(features, block, near.graph.neighbours, states);
       ParallelFor(0, block.own(), kRowsPerTask, [&](int64_t begin, int64_t end) {
         Buffer<float> raw(static_cast<size_t>((end - begin) * out_.outputs()));
         Head(features, block, states, begin, end, raw.data());
         for (int64_t place = begin; place < end; ++place) {
           const int64_t i = block.rows[static_cast<size_t>(place)];
-          const float fade = fades[static_cast<size_t>(i)];
-          const int64_t row = places.rows[static_cast<size_t>(i)];
+          const float fade = fades[static_cast<size_t>(place)];
+          const int64_t row = places.first[static_cast<size_t>(place)];
+          if (fade == kLeftOut) continue;
           if (fade > 0) {
             const float* said = raw.data() + (place - begin) * out_.outputs();
             if (!AllFinite(said, out_.outputs())) {
               said = nothing.data();
               ++not_finite;
             }
-            WriteCopies(config_, start, anchors, i, said, fade, row, places.inside, result.cloud);
+            WriteCopies(config_, start, anchors, i, said, fade, row, places.inside, made);
           } else {
-            WriteCopies(single, single_start, anchors, i, nothing.data(), 0, row, 1, result.cloud);
+            WriteCopies(single, single_start, anchors, i, nothing.data(), 0, row, 1, made);
           }
         }
       });
-      progress.Advance(block.own());
+      result.times.network += watch.Lap();
+      output.Add(places.rows, GroupsOf(task, places, copies), made);
+      result.times.copies += watch.Lap();
     }
+    near = {};
+    made = {};
+    result.cloud = output.Finish(result.chosen);
+    result.times.order = watch.Lap();
   } catch (const NoDiskRoom& none) {
     return Error{ErrorCode::kIo, none.what()};
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("no memory for ", WithThousands(places.copied + result.outside), " Gaussians")};
+    return Error{ErrorCode::kBadArgument, Cat("no memory for ", WithThousands(n * copies), " Gaussians")};
   }
   result.not_finite = not_finite;
-  result.cloud.render_mode = cloud.render_mode;
-  result.cloud.comments = cloud.comments;
+  result.cloud.comments = std::move(comments);
   return result;
 }
 

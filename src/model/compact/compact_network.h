@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "model/compact/compact_blocks.h"
 #include "model/compact/compact_config.h"
 #include "model/compact/compact_features.h"
+#include "model/compact/compact_output.h"
 #include "model/kernels/packed_weights.h"
 #include "model/shared/weights.h"
 #include "tensors/tensor_file.h"
@@ -31,14 +33,24 @@ struct CompactTask {
   double strength = 0;                 // f of the filter that residuals are added to, > 0
   // Gaussians whose states are kept at a time, besides those that they hear from; > 0. Changes no bit of the result.
   int64_t block_gaussians = kCompactBlock;
+  // Which copies live; nothing: all of them.
+  std::optional<CopyChoice> choice = std::nullopt;
+  // Gaussians of which one copy stays where costs choose, ascending.
+  std::span<const int64_t> single = {};
+  // 0: a Gaussian that others hear from and of which nothing comes out; one per Gaussian, empty: none.
+  std::span<const char> inside = {};
 };
 
 struct CompactResult {
   GaussianCloud cloud;  // copy k of all anchors before copy k + 1, then those that stayed alone; the input's metadata
-  std::vector<int64_t> anchors;  // the Gaussians that have copies, in the order of these
-  int64_t outside = 0;           // Gaussians unlike the training data: filtered, and nothing else
-  int64_t partly = 0;            // Gaussians somewhat unlike it: a part of the residual
-  int64_t not_finite = 0;        // Gaussians for which the network says something that is not finite: its start
+  int64_t outside = 0;  // Gaussians unlike the training data: filtered, and nothing else
+  int64_t partly = 0;   // Gaussians somewhat unlike it: a part of the residual
+  int64_t not_finite = 0;  // Gaussians for which the network says something that is not finite: its start
+  int64_t made = 0;        // Gaussians before the choice among copies
+  ChosenCopies chosen;
+  struct {
+    double neighbours = 0, network = 0, copies = 0, order = 0;  // seconds
+  } times;
 };
 
 // A compact network for inference on the CPU, as a row of kernel calls on raw arrays. The torch module in torch/
@@ -60,10 +72,11 @@ class CompactNetwork {
   std::pair<double, double> TrainedUpscales() const;
 
   // Enhances a cloud of finite values (log-scales and opacity logits may be −Inf). The same bits for any number of
-  // threads. Needs about 0.5 KB per Gaussian of a block, and 250 bytes of Buffers per Gaussian of the cloud, besides
-  // the result. Errors (kBadArgument): of Validate(cloud); no Gaussians or 2^31 rows; a wrong number of pixel sizes,
-  // one that is not positive and finite; upscale below 1; a strength that is negative; more output than memory holds.
-  Result<CompactResult> Apply(const GaussianCloud& cloud, const CompactTask& task) const;
+  // threads. Needs about 1.5 KB per Gaussian of a block, and 150 bytes of Buffers per Gaussian of the cloud, besides
+  // the cloud, which is given back before the result is put in order, and twice the result. Errors (kBadArgument): of
+  // Validate(cloud) and Validate(choice); no Gaussians or 2^31 rows; a wrong number of pixel sizes, one that is not
+  // positive and finite; upscale below 1; a strength that is negative; more output than memory holds.
+  Result<CompactResult> Apply(GaussianCloud cloud, const CompactTask& task) const;
 
   // The raw outputs [N, CompactOutputs(config())] for the features of a cloud, before bounds and fading.
   void Outputs(const CompactFeatures& features, const CompactGraph& graph, float* out) const;
@@ -78,12 +91,17 @@ class CompactNetwork {
   };
   class Loader;
 
-  // States [rows,H] of a block's Gaussians; those of its own are after all rounds.
-  Buffer<float> States(const CompactFeatures& features, const CompactBlock& block, int64_t neighbours) const;
+  // Of a block's Gaussians, [rows,H]; its memory serves one block after the other.
+  struct States {
+    Buffer<float> own;     // of the block's own Gaussians these are after all rounds
+    Buffer<float> others;  // what others are told of them
+  };
+  void FindStates(const CompactFeatures& features, const CompactBlock& block, int64_t neighbours, States& states) const;
   // Of the block's own Gaussians begin to end.
-  void Head(const CompactFeatures& features, const CompactBlock& block, const Buffer<float>& states, int64_t begin,
+  void Head(const CompactFeatures& features, const CompactBlock& block, const States& states, int64_t begin,
             int64_t end, float* out) const;
-  Buffer<float> Fades(const CompactFeatures& features, int64_t count) const;
+  // Of a block's own Gaussians.
+  Buffer<float> Fades(const CompactFeatures& features, const CompactBlock& block) const;
   float Fade(const float* node, const std::array<float, 3>& widths) const;
 
   CompactConfig config_;

@@ -1,11 +1,15 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
+#include <vector>
 
+#include "core/buffer.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
+#include "model/compact/copy_group.h"
 
 namespace anchorsplat {
 
@@ -22,25 +26,50 @@ struct CopyChoice {
   float invisible = 0;             // copies of less opacity go first, and 1/255 at least
 };
 
-// Copies of `count` Gaussians: copy k of the g-th is row k·count + g. Rows behind them stand alone.
+// Errors (kBadArgument): more copies than a network makes (`made`), or less than one; a cost or a bound that is
+// negative.
+Status Validate(const CopyChoice& choice, int64_t made);
+
+// Copies of `count` Gaussians: copy k of the g-th is row first + k·count + g of a cloud.
 struct CopyGroups {
   int64_t count = 0;
-  int64_t copies = 1;                  // 1–64
-  std::span<const float> pixel_sizes;  // of the closer view, world units, one for all or one per group
-  std::span<const char> single = {};   // not 0: all its copies are merged into one; one per group, empty: none
-};
-
-struct ChosenCopies {
-  int64_t merged = 0;    // copies that are gone: others stand for them, or they were invisible
-  int64_t left_out = 0;  // Gaussians that are gone, as there are more than max_gaussians without copies
+  int64_t copies = 1;             // 1–64
+  Buffer<float> pixel_sizes;      // of the closer view, world units, one for all or one per group
+  std::vector<char> single = {};  // not 0: all its copies are merged into one; one per group, empty: none
+  int64_t first = 0;
 };
 
 // Merges copies of one Gaussian, always the pair that can be spared best (model/compact/merge_gaussians.h): until the
-// next pair would cost too much or there are no more than `copies`; then the cheapest of all until there are no more
-// than max_gaussians. At least one of each Gaussian stays, unless there are too many even so: then those of the largest
-// opacity × size do. Rows keep their order. The same bits for any number of threads.
-//
-// Errors (kBadArgument): more `copies` than there are, or less than one; a cost or a bound that is negative.
-Result<ChosenCopies> ChooseCopies(const CopyGroups& groups, const CopyChoice& choice, GaussianCloud& cloud);
+// next pair would cost too much or there are no more than CopyChoice::copies. Where max_gaussians is set, it knows what
+// the merges beyond that cost as well. The same bits for any number of threads.
+class CopyPlan {
+ public:
+  CopyPlan(CopyGroups groups, const CopyChoice& choice, const GaussianCloud& cloud);
+
+  int64_t groups() const { return groups_.count; }
+  int64_t merged() const;  // copies that go
+
+  // Writes the merged copies into the rows of `cloud` that stay, and 0 into keep[row] of the others.
+  void Carry(GaussianCloud& cloud, std::vector<char>& keep) const;
+
+ private:
+  friend void MergeMore(std::span<CopyPlan> plans, int64_t more,
+                        const std::function<int64_t(size_t plan, int64_t group)>& row);
+
+  double PixelOf(int64_t g) const {
+    return groups_.pixel_sizes[groups_.pixel_sizes.size() == 1 ? 0 : static_cast<size_t>(g)];
+  }
+  const CopyGroup::Step* StepsOf(int64_t g) const { return steps_.data() + g * (groups_.copies - 1); }
+  CopyGroup::Step* StepsOf(int64_t g) { return steps_.data() + g * (groups_.copies - 1); }
+
+  CopyGroups groups_;
+  float invisible_;
+  Buffer<CopyGroup::Step> steps_;
+  Buffer<uint8_t> chosen_;  // steps of each group that are done
+};
+
+// Adds the cheapest merges that none of the plans has, `more` of them or all there are: at least one copy of each
+// Gaussian stays. Of equally cheap ones those of the first Gaussians, by row(plan, group), which is unique.
+void MergeMore(std::span<CopyPlan> plans, int64_t more, const std::function<int64_t(size_t plan, int64_t group)>& row);
 
 }  // namespace anchorsplat

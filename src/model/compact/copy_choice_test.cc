@@ -12,6 +12,7 @@
 #include "core/random.h"
 #include "core/rotation.h"
 #include "enhance/filter.h"
+#include "model/compact/choose_copies_for_test.h"
 #include "model/compact/compact_network.h"
 #include "model/compact/copy_group.h"
 #include "model/compact/sheet_cloud_for_test.h"
@@ -22,7 +23,7 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kClosePixel = kSheetPixel / 4;
 
-CopyGroups Groups(int64_t count, int64_t copies) { return {count, copies, {&kClosePixel, 1}}; }
+CopyGroups Groups(int64_t count, int64_t copies) { return {count, copies, {kClosePixel}}; }
 
 bool SameValues(const GaussianCloud& a, const GaussianCloud& b) {
   return a.means == b.means && a.log_scales == b.log_scales && a.quats == b.quats &&
@@ -230,7 +231,7 @@ TEST(CopyChoice, OddGaussiansStayUsable) {
     for (const int64_t copies : {1, 2}) {
       for (const int64_t most : {0, 70}) {
         GaussianCloud cloud = hostile;
-        const auto done = ChooseCopies({40, 4, {&pixel, 1}}, {.copies = copies, .max_gaussians = most}, cloud);
+        const auto done = ChooseCopies({40, 4, {pixel}}, {.copies = copies, .max_gaussians = most}, cloud);
         ASSERT_TRUE(done.ok());
         EXPECT_LE(cloud.size(), 40 * copies);
         for (int64_t i = 0; i < cloud.size(); ++i) EXPECT_TRUE(IsUsable(cloud, i)) << i << ' ' << pixel;

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "core/log.h"
+#include "core/most_visible.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "model/published/spatial_blocks.h"
-#include "model/shared/most_visible.h"
 
 namespace anchorsplat {
 

@@ -1,4 +1,4 @@
-#include "model/shared/most_visible.h"
+#include "core/most_visible.h"
 
 #include <algorithm>
 #include <numeric>

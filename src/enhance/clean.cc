@@ -1,0 +1,57 @@
+#include "enhance/clean.h"
+
+#include <utility>
+#include <vector>
+
+#include "core/log.h"
+#include "core/text.h"
+#include "fit/training_views.h"
+
+namespace anchorsplat {
+
+Status Clean(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport& report) {
+  CameraSet set;
+  if (options.cameras) set = *options.cameras;
+  if (!options.refine.images.empty() && (set.cameras.empty() || !set.background)) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(
+        TrainingViews project,
+        OpenProject(options.refine.images, {.hold_out = 0, .downscale = options.refine.downscale}));
+    if (set.cameras.empty()) set.cameras = std::move(project.train);
+    if (!set.background) set.background = project.background;
+  }
+  if (set.cameras.empty()) {
+    LogWarning(
+        "--clean looks from outside only, as there are no cameras; of a scene seen from within it may take what only "
+        "its training views show (--cameras)");
+  }
+  UnseenOptions unseen{.seed = options.seed};
+  unseen.background = options.background.value_or(set.background.value_or(unseen.background));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(report.cleaned, FindUnseen(cloud, set.cameras, unseen));
+  if (options.region) {
+    std::erase_if(report.cleaned->rows, [&](int64_t i) { return !options.region->Holds(cloud.means.data() + 3 * i); });
+  }
+  const UnseenGaussians& found = *report.cleaned;
+  const auto count = static_cast<int64_t>(found.rows.size());
+  LogInfo(Cat("cleaned: ", WithThousands(count), " of ", WithThousands(cloud.size()),
+              " Gaussians taken out, which have the background's colour and are missed in none of ", found.views,
+              " views over it"));
+  if (count == 0) return {};
+  if (count == cloud.size()) {
+    return Error{
+        ErrorCode::kBadArgument,
+        "--clean would take out every Gaussian: is the background another one than in training (--background)?"};
+  }
+  std::vector<int64_t> kept;
+  auto gone = found.rows.begin();
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    if (gone != found.rows.end() && *gone == i) {
+      ++gone;
+    } else {
+      kept.push_back(i);
+    }
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(cloud, Subset(cloud, kept));
+  return {};
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,56 @@
+#include "enhance/enhance_region.h"
+
+#include <utility>
+#include <vector>
+
+#include "core/log.h"
+#include "core/text.h"
+#include "enhance/gaussian_budget.h"
+#include "formats/row_arrays.h"
+
+namespace anchorsplat {
+
+void SetBudget(EnhanceOptions& options, int64_t max_gaussians) {
+  options.max_gaussians = options.model.options.max_gaussians = options.refine.max_gaussians = max_gaussians;
+}
+
+void LeaveRegion(EnhanceInput& input) {
+  if (input.inside.empty()) return;
+  KeepMarked(input.inside, input.cloud);
+  if (input.pixel_sizes.size() > 1) KeepRows(input.pixel_sizes, 1, input.inside);
+  input.inside = {};
+}
+
+Result<GaussianCloud> SetRestAside(const EnhanceOptions& options, EnhanceInput& input, EnhanceOptions& within,
+                                   EnhanceReport& report) {
+  if (!options.region) return GaussianCloud();
+  const int64_t n = input.cloud.size();
+  std::vector<int64_t> outside;
+  input.inside.resize(static_cast<size_t>(n));
+  for (int64_t i = 0; i < n; ++i) {
+    const bool holds = options.region->Holds(input.cloud.means.data() + 3 * i);
+    input.inside[static_cast<size_t>(i)] = holds ? 1 : 0;
+    if (!holds) outside.push_back(i);
+  }
+  const int64_t kept = std::ssize(outside);
+  report.region_in = n - kept;
+  report.kept_outside = kept;
+  if (kept == n) {
+    const Bounds box = *ComputeBounds(input.cloud);
+    const auto corner = [](const std::array<float, 3>& c) { return Cat(c[0], ",", c[1], ",", c[2]); };
+    return Error{ErrorCode::kBadArgument, Cat("--region: no Gaussian lies in it; the splat reaches from ",
+                                              corner(box.min), " to ", corner(box.max))};
+  }
+  if (options.max_gaussians > 0) {
+    if (options.max_gaussians <= kept) {
+      return Error{ErrorCode::kBadArgument, Cat("--max-gaussians ", WithThousands(options.max_gaussians),
+                                                " leaves nothing for the region: ", WithThousands(kept),
+                                                " Gaussians outside of it stay as they are")};
+    }
+    SetBudget(within, options.max_gaussians - kept);
+  }
+  LogInfo(Cat(WithThousands(n - kept), " of ", WithThousands(n), " Gaussians lie in the region and are enhanced"));
+  return Subset(input.cloud, outside);
+}
+
+}  // namespace anchorsplat

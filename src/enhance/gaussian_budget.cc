@@ -1,0 +1,29 @@
+#include "enhance/gaussian_budget.h"
+
+#include "core/log.h"
+#include "core/most_visible.h"
+#include "core/text.h"
+#include "formats/row_arrays.h"
+
+namespace anchorsplat {
+
+void KeepMarked(const std::vector<char>& keep, GaussianCloud& cloud) {
+  KeepRows(cloud.means, 3, keep);
+  KeepRows(cloud.log_scales, 3, keep);
+  KeepRows(cloud.quats, 4, keep);
+  KeepRows(cloud.opacity_logits, 1, keep);
+  KeepRows(cloud.sh, cloud.sh_stride(), keep);
+}
+
+int64_t LeaveOutLeastVisible(int64_t most, GaussianCloud& cloud) {
+  const int64_t over = cloud.size() - most;
+  if (most == 0 || over <= 0) return 0;
+  std::vector<char> keep(static_cast<size_t>(cloud.size()), 0);
+  for (const int64_t row : MostVisible(cloud, most)) keep[static_cast<size_t>(row)] = 1;
+  LogWarning(Cat("--max-gaussians ", WithThousands(most), " are fewer than there are without any copies: the ",
+                 WithThousands(over), " Gaussians of the least opacity × size are left out"));
+  KeepMarked(keep, cloud);
+  return over;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "enhance/gaussian_budget.h"
+#include "model/compact/compact_output.h"
+#include "model/compact/copy_choice.h"
+
+namespace anchorsplat {
+
+// The choice among copies of a cloud that is there as a whole: what blocks must come to as well.
+inline Result<ChosenCopies> ChooseCopies(CopyGroups groups, const CopyChoice& choice, GaussianCloud& cloud) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(choice, groups.copies));
+  std::vector<CopyPlan> plans;
+  plans.emplace_back(std::move(groups), choice, cloud);
+  ChosenCopies done;
+  const int64_t before = cloud.size(), over = before - plans.front().merged() - choice.max_gaussians;
+  if (choice.max_gaussians > 0) MergeMore(plans, over, [](size_t, int64_t group) { return group; });
+  std::vector<char> keep(static_cast<size_t>(before), 1);
+  plans.front().Carry(cloud, keep);
+  KeepMarked(keep, cloud);
+  done.merged = before - cloud.size();
+  done.left_out = LeaveOutLeastVisible(choice.max_gaussians, cloud);
+  return done;
+}
+
+}  // namespace anchorsplat

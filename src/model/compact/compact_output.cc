@@ -1,0 +1,155 @@
+#include "model/compact/compact_output.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <utility>
+
+#include "core/row_scatter.h"
+#include "enhance/gaussian_budget.h"
+#include "formats/row_arrays.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr int64_t kPieceRows = int64_t{1} << 20;
+
+// The five arrays, with their floats per Gaussian.
+constexpr std::array<Buffer<float> GaussianCloud::*, 5> kArrays = {&GaussianCloud::means, &GaussianCloud::log_scales,
+                                                                   &GaussianCloud::quats,
+                                                                   &GaussianCloud::opacity_logits, &GaussianCloud::sh};
+std::array<int64_t, 5> Widths(const GaussianCloud& cloud) { return {3, 3, 4, 1, cloud.sh_stride()}; }
+
+// How many keys are less than another.
+class Ranks {
+ public:
+  explicit Ranks(int64_t keys) : bits_(static_cast<size_t>((keys + 63) / 64), 0) {}
+  void Add(int64_t key) { bits_[static_cast<size_t>(key / 64)] |= uint64_t{1} << (key % 64); }
+  void Count() {
+    before_.resize(bits_.size());
+    int32_t sum = 0;
+    for (size_t i = 0; i < bits_.size(); ++i) {
+      before_[i] = sum;
+      sum += std::popcount(bits_[i]);
+    }
+  }
+  int32_t Of(int64_t key) const {
+    const auto word = static_cast<size_t>(key / 64);
+    return before_[word] + std::popcount(bits_[word] & ((uint64_t{1} << (key % 64)) - 1));
+  }
+
+ private:
+  Buffer<uint64_t> bits_;
+  Buffer<int32_t> before_;
+};
+
+}  // namespace
+
+CompactOutput::CompactOutput(int64_t count, int64_t copies, const CopyChoice& choice)
+    : count_(count),
+      copies_(copies),
+      choice_(choice),
+      waits_(choice.max_gaussians > 0 && choice.max_gaussians < count * copies),
+      merges_(copies > 1 && (waits_ || choice.copies != copies)) {
+  if (!waits_) choice_.max_gaussians = 0;
+}
+
+CompactOutput::Piece& CompactOutput::PieceFor(int64_t rows, const GaussianCloud& block) {
+  if (!pieces_.empty() &&
+      pieces_.back().cloud.opacity_logits.capacity() >= static_cast<size_t>(pieces_.back().cloud.size() + rows)) {
+    return pieces_.back();
+  }
+  Piece& piece = pieces_.emplace_back();
+  const int64_t room = std::max(rows, std::min(kPieceRows, count_ * copies_));
+  piece.cloud.sh_degree = block.sh_degree;
+  piece.cloud.render_mode = block.render_mode;
+  for (size_t a = 0; a < kArrays.size(); ++a) {
+    (piece.cloud.*kArrays[a]).reserve(static_cast<size_t>(room * Widths(block)[a]));
+  }
+  piece.keys.reserve(static_cast<size_t>(room));
+  return piece;
+}
+
+void CompactOutput::Add(const Buffer<int32_t>& rows, CopyGroups groups, GaussianCloud& block) {
+  const int64_t inside = groups.count;
+  keys_.clear();
+  for (int64_t k = 0; k < copies_; ++k) {
+    for (int64_t g = 0; g < inside; ++g) keys_.push_back(k * count_ + rows[static_cast<size_t>(g)]);
+  }
+  for (auto alone = static_cast<size_t>(inside); alone < rows.size(); ++alone) {
+    keys_.push_back(copies_ * count_ + rows[alone]);
+  }
+  made_ += block.size();
+  if (merges_ && !waits_ && inside > 0) {
+    const CopyPlan plan(std::move(groups), choice_, block);
+    if (plan.merged() > 0) {
+      merged_ += plan.merged();
+      std::vector<char> keep(static_cast<size_t>(block.size()), 1);
+      plan.Carry(block, keep);
+      KeepMarked(keep, block);
+      KeepRows(keys_, 1, keep);
+    }
+  }
+  Piece& piece = PieceFor(block.size(), block);
+  const int64_t first = piece.cloud.size();
+  for (const auto array : kArrays) {
+    (piece.cloud.*array).insert((piece.cloud.*array).end(), (block.*array).begin(), (block.*array).end());
+  }
+  piece.keys.insert(piece.keys.end(), keys_.begin(), keys_.end());
+  if (merges_ && waits_ && inside > 0) {
+    groups.first = first;
+    plans_.emplace_back(std::move(groups), choice_, piece.cloud);
+    piece_of_plan_.push_back(pieces_.size() - 1);
+    rows_of_plan_.emplace_back(rows.begin(), rows.begin() + inside);
+  }
+}
+
+void CompactOutput::MergeAll() {
+  for (const CopyPlan& plan : plans_) merged_ += plan.merged();
+  if (const int64_t over = made_ - merged_ - choice_.max_gaussians; waits_ && over > 0) {
+    MergeMore(plans_, over,
+              [&](size_t plan, int64_t group) { return int64_t{rows_of_plan_[plan][static_cast<size_t>(group)]}; });
+  }
+  for (size_t p = 0, first = 0; p < pieces_.size(); ++p) {
+    Piece& piece = pieces_[p];
+    std::vector<char> keep(static_cast<size_t>(piece.cloud.size()), 1);
+    for (; first < plans_.size() && piece_of_plan_[first] == p; ++first) plans_[first].Carry(piece.cloud, keep);
+    KeepMarked(keep, piece.cloud);
+    KeepRows(piece.keys, 1, keep);
+  }
+  plans_.clear();
+  rows_of_plan_.clear();
+}
+
+GaussianCloud CompactOutput::Finish(ChosenCopies& chosen) {
+  if (!plans_.empty()) MergeAll();
+  GaussianCloud out;
+  Ranks ranks((copies_ + 1) * count_);
+  int64_t total = 0;
+  for (const Piece& piece : pieces_) {
+    total += piece.cloud.size();
+    for (const int64_t key : piece.keys) ranks.Add(key);
+  }
+  ranks.Count();
+  Buffer<int32_t> places;
+  places.reserve(static_cast<size_t>(total));
+  for (Piece& piece : pieces_) {
+    for (const int64_t key : piece.keys) places.push_back(ranks.Of(key));
+    piece.keys = {};
+  }
+  for (size_t a = 0; a < kArrays.size() && !pieces_.empty(); ++a) {
+    out.sh_degree = pieces_.front().cloud.sh_degree;
+    out.render_mode = pieces_.front().cloud.render_mode;
+    std::vector<std::span<const float>> arrays;
+    for (const Piece& piece : pieces_) arrays.emplace_back(piece.cloud.*kArrays[a]);
+    out.*kArrays[a] = ScatterRows(arrays, Widths(out)[a], places);
+    for (Piece& piece : pieces_) piece.cloud.*kArrays[a] = {};
+  }
+  chosen.merged = made_ - total;
+  chosen.left_out = LeaveOutLeastVisible(choice_.max_gaussians, out);
+  pieces_.clear();
+  return out;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/buffer.h"
+#include "core/gaussian_cloud.h"
+#include "model/compact/copy_choice.h"
+
+namespace anchorsplat {
+
+struct ChosenCopies {
+  int64_t merged = 0;    // copies that are gone: others stand for them, or they were invisible
+  int64_t left_out = 0;  // Gaussians that are gone, as there are more than max_gaussians without copies
+};
+
+// What a network makes of a splat, gathered block by block in any order. Copies are merged as soon as their block is
+// there, and what is left is written one behind the other and put in order once, at the end. Where max_gaussians may be
+// less than all copies, these wait for the last block: what is cheapest among all is not known before.
+class CompactOutput {
+ public:
+  // `count` Gaussians become at most `copies` each.
+  CompactOutput(int64_t count, int64_t copies, const CopyChoice& choice);
+
+  // Of the block's first groups.count Gaussians copy k of all before copy k + 1, then one of each of the others.
+  // `rows`: all its Gaussians in the input. The block is used up, but keeps its memory.
+  void Add(const Buffer<int32_t>& rows, CopyGroups groups, GaussianCloud& block);
+
+  // Copy k of all Gaussians before copy k + 1, then those that stand alone, each in the order of the input.
+  GaussianCloud Finish(ChosenCopies& chosen);
+
+ private:
+  struct Piece {
+    GaussianCloud cloud;
+    Buffer<int64_t> keys;  // by which rows are ordered
+  };
+  Piece& PieceFor(int64_t rows, const GaussianCloud& block);
+  void MergeAll();
+
+  int64_t count_, copies_;
+  CopyChoice choice_;
+  bool waits_, merges_;
+  int64_t made_ = 0, merged_ = 0;
+  std::vector<Piece> pieces_;
+  std::vector<CopyPlan> plans_;        // that wait
+  std::vector<size_t> piece_of_plan_;  // ascending
+  std::vector<Buffer<int32_t>> rows_of_plan_;
+  Buffer<int64_t> keys_;
+};
+
+}  // namespace anchorsplat

@@ -1,0 +1,161 @@
+#include "model/compact/compact_output.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "enhance/filter.h"
+#include "model/compact/choose_copies_for_test.h"
+#include "model/compact/compact_network.h"
+#include "model/compact/sheet_cloud_for_test.h"
+
+namespace anchorsplat {
+namespace {
+
+constexpr int64_t kCount = 900;
+
+// Of which some Gaussians are unlike the training data.
+CompactNetwork Network() {
+  auto network = CompactNetwork::Load({}, [](const TensorSpec& tensor, std::span<float> values) -> Status {
+    const Status status = OpenDomain()(tensor, values);
+    if (tensor.name == "domain.high") values[0] = 1;
+    return status;
+  });
+  EXPECT_TRUE(network.ok());
+  return *std::move(network);
+}
+
+GaussianCloud Sheet() {
+  GaussianCloud cloud = SheetCloud(kCount);
+  for (size_t i = 5; i < static_cast<size_t>(kCount); i += 50) {
+    for (size_t c = 0; c < 3; ++c) cloud.log_scales[3 * i + c] = std::log(kSheetPixel) + (c == 0 ? 4.0f : -4.0f);
+  }
+  // Copies of equal cost.
+  for (size_t i = 100; i < 140; ++i) cloud.opacity_logits[i] = -std::numeric_limits<float>::infinity();
+  return cloud;
+}
+
+void ExpectSameValues(const GaussianCloud& a, const GaussianCloud& b) {
+  ASSERT_EQ(a.size(), b.size());
+  EXPECT_EQ(a.sh_degree, b.sh_degree);
+  EXPECT_EQ(a.means, b.means);
+  EXPECT_EQ(a.log_scales, b.log_scales);
+  EXPECT_EQ(a.quats, b.quats);
+  EXPECT_EQ(a.opacity_logits, b.opacity_logits);
+  EXPECT_EQ(a.sh, b.sh);
+}
+
+// Chosen block by block, copies are those that are chosen when all of them are there.
+TEST(CompactOutput, BlocksAreChosenAsTheWhole) {
+  const GaussianCloud cloud = Sheet();
+  const CompactNetwork network = Network();
+  std::vector<float> pixels;
+  for (int64_t i = 0; i < kCount; ++i) pixels.push_back(kSheetPixel * (1 + 0.1f * std::sin(static_cast<float>(i))));
+  const float one = kSheetPixel;
+  std::vector<int64_t> single;
+  for (int64_t i = 3; i < kCount; i += 7) single.push_back(i);
+  const CopyChoice choices[] = {{.copies = 2},
+                                {.copies = 4},
+                                {.merge_cost = 1e-3},
+                                {.merge_cost = 1e-3, .invisible = 0.05f},
+                                {.copies = 4, .max_gaussians = 2000},
+                                {.merge_cost = 1e-6, .max_gaussians = 1500},
+                                {.max_gaussians = 3599},
+                                {.max_gaussians = 3600},
+                                {.max_gaussians = 901},
+                                {.max_gaussians = 300}};
+  for (const bool each : {false, true}) {
+    CompactTask task{.pixel_sizes = each ? std::span<const float>(pixels) : std::span<const float>(&one, 1),
+                     .upscale = 4,
+                     .strength = DefaultFilterStrength(4)};
+    const auto all = network.Apply(cloud, task);
+    ASSERT_TRUE(all.ok());
+    ASSERT_EQ(all->outside, 18);
+    for (const CopyChoice& choice : choices) {
+      const int64_t inside = kCount - all->outside;
+      CopyGroups groups{.count = inside, .copies = 4, .pixel_sizes = {}};
+      for (int64_t i = 0; i < kCount; ++i) {
+        if (i % 50 == 5) continue;  // stays alone
+        const float pixel = task.pixel_sizes[each ? static_cast<size_t>(i) : 0];
+        groups.pixel_sizes.push_back(static_cast<float>(pixel / task.upscale));
+        if (!choice.copies) groups.single.push_back(i % 7 == 3 ? 1 : 0);
+      }
+      GaussianCloud expected = all->cloud;
+      const auto chosen = ChooseCopies(groups, choice, expected);
+      ASSERT_TRUE(chosen.ok());
+      task.choice = choice;
+      if (!choice.copies) task.single = single;
+      for (const int64_t block : {int64_t{97}, int64_t{400}, kCount}) {
+        SCOPED_TRACE(block);
+        task.block_gaussians = block;
+        const auto blocks = network.Apply(cloud, task);
+        ASSERT_TRUE(blocks.ok());
+        EXPECT_EQ(blocks->made, 4 * inside + all->outside);
+        EXPECT_EQ(blocks->chosen.merged, chosen->merged);
+        EXPECT_EQ(blocks->chosen.left_out, chosen->left_out);
+        ExpectSameValues(blocks->cloud, expected);
+      }
+      task.choice.reset();
+      task.single = {};
+    }
+  }
+}
+
+// Those of a region are what they are in the whole.
+TEST(CompactOutput, OnlyThoseInsideComeOut) {
+  const GaussianCloud cloud = Sheet();
+  const CompactNetwork network = Network();
+  const float pixel = kSheetPixel;
+  CompactTask task{.pixel_sizes = {&pixel, 1}, .upscale = 4, .strength = DefaultFilterStrength(4)};
+  const auto all = network.Apply(cloud, task);
+  ASSERT_TRUE(all.ok());
+  std::vector<char> inside(static_cast<size_t>(kCount));
+  std::vector<int64_t> rows;  // of the whole result
+  for (int64_t k = 0, row = 0; k < 5; ++k) {
+    for (int64_t i = 0; i < kCount; ++i) {
+      if ((i % 50 == 5) != (k == 4)) continue;  // those that stay alone stand behind
+      inside[static_cast<size_t>(i)] = cloud.means[static_cast<size_t>(3 * i)] < 0.1f ? 1 : 0;
+      if (inside[static_cast<size_t>(i)] != 0) rows.push_back(row);
+      ++row;
+    }
+  }
+  task.inside = inside;
+  for (const int64_t block : {int64_t{97}, kCount}) {
+    task.block_gaussians = block;
+    const auto part = network.Apply(cloud, task);
+    ASSERT_TRUE(part.ok());
+    ExpectSameValues(part->cloud, Subset(all->cloud, rows).value());
+  }
+}
+
+TEST(CompactOutput, RefusesAChoiceWithoutMeaning) {
+  const float pixel = kSheetPixel;
+  const auto result = Network().Apply(Sheet(), {.pixel_sizes = {&pixel, 1}, .choice = CopyChoice{.copies = 5}});
+  ASSERT_FALSE(result.ok());
+  EXPECT_EQ(result.error().code, ErrorCode::kBadArgument);
+}
+
+// Of equally cheap merges those of the first Gaussians, whatever plan they are in.
+TEST(MergeMore, GoesByTheOrderOfTheGaussians) {
+  std::vector<CopyPlan> plans;
+  std::vector<GaussianCloud> clouds(2);
+  for (size_t p = 0; p < 2; ++p) {
+    for (int row = 0; row < 2 * 3; ++row) ASSERT_TRUE(Append(clouds[p], SheetCloud(1)).ok());
+    plans.emplace_back(CopyGroups{3, 2, {kSheetPixel}}, CopyChoice{.copies = 2, .max_gaussians = 1}, clouds[p]);
+    EXPECT_EQ(plans.back().merged(), 0);
+  }
+  // Gaussians 5, 3, 1 and 4, 2, 0.
+  MergeMore(plans, 2, [](size_t plan, int64_t group) { return 5 - 2 * group - static_cast<int64_t>(plan); });
+  const std::vector<std::vector<char>> expected = {{1, 1, 1, 1, 1, 0}, {1, 1, 1, 1, 1, 0}};
+  for (size_t p = 0; p < 2; ++p) {
+    std::vector<char> keep(6, 1);
+    plans[p].Carry(clouds[p], keep);
+    EXPECT_EQ(plans[p].merged(), 1);
+    EXPECT_EQ(keep, expected[p]);
+  }
+}
+
+}  // namespace
+}  // namespace anchorsplat

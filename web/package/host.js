@@ -25,6 +25,7 @@ async function start(compiled, threads) {
   if (typeof globalThis.crypto === 'undefined') globalThis.crypto = module.require('node:crypto').webcrypto;  // Node 18
   engine = await createEngine({
     threads,
+    mainScriptUrlOrBlob: node ? undefined : self.location.href,  // what its threads run
     instantiateWasm(imports, done) {
       WebAssembly.instantiate(compiled, imports).then((instance) => done(instance, compiled));
       return {};

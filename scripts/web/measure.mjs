@@ -19,29 +19,10 @@ const number = (value) => value.toLocaleString('en');
 const seconds = (value) => `${value.toFixed(value < 10 ? 2 : 1)} s`;
 const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
 
-// Copies of the splat side by side, about so many Gaussians in all, as a PLY.
-async function tiled(count) {
+// Copies of the splat side by side.
+function tiled(count) {
   const file = path.join(work, `${count}.ply`);
-  if (fs.existsSync(file)) return file;
-  const source = fs.readFileSync(splat);
-  const headEnd = source.indexOf('end_header\n') + 'end_header\n'.length;
-  const head = source.subarray(0, headEnd).toString('latin1');
-  const rows = Number(head.match(/element vertex (\d+)/)[1]);
-  const stride = (source.length - headEnd) / rows;
-  if (!/property float x\nproperty float y\nproperty float z\n/.test(head) || !Number.isInteger(stride)) throw new Error(`${splat}: not a plain PLY`);
-  const copies = Math.round(count / rows);
-  const side = Math.ceil(Math.sqrt(copies));
-  const out = fs.openSync(file, 'w');
-  fs.writeSync(out, head.replace(/element vertex \d+/, `element vertex ${copies * rows}`));
-  const block = Buffer.from(source.subarray(headEnd));
-  for (let k = 0; k < copies; ++k) {
-    for (let i = 0; i < rows; ++i) {
-      block.writeFloatLE(source.readFloatLE(headEnd + i * stride) + 3 * (k % side), i * stride);
-      block.writeFloatLE(source.readFloatLE(headEnd + i * stride + 8) + 3 * Math.floor(k / side), i * stride + 8);
-    }
-    fs.writeSync(out, block);
-  }
-  fs.closeSync(out);
+  if (!fs.existsSync(file)) execFileSync('scripts/tile-splat.py', [splat, file, String(count)]);
   return file;
 }
 
@@ -175,13 +156,13 @@ if (wanted('20k')) {
   expect('20k by default in 3 s and 3 times', !run.error && run.enhancing <= 3 && run.enhancing <= 3 * theirs[1]);
 }
 if (wanted('500k')) {
-  const file = await tiled(500000);
+  const file = tiled(500000);
   const run = await inBrowser(file, {words: {method: 'model'}});
   tell('500k', run, native(file, {method: 'model'}));
   expect('500k by the network in 2 GB, with progress', !run.error && run.memory <= 2e9 && run.told > 10);
 }
 if (wanted('3M')) {
-  const file = await tiled(3000000);
+  const file = tiled(3000000);
   tell('3M', await inBrowser(file, {words: {method: 'filter'}}), native(file, {method: 'filter'}));
   const refused = await inBrowser(file, {words: {}});
   console.log(`3M by default: ${refused.error}`);
@@ -189,6 +170,6 @@ if (wanted('3M')) {
 }
 if (wanted('threads')) {
   tell('20k with threads', await inBrowser(splat, {words: {}, repeat: 3, isolated: true}));
-  tell('500k with threads', await inBrowser(await tiled(500000), {words: {method: 'model'}, isolated: true}));
+  tell('500k with threads', await inBrowser(tiled(500000), {words: {method: 'model'}, isolated: true}));
 }
 finish();

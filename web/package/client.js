@@ -201,6 +201,7 @@ export class Splat {
       const {answer} = await work.ask(request, {onProgress});
       tellMessages(answer, onMessage);
       const made = await work.ask({verb: 'columns', cloud: answer.cloud});
+      work.end(stopped());  // what it has is not needed beside what the other one gets
       const {answer: kept} = await put(this.worker, made.blocks, describedBy(made.answer), made.blocks);
       return {splat: new Splat(this.engine, this.worker, kept), report: answer.report};
     } finally {

@@ -20,7 +20,7 @@ for room in "${rooms[@]}"; do
     excluded+=:$pattern
   done < <(grep -v '^#' scripts/web/rooms.txt)
   if node "$program" --gtest_brief=1 "--gtest_filter=-${excluded#:}" >build/web-room.log 2>&1; then
-    echo "$room: $(grep -oE '[0-9]+ tests? from .*|PASSED.*' build/web-room.log | tail -n 1)"
+    echo "$room: $(sed -n 's/.*PASSED  \] //p' build/web-room.log | tail -n 1)"
   else
     failed=1
     echo "FAILED $room"

@@ -13,7 +13,7 @@
 #   make serve-test    the page and the API of `anchorsplat serve` in headless Chromium, under load and on Ray
 #   make batch-test    `anchorsplat batch` with kills, an S3 and a cluster on this machine, four minutes
 #   make web      the program in a browser: build/web/dist, a page; make npm: build/web/npm, the package (docs/web.md; half an hour)
-#   make web-test the package under Node beside the native program and under damaged files, the page in headless Chromium
+#   make web-test the engine's unit tests as WebAssembly, the package beside the native program, the page in headless Chromium
 #   make interop  files of ours read by other programs and theirs by us (scripts/interop.py says what it needs)
 #   make lpips-check  LPIPS with its trained weights (fetched once, 64 MB) against the published values
 #   make bench    measured ratios and figures

@@ -57,7 +57,7 @@ function(anchorsplat_room name)
   if(tests AND ANCHORSPLAT_TESTS)
     add_executable(${name}_test ${tests})
     if(EMSCRIPTEN)  # run by Node, on the files of this machine
-      target_link_options(${name}_test PRIVATE -sNODERAWFS=1 -sENVIRONMENT=node -sEXIT_RUNTIME=1 -sALLOW_MEMORY_GROWTH=1
+      target_link_options(${name}_test PRIVATE -O1 -pthread -sPTHREAD_POOL_SIZE=8 -sNODERAWFS=1 -sENVIRONMENT=node -sEXIT_RUNTIME=1 -sALLOW_MEMORY_GROWTH=1
                           -sMAXIMUM_MEMORY=4GB -sSTACK_SIZE=4MB -sINITIAL_MEMORY=64MB)
     endif()
     if(NOT name MATCHES "^(bench|cameras|cli|dataset|formats|images|io|metrics|model.*|render|tensors)$")  # their tests call what they compare alike

@@ -38,7 +38,9 @@ add_library(Threads::Threads INTERFACE IMPORTED GLOBAL)
 add_compile_options(-Wno-c++11-narrowing)
 add_compile_options(-fwasm-exceptions -sSUPPORT_LONGJMP=wasm -msimd128)
 add_link_options(-fwasm-exceptions -sSUPPORT_LONGJMP=wasm)
-# One thread: threads of WebAssembly need a page that is isolated from other origins, and a file that is opened is none.
-add_compile_definitions(ANCHORSPLAT_SERIAL)
+# Threads of WebAssembly need a page that is isolated from other origins, and a file that is opened is none. So all is
+# compiled once as for threads, and linked with them (-pthread) and without: then whoever starts a loop does all of it.
+add_compile_options(-pthread)
+add_compile_definitions(ANCHORSPLAT_WORKERS)
 # Highway knows one instruction set here.
 add_compile_definitions(HWY_COMPILE_ONLY_STATIC)

@@ -7,42 +7,18 @@
 import fs from 'node:fs';
 import path from 'node:path';
 import {pathToFileURL} from 'node:url';
-import {createRequire} from 'node:module';
+import {expect, finish, launchBrowser, watchedTab} from './browser.mjs';
 
-const {chromium} = createRequire(path.join(process.env.NODE_FOLDER, 'package.json'))('playwright-core');
 const [page, references, out] = process.argv.slice(2).map((p) => path.resolve(p));
 const SIDE = 512;
 const LEAST_PSNR = 32;
-let checks = 0;
-let failures = 0;
-
-function expect(name, condition, detail = '') {
-  ++checks;
-  if (condition) return;
-  ++failures;
-  console.log(`FAILED ${name} ${detail}`);
-}
-
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM || '/usr/bin/chromium',
-  args: ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--no-sandbox',
-    '--disable-gpu-sandbox', '--disable-background-networking', '--disable-component-update', '--disable-sync',
-    '--no-first-run'],
-});
+const browser = await launchBrowser();
 
 // A tab with the page in it; whatever it says or asks for that it should not is a failure.
 async function open(file, {width, height, scale = 1, touch = false, quiet = true, before} = {}) {
   const context = await browser.newContext({viewport: {width, height}, deviceScaleFactor: scale, hasTouch: touch});
-  const tab = await context.newPage();
-  tab.setDefaultTimeout(300000);  // a software renderer on a busy machine
+  const tab = await watchedTab(context, {allowed: /^(file|blob|data):/, console: quiet});
   if (before) await tab.addInitScript(before);
-  tab.on('console', (message) => {
-    if (quiet) expect('a silent console', false, `${message.type()}: ${message.text()}`);
-  });
-  tab.on('pageerror', (error) => expect('no uncaught error', false, error.message));
-  tab.on('request', (request) => {
-    expect('no request to the network', /^(file|blob|data):/.test(request.url()), request.url().slice(0, 100));
-  });
   await tab.goto(pathToFileURL(file).href);
   await tab.waitForFunction(() => document.documentElement.dataset.state !== 'loading', null, {timeout: 300000});
   return tab;
@@ -122,6 +98,8 @@ const same = async (a, b) => (await difference(a, b)).share < 1e-4;
   console.log(`${(fs.statSync(page).size / 1e6).toFixed(2)} MB, ready after ${ready} ms`);
   const first = await picture(tab, 'desktop');
 
+  expect('readers can open their own', await tab.locator('#own').getAttribute('href') === 'https://splats.example/' &&
+    await visible(tab, '#own'));
   const divider = tab.locator('#divider');
   const box = await divider.boundingBox();
   await tab.mouse.move(box.x + box.width / 2, 500);
@@ -280,5 +258,4 @@ await expectMessage('no WebGL 2', page, /WebGL 2/,
 
 await browser.close();
 for (const name of ['damaged', 'garbage', 'missing', 'cut']) fs.rmSync(path.join(out, `${name}.html`));
-console.log(`${checks} checks, ${failures} failed`);
-process.exit(failures === 0 ? 0 : 1);
+finish();

@@ -24,5 +24,5 @@ example=examples/biplane
 "$program" render $example/input.ply -o "$work/before" --cameras $example/transforms_hr.json --size 512x512 -q
 "$program" render "$work/after.ply" -o "$work/after" --cameras $example/transforms_hr.json --size 512x512 -q
 "$program" view "$work/after.ply" --before $example/input.ply --truth $example/hr \
-  --cameras $example/transforms_hr.json -o "$work/page.html" -q
+  --cameras $example/transforms_hr.json --open-your-own https://splats.example/ -o "$work/page.html" -q
 node scripts/viewer_test.mjs "$work/page.html" "$work" "$out"

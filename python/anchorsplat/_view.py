@@ -56,6 +56,7 @@ def view(
     mode: RenderMode | None = None,
     background: Color | None = None,
     title: str | None = None,
+    open_your_own: str | None = None,
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> Page:
@@ -69,6 +70,7 @@ def view(
     mode: how both are rasterized; otherwise as each says, else classic.
     background: r, g, b from 0 to 1; otherwise what the camera file says, else black.
     title: heading of the page.
+    open_your_own: address of the hosted page (docs/web.md) that a button of this one opens, for readers with a splat.
 
     Raises BadArgumentError: nothing to show, a page above 300 MB; NotFoundError, BadFileError: true pictures.
     """

@@ -1,6 +1,7 @@
 // Puts what was compiled together: assemble.mjs MODULE_DIR NOTICES_DIR OUT
 //
-//   OUT/dist     the page: index.html with all of it inside, and sw.js for where it is hosted
+//   OUT/dist     the page: index.html with all of it inside; sw.js for where it is hosted, and the engine with threads for
+//                hosts that isolate it from other origins
 //   OUT/npm      the package `anchorsplat`
 import fs from 'node:fs';
 import path from 'node:path';
@@ -11,8 +12,12 @@ const [moduleDir, noticesDir, out] = process.argv.slice(2);
 const source = path.join(path.dirname(fileURLToPath(import.meta.url)), '../..');
 const read = (...parts) => fs.readFileSync(path.join(source, ...parts), 'utf8');
 const version = read('CMakeLists.txt').match(/project\(anchorsplat VERSION ([0-9.]+)/)[1];
-const wasm = fs.readFileSync(path.join(moduleDir, 'engine.wasm'));
-const worker = `${fs.readFileSync(path.join(moduleDir, 'engine.js'), 'utf8')}\n${read('web/package/host.js')}`;
+const engineOf = (name) => ({
+  wasm: fs.readFileSync(path.join(moduleDir, `${name}.wasm`)),
+  worker: `${fs.readFileSync(path.join(moduleDir, `${name}.js`), 'utf8')}\n${read('web/package/host.js')}`,
+});
+const {wasm, worker} = engineOf('engine');
+const threads = engineOf('engine-threads');
 const client = read('web/package/client.js');
 const notices = fs.readdirSync(noticesDir).sort()
   .map((name) => `${name}\n${'='.repeat(name.length)}\n\n${fs.readFileSync(path.join(noticesDir, name), 'utf8').trim()}\n`)
@@ -51,6 +56,8 @@ page('index.html', filled(read('web/page/index.html'), {
   app: inline(read('web/page/app.js'), 'app.js'),
 }));
 page('sw.js', filled(read('web/page/sw.js'), {version}));
+page('worker-threads.js', threads.worker);
+page('engine-threads.wasm', threads.wasm);
 
 const npm = fresh('npm');
 npm('package.json', `${JSON.stringify({...JSON.parse(read('web/package/package.json')), version}, null, 2)}\n`);
@@ -59,11 +66,14 @@ npm('index.d.ts', read('web/package/index.d.ts'));
 npm('client.mjs', client);
 npm('worker.js', worker);
 npm('engine.wasm', wasm);
+npm('worker-threads.js', threads.worker);
+npm('engine-threads.wasm', threads.wasm);
 npm('README.md', read('web/package/README.md'));
 npm('LICENSE', read('LICENSE'));
 npm('NOTICES', linked);
 
 const kilobytes = (bytes) => `${Math.round(bytes / 1000).toLocaleString('en')} kB`;
-const compressed = zlib.gzipSync(Buffer.concat([wasm, Buffer.from(worker)]), {level: 9}).length;
-console.log(`web: module ${kilobytes(wasm.length)}, with its script and compressed ${kilobytes(compressed)}; ` +
+const compressed = (of) => kilobytes(zlib.gzipSync(Buffer.concat([of.wasm, Buffer.from(of.worker)]), {level: 9}).length);
+console.log(`web: module ${kilobytes(wasm.length)}, with its script and compressed ${compressed({wasm, worker})}, ` +
+  `${compressed(threads)} with threads; ` +
   `page ${kilobytes(fs.statSync(path.join(out, 'dist/index.html')).size)}`);

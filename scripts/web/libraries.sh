@@ -7,7 +7,7 @@ cd "$(dirname "$0")/../.."
 [ "$(id -u)" -eq 0 ] || { echo "libraries.sh: this is for the root that scripts/web/build.sh makes" >&2; exit 1; }
 out=$PWD/build/web-libraries
 prefix=$out/prefix
-packages=(emscripten cmake ninja-build dpkg-dev patch xz-utils nlohmann-json3-dev libcli11-dev libfast-float-dev libstb-dev)
+packages=(emscripten cmake ninja-build dpkg-dev patch xz-utils nlohmann-json3-dev libcli11-dev libfast-float-dev libstb-dev ccache)
 sources=(zlib libpng1.6 libjpeg-turbo libwebp libzstd highway googletest)
 stamp=$out/done-$(sha256sum "$0" | cut -c1-16)
 [ ! -e "$stamp" ] || exit 0
@@ -20,7 +20,7 @@ apt-get update -qq
 apt-get install -y -qq --no-install-recommends "${packages[@]}"
 
 # As cmake/Web.cmake has them.
-flags="-O3 -fwasm-exceptions -sSUPPORT_LONGJMP=wasm -msimd128"
+flags="-O3 -fwasm-exceptions -sSUPPORT_LONGJMP=wasm -msimd128 -pthread"
 compile() {  # compile NAME COMPILER FOLDER FLAGS FILE...: libNAME.a of these files of the folder
   local name=$1 compiler=$2 folder=$3 more=$4
   shift 4
@@ -82,9 +82,9 @@ compile hwy em++ "$PWD" "-std=c++17 -I." $(ls hwy/{abort,aligned_allocator,per_t
 (find hwy -name '*.h' | tar -c -T -) | tar -x -C "$prefix/include"
 
 cd "$(here googletest)"
-compile gtest em++ "$PWD/googletest" "-std=c++17 -Iinclude -I. -DGTEST_HAS_PTHREAD=0" src/gtest-all.cc
-compile gtest_main em++ "$PWD/googletest" "-std=c++17 -Iinclude -I. -DGTEST_HAS_PTHREAD=0" src/gtest_main.cc
-compile gmock em++ "$PWD/googlemock" "-std=c++17 -Iinclude -I. -I../googletest/include -DGTEST_HAS_PTHREAD=0" src/gmock-all.cc
+compile gtest em++ "$PWD/googletest" "-std=c++17 -Iinclude -I." src/gtest-all.cc
+compile gtest_main em++ "$PWD/googletest" "-std=c++17 -Iinclude -I." src/gtest_main.cc
+compile gmock em++ "$PWD/googlemock" "-std=c++17 -Iinclude -I. -I../googletest/include" src/gmock-all.cc
 cp -r googletest/include/gtest googlemock/include/gmock "$prefix/include/"
 
 # Of libjpeg-turbo, what is compiled depends on what its own CMake finds.

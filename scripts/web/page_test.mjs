@@ -3,41 +3,17 @@
 // DIST  build/web/dist    SPLAT  a splat file    OUT  folder for screenshots
 // Prints what it measured and every failed expectation; exit code 1 if there is one.
 import fs from 'node:fs';
-import http from 'node:http';
 import path from 'node:path';
 import {pathToFileURL} from 'node:url';
-import {createRequire} from 'node:module';
+import {ISOLATED, expect, finish, launchBrowser, serve, watchedTab} from '../browser.mjs';
 
-const {chromium} = createRequire(path.join(process.env.NODE_FOLDER, 'package.json'))('playwright-core');
 const [dist, splat, out] = process.argv.slice(2).map((p) => path.resolve(p));
-let passed = 0;
-let failed = 0;
-function expect(name, condition, detail = '') {
-  if (condition) return void ++passed;
-  ++failed;
-  console.log(`FAILED ${name} ${detail}`);
-}
-
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM || '/usr/bin/chromium',
-  args: ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--no-sandbox',
-    '--disable-gpu-sandbox', '--disable-background-networking', '--disable-component-update', '--disable-sync',
-    '--no-first-run'],
-});
+const browser = await launchBrowser();
 
 async function openPage(url, allowed, {width = 1200, height = 800, scheme = 'dark'} = {}) {
   const context = await browser.newContext({viewport: {width, height}, colorScheme: scheme, acceptDownloads: true});
-  const tab = await context.newPage();
-  tab.setDefaultTimeout(300000);  // a software renderer on a busy machine
-  tab.on('console', (message) => {
-    // The viewer's help has a button that wants the focus, which a frame does not get.
-    if (/autofocus/.test(message.text())) return;
-    if (message.type() === 'error' || message.type() === 'warning') expect('a silent console', false, message.text());
-  });
-  tab.on('pageerror', (error) => expect('no uncaught error', false, error.message));
-  tab.on('request', (request) => {
-    expect('no request to the network', allowed.test(request.url()), request.url().slice(0, 100));
-  });
+  // The viewer's help has a button that wants the focus, which a frame does not get.
+  const tab = await watchedTab(context, {allowed, hushed: /autofocus/});
   await tab.goto(url);
   await state(tab, 'ready');
   return {tab, context};
@@ -133,54 +109,47 @@ const settled = (tab) => stageOf(tab).waitForFunction(() => document.documentEle
   await tab.close();
 }
 
-// Hosted: only its own files are asked for, and it opens again without a network.
-{
-  const server = http.createServer((request, response) => {
-    const file = path.join(dist, request.url === '/' ? 'index.html' : path.basename(request.url));
-    if (!fs.existsSync(file)) return response.writeHead(404).end();
-    response.writeHead(200, {'content-type': file.endsWith('.js') ? 'text/javascript' : 'text/html'}).end(fs.readFileSync(file));
-  });
-  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
-  const home = `http://127.0.0.1:${server.address().port}/`;
-  const {tab, context} = await openPage(home, new RegExp(`^(blob:|data:|${home}(sw\\.js)?$)`));
+// Hosted: only its own files are asked for, and it opens again without a network. Where the host isolates it, with threads.
+const inDist = (name) => path.join(dist, name === '/' ? 'index.html' : path.basename(name));
+for (const [headers, own] of [[{}, '(sw\\.js)?'], [ISOLATED, '(sw\\.js|worker-threads\\.js|engine-threads\\.wasm)?']]) {
+  const {home, close} = await serve(inDist, headers);
+  const isolated = headers === ISOLATED;
+  const {tab, context} = await openPage(home, new RegExp(`^(blob:|data:|${home}${own}$)`));
   await tab.evaluate(() => navigator.serviceWorker.ready);
-  await tab.waitForFunction(() => caches.keys().then((names) => names.length > 0));
-  server.close();
-  server.closeAllConnections();
+  await tab.waitForFunction((least) => caches.keys()
+    .then(async (names) => names.length > 0 && (await (await caches.open(names[0])).keys()).length >= least), isolated ? 3 : 1);
+  close();
   await context.setOffline(true);
   await tab.reload();
   await state(tab, 'ready');
   await tab.setInputFiles('#file', splat);
   await state(tab, 'shown');
   expect('it works offline', (await troubles(tab)) === '', await troubles(tab));
+  const threads = Number(await tab.evaluate(() => document.documentElement.dataset.threads));
+  expect(isolated ? 'it has threads' : 'it has one thread', isolated ? threads > 1 : threads === 1, String(threads));
+  const began = Date.now();
+  await tab.locator('#enhance').click();
+  await state(tab, 'enhanced');
+  expect('it enhances offline', (await troubles(tab)) === '', await troubles(tab));
+  console.log(`${threads} threads: enhanced and shown after ${((Date.now() - began) / 1000).toFixed(1)} s: ${await tab.locator('#done').innerText()}`);
   await context.close();
 }
 
 // The package in a page of somebody else's, with a viewer from npm (examples/web).
 {
   const modules = path.join(process.env.NODE_FOLDER, 'node_modules');
-  const types = {'.html': 'text/html', '.js': 'text/javascript', '.mjs': 'text/javascript', '.wasm': 'application/wasm'};
-  const server = http.createServer((request, response) => {
-    const name = new URL(request.url, 'http://x').pathname;
-    const file = name === '/' ? path.resolve('examples/web/index.html') : name === '/splat.ply' ? splat
-      : name.startsWith('/node_modules/anchorsplat/') ? path.join(dist, '../npm', path.basename(name))
-      : name.startsWith('/node_modules/') && !name.includes('..') ? path.join(modules, name.slice(14)) : '';
-    if (!fs.existsSync(file)) return response.writeHead(404).end();
-    response.writeHead(200, {'content-type': types[path.extname(file)] ?? 'application/octet-stream'}).end(fs.readFileSync(file));
-  });
-  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
-  const tab = await browser.newPage({viewport: {width: 700, height: 500}});
-  tab.setDefaultTimeout(300000);
-  tab.on('pageerror', (error) => expect('no uncaught error', false, error.message));
-  await tab.goto(`http://127.0.0.1:${server.address().port}/`);
+  const {home, close} = await serve((name) => (name === '/' ? path.resolve('examples/web/index.html') : name === '/splat.ply' ? splat
+    : name.startsWith('/node_modules/anchorsplat/') ? path.join(dist, '../npm', path.basename(name))
+    : name.startsWith('/node_modules/') && !name.includes('..') ? path.join(modules, name.slice(14)) : ''));
+  const tab = await watchedTab(await browser.newContext({viewport: {width: 700, height: 500}}), {console: false});
+  await tab.goto(home);
   await tab.waitForFunction(() => document.documentElement.dataset.state);
   const told = await tab.locator('#told').innerText();
   expect('a viewer from npm shows an enhanced splat', /^20,000 Gaussians became/.test(told), told);
   await tab.waitForTimeout(3000);  // until it has sorted
   await tab.screenshot({path: path.join(out, 'example.png')});
-  server.close();
+  close();
 }
 
 await browser.close();
-console.log(`${passed} passed, ${failed} failed`);
-process.exit(failed === 0 ? 0 : 1);
+finish();

@@ -8,17 +8,11 @@ import fs from 'node:fs';
 import path from 'node:path';
 import {execFileSync} from 'node:child_process';
 import {pathToFileURL} from 'node:url';
+import {expect, finish} from '../browser.mjs';
 
 const [packageDir, reference, mutants] = process.argv.slice(2).map((p) => path.resolve(p));
-const {AnchorsplatError, close, convert, formats, fromColumns, open, readCameras} =
+const {AnchorsplatError, close, convert, formats, fromColumns, open, readCameras, setThreads} =
   await import(pathToFileURL(path.join(packageDir, 'index.mjs')));
-let passed = 0;
-let failed = 0;
-function expect(name, condition, detail = '') {
-  if (condition) return void ++passed;
-  ++failed;
-  console.log(`FAILED ${name} ${detail}`);
-}
 async function refused(name, promise, code) {
   try {
     await promise;
@@ -80,6 +74,7 @@ async function compareColumns(what, splat, k) {
   return most;
 }
 
+setThreads(1);
 const splat = await open(bytes, {name: 'input.ply'});
 expect('it is read bit by bit', await compareColumns('read', splat, 3) === 0);
 const info = await splat.info();
@@ -150,6 +145,26 @@ expect('a splat is there after a stop', (await splat.info()).gaussians === splat
 await again.close();
 await refused('a splat that was closed', again.info(), 'bad_argument');
 
+// Threads change no bit, however many there are.
+const wanted = {network: Buffer.from(await sharp.write('ply')), pictures: (await sharp.render({size: [512, 512], orbit: 2})).pixels};
+await close();
+for (const threads of [2, 5]) {
+  setThreads(threads);
+  const other = await open(bytes, {name: 'input.ply'});
+  const since = performance.now();
+  const {splat: made} = await other.enhance();
+  const took = (performance.now() - since) / 1000;
+  console.log(`default with ${threads} threads: ${took.toFixed(2)} s, ${(seconds / took).toFixed(2)} times as quick as with one`);
+  expect(`${threads} threads make the same splat`, Buffer.compare(Buffer.from(await made.write('ply')), wanted.network) === 0);
+  expect(`${threads} threads render the same`, apart((await made.render({size: [512, 512], orbit: 2})).pixels, wanted.pictures) === 0);
+  const halt = new AbortController();
+  setTimeout(() => halt.abort(), 300);
+  await refused(`${threads} threads that were stopped`, other.enhance({quality: 'good', signal: halt.signal}), 'interrupted');
+  await close();
+}
+setThreads(1);
+const home = await open(bytes, {name: 'input.ply'});
+
 // Damaged files: each is read or refused with a sentence, and the engine that has read them is the same one at the end.
 const damaged = fs.readFileSync(mutants);
 let taken = 0;
@@ -172,7 +187,6 @@ for (let at = 0; at + 4 <= damaged.length;) {
 }
 console.log(`${taken + refusals} damaged files: ${refusals} refused with a sentence, ${taken} read`);
 expect('damaged files were tried', refusals > 100);
-expect('the engine lives on', (await splat.info()).gaussians === splat.count);
+expect('the engine lives on', (await home.info()).gaussians === home.count);
 await close();
-console.log(`${passed} passed, ${failed} failed`);
-process.exit(failed === 0 ? 0 : 1);
+finish();

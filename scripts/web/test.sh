@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What `make web` made: the npm package under Node, beside this machine's own program and under damaged
+# What `make web` made: the unit tests of the engine's rooms and the npm package under Node, beside this machine's own program and under damaged
 # files, and the page in headless Chromium. Needs what scripts/web/build.sh does, and the network once for a browser and
 # playwright-core (as scripts/viewer_test.sh). Screenshots stay in build/web/pictures.
 #
@@ -10,6 +10,9 @@ native=$1
 tools=$PWD/build/viewer-test
 
 scripts/web/build.sh
+sudo=()
+[ "$(id -u)" -eq 0 ] || sudo=(sudo)
+"${sudo[@]}" scripts/bare-debian.sh --suite trixie --keep "$PWD/build/web/root" --env "JOBS=${JOBS:-$(nproc)}" -- scripts/web/rooms.sh
 cmake --build "$native" -j "${JOBS:-$(nproc)}" --target web_reference web_mutants
 
 export CHROMIUM=${CHROMIUM:-/usr/bin/chromium}

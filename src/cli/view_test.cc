@@ -43,6 +43,11 @@ TEST_F(ViewVerb, OneSplat) {
   EXPECT_THAT(FileBytes(page_), HasSubstr(R"("title":"scan")"));
 }
 
+TEST_F(ViewVerb, HasAButtonForReadersWithASplat) {
+  ExpectDone({"view", scan_, "-o", page_, "--open-your-own", "https://splats.example/"});
+  EXPECT_THAT(FileBytes(page_), HasSubstr(R"("ownPage":"https://splats.example/")"));
+}
+
 TEST_F(ViewVerb, RefusesWhatMakesNoSense) {
   const auto refused = [&](std::vector<std::string> words, ErrorCode code, const std::string& why) {
     words.insert(words.begin(), {"view", scan_, "-o", page_});
@@ -53,6 +58,7 @@ TEST_F(ViewVerb, RefusesWhatMakesNoSense) {
   refused({"--truth", folder_.path(), "--cameras", cameras}, ErrorCode::kNotFound, "no PNG or JPEG");
   refused({"--truth", folder_ / "nowhere", "--cameras", cameras}, ErrorCode::kNotFound, "no such folder");
   refused({"--sh-degree", "4"}, ErrorCode::kBadArgument, "--sh-degree");
+  refused({"--open-your-own", "javascript:alert(1)"}, ErrorCode::kBadArgument, "is no address");
   refused({"--views", "0"}, ErrorCode::kBadArgument, "1 or more");
   refused({"--pixel-size", "0"}, ErrorCode::kBadArgument, "--pixel-size");
   refused({"--background", "white"}, ErrorCode::kBadArgument, "--background");

@@ -1,7 +1,10 @@
 #pragma once
 
-#ifdef ANCHORSPLAT_SERIAL
+#ifdef ANCHORSPLAT_WORKERS
 #include <algorithm>
+#include <cstdint>
+
+#include "core/parallel.h"
 #else
 #include <tbb/parallel_sort.h>
 
@@ -14,8 +17,17 @@ namespace anchorsplat {
 // however the work was split.
 template <typename Iterator>
 void ParallelSort(Iterator first, Iterator last) {
-#ifdef ANCHORSPLAT_SERIAL
-  std::sort(first, last);
+#ifdef ANCHORSPLAT_WORKERS
+  const int64_t count = last - first;
+  int64_t pieces = 1;
+  while (pieces < ThreadCount() && count / pieces > 4096) pieces *= 2;
+  const auto at = [&](int64_t piece) { return first + std::min(piece, pieces) * count / pieces; };
+  ParallelFor(0, pieces, 1, [&](int64_t k, int64_t) { std::sort(at(k), at(k + 1)); });
+  for (int64_t width = 1; width < pieces; width *= 2) {
+    ParallelFor(0, pieces / (2 * width), 1, [&](int64_t k, int64_t) {
+      std::inplace_merge(at(2 * k * width), at((2 * k + 1) * width), at((2 * k + 2) * width));
+    });
+  }
 #else
   ParallelSection([&] { tbb::parallel_sort(first, last); });
 #endif

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/parallel.h"
+#include "core/per_thread.h"
 #include "core/run.h"
 
 namespace anchorsplat {
@@ -10,18 +11,19 @@ namespace anchorsplat {
 namespace internal {
 
 namespace {
-thread_local std::shared_ptr<Run> current_run;
-}
+std::shared_ptr<Run>& OwnRun() { return PerThread<std::shared_ptr<Run>>(); }
+}  // namespace
 
-const std::shared_ptr<Run>& CurrentRun() { return current_run; }
+const std::shared_ptr<Run>& CurrentRun() { return OwnRun(); }
 
 RunStorage& CurrentStorage() {
   static RunStorage of_process;
-  return current_run ? *current_run->storage : of_process;
+  const std::shared_ptr<Run>& run = CurrentRun();
+  return run ? *run->storage : of_process;
 }
 
-TakePart::TakePart(const std::shared_ptr<Run>& run) : before_(std::exchange(current_run, run)) {}
-TakePart::~TakePart() { current_run = std::move(before_); }
+TakePart::TakePart(const std::shared_ptr<Run>& run) : before_(std::exchange(OwnRun(), run)) {}
+TakePart::~TakePart() { OwnRun() = std::move(before_); }
 
 }  // namespace internal
 
@@ -35,11 +37,11 @@ RunScope::RunScope(RunContext context) : before_(internal::CurrentRun()) {
   }
   run->context = std::move(context);
   run->storage = before_ ? before_->storage : std::make_shared<internal::RunStorage>();
-  internal::current_run = run;
+  internal::OwnRun() = run;
   if (run->context.threads > 0) run->arena.initialize(ThreadCount());  // oneTBB complains of more than the machine has
 }
 
-RunScope::~RunScope() { internal::current_run = std::move(before_); }
+RunScope::~RunScope() { internal::OwnRun() = std::move(before_); }
 
 bool StopRequested() {
   const auto& run = internal::CurrentRun();

@@ -13,12 +13,19 @@ namespace {
 
 double Factorial(int n) { return n < 2 ? 1 : n * Factorial(n - 1); }
 
+// Without the Condon–Shortley phase, as std::assoc_legendre, which not every standard library has.
+double AssociatedLegendre(int l, int m, double x) {
+  if (l < m) return 0;
+  if (l == m) return l == 0 ? 1 : (2 * l - 1) * std::sqrt(1 - x * x) * AssociatedLegendre(l - 1, l - 1, x);
+  return ((2 * l - 1) * x * AssociatedLegendre(l - 1, m, x) - (l + m - 1) * AssociatedLegendre(l - 2, m, x)) / (l - m);
+}
+
 // From the definition: real spherical harmonics with the Condon–Shortley phase, by associated Legendre polynomials.
 double Reference(int l, int m, double x, double y, double z) {
   const int k = std::abs(m);
   const double norm =
       std::sqrt((2 * l + 1) / (4 * std::numbers::pi) * Factorial(l - k) / Factorial(l + k)) * (k % 2 == 0 ? 1 : -1);
-  const double legendre = std::assoc_legendre(static_cast<unsigned>(l), static_cast<unsigned>(k), z);
+  const double legendre = AssociatedLegendre(l, k, z);
   const double phi = std::atan2(y, x);
   if (m == 0) return norm * legendre;
   return std::numbers::sqrt2 * norm * legendre * (m > 0 ? std::cos(k * phi) : std::sin(k * phi));

@@ -1,8 +1,7 @@
 #pragma once
 
-// The threads that loops of one run share. oneTBB's own; in a build without threads (ANCHORSPLAT_SERIAL: a module for
-// the web, whose threads not every page may have) the thread that asks does all.
-#ifndef ANCHORSPLAT_SERIAL
+// The threads that loops of one run share: oneTBB's own, or places for helpers of core/workers (ANCHORSPLAT_WORKERS).
+#ifndef ANCHORSPLAT_WORKERS
 
 #include <tbb/task_arena.h>
 
@@ -12,10 +11,22 @@ using TaskArena = tbb::task_arena;
 
 #else
 
+#include <climits>
+
 namespace anchorsplat::internal {
+// Its pool locks it.
 class TaskArena {
  public:
-  void initialize(int /*threads*/) {}
+  void initialize(int threads) { free_ = threads - 1; }
+  bool Enter() {
+    if (free_ == 0) return false;
+    --free_;
+    return true;
+  }
+  void Leave() { ++free_; }
+
+ private:
+  int free_ = INT_MAX;
 };
 }  // namespace anchorsplat::internal
 

@@ -82,6 +82,8 @@ void PageFlags::AddTo(CLI::App& verb) {
       ->capture_default_str();
   AddModeOption(verb, mode, "Rasterization of both (default: each file's tag, else classic)");
   verb.add_option("--background", background, "R,G,B, each 0-1 (default: what the camera file says, else black)");
+  verb.add_option("--open-your-own", open_your_own,
+                  "Address of the hosted page (make web) that a button of this page opens, for readers with a splat");
   verb.add_option("--title", title, "Heading of the page (default: the file's name)");
 }
 
@@ -99,6 +101,7 @@ Result<ViewerPage> MakePage(const PageFlags& flags, const CameraSet* given) {
   ViewerPage page;
   if (pixel_size) page.pixel_size = static_cast<float>(*pixel_size);
   page.title = flags.title;
+  page.own_page = flags.open_your_own;
   page.max_sh_degree = flags.sh_degree;
   page.smaller =
       "leave out view-dependent colour (--sh-degree 0), --before or the true pictures, or show a part of the scene";

@@ -17,6 +17,7 @@ struct PageFlags {
   std::string truth;
   std::string cameras;
   std::string title;
+  std::string open_your_own;
   std::string background;
   std::string pixel_size = "auto";
   int views = 10;

@@ -205,6 +205,10 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
   if (page.pixel_size && !(std::isfinite(*page.pixel_size) && *page.pixel_size > 0)) {
     return Error{ErrorCode::kBadArgument, "the training pixel size must be positive and finite"};
   }
+  if (!page.own_page.empty() && !page.own_page.starts_with("https://") && !page.own_page.starts_with("http://")) {
+    return Error{ErrorCode::kBadArgument, Cat("the page where readers open a splat of their own: '",
+                                              Printable(page.own_page), "' is no address, expected https://…")};
+  }
   // Refused before the work is done where that is certain: means and rotations never deflate by more than half.
   uint64_t at_least = static_cast<uint64_t>(page.after.cloud == nullptr ? 0 : page.after.cloud->size());
   if (page.before && page.before->cloud != nullptr) at_least += static_cast<uint64_t>(page.before->cloud->size());
@@ -229,6 +233,7 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
                             {"before", std::move(before)},
                             {"views", std::move(views)},
                             {"pixelSize", page.pixel_size ? Json(*page.pixel_size) : Json()},
+                            {"ownPage", page.own_page.empty() ? Json() : Json(page.own_page)},
                             {"background", page.background},
                             {"up", WorldUpOf(page)},
                             {"credits", AllCredits(page)},

@@ -37,6 +37,7 @@ struct ViewerPage {
   std::optional<ViewerSplat> before;
   std::vector<ViewerView> views;      // the first one opens the page; without any the page finds its own
   std::optional<float> pixel_size;    // world units one training pixel covers at the object; for the scale bar
+  std::string own_page;               // http(s) address of where readers can open a splat of their own; empty: none
   std::array<float, 3> background{};  // rgb 0–1
   int max_sh_degree = kMaxShDegree;   // higher coefficients are left out: they are most of the page
   uint64_t max_bytes = kMaxPageBytes;
@@ -48,7 +49,8 @@ struct ViewerPage {
 // (quantized_cloud.h), deflated and in base64, the page's own code beside them. The modes of rendering follow each
 // cloud's `render_mode`. Credits in the clouds' comments (core/credit.h) stand on the page.
 // Errors: kExists; kIo; kNotFound or kBadFile (a picture that is missing or neither PNG nor JPEG); kBadArgument: a
-// cloud without usable Gaussians, a pixel size that is not positive, a page above `max_bytes`.
+// cloud without usable Gaussians, a pixel size that is not positive, an `own_page` that is no such address, a page
+// above `max_bytes`.
 Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page, const WriteOptions& options = {});
 
 // Bytes that a splat takes in a page, from a sample of it; 0 where nothing of it can be shown. MostPageBytes: of one

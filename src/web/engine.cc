@@ -40,6 +40,7 @@
 #include "request/words.h"
 #include "request/write_flags.h"
 #include "viewer/page_writer.h"
+#include "web/addresses.h"
 #include "web/request.h"
 
 namespace anchorsplat::web {
@@ -323,6 +324,7 @@ Result<Engine::Answer> Engine::Enhance(const Json& request) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(flags.options.given, ReadWords(request, flags, cameras));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const EnhanceOptions options,
                                MakeEnhanceOptions(flags, static_cast<uint64_t>(seed), cameras));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckAddresses(open->cloud, options));
   GaussianCloud cloud = open->cloud;
   if (flags.mode) cloud.render_mode = flags.mode;
   ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, anchorsplat::Enhance(std::move(cloud), options));

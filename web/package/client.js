@@ -1,8 +1,8 @@
 // Splats for programs in JavaScript: the engine lives in a worker, and this is what asks it. Nothing here knows whether it
 // runs in a browser or in Node: `platform` does.
 //
-//   platform.compile() → Promise<WebAssembly.Module>
-//   platform.spawn()   → {post(message, transfer), onMessage(f), onFailure(f), end(), hold(), release()}
+//   platform.compile() → Promise<{module: WebAssembly.Module, threads}>; threads: 1 for the module without
+//   platform.spawn(threads) → {post(message, transfer), onMessage(f), onFailure(f), end(), hold(), release()}
 
 export class AnchorsplatError extends Error {
   constructor({code, message}) {
@@ -22,10 +22,10 @@ class EngineWorker {
     this.waiting = new Map();
     this.last = 0;
     this.gone = null;
-    this.worker = platform.spawn();
+    this.worker = platform.spawn(compiled.threads);
     this.worker.onMessage((message) => this.receive(message));
     this.worker.onFailure((why) => this.end(crashed(why)));
-    this.worker.post({module: compiled}, []);
+    this.worker.post(compiled, []);
   }
 
   ask(request, {data = [], transfer = [], onProgress} = {}) {
@@ -201,6 +201,7 @@ export class Splat {
       const {answer} = await work.ask(request, {onProgress});
       tellMessages(answer, onMessage);
       const made = await work.ask({verb: 'columns', cloud: answer.cloud});
+      work.end(stopped());  // what it has is not needed beside what the other one gets
       const {answer: kept} = await put(this.worker, made.blocks, describedBy(made.answer), made.blocks);
       return {splat: new Splat(this.engine, this.worker, kept), report: answer.report};
     } finally {

@@ -2,24 +2,30 @@
 // In a worker, behind the script that Emscripten makes (createEngine): the engine and the messages it is asked by. A classic
 // script, so that it runs as it is in a browser, from a blob, and as a module of Node.
 //
-// in   {module: WebAssembly.Module}                        first
+// in   {module: WebAssembly.Module, threads}              first; threads: 1, or as many as a module with threads is to have
+//      {compile: url}                                      instead of it: of a module that lies beside this script
 //      {id, request, data: [Uint8Array | Blob]}            src/web/engine.h says what a request is; data is one after the other
 // out  {id, answer, blocks: [ArrayBuffer]}
 //      {id, progress: {task, done, total, note}}
+//      {compiled: WebAssembly.Module}
 //      {id, crash: text}                                   the engine is gone, and this worker is of no more use
+//
+// Threads of the module run this script, too: Emscripten's part of it knows them by their name.
 
-const port = (() => {
-  if (typeof importScripts === 'function') return {post: (m, t) => self.postMessage(m, t), listen: (f) => { self.onmessage = (e) => f(e.data); }};
-  const {parentPort} = module.require('node:worker_threads');
-  return {post: (m, t) => parentPort.postMessage(m, t), listen: (f) => parentPort.on('message', f)};
-})();
+const node = typeof module === 'object' && module.require ? module.require('node:worker_threads') : null;
+const isThread = node ? node.workerData === 'em-pthread' : self.name.startsWith('em-pthread');
+const port = node
+  ? {post: (m, t) => node.parentPort.postMessage(m, t), listen: (f) => node.parentPort.on('message', f)}
+  : {post: (m, t) => self.postMessage(m, t), listen: (f) => { self.onmessage = (e) => f(e.data); }};
 
 let engine = null;
 let asked = null;  // id of the call that runs
 
-async function start(compiled) {
+async function start(compiled, threads) {
   if (typeof globalThis.crypto === 'undefined') globalThis.crypto = module.require('node:crypto').webcrypto;  // Node 18
   engine = await createEngine({
+    threads,
+    mainScriptUrlOrBlob: node ? undefined : self.location.href,  // what its threads run
     instantiateWasm(imports, done) {
       WebAssembly.instantiate(compiled, imports).then((instance) => done(instance, compiled));
       return {};
@@ -35,7 +41,11 @@ async function start(compiled) {
       };
     })(),
   });
+  engine._anchorsplat_threads(threads);
 }
+
+// The engine's memory as it is now: another thread may have made it larger, and a module without threads makes another one.
+const bytes = () => (engine.wasmMemory ? new Uint8Array(engine.wasmMemory.buffer) : engine.HEAPU8);
 
 // Addresses are unsigned: the upper half of the memory is negative otherwise.
 const address = (pointer) => pointer >>> 0;
@@ -48,7 +58,7 @@ function copied(parts) {
   let at = begin;
   if (begin === 0) return 0;
   for (const part of parts) {
-    engine.HEAPU8.set(part, at);
+    bytes().set(part, at);
     at += part.length;
   }
   return begin;
@@ -68,21 +78,26 @@ function call(request, data) {
   engine._anchorsplat_free(from);
   engine._anchorsplat_free(at);
   const json = address(engine._anchorsplat_json());
-  const answer = JSON.parse(new TextDecoder().decode(engine.HEAPU8.slice(json, json + length)));
+  const answer = JSON.parse(new TextDecoder().decode(bytes().slice(json, json + length)));
   const blocks = [];
   for (let k = 0; k < engine._anchorsplat_blocks(); ++k) {
     const begin = address(engine._anchorsplat_block(k));
-    blocks.push(engine.HEAPU8.slice(begin, begin + address(engine._anchorsplat_block_bytes(k))).buffer);
+    blocks.push(bytes().slice(begin, begin + address(engine._anchorsplat_block_bytes(k))).buffer);
   }
   return {answer, blocks};
 }
 
 let before = Promise.resolve();  // one after the other, also while a file is being read
-port.listen((message) => {
+if (!isThread) port.listen((message) => {
   before = before.then(async () => {
     asked = message.id;
     try {
-      if (message.module) return await start(message.module);
+      if (message.module) return await start(message.module, message.threads);
+      if (message.compile) {
+        const response = await fetch(new URL(message.compile, self.location.href));
+        if (!response.ok) throw new Error(`${message.compile}: the server says ${response.status}`);
+        return port.post({compiled: await WebAssembly.compile(await response.arrayBuffer())});
+      }
       const data = await Promise.all(message.data.map(async (part) =>
         (typeof part.arrayBuffer === 'function' ? new Uint8Array(await part.arrayBuffer()) : part)));
       const {answer, blocks} = call(message.request, data);

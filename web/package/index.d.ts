@@ -114,6 +114,8 @@ export interface PageOptions {
   name?: string;
   cameras?: Cameras;
   title?: string;
+  /** Address of a page that a button of this one opens. */
+  openYourOwn?: string;
   views?: number;
   pixelSize?: number | 'auto';
   shDegree?: 0 | 1 | 2 | 3;
@@ -153,5 +155,11 @@ export function fromColumns(columns: Columns): Promise<Splat>;
 export function readCameras(files: CameraFile | CameraFile[]): Promise<Cameras>;
 export function formats(): Promise<{name: string; extensions: string[]; reads: boolean; writes: boolean}[]>;
 export function convert(data: Bytes, options: {to: string; from?: string; name?: string} & WriteOptions): Promise<Uint8Array>;
+/**
+ * Threads that the engine may use, from the next one on (`close()` ends the one that there is); 1: the module without.
+ * null, the default: as many as there are processors, 8 at most. A page that is not isolated from other origins has one.
+ * Results do not depend on it.
+ */
+export function setThreads(threads: number | null): void;
 /** Ends the engine: all splats that are open are gone. */
 export function close(): Promise<void>;

@@ -4,19 +4,44 @@ const byId = (id) => document.getElementById(id);
 const show = (element, visible) => { element.hidden = !visible; };
 const number = (value) => value.toLocaleString('en');
 
-// An engine, from what this file carries.
+// A worker with the engine: from what this file carries, or from beside it.
+function workerWith(threads) {
+  if (threads > 1) return new Worker('worker-threads.js');
+  const url = URL.createObjectURL(new Blob([byId('engine-worker').textContent], {type: 'text/javascript'}));
+  const worker = new Worker(url);
+  URL.revokeObjectURL(url);
+  return worker;
+}
+
+// The module with threads, where the host isolates this page from other origins and has it; else null.
+function moduleWithThreads() {
+  if (!globalThis.crossOriginIsolated || !location.protocol.startsWith('http')) return null;
+  return new Promise((resolve) => {
+    const worker = workerWith(2);
+    const end = (compiled) => {
+      worker.terminate();
+      resolve(compiled);
+    };
+    worker.onmessage = ({data}) => end(data.compiled ?? null);
+    worker.onerror = () => end(null);
+    worker.postMessage({compile: 'engine-threads.wasm'});
+  });
+}
+
 const platform = {
   async compile() {
+    const processors = Math.min(8, navigator.hardwareConcurrency || 1);
+    const shared = processors > 1 ? await moduleWithThreads() : null;
+    document.documentElement.dataset.threads = String(shared ? processors : 1);
+    if (shared) return {module: shared, threads: processors};
     const element = byId('engine-module');
     const packed = Uint8Array.from(atob(element.textContent), (letter) => letter.charCodeAt(0));
     element.remove();
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate'));
-    return WebAssembly.compile(await new Response(stream).arrayBuffer());
+    return {module: await WebAssembly.compile(await new Response(stream).arrayBuffer()), threads: 1};
   },
-  spawn() {
-    const url = URL.createObjectURL(new Blob([byId('engine-worker').textContent], {type: 'text/javascript'}));
-    const worker = new Worker(url);
-    URL.revokeObjectURL(url);
+  spawn(threads) {
+    const worker = workerWith(threads);
     return {
       post: (message, transfer) => worker.postMessage(message, transfer),
       onMessage: (f) => { worker.onmessage = (event) => f(event.data); },
@@ -278,7 +303,8 @@ async function save() {
     const stem = input.name.replace(/(\.compressed)?\.[a-z0-9]+$/i, '') || 'splat';
     const zoom = enhanced ? `-${byId('upscale').value}x` : '';
     const bytes = format === 'html'
-      ? await splat.page({before: enhanced ? input.splat : undefined, name: input.name, title: input.name})
+      ? await splat.page({before: enhanced ? input.splat : undefined, name: input.name, title: input.name,
+        openYourOwn: location.protocol.startsWith('http') ? location.href.split(/[?#]/)[0] : undefined})
       : await splat.write(format);
     const link = document.createElement('a');
     link.href = URL.createObjectURL(new Blob([bytes]));

@@ -1,8 +1,15 @@
 'use strict';
-// Keeps the one page that there is, so that it opens without a network; a newer one is fetched when there is one.
+// Keeps the page, so that it opens without a network; a newer one is fetched when there is one. With it the engine with
+// threads, where the host isolates the page from other origins.
 const KEPT = 'anchorsplat-{{version}}';
+const THREADS = ['worker-threads.js', 'engine-threads.wasm'];
+const nameOf = (url) => new URL(url).pathname.split('/').pop();
 self.addEventListener('install', (event) => {
-  event.waitUntil(caches.open(KEPT).then((cache) => cache.add('./')).then(() => self.skipWaiting()));
+  event.waitUntil(caches.open(KEPT).then(async (cache) => {
+    await cache.add('./');
+    if (self.crossOriginIsolated) await cache.addAll(THREADS).catch(() => {});  // the page does without
+    await self.skipWaiting();
+  }));
 });
 self.addEventListener('activate', (event) => {
   event.waitUntil(caches.keys()
@@ -10,9 +17,10 @@ self.addEventListener('activate', (event) => {
     .then(() => self.clients.claim()));
 });
 self.addEventListener('fetch', (event) => {
-  if (event.request.mode !== 'navigate') return;
+  const name = event.request.mode === 'navigate' ? './' : nameOf(event.request.url);
+  if (name !== './' && !THREADS.includes(name)) return;
   event.respondWith(fetch(event.request).then(async (response) => {
-    if (response.ok) await (await caches.open(KEPT)).put('./', response.clone());
+    if (response.ok) await (await caches.open(KEPT)).put(name, response.clone());
     return response;
-  }).catch(() => caches.match('./')));
+  }).catch(() => caches.match(name)));
 });

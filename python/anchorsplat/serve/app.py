@@ -19,7 +19,7 @@ from .metrics import Metrics
 from .options import KINDS
 from .runner import LocalRunner, Runner
 from .scheduler import Busy, Refused, Scheduler
-from .security import Guard
+from .security import WEB_POLICY, Guard
 from .settings import Settings
 from .store import Store
 from .upload import drain
@@ -30,7 +30,10 @@ _TYPES = {
     ".css": "text/css; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
     ".svg": "image/svg+xml",
+    ".wasm": "application/wasm",
 }
+#: With these a browser lets the page use threads.
+_ISOLATED = {"cross-origin-opener-policy": "same-origin", "cross-origin-embedder-policy": "require-corp"}
 _PAGES = {"/": "index.html", "/docs": "api.html"}
 _SUMMARIES = {
     "enhance": "Make a splat hold up when seen closer",
@@ -39,9 +42,8 @@ _SUMMARIES = {
 }
 
 
-def read_static() -> dict[str, tuple[bytes, str]]:
+def read_static(folder: Path) -> dict[str, tuple[bytes, str]]:
     """All of it, once: no path of a request is ever opened."""
-    folder = Path(__file__).with_name("static")
     return {path.name: (path.read_bytes(), _TYPES[path.suffix]) for path in folder.iterdir() if path.suffix in _TYPES}
 
 
@@ -57,7 +59,7 @@ def make_app(settings: Settings):
     """An ASGI application. Raises DataInUse, EngineMissing. `app.service` is what it works with."""
     engine = Engine(find_program(), settings)
     store, metrics = Store(settings.data), Metrics()
-    static = read_static()
+    static = read_static(Path(__file__).with_name("static"))
     scheduler = Scheduler(store, engine, make_runner(settings, engine), settings, metrics)
     service = Service(settings, store, scheduler, metrics)
 
@@ -79,6 +81,8 @@ def make_app(settings: Settings):
     for kind in KINDS:
         _add_submission(app, service, kind)
     app.include_router(router(service, static))
+    if settings.web is not None:
+        _add_web(app, read_static(settings.web), static)
     for path, name in _PAGES.items():
         app.add_api_route(path, _page(static[name][0]), include_in_schema=False, response_class=Response)
 
@@ -108,6 +112,22 @@ def _page(body: bytes):
         return page_response(body)
 
     return page
+
+
+def _add_web(app: FastAPI, web: dict[str, tuple[bytes, str]], static: dict[str, tuple[bytes, str]]) -> None:
+    """The page that works without uploads, and links to it."""
+    body, media = static["index.html"]
+    link = b'<a href="/web/">Without upload</a> '
+    static["index.html"] = body.replace(b'<a href="/docs">', link + b'<a href="/docs">'), media
+
+    @app.get("/web/", include_in_schema=False)
+    @app.get("/web/{name}", include_in_schema=False)
+    async def web_file(name: str = "index.html") -> Response:
+        if name not in web:
+            raise ApiError(404, "not_found", "There is no such file.")
+        body, media = web[name]
+        headers = _ISOLATED | {"content-security-policy": WEB_POLICY, "cache-control": "no-cache"}
+        return Response(body, 200, headers, media)
 
 
 def _add_submission(app: FastAPI, service: Service, kind: str) -> None:

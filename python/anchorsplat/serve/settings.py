@@ -36,6 +36,7 @@ class Settings:
     keep_days: float = 7.0
     keep_bytes: int = 20 * 10**9
     ray: str | None = None
+    web: Path | None = None  # the folder of the page that `make web` makes
     stall_seconds: float = 30.0  # of an upload that sends nothing
 
     @property
@@ -162,6 +163,12 @@ def _parser() -> argparse.ArgumentParser:
         metavar="ADDRESS",
         help="send jobs to this Ray cluster (host:port, auto, or local) and not to processes of this machine",
     )
+    add(
+        "--web",
+        type=Path,
+        metavar="DIR",
+        help="build/web/dist of `make web`: the page that works without uploads, linked and served at /web/",
+    )
     return parser
 
 
@@ -183,6 +190,8 @@ def parse(argv: list[str]) -> Settings:
         )
     if given.allow_host and token is None:
         raise UsageError("--allow-host lets others in through a proxy, so it needs a token (ANCHORSPLAT_TOKEN)")
+    if given.web is not None and not (given.web / "index.html").is_file():
+        raise UsageError(f"--web: {given.web} has no index.html; `make web` makes build/web/dist")
     processors = len(os.sched_getaffinity(0))
     workers = given.workers or max(1, processors // 4)
     return Settings(
@@ -201,4 +210,5 @@ def parse(argv: list[str]) -> Settings:
         keep_days=given.keep_days,
         keep_bytes=given.keep_bytes,
         ray=given.ray,
+        web=given.web,
     )

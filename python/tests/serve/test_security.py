@@ -217,3 +217,25 @@ def test_sizes() -> None:
     assert parse(["--max-upload", "1.5GB"]).max_upload == 1_500_000_000
     assert parse(["--max-memory", "2 GiB"]).max_memory == 2 * 2**30
     assert parse([]).local and not parse(["--host", "::", "--token", TOKEN]).local
+
+
+def test_the_page_without_uploads_is_isolated_and_nothing_else_of_its_folder_is_there(serve, tmp_path) -> None:
+    web = tmp_path / "dist"
+    web.mkdir()
+    with pytest.raises(UsageError, match="index.html"):
+        parse(["--web", str(web)])
+    (web / "index.html").write_text("<title>web</title>")
+    (web / "engine-threads.wasm").write_bytes(b"\0asm")
+    (web / "notes.txt").write_text("not for others")
+    server = serve("--web", str(web))
+    page = server.http.get("/web/")
+    assert page.text == "<title>web</title>"
+    assert page.headers["cross-origin-embedder-policy"] == "require-corp"
+    assert page.headers["cross-origin-opener-policy"] == "same-origin"
+    policy = page.headers["content-security-policy"]
+    assert "default-src 'none'" in policy and "connect-src 'self'" in policy and "http" not in policy
+    module = server.http.get("/web/engine-threads.wasm")
+    assert (module.content, module.headers["content-type"]) == (b"\0asm", "application/wasm")
+    for name in ("notes.txt", "..%2fdata%2fjobs.sqlite", "%2e%2e"):
+        assert server.http.get(f"/web/{name}").status_code == 404, name
+    assert '<a href="/web/">' in server.http.get("/").text

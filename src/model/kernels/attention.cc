@@ -5,6 +5,7 @@
 
 #include "core/buffer.h"
 #include "core/parallel.h"
+#include "core/per_thread.h"
 #include "model/kernels/bfloat16_attention.h"
 #include "model/kernels/bfloat16_tile.h"
 #include "model/kernels/score_range.h"
@@ -321,7 +322,7 @@ void AttentionCpu(const AttentionParams& p) {
   while (chunk > 128 && patches * p.heads * ((patch + chunk - 1) / chunk) < wanted) chunk = whole_groups(chunk / 2);
   const int64_t chunks = (patch + chunk - 1) / chunk;
   ParallelFor(0, patches * p.heads * chunks, 1, [&](int64_t begin, int64_t end) {
-    thread_local AttentionScratch scratch;
+    auto& scratch = PerThread<AttentionScratch>();
     for (int64_t index = begin; index < end; ++index) {
       const int64_t slot = index / (p.heads * chunks) * patch;
       const int64_t own = std::min(patch, p.count - slot);  // the rest of a last patch is borrowed

@@ -14,6 +14,7 @@
 #include <limits>
 
 #include "core/buffer.h"
+#include "core/per_thread.h"
 #include "model/kernels/packed_weights.h"
 #include "model/kernels/score_range.h"
 #include "model/kernels/unroll.h"
@@ -295,7 +296,7 @@ ANCHORSPLAT_BF16_NOINLINE void AttendGroup(const AttentionParams& p, const Atten
 }  // namespace
 
 void AttendBFloat16Dot(const AttentionParams& p, const AttentionTask& task) {
-  thread_local Scratch scratch;
+  auto& scratch = PerThread<Scratch>();
   const int64_t width = p.channels / p.heads;
   const int64_t pairs = (width + 1) / 2;
   const int64_t depth = (width + kDimTile - 1) / kDimTile * kDimTile;

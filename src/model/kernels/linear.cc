@@ -4,6 +4,7 @@
 
 #include "core/buffer.h"
 #include "core/parallel.h"
+#include "core/per_thread.h"
 #include "model/kernels/bfloat16_tile.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -150,7 +151,7 @@ void LinearCpu(const LinearParams& p) {
   if (p.weights->precision() == WeightPrecision::kBFloat16) {
     const auto rows = HWY_DYNAMIC_DISPATCH(LinearRowsBFloat16);
     ParallelFor(0, p.rows, rows_per_task, [&](int64_t begin, int64_t end) {
-      thread_local Buffer<BFloat16Pair> rounded;
+      auto& rounded = PerThread<Buffer<BFloat16Pair>>();
       rows(p, begin, end, rounded);
     });
     return;

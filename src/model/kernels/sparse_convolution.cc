@@ -5,6 +5,7 @@
 
 #include "core/buffer.h"
 #include "core/parallel.h"
+#include "core/per_thread.h"
 #include "model/kernels/bfloat16_tile.h"
 #include "model/kernels/voxel_neighbours.h"
 
@@ -145,7 +146,7 @@ void SparseConvolutionCpu(const SparseConvolutionParams& p) {
   while (block > 64 && (p.count + block - 1) / block * column_blocks < 4 * ThreadCount()) block /= 2;
   const int64_t row_blocks = (p.count + block - 1) / block;
   ParallelFor(0, row_blocks * column_blocks, 1, [&](int64_t task_begin, int64_t task_end) {
-    thread_local ConvolutionScratch scratch;
+    auto& scratch = PerThread<ConvolutionScratch>();
     for (int64_t task = task_begin; task < task_end; ++task) {
       const int64_t begin = task % row_blocks * block;
       const int64_t first = task / row_blocks * kConvolutionColumns;

@@ -176,6 +176,11 @@ function fillCard(description) {
     text.title = term.title = more.join(', ');
     byId('facts').append(term, text);
   }
+  // Not in a frame: whoever has put it there has a page of their own around it.
+  if (description.ownPage && window.parent === window) {
+    byId('own').setAttribute('href', description.ownPage);
+    byId('own').hidden = false;
+  }
   byId('credits').textContent = description.credits.join('; ');
   byId('credits').hidden = description.credits.length === 0;
 }

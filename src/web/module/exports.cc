@@ -7,12 +7,14 @@
 #include <string>
 #include <string_view>
 
+#include "core/parallel.h"
 #include "web/engine.h"
 
 // What JavaScript sees of the engine: memory for a request, the
 // call, and where its answer lies.
 
-// Progress goes to the listener that the page has put into the module.
+// Progress goes to the listener that the page has put into the module, which only the thread that calls knows: what
+// others have done is in its next word.
 EM_JS_DEPS(anchorsplat_tell_needs, "$UTF8ToString");
 // clang-format off
 EM_JS(void, anchorsplat_tell, (const char* task, double done, double total, const char* note), {
@@ -41,6 +43,9 @@ Reply& LastReply() {
 }  // namespace
 
 extern "C" {
+
+// Threads that loops may use, of as many as the module was started with; a module without threads has one.
+EMSCRIPTEN_KEEPALIVE void anchorsplat_threads(int threads) { anchorsplat::SetThreadCount(threads); }
 
 // Null where there is not so much memory.
 EMSCRIPTEN_KEEPALIVE void* anchorsplat_allocate(size_t bytes) { return std::malloc(bytes); }

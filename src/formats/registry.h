@@ -69,6 +69,9 @@ struct SplatFormat {
                   const CloudWriteOptions& options) = nullptr;
   Status (*write_with_extras)(const std::filesystem::path& path, const CloudView& cloud,
                               const CloudWriteOptions& options, const ExtraProperties& extras) = nullptr;
+  // Rows of the cloud in the order in which `write` puts them, where that is none of SplatOrder's and some may be left
+  // out. Null: WriteOrder (splat_order.h).
+  Buffer<uint32_t> (*written_rows)(const CloudView& cloud, const CloudWriteOptions& options) = nullptr;
   // Files that `write` makes beside the one it is told. Null: none.
   std::vector<std::filesystem::path> (*written_beside)(const std::filesystem::path& path, int sh_degree) = nullptr;
   // Bytes of the file `write` makes of a cloud without comments. Null where nothing can be said.

@@ -93,7 +93,7 @@ double RoundedAway(double x, double sign) {
   return rounded;
 }
 
-OrderedJson JsonOf(const Box& box) {
+OrderedJson BoundJson(const Box& box) {
   OrderedJson min = OrderedJson::array(), max = OrderedJson::array();
   for (size_t k = 0; k < 3; ++k) {
     min.push_back(RoundedAway(box.min[k], -1));
@@ -242,7 +242,7 @@ OrderedJson TreeJson(const LodTree& tree, int64_t at, const std::vector<int64_t>
     box.Add(right);
     json["children"] = std::move(children);
   }
-  json["bound"] = JsonOf(box);
+  json["bound"] = BoundJson(box);
   return json;
 }
 
@@ -268,7 +268,7 @@ std::vector<fs::path> OldChunks(const fs::path& index) {
 // Only what a SOG consists of; a folder with something else in it stays.
 void RemoveChunk(const fs::path& folder) {
   std::error_code ignored;
-  if (!fs::is_directory(fs::symlink_status(folder, ignored))) return;
+  if (fs::symlink_status(folder, ignored).type() != fs::file_type::directory) return;
   fs::remove(folder / "meta.json", ignored);
   for (const char* picture : SogPictures(kMaxShDegree)) fs::remove(folder / picture, ignored);
   fs::remove(folder, ignored);

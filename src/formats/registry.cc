@@ -1,5 +1,6 @@
 #include "formats/registry.h"
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <string>
@@ -132,6 +133,7 @@ constexpr SplatFormat kFormats[] = {
      .read = ReadStreamedSog,
      .write = WriteStreamedSog,
      .written_rows = StreamedSogRows,
+     .several_files = true,
      .predicted_size = EstimatedStreamedSogSize,
      .size_is_estimate = true,
      .seconds_per_gaussian = 5e-5,
@@ -212,7 +214,13 @@ const SplatFormat* FormatOfExtension(const std::filesystem::path& path) {
 }
 
 const SplatFormat* FormatOfName(std::string_view name) {
-  return name.empty() ? nullptr : FormatOfExtension(Cat("x", name.starts_with('.') ? "" : ".", name));
+  if (name.empty()) return nullptr;
+  const SplatFormat* const format = FormatOfExtension(Cat("x", name.starts_with('.') ? "" : ".", name));
+  const auto is_whole_name = [name](const SplatFormat& one) {
+    return std::ranges::find(one.extensions, name) != one.extensions.end();
+  };
+  const auto named = std::ranges::find_if(Formats(), is_whole_name);
+  return format == nullptr && named != Formats().end() ? &*named : format;
 }
 
 const SplatFormat* FormatOfFile(std::string_view head, const std::filesystem::path& path) {

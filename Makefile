@@ -10,6 +10,7 @@
 #   make fuzz     mutated files against all readers, SECONDS=60 by default
 #   make realdata DATA=DIR   checks on splats of your own
 #   make viewer-test   the page of `anchorsplat view` in headless Chromium (installs a browser)
+#   make lod-test   levels of detail (`anchorsplat convert --lod`) in the PlayCanvas engine in headless Chromium
 #   make serve-test    the page and the API of `anchorsplat serve` in headless Chromium, under load and on Ray
 #   make batch-test    `anchorsplat batch` with kills, an S3 and a cluster on this machine, four minutes
 #   make web      the program in a browser: build/web/dist, a page; make npm: build/web/npm, the package (docs/web.md; half an hour)
@@ -98,6 +99,10 @@ test-all: torch python-dependencies
 
 viewer-test: build
 	@scripts/viewer_test.sh build/anchorsplat
+
+lod-test: build
+	@scripts/lod_test.sh build/anchorsplat
+.PHONY: lod-test
 
 # The page in a browser, 1,000 malformed uploads, 200 requests, Ray: the service's tests that take minutes. PYTHON has the
 # packages (pip install ".[serve,batch]" pytest httpx playwright), build/lean the package.

@@ -1,6 +1,7 @@
-// The page of `anchorsplat view` in a real browser: viewer_test.mjs PAGE REFERENCES OUT
+// The page of `anchorsplat view` in a real browser: viewer_test.mjs PAGE LARGE REFERENCES OUT
 //
 // PAGE        a page with before, after and views with true pictures
+// LARGE       folder with one.html and many.html, a large splat in one file and with its data in many.data, in several parts
 // REFERENCES  folder with before/NAME.png and after/NAME.png, 512×512, from `anchorsplat render`
 // OUT         folder for screenshots
 // Prints what it measured and every failed expectation; exit code 1 if there is one.
@@ -9,7 +10,7 @@ import path from 'node:path';
 import {pathToFileURL} from 'node:url';
 import {expect, finish, launchBrowser, watchedTab} from './browser.mjs';
 
-const [page, references, out] = process.argv.slice(2).map((p) => path.resolve(p));
+const [page, large, references, out] = process.argv.slice(2).map((p) => path.resolve(p));
 const SIDE = 512;
 const LEAST_PSNR = 32;
 const browser = await launchBrowser();
@@ -218,9 +219,54 @@ const same = async (a, b) => (await difference(a, b)).share < 1e-4;
   await tab.close();
 }
 
+// A page with its data beside it.
+{
+  const one = await open(path.join(large, 'one.html'), {width: SIDE, height: SIDE});
+  await one.keyboard.press('i');
+  const whole = await picture(one);
+  await one.close();
+
+  const folder = path.join(large, 'many.html');
+  const many = await open(folder, {width: SIDE, height: SIDE});
+  await many.keyboard.press('i');
+  const {psnr} = await difference(whole, await picture(many, 'folder'));
+  console.log(`a folder against one file: ${psnr.toFixed(2)} dB`);
+  expect('a folder shows what one file shows', psnr >= 45, `${psnr.toFixed(2)} dB`);
+  await many.close();
+
+  // While its second part is still to come.
+  let release;
+  const held = new Promise((resolve) => { release = resolve; });
+  const context = await browser.newContext({viewport: {width: SIDE, height: SIDE}});
+  const tab = await context.newPage();
+  tab.setDefaultTimeout(300000);
+  await tab.route('**/after-1.js', async (route) => {
+    await held;
+    await route.continue();
+  });
+  await tab.goto(pathToFileURL(folder).href, {waitUntil: 'commit'});
+  await tab.waitForFunction(() => document.documentElement.dataset.state === 'ready', null, {timeout: 300000});
+  await tab.waitForTimeout(1000);
+  const share = Number(await tab.evaluate(() => document.documentElement.dataset.arrived));
+  expect('a part is shown while others come', share > 0 && share < 1, String(share));
+  expect('how much is there is said', /^\d+ % loaded$/.test(await tab.locator('#arriving').textContent()));
+  await tab.keyboard.press('i');
+  await tab.waitForTimeout(1000);
+  const early = await tab.screenshot({path: path.join(out, 'folder-early.png'), timeout: 300000});
+  const {psnr: rough} = await difference(whole, early);
+  console.log(`with ${Math.round(100 * share)} % of its Gaussians: ${rough.toFixed(2)} dB to all of them`);
+  expect('the largest ones give the picture', rough >= 15 && !(await same(whole, early)), `${rough.toFixed(2)} dB`);
+  release();
+  expect('then the rest comes', (await difference(whole, await picture(tab))).psnr >= 45);
+  expect('and no more is said', !(await visible(tab, '#arriving')));
+  await context.close();
+}
+
 // What goes wrong is said.
 async function expectMessage(name, file, pattern, before) {
   const tab = await open(file, {width: 800, height: 600, quiet: false, before});
+  // A part may be missed when the others are shown already.
+  await tab.waitForFunction(() => document.documentElement.dataset.state === 'error', null, {timeout: 60000}).catch(() => {});
   expect(`${name}: is an error`, (await state(tab)) === 'error');
   const text = await tab.locator('#message').innerText();
   expect(`${name}: says so`, await visible(tab, '#message') && pattern.test(text), text);
@@ -243,6 +289,19 @@ const guardEnd = whole.indexOf('</script>') + '</script>'.length;
 for (const size of [guardEnd, whole.indexOf('<style>') + 500, whole.indexOf('<main') + 20, at,
   whole.indexOf('id="worker-source"') + 100, whole.lastIndexOf('<script>') - 1000, whole.lastIndexOf('</script>')]) {
   await expectMessage(`cut after ${size} bytes`, broken('cut', whole.slice(0, size)), /incomplete/);
+}
+// Parts that are missing, cut, or another page's.
+{
+  const folder = path.join(large, 'many.html');
+  const part = path.join(large, 'many.data', 'after-1.js');
+  const good = fs.readFileSync(part, 'latin1');
+  fs.renameSync(part, `${part}.away`);
+  await expectMessage('no part', folder, /after-1\.js” is missing/);
+  fs.writeFileSync(part, good.slice(0, good.length / 2), 'latin1');
+  await expectMessage('a part that was cut', folder, /after-1\.js” is damaged or of another page/);
+  fs.writeFileSync(part, good.replace(/"[0-9a-f]{16}"/, '"0123456789abcdef"'), 'latin1');
+  await expectMessage('a part of another page', folder, /after-1\.js” is damaged or of another page/);
+  fs.renameSync(`${part}.away`, part);
 }
 await expectMessage('an old browser', page, /Safari 16/, () => { delete globalThis.DecompressionStream; });
 await expectMessage('no WebGL 2', page, /WebGL 2/,

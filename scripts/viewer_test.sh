@@ -25,4 +25,21 @@ example=examples/biplane
 "$program" render "$work/after.ply" -o "$work/after" --cameras $example/transforms_hr.json --size 512x512 -q
 "$program" view "$work/after.ply" --before $example/input.ply --truth $example/hr \
   --cameras $example/transforms_hr.json --open-your-own https://splats.example/ -o "$work/page.html" -q
-node scripts/viewer_test.mjs "$work/page.html" "$work" "$out"
+# Sixteen side by side, whose data fill several parts; rows of 32 bytes that begin with x, y, z.
+"$program" convert $example/input.ply "$work/one.splat" -q
+node -e '
+  const fs = require("fs");
+  const one = fs.readFileSync(process.argv[1]);
+  const copies = [];
+  for (let k = 0; k < 16; ++k) {
+    const copy = Buffer.from(one);
+    for (let row = 0; row < copy.length; row += 32) {
+      copy.writeFloatLE(copy.readFloatLE(row) + 1.1 * (k % 4), row);
+      copy.writeFloatLE(copy.readFloatLE(row + 8) + 1.1 * Math.floor(k / 4), row + 8);
+    }
+    copies.push(copy);
+  }
+  fs.writeFileSync(process.argv[2], Buffer.concat(copies));' "$work/one.splat" "$work/many.splat"
+"$program" view "$work/many.splat" -o "$work/one.html" -q
+"$program" view "$work/many.splat" --folder -o "$work/many.html" -q
+node scripts/viewer_test.mjs "$work/page.html" "$work" "$work" "$out"

@@ -24,6 +24,11 @@ def convert(
     coords: str | None = None,
     sort: Order = "format",
     spz_version: int = 4,
+    lod_levels: int = 4,
+    lod_ratio: float = 0.25,
+    lod_chunk_count: int = 512,
+    lod_chunk_extent: float = 16,
+    lod_level: int = 0,
     report: bool = False,
     report_views: int = 8,
     overwrite: bool = False,
@@ -40,6 +45,9 @@ def convert(
     max_gaussians: keeps at most so many, those of the largest size × opacity.
     coords: what the files' axes really are where they do not follow their format, as "IN:OUT", for example "RUB:".
     sort: order of the Gaussians in the file. spz_version: 4, or 3 for programs that only know gzip.
+    lod_levels, lod_ratio, lod_chunk_count, lod_chunk_extent: of a target named lod-meta.json, a scene at several levels of
+    detail: their number, the Gaussians of each to those of the finer one, Gaussians in a chunk in units of 1,024, and the
+    longest side of what changes its level as one. lod_level: the level to read of such a source; 0 is the finest.
     report: reads the output back: attribute errors, and PSNR of pictures of both, of `report_views` views.
     overwrite: replaces a file that exists.
 

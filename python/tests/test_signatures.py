@@ -46,13 +46,19 @@ FUNCTIONS = {
         "view",
         None,
         {},
-        {"overwrite": "Page.save", "seed": "nothing is random", **OUTPUT},
+        {"overwrite": "Page.save", "seed": "nothing is random", "folder": "a page is one value", **OUTPUT},
     ),
     "convert": (
         "convert",
         None,
         {"from": "format"},
-        {**SIZE, "to": "the target's name says it", "out-dir": "one at a time", "seed": "nothing is random"},
+        {
+            **SIZE,
+            "to": "the target's name says it",
+            "lod": "the target's name says it",
+            "out-dir": "one at a time",
+            "seed": "nothing is random",
+        },
     ),
     "info": ("info", None, {"from": "format"}, {"overwrite": "nothing is written", "seed": "nothing is random"}),
     "refine": (

@@ -16,7 +16,9 @@ namespace fs = std::filesystem;
 constexpr double kSure = 0.85;
 
 constexpr const char* kSmaller =
-    "enhance without --view and let `anchorsplat view` write a smaller one, of the result alone or with --sh-degree 0";
+    "enhance without --view and let `anchorsplat view` write one of any size with --folder, or a smaller one, of the "
+    "result "
+    "alone or with --sh-degree 0";
 
 }  // namespace
 

@@ -6,10 +6,12 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "cli/batch.h"
 #include "cli/clean_output.h"
 #include "cli/output_plan.h"
+#include "cli/stop_signal.h"
 #include "cli/verb.h"
 #include "core/file_system.h"
 #include "core/log.h"
@@ -32,11 +34,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kSecondsToRead = 2e-7;  // a Gaussian, on one core
+constexpr std::string_view kStreamedName = "lod-meta.json";
 
 struct ConvertWords {
   std::vector<std::string> paths;  // inputs, and the output as the last one without --out-dir
   std::string out_dir;
   std::string to = ".ply";
+  bool lod = false;
   ConvertFlags how;
   SizeFlags size;
 };
@@ -45,7 +49,7 @@ struct ConvertWords {
 // folder's name.
 std::string Stem(const fs::path& input) {
   const fs::path found = SplatPath(input);
-  if (found.filename() == "meta.json" && found.has_parent_path()) {
+  if ((found.filename() == "meta.json" || found.filename() == "lod-meta.json") && found.has_parent_path()) {
     const std::string folder = RealPath(found.parent_path()).filename().string();
     return folder.empty() ? "meta" : folder;
   }
@@ -78,11 +82,20 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
       return Error{ErrorCode::kBadArgument, "say IN OUT, or several inputs with --out-dir DIR"};
     }
     jobs.push_back({flags.paths[0], flags.paths[1]});
-    return jobs;
+    if (!flags.lod) return jobs;
+    // The folder of a scene, as it is or will be, stands for the file that programs look for in it.
+    fs::path& output = jobs.back().output;
+    if (IsFolder(output) || !output.has_filename() || !output.has_extension()) output /= kStreamedName;
+    if (output.filename() == kStreamedName) return jobs;
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--lod writes a folder or the lod-meta.json in one, not ", output.string())};
   }
   // Folders of pictures get one folder each; ".spz" may be said without its dot. A slash would lead out of --out-dir.
-  const bool folders = flags.to == "meta.json";
-  const std::string extension = folders ? "/meta.json" : flags.to.starts_with('.') ? flags.to : "." + flags.to;
+  const bool folders = flags.lod || flags.to == "meta.json" || flags.to == kStreamedName;
+  const std::string extension = flags.lod                   ? Cat("/", kStreamedName)
+                                : folders                   ? "/" + flags.to
+                                : flags.to.starts_with('.') ? flags.to
+                                                            : "." + flags.to;
   const bool leads_away = !folders && extension.find('/') != std::string::npos;
   const SplatFormat* const format = leads_away ? nullptr : FormatOfExtension(fs::path("x" + extension));
   if (format == nullptr || format->write == nullptr) {
@@ -195,8 +208,14 @@ Status RunConvert(const ConvertWords& flags, Program& program) {
   std::vector<BatchItem> items;
   for (const Job& job : jobs) items.push_back({job.input.string(), job.output.string()});
   for (const Job& job : jobs) ANCHORSPLAT_RETURN_IF_ERROR(AnnounceConversion(flags, shared, options, job));
+  // Levels of detail take long, and what there is of them when one stops it is taken away.
+  std::optional<StopSignal> stop_signal;
+  if (std::ranges::any_of(outputs, [](const fs::path& output) { return output.filename() == kStreamedName; }))
+    stop_signal.emplace();
   const auto run = [&](size_t k) {
-    const MemoryLimit limit(flags.size.arrays(), jobs[k].output.parent_path());
+    fs::path folder = jobs[k].output.parent_path();
+    if (!folder.empty() && !IsFolder(folder)) folder = folder.parent_path();  // it is made with the output
+    const MemoryLimit limit(flags.size.arrays(), folder);
     return RunJob(jobs[k], options, flags.how.views, shared);
   };
   return RunBatch(items, run, program);
@@ -213,9 +232,13 @@ void AddConvert(CLI::App& app, Program& program) {
                       ", and .safetensors of a network's weights"))
       ->required();
   auto* out_dir = verb.add_option("--out-dir", flags->out_dir, "Folder to write to, under the inputs' names");
-  verb.add_option("--to", flags->to, "Extension of the files in --out-dir; meta.json makes a folder of each")
+  verb.add_option("--to", flags->to,
+                  "Extension of the files in --out-dir; meta.json and lod-meta.json make a folder of each")
       ->capture_default_str()
       ->needs(out_dir);
+  verb.add_flag("--lod", flags->lod,
+                "Write levels of detail in chunks, a streamed SOG: OUT is a folder, or the lod-meta.json in one, which "
+                "says the same without this flag");
   flags->how.AddTo(verb);
   flags->size.AddTo(verb);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunConvert(*flags, program); }; });

@@ -41,6 +41,28 @@ TEST_F(ConvertVerb, SaysWhatItDid) {
   EXPECT_THAT(run.err, IsEmpty());
 }
 
+TEST_F(ConvertVerb, LevelsOfDetail) {
+  const std::string scene = folder_ / "scene";
+  const ProgramRun run = ExpectDone({"convert", scan_, "--lod", scene, "--lod-levels", "3", "--lod-ratio", "0.5"});
+  EXPECT_THAT(run.out, HasSubstr("scene/lod-meta.json (streamed SOG, "));
+  EXPECT_THAT(run.err, HasSubstr("3 levels of 200, 100, 50 Gaussians, 1 leaf, 3 chunks"));
+  EXPECT_EQ(ExpectJson({"info", scene})["gaussians"], 200);
+  ExpectDone({"convert", scene, folder_ / "coarse.ply", "--lod-level", "2"});
+  EXPECT_EQ(ExpectJson({"info", folder_ / "coarse.ply"})["gaussians"], 50);
+  ExpectRefused({"convert", scene, folder_ / "coarser.ply", "--lod-level", "3"}, ErrorCode::kBadFile,
+                {"lod-meta.json: has no level 3; its levels are 0 to 2"});
+  ExpectRefused({"convert", scan_, "--lod", scene}, ErrorCode::kExists, {"scene/lod-meta.json"});
+  ExpectRefused({"convert", scene, "--lod", scene, "-w"}, ErrorCode::kBadArgument, {"lod-meta.json"});
+  // The name alone says it, and many at once.
+  ExpectDone({"convert", scan_, folder_ / "named/lod-meta.json"});
+  ExpectDone({"convert", scan_, "--lod", "--out-dir", folder_ / "many"});
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "many/scan/lod-meta.json"));
+  const nlohmann::json row =
+      ExpectJson({"convert", scene, folder_ / "again.sog", "--report", "--report-views", "1"})[0];
+  EXPECT_GT(row["psnr"]["mean"], 30);
+  ExpectRefused({"convert", scan_, "--lod", folder_ / "scan.sog"}, ErrorCode::kBadArgument, {"--lod writes a folder"});
+}
+
 TEST_F(ConvertVerb, AsksBeforeLargeFiles) {
   const std::string huge = WriteHugeScan(folder_ / "huge.ply", 20'000'000);
   const ProgramRun run = ExpectRefused({"convert", huge, folder_ / "out.ply"}, ErrorCode::kBadArgument,

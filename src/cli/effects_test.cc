@@ -40,6 +40,9 @@ TEST_F(Effects, OfReportsAndFormats) {
   ExpectRefused({"convert", scan_, folder_ / "o.spz", "--report-views", "3"}, ErrorCode::kBadArgument, {"--report"});
   ExpectNoEffect({"convert", scan_, folder_ / "o.ply", "--spz-version", "3"}, "where a .spz is written");
   ExpectDone({"convert", scan_, folder_ / "o.spz", "--spz-version", "3", "-q"});
+  ExpectNoEffect({"convert", scan_, folder_ / "o.ply", "--lod-levels", "3"}, "where a lod-meta.json is written");
+  ExpectNoEffect({"convert", scan_, folder_ / "o.ply", "--lod-level", "1"}, "where a lod-meta.json is read");
+  ExpectNoEffect({"convert", scan_, "--lod", folder_ / "o", "--sort", "keep"}, "--sort has no effect here");
   ExpectNoEffect({"convert", scan_, folder_ / "o.splat", "--mode", "mip"}, "--mode has no effect here");
   ExpectRefused({"view", scan_, "-o", folder_ / "o.html", "--views", "3"}, ErrorCode::kBadArgument, {"--cameras"});
 }

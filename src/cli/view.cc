@@ -4,8 +4,10 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "cli/clean_output.h"
+#include "cli/stop_signal.h"
 #include "cli/verb.h"
 #include "core/log.h"
 #include "core/statistics.h"
@@ -27,14 +29,25 @@ struct PageWords {
   std::string after;
   std::string before;
   std::string output;
+  bool folder = false;
   PageFlags how;
 };
 
-std::optional<uint64_t> FileBytes(const std::string& path) {
+// More Gaussians than this make a single file that browsers take long to show.
+constexpr int64_t kManyGaussians = 1'000'000;
+
+uint64_t FileBytes(const fs::path& path) {
   std::error_code failed;
   const uint64_t bytes = fs::file_size(path, failed);
-  if (failed) return std::nullopt;
-  return bytes;
+  return failed ? 0 : bytes;
+}
+
+// What one loses by a single file, where it is much.
+void WarnOfLargePage(const PageWords& flags, int64_t gaussians, uint64_t bytes) {
+  if (flags.folder || gaussians <= kManyGaussians) return;
+  LogWarning(Cat(flags.output, ": ", WithThousands(gaussians), " Gaussians in one file of ", HumanBytes(bytes),
+                 ": a browser shows nothing before it has all of it, and needs several times that in memory; --folder "
+                 "writes the data beside the page, which shows them as they come"));
 }
 
 struct Shown {
@@ -72,6 +85,11 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(flags.output, shared.overwrite));
   ANCHORSPLAT_ASSIGN_OR_RETURN(ViewerPage page, MakePage(flags.how));
+  page.folder = flags.folder;
+  page.smaller = flags.folder ? "leave out some of the true pictures (--views)"
+                              : Cat("--folder writes a page of any size with its data beside it; or ", page.smaller);
+  std::optional<StopSignal> stop_signal;  // what there is of a folder is taken away
+  if (page.folder) stop_signal.emplace();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown after, ReadShown(flags.after, flags.how.mode));
   Shown before;
   if (!flags.before.empty()) {
@@ -82,14 +100,18 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
   LookAtSplats(page);
   ANCHORSPLAT_RETURN_IF_ERROR(WriteViewerPage(flags.output, page, WriteOptionsFrom(shared)));
 
-  const uint64_t bytes = FileBytes(flags.output).value_or(0);
+  const uint64_t bytes = FileBytes(flags.output);
+  WarnOfLargePage(flags, after.cloud.size() + before.cloud.size(), bytes);
   if (shared.json) {
     PrintJson({{"output", flags.output},
                {"bytes", bytes},
                {"views", page.views.size()},
                {"pixel_size", page.pixel_size ? nlohmann::json(*page.pixel_size) : nlohmann::json()}});
   } else if (!shared.quiet) {
-    std::cout << OneLine(flags.output) << ": " << HumanBytes(bytes) << ", open it in any browser\n";
+    std::cout << OneLine(flags.output) << ": " << HumanBytes(bytes)
+              << (flags.folder
+                      ? ", with its data in the folder beside it: they belong together; open it in any browser\n"
+                      : ", open it in any browser\n");
   }
   return {};
 }
@@ -103,6 +125,9 @@ void AddView(CLI::App& app, Program& program) {
   verb.add_option("after", flags->after, "Splat file")->required();
   verb.add_option("-o,--output", flags->output, "HTML file to write")->required();
   verb.add_option("--before", flags->before, "Splat to compare with");
+  verb.add_flag("--folder", flags->folder,
+                "Put the splats' data into a folder beside the page, PAGE.data, from which it shows the largest "
+                "Gaussians first: for splats of any size");
   flags->how.AddTo(verb);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunView(*flags, program.flags); }; });
 }

@@ -1,3 +1,6 @@
+#include <fstream>
+#include <iterator>
+
 #include "cli/run_for_test.h"
 #include "cli/small_scan_for_test.h"
 #include "io/folder_for_test.h"
@@ -9,6 +12,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 class ViewVerb : public testing::Test {
  protected:
@@ -46,6 +50,30 @@ TEST_F(ViewVerb, OneSplat) {
 TEST_F(ViewVerb, HasAButtonForReadersWithASplat) {
   ExpectDone({"view", scan_, "-o", page_, "--open-your-own", "https://splats.example/"});
   EXPECT_THAT(FileBytes(page_), HasSubstr(R"("ownPage":"https://splats.example/")"));
+}
+
+TEST_F(ViewVerb, AFolderBesideThePage) {
+  const ProgramRun run = ExpectDone({"view", scan_, "--before", scan_, "--folder", "-o", page_});
+  EXPECT_THAT(run.out, HasSubstr("they belong together"));
+  EXPECT_TRUE(fs::is_regular_file(folder_ / "page.data/after-0.js"));
+  EXPECT_TRUE(fs::is_regular_file(folder_ / "page.data/before-0.js"));
+  EXPECT_THAT(FileBytes(page_), HasSubstr(R"("file":"page.data/after-0.js")"));
+  ExpectRefused({"view", scan_, "--folder", "-o", page_}, ErrorCode::kExists, {"page.html"});
+}
+
+TEST_F(ViewVerb, ManyGaussiansInOneFileAreAWarning) {
+  const std::string large = folder_ / "large.splat";
+  const std::string small = folder_ / "small.splat";
+  ExpectDone({"convert", scan_, small, "-q"});
+  const std::string rows = FileBytes(small);
+  {
+    std::ofstream file(large, std::ios::binary);
+    for (int k = 0; k < 5001; ++k) file << rows;
+  }
+  EXPECT_THAT(ExpectDone({"view", large, "-o", page_, "-w"}).err,
+              AllOf(HasSubstr("1,000,200 Gaussians in one file of"), HasSubstr("--folder")));
+  EXPECT_THAT(ExpectDone({"view", large, "--folder", "-o", page_, "-w"}).err, Not(HasSubstr("in one file")));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "page.data"), fs::directory_iterator()), 4);
 }
 
 TEST_F(ViewVerb, RefusesWhatMakesNoSense) {

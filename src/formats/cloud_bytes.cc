@@ -38,7 +38,8 @@ Result<std::vector<std::byte>> WriteCloudBytes(const CloudView& cloud, std::stri
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatFormat* format, FormatCalled(format_name));
   // Of the names that stand for one format of several files or one archive of them, the one that is an archive.
   const std::filesystem::path path = Cat(kInMemory, format->extensions.front());
-  if (format->written_beside != nullptr && !format->written_beside(path, kMaxShDegree).empty()) {
+  if (format->several_files ||
+      (format->written_beside != nullptr && !format->written_beside(path, kMaxShDegree).empty())) {
     return Error{ErrorCode::kBadArgument,
                  Cat(format->name, " consists of several files and cannot be written into memory as one")};
   }

@@ -231,6 +231,9 @@ TEST(Registry, RowsAreConsistent) {
   EXPECT_EQ(FormatOfExtension("compressed.ply")->name, "PLY");
   EXPECT_EQ(FormatOfExtension("plain"), nullptr);
   EXPECT_EQ(FormatOfExtension("not-meta.json"), nullptr);
+  EXPECT_EQ(FormatOfName("lod-meta.json")->name, "streamed SOG");
+  EXPECT_EQ(FormatOfName("sog")->name, "SOG");
+  EXPECT_EQ(FormatOfName("json"), nullptr);
   EXPECT_EQ(FormatOfFile("ply\nformat binary_little_endian 1.0\nelement chunk 3\n", "a.ply")->name, "compressed PLY");
   EXPECT_EQ(FormatOfFile("NGSP", "a.ply")->name, "SPZ");
 }

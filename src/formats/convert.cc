@@ -112,9 +112,14 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(output));
   const SplatFormat* const from = file.format();
 
+  if (options.lod_level > 0 && (from == nullptr || from->name != "streamed SOG")) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--lod-level has no effect on ", input.string(), "; it has one where a lod-meta.json is read")};
+  }
+
   const double begin = Now();
   ExtraProperties extras;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read({}, &extras));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read({.lod_level = options.lod_level}, &extras));
   report.read_seconds = Now() - begin;
   report.input_format = from != nullptr ? from->name : "";
   report.output_format = to->name;
@@ -167,8 +172,15 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   report.predicted_roughly = to->size_is_estimate;
   if (options.measure && to->read != nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadCloud(output));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(report.error,
-                                 CompareAttributes(back, cloud, WriteOrder(cloud, write.order, to->order)));
+    if (to->written_rows != nullptr) {
+      const Buffer<uint32_t> rows = to->written_rows(cloud, write);
+      const Buffer<int64_t> kept_rows(rows.begin(), rows.end());
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud written_cloud, Subset(cloud, kept_rows));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(report.error, CompareAttributes(back, written_cloud));
+    } else {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(report.error,
+                                   CompareAttributes(back, cloud, WriteOrder(cloud, write.order, to->order)));
+    }
   }
   if (kept != nullptr) *kept = std::move(cloud);
   return report;

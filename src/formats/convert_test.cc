@@ -40,15 +40,22 @@ TEST(Convert, ToEveryFormatAndBack) {
   int written = 0;
   for (const SplatFormat& format : Formats()) {
     if (format.write == nullptr) continue;
-    const auto output = folder / ("out" + std::string(format.extensions[0]));
+    const std::string extension(format.extensions[0]);
+    const auto output = extension.starts_with('.') ? folder / ("out" + extension) : folder / "scene" / extension;
     const auto report = ConvertFile(input, output, {.measure = true});
     ASSERT_TRUE(report.ok()) << report.error().message;
     ++written;
     EXPECT_EQ(report->output_format, format.name);
     EXPECT_EQ(report->gaussians_written, 2000);
-    const bool two_files = format.extensions[0] == ".gltf";
-    EXPECT_EQ(report->output_bytes,
-              std::filesystem::file_size(output) + (two_files ? std::filesystem::file_size(folder / "out.bin") : 0));
+    uint64_t bytes = std::filesystem::file_size(output);
+    if (extension == ".gltf") bytes += std::filesystem::file_size(folder / "out.bin");
+    if (format.several_files) {
+      bytes = 0;
+      for (const auto& file : std::filesystem::recursive_directory_iterator(output.parent_path())) {
+        if (file.is_regular_file()) bytes += file.file_size();
+      }
+    }
+    EXPECT_EQ(report->output_bytes, bytes);
     EXPECT_EQ(report->sh_degree_written, format.range.sh_degree == 0 ? 0 : 2) << format.name;
     if (report->predicted_roughly) {
       EXPECT_NEAR(static_cast<double>(*report->predicted_bytes), static_cast<double>(report->output_bytes),

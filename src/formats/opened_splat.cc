@@ -49,15 +49,19 @@ std::string OtherKind(std::string_view head) {
 
 fs::path SplatPath(const fs::path& path) {
   if (!IsFolder(path)) return path;
-  fs::path meta = path / "meta.json";
-  return Exists(meta) ? meta : path;
+  for (const char* name : {"meta.json", "lod-meta.json"}) {
+    if (fs::path meta = path / name; Exists(meta)) return meta;
+  }
+  return path;
 }
 
 Result<OpenedSplat> OpenedSplat::Open(const fs::path& path, const SplatFormat* format) {
   const fs::path found = SplatPath(path);
   if (IsFolder(found)) {
-    return Error{ErrorCode::kBadFile,
-                 Cat(path.string(), ": is a folder without a meta.json: expected a splat file or the folder of a SOG")};
+    return Error{
+        ErrorCode::kBadFile,
+        Cat(path.string(),
+            ": is a folder without a meta.json or lod-meta.json: expected a splat file or the folder of a SOG")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(InputFile input, InputFile::Open(found));
   return Of(std::move(input), format);

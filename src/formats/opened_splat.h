@@ -13,8 +13,8 @@
 
 namespace anchorsplat {
 
-// A splat file that is open: opened once, as a pipe can be read only once. A folder with a meta.json in it stands for
-// that file (SOG); "-" is standard input.
+// A splat file that is open: opened once, as a pipe can be read only once. A folder with a meta.json or a
+// lod-meta.json in it stands for that file (SOG, streamed SOG); "-" is standard input.
 class OpenedSplat {
  public:
   // `format`: what the file is, whatever its content and name say; null: by content first and extension second.
@@ -38,7 +38,7 @@ class OpenedSplat {
   const SplatFormat* format_;
 };
 
-// What OpenedSplat opens for a path: the meta.json of a folder, other paths as they are.
+// What OpenedSplat opens for a path: the meta.json or lod-meta.json of a folder, other paths as they are.
 std::filesystem::path SplatPath(const std::filesystem::path& path);
 
 // OpenedSplat::Extent of a file that can be opened again afterwards; nothing for pipes and for what cannot be opened.

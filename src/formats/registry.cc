@@ -1,5 +1,6 @@
 #include "formats/registry.h"
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <string>
@@ -20,6 +21,8 @@
 #include "formats/splat/splat_writer.h"
 #include "formats/spz/spz_reader.h"
 #include "formats/spz/spz_writer.h"
+#include "formats/streamed_sog/streamed_sog_reader.h"
+#include "formats/streamed_sog/streamed_sog_writer.h"
 #include "formats/tables/table_writers.h"
 
 namespace anchorsplat {
@@ -40,6 +43,9 @@ bool IsSog(std::string_view head) {
          (head.starts_with("{") && head.find("\"means\"") != head.npos && head.find("\"quats\"") != head.npos);
 }
 
+// The JSON file that names the chunks of a scene.
+bool IsStreamedSog(std::string_view head) { return head.starts_with("{") && head.find("\"lodLevels\"") != head.npos; }
+
 // NumPy's archive: a ZIP archive whose first member, whatever its name, is an array.
 bool IsNpz(std::string_view head) {
   constexpr size_t kNameSize = 26, kName = 30;  // in the header of a member
@@ -55,6 +61,7 @@ constexpr std::string_view kPlyExtensions[] = {".ply"};
 constexpr std::string_view kSpzExtensions[] = {".spz"};
 constexpr std::string_view kGsplatExtensions[] = {".pt", ".pth", ".ckpt"};
 constexpr std::string_view kSogExtensions[] = {".sog", "meta.json"};
+constexpr std::string_view kStreamedSogExtensions[] = {"lod-meta.json"};
 constexpr std::string_view kSplatExtensions[] = {".splat"};
 constexpr std::string_view kKsplatExtensions[] = {".ksplat"};
 constexpr std::string_view kGltfExtensions[] = {".glb"};
@@ -118,6 +125,22 @@ constexpr SplatFormat kFormats[] = {
      .extensions = kGsplatExtensions,
      .sniff = IsTorchCheckpoint,
      .read = ReadGsplatCheckpoint},
+    {.name = "streamed SOG",
+     .extensions = kStreamedSogExtensions,
+     .sniff = IsStreamedSog,
+     .describe = DescribeStreamedSog,
+     .size = StreamedSogSize,
+     .read = ReadStreamedSog,
+     .write = WriteStreamedSog,
+     .written_rows = StreamedSogRows,
+     .several_files = true,
+     .predicted_size = EstimatedStreamedSogSize,
+     .size_is_estimate = true,
+     .seconds_per_gaussian = 5e-5,
+     .order = SplatOrder::kMorton,
+     .range = kSogRange,
+     .mode_tag = ModeTag::kCompensated,
+     .comments = CommentPlace::kCredits},
     {.name = "SOG",
      .extensions = kSogExtensions,
      .sniff = IsSog,
@@ -191,7 +214,13 @@ const SplatFormat* FormatOfExtension(const std::filesystem::path& path) {
 }
 
 const SplatFormat* FormatOfName(std::string_view name) {
-  return name.empty() ? nullptr : FormatOfExtension(Cat("x", name.starts_with('.') ? "" : ".", name));
+  if (name.empty()) return nullptr;
+  const SplatFormat* const format = FormatOfExtension(Cat("x", name.starts_with('.') ? "" : ".", name));
+  const auto is_whole_name = [name](const SplatFormat& one) {
+    return std::ranges::find(one.extensions, name) != one.extensions.end();
+  };
+  const auto named = std::ranges::find_if(Formats(), is_whole_name);
+  return format == nullptr && named != Formats().end() ? &*named : format;
 }
 
 const SplatFormat* FormatOfFile(std::string_view head, const std::filesystem::path& path) {

@@ -69,6 +69,11 @@ struct SplatFormat {
                   const CloudWriteOptions& options) = nullptr;
   Status (*write_with_extras)(const std::filesystem::path& path, const CloudView& cloud,
                               const CloudWriteOptions& options, const ExtraProperties& extras) = nullptr;
+  // Rows of the cloud in the order in which `write` puts them, where that is none of SplatOrder's and some may be left
+  // out. Null: WriteOrder (splat_order.h).
+  Buffer<uint32_t> (*written_rows)(const CloudView& cloud, const CloudWriteOptions& options) = nullptr;
+  // It writes more than one file whatever its name, those of `written_beside` aside.
+  bool several_files = false;
   // Files that `write` makes beside the one it is told. Null: none.
   std::vector<std::filesystem::path> (*written_beside)(const std::filesystem::path& path, int sh_degree) = nullptr;
   // Bytes of the file `write` makes of a cloud without comments. Null where nothing can be said.
@@ -96,7 +101,7 @@ std::span<const SplatFormat> Formats();
 // By content first and extension second; null when neither is known.
 const SplatFormat* FormatOfFile(std::string_view head, const std::filesystem::path& path);
 const SplatFormat* FormatOfExtension(const std::filesystem::path& path);
-// By what people write for one: "spz", ".spz", ".compressed.ply"; null for what is none.
+// By what people write for one: "spz", ".spz", ".compressed.ply", "meta.json"; null for what is none.
 const SplatFormat* FormatOfName(std::string_view name);
 
 }  // namespace anchorsplat

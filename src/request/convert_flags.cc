@@ -36,6 +36,23 @@ void ConvertFlags::AddTo(CLI::App& verb) {
                   "for a PLY with y up, :RDF for an SPZ as careless programs expect it")
       ->check(NotEmpty());
   spz_version = AddWriteFlags(verb, options.write);
+  LodOptions& lod = options.write.lod;
+  const std::string group = "Levels of detail";
+  of_streamed = {
+      verb.add_option("--lod-levels", lod.levels, "Levels in a lod-meta.json, with the splat itself, 1 to 16")
+          ->check(CLI::Range(1, 16)),
+      verb.add_option("--lod-ratio", lod.ratio, "Gaussians of each level to those of the finer one, 0.01 to 0.99")
+          ->check(CLI::Range(0.01, 0.99)),
+      verb.add_option("--lod-chunk-count", lod.chunk_count, "Gaussians in a chunk at most, in units of 1,024")
+          ->check(CLI::Range(1, 1 << 17)),
+      verb.add_option("--lod-chunk-extent", lod.chunk_extent,
+                      "Longest side of what changes its level as one, in world units")
+          ->check(CLI::PositiveNumber)};
+  for (CLI::Option* option : of_streamed) option->capture_default_str()->group(group);
+  verb.add_option("--lod-level", options.lod_level, "Level to read of a lod-meta.json: 0 is the finest")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str()
+      ->group(group);
   auto* report_option =
       verb.add_flag("--report", report, "Read the output back: attribute errors, and PSNR of pictures of both");
   verb.add_option("--report-views", views, "Views around the splat for the PSNR")
@@ -60,6 +77,16 @@ Status CheckConvertEffects(const ConvertFlags& flags, std::span<const std::files
   const auto is_spz = [](const std::filesystem::path& output) { return output.extension() == ".spz"; };
   if (flags.spz_version->count() > 0 && std::ranges::none_of(outputs, is_spz)) {
     return Error{ErrorCode::kBadArgument, "--spz-version has no effect here; it has one where a .spz is written"};
+  }
+  const auto is_streamed = [](const std::filesystem::path& output) { return output.filename() == "lod-meta.json"; };
+  for (const CLI::Option* option : flags.of_streamed) {
+    if (option->count() > 0 && std::ranges::none_of(outputs, is_streamed)) {
+      return Error{ErrorCode::kBadArgument,
+                   Cat(option->get_name(), " has no effect here; it has one where a lod-meta.json is written")};
+    }
+  }
+  if (flags.options.write.order != SplatOrder::kFormat && std::ranges::all_of(outputs, is_streamed)) {
+    return Error{ErrorCode::kBadArgument, "--sort has no effect here: a lod-meta.json has an order of its own"};
   }
   const auto says_mode = [](const std::filesystem::path& output) {
     const SplatFormat* const format = FormatOfExtension(output);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "core/result.h"
 #include "formats/convert.h"
@@ -20,7 +21,8 @@ struct ConvertFlags {
   int views = 8;
   bool report = false;
   ConvertOptions options;
-  CLI::Option* spz_version = nullptr;  // of the verb
+  CLI::Option* spz_version = nullptr;     // of the verb
+  std::vector<CLI::Option*> of_streamed;  // likewise: those that only a streamed SOG knows
 
   void AddTo(CLI::App& verb);
 };

@@ -1,7 +1,5 @@
 #include "viewer/page_writer.h"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -10,7 +8,6 @@
 
 #include "core/credit.h"
 #include "core/framing.h"
-#include "core/parallel.h"
 #include "core/text.h"
 #include "core/world_up.h"
 #include "io/atomic_file.h"
@@ -19,6 +16,7 @@
 #include "viewer/base64.h"
 #include "viewer/html_text.h"
 #include "viewer/page_files.h"
+#include "viewer/page_folder.h"
 #include "viewer/quantized_cloud.h"
 
 namespace anchorsplat {
@@ -26,9 +24,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Planes are deflated in pieces of this size, each a stream of its own: several threads write them, and the page never
-// holds more than one piece as text and bytes at a time.
-constexpr size_t kPieceBytes = size_t{1} << 22;
 // A picture is for comparing by eye; anything above this is not one.
 constexpr uint64_t kMaxPictureBytes = 50'000'000;
 
@@ -46,54 +41,15 @@ Error TooLarge(const std::filesystem::path& path, uint64_t bytes, const ViewerPa
                                        HumanBytes(page.max_bytes), " a browser opens well; ", page.smaller)};
 }
 
-// Looking for repeated strings is of no use in planes of numbers: runs and Huffman codes alone make 1 % less of them,
-// five times faster.
-Result<std::string> DeflateBase64(std::span<const uint8_t> bytes) {
-  z_stream stream{};
-  if (deflateInit2(&stream, 6, Z_DEFLATED, 15, 9, Z_RLE) != Z_OK) {
-    return Error{ErrorCode::kIo, "zlib cannot start to compress the page's data: out of memory?"};
-  }
-  std::vector<uint8_t> out(deflateBound(&stream, static_cast<uLong>(bytes.size())));
-  stream.next_in = const_cast<Bytef*>(bytes.data());  // zlib reads only
-  stream.avail_in = static_cast<uInt>(bytes.size());
-  stream.next_out = out.data();
-  stream.avail_out = static_cast<uInt>(out.size());
-  const int end = deflate(&stream, Z_FINISH);
-  out.resize(stream.total_out);
-  deflateEnd(&stream);
-  if (end != Z_STREAM_END) return Error{ErrorCode::kIo, "zlib did not compress the page's data"};
-  return Base64(out);
-}
-
 // Any bytes as JSON: what is not UTF-8 becomes U+FFFD, nothing ends the script element early.
 std::string ScriptJson(const Json& json) {
   return EscapeJsonForScript(json.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
-Result<Json> AddSplat(const ViewerSplat& splat, const std::string& id, int max_sh_degree,
-                      std::vector<DataElement>& elements) {
-  if (splat.cloud == nullptr) return Error{ErrorCode::kBadArgument, Cat("no cloud to show as \"", id, "\"")};
-  auto quantized = Quantize(*splat.cloud, max_sh_degree);
-  if (!quantized.ok())
-    return Error{quantized.error().code, Cat(Printable(splat.name), ": ", quantized.error().message)};
-  const QuantizedCloud& q = *quantized;
-
-  const size_t pieces = (q.planes.size() + kPieceBytes - 1) / kPieceBytes;
-  std::vector<std::optional<Result<std::string>>> texts(pieces);
-  ParallelFor(0, static_cast<int64_t>(pieces), 1, [&](int64_t first, int64_t last) {
-    for (auto k = static_cast<size_t>(first); k < static_cast<size_t>(last); ++k) {
-      const size_t begin = k * kPieceBytes;
-      texts[k] = DeflateBase64({q.planes.data() + begin, std::min(kPieceBytes, q.planes.size() - begin)});
-    }
-  });
+// What the page is told of a splat, without where its data are.
+Json SplatJson(const ViewerSplat& splat, const QuantizedCloud& q) {
   const Framing framing = FrameCloud(*splat.cloud);
   const RenderMode mode = splat.cloud->render_mode.value_or(RenderMode::kClassic);
-  Json ids = Json::array();
-  for (size_t k = 0; k < pieces; ++k) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(std::string text, *std::move(texts[k]));
-    elements.push_back({Cat(id, "-", k), std::move(text)});
-    ids.push_back(elements.back().id);
-  }
   return Json{{"name", splat.name},
               {"fileBytes", splat.file_bytes ? Json(*splat.file_bytes) : Json()},
               {"fileCount", splat.cloud->size()},
@@ -104,6 +60,7 @@ Result<Json> AddSplat(const ViewerSplat& splat, const std::string& id, int max_s
               {"compensated", IsCompensated(mode)},
               {"dilation", DilationOf(mode)},
               {"center", q.center},
+              {"radius", q.radius},
               {"spread", q.spread},
               {"reach", q.reach},
               {"subject", {{"target", framing.target}, {"radius", framing.radius}}},
@@ -114,8 +71,31 @@ Result<Json> AddSplat(const ViewerSplat& splat, const std::string& id, int max_s
               {"scalarBits", kScalarBits},
               {"harmonicTop", kHarmonicTop},
               {"pieceBytes", kPieceBytes},
-              {"planes", PlanesPerGaussian(q.sh_degree)},
-              {"pieces", std::move(ids)}};
+              {"planes", PlanesPerGaussian(q.sh_degree)}};
+}
+
+// Its data go to `elements`, or to `folder` where there is one.
+Result<Json> AddSplat(const ViewerSplat& splat, const std::string& id, int max_sh_degree,
+                      std::vector<DataElement>& elements, PageFolder* folder = nullptr) {
+  if (splat.cloud == nullptr) return Error{ErrorCode::kBadArgument, Cat("no cloud to show as \"", id, "\"")};
+  auto measured = MeasureCloud(*splat.cloud, max_sh_degree);
+  if (!measured.ok()) {
+    return Error{measured.error().code, Cat(Printable(splat.name), ": ", measured.error().message)};
+  }
+  Json json = SplatJson(splat, measured->scale);
+  if (folder != nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(json["parts"], folder->AddSplat(*splat.cloud, *std::move(measured), id));
+    return json;
+  }
+  const std::vector<uint8_t> planes = PlanesOf(*splat.cloud, measured->scale, measured->rows);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<std::string> texts, PackPlanes(planes));
+  Json ids = Json::array();
+  for (size_t k = 0; k < texts.size(); ++k) {
+    elements.push_back({Cat(id, "-", k), std::move(texts[k])});
+    ids.push_back(elements.back().id);
+  }
+  json["pieces"] = std::move(ids);
+  return json;
 }
 
 // The picture's MIME type goes by its first bytes: a browser that is told the truth does not guess.
@@ -213,14 +193,20 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
   uint64_t at_least = static_cast<uint64_t>(page.after.cloud == nullptr ? 0 : page.after.cloud->size());
   if (page.before && page.before->cloud != nullptr) at_least += static_cast<uint64_t>(page.before->cloud->size());
   at_least *= kLeastBytes;
-  if (at_least > page.max_bytes) return TooLarge(path, at_least, page);
+  if (!page.folder && at_least > page.max_bytes) return TooLarge(path, at_least, page);
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, page.memory));
   std::vector<DataElement> elements;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Json after, AddSplat(page.after, "after", page.max_sh_degree, elements));
+  std::optional<PageFolder> folder;
+  if (page.folder) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(PageFolder made, PageFolder::Create(path, page.memory));
+    folder.emplace(std::move(made));
+  }
+  PageFolder* const data = folder ? &*folder : nullptr;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Json after, AddSplat(page.after, "after", page.max_sh_degree, elements, data));
   Json before;
   if (page.before) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(before, AddSplat(*page.before, "before", page.max_sh_degree, elements));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(before, AddSplat(*page.before, "before", page.max_sh_degree, elements, data));
   }
   Json views = Json::array();
   for (size_t k = 0; k < page.views.size(); ++k) {
@@ -248,6 +234,8 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
   std::string head(PageFile("page.html"));
   const std::string end = head.substr(head.find("{{data}}") + std::string_view("{{data}}").size());
   head.resize(head.find("{{data}}"));
+  // Besides what is in the page: scripts beside it, from a disk or a server.
+  Substitute(head, "{{scripts}}", page.folder ? " 'self' file:" : "");
   Substitute(head, "{{style}}", PageFile("page.css"));
   // JSON's way to replace what is not UTF-8 serves the title too.
   const std::string printable_title = Json::parse(Json(title).dump(-1, ' ', false, Json::error_handler_t::replace));
@@ -267,7 +255,11 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
     ANCHORSPLAT_RETURN_IF_ERROR(file.Write("</script>\n"));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(tail));
-  return file.Commit();
+  if (!folder) return file.Commit();
+  ANCHORSPLAT_RETURN_IF_ERROR(folder->Publish());
+  ANCHORSPLAT_RETURN_IF_ERROR(file.Commit());
+  folder->Keep(options.overwrite);
+  return {};
 }
 
 }  // namespace anchorsplat

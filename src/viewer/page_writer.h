@@ -40,6 +40,9 @@ struct ViewerPage {
   std::string own_page;               // http(s) address of where readers can open a splat of their own; empty: none
   std::array<float, 3> background{};  // rgb 0–1
   int max_sh_degree = kMaxShDegree;   // higher coefficients are left out: they are most of the page
+  // The splats' data go to files in a folder beside the page, PAGE.data, from where it loads them: for splats of any
+  // size. The largest Gaussians come first, and are shown while the others are still to come.
+  bool folder = false;
   uint64_t max_bytes = kMaxPageBytes;
   OutputMemory* memory = nullptr;               // the page goes there instead of a folder (io/output_memory.h)
   std::string smaller = "leave something out";  // what to do about a page above it, in the words of who asks for it
@@ -47,10 +50,10 @@ struct ViewerPage {
 
 // One HTML file that shows the splats in any browser with WebGL 2, from disk, with no network: the clouds quantised
 // (quantized_cloud.h), deflated and in base64, the page's own code beside them. The modes of rendering follow each
-// cloud's `render_mode`. Credits in the clouds' comments (core/credit.h) stand on the page.
-// Errors: kExists; kIo; kNotFound or kBadFile (a picture that is missing or neither PNG nor JPEG); kBadArgument: a
-// cloud without usable Gaussians, a pixel size that is not positive, an `own_page` that is no such address, a page
-// above `max_bytes`.
+// cloud's `render_mode`. With ViewerPage::folder that page and a folder beside it (page_folder.h). Credits in the
+// clouds' comments (core/credit.h) stand on the page. Errors: kExists; kIo; kNotFound or kBadFile (a picture that is
+// missing or neither PNG nor JPEG); kBadArgument: a cloud without usable Gaussians, a pixel size that is not positive,
+// an `own_page` that is no such address, a page above `max_bytes`.
 Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page, const WriteOptions& options = {});
 
 // Bytes that a splat takes in a page, from a sample of it; 0 where nothing of it can be shown. MostPageBytes: of one

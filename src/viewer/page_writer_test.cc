@@ -3,20 +3,24 @@
 #include <gtest/gtest.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <array>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
 #include "core/framing.h"
 #include "core/text.h"
 #include "core/world_up.h"
+#include "formats/splat_order.h"
 #include "images/image_io.h"
 #include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 #include "render/constants.h"
 #include "viewer/fitted_cloud.h"
 #include "viewer/page_files.h"
+#include "viewer/page_folder.h"
 #include "viewer/quantized_cloud.h"
 
 namespace anchorsplat {
@@ -111,6 +115,86 @@ TEST(PageWriter, DataComesBackAsItWentIn) {
   EXPECT_EQ(description["after"]["planes"], PlanesPerGaussian(3));
   EXPECT_EQ(description["before"]["planes"], PlanesPerGaussian(1));
   EXPECT_EQ(Planes(text, description["before"]), Quantize(before, 3)->planes);
+}
+
+// The pieces of a part, as the page gets them.
+std::vector<uint8_t> PartPlanes(const std::filesystem::path& folder, const nlohmann::json& splat, size_t number) {
+  const nlohmann::json& part = splat.at("parts").at(number);
+  const std::string text = FileBytes(folder / part.at("file").get<std::string>());
+  const std::string call = "anchorsplatPart(";
+  EXPECT_TRUE(text.starts_with(call) && text.ends_with(");\n"));
+  const auto words = nlohmann::json::parse("[" + text.substr(call.size(), text.size() - call.size() - 3) + "]");
+  EXPECT_EQ(words[0], part.at("token"));
+  EXPECT_EQ(words[1], part.at("id"));
+  std::vector<uint8_t> planes;
+  for (const auto& packed64 : words[2]) {
+    const std::vector<uint8_t> packed = FromBase64(packed64);
+    std::vector<uint8_t> piece(splat.at("pieceBytes").get<size_t>());
+    uLongf size = piece.size();
+    EXPECT_EQ(uncompress(piece.data(), &size, packed.data(), packed.size()), Z_OK);
+    planes.insert(planes.end(), piece.begin(), piece.begin() + static_cast<std::ptrdiff_t>(size));
+  }
+  return planes;
+}
+
+TEST(PageWriter, AFolderHoldsTheLargestGaussiansFirst) {
+  TestFolder folder;
+  GaussianCloud cloud = FittedLookingCloud(kPartGaussians + 1000, 1, 3);
+  cloud.means[0] = std::numeric_limits<float>::quiet_NaN();
+  ViewerPage page;
+  page.after = {&cloud, "after.ply", 12345};
+  page.folder = true;
+  page.max_bytes = 500'000;  // of the page alone
+  const Status status = WriteViewerPage(folder / "my page.html", page);
+  ASSERT_TRUE(status.ok()) << status.error().message;
+  EXPECT_EQ(folder.Entries(), 2) << "the page and its data";
+  const std::string text = FileBytes(folder / "my page.html");
+  EXPECT_EQ(Count(text, "script-src 'unsafe-inline' blob: 'self' file:;"), 1u);
+  const auto splat = nlohmann::json::parse(ElementText(text, "description"))["after"];
+  EXPECT_FALSE(splat.contains("pieces"));
+  ASSERT_EQ(splat["parts"].size(), 2u);
+  EXPECT_EQ(splat["parts"][0]["file"], "my%20page.data/after-0.js");
+  EXPECT_EQ(splat["parts"][0]["count"], kPartGaussians);
+  EXPECT_EQ(splat["parts"][1]["count"], 999);
+  EXPECT_EQ(splat["count"], kPartGaussians + 999);
+
+  const MeasuredCloud measured = *MeasureCloud(cloud, 3);
+  std::vector<int64_t> rows;
+  for (const uint32_t row : ImportanceOrder(cloud)) {
+    if (row != 0) rows.push_back(row);
+  }
+  const std::filesystem::path data = folder.path();
+  for (size_t part = 0; part < 2; ++part) {
+    std::vector<int64_t> own(rows.begin() + (part == 0 ? 0 : kPartGaussians),
+                             part == 0 ? rows.begin() + kPartGaussians : rows.end());
+    std::ranges::sort(own);
+    nlohmann::json plain = splat;
+    plain["parts"][part]["file"] = "my page.data/after-" + std::to_string(part) + ".js";
+    EXPECT_EQ(PartPlanes(data, plain, part), PlanesOf(cloud, measured.scale, own));
+  }
+}
+
+TEST(PageWriter, AnOlderFolderGoesWithItsPage) {
+  TestFolder folder;
+  GaussianCloud cloud = FittedLookingCloud(100, 0, 3);
+  ViewerPage page;
+  page.after = {&cloud, "after.ply", {}};
+  page.folder = true;
+  const std::filesystem::path path = folder / "page.html";
+  const auto file_of_part = [&] {
+    return nlohmann::json::parse(ElementText(FileBytes(path), "description"))["after"]["parts"][0]["file"];
+  };
+  ASSERT_TRUE(WriteViewerPage(path, page).ok());
+  EXPECT_EQ(file_of_part(), "page.data/after-0.js");
+  EXPECT_EQ(WriteViewerPage(path, page).error().code, ErrorCode::kExists);
+  ASSERT_TRUE(WriteViewerPage(path, page, {.overwrite = true}).ok());
+  EXPECT_EQ(file_of_part(), "page.data-2/after-0.js") << "the older page worked until the new one was there";
+  EXPECT_EQ(folder.Entries(), 2);
+  // What somebody put beside the parts is not ours to remove.
+  std::ofstream(folder / "page.data-2/notes.txt") << "mine";
+  ASSERT_TRUE(WriteViewerPage(path, page, {.overwrite = true}).ok());
+  EXPECT_EQ(file_of_part(), "page.data/after-0.js");
+  EXPECT_TRUE(std::filesystem::exists(folder / "page.data-2/notes.txt"));
 }
 
 TEST(PageWriter, SaysWhereUpIsAndHowLargeTheSplatIs) {

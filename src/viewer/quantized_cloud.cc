@@ -76,6 +76,24 @@ struct MeanCode {
   }
 };
 
+// See QuantizedCloud::radius; of every so many Gaussians.
+double RadiusOf(const CloudView& cloud, const std::vector<int64_t>& rows, const QuantizedCloud& q) {
+  constexpr size_t kSample = 20'000;
+  const size_t step = (rows.size() + kSample - 1) / kSample;
+  std::vector<float> distances;
+  for (size_t n = 0; n < rows.size(); n += step) {
+    double most = 0;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double x = cloud.means[static_cast<size_t>(3 * rows[n]) + axis];
+      most = std::max(most, std::abs(x - q.center[axis]));
+    }
+    distances.push_back(static_cast<float>(std::min(most, kFloatMax)));
+  }
+  const double largest = Quantile(distances, 1);
+  const double radius = std::min(1.25 * Quantile(distances, 0.9), 3.0 * Quantile(distances, 0.5));
+  return radius > 0 ? radius : largest > 0 ? largest : 1;
+}
+
 // Where the middle is and how far things go, of the Gaussians at `rows`.
 void MeasureMeans(const CloudView& cloud, const std::vector<int64_t>& rows, QuantizedCloud& q) {
   std::vector<float> values(rows.size());
@@ -95,6 +113,7 @@ void MeasureMeans(const CloudView& cloud, const std::vector<int64_t>& rows, Quan
   }
   if (!(q.spread > 0) || !std::isfinite(q.spread)) q.spread = largest > 0 ? largest : 1;
   q.reach = std::asinh(largest / q.spread);
+  q.radius = RadiusOf(cloud, rows, q);
 }
 
 void MeasureRanges(const CloudView& cloud, const std::vector<int64_t>& rows, QuantizedCloud& q) {
@@ -125,11 +144,11 @@ void MeasureRanges(const CloudView& cloud, const std::vector<int64_t>& rows, Qua
 
 }  // namespace
 
-Result<QuantizedCloud> Quantize(const CloudView& cloud, int max_sh_degree) {
+Result<MeasuredCloud> MeasureCloud(const CloudView& cloud, int max_sh_degree) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
-  QuantizedCloud q;
+  MeasuredCloud measured;
+  auto& [q, rows] = measured;
   q.sh_degree = std::clamp(max_sh_degree, 0, cloud.sh_degree);
-  std::vector<int64_t> rows;
   rows.reserve(static_cast<size_t>(cloud.size()));
   for (int64_t i = 0; i < cloud.size(); ++i) {
     if (IsUsable(cloud, i)) rows.push_back(i);
@@ -141,10 +160,14 @@ Result<QuantizedCloud> Quantize(const CloudView& cloud, int max_sh_degree) {
   }
   MeasureMeans(cloud, rows, q);
   MeasureRanges(cloud, rows, q);
+  return measured;
+}
 
+std::vector<uint8_t> PlanesOf(const CloudView& cloud, const QuantizedCloud& q, std::span<const int64_t> rows) {
+  const auto count = static_cast<int64_t>(rows.size());
   const MeanCode mean_code{q};
   std::vector<std::pair<uint32_t, int64_t>> order(rows.size());  // Morton key, row: a total order, so any sort will do
-  ParallelFor(0, q.count, kGrain, [&](int64_t first, int64_t last) {
+  ParallelFor(0, count, kGrain, [&](int64_t first, int64_t last) {
     for (int64_t n = first; n < last; ++n) {
       uint32_t key = 0;
       for (size_t axis = 0; axis < 3; ++axis) {
@@ -156,15 +179,15 @@ Result<QuantizedCloud> Quantize(const CloudView& cloud, int max_sh_degree) {
   });
   std::sort(order.begin(), order.end());
 
-  q.planes.resize(static_cast<size_t>(q.count) * static_cast<size_t>(PlanesPerGaussian(q.sh_degree)));
+  std::vector<uint8_t> planes(rows.size() * static_cast<size_t>(PlanesPerGaussian(q.sh_degree)));
   const auto stride = static_cast<size_t>(cloud.sh_stride());
-  ParallelFor(0, q.count, kGrain, [&](int64_t first, int64_t last) {
+  ParallelFor(0, count, kGrain, [&](int64_t first, int64_t last) {
     for (int64_t n = first; n < last; ++n) {
       const auto i = static_cast<size_t>(order[static_cast<size_t>(n)].second);
-      uint8_t* plane = q.planes.data() + n;
+      uint8_t* plane = planes.data() + n;
       const auto put = [&](uint32_t byte) {
         *plane = static_cast<uint8_t>(byte);
-        plane += q.count;
+        plane += count;
       };
       const auto put_scalar = [&](uint32_t code) {
         put(code >> (kScalarBits - 8));
@@ -194,7 +217,13 @@ Result<QuantizedCloud> Quantize(const CloudView& cloud, int max_sh_degree) {
       }
     }
   });
-  return q;
+  return planes;
+}
+
+Result<QuantizedCloud> Quantize(const CloudView& cloud, int max_sh_degree) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(MeasuredCloud measured, MeasureCloud(cloud, max_sh_degree));
+  measured.scale.planes = PlanesOf(cloud, measured.scale, measured.rows);
+  return std::move(measured.scale);
 }
 
 }  // namespace anchorsplat

@@ -38,7 +38,10 @@ struct QuantizedCloud {
   std::array<double, 2> log_scale{};  // min, max
   std::array<double, 2> dc{};         // min, max
   std::array<double, 3> sh_max{};     // m of degree 1, 2, 3
-  int64_t left_out = 0;               // Gaussians with a value that is not finite: no rasterizer draws them
+  // World units, per axis from the centre: half the size of what one wants to see, most of the Gaussians, but of a
+  // scene with a far background its middle.
+  double radius = 1;
+  int64_t left_out = 0;  // Gaussians with a value that is not finite: no rasterizer draws them
   // PlanesPerGaussian(sh_degree) planes of `count` bytes: mean x, y, z (3 each); log-scale 0–2, opacity, f_dc r, g, b
   // (2 each); rotation (4, lowest byte first); f_rest coefficient-major, rgb fastest (1 each, two's complement).
   std::vector<uint8_t> planes;
@@ -48,5 +51,16 @@ constexpr int PlanesPerGaussian(int sh_degree) { return 3 * 3 + 7 * 2 + 4 + 3 * 
 
 // Keeps SH up to `max_sh_degree`. kBadArgument: an invalid cloud, or one without any usable Gaussian.
 Result<QuantizedCloud> Quantize(const CloudView& cloud, int max_sh_degree);
+
+// The same by parts, for splats whose planes are not to be in memory all at once.
+//
+// All but the planes, and the rows of usable Gaussians in the order of the cloud. Errors: those of Quantize.
+struct MeasuredCloud {
+  QuantizedCloud scale;
+  std::vector<int64_t> rows;
+};
+Result<MeasuredCloud> MeasureCloud(const CloudView& cloud, int max_sh_degree);
+// Planes of these rows alone, which are put into Morton order.
+std::vector<uint8_t> PlanesOf(const CloudView& cloud, const QuantizedCloud& scale, std::span<const int64_t> rows);
 
 }  // namespace anchorsplat

@@ -100,7 +100,8 @@ Status ReadAsImage(const fs::path& file, const std::string& bytes) {
 // one, besides those made by hand.
 void AddSplatFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
   for (const SplatFormat& format : Formats()) {
-    if (format.read == nullptr || format.name == "glTF as JSON") continue;  // that one is of two files
+    // The latter two are of several files.
+    if (format.read == nullptr || format.name == "glTF as JSON" || format.name == "streamed SOG") continue;
     const std::string file = "fuzz" + std::string(format.extensions.front());
     FuzzReader reader{
         std::string(format.name), {}, {}, [file](const std::string& bytes) { return ReadAsCloud(file, bytes); }};
@@ -139,11 +140,10 @@ void AddSplatsOfSeveralFiles(const fs::path& folder, std::vector<FuzzReader>& re
   struct Part {
     const char *format, *main, *damaged;
   };
-  constexpr Part kParts[] = {{"SOG folder", "meta.json", "meta.json"},
-                             {"SOG folder", "meta.json", "means_u.webp"},
-                             {"SOG folder", "meta.json", "shN_centroids.webp"},
-                             {"glTF as JSON", "fuzz.gltf", "fuzz.gltf"},
-                             {"glTF as JSON", "fuzz.gltf", "fuzz.bin"}};
+  constexpr Part kParts[] = {
+      {"SOG folder", "meta.json", "meta.json"},          {"SOG folder", "meta.json", "means_u.webp"},
+      {"SOG folder", "meta.json", "shN_centroids.webp"}, {"streamed SOG", "lod-meta.json", "lod-meta.json"},
+      {"glTF as JSON", "fuzz.gltf", "fuzz.gltf"},        {"glTF as JSON", "fuzz.gltf", "fuzz.bin"}};
   for (const Part& part : kParts) {
     const fs::path own = folder / Cat("of_", part.damaged);
     fs::create_directories(own);

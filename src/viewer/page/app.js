@@ -49,11 +49,20 @@ class Viewer {
 
   async load() {
     const splats = Object.values(this.splats);
-    const loaded = await Promise.all(splats.map((splat) => splat.load()));
-    splats.forEach((splat, k) => this.renderer.addSplat(splat, loaded[k]));
+    // What came first is shown while the rest is still to come.
+    await Promise.all(splats.map((splat) => new Promise((resolve, reject) => {
+      this.renderer.addSplat(splat);
+      splat.load((part) => {
+        this.renderer.addPart(splat, part);
+        this.partArrived();
+        resolve();
+      }).catch((error) => {
+        reject(error);
+        if (this.camera) fail(error);
+      });
+    })));
     const after = this.splats.after.description;
-    this.camera = new OrbitCamera(after.center, loaded[splats.indexOf(this.splats.after)].radius,
-      this.description.up);
+    this.camera = new OrbitCamera(after.center, after.radius, this.description.up);
     const names = this.description.views.map((view, k) => view.name || `View ${k + 1}`);
     fillViews([...names, ...OWN_VIEWS.map(([name]) => name)], this.description.views.map((view) => view.picture), this);
     this.pairs.forEach(([first, second], k) => {
@@ -67,6 +76,16 @@ class Viewer {
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     for (const ring of document.querySelectorAll('.ring span')) ring.textContent = `×${LENS_MAGNIFICATION}`;
     this.goTo(this.openingView());
+  }
+
+  partArrived() {
+    const splats = Object.values(this.splats);
+    const sum = (value) => splats.reduce((total, splat) => total + value(splat), 0);
+    const share = sum((splat) => splat.arrived) / sum((splat) => splat.description.count);
+    byId('arriving').textContent = `${Math.floor(100 * share)} % loaded`;
+    show(byId('arriving'), share < 1);
+    document.documentElement.dataset.arrived = String(share);
+    if (this.camera) this.cameraChanged();
   }
 
   // The first view, unless it looks straight down or up and another one does not.
@@ -456,6 +475,7 @@ class Viewer {
       this.draw();  // measures of the overlay are known only now that it is visible
       return;
     }
+    if (splats.some((splat) => !splat.complete)) return;
     document.documentElement.dataset.settled = 'true';
   }
 }
@@ -479,7 +499,11 @@ function listenToParent(viewer) {
 
 async function main() {
   byId('reload').addEventListener('click', () => location.reload());
-  addEventListener('error', (event) => fail(event.error || new Error(event.message)));
+  addEventListener('error', (event) => {
+    // A part that was cut is a script that makes no sense; loadPart says so in better words.
+    if (awaitedParts > 0 && !(event.error && !(event.error instanceof SyntaxError))) return;
+    fail(event.error || new Error(event.message));
+  });
   addEventListener('unhandledrejection', (event) => fail(event.reason));
   try {
     if (typeof DecompressionStream === 'undefined') {

@@ -24,47 +24,92 @@ function startWorker(source) {
   return worker;
 }
 
+// Data in files beside the page: scripts, as a page from a disk may load nothing else. Each makes one call of this.
+const arrivedParts = new Map();
+let awaitedParts = 0;
+function anchorsplatPart(token, id, pieces) { arrivedParts.set(`${token} ${id}`, pieces); }
+
+function loadPart({id, file, token}) {
+  const name = decodeURIComponent(file);
+  const again = 'The page and the folder beside it belong together: please copy both again.';
+  return new Promise((resolve, reject) => {
+    const script = document.createElement('script');
+    ++awaitedParts;
+    const end = (settle, value) => {
+      --awaitedParts;
+      script.remove();
+      settle(value);
+    };
+    script.onerror = () => end(reject, new Error(`“${name}” is missing. ${again}`));
+    script.onload = () => {
+      const key = `${token} ${id}`;
+      const pieces = arrivedParts.get(key);
+      arrivedParts.clear();  // the page holds its data once
+      if (pieces) end(resolve, pieces);
+      else end(reject, new Error(`“${name}” is damaged or of another page. ${again}`));
+    };
+    script.src = file;
+    document.head.append(script);
+  });
+}
+
 // Texels per Gaussian, and the size of the texture that holds `count` of them.
 function textureShape(count, texels) {
   return {texels, width: TEXTURE_WIDTH, height: Math.ceil(count * texels / TEXTURE_WIDTH)};
 }
 
-// One splat: its description, its worker, and — after load() — the arrays for its textures. Depth orders arrive by
-// `onOrder`; while one is being made, only the latest further wish is kept.
+// One splat: its description, its worker, and, while it is loaded, the arrays for its textures part by part. A page in
+// one file has one part. Depth orders arrive by `onOrder`; while one is being made, only the latest further wish is kept.
 class Splat {
   constructor(description, workerSource, onOrder, onError) {
     this.description = description;
+    this.parts = description.parts || [{count: description.count, pieces: description.pieces}];
     const bytes = 3 * ((description.degree + 1) ** 2 - 1);
+    this.harmonicsTexels = Math.ceil(bytes / 16);
     this.geometryShape = textureShape(description.count, 2);
-    this.harmonicsShape = textureShape(description.count, Math.ceil(bytes / 16));
+    this.harmonicsShape = textureShape(description.count, this.harmonicsTexels);
+    this.arrived = 0;  // Gaussians
+    this.unpacked = null;
     this.sorting = false;
     this.waiting = null;
     this.sortId = 0;
     this.onOrder = onOrder;
     this.onError = onError;
     this.worker = startWorker(workerSource);
-    this.worker.onerror = (event) => onError(new Error(event.message || 'the sorting worker stopped'));
+    this.worker.onmessage = ({data}) => this.receive(data);
+    this.worker.onerror = (event) => this.stop(new Error(event.message || 'the worker of a splat stopped'));
+    this.worker.postMessage({type: 'begin', description});
   }
 
-  load() {
-    const {geometryShape, harmonicsShape} = this;
+  get complete() { return this.arrived === this.description.count; }
+
+  // Part after part; `onPart` gets each one's texels: {first, count, geometry, harmonics}.
+  async load(onPart) {
+    for (const part of this.parts) {
+      const pieces = part.file ? await loadPart(part) : part.pieces.map(elementText);
+      const first = this.arrived;
+      const {geometry, harmonics} = await this.unpack(first, part.count, pieces);
+      this.arrived += part.count;
+      onPart({first, count: part.count, geometry, harmonics});
+    }
+  }
+
+  unpack(first, count, pieces) {
+    const size = ({width, height}) => 4 * width * height;
     return new Promise((resolve, reject) => {
-      this.worker.onmessage = ({data}) => {
-        if (data.type === 'failed') reject(new Error(data.message));
-        if (data.type !== 'loaded') return;
-        this.worker.onmessage = (message) => this.receive(message.data);
-        resolve(data);
-      };
-      this.worker.onerror = (event) => reject(new Error(event.message || 'the decoding worker stopped'));
+      this.unpacked = {resolve, reject};
       this.worker.postMessage({
-        type: 'load',
-        description: this.description,
-        pieces: this.description.pieces.map(elementText),
-        geometrySize: 4 * geometryShape.width * geometryShape.height,
-        harmonicsSize: 4 * harmonicsShape.width * harmonicsShape.height,
-        harmonicsTexels: harmonicsShape.texels,
+        type: 'part', first, count, pieces,
+        geometrySize: size(textureShape(count, 2)),
+        harmonicsSize: size(textureShape(count, this.harmonicsTexels)),
+        harmonicsTexels: this.harmonicsTexels,
       });
     });
+  }
+
+  stop(error) {
+    if (this.unpacked) this.unpacked.reject(error);
+    else this.onError(error);
   }
 
   // `row` is the camera's viewing direction in world axes, `depth` the camera z of the splat's centre.
@@ -83,7 +128,12 @@ class Splat {
   }
 
   receive(data) {
-    if (data.type === 'failed') return this.onError(new Error(data.message));
+    if (data.type === 'failed') return this.stop(new Error(data.message));
+    if (data.type === 'unpacked') {
+      const {resolve} = this.unpacked;
+      this.unpacked = null;
+      return resolve(data);
+    }
     this.sorting = false;
     this.onOrder(this, data.order, data.count);
     if (this.waiting) {

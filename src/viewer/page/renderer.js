@@ -42,27 +42,28 @@ class Renderer {
     return {program, uniforms};
   }
 
-  dataTexture(shape, data) {
+  dataTexture(shape) {
     const gl = this.gl;
     if (shape.height > this.maxTexture) {
       throw new Error('This splat is too large for this device: its graphics memory takes no texture of that size.');
     }
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32UI, shape.width, shape.height, 0, gl.RGBA_INTEGER, gl.UNSIGNED_INT, data);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32UI, shape.width, shape.height);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
     return texture;
   }
 
-  addSplat(splat, {geometry, harmonics}) {
+  // Room for a splat; its Gaussians come by addPart.
+  addSplat(splat) {
     const gl = this.gl;
     const degree = splat.description.degree;
     if (!this.splatPrograms.has(degree)) {
       this.splatPrograms.set(degree, this.program(splatVertexSource(degree), splatFragmentSource));
     }
-    splat.geometry = this.dataTexture(splat.geometryShape, geometry);
-    splat.harmonics = degree > 0 ? this.dataTexture(splat.harmonicsShape, harmonics) : null;
+    splat.geometry = this.dataTexture(splat.geometryShape);
+    splat.harmonics = degree > 0 ? this.dataTexture(splat.harmonicsShape) : null;
     splat.visible = 0;
     splat.order = gl.createBuffer();
     splat.array = gl.createVertexArray();
@@ -73,6 +74,18 @@ class Renderer {
     gl.vertexAttribIPointer(0, 1, gl.UNSIGNED_INT, 0, 0);
     gl.vertexAttribDivisor(0, 1);
     gl.bindVertexArray(null);
+  }
+
+  // Parts begin with a row of every texture, as kPartGaussians in page_folder.h is a multiple of their width.
+  addPart(splat, {first, count, geometry, harmonics}) {
+    const gl = this.gl;
+    const fill = (texture, texels, data) => {
+      const {width, height} = textureShape(count, texels);
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, first * texels / width, width, height, gl.RGBA_INTEGER, gl.UNSIGNED_INT, data);
+    };
+    fill(splat.geometry, 2, geometry);
+    if (splat.harmonics) fill(splat.harmonics, splat.harmonicsTexels, harmonics);
   }
 
   setOrder(splat, order, count) {

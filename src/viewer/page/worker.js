@@ -2,13 +2,16 @@
 // Everything that takes long: undoing the page's packing (quantized_cloud.h says how a splat is packed), and putting
 // the Gaussians into depth order whenever the camera turns. One worker per splat.
 //
-// in   {type: 'load', description, pieces: [base64]}      out  {type: 'loaded', geometry, harmonics, radius}
+// in   {type: 'begin', description}                       out
+//      {type: 'part', first, count, pieces: [base64]}          {type: 'unpacked', geometry, harmonics}
 //      {type: 'sort', id, forward: [3], offset, near}          {type: 'sorted', id, order, count}
 //                                                              {type: 'failed', message}
 
 let means = null;    // Float32Array [N,3], relative to the splat's centre
 let depths = null;   // Float32Array [N]
 let keys = null;     // Uint16Array [N]
+let description = null;
+let arrived = 0;     // Gaussians that are there: those of the parts so far
 
 function bytesFromBase64(text) {
   const binary = atob(text);
@@ -22,8 +25,8 @@ async function inflate(bytes) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-async function unpackPlanes(description, pieces) {
-  const planes = new Uint8Array(description.count * description.planes);
+async function unpackPlanes(count, pieces) {
+  const planes = new Uint8Array(count * description.planes);
   let at = 0;
   for (let k = 0; k < pieces.length; ++k) {
     const piece = await inflate(bytesFromBase64(pieces[k]));
@@ -38,8 +41,8 @@ async function unpackPlanes(description, pieces) {
 
 // Two RGBA32UI texels per Gaussian: mean (3 floats), rotation code | log-scale codes 0 and 1, log-scale 2 and opacity,
 // f_dc r and g, f_dc b — 16 bits each, the first one low.
-function packGeometry(d, planes, into) {
-  const n = d.count;
+function packGeometry(first, n, planes, into) {
+  const d = description;
   const floats = new Float32Array(into.buffer);
   const scalar = (plane, i) => (planes[plane * n + i] << (d.scalarBits - 8)) | planes[(plane + 1) * n + i];
   const top = 2 ** d.meanBits - 1;
@@ -49,7 +52,7 @@ function packGeometry(d, planes, into) {
       const p = 3 * axis * n + i;
       const code = (planes[p] << (d.meanBits - 8)) | (planes[p + n] << (d.meanBits - 16)) | planes[p + 2 * n];
       const x = d.spread * Math.sinh(d.reach * (2 * code / top - 1));
-      means[3 * i + axis] = x;
+      means[3 * (first + i) + axis] = x;
       floats[out + axis] = x;
     }
     const r = 23 * n + i;
@@ -62,44 +65,35 @@ function packGeometry(d, planes, into) {
 }
 
 // ceil(bytes/16) RGBA32UI texels per Gaussian, four coefficients per word, coefficient-major.
-function packHarmonics(d, planes, texels, into) {
-  const n = d.count;
+function packHarmonics(n, planes, texels, into) {
   const bytes = new Uint8Array(into.buffer);
-  for (let k = 0; k < d.planes - 27; ++k) {
+  for (let k = 0; k < description.planes - 27; ++k) {
     const plane = (27 + k) * n;
     for (let i = 0; i < n; ++i) bytes[16 * texels * i + k] = planes[plane + i];
   }
 }
 
-async function load({description, pieces, geometrySize, harmonicsSize, harmonicsTexels}) {
-  const planes = await unpackPlanes(description, pieces);
-  means = new Float32Array(3 * description.count);
-  depths = new Float32Array(description.count);
-  keys = new Uint16Array(description.count);
-  const geometry = new Uint32Array(geometrySize);
-  packGeometry(description, planes, geometry);
-  const harmonics = new Uint32Array(harmonicsSize);
-  if (harmonicsTexels > 0) packHarmonics(description, planes, harmonicsTexels, harmonics);
-  const radius = objectRadius();
-  postMessage({type: 'loaded', geometry, harmonics, radius}, [geometry.buffer, harmonics.buffer]);
+function begin(whole) {
+  description = whole;
+  means = new Float32Array(3 * whole.count);
+  depths = new Float32Array(whole.count);
+  keys = new Uint16Array(whole.count);
 }
 
-// Half the size of what one wants to see: most of the Gaussians, but of a scene with a far background its middle.
-function objectRadius() {
-  const step = 3 * Math.ceil(means.length / 3 / 20000);
-  const distances = [];
-  for (let i = 0; i < means.length; i += step) {
-    distances.push(Math.max(Math.abs(means[i]), Math.abs(means[i + 1]), Math.abs(means[i + 2])));
-  }
-  distances.sort((a, b) => a - b);
-  const quantile = (q) => distances[Math.floor(q * (distances.length - 1))];
-  return Math.min(1.25 * quantile(0.9), 3 * quantile(0.5)) || quantile(1) || 1;
+async function unpack({first, count, pieces, geometrySize, harmonicsSize, harmonicsTexels}) {
+  const planes = await unpackPlanes(count, pieces);
+  const geometry = new Uint32Array(geometrySize);
+  packGeometry(first, count, planes, geometry);
+  const harmonics = new Uint32Array(harmonicsSize);
+  if (harmonicsTexels > 0) packHarmonics(count, planes, harmonicsTexels, harmonics);
+  arrived = first + count;
+  postMessage({type: 'unpacked', geometry, harmonics}, [geometry.buffer, harmonics.buffer]);
 }
 
 // Farthest first, by camera z as the renderer sorts; what is nearer than the near plane is left out. A counting sort
 // over 16 bits of depth: two passes, no comparisons.
 function sort({id, forward, offset, near}) {
-  const n = depths.length;
+  const n = arrived;
   const [fx, fy, fz] = forward;
   let nearest = Infinity;
   let farthest = -Infinity;
@@ -130,7 +124,8 @@ function sort({id, forward, offset, near}) {
 
 onmessage = async ({data}) => {
   try {
-    if (data.type === 'load') await load(data);
+    if (data.type === 'begin') begin(data.description);
+    if (data.type === 'part') await unpack(data);
     if (data.type === 'sort') sort(data);
   } catch (error) {
     postMessage({type: 'failed', message: error.message || String(error)});

@@ -9,23 +9,12 @@
 import fs from 'node:fs';
 import http from 'node:http';
 import path from 'node:path';
-import {createRequire} from 'node:module';
+import {expect, finish, launchBrowser} from './browser.mjs';
 
-const modules = createRequire(path.join(process.env.NODE_FOLDER, 'package.json'));
-const {chromium} = modules('playwright-core');
 const engine = path.join(process.env.NODE_FOLDER, 'node_modules/playcanvas/build/playcanvas.mjs');
 const [scene, near, far, references, out] = process.argv.slice(2).map((p) => path.resolve(p));
 const SIDE = 512;
 const LEVELS = JSON.parse(fs.readFileSync(path.join(scene, 'lod-meta.json'))).lodLevels;
-let checks = 0;
-let failures = 0;
-
-function expect(name, condition, detail = '') {
-  ++checks;
-  if (condition) return;
-  ++failures;
-  console.log(`FAILED ${name} ${detail}`);
-}
 
 const page = `<!DOCTYPE html><html><head><link rel="icon" href="data:,"></head>
 <body style="margin:0;background:#000"><canvas id="canvas" width="${SIDE}" height="${SIDE}"></canvas>
@@ -83,12 +72,7 @@ const server = http.createServer((request, response) => {
 });
 await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
 
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM || '/usr/bin/chromium',
-  args: ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--no-sandbox',
-    '--disable-gpu-sandbox', '--disable-background-networking', '--disable-component-update', '--disable-sync',
-    '--no-first-run'],
-});
+const browser = await launchBrowser();
 const ruler = await browser.newPage();
 // PSNR of the middle of two PNGs, `side` pixels wide.
 function psnr(a, b, side) {
@@ -151,5 +135,4 @@ expect('far: nothing finer was loaded', chunksFar.every((name) => name.startsWit
 
 await browser.close();
 server.close();
-console.log(`${checks} checks, ${failures} failed`);
-process.exit(failures === 0 ? 0 : 1);
+finish();

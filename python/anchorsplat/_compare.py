@@ -34,6 +34,8 @@ def _pictures(name: str, values: Any) -> npt.NDArray[np.float32]:
         )
     if array.dtype == np.uint8:
         array = array.astype(np.float32) / np.float32(255)
+    elif array.dtype.kind in "iu" and array.size > 0 and array.max() > 1:
+        raise BadArgumentError(f"{name}: {array.dtype} with values up to {array.max()}: give uint8, or floats from 0 to 1")
     array = np.ascontiguousarray(array, dtype=np.float32)
     return array if array.ndim == 4 else array[None]
 

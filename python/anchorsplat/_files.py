@@ -53,6 +53,8 @@ def read(
         if isinstance(source, (str, os.PathLike)):
             return Cloud._of(_core.read_path(path_bytes(source), format or "", how))
         if hasattr(source, "read"):
+            if format is None and str(getattr(source, "name", "")).lower().endswith(".splat"):
+                format = "splat"  # which has no mark of its own
             source = source.read()
         if not is_buffer(source):
             raise TypeError("read: expected a path, bytes or a file opened for bytes, found " + type(source).__name__)

@@ -27,6 +27,14 @@ def test_paths_bytes_and_file_objects(cloud, tmp_path):
     assert all(same(other, by_path) for other in others)
 
 
+def test_an_open_file_has_a_name(cloud, tmp_path):
+    path = tmp_path / "scan.splat"
+    with pytest.warns(anchorsplat.SplatWarning):
+        anchorsplat.write(path, cloud)
+    with path.open("rb") as file:
+        assert same(anchorsplat.read(file), anchorsplat.read(path))
+
+
 def test_a_name_may_be_any_bytes(cloud, tmp_path):
     name = os.fsencode(tmp_path) + b"/\xff.ply"
     anchorsplat.write(os.fsdecode(name), cloud)

@@ -120,6 +120,8 @@ def test_metrics(cloud):
         anchorsplat.psnr(a, b[:, 1:])
     with pytest.raises(anchorsplat.BadArgumentError, match="expected pictures"):
         anchorsplat.ssim(a[0, 0], b[0, 0])
+    with pytest.raises(anchorsplat.BadArgumentError, match="give uint8, or floats"):
+        anchorsplat.psnr(bytes_of_a.astype(np.uint16), a)
     assert anchorsplat.sheet({"a": a[0], "b": b[0]}).shape[2] == 3
 
 

@@ -29,15 +29,15 @@ export function launchBrowser() {
   });
 }
 
-// A new tab. What it says on its console (`hushed` is to be ignored), an error that nobody caught, and a request to an
-// address that `allowed` does not know are failures.
-export async function watchedTab(context, {allowed, hushed = /^$/, console = true} = {}) {
+// A new tab. What it says on its console (`hushed` is to be ignored), an error that nobody caught and that is not `known`,
+// and a request to an address that `allowed` does not know are failures.
+export async function watchedTab(context, {allowed, hushed = /^$/, console = true, known} = {}) {
   const tab = await context.newPage();
   tab.setDefaultTimeout(300000);  // a software renderer on a busy machine
   tab.on('console', (message) => {
     if (console && !hushed.test(message.text())) expect('a silent console', false, `${message.type()}: ${message.text()}`);
   });
-  tab.on('pageerror', (error) => expect('no uncaught error', false, error.message));
+  tab.on('pageerror', (error) => expect('no uncaught error', known?.test(error.message), error.message));
   tab.on('request', (request) => {
     if (allowed) expect('no request to the network', allowed.test(request.url()), request.url().slice(0, 100));
   });

@@ -47,10 +47,10 @@ void ConvertFlags::AddTo(CLI::App& verb) {
           ->check(CLI::Range(1, 1 << 17)),
       verb.add_option("--lod-chunk-extent", lod.chunk_extent,
                       "Longest side of what changes its level as one, in world units")
-          ->check(CLI::PositiveNumber)};
+          ->check(Positive())};
   for (CLI::Option* option : of_streamed) option->capture_default_str()->group(group);
   verb.add_option("--lod-level", options.lod_level, "Level to read of a lod-meta.json: 0 is the finest")
-      ->check(CLI::NonNegativeNumber)
+      ->check(NotNegative())
       ->capture_default_str()
       ->group(group);
   auto* report_option =

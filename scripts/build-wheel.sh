@@ -54,12 +54,10 @@ for whole in "$work"/whole/*.whl; do
   # Every library that came along has its notice in it.
   for library in $(python -m zipfile -l "$whole" | sed -n 's|^anchorsplat\.libs/\([^ ]*\).*|\1|p'); do
     name=$(sed -E 's/-[0-9a-f]{8}(\.so.*)/\1/' <<<"$library")
-    path=$(ldconfig -p | sed -n "s|^\t$name .* => ||p" | head -n 1)
-    source=$(dpkg-query -W -f='${source:Package}\n' "$(dpkg-query -S "$(realpath "$path")" 2>/dev/null | sed 's/:.*//' | head -n 1)" 2>/dev/null || true)
-    if [ -n "$source" ] && ! grep -q "^=== $source " THIRD_PARTY; then
-      fail "$(basename "$whole") holds $library of $source, and THIRD_PARTY has no notice of it"
-    fi
-    [ -n "$source" ] || echo "build-wheel: no Debian package is known to have $library" >>"$log"
+    package=$(dpkg-query -S "*/$name" 2>/dev/null | head -n 1 | sed 's/:.*//')
+    [ -n "$package" ] || fail "$(basename "$whole") holds $library, which is of no Debian package, so nobody knows its notice"
+    source=$(dpkg-query -W -f='${source:Package}\n' "$package" | head -n 1)
+    grep -q "^=== $source " THIRD_PARTY || fail "$(basename "$whole") holds $library of $source, and THIRD_PARTY has no notice of it"
   done
   if python -m zipfile -l "$whole" | grep -E '\.(png|jpe?g|webp)|examples/|testdata/'; then
     fail "$(basename "$whole") holds pictures"

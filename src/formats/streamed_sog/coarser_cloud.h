@@ -12,7 +12,7 @@ namespace anchorsplat {
 // and all keep their order. For a block of a splat: memory is some 300 bytes a Gaussian.
 //
 // A Gaussian weighs w = o·S, its opacity times the surface of its ellipsoid (Kerbl et al. 2024, "A Hierarchical 3D
-// Gaussian Representation", section 4.1), so that what is seen most counts most. A pair keeps its moments:
+// Gaussian Representation"), so that what is seen most counts most. A pair keeps its moments:
 //
 //   w = w₁ + w₂,  p = w₁/w,  μ = p μ₁ + (1−p) μ₂,  Σ = p Σ₁ + (1−p) Σ₂ + p (1−p) (μ₁−μ₂)(μ₁−μ₂)ᵀ
 //

@@ -14,6 +14,7 @@
 
 #include "core/file_system.h"
 #include "core/log.h"
+#include "core/number_text.h"
 #include "core/parallel.h"
 #include "core/rotation.h"
 #include "core/run_context.h"
@@ -85,11 +86,11 @@ double RoundedAway(double x, double sign) {
   char text[32];
   const auto end = std::to_chars(text, text + sizeof text, x, std::chars_format::scientific, 6).ptr;
   double rounded = x;
-  std::from_chars(text, end, rounded);
+  FromChars(text, end, rounded);
   if (sign * rounded >= sign * x) return rounded;
   const double step = std::pow(10.0, std::floor(std::log10(std::fabs(x))) - 6);
   const auto further = std::to_chars(text, text + sizeof text, x + sign * step, std::chars_format::scientific, 6).ptr;
-  std::from_chars(text, further, rounded);
+  FromChars(text, further, rounded);
   return rounded;
 }
 

@@ -366,8 +366,11 @@ class Viewer {
   }
 
   frame() {
-    if (this.pictures.busy) return;  // another frame comes when the graphics card is free
     const {canvas, renderer, ratio} = this;
+    if (this.pictures.busy) {
+      placeOverlay(this);
+      return;  // another frame comes when the graphics card is free
+    }
     const width = Math.max(1, Math.round(canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(canvas.clientHeight * ratio));
     if (canvas.width !== width || canvas.height !== height) {
@@ -412,7 +415,8 @@ class Viewer {
       // A true picture brings its own background.
       background: this.backgrounds[pair.includes('truth') ? 0 : this.backgroundIndex], lenses: [...lenses, nowhere, nowhere].slice(0, 2), lensSize,
     });
-    placeOverlay(this, mode, places);
+    placeOverlay(this);
+    document.documentElement.dataset.pixels = pictures.whole ? 'all' : 'fewer';
     document.documentElement.dataset.drawnWidening = String(this.widening);
     this.settle(pictures.whole);
   }

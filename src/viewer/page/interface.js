@@ -222,8 +222,10 @@ function placeRing(ring, x, y, radius) {
   ring.style.width = ring.style.height = `${2 * radius + 2}px`;
 }
 
-// The page over the picture; `places` are those of the lens.
-function placeOverlay(viewer, mode, places) {
+// The page over the picture.
+function placeOverlay(viewer) {
+  const mode = viewer.comparing ? viewer.mode : 'blink';
+  const places = viewer.lens ? viewer.lensPlaces() : [];
   const divider = byId('divider');
   const portrait = innerWidth <= innerHeight;
   show(divider, mode === 'slider' || mode === 'side');

@@ -6,7 +6,7 @@
 const BUDGET = 40;            // ms of the graphics card for what moves, and for a slice of what stands still
 const COMFORT = 30;           // ms that are aimed at
 const STILL = 150;            // ms without a change, until all pixels are drawn
-const LEAST_SLICE = 256;      // Gaussians
+const LEAST_SLICE = 4096;     // Gaussians
 const FIRST_SLICE = 65536;    // before anything is known
 const COARSEST = 8;           // pixels of the screen per pixel drawn, along either axis
 const PICTURES = 4;           // first, second, and the same under the lens; as many coarse ones follow

@@ -195,6 +195,46 @@ const same = async (a, b) => (await difference(a, b)).share < 1e-4;
   await tab.close();
 }
 
+// Where the graphics card is slow: what moves is shown with fewer pixels, and then with all of them what a fast one shows.
+{
+  // A card that does nothing for its fences until a while after each: a slow one, whatever this machine has.
+  const slow = () => {
+    const status = WebGL2RenderingContext.prototype.getSyncParameter;
+    const asked = new WeakMap();
+    WebGL2RenderingContext.prototype.getSyncParameter = function(sync, name) {
+      if (!asked.has(sync)) asked.set(sync, performance.now());
+      return performance.now() - asked.get(sync) < 60 ? this.UNSIGNALED : status.call(this, sync, name);
+    };
+    globalThis.shown = [];
+    addEventListener('DOMContentLoaded', () => new MutationObserver(() => {
+      globalThis.shown.push(document.documentElement.dataset.pixels);
+    }).observe(document.documentElement, {attributeFilter: ['data-pixels']}));
+  };
+  const tab = await open(page, {width: SIDE, height: SIDE, before: slow});
+  const first = await picture(tab);
+  await tab.keyboard.press('ArrowLeft');
+  await settled(tab);
+  await tab.evaluate(() => { globalThis.shown = []; });
+  await tab.keyboard.press('ArrowRight');
+  expect('what stops is shown with all pixels, as before', await same(first, await picture(tab, 'slow')));
+  const shown = await tab.evaluate(() => globalThis.shown);
+  expect('what moves is shown with fewer pixels at first', shown[0] === 'fewer' && shown.at(-1) === 'all', shown.join());
+  // What has not changed is not drawn again.
+  await tab.evaluate(() => {
+    globalThis.shown = [];
+    globalThis.draws = 0;
+    const draw = WebGL2RenderingContext.prototype.drawElementsInstanced;
+    WebGL2RenderingContext.prototype.drawElementsInstanced = function(...what) {
+      ++globalThis.draws;
+      return draw.apply(this, what);
+    };
+  });
+  await tab.keyboard.press('g');
+  await settled(tab);
+  expect('another background draws no Gaussian', (await tab.evaluate(() => globalThis.draws)) === 0);
+  await tab.close();
+}
+
 // A phone: fingers.
 {
   const tab = await open(page, {width: 390, height: 844, scale: 3, touch: true});

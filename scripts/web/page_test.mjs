@@ -53,6 +53,10 @@ const settled = (tab) => stageOf(tab).waitForFunction(() => document.documentEle
   });
   console.log(`a step of the slider: ${Math.max(...steps.times).toFixed(1)} ms of the page at most`);
   expect('a step of the slider is quick', Math.max(...steps.times) <= 50, String(steps.times));
+  const drawn = () => stageOf(tab).evaluate(() => ({...document.documentElement.dataset}));
+  await stageOf(tab).waitForFunction(() => document.documentElement.dataset.drawnWidening === document.documentElement.dataset.widening);
+  await settled(tab);
+  expect('the last step is shown with all pixels', (await drawn()).pixels === 'all' && (await drawn()).drawnWidening === (await drawn()).widening);
   const widening = () => stageOf(tab).evaluate(() => document.documentElement.dataset.widening || '');
   await settled(tab);
   const first = await widening();

@@ -155,7 +155,8 @@ void Substitute(std::string& text, std::string_view mark, std::string_view value
 
 std::string InlineScripts() {
   std::string out;
-  for (const char* name : {"payload.js", "camera.js", "shaders.js", "renderer.js", "interface.js", "app.js"}) {
+  for (const char* name :
+       {"payload.js", "camera.js", "shaders.js", "pictures.js", "renderer.js", "interface.js", "app.js"}) {
     out += Cat("<script>\n", PageFile(name), "</script>\n");
   }
   return out;

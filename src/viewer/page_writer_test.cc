@@ -281,8 +281,8 @@ TEST(PageWriter, TheGuardComesFirstAndTheStartLast) {
 }
 
 TEST(PageWriter, ItsOwnFilesStayInsideTheirElements) {
-  for (const char* name :
-       {"page.css", "payload.js", "camera.js", "shaders.js", "renderer.js", "interface.js", "app.js", "worker.js"}) {
+  for (const char* name : {"page.css", "payload.js", "camera.js", "shaders.js", "pictures.js", "renderer.js",
+                           "interface.js", "app.js", "worker.js"}) {
     const std::string text(PageFile(name));
     EXPECT_GT(text.size(), 500u) << name;
     EXPECT_EQ(text.find("</s"), std::string::npos) << name;

@@ -14,6 +14,7 @@ class Viewer {
     this.description = description;
     this.canvas = canvas;
     this.renderer = new Renderer(canvas, description.constants);
+    this.pictures = new Pictures(this.renderer, (...what) => this.drawPicture(...what), () => this.request());
     const source = elementText('worker-source');
     const order = (splat, indices, count) => {
       this.renderer.setOrder(splat, indices, count);
@@ -34,7 +35,7 @@ class Viewer {
     this.split = 0.5;
     this.lens = null;     // [x, y] in CSS pixels
     this.view = null;     // index of the view the camera is still at
-    this.pictures = new Map();
+    this.truths = new Map();
     const same = (a, b) => a.every((x, k) => Math.abs(x - b[k]) < 0.02);
     this.backgrounds = [description.background];
     for (const shade of [0, 1, 0.5, 0.16]) {
@@ -44,6 +45,7 @@ class Viewer {
     this.backgroundIndex = 0;
     this.widening = 0;    // of `after`, beside itself as `before`: the filter, while a person looks for its width
     this.frameRequested = false;
+    this.stale = true;    // something was asked for that is not on screen
     this.ready = false;
   }
 
@@ -295,17 +297,17 @@ class Viewer {
     const picture = this.truthHere();
     if (!picture) return null;
     const id = picture.element;
-    if (!this.pictures.has(id)) {
-      this.pictures.set(id, null);
+    if (!this.truths.has(id)) {
+      this.truths.set(id, null);
       const image = new Image();
       image.onload = () => {
-        this.pictures.set(id, this.renderer.pictureTexture(image));
+        this.truths.set(id, this.renderer.pictureTexture(image));
         this.draw();
       };
       image.onerror = () => fail(new Error('a picture in this file cannot be decoded'));
       image.src = `data:${picture.type};base64,${elementText(id)}`;
     }
-    return this.pictures.get(id);
+    return this.truths.get(id);
   }
 
   // Drawing.
@@ -327,8 +329,13 @@ class Viewer {
   }
 
   draw() {
-    if (this.frameRequested) return;
     document.documentElement.dataset.settled = 'false';
+    this.stale = true;
+    this.request();
+  }
+
+  request() {
+    if (this.frameRequested) return;
     this.frameRequested = true;
     requestAnimationFrame(() => {
       this.frameRequested = false;
@@ -340,24 +347,36 @@ class Viewer {
     });
   }
 
-  drawSource(k, name, intrinsics, tangents) {
-    if (name === 'truth') {
-      const texture = this.truthTexture();
-      if (texture) this.renderer.drawPicture(k, texture, intrinsics);
-    } else {
-      const splat = this.splats[name];
-      this.renderer.drawSplat(k, splat, this.camera.axes, this.camera.eye, intrinsics, tangents, this.near(splat),
-        name === 'after' ? this.widening : 0);
-    }
+  // Picture k of `name`, the scene seen through `intrinsics`, for Pictures.
+  wanted(k, name, intrinsics, tangents, clip, width, height) {
+    const {axes, eye} = this.camera;
+    const see = name === 'truth' ? {texture: this.truthTexture(), intrinsics}
+      : {axes, eye, intrinsics, tangents, near: this.near(this.splats[name]), widening: name === 'after' ? this.widening : 0};
+    const splat = name === 'truth' ? null : this.splats[name];
+    const key = JSON.stringify([name, width, height, ...(splat ? [splat.orders, see] : [this.view, see.texture !== null, intrinsics])]);
+    return {k, key, clip, width, height, count: splat ? splat.visible : 0, splat, see};
+  }
+
+  drawPicture({splat, see}, target, across, down, first, count) {
+    const {fx, fy, cx, cy, left, top, width, height} = see.intrinsics;
+    const intrinsics = {fx: fx * across, fy: fy * down, cx: cx * across, cy: cy * down,
+      left: left * across, top: top * down, width: width * across, height: height * down};
+    if (splat) this.renderer.drawSplat(target, splat, {...see, intrinsics, first, count, share: across * down});
+    else if (see.texture) this.renderer.drawPicture(target, see.texture, intrinsics);
   }
 
   frame() {
     const {canvas, renderer, ratio} = this;
+    if (this.pictures.busy) {
+      placeOverlay(this);
+      return;  // another frame comes when the graphics card is free
+    }
     const width = Math.max(1, Math.round(canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(canvas.clientHeight * ratio));
     if (canvas.width !== width || canvas.height !== height) {
       canvas.width = width;
       canvas.height = height;
+      this.stale = true;
     }
     const mode = this.comparing ? this.mode : 'blink';
     const side = this.comparing ? this.side : 1;
@@ -368,35 +387,38 @@ class Viewer {
     const places = this.lens ? this.lensPlaces() : [];
     const lensSize = 2 * Math.ceil(this.lensRadius * ratio);
 
+    const wanted = [];
     for (const k of [0, 1]) {
       let clip = halves[k];
       if (mode === 'slider') {
         clip = k === 0 ? {...clip, width: splitX} : {...clip, x: splitX, width: width - splitX};
       }
-      renderer.begin(k, width, height, clip);
-      renderer.begin(2 + k, lensSize, lensSize, {x: 0, y: 0, width: lensSize, height: lensSize});
       if (mode === 'blink' && side !== k) continue;
       const intrinsics = this.camera.intrinsics(regions[k]);
       const tangents = this.tangents(intrinsics, halves[k]);
-      renderer.begin(k, width, height, clip);
-      if (clip.width > 0) this.drawSource(k, pair[k], intrinsics, tangents);
+      if (clip.width > 0) wanted.push(this.wanted(k, pair[k], intrinsics, tangents, clip, width, height));
       if (places.length === 0) continue;
-      renderer.begin(2 + k, lensSize, lensSize, {x: 0, y: 0, width: lensSize, height: lensSize});
       const place = places[Math.min(k, places.length - 1)].map((c) => c * ratio);
-      this.drawSource(2 + k, pair[k], this.closer(intrinsics, place, lensSize), tangents);
+      wanted.push(this.wanted(2 + k, pair[k], this.closer(intrinsics, place, lensSize), tangents,
+        {x: 0, y: 0, width: lensSize, height: lensSize}, lensSize, lensSize));
     }
+    const pictures = this.pictures.update(wanted);
+    if (!pictures.drawn && !this.stale) return;
+    this.stale = false;
 
     const nowhere = [0, 0, 0];
     const lenses = places.map(([x, y]) => [x * ratio, y * ratio, this.lensRadius * ratio]);
     const splits = {slider: [splitX, -1], side: [halves[1].x, halves[1].y], difference: [-1, -1],
       blink: side === 0 ? [2 * width, -1] : [-1, -1]};
     renderer.show({
-      width, height, split: splits[mode], difference: mode === 'difference', differenceTop: DIFFERENCE_TOP,
+      targets: pictures.targets, width, height, split: splits[mode], difference: mode === 'difference', differenceTop: DIFFERENCE_TOP,
       // A true picture brings its own background.
       background: this.backgrounds[pair.includes('truth') ? 0 : this.backgroundIndex], lenses: [...lenses, nowhere, nowhere].slice(0, 2), lensSize,
     });
-    this.overlay(mode, places);
-    this.settle();
+    placeOverlay(this);
+    document.documentElement.dataset.pixels = pictures.whole ? 'all' : 'fewer';
+    document.documentElement.dataset.drawnWidening = String(this.widening);
+    this.settle(pictures.whole);
   }
 
   // How far x/z and y/z may go in the Jacobian: what is seen and a margin, as the renderer has it.
@@ -414,56 +436,8 @@ class Viewer {
       left: place(left, x), top: place(top, y), width: width * m, height: height * m};
   }
 
-  // The page over the picture.
-  overlay(mode, places) {
-    const divider = byId('divider');
-    const portrait = innerWidth <= innerHeight;
-    show(divider, mode === 'slider' || mode === 'side');
-    divider.classList.toggle('fixed', mode === 'side');
-    divider.classList.toggle('level', mode === 'side' && portrait);
-    const at = mode === 'slider' ? this.split * 100 : 50;
-    divider.style.left = mode === 'side' && portrait ? '' : `${at}%`;
-    divider.style.top = mode === 'side' && portrait ? '50%' : '';
-    divider.setAttribute('aria-valuenow', String(Math.round(at)));
-
-    const tags = [byId('tag-first'), byId('tag-second')];
-    const card = byId('card').getBoundingClientRect();
-    const line = at / 100 * innerWidth;
-    const crowded = line - 90 < card.right || line + 90 > byId('tools').getBoundingClientRect().left;
-    const top = crowded && mode !== 'difference' ? card.bottom + 10 : 16;
-    tags.forEach((tag, k) => {
-      tag.textContent = NAMES[this.pairs[this.pair][k]];
-      show(tag, this.comparing && (mode === 'slider' || mode === 'side' || (mode === 'blink' && this.side === k)));
-      tag.style.top = `${mode === 'side' && portrait && k === 1 ? innerHeight / 2 + 12 : top}px`;
-      tag.style.left = mode === 'blink' || (mode === 'side' && portrait) ? '50%' : `${at}%`;
-      const shift = mode === 'blink' || (mode === 'side' && portrait) ? '-50%' : k === 0 ? 'calc(-100% - 14px)' : '14px';
-      tag.style.transform = `translateX(${shift})`;
-    });
-
-    const rings = [byId('ring-first'), byId('ring-second')];
-    rings.forEach((ring, k) => {
-      show(ring, k < places.length);
-      if (k < places.length) placeRing(ring, places[k][0], places[k][1], this.lensRadius);
-    });
-
-    show(byId('legend'), mode === 'difference');
-    show(byId('modes'), true);
-    for (const button of document.querySelectorAll('#modes [data-mode]')) {
-      show(button, this.comparing);
-      button.setAttribute('aria-pressed', String(button.dataset.mode === mode));
-    }
-    show(document.querySelector('#modes hr'), this.comparing);
-    byId('lens').setAttribute('aria-pressed', String(this.lens !== null));
-    byId('pair').value = String(this.pair);
-    [...byId('views').children].forEach((button, k) => button.setAttribute('aria-pressed', String(k === this.view)));
-    const {pixelSize} = this.description;
-    if (pixelSize !== null) {
-      drawScale(pixelSize * this.camera.intrinsics(this.regions()[0]).fx / this.camera.distance, this.ratio);
-    }
-  }
-
   // The page says when what is on screen is final: for those who take pictures of it.
-  settle() {
+  settle(whole) {
     const splats = Object.values(this.splats);
     const waiting = splats.some((splat) => splat.sorting) ||
       (this.pairs[this.pair].includes('truth') && !this.truthTexture());
@@ -475,7 +449,7 @@ class Viewer {
       this.draw();  // measures of the overlay are known only now that it is visible
       return;
     }
-    if (splats.some((splat) => !splat.complete)) return;
+    if (!whole || splats.some((splat) => !splat.complete)) return;
     document.documentElement.dataset.settled = 'true';
   }
 }
@@ -483,18 +457,6 @@ class Viewer {
 function fail(error) {
   console.warn(error);
   setState('error', `This page cannot be shown. ${error.message || error}`);
-}
-
-// The page that has this one as its stage (web/), if there is one: {widening} and {look} set these, {tell: 'look'} asks.
-function listenToParent(viewer) {
-  if (window.parent === window) return;
-  addEventListener('message', ({source, data}) => {
-    if (source !== window.parent || typeof data !== 'object' || data === null) return;
-    if (typeof data.widening === 'number') viewer.preview(data.widening);
-    if (data.look) viewer.look = data.look;
-    if (data.tell === 'look') window.parent.postMessage({look: viewer.look}, '*');
-  });
-  window.parent.postMessage({ready: true}, '*');
 }
 
 async function main() {

@@ -221,3 +221,65 @@ function placeRing(ring, x, y, radius) {
   ring.style.top = `${y - radius - 1}px`;
   ring.style.width = ring.style.height = `${2 * radius + 2}px`;
 }
+
+// The page over the picture.
+function placeOverlay(viewer) {
+  const mode = viewer.comparing ? viewer.mode : 'blink';
+  const places = viewer.lens ? viewer.lensPlaces() : [];
+  const divider = byId('divider');
+  const portrait = innerWidth <= innerHeight;
+  show(divider, mode === 'slider' || mode === 'side');
+  divider.classList.toggle('fixed', mode === 'side');
+  divider.classList.toggle('level', mode === 'side' && portrait);
+  const at = mode === 'slider' ? viewer.split * 100 : 50;
+  divider.style.left = mode === 'side' && portrait ? '' : `${at}%`;
+  divider.style.top = mode === 'side' && portrait ? '50%' : '';
+  divider.setAttribute('aria-valuenow', String(Math.round(at)));
+
+  const tags = [byId('tag-first'), byId('tag-second')];
+  const card = byId('card').getBoundingClientRect();
+  const line = at / 100 * innerWidth;
+  const crowded = line - 90 < card.right || line + 90 > byId('tools').getBoundingClientRect().left;
+  const top = crowded && mode !== 'difference' ? card.bottom + 10 : 16;
+  tags.forEach((tag, k) => {
+    tag.textContent = NAMES[viewer.pairs[viewer.pair][k]];
+    show(tag, viewer.comparing && (mode === 'slider' || mode === 'side' || (mode === 'blink' && viewer.side === k)));
+    tag.style.top = `${mode === 'side' && portrait && k === 1 ? innerHeight / 2 + 12 : top}px`;
+    tag.style.left = mode === 'blink' || (mode === 'side' && portrait) ? '50%' : `${at}%`;
+    const shift = mode === 'blink' || (mode === 'side' && portrait) ? '-50%' : k === 0 ? 'calc(-100% - 14px)' : '14px';
+    tag.style.transform = `translateX(${shift})`;
+  });
+
+  const rings = [byId('ring-first'), byId('ring-second')];
+  rings.forEach((ring, k) => {
+    show(ring, k < places.length);
+    if (k < places.length) placeRing(ring, places[k][0], places[k][1], viewer.lensRadius);
+  });
+
+  show(byId('legend'), mode === 'difference');
+  show(byId('modes'), true);
+  for (const button of document.querySelectorAll('#modes [data-mode]')) {
+    show(button, viewer.comparing);
+    button.setAttribute('aria-pressed', String(button.dataset.mode === mode));
+  }
+  show(document.querySelector('#modes hr'), viewer.comparing);
+  byId('lens').setAttribute('aria-pressed', String(viewer.lens !== null));
+  byId('pair').value = String(viewer.pair);
+  [...byId('views').children].forEach((button, k) => button.setAttribute('aria-pressed', String(k === viewer.view)));
+  const {pixelSize} = viewer.description;
+  if (pixelSize !== null) {
+    drawScale(pixelSize * viewer.camera.intrinsics(viewer.regions()[0]).fx / viewer.camera.distance, viewer.ratio);
+  }
+}
+
+// The page that has this one as its stage (web/), if there is one: {widening} and {look} set these, {tell: 'look'} asks.
+function listenToParent(viewer) {
+  if (window.parent === window) return;
+  addEventListener('message', ({source, data}) => {
+    if (source !== window.parent || typeof data !== 'object' || data === null) return;
+    if (typeof data.widening === 'number') viewer.preview(data.widening);
+    if (data.look) viewer.look = data.look;
+    if (data.tell === 'look') window.parent.postMessage({look: viewer.look}, '*');
+  });
+  window.parent.postMessage({ready: true}, '*');
+}

@@ -15,8 +15,10 @@ class Renderer {
     this.pictureProgram = this.program(pictureVertexSource, pictureFragmentSource);
     this.screenProgram = this.program(screenVertexSource, screenFragmentSource);
     this.emptyArray = gl.createVertexArray();
-    this.targets = [0, 1, 2, 3].map(() => this.target());  // first, second, and the same under the lens
+    this.quadArray = this.quads();
+    this.targets = Array.from({length: 2 * PICTURES}, () => this.target());
     gl.disable(gl.DEPTH_TEST);
+    this.targets.forEach((_, k) => this.begin(k, 1, 1, {x: 0, y: 0, width: 1, height: 1}));
   }
 
   program(vertex, fragment) {
@@ -42,14 +44,26 @@ class Renderer {
     return {program, uniforms};
   }
 
-  dataTexture(shape) {
+  // Corners of QUADS_AT_ONCE quads. Instances of one quad each would be as many draws where a processor does a card's work.
+  quads() {
+    const gl = this.gl;
+    const corners = Array.from({length: QUADS_AT_ONCE}, (_, k) => [0, 1, 2, 2, 1, 3].map((corner) => 4 * k + corner));
+    const array = gl.createVertexArray();
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, new Uint16Array(corners.flat()), gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
+    return array;
+  }
+
+  dataTexture(shape, format = this.gl.RGBA32UI) {
     const gl = this.gl;
     if (shape.height > this.maxTexture) {
       throw new Error('This splat is too large for this device: its graphics memory takes no texture of that size.');
     }
     const texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32UI, shape.width, shape.height);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, format, shape.width, shape.height);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
     return texture;
@@ -65,15 +79,8 @@ class Renderer {
     splat.geometry = this.dataTexture(splat.geometryShape);
     splat.harmonics = degree > 0 ? this.dataTexture(splat.harmonicsShape) : null;
     splat.visible = 0;
-    splat.order = gl.createBuffer();
-    splat.array = gl.createVertexArray();
-    gl.bindVertexArray(splat.array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, splat.order);
-    gl.bufferData(gl.ARRAY_BUFFER, 4 * splat.description.count, gl.DYNAMIC_DRAW);
-    gl.enableVertexAttribArray(0);
-    gl.vertexAttribIPointer(0, 1, gl.UNSIGNED_INT, 0, 0);
-    gl.vertexAttribDivisor(0, 1);
-    gl.bindVertexArray(null);
+    splat.orders = 0;
+    splat.order = this.dataTexture(textureShape(splat.description.count, 1), gl.R32UI);
   }
 
   // Parts begin with a row of every texture, as kPartGaussians in page_folder.h is a multiple of their width.
@@ -90,9 +97,13 @@ class Renderer {
 
   setOrder(splat, order, count) {
     const gl = this.gl;
-    gl.bindBuffer(gl.ARRAY_BUFFER, splat.order);
-    gl.bufferSubData(gl.ARRAY_BUFFER, 0, order);
+    const {width, height} = textureShape(count, 1);
+    const rows = new Uint32Array(width * height);
+    rows.set(order);
+    gl.bindTexture(gl.TEXTURE_2D, splat.order);
+    if (count > 0) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RED_INTEGER, gl.UNSIGNED_INT, rows);
     splat.visible = count;
+    ++splat.orders;
   }
 
   pictureTexture(image) {
@@ -125,25 +136,35 @@ class Renderer {
       const half = this.format === gl.RGBA16F;
       gl.texImage2D(gl.TEXTURE_2D, 0, this.format, width, height, 0, gl.RGBA,
         half ? gl.HALF_FLOAT : gl.UNSIGNED_BYTE, null);
-      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
-      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
+      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
+      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
       gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target.texture, 0);
       target.width = width;
       target.height = height;
     }
     target.clip = [region.x, region.y, region.x + region.width, region.y + region.height];
-    gl.viewport(0, 0, width, height);
     gl.disable(gl.SCISSOR_TEST);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT);
+    this.select(k);
+  }
+
+  // Makes target k the one to draw to as it is.
+  select(k) {
+    const gl = this.gl;
+    const {framebuffer, width, height, clip: [left, top, right, bottom]} = this.targets[k];
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    gl.viewport(0, 0, width, height);
     gl.enable(gl.SCISSOR_TEST);
-    gl.scissor(Math.floor(region.x), Math.floor(height - region.y - region.height),
-      Math.ceil(region.width), Math.ceil(region.height));
+    gl.scissor(Math.floor(left), Math.floor(height - bottom), Math.ceil(right - left), Math.ceil(bottom - top));
   }
 
   // `intrinsics` in pixels of the target; `tangents` as the shader wants them; nothing is drawn before camera z `near`;
-  // `widening` as the smoothing filter adds it to variances.
-  drawSplat(k, splat, axes, eye, intrinsics, tangents, near, widening) {
+  // `widening` as the smoothing filter adds it to variances; of the Gaussians in order the `count` ones from `first` on;
+  // `share` of the screen's pixels is in the target.
+  drawSplat(k, splat, {axes, eye, intrinsics, tangents, near, widening, first, count, share}) {
     const gl = this.gl;
     const d = splat.description;
     const {program, uniforms: u} = this.splatPrograms.get(d.degree);
@@ -153,6 +174,10 @@ class Renderer {
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, splat.geometry);
     gl.uniform1i(u.uGeometry, 0);
+    gl.activeTexture(gl.TEXTURE2);
+    gl.bindTexture(gl.TEXTURE_2D, splat.order);
+    gl.uniform1i(u.uOrder, 2);
+    gl.uniform2i(u.uRange, first, first + count);
     if (splat.harmonics) {
       gl.activeTexture(gl.TEXTURE1);
       gl.bindTexture(gl.TEXTURE_2D, splat.harmonics);
@@ -171,15 +196,16 @@ class Renderer {
     gl.uniform1f(u.uWidening, widening);
     gl.uniform2fv(u.uDc, d.dc);
     gl.uniform1f(u.uScalarTop, 2 ** d.scalarBits - 1);
-    gl.uniform1f(u.uDilation, d.dilation);
+    gl.uniform1f(u.uDilation, d.dilation * share);
+    gl.uniform1f(u.uSoftening, d.dilation * (1 - share));
     gl.uniform1f(u.uMinAlpha, this.constants.minAlpha);
     gl.uniform1f(u.uMaxAlpha, this.constants.maxAlpha);
     gl.uniform1f(u.uNear, near);
     gl.uniform1i(u.uCompensated, d.compensated ? 1 : 0);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.bindVertexArray(splat.array);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, splat.visible);
+    gl.bindVertexArray(this.quadArray);
+    gl.drawElementsInstanced(gl.TRIANGLES, 6 * QUADS_AT_ONCE, gl.UNSIGNED_SHORT, 0, Math.ceil(count / QUADS_AT_ONCE));
     gl.bindVertexArray(null);
     gl.disable(gl.BLEND);
   }
@@ -198,8 +224,8 @@ class Renderer {
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
   }
 
-  // All four targets onto the canvas; `lenses` are [x, y, radius], two of them.
-  show({width, height, background, split, difference, differenceTop, lenses, lensSize}) {
+  // Four of the targets onto the canvas; `lenses` are [x, y, radius], two of them.
+  show({targets, width, height, background, split, difference, differenceTop, lenses, lensSize}) {
     const gl = this.gl;
     const {program, uniforms: u} = this.screenProgram;
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
@@ -208,7 +234,7 @@ class Renderer {
     gl.useProgram(program);
     ['uFirst', 'uSecond', 'uLensFirst', 'uLensSecond'].forEach((name, k) => {
       gl.activeTexture(gl.TEXTURE0 + k);
-      gl.bindTexture(gl.TEXTURE_2D, this.targets[k].texture);
+      gl.bindTexture(gl.TEXTURE_2D, this.targets[targets[k]].texture);
       gl.uniform1i(u[name], k);
     });
     gl.uniform2f(u.uSize, width, height);

@@ -2,6 +2,8 @@
 // The rasterizer of Kerbl et al. 2023 in the order a GPU likes: Gaussians as quads, farthest first, blended
 // premultiplied. Same projection, dilation and cut-offs as anchorsplat's own renderer; the numbers come with the page.
 
+const QUADS_AT_ONCE = 256;
+
 // Spherical harmonics up to `degree`, as 3DGS orders and signs them. GLSL that adds them to `color` for the direction (x, y, z).
 function harmonicsSource(degree) {
   const terms = [
@@ -37,6 +39,8 @@ precision highp usampler2D;
 
 uniform usampler2D uGeometry;
 uniform usampler2D uHarmonics;
+uniform usampler2D uOrder;    // farthest first
+uniform ivec2 uRange;         // of it: first, end
 uniform mat3 uRotation;       // world to camera
 uniform vec3 uTranslation;    // camera position of the splat's centre
 uniform vec3 uEye;            // camera centre, relative to the splat's centre
@@ -51,11 +55,11 @@ uniform vec3 uHarmonicMax;    // per degree
 uniform float uHarmonicTop;   // largest code of a harmonic
 uniform float uScalarTop;     // largest scalar code
 uniform float uDilation;      // px²
+uniform float uSoftening;     // px², where the target has fewer pixels than the screen: what is seen fades as it grows
 uniform float uMinAlpha;
 uniform float uNear;
 uniform bool uCompensated;    // opacity, for the dilation
 
-layout(location = 0) in uint aIndex;
 out vec2 vOffset;             // from the mean, in standard deviations
 flat out vec4 vColor;         // rgb, opacity
 
@@ -86,7 +90,9 @@ void main() {
   gl_Position = vec4(0.0, 0.0, 2.0, 1.0);  // outside, until something is to be seen
   vOffset = vec2(0.0);
   vColor = vec4(0.0);
-  uint index = aIndex;
+  int place = uRange.x + gl_InstanceID * ${QUADS_AT_ONCE} + (gl_VertexID >> 2);
+  if (place >= uRange.y) return;
+  uint index = texel(uOrder, uint(place)).x;
   uvec4 g0 = texel(uGeometry, index * 2u);
   uvec4 g1 = texel(uGeometry, index * 2u + 1u);
 
@@ -115,19 +121,26 @@ void main() {
     opacity *= sqrt(max(0.0, before / (xx * yy - xy * xy)));
     if (opacity < uMinAlpha) return;
   }
+  if (uSoftening > 0.0) {
+    float sharp = xx * yy - xy * xy;
+    xx += uSoftening;
+    yy += uSoftening;
+    opacity *= sqrt(max(0.0, sharp / (xx * yy - xy * xy)));
+    if (opacity < uMinAlpha) return;
+  }
 
   // Half axes where alpha falls to the cut-off, along the eigenvectors.
   float middle = 0.5 * (xx + yy);
   float radius = length(vec2(0.5 * (xx - yy), xy));
   float angle = 0.5 * atan(2.0 * xy, xx - yy);
   vec2 axis = vec2(cos(angle), sin(angle));
-  vec2 sigma = sqrt(vec2(middle + radius, max(middle - radius, uDilation)));
+  vec2 sigma = sqrt(vec2(middle + radius, max(middle - radius, uDilation + uSoftening)));
   float reach = sqrt(max(0.0, 2.0 * log(opacity / uMinAlpha)));
   vec2 center = uIntrinsics.xy * p.xy / p.z + uIntrinsics.zw;
   // Colours are most of the work: not for what is beside the picture.
   float extent = reach * sigma.x;
   if (any(lessThan(center + extent, uClip.xy)) || any(greaterThan(center - extent, uClip.zw))) return;
-  vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1)) * 2.0 - 1.0;
+  vec2 corner = vec2(float(gl_VertexID & 1), float((gl_VertexID >> 1) & 1)) * 2.0 - 1.0;
   vOffset = corner * reach;
   vec2 pixel = center + vOffset.x * sigma.x * axis + vOffset.y * sigma.y * vec2(-axis.y, axis.x);
 
@@ -178,7 +191,7 @@ void main() {
 }`;
 
 // What is on screen: one of the two pictures on either side of a line, or how far they are apart; magnified under the
-// lens. Textures have y up, the page y down.
+// lens. Pictures that are smaller than where they are shown fill it smoothly. Textures have y up, the page y down.
 const screenFragmentSource = `#version 300 es
 precision highp float;
 uniform sampler2D uFirst, uSecond;          // premultiplied
@@ -191,6 +204,11 @@ uniform float uDifferenceTop;               // mean absolute difference shown as
 uniform vec3 uLenses[2];                    // x, y of the centre, radius; 0: none
 uniform vec2 uLensSize;
 out vec4 fragment;
+
+vec4 at(sampler2D picture, vec2 place, vec2 size) {
+  if (textureSize(picture, 0) == ivec2(size)) return texelFetch(picture, ivec2(floor(place)), 0);
+  return textureLod(picture, place / size, 0.0);
+}
 
 vec3 over(vec4 c) { return clamp(c.rgb + (1.0 - c.a) * uBackground, 0.0, 1.0); }
 
@@ -214,11 +232,10 @@ void main() {
     vec3 lens = uLenses[k];
     vec2 d = pixel - lens.xy;
     if (lens.z > 0.0 && dot(d, d) < lens.z * lens.z) {
-      ivec2 texel = ivec2(floor(vec2(d.x, -d.y) + 0.5 * uLensSize));
-      fragment = vec4(shown(texelFetch(uLensFirst, texel, 0), texelFetch(uLensSecond, texel, 0), pixel), 1.0);
+      vec2 place = vec2(d.x, -d.y) + 0.5 * uLensSize;
+      fragment = vec4(shown(at(uLensFirst, place, uLensSize), at(uLensSecond, place, uLensSize), pixel), 1.0);
       return;
     }
   }
-  ivec2 texel = ivec2(gl_FragCoord.xy);
-  fragment = vec4(shown(texelFetch(uFirst, texel, 0), texelFetch(uSecond, texel, 0), pixel), 1.0);
+  fragment = vec4(shown(at(uFirst, gl_FragCoord.xy, uSize), at(uSecond, gl_FragCoord.xy, uSize), pixel), 1.0);
 }`;

@@ -308,7 +308,7 @@ const same = async (a, b) => (await difference(a, b)).share < 1e-4;
 async function expectMessage(name, file, pattern, before, cut) {
   const tab = await open(file, {width: 800, height: 600, quiet: false, before, cut});
   // A part may be missed when the others are shown already.
-  await tab.waitForFunction(() => document.documentElement.dataset.state === 'error', null, {timeout: 60000}).catch(() => {});
+  await tab.waitForFunction(() => document.documentElement.dataset.state === 'error', null, {timeout: 300000}).catch(() => {});
   expect(`${name}: is an error`, (await state(tab)) === 'error');
   const text = await tab.locator('#message').innerText();
   expect(`${name}: says so`, await visible(tab, '#message') && pattern.test(text), text);

@@ -13,6 +13,7 @@ function sizeText(bytes) {
 }
 
 function setState(state, message) {
+  if (document.documentElement.dataset.state === 'error') return;  // stays, whatever is still under way
   document.documentElement.dataset.state = state;
   if (message !== undefined) byId('message').querySelector('p').textContent = message;
   show(byId('reload'), state === 'error');

@@ -13,6 +13,7 @@ class Viewer {
   constructor(description, canvas) {
     this.description = description;
     this.canvas = canvas;
+    this.size = {width: 0, height: 0};  // in device pixels
     this.renderer = new Renderer(canvas, description.constants);
     this.pictures = new Pictures(this.renderer, (...what) => this.drawPicture(...what), () => this.request());
     const source = elementText('worker-source');
@@ -249,7 +250,7 @@ class Viewer {
 
   // The parts of the screen that the first and the second picture have to themselves.
   halves() {
-    const {width, height} = this.canvas;
+    const {width, height} = this.size;
     const whole = {x: 0, y: 0, width, height};
     if (this.mode !== 'side' || !this.comparing) return [whole, whole];
     if (width > height) {
@@ -373,9 +374,8 @@ class Viewer {
     }
     const width = Math.max(1, Math.round(canvas.clientWidth * ratio));
     const height = Math.max(1, Math.round(canvas.clientHeight * ratio));
-    if (canvas.width !== width || canvas.height !== height) {
-      canvas.width = width;
-      canvas.height = height;
+    if (this.size.width !== width || this.size.height !== height) {
+      this.size = {width, height};
       this.stale = true;
     }
     const mode = this.comparing ? this.mode : 'blink';
@@ -411,7 +411,8 @@ class Viewer {
     const splits = {slider: [splitX, -1], side: [halves[1].x, halves[1].y], difference: [-1, -1],
       blink: side === 0 ? [2 * width, -1] : [-1, -1]};
     renderer.show({
-      targets: pictures.targets, width, height, split: splits[mode], difference: mode === 'difference', differenceTop: DIFFERENCE_TOP,
+      targets: pictures.targets, width, height, fewer: pictures.fewer,
+      split: splits[mode], difference: mode === 'difference', differenceTop: DIFFERENCE_TOP,
       // A true picture brings its own background.
       background: this.backgrounds[pair.includes('truth') ? 0 : this.backgroundIndex], lenses: [...lenses, nowhere, nowhere].slice(0, 2), lensSize,
     });

@@ -8,7 +8,8 @@ const COMFORT = 30;           // ms that are aimed at
 const STILL = 150;            // ms without a change, until all pixels are drawn
 const LEAST_SLICE = 4096;     // Gaussians
 const FIRST_SLICE = 65536;    // before anything is known
-const COARSEST = 8;           // pixels of the screen per pixel drawn, along either axis
+const COARSEST = 4;           // pixels of the screen per pixel drawn, along either axis; from there on corners cost more than pixels
+const FEWEST = 3;             // the same of the screen's own buffer, while a picture is coarse
 const PICTURES = 4;           // first, second, and the same under the lens; as many coarse ones follow
 
 // How much the graphics card does in `BUDGET`: learnt from how long it took, as it says by fences.
@@ -103,8 +104,8 @@ class Pictures {
   get busy() { return this.pace.busy; }
 
   // Draws of `wanted` what is missing, as far as there is time. A picture: {k, key, clip, width, height, count}; `key`
-  // says all that it depends on but its clip. Returns {drawn, whole, targets}: whether there is anything new to show,
-  // whether it is with all pixels, and which target has each of the four.
+  // says all that it depends on but its clip. Returns {drawn, whole, targets, fewer}: whether there is anything new to show,
+  // whether it is with all pixels, which target has each of the four, and how many times fewer pixels the screen needs.
   update(wanted) {
     const now = performance.now();
     const asked = JSON.stringify(wanted.map(({k, key, clip}) => [k, key, clip]));
@@ -138,7 +139,7 @@ class Pictures {
       targets[picture.k] += PICTURES;
       whole = false;
     }
-    return {drawn, whole, targets};
+    return {drawn, whole, targets, fewer: whole ? 1 : Math.max(1, Math.min(FEWEST, this.pace.coarseness))};
   }
 
   // Gaussians that are still to be drawn.

@@ -11,11 +11,13 @@ class Renderer {
     const half = gl.getExtension('EXT_color_buffer_float') || gl.getExtension('EXT_color_buffer_half_float');
     this.format = half ? gl.RGBA16F : gl.RGBA8;
     this.maxTexture = gl.getParameter(gl.MAX_TEXTURE_SIZE);
-    this.splatPrograms = new Map();
+    this.projectionPrograms = new Map();
+    this.splatProgram = this.program(splatVertexSource, splatFragmentSource);
     this.pictureProgram = this.program(pictureVertexSource, pictureFragmentSource);
     this.screenProgram = this.program(screenVertexSource, screenFragmentSource);
     this.emptyArray = gl.createVertexArray();
     this.quadArray = this.quads();
+    this.projected = this.projectionTarget();
     this.targets = Array.from({length: 2 * PICTURES}, () => this.target());
     gl.disable(gl.DEPTH_TEST);
     this.targets.forEach((_, k) => this.begin(k, 1, 1, {x: 0, y: 0, width: 1, height: 1}));
@@ -73,8 +75,8 @@ class Renderer {
   addSplat(splat) {
     const gl = this.gl;
     const degree = splat.description.degree;
-    if (!this.splatPrograms.has(degree)) {
-      this.splatPrograms.set(degree, this.program(splatVertexSource(degree), splatFragmentSource));
+    if (!this.projectionPrograms.has(degree)) {
+      this.projectionPrograms.set(degree, this.program(screenVertexSource, projectionSource(degree)));
     }
     splat.geometry = this.dataTexture(splat.geometryShape);
     splat.harmonics = degree > 0 ? this.dataTexture(splat.harmonicsShape) : null;
@@ -161,26 +163,41 @@ class Renderer {
     gl.scissor(Math.floor(left), Math.floor(height - bottom), Math.ceil(right - left), Math.ceil(bottom - top));
   }
 
-  // `intrinsics` in pixels of the target; `tangents` as the shader wants them; nothing is drawn before camera z `near`;
-  // `widening` as the smoothing filter adds it to variances; of the Gaussians in order the `count` ones from `first` on;
-  // `share` of the screen's pixels is in the target.
-  drawSplat(k, splat, {axes, eye, intrinsics, tangents, near, widening, first, count, share}) {
+  // What a draw of Gaussians begins with: PROJECTED_AT_ONCE of them as corners want them.
+  projectionTarget() {
+    const gl = this.gl;
+    const shape = textureShape(PROJECTED_AT_ONCE, 1);
+    const [placed, painted] = [this.dataTexture(shape), this.dataTexture(shape)];
+    const framebuffer = gl.createFramebuffer();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, framebuffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, placed, 0);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT1, gl.TEXTURE_2D, painted, 0);
+    gl.drawBuffers([gl.COLOR_ATTACHMENT0, gl.COLOR_ATTACHMENT1]);
+    return {placed, painted, framebuffer};
+  }
+
+  // `seen`: intrinsics in pixels of the target; `tangents` as the shader wants them; nothing is drawn before camera z
+  // `near`; `widening` as the smoothing filter adds it to variances; of the Gaussians in order the `count` ones from
+  // `first` on; `share` of the screen's pixels is in the target.
+  drawSplat(k, splat, {first, count, ...seen}) {
+    this.lookAt(k, splat, seen);
+    for (let from = first; from < first + count; from += PROJECTED_AT_ONCE) {
+      const part = Math.min(PROJECTED_AT_ONCE, first + count - from);
+      this.project(splat, from, part);
+      this.drawProjected(k, part);
+    }
+  }
+
+  // Tells the program that projects how the splat is seen in target k.
+  lookAt(k, splat, {axes, eye, intrinsics, tangents, near, widening, share}) {
     const gl = this.gl;
     const d = splat.description;
-    const {program, uniforms: u} = this.splatPrograms.get(d.degree);
-    const target = this.targets[k];
+    const {program, uniforms: u} = this.projectionPrograms.get(d.degree);
     const fromCenter = add(eye, d.center, -1);
     gl.useProgram(program);
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, splat.geometry);
     gl.uniform1i(u.uGeometry, 0);
-    gl.activeTexture(gl.TEXTURE2);
-    gl.bindTexture(gl.TEXTURE_2D, splat.order);
     gl.uniform1i(u.uOrder, 2);
-    gl.uniform2i(u.uRange, first, first + count);
     if (splat.harmonics) {
-      gl.activeTexture(gl.TEXTURE1);
-      gl.bindTexture(gl.TEXTURE_2D, splat.harmonics);
       gl.uniform1i(u.uHarmonics, 1);
       gl.uniform3fv(u.uHarmonicMax, d.shMax);
       gl.uniform1f(u.uHarmonicTop, d.harmonicTop);
@@ -189,8 +206,7 @@ class Renderer {
     gl.uniform3fv(u.uTranslation, axes.map((a) => -dot(a, fromCenter)));
     gl.uniform3fv(u.uEye, fromCenter);
     gl.uniform4f(u.uIntrinsics, intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy);
-    gl.uniform2f(u.uSize, target.width, target.height);
-    gl.uniform4fv(u.uClip, target.clip);
+    gl.uniform4fv(u.uClip, this.targets[k].clip);
     gl.uniform4fv(u.uTangents, tangents);
     gl.uniform2fv(u.uLogScale, d.logScale);
     gl.uniform1f(u.uWidening, widening);
@@ -199,15 +215,53 @@ class Renderer {
     gl.uniform1f(u.uDilation, d.dilation * share);
     gl.uniform1f(u.uSoftening, d.dilation * (1 - share));
     gl.uniform1f(u.uMinAlpha, this.constants.minAlpha);
-    gl.uniform1f(u.uMaxAlpha, this.constants.maxAlpha);
     gl.uniform1f(u.uNear, near);
     gl.uniform1i(u.uCompensated, d.compensated ? 1 : 0);
+  }
+
+  project(splat, first, count) {
+    const gl = this.gl;
+    const {program, uniforms: u} = this.projectionPrograms.get(splat.description.degree);
+    const {width, height} = textureShape(count, 1);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.projected.framebuffer);
+    gl.viewport(0, 0, width, height);
+    gl.disable(gl.SCISSOR_TEST);
+    gl.useProgram(program);
+    this.bindTextures([splat.geometry, splat.harmonics, splat.order]);
+    gl.uniform2i(u.uRange, first, first + count);
+    gl.bindVertexArray(this.emptyArray);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 3);
+  }
+
+  drawProjected(k, count) {
+    const gl = this.gl;
+    const {program, uniforms: u} = this.splatProgram;
+    const target = this.targets[k];
+    this.select(k);
+    gl.useProgram(program);
+    this.bindTextures([this.projected.placed, this.projected.painted]);
+    gl.uniform1i(u.uPlaced, 0);
+    gl.uniform1i(u.uPainted, 1);
+    gl.uniform1i(u.uCount, count);
+    gl.uniform2f(u.uSize, target.width, target.height);
+    gl.uniform1f(u.uMinAlpha, this.constants.minAlpha);
+    gl.uniform1f(u.uMaxAlpha, this.constants.maxAlpha);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     gl.bindVertexArray(this.quadArray);
     gl.drawElementsInstanced(gl.TRIANGLES, 6 * QUADS_AT_ONCE, gl.UNSIGNED_SHORT, 0, Math.ceil(count / QUADS_AT_ONCE));
     gl.bindVertexArray(null);
     gl.disable(gl.BLEND);
+    // They are written to next time: nothing may have them as its source then.
+    this.bindTextures([null, null]);
+  }
+
+  bindTextures(textures) {
+    const gl = this.gl;
+    textures.forEach((texture, unit) => {
+      gl.activeTexture(gl.TEXTURE0 + unit);
+      gl.bindTexture(gl.TEXTURE_2D, texture);
+    });
   }
 
   drawPicture(k, texture, {left, top, width, height}) {
@@ -224,12 +278,17 @@ class Renderer {
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
   }
 
-  // Four of the targets onto the canvas; `lenses` are [x, y, radius], two of them.
-  show({targets, width, height, background, split, difference, differenceTop, lenses, lensSize}) {
+  // Four of the targets onto the canvas, which is made to have `fewer` times fewer pixels along either axis than `width` and
+  // `height`: where a processor does a card's work, filling them costs more than the Gaussians do. `lenses` are
+  // [x, y, radius], two of them.
+  show({targets, width, height, fewer, background, split, difference, differenceTop, lenses, lensSize}) {
     const gl = this.gl;
     const {program, uniforms: u} = this.screenProgram;
+    const columns = Math.ceil(width / fewer);
+    const rows = Math.ceil(height / fewer);
+    if (gl.canvas.width !== columns || gl.canvas.height !== rows) Object.assign(gl.canvas, {width: columns, height: rows});
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    gl.viewport(0, 0, width, height);
+    gl.viewport(0, 0, columns, rows);
     gl.disable(gl.SCISSOR_TEST);
     gl.useProgram(program);
     ['uFirst', 'uSecond', 'uLensFirst', 'uLensSecond'].forEach((name, k) => {
@@ -238,6 +297,7 @@ class Renderer {
       gl.uniform1i(u[name], k);
     });
     gl.uniform2f(u.uSize, width, height);
+    gl.uniform2f(u.uPixel, width / columns, height / rows);
     gl.uniform3fv(u.uBackground, background);
     gl.uniform2fv(u.uSplit, split);
     gl.uniform1i(u.uDifference, difference ? 1 : 0);

@@ -3,6 +3,7 @@
 // premultiplied. Same projection, dilation and cut-offs as anchorsplat's own renderer; the numbers come with the page.
 
 const QUADS_AT_ONCE = 256;
+const PROJECTED_AT_ONCE = 1 << 20;  // 32 MB of the graphics card
 
 // Spherical harmonics up to `degree`, as 3DGS orders and signs them. GLSL that adds them to `color` for the direction (x, y, z).
 function harmonicsSource(degree) {
@@ -32,7 +33,10 @@ function harmonicsSource(degree) {
   return lines.join('\n  ');
 }
 
-const splatVertexSource = (degree) => `#version 300 es
+// One pixel per Gaussian: what the corners of its quad need to know, worked out once instead of by each of them. Two texels of
+// bits: centre and longer half axis in pixels; length of the shorter one, reach in standard deviations (0: not to be
+// seen), colour and opacity as halves.
+const projectionSource = (degree) => `#version 300 es
 precision highp float;
 precision highp int;
 precision highp usampler2D;
@@ -40,12 +44,11 @@ precision highp usampler2D;
 uniform usampler2D uGeometry;
 uniform usampler2D uHarmonics;
 uniform usampler2D uOrder;    // farthest first
-uniform ivec2 uRange;         // of it: first, end
+uniform ivec2 uRange;         // of it: what the first pixel is, end
 uniform mat3 uRotation;       // world to camera
 uniform vec3 uTranslation;    // camera position of the splat's centre
 uniform vec3 uEye;            // camera centre, relative to the splat's centre
 uniform vec4 uIntrinsics;     // fx, fy, cx, cy in pixels
-uniform vec2 uSize;           // of the target, pixels
 uniform vec4 uClip;           // left, top, right, bottom of what is drawn, pixels
 uniform vec4 uTangents;       // limits of x/z (min, max) and y/z (min, max) in the Jacobian
 uniform vec2 uLogScale;       // min, max
@@ -60,8 +63,8 @@ uniform float uMinAlpha;
 uniform float uNear;
 uniform bool uCompensated;    // opacity, for the dilation
 
-out vec2 vOffset;             // from the mean, in standard deviations
-flat out vec4 vColor;         // rgb, opacity
+layout(location = 0) out uvec4 placed;
+layout(location = 1) out uvec4 painted;
 
 uvec4 texel(usampler2D data, uint index) {
   return texelFetch(data, ivec2(int(index) & ${TEXTURE_WIDTH - 1}, int(index) / ${TEXTURE_WIDTH}), 0);
@@ -87,10 +90,9 @@ mat3 rotation(uint code) {
 }
 
 void main() {
-  gl_Position = vec4(0.0, 0.0, 2.0, 1.0);  // outside, until something is to be seen
-  vOffset = vec2(0.0);
-  vColor = vec4(0.0);
-  int place = uRange.x + gl_InstanceID * ${QUADS_AT_ONCE} + (gl_VertexID >> 2);
+  placed = uvec4(0u);
+  painted = uvec4(0u);
+  int place = uRange.x + int(gl_FragCoord.y) * ${TEXTURE_WIDTH} + int(gl_FragCoord.x);
   if (place >= uRange.y) return;
   uint index = texel(uOrder, uint(place)).x;
   uvec4 g0 = texel(uGeometry, index * 2u);
@@ -140,9 +142,6 @@ void main() {
   // Colours are most of the work: not for what is beside the picture.
   float extent = reach * sigma.x;
   if (any(lessThan(center + extent, uClip.xy)) || any(greaterThan(center - extent, uClip.zw))) return;
-  vec2 corner = vec2(float(gl_VertexID & 1), float((gl_VertexID >> 1) & 1)) * 2.0 - 1.0;
-  vOffset = corner * reach;
-  vec2 pixel = center + vOffset.x * sigma.x * axis + vOffset.y * sigma.y * vec2(-axis.y, axis.x);
 
   vec3 color = mix(vec3(uDc.x), vec3(uDc.y), vec3(g1.z & 65535u, g1.z >> 16, g1.w & 65535u) / uScalarTop);
   color = 0.28209479177387814 * color + 0.5;
@@ -150,7 +149,40 @@ void main() {
   float x = direction.x, y = direction.y, z = direction.z;
   float x2 = x * x, y2 = y * y, z2 = z * z;
   ${harmonicsSource(degree)}
-  vColor = vec4(max(color, 0.0), opacity);
+  color = max(color, 0.0);
+  placed = floatBitsToUint(vec4(center, extent * axis));
+  painted = uvec4(floatBitsToUint(vec2(reach * sigma.y, reach)), packHalf2x16(color.rg), packHalf2x16(vec2(color.b, opacity)));
+}`;
+
+const splatVertexSource = `#version 300 es
+precision highp float;
+precision highp int;
+precision highp usampler2D;
+
+uniform usampler2D uPlaced;
+uniform usampler2D uPainted;
+uniform int uCount;
+uniform vec2 uSize;           // of the target, pixels
+out vec2 vOffset;             // from the mean, in standard deviations
+flat out vec4 vColor;         // rgb, opacity
+
+void main() {
+  gl_Position = vec4(0.0, 0.0, 2.0, 1.0);  // outside, until something is to be seen
+  vOffset = vec2(0.0);
+  vColor = vec4(0.0);
+  int place = gl_InstanceID * ${QUADS_AT_ONCE} + (gl_VertexID >> 2);
+  if (place >= uCount) return;
+  ivec2 texel = ivec2(place & ${TEXTURE_WIDTH - 1}, place / ${TEXTURE_WIDTH});
+  uvec4 painted = texelFetch(uPainted, texel, 0);
+  vec2 reach = uintBitsToFloat(painted.xy);
+  if (reach.y == 0.0) return;
+  vec4 placed = uintBitsToFloat(texelFetch(uPlaced, texel, 0));
+  vec2 corner = vec2(float(gl_VertexID & 1), float((gl_VertexID >> 1) & 1)) * 2.0 - 1.0;
+  vec2 longer = placed.zw;
+  vec2 shorter = reach.x * normalize(vec2(-longer.y, longer.x));
+  vec2 pixel = placed.xy + corner.x * longer + corner.y * shorter;
+  vOffset = corner * reach.y;
+  vColor = vec4(unpackHalf2x16(painted.z), unpackHalf2x16(painted.w));
   gl_Position = vec4(pixel / uSize * vec2(2.0, -2.0) + vec2(-1.0, 1.0), 0.0, 1.0);
 }`;
 
@@ -196,7 +228,8 @@ const screenFragmentSource = `#version 300 es
 precision highp float;
 uniform sampler2D uFirst, uSecond;          // premultiplied
 uniform sampler2D uLensFirst, uLensSecond;
-uniform vec2 uSize;
+uniform vec2 uSize;                         // of the pictures, pixels
+uniform vec2 uPixel;                        // how many of them, along either axis, are one here
 uniform vec3 uBackground;
 uniform vec2 uSplit;                        // first where x < uSplit.x or y < uSplit.y
 uniform bool uDifference;
@@ -220,22 +253,25 @@ vec3 heat(float t) {
   return mix(stops[k], stops[k + 1], x - float(k));
 }
 
-vec3 shown(vec4 first, vec4 second, vec2 place) {
-  vec3 a = over(first), b = over(second);
-  if (uDifference) return heat(dot(abs(a - b), vec3(1.0 / 3.0)) / uDifferenceTop);
-  return place.x < uSplit.x || place.y < uSplit.y ? a : b;
+vec3 shown(sampler2D first, sampler2D second, vec2 place, vec2 size, vec2 pixel) {
+  if (uDifference) {
+    vec3 apart = abs(over(at(first, place, size)) - over(at(second, place, size)));
+    return heat(dot(apart, vec3(1.0 / 3.0)) / uDifferenceTop);
+  }
+  if (pixel.x < uSplit.x || pixel.y < uSplit.y) return over(at(first, place, size));
+  return over(at(second, place, size));
 }
 
 void main() {
-  vec2 pixel = vec2(gl_FragCoord.x, uSize.y - gl_FragCoord.y);
+  vec2 place = gl_FragCoord.xy * uPixel;
+  vec2 pixel = vec2(place.x, uSize.y - place.y);
   for (int k = 0; k < 2; ++k) {
     vec3 lens = uLenses[k];
     vec2 d = pixel - lens.xy;
     if (lens.z > 0.0 && dot(d, d) < lens.z * lens.z) {
-      vec2 place = vec2(d.x, -d.y) + 0.5 * uLensSize;
-      fragment = vec4(shown(at(uLensFirst, place, uLensSize), at(uLensSecond, place, uLensSize), pixel), 1.0);
+      fragment = vec4(shown(uLensFirst, uLensSecond, vec2(d.x, -d.y) + 0.5 * uLensSize, uLensSize, pixel), 1.0);
       return;
     }
   }
-  fragment = vec4(shown(at(uFirst, gl_FragCoord.xy, uSize), at(uSecond, gl_FragCoord.xy, uSize), pixel), 1.0);
+  fragment = vec4(shown(uFirst, uSecond, place, uSize, pixel), 1.0);
 }`;

@@ -72,6 +72,8 @@ const settled = (tab) => stageOf(tab).waitForFunction(() => document.documentEle
   await tab.selectOption('#quality', 'good');
   await tab.locator('#enhance').click();
   await tab.locator('#stop').waitFor({state: 'visible'});
+  expect('nothing that it is made with changes meanwhile', await tab.evaluate(() =>
+    ['upscale', 'quality', 'pixel', 'pixel-auto', 'cameras'].every((id) => document.getElementById(id).disabled)));
   await tab.locator('#stop').click();
   await tab.waitForFunction(() => /Stopped/.test(document.getElementById('done').textContent));
   await tab.selectOption('#quality', 'fast');
@@ -91,6 +93,21 @@ const settled = (tab) => stageOf(tab).waitForFunction(() => document.documentEle
     expect(`it is saved as ${format}`, fs.statSync(file).size > 10000 && file.endsWith(`-4x.${format}`), file);
     fs.rmSync(file);
   }
+
+  // A splat that lies elsewhere, and of which nothing can be estimated, is seen whole; its slider's picture goes back, too.
+  const place = (tab) => tab.evaluate(() => new Promise((resolve) => {
+    addEventListener('message', ({data}) => { if (data && data.look) resolve(data.look.target); });
+    document.getElementById('viewer').contentWindow.postMessage({tell: 'look'}, '*');
+  }));
+  const columns = ['x', 'y', 'z', 'f_dc_0', 'f_dc_1', 'f_dc_2', 'opacity', 'scale_0', 'scale_1', 'scale_2', 'rot_0', 'rot_1', 'rot_2', 'rot_3'];
+  const far = `ply\nformat ascii 1.0\nelement vertex 2\n${columns.map((name) => `property float ${name}\n`).join('')}end_header\n` +
+    '1000 0 0 1 1 1 3 -3 -3 -3 1 0 0 0\n1001 0 0 1 1 1 3 -3 -3 -3 1 0 0 0\n';
+  await tab.setInputFiles('#file', {name: 'far.ply', mimeType: 'application/octet-stream', buffer: Buffer.from(far)});
+  await tab.waitForFunction(() => document.getElementById('name').textContent === 'far.ply' && document.documentElement.dataset.state === 'shown');
+  expect('another splat is looked at where it is', (await place(tab))[0] > 900, String(await place(tab)));
+  await tab.locator('#pixel').press('ArrowRight');
+  await tab.locator('#pixel-auto').click();
+  await stageOf(tab).waitForFunction(() => !Number(document.documentElement.dataset.widening));
 
   // A file that is none is an error with a sentence, and the page goes on.
   await tab.setInputFiles('#file', {name: 'broken.ply', mimeType: 'application/octet-stream', buffer: Buffer.from('ply\nformat ascii 1.0\n')});
@@ -122,6 +139,12 @@ for (const [headers, own] of [[{}, '(sw\\.js)?'], [ISOLATED, '(sw\\.js|worker-th
   await tab.evaluate(() => navigator.serviceWorker.ready);
   await tab.waitForFunction((least) => caches.keys()
     .then(async (names) => names.length > 0 && (await (await caches.open(names[0])).keys()).length >= least), isolated ? 3 : 1);
+  // Another page of the host is not kept under the address of this one.
+  if (!isolated) {
+    const other = await context.newPage();
+    await other.goto(`${home}sw.js`);
+    await other.close();
+  }
   close();
   await context.setOffline(true);
   await tab.reload();

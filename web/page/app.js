@@ -92,9 +92,9 @@ const viewer = byId('viewer');
 let stageUrl = null;
 let look = null;
 
-// Shows a page in the frame, from where the one before it looked.
-async function stage(bytes) {
-  look = viewer.hidden ? null : await lookOfStage();
+// Shows a page in the frame, from where the one before it looked if that was of the same splat.
+async function stage(bytes, {same = true} = {}) {
+  look = viewer.hidden || !same ? null : await lookOfStage();
   if (stageUrl) URL.revokeObjectURL(stageUrl);
   stageUrl = URL.createObjectURL(new Blob([bytes], {type: 'text/html'}));
   const ready = heard((data) => data.ready);
@@ -131,15 +131,15 @@ async function lookOfStage() {
 // Colour that depends on the view is most of a page: large scenes are shown with less of it. What is saved has all.
 const shownDegree = (splat) => Math.min(splat.shDegree, splat.count > 1.5e6 ? 0 : splat.count > 5e5 ? 1 : 3);
 
-async function showInput() {
-  await stage(await input.splat.page({name: input.name, title: input.name, shDegree: shownDegree(input.splat)}));
+async function showInput(how) {
+  await stage(await input.splat.page({name: input.name, title: input.name, shDegree: shownDegree(input.splat)}), how);
   preview();
 }
 
 // The filter of this pixel size, at once: the frame adds its variance to every Gaussian.
 function preview() {
-  if (!input || result || pixelSize() === null) return;
-  viewer.contentWindow.postMessage({widening: gain * pixelSize() ** 2}, '*');
+  if (!input || result) return;
+  viewer.contentWindow.postMessage({widening: gain * (pixelSize() ?? 0) ** 2}, '*');
 }
 
 // The pixel size.
@@ -211,6 +211,8 @@ async function openFile(file) {
     input = {splat, info, name: file.name, bytes: file.size};
     result = null;
     chosen = false;
+    // Far enough for what the page says is likely, also where the smallest plausible pixel is taken instead.
+    byId('pixel').max = String(Math.max(2.5, info.pixel_size ? Math.ceil(Math.log2(info.pixel_size.high / info.pixel_size.used)) + 1 : 0));
     byId('pixel').value = '0';
     byId('done').textContent = '';
     for (const before of old) if (before) await before.close().catch(() => {});
@@ -221,7 +223,7 @@ async function openFile(file) {
     show(byId('save'), true);
     tellPixelSize();
     offer();
-    await showInput();
+    await showInput({same: false});
     document.documentElement.dataset.state = 'shown';
   } catch (error) {
     if (mine === session) trouble(error);
@@ -234,6 +236,8 @@ function offer() {
   byId('which').querySelector('[value="result"]').disabled = !result;
   byId('which').value = result ? 'result' : 'input';
   byId('enhance').disabled = !input || running !== null;
+  // What is being made is made with these.
+  for (const id of ['upscale', 'quality', 'pixel', 'pixel-auto', 'cameras']) byId(id).disabled = running !== null;
   show(byId('stop'), running !== null);
   show(byId('progress'), running !== null);
 }

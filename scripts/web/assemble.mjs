@@ -62,7 +62,7 @@ page('engine-threads.wasm', threads.wasm);
 const npm = fresh('npm');
 npm('package.json', `${JSON.stringify({...JSON.parse(read('web/package/package.json')), version}, null, 2)}\n`);
 npm('index.mjs', read('web/package/index.mjs'));
-npm('index.d.ts', read('web/package/index.d.ts'));
+npm('index.d.mts', read('web/package/index.d.mts'));
 npm('client.mjs', client);
 npm('worker.js', worker);
 npm('engine.wasm', wasm);

@@ -107,7 +107,7 @@ function tell(what, run, theirs) {
 
 async function measurePage() {
   const browser = await launchBrowser();
-  const tab = await watchedTab(await browser.newContext({viewport: {width: 1200, height: 800}}), {hushed: /autofocus/});
+  const tab = await watchedTab(await browser.newContext({viewport: {width: 1200, height: 800}}), {hushed: /autofocus/i});
   const ready = [];
   for (let k = 0; k < 5; ++k) {
     await tab.goto(pathToFileURL(path.join(web, 'dist/index.html')).href);

@@ -13,7 +13,7 @@ const browser = await launchBrowser();
 async function openPage(url, allowed, {width = 1200, height = 800, scheme = 'dark'} = {}) {
   const context = await browser.newContext({viewport: {width, height}, colorScheme: scheme, acceptDownloads: true});
   // The viewer's help has a button that wants the focus, which a frame does not get.
-  const tab = await watchedTab(context, {allowed, hushed: /autofocus/});
+  const tab = await watchedTab(context, {allowed, hushed: /autofocus/i});
   await tab.goto(url);
   await state(tab, 'ready');
   return {tab, context};
@@ -22,6 +22,17 @@ const state = (tab, wanted) => tab.waitForFunction((name) =>
   document.documentElement.dataset.state === name || document.documentElement.dataset.trouble, wanted);
 const troubles = (tab) => tab.evaluate(() => document.documentElement.dataset.trouble || '');
 const stageOf = (tab) => tab.frames().find((frame) => frame !== tab.mainFrame());
+const inSight = (tab) => tab.evaluate(() => {
+  const {top, bottom} = document.getElementById('trouble').getBoundingClientRect();
+  const panel = document.getElementById('panel').getBoundingClientRect();
+  return bottom > top && top >= panel.top && bottom <= panel.bottom;
+});
+// As if these files had been dropped: [name, text].
+const dropFiles = (tab, files) => tab.evaluate((list) => {
+  const dataTransfer = new DataTransfer();
+  for (const [name, text] of list) dataTransfer.items.add(new File([text], name));
+  dispatchEvent(new DragEvent('drop', {dataTransfer, cancelable: true}));
+}, files);
 const settled = (tab) => stageOf(tab).waitForFunction(() => document.documentElement.dataset.settled === 'true');
 
 // From a folder, as a file: everything.
@@ -109,10 +120,27 @@ const settled = (tab) => stageOf(tab).waitForFunction(() => document.documentEle
   await tab.locator('#pixel-auto').click();
   await stageOf(tab).waitForFunction(() => !Number(document.documentElement.dataset.widening));
 
+  // Cameras: dropped beside the splat they are of; the slider is instead of them; another splat has none.
+  const cameraText = fs.readFileSync(path.join(path.dirname(splat), 'transforms_lr.json'), 'utf8');
+  const said = () => tab.locator('#cameras-about').innerText();
+  await dropFiles(tab, [['transforms.json', cameraText], ['near.ply', far.replaceAll(/100([01])/g, '$1')]]);
+  await tab.waitForFunction(() => /127 cameras/.test(document.getElementById('cameras-about').textContent));
+  expect('the splat beside the cameras is open', await tab.locator('#name').innerText() === 'near.ply');
+  await tab.locator('#pixel').press('ArrowRight');
+  expect('cameras are not used behind the slider', /not used/.test(await said()), await said());
+  await tab.locator('#pixel-auto').click();
+  expect('cameras are used again', /127 cameras: Enhance takes/.test(await said()), await said());
+  await dropFiles(tab, [['a.ply', far], ['b.ply', far]]);
+  expect('two splats at once are refused', /a\.ply, b\.ply/.test(await troubles(tab)), await troubles(tab));
+  await tab.setInputFiles('#file', {name: 'far.ply', mimeType: 'application/octet-stream', buffer: Buffer.from(far)});
+  await tab.waitForFunction(() => document.getElementById('name').textContent === 'far.ply');
+  expect('another splat has no cameras', await said() === '', await said());
+
   // A file that is none is an error with a sentence, and the page goes on.
   await tab.setInputFiles('#file', {name: 'broken.ply', mimeType: 'application/octet-stream', buffer: Buffer.from('ply\nformat ascii 1.0\n')});
   await tab.waitForFunction(() => document.documentElement.dataset.trouble);
   expect('a broken file is named', /broken\.ply/.test(await troubles(tab)), await troubles(tab));
+  expect('an error can be seen', await inSight(tab));
   await tab.setInputFiles('#file', splat);
   await tab.waitForFunction(() => !document.documentElement.dataset.trouble && document.documentElement.dataset.state === 'shown');
   await tab.close();
@@ -127,6 +155,14 @@ const settled = (tab) => stageOf(tab).waitForFunction(() => document.documentEle
   await settled(tab);
   expect('nothing is wider than a phone', await tab.evaluate(() => document.documentElement.scrollWidth <= innerWidth));
   await tab.screenshot({path: path.join(out, 'phone.png')});
+  await tab.setInputFiles('#file', {name: 'broken.ply', mimeType: 'application/octet-stream', buffer: Buffer.from('ply\nformat ascii 1.0\n')});
+  await tab.waitForFunction(() => document.documentElement.dataset.trouble);
+  expect('an error can be seen on a phone', await inSight(tab));
+  await tab.screenshot({path: path.join(out, 'phone-error.png')});
+  await tab.setViewportSize({width: 740, height: 360});
+  expect('held sideways, the stage has the whole height', await tab.evaluate(() => document.getElementById('viewer').clientHeight === innerHeight));
+  await settled(tab);
+  await tab.screenshot({path: path.join(out, 'phone-sideways.png')});
   await tab.close();
 }
 

@@ -134,6 +134,36 @@ const {report: withCameras} = await splat.enhance({method: 'filter', cameras});
 expect('cameras are used', withCameras.pixel_size.source === 'cameras', JSON.stringify(withCameras.pixel_size));
 expect('a page is one', Buffer.from((await sharp.page({before: splat})).slice(0, 15)).toString() === '<!DOCTYPE html>');
 await refused('an option that there is not', splat.enhance({sharpness: 2}), 'bad_argument');
+await refused('help', splat.enhance({help: true}), 'bad_argument');
+
+// What a program may get wrong is an error with a sentence, and nothing goes on waiting.
+const detached = new Uint8Array(8);
+structuredClone(detached, {transfer: [detached.buffer]});
+const late = await open(bytes);
+await late.close();
+for (const [name, wrong] of Object.entries({
+  'no bytes': () => open(), 'text for bytes': () => open('x'), 'options that are none': () => open(bytes, 'x'), 'bytes that were given away': () => open(detached),
+  'no columns': () => fromColumns(), 'columns that are none': () => fromColumns({}), 'no camera files': () => readCameras(), 'convert to nothing': () => convert(bytes),
+  'cameras that are none': () => splat.enhance({cameras: {}}), 'a signal that is none': () => splat.enhance({signal: 5}), 'progress that is no function': () => splat.render({onProgress: 1}),
+  'cameras of a picture that are none': () => splat.render({cameras: {}}), 'a splat before that is none': () => splat.page({before: {}}), 'a splat before that is closed': () => splat.page({before: late}),
+  'a format that is no word': () => splat.write(3),
+})) await refused(name, wrong(), 'bad_argument');
+expect('options that are null are none', (await (await open(bytes, null)).info()).gaussians === 20000);
+expect('half a character in a name', (await open(bytes, {name: 'a\ud800.ply'})).count === 20000);
+const mine = new Error('mine');
+expect('what a listener throws comes back', await splat.enhance({onProgress() { throw mine; }}).catch((error) => error) === mine);
+
+// Every option that the types name is one that the engine knows.
+const types = fs.readFileSync(path.join(packageDir, 'index.d.mts'), 'utf8');
+for (const [kind, ask] of [['Enhance', (o) => splat.enhance(o)], ['Write', (o) => splat.write('ply', o)], ['Render', (o) => splat.render(o)], ['Page', (o) => splat.page(o)]]) {
+  const [, body] = types.match(new RegExp(`interface ${kind}Options {([^}]*)}`));
+  const keys = [...body.matchAll(/^ {2}(\w+)\?:/gm)].map(([, key]) => key).filter((key) => !/^(cameras|before|signal|on[A-Z].*)$/.test(key));
+  expect(`${kind}Options are read`, keys.length > 1, String(keys));
+  for (const key of keys) {
+    const answer = await ask({[key]: '@'}).catch((error) => error.message);
+    expect(`${kind}Options: ${key}`, !/not expected/.test(answer), answer);
+  }
+}
 await refused('a format that there is not', splat.write('jpg'), 'bad_argument');
 await refused('a file that is none', open(new Uint8Array(1000), {name: 'x.ply'}), 'bad_file');
 await refused('an empty file', open(new Uint8Array(0), {name: 'x.ply'}), 'bad_file');

@@ -14,6 +14,7 @@ export class AnchorsplatError extends Error {
 
 const crashed = (why) => new AnchorsplatError({
   code: 'crashed', message: `the engine stopped (${why}); a new one has been started: open the splat again`});
+const badArgument = (message) => new AnchorsplatError({code: 'bad_argument', message});
 const stopped = () => new AnchorsplatError({code: 'interrupted', message: 'stopped, as it was asked to'});
 
 // One worker with an engine in it.
@@ -34,8 +35,20 @@ class EngineWorker {
     return new Promise((resolve, reject) => {
       if (this.waiting.size === 0) this.worker.hold();
       this.waiting.set(id, {resolve, reject, onProgress});
-      this.worker.post({id, request, data}, transfer);
+      try {
+        this.worker.post({id, request, data}, transfer);
+      } catch (error) {
+        this.ended(id);
+        reject(badArgument(`this cannot be sent to the engine: ${error.message}`));
+      }
     });
+  }
+
+  // The call that waits for `id`, which waits no more.
+  ended(id) {
+    const call = this.waiting.get(id);
+    if (this.waiting.delete(id) && this.waiting.size === 0) this.worker.release();
+    return call;
   }
 
   receive(message) {
@@ -43,11 +56,14 @@ class EngineWorker {
     const call = this.waiting.get(message.id);
     if (!call) return;
     if (message.progress) {
-      if (call.onProgress) call.onProgress(message.progress);
+      try {
+        if (call.onProgress) call.onProgress(message.progress);
+      } catch (error) {
+        this.ended(message.id).reject(error);  // whoever asked hears of it
+      }
       return;
     }
-    this.waiting.delete(message.id);
-    if (this.waiting.size === 0) this.worker.release();
+    this.ended(message.id);
     const {answer, blocks} = message;
     if (answer.error) call.reject(new AnchorsplatError(answer.error));
     else call.resolve({answer, blocks});
@@ -67,6 +83,8 @@ class EngineWorker {
 export function wordsOf(options, besides = []) {
   const words = [];
   for (const [key, value] of Object.entries(options)) {
+    // Not an option here: the engine would answer with the text of the command line.
+    if (key === 'help') throw badArgument('help is in index.d.mts');
     if (besides.includes(key) || value === undefined || value === null || value === false) continue;
     const option = `--${key.replace(/[A-Z]/g, (letter) => `-${letter.toLowerCase()}`)}`;
     const text = Array.isArray(value) ? value.join(key === 'size' ? 'x' : ',') : String(value);
@@ -75,12 +93,25 @@ export function wordsOf(options, besides = []) {
   return words;
 }
 
+// What a program hands over: looked at here, so that its mistake is an error with a sentence and not one of this file's lines.
+function optionsOf(options, what) {
+  if (options === undefined || options === null) return {};
+  if (typeof options !== 'object' || Array.isArray(options)) throw badArgument(`the options of ${what} are an object`);
+  for (const name of ['onProgress', 'onMessage']) {
+    if (options[name] !== undefined && options[name] !== null && typeof options[name] !== 'function') throw badArgument(`${name} is a function`);
+  }
+  const {signal, cameras} = options;
+  if (signal !== undefined && signal !== null && typeof signal.addEventListener !== 'function') throw badArgument('signal is an AbortSignal');
+  if (cameras !== undefined && cameras !== null && !(cameras instanceof Cameras)) throw badArgument('cameras are what readCameras() has read');
+  return options;
+}
+
 const bytesOf = (data) => {
   if (data instanceof Uint8Array) return data;
   if (data instanceof ArrayBuffer) return new Uint8Array(data);
   if (ArrayBuffer.isView(data)) return new Uint8Array(data.buffer, data.byteOffset, data.byteLength);
   if (data && typeof data.arrayBuffer === 'function') return data;  // a Blob is read in the worker
-  throw new TypeError('a splat is a Uint8Array, an ArrayBuffer or a Blob');
+  throw badArgument('the bytes of a file are a Uint8Array, an ArrayBuffer or a Blob');
 };
 
 const COLUMNS = ['means', 'logScales', 'quats', 'opacityLogits', 'sh'];
@@ -108,7 +139,8 @@ export class Engine {
     return worker;
   }
 
-  async open(data, {name, format, onMessage} = {}) {
+  async open(data, options) {
+    const {name, format, onMessage} = optionsOf(options, 'open');
     const bytes = bytesOf(data);
     const worker = await this.home();
     const {answer} = await worker.ask({verb: 'open', name: name ?? data.name ?? '', format: format ?? ''}, {data: [bytes]});
@@ -117,9 +149,10 @@ export class Engine {
   }
 
   async fromColumns(columns) {
+    if (typeof columns !== 'object' || columns === null) throw badArgument(`a splat's columns are an object of ${COLUMNS.join(', ')}`);
     const blocks = COLUMNS.map((name) => columns[name]);
     if (!blocks.every((block) => block instanceof Float32Array)) {
-      throw new TypeError(`a splat's columns are Float32Arrays: ${COLUMNS.join(', ')}`);
+      throw badArgument(`a splat's columns are Float32Arrays: ${COLUMNS.join(', ')}`);
     }
     const worker = await this.home();
     const {answer} = await put(worker, blocks, {gaussians: columns.count ?? blocks[3].length, sh_degree: columns.shDegree ?? 0,
@@ -129,14 +162,16 @@ export class Engine {
 
   async readCameras(files) {
     const list = Array.isArray(files) ? files : [files];
-    const parts = await Promise.all(list.map(async ({name, data}) => {
+    const parts = await Promise.all(list.map(async (file) => {
+      if (typeof file !== 'object' || file === null || typeof file.name !== 'string') throw badArgument('files of cameras are {name, data}');
+      const {name, data} = file;
       const bytes = bytesOf(data);
       return {name, bytes: bytes instanceof Uint8Array ? bytes : new Uint8Array(await bytes.arrayBuffer())};
     }));
     const worker = await this.home();
     const {answer} = await worker.ask({verb: 'cameras', files: parts.map(({name, bytes}) => ({name, bytes: bytes.length}))},
       {data: parts.map(({bytes}) => bytes)});
-    return {worker, handle: answer.cameras, count: answer.views, parts};
+    return new Cameras(worker, answer, parts);
   }
 
   async formats() { return (await (await this.home()).ask({verb: 'formats'})).answer.formats; }
@@ -146,6 +181,16 @@ export class Engine {
     const worker = await this.worker;
     this.worker = null;
     worker.end(stopped());
+  }
+}
+
+// Cameras that an engine has, and their files, for another one that is to have them.
+export class Cameras {
+  constructor(worker, answer, parts) {
+    this.worker = worker;
+    this.handle = answer.cameras;
+    this.count = answer.views;
+    this.parts = parts;
   }
 }
 
@@ -175,15 +220,22 @@ export class Splat {
   }
 
   async ask(request, options) {
-    if (this.handle === null) throw new AnchorsplatError({code: 'bad_argument', message: 'this splat has been closed'});
+    if (this.handle === null) throw badArgument('this splat has been closed');
     return this.worker.ask({cloud: this.handle, ...request}, options);
+  }
+
+  // The engine's number of something that goes with this splat.
+  numberOf(other, what) {
+    if (other.handle === null) throw badArgument(`${what} has been closed`);
+    if (other.worker !== this.worker) throw badArgument(`${what} belongs to an engine that has ended`);
+    return other.handle;
   }
 
   async info() { return (await this.ask({verb: 'info'})).answer; }
 
   // In a worker of its own: `signal` ends it at once, and its memory goes back when it is done.
-  async enhance(options = {}) {
-    const {cameras, seed = 0, signal, onProgress, onMessage, ...rest} = options;
+  async enhance(options) {
+    const {cameras, seed = 0, signal, onProgress, onMessage, ...rest} = optionsOf(options, 'enhance');
     if (signal && signal.aborted) throw stopped();
     const columns = await this.ask({verb: 'columns'});
     const work = await this.engine.newWorker();
@@ -215,25 +267,32 @@ export class Splat {
     return (await this.ask({verb: 'filter', upscale})).answer.gain;
   }
 
-  async write(format, {onMessage, ...options} = {}) {
-    const {answer, blocks} = await this.ask({verb: 'write', format, words: wordsOf(options)});
+  async write(format, options) {
+    if (typeof format !== 'string') throw badArgument('a format is a word, like "spz"');
+    const {onMessage, ...rest} = optionsOf(options, 'write');
+    const {answer, blocks} = await this.ask({verb: 'write', format, words: wordsOf(rest)});
     tellMessages(answer, onMessage);
     return new Uint8Array(blocks[0]);
   }
 
   // The page of `anchorsplat view`: one HTML file.
-  async page({before, name = '', cameras, onMessage, ...options} = {}) {
-    const request = {verb: 'page', after: this.handle, name, words: wordsOf(options)};
-    if (before) request.before = before.handle;
-    if (cameras) request.cameras = cameras.handle;
+  async page(options) {
+    const {before, name = '', cameras, onMessage, ...rest} = optionsOf(options, 'page');
+    const request = {verb: 'page', after: this.handle, name, words: wordsOf(rest)};
+    if (before !== undefined && before !== null) {
+      if (!(before instanceof Splat)) throw badArgument('before is a splat');
+      request.before = this.numberOf(before, 'the splat before');
+    }
+    if (cameras) request.cameras = this.numberOf(cameras, 'the set of cameras');
     const {answer, blocks} = await this.ask(request);
     tellMessages(answer, onMessage);
     return new Uint8Array(blocks[0]);
   }
 
-  async render({cameras, transparent = false, onProgress, onMessage, ...options} = {}) {
-    const request = {verb: 'render', transparent, words: wordsOf(options)};
-    if (cameras) request.cameras = cameras.handle;
+  async render(options) {
+    const {cameras, transparent = false, onProgress, onMessage, ...rest} = optionsOf(options, 'render');
+    const request = {verb: 'render', transparent, words: wordsOf(rest)};
+    if (cameras) request.cameras = this.numberOf(cameras, 'the set of cameras');
     const {answer, blocks} = await this.ask(request, {onProgress});
     tellMessages(answer, onMessage);
     const {views, height, width, channels} = answer;

@@ -1,4 +1,4 @@
-// The package's door: the engine of this process or page, made when it is first needed. index.d.ts says what there is.
+// The package's door: the engine of this process or page, made when it is first needed. index.d.mts says what there is.
 import {AnchorsplatError, Engine, Splat} from './client.mjs';
 
 export {AnchorsplatError, Splat};
@@ -79,10 +79,12 @@ export const readCameras = (files) => engine().readCameras(files);
 export const formats = () => engine().formats();
 
 // One file in, another one out.
-export async function convert(data, {to, from, name, ...options}) {
+export async function convert(data, options) {
+  const {to, from, name, ...rest} = options ?? {};
+  if (typeof to !== 'string') throw new AnchorsplatError({code: 'bad_argument', message: 'convert() wants {to: "spz"}, or another format'});
   const splat = await open(data, {format: from, name});
   try {
-    return await splat.write(to, options);
+    return await splat.write(to, rest);
   } finally {
     await splat.close();
   }

@@ -61,6 +61,7 @@ let gain = 0;         // of the filter at this zoom
 let chosen = false;   // the person has moved the pixel size
 let running = null;   // AbortController of what is being enhanced
 let session = 0;      // of the splat that is open: what belongs to an older one is dropped
+let openings = 0;     // files that were to be opened: the last one counts
 
 function sizeText(bytes) {
   const units = ['bytes', 'kB', 'MB', 'GB'];
@@ -73,6 +74,7 @@ function trouble(error) {
   const text = error ? error.message || String(error) : '';
   byId('trouble').textContent = text;
   show(byId('trouble'), text !== '');
+  if (text) byId('trouble').scrollIntoView({block: 'nearest'});
   document.documentElement.dataset.trouble = text;
   if (error && !input) {
     show(byId('panel'), true);
@@ -142,6 +144,14 @@ function preview() {
   viewer.contentWindow.postMessage({widening: gain * (pixelSize() ?? 0) ** 2}, '*');
 }
 
+// What the engine says as the command line does, in words of this page, a sentence each.
+function sentence(text) {
+  const here = text.replace('--pixel-size or --cameras would tell', 'the slider or training cameras would tell')
+    .replace(/[.;:]? --filter-strength F overrides it/, '').replace(/ \(--[^)]*\)/g, '')
+    .replace(/--pixel-size/g, 'the slider').replace(/--cameras/g, 'training cameras');
+  return here.charAt(0).toUpperCase() + here.slice(1) + (/[.?!]$/.test(here) ? '' : '.');
+}
+
 // The pixel size.
 
 // Where the slider is 0: what the engine would take.
@@ -155,7 +165,23 @@ function pixelSize() {
 
 function tellPixelSize() {
   const size = pixelSize();
-  byId('pixel-value').textContent = size === null ? 'not known' : `${size.toPrecision(3)}${chosen ? '' : ' (estimated)'}`;
+  const unsure = input.info.pixel_size && input.info.pixel_size.contradictions.length > 0;
+  const source = chosen ? '' : unsure ? ' (smallest plausible)' : ' (estimated)';
+  byId('pixel-value').textContent = size === null ? 'not known' : `${size.toPrecision(3)}${source}`;
+  if (cameras) {
+    byId('cameras-about').textContent = `${number(cameras.count)} cameras: ` + (chosen
+      ? 'not used, as the slider says one size for all. Estimate takes them again.'
+      : 'Enhance takes the size of every Gaussian\'s pixel from them. The preview shows one size for all.');
+  }
+}
+
+// How much of what a fit in the classic mode has lost is given back.
+const CLASSIC_LOSS = 0.74;
+function lostWidth({strength, upscale, likely}) {
+  if (strength < 0.02) return `Seen ${upscale}× closer it has lost no width that could be given back.`;
+  const share = Math.round(100 * strength / CLASSIC_LOSS);
+  const much = share > 90 ? 'as much width as usual' : `${share} % of the usual width`;
+  return `Seen ${upscale}× closer its Gaussians are too thin: it is given back ${much}${likely ? '' : ', as little is sure'}.`;
 }
 
 // What the file is, in words.
@@ -173,7 +199,7 @@ function describe({info, name, bytes}) {
   say(`${number(info.gaussians)} Gaussians, ${info.format}, ${sizeText(bytes)}, colour of SH degree ${info.sh_degree}.`);
   if (info.render_mode) say(`It says that it was trained as ${info.render_mode}.`);
   else say(`It looks ${info.looks_in_words}.`);
-  say(`Lost width: ${info.lost_width_in_words}.`);
+  say(lostWidth(info.lost_width));
   if (info.pixel_size) {
     const {low, high, contradictions} = info.pixel_size;
     say(`A pixel of its training pictures covered about ${info.pixel_size.estimate.toPrecision(3)} of its units ` +
@@ -188,7 +214,7 @@ function describe({info, name, bytes}) {
     const list = document.createElement('ul');
     for (const problem of info.problems) {
       const item = document.createElement('li');
-      item.textContent = problem;
+      item.textContent = sentence(problem);
       list.append(item);
     }
     about.append(list);
@@ -199,18 +225,20 @@ function describe({info, name, bytes}) {
 // What a person does.
 
 async function openFile(file) {
-  const mine = ++session;
-  if (running) running.abort();
+  const mine = ++openings;
   trouble(null);
   busy(`Reading ${file.name}…`);
   try {
     const splat = await engine.open(file, {name: file.name});
     const info = await splat.info();
-    if (mine !== session) return await splat.close();
+    if (mine !== openings) return await splat.close();
+    ++session;
+    if (running) running.abort();
     const old = [input && input.splat, result && result.splat];
     input = {splat, info, name: file.name, bytes: file.size};
     result = null;
     chosen = false;
+    dropCameras();
     // Far enough for what the page says is likely, also where the smallest plausible pixel is taken instead.
     byId('pixel').max = String(Math.max(2.5, info.pixel_size ? Math.ceil(Math.log2(info.pixel_size.high / info.pixel_size.used)) + 1 : 0));
     byId('pixel').value = '0';
@@ -226,10 +254,32 @@ async function openFile(file) {
     await showInput({same: false});
     document.documentElement.dataset.state = 'shown';
   } catch (error) {
-    if (mine === session) trouble(error);
+    if (mine === openings) trouble(error);
   } finally {
-    if (mine === session) busy('');
+    if (mine === openings) busy('');
   }
+}
+
+// Cameras belong to the splat that they were opened for.
+function dropCameras() {
+  cameras = null;
+  byId('cameras').value = '';
+  byId('cameras-about').textContent = '';
+}
+
+// A splat, or cameras for the one that is open, or both.
+const isCameraFile = (file) => /\.(json|txt|bin)$/i.test(file.name);
+async function takeFiles(files) {
+  const splats = files.filter((file) => !isCameraFile(file));
+  const cameraFiles = files.filter(isCameraFile);
+  if (splats.length > 1) {
+    return trouble(new Error(`One splat at a time: ${splats.map((file) => file.name).join(', ')} are ${splats.length}.`));
+  }
+  if (splats.length === 1) await openFile(splats[0]);
+  if (cameraFiles.length === 0 || byId('trouble').textContent) return;
+  if (!input) return trouble(new Error(`${cameraFiles[0].name} looks like cameras: open the splat first that was trained with them.`));
+  if (running) return trouble(new Error('Cameras are for the next run: stop this one, or wait for it.'));
+  await takeCameras(cameraFiles);
 }
 
 function offer() {
@@ -254,13 +304,15 @@ async function enhance() {
   const messages = [];
   trouble(null);
   running = new AbortController();
+  const byKeyboard = document.activeElement === byId('enhance');
   told({task: 'starting', done: 0, total: 0, note: ''});
   offer();
+  if (byKeyboard) byId('stop').focus();
   const began = performance.now();
   try {
     const method = byId('quality').value;
     const options = {upscale: Number(byId('upscale').value), signal: running.signal, onProgress: told,
-      onMessage: ({level, text}) => { if (level !== 'info') messages.push(text); }};
+      onMessage: ({level, text}) => { if (level !== 'info') messages.push(sentence(text)); }};
     if (method === 'filter') options.method = 'filter';
     else options.quality = method;
     if (chosen) options.pixelSize = pixelSize();
@@ -280,7 +332,9 @@ async function enhance() {
   } finally {
     running = null;
     busy('');
+    const free = document.activeElement === byId('stop') || document.activeElement === document.body;
     offer();
+    if (byKeyboard && free) byId('enhance').focus();
   }
 }
 
@@ -326,10 +380,10 @@ async function save() {
 async function takeCameras(files) {
   cameras = null;
   byId('cameras-about').textContent = '';
+  tellPixelSize();
   if (files.length === 0) return;
   try {
     cameras = await engine.readCameras([...files].map((file) => ({name: file.name, data: file})));
-    byId('cameras-about').textContent = `${number(cameras.count)} cameras: they say the size of every Gaussian's pixel.`;
     chosen = false;
     byId('pixel').value = '0';
     if (input) await changed();
@@ -354,12 +408,15 @@ byId('upscale').onchange = async () => {
   changed();
 };
 
-addEventListener('dragover', (event) => { event.preventDefault(); show(byId('drop'), true); });
+addEventListener('dragover', (event) => {
+  event.preventDefault();
+  show(byId('drop'), event.dataTransfer.types.includes('Files'));
+});
 addEventListener('dragleave', (event) => { if (!event.relatedTarget) show(byId('drop'), false); });
 addEventListener('drop', (event) => {
   event.preventDefault();
   show(byId('drop'), false);
-  if (event.dataTransfer.files.length > 0) openFile(event.dataTransfer.files[0]);
+  if (event.dataTransfer.files.length > 0) takeFiles([...event.dataTransfer.files]);
 });
 addEventListener('unhandledrejection', (event) => trouble(event.reason));
 

@@ -17,6 +17,9 @@ export interface Progress {
 }
 
 type RenderMode = 'classic' | 'antialiased' | 'mip';
+/** What is made here lies in memory of its own, as `Blob` wants it. */
+type Made = Uint8Array & {readonly buffer: ArrayBuffer};
+type Numbers = Float32Array & {readonly buffer: ArrayBuffer};
 type Bytes = Uint8Array | ArrayBuffer | ArrayBufferView | Blob;
 
 export interface OpenOptions {
@@ -75,7 +78,6 @@ export interface EnhanceOptions {
   maxGaussians?: number;
   pruneOpacity?: number;
   blockGaussians?: number;
-  refine?: string;
   seed?: number;
   /** Stops it at once; the promise is rejected with the code "interrupted". */
   signal?: AbortSignal;
@@ -139,11 +141,11 @@ export class Splat {
   /** Variance that the filter adds to every axis, for a training pixel of size 1. */
   filterGain(upscale?: number): Promise<number>;
   /** The bytes of a file: "ply", "compressed.ply", "spz", "sog", "splat", "glb", … */
-  write(format: string, options?: WriteOptions): Promise<Uint8Array>;
+  write(format: string, options?: WriteOptions): Promise<Made>;
   /** The page of `anchorsplat view`: one HTML file that opens anywhere. */
-  page(options?: PageOptions): Promise<Uint8Array>;
+  page(options?: PageOptions): Promise<Made>;
   /** float32 [views, height, width, channels], from 0 to 1. */
-  render(options?: RenderOptions): Promise<{views: number; height: number; width: number; channels: 3 | 4; pixels: Float32Array}>;
+  render(options?: RenderOptions): Promise<{views: number; height: number; width: number; channels: 3 | 4; pixels: Numbers}>;
   columns(): Promise<Required<Columns>>;
   /** Gives its memory back. */
   close(): Promise<void>;
@@ -154,7 +156,7 @@ export function fromColumns(columns: Columns): Promise<Splat>;
 /** transforms.json, cameras.json, or the files of a COLMAP model. */
 export function readCameras(files: CameraFile | CameraFile[]): Promise<Cameras>;
 export function formats(): Promise<{name: string; extensions: string[]; reads: boolean; writes: boolean}[]>;
-export function convert(data: Bytes, options: {to: string; from?: string; name?: string} & WriteOptions): Promise<Uint8Array>;
+export function convert(data: Bytes, options: {to: string; from?: string; name?: string} & WriteOptions): Promise<Made>;
 /**
  * Threads that the engine may use, from the next one on (`close()` ends the one that there is); 1: the module without.
  * null, the default: as many as there are processors, 8 at most. A page that is not isolated from other origins has one.

@@ -161,6 +161,10 @@ const settled = (tab) => stageOf(tab).waitForFunction(() => document.documentEle
   await tab.screenshot({path: path.join(out, 'phone-error.png')});
   await tab.setViewportSize({width: 740, height: 360});
   expect('held sideways, the stage has the whole height', await tab.evaluate(() => document.getElementById('viewer').clientHeight === innerHeight));
+  expect('held sideways, the panel has no wide parts', await tab.evaluate(() => {
+    const panel = document.getElementById('panel');
+    return panel.scrollWidth <= panel.clientWidth;
+  }));
   await settled(tab);
   await tab.screenshot({path: path.join(out, 'phone-sideways.png')});
   await tab.close();

@@ -6,17 +6,10 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 program=$(realpath "$1")
-tools=$PWD/build/viewer-test
-out=${2:-$tools/pictures}
-mkdir -p "$tools" "$out"
-
-export CHROMIUM=${CHROMIUM:-/usr/bin/chromium}
-scripts/install-missing.sh lod-test "$CHROMIUM=chromium" node=nodejs npm=npm
-export NODE_FOLDER=$tools
-if [ ! -d "$tools/node_modules/playcanvas" ] || [ ! -d "$tools/node_modules/playwright-core" ]; then
-  echo '{"private": true}' >"$tools/package.json"
-  npm install --prefix "$tools" --no-audit --no-fund --silent playwright-core@1.65.1 playcanvas@2.23.3
-fi
+. scripts/browser-tools.sh
+browser_tools lod-test playwright-core@1.65.1 playcanvas@2.23.3
+out=${2:-$NODE_FOLDER/pictures}
+mkdir -p "$out"
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

@@ -5,17 +5,10 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 program=$(realpath "$1")
-tools=$PWD/build/viewer-test
-out=${2:-$tools/pictures}
-mkdir -p "$tools" "$out"
-
-export CHROMIUM=${CHROMIUM:-/usr/bin/chromium}
-scripts/install-missing.sh viewer-test "$CHROMIUM=chromium" node=nodejs npm=npm
-export NODE_FOLDER=$tools
-if [ ! -d "$tools/node_modules/playwright-core" ]; then
-  echo '{"private": true}' >"$tools/package.json"
-  npm install --prefix "$tools" --no-audit --no-fund --silent playwright-core@1.65.1
-fi
+. scripts/browser-tools.sh
+browser_tools viewer-test playwright-core@1.65.1
+out=${2:-$NODE_FOLDER/pictures}
+mkdir -p "$out"
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

@@ -27,10 +27,7 @@ std::string BytesOf(nb::handle text) {
 
 std::optional<RenderMode> ModeOf(const nb::object& name) {
   if (name.is_none()) return std::nullopt;
-  const auto word = nb::cast<std::string>(name);
-  for (const RenderMode mode : kRenderModes) {
-    if (word == NameOf(mode)) return mode;
-  }
+  if (const auto mode = RenderModeNamed(nb::cast<std::string>(name))) return mode;
   throw nb::value_error("render_mode is none that there is");
 }
 

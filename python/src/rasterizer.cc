@@ -119,9 +119,7 @@ class DifferentiableViews {
 };
 
 RenderMode ModeOf(const std::string& word) {
-  for (const RenderMode mode : kRenderModes) {
-    if (word == NameOf(mode)) return mode;
-  }
+  if (const std::optional<RenderMode> mode = RenderModeNamed(word)) return *mode;
   throw EngineError(
       {ErrorCode::kBadArgument, Cat("--mode: ", Printable(word), " is none of classic, antialiased, mip")});
 }

@@ -129,17 +129,20 @@ def test_ctrl_c_ends_every_long_call_and_leaves_nothing(cloud, tmp_path):
     assert os.listdir(tmp_path) == []
 
 
+# A thread is in the middle of a call that would take hours.
+CALL_OF_HOURS = """
+import threading, numpy as np, anchorsplat
+one = np.zeros((1, 3), np.float32)
+cloud = anchorsplat.Cloud(one, one - 2, np.ones((1, 4), np.float32), one[:, 0], one[:, None])
+begun = threading.Event()
+call = lambda: anchorsplat.render(cloud, orbit=100_000, size=(64, 64), progress=lambda _: begun.set())
+threading.Thread(target=call, daemon=True).start()
+begun.wait()
+"""
+
+
 def test_the_end_of_the_program_ends_calls_of_daemon_threads(python):
-    """In the middle of a call that would take hours."""
-    done = python(
-        "import threading, numpy as np, anchorsplat\n"
-        "one = np.zeros((1, 3), np.float32)\n"
-        "cloud = anchorsplat.Cloud(one, one - 2, np.ones((1, 4), np.float32), one[:, 0], one[:, None])\n"
-        "begun = threading.Event()\n"
-        "call = lambda: anchorsplat.render(cloud, orbit=100_000, size=(64, 64), progress=lambda _: begun.set())\n"
-        "threading.Thread(target=call, daemon=True).start()\n"
-        "begun.wait()\n"
-    )
+    done = python(CALL_OF_HOURS)
     assert done.returncode == 0 and done.stderr == ""
 
 
@@ -211,13 +214,7 @@ def test_ctrl_c_ends_waiting_for_a_pipe(tmp_path):
 
 def test_a_fork_does_not_wait_for_calls_of_its_parent(python):
     done = python(
-        "import os, sys, threading, numpy as np, anchorsplat\n"
-        "one = np.zeros((1, 3), np.float32)\n"
-        "cloud = anchorsplat.Cloud(one, one - 2, np.ones((1, 4), np.float32), one[:, 0], one[:, None])\n"
-        "begun = threading.Event()\n"
-        "call = lambda: anchorsplat.render(cloud, orbit=100_000, size=(64, 64), progress=lambda _: begun.set())\n"
-        "threading.Thread(target=call, daemon=True).start()\n"
-        "begun.wait()\n"
+        CALL_OF_HOURS + "import os, sys\n"
         "child = os.fork()\n"
         "if child == 0: sys.exit(7)\n"
         "assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7\n"

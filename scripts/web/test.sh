@@ -7,7 +7,6 @@
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 native=$1
-tools=$PWD/build/viewer-test
 
 scripts/web/build.sh
 sudo=()
@@ -15,15 +14,9 @@ sudo=()
 "${sudo[@]}" scripts/bare-debian.sh --suite trixie --keep "$PWD/build/web/root" --env "JOBS=${JOBS:-$(nproc)}" -- scripts/web/rooms.sh
 cmake --build "$native" -j "${JOBS:-$(nproc)}" --target web_reference web_mutants
 
-export CHROMIUM=${CHROMIUM:-/usr/bin/chromium}
-scripts/install-missing.sh web-test "$CHROMIUM=chromium" node=nodejs npm=npm
-export NODE_FOLDER=$tools
-if [ ! -d "$tools/node_modules/playwright-core" ] || [ ! -d "$tools/node_modules/three" ]; then
-  mkdir -p "$tools"
-  echo '{"private": true}' >"$tools/package.json"
-  npm install --prefix "$tools" --no-audit --no-fund --silent playwright-core@1.65.1 three@0.165.0 \
-    @mkkellogg/gaussian-splats-3d@0.4.7  # the viewer of examples/web
-fi
+. scripts/browser-tools.sh
+browser_tools web-test playwright-core@1.65.1 three@0.165.0 \
+  @mkkellogg/gaussian-splats-3d@0.4.7  # the viewer of examples/web
 
 "$native/src/web/web_mutants" build/web/mutants 4000 1
 WEB_REFERENCE=$native/src/web/web_reference node scripts/web/test.mjs build/web/npm build/web/reference build/web/mutants

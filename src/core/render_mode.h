@@ -39,4 +39,12 @@ constexpr std::string_view NameOf(RenderMode mode) {
   }
 }
 
+// The mode of that name; none for any other word.
+constexpr std::optional<RenderMode> RenderModeNamed(std::string_view name) {
+  for (const RenderMode mode : kRenderModes) {
+    if (name == NameOf(mode)) return mode;
+  }
+  return std::nullopt;
+}
+
 }  // namespace anchorsplat

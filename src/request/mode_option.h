@@ -13,11 +13,7 @@ namespace anchorsplat {
 inline CLI::Option* AddModeOption(CLI::App& verb, std::optional<RenderMode>& mode, const std::string& help) {
   std::vector<std::string> words;
   for (const RenderMode known : kRenderModes) words.emplace_back(NameOf(known));
-  const auto assign = [&mode](const std::string& word) {
-    for (const RenderMode known : kRenderModes) {
-      if (word == NameOf(known)) mode = known;
-    }
-  };
+  const auto assign = [&mode](const std::string& word) { mode = RenderModeNamed(word); };
   return verb.add_option_function<std::string>("--mode", assign, help)->check(CLI::IsMember(words));
 }
 

@@ -72,9 +72,7 @@ struct WriteFlags {
 Result<std::optional<RenderMode>> ModeOf(const Json& request) {
   const std::string name = TextOf(request, "render_mode");
   if (name.empty()) return std::optional<RenderMode>();
-  for (const RenderMode mode : kRenderModes) {
-    if (name == NameOf(mode)) return std::optional<RenderMode>(mode);
-  }
+  if (const std::optional<RenderMode> mode = RenderModeNamed(name)) return mode;
   return BadRequest("says a 'render_mode' that is none of classic, antialiased, mip");
 }
 

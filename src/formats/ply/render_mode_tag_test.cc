@@ -49,9 +49,11 @@ TEST(RenderModeTag, TheLastOneCounts) {
 TEST(RenderModeTag, EveryModeComesBack) {
   for (const RenderMode mode : kRenderModes) {
     EXPECT_EQ(ModeOf(CommentsOf(mode)), mode) << NameOf(mode);
+    EXPECT_EQ(RenderModeNamed(NameOf(mode)), mode);
     RenderModeTag tag;
     for (const std::string& comment : CommentsOf(mode)) EXPECT_TRUE(tag.Take(comment)) << comment;
   }
+  EXPECT_EQ(RenderModeNamed("Classic"), std::nullopt);
 }
 
 }  // namespace

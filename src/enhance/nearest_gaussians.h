@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <vector>
@@ -44,7 +45,7 @@ class NearestGaussians {
   std::mutex mutex_;
   std::vector<Item> items_;
   size_t seen_ = 0;
-  std::atomic<double> farthest_ = __builtin_inf();
+  std::atomic<double> farthest_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace anchorsplat

@@ -38,7 +38,10 @@ bool HasNotFinite(const char* from, size_t count) {
 class PlyBlocks final : public CloudBlocks {
  public:
   PlyBlocks(const InputFile& file, PlyHeader header, const PlyLayout& layout, uint64_t begin)
-      : file_(file), header_(std::move(header)), begin_(begin), row_size_(layout.vertex->row_size()) {
+      : file_(file),
+        header_(std::move(header)),
+        begin_(begin),
+        row_size_(static_cast<size_t>(layout.vertex->row_size())) {
     size_ = layout.vertex->count;
     sh_degree_ = layout.sh_degree;
     render_mode_ = header_.render_mode;

@@ -36,7 +36,7 @@ std::string InfoCloud(nb::handle cloud, const RunArguments& run) {
   const Columns columns(cloud);
   return ResultOf(run, [&]() -> Result<std::string> {
     ANCHORSPLAT_RETURN_IF_ERROR(Validate(columns.view()));
-    return Text(ToJson(InspectSplat(CopyOf(columns.view()))));
+    return Text(ToJson(InspectSplat(columns.view())));
   });
 }
 

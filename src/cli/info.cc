@@ -3,6 +3,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "cli/clean_output.h"
 #include "cli/mesh_info.h"
@@ -11,7 +12,6 @@
 #include "core/credit.h"
 #include "core/statistics.h"
 #include "core/text.h"
-#include "enhance/enhanced_mark.h"
 #include "enhance/trained_kind.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
@@ -23,8 +23,8 @@ namespace anchorsplat {
 
 namespace {
 
-std::string_view ModeName(const GaussianCloud& cloud) {
-  return cloud.render_mode ? NameOf(*cloud.render_mode) : "not said (render, compare and view take it for classic)";
+std::string_view ModeName(std::optional<RenderMode> mode) {
+  return mode ? NameOf(*mode) : "not said (render, compare and view take it for classic)";
 }
 
 std::string Number(double value) {
@@ -41,12 +41,12 @@ void PrintTable(const SplatFindings& f) {
   std::cout << OneLine(f.file) << "\n"
             << "  Gaussians    " << WithThousands(s.gaussians) << ", SH degree " << s.sh_degree << "\n"
             << "  file         " << HumanBytes(f.file_bytes) << (f.format.empty() ? "" : ", " + f.format) << "\n"
-            << "  render mode  " << ModeName(f.cloud) << "\n";
-  if (!f.cloud.render_mode && !HasLostNoWidth(f.cloud)) {
+            << "  render mode  " << ModeName(f.render_mode) << "\n";
+  if (!f.render_mode && !f.lost_no_width) {
     std::cout << "  it looks     " << InWords(f.looks) << "\n";
   }
   std::cout << "  lost width   " << InWords(f.lost_width, f.pixel_size.ok() && f.pixel_size->contradicted()) << "\n";
-  for (const std::string& credit : CreditsOf(f.cloud.comments)) {
+  for (const std::string& credit : CreditsOf(f.comments)) {
     std::cout << "  credit       " << Printable(credit, kMostCredit) << "\n";
   }
   for (const auto& [name, value] : f.facts.all()) std::cout << "  " << name << "  " << value << "\n";

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
+#include <mutex>
 
+#include "core/buffer.h"
 #include "core/camera.h"
 #include "core/cloud_view.h"
 
@@ -16,6 +19,20 @@ struct Framing {
   double radius = 1;                         // world; always positive
 };
 Framing FrameCloud(const CloudView& cloud);
+
+// The same of a splat that is shown block by block, or of a part of its Gaussians, numbered without gaps.
+class FramingStudy {
+ public:
+  explicit FramingStudy(int64_t gaussians);
+  void Look(int64_t first, const CloudView& rows);  // Gaussians from number `first` on; from several threads
+  Framing Find() const;                             // once all were shown
+
+ private:
+  int64_t step_;
+  Buffer<float> means_, opacity_logits_;  // of every step-th: [M,3], [M]
+  std::mutex mutex_;
+  double reach_ = 0, visible_reach_ = 0;  // 3 σ of the largest Gaussian, of those that are visible
+};
 
 // Distance from which a sphere of `radius` fills the smaller side of the image, with a tenth to spare.
 double FramingDistance(const Framing& framing, const Pinhole& intrinsics);

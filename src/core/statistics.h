@@ -2,9 +2,11 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 
+#include "core/cloud_blocks.h"
 #include "core/cloud_view.h"
 
 namespace anchorsplat {
@@ -54,5 +56,21 @@ struct CloudStatistics {
   bool linear_looking_opacities = false;  // stored opacities look like 0–1, not logits
 };
 CloudStatistics ComputeStatistics(const CloudView& cloud);
+
+// The same of a splat that is looked at block by block, twice, or three times where very many Gaussians lie far out.
+// All numbers are exact. Memory: 50 MB at most and, the first time, 1 MB per thread.
+class StatisticsStudy final : public RowStudy {
+ public:
+  explicit StatisticsStudy(const CloudBlocks& blocks);
+  ~StatisticsStudy() override;
+  bool done() const override;
+  void Look(const CloudBlock& block) override;
+  void EndPass() override;
+  CloudStatistics Find() const;  // once it is done
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 }  // namespace anchorsplat

@@ -18,11 +18,11 @@ std::string EnhancedComment(const std::string& method, double upscale) {
   return Cat(kEnhanced, method, ", ", upscale, " times closer");
 }
 
-bool IsMarkedEnhanced(const GaussianCloud& cloud) {
+bool IsMarkedEnhanced(const CloudView& cloud) {
   return std::any_of(cloud.comments.begin(), cloud.comments.end(),
                      [](const std::string& comment) { return comment.starts_with(kEnhanced); });
 }
 
-bool HasLostNoWidth(const GaussianCloud& cloud) { return IsFittedToPixelAreas(cloud) || IsMarkedEnhanced(cloud); }
+bool HasLostNoWidth(const CloudView& cloud) { return IsFittedToPixelAreas(cloud) || IsMarkedEnhanced(cloud); }
 
 }  // namespace anchorsplat

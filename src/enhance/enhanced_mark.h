@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "core/cloud_view.h"
 #include "core/gaussian_cloud.h"
 
 namespace anchorsplat {
@@ -12,10 +13,10 @@ namespace anchorsplat {
 //
 // `method` as in EnhanceReport::method.
 std::string EnhancedComment(const std::string& method, double upscale);
-bool IsMarkedEnhanced(const GaussianCloud& cloud);
+bool IsMarkedEnhanced(const CloudView& cloud);
 
 // Whether there is nothing to give back, as far as the file says: it was fitted to areas of pixels or enhanced
 // before.
-bool HasLostNoWidth(const GaussianCloud& cloud);
+bool HasLostNoWidth(const CloudView& cloud);
 
 }  // namespace anchorsplat

@@ -28,7 +28,7 @@ std::string_view NameOf(LostWidthReason reason) {
   return "";
 }
 
-LostWidth FindLostWidth(const GaussianCloud& cloud, std::optional<TrainedKind> looks, double upscale) {
+LostWidth FindLostWidth(const CloudView& cloud, std::optional<TrainedKind> looks, double upscale) {
   if (IsFittedToPixelAreas(cloud)) return {0, LostWidthReason::kFittedToAreas};
   if (IsMarkedEnhanced(cloud)) return {0, LostWidthReason::kMarkedEnhanced};
   if (looks == TrainedKind::kWidened) {

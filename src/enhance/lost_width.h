@@ -3,7 +3,7 @@
 #include <optional>
 #include <string_view>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_view.h"
 #include "enhance/trained_kind.h"
 
 namespace anchorsplat {
@@ -32,6 +32,6 @@ struct LostWidth {
 };
 
 // `looks`: FindTrainedKind of the cloud; nothing where the tag is to be believed. upscale ≥ 1.
-LostWidth FindLostWidth(const GaussianCloud& cloud, std::optional<TrainedKind> looks, double upscale);
+LostWidth FindLostWidth(const CloudView& cloud, std::optional<TrainedKind> looks, double upscale);
 
 }  // namespace anchorsplat

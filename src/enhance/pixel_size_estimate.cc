@@ -107,6 +107,10 @@ double Share(double strangeness, double none, double all) {
 
 Result<PixelSizeEstimate> EstimatePixelSize(const GaussianCloud& cloud) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(PixelSizeProbe probe, PixelSizeProbe::Make(cloud));
+  return EstimatePixelSize(probe, cloud.render_mode);
+}
+
+Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional<RenderMode> mode) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(Settled settled,
                                Settle(kStandardPixelSize, probe.start(), [&](double size) { return probe.At(size); }));
   const double share = std::max(Share(settled.strangeness, kStandard, kOther),
@@ -120,7 +124,7 @@ Result<PixelSizeEstimate> EstimatePixelSize(const GaussianCloud& cloud) {
     settled.half = std::lerp(settled.half, kinds.half, share);
   }
   double size = std::exp(settled.log_size);
-  if (cloud.render_mode == RenderMode::kAntialiased) size /= kAntialiasedLook;
+  if (mode == RenderMode::kAntialiased) size /= kAntialiasedLook;
   const double spread = std::exp(settled.half);
   return PixelSizeEstimate{size, size / spread, size * spread, share};
 }

@@ -1,7 +1,11 @@
 #pragma once
 
+#include <optional>
+
 #include "core/gaussian_cloud.h"
+#include "core/render_mode.h"
 #include "core/result.h"
+#include "enhance/pixel_size_features.h"
 
 namespace anchorsplat {
 
@@ -22,5 +26,8 @@ struct PixelSizeEstimate {
 // Scales with the cloud. Takes up to a second, for large clouds too, as only a part of them is looked at.
 // kBadArgument: fewer than 16 usable Gaussians with visible opacity and finite scales: nothing to estimate from.
 Result<PixelSizeEstimate> EstimatePixelSize(const GaussianCloud& cloud);
+
+// The same with a probe of the cloud.
+Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional<RenderMode> mode);
 
 }  // namespace anchorsplat

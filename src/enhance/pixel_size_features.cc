@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "core/activations.h"
-#include "core/framing.h"
 #include "core/run_context.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
@@ -25,10 +24,6 @@ constexpr double kNearPlane = 0.01;  // of the distance; everything lies behind
 constexpr double kSamples = 2;       // at least, per pixel of the size that is tried, along a side
 constexpr double kOctavesPerStep = 0.5;
 constexpr double kMostSteps = 12;  // either way from the start
-// Larger clouds than kMostShowing are cut down to those nearest to the middle, so that the time is bounded: a part of a
-// scene has outlines enough, while every so many Gaussians of it would have gaps. Giants would drown what does say
-// something: only Gaussians this small count, in units of the radius that frames the cloud.
-constexpr double kLargestAxis = 0.25;
 // Brightness, that of the constant colour's brightest channel, up to which a Gaussian counts as unseen over black, and
 // from which on as seen.
 constexpr float kUnseen = 0.02f, kSeen = 0.1f;
@@ -48,47 +43,14 @@ double WeightedQuantile(std::vector<std::pair<float, double>>& items, double sha
   return items.back().first;
 }
 
-// The part of the cloud that says something, without its colours. `radius` becomes that of the part where it is cut.
-GaussianCloud Telling(const GaussianCloud& cloud, const Framing& framing, double& radius) {
-  LeaveIfAbandoned();
-  using Near = std::pair<double, int64_t>;  // distance², row
-  const double longest_allowed = std::log(kLargestAxis * framing.radius);
-  std::vector<Near> near = CollectRows<Near>(cloud.size(), [&](int64_t i, std::vector<Near>& out) {
-    double distance = 0;
-    for (size_t a = 0; a < 3; ++a) {
-      const double d = cloud.means[static_cast<size_t>(3 * i) + a] - framing.target[a];
-      distance += d * d;
-    }
-    const float* scales = cloud.log_scales.data() + 3 * i;
-    const float longest = std::max({scales[0], scales[1], scales[2]});
-    if (std::sqrt(distance) <= kShowingFarthest * framing.radius && longest <= longest_allowed && IsUsable(cloud, i)) {
-      out.emplace_back(distance, i);
-    }
-  });
-  if (near.size() > kMostShowing) {
-    const auto last = near.begin() + static_cast<std::ptrdiff_t>(kMostShowing);
-    std::nth_element(near.begin(), last, near.end());
-    radius = std::min(radius, std::sqrt(last->first));
-    near.erase(last, near.end());
-  }
-  LeaveIfAbandoned();
-  std::vector<int64_t> rows;
-  for (const auto& item : near) rows.push_back(item.second);
-  std::sort(rows.begin(), rows.end());
-  GaussianCloud out;
-  out.Resize(static_cast<int64_t>(rows.size()), 0);
-  for (size_t k = 0; k < rows.size(); ++k) {
-    const int64_t i = rows[k];
-    std::copy_n(cloud.means.data() + 3 * i, 3, out.means.data() + 3 * k);
-    std::copy_n(cloud.log_scales.data() + 3 * i, 3, out.log_scales.data() + 3 * k);
-    std::copy_n(cloud.quats.data() + 4 * i, 4, out.quats.data() + 4 * k);
-    out.opacity_logits[k] = cloud.opacity_logits[static_cast<size_t>(i)];
-    const float* sh = cloud.sh.data() + i * cloud.sh_stride();
+// Instead of colours: how much of a Gaussian is seen over black.
+void ShowBrightness(GaussianCloud& cloud) {
+  for (size_t k = 0; k < cloud.sh.size(); k += 3) {
+    float* const sh = cloud.sh.data() + k;
     const float brightness = 0.5f + kSh0 * std::max({sh[0], sh[1], sh[2]});
     const float seen = std::clamp((brightness - kUnseen) / (kSeen - kUnseen), 0.0f, 1.0f);
-    std::fill_n(out.sh.data() + 3 * k, 3, (seen - 0.5f) / kSh0);
+    std::fill_n(sh, 3, (seen - 0.5f) / kSh0);
   }
-  return out;
 }
 
 // √(largest × middle axis) of their 10 % quantiles over the visible Gaussians, weighted by opacity × area (product of
@@ -140,11 +102,14 @@ SizeFeatures SizesOf(const GaussianCloud& cloud) {
 
 }  // namespace
 
-Result<PixelSizeProbe> PixelSizeProbe::Make(const GaussianCloud& whole) {
-  const Framing framing = FrameCloud(whole);
+Result<PixelSizeProbe> PixelSizeProbe::Make(const GaussianCloud& whole) { return Make(FindTellingGaussians(whole)); }
+
+Result<PixelSizeProbe> PixelSizeProbe::Make(TellingGaussians telling) {
+  const Framing& framing = telling.framing;
+  const double radius = telling.radius;
   PixelSizeProbe probe;
-  double radius = framing.radius;
-  probe.cloud_ = Telling(whole, framing, radius);
+  probe.cloud_ = std::move(telling.cloud);
+  ShowBrightness(probe.cloud_);
   const std::optional<double> start = AxisOfSmallGaussians(probe.cloud_);
   if (!start) {
     return Error{ErrorCode::kBadArgument,

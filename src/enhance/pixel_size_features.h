@@ -9,6 +9,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "enhance/outline_profile.h"
+#include "enhance/showing_gaussians.h"
 #include "render/rasterizer.h"
 
 namespace anchorsplat {
@@ -43,6 +44,7 @@ class PixelSizeProbe {
   // Only Gaussians near the middle of the cloud and small beside it are looked at, and at most 200,000 of them.
   // kBadArgument: fewer than kLeastGaussians of them have an opacity of 10 % or more and three positive scales.
   static Result<PixelSizeProbe> Make(const GaussianCloud& cloud);
+  static Result<PixelSizeProbe> Make(TellingGaussians telling);
 
   // A first guess from the sizes of the Gaussians, within a factor of three or so; world units.
   double start() const { return start_; }

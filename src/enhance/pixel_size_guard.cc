@@ -18,8 +18,6 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr double kFewBlack = 0.01;  // share of the Gaussians below which black ones cannot move an outline
-
 constexpr int64_t kNeighbours = 8;
 constexpr int64_t kGuardSamples = 256;  // of the spacing; its median is good to a few percent
 
@@ -38,13 +36,10 @@ constexpr double kMoved = 1.5;
 constexpr double kHarmless = 0.7;
 
 // Side of the square that one Gaussian has for itself, where they lie on surfaces: kNeighbours others lie within π r².
-double Spacing(const GaussianCloud& cloud, const std::vector<int64_t>& rows) {
-  const auto count = static_cast<int64_t>(rows.size());
+double Spacing(const GaussianCloud& cloud) {
+  const int64_t count = cloud.size();
   if (count <= kNeighbours) return 0;
-  Buffer<float> positions(static_cast<size_t>(3 * count));
-  for (int64_t k = 0; k < count; ++k) {
-    std::copy_n(cloud.means.data() + 3 * rows[static_cast<size_t>(k)], 3, positions.data() + 3 * k);
-  }
+  const Buffer<float>& positions = cloud.means;
   const int64_t samples = std::min(kGuardSamples, count);
   Buffer<float> farthest(static_cast<size_t>(samples));
   ParallelFor(0, samples, 8, [&](int64_t first, int64_t last) {
@@ -65,26 +60,38 @@ double Spacing(const GaussianCloud& cloud, const std::vector<int64_t>& rows) {
   return double{Quantile(farthest, 0.5)} * std::sqrt(std::numbers::pi / static_cast<double>(kNeighbours));
 }
 
-// Usable rows of a cloud, as far as an estimate looks at them.
-GaussianCloud WithoutHarmonics(const GaussianCloud& cloud, const std::vector<int64_t>& rows) {
-  GaussianCloud out;
-  out.Resize(std::ssize(rows), 0);
-  out.render_mode = cloud.render_mode;
-  out.comments = cloud.comments;
-  ParallelFor(0, out.size(), 1 << 14, [&](int64_t first, int64_t last) {
-    for (int64_t k = first; k < last; ++k) {
-      const int64_t i = rows[static_cast<size_t>(k)];
-      std::copy_n(cloud.means.data() + 3 * i, 3, out.means.data() + 3 * k);
-      std::copy_n(cloud.log_scales.data() + 3 * i, 3, out.log_scales.data() + 3 * k);
-      std::copy_n(cloud.quats.data() + 4 * i, 4, out.quats.data() + 4 * k);
-      out.opacity_logits[static_cast<size_t>(k)] = cloud.opacity_logits[static_cast<size_t>(i)];
-      std::copy_n(cloud.sh.data() + i * cloud.sh_stride(), 3, out.sh.data() + 3 * k);
-    }
-  });
-  return out;
-}
-
 std::string Number(double value) { return Fixed(value, value < 10 ? 1 : 0); }
+
+// `probe`: of showing.telling. What is left of that is used up.
+Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, const Result<PixelSizeProbe>& probe,
+                                 std::optional<RenderMode> mode) {
+  PixelSizeEvidence evidence;
+  evidence.gaussians = showing.bright.size();
+  if (evidence.gaussians < kLeastGaussians) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("fewer than ", kLeastGaussians, " visible Gaussians to estimate a pixel size from")};
+  }
+  evidence.spacing = Spacing(showing.bright);
+  if (!probe.ok()) return probe.error();
+  evidence.small_axis = probe->start();
+  LeaveIfAbandoned();
+  Buffer<float> middle;
+  for (size_t i = 0; i < showing.bright.opacity_logits.size(); ++i) {
+    std::array<float, 3> axes;
+    for (size_t a = 0; a < 3; ++a) axes[a] = std::exp(showing.bright.log_scales[3 * i + a]);
+    std::sort(axes.begin(), axes.end());
+    middle.push_back(axes[1]);
+  }
+  evidence.width = double{Quantile(middle, 0.25)};
+  if (showing.telling_not_black) {
+    Result<PixelSizeProbe> without = PixelSizeProbe::Make(std::move(*showing.telling_not_black));
+    if (without.ok()) {
+      const auto estimate = EstimatePixelSize(*without, mode);
+      if (estimate.ok()) evidence.without_black = estimate->size;
+    }
+  }
+  return evidence;
+}
 
 }  // namespace
 
@@ -93,32 +100,9 @@ double MostGaussiansPerPixel(int64_t gaussians) {
 }
 
 Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud) {
-  const ShowingGaussians showing = FindShowingGaussians(cloud);
-  PixelSizeEvidence evidence;
-  evidence.gaussians = static_cast<int64_t>(showing.bright.size());
-  if (evidence.gaussians < kLeastGaussians) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("fewer than ", kLeastGaussians, " visible Gaussians to estimate a pixel size from")};
-  }
-  evidence.spacing = Spacing(cloud, showing.bright);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeProbe probe, PixelSizeProbe::Make(cloud));
-  evidence.small_axis = probe.start();
-  LeaveIfAbandoned();
-  Buffer<float> middle;
-  for (const int64_t i : showing.bright) {
-    std::array<float, 3> axes;
-    for (size_t a = 0; a < 3; ++a) axes[a] = std::exp(cloud.log_scales[static_cast<size_t>(3 * i) + a]);
-    std::sort(axes.begin(), axes.end());
-    middle.push_back(axes[1]);
-  }
-  evidence.width = double{Quantile(middle, 0.25)};
-
-  const auto black = static_cast<double>(cloud.size()) - static_cast<double>(showing.not_black.size());
-  if (black > kFewBlack * static_cast<double>(cloud.size())) {
-    const auto without = EstimatePixelSize(WithoutHarmonics(cloud, showing.not_black));
-    if (without.ok()) evidence.without_black = without->size;
-  }
-  return evidence;
+  ShowingGaussians showing = FindShowingGaussians(cloud);
+  const Result<PixelSizeProbe> probe = PixelSizeProbe::Make(std::move(showing.telling));
+  return Gather(showing, probe, cloud.render_mode);
 }
 
 PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidence& evidence) {
@@ -143,8 +127,14 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
 }
 
 Result<PixelSizeFinding> FindPixelSize(const GaussianCloud& cloud) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEstimate estimate, EstimatePixelSize(cloud));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEvidence evidence, GatherPixelSizeEvidence(cloud));
+  return FindPixelSize(FindShowingGaussians(cloud), cloud.render_mode);
+}
+
+Result<PixelSizeFinding> FindPixelSize(ShowingGaussians showing, std::optional<RenderMode> mode) {
+  Result<PixelSizeProbe> probe = PixelSizeProbe::Make(std::move(showing.telling));
+  if (!probe.ok()) return probe.error();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEstimate estimate, EstimatePixelSize(*probe, mode));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEvidence evidence, Gather(showing, probe, mode));
   return Judge(estimate, evidence);
 }
 

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "enhance/pixel_size_estimate.h"
+#include "enhance/showing_gaussians.h"
 
 namespace anchorsplat {
 
@@ -41,5 +43,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
 
 // Scales with the cloud. Errors: those of EstimatePixelSize.
 Result<PixelSizeFinding> FindPixelSize(const GaussianCloud& cloud);
+// The same of what was found in a cloud; `mode`: its render mode.
+Result<PixelSizeFinding> FindPixelSize(ShowingGaussians showing, std::optional<RenderMode> mode);
 
 }  // namespace anchorsplat

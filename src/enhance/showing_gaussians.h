@@ -2,10 +2,12 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
+#include <memory>
+#include <optional>
 
+#include "core/cloud_blocks.h"
+#include "core/framing.h"
 #include "core/gaussian_cloud.h"
-#include "core/parallel.h"
 
 namespace anchorsplat {
 
@@ -14,36 +16,46 @@ inline constexpr float kShowingOpacity = 0.1f;
 inline constexpr double kShowingFarthest = 1.5;  // of the radius that frames the cloud
 inline constexpr size_t kMostShowing = 200'000;
 
-// The Gaussians of a cloud that say something about its fit: usable, of kShowingOpacity or more and near the middle of
-// the cloud; those nearest to it where there are more than kMostShowing. Ascending rows.
-struct ShowingGaussians {
-  std::vector<int64_t> all;
-  // Without those that are nearly black: fits on black keep black ones around the object that no picture shows. The
-  // same as `all` where fewer than kLeastGaussians are not black.
-  std::vector<int64_t> bright;
-  std::vector<int64_t> not_black;  // of the whole cloud, usable, visible or not
+// The Gaussians whose outlines say something: those near the middle of the cloud and small beside it, whatever their
+// opacity, and the kMostShowing nearest to it where there are more: a part of a scene has outlines enough, while every
+// so many Gaussians of it would have gaps. Giants would drown what does say something.
+struct TellingGaussians {
+  GaussianCloud cloud;  // without harmonics, in the order of the whole cloud
+  Framing framing;      // of the whole cloud
+  double radius = 1;    // of the part, where it was cut, else the framing's
 };
-ShowingGaussians FindShowingGaussians(const GaussianCloud& cloud);
 
-// What `look(i, out)` puts into `out` for all i below `count`, in their order. Looks at many at a time.
-template <typename Item, typename Look>
-std::vector<Item> CollectRows(int64_t count, Look&& look) {
-  constexpr int64_t kRowsPerTask = 1 << 16;
-  std::vector<std::vector<Item>> parts(static_cast<size_t>((count + kRowsPerTask - 1) / kRowsPerTask));
-  ParallelFor(0, count, kRowsPerTask, [&](int64_t first, int64_t last) {
-    std::vector<Item>& part = parts[static_cast<size_t>(first / kRowsPerTask)];
-    for (int64_t i = first; i < last; ++i) look(i, part);
-  });
-  std::vector<Item> all;
-  size_t size = 0;
-  for (const auto& part : parts) size += part.size();
-  all.reserve(size);
-  for (auto& part : parts) {
-    all.insert(all.end(), part.begin(), part.end());
-    std::vector<Item>().swap(part);
-  }
-  return all;
-}
+// The Gaussians of a cloud that say something about its fit. All without harmonics, in the order of the whole cloud.
+struct ShowingGaussians {
+  // Usable, of kShowingOpacity or more and near the middle of the cloud; those nearest to it where there are more than
+  // kMostShowing.
+  GaussianCloud all;
+  // The same of those that are not nearly black: fits on black keep black ones around the object that no picture shows.
+  // The same as `all` where fewer than kLeastGaussians are not black.
+  GaussianCloud bright;
+  TellingGaussians telling;
+  // Of the cloud without black Gaussians, visible or not; nothing where these are too few to move an outline.
+  std::optional<TellingGaussians> telling_not_black;
+};
+
+// Finds them in a splat that is looked at block by block, twice, or three times where there are black ones. Keeps up to
+// 100 MB.
+class ShowingStudy final : public RowStudy {
+ public:
+  explicit ShowingStudy(const CloudBlocks& blocks);
+  ~ShowingStudy() override;
+  bool done() const override;
+  void Look(const CloudBlock& block) override;
+  void EndPass() override;
+  ShowingGaussians Take();  // once it is done
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+ShowingGaussians FindShowingGaussians(const CloudView& cloud);
+TellingGaussians FindTellingGaussians(const CloudView& cloud);
 
 double SquaredDistance(const float* a, const float* b);  // of two points of three coordinates
 

@@ -70,18 +70,20 @@ std::string_view NameOf(TrainedKind kind) {
   }
 }
 
-SizeTails FindSizeTails(const GaussianCloud& cloud) {
+SizeTails FindSizeTails(const GaussianCloud& cloud) { return SizeTailsOf(FindShowingGaussians(cloud).all); }
+
+SizeTails SizeTailsOf(const GaussianCloud& showing) {
   SizeTails tails;
   Buffer<float> smallest, middle;
   std::vector<std::pair<float, float>> areas;
-  for (const int64_t i : FindShowingGaussians(cloud).all) {
-    const float* scales = cloud.log_scales.data() + 3 * i;
+  for (size_t i = 0; i < showing.opacity_logits.size(); ++i) {
+    const float* scales = showing.log_scales.data() + 3 * i;
     std::array<float, 3> axes = {scales[0], scales[1], scales[2]};
     std::sort(axes.begin(), axes.end());
     if (!std::isfinite(axes[0])) continue;  // flat
     smallest.push_back(axes[0]);
     middle.push_back(axes[1]);
-    areas.emplace_back(axes[1] + axes[2], Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]));
+    areas.emplace_back(axes[1] + axes[2], Sigmoid(showing.opacity_logits[i]));
   }
   tails.gaussians = static_cast<int64_t>(middle.size());
   if (middle.empty()) return tails;

@@ -36,6 +36,7 @@ struct SizeTails {
   double opaque = 0;      // the share of opacities above 0.95 among the tenth of least middle × largest axis
 };
 SizeTails FindSizeTails(const GaussianCloud& cloud);
+SizeTails SizeTailsOf(const GaussianCloud& showing);  // of ShowingGaussians::all
 
 // Looks at sizes only, not at what the cloud says of itself. Nothing: fewer than 200 Gaussians, too few to tell; below
 // 1000 there is more that is unclear.

@@ -11,6 +11,7 @@
 #include "core/cloud_view.h"
 #include "core/framing.h"
 #include "core/log.h"
+#include "core/parallel.h"
 #include "core/random.h"
 #include "core/run_context.h"
 #include "core/spherical_harmonics.h"
@@ -30,6 +31,7 @@ constexpr int kPredictingViews = 8, kPredictingPixels = 128;
 constexpr double kPredictedPsnr = 56;
 constexpr double kReachesViews = 0.01;  // of the squares that it would have with nothing in front of it
 constexpr int kMostTrials = 10;
+constexpr int64_t kRowsAtOnce = 1 << 14;
 constexpr double kCloseEnough = 0.01;  // of the number that go
 // α is capped at 0.999, where no gradient flows. Opacities are lowered below that while gradients are taken.
 constexpr float kHighestOpacity = 0.98f;
@@ -98,17 +100,19 @@ Result<Shown> FindShown(CloudView cloud, const std::vector<Camera>& views, Rende
     signs.box = {0, 0, camera.intrinsics.width, camera.intrinsics.height};
     for (float& sign : signs.color.pixels) sign = random.Below(2) == 0 ? -1.0f : 1.0f;
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Backward(cloud, signs, gradient));
-    for (size_t i = 0; i < logits.size(); ++i) {
-      if (gradient.radii[2 * i] <= 0) continue;
-      const double opacity = Sigmoid(double{logits[i]});
-      // o·∂L/∂o = ∂L/∂logit / (1 − o), the sum of sign·T·α·(colour − behind) over the pixels.
-      const double sum = gradient.opacity_logits[i] / (1 - opacity);
-      shown.additions[i] = std::max(shown.additions[i], 0.0) + sum * sum;
-      for (size_t c = 0; c < 3; ++c) shown.reaches[i] += std::pow(gradient.sh[stride * i + c] / kSh0, 2) / 3;
-      // ∫ exp(−r²/σ²) of radii of 3 σ.
-      shown.footprints[i] +=
-          opacity * opacity * std::numbers::pi * (gradient.radii[2 * i] / 3.0) * (gradient.radii[2 * i + 1] / 3.0);
-    }
+    ParallelFor(0, cloud.size(), kRowsAtOnce, [&](int64_t first, int64_t last) {
+      for (auto i = static_cast<size_t>(first); i < static_cast<size_t>(last); ++i) {
+        if (gradient.radii[2 * i] <= 0) continue;
+        const double opacity = Sigmoid(double{logits[i]});
+        // o·∂L/∂o = ∂L/∂logit / (1 − o), the sum of sign·T·α·(colour − behind) over the pixels.
+        const double sum = gradient.opacity_logits[i] / (1 - opacity);
+        shown.additions[i] = std::max(shown.additions[i], 0.0) + sum * sum;
+        for (size_t c = 0; c < 3; ++c) shown.reaches[i] += std::pow(gradient.sh[stride * i + c] / kSh0, 2) / 3;
+        // ∫ exp(−r²/σ²) of radii of 3 σ.
+        shown.footprints[i] +=
+            opacity * opacity * std::numbers::pi * (gradient.radii[2 * i] / 3.0) * (gradient.radii[2 * i + 1] / 3.0);
+      }
+    });
     progress.Advance();
   }
   return shown;
@@ -256,12 +260,14 @@ Result<std::vector<int64_t>> PredictUnseen(const GaussianCloud& cloud) {
                                ViewsAround(cloud, kPredictingViews, kPredictingPixels));
   // A little brighter than black, where the gradient tells how much of them reaches the views.
   Buffer<float> colours(3 * cloud.opacity_logits.size());
-  for (int64_t i = 0; i < count; ++i) {
-    for (int64_t c = 0; c < 3; ++c) {
-      colours[static_cast<size_t>(3 * i + c)] =
-          std::max(cloud.sh[static_cast<size_t>(i * cloud.sh_stride() + c)], DcFromColor(1e-4f));
+  ParallelFor(0, count, kRowsAtOnce, [&](int64_t first, int64_t last) {
+    for (int64_t i = first; i < last; ++i) {
+      for (int64_t c = 0; c < 3; ++c) {
+        colours[static_cast<size_t>(3 * i + c)] =
+            std::max(cloud.sh[static_cast<size_t>(i * cloud.sh_stride() + c)], DcFromColor(1e-4f));
+      }
     }
-  }
+  });
   CloudView view(cloud);
   view.sh_degree = 0;
   view.sh = colours;

@@ -52,7 +52,7 @@ PixelModel AreaModel(double upscale) { return {static_cast<int>(std::ceil(upscal
 
 std::string PixelAreaComment(double upscale) { return Cat(kPixelAreas, upscale, " times closer"); }
 
-bool IsFittedToPixelAreas(const GaussianCloud& cloud) {
+bool IsFittedToPixelAreas(const CloudView& cloud) {
   return std::any_of(cloud.comments.begin(), cloud.comments.end(),
                      [](const std::string& comment) { return comment.starts_with(kPixelAreas); });
 }

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "core/camera.h"
+#include "core/cloud_view.h"
 #include "core/gaussian_cloud.h"
 #include "core/image.h"
 #include "core/result.h"
@@ -39,7 +40,7 @@ PixelModel AreaModel(double upscale);
 // What a splat fitted with that model says about itself in its comments (GaussianCloud::comments), and whether one says
 // so: it has not lost the width that standard fits lose.
 std::string PixelAreaComment(double upscale);
-bool IsFittedToPixelAreas(const GaussianCloud& cloud);
+bool IsFittedToPixelAreas(const CloudView& cloud);
 
 // From few rays to all of them while an optimisation runs: one, then half as many per side as there will be, then all.
 // Early on the cheap model is good enough, and the last part undoes its bias.

@@ -1,5 +1,6 @@
 #include "formats/opened_splat.h"
 
+#include <memory>
 #include <new>
 #include <string>
 #include <string_view>
@@ -114,6 +115,15 @@ std::optional<CloudExtent> ExtentOf(const fs::path& path, const SplatFormat* for
   if (path == "-" || !IsFile(SplatPath(path))) return std::nullopt;
   const Result<OpenedSplat> file = OpenedSplat::Open(path, format);
   return file.ok() ? file->Extent() : std::nullopt;
+}
+
+Result<std::unique_ptr<CloudBlocks>> OpenedSplat::Blocks(const ReadLimits& limits) const {
+  if (format_ != nullptr && format_->blocks != nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(std::unique_ptr<CloudBlocks> blocks, format_->blocks(input_, limits));
+    if (blocks != nullptr) return blocks;
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, Read(limits));
+  return std::unique_ptr<CloudBlocks>(std::make_unique<MemoryBlocks>(std::move(cloud)));
 }
 
 void RecordSplat(const fs::path& path) {

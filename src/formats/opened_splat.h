@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <utility>
 
+#include "core/cloud_blocks.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
@@ -30,6 +32,10 @@ class OpenedSplat {
   std::optional<CloudExtent> Extent() const;
   // Errors: see ReadCloud. `extras` gets what the file says beside its Gaussians, if not null.
   Result<GaussianCloud> Read(const ReadLimits& limits = {}, ExtraProperties* extras = nullptr) const;
+  // The same Gaussians to look at block by block: straight from the file where it can be read so, which takes little
+  // memory, else all of it is read. This must outlive it and stay where it is. Errors: of Read; some of them come from
+  // CloudBlocks::ForEach.
+  Result<std::unique_ptr<CloudBlocks>> Blocks(const ReadLimits& limits = {}) const;
 
  private:
   OpenedSplat(InputFile input, const SplatFormat* format) : input_(std::move(input)), format_(format) {}

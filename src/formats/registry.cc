@@ -13,6 +13,7 @@
 #include "formats/gltf/gltf_writer.h"
 #include "formats/gsplat_checkpoint/gsplat_checkpoint.h"
 #include "formats/ksplat/ksplat_reader.h"
+#include "formats/ply/ply_blocks.h"
 #include "formats/ply/ply_reader.h"
 #include "formats/ply/ply_writer.h"
 #include "formats/sog/sog_reader.h"
@@ -94,6 +95,7 @@ constexpr SplatFormat kFormats[] = {
      .extent = ExtentOfPly,
      .describe = DescribePly,
      .read = ReadPly,
+     .blocks = BlocksOfPly,
      .read_with_extras = ReadPlyWithExtras,
      .write = WritePly,
      .write_with_extras = WritePlyWithExtras,

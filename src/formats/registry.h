@@ -3,11 +3,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "core/cloud_blocks.h"
 #include "core/cloud_view.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
@@ -62,6 +64,9 @@ struct SplatFormat {
   uint64_t (*size)(const InputFile& file) = nullptr;
   // Null: recognised, but not read or not written by this version.
   Result<GaussianCloud> (*read)(const InputFile& file, const ReadLimits& limits) = nullptr;
+  // The same to look at block by block, with memory for few of them; null inside where this file cannot be read so, as
+  // where the format cannot. The file must outlive it.
+  Result<std::unique_ptr<CloudBlocks>> (*blocks)(const InputFile& file, const ReadLimits& limits) = nullptr;
   // `read` and `write` with what a file says beside its Gaussians (extra_properties.h). Null where that has no place.
   Result<GaussianCloud> (*read_with_extras)(const InputFile& file, const ReadLimits& limits,
                                             ExtraProperties& extras) = nullptr;

@@ -1,7 +1,9 @@
 #include "request/findings.h"
 
 #include <cmath>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -10,6 +12,7 @@
 #include "core/file_system.h"
 #include "core/text.h"
 #include "enhance/enhanced_mark.h"
+#include "enhance/showing_gaussians.h"
 #include "formats/registry.h"
 #include "io/input_file.h"
 #include "model/compact/compact_network.h"
@@ -43,17 +46,30 @@ std::vector<std::string> Problems(const CloudStatistics& s) {
   return out;
 }
 
-void LookAt(SplatFindings& findings) {
-  findings.statistics = ComputeStatistics(findings.cloud);
-  findings.looks = FindTrainedKind(findings.cloud);
+// Goes through the Gaussians two or three times. Errors: of reading.
+Status LookAt(CloudBlocks& blocks, SplatFindings& findings) {
+  findings.render_mode = blocks.render_mode();
+  findings.comments = blocks.comments();
+  CloudView said;  // all but the Gaussians
+  said.render_mode = findings.render_mode;
+  said.comments = findings.comments;
+  findings.lost_no_width = HasLostNoWidth(said);
+
+  StatisticsStudy statistics(blocks);
+  ShowingStudy study(blocks);
+  RowStudy* const studies[] = {&statistics, &study};
+  ANCHORSPLAT_RETURN_IF_ERROR(Study(blocks, studies));
+  findings.statistics = statistics.Find();
+  ShowingGaussians showing = study.Take();
+  findings.looks = Judge(SizeTailsOf(showing.all));
   // As `enhance` takes it.
-  GaussianCloud& cloud = findings.cloud;
-  const bool untold = !cloud.render_mode && !HasLostNoWidth(cloud);
-  if (untold && findings.looks == TrainedKind::kAntialiased) cloud.render_mode = RenderMode::kAntialiased;
-  findings.pixel_size = FindPixelSize(cloud);
-  if (untold) cloud.render_mode.reset();
-  findings.lost_width = FindLostWidth(cloud, findings.looks, kInfoUpscale);
+  const bool untold = !findings.render_mode && !findings.lost_no_width;
+  const bool antialiased = untold && findings.looks == TrainedKind::kAntialiased;
+  findings.pixel_size =
+      FindPixelSize(std::move(showing), antialiased ? std::optional(RenderMode::kAntialiased) : findings.render_mode);
+  findings.lost_width = FindLostWidth(said, findings.looks, kInfoUpscale);
   findings.problems = Problems(findings.statistics);
+  return {};
 }
 
 struct ModelFindings {
@@ -124,19 +140,19 @@ Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& n
   SplatFindings findings;
   findings.file = name;
   findings.file_bytes = file.bytes();
-  ANCHORSPLAT_ASSIGN_OR_RETURN(findings.cloud, file.Read());
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::unique_ptr<CloudBlocks> blocks, file.Blocks());
   findings.format = file.format()->name;
   if (file.format()->describe != nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(findings.facts, file.format()->describe(file.input()));
   }
-  LookAt(findings);
+  ANCHORSPLAT_RETURN_IF_ERROR(LookAt(*blocks, findings));
   return findings;
 }
 
-SplatFindings InspectSplat(GaussianCloud cloud) {
+SplatFindings InspectSplat(const CloudView& cloud) {
   SplatFindings findings;
-  findings.cloud = std::move(cloud);
-  LookAt(findings);
+  MemoryBlocks blocks(cloud);
+  (void)LookAt(blocks, findings);  // memory can be read
   return findings;
 }
 
@@ -161,8 +177,8 @@ nlohmann::json ToJson(const SplatFindings& f) {
                            {"upscale", kInfoUpscale},
                            {"likely", f.lost_width.likely()},
                            {"because", NameOf(f.lost_width.reason)}}},
-                         {"comments", f.cloud.comments},
-                         {"credits", CreditsOf(f.cloud.comments)},
+                         {"comments", f.comments},
+                         {"credits", CreditsOf(f.comments)},
                          {"largest_axis", percentiles(s.largest_axis)},
                          {"smallest_axis", percentiles(s.smallest_axis)},
                          {"axis_ratio", percentiles(s.axis_ratio)},
@@ -183,7 +199,7 @@ nlohmann::json ToJson(const SplatFindings& f) {
                          {"predicted_roughly", nlohmann::json::array()}};
   for (const auto& [name, value] : f.facts.all()) json["facts"][name] = value;
   if (s.bounds) json["bounds"] = {{"min", s.bounds->min}, {"max", s.bounds->max}};
-  if (f.cloud.render_mode) json["render_mode"] = NameOf(*f.cloud.render_mode);
+  if (f.render_mode) json["render_mode"] = NameOf(*f.render_mode);
   if (f.looks) json["looks"] = NameOf(*f.looks);
   if (f.pixel_size.ok()) {
     json["pixel_size"] = {{"estimate", f.pixel_size->estimate.size},

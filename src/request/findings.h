@@ -9,7 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "core/gaussian_cloud.h"
+#include "core/cloud_blocks.h"
+#include "core/cloud_view.h"
 #include "core/result.h"
 #include "core/statistics.h"
 #include "enhance/lost_width.h"
@@ -25,7 +26,9 @@ struct SplatFindings {
   std::string format;  // by content
   FormatFacts facts;
   uint64_t file_bytes = 0;
-  GaussianCloud cloud;
+  std::optional<RenderMode> render_mode;  // as the file says
+  std::vector<std::string> comments;
+  bool lost_no_width = false;  // HasLostNoWidth (enhance/enhanced_mark.h)
   CloudStatistics statistics;
   Result<PixelSizeFinding> pixel_size = Error{};
   std::optional<TrainedKind> looks;   // by its sizes, whatever the file says; nothing where there are too few Gaussians
@@ -40,10 +43,11 @@ inline constexpr double kInfoUpscale = 4;  // the default zoom of `enhance`
 std::string_view InWords(const std::optional<TrainedKind>& looks);
 std::string InWords(const LostWidth& lost, bool pixel_doubted);
 
-// `name` is the file's, for people. Errors: of reading.
+// `name` is the file's, for people. The same numbers with any number of threads, whatever of the file is in memory.
+// Errors: of reading.
 Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& name);
 // Of a splat in memory: without format and size of a file.
-SplatFindings InspectSplat(GaussianCloud cloud);
+SplatFindings InspectSplat(const CloudView& cloud);
 nlohmann::json ToJson(const SplatFindings& findings);
 
 // What is in a network's weights.

@@ -293,24 +293,16 @@ Result<Engine::Answer> Engine::Put(const Json& request, std::span<const std::byt
 
 Result<Engine::Answer> Engine::Info(const Json& request) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(OpenCloud* const found, FindCloud(request, "cloud"));
-  // Taken out of the list and lent, not copied: it may be as large as memory allows. Where that is used up on the way,
-  // the splat is closed, not empty.
-  const auto entry = std::ranges::find(clouds_, found, [](const auto& kept) { return kept.second.get(); });
-  const int64_t number = entry->first;
-  std::unique_ptr<OpenCloud> open = std::move(entry->second);
-  clouds_.erase(entry);
-  SplatFindings findings = InspectSplat(std::move(open->cloud));
-  findings.file = open->name;
-  findings.format = open->format;
-  findings.facts = open->facts;
-  findings.file_bytes = open->bytes;
+  SplatFindings findings = InspectSplat(found->cloud);
+  findings.file = found->name;
+  findings.format = found->format;
+  findings.facts = found->facts;
+  findings.file_bytes = found->bytes;
   Answer answer;
   answer.json = ToJson(findings);
   answer.json["looks_in_words"] = InWords(findings.looks);
   answer.json["lost_width_in_words"] =
       InWords(findings.lost_width, findings.pixel_size.ok() && findings.pixel_size->contradicted());
-  open->cloud = std::move(findings.cloud);
-  clouds_[number] = std::move(open);
   return answer;
 }
 

@@ -23,15 +23,7 @@ Status CheckPromise(const InputFile& file, const PlyElement& element, uint64_t r
 
 }  // namespace
 
-Status ReadPlyBody(const InputFile& file, const PlyHeader& header, const PlyElement& vertex,
-                   const std::function<std::vector<PlyDestination>()>& make_room) {
-  if (header.encoding == PlyEncoding::kAscii) {
-    // A value is at least one digit and a blank; the very last line end may be missing.
-    if ((file.size() - header.body + 1) / 2 / vertex.properties.size() < static_cast<uint64_t>(vertex.count)) {
-      return CheckPromise(file, vertex, 2 * vertex.properties.size(), header.body).error();
-    }
-    return ReadAsciiBody(file, header, vertex, make_room());
-  }
+Result<uint64_t> BeginOfPlyRows(const InputFile& file, const PlyHeader& header, const PlyElement& vertex) {
   uint64_t begin = header.body;
   for (const PlyElement& element : header.elements) {
     ANCHORSPLAT_RETURN_IF_ERROR(CheckPromise(file, element, element.row_size(), begin));
@@ -44,6 +36,25 @@ Status ReadPlyBody(const InputFile& file, const PlyHeader& header, const PlyElem
       begin += static_cast<uint64_t>(element.count) * element.row_size();
     }
   }
+  return begin;
+}
+
+Status CheckGaussianLimit(const InputFile& file, const PlyElement& vertex, const ReadLimits& limits) {
+  if (vertex.count <= limits.max_gaussians) return {};
+  return Error{ErrorCode::kBadFile, Cat(file.name(), ": line ", vertex.line, ": has ", WithThousands(vertex.count),
+                                        " Gaussians, more than the limit of ", WithThousands(limits.max_gaussians))};
+}
+
+Status ReadPlyBody(const InputFile& file, const PlyHeader& header, const PlyElement& vertex,
+                   const std::function<std::vector<PlyDestination>()>& make_room) {
+  if (header.encoding == PlyEncoding::kAscii) {
+    // A value is at least one digit and a blank; the very last line end may be missing.
+    if ((file.size() - header.body + 1) / 2 / vertex.properties.size() < static_cast<uint64_t>(vertex.count)) {
+      return CheckPromise(file, vertex, 2 * vertex.properties.size(), header.body).error();
+    }
+    return ReadAsciiBody(file, header, vertex, make_room());
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const uint64_t begin, BeginOfPlyRows(file, header, vertex));
   const std::vector<PlyDestination> to = make_room();
   if (!vertex.has_lists()) return ReadFixedRows(file, vertex, header.encoding, begin, to);
   SequentialReader reader(file, begin);

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <vector>
 
 #include "core/result.h"
+#include "formats/cloud_io.h"
 #include "formats/ply/ply_header.h"
 #include "formats/ply/ply_layout.h"
 #include "io/input_file.h"
@@ -15,5 +17,11 @@ namespace anchorsplat {
 // header promises, rows that are no numbers.
 Status ReadPlyBody(const InputFile& file, const PlyHeader& header, const PlyElement& vertex,
                    const std::function<std::vector<PlyDestination>()>& make_room);
+
+// The byte where the rows of `vertex` begin in a binary file. Errors: as above.
+Result<uint64_t> BeginOfPlyRows(const InputFile& file, const PlyHeader& header, const PlyElement& vertex);
+
+// kBadFile where the header promises more Gaussians than are wanted.
+Status CheckGaussianLimit(const InputFile& file, const PlyElement& vertex, const ReadLimits& limits);
 
 }  // namespace anchorsplat

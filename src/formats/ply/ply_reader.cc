@@ -1,13 +1,11 @@
 #include "formats/ply/ply_reader.h"
 
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
-#include "core/log.h"
-#include "core/smoothing_filter.h"
 #include "core/text.h"
 #include "formats/ply/ply_body.h"
+#include "formats/ply/ply_filter.h"
 #include "formats/ply/ply_header.h"
 #include "formats/ply/ply_layout.h"
 
@@ -24,30 +22,11 @@ std::vector<PlyDestination> MakeRoom(const PlyHeader& header, const PlyLayout& l
   return Destinations(layout, cloud, filter, extras);
 }
 
-// Makes the smoothing filter a part of the Gaussians, as the "fused" file of Mip-Splatting's program has it: every
-// program draws those, none but its own knows the property. What trains so is drawn with compensated opacity.
-Status FuseFilter(const InputFile& file, const Buffer<float>& filter, GaussianCloud& cloud) {
-  for (size_t i = 0; i < filter.size(); ++i) {
-    if (filter[i] >= 0 && std::isfinite(filter[i])) continue;
-    return Error{ErrorCode::kBadFile,
-                 Cat(file.name(), ": row ", WithThousands(static_cast<int64_t>(i) + 1), ": property \"", kFilter3d,
-                     "\" is ", filter[i], " (expected the size of Mip-Splatting's 3-D filter, 0 or more)")};
-  }
-  Smooth(cloud, filter, cloud.log_scales.data(), cloud.opacity_logits.data());
-  if (!cloud.render_mode) cloud.render_mode = RenderMode::kMip;
-  LogInfo(Cat(file.name(), ": Mip-Splatting's 3-D filter (", kFilter3d,
-              ") is made a part of scales and opacities; the render mode is ", NameOf(*cloud.render_mode)));
-  return {};
-}
-
 Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, ExtraProperties* extras) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(PlyHeader header, ReadPlyHeader(file));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyLayout layout, PlanPly(file, header));
   const PlyElement& vertex = *layout.vertex;
-  if (vertex.count > limits.max_gaussians) {
-    return Error{ErrorCode::kBadFile, Cat(file.name(), ": line ", vertex.line, ": has ", WithThousands(vertex.count),
-                                          " Gaussians, more than the limit of ", WithThousands(limits.max_gaussians))};
-  }
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckGaussianLimit(file, vertex, limits));
   GaussianCloud cloud;
   Buffer<float> filter;
   ANCHORSPLAT_RETURN_IF_ERROR(
@@ -59,7 +38,11 @@ Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, Extr
   WarnOfOddTags(file, header);
   cloud.render_mode = header.render_mode;
   cloud.comments = std::move(header.comments);
-  if (layout.filter) ANCHORSPLAT_RETURN_IF_ERROR(FuseFilter(file, filter, cloud));
+  if (layout.filter) {
+    ANCHORSPLAT_RETURN_IF_ERROR(FuseFilter(file, filter, 0, cloud));
+    if (!cloud.render_mode) cloud.render_mode = RenderMode::kMip;
+    SayFilterIsFused(file, *cloud.render_mode);
+  }
   return cloud;
 }
 

@@ -4,11 +4,11 @@
 #include <atomic>
 #include <bit>
 #include <cstring>
-#include <mutex>
 #include <vector>
 
 #include "core/parallel.h"
 #include "core/text.h"
+#include "formats/first_failure.h"
 
 namespace anchorsplat {
 
@@ -100,25 +100,6 @@ void Convert(const char* rows, size_t row_size, const std::vector<Column>& colum
     }
   }
 }
-
-// Keeps the failure of the lowest row, so that the message does not depend on which thread was first.
-class FirstFailure {
- public:
-  void Report(int64_t row, const Status& status) {
-    if (status.ok()) return;
-    const std::lock_guard lock(mutex_);
-    if (row < row_) {
-      row_ = row;
-      status_ = status;
-    }
-  }
-  const Status& status() const { return status_; }
-
- private:
-  std::mutex mutex_;
-  int64_t row_ = INT64_MAX;
-  Status status_;
-};
 
 }  // namespace
 

@@ -1,0 +1,314 @@
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "core/activations.h"
+#include "core/rank_search.h"
+#include "core/statistics.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// What quantiles are wanted of. Those of lengths and opacities are of their stored logarithms and logits: in the same
+// order, and two exponentials instead of one per Gaussian.
+enum Column : size_t { kLargest, kSmallest, kRatio, kOpacity, kX, kY, kZ, kColumns };
+
+constexpr std::array<double, 2> kMiddle = {0.01, 0.99};  // of the means, along an axis
+constexpr float kFarOut = 10;
+// Rows that may be outliers are kept until it is known; if there are more, all are looked at once more.
+constexpr size_t kMostKept = 1'000'000;
+
+constexpr float kEndless = std::numeric_limits<float>::infinity();
+constexpr Bounds kNowhere = {{kEndless, kEndless, kEndless}, {-kEndless, -kEndless, -kEndless}};
+
+void Widen(Bounds& box, const Bounds& other) {
+  for (size_t a = 0; a < 3; ++a) {
+    box.min[a] = std::min(box.min[a], other.min[a]);
+    box.max[a] = std::max(box.max[a], other.max[a]);
+  }
+}
+
+// Numbers of one block, side by side as quantiles take them.
+struct Values {
+  std::array<Buffer<float>, kColumns> columns;
+
+  // Calls per_row(i) for usable rows.
+  template <typename PerRow>
+  void Take(const CloudBlock& block, PerRow&& per_row) {
+    const auto rows = static_cast<size_t>(block.size());
+    for (Buffer<float>& column : columns) {
+      column.clear();
+      column.reserve(rows);
+    }
+    for (size_t i = 0; i < rows; ++i) {
+      for (size_t a = 0; a < 3; ++a) {
+        if (const float x = block.rows.means[3 * i + a]; std::isfinite(x)) columns[kX + a].push_back(x);
+      }
+      if (block.usable[i] == 0) continue;
+      per_row(i);
+      columns[kOpacity].push_back(block.rows.opacity_logits[i]);
+      const float* s = block.rows.log_scales.data() + 3 * i;
+      const float low = std::min({s[0], s[1], s[2]}), high = std::max({s[0], s[1], s[2]});
+      if (!std::isfinite(high)) continue;
+      columns[kLargest].push_back(high);
+      columns[kSmallest].push_back(low);
+      if (std::isfinite(low)) columns[kRatio].push_back(high - low);
+    }
+  }
+};
+
+bool IsPlausible(const CloudView& cloud, size_t i) {
+  static const float kLongest = std::log(kPlausibleExtent);
+  const float* mean = cloud.means.data() + 3 * i;
+  const float* scale = cloud.log_scales.data() + 3 * i;
+  return std::all_of(mean, mean + 3, [](float x) { return std::fabs(x) <= kPlausibleExtent; }) &&
+         std::all_of(scale, scale + 3, [](float x) { return x <= kLongest; });
+}
+
+float Between(float low, float high, double fraction) {
+  if (fraction == 0 || low == high) return low;  // infinite ones have no difference
+  return static_cast<float>(low + fraction * (static_cast<double>(high) - low));
+}
+
+// What one thread at a time counts into.
+struct Tally {
+  std::array<std::vector<uint32_t>, kColumns> counts;
+  CloudStatistics sums;
+  int64_t usable = 0, positive_scales = 0, unit_opacities = 0;
+  Values values;
+
+  Tally() { counts.fill(std::vector<uint32_t>(RankSearch::kCoarse)); }
+
+  void Add(const CloudBlock& block) {
+    values.Take(block, [&](size_t i) { Count(block.rows, i); });
+    for (size_t c = 0; c < kColumns; ++c) {
+      for (const float value : values.columns[c]) ++counts[c][RankSearch::CoarseOf(value)];
+    }
+    sums.not_finite += block.size() - std::ssize(values.columns[kOpacity]);
+  }
+
+  void Count(const CloudView& rows, size_t i) {
+    ++usable;
+    if (!IsPlausible(rows, i)) ++sums.implausible;
+    const float* q = rows.quats.data() + 4 * i;
+    const double norm =
+        std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] + double{q[2]} * q[2] + double{q[3]} * q[3]);
+    if (norm < 1e-12) {
+      ++sums.zero_quaternions;
+    } else if (std::abs(norm - 1) > 0.01) {
+      ++sums.unnormalised_quaternions;
+    }
+    const float logit = rows.opacity_logits[i];
+    if (logit < -5 && Sigmoid(logit) < 1.0f / 255) ++sums.invisible;  // ln(1/254) is −5.5
+    if (logit >= 0 && logit <= 1) ++unit_opacities;
+    const float* s = rows.log_scales.data() + 3 * i;
+    const float low = std::min({s[0], s[1], s[2]});
+    if (low >= 0) ++positive_scales;
+    if (!std::isfinite(low)) ++sums.zero_scales;
+  }
+};
+
+}  // namespace
+
+struct StatisticsStudy::State {
+  int pass = 0;
+  int64_t gaussians = 0;
+  int sh_degree = 0;
+  std::mutex mutex;
+  std::vector<std::unique_ptr<Tally>> tallies;  // that no thread has just now
+  std::vector<Bounds> bounds;                   // of each block: which of two zeros counts must not depend on threads
+  std::vector<RankSearch> searches;             // one per column
+  Tally sum;
+  // A mean within this box is no outlier, wherever exactly the middle ends.
+  Bounds surely_in = kNowhere;
+  Buffer<float> maybe_out;  // [.,3]
+  bool too_many = false;
+  Bounds box = kNowhere;  // outside are the outliers
+  std::atomic<int64_t> outliers = 0;
+
+  bool IsOut(const float* p) const {
+    bool out = false;
+    for (size_t a = 0; a < 3; ++a) out |= std::isfinite(p[a]) && (p[a] < box.min[a] || p[a] > box.max[a]);
+    return out;
+  }
+
+  std::unique_ptr<Tally> Borrow() {
+    {
+      const std::lock_guard lock(mutex);
+      if (!tallies.empty()) {
+        std::unique_ptr<Tally> tally = std::move(tallies.back());
+        tallies.pop_back();
+        return tally;
+      }
+    }
+    return std::make_unique<Tally>();
+  }
+  void GiveBack(std::unique_ptr<Tally> tally) {
+    const std::lock_guard lock(mutex);
+    tallies.push_back(std::move(tally));
+  }
+
+  void CountBlock(const CloudBlock& block) {
+    bounds[static_cast<size_t>(block.first / kCloudBlockRows)] = ComputeBounds(block.rows).value_or(kNowhere);
+    std::unique_ptr<Tally> tally = Borrow();
+    tally->Add(block);
+    GiveBack(std::move(tally));
+  }
+  void SumUp();
+  void BoundOutliers();
+  void RefineBlock(const CloudBlock& block);
+  void FindBox();
+  void CountOutliers(const CloudBlock& block);
+  Percentiles PercentilesOf(Column column, float (*meaning)(float)) const;
+};
+
+void StatisticsStudy::State::SumUp() {
+  for (const std::unique_ptr<Tally>& tally : tallies) {
+    for (size_t c = 0; c < kColumns; ++c) searches[c].Count(tally->counts[c]);
+    for (int64_t CloudStatistics::*count :
+         {&CloudStatistics::not_finite, &CloudStatistics::zero_quaternions, &CloudStatistics::unnormalised_quaternions,
+          &CloudStatistics::zero_scales, &CloudStatistics::invisible, &CloudStatistics::implausible}) {
+      sum.sums.*count += tally->sums.*count;
+    }
+    sum.usable += tally->usable;
+    sum.positive_scales += tally->positive_scales;
+    sum.unit_opacities += tally->unit_opacities;
+  }
+  tallies.clear();
+  for (RankSearch& search : searches) search.EndCounting();
+}
+
+// Where the middle 98 % begins and ends is known to one part in a hundred by now.
+void StatisticsStudy::State::BoundOutliers() {
+  for (size_t a = 0; a < 3; ++a) {
+    const RankSearch& search = searches[kX + a];
+    const double first_least = search.LeastOf(0), first_most = search.MostOf(0);
+    const double last_least = search.LeastOf(1), last_most = search.MostOf(1);
+    const double rounding = 1e-5 * (std::abs(first_least) + std::abs(first_most) + std::abs(last_most));
+    const double grown = 0.5 * (kFarOut + 1), shrunk = 0.5 * (kFarOut - 1);
+    surely_in.min[a] = static_cast<float>(grown * first_most - shrunk * last_least + rounding);
+    surely_in.max[a] = static_cast<float>(grown * last_least - shrunk * first_most - rounding);
+  }
+}
+
+void StatisticsStudy::State::RefineBlock(const CloudBlock& block) {
+  Values values;
+  values.Take(block, [](size_t) {});
+  for (size_t c = 0; c < kColumns; ++c) searches[c].Refine(values.columns[c]);
+  Buffer<float> maybe;
+  for (size_t i = 0; i < static_cast<size_t>(block.size()); ++i) {
+    const float* p = block.rows.means.data() + 3 * i;
+    bool in = true;
+    for (size_t a = 0; a < 3; ++a) in &= p[a] >= surely_in.min[a] && p[a] <= surely_in.max[a];
+    if (!in) maybe.insert(maybe.end(), p, p + 3);
+  }
+  if (maybe.empty()) return;
+  const std::lock_guard lock(mutex);
+  too_many |= maybe_out.size() + maybe.size() > 3 * kMostKept;
+  if (!too_many) maybe_out.insert(maybe_out.end(), maybe.begin(), maybe.end());
+}
+
+void StatisticsStudy::State::FindBox() {
+  for (size_t a = 0; a < 3; ++a) {
+    const RankSearch::Place low = searches[kX + a].At(0), high = searches[kX + a].At(1);
+    const float first = Between(low.low, low.high, low.fraction), last = Between(high.low, high.high, high.fraction);
+    const float centre = 0.5f * (first + last), half = 0.5f * (last - first);
+    box.min[a] = centre - kFarOut * half;
+    box.max[a] = centre + kFarOut * half;
+  }
+  if (too_many) return;
+  for (size_t k = 0; k < maybe_out.size(); k += 3) outliers += IsOut(maybe_out.data() + k) ? 1 : 0;
+}
+
+void StatisticsStudy::State::CountOutliers(const CloudBlock& block) {
+  int64_t here = 0;
+  for (size_t i = 0; i < static_cast<size_t>(block.size()); ++i) here += IsOut(block.rows.means.data() + 3 * i) ? 1 : 0;
+  outliers += here;
+}
+
+Percentiles StatisticsStudy::State::PercentilesOf(Column column, float (*meaning)(float)) const {
+  Percentiles out;
+  for (size_t k = 0; k < out.size(); ++k) {
+    const RankSearch::Place place = searches[column].At(k);
+    out[k] = Between(meaning(place.low), meaning(place.high), place.fraction);
+  }
+  return out;
+}
+
+StatisticsStudy::StatisticsStudy(const CloudBlocks& blocks) : state_(std::make_unique<State>()) {
+  state_->gaussians = blocks.size();
+  state_->sh_degree = blocks.sh_degree();
+  state_->bounds.resize(static_cast<size_t>((blocks.size() + kCloudBlockRows - 1) / kCloudBlockRows), kNowhere);
+  for (size_t c = 0; c < kColumns; ++c) {
+    c < kX ? state_->searches.emplace_back(kPercentiles) : state_->searches.emplace_back(kMiddle);
+  }
+}
+
+StatisticsStudy::~StatisticsStudy() = default;
+
+bool StatisticsStudy::done() const { return state_->pass >= (state_->too_many ? 3 : 2); }
+
+void StatisticsStudy::Look(const CloudBlock& block) {
+  if (state_->pass == 0) {
+    state_->CountBlock(block);
+  } else if (state_->pass == 1) {
+    state_->RefineBlock(block);
+  } else {
+    state_->CountOutliers(block);
+  }
+}
+
+void StatisticsStudy::EndPass() {
+  if (state_->pass == 0) {
+    state_->SumUp();
+    state_->BoundOutliers();
+  } else if (state_->pass == 1) {
+    state_->FindBox();
+  }
+  ++state_->pass;
+}
+
+CloudStatistics StatisticsStudy::Find() const {
+  const State& s = *state_;
+  CloudStatistics out = s.sum.sums;
+  out.gaussians = s.gaussians;
+  out.sh_degree = s.sh_degree;
+  Bounds all = kNowhere;
+  for (const Bounds& box : s.bounds) Widen(all, box);
+  if (all.min[0] <= all.max[0]) out.bounds = all;
+  const auto exp = [](float x) { return std::exp(x); };
+  out.largest_axis = s.PercentilesOf(kLargest, exp);
+  out.smallest_axis = s.PercentilesOf(kSmallest, exp);
+  out.axis_ratio = s.PercentilesOf(kRatio, exp);
+  out.opacity = s.PercentilesOf(kOpacity, [](float x) { return Sigmoid(x); });
+  out.outliers = s.outliers;
+
+  // Logarithms of lengths are negative for anything shorter than one unit, and a splat whose Gaussians are all longer
+  // than the box that holds them is no splat. Logits inside 0–1 would be opacities of 50–73 % only.
+  if (out.bounds && s.sum.usable > 0) {
+    float extent = 0;
+    for (size_t a = 0; a < 3; ++a) extent = std::max(extent, out.bounds->max[a] - out.bounds->min[a]);
+    const double share = static_cast<double>(s.sum.positive_scales) / static_cast<double>(s.sum.usable);
+    out.linear_looking_scales = share > 0.99 && out.largest_axis[2] > extent;
+    out.linear_looking_opacities =
+        s.sum.usable >= 100 && static_cast<double>(s.sum.unit_opacities) > 0.99 * static_cast<double>(s.sum.usable);
+  }
+  return out;
+}
+
+CloudStatistics ComputeStatistics(const CloudView& cloud) {
+  MemoryBlocks blocks(cloud);
+  StatisticsStudy study(blocks);
+  RowStudy* const studies[] = {&study};
+  (void)Study(blocks, studies);  // memory can be read
+  return study.Find();
+}
+
+}  // namespace anchorsplat

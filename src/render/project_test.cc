@@ -83,13 +83,13 @@ TEST(Project, MatchesReference) {
       EXPECT_NEAR(g.y, expected.y, 1e-9);
       EXPECT_EQ(g.depth, expected.depth);
       EXPECT_NEAR(std::exp2(g.log2_opacity), expected.opacity, 1e-6);
-      // The conic from its factor, which carries ½·log2 e.
+      // The conic from its factor, which carries ½·log2 e. It is calculated in float.
       const double scale = 2 / std::log2(std::exp(1.0));
       const double a = scale * g.u_xx * g.u_xx, b = scale * g.u_xx * g.u_xy,
                    c = scale * (double{g.u_xy} * g.u_xy + double{g.u_yy} * g.u_yy);
-      EXPECT_NEAR(a, expected.a, 1e-6 * expected.a);
-      EXPECT_NEAR(b, expected.b, 1e-6 * std::sqrt(expected.a * expected.c));
-      EXPECT_NEAR(c, expected.c, 1e-6 * expected.c);
+      EXPECT_NEAR(a, expected.a, 5e-6 * expected.a);
+      EXPECT_NEAR(b, expected.b, 5e-6 * std::sqrt(expected.a * expected.c));
+      EXPECT_NEAR(c, expected.c, 5e-6 * expected.c);
     }
     EXPECT_EQ(out.visible, expected_visible);
     EXPECT_GT(with_radius, 600);

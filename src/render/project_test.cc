@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "render/rasterizer_reference.h"
@@ -95,6 +97,65 @@ TEST(Project, MatchesReference) {
     EXPECT_GT(with_radius, 600);
     EXPECT_LT(with_radius, 1237);
     EXPECT_GT(expected_visible.size(), 500u);
+  }
+}
+
+// What floats cannot square, one by one among Gaussians that they can.
+TEST(Project, ExtremesMatchReference) {
+  for (const RenderMode mode : kRenderModes) {
+    RenderOptions options;
+    options.mode = mode;
+    GaussianCloud cloud = test::RandomCloud(3, {.gaussians = 200, .degree = 0});
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    for (size_t i = 0; i < 200; ++i) {
+      for (size_t a = 0; a < 3; ++a) cloud.means[3 * i + a] *= 0.2f;
+      float *scales = &cloud.log_scales[3 * i], *q = &cloud.quats[4 * i];
+      cloud.opacity_logits[i] = 2;
+      switch (i % 8) {
+        case 1:
+          scales[0] = 25;
+          break;  // a needle beyond all pictures
+        case 2:
+          std::fill_n(scales, 3, 60.0f);
+          break;  // enormous
+        case 3:
+          std::fill_n(scales, 3, -60.0f);
+          break;  // a point
+        case 4:
+          std::fill_n(q, 4, 0.0f);
+          break;  // the zero quaternion
+        case 5:
+          std::for_each(q, q + 4, [](float& x) { x *= 1e-25f; });
+          break;  // short ones
+        case 6:
+          std::for_each(q, q + 4, [](float& x) { x *= 1e25f; });
+          break;  // long ones
+        case 7:
+          scales[1] = -kInfinity;
+          break;  // flat
+        default:
+          break;
+      }
+    }
+    const Camera camera = test::RandomCamera(3, 211, 97);
+    const Projected out = Project(cloud, camera, options);
+    int compared = 0;
+    for (const int32_t i : out.visible) {
+      const auto row = static_cast<size_t>(i);
+      SCOPED_TRACE(i);
+      reference::Splat expected{};
+      ASSERT_TRUE(reference::Project(cloud, i, camera, options, expected));
+      const ProjectedGaussian& g = out.gaussians[row];
+      const double scale = 2 / std::log2(std::exp(1.0));
+      const double a = scale * g.u_xx * g.u_xx, c = scale * (double{g.u_xy} * g.u_xy + double{g.u_yy} * g.u_yy);
+      // The reference multiplies matrices out: of needles, its own digits are few.
+      const double digits = i % 8 == 1 ? 1e-2 : 1e-5;
+      EXPECT_NEAR(a, expected.a, digits * expected.a);
+      EXPECT_NEAR(c, expected.c, digits * expected.c);
+      EXPECT_NEAR(std::exp2(g.log2_opacity), expected.opacity, 1e-5);
+      ++compared;
+    }
+    EXPECT_GT(compared, 100);
   }
 }
 

@@ -56,9 +56,10 @@ Result<Iteration> Iterate(const Camera& camera, const Image& target, Learner& l)
       PhotometricLoss(l.output.color, target, {}, l.output_gradient.color, l.output_gradient.box));
   const double compared = Now();
   it.loss = compared - rendered;
-  ANCHORSPLAT_RETURN_IF_ERROR(l.rasterizer.Backward(l.cloud, l.output_gradient, l.gradient));
+  const CoefficientStep coefficients = l.optimizer.BeginStep(rates, kMaxShDegree, l.cloud);
+  ANCHORSPLAT_RETURN_IF_ERROR(l.rasterizer.Backward(l.cloud, l.output_gradient, l.gradient, &coefficients));
   const double differentiated = Now();
-  l.optimizer.Step(rates, 0, kMaxShDegree, l.gradient, l.cloud);
+  l.optimizer.FinishStep(rates, 0, l.gradient, l.cloud);
   const double stepped = Now();
   it.adam = stepped - differentiated;
   l.densification.AfterStep(densification, 1, 1, 0, camera.intrinsics.width, camera.intrinsics.height, l.gradient,

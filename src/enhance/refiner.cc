@@ -130,11 +130,13 @@ Result<FitStep> Refiner::Step(double done) {
   }
   ANCHORSPLAT_RETURN_IF_ERROR(objective_.Show(objective, state_.cloud, camera));
   AdjustTarget(done);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Compare(objective, state_.cloud, target_.picture, gradient_));
+  const LearningRates rates = Scaled(LearningRates(), options_.rate.value_or(1) * std::pow(options_.rate_decay, done));
+  const CoefficientStep coefficients = state_.optimizer.BeginStep(rates, kMaxShDegree, state_.cloud);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss,
+                               objective_.Compare(objective, state_.cloud, target_.picture, gradient_, &coefficients));
 
   watch.Lap();
-  const LearningRates rates = Scaled(LearningRates(), options_.rate.value_or(1) * std::pow(options_.rate_decay, done));
-  state_.optimizer.Step(rates, rates.means * problem_.scene_scale, kMaxShDegree, gradient_, state_.cloud);
+  state_.optimizer.FinishStep(rates, rates.means * problem_.scene_scale, gradient_, state_.cloud);
   times_.adam += watch.Lap();
   ++state_.step;
   return out;

@@ -33,31 +33,51 @@ CloudOptimizer::CloudOptimizer(const GaussianCloud& cloud) {
 
 void CloudOptimizer::Step(const LearningRates& rates, double means_rate, int sh_degree, const CloudGradient& gradient,
                           GaussianCloud& cloud) {
+  FinishStep(rates, means_rate, gradient, cloud);
+  StepAttribute(kSh, 3 * ShCoefficients(std::min(sh_degree, cloud.sh_degree)), 3, rates, rates.sh0, rates.sh_rest,
+                gradient.sh, cloud.sh);
+}
+
+CoefficientStep CloudOptimizer::BeginStep(const LearningRates& rates, int sh_degree, GaussianCloud& cloud) {
+  const int64_t step = steps_ + 1;
+  const auto corrected = [&](double rate) { return CorrectedRate(static_cast<float>(rate), rates.beta1, step); };
+  Moments& m = moments_[kSh];
+  return {.numbers = MakeAdamNumbers(rates.beta1, rates.beta2, static_cast<float>(rates.epsilon), step),
+          .columns = 3 * ShCoefficients(std::min(sh_degree, cloud.sh_degree)),
+          .first_rate = corrected(rates.sh0),
+          .rate = corrected(rates.sh_rest),
+          .first_moment = m.first.data(),
+          .second_moment = m.second.data(),
+          .values = cloud.sh.data()};
+}
+
+void CloudOptimizer::FinishStep(const LearningRates& rates, double means_rate, const CloudGradient& gradient,
+                                GaussianCloud& cloud) {
   ++steps_;
-  const int64_t used = 3 * ShCoefficients(std::min(sh_degree, cloud.sh_degree));
-  const auto step = [&](Attribute attribute, int64_t columns, int64_t first_columns, double first_rate, double rate,
-                        const Buffer<float>& g, Buffer<float>& values) {
-    Moments& m = moments_[attribute];
-    AdamStep({.rows = cloud.size(),
-              .stride = m.width,
-              .columns = columns,
-              .first_columns = first_columns,
-              .first_rate = static_cast<float>(first_rate),
-              .rate = static_cast<float>(rate),
-              .beta1 = rates.beta1,
-              .beta2 = rates.beta2,
-              .epsilon = static_cast<float>(rates.epsilon),
-              .step = steps_,
-              .gradient = g.data(),
-              .first_moment = m.first.data(),
-              .second_moment = m.second.data(),
-              .values = values.data()});
-  };
-  step(kMeans, 3, 0, 0, means_rate, gradient.means, cloud.means);
-  step(kScales, 3, 0, 0, rates.scales, gradient.log_scales, cloud.log_scales);
-  step(kQuats, 4, 0, 0, rates.quats, gradient.quats, cloud.quats);
-  step(kOpacities, 1, 0, 0, rates.opacities, gradient.opacity_logits, cloud.opacity_logits);
-  step(kSh, used, 3, rates.sh0, rates.sh_rest, gradient.sh, cloud.sh);
+  StepAttribute(kMeans, 3, 0, rates, 0, means_rate, gradient.means, cloud.means);
+  StepAttribute(kScales, 3, 0, rates, 0, rates.scales, gradient.log_scales, cloud.log_scales);
+  StepAttribute(kQuats, 4, 0, rates, 0, rates.quats, gradient.quats, cloud.quats);
+  StepAttribute(kOpacities, 1, 0, rates, 0, rates.opacities, gradient.opacity_logits, cloud.opacity_logits);
+}
+
+void CloudOptimizer::StepAttribute(size_t attribute, int64_t columns, int64_t first_columns, const LearningRates& rates,
+                                   double first_rate, double rate, const Buffer<float>& gradient,
+                                   Buffer<float>& values) {
+  Moments& m = moments_[attribute];
+  AdamStep({.rows = static_cast<int64_t>(values.size()) / m.width,
+            .stride = m.width,
+            .columns = columns,
+            .first_columns = first_columns,
+            .first_rate = static_cast<float>(first_rate),
+            .rate = static_cast<float>(rate),
+            .beta1 = rates.beta1,
+            .beta2 = rates.beta2,
+            .epsilon = static_cast<float>(rates.epsilon),
+            .step = steps_,
+            .gradient = gradient.data(),
+            .first_moment = m.first.data(),
+            .second_moment = m.second.data(),
+            .values = values.data()});
 }
 
 Buffer<float> ChangeRows(const Buffer<float>& values, int64_t width, const RowChange& change) {

@@ -44,6 +44,10 @@ class CloudOptimizer {
   // One step along −gradient. `means_rate` is that of this step; SH coefficients above `sh_degree` stay.
   void Step(const LearningRates& rates, double means_rate, int sh_degree, const CloudGradient& gradient,
             GaussianCloud& cloud);
+  // The same in two parts, for Rasterizer::Backward in between: what it is to do with the coefficients, which changes
+  // nothing yet, and then the step of everything else.
+  CoefficientStep BeginStep(const LearningRates& rates, int sh_degree, GaussianCloud& cloud);
+  void FinishStep(const LearningRates& rates, double means_rate, const CloudGradient& gradient, GaussianCloud& cloud);
 
   void Apply(const RowChange& change);
   void ForgetOpacities();                          // their moments become zero
@@ -62,6 +66,9 @@ class CloudOptimizer {
   void set_steps(int64_t steps) { steps_ = steps; }
 
  private:
+  void StepAttribute(size_t attribute, int64_t columns, int64_t first_columns, const LearningRates& rates,
+                     double first_rate, double rate, const Buffer<float>& gradient, Buffer<float>& values);
+
   std::array<Moments, 5> moments_;
   int64_t steps_ = 0;
 };

@@ -58,12 +58,13 @@ Result<FitStep> Fitter::Step() {
   const CloudView shown = options_.mip_filter ? filtered_.Of(state_.cloud, state_.mip_filter) : CloudView(state_.cloud);
   ANCHORSPLAT_RETURN_IF_ERROR(objective_.Show(objective, shown, camera));
   FillIgnored(ignored_, objective_.rendered(), picture_);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Compare(objective, shown, picture_, gradient_));
+  const CoefficientStep coefficients = state_.optimizer.BeginStep(options_.rates, degree, state_.cloud);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Compare(objective, shown, picture_, gradient_, &coefficients));
   watch.Lap();
   if (options_.mip_filter) MipFilterBackward(state_.cloud, state_.mip_filter, gradient_);
   AddRegularizers(options_.regularizers, UnitOf(scene_scale_), state_.cloud, gradient_);
   const double means_rate = MeansRate(options_.rates, scene_scale_, step, options_.steps);
-  state_.optimizer.Step(options_.rates, means_rate, degree, gradient_, state_.cloud);
+  state_.optimizer.FinishStep(options_.rates, means_rate, gradient_, state_.cloud);
   times_.adam += watch.Lap();
 
   out.change = ChangeGaussians(RaysOf(objective.pixel, camera));

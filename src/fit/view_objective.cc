@@ -17,7 +17,8 @@ Status ViewObjective::Show(const ObjectiveOptions& options, const CloudView& clo
 }
 
 Result<PhotometricLossValue> ViewObjective::Compare(const ObjectiveOptions& options, const CloudView& cloud,
-                                                    const Image& picture, CloudGradient& gradient) {
+                                                    const Image& picture, CloudGradient& gradient,
+                                                    const CoefficientStep* step) {
   Stopwatch watch;
   PhotometricLossValue value;
   if (averaged_) {
@@ -29,7 +30,7 @@ Result<PhotometricLossValue> ViewObjective::Compare(const ObjectiveOptions& opti
                                  PhotometricLoss(output_.color, picture, options.loss, gradient_.color, gradient_.box));
   }
   times_.loss += watch.Lap();
-  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Backward(cloud, gradient_, gradient));
+  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Backward(cloud, gradient_, gradient, step));
   times_.backward += watch.Lap();
   return value;
 }

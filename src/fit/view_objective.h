@@ -34,8 +34,9 @@ class ViewObjective {
   // The two halves of it, for those who look at rendered() before they decide what to compare it with. Compare takes
   // the options and the cloud of the last Show.
   Status Show(const ObjectiveOptions& options, const CloudView& cloud, const Camera& camera);
+  // `step`: that of Rasterizer::Backward.
   Result<PhotometricLossValue> Compare(const ObjectiveOptions& options, const CloudView& cloud, const Image& picture,
-                                       CloudGradient& gradient);
+                                       CloudGradient& gradient, const CoefficientStep* step = nullptr);
 
   // What the camera sees of the cloud, of the last Evaluate or Show: [3,H,W].
   const Image& rendered() const { return averaged_ ? average_ : output_.color; }

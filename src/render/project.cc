@@ -22,12 +22,23 @@ namespace anchorsplat {
 namespace HWY_NAMESPACE {
 namespace {
 
+// Where Gaussians are, in doubles: at x = 1000 px floats are too coarse.
+struct Places {
+  alignas(64) double x[kBatch], y[kBatch], z[kBatch];  // px, px, world units
+};
+
+template <typename T>
+struct Columns {
+  StoredColumns<T> stored;
+  alignas(64) T drawable[kBatch];  // 1 where the mean is finite and between the planes, else 0
+};
+
+template <typename T>
 struct Projection {
-  alignas(64) double x[kBatch], y[kBatch], z[kBatch];
-  alignas(64) double u_xx[kBatch], u_xy[kBatch], u_yy[kBatch];
-  alignas(64) double log2_opacity[kBatch], compensation[kBatch];
-  alignas(64) double tile_x0[kBatch], tile_y0[kBatch], tile_x1[kBatch], tile_y1[kBatch];  // tiles, 0 where culled
-  alignas(64) double radius_x[kBatch], radius_y[kBatch];                                  // px, 0 where culled
+  alignas(64) T u_xx[kBatch], u_xy[kBatch], u_yy[kBatch];
+  alignas(64) T log2_opacity[kBatch], compensation[kBatch];
+  alignas(64) T tile_x0[kBatch], tile_y0[kBatch], tile_x1[kBatch], tile_y1[kBatch];  // tiles, 0 where culled
+  alignas(64) T radius_x[kBatch], radius_y[kBatch];                                  // px, 0 where culled
 };
 
 // The view, and what only this direction needs of it.
@@ -50,87 +61,117 @@ Frame MakeFrame(const ProjectParams& p) {
           .log2_min_alpha = std::log2(double{p.min_alpha})};
 }
 
-void ReadColumns(const ProjectParams& p, int64_t first, size_t n, StoredColumns& c) {
-  for (size_t j = ReadWholeRegisters(p, first, n, c); j < n; ++j) {
-    const int64_t i = first + static_cast<int64_t>(j);
-    for (int a = 0; a < 3; ++a) c.means[a][j] = p.means[3 * i + a];
-    for (int a = 0; a < 3; ++a) c.log_scales[a][j] = p.log_scales[3 * i + a];
-    for (int a = 0; a < 4; ++a) c.quats[a][j] = p.quats[4 * i + a];
-    c.logits[j] = p.opacity_logits[i];
-  }
-  // Lanes after the last Gaussian: any finite value will do, their results are not read.
-  const size_t end = std::min(kBatch, (n + 7) / 8 * 8);
-  for (size_t j = n; j < end; ++j) {
-    for (int a = 0; a < 3; ++a) c.means[a][j] = c.log_scales[a][j] = 0;
-    for (int a = 0; a < 4; ++a) c.quats[a][j] = 0;
-    c.logits[j] = 0;
-  }
-}
+constexpr double kLargest = std::numeric_limits<float>::max();
+template <typename T>
+constexpr bool kIsFloat = sizeof(T) == sizeof(float);
+template <typename T>
+constexpr double kLargestDet = kIsFloat<T> ? kLargest : 1e300;
+template <typename T>
+constexpr double kSmallestOpacity = kIsFloat<T> ? 1e-37 : 1e-300;
+template <typename T>
+constexpr double kHair = kIsFloat<T> ? 1e-6 : 1e-9;  // px, and per pixel from the picture's corner
 
-HWY_INLINE V Finite(D d, V x) {  // 1 or 0 per lane; as a vector so that conditions multiply
-  return hn::IfThenElseZero(hn::Le(hn::Abs(x), hn::Set(d, double{std::numeric_limits<float>::max()})), hn::Set(d, 1.0));
-}
-HWY_INLINE V NotPositiveInfinity(D d, V x) {
-  return hn::IfThenElseZero(hn::Le(x, hn::Set(d, double{std::numeric_limits<float>::max()})), hn::Set(d, 1.0));
-}
-
-HWY_INLINE V IsNumber(D d, V x) { return hn::IfThenElseZero(hn::Eq(x, x), hn::Set(d, 1.0)); }
-
-// One register of Gaussians, columns j … j + lanes − 1.
-HWY_INLINE void ProjectLanes(const Frame& frame, RasterProfile profile, RenderMode mode, const StoredColumns& in,
-                             size_t j, Projection& out) {
-  const D d;
+// One register of means, which are in the columns of `places`, to where they are seen.
+HWY_INLINE void PlaceLanes(const Frame& frame, size_t j, Places& places, Columns<float>& c) {
+  const Doubles d;
+  const Narrow narrow;
+  using V = hn::Vec<Doubles>;
   const View& view = frame.view;
-  const V zero = hn::Zero(d), one = hn::Set(d, 1.0);
-  const V mx = hn::Load(d, in.means[0] + j), my = hn::Load(d, in.means[1] + j), mz = hn::Load(d, in.means[2] + j);
-  const V ls0 = hn::Load(d, in.log_scales[0] + j), ls1 = hn::Load(d, in.log_scales[1] + j),
-          ls2 = hn::Load(d, in.log_scales[2] + j);
-  const V qw = hn::Load(d, in.quats[0] + j), qx = hn::Load(d, in.quats[1] + j), qy = hn::Load(d, in.quats[2] + j),
-          qz = hn::Load(d, in.quats[3] + j);
-  const V logit = hn::Load(d, in.logits + j);
+  const V mx = hn::Load(d, places.x + j), my = hn::Load(d, places.y + j), mz = hn::Load(d, places.z + j);
+  const auto row = [&](size_t k) HWY_ATTR {
+    const double* r = view.r + 3 * k;
+    return hn::Add(Dot3(hn::Set(d, r[0]), hn::Set(d, r[1]), hn::Set(d, r[2]), mx, my, mz), hn::Set(d, view.t[k]));
+  };
+  const V x = row(0), y = row(1), z = row(2), one = hn::Set(d, 1.0);
+  const auto finite = [d](V a) HWY_ATTR { return hn::Le(hn::Abs(a), hn::Set(d, kLargest)); };
+  const auto between = hn::And(hn::Ge(z, hn::Set(d, frame.near_plane)), hn::Le(z, hn::Set(d, frame.far_plane)));
+  const auto drawable = hn::And(hn::And(finite(mx), finite(my)), hn::And(finite(mz), between));
+  const V inverse_z = hn::Div(one, hn::IfThenElse(drawable, z, one));
+  const V ratio_x = hn::Mul(x, inverse_z), ratio_y = hn::Mul(y, inverse_z);
+  hn::Store(hn::MulAdd(hn::Set(d, view.fx), ratio_x, hn::Set(d, view.cx)), d, places.x + j);
+  hn::Store(hn::MulAdd(hn::Set(d, view.fy), ratio_y, hn::Set(d, view.cy)), d, places.y + j);
+  hn::Store(z, d, places.z + j);
+  hn::Store(hn::DemoteTo(narrow, inverse_z), narrow, c.stored.inverse_z + j);
+  hn::Store(hn::DemoteTo(narrow, ratio_x), narrow, c.stored.ratio_x + j);
+  hn::Store(hn::DemoteTo(narrow, ratio_y), narrow, c.stored.ratio_y + j);
+  hn::Store(hn::DemoteTo(narrow, hn::IfThenElseZero(drawable, one)), narrow, c.drawable + j);
+}
 
-  V usable = hn::Mul(hn::Mul(Finite(d, mx), Finite(d, my)), Finite(d, mz));
-  usable = hn::Mul(usable, hn::Mul(hn::Mul(Finite(d, qw), Finite(d, qx)), hn::Mul(Finite(d, qy), Finite(d, qz))));
-  usable = hn::Mul(usable, hn::Mul(NotPositiveInfinity(d, ls0), NotPositiveInfinity(d, ls1)));
-  usable = hn::Mul(usable, hn::Mul(NotPositiveInfinity(d, ls2), IsNumber(d, logit)));
+// Gaussians [first, first + n) to columns. Lanes after the last one are finite; their results are not read.
+void ReadColumns(const ProjectParams& p, const Frame& frame, int64_t first, size_t n, Places& places,
+                 Columns<float>& c) {
+  const Doubles d;
+  const Narrow narrow;
+  const size_t wide = hn::Lanes(d), whole = n / wide * wide, end = std::min(kBatch, (n + 15) / 16 * 16);
+  for (size_t j = 0; j < whole; j += wide) {
+    hn::Vec<Narrow> x, y, z;
+    hn::LoadInterleaved3(narrow, p.means + 3 * (first + static_cast<int64_t>(j)), x, y, z);
+    hn::Store(hn::PromoteTo(d, x), d, places.x + j);
+    hn::Store(hn::PromoteTo(d, y), d, places.y + j);
+    hn::Store(hn::PromoteTo(d, z), d, places.z + j);
+  }
+  for (size_t j = whole; j < end; ++j) {
+    const float* mean = p.means + 3 * (first + static_cast<int64_t>(std::min(j, n - 1)));
+    places.x[j] = mean[0], places.y[j] = mean[1], places.z[j] = mean[2];
+  }
+  for (size_t j = 0; j < end; j += wide) PlaceLanes(frame, j, places, c);
+  for (size_t j = ReadWholeRegisters(p, first, n, c.stored); j < end; ++j) {
+    ReadRow(p, first + static_cast<int64_t>(std::min(j, n - 1)), j, c.stored);
+  }
+}
 
-  const V x = CameraSpace(d, view, in, j, 0), y = CameraSpace(d, view, in, j, 1), z = CameraSpace(d, view, in, j, 2);
-  M keep = hn::And(hn::Gt(usable, zero),
-                   hn::And(hn::Ge(z, hn::Set(d, frame.near_plane)), hn::Le(z, hn::Set(d, frame.far_plane))));
-  const Shape shape = ShapeOf(d, view, in, j, x, y, hn::IfThenElse(keep, z, one));
-  const V px = hn::MulAdd(hn::Set(d, view.fx), shape.ratio_x, hn::Set(d, view.cx));
-  const V py = hn::MulAdd(hn::Set(d, view.fy), shape.ratio_y, hn::Set(d, view.cy));
-  const Covariance covariance = CovarianceOf(d, view, shape);
+// One register of Gaussians, columns j … j + lanes − 1. `extreme`: not to be trusted, see IsExtreme.
+template <class D, typename T = hn::TFromD<D>>
+HWY_INLINE hn::Mask<D> ProjectLanes(D d, const Frame& frame, RasterProfile profile, RenderMode mode,
+                                    const Columns<T>& in, size_t j, Projection<T>& out) {
+  using V = hn::Vec<D>;
+  using M = hn::Mask<D>;
+  const View& view = frame.view;
+  const V zero = hn::Zero(d), one = Number(d, 1);
+  const V logit = hn::Load(d, in.stored.logits + j);
+  const auto stored = [&](const T* column) HWY_ATTR { return hn::Load(d, column + j); };
+  const auto finite = [&](const T* column) HWY_ATTR { return hn::Le(hn::Abs(stored(column)), Number(d, kLargest)); };
+  const auto below_infinity = [&](const T* column) HWY_ATTR { return hn::Le(stored(column), Number(d, kLargest)); };
+  const auto &quats = in.stored.quats, &log_scales = in.stored.log_scales;
+  M keep = hn::And(hn::And(finite(quats[0]), finite(quats[1])), hn::And(finite(quats[2]), finite(quats[3])));
+  keep = hn::And(hn::And(keep, below_infinity(log_scales[0])),
+                 hn::And(below_infinity(log_scales[1]), below_infinity(log_scales[2])));
+  keep = hn::And(keep, hn::And(hn::Gt(stored(in.drawable), zero), hn::Eq(logit, logit)));
+
+  const Shape<D> shape = ShapeOf(d, view, in.stored, j);
+  const V px = hn::MulAdd(Number(d, view.fx), shape.ratio_x, Number(d, view.cx));
+  const V py = hn::MulAdd(Number(d, view.fy), shape.ratio_y, Number(d, view.cy));
+  const Covariance<V> covariance = CovarianceOf(d, view, shape);
   const V xx = covariance.xx, xy = covariance.xy, yy = covariance.yy, det = covariance.det;
-  keep = hn::And(keep, hn::And(hn::Gt(det, zero), hn::Lt(det, hn::Set(d, 1e300))));  // false for NaN, too
+  const bool compensated = IsCompensated(mode);
+  const M extreme = hn::And(keep, IsExtreme(d, shape, compensated ? covariance.from_det : det));
+  keep = hn::And(keep, hn::And(hn::Gt(det, zero), hn::Lt(det, Number(d, kLargestDet<T>))));  // false for NaN, too
   const V safe_det = hn::IfThenElse(keep, det, one);
 
   // Opacity.
   V compensation = one;
-  if (IsCompensated(mode)) {
-    const V kept_det = hn::Max(zero, covariance.from_det);
-    compensation = hn::Sqrt(hn::Div(kept_det, safe_det));
-  }
+  if (compensated) compensation = hn::Sqrt(hn::Div(covariance.from_det, safe_det));
   const V opacity = hn::Div(compensation, hn::Add(one, ExpInDomain(d, hn::Neg(logit))));
-  const V log2_opacity =  // the bound keeps log inside its domain; such an opacity is culled
-      hn::Mul(hn::Set(d, std::numbers::log2e), hn::Log(d, hn::Max(opacity, hn::Set(d, 1e-300))));
-  const V room = hn::Sub(log2_opacity, hn::Set(d, frame.log2_min_alpha));            // log2(opacity / min_alpha)
-  const V reach2 = hn::Mul(hn::Set(d, 2 * std::numbers::ln2), hn::Max(room, zero));  // σ² where α = min_alpha
+  // The bound keeps log inside its domain; such an opacity is culled.
+  const V log2_opacity =
+      hn::Mul(Number(d, std::numbers::log2e), hn::Log(d, hn::Max(opacity, Number(d, kSmallestOpacity<T>))));
+  const V room = hn::Sub(log2_opacity, Number(d, frame.log2_min_alpha));            // log2(opacity / min_alpha)
+  const V reach2 = hn::Mul(Number(d, 2 * std::numbers::ln2), hn::Max(room, zero));  // σ² where α = min_alpha
 
   // Radius and square of the profile.
   V radius_x, radius_y;
   if (profile == RasterProfile::kGsplat14) {
-    const V half_trace = hn::Mul(hn::Set(d, 0.5), hn::Add(xx, yy));
-    const V gap = hn::Max(hn::Set(d, kMinEigenGap), hn::MulSub(half_trace, half_trace, det));
+    const V half = Number(d, 0.5), half_trace = hn::Mul(half, hn::Add(xx, yy)), slant = hn::Mul(half, hn::Sub(xx, yy));
+    const V gap = hn::Max(Number(d, kMinEigenGap), hn::MulAdd(slant, slant, hn::Mul(xy, xy)));  // half_trace² − det
     const V largest = hn::Add(half_trace, hn::Sqrt(gap));
-    radius_x = radius_y = hn::Ceil(hn::Mul(hn::Set(d, kExtent14), hn::Sqrt(largest)));
+    radius_x = radius_y = hn::Ceil(hn::Mul(Number(d, kExtent14), hn::Sqrt(largest)));
   } else {
     keep = hn::And(keep, hn::Ge(room, zero));
-    const V extent = hn::Min(hn::Set(d, kExtent15), hn::Sqrt(reach2));
+    const V extent = hn::Min(Number(d, kExtent15), hn::Sqrt(reach2));
     radius_x = hn::Ceil(hn::Mul(extent, hn::Sqrt(xx)));
     radius_y = hn::Ceil(hn::Mul(extent, hn::Sqrt(yy)));
   }
-  const V width = hn::Set(d, frame.width), height = hn::Set(d, frame.height);
+  const V width = Number(d, frame.width), height = Number(d, frame.height);
   keep = hn::And(keep, hn::And(hn::And(hn::Gt(hn::Add(px, radius_x), zero), hn::Lt(hn::Sub(px, radius_x), width)),
                                hn::And(hn::Gt(hn::Add(py, radius_y), zero), hn::Lt(hn::Sub(py, radius_y), height))));
   hn::Store(hn::IfThenElseZero(keep, radius_x), d, out.radius_x + j);
@@ -138,13 +179,14 @@ HWY_INLINE void ProjectLanes(const Frame& frame, RasterProfile profile, RenderMo
   keep = hn::And(keep, hn::Ge(room, zero));
 
   // Tiles of the square, and those of the pixel centres within the ellipse's box; a hair more against rounding.
-  const V per_tile = hn::Set(d, 1.0 / kTile), hair = hn::Set(d, 1e-6);
+  const V per_tile = Number(d, 1.0 / kTile), centre = Number(d, 0.5), hair = Number(d, kHair<T>);
   const V half_x = hn::Sqrt(hn::Mul(reach2, xx)), half_y = hn::Sqrt(hn::Mul(reach2, yy));
-  const V centre = hn::Set(d, 0.5);
-  const V box_x0 = hn::Sub(hn::Sub(hn::Sub(px, half_x), centre), hair),
-          box_x1 = hn::Add(hn::Sub(hn::Add(px, half_x), centre), hair);
-  const V box_y0 = hn::Sub(hn::Sub(hn::Sub(py, half_y), centre), hair),
-          box_y1 = hn::Add(hn::Sub(hn::Add(py, half_y), centre), hair);
+  const V margin_x = hn::MulAdd(hair, hn::Add(hn::Abs(px), half_x), hair),
+          margin_y = hn::MulAdd(hair, hn::Add(hn::Abs(py), half_y), hair);
+  const V box_x0 = hn::Sub(hn::Sub(hn::Sub(px, half_x), centre), margin_x),
+          box_x1 = hn::Add(hn::Sub(hn::Add(px, half_x), centre), margin_x);
+  const V box_y0 = hn::Sub(hn::Sub(hn::Sub(py, half_y), centre), margin_y),
+          box_y1 = hn::Add(hn::Sub(hn::Add(py, half_y), centre), margin_y);
   const V x0 = hn::Max(hn::Floor(hn::Mul(hn::Sub(px, radius_x), per_tile)), hn::Floor(hn::Mul(box_x0, per_tile)));
   const V y0 = hn::Max(hn::Floor(hn::Mul(hn::Sub(py, radius_y), per_tile)), hn::Floor(hn::Mul(box_y0, per_tile)));
   const V x1 =
@@ -161,49 +203,82 @@ HWY_INLINE void ProjectLanes(const Frame& frame, RasterProfile profile, RenderMo
 
   // The conic's Cholesky factor; see ProjectedGaussian.
   constexpr double kScale = 0.84932180028801904;  // sqrt(½·log2 e)
-  const V root_yy = hn::Sqrt(yy), root_det = hn::Sqrt(safe_det);
-  hn::Store(hn::Div(hn::Mul(hn::Set(d, kScale), root_yy), root_det), d, out.u_xx + j);
-  hn::Store(hn::Div(hn::Mul(hn::Set(d, -kScale), xy), hn::Mul(root_yy, root_det)), d, out.u_xy + j);
-  hn::Store(hn::Div(hn::Set(d, kScale), root_yy), d, out.u_yy + j);
-  hn::Store(px, d, out.x + j);
-  hn::Store(py, d, out.y + j);
-  hn::Store(z, d, out.z + j);
+  const V root_yy = hn::Sqrt(yy), root_det = hn::Sqrt(safe_det), scale = Number(d, kScale);
+  const V by_yy = hn::Div(scale, root_yy), by_det = hn::Div(one, root_det);
+  hn::Store(hn::Mul(hn::Mul(scale, root_yy), by_det), d, out.u_xx + j);
+  hn::Store(hn::Neg(hn::Mul(hn::Mul(by_yy, by_det), xy)), d, out.u_xy + j);
+  hn::Store(by_yy, d, out.u_yy + j);
   hn::Store(log2_opacity, d, out.log2_opacity + j);
   hn::Store(compensation, d, out.compensation + j);
+  return extreme;
+}
+
+// Column j of the batch once more in double.
+void ProjectAgain(const ProjectParams& p, const Frame& frame, const Places& places, int64_t i, size_t j,
+                  Projection<float>& out) {
+  Columns<double> in;
+  Projection<double> exact;
+  const double z = places.z[j];
+  for (size_t k = 0; k < hn::Lanes(Doubles()); ++k) {
+    ReadRow(p, i, k, in.stored);
+    in.stored.inverse_z[k] = 1 / z;
+    in.stored.ratio_x[k] = (places.x[j] - frame.view.cx) * frame.view.inverse_fx;
+    in.stored.ratio_y[k] = (places.y[j] - frame.view.cy) * frame.view.inverse_fy;
+    in.drawable[k] = 1;
+  }
+  ProjectLanes(Doubles(), frame, p.profile, p.mode, in, 0, exact);
+  const auto narrow = [j](const double* from, float* to) { to[j] = static_cast<float>(from[0]); };
+  narrow(exact.u_xx, out.u_xx), narrow(exact.u_xy, out.u_xy), narrow(exact.u_yy, out.u_yy);
+  narrow(exact.log2_opacity, out.log2_opacity), narrow(exact.compensation, out.compensation);
+  narrow(exact.tile_x0, out.tile_x0), narrow(exact.tile_x1, out.tile_x1);
+  narrow(exact.tile_y0, out.tile_y0), narrow(exact.tile_y1, out.tile_y1);
+  const double widest = kLargest;
+  out.radius_x[j] = static_cast<float>(std::min(exact.radius_x[0], widest));
+  out.radius_y[j] = static_cast<float>(std::min(exact.radius_y[0], widest));
 }
 
 // Gaussians [first, last): at most one chunk.
 void ProjectChunk(const ProjectParams& p, int64_t first, int64_t last) {
   const Frame frame = MakeFrame(p);
-  StoredColumns in;
-  Projection out;
-  const size_t lanes = hn::Lanes(D());
+  Places places;
+  Columns<float> in;
+  Projection<float> out;
+  const Floats d;
+  const size_t lanes = hn::Lanes(d);
   int32_t* visible = p.visible + first;
   int32_t found = 0;
   for (int64_t begin = first; begin < last; begin += static_cast<int64_t>(kBatch)) {
     const size_t n = static_cast<size_t>(std::min<int64_t>(kBatch, last - begin));
-    ReadColumns(p, begin, n, in);
-    for (size_t j = 0; j < n; j += lanes) ProjectLanes(frame, p.profile, p.mode, in, j, out);
+    ReadColumns(p, frame, begin, n, places, in);
+    for (size_t j = 0; j < n; j += lanes) {
+      const auto extreme = ProjectLanes(d, frame, p.profile, p.mode, in, j, out);
+      if (hn::AllFalse(d, extreme)) continue;
+      alignas(64) float again[kLanesAtMost];
+      hn::Store(hn::IfThenElseZero(extreme, hn::Set(d, 1.0f)), d, again);
+      for (size_t k = 0; k < lanes && j + k < n; ++k) {
+        if (again[k] != 0) ProjectAgain(p, frame, places, begin + static_cast<int64_t>(j + k), j + k, out);
+      }
+    }
     for (size_t j = 0; j < n; ++j) {
       const int64_t i = begin + static_cast<int64_t>(j);
       if (p.radii != nullptr) {
-        constexpr double kLargest = std::numeric_limits<int32_t>::max();
-        p.radii[2 * i] = static_cast<int32_t>(std::min(out.radius_x[j], kLargest));
-        p.radii[2 * i + 1] = static_cast<int32_t>(std::min(out.radius_y[j], kLargest));
+        constexpr float kLargestRadius = 2147483520.0f;  // of the floats that an int32 holds
+        p.radii[2 * i] = static_cast<int32_t>(std::min(out.radius_x[j], kLargestRadius));
+        p.radii[2 * i + 1] = static_cast<int32_t>(std::min(out.radius_y[j], kLargestRadius));
       }
-      const auto tile = [](double t) { return static_cast<uint16_t>(static_cast<int32_t>(t)); };
+      const auto tile = [](float t) { return static_cast<uint16_t>(static_cast<int32_t>(t)); };
       const TileRect rect = {tile(out.tile_x0[j]), tile(out.tile_y0[j]), tile(out.tile_x1[j]), tile(out.tile_y1[j])};
       p.tiles[i] = rect;
       if (rect.x1 == 0) continue;
       ProjectedGaussian& g = p.projected[i];
-      g.x = out.x[j];
-      g.y = out.y[j];
-      g.u_xx = static_cast<float>(out.u_xx[j]);
-      g.u_xy = static_cast<float>(out.u_xy[j]);
-      g.u_yy = static_cast<float>(out.u_yy[j]);
-      g.log2_opacity = static_cast<float>(out.log2_opacity[j]);
-      g.depth = static_cast<float>(out.z[j]);
-      g.compensation = static_cast<float>(out.compensation[j]);
+      g.x = places.x[j];
+      g.y = places.y[j];
+      g.u_xx = out.u_xx[j];
+      g.u_xy = out.u_xy[j];
+      g.u_yy = out.u_yy[j];
+      g.log2_opacity = out.log2_opacity[j];
+      g.depth = static_cast<float>(places.z[j]);
+      g.compensation = out.compensation[j];
       visible[found++] = static_cast<int32_t>(i);
     }
   }

@@ -14,8 +14,9 @@ namespace anchorsplat {
 // one may touch: the profile's square cut down to the box of the ellipse where α reaches `min_alpha`, outside of which
 // blending would skip every pixel anyway.
 //
-// Inside it calculates in double: the image coordinates, the determinant of a needle's covariance and therefore its
-// conic lose up to four digits otherwise.
+// Inside, where a Gaussian is seen is calculated in double and its shape in float; the determinant of a needle's
+// covariance, and therefore its conic, is a sum of squares that loses nothing. The few shapes that leave the range of
+// floats (IsExtreme in render/projection-inl.h) are calculated in double, too.
 struct ProjectParams {
   int64_t count;                // N Gaussians
   const float* means;           // [N,3] world

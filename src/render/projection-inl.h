@@ -23,55 +23,61 @@ namespace HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-using D = hn::CappedTag<double, 8>;
-using V = hn::Vec<D>;
-using M = hn::Mask<D>;
+// Shapes are calculated in float, two registers of doubles at a time; see IsExtreme for those that are not.
+using Floats = hn::CappedTag<float, 16>;
+using Doubles = hn::CappedTag<double, 8>;
+using Narrow = hn::Rebind<float, Doubles>;  // as many floats as there are doubles in a register
 
 // Gaussians are turned from rows into columns this many at a time: long enough that a column is read after its stores
 // have left the store buffer, short enough for the L1 cache.
 constexpr size_t kBatch = 64;
+constexpr size_t kLanesAtMost = 16;
 
-// Stored values, a Gaussian per column.
+// Of Gaussians, one per column: what is stored, and where each is seen.
+template <typename T>
 struct StoredColumns {
-  alignas(64) double means[3][kBatch];
-  alignas(64) double log_scales[3][kBatch];
-  alignas(64) double quats[4][kBatch];
-  alignas(64) double logits[kBatch];
+  alignas(64) T log_scales[3][kBatch];
+  alignas(64) T quats[4][kBatch];
+  alignas(64) T logits[kBatch];
+  alignas(64) T inverse_z[kBatch], ratio_x[kBatch], ratio_y[kBatch];  // 1/z, x/z, y/z in camera space, z ≠ 0
 };
 
-// Rows of the cloud from `first` on to columns, as many whole registers as there are in `n`. Returns how many rows that
+// Stored values of rows `first` … to columns, as many whole registers as there are in `n`. Returns how many rows that
 // are; the others go one by one.
 template <typename Params>
-HWY_INLINE size_t ReadWholeRegisters(const Params& p, int64_t first, size_t n, StoredColumns& c) {
-  const D d;
-  const hn::Rebind<float, D> df;
-  using F = hn::Vec<decltype(df)>;
+HWY_INLINE size_t ReadWholeRegisters(const Params& p, int64_t first, size_t n, StoredColumns<float>& c) {
+  const Floats d;
+  using F = hn::Vec<Floats>;
   const size_t lanes = hn::Lanes(d), whole = n / lanes * lanes;
   for (size_t j = 0; j < whole; j += lanes) {
     const int64_t i = first + static_cast<int64_t>(j);
     F x, y, z, w;
-    hn::LoadInterleaved3(df, p.means + 3 * i, x, y, z);
-    hn::Store(hn::PromoteTo(d, x), d, c.means[0] + j);
-    hn::Store(hn::PromoteTo(d, y), d, c.means[1] + j);
-    hn::Store(hn::PromoteTo(d, z), d, c.means[2] + j);
-    hn::LoadInterleaved3(df, p.log_scales + 3 * i, x, y, z);
-    hn::Store(hn::PromoteTo(d, x), d, c.log_scales[0] + j);
-    hn::Store(hn::PromoteTo(d, y), d, c.log_scales[1] + j);
-    hn::Store(hn::PromoteTo(d, z), d, c.log_scales[2] + j);
-    hn::LoadInterleaved4(df, p.quats + 4 * i, w, x, y, z);
-    hn::Store(hn::PromoteTo(d, w), d, c.quats[0] + j);
-    hn::Store(hn::PromoteTo(d, x), d, c.quats[1] + j);
-    hn::Store(hn::PromoteTo(d, y), d, c.quats[2] + j);
-    hn::Store(hn::PromoteTo(d, z), d, c.quats[3] + j);
-    hn::Store(hn::PromoteTo(d, hn::LoadU(df, p.opacity_logits + i)), d, c.logits + j);
+    hn::LoadInterleaved3(d, p.log_scales + 3 * i, x, y, z);
+    hn::Store(x, d, c.log_scales[0] + j);
+    hn::Store(y, d, c.log_scales[1] + j);
+    hn::Store(z, d, c.log_scales[2] + j);
+    hn::LoadInterleaved4(d, p.quats + 4 * i, w, x, y, z);
+    hn::Store(w, d, c.quats[0] + j);
+    hn::Store(x, d, c.quats[1] + j);
+    hn::Store(y, d, c.quats[2] + j);
+    hn::Store(z, d, c.quats[3] + j);
+    hn::Store(hn::LoadU(d, p.opacity_logits + i), d, c.logits + j);
   }
   return whole;
+}
+
+// The same for one row.
+template <typename Params, typename T>
+HWY_INLINE void ReadRow(const Params& p, int64_t i, size_t j, StoredColumns<T>& c) {
+  for (int a = 0; a < 3; ++a) c.log_scales[a][j] = p.log_scales[3 * i + a];
+  for (int a = 0; a < 4; ++a) c.quats[a][j] = p.quats[4 * i + a];
+  c.logits[j] = p.opacity_logits[i];
 }
 
 // What does not depend on the Gaussian.
 struct View {
   double r[9], t[3];
-  double fx, fy, cx, cy;
+  double fx, fy, cx, cy, inverse_fx, inverse_fy;
   double left, right, up, down;  // limits of x/z and y/z in the Jacobian
   double dilation, compensated_from;
 };
@@ -83,6 +89,7 @@ View MakeView(const Params& p) {
   std::copy(p.world_to_camera.translation.begin(), p.world_to_camera.translation.end(), v.t);
   const Pinhole& k = p.intrinsics;
   v.fx = k.fx, v.fy = k.fy, v.cx = k.cx, v.cy = k.cy;
+  v.inverse_fx = 1 / k.fx, v.inverse_fy = 1 / k.fy;
   const double margin_x = double{kFrustumMargin} * 0.5 * k.width / k.fx;
   const double margin_y = double{kFrustumMargin} * 0.5 * k.height / k.fy;
   v.left = -(k.cx / k.fx + margin_x);
@@ -93,55 +100,63 @@ View MakeView(const Params& p) {
   return v;
 }
 
+template <class D>
+HWY_INLINE hn::Vec<D> Number(D d, double x) {
+  return hn::Set(d, static_cast<hn::TFromD<D>>(x));
+}
+
+template <class V>
 HWY_INLINE V Dot3(V a0, V a1, V a2, V b0, V b1, V b2) {
   return hn::MulAdd(a0, b0, hn::MulAdd(a1, b1, hn::Mul(a2, b2)));
 }
 
+template <class D, class V = hn::Vec<D>>
 HWY_INLINE V Clamped(D d, V x, double low, double high) {
-  return hn::Min(hn::Max(x, hn::Set(d, low)), hn::Set(d, high));
+  return hn::Min(hn::Max(x, Number(d, low)), Number(d, high));
 }
 
-// Row `row` of R·mean + t: x, y or z in camera space.
-HWY_INLINE V CameraSpace(D d, const View& view, const StoredColumns& in, size_t j, size_t row) {
-  const double* r = view.r + 3 * row;
-  return hn::Add(Dot3(hn::Set(d, r[0]), hn::Set(d, r[1]), hn::Set(d, r[2]), hn::Load(d, in.means[0] + j),
-                      hn::Load(d, in.means[1] + j), hn::Load(d, in.means[2] + j)),
-                 hn::Set(d, view.t[row]));
+// Above the bound a covariance is infinite and its Gaussian culled (in float: handed over to double); it only keeps exp
+// inside its domain.
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE V ExpInDomain(D d, V x) {
+  return hn::Exp(d, hn::Min(x, Number(d, sizeof(hn::TFromD<D>) == sizeof(float) ? 87.0 : 690.0)));
 }
-
-// Above ln(1e300) a covariance is infinite and its Gaussian culled; the bound only keeps exp inside its domain.
-HWY_INLINE V ExpInDomain(D d, V x) { return hn::Exp(d, hn::Min(x, hn::Set(d, 690.0))); }
 
 // One register of Gaussians. Names are those of the formulas: q the unit quaternion, R_q its rotation, s the lengths,
 // A = J·R (rows for image x and y), B = A·R_q·S.
 //
 // Constructors are written down because the compiler's own would not be of this target, which ARM's vectors insist on.
+template <class D>
 struct Shape {
+  using V = hn::Vec<D>;
   HWY_INLINE Shape() {}
   V inverse_z, ratio_x, ratio_y;  // 1/z, x/z, y/z
   V focal_x, focal_y;             // f/z
   V u, v;                         // the ratios within the view's limits
-  V qw, qx, qy, qz, inverse_norm;
-  M zero_quat;  // which counts as (1, 0, 0, 0)
+  V qw, qx, qy, qz, norm2, inverse_norm;
+  hn::Mask<D> zero_quat;  // which counts as (1, 0, 0, 0)
   V r00, r01, r02, r10, r11, r12, r20, r21, r22;
   V s0, s1, s2;
   V a0, a1, a2, a3, a4, a5;
   V b0, b1, b2, b3, b4, b5;
 };
 
-// From columns j … j + lanes − 1, which are at (x, y, z) in camera space, z ≠ 0.
-HWY_INLINE Shape ShapeOf(D d, const View& view, const StoredColumns& in, size_t j, V x, V y, V z) {
-  const V one = hn::Set(d, 1.0), two = hn::Set(d, 2.0);
-  const double* r = view.r;
-  Shape g;
-  g.inverse_z = hn::Div(one, z);
-  g.ratio_x = hn::Mul(x, g.inverse_z), g.ratio_y = hn::Mul(y, g.inverse_z);
+// From columns j … j + lanes − 1.
+template <class D>
+HWY_INLINE Shape<D> ShapeOf(D d, const View& view, const StoredColumns<hn::TFromD<D>>& in, size_t j) {
+  using V = hn::Vec<D>;
+  const V one = Number(d, 1), two = Number(d, 2);
+  const auto r = [&view, d](size_t k) HWY_ATTR { return Number(d, view.r[k]); };
+  Shape<D> g;
+  g.inverse_z = hn::Load(d, in.inverse_z + j);
+  g.ratio_x = hn::Load(d, in.ratio_x + j), g.ratio_y = hn::Load(d, in.ratio_y + j);
 
   V qw = hn::Load(d, in.quats[0] + j), qx = hn::Load(d, in.quats[1] + j), qy = hn::Load(d, in.quats[2] + j),
     qz = hn::Load(d, in.quats[3] + j);
-  const V norm2 = hn::Add(Dot3(qw, qx, qy, qw, qx, qy), hn::Mul(qz, qz));
-  g.zero_quat = hn::Eq(norm2, hn::Zero(d));
-  g.inverse_norm = hn::IfThenElse(g.zero_quat, one, hn::Div(one, hn::Sqrt(norm2)));
+  g.norm2 = hn::Add(Dot3(qw, qx, qy, qw, qx, qy), hn::Mul(qz, qz));
+  // Not by the square, which is 0 of short ones, too.
+  g.zero_quat = hn::Eq(hn::Max(hn::Max(hn::Abs(qw), hn::Abs(qx)), hn::Max(hn::Abs(qy), hn::Abs(qz))), hn::Zero(d));
+  g.inverse_norm = hn::IfThenElse(g.zero_quat, one, hn::Div(one, hn::Sqrt(g.norm2)));
   qw = g.qw = hn::IfThenElse(g.zero_quat, one, hn::Mul(qw, g.inverse_norm));
   qx = g.qx = hn::Mul(qx, g.inverse_norm);
   qy = g.qy = hn::Mul(qy, g.inverse_norm);
@@ -158,13 +173,13 @@ HWY_INLINE Shape ShapeOf(D d, const View& view, const StoredColumns& in, size_t 
   g.s2 = ExpInDomain(d, hn::Load(d, in.log_scales[2] + j));
 
   g.u = Clamped(d, g.ratio_x, view.left, view.right), g.v = Clamped(d, g.ratio_y, view.up, view.down);
-  g.focal_x = hn::Mul(hn::Set(d, view.fx), g.inverse_z), g.focal_y = hn::Mul(hn::Set(d, view.fy), g.inverse_z);
-  g.a0 = hn::Mul(g.focal_x, hn::NegMulAdd(g.u, hn::Set(d, r[6]), hn::Set(d, r[0])));
-  g.a1 = hn::Mul(g.focal_x, hn::NegMulAdd(g.u, hn::Set(d, r[7]), hn::Set(d, r[1])));
-  g.a2 = hn::Mul(g.focal_x, hn::NegMulAdd(g.u, hn::Set(d, r[8]), hn::Set(d, r[2])));
-  g.a3 = hn::Mul(g.focal_y, hn::NegMulAdd(g.v, hn::Set(d, r[6]), hn::Set(d, r[3])));
-  g.a4 = hn::Mul(g.focal_y, hn::NegMulAdd(g.v, hn::Set(d, r[7]), hn::Set(d, r[4])));
-  g.a5 = hn::Mul(g.focal_y, hn::NegMulAdd(g.v, hn::Set(d, r[8]), hn::Set(d, r[5])));
+  g.focal_x = hn::Mul(Number(d, view.fx), g.inverse_z), g.focal_y = hn::Mul(Number(d, view.fy), g.inverse_z);
+  g.a0 = hn::Mul(g.focal_x, hn::NegMulAdd(g.u, r(6), r(0)));
+  g.a1 = hn::Mul(g.focal_x, hn::NegMulAdd(g.u, r(7), r(1)));
+  g.a2 = hn::Mul(g.focal_x, hn::NegMulAdd(g.u, r(8), r(2)));
+  g.a3 = hn::Mul(g.focal_y, hn::NegMulAdd(g.v, r(6), r(3)));
+  g.a4 = hn::Mul(g.focal_y, hn::NegMulAdd(g.v, r(7), r(4)));
+  g.a5 = hn::Mul(g.focal_y, hn::NegMulAdd(g.v, r(8), r(5)));
   g.b0 = hn::Mul(g.s0, Dot3(g.a0, g.a1, g.a2, g.r00, g.r10, g.r20));
   g.b1 = hn::Mul(g.s1, Dot3(g.a0, g.a1, g.a2, g.r01, g.r11, g.r21));
   g.b2 = hn::Mul(g.s2, Dot3(g.a0, g.a1, g.a2, g.r02, g.r12, g.r22));
@@ -174,24 +189,53 @@ HWY_INLINE Shape ShapeOf(D d, const View& view, const StoredColumns& in, size_t 
   return g;
 }
 
-// Σ₂ in pixels², as the Gaussian is (sharp), with the dilation (xx, yy) and with the lesser dilation that opacities
-// are compensated from.
+// a·b − c·d without the cancellation of the two roundings (Kahan), where multiply-adds are fused.
+template <class V>
+HWY_INLINE V DifferenceOfProducts(V a, V b, V c, V d) {
+  const V second = hn::Mul(c, d);
+  const V error = hn::NegMulAdd(c, d, second);
+  return hn::Add(hn::MulSub(a, b, second), error);
+}
+
+// Σ₂ in pixels² with the dilation (xx, yy) and with the lesser dilation that opacities are compensated from.
+template <class V>
 struct Covariance {
   HWY_INLINE Covariance() {}
   V xx, xy, yy, det;
   V from_xx, from_yy, from_det;
 };
-HWY_INLINE Covariance CovarianceOf(D d, const View& view, const Shape& g) {
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE Covariance<V> CovarianceOf(D d, const View& view, const Shape<D>& g) {
   const V sharp_xx = Dot3(g.b0, g.b1, g.b2, g.b0, g.b1, g.b2), sharp_yy = Dot3(g.b3, g.b4, g.b5, g.b3, g.b4, g.b5);
-  const V dilation = hn::Set(d, view.dilation), from = hn::Set(d, view.compensated_from);
-  Covariance c;
+  const V dilation = Number(d, view.dilation), from = Number(d, view.compensated_from);
+  // det(B·Bᵀ) as the sum of the squares of B's minors (Cauchy-Binet), and what a dilation δ adds to it, δ·trace + δ²:
+  // no term is negative, and a needle keeps the digits that xx·yy − xy² would lose.
+  const V minor0 = DifferenceOfProducts(g.b1, g.b5, g.b2, g.b4), minor1 = DifferenceOfProducts(g.b2, g.b3, g.b0, g.b5),
+          minor2 = DifferenceOfProducts(g.b0, g.b4, g.b1, g.b3);
+  const V sharp_det = Dot3(minor0, minor1, minor2, minor0, minor1, minor2), trace = hn::Add(sharp_xx, sharp_yy);
+  Covariance<V> c;
   c.xy = Dot3(g.b0, g.b1, g.b2, g.b3, g.b4, g.b5);
-  const V square = hn::Mul(c.xy, c.xy);
   c.xx = hn::Add(sharp_xx, dilation), c.yy = hn::Add(sharp_yy, dilation);
-  c.det = hn::MulSub(c.xx, c.yy, square);
+  c.det = hn::MulAdd(dilation, hn::Add(trace, dilation), sharp_det);
   c.from_xx = hn::Add(sharp_xx, from), c.from_yy = hn::Add(sharp_yy, from);
-  c.from_det = hn::MulSub(c.from_xx, c.from_yy, square);
+  c.from_det = hn::MulAdd(from, hn::Add(trace, from), sharp_det);
   return c;
+}
+
+// Gaussians whose numbers leave the range in which floats hold their squares: they are calculated in double, each by
+// itself, so that none depends on its neighbours. `lowest` is the smallest determinant that is divided by. NaN counts
+// as extreme.
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE hn::Mask<D> IsExtreme(D d, const Shape<D>& g, V lowest) {
+  const V longest = hn::Max(hn::Max(hn::Max(hn::Abs(g.b0), hn::Abs(g.b1)), hn::Max(hn::Abs(g.b2), hn::Abs(g.b3))),
+                            hn::Max(hn::Abs(g.b4), hn::Abs(g.b5)));
+  const V sum = hn::Add(Dot3(g.b0, g.b1, g.b2, g.b3, g.b4, g.b5), g.norm2);  // NaN if one is, which Max may lose
+  const V scale = hn::Max(hn::Max(g.s0, g.s1), hn::Max(g.s2, hn::Max(g.focal_x, g.focal_y)));
+  const auto longest_fits = hn::And(hn::Le(longest, Number(d, 1e8)), hn::Le(scale, Number(d, 1e20)));
+  const auto det_fits = hn::Ge(lowest, Number(d, 1e-30));
+  const auto norm_fits =
+      hn::Or(g.zero_quat, hn::And(hn::Ge(g.norm2, Number(d, 1e-24)), hn::Le(g.norm2, Number(d, 1e24))));
+  return hn::Not(hn::And(hn::And(longest_fits, det_fits), hn::And(norm_fits, hn::Eq(sum, sum))));
 }
 
 }  // namespace

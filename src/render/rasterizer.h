@@ -11,6 +11,7 @@
 #include "core/gaussian_cloud.h"
 #include "core/image.h"
 #include "core/result.h"
+#include "render/adam_runs.h"
 #include "render/constants.h"
 #include "render/profile.h"
 
@@ -66,7 +67,8 @@ struct CloudGradient {
   Buffer<float> log_scales;      // [N,3]
   Buffer<float> quats;           // [N,4] of the quaternion as stored: orthogonal to it; 0 for the zero quaternion
   Buffer<float> opacity_logits;  // [N]
-  Buffer<float> sh;              // [N,K,3] as the cloud's; 0 for coefficients above the degree in use
+  Buffer<float> sh;              // [N,K,3] as the cloud's; 0 for coefficients above the degree in use. Empty where
+                                 // they took a step instead
 
   // What densification asks for.
   Buffer<float> means2d;  // [N,2] ∂L/∂(mean in the picture), per pixel
@@ -92,9 +94,9 @@ struct RenderStatistics {
 // many views without allocating: 100 bytes per Gaussian and 4 per pair listed at once. The result is bit-identical for
 // every number of threads.
 //
-// Two things follow gsplat in spirit rather than to the letter. Coordinates and covariances are calculated in double,
-// because in floats the determinant of a long thin Gaussian's covariance keeps only three or four digits. The zero
-// quaternion is the identity (core/rotation.h), where gsplat divides by zero.
+// Two things follow gsplat in spirit rather than to the letter. Coordinates are calculated in double, and the
+// determinant of a covariance as a sum of squares: gsplat's difference in floats leaves a long thin Gaussian three or
+// four digits. The zero quaternion is the identity (core/rotation.h), where gsplat divides by zero.
 class Rasterizer {
  public:
   Rasterizer();
@@ -119,7 +121,12 @@ class Rasterizer {
   //
   // Errors (kBadArgument): no such Render before; a cloud of another size or degree; gradients of another size than the
   // picture; a box that reaches outside of it; not enough memory (kIo).
-  Status Backward(const CloudView& cloud, const RenderGradient& output_gradient, CloudGradient& gradient);
+  //
+  // With a `step` the coefficients of the spherical harmonics take it right away, and CloudGradient::sh stays empty:
+  // written down, it would be the largest part of what a fit moves through memory. The values are those of a gradient
+  // that is written down and followed by the same step of Adam, bit by bit.
+  Status Backward(const CloudView& cloud, const RenderGradient& output_gradient, CloudGradient& gradient,
+                  const CoefficientStep* step = nullptr);
 
   const RenderStatistics& statistics() const;  // of the last Render that succeeded
 

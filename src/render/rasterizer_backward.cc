@@ -89,13 +89,13 @@ void Rasterizer::State::BlendBackward(const RenderGradient& output_gradient, Clo
   for (size_t c = 0; c < 3; ++c) gradient.background[c] = static_cast<float>(background_gradient[c]);
 }
 
-void Rasterizer::State::ProjectBackward(const CloudView& cloud, CloudGradient& gradient) {
+void Rasterizer::State::ProjectBackward(const CloudView& cloud, const CoefficientStep* step, CloudGradient& gradient) {
   const size_t n = static_cast<size_t>(kept->count);
   gradient.means.resize(3 * n);
   gradient.log_scales.resize(3 * n);
   gradient.quats.resize(4 * n);
   gradient.opacity_logits.resize(n);
-  gradient.sh.resize(cloud.sh.size());
+  gradient.sh.resize(step == nullptr ? cloud.sh.size() : 0);
   gradient.means2d.resize(2 * n);
   gradient.radii.assign(radii.begin(), radii.begin() + static_cast<int64_t>(2 * n));
 
@@ -132,7 +132,8 @@ void Rasterizer::State::ProjectBackward(const CloudView& cloud, CloudGradient& g
   sh.visible = visible.data();
   sh.visible_counts = visible_counts.data();
   sh.mean_gradients = gradient.means.data();
-  sh.sh_gradients = gradient.sh.data();
+  sh.sh_gradients = step == nullptr ? gradient.sh.data() : nullptr;
+  sh.step = step;
 
   // Both of a chunk while it is in the cache.
   ParallelFor(0, ProjectChunks(kept->count), 1, [&](int64_t first, int64_t last) {
@@ -143,7 +144,8 @@ void Rasterizer::State::ProjectBackward(const CloudView& cloud, CloudGradient& g
   });
 }
 
-Status Rasterizer::Backward(const CloudView& cloud, const RenderGradient& output_gradient, CloudGradient& gradient) {
+Status Rasterizer::Backward(const CloudView& cloud, const RenderGradient& output_gradient, CloudGradient& gradient,
+                            const CoefficientStep* step) {
   if (!state_->kept) {
     return BadGradientArgument("no picture to take the gradient of: render one with RenderOptions::gradient first");
   }
@@ -155,11 +157,15 @@ Status Rasterizer::Backward(const CloudView& cloud, const RenderGradient& output
                                    cloud.sh_degree));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckGradient(output_gradient, kept.intrinsics.width, kept.intrinsics.height));
+  if (step != nullptr && (step->values != cloud.sh.data() || step->columns > cloud.sh_stride() ||
+                          step->columns < 3 * ShCoefficients(std::min(kept.options.sh_degree, cloud.sh_degree)))) {
+    return BadGradientArgument(Cat("a step of ", step->columns, " coefficients that is not of the picture's cloud"));
+  }
   try {
     Stopwatch watch;
     state_->BlendBackward(output_gradient, gradient);
     state_->statistics.blend_backward = watch.Lap();
-    state_->ProjectBackward(cloud, gradient);
+    state_->ProjectBackward(cloud, step, gradient);
     state_->statistics.project_backward = watch.Lap();
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kIo,

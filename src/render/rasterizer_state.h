@@ -56,7 +56,7 @@ struct Rasterizer::State {
   void BinAndBlend(int64_t visible_total, const Camera& camera, const RenderOptions& options, RenderOutput& output,
                    Stopwatch& watch);
   void BlendBackward(const RenderGradient& output_gradient, CloudGradient& gradient);  // background and means2d_abs
-  void ProjectBackward(const CloudView& cloud, CloudGradient& gradient);
+  void ProjectBackward(const CloudView& cloud, const CoefficientStep* step, CloudGradient& gradient);
 };
 
 }  // namespace anchorsplat

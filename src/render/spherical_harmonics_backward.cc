@@ -7,6 +7,7 @@
 
 #include "core/gaussian_cloud.h"
 #include "core/spherical_harmonics.h"
+#include "render/adam_runs.h"
 #include "render/project.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -15,6 +16,7 @@
 // clang-format off
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include "render/adam-inl.h"
 #include "render/spherical_harmonics_basis-inl.h"
 // clang-format on
 
@@ -25,8 +27,9 @@ namespace {
 
 constexpr ptrdiff_t kAhead = 24;  // Gaussians that are fetched ahead: rows are large and not all of them are needed
 constexpr int kFloatsPerLine = 16;
+constexpr size_t kFloatsAtMost = 3 * kShCoefficientsAtMost;  // of a row
 
-// ∂Y_k/∂(x, y, z) of the formulas as they stand, at unit directions.
+// ∂Y_k/∂(x, y, z) of the formulas as they stand, at unit directions; where it is 0 everywhere, it is not written.
 struct BasisSlopes {
   alignas(64) float slope[3][kShCoefficientsAtMost][kShBatch];
 };
@@ -37,33 +40,30 @@ HWY_INLINE void EvaluateSlopes(int degree, size_t j, const ShBasisBatch& b, Basi
   const ShVector x = hn::Load(d, b.direction[0] + j), y = hn::Load(d, b.direction[1] + j),
                  z = hn::Load(d, b.direction[2] + j);
   const auto c = [d](float value) HWY_ATTR { return hn::Set(d, value); };
-  const ShVector zero = hn::Zero(d);
-  const auto put = [&s, d, j](size_t k, ShVector sx, ShVector sy, ShVector sz) HWY_ATTR {
-    hn::Store(sx, d, s.slope[0][k] + j);
-    hn::Store(sy, d, s.slope[1][k] + j);
-    hn::Store(sz, d, s.slope[2][k] + j);
-  };
-  put(1, zero, c(-kSh1), zero);
-  put(2, zero, zero, c(kSh1));
-  put(3, c(-kSh1), zero, zero);
-  if (degree < 2) return;
   const auto times = [d](float f, ShVector a) HWY_ATTR { return hn::Mul(hn::Set(d, f), a); };
-  put(4, times(kSh2[0], y), times(kSh2[0], x), zero);
-  put(5, zero, times(-kSh2[0], z), times(-kSh2[0], y));
-  put(6, zero, zero, times(2 * kSh2[1], z));
-  put(7, times(-kSh2[0], z), zero, times(-kSh2[0], x));
-  put(8, times(2 * kSh2Diagonal, x), times(-2 * kSh2Diagonal, y), zero);
+  const auto put_x = [&s, d, j](size_t k, ShVector slope) HWY_ATTR { hn::Store(slope, d, s.slope[0][k] + j); };
+  const auto put_y = [&s, d, j](size_t k, ShVector slope) HWY_ATTR { hn::Store(slope, d, s.slope[1][k] + j); };
+  const auto put_z = [&s, d, j](size_t k, ShVector slope) HWY_ATTR { hn::Store(slope, d, s.slope[2][k] + j); };
+  put_y(1, c(-kSh1));
+  put_z(2, c(kSh1));
+  put_x(3, c(-kSh1));
+  if (degree < 2) return;
+  put_x(4, times(kSh2[0], y)), put_y(4, times(kSh2[0], x));
+  put_y(5, times(-kSh2[0], z)), put_z(5, times(-kSh2[0], y));
+  put_z(6, times(2 * kSh2[1], z));
+  put_x(7, times(-kSh2[0], z)), put_z(7, times(-kSh2[0], x));
+  put_x(8, times(2 * kSh2Diagonal, x)), put_y(8, times(-2 * kSh2Diagonal, y));
   if (degree < 3) return;
   const ShVector xx = hn::Mul(x, x), yy = hn::Mul(y, y), zz = hn::Mul(z, z), xy = hn::Mul(x, y), xz = hn::Mul(x, z),
                  yz = hn::Mul(y, z), difference = hn::Sub(xx, yy);
   const ShVector ring = hn::NegMulAdd(c(kSh3[3]), zz, c(kSh3[2]));
-  put(9, times(-6 * kSh3[0], xy), times(-3 * kSh3[0], difference), zero);
-  put(10, times(kSh3[1], yz), times(kSh3[1], xz), times(kSh3[1], xy));
-  put(11, zero, ring, times(-2 * kSh3[3], yz));
-  put(12, zero, zero, hn::MulSub(c(3 * kSh3[4]), zz, c(kSh3[5])));
-  put(13, ring, zero, times(-2 * kSh3[3], xz));
-  put(14, times(2 * kSh3[6], xz), times(-2 * kSh3[6], yz), times(kSh3[6], difference));
-  put(15, times(-3 * kSh3[0], difference), times(6 * kSh3[0], xy), zero);
+  put_x(9, times(-6 * kSh3[0], xy)), put_y(9, times(-3 * kSh3[0], difference));
+  put_x(10, times(kSh3[1], yz)), put_y(10, times(kSh3[1], xz)), put_z(10, times(kSh3[1], xy));
+  put_y(11, ring), put_z(11, times(-2 * kSh3[3], yz));
+  put_z(12, hn::MulSub(c(3 * kSh3[4]), zz, c(kSh3[5])));
+  put_x(13, ring), put_z(13, times(-2 * kSh3[3], xz));
+  put_x(14, times(2 * kSh3[6], xz)), put_y(14, times(-2 * kSh3[6], yz)), put_z(14, times(kSh3[6], difference));
+  put_x(15, times(-3 * kSh3[0], difference)), put_y(15, times(6 * kSh3[0], xy));
 }
 
 // sh_gradient[k] = Y_k·g for all coefficients.
@@ -82,96 +82,155 @@ HWY_INLINE void Spread(const ShBasisBatch& b, size_t j, int coefficients, const 
   for (int c = 0; c < 3; ++c) out[3 * last + c] = b.value[last][j] * g[c];
 }
 
-// ∂L/∂direction = Σ_k ∇Y_k·(sh[k]·g); Y_0 has no slope.
-HWY_INLINE void DirectionGradient(const BasisSlopes& s, size_t j, int coefficients, const float* HWY_RESTRICT sh,
-                                  const float* g, float* out) {
+// The coefficients along the slopes, Σ_k ∇Y_k·sh[k], for x, y and z: each a number nobody reads, red, green and blue.
+// Y_0 has no slope, and most others none along one or two axes.
+HWY_INLINE void AlongSlopes(const BasisSlopes& s, size_t j, int degree, const float* HWY_RESTRICT sh,
+                            float* HWY_RESTRICT out) {
 #if HWY_TARGET == HWY_SCALAR
-  for (int a = 0; a < 3; ++a) out[a] = 0;
-  for (int k = 1; k < coefficients; ++k) {
-    const float along = sh[3 * k] * g[0] + sh[3 * k + 1] * g[1] + sh[3 * k + 2] * g[2];
-    for (int a = 0; a < 3; ++a) out[a] += s.slope[a][k][j] * along;
-  }
+  std::fill_n(out, 12, 0.0f);
+  const auto add = [&](size_t axis, size_t k) {
+    for (size_t c = 0; c < 3; ++c) out[4 * axis + 1 + c] += s.slope[axis][k][j] * sh[3 * k + c];
+  };
+  const auto one = [&](size_t k, size_t a) { add(a, k); };
 #else
-  // Reads from the float before the coefficient's red, so that nothing behind the last coefficient is touched; its lane
-  // is multiplied by 0 at the end.
+  // Reads from the float before the coefficient's red, so that nothing behind the last coefficient is touched.
   const hn::FixedTag<float, 4> d4;
-  auto x = hn::Zero(d4), y = hn::Zero(d4), z = hn::Zero(d4);
-  for (int k = 1; k < coefficients; ++k) {
-    const auto rgb = hn::LoadU(d4, sh + 3 * k - 1);
-    x = hn::MulAdd(hn::Set(d4, s.slope[0][k][j]), rgb, x);
-    y = hn::MulAdd(hn::Set(d4, s.slope[1][k][j]), rgb, y);
-    z = hn::MulAdd(hn::Set(d4, s.slope[2][k][j]), rgb, z);
-  }
-  alignas(16) float sums[3][4];
-  hn::Store(x, d4, sums[0]);
-  hn::Store(y, d4, sums[1]);
-  hn::Store(z, d4, sums[2]);
-  for (int a = 0; a < 3; ++a) out[a] = sums[a][1] * g[0] + sums[a][2] * g[1] + sums[a][3] * g[2];
+  using V4 = hn::Vec<decltype(d4)>;
+  V4 x = hn::Zero(d4), y = hn::Zero(d4), z = hn::Zero(d4);
+  const auto add = [&](size_t axis, size_t k) HWY_ATTR {
+    V4& sum = axis == 0 ? x : axis == 1 ? y : z;
+    sum = hn::MulAdd(hn::Set(d4, s.slope[axis][k][j]), hn::LoadU(d4, sh + 3 * k - 1), sum);
+  };
+  const auto one = [&](size_t k, size_t a) HWY_ATTR { add(a, k); };
+#endif
+  const auto two = [&](size_t k, size_t a, size_t b) HWY_ATTR { add(a, k), add(b, k); };
+  const auto all = [&](size_t k) HWY_ATTR { add(0, k), add(1, k), add(2, k); };
+  one(1, 1), one(2, 2), one(3, 0);
+  if (degree > 1) two(4, 0, 1), two(5, 1, 2), one(6, 2), two(7, 0, 2), two(8, 0, 1);
+  if (degree > 2) two(9, 0, 1), all(10), two(11, 1, 2), one(12, 2), two(13, 0, 2), all(14), two(15, 0, 1);
+#if HWY_TARGET != HWY_SCALAR
+  hn::Store(x, d4, out);
+  hn::Store(y, d4, out + 4);
+  hn::Store(z, d4, out + 8);
 #endif
 }
 
-void BackwardChunk(const SphericalHarmonicsBackwardParams& p, int64_t chunk) {
-  const int64_t first = chunk * kProjectChunk, rows_of_chunk = std::min(kProjectChunk, p.count - first);
+// Those of a batch that have a gradient.
+struct Taught {
+  size_t count = 0;
+  int64_t rows[kShBatch];
+  alignas(64) float g[kShBatch][4];         // ∂L/∂rgb, 0
+  alignas(64) float along[3][kShBatch][4];  // of AlongSlopes, by axis
+  alignas(64) float means[3][kShBatch];     // ∂L/∂mean through the direction
+};
+
+// One register of Gaussians: ∂L/∂direction, and through the normalisation: what points along the ray changes nothing.
+HWY_INLINE void DirectionLanes(const ShBasisBatch& b, size_t j, Taught& t) {
+  const ShTag d;
+  ShVector red, green, blue, unread;
+  hn::LoadInterleaved4(d, t.g[j], red, green, blue, unread);
+  const auto along = [&](size_t axis) HWY_ATTR {
+    ShVector r, g, v;
+    hn::LoadInterleaved4(d, t.along[axis][j], unread, r, g, v);
+    return hn::MulAdd(r, red, hn::MulAdd(g, green, hn::Mul(v, blue)));
+  };
+  const ShVector along_x = along(0), along_y = along(1), along_z = along(2);
+  const ShVector x = hn::Load(d, b.direction[0] + j), y = hn::Load(d, b.direction[1] + j),
+                 z = hn::Load(d, b.direction[2] + j), inverse = hn::Load(d, b.inverse_distance + j);
+  const ShVector radial = hn::MulAdd(along_x, x, hn::MulAdd(along_y, y, hn::Mul(along_z, z)));
+  hn::Store(hn::Mul(inverse, hn::NegMulAdd(radial, x, along_x)), d, t.means[0] + j);
+  hn::Store(hn::Mul(inverse, hn::NegMulAdd(radial, y, along_y)), d, t.means[1] + j);
+  hn::Store(hn::Mul(inverse, hn::NegMulAdd(radial, z, along_z)), d, t.means[2] + j);
+}
+
+// Rows [first, last), at most a batch, of which [visible, end) are not culled. `out` is the gradient of row `first`.
+void BackwardRows(const SphericalHarmonicsBackwardParams& p, int64_t first, int64_t last, const int32_t* visible,
+                  const int32_t* end, float* out) {
   const size_t lanes = hn::Lanes(ShTag());
   const int coefficients = ShCoefficients(p.degree);
+  Taught t;
+  for (; visible != end; ++visible) {
+    const int64_t i = *visible;
+    const ProjectedGaussian& projected = p.projected[i];
+    float* g = t.g[t.count];
+    for (int c = 0; c < 3; ++c) g[c] = projected.rgb[c] > 0 ? p.gradients[i].rgb[c] : 0.0f;
+    g[3] = 0;
+    t.rows[t.count] = i;
+    // Hidden ones have no gradient, and they are many.
+    t.count += !(g[0] == 0 && g[1] == 0 && g[2] == 0);
+  }
   ShBasisBatch b;
   BasisSlopes s;
-  struct Row {
-    int64_t row;
-    alignas(16) float g[4];  // rgb, 0
-  } batch[kShBatch];
-  const int32_t* visible = p.visible + first;
-  const int32_t* end = visible + p.visible_counts[chunk];
-  int64_t written = first;  // rows below are final
-  while (visible != end) {
-    size_t n = 0;
-    for (; visible != end && n < kShBatch; ++visible) {
-      if (visible + kAhead < end) {
-        hwy::Prefetch(p.gradients + visible[kAhead]);
-        hwy::Prefetch(p.projected + visible[kAhead]);
-      }
-      const ProjectedGaussian& projected = p.projected[*visible];
-      Row& row = batch[n];
-      row.row = *visible;
-      for (int c = 0; c < 3; ++c) row.g[c] = projected.rgb[c] > 0 ? p.gradients[row.row].rgb[c] : 0.0f;
-      row.g[3] = 0;
-      // Hidden ones have no gradient, and they are many.
-      n += !(row.g[0] == 0 && row.g[1] == 0 && row.g[2] == 0);
-    }
-    if (n == 0) break;
+  if (t.count > 0) {
     LoadDirections(
-        n, [&](size_t j) { return p.means + 3 * batch[j].row; }, p.center, b);
-    for (size_t j = 0; j < n; j += lanes) {
-      EvaluateBasis(p.degree, j, b);
-      EvaluateSlopes(p.degree, j, b, s);
+        t.count, [&](size_t j) { return p.means + 3 * t.rows[j]; }, p.center, b);
+  }
+  for (size_t j = 0; j < t.count; j += lanes) {
+    EvaluateBasis(p.degree, j, b);
+    EvaluateSlopes(p.degree, j, b, s);
+  }
+  int64_t written = first;  // rows below are final
+  const auto clear_to = [&](int64_t row) {
+    std::fill(out + (written - first) * p.stride, out + (row - first) * p.stride, 0.0f);
+  };
+  for (size_t j = 0; j < t.count; ++j) {
+    const int64_t i = t.rows[j];
+    // Of dense splats nearly all are needed; fetched one by one, as many at once wait for each other.
+    if (const int64_t next = i + kAhead; next < p.count) {
+      for (int k = 0; k < 3 * coefficients; k += kFloatsPerLine) hwy::Prefetch(p.sh + next * p.stride + k);
     }
-    for (size_t j = 0; j < n; ++j) {
-      const auto& [i, g] = batch[j];
-      // Of dense splats nearly all are needed; fetched one by one, as many at once wait for each other.
-      if (const int64_t next = i + kAhead; next < p.count) {
-        for (int k = 0; k < 3 * coefficients; k += kFloatsPerLine) {
-          hwy::Prefetch(p.sh + next * p.stride + k);
-          hwy::Prefetch(p.sh_gradients + next * p.stride + k);
-        }
-      }
-      std::fill(p.sh_gradients + written * p.stride, p.sh_gradients + i * p.stride, 0.0f);
-      written = i + 1;
-      float* out = p.sh_gradients + i * p.stride;
-      Spread(b, j, coefficients, g, out);
-      std::fill(out + 3 * coefficients, out + p.stride, 0.0f);
-      if (p.degree < 1) continue;
-      float along[3];
-      DirectionGradient(s, j, coefficients, p.sh + i * p.stride, g, along);
-      // Through the normalisation: what points along the ray changes nothing.
-      const float x = b.direction[0][j], y = b.direction[1][j], z = b.direction[2][j];
-      const float radial = along[0] * x + along[1] * y + along[2] * z;
-      float* mean = p.mean_gradients + 3 * i;
-      mean[0] += b.inverse_distance[j] * (along[0] - radial * x);
-      mean[1] += b.inverse_distance[j] * (along[1] - radial * y);
-      mean[2] += b.inverse_distance[j] * (along[2] - radial * z);
+    clear_to(i);
+    written = i + 1;
+    float* row = out + (i - first) * p.stride;
+    Spread(b, j, coefficients, t.g[j], row);
+    std::fill(row + 3 * coefficients, row + p.stride, 0.0f);
+    if (p.degree < 1) continue;
+    alignas(16) float along[12];
+    AlongSlopes(s, j, p.degree, p.sh + i * p.stride, along);
+    for (size_t a = 0; a < 3; ++a) std::copy_n(along + 4 * a, 4, t.along[a][j]);
+  }
+  clear_to(last);
+  if (p.degree < 1) return;
+  for (size_t j = 0; j < t.count; j += lanes) DirectionLanes(b, j, t);
+  for (size_t j = 0; j < t.count; ++j) {
+    float* mean = p.mean_gradients + 3 * t.rows[j];
+    for (size_t a = 0; a < 3; ++a) mean[a] += t.means[a][j];
+  }
+}
+
+void BackwardChunk(const SphericalHarmonicsBackwardParams& p, int64_t chunk) {
+  constexpr int64_t kRows = static_cast<int64_t>(kShBatch);
+  const int64_t chunk_begin = chunk * kProjectChunk, chunk_end = std::min(chunk_begin + kProjectChunk, p.count);
+  const int32_t* visible = p.visible + chunk_begin;
+  const int32_t* end = visible + p.visible_counts[chunk];
+  AdamRuns runs{};
+  alignas(64) float rates[kFloatsAtMost * kAdamLanesAtMost];
+  alignas(64) float gradients[kShBatch * kFloatsAtMost];
+  const bool whole = p.step != nullptr && p.step->columns == p.stride;  // then all rows are one run
+  if (p.step != nullptr) {
+    runs.stride = p.stride;
+    runs.period = AdamPeriod(p.step->columns);
+    runs.rates = rates;
+    runs.numbers = p.step->numbers;
+    runs.gradient = gradients;
+    for (int64_t k = 0; k < runs.period; ++k) {
+      rates[k] = k % p.step->columns < 3 ? p.step->first_rate : p.step->rate;
     }
   }
-  std::fill(p.sh_gradients + written * p.stride, p.sh_gradients + (first + rows_of_chunk) * p.stride, 0.0f);
+  for (int64_t first = chunk_begin; first < chunk_end; first += kRows) {
+    const int64_t last = std::min(first + kRows, chunk_end);
+    const int32_t* behind = visible;
+    while (behind != end && *behind < last) ++behind;
+    BackwardRows(p, first, last, visible, behind, p.step != nullptr ? gradients : p.sh_gradients + first * p.stride);
+    visible = behind;
+    if (p.step == nullptr) continue;
+    runs.runs = whole ? 1 : last - first;
+    runs.count = whole ? (last - first) * p.stride : p.step->columns;
+    runs.first_moment = p.step->first_moment + first * p.stride;
+    runs.second_moment = p.step->second_moment + first * p.stride;
+    runs.values = p.step->values + first * p.stride;
+    UpdateAll(runs);
+  }
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 
+#include "render/adam_runs.h"
 #include "render/blend_backward.h"
 #include "render/projected_gaussian.h"
 
@@ -24,7 +25,9 @@ struct SphericalHarmonicsBackwardParams {
   // in and out
   float* mean_gradients;  // [N,3] per world unit; the part through the direction is added
   // out; rows of culled Gaussians and coefficients above the degree become 0
-  float* sh_gradients;  // [N,stride/3,3]
+  float* sh_gradients;  // [N,stride/3,3]; null where `step` uses them instead
+  // in and out, else null: the coefficients take this step as soon as their gradient is known, `sh` being its values
+  const CoefficientStep* step;
 };
 
 // Gaussians of one chunk, [chunk·kProjectChunk, …).

@@ -14,6 +14,7 @@
 #include "dataset/room.h"
 #include "io/atomic_file.h"
 #include "io/file_bytes.h"
+#include "io/input_record.h"
 #include "request/choice.h"
 
 namespace anchorsplat {
@@ -31,6 +32,7 @@ struct RoomFlags {
   RoomOptions room;
   ViewSetOptions views;
   int count = 200;
+  double light_every = 0.06;  // metres
 
   RoomFlags() {
     views.high_size = 1600;
@@ -57,6 +59,7 @@ std::string RoomText(const RoomFlags& flags, const std::vector<PlacedMesh>& piec
                                {"sizes", {flags.views.low_size, flags.views.high_size}},
                                {"samples", flags.views.trace.samples},
                                {"points", flags.views.points},
+                               {"light_every", flags.light_every},
                                {"furniture", list}};
   return json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
@@ -74,6 +77,7 @@ Status RunRoom(const RoomFlags& given, const SharedFlags& shared) {
   const fs::path folder = flags.output, note = folder / kRoomName;
   const std::string text = RoomText(flags, pieces);
   bool keep = false;
+  RecordOwnFile(note);
   if (IsFile(note) && !shared.overwrite) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string earlier, ReadFileBytes(note, uint64_t{1} << 20));
     if (earlier != text) {
@@ -85,6 +89,7 @@ Status RunRoom(const RoomFlags& given, const SharedFlags& shared) {
   std::error_code code;
   fs::create_directories(folder, code);
   if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot make this folder: ", code.message())};
+  room.daylight.longest_edge = static_cast<float>(flags.light_every);
   LogInfo("daylight is computed");
   ANCHORSPLAT_RETURN_IF_ERROR(BakeDaylight(room.mesh, room.daylight));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const RayTracer tracer, RayTracer::Create(std::move(room.mesh)));
@@ -129,6 +134,9 @@ void AddDatasetRoom(CLI::App& parent, Program& program) {
       ->capture_default_str();
   verb.add_option("--samples", flags->views.trace.samples, "Rays per pixel and side: 3 is 9 rays a pixel")
       ->check(CLI::Range(1, kMaxTraceSamples))
+      ->capture_default_str();
+  verb.add_option("--light-every", flags->light_every, "Metres between the places whose light is computed")
+      ->check(CLI::Range(0.01, 10.0))
       ->capture_default_str();
   verb.add_option("--points", flags->views.points, "Samples of the surface, as initial points of a fit")
       ->check(CLI::Range(0, 10'000'000))

@@ -47,10 +47,8 @@ struct RoomFlags {
 std::string RoomText(const RoomFlags& flags, const std::vector<PlacedMesh>& pieces) {
   nlohmann::json list = nlohmann::json::array();
   for (const PlacedMesh& p : pieces) {
-    list.push_back({{"mesh", fs::path(p.mesh).filename().string()},
-                    {"at", p.at},
-                    {"turn", p.turn},
-                    {"height", p.height}});
+    list.push_back(
+        {{"mesh", fs::path(p.mesh).filename().string()}, {"at", p.at}, {"turn", p.turn}, {"height", p.height}});
   }
   const nlohmann::json json = {{"version", 1},
                                {"size", flags.room.size},
@@ -81,8 +79,9 @@ Status RunRoom(const RoomFlags& given, const SharedFlags& shared) {
   if (IsFile(note) && !shared.overwrite) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string earlier, ReadFileBytes(note, uint64_t{1} << 20));
     if (earlier != text) {
-      return Error{ErrorCode::kExists,
-                   Cat(folder.string(), ": has views that were made with other settings or furniture; -w makes them again")};
+      return Error{
+          ErrorCode::kExists,
+          Cat(folder.string(), ": has views that were made with other settings or furniture; -w makes them again")};
     }
     keep = true;
   }

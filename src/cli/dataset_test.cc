@@ -51,8 +51,25 @@ TEST_F(DatasetVerb, RoomGoesOnWhereItWasStopped) {
   std::ofstream(folder_ / "room.txt") << "cube.obj 2.5 0 2 30 0.7\n";
   const std::string room = folder_ / "room";
   const auto words = [&](const std::string& views) -> std::vector<std::string> {
-    return {"dataset", "room", folder_ / "room.txt", "--objects", folder_.path().string(), "-o", room, "--views", views,
-            "--size",  "32",   "--low-size", "16",   "--samples", "1", "--points", "50", "--light-every", "2"};
+    return {"dataset",
+            "room",
+            folder_ / "room.txt",
+            "--objects",
+            folder_.path().string(),
+            "-o",
+            room,
+            "--views",
+            views,
+            "--size",
+            "32",
+            "--low-size",
+            "16",
+            "--samples",
+            "1",
+            "--points",
+            "50",
+            "--light-every",
+            "2"};
   };
   EXPECT_EQ(ExpectJson(words("3"))["views"], 3);
   const auto picture = ReadImage(fs::path(room) / "32/images/001.png");

@@ -137,9 +137,8 @@ Status Place(const PlacedMesh& piece, Room& room) {
   const Room::Box box = BoxOf(mesh);
   for (size_t k = 0; k < 3; ++k) {
     if (box.low[k] < -1e-3f || box.high[k] > static_cast<float>(room.size[k]) + 1e-3f) {
-      return Error{ErrorCode::kBadArgument,
-                   Cat(piece.mesh, ": reaches from ", box.low[k], " to ", box.high[k], " m along ", "xyz"[k],
-                       ", the room from 0 to ", room.size[k])};
+      return Error{ErrorCode::kBadArgument, Cat(piece.mesh, ": reaches from ", box.low[k], " to ", box.high[k],
+                                                " m along ", "xyz"[k], ", the room from 0 to ", room.size[k])};
     }
   }
   room.furniture.push_back(box);
@@ -302,8 +301,8 @@ Result<std::vector<PlacedMesh>> ReadFurniture(const std::filesystem::path& file,
 Result<Room> FurnishRoom(const std::vector<PlacedMesh>& furniture, const RoomOptions& options) {
   const auto& size = options.size;
   if (!(size[0] >= 4.5 && size[1] >= 2.5 && size[2] >= 4 && size[0] < 20 && size[1] < 20 && size[2] < 20)) {
-    return Error{ErrorCode::kBadArgument, Cat("a room is 4.5 x 2.5 x 4 to 20 x 20 x 20 m large, not ", size[0], " x ",
-                                              size[1], " x ", size[2])};
+    return Error{ErrorCode::kBadArgument,
+                 Cat("a room is 4.5 x 2.5 x 4 to 20 x 20 x 20 m large, not ", size[0], " x ", size[1], " x ", size[2])};
   }
   Room room;
   room.size = size;

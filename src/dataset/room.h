@@ -14,7 +14,7 @@
 namespace anchorsplat {
 
 // A furnished room seen from within: what people capture, where objects are seen from all around. Everything is near
-// or far, from a hand's breadth to the houses behind the window, and every ray meets something.
+// or far, from 15 cm to the houses behind the window, and every ray meets something.
 //
 // Metres, y up: x from 0 to the room's width, z from 0 (the wall with the window) to its depth.
 struct RoomOptions {

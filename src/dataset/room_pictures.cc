@@ -174,7 +174,8 @@ Texture LandscapePicture(uint64_t seed) {
     Paint color = Blend({0.95f, 0.80f, 0.60f}, {0.35f, 0.52f, 0.78f}, std::clamp(2 * t - 0.9f, 0.0f, 1.0f));
     if (std::hypot((s - 0.72f) * 1.47f, t - 0.74f) < 0.06f) color = {1.0f, 0.95f, 0.75f};
     if (t < 0.45f + 0.2f * ridge.At(s, 0.1f)) color = {0.45f, 0.47f, 0.62f};
-    if (t < 0.33f + 0.14f * crest.At(s, 0.2f)) color = Blend({0.20f, 0.36f, 0.20f}, {0.45f, 0.55f, 0.25f}, leaf.At(s, t));
+    if (t < 0.33f + 0.14f * crest.At(s, 0.2f))
+      color = Blend({0.20f, 0.36f, 0.20f}, {0.45f, 0.55f, 0.25f}, leaf.At(s, t));
     if (t < 0.26f) {
       color = Blend({0.20f, 0.33f, 0.48f}, {0.80f, 0.78f, 0.70f},
                     Step(0.72f, 0.2f, leaf.At(2 * s, 0.25f * t) + 0.4f * stroke.At(s, 3 * t)));
@@ -214,7 +215,8 @@ Texture CurtainPicture(uint64_t seed) {
     const float stripe = s * 5 - std::floor(s * 5);
     Paint color = stripe < 0.3f ? Paint{0.25f, 0.40f, 0.48f} : Paint{0.82f, 0.78f, 0.66f};
     if (std::abs(stripe - 0.65f) < 0.03f) color = {0.70f, 0.30f, 0.20f};
-    const float weave = std::sin(t * 2 * std::numbers::pi_v<float> * 150) * std::sin(s * 2 * std::numbers::pi_v<float> * 150);
+    const float weave =
+        std::sin(t * 2 * std::numbers::pi_v<float> * 150) * std::sin(s * 2 * std::numbers::pi_v<float> * 150);
     return Shade(color, 0.85f + 0.1f * thread.At(s, t) + 0.05f * weave);
   });
 }
@@ -222,16 +224,17 @@ Texture CurtainPicture(uint64_t seed) {
 Texture ReadingChartPicture() {
   Image image = Sheet(1400, 2000, {0.96f, 0.95f, 0.91f});
   const Paint ink = {0.08f, 0.08f, 0.10f};
-  const std::string lines[] = {"E F P",
-                               "T O Z L",
-                               "L P E D Q",
-                               "P E C F D R",
-                               "E D F C Z P T",
-                               "F E L O P Z D B",
-                               "What is near shows more than what is far,",
-                               "and what was photographed from afar is soft when somebody",
-                               "comes closer. A picture has as much of a thing as its pixels could hold; no more.",
-                               "The smallest line of this chart has letters of three and a half millimetres, and then two."};
+  const std::string lines[] = {
+      "E F P",
+      "T O Z L",
+      "L P E D Q",
+      "P E C F D R",
+      "E D F C Z P T",
+      "F E L O P Z D B",
+      "What is near shows more than what is far,",
+      "and what was photographed from afar is soft when somebody",
+      "comes closer. A picture has as much of a thing as its pixels could hold; no more.",
+      "The smallest line of this chart has letters of three and a half millimetres, and then two."};
   const int scales[] = {28, 20, 15, 12, 9, 7, 5, 4, 3, 2};
   int y = 90;
   for (size_t i = 0; i < std::size(scales); ++i) {
@@ -244,8 +247,8 @@ Texture ReadingChartPicture() {
   }
   // A column of the smallest letters, and lines that come closer and closer.
   for (int row = 0; row < 12 && y < 1760; ++row, y += 12) {
-    DrawText(image, 90, y, Cat("row ", row + 1, ": the quick brown fox jumps over the lazy dog, 0123456789, and on it goes"), 1,
-             ink);
+    DrawText(image, 90, y,
+             Cat("row ", row + 1, ": the quick brown fox jumps over the lazy dog, 0123456789, and on it goes"), 1, ink);
   }
   int x = 90;
   for (int width = 1; width < 13; ++width) {
@@ -263,8 +266,8 @@ Texture ReadingChartPicture() {
 
 Texture BookSpinesPicture(uint64_t seed) {
   constexpr int kLong = 1024, kThick = 64;  // pixels of a spine
-  const char* first[] = {"THE HISTORY OF", "A GUIDE TO",  "NOTES ON",  "LECTURES ON",
-                         "ON",             "TRAVELS IN", "ATLAS OF",  "LETTERS ABOUT"};
+  const char* first[] = {"THE HISTORY OF", "A GUIDE TO", "NOTES ON",     "LECTURES ON", "ON",
+                         "TRAVELS IN",     "ATLAS OF",   "LETTERS ABOUT"};
   const char* second[] = {"OPTICS",   "GARDENS", "BRIDGES", "THE STARS", "CLOCKS",  "RIVERS",
                           "PAINTING", "BREAD",   "SURVEY",  "THE NORTH", "NUMBERS", "BIRDS"};
   const char* authors[] = {"Adler", "Brook", "Castellan", "Dorn", "Ege", "Fenn", "Gray", "Holm", "Ivers"};
@@ -281,7 +284,8 @@ Texture BookSpinesPicture(uint64_t seed) {
         for (int y = 0; y < kThick; ++y) std::fill_n(&spine.at(c, y, band), 6, foil[static_cast<size_t>(c)]);
       }
     }
-    const std::string title = Cat(first[random.Below(std::ssize(first))], " ", second[random.Below(std::ssize(second))]);
+    const std::string title =
+        Cat(first[random.Below(std::ssize(first))], " ", second[random.Below(std::ssize(second))]);
     const std::string author = authors[random.Below(std::ssize(authors))];
     const int scale = random.Below(2) == 0 ? 4 : 5;
     DrawText(spine, 100, (kThick - 7 * scale) / 2, FittingText(title, 580, scale), scale, foil);

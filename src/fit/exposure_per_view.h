@@ -17,7 +17,8 @@ inline constexpr float kExposureRate = 0.3f;  // how far a step's measurement mo
 
 // Takes the exposure of view `view` out of its `picture` after `rendered`, what the fit shows for it now, has moved it:
 // EstimateExposure (view_exposure.h), which is drawn towards gain 1 and bias 0; then the geometric mean of all views'
-// gains and the mean of their biases are divided and taken off. Errors: as EstimateExposure; kBadArgument: no such view.
+// gains and the mean of their biases are divided and taken off. Errors: as EstimateExposure; kBadArgument: no such
+// view.
 Status FollowExposure(const Image& rendered, int64_t view, Image& picture, Buffer<float>& exposures);
 
 }  // namespace anchorsplat

@@ -44,7 +44,8 @@ Fitter::Fitter(const FitOptions& options, PictureCache pictures, double scene_sc
       order_(static_cast<int64_t>(pictures_.views().size()), options.seed) {
   if (options_.strategy == Strategy::kMcmc) state_.densification = Densification();
   if (options_.mip_filter && state_.step == 0) MeasureMipFilter();
-  if (options_.exposure_from >= 0 && state_.exposures.empty()) state_.exposures = NoExposures(static_cast<int64_t>(pictures_.views().size()));
+  if (options_.exposure_from >= 0 && state_.exposures.empty())
+    state_.exposures = NoExposures(static_cast<int64_t>(pictures_.views().size()));
 }
 
 Result<FitStep> Fitter::Step() {

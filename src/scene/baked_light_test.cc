@@ -61,9 +61,8 @@ float LightAt(const Mesh& mesh, float x, float z) {
   for (size_t i = 0; i < mesh.positions.size(); ++i) {
     const auto& p = mesh.positions[i];
     const float far = std::abs(p[0] - x) + std::abs(p[2] - z) + 100 * std::abs(p[1]);
-    if (far < nearest && std::any_of(mesh.triangles.begin(), mesh.triangles.end(), [&](const auto& t) {
-          return t[0] == i || t[1] == i || t[2] == i;
-        })) {
+    if (far < nearest && std::any_of(mesh.triangles.begin(), mesh.triangles.end(),
+                                     [&](const auto& t) { return t[0] == i || t[1] == i || t[2] == i; })) {
       nearest = far;
       light = mesh.colors[i][0];
     }

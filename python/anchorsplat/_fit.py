@@ -20,6 +20,7 @@ def fit(
     max_gaussians: int | None = None,
     strategy: Literal["default", "absgrad", "mcmc"] = "default",
     mip_filter: bool = False,
+    exposure: bool = False,
     hold_out: int = 8,
     downscale: int = 1,
     init: Literal["auto", "points", "view", "random"] = "auto",
@@ -68,6 +69,7 @@ def fit(
     max_gaussians: growth stops there; 0: no bound. Otherwise none, a million with mcmc.
     strategy: who comes and goes: Kerbl et al.; the same by absolute gradients; a number of Gaussians that move.
     mip_filter: smooths every Gaussian by the pixel of the closest camera, as Mip-Splatting does; implies mode="mip".
+    exposure: pictures differ in brightness and tint; each has a gain and a bias per channel of its own.
     hold_out: every Nth view, by name, is not trained on; 0: all are.
     downscale: N × N pixels of the pictures become one, their mean.
     init: first Gaussians: the project's points, random where many cameras look, random in gsplat's cube.

@@ -172,6 +172,7 @@ void AddDataset(CLI::App& app, Program& program) {
   verb.require_subcommand(1);
   AddDatasetBuild(verb, program);
   AddDatasetObject(verb, program);
+  AddDatasetRoom(verb, program);
   AddDatasetSplit(verb, program);
   AddDatasetCheck(verb, program);
   AddDatasetInfo(verb, program);

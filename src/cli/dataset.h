@@ -9,5 +9,6 @@ namespace anchorsplat {
 // The verbs below `dataset` that make objects.
 void AddDatasetBuild(CLI::App& parent, Program& program);
 void AddDatasetObject(CLI::App& parent, Program& program);
+void AddDatasetRoom(CLI::App& parent, Program& program);
 
 }  // namespace anchorsplat

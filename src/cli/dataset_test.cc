@@ -1,8 +1,11 @@
 #include "cli/dataset.h"
 
+#include <fstream>
+
 #include "cli/run_for_test.h"
 #include "cli/small_scan_for_test.h"
 #include "dataset/small_dataset_for_test.h"
+#include "images/image_io.h"
 #include "io/folder_for_test.h"
 
 namespace anchorsplat {
@@ -40,6 +43,55 @@ TEST_F(DatasetVerb, Info) {
   EXPECT_EQ(json["recipes"]["small"]["objects"], 1);
   EXPECT_THAT(ExpectDone({"dataset", "info", set_}).out,
               AllOf(HasSubstr("set: 1 object, "), HasSubstr("training PSNR"), HasSubstr("licences:")));
+}
+
+TEST_F(DatasetVerb, RoomGoesOnWhereItWasStopped) {
+  std::ofstream(folder_ / "cube.obj") << "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
+                                         "f 1 2 3 4\nf 5 8 7 6\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 5 1 4 8\n";
+  std::ofstream(folder_ / "room.txt") << "cube.obj 2.5 0 2 30 0.7\n";
+  const std::string room = folder_ / "room";
+  const auto words = [&](const std::string& views) -> std::vector<std::string> {
+    return {"dataset",
+            "room",
+            folder_ / "room.txt",
+            "--objects",
+            folder_.path().string(),
+            "-o",
+            room,
+            "--views",
+            views,
+            "--size",
+            "32",
+            "--low-size",
+            "16",
+            "--samples",
+            "1",
+            "--points",
+            "50",
+            "--light-every",
+            "2"};
+  };
+  EXPECT_EQ(ExpectJson(words("3"))["views"], 3);
+  const auto picture = ReadImage(fs::path(room) / "32/images/001.png");
+  ASSERT_TRUE(picture.ok()) << picture.error().message;
+  EXPECT_EQ(picture->height, 24);
+  EXPECT_EQ(picture->channels, 3);
+  EXPECT_TRUE(fs::exists(fs::path(room) / "16/sparse/0/points3D.bin"));
+  EXPECT_TRUE(fs::exists(fs::path(room) / "transforms_32.json"));
+
+  fs::remove(fs::path(room) / "32/images/001.png");
+  std::ofstream(fs::path(room) / "32/images/002.png") << "kept";
+  ExpectDone(words("3"));
+  const auto again = ReadImage(fs::path(room) / "32/images/001.png");
+  ASSERT_TRUE(again.ok()) << again.error().message;
+  EXPECT_EQ(again->pixels, picture->pixels);
+  EXPECT_EQ(fs::file_size(fs::path(room) / "32/images/002.png"), 4u);
+
+  ExpectRefused(words("4"), ErrorCode::kExists, {"other settings", "-w"});
+  std::vector<std::string> anew = words("4");
+  anew.push_back("-w");
+  ExpectDone(anew);
+  EXPECT_TRUE(ReadImage(fs::path(room) / "32/images/002.png").ok());
 }
 
 TEST_F(DatasetVerb, Check) {

@@ -33,6 +33,7 @@ bool IsFormatBefore(const std::string& format) {
 }
 
 constexpr const char* kMotions = "views.motions";
+constexpr const char* kExposures = "views.exposures";
 
 // An array of the state and what it is called in the file.
 template <typename Array>
@@ -105,6 +106,9 @@ Status WriteFitCheckpoint(const std::filesystem::path& path, const FitState& sta
   }
   if (!state.motions.empty()) {
     entries.push_back(MakeEntry(kMotions, {static_cast<int64_t>(state.motions.size()) / 6, 6}, state.motions));
+  }
+  if (!state.exposures.empty()) {
+    entries.push_back(MakeEntry(kExposures, {static_cast<int64_t>(state.exposures.size()) / 6, 6}, state.exposures));
   }
   std::string left;
   for (const std::string& file : state.left) left += file + '\n';
@@ -211,6 +215,10 @@ Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std:
   if (const TensorEntry* motions = file.Find(kMotions)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values values, file.ReadFloat32(kMotions, motions->shape));
     state.motions.assign(values.values().begin(), values.values().end());
+  }
+  if (const TensorEntry* exposures = file.Find(kExposures)) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values values, file.ReadFloat32(kExposures, exposures->shape));
+    state.exposures.assign(values.values().begin(), values.values().end());
   }
   return state;
 }

@@ -169,6 +169,7 @@ std::string ToJsonText(const FitOptions& o) {
       {"pixel_upscale", o.pixel.upscale},
       {"pixel_half_from", o.pixel.half_from},
       {"pixel_all_from", o.pixel.all_from},
+      {"exposure_from", o.exposure_from},
       {"ssim_weight", o.objective.loss.ssim_weight},
       {"ssim_padding", static_cast<int>(o.objective.loss.padding)},
   };

@@ -44,7 +44,13 @@ struct FitOptions {
   int64_t mip_filter_every = 100;
   ObjectiveOptions objective;  // its `pixel` follows from the schedule, its `absgrad` from the densification
   PixelSchedule pixel;
+  // Views differ in brightness and tint: each has a gain and a bias per channel of its own (fit/exposure_per_view.h),
+  // which are taken out of its picture from this step on; −1: never.
+  int64_t exposure_from = -1;
 };
+
+// Where --exposure begins: before that, pictures and renders differ by more than their exposure.
+inline int64_t ExposureFrom(int64_t steps) { return steps / 30; }
 
 inline constexpr int64_t kDefaultFitSteps = 15000;  // what the low-quality splats of the paper's data set had
 

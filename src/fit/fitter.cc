@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/stopwatch.h"
+#include "fit/exposure_per_view.h"
 #include "metrics/image_metrics.h"
 
 namespace anchorsplat {
@@ -19,6 +20,10 @@ Result<Fitter> Fitter::Begin(const FitOptions& options, PictureCache pictures, d
   }
   if (options.mip_filter && state.step > 0 && state.mip_filter.size() != n) {
     return Error{ErrorCode::kBadArgument, "fit: the state is that of a fit without a smoothing filter"};
+  }
+  const size_t exposures = options.exposure_from < 0 || state.step == 0 ? 0 : 6 * pictures.views().size();
+  if (state.exposures.size() != exposures) {
+    return Error{ErrorCode::kBadArgument, "fit: the state is that of a fit with other exposures of its views"};
   }
   return Fitter(options, std::move(pictures), scene_scale, std::move(state));
 }
@@ -39,6 +44,8 @@ Fitter::Fitter(const FitOptions& options, PictureCache pictures, double scene_sc
       order_(static_cast<int64_t>(pictures_.views().size()), options.seed) {
   if (options_.strategy == Strategy::kMcmc) state_.densification = Densification();
   if (options_.mip_filter && state_.step == 0) MeasureMipFilter();
+  if (options_.exposure_from >= 0 && state_.exposures.empty())
+    state_.exposures = NoExposures(static_cast<int64_t>(pictures_.views().size()));
 }
 
 Result<FitStep> Fitter::Step() {
@@ -58,6 +65,9 @@ Result<FitStep> Fitter::Step() {
   const CloudView shown = options_.mip_filter ? filtered_.Of(state_.cloud, state_.mip_filter) : CloudView(state_.cloud);
   ANCHORSPLAT_RETURN_IF_ERROR(objective_.Show(objective, shown, camera));
   FillIgnored(ignored_, objective_.rendered(), picture_);
+  if (options_.exposure_from >= 0 && step >= options_.exposure_from) {
+    ANCHORSPLAT_RETURN_IF_ERROR(FollowExposure(objective_.rendered(), out.view, picture_, state_.exposures));
+  }
   const CoefficientStep coefficients = state_.optimizer.BeginStep(options_.rates, degree, state_.cloud);
   ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Compare(objective, shown, picture_, gradient_, &coefficients));
   watch.Lap();

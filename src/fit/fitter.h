@@ -29,6 +29,7 @@ struct FitState {
   // [V,6] of refinements that align their views: how far each has moved from where its camera says (MotionBetween in
   // fit/view_pose.h). Empty: they stay.
   Buffer<float> motions;
+  Buffer<float> exposures;  // [V,6] of fits that take them out: gain and bias per channel, as they are measured
   // Files that an interruption leaves besides its checkpoint, by their AbsoluteName: what goes on may replace them.
   std::vector<std::string> left;
 };

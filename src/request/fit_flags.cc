@@ -94,6 +94,8 @@ void FitFlags::AddTo(CLI::App& verb) {
             "(AbsGS); mcmc: a number of Gaussians that move to where they are needed");
   verb.add_flag("--mip-filter", mip_filter,
                 "Smooth every Gaussian by the pixel of the closest camera, as Mip-Splatting does; implies --mode mip");
+  verb.add_flag("--exposure", exposure,
+                "Pictures differ in brightness and tint: each has a gain and a bias per channel of its own");
   verb.add_option("--hold-out", hold_out, "Hold out every Nth view, by name; 0: none")
       ->check(CLI::Range(0, 1 << 30))
       ->capture_default_str();
@@ -222,6 +224,7 @@ Result<FitOptions> MakeFitOptions(const FitFlags& flags, const std::optional<std
                  "--mip-filter and --pixel area are two answers to one question, how large a pixel is; leave one out"};
   }
   if (flags.mip_filter) UseMipFilter(options);
+  options.exposure_from = flags.exposure ? ExposureFrom(flags.steps) : -1;
   options.objective.render.background = background.value_or(options.objective.render.background);
   if (!flags.background.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(options.objective.render.background, ParseColor("--background", flags.background));

@@ -33,6 +33,7 @@ struct FitFlags {
   std::string background;
   FitPreset strategy = FitPreset::kDefault;
   bool mip_filter = false;
+  bool exposure = false;
   FitPixel pixel = FitPixel::kPoint;
   double upscale = 4;  // of FitPixel::kArea
 

@@ -24,6 +24,7 @@ struct Material {
   float opacity = 1;                                  // 0 invisible … 1 solid
   int texture = -1;                                   // index into Mesh::textures, −1: none
   bool two_sided = true;                              // as the file says; every surface is shaded towards the viewer
+  bool lit = false;  // colours have the light in them (baked_light.h): it is shown as it is, without lamps
 };
 
 // Triangles with unified vertices: one index per corner for position, normal, texture coordinate and colour. y is up.

@@ -71,7 +71,7 @@ Status WriteMeshFile(const std::filesystem::path& path, const Mesh& mesh, const 
   for (const Material& m : mesh.materials) {
     colors.push_back({m.diffuse[0], m.diffuse[1], m.diffuse[2], m.opacity});
     textures.push_back(m.texture);
-    flags.push_back(m.two_sided ? 1 : 0);
+    flags.push_back((m.two_sided ? 1 : 0) + (m.lit ? 2 : 0));
   }
   std::vector<TensorEntry> tensors = {
       Entry("positions", TensorType::kFloat32, {vertices, 3}, mesh.positions),
@@ -120,6 +120,7 @@ Result<Mesh> ReadMeshFile(const std::filesystem::path& path) {
     m.opacity = colors[i][3];
     m.texture = textures[i];
     m.two_sided = (flags[i] & 1) != 0;
+    m.lit = (flags[i] & 2) != 0;
   }
   if (const Status status = Validate(mesh); !status.ok()) {
     return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", status.error().message)};

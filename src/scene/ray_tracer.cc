@@ -350,6 +350,23 @@ std::array<float, 3> RayTracer::Position(const SurfacePoint& point) const {
   return out;
 }
 
+bool RayTracer::IsBlocked(const std::array<float, 3>& from, const std::array<float, 3>& to) const {
+  RTCRay ray = {};
+  ray.org_x = from[0];
+  ray.org_y = from[1];
+  ray.org_z = from[2];
+  ray.dir_x = to[0] - from[0];
+  ray.dir_y = to[1] - from[1];
+  ray.dir_z = to[2] - from[2];
+  ray.tnear = 1e-4f;
+  ray.tfar = 1 - 1e-4f;
+  ray.mask = ~0u;
+  TraceContext context;
+  embree::Init(context.base);
+  context.sample_area = 0;
+  return embree::Occluded(scene_->embree.get(), context.base, ray);
+}
+
 std::vector<RayTracer::Sighting> RayTracer::LookAtPoints(std::span<const SurfacePoint> points,
                                                          std::span<const std::array<double, 3>> eyes,
                                                          float sample_area) const {

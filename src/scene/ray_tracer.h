@@ -56,6 +56,9 @@ class RayTracer {
                                      float sample_area) const;
   std::array<float, 3> Position(const SurfacePoint& point) const;  // world
 
+  // Whether anything stands between two places; what is at the places themselves does not count.
+  bool IsBlocked(const std::array<float, 3>& from, const std::array<float, 3>& to) const;
+
  private:
   struct Scene;
   explicit RayTracer(std::unique_ptr<Scene> scene);

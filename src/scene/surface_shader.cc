@@ -36,7 +36,7 @@ SurfaceShader::SurfaceShader(const Mesh& mesh) : mesh_(mesh) {
   for (const Texture& texture : mesh.textures) pyramids_.emplace_back(texture);
   const Material plain;
   for (const Material& material : mesh.materials) {
-    Surface surface{{}, mesh.uvs.empty() ? -1 : material.texture};
+    Surface surface{{}, mesh.uvs.empty() ? -1 : material.texture, material.lit};
     for (size_t c = 0; c < 3; ++c) surface.diffuse[c] = UnitOr(material.diffuse[c], plain.diffuse[c]);
     materials_.push_back(surface);
   }
@@ -120,6 +120,7 @@ Vec3 SurfaceShader::Color(const SurfacePoint& point, const Vec3& direction, floa
   const Triangle& triangle = triangles_[point.triangle];
   const int level = triangle.texel_density > 0 ? LevelOfFootprint(TexelsUnder(triangle, direction, footprint)) : 0;
   Vec3 color = AlbedoAt(triangle, point, level);
+  if (materials_[static_cast<size_t>(triangle.material)].lit) return color;
 
   const float w = 1 - point.u - point.v;
   const auto& n = triangle.normals;

@@ -11,7 +11,7 @@ namespace anchorsplat {
 
 // The light of every view: ambient and two distant lamps that stand still in the world, Lambert, no shadows, no gloss.
 // colour = min(1, albedo · (0.45 + 0.45·max(0, n·l₁) + 0.25·max(0, n·l₂))). Views of one object agree with each other,
-// as the input of a splat must, and no surface is black.
+// as the input of a splat must, and no surface is black. Materials that are lit already are shown as they are.
 inline constexpr float kAmbientLight = 0.45f;
 struct Lamp {
   std::array<float, 3> towards;  // world, need not have length 1
@@ -53,6 +53,7 @@ class SurfaceShader {
   struct Surface {
     std::array<float, 3> diffuse;
     int texture;
+    bool lit;
   };
   float TexelsUnder(const Triangle& triangle, const std::array<float, 3>& direction, float footprint) const;
   std::array<float, 3> AlbedoAt(const Triangle& triangle, const SurfacePoint& point, int level) const;

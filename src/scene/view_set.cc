@@ -8,6 +8,7 @@
 
 #include "cameras/camera_io.h"
 #include "cameras/colmap_writer.h"
+#include "core/file_system.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/run_context.h"
@@ -100,9 +101,19 @@ Result<Image> RenderStoredView(const RayTracer& tracer, const Camera& camera, co
 }
 
 Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const fs::path& folder, const ViewSetOptions& options) {
-  const Stopwatch watch;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewSetCameras cameras, MakeViewSetCameras(options));
-  const WriteOptions write{.overwrite = options.overwrite};
+  return WriteViews(tracer, folder, cameras, options);
+}
+
+Result<ViewSetCost> WriteViews(const RayTracer& tracer, const fs::path& folder, const ViewSetCameras& cameras,
+                               const ViewSetOptions& options, bool keep) {
+  const Stopwatch watch;
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckSizes(options));
+  if (cameras.low.cameras.empty() || cameras.low.cameras.size() != cameras.high.cameras.size()) {
+    return Error{ErrorCode::kBadArgument, Cat("views of ", cameras.low.cameras.size(), " and ",
+                                              cameras.high.cameras.size(), " places; both need the same ones")};
+  }
+  const WriteOptions write{.overwrite = options.overwrite || keep};
   const fs::path low = folder / std::to_string(options.low_size), high = folder / std::to_string(options.high_size);
   const fs::path sparse = low / "sparse" / "0";
   ANCHORSPLAT_RETURN_IF_ERROR(MakeFolder(sparse));
@@ -134,12 +145,16 @@ Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const fs::path& folder
       }
       if (!failed.ok()) return;
     }
+    const fs::path file = (is_high ? high : low) / "images" / (camera.name + ".png");
+    if (keep && IsFile(file)) {
+      const std::lock_guard<std::mutex> lock(mutex);
+      progress.Advance();
+      return;
+    }
     TraceCost mine;
     auto image = RenderView(tracer, camera, options, &mine);
     const double picture_begin = ThreadSeconds();
-    const Status written = image.ok()
-                               ? WritePng((is_high ? high : low) / "images" / (camera.name + ".png"), *image, write)
-                               : Status(image.error());
+    const Status written = image.ok() ? WritePng(file, *image, write) : Status(image.error());
     const double picture_seconds = ThreadSeconds() - picture_begin;
     const std::lock_guard<std::mutex> lock(mutex);
     (is_high ? cost.high : cost.low) += mine;

@@ -52,6 +52,13 @@ Result<ViewSetCameras> MakeViewSetCameras(const ViewSetOptions& options);
 Result<Image> RenderStoredView(const RayTracer& tracer, const Camera& camera, const ViewSetOptions& options,
                                TraceCost* cost = nullptr);
 
+// As WriteViewSet, of any cameras: two sets of the same places in the same order, whose pictures are `options.low_size`
+// and `options.high_size` wide. The rig is not looked at. `keep`: pictures that are there already are those of an
+// earlier run that was stopped, and stay; all other files are written anew.
+// Errors as WriteViewSet; kBadArgument: sets of different length, or none.
+Result<ViewSetCost> WriteViews(const RayTracer& tracer, const std::filesystem::path& folder,
+                               const ViewSetCameras& cameras, const ViewSetOptions& options, bool keep = false);
+
 // Makes `folder` and fills it. When the run is asked to stop (core/run_context.h) it ends between two views
 // (kInterrupted). Errors: kExists unless options.overwrite; kIo; as MakeViewSetCameras.
 Result<ViewSetCost> WriteViewSet(const RayTracer& tracer, const std::filesystem::path& folder,

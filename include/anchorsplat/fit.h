@@ -34,6 +34,7 @@ struct FitSettings {
   FitStrategy strategy = FitStrategy::kDefault;
   bool mip_filter = false;  // Mip-Splatting's 3-D smoothing filter; the splat is for Rasterization::kMip
   Rasterization rasterization = Rasterization::kClassic;  // of the fit, and so of the splat; kMip with mip_filter
+  bool exposure = false;  // a gain and a bias per channel for each view: photographs that differ in brightness and tint
   // Above 1 a pixel is the mean over its area and not what the ray through its centre meets: for a splat that will be
   // seen as many times closer. Up to 16; not with mip_filter.
   double area_pixels = 1;

@@ -62,6 +62,7 @@ Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianClo
   options.objective.render.mode = *ToMode(settings.rasterization);
   options.pixel.upscale = settings.area_pixels;
   if (settings.mip_filter) UseMipFilter(options);
+  if (settings.exposure) options.exposure_from = ExposureFrom(settings.steps);
   options.objective.render.sh_degree = settings.sh_degree;
   if (const auto background = settings.background ? settings.background : views.background) {
     options.objective.render.background = *background;

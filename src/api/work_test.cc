@@ -187,6 +187,7 @@ TEST(Fit, ComesCloserToThePictures) {
   ASSERT_TRUE(mcmc.ok()) << mcmc.failure().message;
   EXPECT_EQ(mcmc->splat.size(), 420);
   EXPECT_TRUE(FitProject(folder.path(), {.steps = 2, .mip_filter = true, .initial_points = 400}).ok());
+  EXPECT_TRUE(FitProject(folder.path(), {.steps = 2, .exposure = true, .initial_points = 400}).ok());
   EXPECT_EQ(FitProject("/there/is/none").failure().kind, FailureKind::kNotFound);
 }
 

@@ -132,7 +132,8 @@ HWY_INLINE hn::Mask<D> ProjectLanes(D d, const Frame& frame, RasterProfile profi
   const auto stored = [&](const T* column) HWY_ATTR { return hn::Load(d, column + j); };
   const auto finite = [&](const T* column) HWY_ATTR { return hn::Le(hn::Abs(stored(column)), Number(d, kLargest)); };
   const auto below_infinity = [&](const T* column) HWY_ATTR { return hn::Le(stored(column), Number(d, kLargest)); };
-  const auto &quats = in.stored.quats, &log_scales = in.stored.log_scales;
+  const auto& quats = in.stored.quats;
+  const auto& log_scales = in.stored.log_scales;
   M keep = hn::And(hn::And(finite(quats[0]), finite(quats[1])), hn::And(finite(quats[2]), finite(quats[3])));
   keep = hn::And(hn::And(keep, below_infinity(log_scales[0])),
                  hn::And(below_infinity(log_scales[1]), below_infinity(log_scales[2])));

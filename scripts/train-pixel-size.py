@@ -13,7 +13,9 @@ records in the data set say, count `--short-weight` times. Needs numpy.
 With `--kinds` the regression is that for splats unlike standard fits. It looks at more features, and its ridge pulls
 towards the regression of standard fits instead of towards zero. What is printed is what both together say, as in
 src/enhance/pixel_size_estimate.cc, with all fits of a mesh left out and with all of a kind. Antialiased fits, for which
-their tag makes up, have no part in it. `--keep FILE` writes all features to one small file.
+their tag makes up, have no part in it. `--keep FILE` writes all features to one small file. With `--correction FILE` a
+third regression learns what those two leave, by kernels, and is written there; it is cross-validated, too, from
+estimates that were themselves made without the mesh.
 """
 
 import argparse
@@ -32,6 +34,10 @@ ALPHA = np.arange(OUTLINE)
 KINDS = np.r_[np.arange(2 * OUTLINE), np.arange(3 * OUTLINE, 3 * OUTLINE + 16)]  # as kKindsPixelSize
 STANDARD_FILE = pathlib.Path(__file__).parent.parent / "src/enhance/pixel_size_coefficients.cc"
 SIZES, LENGTHS = slice(3 * OUTLINE, 3 * OUTLINE + 16), 12  # the first twelve of the sizes are in units of the pixel
+LANDMARKS = 32  # kCorrectionLandmarks
+KERNEL, STRAIGHT = 0.5, 0.3  # width of a kernel, and how much the straight part may say
+CORRECTION_RIDGE = 0.05
+MOST_CORRECTION = 0.5  # kMostCorrection
 STANDARD, OTHER = 0.6, 0.9  # kStandard, kOther in pixel_size_estimate.cc
 PLAUSIBLE, IMPLAUSIBLE = 1.5, 2.2  # kPlausible, kImplausible
 
@@ -157,6 +163,58 @@ def believe_standard(objects, standard, kinds):
         o["share"] = np.clip(share, 0, 1)
 
 
+def look_at(item, said):
+    """The features of the correction where the estimate is exp(said) times the truth: of alpha, and sizes."""
+    at = np.clip(said, item["offsets"][0], item["offsets"][-1])
+    alpha = [np.interp(at, item["offsets"], column) for column in item["all"][:, ALPHA].T]
+    sizes = item["all"][0, SIZES].copy()
+    sizes[:LENGTHS] -= said - item["offsets"][0]
+    return np.concatenate([alpha, sizes])
+
+
+def fit_correction(x, y):
+    """Ridge regression on z and on kernels around landmarks: rows far from each other."""
+    mean, deviation = x.mean(0), x.std(0) + 1e-6
+    z = np.clip((x - mean) / deviation, -MOST_DEVIATIONS, MOST_DEVIATIONS)
+    chosen = [int(np.argmin((z**2).sum(1)))]
+    distance = ((z - z[chosen[0]]) ** 2).sum(1)
+    while len(chosen) < LANDMARKS:
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, ((z - z[chosen[-1]]) ** 2).sum(1))
+    model = {"mean": mean, "deviation": deviation, "landmark": z[chosen]}
+    n = z.shape[1]
+    straight = np.sqrt(STRAIGHT / n)
+    basis = np.hstack([straight * z, kernels(model, z)])
+    penalty = np.eye(basis.shape[1])
+    penalty[n:, n:] = kernels(model, z[chosen]) + 1e-6 * np.eye(LANDMARKS)
+    weights = np.linalg.solve(basis.T @ basis + CORRECTION_RIDGE * penalty, basis.T @ (y - y.mean()))
+    return model | {"weight": straight * weights[:n], "height": weights[n:], "intercept": y.mean()}
+
+
+def kernels(model, z):
+    squares = ((z[:, None] - model["landmark"][None]) ** 2).sum(-1)
+    return np.exp(-KERNEL * squares / z.shape[1])
+
+
+def correct(model, x):
+    z = np.clip((x - model["mean"]) / model["deviation"], -MOST_DEVIATIONS, MOST_DEVIATIONS)
+    step = model["intercept"] + z @ model["weight"] + kernels(model, z) @ model["height"]
+    return np.clip(step, -MOST_CORRECTION, MOST_CORRECTION)
+
+
+def train_correction(objects, both):
+    """The correction of all, and what the estimates become: of cross-validation by mesh, and by kind."""
+    x = np.array([look_at(o, e) for o, e in zip(objects, both)])
+    results = []
+    for by in ("mesh", "kind"):
+        corrected = both.copy()
+        for group in sorted({o[by] for o in objects}):
+            out = np.array([o[by] == group for o in objects])
+            corrected[out] += correct(fit_correction(x[~out], -both[~out]), x[out])
+        results.append(corrected)
+    return fit_correction(x, -both), *results
+
+
 def train_kinds(objects, arguments):
     standard = read_standard()
     select(objects, KINDS)
@@ -176,13 +234,19 @@ def train_kinds(objects, arguments):
     best = min(results, key=lambda r: np.sqrt(np.mean(results[r][1] ** 2)))
     alone, both = results[best]
     print(f"ridge {best:g} chosen; estimate / truth by kind:")
+    correction, corrected, unknown = train_correction(objects, both)
+    print(f"corrected: {describe(corrected)}")
+    print(f"  kinds left out: {describe(unknown)}")
     for kind in sorted({o["kind"] for o in objects}):
         mine = [k for k, o in enumerate(objects) if o["kind"] == kind]
-        ratios = " ".join(f"{r:.2f}" for r in sorted(np.exp(both[mine])))
-        print(f"  {kind or 'others'}: {np.exp(said[mine]).min():.2f}–{np.exp(said[mine]).max():.2f} → {ratios}")
+        ratios = " ".join(f"{r:.2f}" for r in sorted(np.exp(corrected[mine])))
+        two = f"{np.exp(both[mine]).min():.2f}–{np.exp(both[mine]).max():.2f}"
+        print(f"  {kind or 'others'}: {np.exp(said[mine]).min():.2f}–{np.exp(said[mine]).max():.2f} → {two} → {ratios}")
     if arguments.list:
-        for o, s, e in zip(objects, said, both):
-            print(f"  {np.exp(s):.2f} → {np.exp(e):.2f}  {o['kind']} {o['name']}")
+        for o, s, e, c in zip(objects, said, both, corrected):
+            print(f"  {np.exp(s):.2f} → {np.exp(e):.2f} → {np.exp(c):.2f}  {o['kind']} {o['name']}")
+    if arguments.correction:
+        write_correction(arguments.correction, correction, len(objects))
     if arguments.output:
         write(arguments.output, fit(objects, best, standard), np.sqrt(np.mean(alone[share > 0] ** 2)), len(objects),
               "<kKindsPixelSizeFeatures> kKindsPixelSize")
@@ -226,6 +290,42 @@ const PixelSizeCoefficients{name} = {{
 ''')
 
 
+def write_correction(path, model, count):
+    def numbers(values, decimals):
+        text = ", ".join(f"{v:.{decimals}f}".rstrip("0").rstrip(".").replace("-0,", "0,") for v in values)
+        lines, line = [], "     "
+        for word in text.split(" "):
+            if len(line) + len(word) + 1 > 118:
+                lines.append(line)
+                line = "     "
+            line += " " + word
+        return "\n".join(lines + [line])
+
+    landmarks = ",\n".join(f"        {{{{\n{numbers(row, 2)}}}}}" for row in model["landmark"])
+    with open(path, "w", encoding="utf-8") as out:
+        out.write(f'''#include "enhance/pixel_size_coefficients.h"
+
+namespace anchorsplat {{
+
+// Written by scripts/train-pixel-size.py from {count} fits; not to be edited.
+const PixelSizeCorrection kPixelSizeCorrection = {{
+    .mean = {{
+{numbers(model["mean"], 5)}}},
+    .deviation = {{
+{numbers(model["deviation"], 5)}}},
+    .weight = {{
+{numbers(model["weight"], 6)}}},
+    .intercept = {model["intercept"]:.6g},
+    .height = {{
+{numbers(model["height"], 6)}}},
+    .landmark = {{{{
+{landmarks}}}}},
+}};
+
+}}  // namespace anchorsplat
+''')
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("features", nargs="+")
@@ -238,6 +338,7 @@ def main():
     parser.add_argument("--lean", type=float, default=0.0, help="ln, added to the estimate: negative is cautious")
     parser.add_argument("--list", action="store_true", help="the cross-validated error of every object")
     parser.add_argument("--kinds", action="store_true", help="the regression for splats unlike standard fits")
+    parser.add_argument("--correction", metavar="FILE.cc", help="write the third regression")
     parser.add_argument("--keep", metavar="FILE.json.gz", help="write the features to one file")
     arguments = parser.parse_args()
     if arguments.keep:

@@ -23,4 +23,17 @@ extern const PixelSizeCoefficients<kPixelSizeFeatures> kStandardPixelSize;
 inline constexpr size_t kKindsPixelSizeFeatures = 2 * kPixelSizeFeatures + kSizeFeatures - 1;
 extern const PixelSizeCoefficients<kKindsPixelSizeFeatures> kKindsPixelSize;
 
+// What is still wrong where the two end: kernel ridge regression of ln(true pixel size / estimate) on the features of
+// Look::kAlpha and SizeFeatures without the number of Gaussians, at the estimate: intercept + Σ weight · z +
+// Σ height · exp(−½ |z − landmark|² / number of features), z = (feature − mean) / deviation.
+inline constexpr size_t kCorrectionFeatures = kPixelSizeFeatures + kSizeFeatures - 1;
+inline constexpr size_t kCorrectionLandmarks = 32;
+struct PixelSizeCorrection {
+  std::array<double, kCorrectionFeatures> mean, deviation, weight;
+  double intercept;
+  std::array<double, kCorrectionLandmarks> height;
+  std::array<std::array<float, kCorrectionFeatures>, kCorrectionLandmarks> landmark;
+};
+extern const PixelSizeCorrection kPixelSizeCorrection;
+
 }  // namespace anchorsplat

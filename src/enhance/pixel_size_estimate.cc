@@ -32,6 +32,9 @@ constexpr double kPlausible = 1.5, kImplausible = 2.2;
 // the truth for eight of them. Divided by this much it is too large by at most a tenth in all of them.
 constexpr double kAntialiasedLook = 0.8;
 
+// No correction of what both say is larger; ln.
+constexpr double kMostCorrection = 0.5;
+
 struct Guess {
   double step = 0;  // ln(pixel size / d)
   double strangeness = 0;
@@ -99,6 +102,26 @@ double StrangenessOfSizes(const PixelSizeProbe& probe, double size) {
                      std::span(kKindsPixelSize.deviation).subspan(kFirst));
 }
 
+// ln(true pixel size / size), as far as fits of many kinds tell what the regressions leave. Between two known kinds it
+// is smooth; far from all of them the landmarks say nothing, and the straight part is cut off.
+Result<double> Correction(const PixelSizeCorrection& c, PixelSizeProbe& probe, double size) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeFeatures alpha, probe.At(size));
+  const SizeFeatures sizes = probe.SizesAt(size);
+  std::array<double, kCorrectionFeatures> z;
+  std::copy_n(sizes.begin(), kSizeFeatures - 1, std::ranges::copy(alpha, z.begin()).out);
+  double sum = c.intercept;
+  for (size_t k = 0; k < z.size(); ++k) {
+    z[k] = std::clamp((z[k] - c.mean[k]) / c.deviation[k], -kMostDeviations, kMostDeviations);
+    sum += c.weight[k] * z[k];
+  }
+  for (size_t l = 0; l < kCorrectionLandmarks; ++l) {
+    double squares = 0;
+    for (size_t k = 0; k < z.size(); ++k) squares += std::pow(z[k] - double{c.landmark[l][k]}, 2);
+    sum += c.height[l] * std::exp(-0.5 * squares / static_cast<double>(z.size()));
+  }
+  return std::clamp(sum, -kMostCorrection, kMostCorrection);
+}
+
 double Share(double strangeness, double none, double all) {
   return std::clamp((strangeness - none) / (all - none), 0.0, 1.0);
 }
@@ -122,6 +145,11 @@ Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional
     // antialiased ones, look like fits of smaller pixels to the standard regression, which is what they need.
     settled.log_size = std::min(settled.log_size, std::lerp(settled.log_size, kinds.log_size, share));
     settled.half = std::lerp(settled.half, kinds.half, share);
+  }
+  if (mode != RenderMode::kAntialiased) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double correction,
+                                 Correction(kPixelSizeCorrection, probe, std::exp(settled.log_size)));
+    settled.log_size += correction;
   }
   double size = std::exp(settled.log_size);
   if (mode == RenderMode::kAntialiased) size /= kAntialiasedLook;

@@ -34,6 +34,9 @@ constexpr double kMoved = 1.5;
 // The filter's variance at the usual four times closer is 0.2 pixels²: with a pixel of this many widths it lengthens
 // the middle axis of three in four Gaussians by less than a twentieth.
 constexpr double kHarmless = 0.7;
+// A crowd hardly above the bound says little: pixels shrink with this power of how far above it is, down to harmless
+// ones. Dense fits of small pictures are at up to 1.3 times the bound, captures from 1.7 times on.
+constexpr double kCrowdedFall = 3;
 
 // Side of the square that one Gaussian has for itself, where they lie on surfaces: kNeighbours others lie within π r².
 double Spacing(const GaussianCloud& cloud) {
@@ -122,7 +125,12 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     finding.contradictions.push_back(
         Cat("without its black Gaussians, which no picture shows, the outlines say ", evidence.without_black));
   }
-  if (finding.contradicted()) finding.size = std::min(estimate.size, kHarmless * evidence.width);
+  if (finding.contradicted()) {
+    double size = kHarmless * evidence.width;
+    const bool crowd_alone = crowd > most && finding.contradictions.size() == 1;
+    if (crowd_alone) size = std::max(size, estimate.size * std::pow(most / crowd, kCrowdedFall));
+    finding.size = std::min(estimate.size, size);
+  }
   return finding;
 }
 

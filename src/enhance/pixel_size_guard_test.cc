@@ -117,6 +117,20 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   crowded.spacing = 0.012;  // 0.7
   EXPECT_TRUE(Judge(estimate, crowded).contradicted());
 
+  // Hardly above the bound of two on a pixel, it makes pixels a little smaller; far above it, harmless.
+  crowded = plain;
+  crowded.width = 0.001;
+  crowded.spacing = 0.01 / std::sqrt(2 * 1.001);
+  EXPECT_LT(Judge(estimate, crowded).size, 0.01);
+  EXPECT_GT(Judge(estimate, crowded).size, 0.0099);
+  crowded.spacing = 0.01 / std::sqrt(2 * 1.25);
+  EXPECT_NEAR(Judge(estimate, crowded).size, 0.01 / 1.953, 1e-5);
+  crowded.spacing = 0.01 / std::sqrt(2 * 10.0);
+  EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.0007);
+  crowded.spacing = 0.01 / std::sqrt(2 * 1.25);
+  crowded.without_black = 0.005;  // more than one thing speaks against it
+  EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.0007);
+
   PixelSizeEvidence small = plain;
   small.small_axis = 0.001;
   EXPECT_TRUE(Judge(estimate, small).contradicted());

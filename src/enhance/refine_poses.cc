@@ -24,7 +24,7 @@ namespace {
 
 constexpr double kPoseFieldOfView = std::numbers::pi / 4;
 constexpr int kSmallestSide = 32;    // pixels: less says nothing, and SSIM's window needs 11
-constexpr float kOpaque = 0.1f;      // a Gaussian that hides something
+constexpr float kHides = 0.1f;      // a Gaussian that hides something
 constexpr double kRoom = 0.05;       // of the distance to the object: nothing opaque may be nearer to a camera
 constexpr double kSigmas = 3;        // and the camera may not be within a Gaussian
 constexpr double kSameWay = 0.7071;  // cosine of 45°
@@ -46,7 +46,7 @@ bool IsObstructed(const GaussianCloud& cloud, const Vec3& center, double room) {
       const double distance = std::hypot(p[0] - center[0], p[1] - center[1], p[2] - center[2]);
       const double reach = std::max(room, kSigmas * std::exp(double{std::max({s[0], s[1], s[2]})}));
       // The bound by the largest axis is rough, but only for Gaussians nearly as large as the object.
-      if (distance < reach && Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) > kOpaque) obstructed = true;
+      if (distance < reach && Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) > kHides) obstructed = true;
     }
   });
   return obstructed;

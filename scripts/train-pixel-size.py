@@ -202,7 +202,7 @@ def correct(model, x):
     return np.clip(step, -MOST_CORRECTION, MOST_CORRECTION)
 
 
-def train_correction(objects, both):
+def train_correction(objects, both, share):
     """The correction of all, and what the estimates become: of cross-validation by mesh, and by kind."""
     x = np.array([look_at(o, e) for o, e in zip(objects, both)])
     results = []
@@ -210,7 +210,8 @@ def train_correction(objects, both):
         corrected = both.copy()
         for group in sorted({o[by] for o in objects}):
             out = np.array([o[by] == group for o in objects])
-            corrected[out] += correct(fit_correction(x[~out], -both[~out]), x[out])
+            step = correct(fit_correction(x[~out], -both[~out]), x[out])
+            corrected[out] += np.where(step > 0, (1 - share[out]) * step, step)
         results.append(corrected)
     return fit_correction(x, -both), *results
 
@@ -234,7 +235,7 @@ def train_kinds(objects, arguments):
     best = min(results, key=lambda r: np.sqrt(np.mean(results[r][1] ** 2)))
     alone, both = results[best]
     print(f"ridge {best:g} chosen; estimate / truth by kind:")
-    correction, corrected, unknown = train_correction(objects, both)
+    correction, corrected, unknown = train_correction(objects, both, share)
     print(f"corrected: {describe(corrected)}")
     print(f"  kinds left out: {describe(unknown)}")
     for kind in sorted({o["kind"] for o in objects}):

@@ -149,7 +149,8 @@ Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional
   if (mode != RenderMode::kAntialiased) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double correction,
                                  Correction(kPixelSizeCorrection, probe, std::exp(settled.log_size)));
-    settled.log_size += correction;
+    // Upwards only as far as the splat is like standard fits: pixels that are too large blur.
+    settled.log_size += correction > 0 ? (1 - share) * correction : correction;
   }
   double size = std::exp(settled.log_size);
   if (mode == RenderMode::kAntialiased) size /= kAntialiasedLook;

@@ -24,7 +24,7 @@ namespace {
 
 constexpr double kPoseFieldOfView = std::numbers::pi / 4;
 constexpr int kSmallestSide = 32;    // pixels: less says nothing, and SSIM's window needs 11
-constexpr float kHides = 0.1f;      // a Gaussian that hides something
+constexpr float kHides = 0.1f;       // a Gaussian that hides something
 constexpr double kRoom = 0.05;       // of the distance to the object: nothing opaque may be nearer to a camera
 constexpr double kSigmas = 3;        // and the camera may not be within a Gaussian
 constexpr double kSameWay = 0.7071;  // cosine of 45°

@@ -36,7 +36,7 @@ constexpr double kMoved = 1.5;
 constexpr double kHarmless = 0.7;
 // A crowd hardly above the bound says little: pixels shrink with this power of how far above it is, down to harmless
 // ones. Dense fits of small pictures are at up to 1.3 times the bound, captures from 1.7 times on.
-constexpr double kCrowdedFall = 3;
+constexpr double kCrowdedFall = 4;
 
 // Side of the square that one Gaussian has for itself, where they lie on surfaces: kNeighbours others lie within π r².
 double Spacing(const GaussianCloud& cloud) {

@@ -124,7 +124,7 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   EXPECT_LT(Judge(estimate, crowded).size, 0.01);
   EXPECT_GT(Judge(estimate, crowded).size, 0.0099);
   crowded.spacing = 0.01 / std::sqrt(2 * 1.25);
-  EXPECT_NEAR(Judge(estimate, crowded).size, 0.01 / 1.953, 1e-5);
+  EXPECT_NEAR(Judge(estimate, crowded).size, 0.01 / 2.4414, 1e-5);
   crowded.spacing = 0.01 / std::sqrt(2 * 10.0);
   EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.0007);
   crowded.spacing = 0.01 / std::sqrt(2 * 1.25);

@@ -67,7 +67,7 @@ void PrintTable(const SplatFindings& f) {
     for (const std::string& contradiction : f.pixel_size->contradictions)
       std::cout << "    but " << contradiction << "\n";
     if (f.pixel_size->contradicted()) {
-      std::cout << "    so enhance would take the smallest plausible pixel, " << Number(f.pixel_size->size)
+      std::cout << "    so enhance would take a smaller pixel, " << Number(f.pixel_size->size)
                 << ", and no network; --cameras or --pixel-size would tell\n";
     }
   } else {

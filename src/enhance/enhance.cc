@@ -161,7 +161,7 @@ void SayWhatWasFound(const PixelSizeFinding& found) {
     }
     LogWarning(
         Cat("outlines say a training pixel of ", estimate.size, ", but ", contradictions,
-            ". So that nothing is blurred, the smallest plausible pixel is taken, ", found.size,
+            ". So that nothing is blurred, a smaller pixel is taken, ", found.size,
             "; --cameras or --pixel-size will do better. In a room or a street the pixels of what is near and of what "
             "is far differ many times: no single size is right there, and only cameras know them"));
     return;

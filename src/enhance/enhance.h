@@ -59,7 +59,7 @@ void SetBudget(EnhanceOptions& options, int64_t max_gaussians);
 
 // The splat says nothing about its pixels, so that no method can know what to do: it has been left as it is.
 inline constexpr const char* kUnknownPixelSize = "unknown";
-// The estimate is contradicted (pixel_size_guard.h); the smallest plausible pixel was taken, and by "auto" the filter.
+// The estimate is contradicted (pixel_size_guard.h); a smaller pixel was taken, and by "auto" the filter.
 inline constexpr const char* kCautiousPixelSize = "cautious";
 
 // Something that a method has to tell: whether it was so; counts, which are whole; measurements, which are not.

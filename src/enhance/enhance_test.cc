@@ -376,7 +376,7 @@ TEST_F(EnhanceDoor, ContradictedEstimateIsNotActedOn) {
   ASSERT_TRUE(report.finding && report.finding->contradicted());
   EXPECT_LT(report.pixel_size, report.finding->estimate.size);
   EXPECT_EQ(report.method, "filter");
-  EXPECT_TRUE(log_->Says("smallest plausible pixel")) << log_->text();
+  EXPECT_TRUE(log_->Says("smaller pixel is taken")) << log_->text();
   EXPECT_TRUE(log_->Says("no single size is right there")) << log_->text();
   EXPECT_TRUE(log_->Says("the filter instead of 'network'")) << log_->text();
 

@@ -166,7 +166,7 @@ function pixelSize() {
 function tellPixelSize() {
   const size = pixelSize();
   const unsure = input.info.pixel_size && input.info.pixel_size.contradictions.length > 0;
-  const source = chosen ? '' : unsure ? ' (smallest plausible)' : ' (estimated)';
+  const source = chosen ? '' : unsure ? ' (made smaller)' : ' (estimated)';
   byId('pixel-value').textContent = size === null ? 'not known' : `${size.toPrecision(3)}${source}`;
   if (cameras) {
     byId('cameras-about').textContent = `${number(cameras.count)} cameras: ` + (chosen
@@ -205,7 +205,7 @@ function describe({info, name, bytes}) {
     say(`A pixel of its training pictures covered about ${info.pixel_size.estimate.toPrecision(3)} of its units ` +
       `(likely ${low.toPrecision(2)} to ${high.toPrecision(2)}).`);
     if (contradictions.length > 0) {
-      say(`That is unsure: ${contradictions.join('; ')}. So the smallest plausible pixel is taken; look for yourself with the slider.`);
+      say(`That is unsure: ${contradictions.join('; ')}. So a smaller pixel is taken; look for yourself with the slider.`);
     }
   } else {
     say('How large a pixel of its training pictures was cannot be told: the slider decides.');
@@ -239,7 +239,7 @@ async function openFile(file) {
     result = null;
     chosen = false;
     dropCameras();
-    // Far enough for what the page says is likely, also where the smallest plausible pixel is taken instead.
+    // Far enough for what the page says is likely, also where a smaller pixel is taken instead.
     byId('pixel').max = String(Math.max(2.5, info.pixel_size ? Math.ceil(Math.log2(info.pixel_size.high / info.pixel_size.used)) + 1 : 0));
     byId('pixel').value = '0';
     byId('done').textContent = '';

@@ -37,14 +37,24 @@ nlohmann::json ToJson(const PixelSizeCheck& check, const std::string& kind) {
 }
 
 Status RunPixelSize(const PixelSizeFlags& flags, const SharedFlags& shared) {
-  nlohmann::json json = {{"bench", "pixel-size"}, {"objects", nlohmann::json::array()}};
+  nlohmann::json json = {
+      {"bench", "pixel-size"}, {"objects", nlohmann::json::array()}, {"without_estimate", nlohmann::json::array()}};
   std::vector<std::vector<std::string>> table = {{"object", "true", "estimated", "÷ true", "likely", "time"}};
   std::vector<float> errors;
   for (const std::string& folder : flags.folders) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<BenchmarkEntry> entries, ListBenchmark(folder));
     for (const BenchmarkEntry& entry : entries) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const BenchmarkObject object, OpenObject(entry));
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeCheck check, CheckPixelSize(object, flags.features));
+      const Result<PixelSizeCheck> checked = CheckPixelSize(object, flags.features);
+      if (!checked.ok()) {
+        // One splat that shows next to nothing is no reason to lose a list of hundreds.
+        const std::string why = Cat(entry.name, ": ", checked.error().message);
+        LogWarning(why);
+        json["without_estimate"].push_back(
+            {{"object", entry.name}, {"kind", entry.kind}, {"why", checked.error().message}});
+        continue;
+      }
+      const PixelSizeCheck& check = checked.value();
       const double ratio = check.estimate.size / check.truth;
       errors.push_back(static_cast<float>(std::abs(ratio - 1)));
       json["objects"].push_back(ToJson(check, entry.kind));
@@ -54,6 +64,7 @@ Status RunPixelSize(const PixelSizeFlags& flags, const SharedFlags& shared) {
            HumanSeconds(check.seconds)});
     }
   }
+  if (errors.empty()) return Error{ErrorCode::kBadFile, "none of these splats has an estimate"};
   const double median = double{Quantile(errors, 0.5)}, most = double{Quantile(errors, 0.95)};
   if (shared.json) {
     json["error_median"] = median;

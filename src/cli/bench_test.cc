@@ -1,5 +1,9 @@
+#include <algorithm>
+#include <filesystem>
+
 #include "cli/run_for_test.h"
 #include "cli/small_scan_for_test.h"
+#include "formats/cloud_io.h"
 #include "io/folder_for_test.h"
 
 namespace anchorsplat {
@@ -29,6 +33,23 @@ TEST(BenchVerb, PixelSize) {
   EXPECT_GT(json["objects"][0]["samples"].size(), 0u);
   EXPECT_LT(json["error_median"], 0.5);
   EXPECT_THAT(ExpectDone({"bench", "pixel-size", Biplane()}).out, HasSubstr("% in the median"));
+}
+
+TEST(BenchVerb, GoesOnAfterASplatThatShowsNothing) {
+  const TestFolder folder;
+  std::filesystem::create_directories(folder / "objects");
+  std::filesystem::copy(Biplane(), folder / "objects/good", std::filesystem::copy_options::recursive);
+  std::filesystem::copy(Biplane(), folder / "objects/faint", std::filesystem::copy_options::recursive);
+  GaussianCloud faint = *ReadCloud(folder / "objects/faint/input.ply");
+  std::fill(faint.opacity_logits.begin(), faint.opacity_logits.end(), -20.0f);
+  std::filesystem::remove(folder / "objects/faint/input.ply");
+  ASSERT_TRUE(WriteCloud(folder / "objects/faint/input.ply", faint).ok());
+  const nlohmann::json json = ExpectJson({"bench", "pixel-size", folder / "objects"});
+  ASSERT_EQ(json["objects"].size(), 1u);
+  EXPECT_EQ(json["objects"][0]["object"], "good");
+  ASSERT_EQ(json["without_estimate"].size(), 1u);
+  EXPECT_EQ(json["without_estimate"][0]["object"], "faint");
+  ExpectRefused({"bench", "pixel-size", folder / "objects/faint"}, ErrorCode::kBadFile, {"none of these splats"});
 }
 
 }  // namespace

@@ -197,17 +197,17 @@ TEST_F(EnhanceDoor, LeavesWhatItMadeAlone) {
 
 TEST_F(EnhanceDoor, PixelSizeFromCameras) {
   EnhanceOptions options;
-  options.cameras = CamerasForPixel(0.005);  // as the ball looks to the estimate
+  options.cameras = CamerasForPixel(0.0025);  // as the ball looks to the estimate
   const auto enhanced = Enhance(Ball(0.01), options);
   ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
   EXPECT_EQ(enhanced->report.pixel_size_source, "cameras");
-  EXPECT_NEAR(enhanced->report.pixel_size, 0.0066, 0.0003);  // of the median view: they stand all around
+  EXPECT_NEAR(enhanced->report.pixel_size, 0.0041, 0.0002);  // of the median view: they stand all around
   EXPECT_EQ(enhanced->report.camera_rule, "median");
   EXPECT_TRUE(log_->Says("--camera-rule median: the cameras look at one thing")) << log_->text();
   options.camera_rule = CameraPixelRule::kSmallest;
   const auto smallest = Enhance(Ball(0.01), options);
   ASSERT_TRUE(smallest.ok()) << smallest.error().message;
-  EXPECT_NEAR(smallest->report.pixel_size, 0.0053, 0.0003);
+  EXPECT_NEAR(smallest->report.pixel_size, 0.0027, 0.0002);
   EXPECT_EQ(smallest->report.camera_rule, "smallest");
   options.pixel_size = 0.01;
   EXPECT_FALSE(Enhance(Ball(0.01), options).ok());  // both

@@ -27,7 +27,7 @@ extern const PixelSizeCoefficients<kKindsPixelSizeFeatures> kKindsPixelSize;
 // Look::kAlpha and SizeFeatures without the number of Gaussians, at the estimate: intercept + Σ weight · z +
 // Σ height · exp(−½ |z − landmark|² / number of features), z = (feature − mean) / deviation.
 inline constexpr size_t kCorrectionFeatures = kPixelSizeFeatures + kSizeFeatures - 1;
-inline constexpr size_t kCorrectionLandmarks = 32;
+inline constexpr size_t kCorrectionLandmarks = 64;
 struct PixelSizeCorrection {
   std::array<double, kCorrectionFeatures> mean, deviation, weight;
   double intercept;

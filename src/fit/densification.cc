@@ -44,8 +44,11 @@ struct Rules {
 };
 
 Rules MakeRules(const DensificationOptions& options, const FarUnits& far, int64_t step, double scene_scale) {
-  return {&options, &far, static_cast<float>(std::log(options.grow_scale3d * scene_scale)),
-          static_cast<float>(std::log(options.prune_scale3d * scene_scale)), step > options.reset_every,
+  return {&options,
+          &far,
+          static_cast<float>(std::log(options.grow_scale3d * scene_scale)),
+          static_cast<float>(std::log(options.prune_scale3d * scene_scale)),
+          step > options.reset_every,
           step < options.refine_scale2d_stop_iter};
 }
 
@@ -220,7 +223,8 @@ void Densification::Refine(const DensificationOptions& options, int64_t step, do
       continue;
     }
     const auto k = static_cast<size_t>(i);
-    if (IsPruned(rules, cloud, i, cloud.opacity_logits[k], LargestLogScale(far, cloud, i), gathered_.radii[k])) continue;
+    if (IsPruned(rules, cloud, i, cloud.opacity_logits[k], LargestLogScale(far, cloud, i), gathered_.radii[k]))
+      continue;
     rows.kept.push_back(i);
   }
   rows.fresh = static_cast<int64_t>(newcomers.size());

@@ -83,8 +83,8 @@ void SamplePlaces(const Camera& camera, const LookedAtPicture& picture, const st
   const double spacing = std::sqrt(4 * std::numbers::pi / static_cast<double>(sphere.size()));
   for (size_t i = 0; i < sphere.size(); ++i) {
     const Direction& d = sphere[i];
-    const auto c = camera.ToCamera(
-        {at.center[0] + radius * d[0], at.center[1] + radius * d[1], at.center[2] + radius * d[2]});
+    const auto c =
+        camera.ToCamera({at.center[0] + radius * d[0], at.center[1] + radius * d[1], at.center[2] + radius * d[2]});
     if (!(c[2] > 0)) continue;
     const double x = k.fx * c[0] / c[2] + k.cx, y = k.fy * c[1] / c[2] + k.cy;
     if (!(x >= 0 && x < k.width && y >= 0 && y < k.height)) continue;
@@ -220,17 +220,16 @@ Result<FarShell> MakeFarShell(const TrainingViews& views, const InitialPoints& s
   for (int64_t i = 0; i < rows; ++i) made[static_cast<size_t>(i)] = i;
   ANCHORSPLAT_ASSIGN_OR_RETURN(shell.cloud, Subset(shell.cloud, made));
   shell.units = {at.center, at.extent};
-  shell.why = Cat(WithThousands(rows), " Gaussians at a distance of ", Fixed(shell.radius, 2), ", ",
-                  decides ? Cat("no points are on ", PercentText(shell.open_share), " of the pictures")
-                          : std::string("as asked"));
+  shell.why = Cat(
+      WithThousands(rows), " Gaussians at a distance of ", Fixed(shell.radius, 2), ", ",
+      decides ? Cat("no points are on ", PercentText(shell.open_share), " of the pictures") : std::string("as asked"));
   return shell;
 }
 
 Result<AddedShell> AddFarShell(const TrainingViews& views, const InitialPoints& start, std::optional<int64_t> count,
                                bool points_tell, FitOptions& options, GaussianCloud& initial) {
   AddedShell added;
-  const int64_t most =
-      options.strategy == Strategy::kMcmc ? options.mcmc.cap_max : options.densification.max_gaussians;
+  const int64_t most = options.strategy == Strategy::kMcmc ? options.mcmc.cap_max : options.densification.max_gaussians;
   ANCHORSPLAT_ASSIGN_OR_RETURN(added.shell, MakeFarShell(views, start,
                                                          {.count = count,
                                                           .points_tell = points_tell,

@@ -29,7 +29,7 @@ inline constexpr int64_t kShellDefaultMost = 50'000;
 struct FarShellOptions {
   // On the whole sphere; those that no picture shows are left out. 0: none. Nothing: the pictures decide, and only
   // those are made that some picture shows where no point is.
-  std::optional<int64_t> count;
+  std::optional<int64_t> count = std::nullopt;
   // Of a start whose points are random or a splat's: they do not say where the pictures show something else.
   bool points_tell = true;
   std::array<float, 3> background = {0, 0, 0};  // of the fit, rgb 0–1

@@ -100,9 +100,9 @@ DensificationChange Fitter::ChangeGaussians(const Camera& rays) {
                             .far = options_.far},
                            state_.cloud);
   } else {
-    change = state_.densification.AfterStep(options_.densification, step, scene_scale_, options_.seed,
-                                            rays.intrinsics.width, rays.intrinsics.height, gradient_, state_.cloud,
-                                            options_.far);
+    change =
+        state_.densification.AfterStep(options_.densification, step, scene_scale_, options_.seed, rays.intrinsics.width,
+                                       rays.intrinsics.height, gradient_, state_.cloud, options_.far);
   }
   state_.optimizer.ForgetRows(change.forgotten);
   state_.optimizer.Apply(change.rows);

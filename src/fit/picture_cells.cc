@@ -56,8 +56,8 @@ size_t PictureCells::CellAt(double x, double y) const {
 PixelBox PictureCells::BoxOf(size_t cell) const {
   const int column = static_cast<int>(cell) % columns_, row = static_cast<int>(cell) / columns_;
   return {static_cast<int>(column * side_), static_cast<int>(row * side_),
-          std::min(width_, static_cast<int>((column + 1) * side_)),
-          std::min(height_, static_cast<int>((row + 1) * side_))};
+          column + 1 == columns_ ? width_ : static_cast<int>((column + 1) * side_),
+          row + 1 == rows_ ? height_ : static_cast<int>((row + 1) * side_)};
 }
 
 Status LookAtPicture(const Camera& camera, const std::array<float, 3>& background, LookedAtPicture& picture) {

@@ -7,8 +7,8 @@
 
 namespace anchorsplat {
 
-void AddRegularizers(const Regularizers& regularizers, double unit, const FarUnits& far,
-                     const GaussianCloud& cloud, CloudGradient& gradient) {
+void AddRegularizers(const Regularizers& regularizers, double unit, const FarUnits& far, const GaussianCloud& cloud,
+                     CloudGradient& gradient) {
   if (cloud.empty() || (regularizers.opacity_reg == 0 && regularizers.scale_reg == 0)) return;
   const auto n = static_cast<double>(cloud.size());
   const auto by_opacity = static_cast<float>(regularizers.opacity_reg / n);

@@ -34,8 +34,8 @@ Result<FirstGaussians> MakeFirstGaussians(const FitFlags& flags, const TrainingV
                                           FitOptions& options) {
   FirstGaussians first;
   ANCHORSPLAT_ASSIGN_OR_RETURN(first.cloud, InitialCloud(start.points, views.scene_scale, StartOptions(options)));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(first.shell, AddFarShell(views, start.points, flags.shell, start.origin == "points",
-                                                        options, first.cloud));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      first.shell, AddFarShell(views, start.points, flags.shell, start.origin == "points", options, first.cloud));
   return first;
 }
 

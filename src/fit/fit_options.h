@@ -48,7 +48,7 @@ struct FitOptions {
   // Views differ in brightness and tint: each has a gain and a bias per channel of its own (fit/exposure_per_view.h),
   // which are taken out of its picture from this step on; −1: never.
   int64_t exposure_from = -1;
-  FarUnits far;  // of a fit with a far shell (AddFarShell sets them)
+  FarUnits far = {};  // of a fit with a far shell (AddFarShell sets them)
 };
 
 // Where --exposure begins: before that, pictures and renders differ by more than their exposure.

@@ -35,7 +35,7 @@ struct McmcStep {
   // of the project.
   double unit = 1;
   uint64_t seed = 0;
-  FarUnits far;  // of the noise: rate and unit are as much larger there
+  FarUnits far = {};  // of the noise: rate and unit are as much larger there
 };
 
 // What MCMCStrategy does after the optimizer's step: at its times dead Gaussians move (`forgotten` are those and the

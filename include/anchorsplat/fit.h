@@ -44,6 +44,9 @@ struct FitSettings {
   StartingPoints starting_points = StartingPoints::kAuto;  // without a splat to begin at
   std::optional<int64_t> initial_points =
       std::nullopt;  // thinned to as many, or random ones; 100,000 where there are none
+  // Gaussians on a sphere far beyond cameras and points, for what is seen there; 0: none. Some where the project's
+  // points leave much of the pictures open, when nothing is said.
+  std::optional<int64_t> far_shell = std::nullopt;
   std::optional<std::array<float, 3>> background =
       std::nullopt;                       // what the project says otherwise, black where it says nothing
   std::filesystem::path checkpoint = {};  // state of a stopped fit; empty: none is written

@@ -26,6 +26,7 @@ def fit(
     init: Literal["auto", "points", "view", "random"] = "auto",
     init_splat: Cloud | PathLike | None = None,
     init_points: int | None = None,
+    shell: int | Literal["auto"] = "auto",
     background: Color | None = None,
     sh_degree: int = 3,
     ssim_weight: float = 0.2,
@@ -75,6 +76,8 @@ def fit(
     init: first Gaussians: the project's points, random where many cameras look, random in gsplat's cube.
     init_splat: a Cloud or a file: first Gaussians at the centres of this splat.
     init_points: how many first Gaussians; otherwise all points, 100,000 random ones.
+    shell: Gaussians on a sphere far beyond cameras and points, for what is seen there; 0: none. "auto": some where the
+        project's points leave much of the pictures open.
     background: r, g, b from 0 to 1; otherwise what the project says, else black.
     sh_degree: highest degree of spherical harmonics, 0 to 3.
     ssim_weight: w of the loss (1 − w)·L1 + w·(1 − SSIM).

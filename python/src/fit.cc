@@ -13,7 +13,6 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "fit/checkpoint_guard.h"
-#include "fit/initial_cloud.h"
 #include "fit/training_views.h"
 #include "request/fit_flags.h"
 #include "request/words.h"
@@ -43,15 +42,14 @@ Result<Outcome> FitTo(const std::string& project, const FitFlags& flags, const G
     ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(control.checkpoint, {}, control.resume, /*overwrite=*/false));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto lock, HoldCheckpoint(control.checkpoint));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const FitOptions options, MakeFitOptions(flags, views.background, seed));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(FitOptions options, MakeFitOptions(flags, views.background, seed));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ChosenStart chosen, ChooseFitStart(flags, views, project, seed, start));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial,
-                               InitialCloud(chosen.points, views.scene_scale, StartOptions(options)));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(FirstGaussians first, MakeFirstGaussians(flags, views, chosen, options));
   LogInfo(Cat(views.train.size(), " training views, ", views.held_out.size(), " held out, scene scale ",
-              Fixed(views.scene_scale, 3), ", ", WithThousands(initial.size()), " initial Gaussians"));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Fitted fitted, Fit(views, std::move(initial), options, control));
+              Fixed(views.scene_scale, 3), ", ", WithThousands(first.cloud.size()), " initial Gaussians"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Fitted fitted, Fit(views, std::move(first.cloud), options, control));
   if (fitted.report.interrupted) return Error{ErrorCode::kInterrupted, "stopped"};
-  nlohmann::json json = ToJson(options, chosen.origin, fitted.report);
+  nlohmann::json json = ToJson(options, chosen.origin, first.shell, fitted.report);
   json["project"] = project;
   return Outcome{std::move(fitted.cloud), json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)};
 }

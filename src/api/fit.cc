@@ -2,10 +2,13 @@
 
 #include <anchorsplat/fit.h>
 
+#include <string_view>
+
 #include "api/bridge.h"
 #include "cameras/photograph.h"
 #include "core/text.h"
 #include "fit/checkpoint_guard.h"
+#include "fit/far_shell.h"
 #include "fit/initial_cloud.h"
 #include "fit/initial_points.h"
 #include "fit/training_views.h"
@@ -76,6 +79,10 @@ Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianClo
         points, InitialPointsOf(InitOf(settings.starting_points), views, settings.initial_points, settings.seed));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial, InitialCloud(points, views.scene_scale, StartOptions(options)));
+  const bool from_points =
+      start == nullptr && std::string_view(NameOf(InitOf(settings.starting_points), views)) == "points";
+  const auto shell = AddFarShell(views, points, settings.far_shell, from_points, options, initial);
+  if (!shell.ok()) return shell.error();
   FitControl control;
   control.checkpoint = settings.checkpoint;
   control.resume = settings.resume;

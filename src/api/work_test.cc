@@ -188,6 +188,10 @@ TEST(Fit, ComesCloserToThePictures) {
   EXPECT_EQ(mcmc->splat.size(), 420);
   EXPECT_TRUE(FitProject(folder.path(), {.steps = 2, .mip_filter = true, .initial_points = 400}).ok());
   EXPECT_TRUE(FitProject(folder.path(), {.steps = 2, .exposure = true, .initial_points = 400}).ok());
+  const auto shelled = FitProject(folder.path(), {.steps = 2, .initial_points = 400, .far_shell = 300});
+  ASSERT_TRUE(shelled.ok());
+  EXPECT_GT(shelled->gaussians_in, 400);
+  EXPECT_FALSE(FitProject(folder.path(), {.steps = 2, .initial_points = 400, .far_shell = -1}).ok());
   EXPECT_EQ(FitProject("/there/is/none").failure().kind, FailureKind::kNotFound);
 }
 

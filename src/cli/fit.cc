@@ -12,7 +12,6 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "fit/checkpoint_guard.h"
-#include "fit/initial_cloud.h"
 #include "fit/training_views.h"
 #include "formats/cloud_io.h"
 #include "formats/cloud_output.h"
@@ -115,20 +114,19 @@ Status RunFit(const FitWords& flags, const SharedFlags& shared) {
       OpenProject(flags.project, {.hold_out = flags.how.hold_out, .downscale = flags.how.downscale}));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOutputs(flags, control, shared.overwrite));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto lock, HoldCheckpoint(control.checkpoint));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const FitOptions options, MakeFitOptions(flags.how, views.background, shared.seed));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(FitOptions options, MakeFitOptions(flags.how, views.background, shared.seed));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ChosenStart start, ChooseFitStart(flags.how, views, flags.project, shared.seed));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial,
-                               InitialCloud(start.points, views.scene_scale, StartOptions(options)));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(FirstGaussians first, MakeFirstGaussians(flags.how, views, start, options));
   LogInfo(Cat(views.train.size(), " training views, ", views.held_out.size(), " held out, scene scale ",
-              Fixed(views.scene_scale, 3), ", ", WithThousands(initial.size()), " initial Gaussians"));
+              Fixed(views.scene_scale, 3), ", ", WithThousands(first.cloud.size()), " initial Gaussians"));
 
   std::optional<StopSignal> stop_signal(std::in_place);
-  auto fitted = Fit(views, std::move(initial), options, control);
+  auto fitted = Fit(views, std::move(first.cloud), options, control);
   stop_signal.reset();
   if (!fitted.ok()) return fitted.error();
   if (fitted->report.interrupted) return Interrupted(flags, fitted->report, options.steps, control.checkpoint);
   if (shared.json) {
-    nlohmann::json json = ToJson(options, start.origin, fitted->report);
+    nlohmann::json json = ToJson(options, start.origin, first.shell, fitted->report);
     json["project"] = flags.project;
     json["output"] = flags.output;
     PrintJson(json);

@@ -9,6 +9,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 class FitVerb : public testing::Test {
  protected:
@@ -62,6 +63,24 @@ TEST_F(FitVerb, BeginsWhereItIsTold) {
   EXPECT_EQ(json["initial_points"], "splat");
   EXPECT_EQ(json["gaussians"]["in"], 50);
   ExpectDone(Fit("area.ply", {"--pixel", "area", "--upscale", "2"}));
+}
+
+TEST_F(FitVerb, SaysWhatBecameOfItsShell) {
+  const ProgramRun automatic = ExpectDone(Fit("auto.ply", {}));
+  EXPECT_THAT(automatic.err, HasSubstr("far shell: none, the first Gaussians do not say where the points end"));
+  EXPECT_THAT(ExpectDone(Fit("none.ply", {"--shell", "0"})).err, Not(HasSubstr("far shell")));
+  EXPECT_EQ(FileBytes(folder_ / "auto.ply"), FileBytes(folder_ / "none.ply"));
+  const nlohmann::json json = ExpectJson(Fit("shell.ply", {"--shell", "300"}));
+  const int64_t made = json["shell"]["gaussians"];
+  EXPECT_GT(made, 50);
+  EXPECT_LE(made, 300);
+  EXPECT_EQ(json["shell"]["on_sphere"], 300);
+  EXPECT_EQ(json["gaussians"]["in"], 200 + made);
+  EXPECT_GT(json["settings"]["far_radius"], 0);
+  EXPECT_FALSE(ExpectJson(Fit("plain.ply", {"--shell", "auto"}))["settings"].contains("far_radius"));
+  for (const char* wrong : {"-1", "some", "1.5", "1048577", ""}) {
+    ExpectRefused(Fit("x.ply", {"--shell", wrong}), ErrorCode::kBadArgument, {"--shell"});
+  }
 }
 
 TEST_F(FitVerb, KnowsItsStrategies) {

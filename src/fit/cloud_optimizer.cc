@@ -12,6 +12,17 @@ namespace {
 
 enum Attribute : size_t { kMeans, kScales, kQuats, kOpacities, kSh };
 
+// Makes the step from `before` to `means` [N,3] as much longer as lengths are where it began.
+void Lengthen(const FarUnits& far, const Buffer<float>& before, Buffer<float>& means) {
+  ParallelFor(0, static_cast<int64_t>(means.size()) / 3, 4096, [&](int64_t begin, int64_t end) {
+    for (auto i = static_cast<size_t>(3 * begin); i < static_cast<size_t>(3 * end); i += 3) {
+      const auto factor = static_cast<float>(far.FactorAt(before.data() + i));
+      if (factor == 1) continue;
+      for (size_t k = i; k < i + 3; ++k) means[k] = before[k] + factor * (means[k] - before[k]);
+    }
+  });
+}
+
 }  // namespace
 
 double MeansRate(const LearningRates& rates, double scene_scale, int64_t step, int64_t steps) {
@@ -52,9 +63,12 @@ CoefficientStep CloudOptimizer::BeginStep(const LearningRates& rates, int sh_deg
 }
 
 void CloudOptimizer::FinishStep(const LearningRates& rates, double means_rate, const CloudGradient& gradient,
-                                GaussianCloud& cloud) {
+                                GaussianCloud& cloud, const FarUnits& far) {
   ++steps_;
+  Buffer<float> before;
+  if (far.any()) before = cloud.means;
   StepAttribute(kMeans, 3, 0, rates, 0, means_rate, gradient.means, cloud.means);
+  if (far.any()) Lengthen(far, before, cloud.means);
   StepAttribute(kScales, 3, 0, rates, 0, rates.scales, gradient.log_scales, cloud.log_scales);
   StepAttribute(kQuats, 4, 0, rates, 0, rates.quats, gradient.quats, cloud.quats);
   StepAttribute(kOpacities, 1, 0, rates, 0, rates.opacities, gradient.opacity_logits, cloud.opacity_logits);

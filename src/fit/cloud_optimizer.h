@@ -7,6 +7,7 @@
 
 #include "core/buffer.h"
 #include "core/gaussian_cloud.h"
+#include "fit/far_units.h"
 #include "render/rasterizer.h"
 
 namespace anchorsplat {
@@ -47,7 +48,9 @@ class CloudOptimizer {
   // The same in two parts, for Rasterizer::Backward in between: what it is to do with the coefficients, which changes
   // nothing yet, and then the step of everything else.
   CoefficientStep BeginStep(const LearningRates& rates, int sh_degree, GaussianCloud& cloud);
-  void FinishStep(const LearningRates& rates, double means_rate, const CloudGradient& gradient, GaussianCloud& cloud);
+  // Means move in `far` units.
+  void FinishStep(const LearningRates& rates, double means_rate, const CloudGradient& gradient, GaussianCloud& cloud,
+                  const FarUnits& far = {});
 
   void Apply(const RowChange& change);
   void ForgetOpacities();                          // their moments become zero

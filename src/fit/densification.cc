@@ -17,9 +17,11 @@ namespace {
 constexpr float kSplitShrink = 1.6f;  // of Kerbl et al. 2023: halves of a split are this much smaller
 constexpr int kSplitSamples = 2;
 
-float LargestLogScale(const GaussianCloud& cloud, int64_t i) {
+// In `far` units, which most fits have none of.
+float LargestLogScale(const FarUnits& far, const GaussianCloud& cloud, int64_t i) {
   const float* s = cloud.log_scales.data() + 3 * i;
-  return std::max({s[0], s[1], s[2]});
+  const float largest = std::max({s[0], s[1], s[2]});
+  return far.any() ? largest - static_cast<float>(std::log(far.FactorAt(cloud.means.data() + 3 * i))) : largest;
 }
 
 float RevisedLogit(float logit) {
@@ -35,14 +37,18 @@ struct Growth {
 // What is the same for all rows in one refinement.
 struct Rules {
   const DensificationOptions* options;
+  const FarUnits* far;
   float log_grow_scale, log_prune_scale;  // ln of world units
   bool prune_large;                       // after the first reset
   bool by_radius;                         // the 2-D rules apply
 };
 
-Rules MakeRules(const DensificationOptions& options, int64_t step, double scene_scale) {
-  return {&options, static_cast<float>(std::log(options.grow_scale3d * scene_scale)),
-          static_cast<float>(std::log(options.prune_scale3d * scene_scale)), step > options.reset_every,
+Rules MakeRules(const DensificationOptions& options, const FarUnits& far, int64_t step, double scene_scale) {
+  return {&options,
+          &far,
+          static_cast<float>(std::log(options.grow_scale3d * scene_scale)),
+          static_cast<float>(std::log(options.prune_scale3d * scene_scale)),
+          step > options.reset_every,
           step < options.refine_scale2d_stop_iter};
 }
 
@@ -54,7 +60,7 @@ Growth ChooseGrowth(const Rules& rules, const Densification::Gathered& gathered,
     const auto k = static_cast<size_t>(i);
     gradients[k] = gathered.grad2d[k] / std::max(gathered.count[k], 1.0f);
     const bool high = gradients[k] > static_cast<float>(options.grow_grad2d);
-    const bool small = LargestLogScale(cloud, i) <= rules.log_grow_scale;
+    const bool small = LargestLogScale(*rules.far, cloud, i) <= rules.log_grow_scale;
     const bool wide = rules.by_radius && gathered.radii[k] > static_cast<float>(options.grow_scale2d);
     // Both may be true: then it is split, and its duplicate, which has no history, stays whole.
     if (high && small) growth.duplicate.push_back(i);
@@ -195,15 +201,15 @@ void Densification::Gather(bool absgrad, int width, int height, const CloudGradi
 }
 
 void Densification::Refine(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed,
-                           GaussianCloud& cloud, DensificationChange& change) {
-  const Rules rules = MakeRules(options, step, scene_scale);
+                           const FarUnits& far, GaussianCloud& cloud, DensificationChange& change) {
+  const Rules rules = MakeRules(options, far, step, scene_scale);
   const Growth growth = ChooseGrowth(rules, gathered_, cloud);
   std::vector<Newcomer> newcomers = MakeNewcomers(growth, cloud, RandomStream(seed, RandomPurpose::kSplit, step));
 
   // Pruning looks at the grown cloud, newcomers included.
   std::erase_if(newcomers, [&](const Newcomer& newcomer) {
     const auto k = static_cast<size_t>(newcomer.source);
-    const float logit = cloud.opacity_logits[k], size = LargestLogScale(cloud, newcomer.source);
+    const float logit = cloud.opacity_logits[k], size = LargestLogScale(far, cloud, newcomer.source);
     return IsPruned(rules, cloud, newcomer.source,
                     newcomer.half && options.revised_opacity ? RevisedLogit(logit) : logit,
                     newcomer.half ? size - std::log(kSplitShrink) : size, gathered_.radii[k]);
@@ -217,7 +223,8 @@ void Densification::Refine(const DensificationOptions& options, int64_t step, do
       continue;
     }
     const auto k = static_cast<size_t>(i);
-    if (IsPruned(rules, cloud, i, cloud.opacity_logits[k], LargestLogScale(cloud, i), gathered_.radii[k])) continue;
+    if (IsPruned(rules, cloud, i, cloud.opacity_logits[k], LargestLogScale(far, cloud, i), gathered_.radii[k]))
+      continue;
     rows.kept.push_back(i);
   }
   rows.fresh = static_cast<int64_t>(newcomers.size());
@@ -232,13 +239,13 @@ void Densification::Refine(const DensificationOptions& options, int64_t step, do
 
 DensificationChange Densification::AfterStep(const DensificationOptions& options, int64_t step, double scene_scale,
                                              uint64_t seed, int width, int height, const CloudGradient& gradient,
-                                             GaussianCloud& cloud) {
+                                             GaussianCloud& cloud, const FarUnits& far) {
   DensificationChange change;
   if (step >= options.refine_stop_iter) return change;
   Gather(options.absgrad, width, height, gradient);
   if (step > options.refine_start_iter && step % options.refine_every == 0 &&
       step % options.reset_every >= options.pause_refine_after_reset) {
-    Refine(options, step, scene_scale, seed, cloud, change);
+    Refine(options, step, scene_scale, seed, far, cloud, change);
   }
   change.resets_opacities = options.opacity_reset != OpacityReset::kNever && step % options.reset_every == 0 &&
                             (step > 0 || options.opacity_reset == OpacityReset::kFromZero);

@@ -5,6 +5,7 @@
 #include "core/buffer.h"
 #include "core/gaussian_cloud.h"
 #include "fit/cloud_optimizer.h"
+#include "fit/far_units.h"
 #include "render/rasterizer.h"
 
 namespace anchorsplat {
@@ -63,9 +64,11 @@ class Densification {
   // What DefaultStrategy does after the optimizer's step `step` (0, 1, …): gathers the gradients of the centres and,
   // at its times, duplicates, splits and prunes `cloud` and says when opacities are to be taken down to twice
   // prune_opa. `gradient` is that of the step, for a picture of width × height pixels. Rows that are not finite
-  // (IsUsable) are pruned with the others. The noise of splits follows from seed and step.
+  // (IsUsable) are pruned with the others. The noise of splits follows from seed and step. Thresholds in scene scales
+  // are in `far` units.
   DensificationChange AfterStep(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed,
-                                int width, int height, const CloudGradient& gradient, GaussianCloud& cloud);
+                                int width, int height, const CloudGradient& gradient, GaussianCloud& cloud,
+                                const FarUnits& far = {});
 
   // For checkpoints: what was gathered since the last change. [N] each.
   struct Gathered {
@@ -79,7 +82,7 @@ class Densification {
  private:
   void Clear(int64_t gaussians);
   void Gather(bool absgrad, int width, int height, const CloudGradient& gradient);
-  void Refine(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed,
+  void Refine(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed, const FarUnits& far,
               GaussianCloud& cloud, DensificationChange& change);
 
   Gathered gathered_;

@@ -84,13 +84,15 @@ Status CompareSettings(const std::string& file, const std::string& theirs, const
   if (a.is_object() && b.is_object()) {
     for (const auto& [key, value] : b.items()) {
       const auto found = a.find(key);
-      if (found != a.end() && *found == value) continue;
-      if (found == a.end()) {
-        return Error{ErrorCode::kBadFile, Cat(file, ": is a checkpoint of another version, which knew no ", key)};
-      }
+      if (found == a.end() || *found == value) continue;
       const std::string how =
           IsFingerprint(value) ? "another one" : Cat(Printable(found->dump()), ", this one's is ", value.dump());
       return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run: its ", key, " is ", how)};
+    }
+    // Only fits with a far shell say how far it is, and their start differs from others': that has been said.
+    for (const auto& [key, value] : b.items()) {
+      if (a.contains(key)) continue;
+      return Error{ErrorCode::kBadFile, Cat(file, ": is a checkpoint of another version, which knew no ", key)};
     }
   }
   return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run")};

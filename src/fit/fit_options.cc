@@ -100,6 +100,10 @@ Status Validate(const FitOptions& options) {
        {std::pair{"opacity_reg", options.regularizers.opacity_reg}, {"scale_reg", options.regularizers.scale_reg}}) {
     if (!(value >= 0 && std::isfinite(value))) return bad(Cat(name, " must be a number and not negative"));
   }
+  const auto& center = options.far.center;
+  if (!(options.far.radius >= 0 && std::isfinite(options.far.radius + center[0] + center[1] + center[2]))) {
+    return bad("the far units' centre and radius must be numbers, and the radius not negative");
+  }
   if (options.mip_filter_every < 1) return bad("mip_filter_every must be at least 1");
   if (options.mip_filter && options.pixel.upscale > 1) return bad("the smoothing filter is for pixels that are points");
   if (options.mip_filter && options.objective.render.mode != RenderMode::kMip) {
@@ -115,7 +119,7 @@ std::string ToJsonText(const FitOptions& o) {
   const LearningRates& r = o.rates;
   const RenderOptions& render = o.objective.render;
   // One level, so that what differs can be named by one word.
-  const nlohmann::json json = {
+  nlohmann::json json = {
       {"steps", o.steps},
       {"seed", o.seed},
       {"sh_degree_interval", o.sh_degree_interval},
@@ -173,6 +177,10 @@ std::string ToJsonText(const FitOptions& o) {
       {"ssim_weight", o.objective.loss.ssim_weight},
       {"ssim_padding", static_cast<int>(o.objective.loss.padding)},
   };
+  if (o.far.any()) {
+    json["far_center"] = o.far.center;
+    json["far_radius"] = o.far.radius;
+  }
   return json.dump();
 }
 

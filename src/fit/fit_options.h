@@ -6,6 +6,7 @@
 #include "core/result.h"
 #include "fit/cloud_optimizer.h"
 #include "fit/densification.h"
+#include "fit/far_units.h"
 #include "fit/initial_cloud.h"
 #include "fit/mcmc.h"
 #include "fit/regularizers.h"
@@ -47,6 +48,7 @@ struct FitOptions {
   // Views differ in brightness and tint: each has a gain and a bias per channel of its own (fit/exposure_per_view.h),
   // which are taken out of its picture from this step on; −1: never.
   int64_t exposure_from = -1;
+  FarUnits far = {};  // of a fit with a far shell (AddFarShell sets them)
 };
 
 // Where --exposure begins: before that, pictures and renders differ by more than their exposure.

@@ -72,9 +72,9 @@ Result<FitStep> Fitter::Step() {
   ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Compare(objective, shown, picture_, gradient_, &coefficients));
   watch.Lap();
   if (options_.mip_filter) MipFilterBackward(state_.cloud, state_.mip_filter, gradient_);
-  AddRegularizers(options_.regularizers, UnitOf(scene_scale_), state_.cloud, gradient_);
+  AddRegularizers(options_.regularizers, UnitOf(scene_scale_), options_.far, state_.cloud, gradient_);
   const double means_rate = MeansRate(options_.rates, scene_scale_, step, options_.steps);
-  state_.optimizer.FinishStep(options_.rates, means_rate, gradient_, state_.cloud);
+  state_.optimizer.FinishStep(options_.rates, means_rate, gradient_, state_.cloud, options_.far);
   times_.adam += watch.Lap();
 
   out.change = ChangeGaussians(RaysOf(objective.pixel, camera));
@@ -96,11 +96,13 @@ DensificationChange Fitter::ChangeGaussians(const Camera& rays) {
                            {.step = step,
                             .means_rate = MeansRate(options_.rates, scene_scale_, step + 1, options_.steps),
                             .unit = UnitOf(scene_scale_),
-                            .seed = options_.seed},
+                            .seed = options_.seed,
+                            .far = options_.far},
                            state_.cloud);
   } else {
-    change = state_.densification.AfterStep(options_.densification, step, scene_scale_, options_.seed,
-                                            rays.intrinsics.width, rays.intrinsics.height, gradient_, state_.cloud);
+    change =
+        state_.densification.AfterStep(options_.densification, step, scene_scale_, options_.seed, rays.intrinsics.width,
+                                       rays.intrinsics.height, gradient_, state_.cloud, options_.far);
   }
   state_.optimizer.ForgetRows(change.forgotten);
   state_.optimizer.Apply(change.rows);

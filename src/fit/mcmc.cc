@@ -128,7 +128,8 @@ void AddNoise(double scaler, const McmcStep& step, GaussianCloud& cloud) {
       const float* q = cloud.quats.data() + 4 * i;
       const auto r = RotationFromQuaternion<double>(q[0], q[1], q[2], q[3]);
       std::array<double, 3> noise, along{};
-      for (double& x : noise) x = random.Normal() * gate * scaler;
+      const double here = scaler / step.far.FactorAt(cloud.means.data() + 3 * i);
+      for (double& x : noise) x = random.Normal() * gate * here;
       for (size_t a = 0; a < 3; ++a) {
         const double variance = std::exp(2 * double{cloud.log_scales[static_cast<size_t>(3 * i) + a]});
         along[a] = variance * (r[a] * noise[0] + r[3 + a] * noise[1] + r[6 + a] * noise[2]);

@@ -4,6 +4,7 @@
 
 #include "core/gaussian_cloud.h"
 #include "fit/densification.h"
+#include "fit/far_units.h"
 
 namespace anchorsplat {
 
@@ -34,6 +35,7 @@ struct McmcStep {
   // of the project.
   double unit = 1;
   uint64_t seed = 0;
+  FarUnits far = {};  // of the noise: rate and unit are as much larger there
 };
 
 // What MCMCStrategy does after the optimizer's step: at its times dead Gaussians move (`forgotten` are those and the

@@ -307,7 +307,7 @@ TEST(Regularizers, MatchDifferenceQuotients) {
   CloudGradient gradient;
   gradient.opacity_logits.assign(30, 1.0f);  // it is added
   gradient.log_scales.assign(90, 0.0f);
-  AddRegularizers(regularizers, kUnit, cloud, gradient);
+  AddRegularizers(regularizers, kUnit, {}, cloud, gradient);
   const auto compare = [&](Buffer<float>& values, const Buffer<float>& analytic, float before) {
     for (size_t i = 0; i < values.size(); ++i) {
       const float value = values[i];

@@ -7,7 +7,7 @@
 
 namespace anchorsplat {
 
-void AddRegularizers(const Regularizers& regularizers, double unit, const GaussianCloud& cloud,
+void AddRegularizers(const Regularizers& regularizers, double unit, const FarUnits& far, const GaussianCloud& cloud,
                      CloudGradient& gradient) {
   if (cloud.empty() || (regularizers.opacity_reg == 0 && regularizers.scale_reg == 0)) return;
   const auto n = static_cast<double>(cloud.size());
@@ -19,7 +19,8 @@ void AddRegularizers(const Regularizers& regularizers, double unit, const Gaussi
       const auto k = static_cast<size_t>(i);
       const float opacity = Sigmoid(cloud.opacity_logits[k]);
       gradient.opacity_logits[k] += by_opacity * opacity * (1 - opacity);
-      for (size_t a = 3 * k; a < 3 * k + 3; ++a) gradient.log_scales[a] += by_scale * std::exp(cloud.log_scales[a]);
+      const auto here = static_cast<float>(by_scale / far.FactorAt(cloud.means.data() + 3 * k));
+      for (size_t a = 3 * k; a < 3 * k + 3; ++a) gradient.log_scales[a] += here * std::exp(cloud.log_scales[a]);
     }
   });
 }

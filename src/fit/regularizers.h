@@ -1,6 +1,7 @@
 #pragma once
 
 #include "core/gaussian_cloud.h"
+#include "fit/far_units.h"
 #include "render/rasterizer.h"
 
 namespace anchorsplat {
@@ -13,8 +14,9 @@ struct Regularizers {
   double scale_reg = 0;    // × mean of all axes' sizes, in units of McmcStep::unit
 };
 
-// What they add to the gradient of a cloud. Rows that are not finite get nothing.
-void AddRegularizers(const Regularizers& regularizers, double unit, const GaussianCloud& cloud,
+// What they add to the gradient of a cloud. Rows that are not finite get nothing. Sizes are in `far`
+// units.
+void AddRegularizers(const Regularizers& regularizers, double unit, const FarUnits& far, const GaussianCloud& cloud,
                      CloudGradient& gradient);
 
 }  // namespace anchorsplat

@@ -24,6 +24,25 @@ CLI::Validator FaintOpacity() {
       "");
 }
 
+// A count, or auto, which leaves `count` empty.
+void AddShellFlag(CLI::App& verb, std::optional<int64_t>& count) {
+  const auto check = [](const std::string& text) -> std::string {
+    int64_t value = 0;
+    if (text == "auto" || (CLI::detail::lexical_cast(text, value) && value >= 0 && value <= kMostOnShell)) return "";
+    return Cat("must be auto or a whole number from 0 to ", kMostOnShell, ", found '", text, "'");
+  };
+  const auto assign = [&count](const std::string& text) {
+    int64_t value = 0;
+    count = text != "auto" && CLI::detail::lexical_cast(text, value) ? std::optional(value) : std::nullopt;
+  };
+  verb.add_option_function<std::string>("--shell", assign,
+                                        "Gaussians on a sphere far beyond cameras and points, for what is seen "
+                                        "there: how many, 0: none; auto: some where the project's points leave "
+                                        "much of the pictures open")
+      ->check(CLI::Validator(check, ""))
+      ->default_str("auto");
+}
+
 void AddScheduleFlags(CLI::App& verb, FitFlags& f) {
   const std::string group = "Densification (names of gsplat's strategies; steps default to their schedules, scaled)";
   DensificationOptions& d = f.standard.densification;
@@ -112,6 +131,7 @@ void FitFlags::AddTo(CLI::App& verb) {
       ->excludes(init_option);
   verb.add_option("--init-points", init_points, "How many (default: all points; 100000 random ones)")
       ->check(CLI::Range(int64_t{1}, int64_t{1} << 28));
+  AddShellFlag(verb, shell);
   verb.add_option("--background", background, "R,G,B from 0 to 1 (default: what the project says, else black)");
   verb.add_option("--sh-degree", standard.objective.render.sh_degree, "Highest degree of spherical harmonics")
       ->check(CLI::Range(0, kMaxShDegree))

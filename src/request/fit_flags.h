@@ -10,6 +10,7 @@
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
+#include "fit/far_shell.h"
 #include "fit/fit.h"
 #include "fit/fit_options.h"
 #include "fit/initial_points.h"
@@ -30,6 +31,7 @@ struct FitFlags {
   FitInit init = FitInit::kAuto;
   std::string init_splat;
   std::optional<int64_t> init_points;
+  std::optional<int64_t> shell;  // nothing: auto
   std::string background;
   FitPreset strategy = FitPreset::kDefault;
   bool mip_filter = false;
@@ -64,7 +66,17 @@ struct ChosenStart {
 Result<ChosenStart> ChooseFitStart(const FitFlags& flags, const TrainingViews& views, const std::string& project,
                                    uint64_t seed, const GaussianCloud* splat = nullptr);
 
+// The Gaussians with which a fit begins: those of the start and, where --shell or the pictures ask for it, a far shell,
+// of which `options` learn. Errors: those of InitialCloud and AddFarShell.
+struct FirstGaussians {
+  GaussianCloud cloud;
+  AddedShell shell;
+};
+Result<FirstGaussians> MakeFirstGaussians(const FitFlags& flags, const TrainingViews& views, const ChosenStart& start,
+                                          FitOptions& options);
+
 // What was done, as --json and Python say it.
-nlohmann::json ToJson(const FitOptions& options, const std::string& origin, const FitReport& report);
+nlohmann::json ToJson(const FitOptions& options, const std::string& origin, const AddedShell& shell,
+                      const FitReport& report);
 
 }  // namespace anchorsplat

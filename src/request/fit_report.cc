@@ -30,12 +30,28 @@ Result<ChosenStart> ChooseFitStart(const FitFlags& flags, const TrainingViews& v
   return ChosenStart{std::move(points), NameOf(flags.init, views)};
 }
 
-nlohmann::json ToJson(const FitOptions& options, const std::string& origin, const FitReport& r) {
+Result<FirstGaussians> MakeFirstGaussians(const FitFlags& flags, const TrainingViews& views, const ChosenStart& start,
+                                          FitOptions& options) {
+  FirstGaussians first;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(first.cloud, InitialCloud(start.points, views.scene_scale, StartOptions(options)));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      first.shell, AddFarShell(views, start.points, flags.shell, start.origin == "points", options, first.cloud));
+  return first;
+}
+
+nlohmann::json ToJson(const FitOptions& options, const std::string& origin, const AddedShell& added,
+                      const FitReport& r) {
   const auto& t = r.times;
   nlohmann::json json = {
       {"steps", r.steps},
       {"resumed_at", r.resumed_at},
       {"initial_points", origin},
+      {"shell",
+       {{"gaussians", added.gaussians},
+        {"on_sphere", added.shell.on_sphere},
+        {"radius", added.shell.radius},
+        {"share", added.shell.open_share},
+        {"why", added.shell.why}}},
       {"settings", nlohmann::json::parse(ToJsonText(options))},
       {"scene_scale", r.scene_scale},
       {"gaussians",

@@ -84,8 +84,8 @@ def enhance(
     train_width: pixels of the pictures in training where they were smaller than the cameras say.
     camera_rule: which of the views that hold a Gaussian says its pixel size.
     filter_strength: share of the absorbed 0.3 px² to give back; otherwise 1 − (1 − 1/upscale²)/3.6.
-    clean: first takes out Gaussians of the colour of `background` (r, g, b from 0 to 1; otherwise what the camera file says,
-        else black) that no training view would miss.
+    background: r, g, b from 0 to 1, of the training views; otherwise what the camera file says, else the splat, else black.
+    clean: first takes out Gaussians of that colour that no training view would miss.
 
     model: weights of a network, .pth or .safetensors; otherwise the one in the box.
     copies, merge_cost: Gaussians that a compact network makes of each, at most, or "auto"; what a merge may cost then.

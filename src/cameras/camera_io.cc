@@ -1,6 +1,7 @@
 #include "cameras/camera_io.h"
 
 #include <algorithm>
+#include <cctype>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "cameras/poses_bounds.h"
 #include "cameras/transforms_json.h"
 #include "core/file_system.h"
+#include "core/log.h"
 #include "core/text.h"
 #include "io/json_file.h"
 
@@ -68,14 +70,45 @@ Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder) {
   return IsFolder(candidates[0]) ? ReadColmapModel(candidates[0]) : ReadCameraJson(candidates[0]);
 }
 
-}  // namespace
-
-Result<CameraSet> ParseCameras(const std::string& name, std::string_view bytes, const std::filesystem::path& folder) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile file, JsonFile::Parse(name, bytes));
-  return CamerasFromJson(file.root(), folder);
+// A folder of masks beside the pictures or among them, by any spelling; empty where there is none.
+std::filesystem::path MasksBeside(const std::filesystem::path& picture) {
+  for (const auto& folder : {picture.parent_path(), picture.parent_path().parent_path()}) {
+    std::error_code code;
+    for (std::filesystem::directory_iterator it(folder.empty() ? "." : folder, code), end; !code && it != end;
+         it.increment(code)) {
+      std::string name = it->path().filename().string();
+      std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+      if ((name == "masks" || name == "mask") && IsFolder(it->path())) return it->path();
+    }
+  }
+  return {};
 }
 
-Result<CameraSet> ReadCameras(const std::filesystem::path& path) {
+// Masks that were meant for these views and are not found are a mistake that nothing else tells.
+void WarnOfMissingMasks(const CameraSet& set) {
+  const Camera* bare = nullptr;
+  size_t pictures = 0, masked = 0;
+  for (const Camera& camera : set.cameras) {
+    if (camera.image.empty()) continue;
+    ++pictures;
+    if (!camera.photograph.mask.empty()) {
+      ++masked;
+    } else if (bare == nullptr) {
+      bare = &camera;
+    }
+  }
+  if (bare == nullptr) return;
+  const std::string expected = "expected masks/NAME.EXT.png or masks/NAME.png";
+  if (masked > 0) {
+    LogWarning(Cat(pictures - masked, " of ", pictures, " pictures have no mask, the first is ",
+                   Printable(bare->image.string()), ": all of their pixels count (", expected, ")"));
+  } else if (const std::filesystem::path folder = MasksBeside(bare->image); !folder.empty()) {
+    LogWarning(Cat(folder.string(), ": none of the ", pictures, " pictures has its mask there; for ",
+                   Printable(bare->image.filename().string()), " ", expected));
+  }
+}
+
+Result<CameraSet> ReadAnyCameras(const std::filesystem::path& path) {
   if (IsFolder(path)) return ReadCameraFolder(path);
   // Any file of a COLMAP model stands for the model.
   const std::string name = path.filename().string();
@@ -87,6 +120,19 @@ Result<CameraSet> ReadCameras(const std::filesystem::path& path) {
                  Cat(folder.string(), ": a COLMAP model needs both cameras and images, as .bin or .txt")};
   }
   return path.extension() == ".npy" ? ReadPosesBounds(path) : ReadCameraJson(path);
+}
+
+}  // namespace
+
+Result<CameraSet> ParseCameras(const std::string& name, std::string_view bytes, const std::filesystem::path& folder) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile file, JsonFile::Parse(name, bytes));
+  return CamerasFromJson(file.root(), folder);
+}
+
+Result<CameraSet> ReadCameras(const std::filesystem::path& path) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadAnyCameras(path));
+  WarnOfMissingMasks(set);
+  return set;
 }
 
 }  // namespace anchorsplat

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -10,6 +11,7 @@
 #include <utility>
 
 #include "cameras/parse_cameras.h"
+#include "core/messages_for_test.h"
 #include "core/random.h"
 #include "core/rotation.h"
 #include "core/source_dir_for_test.h"
@@ -212,6 +214,40 @@ TEST(ReadCameras, TakesTheOnlyCandidateOfAFolder) {
   for (const char* name : {"transforms_train.json", "cameras.json"}) {
     EXPECT_NE(set.error().message.find(name), std::string::npos) << set.error().message;
   }
+}
+
+// Nothing else tells of masks that were meant and are not found.
+TEST(CameraIo, WarnsOfMasksThatAreNotFound) {
+  const TestFolder folder;
+  Image white(8, 6, 1);
+  std::fill(white.pixels.begin(), white.pixels.end(), 1.0f);
+  std::filesystem::create_directories(folder / "images");
+  std::string frames;
+  for (const char* name : {"a", "b", "c"}) {
+    ASSERT_TRUE(WritePng(folder / "images" / (std::string(name) + ".png"), white).ok());
+    frames += std::string(frames.empty() ? "" : ",") + R"({"file_path": "images/)" + name +
+              R"(.png", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]})";
+  }
+  Write(folder / "transforms.json", R"({"w": 8, "h": 6, "fl_x": 10, "frames": [)" + frames + "]}");
+  const auto warnings = [&] {
+    const Messages messages;
+    EXPECT_TRUE(ReadCameras(folder.path()).ok());
+    return messages.warnings();
+  };
+  EXPECT_TRUE(warnings().empty()) << "there is no sign of masks";
+  std::filesystem::create_directories(folder / "Masks");
+  ASSERT_TRUE(WritePng(folder / "Masks/other.png", white).ok());
+  auto said = warnings();
+  ASSERT_EQ(said.size(), 1u);
+  EXPECT_NE(said[0].find("none of the 3 pictures has its mask there"), std::string::npos) << said[0];
+  std::filesystem::create_directories(folder / "masks");
+  ASSERT_TRUE(WritePng(folder / "masks/a.png", white).ok());
+  ASSERT_TRUE(WritePng(folder / "masks/b.png.png", white).ok());
+  said = warnings();
+  ASSERT_EQ(said.size(), 1u);
+  EXPECT_NE(said[0].find("1 of 3 pictures have no mask"), std::string::npos) << said[0];
+  ASSERT_TRUE(WritePng(folder / "masks/c.png", white).ok());
+  EXPECT_TRUE(warnings().empty());
 }
 
 }  // namespace

@@ -107,7 +107,7 @@ Status WriteSideBySide(const CompareWords& flags, Sides& sides, const std::vecto
   ViewSource& reference = sides.truth ? *sides.truth : *sides.b;
   if (sides.truth) sources.push_back(sides.b.get());
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto partners, MatchSources(sources, reference));
-  const size_t view = MedianView(results.back());
+  const size_t row = MedianView(results.back()), view = results.back().views[row].reference_view;
 
   std::vector<Image> pictures;
   for (size_t s = 0; s < sources.size(); ++s) {
@@ -117,12 +117,12 @@ Status WriteSideBySide(const CompareWords& flags, Sides& sides, const std::vecto
   const std::array<std::string, 2> names = {flags.a, flags.b};
   std::vector<LabelledImage> images;
   for (size_t s = 0; s < sources.size(); ++s) {
-    const ViewScore& score = results[s].views[view];
+    const ViewScore& score = results[s].views[row];
     images.push_back(
         {ShortName(names[s]), Cat(Fixed(score.psnr, 2), " dB  SSIM ", Fixed(score.ssim, 4)), &pictures[s]});
   }
   images.push_back(
-      {sides.truth ? "ground truth" : ShortName(flags.b), "view " + results[0].views[view].name, &pictures.back()});
+      {sides.truth ? "ground truth" : ShortName(flags.b), "view " + results[0].views[row].name, &pictures.back()});
   sources.push_back(&reference);
   std::vector<std::string> credits;
   for (const ViewSource* source : sources) {

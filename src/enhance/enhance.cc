@@ -341,7 +341,11 @@ Status CheckTask(const GaussianCloud& cloud, const EnhanceOptions& options) {
     }
   }
   if (options.background && !options.clean) {
-    return Error{ErrorCode::kBadArgument, "a background has no effect without cleaning (--clean)"};
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const MethodPlan plan, PlanEnhancement(options));
+    const auto looks = [](const MethodOption& option) { return option.name == "background"; };
+    if (std::ranges::none_of(plan.method->options, looks)) {
+      return Error{ErrorCode::kBadArgument, "a background has no effect without cleaning (--clean) or refinement"};
+    }
   }
   if (options.filter_strength && !(*options.filter_strength >= 0 && *options.filter_strength <= kMaxFilterStrength)) {
     return Error{ErrorCode::kBadArgument,

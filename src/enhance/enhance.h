@@ -51,7 +51,8 @@ struct EnhanceOptions {
   // Only what lies in there is enhanced. The rest stays bit by bit, behind it, and a splat of which only a part was is
   // not marked as enhanced.
   std::optional<Region> region;
-  std::optional<std::array<float, 3>> background;  // for `clean`; what the cameras say otherwise, else black
+  std::optional<std::array<float, 3>> background;  // of the training views, for `clean` and refinement; what the
+                                                   // cameras say otherwise, else the splat's comment, else black
   uint64_t seed = 0;
 };
 

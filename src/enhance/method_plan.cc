@@ -113,7 +113,7 @@ Status CheckOptions(const EnhanceOptions& options) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const MethodPlan plan, PlanEnhancement(options));
   for (const std::string& name : options.given) {
     std::string lack;
-    bool works = options.clean && (name == "cameras" || name == "images");
+    bool works = options.clean && (name == "cameras" || name == "images" || name == "background");
     for (const auto& [method, start] : {std::pair(plan.method, plan.start), std::pair(plan.start, plan.start)}) {
       const MethodOption* option = FindOption(method, name);
       if (option == nullptr) continue;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -171,17 +172,27 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
   };
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const RefineOptions options, ChooseRefineOptions(input, given));
-  KeepToBudget(options.max_gaussians, input.fixed, input.start);
+  const int64_t left_out = KeepToBudget(options.max_gaussians, input.fixed, input.start);
+  std::optional<GaussianCloud> fewer;  // of the input, where there may not be all
+  if (options.max_gaussians > 0 && input.cloud.size() - input.fixed > options.max_gaussians) {
+    fewer = input.cloud;
+    KeepToBudget(options.max_gaussians, input.fixed, *fewer);
+  }
+  const GaussianCloud& as_it_is = fewer ? *fewer : input.cloud;
+  if (left_out > 0) {
+    LogWarning(Cat("--max-gaussians ", WithThousands(options.max_gaussians),
+                   " are fewer than there are before any is split: the ", WithThousands(left_out),
+                   " of the least opacity × size are left out"));
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(RefineViews views, OpenRefineViews(input, options));
   const bool resumes = control.resume && Exists(control.checkpoint);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(report.plan, PlanRefinement(input, options, resumes, views));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(report.plan, PlanRefinement(input, as_it_is, options, resumes, views));
   const RefinePlan& plan = report.plan;
   if (!plan.why.empty()) LogInfo(plan.why);
   report.views = static_cast<int64_t>(views.train.views().size());
   report.input_psnr = views.input_psnr;
   report.before = plan.before;
-  GaussianCloud start = plan.from_input ? input.cloud : std::move(input.start);
-  if (plan.from_input) KeepToBudget(options.max_gaussians, input.fixed, start);
+  GaussianCloud start = plan.from_input ? as_it_is : std::move(input.start);
   if (plan.nothing_to_do) return timed(KeptStart(WithoutLast(std::move(start), input.fixed), std::move(report)));
   report.copies = *plan.options.copies;
 

@@ -87,7 +87,9 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
     ANCHORSPLAT_RETURN_IF_ERROR(Append(refine.cloud, rest));
     ANCHORSPLAT_RETURN_IF_ERROR(Append(refine.start, rest));
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Refined refined, Refine(std::move(refine), options.refine, options.control));
+  RefineOptions how = options.refine;
+  if (options.background) how.background = options.background;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Refined refined, Refine(std::move(refine), how, options.control));
   AddFacts(refined.report, report);
   return std::move(refined.cloud);
 }
@@ -111,6 +113,7 @@ std::vector<MethodOption> RefinementOptions() {
       {"camera-rule", filtered},
       {"filter-strength", filtered},
       {"images", {}},
+      {"background", {}},
       {"hold-out", with_images},
       {"downscale", with_images},
       {"steps", {}},

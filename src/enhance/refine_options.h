@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -15,6 +16,9 @@ namespace anchorsplat {
 // it begins and on how many Gaussians there are.
 struct RefineOptions {
   std::filesystem::path images;  // project with the training pictures (fit/training_views.h); empty: without any
+  // What the pictures' alpha is laid over, and the splat; otherwise what the cameras' file says, else the splat's own
+  // comment (core/training_background.h), else black.
+  std::optional<std::array<float, 3>> background;
   int hold_out = 8;              // every Nth view is not trained on, as in fits; 0: all are
   int downscale = 1;             // pixels of a picture per side that become one, as in fits
   std::optional<int64_t> steps;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "core/log.h"
@@ -130,18 +132,30 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
   agreement.views = std::min(count, kMostViews);
   Rasterizer rasterizer;
   RenderOutput output;
-  std::vector<Image> shown(static_cast<size_t>(agreement.views)), truth(shown.size());
+  std::vector<Image> shown, truth;
   std::vector<Camera> cameras;
+  std::vector<std::string> masked;
+  Image picture;
   Buffer<uint8_t> ignored;
-  for (size_t i = 0; i < shown.size(); ++i) {
-    const int64_t view = static_cast<int64_t>(i) * count / agreement.views;
-    const Camera& camera = cameras.emplace_back(pictures.views()[static_cast<size_t>(view)]);
-    ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(view, truth[i], ignored));
+  const int64_t looked_at = agreement.views;
+  for (int64_t i = 0; i < looked_at; ++i) {
+    const int64_t view = i * count / looked_at;
+    const Camera& camera = pictures.views()[static_cast<size_t>(view)];
+    ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(view, picture, ignored));
+    if (!ignored.empty() && std::ranges::find(ignored, 0) == ignored.end()) {
+      masked.push_back(camera.name);
+      continue;
+    }
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, camera, render, output));
     Clamp01(output.color);
-    shown[i] = output.color;
-    FillIgnored(ignored, shown[i], truth[i]);
+    cameras.push_back(camera);
+    shown.push_back(output.color);
+    truth.push_back(picture);
+    FillIgnored(ignored, shown.back(), truth.back());
   }
+  agreement.views = std::ssize(shown);
+  if (agreement.views == 0) return agreement;
+  if (!masked.empty()) LogWarning(Cat("--images: ", WhollyMasked(masked, looked_at)));
   std::vector<double> each;
   for (size_t i = 0; i < shown.size(); ++i) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double own, Psnr(shown[i], truth[i]));
@@ -175,6 +189,10 @@ Status CheckAgreement(const PictureAgreement& agreement, double least_psnr, bool
   const std::string suspicions =
       "; are these the pictures it was fitted to, in the order of their cameras, and is the splat in the cameras' "
       "coordinates?";
+  if (agreement.views == 0) {
+    return Error{ErrorCode::kBadArgument,
+                 "--images: the masks leave nothing of any picture that was looked at: black is left out, white counts"};
+  }
   if (!(agreement.psnr >= least_psnr)) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--images: the splat's own renders agree with the pictures to ", Fixed(agreement.psnr, 1),

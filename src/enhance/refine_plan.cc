@@ -4,7 +4,6 @@
 #include <numeric>
 #include <vector>
 
-#include "core/log.h"
 #include "core/most_visible.h"
 #include "core/text.h"
 #include "enhance/refine_copies.h"
@@ -48,16 +47,15 @@ std::vector<int> CopiesWithin(const GaussianCloud& start, int64_t fixed, RefineO
 
 }  // namespace
 
-void KeepToBudget(int64_t max_gaussians, int64_t fixed, GaussianCloud& start) {
-  if (max_gaussians == 0 || start.size() - fixed <= max_gaussians) return;
+int64_t KeepToBudget(int64_t max_gaussians, int64_t fixed, GaussianCloud& start) {
+  const int64_t over = max_gaussians == 0 ? 0 : start.size() - fixed - max_gaussians;
+  if (over <= 0) return 0;
   std::vector<int64_t> rows(static_cast<size_t>(start.size() - fixed));
   std::iota(rows.begin(), rows.end(), int64_t{0});
-  LogWarning(Cat("--max-gaussians ", WithThousands(max_gaussians),
-                 " are fewer than there are before any is split: the ",
-                 WithThousands(start.size() - fixed - max_gaussians), " of the least opacity × size are left out"));
   rows = MostVisible(start, rows, max_gaussians);
   for (int64_t row = start.size() - fixed; row < start.size(); ++row) rows.push_back(row);
   start = Subset(start, rows).value();
+  return over;
 }
 
 Result<RefineOptions> ChooseRefineOptions(const RefineInput& input, const RefineOptions& given) {
@@ -75,8 +73,8 @@ Result<RefineOptions> ChooseRefineOptions(const RefineInput& input, const Refine
   return options;
 }
 
-Result<RefinePlan> PlanRefinement(const RefineInput& input, const RefineOptions& chosen, bool resumes,
-                                  RefineViews& views) {
+Result<RefinePlan> PlanRefinement(const RefineInput& input, const GaussianCloud& as_it_is, const RefineOptions& chosen,
+                                  bool resumes, RefineViews& views) {
   RefinePlan plan;
   plan.options = chosen;
   const bool pictures = HasPictures(chosen);
@@ -88,19 +86,11 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const RefineOptions&
   if (pictures && IsCompensated(views.render.mode)) plan.least_gain = kGainOverFine;
   if (pictures) {
     // A splat that has lost no width is spoiled by what gives it back: the pictures tell.
-    const auto measure = [&](const GaussianCloud& cloud) {
-      return MeasureConsistency(cloud, input.upscale, input.cloud, chosen, views);
-    };
-    const bool too_many = chosen.max_gaussians > 0 && input.cloud.size() - input.fixed > chosen.max_gaussians;
-    GaussianCloud less;
-    if (too_many) {
-      less = input.cloud;
-      KeepToBudget(chosen.max_gaussians, input.fixed, less);
-    }
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double as_it_is, measure(too_many ? less : input.cloud));
-    if (as_it_is > plan.before) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double agreement,
+                                 MeasureConsistency(as_it_is, input.upscale, input.cloud, chosen, views));
+    if (agreement > plan.before) {
       plan.why = "the splat agrees better with the pictures as it is: the refinement begins with that";
-      plan.before = as_it_is;
+      plan.before = agreement;
       plan.from_input = true;
       plan.least_gain = kGainOverFine;
     }
@@ -110,7 +100,7 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const RefineOptions&
     return plan;
   }
 
-  const GaussianCloud& start = plan.from_input ? input.cloud : input.start;
+  const GaussianCloud& start = plan.from_input ? as_it_is : input.start;
   if (!plan.options.copies) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewDensity density,
                                  MeasureDensity(input.cloud, views.render, views.train.views()));

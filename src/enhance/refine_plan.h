@@ -10,13 +10,14 @@ namespace anchorsplat {
 // photographs without photographs.
 Result<RefineOptions> ChooseRefineOptions(const RefineInput& input, const RefineOptions& given);
 
-// Leaves as many of all but the last `fixed` Gaussians as there may be, those of the largest opacity × size, with a
-// warning; 0: no bound.
-void KeepToBudget(int64_t max_gaussians, int64_t fixed, GaussianCloud& start);
+// Leaves as many of all but the last `fixed` Gaussians as there may be, those of the largest opacity × size; 0: no bound.
+// How many went.
+int64_t KeepToBudget(int64_t max_gaussians, int64_t fixed, GaussianCloud& start);
 
-// The rest: looks at the views. What `resumes` is not split, so that nothing is measured for that. Errors: those of
-// MeasureConsistency, MeasureDensity and Residuals.
-Result<RefinePlan> PlanRefinement(const RefineInput& input, const RefineOptions& chosen, bool resumes,
-                                  RefineViews& views);
+// The rest: looks at the views. `as_it_is` is the input as refinement could begin with it: within its bound. What
+// `resumes` is not split, so that nothing is measured for that. Errors: those of MeasureConsistency, MeasureDensity and
+// Residuals.
+Result<RefinePlan> PlanRefinement(const RefineInput& input, const GaussianCloud& as_it_is, const RefineOptions& chosen,
+                                  bool resumes, RefineViews& views);
 
 }  // namespace anchorsplat

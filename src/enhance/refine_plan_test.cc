@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <filesystem>
 
 #include "core/random.h"
+#include "core/training_background.h"
 #include "enhance/enhance.h"
 #include "enhance/refinement_for_test.h"
 #include "fit/orbit_scene_for_test.h"
@@ -130,6 +133,49 @@ TEST_F(Refinement, WhatKnowsMoreThanThePicturesStays) {
   ASSERT_TRUE(refined.ok()) << refined.error().message;
   EXPECT_FALSE(refined->report.kept_start);
   EXPECT_GT(refined->report.after, refined->report.before + 2);
+}
+
+// Where it begins with the splat as it is, the budget holds from the beginning, too.
+TEST_F(Refinement, BeginsWithinItsBudgetWithTheSplatAsItIs) {
+  input_.cloud = truth_;
+  input_.start = truth_;
+  for (float& s : input_.start.log_scales) s += 0.5f;  // the pictures agree better with the splat as it is
+  options_.steps = 5;
+  for (const int64_t most : {input_.cloud.size() - 10, input_.cloud.size() - 1}) {
+    for (const int copies : {1, 4}) {
+      options_.copies = copies;
+      options_.max_gaussians = most;
+      const auto refined = Refine(input_, options_, {});
+      ASSERT_TRUE(refined.ok()) << refined.error().message;
+      EXPECT_TRUE(refined->report.plan.from_input);
+      EXPECT_LE(refined->cloud.size(), most);
+    }
+  }
+}
+
+// What the pictures' alpha is laid over: what is asked, else what the splat says of its training.
+TEST_F(Refinement, KnowsTheBackgroundOfTraining) {
+  CameraSet cameras = orbit_scene::Cameras(12, kSide, kSide);
+  Rasterizer rasterizer;
+  RenderOutput rays;
+  Image seen;
+  const std::array<float, 3> white = {1, 1, 1};
+  for (const Camera& camera : cameras.cameras) {
+    ASSERT_TRUE(rasterizer.Render(truth_, RaysOf(AreaModel(kUpscale), camera), {.background = white}, rays).ok());
+    AverageRays(rays.color, kUpscale, seen);
+    std::filesystem::remove(project() / (camera.name + ".png"));
+    ASSERT_TRUE(WritePng(project() / (camera.name + ".png"), seen).ok());
+  }
+  options_.steps = 2;
+  EXPECT_FALSE(Refine(input_, options_, {}).ok()) << "over black these are pictures of something else";
+  options_.background = white;
+  const auto asked = Refine(input_, options_, {});
+  ASSERT_TRUE(asked.ok()) << asked.error().message;
+  options_.background.reset();
+  input_.cloud.comments.push_back(BackgroundComment(white));
+  const auto known = Refine(input_, options_, {});
+  ASSERT_TRUE(known.ok()) << known.error().message;
+  EXPECT_EQ(known->report.before, asked->report.before);
 }
 
 }  // namespace

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "core/log.h"
 #include "core/text.h"
+#include "core/training_background.h"
 #include "enhance/refine_pictures.h"
 #include "enhance/refine_poses.h"
 #include "enhance/refiner.h"
@@ -26,6 +28,12 @@ constexpr int64_t kResidualViews = 64;
 constexpr int kCheckAlignSteps = 4;
 constexpr double kPerfect = 100;  // dB that stand for identical pictures in means
 
+std::array<float, 3> BackgroundFor(const RefineOptions& options, const std::optional<std::array<float, 3>>& of_cameras,
+                                   const GaussianCloud& cloud) {
+  if (options.background) return *options.background;
+  return of_cameras.value_or(BackgroundOf(cloud.comments).value_or(std::array<float, 3>{}));
+}
+
 Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.images, {.hold_out = options.hold_out,
                                                                                    .downscale = options.downscale}));
@@ -36,7 +44,7 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
                      " cameras have no picture, the first is ", Printable(project.without_picture.front()),
                      "; are these the pictures of these cameras? If so, take those out that have none")};
   }
-  if (project.background) render.background = *project.background;
+  render.background = BackgroundFor(options, project.background, input.cloud);
   PictureCache pictures(project.train, render.background);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement agreement, MeasureAgreement(input.cloud, render, pictures));
   LogInfo(Cat(project.train.size(), " views with pictures, ", project.held_out.size(),
@@ -50,8 +58,9 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
 
 Result<RefineViews> OpenSplat(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
   RefinePoses poses;
+  render.background =
+      BackgroundFor(options, input.cameras ? input.cameras->background : std::nullopt, input.cloud);
   if (input.cameras && !input.cameras->cameras.empty()) {
-    if (input.cameras->background) render.background = *input.cameras->background;
     poses = RefinePosesAlong(input.cameras->cameras, options.between, kCheckViews);
     if (!poses.apart) {
       LogInfo("there is no place between these cameras: whether it helps is looked at where it is learned from");

@@ -1,7 +1,7 @@
 #include "eval/comparison.h"
 
 #include <algorithm>
-#include <cmath>
+#include <optional>
 #include <utility>
 
 #include "core/log.h"
@@ -55,37 +55,50 @@ Status CheckSizes(std::span<ViewSource* const> sources, const std::vector<std::v
   return Error{ErrorCode::kBadArgument, Cat("pictures of different sizes: ", list, "; --size sets that of renders")};
 }
 
-// Makes both pictures the same where there is nothing to compare. The part of the pixels that is left, by which means
-// over all of them have to be divided.
-double LeaveOut(const Buffer<uint8_t>& ignored, const Image& truth, Image& image) {
-  int64_t left = truth.plane();
+// Makes both pictures the same where there is nothing to compare.
+void LeaveOut(const Buffer<uint8_t>& ignored, const Image& truth, Image& image) {
   for (size_t i = 0; i < ignored.size(); ++i) {
-    if (ignored[i] == 0) continue;
-    --left;
-    for (int c = 0; c < 3; ++c) image.channel(c)[i] = truth.channel(c)[i];
+    for (int c = 0; c < 3 && ignored[i] != 0; ++c) image.channel(c)[i] = truth.channel(c)[i];
   }
-  return static_cast<double>(std::max<int64_t>(left, 1)) / static_cast<double>(truth.plane());
 }
 
-Status Measure(const Image& image, const Image& truth, double share, double& psnr, double& ssim) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(psnr, Psnr(image, truth));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(ssim, Ssim(image, truth));
-  psnr += 10 * std::log10(share);
-  ssim = 1 - (1 - ssim) / share;
-  return {};
+// Where either picture says nothing.
+Buffer<uint8_t> EitherIgnored(const Buffer<uint8_t>& a, const Buffer<uint8_t>& b) {
+  if (a.size() != b.size()) return a.empty() ? b : a;  // pictures of one size: one has no mask
+  Buffer<uint8_t> either = a;
+  for (size_t i = 0; i < either.size(); ++i) either[i] = a[i] != 0 || b[i] != 0;
+  return either;
 }
 
-template <typename Function>
-Result<CorrectedScore> CorrectColors(Image image, const Image& truth, const Lpips* lpips, const Function& leave_out) {
+Result<CorrectedScore> CorrectColors(Image image, const Image& truth, const Buffer<uint8_t>& ignored,
+                                     const Lpips* lpips) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ColorMap map, FitColors(image, truth));
   ApplyColors(map, image);
-  const double share = leave_out(image);
-  CorrectedScore score;
-  ANCHORSPLAT_RETURN_IF_ERROR(Measure(image, truth, share, score.psnr, score.ssim));
+  LeaveOut(ignored, truth, image);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const MaskedQuality quality, MeasureMasked(image, truth, ignored));
+  CorrectedScore score{quality.psnr, quality.ssim, std::nullopt};
   if (lpips != nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, lpips->Distance(image, truth));
   }
   return score;
+}
+
+// Nothing: the masks leave nothing to compare.
+Result<std::optional<ViewScore>> Score(Image image, const Image& truth, const Buffer<uint8_t>& ignored,
+                                       const CompareOptions& options) {
+  LeaveOut(ignored, truth, image);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const MaskedQuality quality, MeasureMasked(image, truth, ignored));
+  if (quality.counted == 0) return std::optional<ViewScore>();
+  ViewScore score;
+  score.psnr = quality.psnr;
+  score.ssim = quality.ssim;
+  if (options.lpips != nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, options.lpips->Distance(image, truth));
+  }
+  if (options.color_correct) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(score.corrected, CorrectColors(std::move(image), truth, ignored, options.lpips));
+  }
+  return std::optional<ViewScore>(std::move(score));
 }
 
 void TakeMeans(const CompareOptions& options, Comparison& comparison) {
@@ -112,26 +125,33 @@ Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> 
   ANCHORSPLAT_RETURN_IF_ERROR(CheckSizes(sources, partners, reference));
   std::vector<Comparison> out(sources.size());
   Progress progress("compare", static_cast<int64_t>(reference.names().size()));
+  std::vector<std::string> masked;
   for (size_t r = 0; r < reference.names().size(); ++r) {
     const std::string name = ViewLabel(reference.names()[r]);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Image truth, reference.Load(r));
+    std::vector<ViewScore> scores;  // of every source
     for (size_t s = 0; s < sources.size(); ++s) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, sources[s]->Load(partners[s][r]));
-      ViewScore score{name, 0, 0, std::nullopt};
-      const auto leave_out = [&](Image& shown) {
-        return LeaveOut(reference.ignored(), truth, shown) * LeaveOut(sources[s]->ignored(), truth, shown);
-      };
-      ANCHORSPLAT_RETURN_IF_ERROR(Measure(image, truth, leave_out(image), score.psnr, score.ssim));
-      if (options.lpips != nullptr) {
-        ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, options.lpips->Distance(image, truth));
-      }
-      if (options.color_correct) {
-        ANCHORSPLAT_ASSIGN_OR_RETURN(score.corrected, CorrectColors(std::move(image), truth, options.lpips, leave_out));
-      }
-      out[s].views.push_back(score);
+      const Buffer<uint8_t> ignored = EitherIgnored(reference.ignored(), sources[s]->ignored());
+      ANCHORSPLAT_ASSIGN_OR_RETURN(std::optional<ViewScore> score, Score(std::move(image), truth, ignored, options));
+      if (!score) break;
+      score->name = name;
+      score->reference_view = r;
+      scores.push_back(*std::move(score));
     }
     progress.Advance();
+    if (scores.size() < sources.size()) {  // what one of them cannot say counts for none, so that means compare
+      masked.push_back(name);
+      continue;
+    }
+    for (size_t s = 0; s < sources.size(); ++s) out[s].views.push_back(std::move(scores[s]));
   }
+  const auto count = static_cast<int64_t>(reference.names().size());
+  if (!masked.empty() && std::ssize(masked) == count) {
+    return Error{ErrorCode::kBadArgument,
+                 "the masks leave nothing of any view to compare: black is left out, white counts"};
+  }
+  if (!masked.empty()) LogWarning(WhollyMasked(masked, count));
   for (Comparison& comparison : out) TakeMeans(options, comparison);
   return out;
 }

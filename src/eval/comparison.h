@@ -25,10 +25,11 @@ struct ViewScore {
   double ssim = 0;
   std::optional<double> lpips;                // where it was asked for
   std::optional<CorrectedScore> corrected{};  // likewise
+  size_t reference_view = 0;                  // which of the reference's it is
 };
 
 struct Comparison {
-  std::vector<ViewScore> views;  // in the reference's order
+  std::vector<ViewScore> views;  // in the reference's order, without those that masks hide
   double mean_psnr = 0;          // over the views; infinite when one of them is
   double mean_ssim = 0;
   std::optional<double> mean_lpips;
@@ -47,8 +48,9 @@ struct CompareOptions {
 Result<std::vector<std::vector<size_t>>> MatchSources(std::span<ViewSource* const> sources,
                                                       const ViewSource& reference);
 
-// PSNR, SSIM and LPIPS of every source against the reference, view by view; one result per source. Pictures of
-// different sizes are an error that names them. Shows progress.
+// PSNR, SSIM and LPIPS of every source against the reference, view by view; one result per source. Pixels that a mask of
+// either leaves out do not count, and views of which nothing is left are in no result, which a warning says. Pictures of
+// different sizes are an error that names them, and so is it when nothing is left of any view. Shows progress.
 Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> sources, ViewSource& reference,
                                                    const CompareOptions& options = {});
 

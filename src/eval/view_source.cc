@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <functional>
 #include <map>
 #include <system_error>
 #include <utility>
@@ -155,6 +156,13 @@ Result<std::unique_ptr<ViewSource>> OpenImageViews(const fs::path& path, const s
     if (owner == owners.end()) continue;
     view.camera = *owner->second;
     ANCHORSPLAT_RETURN_IF_ERROR(MatchPhotograph(view.camera));
+  }
+  // Depth maps and other pictures beside those that the cameras name are nobody's views.
+  const auto owned = [](const ImageViews::View& view) { return view.camera.intrinsics.width > 0; };
+  const auto strangers = static_cast<size_t>(std::ranges::count_if(views, std::not_fn(owned)));
+  if (strangers > 0 && strangers < views.size()) {
+    LogInfo(Cat(path.string(), ": ", strangers, " of ", views.size(), " pictures are no camera's and are passed over"));
+    std::erase_if(views, std::not_fn(owned));
   }
   return std::unique_ptr<ViewSource>(std::make_unique<ImageViews>(std::move(views), background));
 }

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <string>
 
 #include "cameras/camera_io.h"
 #include "cameras/undistortion.h"
+#include "core/messages_for_test.h"
 #include "core/source_dir_for_test.h"
 #include "eval/comparison.h"
 #include "formats/cloud_io.h"
@@ -86,6 +88,54 @@ TEST(ViewSource, CamerasOwnPicturesComeWithoutLensAndMasked) {
   const auto compared = CompareToReference(sources, **own);
   ASSERT_TRUE(compared.ok()) << compared.error().message;
   EXPECT_NEAR((*compared)[0].mean_psnr, 20, 0.2) << "0.1 everywhere that is asked, in steps of 1/255";
+}
+
+// A view of which a mask leaves nothing is in no mean, and pictures that are no camera's are passed over.
+TEST(ViewSource, WhollyMaskedViewsAndStrangersDoNotCount) {
+  const TestFolder folder;
+  std::filesystem::create_directories(folder / "images");
+  std::filesystem::create_directories(folder / "shown");
+  Image picture(16, 12, 3), shown(16, 12, 3), black(16, 12, 1), white(16, 12, 1);
+  std::fill(picture.pixels.begin(), picture.pixels.end(), 0.25f);
+  std::fill(shown.pixels.begin(), shown.pixels.end(), 0.35f);
+  std::fill(black.pixels.begin(), black.pixels.end(), 0.0f);
+  std::fill(white.pixels.begin(), white.pixels.end(), 1.0f);
+  ASSERT_TRUE(WritePng(folder / "black.png", black).ok());
+  ASSERT_TRUE(WritePng(folder / "white.png", white).ok());
+  CameraSet cameras;
+  for (const char* name : {"a", "b"}) {
+    ASSERT_TRUE(WritePng(folder / "images" / (std::string(name) + ".png"), picture).ok());
+    ASSERT_TRUE(WritePng(folder / "shown" / (std::string(name) + ".png"), shown).ok());
+    Camera& camera = cameras.cameras.emplace_back();
+    camera.name = name;
+    camera.image = folder / "images" / (std::string(name) + ".png");
+    camera.intrinsics = {16, 12, 20, 20, 8, 6};
+    camera.photograph.mask = folder / (*name == 'a' ? "black.png" : "white.png");
+  }
+  ASSERT_TRUE(WritePng(folder / "images/a_depth.png", picture).ok());
+  const Messages messages;
+  const auto compare = [&]() {
+    const auto own = OpenImageViews(folder / "images", {0, 0, 0}, cameras);
+    EXPECT_TRUE(own.ok()) << own.error().message;
+    EXPECT_EQ((*own)->names().size(), 2u) << "the depth map is nobody's view";
+    const auto other = OpenImageViews(folder / "shown", {0, 0, 0}, {});
+    EXPECT_TRUE(other.ok());
+    ViewSource* const sources[] = {other->get()};
+    return CompareToReference(sources, **own);
+  };
+  const auto compared = compare();
+  ASSERT_TRUE(compared.ok()) << compared.error().message;
+  ASSERT_EQ((*compared)[0].views.size(), 1u);
+  EXPECT_EQ((*compared)[0].views[0].name, "b");
+  EXPECT_EQ((*compared)[0].views[0].reference_view, 1u);
+  EXPECT_NEAR((*compared)[0].mean_psnr, 20, 0.2);
+  ASSERT_EQ(messages.warnings().size(), 1u);
+  EXPECT_NE(messages.warnings()[0].find("1 of 2 views, which are left out"), std::string::npos)
+      << messages.warnings()[0];
+  cameras.cameras[1].photograph.mask = folder / "black.png";
+  const auto nothing = compare();
+  ASSERT_FALSE(nothing.ok());
+  EXPECT_EQ(nothing.error().code, ErrorCode::kBadArgument);
 }
 
 }  // namespace

@@ -37,7 +37,8 @@ struct DensificationOptions {
   bool absgrad = false;  // the gradient is that of CloudGradient::means2d_abs (Ye et al. 2024); see kAbsgradGrowGrad2d
   bool revised_opacity = false;  // halves of a split get 1 − √(1 − o) (Rota Bulò et al. 2024)
   OpacityReset opacity_reset = OpacityReset::kPositive;
-  int64_t max_gaussians = 0;  // growth stops there, Gaussians with the largest gradients first; 0 = no bound. Ours
+  int64_t max_gaussians = 0;  // growth stops there, Gaussians with the largest gradients first, and what
+                              // began above it is cut to it when growth ends (Fitter); 0 = no bound. Ours
 };
 
 // The threshold grow_grad2d that gsplat's DefaultStrategy recommends with absgrad.

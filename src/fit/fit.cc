@@ -1,5 +1,7 @@
 #include "fit/fit.h"
 
+#include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -11,6 +13,7 @@
 #include "core/run_context.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
+#include "core/training_background.h"
 #include "core/world_up.h"
 #include "fit/fingerprints.h"
 #include "fit/picture_cache.h"
@@ -99,6 +102,21 @@ Status MakeSteps(Fitter& fitter, const FitControl& control, KeptState& kept, Fit
   return {};
 }
 
+// Masks may leave nothing of any picture. Where one has none, or at the first pixel that counts, nobody looks further.
+Status CheckSomethingCounts(PictureCache& pictures) {
+  const std::vector<Camera>& views = pictures.views();
+  if (std::ranges::any_of(views, [](const Camera& view) { return view.photograph.mask.empty(); })) return {};
+  Image picture;
+  Buffer<uint8_t> ignored;
+  for (int64_t view = 0; view < std::ssize(views); ++view) {
+    ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(view, picture, ignored));
+    if (ignored.empty() || std::ranges::find(ignored, 0) != ignored.end()) return {};
+  }
+  return Error{ErrorCode::kBadArgument,
+               Cat("the masks leave nothing of any of the ", views.size(), " pictures to learn from, as in ",
+                   views.front().photograph.mask.string(), ": black is left out, white counts")};
+}
+
 void WarnUnlessNoted(const Status& noted) {
   if (!noted.ok()) LogWarning(Cat("going on will need -w for what is left here: ", noted.error().message));
 }
@@ -155,6 +173,7 @@ Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitO
     if (!now.cloud.empty() && now.step > 0 && !(unfit && !kept.step())) kept.Write(now);
     return kept.NotedIn(error);
   };
+  if (const Status counts = CheckSomethingCounts(fitter.pictures()); !counts.ok()) return failed(counts.error());
   Stopwatch watch;
   if (const Status made = MakeSteps(fitter, control, kept, report); !made.ok()) return failed(made.error());
   report.seconds = watch.Lap();
@@ -165,6 +184,9 @@ Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitO
   Fitted out{fitter.UsableCloud(), report};
   out.cloud.render_mode = options.objective.render.mode;
   if (options.pixel.upscale > 1) out.cloud.comments.push_back(PixelAreaComment(options.pixel.upscale));
+  if (const auto& background = options.objective.render.background; background != std::array<float, 3>{}) {
+    out.cloud.comments.push_back(BackgroundComment(background));
+  }
   if (const auto up = WorldUp(views.train)) out.cloud.comments.push_back(UpComment(*up));
   out.report.gaussians_out = out.cloud.size();
   if (const Status finished = Finish(views, options, control, fitter, out); !finished.ok()) {

@@ -1,8 +1,10 @@
 #include "fit/fitter.h"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
+#include "core/most_visible.h"
 #include "core/stopwatch.h"
 #include "fit/exposure_per_view.h"
 #include "metrics/image_metrics.h"
@@ -104,6 +106,7 @@ DensificationChange Fitter::ChangeGaussians(const Camera& rays) {
         state_.densification.AfterStep(options_.densification, step, scene_scale_, options_.seed, rays.intrinsics.width,
                                        rays.intrinsics.height, gradient_, state_.cloud, options_.far);
   }
+  KeepToBudget(step, change);
   state_.optimizer.ForgetRows(change.forgotten);
   state_.optimizer.Apply(change.rows);
   if (options_.mip_filter) {
@@ -121,6 +124,20 @@ DensificationChange Fitter::ChangeGaussians(const Camera& rays) {
     state_.optimizer.ForgetOpacities();
   }
   return change;
+}
+
+void Fitter::KeepToBudget(int64_t step, DensificationChange& change) {
+  const bool mcmc = options_.strategy == Strategy::kMcmc;
+  const int64_t most = mcmc ? options_.mcmc.cap_max : options_.densification.max_gaussians;
+  const int64_t stop = mcmc ? options_.mcmc.refine_stop_iter : options_.densification.refine_stop_iter;
+  if (most <= 0 || state_.cloud.size() <= most) return;
+  if (step != std::min(stop, options_.steps - 1) || change.rows.any) return;
+  change.rows.kept.clear();
+  for (const int64_t row : MostVisible(state_.cloud, most)) change.rows.kept.push_back(row);
+  change.rows.any = true;
+  change.pruned += state_.cloud.size() - most;
+  state_.cloud = Subset(state_.cloud, change.rows.kept).value();
+  if (!mcmc) state_.densification = Densification(most);
 }
 
 void Fitter::MeasureMipFilter() {

@@ -80,6 +80,9 @@ class Fitter {
   Fitter(const FitOptions& options, PictureCache pictures, double scene_scale, FitState state);
 
   DensificationChange ChangeGaussians(const Camera& rays);
+  // Where growth ends, what is above the bound goes, least opacity × size first: the start had more, for growth never
+  // passes it. The steps that are left make up for it.
+  void KeepToBudget(int64_t step, DensificationChange& change);
   void MeasureMipFilter();
 
   FitOptions options_;

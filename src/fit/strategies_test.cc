@@ -265,5 +265,17 @@ TEST(FitStrategies, SettingsNameThemAll) {
   EXPECT_TRUE(differs([](FitOptions& o) { o.mip_filter_every = 7; }));
 }
 
+// A start above the bound: growth never passes it, and where it ends the bound is kept, from a checkpoint, too.
+TEST_P(Strategies, EndWithinTheirBudget) {
+  FitOptions options = ShortOptions();
+  const GaussianCloud initial = Initial(options);
+  options.densification.reset_every = 1000;  // what is reset and cannot grow may be pruned to the last
+  options.mcmc.cap_max = options.densification.max_gaussians = 25;
+  ASSERT_GT(initial.size(), 25);
+  const auto fitted = Fit(views_, initial, options);
+  ASSERT_TRUE(fitted.ok()) << fitted.error().message;
+  EXPECT_EQ(fitted->cloud.size(), 25);
+}
+
 }  // namespace
 }  // namespace anchorsplat

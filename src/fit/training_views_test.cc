@@ -2,10 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 
+#include "core/messages_for_test.h"
+#include "fit/fit.h"
+#include "fit/initial_cloud.h"
 #include "fit/orbit_scene_for_test.h"
 #include "fit/picture_cache.h"
 #include "io/folder_for_test.h"
@@ -148,6 +152,31 @@ TEST(TrainingViews, PicturesOfAnotherSize) {
 TEST(TrainingViews, SceneScaleOfOnePlaceIsOne) {
   Camera camera;
   EXPECT_EQ(SceneScale({camera, camera}), 1);
+}
+
+TEST(TrainingViews, MasksThatLeaveNothing) {
+  const TestFolder folder;
+  orbit_scene::Write(folder.path(), orbit_scene::Ball(20, 1), 6, 24);
+  TrainingViews views = OpenProject(folder.path(), {.hold_out = 3}).value();
+  Image mask(24, 24, 1);
+  std::fill(mask.pixels.begin(), mask.pixels.end(), 0.0f);
+  ASSERT_TRUE(WritePng(folder / "black.png", mask).ok());
+  views.train.front().photograph.mask = folder / "black.png";
+  FitOptions options = FitOptionsFor(20, FitPreset::kDefault);
+  const GaussianCloud initial =
+      InitialCloud(RandomPointsInView(30, views.train, views.scene_scale, 1), views.scene_scale, StartOptions(options))
+          .value();
+  const Messages messages;
+  const auto fitted = Fit(views, initial, options);
+  ASSERT_TRUE(fitted.ok()) << fitted.error().message;
+  EXPECT_EQ(fitted->report.train.views, std::ssize(views.train) - 1);
+  EXPECT_TRUE(std::isfinite(fitted->report.train.psnr));
+  ASSERT_EQ(messages.warnings().size(), 1u);
+  EXPECT_NE(messages.warnings()[0].find("a mask leaves nothing of 1 of"), std::string::npos) << messages.warnings()[0];
+  for (Camera& camera : views.train) camera.photograph.mask = folder / "black.png";
+  const auto nothing = Fit(views, initial, options);
+  ASSERT_FALSE(nothing.ok());
+  EXPECT_NE(nothing.error().message.find("black.png"), std::string::npos) << nothing.error().message;
 }
 
 }  // namespace

@@ -1,8 +1,9 @@
 #include "fit/view_quality.h"
 
-#include <algorithm>
-#include <cmath>
+#include <string>
+#include <vector>
 
+#include "core/log.h"
 #include "metrics/image_metrics.h"
 
 namespace anchorsplat {
@@ -15,8 +16,9 @@ Result<ViewQuality> MeasureQuality(const GaussianCloud& cloud, const RenderOptio
   Image picture, average;
   Buffer<uint8_t> ignored;
   ViewQuality sum;
-  sum.views = static_cast<int64_t>(pictures.views().size());
-  for (int64_t view = 0; view < sum.views; ++view) {
+  std::vector<std::string> masked;
+  const auto count = static_cast<int64_t>(pictures.views().size());
+  for (int64_t view = 0; view < count; ++view) {
     const Camera& camera = pictures.views()[static_cast<size_t>(view)];
     ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(view, picture, ignored));
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, RaysOf(pixel, camera), RaysOf(pixel, options), output));
@@ -24,16 +26,20 @@ Result<ViewQuality> MeasureQuality(const GaussianCloud& cloud, const RenderOptio
     Image& shown = pixel.samples > 1 ? average : output.color;
     Clamp01(shown);
     FillIgnored(ignored, shown, picture);
-    // Means over all pixels of what is 0 for the ignored ones become means over the others.
-    const double counted = static_cast<double>(picture.plane() - std::count(ignored.begin(), ignored.end(), 1));
-    const double share = std::max(counted, 1.0) / static_cast<double>(picture.plane());
-    ANCHORSPLAT_ASSIGN_OR_RETURN(double psnr, Psnr(shown, picture));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(double ssim, Ssim(shown, picture));
-    psnr += 10 * std::log10(share);
-    ssim = 1 - (1 - ssim) / share;
-    sum.psnr += psnr / static_cast<double>(sum.views);
-    sum.ssim += ssim / static_cast<double>(sum.views);
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const MaskedQuality quality, MeasureMasked(shown, picture, ignored));
+    if (quality.counted == 0) {
+      masked.push_back(camera.name);
+      continue;
+    }
+    ++sum.views;
+    sum.psnr += quality.psnr;
+    sum.ssim += quality.ssim;
   }
+  if (sum.views > 0) {
+    sum.psnr /= static_cast<double>(sum.views);
+    sum.ssim /= static_cast<double>(sum.views);
+  }
+  if (!masked.empty()) LogWarning(WhollyMasked(masked, count));
   return sum;
 }
 

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "formats/messages_for_test.h"
+#include "core/messages_for_test.h"
 #include "formats/opened_splat.h"
 #include "formats/ply/ply_writer.h"
 #include "formats/random_cloud_for_test.h"

@@ -11,7 +11,7 @@
 
 #include "core/text.h"
 #include "formats/convert.h"
-#include "formats/messages_for_test.h"
+#include "core/messages_for_test.h"
 #include "formats/opened_splat.h"
 #include "formats/ply/ply_reader.h"
 #include "formats/ply/ply_writer.h"

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "core/parallel.h"
@@ -51,8 +53,9 @@ double SumOfSquaredDifferences(const float* a, const float* b, int64_t count) {
 
 }  // namespace
 
-Result<double> Psnr(const Image& a, const Image& b) {
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckComparable(a, b));
+namespace {
+
+double SumOfSquares(const Image& a, const Image& b) {
   const int64_t count = a.plane() * ColourChannels(a);
   constexpr int64_t kGrain = int64_t{1} << 16;
   std::vector<double> sums(static_cast<size_t>((count + kGrain - 1) / kGrain));
@@ -62,12 +65,10 @@ Result<double> Psnr(const Image& a, const Image& b) {
   });
   double sum = 0;
   for (const double part : sums) sum += part;
-  if (sum == 0) return std::numeric_limits<double>::infinity();
-  return -10 * std::log10(sum / static_cast<double>(count));
+  return sum;
 }
 
-Result<double> Ssim(const Image& a, const Image& b) {
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckComparable(a, b));
+double SumOfDissimilarities(const Image& a, const Image& b, const uint8_t* ignored) {
   // A chunk is a band of rows of one channel; bands never straddle channels.
   constexpr int64_t kRows = 32;
   const int64_t bands = (a.height + kRows - 1) / kRows;
@@ -79,12 +80,54 @@ Result<double> Ssim(const Image& a, const Image& b) {
       const int first = static_cast<int>(k % bands * kRows);
       const int last = std::min(a.height, first + static_cast<int>(kRows));
       sums[static_cast<size_t>(k)] =
-          SumOfDissimilarity({a.channel(channel), b.channel(channel), a.width, a.height, first, last});
+          SumOfDissimilarity({a.channel(channel), b.channel(channel), a.width, a.height, first, last, ignored});
     }
   });
   double sum = 0;
   for (const double part : sums) sum += part;
-  return 1 - sum / static_cast<double>(a.plane() * channels);
+  return sum;
+}
+
+double PsnrOf(double squares, int64_t values) {
+  if (squares == 0) return std::numeric_limits<double>::infinity();
+  return -10 * std::log10(squares / static_cast<double>(values));
+}
+
+}  // namespace
+
+Result<double> Psnr(const Image& a, const Image& b) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckComparable(a, b));
+  return PsnrOf(SumOfSquares(a, b), a.plane() * ColourChannels(a));
+}
+
+Result<double> Ssim(const Image& a, const Image& b) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckComparable(a, b));
+  return 1 - SumOfDissimilarities(a, b, nullptr) / static_cast<double>(a.plane() * ColourChannels(a));
+}
+
+Result<MaskedQuality> MeasureMasked(const Image& a, const Image& b, std::span<const uint8_t> ignored) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckComparable(a, b));
+  if (!ignored.empty() && std::ssize(ignored) != a.plane()) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("a mask of ", ignored.size(), " pixels for images of ", a.width, " x ", a.height)};
+  }
+  MaskedQuality quality;
+  quality.counted = a.plane() - std::ranges::count_if(ignored, [](uint8_t x) { return x != 0; });
+  if (quality.counted == 0) return quality;
+  const int64_t values = quality.counted * ColourChannels(a);
+  quality.psnr = PsnrOf(SumOfSquares(a, b), values);
+  quality.ssim =
+      1 - SumOfDissimilarities(a, b, ignored.empty() ? nullptr : ignored.data()) / static_cast<double>(values);
+  return quality;
+}
+
+std::string WhollyMasked(std::span<const std::string> names, int64_t count) {
+  constexpr size_t kShown = 10;
+  std::string text = Cat("a mask leaves nothing of ", names.size(), " of ", count,
+                         " views, which are left out (black is left out, white counts): ");
+  for (size_t i = 0; i < std::min(kShown, names.size()); ++i) text += Cat(i == 0 ? "" : ", ", Printable(names[i]));
+  if (names.size() > kShown) text += Cat(" and ", names.size() - kShown, " more");
+  return text;
 }
 
 void Clamp01(Image& image) {

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -160,6 +162,46 @@ TEST(ImageMetrics, ClampKeepsWhatIsInside) {
   image.pixels = {-0.5f, 0.25f, 1.0f, 7.0f};
   Clamp01(image);
   EXPECT_EQ(image.pixels, (Buffer<float>{0.0f, 0.25f, 1.0f, 1.0f}));
+}
+
+// Means over what counts alone: by the reference, of pictures that are the same where nothing does.
+TEST(ImageMetrics, MaskedAreMeansOverWhatCounts) {
+  const Image a = RandomImage(37, 29, 3, 21);
+  Image b = Disturbed(a, 0.2, 22);
+  std::vector<uint8_t> ignored(static_cast<size_t>(a.plane()));
+  double squares = 0;
+  int64_t counted = 0;
+  for (size_t i = 0; i < ignored.size(); ++i) {
+    ignored[i] = i % 37 < 20 || i % 5 == 0;
+    counted += ignored[i] == 0;
+    for (int c = 0; c < 3; ++c) {
+      if (ignored[i] != 0) b.channel(c)[i] = a.channel(c)[i];
+      squares += std::pow(a.channel(c)[i] - b.channel(c)[i], 2);
+    }
+  }
+  const auto masked = MeasureMasked(a, b, ignored);
+  ASSERT_TRUE(masked.ok());
+  EXPECT_EQ(masked->counted, counted);
+  EXPECT_NEAR(masked->psnr, -10 * std::log10(squares / static_cast<double>(3 * counted)), 1e-4);
+  EXPECT_GE(masked->ssim, -1);
+  EXPECT_LT(masked->ssim, *Ssim(a, b)) << "what is the same no longer counts";
+  // One pixel: the mean over it is its own value, never below -1, where 1 - (1 - SSIM) / share would be.
+  std::fill(ignored.begin(), ignored.end(), uint8_t{1});
+  ignored[500] = 0;
+  Image one = a;
+  for (int c = 0; c < 3; ++c) one.channel(c)[500] = 1 - a.channel(c)[500];
+  const auto single = MeasureMasked(a, one, ignored);
+  ASSERT_TRUE(single.ok());
+  EXPECT_EQ(single->counted, 1);
+  EXPECT_GE(single->ssim, -1);
+  EXPECT_LE(single->ssim, 1);
+
+  const auto all = MeasureMasked(a, b, {});
+  EXPECT_EQ(all->psnr, *Psnr(a, b));
+  EXPECT_EQ(all->ssim, *Ssim(a, b));
+  std::fill(ignored.begin(), ignored.end(), uint8_t{1});
+  EXPECT_EQ(MeasureMasked(a, a, ignored)->counted, 0);
+  EXPECT_FALSE(MeasureMasked(a, b, std::span(ignored).first(7)).ok());
 }
 
 }  // namespace

@@ -97,6 +97,12 @@ double SumOfDissimilarityImpl(const SsimRows& rows, const float* weights) {
       const auto off = Dissimilarity(d, mean(kA), mean(kB), mean(kAA), mean(kBB), mean(kAB));
       hn::StoreU(off, d, values.data() + x);
     }
+    if (rows.ignored != nullptr) {
+      const uint8_t* ignored = rows.ignored + static_cast<size_t>(y) * static_cast<size_t>(rows.width);
+      for (x = 0; x < rows.width; ++x) {
+        if (ignored[x] != 0) values[static_cast<size_t>(x)] = 0;
+      }
+    }
     // Fixed lanes, whatever the instruction set's width: eight sums of floats per row, then doubles.
     float sums[8] = {};
     for (x = 0; x + 8 <= rows.width; x += 8) {

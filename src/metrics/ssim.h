@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 namespace anchorsplat {
 
@@ -21,9 +22,10 @@ struct SsimRows {
   int height;      // pixels, of the whole channel: rows outside [0, height) count as 0
   int first;       // the rows [first, last)
   int last;
+  const uint8_t* ignored = nullptr;  // [H,W] 1: the pixel does not count; null: all count
 };
 
-// Σ (1 − SSIM) over the pixels of the rows: small for pictures that are alike, so that floats keep its digits.
+// Σ (1 − SSIM) over the pixels of the rows that count: small for pictures that are alike, so that floats keep its digits.
 double SumOfDissimilarity(const SsimRows& rows);
 
 }  // namespace anchorsplat

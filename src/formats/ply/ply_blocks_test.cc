@@ -9,6 +9,7 @@
 
 #include "core/statistics.h"
 #include "core/text.h"
+#include "formats/both_ways_for_test.h"
 #include "formats/extra_properties.h"
 #include "formats/opened_splat.h"
 #include "formats/ply/ply_reader.h"
@@ -39,38 +40,12 @@ GaussianCloud Troubled(int64_t n, int degree) {
 
 // What a file's blocks show is what reading it gives.
 void ExpectBlocksOf(const std::filesystem::path& path) {
-  const auto read = ReadCloud(path);
-  ASSERT_TRUE(read.ok()) << read.error().message;
   const auto file = InputFile::Open(path);
+  const auto read = ReadBothWays(ReadPly, BlocksOfPly, *file);
+  ASSERT_TRUE(read.ok()) << read.error().message;
   const auto blocks = BlocksOfPly(*file, {});
   ASSERT_TRUE(blocks.ok()) << blocks.error().message;
   ASSERT_NE(*blocks, nullptr);
-  EXPECT_EQ((*blocks)->size(), read->size());
-  EXPECT_EQ((*blocks)->sh_degree(), read->sh_degree);
-  EXPECT_EQ((*blocks)->render_mode(), read->render_mode);
-  EXPECT_EQ((*blocks)->comments(), read->comments);
-  const GaussianCloud flat = WithShDegree(*read, 0);
-  for (int pass = 0; pass < 2; ++pass) {
-    GaussianCloud shown;
-    shown.Resize(read->size(), 0);
-    const Status done = (*blocks)->ForEach([&](const CloudBlock& block) {
-      const auto copy = [&](std::span<const float> from, Buffer<float>& to, int64_t width) {
-        std::memcpy(to.data() + block.first * width, from.data(), from.size_bytes());
-      };
-      copy(block.rows.means, shown.means, 3);
-      copy(block.rows.log_scales, shown.log_scales, 3);
-      copy(block.rows.quats, shown.quats, 4);
-      copy(block.rows.opacity_logits, shown.opacity_logits, 1);
-      copy(block.rows.sh, shown.sh, 3);
-      for (int64_t i = 0; i < block.size(); ++i) {
-        EXPECT_EQ(block.usable[static_cast<size_t>(i)] != 0, IsUsable(*read, block.first + i)) << block.first + i;
-      }
-    });
-    ASSERT_TRUE(done.ok()) << done.error().message;
-    shown.render_mode = flat.render_mode;
-    shown.comments = flat.comments;
-    ExpectSameCloud(shown, flat);
-  }
   StatisticsStudy study(**blocks);
   RowStudy* const studies[] = {&study};
   ASSERT_TRUE(Study(**blocks, studies).ok());

@@ -12,8 +12,10 @@
 #include "core/parallel.h"
 #include "formats/attribute_error.h"
 #include "formats/axes.h"
+#include "formats/both_ways_for_test.h"
 #include "formats/random_cloud_for_test.h"
 #include "formats/splat_order.h"
+#include "formats/spz/spz_blocks.h"
 #include "formats/spz/spz_reader.h"
 #include "formats/spz/spz_writer.h"
 #include "io/file_bytes_for_test.h"
@@ -25,11 +27,11 @@ namespace {
 
 Result<GaussianCloud> Read(const std::filesystem::path& path, const ReadLimits& limits = {}) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
-  return ReadSpz(file, limits);
+  return ReadBothWays(ReadSpz, BlocksOfSpz, file, limits);
 }
 
 std::string ErrorOf(std::string bytes) {
-  const auto cloud = ReadSpz(InputFile::FromBytes("a.spz", std::move(bytes)));
+  const auto cloud = ReadBothWays(ReadSpz, BlocksOfSpz, InputFile::FromBytes("a.spz", std::move(bytes)));
   return cloud.ok() ? "accepted" : cloud.error().message;
 }
 
@@ -111,7 +113,7 @@ TEST(Spz, BytesOfOneGaussian) {
   for (const uint32_t version : {1u, 2u, 3u}) {
     const std::string file = Gzip(RawHeader(version, 1, 1, 12, version == 2 ? 1 : 0) + (version == 1 ? halves : fixed) +
                                   middle + (version < 3 ? xyz : smallest) + sh);
-    const auto cloud = ReadSpz(InputFile::FromBytes("a.spz", file));
+    const auto cloud = ReadBothWays(ReadSpz, BlocksOfSpz, InputFile::FromBytes("a.spz", file));
     ASSERT_TRUE(cloud.ok()) << cloud.error().message;
     EXPECT_THAT(cloud->means, testing::ElementsAre(1.5f, 1.5f, -1.0f));
     EXPECT_THAT(cloud->log_scales, testing::ElementsAre(0.0f, -1.0f, -10.0f));
@@ -138,7 +140,7 @@ TEST(Spz, DegreeFourIsReadAsThree) {
   sh[44] = '\x81';
   sh[45] = '\xff';
   const std::string file = Gzip(RawHeader(3, 1, 4, 12, 0) + std::string(9 + 7 + 4, '\x80') + sh);
-  const auto cloud = ReadSpz(InputFile::FromBytes("a.spz", file));
+  const auto cloud = ReadBothWays(ReadSpz, BlocksOfSpz, InputFile::FromBytes("a.spz", file));
   ASSERT_TRUE(cloud.ok()) << cloud.error().message;
   EXPECT_EQ(cloud->sh_degree, 3);
   EXPECT_EQ(std::fabs(cloud->sh[47]), 1.0f / 128);

@@ -17,6 +17,7 @@
 #include "formats/ply/ply_blocks.h"
 #include "formats/ply/ply_reader.h"
 #include "formats/ply/ply_writer.h"
+#include "formats/sog/sog_blocks.h"
 #include "formats/sog/sog_reader.h"
 #include "formats/sog/sog_writer.h"
 #include "formats/splat/splat_reader.h"
@@ -153,6 +154,7 @@ constexpr SplatFormat kFormats[] = {
      .describe = DescribeSog,
      .size = SogSize,
      .read = ReadSog,
+     .blocks = BlocksOfSog,
      .write = WriteSog,
      .written_beside = SogFilesBeside,
      .predicted_size = EstimatedSogSize,

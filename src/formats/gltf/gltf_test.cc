@@ -135,6 +135,27 @@ TEST(Gltf, NodesMoveAndScale) {
   }
 }
 
+// Blocks that begin in one primitive and end in another, with logarithms in one of them.
+TEST(Gltf, PrimitivesOfAnyLengthSideBySide) {
+  Glb glb = Example(5'000, 1);
+  const Json attributes = glb.json["meshes"][0]["primitives"][0]["attributes"];
+  for (const int count : {1, 4'096, 17, 4'999}) {
+    Json primitive = glb.json["meshes"][0]["primitives"][0];
+    for (auto& [name, index] : primitive["attributes"].items()) {
+      Json accessor = glb.json["accessors"][index.get<size_t>()];
+      accessor["count"] = count;
+      if (name.ends_with(":SCALE") && count == 17) accessor["bufferView"] = attributes["POSITION"];
+      index = glb.json["accessors"].size();
+      glb.json["accessors"].push_back(accessor);
+    }
+    glb.json["meshes"][0]["primitives"].push_back(primitive);
+  }
+  glb.json["nodes"] = Json::parse(R"([{"mesh":0},{"mesh":0,"translation":[1,2,3]}])");
+  const auto cloud = Read(glb.bytes());
+  ASSERT_TRUE(cloud.ok()) << cloud.error().message;
+  EXPECT_EQ(cloud->size(), 2 * (5'000 + 1 + 4'096 + 17 + 4'999));
+}
+
 TEST(Gltf, SmallIntegersBesideAndInside) {
   const TestFolder folder;
   Glb glb = Example(2, 0);

@@ -2,9 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <cstring>
-#include <limits>
 #include <string>
 
 #include "core/statistics.h"
@@ -20,23 +18,6 @@
 
 namespace anchorsplat {
 namespace {
-
-// Harmonics and other values that are not finite here and there.
-GaussianCloud Troubled(int64_t n, int degree) {
-  GaussianCloud cloud = RandomCloud(n, degree, static_cast<uint64_t>(degree + 1));
-  const float bad[] = {std::nanf(""), std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()};
-  for (int64_t i = 0; i < n; i += 7) {
-    const auto k = static_cast<size_t>(i);
-    Buffer<float>* const arrays[] = {&cloud.means, &cloud.log_scales, &cloud.quats, &cloud.opacity_logits, &cloud.sh};
-    Buffer<float>& array = *arrays[k % 5];
-    const size_t width = array.size() / static_cast<size_t>(n);
-    array[k * width + (k / 5) % width] = bad[k % 3];
-  }
-  // The largest finite numbers are none of them.
-  cloud.sh[0] = std::numeric_limits<float>::max();
-  cloud.sh[1] = std::numeric_limits<float>::denorm_min();
-  return cloud;
-}
 
 // What a file's blocks show is what reading it gives.
 void ExpectBlocksOf(const std::filesystem::path& path) {
@@ -60,7 +41,7 @@ TEST(PlyBlocks, ShowWhatReadingGives) {
   const TestFolder folder;
   for (int degree = 0; degree <= kMaxShDegree; ++degree) {
     for (const int64_t n : {int64_t{2}, int64_t{700}, 5 * kCloudBlockRows + 3}) {
-      GaussianCloud cloud = Troubled(n, degree);
+      GaussianCloud cloud = TroubledCloud(n, degree);
       cloud.comments = {"a comment"};
       ASSERT_TRUE(WritePly(folder / "a.ply", cloud, {.overwrite = true}).ok());
       SCOPED_TRACE(testing::Message() << n << " Gaussians of degree " << degree);
@@ -71,7 +52,7 @@ TEST(PlyBlocks, ShowWhatReadingGives) {
 
 // Mip-Splatting's filter, and a property that is no float.
 std::filesystem::path WriteFiltered(const TestFolder& folder, int64_t n, int64_t bad_row) {
-  const GaussianCloud cloud = Troubled(n, 1);
+  const GaussianCloud cloud = TroubledCloud(n, 1);
   ExtraProperties extras;
   extras.properties = {{"label", PlyType::kUint8}, {"filter_3D", PlyType::kFloat}};
   extras.rows.resize(extras.row_size() * static_cast<size_t>(n));

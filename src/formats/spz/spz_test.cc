@@ -3,6 +3,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -254,6 +255,33 @@ TEST(Spz, RefusesDamageLiesAndBombs) {
   EXPECT_EQ(Read(folder / "4.spz", {.max_gaussians = 2999}).error().code, ErrorCode::kBadFile);
   EXPECT_EQ(WriteSpz(folder / "b.spz", cloud, {.spz_version = 2}).error().code, ErrorCode::kBadArgument);
   EXPECT_EQ(folder.Entries(), 2);
+}
+
+// Sections are looked at side by side, and the error is still that of the first one, wherever in it.
+TEST(Spz, BlocksNameTheFirstDamagedSection) {
+  const TestFolder folder;
+  const int64_t n = 300'000;
+  for (const int version : {3, 4}) {
+    ASSERT_TRUE(WriteSpz(folder / "a.spz", Tame(n, 1, 8), {.overwrite = true, .spz_version = version}).ok());
+    std::string bytes = FileBytes(folder / "a.spz");
+    EXPECT_EQ(ErrorOf(bytes), "accepted");
+    // Near the end of the means, and where the harmonics begin.
+    size_t means_end = bytes.size() / 3, harmonics = bytes.size() * 2 / 3;
+    if (version == 4) {
+      std::array<uint64_t, 12> table;
+      std::memcpy(table.data(), bytes.data() + 32, sizeof table);
+      means_end = 32 + sizeof table + table[0] - 100;
+      harmonics = bytes.size() - table[10] + 5000;
+    }
+    bytes[harmonics] = static_cast<char>(bytes[harmonics] ^ 0x5a);
+    const std::string later = ErrorOf(bytes);
+    EXPECT_NE(later, "accepted");
+    bytes[means_end] = static_cast<char>(bytes[means_end] ^ 0x5a);
+    const std::string first = ErrorOf(bytes);
+    EXPECT_NE(first, "accepted");
+    EXPECT_NE(first, later);
+    EXPECT_NE(ErrorOf(bytes.substr(0, harmonics)), "accepted");
+  }
 }
 
 }  // namespace

@@ -35,8 +35,9 @@ Status FileBlocks::Show(int64_t first, int64_t last, Room& room, const Look& loo
 
 Status FileBlocks::EndPass() {
   if (!first_time()) return {};
+  ANCHORSPLAT_RETURN_IF_ERROR(EndFirst());
   usable_known_ = true;
-  return EndFirst();
+  return {};
 }
 
 Status FileBlocks::ForEach(const Look& look) {

@@ -92,10 +92,10 @@ class SplatBlocks final : public FileBlocks {
     if (!finite.empty()) absurd_ += absurd;
     return {};
   }
-  Status EndFirst() override { return CheckSplatRows(file_, absurd_, size_); }
+  Status EndFirst() override { return CheckSplatRows(file_, absurd_.exchange(0), size_); }
 
   const InputFile& file_;
-  std::atomic<int64_t> absurd_ = 0;
+  std::atomic<int64_t> absurd_ = 0;  // rows of the first pass
 };
 
 }  // namespace

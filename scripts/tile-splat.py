@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Copies of a splat side by side, as a large one for measurements: tile-splat.py IN.ply OUT.ply GAUSSIANS
+"""Copies of a splat side by side, as a large one for measurements: tile-splat.py IN.ply OUT.ply GAUSSIANS [NOISE]
 
 IN is a binary PLY as `anchorsplat convert` writes it. The copies stand on a square grid. Their Gaussians are interleaved, so that
-neighbours in space are far from each other in the file, as after training. Needs NumPy."""
+neighbours in space are far from each other in the file, as after training. With NOISE, say 0.03, every number x varies by NOISE (1 + |x|), normally distributed: copies that are all the same compress better
+than any scan. Needs NumPy."""
 
 import math
 import sys
@@ -10,6 +11,8 @@ import sys
 import numpy
 
 source, target, wanted = sys.argv[1], sys.argv[2], int(sys.argv[3])
+noise = float(sys.argv[4]) if len(sys.argv) > 4 else 0
+random = numpy.random.default_rng(1)
 data = open(source, "rb").read()
 header_end = data.index(b"end_header\n") + len(b"end_header\n")
 header = data[:header_end].decode().splitlines()
@@ -33,4 +36,6 @@ with open(target, "wb") as out:
         block[:, :, :3] += offsets
         block = block.reshape(-1, floats)[:left]
         left -= len(block)
+        if noise:
+            block = block + noise * (1 + abs(block)) * random.standard_normal(block.shape, dtype="<f4")
         out.write(block.tobytes())

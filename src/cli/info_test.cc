@@ -1,8 +1,14 @@
+#include <algorithm>
+#include <cmath>
+
 #include "cli/run_for_test.h"
 #include "cli/small_scan_for_test.h"
 #include "core/text.h"
 #include "dataset/small_dataset_for_test.h"
+#include "formats/cloud_io.h"
+#include "formats/opened_splat.h"
 #include "io/folder_for_test.h"
+#include "request/findings.h"
 
 namespace anchorsplat {
 namespace {
@@ -71,6 +77,33 @@ TEST_F(InfoVerb, OfCredits) {
   }
   EXPECT_THAT(ExpectRefused({"info", folder_ / "scan.npz"}, ErrorCode::kBadFile).err,
               HasSubstr("is an NPZ file, which this version writes for other programs and does not read"));
+}
+
+// Files that are gone through block by block give the numbers that reading them gives, with any number of threads.
+TEST_F(InfoVerb, OfEveryFormatAsIfItWereReadWhole) {
+  GaussianCloud cloud = *ReadCloud(Biplane() / "input.ply");
+  for (size_t i = 0; i < static_cast<size_t>(cloud.size()); i += 97) {
+    cloud.sh[i * static_cast<size_t>(cloud.sh_stride()) + 30] = std::nanf("");
+    cloud.opacity_logits[i + 1] = -40;
+    cloud.means[3 * (i + 2)] *= 3000;
+    cloud.log_scales[3 * (i + 3)] = -INFINITY;
+    std::fill_n(&cloud.quats[4 * (i + 4)], 4, 0.0f);
+  }
+  cloud.comments.push_back("credit: Mug by Ann, CC BY 4.0");
+  for (const char* name : {"a.ply", "a.spz", "old.spz", "a.glb", "a.gltf", "a.splat", "a.compressed.ply", "a.sog"}) {
+    const std::string path = folder_ / name;
+    CloudWriteOptions options;
+    if (std::string_view(name).starts_with("old")) options.spz_version = 3;
+    ASSERT_TRUE(WriteCloud(path, cloud, options).ok());
+    const auto read = ReadCloud(path);
+    ASSERT_TRUE(read.ok()) << read.error().message;
+    nlohmann::json expected = ToJson(InspectSplat(CloudView(*read)));
+    nlohmann::json shown = ExpectJson({"info", path});
+    EXPECT_EQ(ExpectJson({"info", path, "--threads", "1"}), shown) << name;
+    EXPECT_EQ(shown["bytes"], OpenedSplat::Open(path)->bytes());
+    for (const char* of_files : {"file", "format", "facts", "bytes"}) expected.erase(of_files), shown.erase(of_files);
+    EXPECT_EQ(shown.dump(1), expected.dump(1)) << name;
+  }
 }
 
 TEST_F(InfoVerb, OfASplatOfNaN) {

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "core/gaussian_cloud.h"
 #include "core/random.h"
@@ -17,6 +19,23 @@ inline GaussianCloud RandomCloud(int64_t n, int degree, uint64_t seed) {
   for (Buffer<float>* array : {&cloud.means, &cloud.log_scales, &cloud.quats, &cloud.opacity_logits, &cloud.sh}) {
     for (float& x : *array) x = static_cast<float>(random.Normal());
   }
+  return cloud;
+}
+
+// The same with harmonics and other values that are not finite here and there.
+inline GaussianCloud TroubledCloud(int64_t n, int degree) {
+  GaussianCloud cloud = RandomCloud(n, degree, static_cast<uint64_t>(degree + 1));
+  const float bad[] = {std::nanf(""), std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()};
+  for (int64_t i = 0; i < n; i += 7) {
+    const auto k = static_cast<size_t>(i);
+    Buffer<float>* const arrays[] = {&cloud.means, &cloud.log_scales, &cloud.quats, &cloud.opacity_logits, &cloud.sh};
+    Buffer<float>& array = *arrays[k % 5];
+    const size_t width = array.size() / static_cast<size_t>(n);
+    array[k * width + (k / 5) % width] = bad[k % 3];
+  }
+  // The largest finite numbers are none of them.
+  cloud.sh[0] = std::numeric_limits<float>::max();
+  cloud.sh[1] = std::numeric_limits<float>::denorm_min();
   return cloud;
 }
 

@@ -9,6 +9,7 @@
 #include "formats/compressed_ply/compressed_ply_reader.h"
 #include "formats/compressed_ply/compressed_ply_writer.h"
 #include "formats/extra_properties.h"
+#include "formats/gltf/gltf_blocks.h"
 #include "formats/gltf/gltf_reader.h"
 #include "formats/gltf/gltf_writer.h"
 #include "formats/gsplat_checkpoint/gsplat_checkpoint.h"
@@ -16,10 +17,12 @@
 #include "formats/ply/ply_blocks.h"
 #include "formats/ply/ply_reader.h"
 #include "formats/ply/ply_writer.h"
+#include "formats/sog/sog_blocks.h"
 #include "formats/sog/sog_reader.h"
 #include "formats/sog/sog_writer.h"
 #include "formats/splat/splat_reader.h"
 #include "formats/splat/splat_writer.h"
+#include "formats/spz/spz_blocks.h"
 #include "formats/spz/spz_reader.h"
 #include "formats/spz/spz_writer.h"
 #include "formats/streamed_sog/streamed_sog_reader.h"
@@ -82,6 +85,7 @@ constexpr SplatFormat kFormats[] = {
      .extent = ExtentOfCompressedPly,
      .describe = DescribeCompressedPly,
      .read = ReadCompressedPly,
+     .blocks = BlocksOfCompressedPly,
      .write = WriteCompressedPly,
      .predicted_size = PredictedCompressedPlySize,
      .order = SplatOrder::kMorton,
@@ -109,6 +113,7 @@ constexpr SplatFormat kFormats[] = {
      .extent = ExtentOfSpz,
      .describe = DescribeSpz,
      .read = ReadSpz,
+     .blocks = BlocksOfSpz,
      .write = WriteSpz,
      .predicted_size = EstimatedSpzSize,
      .size_is_estimate = true,
@@ -149,6 +154,7 @@ constexpr SplatFormat kFormats[] = {
      .describe = DescribeSog,
      .size = SogSize,
      .read = ReadSog,
+     .blocks = BlocksOfSog,
      .write = WriteSog,
      .written_beside = SogFilesBeside,
      .predicted_size = EstimatedSogSize,
@@ -165,17 +171,23 @@ constexpr SplatFormat kFormats[] = {
        return CloudExtent{static_cast<int64_t>(file.size() / kSplatRecord), 0};
      },
      .read = ReadSplat,
+     .blocks = BlocksOfSplat,
      .write = WriteSplat,
      .predicted_size = PredictedSplatSize,
      .order = SplatOrder::kImportance,
      .range = kSplatRange},
-    {.name = "ksplat", .extensions = kKsplatExtensions, .describe = DescribeKsplat, .read = ReadKsplat},
+    {.name = "ksplat",
+     .extensions = kKsplatExtensions,
+     .describe = DescribeKsplat,
+     .read = ReadKsplat,
+     .blocks = BlocksOfKsplat},
     {.name = "glTF",
      .extensions = kGltfExtensions,
      .sniff = IsGltf,
      .describe = DescribeGltf,
      .size = GltfSize,
      .read = ReadGltf,
+     .blocks = BlocksOfGltf,
      .write = WriteGlb,
      .predicted_size = PredictedGlbSize,
      .axes = kLuf,
@@ -185,6 +197,7 @@ constexpr SplatFormat kFormats[] = {
      .describe = DescribeGltf,
      .size = GltfSize,
      .read = ReadGltf,
+     .blocks = BlocksOfGltf,
      .write = WriteGltf,
      .written_beside = [](const std::filesystem::path& path, int) { return std::vector{GltfFileBeside(path)}; },
      .predicted_size = EstimatedGltfSize,

@@ -20,12 +20,18 @@ class Input {
  public:
   Input(const InputFile& file, uint64_t begin, uint64_t end)
       : file_(&file), next_(begin), end_(end), block_(new uint8_t[kInput]) {}
+  Input(const Input& other) : Input(*other.file_, other.next_, other.end_) {
+    filled_ = other.filled_;
+    std::copy_n(other.block_.get(), filled_, block_.get());
+  }
+  Input& operator=(const Input&) = delete;
 
   // The next block, empty at the end.
   Result<size_t> Fill() {
     const size_t size = static_cast<size_t>(std::min<uint64_t>(kInput, end_ - next_));
     ANCHORSPLAT_RETURN_IF_ERROR(file_->ReadAt(next_, block_.get(), size));
     next_ += size;
+    filled_ = size;
     return size;
   }
   const uint8_t* block() const { return block_.get(); }
@@ -38,16 +44,23 @@ class Input {
   const InputFile* file_;
   uint64_t next_, end_;
   std::unique_ptr<uint8_t[]> block_;
+  size_t filled_ = 0;  // bytes of the block
 };
 
-class GzipReader : public InflatingReader {
+class GzipReader : public CopyableReader {
  public:
   GzipReader(const InputFile& file, uint64_t begin) : input_(file, begin, file.size()) {
     if (inflateInit2(&stream_, 16 + MAX_WBITS) != Z_OK) throw std::bad_alloc();
   }
-  GzipReader(const GzipReader&) = delete;
+  GzipReader(const GzipReader& other) : input_(other.input_), ended_(other.ended_) {
+    if (inflateCopy(&stream_, const_cast<z_stream*>(&other.stream_)) != Z_OK) throw std::bad_alloc();
+    if (stream_.avail_in == 0) return;
+    stream_.next_in = const_cast<Bytef*>(input_.block()) + (other.stream_.next_in - other.input_.block());
+  }
   GzipReader& operator=(const GzipReader&) = delete;
   ~GzipReader() override { inflateEnd(&stream_); }
+
+  std::unique_ptr<CopyableReader> Copy() const override { return std::make_unique<GzipReader>(*this); }
 
   Status Read(void* out, size_t size) override {
     auto* to = static_cast<Bytef*>(out);
@@ -160,7 +173,7 @@ class ZstdReader : public InflatingReader {
 
 }  // namespace
 
-std::unique_ptr<InflatingReader> OpenGzip(const InputFile& file, uint64_t begin) {
+std::unique_ptr<CopyableReader> OpenGzip(const InputFile& file, uint64_t begin) {
   return std::make_unique<GzipReader>(file, begin);
 }
 

@@ -20,8 +20,15 @@ class InflatingReader {
   virtual Status ExpectEnd() = 0;
 };
 
+// One that another can go on from: what lies far into a stream can be read again without all before it.
+class CopyableReader : public InflatingReader {
+ public:
+  // A reader of its own at the same place: 200 kB. The file must outlive it.
+  virtual std::unique_ptr<CopyableReader> Copy() const = 0;
+};
+
 // The one gzip stream from `begin` on, or the zstd frames in bytes [begin, end).
-std::unique_ptr<InflatingReader> OpenGzip(const InputFile& file, uint64_t begin);
+std::unique_ptr<CopyableReader> OpenGzip(const InputFile& file, uint64_t begin);
 std::unique_ptr<InflatingReader> OpenZstd(const InputFile& file, uint64_t begin, uint64_t end);
 
 }  // namespace anchorsplat

@@ -142,10 +142,10 @@ Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& n
   findings.file_bytes = file.bytes();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::unique_ptr<CloudBlocks> blocks, file.Blocks());
   findings.format = file.format()->name;
+  ANCHORSPLAT_RETURN_IF_ERROR(LookAt(*blocks, findings));
   if (file.format()->describe != nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(findings.facts, file.format()->describe(file.input()));
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(LookAt(*blocks, findings));
   return findings;
 }
 

@@ -4,13 +4,16 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <span>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/activations.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
+#include "formats/file_blocks.h"
 #include "formats/ply/ply_header.h"
 #include "formats/quantize.h"
 #include "formats/record_blocks.h"
@@ -130,46 +133,90 @@ void UnpackQuat(uint32_t packed, float quat[4]) {
   RestoreLargest(three, quat);
 }
 
-Status ReadVertices(const InputFile& file, const Rows& rows, const std::vector<ChunkRanges>& chunks,
-                    GaussianCloud& cloud) {
-  std::array<size_t, 4> offsets{};
-  for (size_t k = 0; k < 4; ++k) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(offsets[k], OffsetOf(file, *rows.element, kVertexProperties[k], PlyType::kUint32));
+// A file whose header and ranges have been read and checked.
+struct OpenedCompressedPly {
+  PlyHeader header;
+  Rows vertices, harmonics;  // the element of the latter is null where there are none
+  int degree = 0;
+  std::vector<ChunkRanges> chunks;
+  std::array<size_t, 4> vertex_offsets{};   // of kVertexProperties
+  std::vector<size_t> harmonics_offsets{};  // of f_rest_0 and on
+
+  int64_t count() const { return vertices.element->count; }
+  size_t vertex_size() const { return static_cast<size_t>(vertices.element->row_size()); }
+};
+
+Result<OpenedCompressedPly> OpenCompressedPly(const InputFile& file, const ReadLimits& limits) {
+  OpenedCompressedPly ply;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ply.header, ReadPlyHeader(file));
+  if (ply.header.encoding != PlyEncoding::kLittleEndian) return BadHeader(file, "it is not binary little-endian");
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Rows chunk_rows, Locate(file, ply.header, "chunk"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ply.vertices, Locate(file, ply.header, "vertex"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ply.harmonics, Locate(file, ply.header, "sh"));
+  for (const auto& [rows, name] : {std::pair(chunk_rows, "chunk"), std::pair(ply.vertices, "vertex")}) {
+    if (rows.element == nullptr) return BadHeader(file, Cat("it has no element \"", name, "\""));
   }
-  std::array<float, 256> logits{};
-  for (size_t k = 0; k < 256; ++k) logits[k] = LogitFromOpacity(static_cast<float>(k) / 255);
-  const auto row_size = static_cast<size_t>(rows.element->row_size());
-  return ReadRecords(file, rows.begin, rows.element->count, row_size,
-                     [&](int64_t first, int64_t last, const uint8_t* bytes) {
-                       for (int64_t i = first; i < last; ++i, bytes += row_size) {
-                         uint32_t packed[4];
-                         for (size_t k = 0; k < 4; ++k) std::memcpy(&packed[k], bytes + offsets[k], sizeof(uint32_t));
-                         const ChunkRanges& chunk = chunks[static_cast<size_t>(i / kCompressedPlyChunk)];
-                         UnpackRanged(packed[0], chunk.mean_min, chunk.mean_max, cloud.means.data() + 3 * i);
-                         UnpackQuat(packed[1], cloud.quats.data() + 4 * i);
-                         UnpackRanged(packed[2], chunk.scale_min, chunk.scale_max, cloud.log_scales.data() + 3 * i);
-                         float* dc = cloud.sh.data() + i * cloud.sh_stride();
-                         for (int k = 0; k < 3; ++k) {
-                           const uint32_t bits = packed[3] >> (24 - 8 * k) & 255;
-                           dc[k] = DcFromColor(Mix(chunk.color_min[k], chunk.color_max[k], bits, 255));
-                         }
-                         cloud.opacity_logits[static_cast<size_t>(i)] = logits[packed[3] & 255];
-                       }
-                     });
+  const int64_t count = ply.count();
+  ANCHORSPLAT_RETURN_IF_ERROR(
+      CheckCount(Cat(file.name(), ": line ", ply.vertices.element->line), static_cast<uint64_t>(count), limits));
+  if (chunk_rows.element->count != (count + kCompressedPlyChunk - 1) / kCompressedPlyChunk) {
+    return BadHeader(file, Cat("line ", chunk_rows.element->line, ": has ", WithThousands(chunk_rows.element->count),
+                               " chunks for ", WithThousands(count), " Gaussians, expected one for 256"));
+  }
+  const PlyElement* const sh = ply.harmonics.element;
+  if (sh != nullptr && sh->count != count) {
+    return BadHeader(file, Cat("line ", sh->line, ": has ", WithThousands(sh->count), " rows of \"sh\" for ",
+                               WithThousands(count), " Gaussians"));
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ply.degree, HarmonicsDegree(file, sh));
+  // Rows of no bytes would let the header promise any number of them.
+  for (size_t k = 0; k < kVertexProperties.size(); ++k) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(ply.vertex_offsets[k],
+                                 OffsetOf(file, *ply.vertices.element, kVertexProperties[k], PlyType::kUint32));
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ply.chunks, ReadChunks(file, chunk_rows));
+  for (int k = 0; k < 3 * (ShCoefficients(ply.degree) - 1); ++k) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t offset, OffsetOf(file, *sh, Cat("f_rest_", k), PlyType::kUint8));
+    ply.harmonics_offsets.push_back(offset);
+  }
+  return ply;
 }
 
-Status ReadHarmonics(const InputFile& file, const Rows& rows, GaussianCloud& cloud) {
-  const auto rest = static_cast<size_t>(cloud.sh_stride()) - 3;
-  std::vector<size_t> offsets(rest);
-  for (size_t k = 0; k < rest; ++k) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(offsets[k], OffsetOf(file, *rows.element, Cat("f_rest_", k), PlyType::kUint8));
+// Rows of the file from `first` on to row `to` of the cloud and on.
+void UnpackVertices(const OpenedCompressedPly& ply, const uint8_t* bytes, int64_t first, int64_t count, int64_t to,
+                    GaussianCloud& cloud) {
+  static const std::array<float, 256> kLogits = [] {
+    std::array<float, 256> logits{};
+    for (size_t k = 0; k < 256; ++k) logits[k] = LogitFromOpacity(static_cast<float>(k) / 255);
+    return logits;
+  }();
+  const size_t row_size = ply.vertex_size();
+  for (int64_t n = 0; n < count; ++n, bytes += row_size) {
+    uint32_t packed[4];
+    for (size_t k = 0; k < 4; ++k) std::memcpy(&packed[k], bytes + ply.vertex_offsets[k], sizeof(uint32_t));
+    const ChunkRanges& chunk = ply.chunks[static_cast<size_t>((first + n) / kCompressedPlyChunk)];
+    const int64_t i = to + n;
+    UnpackRanged(packed[0], chunk.mean_min, chunk.mean_max, cloud.means.data() + 3 * i);
+    UnpackQuat(packed[1], cloud.quats.data() + 4 * i);
+    UnpackRanged(packed[2], chunk.scale_min, chunk.scale_max, cloud.log_scales.data() + 3 * i);
+    float* dc = cloud.sh.data() + i * cloud.sh_stride();
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t bits = packed[3] >> (24 - 8 * k) & 255;
+      dc[k] = DcFromColor(Mix(chunk.color_min[k], chunk.color_max[k], bits, 255));
+    }
+    cloud.opacity_logits[static_cast<size_t>(i)] = kLogits[packed[3] & 255];
   }
+}
+
+Status ReadHarmonics(const InputFile& file, const OpenedCompressedPly& ply, GaussianCloud& cloud) {
+  const std::vector<size_t>& offsets = ply.harmonics_offsets;
+  const size_t rest = offsets.size();
   std::array<float, 256> values{};
   for (size_t k = 1; k < 255; ++k) values[k] = (static_cast<float>(k) + 0.5f) / 256 * 8 - 4;
   values[0] = -4;
   values[255] = 4;
-  const auto row_size = static_cast<size_t>(rows.element->row_size());
-  return ReadRecords(file, rows.begin, rows.element->count, row_size,
+  const auto row_size = static_cast<size_t>(ply.harmonics.element->row_size());
+  return ReadRecords(file, ply.harmonics.begin, cloud.size(), row_size,
                      [&](int64_t first, int64_t last, const uint8_t* bytes) {
                        for (int64_t i = first; i < last; ++i, bytes += row_size) {
                          float* out = cloud.sh.data() + i * cloud.sh_stride() + 3;
@@ -180,6 +227,32 @@ Status ReadHarmonics(const InputFile& file, const Rows& rows, GaussianCloud& clo
                        }
                      });
 }
+
+// The bytes of the harmonics stand for finite numbers, whatever they are: nobody looks at them.
+class CompressedPlyBlocks final : public FileBlocks {
+ public:
+  CompressedPlyBlocks(const InputFile& file, OpenedCompressedPly ply) : file_(file), ply_(std::move(ply)) {
+    size_ = ply_.count();
+    sh_degree_ = ply_.degree;
+    render_mode_ = ply_.header.render_mode;
+    comments_ = ply_.header.comments;
+  }
+
+ private:
+  Status Fill(int64_t first, int64_t last, Room& room, std::span<uint8_t>) override {
+    return ReadRows(file_, ply_.vertices.begin, ply_.vertex_size(), first, last, room.bytes,
+                    [&](const uint8_t* bytes, int64_t count, int64_t to) {
+                      UnpackVertices(ply_, bytes, first + to, count, to, room.rows);
+                    });
+  }
+  Status EndFirst() override {
+    WarnOfOddTags(file_, ply_.header);
+    return {};
+  }
+
+  const InputFile& file_;
+  OpenedCompressedPly ply_;
+};
 
 }  // namespace
 
@@ -195,39 +268,23 @@ Result<CloudExtent> ExtentOfCompressedPly(const InputFile& file) {
 }
 
 Result<GaussianCloud> ReadCompressedPly(const InputFile& file, const ReadLimits& limits) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(PlyHeader header, ReadPlyHeader(file));
-  if (header.encoding != PlyEncoding::kLittleEndian) return BadHeader(file, "it is not binary little-endian");
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Rows chunk_rows, Locate(file, header, "chunk"));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Rows vertex_rows, Locate(file, header, "vertex"));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Rows sh_rows, Locate(file, header, "sh"));
-  for (const auto& [rows, name] : {std::pair(chunk_rows, "chunk"), std::pair(vertex_rows, "vertex")}) {
-    if (rows.element == nullptr) return BadHeader(file, Cat("it has no element \"", name, "\""));
-  }
-  const int64_t count = vertex_rows.element->count;
-  ANCHORSPLAT_RETURN_IF_ERROR(
-      CheckCount(Cat(file.name(), ": line ", vertex_rows.element->line), static_cast<uint64_t>(count), limits));
-  if (chunk_rows.element->count != (count + kCompressedPlyChunk - 1) / kCompressedPlyChunk) {
-    return BadHeader(file, Cat("line ", chunk_rows.element->line, ": has ", WithThousands(chunk_rows.element->count),
-                               " chunks for ", WithThousands(count), " Gaussians, expected one for 256"));
-  }
-  if (sh_rows.element != nullptr && sh_rows.element->count != count) {
-    return BadHeader(file, Cat("line ", sh_rows.element->line, ": has ", WithThousands(sh_rows.element->count),
-                               " rows of \"sh\" for ", WithThousands(count), " Gaussians"));
-  }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const int degree, HarmonicsDegree(file, sh_rows.element));
-  // Rows of no bytes would let the header promise any number of them.
-  for (const std::string_view name : kVertexProperties) {
-    ANCHORSPLAT_RETURN_IF_ERROR(OffsetOf(file, *vertex_rows.element, name, PlyType::kUint32));
-  }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<ChunkRanges> chunks, ReadChunks(file, chunk_rows));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OpenedCompressedPly ply, OpenCompressedPly(file, limits));
   GaussianCloud cloud;
-  cloud.Resize(count, degree);
-  ANCHORSPLAT_RETURN_IF_ERROR(ReadVertices(file, vertex_rows, chunks, cloud));
-  if (degree > 0) ANCHORSPLAT_RETURN_IF_ERROR(ReadHarmonics(file, sh_rows, cloud));
-  WarnOfOddTags(file, header);
-  cloud.render_mode = header.render_mode;
-  cloud.comments = std::move(header.comments);
+  cloud.Resize(ply.count(), ply.degree);
+  ANCHORSPLAT_RETURN_IF_ERROR(ReadRecords(file, ply.vertices.begin, ply.count(), ply.vertex_size(),
+                                          [&](int64_t first, int64_t last, const uint8_t* bytes) {
+                                            UnpackVertices(ply, bytes, first, last - first, first, cloud);
+                                          }));
+  if (ply.degree > 0) ANCHORSPLAT_RETURN_IF_ERROR(ReadHarmonics(file, ply, cloud));
+  WarnOfOddTags(file, ply.header);
+  cloud.render_mode = ply.header.render_mode;
+  cloud.comments = std::move(ply.header.comments);
   return cloud;
+}
+
+Result<std::unique_ptr<CloudBlocks>> BlocksOfCompressedPly(const InputFile& file, const ReadLimits& limits) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OpenedCompressedPly ply, OpenCompressedPly(file, limits));
+  return std::unique_ptr<CloudBlocks>(std::make_unique<CompressedPlyBlocks>(file, std::move(ply)));
 }
 
 Result<FormatFacts> DescribeCompressedPly(const InputFile& file) {

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 
+#include "core/cloud_blocks.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
@@ -23,6 +25,9 @@ inline constexpr int64_t kCompressedPlyChunk = 256;
 // Errors (kBadFile): elements or properties missing or of another type, not binary little-endian, counts that do not
 // belong together, fewer bytes than the header promises, more than `limits.max_gaussians`.
 Result<GaussianCloud> ReadCompressedPly(const InputFile& file, const ReadLimits& limits = {});
+
+// The same, to look at block by block. Errors as ReadCompressedPly.
+Result<std::unique_ptr<CloudBlocks>> BlocksOfCompressedPly(const InputFile& file, const ReadLimits& limits);
 
 // What the header says. Errors as ReadCompressedPly.
 Result<CloudExtent> ExtentOfCompressedPly(const InputFile& file);

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "formats/attribute_error.h"
+#include "formats/both_ways_for_test.h"
 #include "formats/compressed_ply/compressed_ply_reader.h"
 #include "formats/compressed_ply/compressed_ply_writer.h"
 #include "formats/random_cloud_for_test.h"
@@ -19,11 +20,12 @@ namespace {
 
 Result<GaussianCloud> Read(const std::filesystem::path& path, const ReadLimits& limits = {}) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
-  return ReadCompressedPly(file, limits);
+  return ReadBothWays(ReadCompressedPly, BlocksOfCompressedPly, file, limits);
 }
 
 std::string ErrorOf(std::string bytes) {
-  const auto cloud = ReadCompressedPly(InputFile::FromBytes("a.compressed.ply", std::move(bytes)));
+  const auto cloud = ReadBothWays(ReadCompressedPly, BlocksOfCompressedPly,
+                                  InputFile::FromBytes("a.compressed.ply", std::move(bytes)));
   return cloud.ok() ? "accepted" : cloud.error().message;
 }
 

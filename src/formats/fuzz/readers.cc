@@ -12,8 +12,10 @@
 #include "core/gaussian_cloud.h"
 #include "core/random.h"
 #include "core/text.h"
+#include "formats/blocks_for_test.h"
 #include "formats/extra_properties.h"
 #include "formats/fuzz/seeds.h"
+#include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "images/image_io.h"
 #include "io/file_bytes_for_test.h"
@@ -37,6 +39,13 @@ Status CheckError(const Error& error, std::string_view file) {
   return error;
 }
 
+// Who looks at the file block by block must see what reading it gave.
+void CompareBlocks(const SplatFormat& format, const InputFile& input, const Result<GaussianCloud>& read) {
+  if (format.blocks == nullptr) return;
+  const std::string difference = DifferenceOfBlocks(format.blocks, input, {}, read);
+  Require(difference.empty(), Cat("in its blocks ", difference).c_str());
+}
+
 Status ReadAsCloud(const std::string& file, const std::string& bytes) {
   const InputFile input = InputFile::FromBytes(file, bytes);
   const auto head = input.Head(kSniffBytes);
@@ -56,6 +65,7 @@ Status ReadAsCloud(const std::string& file, const std::string& bytes) {
   }
   if (format == nullptr || format->read == nullptr) return Error{ErrorCode::kBadFile, "no format that is read"};
   const auto cloud = format->read(input, {});
+  CompareBlocks(*format, input, cloud);
   if (!cloud.ok()) return CheckError(cloud.error(), file);
   Require(!cloud->empty(), "an empty cloud");
   Require(!extent || (extent->gaussians == cloud->size() && extent->sh_degree == cloud->sh_degree),
@@ -153,7 +163,10 @@ void AddSplatsOfSeveralFiles(const fs::path& folder, std::vector<FuzzReader>& re
                       {},
                       [own, part](const std::string& bytes) -> Status {
                         Put(own / part.damaged, bytes);
-                        const auto cloud = ReadCloud(own / part.main);
+                        const auto opened = OpenedSplat::Open(own / part.main);
+                        if (!opened.ok()) return CheckError(opened.error(), own.filename().string());
+                        const auto cloud = opened->Read();
+                        if (opened->format() != nullptr) CompareBlocks(*opened->format(), opened->input(), cloud);
                         if (!cloud.ok()) return CheckError(cloud.error(), own.filename().string());
                         Require(Validate(*cloud).ok(), "a cloud whose arrays disagree");
                         return {};

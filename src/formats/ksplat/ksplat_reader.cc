@@ -6,14 +6,18 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/activations.h"
+#include "core/finite.h"
 #include "core/half.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
+#include "formats/file_blocks.h"
 #include "formats/record_blocks.h"
 #include "io/little_endian.h"
 
@@ -191,49 +195,117 @@ void UnpackHarmonics(const Ksplat& ksplat, const Section& section, const uint8_t
   }
 }
 
+// The buckets of a section, none where its level has none.
+Result<Buckets> BucketsOf(const InputFile& file, const Ksplat& ksplat, const Section& section) {
+  return kLevels[ksplat.level].mean == 2 ? ReadBuckets(file, section) : Buckets();
+}
+
+Error LostRow(const InputFile& file, const Section& section) {
+  return Bad(file, section.begin, "a Gaussian lies in no bucket of its section");
+}
+
+// Records [first, first + count) of a section to row `to` of the cloud and on, with the harmonics that it has place
+// for. Calls each(row, harmonics) with bytes of the harmonics. False where a Gaussian lies in no bucket.
+template <typename Each>
+bool UnpackKsplat(const Ksplat& ksplat, const Section& section, const Buckets& buckets, const uint8_t* record,
+                  int64_t first, int64_t count, int64_t to, GaussianCloud& cloud, Each&& each) {
+  const Level& level = kLevels[ksplat.level];
+  const float step = section.block_size / 2 / static_cast<float>(section.range);
+  for (int64_t i = first; i < first + count; ++i, record += section.record) {
+    const int64_t row = to + (i - first);
+    const uint8_t* bytes = record;
+    float* mean = cloud.means.data() + 3 * row;
+    const float* center = level.mean == 2 ? buckets.CenterOf(section, static_cast<uint64_t>(i)) : nullptr;
+    if (level.mean == 2 && center == nullptr) return false;
+    for (int k = 0; k < 3; ++k, bytes += level.mean) {
+      mean[k] =
+          level.mean == 4
+              ? Number(bytes, 4)
+              : (static_cast<float>(bytes[0] + 256 * bytes[1]) - static_cast<float>(section.range)) * step + center[k];
+    }
+    for (int k = 0; k < 3; ++k, bytes += level.number) {
+      cloud.log_scales[static_cast<size_t>(3 * row + k)] = LogFromScale(Number(bytes, level.number));
+    }
+    for (int k = 0; k < 4; ++k, bytes += level.number) {
+      cloud.quats[static_cast<size_t>(4 * row + k)] = Number(bytes, level.number);
+    }
+    float* sh = cloud.sh.data() + row * cloud.sh_stride();
+    for (int k = 0; k < 3; ++k) sh[k] = DcFromColor(static_cast<float>(*bytes++) / 255);
+    cloud.opacity_logits[static_cast<size_t>(row)] = LogitFromOpacity(static_cast<float>(*bytes++) / 255);
+    each(row, bytes);
+  }
+  return true;
+}
+
 Status ReadSection(const InputFile& file, const Ksplat& ksplat, const Section& section, int64_t begin,
                    GaussianCloud& cloud) {
-  const Level& level = kLevels[ksplat.level];
-  Buckets buckets;
-  if (level.mean == 2) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(buckets, ReadBuckets(file, section));
-  }
-  const float step = section.block_size / 2 / static_cast<float>(section.range);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Buckets buckets, BucketsOf(file, ksplat, section));
   std::atomic<bool> lost = false;
-  ANCHORSPLAT_RETURN_IF_ERROR(ReadRecords(
-      file, section.data_begin(), static_cast<int64_t>(section.count), section.record,
-      [&](int64_t first, int64_t last, const uint8_t* record) {
-        for (int64_t i = first; i < last; ++i, record += section.record) {
-          const int64_t row = begin + i;
-          const uint8_t* bytes = record;
-          float* mean = cloud.means.data() + 3 * row;
-          const float* center = level.mean == 2 ? buckets.CenterOf(section, static_cast<uint64_t>(i)) : nullptr;
-          if (level.mean == 2 && center == nullptr) {
-            lost = true;
-            return;
-          }
-          for (int k = 0; k < 3; ++k, bytes += level.mean) {
-            mean[k] = level.mean == 4
-                          ? Number(bytes, 4)
-                          : (static_cast<float>(bytes[0] + 256 * bytes[1]) - static_cast<float>(section.range)) * step +
-                                center[k];
-          }
-          for (int k = 0; k < 3; ++k, bytes += level.number) {
-            cloud.log_scales[static_cast<size_t>(3 * row + k)] = LogFromScale(Number(bytes, level.number));
-          }
-          for (int k = 0; k < 4; ++k, bytes += level.number) {
-            cloud.quats[static_cast<size_t>(4 * row + k)] = Number(bytes, level.number);
-          }
-          float* sh = cloud.sh.data() + row * cloud.sh_stride();
-          std::fill_n(sh, cloud.sh_stride(), 0.0f);
-          for (int k = 0; k < 3; ++k) sh[k] = DcFromColor(static_cast<float>(*bytes++) / 255);
-          cloud.opacity_logits[static_cast<size_t>(row)] = LogitFromOpacity(static_cast<float>(*bytes++) / 255);
-          UnpackHarmonics(ksplat, section, bytes, sh);
-        }
-      }));
-  if (lost) return Bad(file, section.begin, "a Gaussian lies in no bucket of its section");
+  ANCHORSPLAT_RETURN_IF_ERROR(ReadRecords(file, section.data_begin(), static_cast<int64_t>(section.count),
+                                          section.record, [&](int64_t first, int64_t last, const uint8_t* bytes) {
+                                            const auto harmonics = [&](int64_t row, const uint8_t* from) {
+                                              float* sh = cloud.sh.data() + row * cloud.sh_stride();
+                                              std::fill_n(sh + 3, cloud.sh_stride() - 3, 0.0f);
+                                              UnpackHarmonics(ksplat, section, from, sh);
+                                            };
+                                            if (!UnpackKsplat(ksplat, section, buckets, bytes, first, last - first,
+                                                              begin + first, cloud, harmonics)) {
+                                              lost = true;
+                                            }
+                                          }));
+  if (lost) return LostRow(file, section);
   return {};
 }
+
+class KsplatBlocks final : public FileBlocks {
+ public:
+  KsplatBlocks(const InputFile& file, Ksplat ksplat, std::vector<Buckets> buckets)
+      : file_(file), ksplat_(std::move(ksplat)), buckets_(std::move(buckets)) {
+    size_ = static_cast<int64_t>(ksplat_.count);
+    sh_degree_ = ksplat_.degree;
+    int64_t begin = 0;
+    for (const Section& section : ksplat_.sections) {
+      begins_.push_back(begin);
+      begin += static_cast<int64_t>(section.count);
+    }
+  }
+
+ private:
+  Status Fill(int64_t first, int64_t last, Room& room, std::span<uint8_t> finite) override {
+    for (int64_t i = first; i < last;) {
+      // The last one that begins here: those before it that do have no rows.
+      const auto s = static_cast<size_t>(std::upper_bound(begins_.begin(), begins_.end(), i) - begins_.begin()) - 1;
+      const Section& section = ksplat_.sections[s];
+      const int64_t end = std::min(last, begins_[s] + static_cast<int64_t>(section.count));
+      ANCHORSPLAT_RETURN_IF_ERROR(FillFrom(s, i - begins_[s], end - begins_[s], i - first, room, finite));
+      i = end;
+    }
+    return {};
+  }
+
+  // Rows [first, last) of section s to row `to` of the room and on.
+  Status FillFrom(size_t s, int64_t first, int64_t last, int64_t to, Room& room, std::span<uint8_t> finite) const {
+    const Section& section = ksplat_.sections[s];
+    const auto harmonics = [&](int64_t row, const uint8_t* bytes) {
+      if (finite.empty() || section.degree == 0) return;
+      std::array<float, 3 * ShCoefficients(kMaxShDegree)> sh{};
+      UnpackHarmonics(ksplat_, section, bytes, sh.data());
+      if (!AllFinite(sh)) finite[static_cast<size_t>(row)] = 0;
+    };
+    bool all = true;
+    ANCHORSPLAT_RETURN_IF_ERROR(ReadRows(file_, section.data_begin(), static_cast<size_t>(section.record), first, last,
+                                         room.bytes, [&](const uint8_t* bytes, int64_t count, int64_t at) {
+                                           all = all && UnpackKsplat(ksplat_, section, buckets_[s], bytes, first + at,
+                                                                     count, to + at, room.rows, harmonics);
+                                         }));
+    return all ? Status() : LostRow(file_, section);
+  }
+
+  const InputFile& file_;
+  Ksplat ksplat_;
+  std::vector<Buckets> buckets_;  // of each section
+  std::vector<int64_t> begins_;   // the first row of each
+};
 
 }  // namespace
 
@@ -259,6 +331,16 @@ Result<GaussianCloud> ReadKsplat(const InputFile& file, const ReadLimits& limits
     begin += static_cast<int64_t>(section.count);
   }
   return cloud;
+}
+
+Result<std::unique_ptr<CloudBlocks>> BlocksOfKsplat(const InputFile& file, const ReadLimits& limits) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Ksplat ksplat, ReadHeaders(file, limits));
+  std::vector<Buckets> buckets;
+  for (const Section& section : ksplat.sections) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(Buckets of_one, BucketsOf(file, ksplat, section));
+    buckets.push_back(std::move(of_one));
+  }
+  return std::unique_ptr<CloudBlocks>(std::make_unique<KsplatBlocks>(file, std::move(ksplat), std::move(buckets)));
 }
 
 }  // namespace anchorsplat

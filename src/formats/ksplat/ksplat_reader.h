@@ -1,5 +1,8 @@
 #pragma once
 
+#include <memory>
+
+#include "core/cloud_blocks.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
@@ -17,6 +20,9 @@ namespace anchorsplat {
 // Errors (kBadFile): another version or level, fewer bytes than the headers promise, counts that do not belong
 // together, more than `limits.max_gaussians`.
 Result<GaussianCloud> ReadKsplat(const InputFile& file, const ReadLimits& limits = {});
+
+// The same, to look at block by block. Errors as ReadKsplat; a Gaussian in no bucket comes from the first ForEach.
+Result<std::unique_ptr<CloudBlocks>> BlocksOfKsplat(const InputFile& file, const ReadLimits& limits);
 
 // Version, compression level, sections. Errors as ReadKsplat.
 Result<FormatFacts> DescribeKsplat(const InputFile& file);

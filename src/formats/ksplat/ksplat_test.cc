@@ -5,6 +5,7 @@
 #include <cstring>
 #include <string>
 
+#include "formats/both_ways_for_test.h"
 #include "formats/ksplat/ksplat_reader.h"
 
 namespace anchorsplat {
@@ -62,7 +63,7 @@ std::string Example(uint16_t level) {
 }
 
 Result<GaussianCloud> Read(std::string bytes, const ReadLimits& limits = {}) {
-  return ReadKsplat(InputFile::FromBytes("a.ksplat", std::move(bytes)), limits);
+  return ReadBothWays(ReadKsplat, BlocksOfKsplat, InputFile::FromBytes("a.ksplat", std::move(bytes)), limits);
 }
 
 TEST(Ksplat, ReadsEveryLevel) {

@@ -9,9 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/parallel.h"
-#include "core/statistics.h"
-#include "formats/first_failure.h"
+#include "formats/file_blocks.h"
 #include "formats/ply/ply_body.h"
 #include "formats/ply/ply_filter.h"
 #include "formats/ply/ply_header.h"
@@ -21,21 +19,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr size_t kReadAtOnce = size_t{128} << 10;  // bytes: stay in the L2 cache with what becomes of them
-
-// Whether one of `count` floats is infinite or NaN: its exponent is all ones, to which one more is added here so that
-// the sign bit tells. `from` has any alignment.
-bool HasNotFinite(const char* from, size_t count) {
-  uint32_t carry = 0;
-  for (size_t k = 0; k < count; ++k) {
-    uint32_t bits;
-    std::memcpy(&bits, from + k * sizeof bits, sizeof bits);
-    carry |= (bits & 0x7fffffffu) + 0x00800000u;
-  }
-  return (carry >> 31) != 0;
-}
-
-class PlyBlocks final : public CloudBlocks {
+class PlyBlocks final : public FileBlocks {
  public:
   PlyBlocks(const InputFile& file, PlyHeader header, const PlyLayout& layout, uint64_t begin)
       : file_(file),
@@ -67,30 +51,6 @@ class PlyBlocks final : public CloudBlocks {
     }
   }
 
-  Status ForEach(const Look& look) override {
-    if (!usable_known_) usable_.resize(static_cast<size_t>(size_));
-    FirstFailure failure;
-    ParallelFor(0, size_, 4 * kCloudBlockRows, [&](int64_t first, int64_t last) {
-      Room room;
-      for (int64_t i = first; i < last; i += kCloudBlockRows) {
-        const Status status = Fill(i, std::min(last, i + kCloudBlockRows), room);
-        if (!status.ok()) return failure.Report(i, status);
-        CloudBlock block;
-        block.first = i;
-        block.rows = room.rows;
-        block.usable =
-            std::span<const uint8_t>(usable_).subspan(static_cast<size_t>(i), room.rows.opacity_logits.size());
-        look(block);
-      }
-    });
-    ANCHORSPLAT_RETURN_IF_ERROR(failure.status());
-    if (usable_known_) return {};
-    usable_known_ = true;
-    WarnOfOddTags(file_, header_);
-    if (filter_) SayFilterIsFused(file_, *render_mode_);
-    return {};
-  }
-
  private:
   struct Column {
     size_t offset;  // bytes from the row's begin
@@ -102,55 +62,38 @@ class PlyBlocks final : public CloudBlocks {
     size_t offset;
     size_t count;  // floats one behind the other
   };
-  struct Room {
-    Buffer<char> bytes;
-    GaussianCloud rows;
-    Buffer<float> filter;
-  };
-
-  Status Fill(int64_t first, int64_t last, Room& room) {
-    const int64_t at_once = std::max<int64_t>(1, static_cast<int64_t>(kReadAtOnce / row_size_));
-    room.rows.Resize(last - first, 0);
-    if (filter_) room.filter.resize(static_cast<size_t>(last - first));
-    room.bytes.resize(static_cast<size_t>(std::min(at_once, last - first)) * row_size_);
-    for (int64_t i = first; i < last; i += at_once) {
-      const int64_t end = std::min(last, i + at_once);
-      ANCHORSPLAT_RETURN_IF_ERROR(file_.ReadAt(begin_ + static_cast<uint64_t>(i) * row_size_, room.bytes.data(),
-                                               static_cast<size_t>(end - i) * row_size_));
-      Unpack(i, end, i - first, room);
-    }
-    if (filter_) {
-      ANCHORSPLAT_RETURN_IF_ERROR(FuseFilter(file_, room.filter, first, room.rows));
-    }
-    if (usable_known_) return {};
-    for (int64_t i = first; i < last; ++i) {
-      uint8_t& usable = usable_[static_cast<size_t>(i)];
-      usable = usable != 0 && IsUsable(room.rows, i - first) ? 1 : 0;
-    }
-    return {};
+  Status Fill(int64_t first, int64_t last, Room& room, std::span<uint8_t> finite) override {
+    Buffer<float> filter(filter_ ? static_cast<size_t>(last - first) : 0);
+    ANCHORSPLAT_RETURN_IF_ERROR(ReadRows(
+        file_, begin_, row_size_, first, last, room.bytes, [&](const uint8_t* bytes, int64_t count, int64_t to) {
+          Unpack(bytes, count, to, room.rows);
+          for (int64_t i = 0; filter_ && i < count; ++i) {
+            std::memcpy(filter.data() + to + i, bytes + *filter_ + static_cast<size_t>(i) * row_size_, sizeof(float));
+          }
+          if (finite.empty()) return;
+          const uint8_t* row = bytes;
+          for (int64_t i = to; i < to + count; ++i, row += row_size_) {
+            bool all = true;
+            for (const Run& run : harmonics_) all &= !HasNotFinite(row + run.offset, run.count);
+            finite[static_cast<size_t>(i)] = all ? 1 : 0;
+          }
+        }));
+    return filter_ ? FuseFilter(file_, filter, first, room.rows) : Status();
   }
 
-  // Rows first to last of the file to row `to` of the room and on.
-  void Unpack(int64_t first, int64_t last, int64_t to, Room& room) {
+  // `count` rows of the file to row `to` and on.
+  void Unpack(const uint8_t* bytes, int64_t count, int64_t to, GaussianCloud& rows) const {
     for (const Column& column : columns_) {
-      float* out = (room.rows.*column.array).data() + to * column.width + column.component;
-      const char* from = room.bytes.data() + column.offset;
-      for (int64_t i = first; i < last; ++i, from += row_size_, out += column.width)
-        std::memcpy(out, from, sizeof *out);
+      float* out = (rows.*column.array).data() + to * column.width + column.component;
+      const uint8_t* from = bytes + column.offset;
+      for (int64_t i = 0; i < count; ++i, from += row_size_, out += column.width) std::memcpy(out, from, sizeof *out);
     }
-    if (filter_) {
-      const char* from = room.bytes.data() + *filter_;
-      for (int64_t i = first; i < last; ++i, from += row_size_) {
-        std::memcpy(room.filter.data() + to + (i - first), from, sizeof(float));
-      }
-    }
-    if (usable_known_) return;
-    const char* row = room.bytes.data();
-    for (int64_t i = first; i < last; ++i, row += row_size_) {
-      bool finite = true;
-      for (const Run& run : harmonics_) finite &= !HasNotFinite(row + run.offset, run.count);
-      usable_[static_cast<size_t>(i)] = finite ? 1 : 0;
-    }
+  }
+
+  Status EndFirst() override {
+    WarnOfOddTags(file_, header_);
+    if (filter_) SayFilterIsFused(file_, *render_mode_);
+    return {};
   }
 
   const InputFile& file_;

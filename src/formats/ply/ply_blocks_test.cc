@@ -2,13 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <cstring>
-#include <limits>
 #include <string>
 
 #include "core/statistics.h"
 #include "core/text.h"
+#include "formats/both_ways_for_test.h"
 #include "formats/extra_properties.h"
 #include "formats/opened_splat.h"
 #include "formats/ply/ply_reader.h"
@@ -20,57 +19,14 @@
 namespace anchorsplat {
 namespace {
 
-// Harmonics and other values that are not finite here and there.
-GaussianCloud Troubled(int64_t n, int degree) {
-  GaussianCloud cloud = RandomCloud(n, degree, static_cast<uint64_t>(degree + 1));
-  const float bad[] = {std::nanf(""), std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity()};
-  for (int64_t i = 0; i < n; i += 7) {
-    const auto k = static_cast<size_t>(i);
-    Buffer<float>* const arrays[] = {&cloud.means, &cloud.log_scales, &cloud.quats, &cloud.opacity_logits, &cloud.sh};
-    Buffer<float>& array = *arrays[k % 5];
-    const size_t width = array.size() / static_cast<size_t>(n);
-    array[k * width + (k / 5) % width] = bad[k % 3];
-  }
-  // The largest finite numbers are none of them.
-  cloud.sh[0] = std::numeric_limits<float>::max();
-  cloud.sh[1] = std::numeric_limits<float>::denorm_min();
-  return cloud;
-}
-
 // What a file's blocks show is what reading it gives.
 void ExpectBlocksOf(const std::filesystem::path& path) {
-  const auto read = ReadCloud(path);
-  ASSERT_TRUE(read.ok()) << read.error().message;
   const auto file = InputFile::Open(path);
+  const auto read = ReadBothWays(ReadPly, BlocksOfPly, *file);
+  ASSERT_TRUE(read.ok()) << read.error().message;
   const auto blocks = BlocksOfPly(*file, {});
   ASSERT_TRUE(blocks.ok()) << blocks.error().message;
   ASSERT_NE(*blocks, nullptr);
-  EXPECT_EQ((*blocks)->size(), read->size());
-  EXPECT_EQ((*blocks)->sh_degree(), read->sh_degree);
-  EXPECT_EQ((*blocks)->render_mode(), read->render_mode);
-  EXPECT_EQ((*blocks)->comments(), read->comments);
-  const GaussianCloud flat = WithShDegree(*read, 0);
-  for (int pass = 0; pass < 2; ++pass) {
-    GaussianCloud shown;
-    shown.Resize(read->size(), 0);
-    const Status done = (*blocks)->ForEach([&](const CloudBlock& block) {
-      const auto copy = [&](std::span<const float> from, Buffer<float>& to, int64_t width) {
-        std::memcpy(to.data() + block.first * width, from.data(), from.size_bytes());
-      };
-      copy(block.rows.means, shown.means, 3);
-      copy(block.rows.log_scales, shown.log_scales, 3);
-      copy(block.rows.quats, shown.quats, 4);
-      copy(block.rows.opacity_logits, shown.opacity_logits, 1);
-      copy(block.rows.sh, shown.sh, 3);
-      for (int64_t i = 0; i < block.size(); ++i) {
-        EXPECT_EQ(block.usable[static_cast<size_t>(i)] != 0, IsUsable(*read, block.first + i)) << block.first + i;
-      }
-    });
-    ASSERT_TRUE(done.ok()) << done.error().message;
-    shown.render_mode = flat.render_mode;
-    shown.comments = flat.comments;
-    ExpectSameCloud(shown, flat);
-  }
   StatisticsStudy study(**blocks);
   RowStudy* const studies[] = {&study};
   ASSERT_TRUE(Study(**blocks, studies).ok());
@@ -85,7 +41,7 @@ TEST(PlyBlocks, ShowWhatReadingGives) {
   const TestFolder folder;
   for (int degree = 0; degree <= kMaxShDegree; ++degree) {
     for (const int64_t n : {int64_t{2}, int64_t{700}, 5 * kCloudBlockRows + 3}) {
-      GaussianCloud cloud = Troubled(n, degree);
+      GaussianCloud cloud = TroubledCloud(n, degree);
       cloud.comments = {"a comment"};
       ASSERT_TRUE(WritePly(folder / "a.ply", cloud, {.overwrite = true}).ok());
       SCOPED_TRACE(testing::Message() << n << " Gaussians of degree " << degree);
@@ -96,7 +52,7 @@ TEST(PlyBlocks, ShowWhatReadingGives) {
 
 // Mip-Splatting's filter, and a property that is no float.
 std::filesystem::path WriteFiltered(const TestFolder& folder, int64_t n, int64_t bad_row) {
-  const GaussianCloud cloud = Troubled(n, 1);
+  const GaussianCloud cloud = TroubledCloud(n, 1);
   ExtraProperties extras;
   extras.properties = {{"label", PlyType::kUint8}, {"filter_3D", PlyType::kFloat}};
   extras.rows.resize(extras.row_size() * static_cast<size_t>(n));

@@ -11,9 +11,11 @@
 
 #include "core/parallel.h"
 #include "formats/attribute_error.h"
+#include "formats/both_ways_for_test.h"
 #include "formats/opened_splat.h"
 #include "formats/random_cloud_for_test.h"
 #include "formats/sog/clustered_cloud_for_test.h"
+#include "formats/sog/sog_blocks.h"
 #include "formats/sog/sog_reader.h"
 #include "formats/sog/sog_writer.h"
 #include "formats/splat_order.h"
@@ -27,7 +29,7 @@ namespace {
 
 Result<GaussianCloud> Read(const std::filesystem::path& path, const ReadLimits& limits = {}) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
-  return ReadSog(file, limits);
+  return ReadBothWays(ReadSog, BlocksOfSog, file, limits);
 }
 
 // Bytes that this process has asked the system for.
@@ -192,11 +194,12 @@ TEST(Sog, RefusesLiesAndOtherFolders) {
   EXPECT_CONTAINS(error_of(with("/shN/files/1", "quats.webp")), "labels beyond");
   const std::string zip = FileBytes(folder / "a.sog");
   for (const size_t size : {size_t{3}, size_t{100}, zip.size() / 2, zip.size() - 10}) {
-    EXPECT_FALSE(ReadSog(InputFile::FromBytes("a.sog", zip.substr(0, size))).ok()) << size;
+    EXPECT_FALSE(ReadBothWays(ReadSog, BlocksOfSog, InputFile::FromBytes("a.sog", zip.substr(0, size))).ok()) << size;
   }
   std::string damaged = zip;
   damaged[zip.size() / 2] = static_cast<char>(damaged[zip.size() / 2] ^ 0x10);
-  EXPECT_CONTAINS(ReadSog(InputFile::FromBytes("a.sog", damaged)).error().message, "damaged");
+  EXPECT_CONTAINS(ReadBothWays(ReadSog, BlocksOfSog, InputFile::FromBytes("a.sog", damaged)).error().message,
+                  "damaged");
   EXPECT_FALSE(Read(folder / "a.sog", {.max_gaussians = 1999}).ok());
 }
 

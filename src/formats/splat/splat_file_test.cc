@@ -10,6 +10,7 @@
 
 #include "core/random.h"
 #include "formats/attribute_error.h"
+#include "formats/both_ways_for_test.h"
 #include "formats/random_cloud_for_test.h"
 #include "formats/splat/splat_reader.h"
 #include "formats/splat/splat_writer.h"
@@ -21,7 +22,7 @@ namespace {
 
 Result<GaussianCloud> Read(const std::filesystem::path& path, const ReadLimits& limits = {}) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
-  return ReadSplat(file, limits);
+  return ReadBothWays(ReadSplat, BlocksOfSplat, file, limits);
 }
 
 TEST(SplatFile, BytesOfOneGaussian) {

@@ -1,14 +1,17 @@
 #include "formats/splat/splat_reader.h"
 
+#include <array>
 #include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <span>
 
 #include "core/activations.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
+#include "formats/file_blocks.h"
 #include "formats/record_blocks.h"
 
 namespace anchorsplat {
@@ -23,7 +26,18 @@ bool IsNoSplatRow(const float numbers[6]) {  // comparisons that NaN fails
   return false;
 }
 
-Result<GaussianCloud> ReadSplat(const InputFile& file, const ReadLimits& limits) {
+namespace {
+
+using SplatTable = std::array<float, 256>;
+template <typename Function>
+SplatTable OfEachByte(Function&& value) {
+  SplatTable table;
+  for (size_t k = 0; k < table.size(); ++k) table[k] = value(static_cast<float>(k) / 255);
+  return table;
+}
+
+// The number of Gaussians.
+Result<int64_t> CountOfSplat(const InputFile& file, const ReadLimits& limits) {
   if (file.size() == 0) {
     return Error{ErrorCode::kBadFile, Cat(file.name(), ": is empty, expected 32 bytes per Gaussian of a .splat file")};
   }
@@ -32,37 +46,76 @@ Result<GaussianCloud> ReadSplat(const InputFile& file, const ReadLimits& limits)
                                           ": a .splat file has 32 bytes per Gaussian, this one ends ",
                                           file.size() % kSplatRecord, " bytes after a whole number of them")};
   }
-  const auto count = static_cast<int64_t>(file.size() / kSplatRecord);
   ANCHORSPLAT_RETURN_IF_ERROR(CheckCount(file.name(), file.size() / kSplatRecord, limits));
+  return static_cast<int64_t>(file.size() / kSplatRecord);
+}
+
+// `count` records to row `to` and on; returns how many of them are those of no splat.
+int64_t UnpackSplat(const uint8_t* bytes, int64_t count, int64_t to, GaussianCloud& cloud) {
+  static const SplatTable kLogits = OfEachByte(LogitFromOpacity), kDc = OfEachByte(DcFromColor);
+  int64_t absurd = 0;
+  for (int64_t i = to; i < to + count; ++i, bytes += kSplatRecord) {
+    float numbers[6];
+    std::memcpy(numbers, bytes, sizeof numbers);
+    if (IsNoSplatRow(numbers)) ++absurd;
+    for (int k = 0; k < 3; ++k) {
+      cloud.means[static_cast<size_t>(3 * i + k)] = numbers[k];
+      cloud.log_scales[static_cast<size_t>(3 * i + k)] = LogFromScale(numbers[3 + k]);
+      cloud.sh[static_cast<size_t>(3 * i + k)] = kDc[bytes[24 + k]];
+    }
+    cloud.opacity_logits[static_cast<size_t>(i)] = kLogits[bytes[27]];
+    for (int k = 0; k < 4; ++k) {
+      cloud.quats[static_cast<size_t>(4 * i + k)] = (static_cast<float>(bytes[28 + k]) - 128) / 128;
+    }
+  }
+  return absurd;
+}
+
+Status CheckSplatRows(const InputFile& file, int64_t absurd, int64_t count) {
+  if (2 * absurd <= count) return {};
+  return Error{
+      ErrorCode::kBadFile,
+      Cat(file.name(), ": is no .splat file: ", WithThousands(absurd), " of ", WithThousands(count),
+          " rows of 32 bytes have positions or scales that are no numbers, negative or above a million millions")};
+}
+
+class SplatBlocks final : public FileBlocks {
+ public:
+  SplatBlocks(const InputFile& file, int64_t count) : file_(file) { size_ = count; }
+
+ private:
+  Status Fill(int64_t first, int64_t last, Room& room, std::span<uint8_t> finite) override {
+    int64_t absurd = 0;
+    ANCHORSPLAT_RETURN_IF_ERROR(ReadRows(
+        file_, 0, kSplatRecord, first, last, room.bytes,
+        [&](const uint8_t* bytes, int64_t count, int64_t to) { absurd += UnpackSplat(bytes, count, to, room.rows); }));
+    if (!finite.empty()) absurd_ += absurd;
+    return {};
+  }
+  Status EndFirst() override { return CheckSplatRows(file_, absurd_.exchange(0), size_); }
+
+  const InputFile& file_;
+  std::atomic<int64_t> absurd_ = 0;  // rows of the first pass
+};
+
+}  // namespace
+
+Result<GaussianCloud> ReadSplat(const InputFile& file, const ReadLimits& limits) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t count, CountOfSplat(file, limits));
   GaussianCloud cloud;
   cloud.Resize(count, 0);
   std::atomic<int64_t> absurd = 0;
   ANCHORSPLAT_RETURN_IF_ERROR(
       ReadRecords(file, 0, count, kSplatRecord, [&](int64_t first, int64_t last, const uint8_t* bytes) {
-        int64_t absurd_here = 0;
-        for (int64_t i = first; i < last; ++i, bytes += kSplatRecord) {
-          float numbers[6];
-          std::memcpy(numbers, bytes, sizeof numbers);
-          if (IsNoSplatRow(numbers)) ++absurd_here;
-          for (int k = 0; k < 3; ++k) {
-            cloud.means[static_cast<size_t>(3 * i + k)] = numbers[k];
-            cloud.log_scales[static_cast<size_t>(3 * i + k)] = LogFromScale(numbers[3 + k]);
-            cloud.sh[static_cast<size_t>(3 * i + k)] = DcFromColor(static_cast<float>(bytes[24 + k]) / 255);
-          }
-          cloud.opacity_logits[static_cast<size_t>(i)] = LogitFromOpacity(static_cast<float>(bytes[27]) / 255);
-          for (int k = 0; k < 4; ++k) {
-            cloud.quats[static_cast<size_t>(4 * i + k)] = (static_cast<float>(bytes[28 + k]) - 128) / 128;
-          }
-        }
-        absurd += absurd_here;
+        absurd += UnpackSplat(bytes, last - first, first, cloud);
       }));
-  if (2 * absurd > count) {
-    return Error{
-        ErrorCode::kBadFile,
-        Cat(file.name(), ": is no .splat file: ", WithThousands(absurd), " of ", WithThousands(count),
-            " rows of 32 bytes have positions or scales that are no numbers, negative or above a million millions")};
-  }
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckSplatRows(file, absurd, count));
   return cloud;
+}
+
+Result<std::unique_ptr<CloudBlocks>> BlocksOfSplat(const InputFile& file, const ReadLimits& limits) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t count, CountOfSplat(file, limits));
+  return std::unique_ptr<CloudBlocks>(std::make_unique<SplatBlocks>(file, count));
 }
 
 }  // namespace anchorsplat

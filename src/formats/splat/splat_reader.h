@@ -1,5 +1,8 @@
 #pragma once
 
+#include <memory>
+
+#include "core/cloud_blocks.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
@@ -15,6 +18,9 @@ namespace anchorsplat {
 // of the rows have a position or scale that is not finite, beyond kSplatExtent or, for scales, negative: that is text
 // or another format under this name.
 Result<GaussianCloud> ReadSplat(const InputFile& file, const ReadLimits& limits = {});
+
+// The same, to look at block by block. Errors as ReadSplat; what rows tell comes from the first ForEach.
+Result<std::unique_ptr<CloudBlocks>> BlocksOfSplat(const InputFile& file, const ReadLimits& limits);
 
 inline constexpr size_t kSplatRecord = 32;  // bytes
 

@@ -3,6 +3,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -12,8 +13,10 @@
 #include "core/parallel.h"
 #include "formats/attribute_error.h"
 #include "formats/axes.h"
+#include "formats/both_ways_for_test.h"
 #include "formats/random_cloud_for_test.h"
 #include "formats/splat_order.h"
+#include "formats/spz/spz_blocks.h"
 #include "formats/spz/spz_reader.h"
 #include "formats/spz/spz_writer.h"
 #include "io/file_bytes_for_test.h"
@@ -25,11 +28,11 @@ namespace {
 
 Result<GaussianCloud> Read(const std::filesystem::path& path, const ReadLimits& limits = {}) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
-  return ReadSpz(file, limits);
+  return ReadBothWays(ReadSpz, BlocksOfSpz, file, limits);
 }
 
 std::string ErrorOf(std::string bytes) {
-  const auto cloud = ReadSpz(InputFile::FromBytes("a.spz", std::move(bytes)));
+  const auto cloud = ReadBothWays(ReadSpz, BlocksOfSpz, InputFile::FromBytes("a.spz", std::move(bytes)));
   return cloud.ok() ? "accepted" : cloud.error().message;
 }
 
@@ -111,7 +114,7 @@ TEST(Spz, BytesOfOneGaussian) {
   for (const uint32_t version : {1u, 2u, 3u}) {
     const std::string file = Gzip(RawHeader(version, 1, 1, 12, version == 2 ? 1 : 0) + (version == 1 ? halves : fixed) +
                                   middle + (version < 3 ? xyz : smallest) + sh);
-    const auto cloud = ReadSpz(InputFile::FromBytes("a.spz", file));
+    const auto cloud = ReadBothWays(ReadSpz, BlocksOfSpz, InputFile::FromBytes("a.spz", file));
     ASSERT_TRUE(cloud.ok()) << cloud.error().message;
     EXPECT_THAT(cloud->means, testing::ElementsAre(1.5f, 1.5f, -1.0f));
     EXPECT_THAT(cloud->log_scales, testing::ElementsAre(0.0f, -1.0f, -10.0f));
@@ -138,7 +141,7 @@ TEST(Spz, DegreeFourIsReadAsThree) {
   sh[44] = '\x81';
   sh[45] = '\xff';
   const std::string file = Gzip(RawHeader(3, 1, 4, 12, 0) + std::string(9 + 7 + 4, '\x80') + sh);
-  const auto cloud = ReadSpz(InputFile::FromBytes("a.spz", file));
+  const auto cloud = ReadBothWays(ReadSpz, BlocksOfSpz, InputFile::FromBytes("a.spz", file));
   ASSERT_TRUE(cloud.ok()) << cloud.error().message;
   EXPECT_EQ(cloud->sh_degree, 3);
   EXPECT_EQ(std::fabs(cloud->sh[47]), 1.0f / 128);
@@ -252,6 +255,35 @@ TEST(Spz, RefusesDamageLiesAndBombs) {
   EXPECT_EQ(Read(folder / "4.spz", {.max_gaussians = 2999}).error().code, ErrorCode::kBadFile);
   EXPECT_EQ(WriteSpz(folder / "b.spz", cloud, {.spz_version = 2}).error().code, ErrorCode::kBadArgument);
   EXPECT_EQ(folder.Entries(), 2);
+}
+
+// Sections are looked at side by side, and the error is still that of the first one, wherever in it.
+TEST(Spz, BlocksNameTheFirstDamagedSection) {
+  const TestFolder folder;
+  const int64_t n = 300'000;
+  for (const int version : {3, 4}) {
+    ASSERT_TRUE(WriteSpz(folder / "a.spz", Tame(n, 1, 8), {.overwrite = true, .spz_version = version}).ok());
+    std::string bytes = FileBytes(folder / "a.spz");
+    EXPECT_EQ(ErrorOf(bytes), "accepted");
+    // Behind the first rows of the means, and the harmonics. So many bytes are no value that happens to be another, as
+    // a few in a stream without a checksum.
+    constexpr size_t kDamaged = 300'000;
+    size_t means = bytes.size() / 3, harmonics = bytes.size() - kDamaged;
+    if (version == 4) {
+      std::array<uint64_t, 12> table;  // compressed and raw size of each section
+      std::memcpy(table.data(), bytes.data() + 32, sizeof table);
+      means = 32 + sizeof table + table[0] - kDamaged;
+      harmonics = bytes.size() - table[10];
+    }
+    bytes.replace(harmonics, kDamaged, kDamaged, '\xff');
+    const std::string later = ErrorOf(bytes);
+    EXPECT_NE(later, "accepted");
+    bytes.replace(means, kDamaged, kDamaged, '\xff');
+    const std::string first = ErrorOf(bytes);
+    EXPECT_NE(first, "accepted");
+    EXPECT_NE(first, later);
+    EXPECT_NE(ErrorOf(bytes.substr(0, harmonics)), "accepted");
+  }
 }
 
 }  // namespace

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "core/log.h"
+#include "core/parallel.h"
+#include "formats/blocks_for_test.h"
+#include "formats/messages_for_test.h"
+
+namespace anchorsplat {
+
+// Reads a file whole and looks at it block by block, with all threads and with one: expects the same of both, warnings
+// included. For the tests of readers, which so are tests of blocks.
+inline Result<GaussianCloud> ReadBothWays(ReadFunction read, BlocksFunction open, const InputFile& file,
+                                          const ReadLimits& limits = {}) {
+  std::vector<std::string> warnings, notes;
+  Result<GaussianCloud> cloud = [&] {
+    const Messages messages;
+    auto result = read(file, limits);
+    warnings = messages.warnings();
+    notes = messages.notes();
+    return result;
+  }();
+  for (const int threads : {0, 1}) {
+    SetThreadCount(threads);
+    const Messages messages;
+    EXPECT_EQ(DifferenceOfBlocks(open, file, limits, cloud), "") << file.name() << " with threads: " << threads;
+    if (cloud.ok()) {
+      EXPECT_EQ(messages.warnings(), warnings);
+      EXPECT_EQ(messages.notes(), notes);
+    }
+  }
+  SetThreadCount(0);
+  for (const std::string& text : warnings) LogWarning(text);
+  for (const std::string& text : notes) LogInfo(text);
+  return cloud;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <vector>
+
+#include "core/result.h"
+#include "formats/cloud_io.h"
+#include "formats/gltf/gltf_document.h"
+#include "io/input_file.h"
+#include "io/json_file.h"
+
+namespace anchorsplat {
+
+inline constexpr const char* kGltfSplatting = "KHR_gaussian_splatting";
+
+// A primitive of splats as a node shows it, its accessors checked against each other.
+struct GltfPrimitive {
+  GltfDocument::Accessor means, quats, scales, opacities;
+  std::vector<GltfDocument::Accessor> sh;  // floats, by coefficient
+  int degree = 0;
+  double scale = 1;
+  std::array<double, 3> translation = {0, 0, 0};
+
+  int64_t count() const { return means.count; }
+};
+
+// All that the scene's nodes show. The accessors are the document's.
+struct GltfSplats {
+  std::vector<GltfPrimitive> primitives;
+  int64_t count = 0;  // of their Gaussians
+  int degree = 0;     // the highest
+};
+// Errors as ReadGltf, but for those of reading.
+Result<GltfSplats> FindGltfSplats(const InputFile& file, const GltfDocument& document, const ReadLimits& limits);
+
+// What makes a primitive a splat.
+std::optional<JsonValue> SplatExtension(const JsonValue& primitive);
+
+// The primitives of meshes. Each mesh is looked through once: a hostile file shows one with a hundred thousand
+// primitives by as many nodes.
+class MeshSplats {
+ public:
+  struct Mesh {
+    std::vector<JsonValue> splats;
+    int64_t others = 0;  // primitives that are none
+  };
+  explicit MeshSplats(const GltfDocument& document) : document_(&document) {}
+
+  // Valid as long as this lives.
+  Result<const Mesh*> Find(const JsonValue& index);
+
+ private:
+  const GltfDocument* document_;
+  std::map<const nlohmann::json*, Mesh> meshes_;
+};
+
+}  // namespace anchorsplat

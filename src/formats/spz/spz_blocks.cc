@@ -1,0 +1,177 @@
+#include "formats/spz/spz_blocks.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <iterator>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/parallel.h"
+#include "core/run_context.h"
+#include "formats/axes.h"
+#include "formats/file_blocks.h"
+#include "formats/spz/spz_file.h"
+#include "formats/spz/spz_sections.h"
+#include "io/inflating_reader.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr size_t kLooked = 5;     // sections that rows of degree 0 need: the first ones
+constexpr size_t kHarmonics = 5;  // the one that is only checked
+constexpr int64_t kBatchRows = 8 * kRowsPerRoom;
+
+// Passes over decompressed bytes.
+Status Drain(InflatingReader& reader, uint64_t bytes) {
+  std::array<uint8_t, size_t{64} << 10> scratch;
+  for (uint64_t done = 0; done < bytes;) {
+    LeaveIfAbandoned();
+    const auto size = static_cast<size_t>(std::min<uint64_t>(scratch.size(), bytes - done));
+    ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(scratch.data(), size));
+    done += size;
+  }
+  return {};
+}
+
+class SpzBlocks final : public FileBlocks {
+ public:
+  SpzBlocks(const InputFile& file, SpzFile spz) : file_(file), spz_(std::move(spz)) {
+    size_ = spz_.count;
+    sh_degree_ = spz_.sh_degree();
+    if (spz_.antialiased) render_mode_ = RenderMode::kAntialiased;
+  }
+
+  Status ForEach(const Look& look) override {
+    BeginPass();
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Readers readers, OpenReaders());
+    now_ = {};
+    Batch next;
+    do {
+      std::swap(now_, next);
+      next.first = now_.last;
+      next.last = std::min(next.first + kBatchRows, size_);
+      ANCHORSPLAT_RETURN_IF_ERROR(LookAndDecompress(readers, next, look));
+    } while (now_.last < size_);
+    return EndPass();
+  }
+
+ private:
+  // By section; null where it needs no reading.
+  using Readers = std::array<std::unique_ptr<InflatingReader>, kSpzSections.size()>;
+  // Rows that have been decompressed.
+  struct Batch {
+    int64_t first = 0, last = 0;
+    std::array<Buffer<uint8_t>, kLooked> bytes;
+  };
+
+  Result<Readers> OpenReaders() {
+    Readers readers;
+    if (!spz_.gzip) {
+      for (size_t k = 0; k < (first_time() ? spz_.sections() : kLooked); ++k) {
+        readers[k] = OpenZstd(file_, spz_.begins[k], spz_.begins[k + 1]);
+      }
+      return readers;
+    }
+    if (first_time()) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(readers[kHarmonics], FindStarts());
+    }
+    for (size_t k = 0; k < kLooked; ++k) readers[k] = starts_[k]->Copy();
+    return readers;
+  }
+
+  // Goes through what rows of degree 0 need and keeps where its sections begin. Returns what reads the harmonics, which
+  // follow; null where there are none.
+  Result<std::unique_ptr<InflatingReader>> FindStarts() {
+    std::unique_ptr<CopyableReader> reader = spz_.gzip->Copy();
+    for (size_t k = 0; k < kLooked; ++k) {
+      starts_[k] = reader->Copy();
+      ANCHORSPLAT_RETURN_IF_ERROR(Drain(*reader, BytesOf(k, size_)));
+    }
+    if (spz_.sections() > kLooked) return std::unique_ptr<InflatingReader>(std::move(reader));
+    ANCHORSPLAT_RETURN_IF_ERROR(reader->ExpectEnd());
+    return std::unique_ptr<InflatingReader>();
+  }
+
+  // Calls `look` with what has been decompressed and decompresses what comes next, side by side.
+  Status LookAndDecompress(const Readers& readers, Batch& next, const Look& look) {
+    std::vector<size_t> sections;
+    for (const size_t k :
+         {kHarmonics, size_t{0}, size_t{4}, size_t{2}, size_t{3}, size_t{1}}) {  // the longest ones first
+      if (readers[k] && next.first < next.last) sections.push_back(k);
+    }
+    const auto streams = std::ssize(sections);
+    const int64_t rooms = (now_.last - now_.first + kRowsPerRoom - 1) / kRowsPerRoom;
+    std::array<Status, kSpzSections.size()> statuses;
+    ParallelFor(0, streams + rooms, 1, [&](int64_t begin, int64_t end) {
+      for (int64_t task = begin; task < end; ++task) {
+        if (task < streams) {
+          const size_t k = sections[static_cast<size_t>(task)];
+          statuses[k] = Decompress(k, *readers[k], next);
+        } else {
+          const int64_t first = now_.first + (task - streams) * kRowsPerRoom;
+          Room room;
+          (void)Show(first, std::min(now_.last, first + kRowsPerRoom), room, look);  // reads nothing
+        }
+      }
+    });
+    for (const Status& status : statuses) {
+      if (!status.ok()) return FirstError(status);
+    }
+    return {};
+  }
+
+  Status Decompress(size_t section, InflatingReader& reader, Batch& batch) const {
+    const uint64_t bytes = BytesOf(section, batch.last - batch.first);
+    if (section == kHarmonics) {
+      ANCHORSPLAT_RETURN_IF_ERROR(Drain(reader, bytes));
+    } else {
+      batch.bytes[section].resize(static_cast<size_t>(bytes));
+      ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(batch.bytes[section].data(), batch.bytes[section].size()));
+    }
+    const bool has_end = !spz_.gzip || section == kHarmonics;
+    return has_end && batch.last == size_ ? reader.ExpectEnd() : Status();
+  }
+
+  // Reading looks at one section after the other, this at all of them from the first row to the last.
+  Status FirstError(const Status& found) const {
+    if (spz_.gzip) return found;  // its other sections have been gone through
+    for (size_t k = 0; k < spz_.sections(); ++k) {
+      const std::unique_ptr<InflatingReader> reader = OpenZstd(file_, spz_.begins[k], spz_.begins[k + 1]);
+      ANCHORSPLAT_RETURN_IF_ERROR(Drain(*reader, BytesOf(k, size_)));
+      ANCHORSPLAT_RETURN_IF_ERROR(reader->ExpectEnd());
+    }
+    return found;
+  }
+
+  Status Fill(int64_t first, int64_t last, Room& room, std::span<uint8_t>) override {
+    for (size_t k = 0; k < kLooked; ++k) {
+      const uint8_t* const bytes = now_.bytes[k].data() + BytesOf(k, first - now_.first);
+      UnpackSpz(spz_.layout, kSpzSections[k], 0, last - first, bytes, flip_, room.rows);
+    }
+    return {};
+  }
+
+  uint64_t BytesOf(size_t section, int64_t rows) const {
+    return static_cast<uint64_t>(rows) * spz_.layout.record_size(kSpzSections[section]);
+  }
+
+  const InputFile& file_;
+  SpzFile spz_;
+  std::array<std::unique_ptr<CopyableReader>, kLooked> starts_;  // of a gzip stream
+  Batch now_;
+  AxisFlip flip_ = FlipBetween(kRub, kRdf);
+};
+
+}  // namespace
+
+Result<std::unique_ptr<CloudBlocks>> BlocksOfSpz(const InputFile& file, const ReadLimits& limits) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(SpzFile spz, OpenSpz(file, limits));
+  WarnOfSpzDegree(file, spz);
+  return std::unique_ptr<CloudBlocks>(std::make_unique<SpzBlocks>(file, std::move(spz)));
+}
+
+}  // namespace anchorsplat

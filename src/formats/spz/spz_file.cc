@@ -1,0 +1,161 @@
+#include "formats/spz/spz_file.h"
+
+#include <algorithm>
+#include <bit>
+#include <string>
+#include <utility>
+
+#include "core/log.h"
+#include "core/text.h"
+#include "formats/cloud_checks.h"
+#include "formats/spz/spz_reader.h"
+#include "io/compression_ratio.h"
+
+namespace anchorsplat {
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "headers are copied as they lie in the file");
+
+struct SpzHeader {
+  uint32_t magic, version, count;
+  uint8_t sh_degree, fractional_bits, flags, streams;
+};
+static_assert(sizeof(SpzHeader) == 16);
+
+// Version 4: follows the header; streams begin after the table.
+struct TablePlace {
+  uint32_t offset;
+  uint32_t reserved[3];
+};
+struct StreamSize {
+  uint64_t compressed, raw;
+};
+
+std::string At(const InputFile& file, uint64_t byte) {
+  return Cat(file.name(), ": byte ", WithThousands(static_cast<int64_t>(byte)));
+}
+
+// The layout that the header speaks of.
+Result<SpzLayout> CheckHeader(const InputFile& file, const SpzHeader& header, const ReadLimits& limits) {
+  const auto bad = [&file](uint64_t byte, const std::string& what) {
+    return Error{ErrorCode::kBadFile, Cat(At(file, byte), " of the SPZ header: ", what)};
+  };
+  if (header.magic != kSpzMagic) return bad(0, "does not begin with \"NGSP\": no SPZ file");
+  if (header.version < 1 || header.version > 4) return bad(4, Cat("version ", header.version, ", expected 1 to 4"));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckCount(At(file, 8), header.count, limits));
+  if (header.sh_degree > kMaxSpzShDegree) return bad(12, Cat("SH degree ", int{header.sh_degree}, ", expected 0 to 4"));
+  if (header.fractional_bits > 24)
+    return bad(13, Cat(int{header.fractional_bits}, " fractional bits, expected 0 to 24"));
+  SpzLayout layout;
+  layout.version = static_cast<int>(header.version);
+  layout.sh_degree = header.sh_degree;
+  layout.fractional_bits = header.fractional_bits;
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), file.size(), header.count * uint64_t{layout.record_size()}));
+  return layout;
+}
+
+SpzFile FileOf(const SpzHeader& header, const SpzLayout& layout) {
+  SpzFile spz;
+  spz.layout = layout;
+  spz.count = header.count;
+  spz.antialiased = (header.flags & kSpzAntialiased) != 0;
+  return spz;
+}
+
+Result<SpzFile> OpenGzipped(const InputFile& file, const ReadLimits& limits) {
+  std::unique_ptr<CopyableReader> reader = OpenGzip(file, 0);
+  SpzHeader header;
+  ANCHORSPLAT_RETURN_IF_ERROR(reader->Read(&header, sizeof header));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzLayout layout, CheckHeader(file, header, limits));
+  if (layout.version > 3) return Error{ErrorCode::kBadFile, Cat(At(file, 0), ": version 4 in a gzip stream")};
+  SpzFile spz = FileOf(header, layout);
+  spz.gzip = std::move(reader);
+  return spz;
+}
+
+Result<SpzFile> OpenStreams(const InputFile& file, const ReadLimits& limits) {
+  SpzHeader header;
+  TablePlace place;
+  ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(0, &header, sizeof header));
+  ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(sizeof header, &place, sizeof place));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzLayout layout, CheckHeader(file, header, limits));
+  if (layout.version < 4) {
+    return Error{ErrorCode::kBadFile, Cat(At(file, 4), ": version ", layout.version, " outside of a gzip stream")};
+  }
+  SpzFile spz = FileOf(header, layout);
+  const size_t streams = header.sh_degree > 0 ? 6 : 5;
+  if (header.streams != streams || place.offset < sizeof header + sizeof place) {
+    return Error{ErrorCode::kBadFile,
+                 Cat(At(file, 15), ": has ", int{header.streams}, " streams with their table at byte ", place.offset,
+                     ", expected ", streams, " and a table from byte 32 on")};
+  }
+  std::array<StreamSize, 6> sizes{};
+  ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(place.offset, sizes.data(), streams * sizeof(StreamSize)));
+  std::array<uint64_t, 7>& begins = spz.begins;
+  begins[0] = place.offset + streams * sizeof(StreamSize);
+  for (size_t k = 0; k < streams; ++k) {
+    const uint64_t expected = header.count * uint64_t{spz.layout.record_size(kSpzSections[k])};
+    if (sizes[k].compressed > file.size() - begins[k] || sizes[k].raw != expected) {
+      return Error{ErrorCode::kBadFile, Cat(At(file, place.offset + k * sizeof(StreamSize)), ": stream ", k, " has ",
+                                            sizes[k].compressed, " bytes for ", sizes[k].raw, ", expected ", expected,
+                                            " from at most ", file.size() - begins[k])};
+    }
+    begins[k + 1] = begins[k] + sizes[k].compressed;
+  }
+  return spz;
+}
+
+bool IsGzip(const std::string& head) { return head == "\x1f\x8b"; }
+
+Result<SpzHeader> ReadHeader(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
+  SpzHeader header;
+  if (IsGzip(head)) {
+    ANCHORSPLAT_RETURN_IF_ERROR(OpenGzip(file, 0)->Read(&header, sizeof header));
+  } else {
+    ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(0, &header, sizeof header));
+  }
+  return header;
+}
+
+}  // namespace
+
+int SpzFile::sh_degree() const { return std::min(layout.sh_degree, kMaxShDegree); }
+size_t SpzFile::sections() const { return layout.sh_degree > 0 ? 6 : 5; }
+
+Result<SpzFile> OpenSpz(const InputFile& file, const ReadLimits& limits) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
+  return IsGzip(head) ? OpenGzipped(file, limits) : OpenStreams(file, limits);
+}
+
+void WarnOfSpzDegree(const InputFile& file, const SpzFile& spz) {
+  if (spz.layout.sh_degree > kMaxShDegree) LogWarning(Cat(file.name(), ": SH degree 4 is read as 3"));
+}
+
+Result<CloudExtent> ExtentOfSpz(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzHeader header, ReadHeader(file));
+  ANCHORSPLAT_RETURN_IF_ERROR([&]() -> Status {
+    const auto layout = CheckHeader(file, header, {});
+    return layout.ok() ? Status() : Status(layout.error());
+  }());
+  return CloudExtent{header.count, std::min<int>(header.sh_degree, kMaxShDegree)};
+}
+
+Result<FormatFacts> DescribeSpz(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzHeader header, ReadHeader(file));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzLayout layout, CheckHeader(file, header, {}));
+  FormatFacts facts;
+  facts.Add("version", layout.version, layout.version < 4 ? ", one gzip stream" : ", a zstd stream per attribute");
+  if (layout.version == 1) {
+    facts.Add("positions", "half floats");
+  } else {
+    facts.Add("positions", layout.fractional_bits, " fractional bits: steps of 1/",
+              uint32_t{1} << layout.fractional_bits);
+  }
+  facts.Add("antialiased", (header.flags & kSpzAntialiased) != 0 ? "yes" : "no, or not said");
+  if (layout.sh_degree > kMaxShDegree) facts.Add("harmonics", "degree ", layout.sh_degree, ", read as ", kMaxShDegree);
+  return facts;
+}
+
+}  // namespace anchorsplat

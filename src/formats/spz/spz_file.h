@@ -1,0 +1,35 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include "core/result.h"
+#include "formats/cloud_io.h"
+#include "formats/spz/spz_sections.h"
+#include "io/inflating_reader.h"
+#include "io/input_file.h"
+
+namespace anchorsplat {
+
+// An SPZ file whose header has been read and checked: spz_reader.h has the two kinds.
+struct SpzFile {
+  SpzLayout layout;
+  int64_t count = 0;
+  bool antialiased = false;
+  // Versions 1 to 3: the stream, behind its header. Null for version 4:
+  std::unique_ptr<CopyableReader> gzip;
+  // of section k of kSpzSections are bytes begins[k] to begins[k + 1].
+  std::array<uint64_t, 7> begins{};
+
+  int sh_degree() const;    // of a cloud
+  size_t sections() const;  // those with bytes; the harmonics are the last
+};
+
+// Errors as ReadSpz, but for those of the sections.
+Result<SpzFile> OpenSpz(const InputFile& file, const ReadLimits& limits);
+
+// Says what of it will not be read.
+void WarnOfSpzDegree(const InputFile& file, const SpzFile& spz);
+
+}  // namespace anchorsplat

@@ -13,7 +13,7 @@ namespace anchorsplat {
 namespace {
 
 constexpr int kChannels = 3;
-constexpr int kRowsPerTask = 64;
+constexpr int kRowsPerTask = 128;
 
 Error BadArgument(std::string message) { return {ErrorCode::kBadArgument, std::move(message)}; }
 

@@ -121,6 +121,10 @@ void StartTile(int columns, int rows, Tile& t) {
     const int x = static_cast<int>(block % kBlocksPerSide) * kBlock;
     const int y = static_cast<int>(block / kBlocksPerSide) * kBlock;
     t.finished[block] = x >= columns || y >= rows;
+    if (x + kBlock <= columns && y + kBlock <= rows) {  // nearly all
+      std::fill_n(t.passed[block], kPixels, 1.0f);
+      continue;
+    }
     for (int i = 0; i < static_cast<int>(kPixels); ++i) {
       const bool inside = x + i % kBlock < columns && y + i / kBlock < rows;
       t.passed[block][i] = inside ? 1.0f : 0.0f;

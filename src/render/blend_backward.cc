@@ -45,8 +45,7 @@ struct Tile : TileBatch<kBatch> {
   alignas(64) float transmittance[kBlocks][kPixels];  // T behind the Gaussian that is next
   alignas(64) float behind[kBlocks][kPixels];         // S of BlendBackwardParams
   alignas(64) int32_t contributors[kBlocks][kPixels];
-  int32_t last[kBlocks];  // the largest of its contributors
-  bool flat[kBlocks];     // no pixel has a gradient
+  int32_t last[kBlocks];  // the largest of its contributors, 0 where no pixel has a gradient
 
   // Of a group: q and w of every pixel in turn, whose they are and whether they are not all 0. Behind the group, three
   // Gaussians with sums of their own that nobody reads.
@@ -257,6 +256,44 @@ void LoadPlane(const T* plane, int width, int x0, int y0, int x1, int y1, T outs
   }
 }
 
+// What follows from a block's pixels.
+HWY_INLINE void StartBlock(const BlendBackwardParams& p, size_t block, double* background_gradient, Tile& t) {
+  const D d;
+  const DI di;
+  const V zero = hn::Zero(d);
+  V background[3] = {zero, zero, zero};
+  VI last = hn::Zero(di);
+  bool flat = true;
+  for (size_t first = 0; first < kPixels; first += hn::Lanes(d)) {
+    const auto load = [&](const float(*plane)[kPixels]) HWY_ATTR { return hn::Load(d, plane[block] + first); };
+    const V red = load(t.color_gradient[0]), green = load(t.color_gradient[1]), blue = load(t.color_gradient[2]);
+    const V transmittance = load(t.transmittance), alpha = load(t.behind);
+    // Written so that NaN is not flat.
+    const M flat_color = hn::And(hn::And(hn::Eq(red, zero), hn::Eq(green, zero)), hn::Eq(blue, zero));
+    flat = flat && hn::AllTrue(d, hn::And(flat_color, hn::Eq(alpha, zero)));
+    last = hn::Max(last, hn::Load(di, t.contributors[block] + first));
+    background[0] = hn::MulAdd(transmittance, red, background[0]);
+    background[1] = hn::MulAdd(transmittance, green, background[1]);
+    background[2] = hn::MulAdd(transmittance, blue, background[2]);
+    const V behind = hn::MulAdd(
+        hn::Set(d, p.background[0]), red,
+        hn::MulAdd(hn::Set(d, p.background[1]), green, hn::MulSub(hn::Set(d, p.background[2]), blue, alpha)));
+    hn::Store(hn::Mul(transmittance, behind), d, t.behind[block] + first);
+  }
+  for (size_t c = 0; c < 3; ++c) {
+    background_gradient[c] += static_cast<double>(hn::GetLane(hn::SumOfLanes(d, background[c])));
+  }
+  t.last[block] = flat ? 0 : hn::GetLane(hn::MaxOfLanes(di, last));
+  if (t.last[block] == 0) return;
+  for (size_t k = 0; k < kPixels; ++k) {
+    const size_t i = t.order[k];
+    float* features = t.features[block][k];
+    features[kRed] = t.color_gradient[0][block][i];
+    features[kGreen] = t.color_gradient[1][block][i];
+    features[kBlue] = t.color_gradient[2][block][i];
+  }
+}
+
 // Loads the pixels and adds the background's gradient. Returns 1 + the last place of the tile's list that matters.
 int32_t StartTile(const BlendBackwardParams& p, int tile_x, int tile_y, double* background_gradient, Tile& t) {
   // Pixels outside of the image or the box have no gradient, which makes everything 0.
@@ -276,31 +313,7 @@ int32_t StartTile(const BlendBackwardParams& p, int tile_x, int tile_y, double* 
   }
   int32_t last_of_tile = 0;
   for (size_t block = 0; block < kBlocks; ++block) {
-    float background[3] = {0, 0, 0};
-    int32_t last = 0;
-    bool flat = true;
-    for (size_t i = 0; i < kPixels; ++i) {
-      const float red = t.color_gradient[0][block][i], green = t.color_gradient[1][block][i],
-                  blue = t.color_gradient[2][block][i];
-      const float transmittance = t.transmittance[block][i];
-      // Written so that NaN is not flat.
-      flat = flat && red == 0 && green == 0 && blue == 0 && t.behind[block][i] == 0;
-      last = std::max(last, t.contributors[block][i]);
-      background[0] += transmittance * red;
-      background[1] += transmittance * green;
-      background[2] += transmittance * blue;
-      t.behind[block][i] = transmittance * (p.background[0] * red + p.background[1] * green + p.background[2] * blue -
-                                            t.behind[block][i]);
-    }
-    for (size_t k = 0; k < kPixels; ++k) {
-      const size_t i = t.order[k];
-      t.features[block][k][kRed] = t.color_gradient[0][block][i];
-      t.features[block][k][kGreen] = t.color_gradient[1][block][i];
-      t.features[block][k][kBlue] = t.color_gradient[2][block][i];
-    }
-    for (int c = 0; c < 3; ++c) background_gradient[c] += static_cast<double>(background[c]);
-    t.flat[block] = flat;
-    t.last[block] = flat ? 0 : last;
+    StartBlock(p, block, background_gradient, t);
     last_of_tile = std::max(last_of_tile, t.last[block]);
   }
   return last_of_tile;

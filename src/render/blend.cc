@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "core/parallel.h"
+#include "render/piece.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/blend.cc"
@@ -243,11 +244,10 @@ namespace anchorsplat {
 HWY_EXPORT(BlendRange);
 
 void BlendCpu(const BlendParams& p) {
-  // Tiles cost very differently, so tasks are small; empty ones are so cheap that one alone is not worth a task.
-  constexpr int64_t kTilesPerTask = 4;
-  ParallelFor(p.first_tile, p.last_tile, kTilesPerTask, [&p](int64_t first, int64_t last) {
-    HWY_DYNAMIC_DISPATCH(BlendRange)(p, first, last);
-  });
+  const int64_t pairs = p.tile_offsets[p.last_tile] - p.tile_offsets[p.first_tile];
+  ParallelFor(p.first_tile, p.last_tile, TilesPerTask(p.last_tile - p.first_tile, pairs),
+              [&p](int64_t first, int64_t last) { HWY_DYNAMIC_DISPATCH(BlendRange)
+                                                  (p, first, last); });
 }
 
 }  // namespace anchorsplat

@@ -454,12 +454,14 @@ namespace anchorsplat {
 HWY_EXPORT(BackwardRange);
 
 void BlendBackwardCpu(const BlendBackwardParams& p) {
-  // All in one task where they share the gradients. Otherwise tiles cost very differently, so tasks are small.
-  const int64_t tiles_per_task = p.gradients != nullptr ? p.last_tile - p.first_tile : 4;
+  const int64_t tiles = p.last_tile - p.first_tile;
+  const int64_t pairs = p.tile_offsets[p.last_tile] - p.tile_offsets[p.first_tile];
+  // All in one task where they share the gradients.
+  const int64_t tiles_per_task = p.gradients != nullptr ? tiles : TilesPerTask(tiles, pairs);
   ParallelFor(p.first_tile, p.last_tile, tiles_per_task, [&p](int64_t first, int64_t last) {
     HWY_DYNAMIC_DISPATCH(BackwardRange)(p, first, last);
   });
-  for (int64_t tile = 0; tile < p.last_tile - p.first_tile; ++tile) {
+  for (int64_t tile = 0; tile < tiles; ++tile) {
     for (int c = 0; c < 3; ++c) p.background_gradient[c] += p.tile_backgrounds[3 * tile + c];
   }
 }

@@ -246,8 +246,10 @@ HWY_EXPORT(BlendRange);
 void BlendCpu(const BlendParams& p) {
   const int64_t pairs = p.tile_offsets[p.last_tile] - p.tile_offsets[p.first_tile];
   ParallelFor(p.first_tile, p.last_tile, TilesPerTask(p.last_tile - p.first_tile, pairs),
-              [&p](int64_t first, int64_t last) { HWY_DYNAMIC_DISPATCH(BlendRange)
-                                                  (p, first, last); });
+              [&p](int64_t first, int64_t last) {
+                HWY_DYNAMIC_DISPATCH(BlendRange)
+                (p, first, last);
+              });
 }
 
 }  // namespace anchorsplat

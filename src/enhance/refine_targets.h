@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/buffer.h"
@@ -38,6 +39,11 @@ class RefineTargets {
   // The part `window`, within the picture, of what views()[view] should show. Errors: those of PictureCache and
   // Rasterizer.
   Status Load(int64_t view, const PixelBox& window, RefineTarget& target);
+
+  // `views` are asked for next, see PictureCache.
+  void LoadAhead(std::span<const int64_t> views) {
+    if (pictures_) pictures_->LoadAhead(views);
+  }
 
  private:
   static constexpr int64_t kBudget = int64_t{1} << 30;  // bytes of rendered targets that are kept

@@ -116,6 +116,7 @@ Result<FitStep> Refiner::Step(double done) {
   out.view = order_.At(step);
   const Camera& view = targets_.views()[static_cast<size_t>(out.view)];
   const PixelBox window = ChooseWindow(view, state_.cloud, problem_.seed, step);
+  targets_.LoadAhead(order_.From(step));
   ANCHORSPLAT_RETURN_IF_ERROR(targets_.Load(out.view, window, target_));
   times_.load += watch.Lap();
 

@@ -16,6 +16,7 @@ namespace {
 
 constexpr float kSplitShrink = 1.6f;  // of Kerbl et al. 2023: halves of a split are this much smaller
 constexpr int kSplitSamples = 2;
+constexpr int64_t kGaussiansPerTask = 4096;
 
 // In `far` units, which most fits have none of.
 float LargestLogScale(const FarUnits& far, const GaussianCloud& cloud, int64_t i) {
@@ -56,15 +57,23 @@ Growth ChooseGrowth(const Rules& rules, const Densification::Gathered& gathered,
   const DensificationOptions& options = *rules.options;
   Growth growth;
   std::vector<float> gradients(static_cast<size_t>(cloud.size()));
+  enum : uint8_t { kDuplicate = 1, kSplit = 2 };
+  std::vector<uint8_t> grows(static_cast<size_t>(cloud.size()));
+  ParallelFor(0, cloud.size(), kGaussiansPerTask, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      const auto k = static_cast<size_t>(i);
+      gradients[k] = gathered.grad2d[k] / std::max(gathered.count[k], 1.0f);
+      const bool high = gradients[k] > static_cast<float>(options.grow_grad2d);
+      const bool small = LargestLogScale(*rules.far, cloud, i) <= rules.log_grow_scale;
+      const bool wide = rules.by_radius && gathered.radii[k] > static_cast<float>(options.grow_scale2d);
+      // Both may be true: then it is split, and its duplicate, which has no history, stays whole.
+      grows[k] = static_cast<uint8_t>((high && small ? kDuplicate : 0) | ((high && !small) || wide ? kSplit : 0));
+    }
+  });
   for (int64_t i = 0; i < cloud.size(); ++i) {
-    const auto k = static_cast<size_t>(i);
-    gradients[k] = gathered.grad2d[k] / std::max(gathered.count[k], 1.0f);
-    const bool high = gradients[k] > static_cast<float>(options.grow_grad2d);
-    const bool small = LargestLogScale(*rules.far, cloud, i) <= rules.log_grow_scale;
-    const bool wide = rules.by_radius && gathered.radii[k] > static_cast<float>(options.grow_scale2d);
-    // Both may be true: then it is split, and its duplicate, which has no history, stays whole.
-    if (high && small) growth.duplicate.push_back(i);
-    if ((high && !small) || wide) growth.split.push_back(i);
+    const uint8_t how = grows[static_cast<size_t>(i)];
+    if ((how & kDuplicate) != 0) growth.duplicate.push_back(i);
+    if ((how & kSplit) != 0) growth.split.push_back(i);
   }
 
   const auto wanted = static_cast<int64_t>(growth.duplicate.size() + growth.split.size());
@@ -118,11 +127,10 @@ std::vector<Newcomer> MakeNewcomers(const Growth& growth, const GaussianCloud& c
   return newcomers;
 }
 
-// Whether a Gaussian with the attributes of row i, but perhaps another opacity and size, goes.
-bool IsPruned(const Rules& rules, const GaussianCloud& cloud, int64_t i, float logit, float largest_log_scale,
-              float radius) {
+// Whether a Gaussian of this opacity and size goes.
+bool IsPruned(const Rules& rules, bool usable, float logit, float largest_log_scale, float radius) {
   const DensificationOptions& options = *rules.options;
-  if (!IsUsable(cloud, i)) return true;
+  if (!usable) return true;
   if (Sigmoid(logit) < static_cast<float>(options.prune_opa)) return true;
   if (!rules.prune_large) return false;
   return largest_log_scale > rules.log_prune_scale ||
@@ -141,21 +149,23 @@ void ChangeCloud(const DensificationOptions& options, const RowChange& change, c
   cloud.quats = ChangeRows(old.quats, 4, change);
   cloud.opacity_logits = ChangeRows(old.opacity_logits, 1, change);
   cloud.sh = ChangeRows(old.sh, stride, change);
-  auto to = static_cast<int64_t>(change.kept.size());
-  for (const Newcomer& newcomer : newcomers) {
-    const int64_t from = newcomer.source;
-    for (int64_t a = 0; a < 3; ++a) {
-      const auto out = static_cast<size_t>(3 * to + a), in = static_cast<size_t>(3 * from + a);
-      cloud.means[out] = old.means[in] + newcomer.offset[a];
-      cloud.log_scales[out] = newcomer.half ? old.log_scales[in] - std::log(kSplitShrink) : old.log_scales[in];
+  const auto kept = static_cast<int64_t>(change.kept.size());
+  ParallelFor(0, static_cast<int64_t>(newcomers.size()), kGaussiansPerTask / 16, [&](int64_t first, int64_t last) {
+    for (int64_t k = first; k < last; ++k) {
+      const Newcomer& newcomer = newcomers[static_cast<size_t>(k)];
+      const int64_t from = newcomer.source, to = kept + k;
+      for (int64_t a = 0; a < 3; ++a) {
+        const auto out = static_cast<size_t>(3 * to + a), in = static_cast<size_t>(3 * from + a);
+        cloud.means[out] = old.means[in] + newcomer.offset[a];
+        cloud.log_scales[out] = newcomer.half ? old.log_scales[in] - std::log(kSplitShrink) : old.log_scales[in];
+      }
+      std::copy_n(old.quats.data() + 4 * from, 4, cloud.quats.data() + 4 * to);
+      const float logit = old.opacity_logits[static_cast<size_t>(from)];
+      cloud.opacity_logits[static_cast<size_t>(to)] =
+          newcomer.half && options.revised_opacity ? RevisedLogit(logit) : logit;
+      std::copy_n(old.sh.data() + stride * from, stride, cloud.sh.data() + stride * to);
     }
-    std::copy_n(old.quats.data() + 4 * from, 4, cloud.quats.data() + 4 * to);
-    const float logit = old.opacity_logits[static_cast<size_t>(from)];
-    cloud.opacity_logits[static_cast<size_t>(to)] =
-        newcomer.half && options.revised_opacity ? RevisedLogit(logit) : logit;
-    std::copy_n(old.sh.data() + stride * from, stride, cloud.sh.data() + stride * to);
-    ++to;
-  }
+  });
 }
 
 }  // namespace
@@ -206,12 +216,20 @@ void Densification::Refine(const DensificationOptions& options, int64_t step, do
   const Growth growth = ChooseGrowth(rules, gathered_, cloud);
   std::vector<Newcomer> newcomers = MakeNewcomers(growth, cloud, RandomStream(seed, RandomPurpose::kSplit, step));
 
+  std::vector<uint8_t> usable(static_cast<size_t>(cloud.size())), pruned(usable.size());
+  ParallelFor(0, cloud.size(), kGaussiansPerTask, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) {
+      const auto k = static_cast<size_t>(i);
+      usable[k] = IsUsable(cloud, i);
+      pruned[k] =
+          IsPruned(rules, usable[k] != 0, cloud.opacity_logits[k], LargestLogScale(far, cloud, i), gathered_.radii[k]);
+    }
+  });
   // Pruning looks at the grown cloud, newcomers included.
   std::erase_if(newcomers, [&](const Newcomer& newcomer) {
     const auto k = static_cast<size_t>(newcomer.source);
     const float logit = cloud.opacity_logits[k], size = LargestLogScale(far, cloud, newcomer.source);
-    return IsPruned(rules, cloud, newcomer.source,
-                    newcomer.half && options.revised_opacity ? RevisedLogit(logit) : logit,
+    return IsPruned(rules, usable[k] != 0, newcomer.half && options.revised_opacity ? RevisedLogit(logit) : logit,
                     newcomer.half ? size - std::log(kSplitShrink) : size, gathered_.radii[k]);
   });
   RowChange& rows = change.rows;
@@ -222,10 +240,7 @@ void Densification::Refine(const DensificationOptions& options, int64_t step, do
       ++next_split;
       continue;
     }
-    const auto k = static_cast<size_t>(i);
-    if (IsPruned(rules, cloud, i, cloud.opacity_logits[k], LargestLogScale(far, cloud, i), gathered_.radii[k]))
-      continue;
-    rows.kept.push_back(i);
+    if (pruned[static_cast<size_t>(i)] == 0) rows.kept.push_back(i);
   }
   rows.fresh = static_cast<int64_t>(newcomers.size());
   change.duplicated = static_cast<int64_t>(growth.duplicate.size());

@@ -57,6 +57,7 @@ Result<FitStep> Fitter::Step() {
   FitStep out;
   out.view = order_.At(step);
   const Camera& camera = pictures_.views()[static_cast<size_t>(out.view)];
+  pictures_.LoadAhead(order_.From(step));
   ANCHORSPLAT_RETURN_IF_ERROR(pictures_.Load(out.view, picture_, ignored_));
   times_.load += watch.Lap();
 

@@ -17,31 +17,66 @@ constexpr float kByte = 1.0f / 255;
 PictureCache::PictureCache(std::vector<Camera> views, const std::array<float, 3>& background, int64_t budget)
     : views_(std::move(views)), background_(background), left_(budget), stored_(views_.size()) {}
 
-Status PictureCache::Load(int64_t view, Image& picture, Buffer<uint8_t>& ignored) {
-  Stored& kept = stored_[static_cast<size_t>(view)];
+Result<PictureCache::Stored> PictureCache::Read(int64_t view) const {
   const Camera& camera = views_[static_cast<size_t>(view)];
   const Pinhole& size = camera.intrinsics;
-  if (kept.channels == 0) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(ViewPicture read, ReadPhotograph(camera));
-    const Image& image = read.image;
-    if (image.width != size.width || image.height != size.height) {
-      return Error{ErrorCode::kBadFile, Cat(camera.image.string(), ": ", image.width, "x", image.height,
-                                            " pixels, expected ", size.width, "x", size.height)};
-    }
-    Stored fresh{image.channels, Buffer<uint8_t>(image.pixels.size()), std::move(read.ignored)};
-    for (size_t i = 0; i < image.pixels.size(); ++i) fresh.pixels[i] = QuantizeByte(image.pixels[i] * 255);
-    Unpack(fresh, size, picture);
-    ignored = fresh.ignored;
-    const auto bytes = static_cast<int64_t>(fresh.pixels.size() + fresh.ignored.size());
-    if (bytes <= left_) {
-      left_ -= bytes;
-      kept = std::move(fresh);
-    }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ViewPicture read, ReadPhotograph(camera));
+  const Image& image = read.image;
+  if (image.width != size.width || image.height != size.height) {
+    return Error{ErrorCode::kBadFile, Cat(camera.image.string(), ": ", image.width, "x", image.height,
+                                          " pixels, expected ", size.width, "x", size.height)};
+  }
+  Stored fresh{image.channels, Buffer<uint8_t>(image.pixels.size()), std::move(read.ignored)};
+  for (size_t i = 0; i < image.pixels.size(); ++i) fresh.pixels[i] = QuantizeByte(image.pixels[i] * 255);
+  return fresh;
+}
+
+void PictureCache::Keep(int64_t view, Stored&& fresh) {
+  const auto bytes = static_cast<int64_t>(fresh.pixels.size() + fresh.ignored.size());
+  if (bytes > left_) return;
+  left_ -= bytes;
+  stored_[static_cast<size_t>(view)] = std::move(fresh);
+}
+
+Status PictureCache::Load(int64_t view, Image& picture, Buffer<uint8_t>& ignored) {
+  const Stored& kept = stored_[static_cast<size_t>(view)];
+  const Pinhole& size = views_[static_cast<size_t>(view)].intrinsics;
+  if (kept.channels != 0) {
+    Unpack(kept, size, picture);
+    ignored = kept.ignored;
     return {};
   }
-  Unpack(kept, size, picture);
-  ignored = kept.ignored;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Stored fresh, Read(view));
+  Unpack(fresh, size, picture);
+  ignored = fresh.ignored;
+  Keep(view, std::move(fresh));
   return {};
+}
+
+void PictureCache::LoadAhead(std::span<const int64_t> views) {
+  if (views.empty() || stored_[static_cast<size_t>(views.front())].channels != 0) return;
+  const auto most = static_cast<size_t>(ThreadCount());
+  int64_t room = left_, pixels = 0;
+  std::vector<int64_t> chosen;
+  for (const int64_t view : views) {
+    if (chosen.size() == most) break;
+    if (stored_[static_cast<size_t>(view)].channels != 0) continue;
+    const Pinhole& size = views_[static_cast<size_t>(view)].intrinsics;
+    const int64_t own = int64_t{size.width} * size.height;
+    pixels += own;
+    room -= 5 * own;  // bytes at most: colour, alpha and what is ignored
+    if (room < 0 || pixels > kDecodedAtOnce) break;
+    chosen.push_back(view);
+  }
+  if (chosen.size() < 2) return;  // Load does as well
+  std::vector<Stored> read(chosen.size());
+  ParallelFor(0, static_cast<int64_t>(chosen.size()), 1, [&](int64_t k, int64_t) {
+    auto fresh = Read(chosen[static_cast<size_t>(k)]);
+    if (fresh.ok()) read[static_cast<size_t>(k)] = *std::move(fresh);
+  });
+  for (size_t k = 0; k < chosen.size(); ++k) {
+    if (read[k].channels != 0) Keep(chosen[k], std::move(read[k]));
+  }
 }
 
 void FillIgnored(const Buffer<uint8_t>& ignored, const Image& shown, Image& picture) {

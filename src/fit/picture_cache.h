@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/buffer.h"
@@ -27,12 +28,20 @@ class PictureCache {
   // Errors: those of ReadPhotograph; kBadFile when the picture has not its camera's size.
   Status Load(int64_t view, Image& picture, Buffer<uint8_t>& ignored);
 
+  // `views` are asked for next, in this order. If the first of them is not kept but would fit, it is decoded at the
+  // same time as others after it, as many as there are threads for and kDecodedAtOnce allows: a picture is decoded by
+  // one thread. Changes no result. What cannot be read is not kept, and Load says why when its turn comes.
+  void LoadAhead(std::span<const int64_t> views);
+
  private:
   struct Stored {
     int channels = 0;        // 3, or 4 with alpha; 0: not kept
     Buffer<uint8_t> pixels;  // [C,H,W]
     Buffer<uint8_t> ignored;
   };
+  static constexpr int64_t kDecodedAtOnce = int64_t{1} << 26;  // pixels, which take 16 bytes each while at work
+  Result<Stored> Read(int64_t view) const;
+  void Keep(int64_t view, Stored&& fresh);  // if it fits
   void Unpack(const Stored& stored, const Pinhole& size, Image& picture) const;
 
   std::vector<Camera> views_;

@@ -2,9 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <string>
+#include <system_error>
+#include <vector>
 
+#include "core/parallel.h"
 #include "core/random.h"
+#include "core/run_context.h"
 #include "images/image_io.h"
 #include "io/folder_for_test.h"
 
@@ -57,6 +63,58 @@ TEST(PictureCache, KeepsWhatFitsAndGivesTheSameEitherWay) {
   EXPECT_TRUE(one.Load(0, picture, ignored).ok());
   EXPECT_EQ(one.Load(1, picture, ignored).error().code, ErrorCode::kNotFound);
   EXPECT_EQ(none.Load(0, picture, ignored).error().code, ErrorCode::kNotFound);
+}
+
+// As many as there are threads are read ahead and kept, in their order, and none that would not fit.
+TEST(PictureCache, ReadsAheadWhatComesNext) {
+  const TestFolder folder;
+  std::vector<Camera> views;
+  std::vector<Image> pictures;
+  for (int k = 0; k < 6; ++k) {
+    const std::filesystem::path path = folder / (std::to_string(k) + ".png");
+    pictures.push_back(RandomBytes(17, 9, 3, static_cast<uint64_t>(k)));
+    if (k != 3) {
+      ASSERT_TRUE(WritePng(path, pictures.back()).ok());
+    }
+    views.push_back(ViewOf(path, 17, 9));
+  }
+  // Which of the views are kept, by what can still be had without the files; and that it is right.
+  std::error_code ignored_error;  // of the one that is not there
+  const auto kept = [&](PictureCache cache, const std::vector<int64_t>& next) {
+    cache.LoadAhead(next);
+    for (const Camera& view : views) std::filesystem::rename(view.image, view.image.string() + ".away", ignored_error);
+    std::vector<int64_t> found;
+    for (size_t k = 0; k < views.size(); ++k) {
+      Image picture;
+      Buffer<uint8_t> ignored;
+      if (!cache.Load(static_cast<int64_t>(k), picture, ignored).ok()) continue;
+      ExpectSamePicture(picture, pictures[k]);
+      found.push_back(static_cast<int64_t>(k));
+    }
+    for (const Camera& view : views) std::filesystem::rename(view.image.string() + ".away", view.image, ignored_error);
+    return found;
+  };
+  using Views = std::vector<int64_t>;
+  const RunScope three({.threads = 3});
+  const auto threads = static_cast<size_t>(ThreadCount());  // fewer on a small machine
+  const Views order = {4, 0, 5, 1, 2};
+  Views expected(order.begin(), order.begin() + static_cast<ptrdiff_t>(threads));
+  std::sort(expected.begin(), expected.end());
+  if (threads == 1) expected.clear();  // nothing is gained
+  const PictureCache roomy(views, {0, 0, 0});
+  EXPECT_EQ(kept(roomy, order), expected);
+  EXPECT_EQ(kept(roomy, {}), Views());
+  EXPECT_EQ(kept(roomy, {2}), Views());  // Load does it
+  if (threads > 1) {
+    EXPECT_EQ(kept(roomy, {3, 2}), Views({2}));  // of one that is not there, Load says so
+  }
+  EXPECT_EQ(kept(PictureCache(views, {0, 0, 0}, 5 * 17 * 9 + 1), order), Views());  // no room for two
+  PictureCache begun(views, {0, 0, 0});
+  Image picture;
+  Buffer<uint8_t> ignored;
+  ASSERT_TRUE(begun.Load(4, picture, ignored).ok());
+  EXPECT_EQ(kept(begun, order), Views({4}));  // the next one is there: later is early enough
+  EXPECT_EQ(begun.Load(3, picture, ignored).error().code, ErrorCode::kNotFound);
 }
 
 TEST(PictureCache, WhatIsIgnoredDoesNotDiffer) {

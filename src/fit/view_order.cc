@@ -10,7 +10,9 @@ namespace anchorsplat {
 
 ViewOrder::ViewOrder(int64_t views, uint64_t seed) : seed_(seed), order_(static_cast<size_t>(views)) {}
 
-int64_t ViewOrder::At(int64_t step) {
+int64_t ViewOrder::At(int64_t step) { return From(step).front(); }
+
+std::span<const int64_t> ViewOrder::From(int64_t step) {
   const auto views = static_cast<int64_t>(order_.size());
   if (epoch_ != step / views) {
     epoch_ = step / views;
@@ -20,7 +22,7 @@ int64_t ViewOrder::At(int64_t step) {
       std::swap(order_[static_cast<size_t>(left - 1)], order_[static_cast<size_t>(random.Below(left))]);
     }
   }
-  return order_[static_cast<size_t>(step % views)];
+  return std::span(order_).subspan(static_cast<size_t>(step % views));
 }
 
 }  // namespace anchorsplat

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace anchorsplat {
@@ -11,6 +12,8 @@ class ViewOrder {
  public:
   ViewOrder(int64_t views, uint64_t seed);
   int64_t At(int64_t step);  // 0 … views − 1; step ≥ 0
+  // That of `step` and those of the steps after it in the same epoch. Until the next call.
+  std::span<const int64_t> From(int64_t step);
 
  private:
   uint64_t seed_;

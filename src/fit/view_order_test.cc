@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <set>
+#include <span>
 #include <vector>
 
 namespace anchorsplat {
@@ -34,6 +35,15 @@ TEST(ViewOrder, FollowsFromSeedAndStepAlone) {
   }
   EXPECT_TRUE(differs);
   EXPECT_EQ(ViewOrder(1, 3).At(1000), 0);
+}
+
+TEST(ViewOrder, SaysWhatComesNextInTheEpoch) {
+  ViewOrder order(7, 5), again(7, 5);
+  for (int64_t step = 0; step < 21; ++step) {
+    const std::span<const int64_t> next = order.From(step);
+    ASSERT_EQ(static_cast<int64_t>(next.size()), 7 - step % 7);
+    for (size_t k = 0; k < next.size(); ++k) EXPECT_EQ(next[k], again.At(step + static_cast<int64_t>(k)));
+  }
 }
 
 TEST(ViewOrder, FirstPlacesAreEvenlyTaken) {

@@ -13,7 +13,11 @@ namespace anchorsplat {
 namespace {
 
 constexpr int kChannels = 3;
-constexpr int kRowsPerTask = 64;
+constexpr int kRowsPerBand = 64;  // compared at once
+
+// Rows of a task's gradient. It needs twenty more of the pictures, so large pictures have large tasks; small ones would
+// leave threads without work.
+constexpr int RowsPerTask(int rows) { return rows > 512 ? 128 : 64; }
 
 Error BadArgument(std::string message) { return {ErrorCode::kBadArgument, std::move(message)}; }
 
@@ -95,10 +99,10 @@ Result<PhotometricLossValue> PhotometricLoss(const Image& rendered, const Image&
     gradient = Image(width, height, kChannels);
   }
 
-  const int bands = (height + kRowsPerTask - 1) / kRowsPerTask;
+  const int bands = (height + kRowsPerBand - 1) / kRowsPerBand;
   std::vector<PixelBox> boxes(static_cast<size_t>(bands));
-  ParallelFor(0, height, kRowsPerTask, [&](int64_t first, int64_t last) {
-    boxes[static_cast<size_t>(first / kRowsPerTask)] =
+  ParallelFor(0, height, kRowsPerBand, [&](int64_t first, int64_t last) {
+    boxes[static_cast<size_t>(first / kRowsPerBand)] =
         BoxOfDifference(rendered, target, static_cast<int>(first), static_cast<int>(last));
   });
   PixelBox different = {width, height, 0, 0};
@@ -124,7 +128,8 @@ Result<PhotometricLossValue> PhotometricLoss(const Image& rendered, const Image&
   // Strips of nearly the same width, in whole registers.
   const int strips = (box.x1 - box.x0 + kSsimStrip - 1) / kSsimStrip;
   const int strip_width = ((box.x1 - box.x0 + strips - 1) / strips + 15) / 16 * 16;
-  const int rows = (box.y1 - box.y0 + kRowsPerTask - 1) / kRowsPerTask;
+  const int rows_per_task = RowsPerTask(box.y1 - box.y0);
+  const int rows = (box.y1 - box.y0 + rows_per_task - 1) / rows_per_task;
   const int64_t tasks = int64_t{kChannels} * rows * strips;
   std::vector<SsimGradientSums> parts(static_cast<size_t>(tasks));
   ParallelFor(0, tasks, 1, [&](int64_t k, int64_t) {
@@ -138,8 +143,8 @@ Result<PhotometricLossValue> PhotometricLoss(const Image& rendered, const Image&
     task.map = map;
     task.out.x0 = std::min(box.x1, box.x0 + strip * strip_width);
     task.out.x1 = std::min(box.x1, task.out.x0 + strip_width);
-    task.out.y0 = box.y0 + row * kRowsPerTask;
-    task.out.y1 = std::min(box.y1, task.out.y0 + kRowsPerTask);
+    task.out.y0 = box.y0 + row * rows_per_task;
+    task.out.y1 = std::min(box.y1, task.out.y0 + rows_per_task);
     task.ssim_weight = options.ssim_weight > 0 ? static_cast<float>(-options.ssim_weight / windows) : 0.0f;
     task.difference_weight = static_cast<float>((1 - options.ssim_weight) / values);
     task.gradient = gradient.channel(channel);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "core/parallel.h"
@@ -109,14 +110,17 @@ void CountPairs(const BinParams& p) {
     }
   });
   // Offsets of the tiles; the counts become each chunk's place within its tile: earlier chunks are nearer.
-  int64_t start = 0;
-  for (int64_t t = 0; t < tiles; ++t) {
-    p.tile_offsets[t] = start;
-    uint32_t within = 0;
-    for (int64_t c = 0; c < p.chunks; ++c) within += std::exchange(p.chunk_counts[c * tiles + t], within);
-    start += within;
+  // This is done by one thread, so it goes along the chunks.
+  std::fill_n(p.tile_offsets, tiles + 1, int64_t{0});
+  for (int64_t c = 0; c < p.chunks; ++c) {
+    uint32_t* counts = p.chunk_counts + c * tiles;
+    for (int64_t t = 0; t < tiles; ++t) {
+      const uint32_t own = counts[t];
+      counts[t] = static_cast<uint32_t>(p.tile_offsets[t]);
+      p.tile_offsets[t] += own;
+    }
   }
-  p.tile_offsets[tiles] = start;
+  std::exclusive_scan(p.tile_offsets, p.tile_offsets + tiles + 1, p.tile_offsets, int64_t{0});
 }
 
 void ListPairs(const BinParams& p, int64_t first_tile, int64_t last_tile, int32_t* pairs) {

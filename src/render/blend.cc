@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "core/parallel.h"
+#include "render/piece.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "render/blend.cc"
@@ -121,6 +122,10 @@ void StartTile(int columns, int rows, Tile& t) {
     const int x = static_cast<int>(block % kBlocksPerSide) * kBlock;
     const int y = static_cast<int>(block / kBlocksPerSide) * kBlock;
     t.finished[block] = x >= columns || y >= rows;
+    if (x + kBlock <= columns && y + kBlock <= rows) {  // nearly all
+      std::fill_n(t.passed[block], kPixels, 1.0f);
+      continue;
+    }
     for (int i = 0; i < static_cast<int>(kPixels); ++i) {
       const bool inside = x + i % kBlock < columns && y + i / kBlock < rows;
       t.passed[block][i] = inside ? 1.0f : 0.0f;
@@ -239,11 +244,12 @@ namespace anchorsplat {
 HWY_EXPORT(BlendRange);
 
 void BlendCpu(const BlendParams& p) {
-  // Tiles cost very differently, so tasks are small; empty ones are so cheap that one alone is not worth a task.
-  constexpr int64_t kTilesPerTask = 4;
-  ParallelFor(p.first_tile, p.last_tile, kTilesPerTask, [&p](int64_t first, int64_t last) {
-    HWY_DYNAMIC_DISPATCH(BlendRange)(p, first, last);
-  });
+  const int64_t pairs = p.tile_offsets[p.last_tile] - p.tile_offsets[p.first_tile];
+  ParallelFor(p.first_tile, p.last_tile, TilesPerTask(p.last_tile - p.first_tile, pairs),
+              [&p](int64_t first, int64_t last) {
+                HWY_DYNAMIC_DISPATCH(BlendRange)
+                (p, first, last);
+              });
 }
 
 }  // namespace anchorsplat

@@ -45,8 +45,7 @@ struct Tile : TileBatch<kBatch> {
   alignas(64) float transmittance[kBlocks][kPixels];  // T behind the Gaussian that is next
   alignas(64) float behind[kBlocks][kPixels];         // S of BlendBackwardParams
   alignas(64) int32_t contributors[kBlocks][kPixels];
-  int32_t last[kBlocks];  // the largest of its contributors
-  bool flat[kBlocks];     // no pixel has a gradient
+  int32_t last[kBlocks];  // the largest of its contributors, 0 where no pixel has a gradient
 
   // Of a group: q and w of every pixel in turn, whose they are and whether they are not all 0. Behind the group, three
   // Gaussians with sums of their own that nobody reads.
@@ -257,6 +256,44 @@ void LoadPlane(const T* plane, int width, int x0, int y0, int x1, int y1, T outs
   }
 }
 
+// What follows from a block's pixels.
+HWY_INLINE void StartBlock(const BlendBackwardParams& p, size_t block, double* background_gradient, Tile& t) {
+  const D d;
+  const DI di;
+  const V zero = hn::Zero(d);
+  V background[3] = {zero, zero, zero};
+  VI last = hn::Zero(di);
+  bool flat = true;
+  for (size_t first = 0; first < kPixels; first += hn::Lanes(d)) {
+    const auto load = [&](const float(*plane)[kPixels]) HWY_ATTR { return hn::Load(d, plane[block] + first); };
+    const V red = load(t.color_gradient[0]), green = load(t.color_gradient[1]), blue = load(t.color_gradient[2]);
+    const V transmittance = load(t.transmittance), alpha = load(t.behind);
+    // Written so that NaN is not flat.
+    const M flat_color = hn::And(hn::And(hn::Eq(red, zero), hn::Eq(green, zero)), hn::Eq(blue, zero));
+    flat = flat && hn::AllTrue(d, hn::And(flat_color, hn::Eq(alpha, zero)));
+    last = hn::Max(last, hn::Load(di, t.contributors[block] + first));
+    background[0] = hn::MulAdd(transmittance, red, background[0]);
+    background[1] = hn::MulAdd(transmittance, green, background[1]);
+    background[2] = hn::MulAdd(transmittance, blue, background[2]);
+    const V behind = hn::MulAdd(
+        hn::Set(d, p.background[0]), red,
+        hn::MulAdd(hn::Set(d, p.background[1]), green, hn::MulSub(hn::Set(d, p.background[2]), blue, alpha)));
+    hn::Store(hn::Mul(transmittance, behind), d, t.behind[block] + first);
+  }
+  for (size_t c = 0; c < 3; ++c) {
+    background_gradient[c] += static_cast<double>(hn::GetLane(hn::SumOfLanes(d, background[c])));
+  }
+  t.last[block] = flat ? 0 : hn::GetLane(hn::MaxOfLanes(di, last));
+  if (t.last[block] == 0) return;
+  for (size_t k = 0; k < kPixels; ++k) {
+    const size_t i = t.order[k];
+    float* features = t.features[block][k];
+    features[kRed] = t.color_gradient[0][block][i];
+    features[kGreen] = t.color_gradient[1][block][i];
+    features[kBlue] = t.color_gradient[2][block][i];
+  }
+}
+
 // Loads the pixels and adds the background's gradient. Returns 1 + the last place of the tile's list that matters.
 int32_t StartTile(const BlendBackwardParams& p, int tile_x, int tile_y, double* background_gradient, Tile& t) {
   // Pixels outside of the image or the box have no gradient, which makes everything 0.
@@ -276,38 +313,14 @@ int32_t StartTile(const BlendBackwardParams& p, int tile_x, int tile_y, double* 
   }
   int32_t last_of_tile = 0;
   for (size_t block = 0; block < kBlocks; ++block) {
-    float background[3] = {0, 0, 0};
-    int32_t last = 0;
-    bool flat = true;
-    for (size_t i = 0; i < kPixels; ++i) {
-      const float red = t.color_gradient[0][block][i], green = t.color_gradient[1][block][i],
-                  blue = t.color_gradient[2][block][i];
-      const float transmittance = t.transmittance[block][i];
-      // Written so that NaN is not flat.
-      flat = flat && red == 0 && green == 0 && blue == 0 && t.behind[block][i] == 0;
-      last = std::max(last, t.contributors[block][i]);
-      background[0] += transmittance * red;
-      background[1] += transmittance * green;
-      background[2] += transmittance * blue;
-      t.behind[block][i] = transmittance * (p.background[0] * red + p.background[1] * green + p.background[2] * blue -
-                                            t.behind[block][i]);
-    }
-    for (size_t k = 0; k < kPixels; ++k) {
-      const size_t i = t.order[k];
-      t.features[block][k][kRed] = t.color_gradient[0][block][i];
-      t.features[block][k][kGreen] = t.color_gradient[1][block][i];
-      t.features[block][k][kBlue] = t.color_gradient[2][block][i];
-    }
-    for (int c = 0; c < 3; ++c) background_gradient[c] += static_cast<double>(background[c]);
-    t.flat[block] = flat;
-    t.last[block] = flat ? 0 : last;
+    StartBlock(p, block, background_gradient, t);
     last_of_tile = std::max(last_of_tile, t.last[block]);
   }
   return last_of_tile;
 }
 
-// From the sums about the middle of the tile to those of BlendGradient, which are added to `to`.
-HWY_INLINE void AddWhitened(const Tile& t, size_t j, BlendGradient& to) {
+// From the sums about the middle of the tile to those of BlendGradient.
+HWY_INLINE void Whiten(const Tile& t, size_t j, BlendGradient& to) {
   const float* s = t.sums[j];
   const float xx = t.shape[j][0], xy = t.shape[j][1], yy = t.shape[j][2];
   const float dx = kMiddle - t.at[j][0], dy = kMiddle - t.at[j][1];
@@ -319,24 +332,72 @@ HWY_INLINE void AddWhitened(const Tile& t, size_t j, BlendGradient& to) {
   const float ouu = xx * xx * s[kXX] + 2 * xx * xy * s[kXY] + xy * xy * s[kYY];
   const float ouv = yy * (xx * s[kXY] + xy * s[kYY]);
   const float ovv = yy * yy * s[kYY];
-  to.q += s[kOne];
-  to.qu += ou + u * s[kOne];
-  to.qv += ov + v * s[kOne];
-  to.quu += ouu + u * (2 * ou + u * s[kOne]);
-  to.quv += ouv + v * ou + u * (ov + v * s[kOne]);
-  to.qvv += ovv + v * (2 * ov + v * s[kOne]);
-  to.rgb[0] += s[kRed];
-  to.rgb[1] += s[kGreen];
-  to.rgb[2] += s[kBlue];
+  to.q = s[kOne];
+  to.qu = ou + u * s[kOne];
+  to.qv = ov + v * s[kOne];
+  to.quu = ouu + u * (2 * ou + u * s[kOne]);
+  to.quv = ouv + v * ou + u * (ov + v * s[kOne]);
+  to.qvv = ovv + v * (2 * ov + v * s[kOne]);
+  to.rgb[0] = s[kRed];
+  to.rgb[1] = s[kGreen];
+  to.rgb[2] = s[kBlue];
 }
 
-// The absolute sums of Gaussian j of the batch are added to `to` [2].
-HWY_INLINE void AddAbsolute(const Tile& t, size_t j, float* to) {
+// The absolute sums of Gaussian j of the batch to `to` [2].
+HWY_INLINE void WriteAbsolute(const Tile& t, size_t j, float* to) {
   constexpr float kTwoLn2 = 1.38629436f;
   for (size_t a = 0; a < 2; ++a) {
     float sum = 0;
     for (size_t lane = 0; lane < hn::Lanes(D()); ++lane) sum += t.absolute[j][a][lane];
-    to[a] += kTwoLn2 * sum;
+    to[a] = kTwoLn2 * sum;
+  }
+}
+
+HWY_INLINE void FetchSums(const BlendGradient* to) {
+  hwy::Prefetch(&to->q);
+  hwy::Prefetch(&to->rgb[2]);  // most lie in two lines of the cache
+}
+
+// What the batch has found is added to the Gaussians' own sums.
+template <bool kAbsolute>
+HWY_INLINE void AddToGradients(const BlendBackwardParams& p, const int32_t* rows, size_t n, const Tile& t) {
+  for (size_t j = 0; j < std::min(n, kSumsAhead); ++j) hwy::Prefetch(p.gradients + rows[j]);
+  for (size_t j = 0; j < n; ++j) {
+    if (j + kSumsAhead < n) FetchSums(p.gradients + rows[j + kSumsAhead]);
+    if (!t.touched[j]) continue;
+    BlendGradient own;
+    Whiten(t, j, own);
+    p.gradients[rows[j]] += own;
+    if constexpr (kAbsolute) {
+      float absolute[2];
+      WriteAbsolute(t, j, absolute);
+      for (size_t a = 0; a < 2; ++a) p.absolute[2 * int64_t{rows[j]} + static_cast<int64_t>(a)] += absolute[a];
+    }
+  }
+}
+
+// What the batch has found, to the slots of its Gaussians in this tile.
+template <bool kAbsolute>
+HWY_INLINE void WriteSlots(const BlendBackwardParams& p, const int32_t* rows, size_t n, int64_t tile, const Tile& t) {
+  const int32_t tile_x = static_cast<int32_t>(tile % p.tiles_x), tile_y = static_cast<int32_t>(tile / p.tiles_x);
+  size_t found = 0;
+  uint8_t which[kBatch];
+  int64_t slots[kBatch];
+  for (size_t j = 0; j < n; ++j) {
+    which[found] = static_cast<uint8_t>(j);
+    found += t.touched[j];
+  }
+  for (size_t k = 0; k < found; ++k) {
+    const int32_t row = rows[which[k]];
+    const ProjectedGaussian& g = p.projected[row];
+    slots[k] = p.slot_starts[row / kProjectChunk] + g.slot + int64_t{tile_y - g.tile_y0} * g.tiles_across +
+               (tile_x - g.tile_x0);
+    FetchSums(p.sums + slots[k]);
+  }
+  for (size_t k = 0; k < found; ++k) {
+    Whiten(t, which[k], p.sums[slots[k]]);
+    p.touched[slots[k]] = 1;
+    if constexpr (kAbsolute) WriteAbsolute(t, which[k], p.absolute + 2 * slots[k]);
   }
 }
 
@@ -344,16 +405,11 @@ template <bool kAbsolute>
 void BackwardTile(const BlendBackwardParams& p, int64_t tile, Tile& t) {
   const int tile_x = static_cast<int>(tile % p.tiles_x) * kTile, tile_y = static_cast<int>(tile / p.tiles_x) * kTile;
   const int64_t list_begin = p.tile_offsets[tile] - p.tile_offsets[p.first_tile];
-  const int64_t count = p.tile_offsets[tile + 1] - p.tile_offsets[tile];
   double* background_gradient = p.tile_backgrounds + 3 * (tile - p.first_tile);
   std::fill_n(background_gradient, 3, 0.0);
   const bool outside = p.box.empty() || p.box.x0 >= tile_x + kTile || p.box.x1 <= tile_x ||
                        p.box.y0 >= tile_y + kTile || p.box.y1 <= tile_y;
   const int32_t last = outside ? 0 : StartTile(p, tile_x, tile_y, background_gradient, t);
-  if (p.partial != nullptr) {
-    std::fill_n(p.partial + list_begin + last, count - last, BlendGradient{});
-    if constexpr (kAbsolute) std::fill_n(p.partial_absolute + 2 * (list_begin + last), 2 * (count - last), 0.0f);
-  }
   const Limits limits = {std::log2(p.min_alpha), p.max_alpha};
   constexpr int32_t kStep = static_cast<int32_t>(kBatch);
   for (int32_t place = (last - 1) / kStep * kStep; last > 0 && place >= 0; place -= kStep) {
@@ -369,29 +425,10 @@ void BackwardTile(const BlendBackwardParams& p, int64_t tile, Tile& t) {
     for (size_t block = 0; block < kBlocks; ++block) {
       if (t.list_sizes[block] > 0) AddBlock<kAbsolute>(limits, block, place, t);
     }
-    if (p.partial != nullptr) {
-      BlendGradient* partial = p.partial + list_begin + place;
-      std::fill_n(partial, n, BlendGradient{});
-      for (size_t j = 0; j < n; ++j) {
-        if (t.touched[j]) AddWhitened(t, j, partial[j]);
-      }
+    if (p.gradients != nullptr) {
+      AddToGradients<kAbsolute>(p, rows, n, t);
     } else {
-      for (size_t j = 0; j < std::min(n, kSumsAhead); ++j) hwy::Prefetch(p.gradients + rows[j]);
-      for (size_t j = 0; j < n; ++j) {
-        if (j + kSumsAhead < n) {
-          const float* to = &p.gradients[rows[j + kSumsAhead]].q;
-          hwy::Prefetch(to);
-          hwy::Prefetch(to + sizeof(BlendGradient) / sizeof(float) - 1);  // most lie in two lines of the cache
-        }
-        if (t.touched[j]) AddWhitened(t, j, p.gradients[rows[j]]);
-      }
-    }
-    if constexpr (kAbsolute) {
-      float* partial = p.partial == nullptr ? nullptr : p.partial_absolute + 2 * (list_begin + place);
-      if (partial != nullptr) std::fill_n(partial, 2 * n, 0.0f);
-      for (size_t j = 0; j < n; ++j) {
-        if (t.touched[j]) AddAbsolute(t, j, partial != nullptr ? partial + 2 * j : p.absolute + 2 * int64_t{rows[j]});
-      }
+      WriteSlots<kAbsolute>(p, rows, n, tile, t);
     }
   }
 }
@@ -416,45 +453,15 @@ namespace anchorsplat {
 
 HWY_EXPORT(BackwardRange);
 
-namespace {
-
-// gradients += partial, every Gaussian's in the order of the tiles. Each task has rows of its own.
-void AddPartial(const BlendBackwardParams& p) {
-  const int64_t pairs = p.tile_offsets[p.last_tile] - p.tile_offsets[p.first_tile];
-  const int64_t tasks = std::clamp<int64_t>(pairs / 4096, 1, ThreadCount());
-  ParallelFor(0, tasks, 1, [&](int64_t task, int64_t) {
-    const auto [first, last] = PieceOf(p.count, tasks, task);
-    for (int64_t k = 0; k < pairs; ++k) {
-      const int32_t row = p.pairs[k];
-      if (row < first || row >= last) continue;
-      const BlendGradient& from = p.partial[k];
-      BlendGradient& to = p.gradients[row];
-      to.q += from.q;
-      to.qu += from.qu;
-      to.qv += from.qv;
-      to.quu += from.quu;
-      to.quv += from.quv;
-      to.qvv += from.qvv;
-      for (int c = 0; c < 3; ++c) to.rgb[c] += from.rgb[c];
-      if (p.absolute == nullptr) continue;
-      for (int a = 0; a < 2; ++a) p.absolute[2 * int64_t{row} + a] += p.partial_absolute[2 * k + a];
-    }
-  });
-}
-
-}  // namespace
-
 void BlendBackwardCpu(const BlendBackwardParams& p) {
-  if (p.partial == nullptr) {
-    HWY_DYNAMIC_DISPATCH(BackwardRange)(p, p.first_tile, p.last_tile);
-  } else {
-    constexpr int64_t kTilesPerTask = 4;
-    ParallelFor(p.first_tile, p.last_tile, kTilesPerTask, [&p](int64_t first, int64_t last) {
-      HWY_DYNAMIC_DISPATCH(BackwardRange)(p, first, last);
-    });
-    AddPartial(p);
-  }
-  for (int64_t tile = 0; tile < p.last_tile - p.first_tile; ++tile) {
+  const int64_t tiles = p.last_tile - p.first_tile;
+  const int64_t pairs = p.tile_offsets[p.last_tile] - p.tile_offsets[p.first_tile];
+  // All in one task where they share the gradients.
+  const int64_t tiles_per_task = p.gradients != nullptr ? tiles : TilesPerTask(tiles, pairs);
+  ParallelFor(p.first_tile, p.last_tile, tiles_per_task, [&p](int64_t first, int64_t last) {
+    HWY_DYNAMIC_DISPATCH(BackwardRange)(p, first, last);
+  });
+  for (int64_t tile = 0; tile < tiles; ++tile) {
     for (int c = 0; c < 3; ++c) p.background_gradient[c] += p.tile_backgrounds[3 * tile + c];
   }
 }

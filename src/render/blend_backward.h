@@ -18,6 +18,17 @@ struct BlendGradient {
   float qu, qv;  // Σ q·u, Σ q·v
   float quu, quv, qvv;
   float rgb[3];  // Σ α·T·∂L/∂C, which is ∂L/∂rgb
+
+  BlendGradient& operator+=(const BlendGradient& more) {
+    q += more.q;
+    qu += more.qu;
+    qv += more.qv;
+    quu += more.quu;
+    quv += more.quv;
+    qvv += more.qvv;
+    for (int c = 0; c < 3; ++c) rgb[c] += more.rgb[c];
+    return *this;
+  }
 };
 
 // The gradient of BlendCpu (Kerbl et al. 2023, appendix), tile by tile from the farthest Gaussian that was added to the
@@ -26,11 +37,11 @@ struct BlendGradient {
 // Which Gaussians a pixel adds is decided by the same arithmetic as in BlendCpu.
 //
 // The sums of a Gaussian are made per tile and added in the order of the tiles, so that the number of threads does not
-// change them. With one thread they need not be kept apart until then.
+// change them. Several threads keep them apart until then, each in a slot of its own (render/gradient_slots.h); one
+// adds them where they belong.
 struct BlendBackwardParams {
   int width, height;                   // pixels
   int tiles_x;                         // T = tiles_x·⌈height/16⌉ tiles, row-major
-  int64_t count;                       // N Gaussians
   const ProjectedGaussian* projected;  // [N]
   const int64_t* tile_offsets;         // [T+1] of the whole image; fewer than 2^31 pairs per tile
   const int32_t* pairs;                // [tile_offsets[last_tile] − tile_offsets[first_tile]] rows, by tile and depth
@@ -44,17 +55,19 @@ struct BlendBackwardParams {
   const float* color_gradient;  // [3,H,W] ∂L/∂C
   const float* alpha_gradient;  // [H,W] ∂L/∂A; may be null
   // scratch
-  BlendGradient*
-      partial;  // [tile_offsets[last_tile] − tile_offsets[first_tile]] per pair; null = one tile after another
-  float* partial_absolute;   // [.., 2] beside `partial` where both it and `absolute` are wanted, else null
   double* tile_backgrounds;  // [last_tile − first_tile, 3]
-  // in and out
-  BlendGradient* gradients;     // [N] the run's sums are added to it
-  double* background_gradient;  // [3] Σ T_end·∂L/∂C is added to it
-  // [N,2] Σ |∂L/∂x|, Σ |∂L/∂y| of the mean in the picture, per pixel, over the pixels: the run's sums are added to it.
-  // Where ∂L/∂mean2d of a large Gaussian adds up to nothing because its pixels pull in all directions, this does not
-  // (Ye et al. 2024, AbsGS; gsplat's absgrad). Null: not wanted, and costs nothing.
+  // out, either: of N Gaussians, to which the run's sums are added by a single thread
+  BlendGradient* gradients;  // [N]
+  // or, where that is null, of all slots, of which those are written that this run's tiles touch
+  const int64_t* slot_starts;  // GradientSlots::starts
+  BlendGradient* sums;         // GradientSlots::sums
+  uint8_t* touched;            // GradientSlots::touched, all 0 before
+  // Beside either, [..,2] Σ |∂L/∂x|, Σ |∂L/∂y| of the mean in the picture, per pixel, over the pixels. Where ∂L/∂mean2d
+  // of a large Gaussian adds up to nothing because its pixels pull in all directions, this does not (Ye et al. 2024,
+  // AbsGS; gsplat's absgrad). Null: not wanted, and costs nothing.
   float* absolute;
+  // in and out
+  double* background_gradient;  // [3] Σ T_end·∂L/∂C is added to it
 };
 
 void BlendBackwardCpu(const BlendBackwardParams& p);

@@ -248,6 +248,7 @@ void ProjectChunk(const ProjectParams& p, int64_t first, int64_t last) {
   const size_t lanes = hn::Lanes(d);
   int32_t* visible = p.visible + first;
   int32_t found = 0;
+  int64_t slots = 0;
   for (int64_t begin = first; begin < last; begin += static_cast<int64_t>(kBatch)) {
     const size_t n = static_cast<size_t>(std::min<int64_t>(kBatch, last - begin));
     ReadColumns(p, frame, begin, n, places, in);
@@ -280,10 +281,16 @@ void ProjectChunk(const ProjectParams& p, int64_t first, int64_t last) {
       g.log2_opacity = out.log2_opacity[j];
       g.depth = static_cast<float>(places.z[j]);
       g.compensation = out.compensation[j];
+      g.slot = static_cast<int32_t>(slots);
+      g.tile_x0 = rect.x0;
+      g.tile_y0 = rect.y0;
+      g.tiles_across = static_cast<uint16_t>(rect.x1 - rect.x0);
+      slots += int64_t{g.tiles_across} * (rect.y1 - rect.y0);
       visible[found++] = static_cast<int32_t>(i);
     }
   }
   p.visible_counts[first / kProjectChunk] = found;
+  if (p.slot_counts != nullptr) p.slot_counts[first / kProjectChunk] = slots;
 }
 
 }  // namespace

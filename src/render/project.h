@@ -38,6 +38,7 @@ struct ProjectParams {
   int32_t* radii;                // [N,2] pixels as the profile defines them, 0 = outside by its rules; may be null
   int32_t* visible;              // [N] rows that are not culled, ascending, each chunk's from c·kProjectChunk on
   int32_t* visible_counts;       // [ProjectChunks(N)] how many of each chunk
+  int64_t* slot_counts;          // [ProjectChunks(N)] tiles of each chunk's Gaussians, all together; may be null
 };
 
 inline int64_t ProjectChunks(int64_t count) { return (count + kProjectChunk - 1) / kProjectChunk; }

@@ -25,7 +25,7 @@ struct ProjectBackwardParams {
   float dilation = kDilation;          // px²
   float compensated_from = 0;          // px²
   const ProjectedGaussian* projected;  // [N] of ProjectCpu
-  const BlendGradient* gradients;      // [N] of BlendBackwardCpu; read where visible
+  const BlendGradient* gradients;      // [N] of SumSlots; read where visible
   const int32_t* visible;              // [N] rows that are not culled, ascending, each chunk's from c·kProjectChunk on
   const int32_t* visible_counts;       // [ProjectChunks(N)] how many of each chunk
   // out; rows of culled Gaussians become 0

@@ -19,8 +19,11 @@ struct alignas(64) ProjectedGaussian {
   float log2_opacity;  // ≤ 0; includes the compensation of modes that have one
   float rgb[3];        // ≥ 0; written by the spherical harmonics stage
   float depth;         // camera z, world units
-  float compensation;  // of the opacity (RenderOptions::compensated_from), 1 in RenderMode::kClassic; for the backward
-                       // pass
+  // For the backward pass:
+  float compensation;         // of the opacity (RenderOptions::compensated_from), 1 in RenderMode::kClassic
+  int32_t slot;               // of its first tile, within its chunk (render/gradient_slots.h)
+  uint16_t tile_x0, tile_y0;  // of its TileRect
+  uint16_t tiles_across;
 };
 static_assert(sizeof(ProjectedGaussian) == 64);
 // Blending copies them by fours.

@@ -91,6 +91,7 @@ int64_t Rasterizer::State::Project(const CloudView& cloud, const Camera& camera,
   project.radii = options.gradient ? Room(radii, 2 * n) : nullptr;
   project.visible = Room(visible, n);
   project.visible_counts = Room(visible_counts, chunks);
+  project.slot_counts = options.gradient ? Room(slot_counts, chunks) : nullptr;
   ProjectCpu(project);
   statistics.project = watch.Lap();
 

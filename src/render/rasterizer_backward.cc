@@ -1,9 +1,12 @@
 #include <algorithm>
 #include <new>
+#include <numeric>
+#include <optional>
 
 #include "core/parallel.h"
 #include "core/text.h"
 #include "render/blend_backward.h"
+#include "render/gradient_slots.h"
 #include "render/project.h"
 #include "render/project_backward.h"
 #include "render/rasterizer_state.h"
@@ -36,24 +39,41 @@ Status CheckGradient(const RenderGradient& g, int width, int height) {
   return {};
 }
 
-// Pairs whose gradients are kept apart at once: 36 MiB. More pairs are done in several runs of tiles.
-constexpr int64_t kMaxPartial = int64_t{1} << 20;
+// Slots of tiles (render/gradient_slots.h) that are there at once: 150 MiB. Where there are more, the tiles are done in
+// several runs.
+constexpr int64_t kMaxSlots = int64_t{1} << 22;
 
 }  // namespace
 
-void Rasterizer::State::BlendBackward(const RenderGradient& output_gradient, CloudGradient& gradient) {
+std::optional<Rasterizer::State::SlotsLeft> Rasterizer::State::BlendBackward(const RenderGradient& output_gradient,
+                                                                             CloudGradient& gradient) {
   const RenderOptions& options = kept->options;
   const BinParams bin = MakeBinParams(statistics.visible, kept->intrinsics, options.min_alpha);
-  const int64_t tile_count = int64_t{bin.tiles_x} * bin.tiles_y;
+  const int64_t tile_count = int64_t{bin.tiles_x} * bin.tiles_y, chunks = ProjectChunks(kept->count);
   // The list of the last run of tiles is still there: with one run that is all of them.
   const bool listed = statistics.runs == 1;
   if (!listed) CountPairs(bin);
+  int64_t* starts = Room(slot_starts, chunks);
+  std::exclusive_scan(slot_counts.data(), slot_counts.data() + chunks, starts, int64_t{0});
+  int64_t slot_count = std::accumulate(slot_counts.data(), slot_counts.data() + chunks, int64_t{0});
+  // One thread adds to the gradients right away; several need slots, if possible all at once.
+  const bool apart = ThreadCount() > 1, at_once = apart && listed && slot_count <= kMaxSlots;
 
+  SlotsLeft left{};
+  left.params = {.count = kept->count,
+                 .tiles = tiles.data(),
+                 .visible = visible.data(),
+                 .visible_counts = visible_counts.data(),
+                 .tiles_x = bin.tiles_x,
+                 .tiles_y = bin.tiles_y,
+                 .first_tile = 0,
+                 .last_tile = tile_count,
+                 .projected = projected.data()};
+  BlendGradient* own = Room(gradients, kept->count);
   BlendBackwardParams p{};
   p.width = kept->intrinsics.width;
   p.height = kept->intrinsics.height;
   p.tiles_x = bin.tiles_x;
-  p.count = kept->count;
   p.projected = projected.data();
   p.tile_offsets = bin.tile_offsets;
   std::copy(options.background.begin(), options.background.end(), p.background);
@@ -64,32 +84,53 @@ void Rasterizer::State::BlendBackward(const RenderGradient& output_gradient, Clo
   p.color_gradient = output_gradient.color.pixels.data();
   p.alpha_gradient = output_gradient.alpha.pixels.empty() ? nullptr : output_gradient.alpha.pixels.data();
   p.tile_backgrounds = Room(tile_backgrounds, 3 * tile_count);
-  p.gradients = Room(gradients, kept->count);
+  p.slot_starts = starts;
   double background_gradient[3] = {0, 0, 0};
   p.background_gradient = background_gradient;
   gradient.means2d_abs.assign(options.absgrad ? 2 * static_cast<size_t>(kept->count) : 0, 0.0f);
-  p.absolute = options.absgrad ? gradient.means2d_abs.data() : nullptr;
-  ParallelFor(0, kept->count, int64_t{1} << 14, [&](int64_t first, int64_t last) {
-    std::fill(p.gradients + first, p.gradients + last, BlendGradient{});
-  });
+  float* absolute = options.absgrad ? gradient.means2d_abs.data() : nullptr;
+  if (!apart) {
+    std::fill_n(own, kept->count, BlendGradient{});
+    p.gradients = own;
+    p.absolute = absolute;
+  }
   for (int64_t listed_to = 0; listed_to < tile_count;) {
     const int64_t listed_from = listed_to;
     listed_to = listed ? tile_count : EndOfRun(bin, listed_from, options.max_pairs);
     const auto pairs_before = [&](int64_t tile) { return bin.tile_offsets[tile] - bin.tile_offsets[listed_from]; };
     if (!listed) ListPairs(bin, listed_from, listed_to, Room(pairs, pairs_before(listed_to) + bin.chunks));
     for (p.first_tile = listed_from; p.first_tile < listed_to; p.first_tile = p.last_tile) {
-      p.last_tile = std::min(listed_to, EndOfRun(bin, p.first_tile, kMaxPartial));
       p.pairs = pairs.data() + pairs_before(p.first_tile);
-      const int64_t apart = pairs_before(p.last_tile) - pairs_before(p.first_tile);
-      p.partial = ThreadCount() > 1 ? Room(partial, apart) : nullptr;
-      p.partial_absolute = ThreadCount() > 1 && options.absgrad ? Room(partial_absolute, 2 * apart) : nullptr;
+      p.last_tile = listed_to;
+      if (!apart) {
+        BlendBackwardCpu(p);
+        continue;
+      }
+      if (!at_once) {
+        left.params.first_tile = p.first_tile;
+        left.params.last_tile = std::min(listed_to, EndOfRun(bin, p.first_tile, kMaxSlots));  // no pair without a slot
+        slot_count = PlaceSlots(left.params, kMaxSlots, starts);
+      }
+      p.last_tile = left.params.last_tile;
+      p.sums = Room(slot_sums, slot_count);
+      p.absolute = options.absgrad ? Room(slot_absolute, 2 * slot_count) : nullptr;
+      p.touched = Room(slot_touched, slot_count);
+      left.slots = {starts, p.sums, p.absolute, p.touched};
+      ParallelFor(0, slot_count, int64_t{1} << 18,
+                  [&](int64_t first, int64_t last) { std::fill(p.touched + first, p.touched + last, uint8_t{0}); });
       BlendBackwardCpu(p);
+      if (at_once) continue;
+      ParallelFor(0, chunks, 1, [&](int64_t chunk, int64_t) {
+        SumSlots(left.params, left.slots, chunk, p.first_tile == 0, own, absolute);
+      });
     }
   }
   for (size_t c = 0; c < 3; ++c) gradient.background[c] = static_cast<float>(background_gradient[c]);
+  return at_once ? std::optional(left) : std::nullopt;
 }
 
-void Rasterizer::State::ProjectBackward(const CloudView& cloud, const CoefficientStep* step, CloudGradient& gradient) {
+void Rasterizer::State::ProjectBackward(const std::optional<SlotsLeft>& left, const CloudView& cloud,
+                                        const CoefficientStep* step, CloudGradient& gradient) {
   const size_t n = static_cast<size_t>(kept->count);
   gradient.means.resize(3 * n);
   gradient.log_scales.resize(3 * n);
@@ -97,7 +138,7 @@ void Rasterizer::State::ProjectBackward(const CloudView& cloud, const Coefficien
   gradient.opacity_logits.resize(n);
   gradient.sh.resize(step == nullptr ? cloud.sh.size() : 0);
   gradient.means2d.resize(2 * n);
-  gradient.radii.assign(radii.begin(), radii.begin() + static_cast<int64_t>(2 * n));
+  gradient.radii.resize(2 * n);
 
   ProjectBackwardParams project{};
   project.count = kept->count;
@@ -135,11 +176,17 @@ void Rasterizer::State::ProjectBackward(const CloudView& cloud, const Coefficien
   sh.sh_gradients = step == nullptr ? gradient.sh.data() : nullptr;
   sh.step = step;
 
-  // Both of a chunk while it is in the cache.
+  float* absolute = kept->options.absgrad ? gradient.means2d_abs.data() : nullptr;
+  // All of a chunk while it is in the cache.
   ParallelFor(0, ProjectChunks(kept->count), 1, [&](int64_t first, int64_t last) {
     for (int64_t chunk = first; chunk < last; ++chunk) {
+      if (left) {
+        SumSlots(left->params, left->slots, chunk, true, gradients.data(), absolute);
+      }
       ProjectBackwardCpu(project, chunk);
       SphericalHarmonicsBackwardCpu(sh, chunk);
+      const int64_t begin = 2 * chunk * kProjectChunk, end = std::min(begin + 2 * kProjectChunk, 2 * kept->count);
+      std::copy(radii.data() + begin, radii.data() + end, gradient.radii.data() + begin);
     }
   });
 }
@@ -163,9 +210,9 @@ Status Rasterizer::Backward(const CloudView& cloud, const RenderGradient& output
   }
   try {
     Stopwatch watch;
-    state_->BlendBackward(output_gradient, gradient);
+    const std::optional<State::SlotsLeft> left = state_->BlendBackward(output_gradient, gradient);
     state_->statistics.blend_backward = watch.Lap();
-    state_->ProjectBackward(cloud, step, gradient);
+    state_->ProjectBackward(left, cloud, step, gradient);
     state_->statistics.project_backward = watch.Lap();
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kIo,

@@ -8,7 +8,7 @@
 #include "core/camera.h"
 #include "core/stopwatch.h"
 #include "render/bin.h"
-#include "render/blend_backward.h"
+#include "render/gradient_slots.h"
 #include "render/projected_gaussian.h"
 #include "render/rasterizer.h"
 
@@ -46,8 +46,10 @@ struct Rasterizer::State {
   std::optional<Kept> kept;  // where the last Render was asked to keep it
   Buffer<float> transmittance;
   Buffer<int32_t> contributors, radii;
-  Buffer<BlendGradient> gradients, partial;
-  Buffer<float> partial_absolute;
+  Buffer<int64_t> slot_counts, slot_starts;
+  Buffer<BlendGradient> slot_sums, gradients;
+  Buffer<float> slot_absolute;
+  Buffer<uint8_t> slot_touched;
   Buffer<double> tile_backgrounds;
 
   int64_t Project(const CloudView& cloud, const Camera& camera, const RenderOptions& options, Stopwatch& watch);
@@ -55,8 +57,15 @@ struct Rasterizer::State {
   BinParams MakeBinParams(int64_t visible_total, const Pinhole& intrinsics, float min_alpha);
   void BinAndBlend(int64_t visible_total, const Camera& camera, const RenderOptions& options, RenderOutput& output,
                    Stopwatch& watch);
-  void BlendBackward(const RenderGradient& output_gradient, CloudGradient& gradient);  // background and means2d_abs
-  void ProjectBackward(const CloudView& cloud, const CoefficientStep* step, CloudGradient& gradient);
+  // How the sums of the tiles are to be added up after the last run of tiles.
+  struct SlotsLeft {
+    SlotsParams params;
+    GradientSlots slots;
+  };
+  // Background, and where there is more than one run of tiles, `gradients` and means2d_abs.
+  std::optional<SlotsLeft> BlendBackward(const RenderGradient& output_gradient, CloudGradient& gradient);
+  void ProjectBackward(const std::optional<SlotsLeft>& left, const CloudView& cloud, const CoefficientStep* step,
+                       CloudGradient& gradient);
 };
 
 }  // namespace anchorsplat

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <numeric>
 #include <utility>
 
 #include "core/parallel.h"
@@ -45,10 +46,19 @@ void SortCpu(const SortParams& p) {
       for (int64_t i = first; i < last; ++i) ++histogram[((keys[i] - smallest) >> shift) & mask];
     });
     // Where each chunk's share of each bucket starts: buckets first, then chunks, which is what makes it stable.
-    uint32_t start = 0;
-    for (int64_t bucket = 0; bucket <= mask; ++bucket) {
-      for (int64_t c = 0; c < p.chunks; ++c) {
-        start += std::exchange(p.histograms[c * kSortBuckets + bucket], start);
+    // This is done by one thread, so it goes along the chunks, several buckets at a time.
+    uint32_t starts[kSortBuckets] = {};
+    for (int64_t c = 0; c < p.chunks; ++c) {
+      const uint32_t* histogram = p.histograms + c * kSortBuckets;
+      for (int64_t bucket = 0; bucket <= mask; ++bucket) starts[bucket] += histogram[bucket];
+    }
+    std::exclusive_scan(starts, starts + mask + 1, starts, 0u);
+    for (int64_t c = 0; c < p.chunks; ++c) {
+      uint32_t* histogram = p.histograms + c * kSortBuckets;
+      for (int64_t bucket = 0; bucket <= mask; ++bucket) {
+        const uint32_t own = histogram[bucket];
+        histogram[bucket] = starts[bucket];
+        starts[bucket] += own;
       }
     }
     ParallelFor(0, p.chunks, 1, [&](int64_t c, int64_t) {

@@ -19,7 +19,7 @@ struct SphericalHarmonicsBackwardParams {
   const float* sh;                     // [N,stride/3,3] coefficient-major, rgb fastest
   std::array<double, 3> center;        // camera centre, world
   const ProjectedGaussian* projected;  // [N] rgb of SphericalHarmonicsCpu
-  const BlendGradient* gradients;      // [N] of BlendBackwardCpu; read where visible
+  const BlendGradient* gradients;      // [N] of SumSlots; read where visible
   const int32_t* visible;              // [N] as ProjectBackwardParams::visible
   const int32_t* visible_counts;       // [ProjectChunks(N)]
   // in and out

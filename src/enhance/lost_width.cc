@@ -10,7 +10,7 @@ std::string_view NameOf(LostWidthReason reason) {
   switch (reason) {
     case LostWidthReason::kTagged:
       return "tagged";
-    case LostWidthReason::kLooks:
+    case LostWidthReason::kSizes:
       return "looks";
     case LostWidthReason::kUnclear:
       return "unclear";
@@ -41,7 +41,7 @@ LostWidth FindLostWidth(const CloudView& cloud, std::optional<TrainedKind> looks
     return {DefaultFilterStrength(upscale, RenderMode::kAntialiased), LostWidthReason::kUnclear};
   }
   const auto mode = looks == TrainedKind::kAntialiased ? RenderMode::kAntialiased : RenderMode::kClassic;
-  return {DefaultFilterStrength(upscale, mode), LostWidthReason::kLooks};
+  return {DefaultFilterStrength(upscale, mode), LostWidthReason::kSizes};
 }
 
 }  // namespace anchorsplat

@@ -11,7 +11,7 @@ namespace anchorsplat {
 // What `enhance` gives back to a splat, and why.
 enum class LostWidthReason {
   kTagged,            // the file says how it was trained
-  kLooks,             // its sizes say it
+  kSizes,             // its sizes say it
   kUnclear,           // they are like those of no kind: only a little, which harms none of them
   kTooFew,            // too few Gaussians to tell: taken for a classic one
   kFittedToAreas,     // nothing was lost
@@ -25,7 +25,7 @@ std::string_view NameOf(LostWidthReason reason);
 
 struct LostWidth {
   double strength = 0;  // f of enhance/filter.h, at the zoom that was asked for
-  LostWidthReason reason = LostWidthReason::kLooks;
+  LostWidthReason reason = LostWidthReason::kSizes;
 
   // Of what is called likely nine in ten hold on every kind of fit (docs/results/recognised.md).
   bool likely() const { return reason != LostWidthReason::kUnclear && reason != LostWidthReason::kTooFew; }

@@ -8,7 +8,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "formats/blocks_for_test.h"
-#include "formats/messages_for_test.h"
+#include "core/messages_for_test.h"
 
 namespace anchorsplat {
 

@@ -130,7 +130,7 @@ Status CheckOptions(const EnhanceOptions& options) {
         if (FindOption(&method, name) != nullptr && !listed) owners.push_back(method.name);
       }
       if (owners.empty()) continue;
-      lack = "with --method " + OrList(owners);
+      lack = "with --method " + OrList(owners) + (name == "background" ? ", and with --clean" : "");
     }
     return Error{ErrorCode::kBadArgument,
                  Cat("--", name, " has no effect with --method ", plan.Name(),

@@ -43,6 +43,9 @@ struct EnhanceSettings {
   // Of a compact network: Gaussians that it makes of each, at most; nothing: merged where nobody would see it.
   std::optional<int64_t> copies = std::nullopt;
   int64_t max_gaussians = 0;  // of the result at most, as --max-gaussians; 0: no bound
+  // Only what lies in there is enhanced, the rest stays bit by bit and comes last: four numbers are a sphere, its
+  // centre and radius, six a box by two corners across, in world units. Empty: all of the splat.
+  std::vector<double> region = {};
   uint64_t seed = 0;
 };
 
@@ -58,6 +61,7 @@ struct EnhanceOutcome {
   Splat splat;
   std::string method = {};  // what "auto" came to: "filter", "model+refine"
   int64_t gaussians_in = 0, dropped = 0, gaussians_out = 0;
+  std::optional<int64_t> kept_outside = std::nullopt;  // of a region: the last ones of the result, as they were
   double filter_strength = 0;
   double pixel_size = 0;  // world units; the median where each Gaussian has its own
   // "given", "cameras", "pictures", "estimated"; "cautious": the estimate is contradicted and the smallest plausible
@@ -72,7 +76,8 @@ struct EnhanceOutcome {
 // finite are dropped; what was assumed is said by messages of the run. Refinement heeds RunSettings::stop.
 //
 // Failures: kBadArgument: no Gaussians, CheckShape, settings out of range or without effect, a method that is not
-// ready; kBadFile: no Gaussian is usable, and files that settings name; kNotFound; kIo.
+// ready, a region that is none or holds no Gaussian; kBadFile: no Gaussian is usable, and files that settings name;
+// kNotFound; kIo.
 ANCHORSPLAT_PUBLIC Expected<EnhanceOutcome> Enhance(const SplatView& splat, const EnhanceSettings& settings = {},
                                                     const RunSettings& run = {});
 // The same without a copy of the splat; it is gone afterwards.

@@ -98,8 +98,10 @@ def enhance(
     N × N pixels of the pictures become one. steps or seconds: how long. k: Gaussians that each becomes at first. poses, between: where to look from
     without pictures. half_from, all_from: parts of the run from which on more rays are rendered. rate, rate_decay: learning
     rates, as a part of those of ``fit``. ssim_weight: of the loss. exposure, robust, align: pictures that differ in brightness,
-    show what is not in the scene, or whose poses are a little off. checkpoint, resume: file for the state when it is stopped
-    (Ctrl-C: it is written, then KeyboardInterrupt), and going on from it.
+    show what is not in the scene, or whose poses are a little off.
+
+    checkpoint, resume: file for the state of a refinement when it is stopped (Ctrl-C: it is written, then KeyboardInterrupt),
+        or for what a compact network has made so far, and going on from it.
 
     seed: of everything random. threads: at most; 0: all of the machine; the result does not depend on it.
 

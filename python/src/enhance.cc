@@ -36,16 +36,18 @@ Result<Enhanced> EnhanceView(const CloudView& view, const EnhanceFlags& flags, c
                              uint64_t seed) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const EnhanceOptions options, MakeEnhanceOptions(flags, seed, cameras));
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(view));
-  const auto& checkpoint = options.control.checkpoint;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const MethodPlan plan, PlanEnhancement(options));
+  const auto checkpoint = plan.KeepsCheckpoint(options) ? options.control.checkpoint : std::filesystem::path();
   if (!checkpoint.empty()) {
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(checkpoint, {}, options.control.resume, /*overwrite=*/false));
+    ANCHORSPLAT_RETURN_IF_ERROR(
+        CheckCheckpoint(checkpoint, {}, options.control.resume, /*overwrite=*/false, plan.method->is_checkpoint));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto lock, HoldCheckpoint(checkpoint));
   GaussianCloud cloud = CopyOf(view);
   if (flags.mode) cloud.render_mode = flags.mode;
   ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, Enhance(std::move(cloud), options));
   if (enhanced.report.interrupted) return Error{ErrorCode::kInterrupted, "stopped"};
-  if (!checkpoint.empty()) RemoveFitCheckpoint(checkpoint);
+  if (!checkpoint.empty()) RemoveCheckpoint(checkpoint, plan.method->is_checkpoint);
   if (options.cameras && !UpOf(enhanced.cloud.comments)) {
     if (const auto up = WorldUp(options.cameras->cameras)) enhanced.cloud.comments.push_back(UpComment(*up));
   }

@@ -67,3 +67,17 @@ def test_refusals_are_the_command_lines(cloud, biplane, program, tmp_path):
 def test_methods_are_listed():
     assert {"filter", "model", "refine"} <= set(anchorsplat.methods())
 
+
+
+def test_a_network_keeps_what_it_has_made(cloud, tmp_path):
+    whole, _ = anchorsplat.enhance(cloud, method="model")
+    state = tmp_path / "state"
+    again, report = anchorsplat.enhance(cloud, method="model", checkpoint=state, resume=True)
+    assert same(again, whole) and report["model"]["blocks_resumed"] == 0
+    assert not state.exists()  # the result is there
+    state.write_bytes(b"my notes")
+    with pytest.raises(anchorsplat.ExistsError, match="is no checkpoint"):
+        anchorsplat.enhance(cloud, method="model", checkpoint=state)
+    with pytest.raises(anchorsplat.BadFileError, match="is not a checkpoint"):
+        anchorsplat.enhance(cloud, method="model", checkpoint=state, resume=True)
+    assert state.read_bytes() == b"my notes"

@@ -5,6 +5,8 @@
 #include <mutex>
 
 #include "api/bridge.h"
+#include "core/region.h"
+#include "core/text.h"
 #include "model/model_method.h"
 
 namespace anchorsplat {
@@ -40,14 +42,24 @@ Result<EnhanceOptions> ToOptions(const EnhanceSettings& settings) {
   given(!settings.model.empty(), "model");
   given(settings.copies.has_value(), "copies");
   given(settings.max_gaussians != 0, "max-gaussians");
+  given(!settings.region.empty(), "region");
+  if (!settings.region.empty()) {
+    options.region = RegionOf(settings.region);
+    if (!options.region) {
+      std::string numbers;
+      for (const double x : settings.region) numbers += Cat(numbers.empty() ? "" : ",", x);
+      return Error{ErrorCode::kBadArgument, Cat("region: '", numbers, "'", kNoRegion)};
+    }
+  }
   if (!settings.cameras.empty()) {
     options.cameras.emplace();
     for (const PinholeCamera& camera : settings.cameras) options.cameras->cameras.push_back(ToCamera(camera));
   }
   for (const auto& [name, value] : settings.refine) {
     ANCHORSPLAT_RETURN_IF_ERROR(SetRefineOption(options.refine, name, value));
-    given(true, name.c_str());
+    given(true, name == "most-gaussians" ? "max-gaussians" : name.c_str());
   }
+  SetBudget(options, options.refine.max_gaussians);  // one budget, wherever it was said
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options.refine));
   return options;
 }
@@ -62,6 +74,7 @@ Result<EnhanceOutcome> RunMethod(GaussianCloud cloud, const EnhanceSettings& set
                          .gaussians_in = report.gaussians_in,
                          .dropped = report.dropped,
                          .gaussians_out = report.gaussians_out,
+                         .kept_outside = report.kept_outside,
                          .filter_strength = report.filter_strength,
                          .pixel_size = report.pixel_size,
                          .pixel_size_source = std::move(report.pixel_size_source),

@@ -90,6 +90,62 @@ TEST(Enhance, RefinementTellsWhatItDid) {
   EXPECT_EQ(Enhance(splat, settings).failure().kind, FailureKind::kBadArgument);
 }
 
+// Rows of `splat` from `first` on, as bits.
+std::vector<float> MeansFrom(const SplatView& splat, int64_t first) {
+  const std::span<const float> means = splat.means;
+  return {means.begin() + 3 * first, means.end()};
+}
+
+TEST(Enhance, OfARegionOnly) {
+  const Splat splat = SmallSplat(300, 1, 4);
+  int64_t inside = 0;
+  std::vector<float> outside;
+  for (int64_t i = 0; i < splat.size(); ++i) {
+    const float* p = SplatView(splat).means.data() + 3 * i;
+    const bool in = p[2] <= 0;
+    inside += in ? 1 : 0;
+    if (!in) outside.insert(outside.end(), p, p + 3);
+  }
+  ASSERT_GT(inside, 0);
+  ASSERT_GT(splat.size() - inside, 0);
+  EnhanceSettings settings{.method = "model", .pixel_size = 0.02, .region = {9, 9, 0, -9, -9, -9}};
+  const auto made = Enhance(splat, settings);
+  ASSERT_TRUE(made.ok()) << made.failure().message;
+  EXPECT_EQ(made->kept_outside, splat.size() - inside);
+  EXPECT_EQ(MeansFrom(made->splat, made->gaussians_out - *made->kept_outside), outside);
+
+  // The budget is of all that there is, also where it is said among refinement's options.
+  settings.max_gaussians = splat.size() + 10;
+  const auto bounded = Enhance(splat, settings);
+  ASSERT_TRUE(bounded.ok()) << bounded.failure().message;
+  EXPECT_LE(bounded->gaussians_out, splat.size() + 10);
+  EXPECT_EQ(bounded->kept_outside, splat.size() - inside);
+
+  settings.max_gaussians = 0;
+  for (const std::vector<double>& none : {std::vector<double>{0, 0, 0}, {0, 0, 0, -1}, {100, 100, 100, 1}}) {
+    settings.region = none;
+    const auto refused = Enhance(splat, settings);
+    ASSERT_FALSE(refused.ok());
+    EXPECT_EQ(refused.failure().kind, FailureKind::kBadArgument);
+    EXPECT_THAT(refused.failure().message, HasSubstr("region"));
+  }
+  EXPECT_FALSE(Enhance(splat, {.method = "filter", .pixel_size = 0.02})->kept_outside);
+}
+
+TEST(Enhance, OneBudgetWhereverItIsSaid) {
+  const Splat splat = SmallSplat(300, 1, 4);
+  EnhanceSettings settings{.method = "model+refine", .pixel_size = 0.02};
+  settings.refine = {{"steps", "2"}, {"poses", "4"}, {"max-gaussians", "320"}};
+  const auto made = Enhance(splat, settings);
+  ASSERT_TRUE(made.ok()) << made.failure().message;
+  EXPECT_LE(made->gaussians_out, 320);
+  settings.refine.erase("max-gaussians");
+  settings.refine["most-gaussians"] = "320";  // its old name
+  const auto old = Enhance(splat, settings);
+  ASSERT_TRUE(old.ok()) << old.failure().message;
+  EXPECT_TRUE(SameBits(old->splat, made->splat));
+}
+
 TEST(Enhance, RefusesWhatItCannotDo) {
   EXPECT_EQ(Enhance(Splat()).failure().kind, FailureKind::kBadArgument);
   const Splat splat = SmallSplat(50, 0, 1);

@@ -71,16 +71,17 @@ Status CheckOutput(const fs::path& output, bool overwrite) {
   return CheckCanWriteCloud(output, 0, {.overwrite = overwrite});
 }
 
-// Whether the user can stop it and go on later.
-bool IsResumable(const EnhanceOptions& options) {
-  const auto plan = PlanEnhancement(options);
-  return plan.ok() && plan->method->resumable;
-}
+// Where a run for this output keeps what it needs to go on after an interruption, and what tells such a file.
+struct Checkpoint {
+  fs::path path;  // empty: nothing is kept
+  bool (*is_checkpoint)(const fs::path&) = nullptr;
+};
 
-// Where the state of a refinement of this output goes when the user stops it; empty when it is not kept.
-fs::path CheckpointOf(const EnhanceOptions& options, const fs::path& output) {
-  if (!IsResumable(options) || options.refine.seconds) return {};
-  return options.control.checkpoint.empty() ? fs::path(output.string() + ".checkpoint") : options.control.checkpoint;
+Checkpoint CheckpointOf(const EnhanceOptions& options, const fs::path& output) {
+  const auto plan = PlanEnhancement(options);
+  if (!plan.ok() || !plan->KeepsCheckpoint(options)) return {};
+  return {options.control.checkpoint.empty() ? fs::path(output.string() + ".checkpoint") : options.control.checkpoint,
+          plan->method->is_checkpoint};
 }
 
 // All that is written for an output.
@@ -160,6 +161,14 @@ Buffer<float> KeepUsable(ExtraProperties& extras, const GaussianCloud& cloud) {
   return means;
 }
 
+// An interruption says how to go on.
+Error WithWayOn(Error error, const fs::path& checkpoint) {
+  if (error.code == ErrorCode::kInterrupted && !checkpoint.empty() && Exists(checkpoint)) {
+    error.message += Cat(", the same command with --resume goes on from ", checkpoint.string());
+  }
+  return error;
+}
+
 // From one file to another; its entry of the results.
 // `said`: what will come out.
 Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& shared, EnhanceOptions options,
@@ -181,13 +190,14 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   const CloudWriteOptions write{.overwrite = shared.overwrite};
   // Again, now that the inputs with the files beside them are known.
   ANCHORSPLAT_RETURN_IF_ERROR(CheckCanWriteCloud(output, cloud.sh_degree, write));
-  options.control.checkpoint = CheckpointOf(options, output);
+  const auto [checkpoint, is_checkpoint] = CheckpointOf(options, output);
+  options.control.checkpoint = checkpoint;
   options.control.outputs = OutputFiles(flags, output);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto lock, HoldCheckpoint(options.control.checkpoint));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto lock, HoldCheckpoint(checkpoint));
   std::optional<StopSignal> stop_signal(std::in_place);
   auto result = Enhance(std::move(cloud), options);
   stop_signal.reset();
-  if (!result.ok()) return result.error();
+  if (!result.ok()) return WithWayOn(result.error(), checkpoint);
   Enhanced enhanced = *std::move(result);
   if (!extras.empty() && enhanced.report.cleaned) {
     std::vector<char> kept(means.size() / 3, 1);
@@ -207,18 +217,14 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   const EnhanceReport& r = enhanced.report;
   if (r.looks == TrainedKind::kAntialiased) before.render_mode = enhanced.cloud.render_mode;  // both as it was trained
   if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(WritePage(input, before, output, enhanced, WriteOptionsFrom(shared)));
-  const fs::path& checkpoint = options.control.checkpoint;
   if (r.interrupted) {
-    const bool resumable = !checkpoint.empty() && Exists(checkpoint);
-    if (resumable) {
+    if (!checkpoint.empty() && Exists(checkpoint)) {
       const Status noted = NoteFilesLeft(checkpoint);
       if (!noted.ok()) LogWarning(Cat("going on will need -w for what is left here: ", noted.error().message));
     }
-    return Error{ErrorCode::kInterrupted,
-                 Cat("stopped; ", output.string(), " is as far as it came",
-                     resumable ? Cat(", the same command with --resume goes on from ", checkpoint.string()) : "")};
+    return WithWayOn({ErrorCode::kInterrupted, Cat("stopped; ", output.string(), " is as far as it came")}, checkpoint);
   }
-  if (!checkpoint.empty()) RemoveFitCheckpoint(checkpoint);
+  if (!checkpoint.empty()) RemoveCheckpoint(checkpoint, is_checkpoint);
   nlohmann::json json = ToJson(r);
   json["input"] = input;
   json["output"] = output.string();
@@ -253,10 +259,11 @@ Status RunEnhance(const EnhanceWords& flags, Program& program) {
 
   // For all before the first is computed: a batch should not fail half-way on something known at its start.
   for (const fs::path& output : outputs) {
-    const fs::path checkpoint = CheckpointOf(options, output);
+    const auto [checkpoint, is_checkpoint] = CheckpointOf(options, output);
     const std::vector<fs::path> files = OutputFiles(flags, output);
     if (!checkpoint.empty()) {
-      ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(checkpoint, files, options.control.resume, shared.overwrite));
+      ANCHORSPLAT_RETURN_IF_ERROR(
+          CheckCheckpoint(checkpoint, files, options.control.resume, shared.overwrite, is_checkpoint));
       if (options.control.resume) RecordWhatWasLeft(checkpoint, files);
     }
     ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(output, shared.overwrite));

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
+#include <span>
 
 namespace anchorsplat {
 
@@ -22,5 +24,11 @@ struct Region {
     return radius ? square <= *radius * *radius : inside;
   }
 };
+
+// Four numbers are a sphere, its centre and a radius above 0, six a box by any two corners across. Nothing: any other
+// count, a value that is not finite, a radius that is not positive.
+std::optional<Region> RegionOf(std::span<const double> numbers);
+inline constexpr const char* kNoRegion =
+    " is neither a box X0,Y0,Z0,X1,Y1,Z1 nor a sphere X,Y,Z,RADIUS, such as 0,0.5,0,2";  // for messages
 
 }  // namespace anchorsplat

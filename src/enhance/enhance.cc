@@ -418,7 +418,9 @@ Result<GaussianCloud> RunPlan(const MethodPlan& plan, const SizedMethods& sized,
   if (plan.start != nullptr) {
     EnhanceInput first = input;
     if (!sized.start) first.pixel_sizes.clear();
-    ANCHORSPLAT_ASSIGN_OR_RETURN(input.start, RunStep(*plan.start, std::move(first), options, report));
+    EnhanceOptions of_first = options;
+    of_first.control = {};  // the checkpoint is the last one's
+    ANCHORSPLAT_ASSIGN_OR_RETURN(input.start, RunStep(*plan.start, std::move(first), of_first, report));
     input.start_has_detail = plan.start->adds_detail;
   }
   return RunStep(*plan.method, std::move(input), options, report);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <span>
@@ -140,8 +141,11 @@ struct EnhanceMethod {
   bool takes_start = false;  // looks at EnhanceInput::start
   // Named alone it begins with the best instant method, if that one adds detail.
   std::function<bool(const EnhanceOptions&)> begins_with_best = [](const EnhanceOptions&) { return false; };
-  bool adds_detail = false;           // shows more than the splat does, not only what it shows with other widths
-  bool resumable = false;             // looks at EnhanceOptions::control
+  bool adds_detail = false;  // shows more than the splat does, not only what it shows with other widths
+  // Keeps what EnhanceOptions::control names: null for methods that keep nothing. Tells such a file from others, and
+  // the file is the command's own from then on.
+  bool (*is_checkpoint)(const std::filesystem::path&) = nullptr;
+  bool keeps_when_asked = false;      // only where a checkpoint is named, or --resume says that there may be one
   std::vector<MethodOption> options;  // all that it looks at: this is the only place that says so
   // False: EnhanceInput::pixel_sizes may be empty, nothing is estimated. Asked once the method is ready. An error: it
   // could not run.
@@ -170,6 +174,8 @@ struct MethodPlan {
   const EnhanceMethod* start = nullptr;   // the one whose result it begins with, if there is one
   std::string chosen_by;                  // "auto" or "--quality …"; empty when the user named the method
   std::string Name() const;               // "refine", "model+refine"
+  // Whether its last method keeps a checkpoint, as these options are.
+  bool KeepsCheckpoint(const EnhanceOptions& options) const;
 };
 
 // kBadArgument: methods or qualities that there are none of, a method that is not ready or cannot go on from another's

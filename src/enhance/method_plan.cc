@@ -90,6 +90,11 @@ std::vector<MethodOption> WidthOptions(const std::function<std::string(const Met
 
 std::string MethodPlan::Name() const { return start == nullptr ? method->name : Cat(start->name, "+", method->name); }
 
+bool MethodPlan::KeepsCheckpoint(const EnhanceOptions& options) const {
+  if (method->is_checkpoint == nullptr || options.refine.seconds) return false;
+  return !method->keeps_when_asked || options.control.resume || !options.control.checkpoint.empty();
+}
+
 Result<MethodPlan> PlanEnhancement(const EnhanceOptions& options) {
   if (!options.quality.empty()) return PlanQuality(options);
   MethodPlan plan;

@@ -8,6 +8,7 @@
 #include "enhance/filter.h"
 #include "enhance/gaussian_budget.h"
 #include "enhance/refine.h"
+#include "fit/fitter.h"
 #include "fit/pixel_model.h"
 
 namespace anchorsplat {
@@ -155,7 +156,7 @@ EnhanceMethod RefineMethod() {
           .rank = -1,  // never without being asked: it takes its time
           .takes_start = true,
           .begins_with_best = WithPictures,
-          .resumable = true,
+          .is_checkpoint = IsFitCheckpoint,
           .options = RefinementOptions(),
           .expected = Expected,
           .ready = [](const EnhanceOptions& options) { return Validate(options.refine); },
@@ -168,7 +169,7 @@ EnhanceMethod RefineImagesMethod() {
           .rank = 2,
           .takes_start = true,
           .begins_with_best = WithPictures,
-          .resumable = true,
+          .is_checkpoint = IsFitCheckpoint,
           .options = RefinementOptions(),
           .expected = Expected,
           .ready = [](const EnhanceOptions& options) -> Status {

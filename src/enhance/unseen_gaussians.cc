@@ -59,58 +59,79 @@ Result<std::vector<Camera>> ChooseViews(const GaussianCloud& cloud, const std::v
   return views;
 }
 
-bool IsLikeBackground(const GaussianCloud& cloud, int64_t i, const std::array<float, 3>& background) {
-  const float* sh = cloud.sh.data() + i * cloud.sh_stride();
+bool IsLikeBackground(const float* constant_term, const std::array<float, 3>& background) {
   for (size_t c = 0; c < 3; ++c) {
-    const float colour = std::clamp(ColorFromDc(sh[c]), 0.0f, 1.0f);
+    const float colour = std::clamp(ColorFromDc(constant_term[c]), 0.0f, 1.0f);
     if (!(std::abs(colour - background[c]) <= kLikeBackground)) return false;
   }
   return true;
 }
 
+// Usable Gaussians of the background's colour, ascending. `constant_terms`: one of each in every `stride` floats.
+std::vector<int64_t> RowsLikeBackground(const GaussianCloud& cloud, const Buffer<float>& constant_terms, int64_t stride,
+                                        const std::array<float, 3>& background) {
+  std::vector<std::vector<int64_t>> parts(static_cast<size_t>((cloud.size() + kRowsAtOnce - 1) / kRowsAtOnce));
+  ParallelFor(0, cloud.size(), kRowsAtOnce, [&](int64_t first, int64_t last) {
+    std::vector<int64_t>& part = parts[static_cast<size_t>(first / kRowsAtOnce)];
+    for (int64_t i = first; i < last; ++i) {
+      if (IsLikeBackground(constant_terms.data() + i * stride, background) && IsUsable(cloud, i)) part.push_back(i);
+    }
+  });
+  std::vector<int64_t> rows;
+  for (const std::vector<int64_t>& part : parts) rows.insert(rows.end(), part.begin(), part.end());
+  return rows;
+}
+
 Error Stopped() { return Error{ErrorCode::kInterrupted, "stopped while cleaning; nothing was written"}; }
 
-// Of every Gaussian, over the pixels of the views: in squares, by the gradient of the picture times random signs.
+// Of some Gaussians, over the pixels of the views: in squares, by the gradient of the picture times random signs.
 struct Shown {
-  std::vector<double> additions;  // Σ (T·α·(its colour − what is behind it))²; negative where no view draws it
-  std::vector<double> reaches;    // Σ (T·α)²; 0 where its colour is clamped
-  std::vector<double>
-      footprints;  // Σ o² over its ellipse in the picture: about what `reaches` is without anything before it
+  std::vector<double> additions;   // Σ (T·α·(its colour − what is behind it))²; negative where no view draws it
+  std::vector<double> reaches;     // Σ (T·α)²; 0 where its colour is clamped
+  std::vector<double> footprints;  // Σ o² over its ellipse: about what `reaches` is without anything before it
+  bool anything = false;           // whether a view draws some Gaussian, of these or another
+
+  // Of footprint: that little of it gets through to the views.
+  bool IsHidden(size_t k) const { return !(reaches[k] > kReachesViews * footprints[k]); }
 };
 
-Result<Shown> FindShown(CloudView cloud, const std::vector<Camera>& views, RenderOptions options, uint64_t seed) {
+Result<Shown> FindShown(CloudView cloud, const std::vector<int64_t>& rows, const std::vector<Camera>& views,
+                        RenderOptions options, uint64_t seed) {
   Buffer<float> logits(cloud.opacity_logits.begin(), cloud.opacity_logits.end());
   for (float& logit : logits) logit = std::min(logit, LogitFromOpacity(kHighestOpacity));
   cloud.opacity_logits = logits;
   options.gradient = true;
-  const size_t stride = static_cast<size_t>(cloud.sh_stride());
-  Shown shown{.additions = std::vector<double>(logits.size(), -1.0),
-              .reaches = std::vector<double>(logits.size()),
-              .footprints = std::vector<double>(logits.size())};
+  Shown shown{.additions = std::vector<double>(rows.size(), -1.0),
+              .reaches = std::vector<double>(rows.size()),
+              .footprints = std::vector<double>(rows.size())};
   Rasterizer rasterizer;
   RenderOutput output;
   RenderGradient signs;
-  CloudGradient gradient;
   Random random(seed);
   Progress progress("look for what nobody misses", static_cast<int64_t>(views.size()));
   for (const Camera& camera : views) {
     if (StopRequested()) return Stopped();
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, camera, options, output));
+    shown.anything = shown.anything || rasterizer.statistics().visible > 0;
     signs.color = output.color;
     signs.box = {0, 0, camera.intrinsics.width, camera.intrinsics.height};
     for (float& sign : signs.color.pixels) sign = random.Below(2) == 0 ? -1.0f : 1.0f;
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Backward(cloud, signs, gradient));
-    ParallelFor(0, cloud.size(), kRowsAtOnce, [&](int64_t first, int64_t last) {
-      for (auto i = static_cast<size_t>(first); i < static_cast<size_t>(last); ++i) {
-        if (gradient.radii[2 * i] <= 0) continue;
-        const double opacity = Sigmoid(double{logits[i]});
-        // o·∂L/∂o = ∂L/∂logit / (1 − o), the sum of sign·T·α·(colour − behind) over the pixels.
-        const double sum = gradient.opacity_logits[i] / (1 - opacity);
-        shown.additions[i] = std::max(shown.additions[i], 0.0) + sum * sum;
-        for (size_t c = 0; c < 3; ++c) shown.reaches[i] += std::pow(gradient.sh[stride * i + c] / kSh0, 2) / 3;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const SeenGradient gradient, rasterizer.BackwardToSeen(signs));
+    ParallelFor(0, std::ssize(rows), kRowsAtOnce, [&](int64_t first, int64_t last) {
+      for (auto k = static_cast<size_t>(first); k < static_cast<size_t>(last); ++k) {
+        const int64_t i = rows[k];
+        const int32_t* radii = gradient.radii.data() + 2 * i;
+        if (radii[0] <= 0) continue;
+        // The sum of sign·T·α·(colour − behind) over the pixels.
+        const double sum = gradient.OfLogOpacity(i);
+        shown.additions[k] = std::max(shown.additions[k], 0.0) + sum * sum;
+        for (size_t c = 0; c < 3; ++c) {
+          const double of_colour = gradient.OfColor(i, c);
+          shown.reaches[k] += of_colour * of_colour / 3;
+        }
         // ∫ exp(−r²/σ²) of radii of 3 σ.
-        shown.footprints[i] +=
-            opacity * opacity * std::numbers::pi * (gradient.radii[2 * i] / 3.0) * (gradient.radii[2 * i + 1] / 3.0);
+        const double opacity = Sigmoid(double{logits[static_cast<size_t>(i)]});
+        shown.footprints[k] += opacity * opacity * std::numbers::pi * (radii[0] / 3.0) * (radii[1] / 3.0);
       }
     });
     progress.Advance();
@@ -177,25 +198,24 @@ class Comparison {
   RenderOutput output_;
 };
 
-// Usable Gaussians of the background's colour that some view draws; those that add least come first.
-std::vector<int64_t> Candidates(const GaussianCloud& cloud, const std::vector<double>& additions,
-                                const std::array<float, 3>& background) {
-  std::vector<int64_t> candidates;
-  for (int64_t i = 0; i < cloud.size(); ++i) {
-    const double addition = additions[static_cast<size_t>(i)];
-    if (!(addition >= 0) || !std::isfinite(addition) || !IsUsable(cloud, i)) continue;
-    if (IsLikeBackground(cloud, i, background)) candidates.push_back(i);
+// Places of what some view draws; those that add least come first.
+std::vector<size_t> Candidates(const Shown& shown) {
+  std::vector<size_t> candidates;
+  for (size_t k = 0; k < shown.additions.size(); ++k) {
+    if (shown.additions[k] >= 0 && std::isfinite(shown.additions[k])) candidates.push_back(k);
   }
-  std::ranges::stable_sort(candidates, {}, [&](int64_t i) { return additions[static_cast<size_t>(i)]; });
   return candidates;
+}
+void SortByAddition(const Shown& shown, std::vector<size_t>& candidates) {
+  std::ranges::stable_sort(candidates, {}, [&](size_t k) { return shown.additions[k]; });
 }
 
 // How many of them add up to `most`, were there no more to it than their sum.
-size_t Predicted(const std::vector<int64_t>& candidates, const std::vector<double>& additions, double most) {
+size_t Predicted(const std::vector<size_t>& candidates, const Shown& shown, double most) {
   double sum = 0;
   size_t count = 0;
   while (count < candidates.size()) {
-    sum += additions[static_cast<size_t>(candidates[count])];
+    sum += shown.additions[candidates[count]];
     if (sum > most) break;
     ++count;
   }
@@ -217,21 +237,24 @@ Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views, ChooseViews(cloud, cameras));
   RenderOptions render = OptionsFor(cloud);
   render.background = options.background;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown shown, FindShown(cloud, views, render, options.seed));
-  const std::vector<double>& additions = shown.additions;
-  if (std::ranges::none_of(additions, [](double addition) { return addition >= 0; })) {
+  const std::vector<int64_t> like = RowsLikeBackground(cloud, cloud.sh, cloud.sh_stride(), options.background);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown shown, FindShown(cloud, like, views, render, options.seed));
+  if (!shown.anything) {
     return Error{ErrorCode::kBadArgument,
                  Cat("cleaning: none of ", views.size(),
                      " views shows anything of the splat: are the cameras of this splat, in its unit and axes?")};
   }
-  const std::vector<int64_t> candidates = Candidates(cloud, additions, options.background);
+  std::vector<size_t> order = Candidates(shown);
+  SortByAddition(shown, order);
+  std::vector<int64_t> candidates;
+  for (const size_t k : order) candidates.push_back(like[k]);
   UnseenGaussians found;
   found.views = static_cast<int64_t>(views.size());
   found.psnr = std::numeric_limits<double>::infinity();
   ANCHORSPLAT_ASSIGN_OR_RETURN(Comparison comparison, Comparison::Make(cloud, std::move(views), render));
   const double most = comparison.values() * std::pow(10, -options.least_psnr / 10);
   size_t enough = 0, too_many = candidates.size() + 1;
-  size_t count = Predicted(candidates, additions, most);
+  size_t count = Predicted(order, shown, most);
   Progress progress("try without it", kMostTrials);
   for (int trial = 0; trial < kMostTrials && enough + 1 < too_many; ++trial) {
     if (static_cast<double>(too_many - enough) <= kCloseEnough * static_cast<double>(enough)) break;
@@ -252,15 +275,9 @@ Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector
 
 Result<std::vector<int64_t>> PredictUnseen(const GaussianCloud& cloud) {
   constexpr std::array<float, 3> kBlack{};
-  const int64_t count = cloud.size();
-  int64_t dark = 0;
-  for (int64_t i = 0; i < count; ++i) dark += IsLikeBackground(cloud, i, kBlack);
-  if (dark == 0) return std::vector<int64_t>();
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<Camera> views,
-                               ViewsAround(cloud, kPredictingViews, kPredictingPixels));
   // A little brighter than black, where the gradient tells how much of them reaches the views.
   Buffer<float> colours(3 * cloud.opacity_logits.size());
-  ParallelFor(0, count, kRowsAtOnce, [&](int64_t first, int64_t last) {
+  ParallelFor(0, cloud.size(), kRowsAtOnce, [&](int64_t first, int64_t last) {
     for (int64_t i = first; i < last; ++i) {
       for (int64_t c = 0; c < 3; ++c) {
         colours[static_cast<size_t>(3 * i + c)] =
@@ -268,18 +285,25 @@ Result<std::vector<int64_t>> PredictUnseen(const GaussianCloud& cloud) {
       }
     }
   });
+  const std::vector<int64_t> dark = RowsLikeBackground(cloud, colours, 3, kBlack);
+  if (dark.empty()) return std::vector<int64_t>();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<Camera> views,
+                               ViewsAround(cloud, kPredictingViews, kPredictingPixels));
   CloudView view(cloud);
   view.sh_degree = 0;
   view.sh = colours;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown shown, FindShown(view, views, OptionsFor(cloud), /*seed=*/0));
-  std::vector<int64_t> rows = Candidates(cloud, shown.additions, kBlack);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown shown, FindShown(view, dark, views, OptionsFor(cloud), /*seed=*/0));
+  std::vector<size_t> order = Candidates(shown);
+  // Most of a large splat is behind something: it adds nothing to the sum and would go out again below.
+  std::erase_if(order, [&](size_t k) { return shown.additions[k] == 0 && shown.IsHidden(k); });
+  SortByAddition(shown, order);
   double values = 0;
   for (const Camera& camera : views) values += 3.0 * camera.intrinsics.width * camera.intrinsics.height;
-  rows.resize(Predicted(rows, shown.additions, values * std::pow(10, -kPredictedPsnr / 10)));
-  std::erase_if(rows, [&](int64_t i) {
-    const auto at = static_cast<size_t>(i);
-    return !(shown.reaches[at] > kReachesViews * shown.footprints[at]);
-  });
+  order.resize(Predicted(order, shown, values * std::pow(10, -kPredictedPsnr / 10)));
+  std::vector<int64_t> rows;
+  for (const size_t k : order) {
+    if (!shown.IsHidden(k)) rows.push_back(dark[k]);
+  }
   std::ranges::sort(rows);
   return rows;
 }

@@ -31,8 +31,8 @@ struct UnseenGaussians {
 
 // Of `cameras`, or of views all around where there are none. What a Gaussian adds to a picture, T·α·(its colour − what
 // is behind it) summed in squares over the pixels, comes of one gradient per view with random signs: its expectation is
-// that sum. Those that add least are taken out, as many as least_psnr allows, within a hundredth. Memory: the gradient
-// of the cloud and of one picture, and the pictures. Shows progress.
+// that sum. Those that add least are taken out, as many as least_psnr allows, within a hundredth. Memory: what blending
+// finds of the cloud, one picture's gradient, and the pictures. Shows progress.
 // Errors: those of Rasterizer; kBadArgument: least_psnr is not positive, the background is not from 0 to 1, no view
 // shows anything; kInterrupted: the user stopped it.
 Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector<Camera>& cameras,

@@ -282,12 +282,14 @@ Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word)
     const size_t end = std::min(word.find('@', at + 1), word.size());
     const std::string option = word.substr(at + 1, end - at - 1);
     const size_t equals = option.find('=');
-    if (equals == std::string::npos || !keys.insert(option.substr(0, equals)).second) {
+    std::string key = option.substr(0, equals);
+    if (key == "most-gaussians") key = "max-gaussians";  // its old name
+    if (equals == std::string::npos || !keys.insert(key).second) {
       return Error{ErrorCode::kBadArgument,
                    Cat("--methods ", Printable(word), ": options are written @KEY=VALUE, each once; of f, ",
                        RefineOptionKeys())};
     }
-    ANCHORSPLAT_RETURN_IF_ERROR(SetOption(method, option.substr(0, equals), option.substr(equals + 1)));
+    ANCHORSPLAT_RETURN_IF_ERROR(SetOption(method, key, option.substr(equals + 1)));
     at = end;
   }
   Status valid = Validate(method.refine);

@@ -1,12 +1,14 @@
 #include "fit/checkpoint_guard.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
 
 #include "core/file_system.h"
+#include "core/fingerprint.h"
 #include "core/text.h"
 #include "fit/fitter.h"
 #include "io/atomic_file.h"
@@ -23,9 +25,36 @@ bool SamePlace(const fs::path& a, const fs::path& b) {
   return AbsoluteName(a) == AbsoluteName(b) || fs::equivalent(a, b, code);
 }
 
+// A text that tells nobody anything.
+bool IsFingerprint(const nlohmann::json& value) {
+  return value.is_string() && value.get_ref<const std::string&>().size() == Fingerprint().text().size() &&
+         value.get_ref<const std::string&>().find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
 }  // namespace
 
-Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> outputs, bool resume, bool overwrite) {
+Status CompareSettings(const std::string& file, const std::string& theirs, const std::string& ours) {
+  if (theirs == ours) return {};
+  const auto a = nlohmann::json::parse(theirs, nullptr, false), b = nlohmann::json::parse(ours, nullptr, false);
+  if (a.is_object() && b.is_object()) {
+    for (const auto& [key, value] : b.items()) {
+      const auto found = a.find(key);
+      if (found == a.end() || *found == value) continue;
+      const std::string how =
+          IsFingerprint(value) ? "another one" : Cat(Printable(found->dump()), ", this one's is ", value.dump());
+      return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run: its ", key, " is ", how)};
+    }
+    // Only fits with a far shell say how far it is, and their start differs from others': that has been said.
+    for (const auto& [key, value] : b.items()) {
+      if (a.contains(key)) continue;
+      return Error{ErrorCode::kBadFile, Cat(file, ": is a checkpoint of another version, which knew no ", key)};
+    }
+  }
+  return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run")};
+}
+
+Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> outputs, bool resume, bool overwrite,
+                       const std::function<bool(const fs::path&)>& is_checkpoint) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(checkpoint));
   for (const fs::path& output : outputs) {
     if (!output.empty() && SamePlace(output, checkpoint)) {
@@ -34,7 +63,7 @@ Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> out
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(checkpoint));
   if (!Exists(checkpoint) || resume) return {};  // what a checkpoint is, reading it shows
-  if (!IsFitCheckpoint(checkpoint)) {
+  if (!(is_checkpoint ? is_checkpoint : IsFitCheckpoint)(checkpoint)) {
     return Error{ErrorCode::kExists,
                  Cat(checkpoint.string(),
                      " is there and is no checkpoint; name a file with --checkpoint for what an interruption leaves")};
@@ -43,6 +72,11 @@ Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> out
   return Error{ErrorCode::kExists, Cat(checkpoint.string(),
                                        " is left from a run that was interrupted: --resume goes on from it, -w begins "
                                        "anew")};
+}
+
+void RemoveCheckpoint(const fs::path& checkpoint, bool (*is_checkpoint)(const fs::path&)) {
+  std::error_code ignored;
+  if (is_checkpoint(checkpoint)) fs::remove(checkpoint, ignored);
 }
 
 void RecordWhatWasLeft(const fs::path& checkpoint, std::span<const fs::path> outputs) {

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/file_system.h"
-#include "core/fingerprint.h"
 #include "core/text.h"
+#include "fit/checkpoint_guard.h"
 #include "fit/fitter.h"
 #include "io/input_record.h"
 #include "tensors/safetensors.h"
@@ -70,32 +70,6 @@ std::vector<Named<Array>> ArraysOf(State& state, int64_t n, int64_t coefficients
   arrays.push_back({"densification.radii", {n}, &gathered.radii, !gathered.radii.empty()});
   arrays.push_back({"mip_filter", {n}, &state.mip_filter, !state.mip_filter.empty()});
   return arrays;
-}
-
-// A text that tells nobody anything.
-bool IsFingerprint(const nlohmann::json& value) {
-  return value.is_string() && value.get_ref<const std::string&>().size() == Fingerprint().text().size() &&
-         value.get_ref<const std::string&>().find_first_not_of("0123456789abcdef") == std::string::npos;
-}
-
-Status CompareSettings(const std::string& file, const std::string& theirs, const std::string& ours) {
-  if (theirs == ours) return {};
-  const auto a = nlohmann::json::parse(theirs, nullptr, false), b = nlohmann::json::parse(ours, nullptr, false);
-  if (a.is_object() && b.is_object()) {
-    for (const auto& [key, value] : b.items()) {
-      const auto found = a.find(key);
-      if (found == a.end() || *found == value) continue;
-      const std::string how =
-          IsFingerprint(value) ? "another one" : Cat(Printable(found->dump()), ", this one's is ", value.dump());
-      return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run: its ", key, " is ", how)};
-    }
-    // Only fits with a far shell say how far it is, and their start differs from others': that has been said.
-    for (const auto& [key, value] : b.items()) {
-      if (a.contains(key)) continue;
-      return Error{ErrorCode::kBadFile, Cat(file, ": is a checkpoint of another version, which knew no ", key)};
-    }
-  }
-  return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run")};
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include "enhance/unseen_gaussians.h"
 #include "io/file_version.h"
 #include "model/any_network.h"
+#include "model/compact/compact_checkpoint.h"
 #include "model/compact/copy_choice.h"
 #include "model/compact/shipped_network.h"
 #include "model/kernels/bfloat16_tile.h"
@@ -51,6 +52,10 @@ std::vector<MethodOption> NetworkOptions() {
   options.push_back({"model", {}});
   options.push_back({"prune-opacity", {}});
   options.push_back({"max-gaussians", {}});
+  for (const char* name : {"checkpoint", "resume"}) {
+    options.push_back(
+        {name, [](const MethodUse& use) { return IsPublished(use.options.model) ? "with a compact network" : ""; }});
+  }
   for (const char* name : {"copies", "merge-cost"}) {
     options.push_back({name, [name = std::string(name)](const MethodUse& use) -> std::string {
                          const ModelSettings& model = use.options.model;
@@ -137,7 +142,8 @@ class LastNetwork {
 }  // namespace
 
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
-                                                const ModelSettings& model, StepReport& report) {
+                                                const ModelSettings& model, StepReport& report,
+                                                const RefineControl& control) {
   // Of what stays one Gaussian for one.
   const CopyChoice choice = {model.copies, model.merge_cost.value_or(kMergeCost), model.options.max_gaussians,
                              model.options.prune_opacity};
@@ -177,7 +183,9 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
                                                                       .strength = input.filter_strength,
                                                                       .choice = choice,
                                                                       .single = dust,
-                                                                      .inside = input.inside}));
+                                                                      .inside = input.inside,
+                                                                      .checkpoint = control.checkpoint,
+                                                                      .resume = control.resume}));
   const auto outside = static_cast<double>(result.outside), partly = static_cast<double>(result.partly);
   if (outside + partly > kNotable * n) {
     const auto [least, greatest] = network.TrainedUpscales();
@@ -207,19 +215,13 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
     }
     KeepMarked(keep, result.cloud);
   }
-  report.facts = {{"copies", network.config().copies},
-                  {"unlike_training", result.outside},
-                  {"partly_unlike_training", result.partly},
-                  {"output_not_finite", result.not_finite},
-                  {"copies_made", result.made},
-                  {"merged", result.chosen.merged},
-                  {"unseen", std::ssize(dust)},
-                  {"pruned", before - result.cloud.size()},
-                  {"left_out", result.chosen.left_out},
-                  {"seconds_unseen", seconds_unseen},
-                  {"seconds_neighbours", result.times.neighbours},
-                  {"seconds_network", result.times.network},
-                  {"seconds_copies", result.times.copies},
+  report.facts = {{"copies", network.config().copies},       {"unlike_training", result.outside},
+                  {"partly_unlike_training", result.partly}, {"output_not_finite", result.not_finite},
+                  {"blocks_resumed", result.resumed},        {"copies_made", result.made},
+                  {"merged", result.chosen.merged},          {"unseen", std::ssize(dust)},
+                  {"pruned", before - result.cloud.size()},  {"left_out", result.chosen.left_out},
+                  {"seconds_unseen", seconds_unseen},        {"seconds_neighbours", result.times.neighbours},
+                  {"seconds_network", result.times.network}, {"seconds_copies", result.times.copies},
                   {"seconds_order", result.times.order}};
   return std::move(result.cloud);
 }
@@ -232,6 +234,8 @@ void RegisterModelMethod() {
                                       : "one pass of the network of --model",
        .rank = 1,
        .adds_detail = true,
+       .is_checkpoint = IsCompactCheckpoint,
+       .keeps_when_asked = true,
        .options = NetworkOptions(),
        .needs_pixel_size = [](const EnhanceOptions& options) -> Result<bool> {
          if (options.model.file.empty()) return true;
@@ -262,8 +266,9 @@ void RegisterModelMethod() {
          if (const auto* published = std::get_if<PublishedNetwork>(network.get())) {
            return EnhanceWithPublished(std::move(input), *published, options.model.options, report);
          }
-         Result<GaussianCloud> out = EnhanceWithCompactNetwork(
-             std::move(input), options.upscale, std::get<CompactNetwork>(*network), options.model, report);
+         Result<GaussianCloud> out =
+             EnhanceWithCompactNetwork(std::move(input), options.upscale, std::get<CompactNetwork>(*network),
+                                       options.model, report, options.control);
          if (options.model.file.empty()) report.facts.emplace_back("network_for_all_kinds", shipped == Shipped::kKinds);
          return out;
        }});

@@ -12,12 +12,14 @@ namespace anchorsplat {
 void RegisterModelMethod();
 
 // Enhances by a compact network, with a word in the log and in report.facts ("copies", "unlike_training",
-// "partly_unlike_training", "output_not_finite", "copies_made", "merged", "unseen", "pruned", "left_out", and
-// "seconds_…" of its stages). Of `model` it looks at what chooses among its copies. kBadFile: it says nothing finite
-// about any Gaussian; kBadArgument: of ChooseCopies. A strength of no more than the closer view's own pixels add means
-// that there is no lost width to build on (a splat that is seen no closer, or has its width): it stays as it is. A
-// network that is not told the kind of splat knows classic ones; others are filtered.
+// "partly_unlike_training", "output_not_finite", "blocks_resumed", "copies_made", "merged", "unseen", "pruned",
+// "left_out", and "seconds_…" of its stages). Of `model` it looks at what chooses among its copies. kBadFile: it says
+// nothing finite about any Gaussian; kBadArgument: of ChooseCopies. A strength of no more than the closer view's own
+// pixels add means that there is no lost width to build on (a splat that is seen no closer, or has its width): it stays
+// as it is. A network that is not told the kind of splat knows classic ones; others are filtered. `control`: what its
+// blocks make is kept there (model/compact/compact_checkpoint.h).
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
-                                                const ModelSettings& model, StepReport& report);
+                                                const ModelSettings& model, StepReport& report,
+                                                const RefineControl& control = {});
 
 }  // namespace anchorsplat

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "core/camera.h"
 #include "core/cloud_view.h"
@@ -12,8 +13,10 @@
 #include "core/image.h"
 #include "core/result.h"
 #include "render/adam_runs.h"
+#include "render/blend_backward.h"
 #include "render/constants.h"
 #include "render/profile.h"
+#include "render/projected_gaussian.h"
 
 namespace anchorsplat {
 
@@ -80,6 +83,22 @@ struct CloudGradient {
   std::array<float, 3> background{};
 };
 
+// ∂L/∂ of what pixels see of a Gaussian: its opacity and its colour, not the shape and the place behind them. Row i
+// belongs to Gaussian i.
+struct SeenGradient {
+  // o·∂L/∂o; of a compensated opacity, too. 0 where no pixel adds it.
+  float OfLogOpacity(int64_t i) const { return sums[static_cast<size_t>(i)].q; }
+  // ∂L/∂rgb; 0 where the colour is clamped at 0.
+  float OfColor(int64_t i, size_t channel) const {
+    const float sum = sums[static_cast<size_t>(i)].rgb[channel];
+    return sum != 0 && projected[static_cast<size_t>(i)].rgb[channel] > 0 ? sum : 0;
+  }
+
+  std::span<const BlendGradient> sums;           // [N]
+  std::span<const ProjectedGaussian> projected;  // [N]; of culled ones anything
+  std::span<const int32_t> radii;                // [N,2] as of CloudGradient
+};
+
 // What the last picture took; the backward stages are those of the last Backward.
 struct RenderStatistics {
   double project = 0, spherical_harmonics = 0, sort = 0, bin = 0, blend = 0;  // seconds on the clock, per stage
@@ -127,6 +146,10 @@ class Rasterizer {
   // that is written down and followed by the same step of Adam, bit by bit.
   Status Backward(const CloudView& cloud, const RenderGradient& output_gradient, CloudGradient& gradient,
                   const CoefficientStep* step = nullptr);
+
+  // The same as far as blending goes, which is a part of Backward's time and takes no memory of its own. The spans are
+  // valid until the next call. Errors: of Backward.
+  Result<SeenGradient> BackwardToSeen(const RenderGradient& output_gradient);
 
   const RenderStatistics& statistics() const;  // of the last Render that succeeded
 

@@ -18,6 +18,10 @@ namespace {
 
 Error BadGradientArgument(std::string message) { return {ErrorCode::kBadArgument, std::move(message)}; }
 
+Error NoPicture() {
+  return BadGradientArgument("no picture to take the gradient of: render one with RenderOptions::gradient first");
+}
+
 Status CheckGradient(const RenderGradient& g, int width, int height) {
   const auto fits = [&](const Image& image, int channels) {
     return image.width == width && image.height == height && image.channels == channels &&
@@ -193,9 +197,7 @@ void Rasterizer::State::ProjectBackward(const std::optional<SlotsLeft>& left, co
 
 Status Rasterizer::Backward(const CloudView& cloud, const RenderGradient& output_gradient, CloudGradient& gradient,
                             const CoefficientStep* step) {
-  if (!state_->kept) {
-    return BadGradientArgument("no picture to take the gradient of: render one with RenderOptions::gradient first");
-  }
+  if (!state_->kept) return NoPicture();
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   const State::Kept& kept = *state_->kept;
   if (cloud.size() != kept.count || cloud.sh_degree != kept.sh_degree) {
@@ -219,6 +221,24 @@ Status Rasterizer::Backward(const CloudView& cloud, const RenderGradient& output
                  Cat("not enough memory for the gradient of ", WithThousands(cloud.size()), " Gaussians")};
   }
   return {};
+}
+
+Result<SeenGradient> Rasterizer::BackwardToSeen(const RenderGradient& output_gradient) {
+  if (!state_->kept) return NoPicture();
+  const State::Kept& kept = *state_->kept;
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckGradient(output_gradient, kept.intrinsics.width, kept.intrinsics.height));
+  try {
+    Stopwatch watch;
+    CloudGradient unused;
+    state_->BlendBackward(output_gradient, unused);
+    state_->statistics.blend_backward = watch.Lap();
+  } catch (const std::bad_alloc&) {
+    return Error{ErrorCode::kIo,
+                 Cat("not enough memory for the gradient of ", WithThousands(kept.count), " Gaussians")};
+  }
+  const auto n = static_cast<size_t>(kept.count);
+  return SeenGradient{std::span(state_->gradients.data(), n), std::span(state_->projected.data(), n),
+                      std::span(state_->radii.data(), 2 * n)};
 }
 
 }  // namespace anchorsplat

@@ -6,6 +6,7 @@
 
 #include "core/parallel.h"
 #include "core/simd_targets_for_test.h"
+#include "core/spherical_harmonics.h"
 #include "render/gradient_check_for_test.h"
 #include "render/scenes_for_test.h"
 
@@ -281,6 +282,40 @@ TEST(RasterizerBackward, EveryInstructionSetMatches) {
   SkipWhenOnlyOneSimdTarget();
 }
 
+// Both are links of the same chain: σ(x) and the constant harmonic are what lies between them.
+TEST(RasterizerBackward, WhatIsSeenIsWhereBackwardBegins) {
+  for (const RenderMode mode : {RenderMode::kClassic, RenderMode::kAntialiased}) {
+    GaussianCloud cloud = RandomCloud(74, {.gaussians = 400, .degree = 1, .smallest = 0.005, .largest = 0.3});
+    for (size_t k = 0; k < 3; ++k) cloud.sh[static_cast<size_t>(cloud.sh_stride()) + k] = -9;  // clamped
+    cloud.opacity_logits[2] = -kInfinity;                                                      // culled
+    cloud.means[9] = std::nanf("");
+    const Camera camera = RandomCamera(74, 70, 45);
+    RenderOptions options;
+    options.mode = mode;
+    options.gradient = true;
+    const LinearLoss loss = RandomLoss(74, cloud, camera, options);
+    const CloudGradient whole = Gradient(cloud, camera, options, loss.weights);
+    Rasterizer rasterizer;
+    RenderOutput output;
+    ASSERT_TRUE(rasterizer.Render(cloud, camera, options, output).ok());
+    const auto seen = rasterizer.BackwardToSeen(loss.weights);
+    ASSERT_TRUE(seen.ok()) << seen.error().message;
+    EXPECT_TRUE(std::equal(seen->radii.begin(), seen->radii.end(), whole.radii.begin(), whole.radii.end()));
+    int64_t taught = 0;
+    for (int64_t i = 0; i < cloud.size(); ++i) {
+      const double opacity = 1 / (1 + std::exp(-double{cloud.opacity_logits[static_cast<size_t>(i)]}));
+      const double expected = whole.opacity_logits[static_cast<size_t>(i)];
+      EXPECT_NEAR(seen->OfLogOpacity(i) * (1 - opacity), expected, 1e-5 * std::abs(expected)) << i;
+      for (size_t c = 0; c < 3; ++c) {
+        const double of_term = whole.sh[static_cast<size_t>(i * cloud.sh_stride()) + c];
+        EXPECT_NEAR(double{kSh0} * seen->OfColor(i, c), of_term, 1e-6 * std::abs(of_term)) << i;
+      }
+      taught += expected != 0;
+    }
+    EXPECT_GT(taught, 100);
+  }
+}
+
 TEST(RasterizerBackward, RefusesWhatDoesNotBelongToThePicture) {
   const GaussianCloud cloud = RandomCloud(73, {.gaussians = 20, .degree = 1});
   const Camera camera = RandomCamera(73, 16, 16);
@@ -294,13 +329,16 @@ TEST(RasterizerBackward, RefusesWhatDoesNotBelongToThePicture) {
     return status.ok() ? std::string() : status.error().message;
   };
   EXPECT_NE(message(cloud).find("RenderOptions::gradient"), std::string::npos);
+  EXPECT_FALSE(rasterizer.BackwardToSeen(weights).ok());
   RenderOptions options;
   options.gradient = true;
   ASSERT_TRUE(rasterizer.Render(cloud, camera, options, output).ok());
   EXPECT_EQ(message(cloud), "");
   EXPECT_NE(message(RandomCloud(73, {.gaussians = 21, .degree = 1})).find("21"), std::string::npos);
   EXPECT_NE(message(WithShDegree(cloud, 2)).find("degree 2"), std::string::npos);
+  EXPECT_TRUE(rasterizer.BackwardToSeen(weights).ok());
   weights.box = {0, 0, 17, 16};
+  EXPECT_FALSE(rasterizer.BackwardToSeen(weights).ok());
   EXPECT_NE(message(cloud).find("17"), std::string::npos);
   weights.box = {0, 0, 16, 16};
   weights.alpha = Image(16, 15, 1);

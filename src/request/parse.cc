@@ -95,20 +95,10 @@ Result<Region> ParseRegion(const std::string& option, const std::string& text) {
     numbers.push_back(*number);
     begin = end + 1;
     if (end == text.size()) {
-      Region region;
-      if (numbers.size() == 4 && numbers[3] > 0) region.radius = numbers[3];
-      if (numbers.size() != 6 && !region.radius) break;
-      for (size_t c = 0; c < 3; ++c) {
-        const double other = region.radius ? numbers[c] : numbers[c + 3];
-        region.low[c] = std::min(numbers[c], other);
-        region.high[c] = std::max(numbers[c], other);
-      }
-      return region;
+      if (const std::optional<Region> region = RegionOf(numbers)) return *region;
     }
   }
-  return Error{ErrorCode::kBadArgument,
-               Cat(option, ": '", Printable(text),
-                   "' is neither a box X0,Y0,Z0,X1,Y1,Z1 nor a sphere X,Y,Z,RADIUS, such as 0,0.5,0,2")};
+  return Error{ErrorCode::kBadArgument, Cat(option, ": '", Printable(text), "'", kNoRegion)};
 }
 
 Result<std::array<double, 3>> ParseDirection(const std::string& option, const std::string& text) {

@@ -70,8 +70,10 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
   verb.add_flag("--robust", options.robust, "Ignore what differs grossly from --images: passers-by, flares")
       ->group(group);
   verb.add_flag("--align", options.align, "Poses of --images are a little off: optimise them, too")->group(group);
-  verb.add_option_function<std::string>("--checkpoint", path(control.checkpoint),
-                                        "State to resume from (default: OUTPUT.checkpoint)")
+  verb.add_option_function<std::string>(
+          "--checkpoint", path(control.checkpoint),
+          "State to resume from (default: OUTPUT.checkpoint); of a network only where this or --resume "
+          "is given")
       ->check(NotEmpty())
       ->group(group);
   verb.add_flag("--resume", control.resume, "Go on from the checkpoint if there is one")->group(group);

@@ -91,6 +91,39 @@ TEST_F(EngineTest, EnhancesWithTheWordsOfTheCommandLine) {
   EXPECT_NE(refused.at("error").at("message").get<std::string>().find("upscale"), std::string::npos);
 }
 
+TEST_F(EngineTest, EnhancesARegionWithinABudget) {
+  const int64_t cloud = OpenExample();
+  const int64_t count = Ask({{"verb", "columns"}, {"cloud", cloud}}).at("gaussians").get<int64_t>();
+  const auto means = [&](const Json& number) {
+    Ask({{"verb", "columns"}, {"cloud", number}});
+    std::vector<float> values(Block(0).size() / sizeof(float));
+    std::memcpy(values.data(), Block(0).data(), Block(0).size());
+    return values;
+  };
+  const std::vector<float> before = means(cloud);
+  std::vector<float> outside;
+  for (size_t i = 0; i < before.size(); i += 3) {
+    if (std::hypot(before[i], before[i + 1], before[i + 2]) > 0.3f) {
+      outside.insert(outside.end(), before.begin() + static_cast<ptrdiff_t>(i),
+                     before.begin() + static_cast<ptrdiff_t>(i + 3));
+    }
+  }
+  const auto kept = static_cast<int64_t>(outside.size() / 3);
+  ASSERT_GT(kept, 0);
+  ASSERT_LT(kept, count);
+  const Json made = Ask({{"verb", "enhance"},
+                         {"cloud", cloud},
+                         {"words", {"--region=0,0,0,0.3", "--max-gaussians=" + std::to_string(count + 5)}}});
+  ASSERT_FALSE(made.contains("error")) << made;
+  EXPECT_EQ(made.at("report").at("region").at("kept_outside"), kept);
+  EXPECT_LE(made.at("gaussians"), count + 5);
+  const std::vector<float> after = means(made.at("cloud"));
+  ASSERT_GE(after.size(), outside.size());
+  EXPECT_EQ(std::vector<float>(after.end() - static_cast<ptrdiff_t>(outside.size()), after.end()), outside);
+  const Json refused = Ask({{"verb", "enhance"}, {"cloud", cloud}, {"words", {"--region=0,0,0,-1"}}});
+  EXPECT_NE(refused.at("error").at("message").get<std::string>().find("--region"), std::string::npos);
+}
+
 // The page previews the filter by this number.
 TEST_F(EngineTest, TheGainIsWhatTheFilterAdds) {
   const int64_t cloud = OpenExample();

@@ -75,7 +75,10 @@ export interface EnhanceOptions {
   background?: [number, number, number];
   copies?: 'auto' | number;
   mergeCost?: number;
+  /** Of the result at most; 0: no bound. */
   maxGaussians?: number;
+  /** Only what lies in there is enhanced, the rest stays bit by bit: a sphere [x, y, z, radius], or a box by two corners. */
+  region?: [number, number, number, number] | [number, number, number, number, number, number];
   pruneOpacity?: number;
   blockGaussians?: number;
   seed?: number;

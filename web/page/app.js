@@ -148,7 +148,8 @@ function preview() {
 function sentence(text) {
   const here = text.replace('--pixel-size or --cameras would tell', 'the slider or training cameras would tell')
     .replace(/[.;:]? --filter-strength F overrides it/, '').replace(/ \(--[^)]*\)/g, '')
-    .replace(/--pixel-size/g, 'the slider').replace(/--cameras/g, 'training cameras');
+    .replace(/--pixel-size/g, 'the slider').replace(/--cameras/g, 'training cameras')
+    .replace(/--region/g, 'only a part').replace(/--max-gaussians/g, 'Gaussians at most');
   return here.charAt(0).toUpperCase() + here.slice(1) + (/[.?!]$/.test(here) ? '' : '.');
 }
 
@@ -287,7 +288,7 @@ function offer() {
   byId('which').value = result ? 'result' : 'input';
   byId('enhance').disabled = !input || running !== null;
   // What is being made is made with these.
-  for (const id of ['upscale', 'quality', 'pixel', 'pixel-auto', 'cameras']) byId(id).disabled = running !== null;
+  for (const id of ['upscale', 'quality', 'pixel', 'pixel-auto', 'cameras', 'region', 'most']) byId(id).disabled = running !== null;
   show(byId('stop'), running !== null);
   show(byId('progress'), running !== null);
 }
@@ -317,6 +318,8 @@ async function enhance() {
     else options.quality = method;
     if (chosen) options.pixelSize = pixelSize();
     else if (cameras) options.cameras = cameras;
+    if (byId('region').value.trim()) options.region = byId('region').value.replace(/\s+/g, '');
+    if (byId('most').value) options.maxGaussians = Number(byId('most').value);
     const made = await input.splat.enhance(options);
     if (mine !== session) return await made.splat.close();
     if (result) await result.splat.close();
@@ -327,7 +330,9 @@ async function enhance() {
     await stage(await made.splat.page({before: input.splat, name: input.name, title: input.name, shDegree: shownDegree(made.splat)}));
     document.documentElement.dataset.state = 'enhanced';
   } catch (error) {
-    if (mine === session && error.code !== 'interrupted') trouble(error);
+    if (mine === session && error.code !== 'interrupted') {
+      trouble(error.code === 'bad_argument' ? new Error(sentence(error.message)) : error);
+    }
     if (error.code === 'interrupted') byId('done').textContent = 'Stopped; the splat is as it was.';
   } finally {
     running = null;
@@ -402,6 +407,7 @@ byId('stop').onclick = () => running && running.abort();
 byId('download').onclick = save;
 byId('cameras').onchange = (event) => takeCameras(event.target.files);
 byId('pixel').oninput = () => { chosen = true; changed(); };
+byId('region').onchange = byId('most').onchange = changed;
 byId('pixel-auto').onclick = () => { chosen = false; byId('pixel').value = '0'; changed(); };
 byId('upscale').onchange = async () => {
   gain = await input.splat.filterGain(Number(byId('upscale').value));

@@ -163,7 +163,8 @@ class Option:
     several: bool  # takes more than one value
 
 
-_OPTION = re.compile(r"^ {2}(?:(-\w),)?(--[a-z][a-z0-9-]*)(?: (TEXT|INT|UINT|FLOAT)(\S*.*))?")
+# A name, and the older ones behind it: "--max-gaussians,--most-gaussians INT:NONNEGATIVE=0".
+_OPTION = re.compile(r"^ {2}(?:(-\w),)?(--[a-z][a-z0-9-]*(?:,--[a-z][a-z0-9-]*)*)(?: (TEXT|INT|UINT|FLOAT)(\S*.*))?")
 
 
 @functools.cache
@@ -175,5 +176,6 @@ def options(*verb: str) -> dict[str, Option]:
         match = _OPTION.match(line)
         if match and match[2] != "--help":
             several = "..." in (match[4] or "")
-            found[match[2]] = Option(match[2], match[1] or "", match[3] or "", several)
+            for name in match[2].split(","):
+                found[name] = Option(name, match[1] or "", match[3] or "", several)
     return found

@@ -24,6 +24,9 @@ Format = Literal["ply", "compressed.ply", "spz", "sog", "splat", "glb", "gltf", 
 Mode = Literal["classic", "antialiased", "mip"]
 _COLOR = r"^(0(\.\d+)?|1(\.0+)?|\.\d+)(,(0(\.\d+)?|1(\.0+)?|\.\d+)){2}$"
 _VECTOR = r"^[-+]?\d{1,9}(\.\d{1,9})?(,[-+]?\d{1,9}(\.\d{1,9})?){2}$"
+_NUMBER = r"[-+]?(\d{1,9}(\.\d{0,18})?|\.\d{1,18})([eE][-+]?\d{1,2})?"
+# A sphere or a box. The program reads it; this only keeps what cannot be one from becoming a job.
+_REGION = rf"^{_NUMBER}(,{_NUMBER}){{3}}((,{_NUMBER}){{2}})?$"
 
 
 class Options(BaseModel):
@@ -49,6 +52,12 @@ class EnhanceOptions(Options):
         "auto", description="Gaussians made of each, at most"
     )
     max_gaussians: int = Field(0, ge=0, le=2**31 - 1, description="budget of the result; 0: none")
+    region: str | None = Field(
+        None,
+        pattern=_REGION,
+        description="only what lies in there is enhanced, the rest stays bit by bit: a sphere X,Y,Z,RADIUS or a box "
+        "X0,Y0,Z0,X1,Y1,Z1 by two corners, in the splat's unit",
+    )
     train_width: int | None = Field(
         None, ge=1, le=65535, description="of the training pictures, where it was less than the cameras say"
     )
@@ -73,6 +82,8 @@ class EnhanceOptions(Options):
             out += ["--copies", str(self.copies)]
         if self.max_gaussians:
             out += ["--max-gaussians", str(self.max_gaussians)]
+        if self.region is not None:
+            out += [f"--region={self.region}"]  # one word: it may begin with a minus
         if cameras:
             out += ["--cameras", "cameras.json"]
         if self.train_width is not None:

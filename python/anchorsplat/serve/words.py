@@ -47,6 +47,12 @@ def _enhanced(row: dict) -> list[str]:
     ]
     if gaussians.get("dropped"):
         out.append(f"{_count(gaussians['dropped'])} Gaussians were dropped: they hold numbers that cannot be drawn.")
+    region = row.get("region") or {}
+    if "kept_outside" in region:
+        out.append(
+            f"Of these {_count(region.get('gaussians'))} lie in the region and were enhanced; "
+            f"{_count(region['kept_outside'])} outside of it stay as they were."
+        )
     if row.get("looks"):
         out.append(
             f"The file does not say how it was trained; it looks trained {_MODES.get(row['looks'], row['looks'])}."

@@ -139,6 +139,20 @@ def test_keywords_are_those_of_the_function_for_one(control: Control, scans: Pat
         batch.enhance(scans / "a.ply", tmp_path / "two", cameras=object())
 
 
+def test_a_region_within_a_budget(control: Control, scans: Path, tmp_path: Path, native: Path) -> None:
+    report = batch.enhance(scans / "a.ply", tmp_path / "out", region=(-1, -1, -1, 0, 1, 1), max_gaussians=45)
+    assert report.done == 1
+    row = rows(report.manifest)[-1]
+    assert row["gaussians"]["out"] <= 45 and row["options"] == ["--max-gaussians=45", "--region=-1,-1,-1,0,1,1"]
+    by_hand = enhanced_by_hand(native, scans / "a.ply", tmp_path / "a.ply", "--region=-1,-1,-1,0,1,1", "--max-gaussians=45")
+    assert (tmp_path / "out/a.ply").read_bytes() == by_hand
+    words = ["enhance", str(scans / "a.ply"), "--out", str(tmp_path / "told"), "--most-gaussians", "45", "--region=-1,-1,-1,0,1,1"]
+    assert batch.main([*words, "--quiet"]) == 0  # its old name
+    assert (tmp_path / "told/a.ply").read_bytes() == by_hand
+    with pytest.raises(BadArgumentError, match="region: '0,0,0,-1' is neither a box"):
+        batch.enhance(scans / "a.ply", tmp_path / "two", region=(0, 0, 0, -1))
+
+
 def test_a_pipe_is_a_row(control: Control, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.ply")
     report = batch.enhance(tmp_path / "pipe.ply", tmp_path / "out")

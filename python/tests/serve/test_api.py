@@ -52,6 +52,21 @@ def test_the_same_bits_as_the_command_line(server: Server, tmp_path: Path) -> No
     assert result(server, done) == (tmp_path / "out.ply").read_bytes()
 
 
+def test_a_region_within_a_budget(server: Server) -> None:
+    before = anchorsplat.read(SPLAT).means
+    inside = (before[:, 2] >= 0).sum()  # of the unit sphere: its upper half
+    done = server.wait(server.submit(SPLAT, region="-2,-2,0,2,2,2", max_gaussians=len(before) + 5))
+    assert done["state"] == "done", done
+    kept = len(before) - inside
+    assert done["report"]["details"]["region"] == {"gaussians": inside, "kept_outside": kept}
+    assert any(f"{kept} outside of it stay" in sentence for sentence in done["report"]["sentences"])
+    after = anchorsplat.read(result(server, done)).means
+    assert len(after) <= len(before) + 5
+    assert (after[len(after) - kept :] == before[before[:, 2] < 0]).all()
+    nothing = server.wait(server.submit(SPLAT, region="9,9,9,1"))
+    assert nothing["state"] == "failed" and "no Gaussian lies in it" in nothing["error"]["message"]
+
+
 def test_the_same_wish_is_answered_from_what_is_there(server: Server) -> None:
     first = server.wait(server.submit(SPLAT, upscale=3))
     again = server.http.post("/v1/enhance?upscale=3.0&quality=fast", files={"file": ("other.ply", SPLAT)})
@@ -140,6 +155,12 @@ def test_the_page_of_a_result(server: Server) -> None:
         ({"background": "1,1,1 -o x", "clean": "true"}, "background"),
         ({"train_width": "64"}, "cameras"),
         ({"pixel_size": "-1"}, "pixel_size"),
+        ({"region": "0,0,0"}, "region"),
+        ({"region": "0,0,0,1,1"}, "region"),
+        ({"region": "0,0,0,nan"}, "region"),
+        ({"region": "0,0,0,1 -o x"}, "region"),
+        ({"region": "0,0,0,1\n"}, "region"),
+        ({"max_gaussians": "-1"}, "max_gaussians"),
     ],
 )
 def test_options_that_make_no_sense(server: Server, options: dict, says: str) -> None:

@@ -115,6 +115,42 @@ not_hung_up() {
 }
 expect 0 "SIGHUP does not end a fit that is not to hear it" not_hung_up
 
+# kill -9 of a network's run on several blocks, in the middle of writing down one of them, then on from there.
+{
+  body=$(($(grep -abo -m 1 end_header "$input" | cut -d: -f1) + 11))
+  count=$(sed -n 's/^element vertex //p;/^end_header/q' "$input")
+  head -c $body "$input" | sed "s/^element vertex .*/element vertex $((7 * count))/"
+  for _ in 1 2 3 4 5 6 7; do tail -c +$((body + 1)) "$input"; done
+} >"$work/blocks.ply"
+network() {
+  "$program" enhance "$work/blocks.ply" --method model --pixel-size 0.005 --mode classic "$@"
+}
+block=$((65536 * 4 * 200)) # bytes, at least
+has_a_block() { [ "$(stat -c %s "$work/net.ply.checkpoint" 2>/dev/null || echo 0)" -gt $((block * 5 / 4)) ]; }
+killed() {
+  "$program" enhance "$work/blocks.ply" -o "$work/net.ply" --method model --pixel-size 0.005 --mode classic --resume -q &
+  child=$!
+  until_is has_a_block
+  kill -KILL $child
+  wait $child
+}
+expect 0 "a network in one go" network -o "$work/net-whole.ply" -q
+expect 1 "which keeps nothing unasked" test -e "$work/net-whole.ply.checkpoint"
+expect 137 "a killed network" killed
+expect 1 "it leaves no half file" test -e "$work/net.ply"
+expect 5 "a killed network is not forgotten" network -o "$work/net.ply" --checkpoint "$work/net.ply.checkpoint"
+says stderr "--resume"
+expect 2 "a killed network is not mistaken for another" network -o "$work/net.ply" --resume --merge-cost 0.1
+says stderr "its merge cost is"
+cp "$work/net.ply.checkpoint" "$work/notes" && printf 'notes' | dd of="$work/notes" conv=notrunc status=none
+expect 4 "it does not go on from what is no checkpoint" network -o "$work/net.ply" --resume --checkpoint "$work/notes"
+expect 0 "which stays" test -e "$work/notes"
+expect 0 "a killed network goes on" network -o "$work/net.ply" --resume
+says stderr "going on after block"
+expect 0 "a kill does not change the splat" cmp "$work/net-whole.ply" "$work/net.ply"
+expect 1 "its state is gone" test -e "$work/net.ply.checkpoint"
+rm -f "$work"/net*.ply "$work/notes" "$work/blocks.ply"
+
 # No room for the state, which is three times as large as the splat: the splat is written.
 no_room() { (ulimit -f 200 && "$@"); }
 expect 0 "a fit without room for its checkpoints" no_room fit -o "$work/room.ply" --steps 30 --checkpoint-every 1

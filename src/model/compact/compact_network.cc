@@ -4,7 +4,6 @@
 #include <atomic>
 #include <cmath>
 #include <new>
-#include <set>
 #include <utility>
 
 #include "core/finite.h"
@@ -15,6 +14,7 @@
 #include "core/run_context.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
+#include "model/compact/compact_checkpoint.h"
 #include "model/compact/compact_residual.h"
 #include "model/compact/compact_start.h"
 #include "model/kernels/edge_messages.h"
@@ -42,98 +42,6 @@ void ApplyLinear(int64_t rows, const float* input, const PackedWeights& weights,
 }
 
 }  // namespace
-
-class CompactNetwork::Loader {
- public:
-  Loader(const CompactConfig& config, const WeightSource& source) : tensors_(CompactTensors(config)), source_(source) {}
-
-  Result<std::vector<float>> Read(const std::string& name) const {
-    const auto spec = std::find_if(tensors_.begin(), tensors_.end(), [&](const auto& t) { return t.name == name; });
-    int64_t count = 1;
-    for (const int64_t side : spec->shape) count *= side;
-    std::vector<float> values(static_cast<size_t>(count));
-    ANCHORSPLAT_RETURN_IF_ERROR(source_(*spec, values));
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckFinite(name, values));
-    return values;
-  }
-  bool Has(const std::string& name) const {
-    return std::any_of(tensors_.begin(), tensors_.end(), [&](const auto& t) { return t.name == name; });
-  }
-  Status Into(const std::string& name, PackedWeights& out) const {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto weight, Read(name + ".weight"));
-    const auto spec =
-        std::find_if(tensors_.begin(), tensors_.end(), [&](const auto& t) { return t.name == name + ".weight"; });
-    std::vector<float> bias;
-    if (Has(name + ".bias")) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(bias, Read(name + ".bias"));
-    }
-    out = PackedWeights(weight.data(), bias.empty() ? nullptr : bias.data(), spec->shape[0], spec->shape[1]);
-    return {};
-  }
-  Status Into(const std::string& name, Norm& out) const {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto weight, Read(name + ".weight"));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto bias, Read(name + ".bias"));
-    out.weight.assign(weight.begin(), weight.end());
-    out.bias.assign(bias.begin(), bias.end());
-    return {};
-  }
-
-  // The output layers of the attributes as one: rows in the order that WriteCopies reads.
-  Status Outputs(const CompactConfig& config, PackedWeights& out) const {
-    const int64_t inputs = config.head_hidden, outputs = CompactOutputs(config), per_copy = ChannelsPerCopy(config);
-    std::vector<float> weights(static_cast<size_t>(outputs * inputs)), biases(static_cast<size_t>(outputs));
-    const auto place = [&](const CompactAttribute& attribute, int64_t copies, int64_t first, int64_t stride) -> Status {
-      const std::string name = std::string("out.") + attribute.name;
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const auto weight, Read(name + ".weight"));
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const auto bias, Read(name + ".bias"));
-      for (int64_t k = 0; k < copies; ++k) {
-        const int64_t to = first + k * stride, from = k * attribute.channels;
-        std::copy_n(weight.begin() + from * inputs, attribute.channels * inputs, weights.begin() + to * inputs);
-        std::copy_n(bias.begin() + from, attribute.channels, biases.begin() + to);
-      }
-      return {};
-    };
-    ANCHORSPLAT_RETURN_IF_ERROR(place(kStrengthAttribute, 1, 0, 0));
-    int64_t first = 1;
-    for (const CompactAttribute& attribute : CopyAttributes(config)) {
-      ANCHORSPLAT_RETURN_IF_ERROR(place(attribute, config.copies, first, per_copy));
-      first += attribute.channels;
-    }
-    out = PackedWeights(weights.data(), biases.data(), outputs, inputs);
-    return {};
-  }
-
- private:
-  std::vector<TensorSpec> tensors_;
-  const WeightSource& source_;
-};
-
-Result<CompactNetwork> CompactNetwork::Load(const CompactConfig& config, const WeightSource& source) {
-  ANCHORSPLAT_RETURN_IF_ERROR(Validate(config));
-  const Loader loader(config, source);
-  CompactNetwork network;
-  network.config_ = config;
-  ANCHORSPLAT_RETURN_IF_ERROR(loader.Into("embed.first", network.embed_first_));
-  ANCHORSPLAT_RETURN_IF_ERROR(loader.Into("embed.second", network.embed_second_));
-  ANCHORSPLAT_RETURN_IF_ERROR(loader.Into("embed.norm", network.embed_norm_));
-  for (int64_t r = 0; r < config.rounds; ++r) {
-    Round& round = network.rounds_.emplace_back();
-    const std::string name = Cat("rounds.", r, ".");
-    ANCHORSPLAT_RETURN_IF_ERROR(loader.Into(name + "own", round.own));
-    ANCHORSPLAT_RETURN_IF_ERROR(loader.Into(name + "other", round.other));
-    ANCHORSPLAT_RETURN_IF_ERROR(loader.Into(name + "edge", round.edge));
-    ANCHORSPLAT_RETURN_IF_ERROR(loader.Into(name + "message", round.message));
-    ANCHORSPLAT_RETURN_IF_ERROR(loader.Into(name + "update_first", round.update_first));
-    ANCHORSPLAT_RETURN_IF_ERROR(loader.Into(name + "update_second", round.update_second));
-    ANCHORSPLAT_RETURN_IF_ERROR(loader.Into(name + "norm", round.norm));
-  }
-  ANCHORSPLAT_RETURN_IF_ERROR(loader.Into("head.first", network.head_first_));
-  ANCHORSPLAT_RETURN_IF_ERROR(loader.Into("head.second", network.head_second_));
-  ANCHORSPLAT_RETURN_IF_ERROR(loader.Outputs(config, network.out_));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(network.low_, loader.Read("domain.low"));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(network.high_, loader.Read("domain.high"));
-  return network;
-}
 
 bool CompactNetwork::KnowsItsDomain() const {
   for (size_t c = 0; c < low_.size(); ++c) {
@@ -388,7 +296,13 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
   CompactResult result;
   Stopwatch watch;
   std::vector<std::string> comments = std::move(cloud.comments);
-  std::atomic<int64_t> not_finite = 0;
+  std::optional<CompactCheckpoint> checkpoint;
+  if (!task.checkpoint.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(
+        CompactCheckpoint opened,
+        CompactCheckpoint::Open(task.checkpoint, CheckpointSettings(fingerprint_, cloud, task), task.resume));
+    checkpoint.emplace(std::move(opened));
+  }
   try {
     NearCloud near = BringTogether(std::move(cloud), task, config_);
     const CompactFeatures features(near.cloud, near.graph,
@@ -398,13 +312,51 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
                                     .node_features = NodeFeatures(config_)});
     const CompactAnchors anchors{&near.cloud, &near.graph, near.pixel_sizes, task.upscale, task.strength, offset_side};
     CompactOutput output(n, copies, task.choice.value_or(CopyChoice{.copies = copies}));
-    GaussianCloud made;
+    CompactBlockResult of_block;
+    GaussianCloud& made = of_block.part.cloud;
     made.render_mode = near.cloud.render_mode;
     CompactBlocks blocks(near.graph, config_.rounds, task.block_gaussians);
     States states;
     result.times.neighbours = watch.Lap();
     Progress progress("Network", n);
-    for (int64_t b = 0; b < blocks.count(); ++b) {
+    const auto add = [&](CopyGroups groups) {
+      result.outside += of_block.outside;
+      result.partly += of_block.partly;
+      result.not_finite += of_block.not_finite;
+      result.made += of_block.part.made;
+      output.Append(of_block.part, std::move(groups));
+    };
+    int64_t next = 0;
+    if (checkpoint) {
+      Buffer<int32_t> at(static_cast<size_t>(n));
+      for (int64_t place = 0; place < n; ++place) {
+        at[static_cast<size_t>(near.rows[static_cast<size_t>(place)])] = static_cast<int32_t>(place);
+      }
+      for (;; ++result.resumed) {
+        if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped"};
+        ANCHORSPLAT_ASSIGN_OR_RETURN(const bool more, checkpoint->Next(near.cloud, of_block));
+        if (!more) break;
+        if (of_block.block < next || of_block.block >= blocks.count() ||
+            !IsOfBlock(of_block, at, task.block_gaussians, copies, output.waits())) {
+          return Error{ErrorCode::kBadFile, Cat(task.checkpoint.string(), ": block ", of_block.block,
+                                                " is none of this run's; -w begins anew")};
+        }
+        CopyGroups groups;
+        if (output.waits()) {
+          BlockPlaces places;
+          places.inside = of_block.part.inside;
+          places.rows.assign(of_block.part.keys.begin(), of_block.part.keys.begin() + places.inside);
+          groups = GroupsOf(task, places, copies);
+        }
+        add(std::move(groups));
+        const int64_t before = next * task.block_gaussians;
+        next = of_block.block + 1;
+        progress.Advance(std::min(n, next * task.block_gaussians) - before);
+      }
+      if (next > 0)
+        LogInfo(Cat("going on after block ", next, " of ", blocks.count(), " of ", task.checkpoint.string()));
+    }
+    for (int64_t b = next; b < blocks.count(); ++b) {
       if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped"};
       const CompactBlock& block = blocks.Find(b);
       Buffer<float> fades = Fades(features, block);
@@ -415,9 +367,7 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
       const BlockPlaces places = PlacesOf(block, fades, near.rows, copies);
       progress.Advance(block.own());
       if (places.made == 0) continue;
-      result.outside += places.alone;
-      result.partly += std::ranges::count_if(fades, [](float fade) { return fade > 0 && fade < 1; });
-      result.made += places.made;
+      std::atomic<int64_t> not_finite = 0;
       made.Resize(places.made, near.cloud.sh_degree);
       FindStates(features, block, near.graph.neighbours, states);
       ParallelFor(0, block.own(), kRowsPerTask, [&](int64_t begin, int64_t end) {
@@ -441,11 +391,18 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
         }
       });
       result.times.network += watch.Lap();
-      output.Add(places.rows, GroupsOf(task, places, copies), made);
+      of_block.block = b;
+      of_block.outside = places.alone;
+      of_block.partly = std::ranges::count_if(fades, [](float fade) { return fade > 0 && fade < 1; });
+      of_block.not_finite = not_finite;
+      CopyGroups groups = GroupsOf(task, places, copies);
+      output.Merge(places.rows, groups, of_block.part);
+      if (checkpoint) checkpoint->Append(of_block);
+      add(std::move(groups));
       result.times.copies += watch.Lap();
     }
     near = {};
-    made = {};
+    of_block = {};
     result.cloud = output.Finish(result.chosen);
     result.times.order = watch.Lap();
   } catch (const NoDiskRoom& none) {
@@ -453,41 +410,8 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kBadArgument, Cat("no memory for ", WithThousands(n * copies), " Gaussians")};
   }
-  result.not_finite = not_finite;
   result.cloud.comments = std::move(comments);
   return result;
-}
-
-bool IsCompactNetwork(const TensorFile& file) {
-  const auto format = file.metadata().find("format");
-  return format != file.metadata().end() && format->second == kCompactFormat;
-}
-
-Result<CompactNetwork> LoadCompactNetwork(const TensorFile& file) {
-  const auto bad = [&](const std::string& message) {
-    return Error{ErrorCode::kBadFile,
-                 message.find(file.name()) == std::string::npos ? Cat(file.name(), ": ", message) : message};
-  };
-  const auto config = CompactConfigFromMetadata(file.metadata());
-  if (!config.ok()) return bad(config.error().message);
-  std::set<std::string> expected;
-  for (const TensorSpec& tensor : CompactTensors(*config)) expected.insert(tensor.name);
-  for (const TensorEntry& entry : file.tensors()) {
-    if (!expected.contains(entry.name)) {
-      return bad(Cat("tensor \"", Printable(entry.name), "\" belongs to no part of the network"));
-    }
-  }
-  auto network = CompactNetwork::Load(*config, [&](const TensorSpec& tensor, std::span<float> values) -> Status {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values read, file.ReadFloat32(tensor.name, tensor.shape));
-    std::copy(read.values().begin(), read.values().end(), values.begin());
-    return {};
-  });
-  if (!network.ok()) return bad(network.error().message);
-  if (!network->KnowsItsDomain()) {
-    LogWarning(Cat(file.name(), ": says nothing about the range of its training data (domain.low above domain.high), ",
-                   "so no Gaussian will count as unlike them"));
-  }
-  return network;
 }
 
 }  // namespace anchorsplat

@@ -39,6 +39,9 @@ struct CompactTask {
   std::span<const int64_t> single = {};
   // 0: a Gaussian that others hear from and of which nothing comes out; one per Gaussian, empty: none.
   std::span<const char> inside = {};
+  // Where what the blocks have made is kept, for a run that ends before its end; empty: nowhere.
+  std::filesystem::path checkpoint = {};
+  bool resume = false;  // go on from `checkpoint` if it is there
 };
 
 struct CompactResult {
@@ -47,6 +50,7 @@ struct CompactResult {
   int64_t partly = 0;   // Gaussians somewhat unlike it: a part of the residual
   int64_t not_finite = 0;  // Gaussians for which the network says something that is not finite: its start
   int64_t made = 0;        // Gaussians before the choice among copies
+  int64_t resumed = 0;     // blocks that a checkpoint brought
   ChosenCopies chosen;
   struct {
     double neighbours = 0, network = 0, copies = 0, order = 0;  // seconds
@@ -75,7 +79,8 @@ class CompactNetwork {
   // threads. Needs about 1.5 KB per Gaussian of a block, and 150 bytes of Buffers per Gaussian of the cloud, besides
   // the cloud, which is given back before the result is put in order, and twice the result. Errors (kBadArgument): of
   // Validate(cloud) and Validate(choice); no Gaussians or 2^31 rows; a wrong number of pixel sizes, one that is not
-  // positive and finite; upscale below 1; a strength that is negative; more output than memory holds.
+  // positive and finite; upscale below 1; a strength that is negative; more output than memory holds. Of
+  // the checkpoint: those of CompactCheckpoint. kInterrupted: the user stopped it; the checkpoint stays.
   Result<CompactResult> Apply(GaussianCloud cloud, const CompactTask& task) const;
 
   // The raw outputs [N, CompactOutputs(config())] for the features of a cloud, before bounds and fading.
@@ -105,6 +110,7 @@ class CompactNetwork {
   float Fade(const float* node, const std::array<float, 3>& widths) const;
 
   CompactConfig config_;
+  std::string fingerprint_;  // of the configuration and all weights
   PackedWeights embed_first_, embed_second_;
   Norm embed_norm_;
   std::vector<Round> rounds_;

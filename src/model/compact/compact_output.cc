@@ -72,42 +72,53 @@ CompactOutput::Piece& CompactOutput::PieceFor(int64_t rows, const GaussianCloud&
 }
 
 void CompactOutput::Add(const Buffer<int32_t>& rows, CopyGroups groups, GaussianCloud& block) {
-  const int64_t inside = groups.count;
-  keys_.clear();
+  std::swap(part_.cloud, block);
+  Merge(rows, groups, part_);
+  Append(part_, std::move(groups));
+  std::swap(part_.cloud, block);
+}
+
+void CompactOutput::Merge(const Buffer<int32_t>& rows, CopyGroups& groups, CompactPart& part) {
+  GaussianCloud& block = part.cloud;
+  part.inside = groups.count;
+  part.made = block.size();
+  part.keys.clear();
   for (int64_t k = 0; k < copies_; ++k) {
-    for (int64_t g = 0; g < inside; ++g) keys_.push_back(k * count_ + rows[static_cast<size_t>(g)]);
+    for (int64_t g = 0; g < part.inside; ++g) part.keys.push_back(k * count_ + rows[static_cast<size_t>(g)]);
   }
-  for (auto alone = static_cast<size_t>(inside); alone < rows.size(); ++alone) {
-    keys_.push_back(copies_ * count_ + rows[alone]);
+  for (auto alone = static_cast<size_t>(part.inside); alone < rows.size(); ++alone) {
+    part.keys.push_back(copies_ * count_ + rows[alone]);
   }
-  made_ += block.size();
-  if (merges_ && !waits_ && inside > 0) {
-    const CopyPlan plan(std::move(groups), choice_, block);
-    if (plan.merged() > 0) {
-      merged_ += plan.merged();
-      std::vector<char> keep(static_cast<size_t>(block.size()), 1);
-      plan.Carry(block, keep);
-      KeepMarked(keep, block);
-      KeepRows(keys_, 1, keep);
-    }
-  }
-  Piece& piece = PieceFor(block.size(), block);
+  if (!merges_ || waits_ || part.inside == 0) return;
+  const CopyPlan plan(std::move(groups), choice_, block);
+  if (plan.merged() == 0) return;
+  std::vector<char> keep(static_cast<size_t>(block.size()), 1);
+  plan.Carry(block, keep);
+  KeepMarked(keep, block);
+  KeepRows(part.keys, 1, keep);
+}
+
+void CompactOutput::Append(const CompactPart& part, CopyGroups groups) {
+  made_ += part.made;
+  Piece& piece = PieceFor(part.cloud.size(), part.cloud);
   const int64_t first = piece.cloud.size();
   for (const auto array : kArrays) {
-    (piece.cloud.*array).insert((piece.cloud.*array).end(), (block.*array).begin(), (block.*array).end());
+    const Buffer<float>& from = part.cloud.*array;
+    (piece.cloud.*array).insert((piece.cloud.*array).end(), from.begin(), from.end());
   }
-  piece.keys.insert(piece.keys.end(), keys_.begin(), keys_.end());
-  if (merges_ && waits_ && inside > 0) {
+  piece.keys.insert(piece.keys.end(), part.keys.begin(), part.keys.end());
+  if (merges_ && waits_ && part.inside > 0) {
     groups.first = first;
     plans_.emplace_back(std::move(groups), choice_, piece.cloud);
     piece_of_plan_.push_back(pieces_.size() - 1);
-    rows_of_plan_.emplace_back(rows.begin(), rows.begin() + inside);
+    rows_of_plan_.emplace_back(part.keys.begin(), part.keys.begin() + part.inside);  // of copy 0
   }
 }
 
 void CompactOutput::MergeAll() {
-  for (const CopyPlan& plan : plans_) merged_ += plan.merged();
-  if (const int64_t over = made_ - merged_ - choice_.max_gaussians; waits_ && over > 0) {
+  int64_t merged = 0;
+  for (const CopyPlan& plan : plans_) merged += plan.merged();
+  if (const int64_t over = made_ - merged - choice_.max_gaussians; waits_ && over > 0) {
     MergeMore(plans_, over,
               [&](size_t plan, int64_t group) { return int64_t{rows_of_plan_[plan][static_cast<size_t>(group)]}; });
   }

@@ -188,6 +188,9 @@ function formOf() {
   const form = new FormData();
   for (const name of ['quality', 'upscale']) form.append(name, $('form').elements[name].value);
   if ($('form').elements.mode.value) form.append('mode', $('form').elements.mode.value);
+  const region = $('form').elements.region.value.replace(/\s+/g, '');
+  if (region) form.append('region', region);
+  if ($('form').elements.max_gaussians.value) form.append('max_gaussians', $('form').elements.max_gaussians.value);
   if ($('form').elements.clean.checked) form.append('clean', 'true');
   if ($('cameras').files[0]) form.append('cameras', $('cameras').files[0]);
   form.append('file', $('file').files[0]);

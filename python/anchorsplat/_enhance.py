@@ -64,6 +64,7 @@ def enhance(
     robust: bool = False,
     align: bool = False,
     checkpoint: PathLike | None = None,
+    checkpoint_every: int = 0,
     resume: bool = False,
     seed: int = 0,
     threads: int = 0,
@@ -100,8 +101,8 @@ def enhance(
     rates, as a part of those of ``fit``. ssim_weight: of the loss. exposure, robust, align: pictures that differ in brightness,
     show what is not in the scene, or whose poses are a little off.
 
-    checkpoint, resume: file for the state of a refinement when it is stopped (Ctrl-C: it is written, then KeyboardInterrupt),
-        or for what a compact network has made so far, and going on from it.
+    checkpoint, resume: file for the state of a refinement when it is stopped (Ctrl-C: it is written, then KeyboardInterrupt; every
+        checkpoint_every steps, too), or for what a compact network has made so far, and going on from it.
 
     seed: of everything random. threads: at most; 0: all of the machine; the result does not depend on it.
 
@@ -130,6 +131,7 @@ def refine(
     train_width: int | None = None,
     camera_rule: Literal["auto", "smallest", "median"] = "auto",
     filter_strength: float | None = None,
+    background: Color | None = None,
     hold_out: int = 8,
     downscale: int = 1,
     steps: int | None = None,
@@ -146,6 +148,7 @@ def refine(
     robust: bool = False,
     align: bool = False,
     checkpoint: PathLike | None = None,
+    checkpoint_every: int = 0,
     resume: bool = False,
     seed: int = 0,
     threads: int = 0,

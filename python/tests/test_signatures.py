@@ -71,7 +71,6 @@ FUNCTIONS = {
             "method": "it is refine",
             "quality": "it is refine",
             "clean": "of enhance",
-            "background": "of enhance's clean",
             **FILES,
         },
     ),

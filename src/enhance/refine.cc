@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -62,9 +63,32 @@ GaussianCloud WithoutLast(GaussianCloud cloud, int64_t rows) {
   return cloud;
 }
 
+// Where the state of a run is kept, if it is.
+class RefineCheckpoint {
+ public:
+  // Runs for seconds have none.
+  RefineCheckpoint(const RefineControl& control, bool for_seconds, std::string settings)
+      : path_(for_seconds ? std::filesystem::path() : control.checkpoint),
+        every_(control.checkpoint_every),
+        settings_(std::move(settings)) {}
+
+  bool kept() const { return !path_.empty(); }
+  bool IsDue(int64_t step) const { return kept() && every_ > 0 && step % every_ == 0; }
+  // What cannot be written costs no more than itself.
+  void Write(const FitState& state, const char* otherwise) const {
+    const Status written = WriteFitCheckpoint(path_, state, settings_);
+    if (!written.ok()) LogWarning(Cat(otherwise, ": ", written.error().message));
+  }
+
+ private:
+  std::filesystem::path path_;
+  int64_t every_;
+  std::string settings_;
+};
+
 // Steps until they are done, the time is over or the user stops it. The last `fixed` Gaussians stay those of `start`.
 Status MakeSteps(Refiner& refiner, const RefineOptions& options, const GaussianCloud& start, int64_t fixed,
-                 RefineReport& report) {
+                 const RefineCheckpoint& checkpoint, RefineReport& report) {
   const Stopwatch watch;
   const auto done = [&] {
     if (!options.seconds) return static_cast<double>(refiner.state().step) / static_cast<double>(*options.steps);
@@ -88,6 +112,9 @@ Status MakeSteps(Refiner& refiner, const RefineOptions& options, const GaussianC
     }
     report.interrupted = StopRequested() && done() < 1;
     if (report.interrupted) return {};
+    if (checkpoint.IsDue(refiner.state().step) && done() < 1) {
+      checkpoint.Write(refiner.state(), "there is no new checkpoint");
+    }
   }
   if (shown < total) progress.Advance(total - shown, note);
   return {};
@@ -127,16 +154,16 @@ Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianClou
     plan.each = std::vector<int>();
     state = Fitter::Fresh(std::move(split));
   }
+  const RefineCheckpoint checkpoint(control, plan.options.seconds.has_value(), settings);
   const RefineProblem problem{views.render, input.upscale, views.scene_scale, input.seed};
   ANCHORSPLAT_ASSIGN_OR_RETURN(Refiner refiner,
                                Refiner::Begin(plan.options, problem, std::move(views.train), std::move(state)));
-  ANCHORSPLAT_RETURN_IF_ERROR(MakeSteps(refiner, plan.options, start, input.fixed, report));
+  ANCHORSPLAT_RETURN_IF_ERROR(MakeSteps(refiner, plan.options, start, input.fixed, checkpoint, report));
   report.steps = refiner.state().step;
   report.times = refiner.times();
-  if (report.interrupted && !control.checkpoint.empty() && !plan.options.seconds) {
+  if (report.interrupted && checkpoint.kept()) {
     Leave(refiner.state(), control.outputs);
-    const Status written = WriteFitCheckpoint(control.checkpoint, refiner.state(), settings);
-    if (!written.ok()) LogWarning(Cat("there is nothing to resume from: ", written.error().message));
+    checkpoint.Write(refiner.state(), "there is nothing to resume from");
   }
   GaussianCloud result = Pruned(std::move(refiner.state().cloud), input.fixed, report);
   result.render_mode = input.cloud.render_mode;

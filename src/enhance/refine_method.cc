@@ -136,6 +136,7 @@ std::vector<MethodOption> RefinementOptions() {
       {"robust", with_images},
       {"align", with_images},
       {"checkpoint", for_steps},
+      {"checkpoint-every", for_steps},
       {"resume", for_steps},
   };
 }

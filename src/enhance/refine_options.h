@@ -38,8 +38,10 @@ struct RefineOptions {
 
 // How it is run.
 struct RefineControl {
-  // Empty: none is written or read. Written when the user stops it, unless it runs for seconds; never removed.
+  // Empty: none is written or read. Written when the user stops it and as often as
+  // checkpoint_every says, unless it runs for seconds; never removed.
   std::filesystem::path checkpoint;
+  int64_t checkpoint_every = 0;                // steps; 0: only when the user stops it
   bool resume = false;                         // go on from `checkpoint` if it is there
   std::vector<std::filesystem::path> outputs;  // that its caller writes, also when it was interrupted
 };

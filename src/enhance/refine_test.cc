@@ -82,6 +82,22 @@ TEST_F(Refinement, SameBitsForAnyNumberOfThreads) {
   EXPECT_FALSE(SameBits(Refine(input_, options_, {})->cloud.means, expected.means));
 }
 
+// What a killed run leaves: the state of the last multiple of the steps that were asked for.
+TEST_F(Refinement, KeepsItsStateWhileItRuns) {
+  options_.steps = 7;
+  const auto whole = Refine(input_, options_, {});
+  ASSERT_TRUE(whole.ok());
+  RefineControl control{.checkpoint = folder_ / "state", .checkpoint_every = 3, .outputs = {}};
+  const auto first = Refine(input_, options_, control);
+  ASSERT_TRUE(first.ok()) << first.error().message;
+  ExpectSameCloud(first->cloud, whole->cloud);
+  control.resume = true;
+  const auto second = Refine(input_, options_, control);
+  ASSERT_TRUE(second.ok()) << second.error().message;
+  EXPECT_EQ(second->report.resumed_at, 6);
+  ExpectSameCloud(second->cloud, whole->cloud);
+}
+
 TEST_F(Refinement, GoesOnWhereItWasStopped) {
   options_.align = true;  // more to remember
   input_.start.comments = input_.cloud.comments = {"credit: Ann"};

@@ -82,7 +82,7 @@ std::vector<int64_t> RowsLikeBackground(const GaussianCloud& cloud, const Buffer
   return rows;
 }
 
-Error Stopped() { return Error{ErrorCode::kInterrupted, "stopped while cleaning; nothing was written"}; }
+Error Stopped() { return Error{ErrorCode::kInterrupted, "stopped while looking for what nobody misses"}; }
 
 // Of some Gaussians, over the pixels of the views: in squares, by the gradient of the picture times random signs.
 struct Shown {

@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "core/log.h"
 #include "core/text.h"
 #include "fit/initial_cloud.h"
 #include "formats/cloud_io.h"
@@ -21,7 +22,12 @@ Result<ChosenStart> ChooseFitStart(const FitFlags& flags, const TrainingViews& v
   if (splat != nullptr) return ChosenStart{Thinned(PointsOf(*splat), flags.init_points), "splat"};
   if (!flags.init_splat.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(flags.init_splat));
-    return ChosenStart{Thinned(PointsOf(cloud), flags.init_points), "splat"};
+    InitialPoints points = PointsOf(cloud);
+    if (points.size() < cloud.size()) {
+      LogWarning(Cat(flags.init_splat, ": ", WithThousands(cloud.size() - points.size()), " of ",
+                     WithThousands(cloud.size()), " Gaussians are not usable and begin nothing (`info` says why)"));
+    }
+    return ChosenStart{Thinned(points, flags.init_points), "splat"};
   }
   if (flags.init == FitInit::kPoints && views.points.size() == 0) {
     return Error{ErrorCode::kBadArgument, Cat(project, ": --init points, but the project has none")};

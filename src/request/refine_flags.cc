@@ -76,6 +76,11 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
           "is given")
       ->check(NotEmpty())
       ->group(group);
+  verb.add_option("--checkpoint-every", control.checkpoint_every,
+                  "Of refinement: steps between checkpoints; 0: only when interrupted")
+      ->check(NotNegative())
+      ->capture_default_str()
+      ->group(group);
   verb.add_flag("--resume", control.resume, "Go on from the checkpoint if there is one")->group(group);
 }
 

@@ -208,10 +208,7 @@ Status RunConvert(const ConvertWords& flags, Program& program) {
   std::vector<BatchItem> items;
   for (const Job& job : jobs) items.push_back({job.input.string(), job.output.string()});
   for (const Job& job : jobs) ANCHORSPLAT_RETURN_IF_ERROR(AnnounceConversion(flags, shared, options, job));
-  // Levels of detail take long, and what there is of them when one stops it is taken away.
-  std::optional<StopSignal> stop_signal;
-  if (std::ranges::any_of(outputs, [](const fs::path& output) { return output.filename() == kStreamedName; }))
-    stop_signal.emplace();
+  const StopSignal stop_signal(StopSignal::Leaves::kNothing);
   const auto run = [&](size_t k) {
     fs::path folder = jobs[k].output.parent_path();
     if (!folder.empty() && !IsFolder(folder)) folder = folder.parent_path();  // it is made with the output

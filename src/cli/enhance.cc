@@ -165,9 +165,11 @@ Buffer<float> KeepUsable(ExtraProperties& extras, const GaussianCloud& cloud) {
 Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& shared, EnhanceOptions options,
                                   const std::string& input, const fs::path& output, bool said) {
   const MemoryLimit limit(flags.size.arrays(), output.parent_path());
+  std::optional<StopSignal> stop_signal(std::in_place, StopSignal::Leaves::kNothing);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(input));
   ExtraProperties extras;
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read({}, &extras));
+  stop_signal.reset();  // a question is asked of who can end it
   if (!said) {
     ANCHORSPLAT_RETURN_IF_ERROR(AnnounceResult(flags, shared, options, input, output, {cloud.size(), cloud.sh_degree}));
   }
@@ -184,9 +186,10 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   options.control.checkpoint = CheckpointOf(options, output);
   options.control.outputs = OutputFiles(flags, output);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto lock, HoldCheckpoint(options.control.checkpoint));
-  std::optional<StopSignal> stop_signal(std::in_place);
+  const bool resumable_method = IsResumable(options);
+  stop_signal.emplace(resumable_method ? StopSignal::Leaves::kWhatIsDone : StopSignal::Leaves::kNothing);
   auto result = Enhance(std::move(cloud), options);
-  stop_signal.reset();
+  if (resumable_method) stop_signal.reset();
   if (!result.ok()) return result.error();
   Enhanced enhanced = *std::move(result);
   if (!extras.empty() && enhanced.report.cleaned) {

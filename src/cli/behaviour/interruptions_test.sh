@@ -104,6 +104,50 @@ says stdout "other: the build that was to make it has not ended"
 says stdout "square: the build that was to make it has not ended"
 expect 0 "info counts both" "$program" dataset info "$work/set" --json
 says stdout '"unfinished": 2'
+# What nobody can go on with ends at once and leaves nothing. A splat that takes a while: the small one over and over.
+header=$(grep -aobm1 end_header "$input" | cut -d: -f1)
+head -c $((header + 11)) "$input" | sed 's/^element vertex .*/element vertex 640000/' >"$work/large.ply"
+count=$(sed -n 's/^element vertex //p;/^end_header/q' "$input")
+tail -c +$((header + 12)) "$input" >"$work/body"
+for _ in $(seq 5); do cat "$work/body" "$work/body" >"$work/twice" && mv "$work/twice" "$work/body"; done
+cat "$work/body" >>"$work/large.ply"
+sed -i "s/^element vertex 640000/element vertex $((count * 32))/" "$work/large.ply"
+rm "$work/body"
+stopped_at() {
+  local words=$1
+  shift
+  "$program" "$@" 2>"$work/log" &
+  child=$!
+  until_is says_log "$words"
+  kill -INT $child
+  wait $child
+  local code=$?
+  cat "$work/log" >&2
+  return $code
+}
+gone() { [ ! -e "$1" ] && [ -z "$(find "$work" -name '.anchorsplat*')" ]; }
+expect 130 "Ctrl-C ends the filter" stopped_at "training pixel" enhance "$work/large.ply" --method filter -o "$work/gone.ply"
+says stderr "error: stopped"
+expect 0 "there is no splat of it" gone "$work/gone.ply"
+expect 130 "and levels of detail" stopped_at '"levels of detail"' convert "$work/large.ply" "$work/lod" --lod --progress json
+says stderr "stopped; what was being written is gone"
+expect 0 "there is no folder of them" gone "$work/lod"
+# While a pipe is read that nobody ends; from when on the signal is heard, the system knows (bit 1 is SIGINT).
+mkfifo "$work/pipe"
+hears() { local caught && caught=$(sed -n 's/^SigCgt:.*\(.\)$/\1/p' "/proc/$child/status" 2>/dev/null) && (((0x${caught:-0} & 2) != 0)); }
+stopped_reading() {
+  "$program" "$@" <>"$work/pipe" &
+  child=$!
+  until_is hears
+  kill -INT $child
+  wait $child
+}
+expect 130 "Ctrl-C ends a conversion that reads" stopped_reading convert - "$work/gone.spz"
+says stderr "error: stopped"
+expect 130 "and a page" stopped_reading view - -o "$work/gone.html"
+says stderr "error: stopped"
+expect 0 "there is nothing of them" gone "$work/gone.spz"
+rm "$work/large.ply"
 # Under nohup it does not end at all.
 not_hung_up() {
   (trap '' HUP && exec "$program" fit "$work/project" --init-points 300 --hold-out 5 -o "$work/nohup.ply" --steps 100 \

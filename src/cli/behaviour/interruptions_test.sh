@@ -87,7 +87,7 @@ expect 0 "its splat is there, too" "$program" info "$work/refined.ply"
 expect 0 "its state is there, too" test -s "$work/refined.ply.checkpoint"
 expect 5 "an interrupted refinement is not forgotten" refine --steps 9
 expect 2 "an interrupted refinement is not mistaken for another" refine --steps 9 --resume
-says stderr "its steps is"
+says stderr "its --steps is"
 hung_up_build() {
   "$program" dataset build "$work/square.obj" "$work/other.obj" -o "$work/set" --views 8 --size 24 --low-size 12 --points 60 \
     --steps $long --max-gaussians 100 --jobs 1 -q &
@@ -134,7 +134,12 @@ says stderr "stopped; what was being written is gone"
 expect 0 "there is no folder of them" gone "$work/lod"
 # While a pipe is read that nobody ends; from when on the signal is heard, the system knows (bit 1 is SIGINT).
 mkfifo "$work/pipe"
-hears() { local caught && caught=$(sed -n 's/^SigCgt:.*\(.\)$/\1/p' "/proc/$child/status" 2>/dev/null) && (((0x${caught:-0} & 2) != 0)); }
+hears() {
+  [ "/proc/$child/exe" -ef "$program" ] || return 1  # the shell's own child, at first
+  local caught
+  caught=$(sed -n 's/^SigCgt:.*\(.\)$/\1/p' "/proc/$child/status" 2>/dev/null)
+  (((0x${caught:-0} & 2) != 0))
+}
 stopped_reading() {
   "$program" "$@" <>"$work/pipe" &
   child=$!
@@ -147,7 +152,11 @@ says stderr "error: stopped"
 expect 130 "and a page" stopped_reading view - -o "$work/gone.html"
 says stderr "error: stopped"
 expect 0 "there is nothing of them" gone "$work/gone.spz"
-rm "$work/large.ply"
+# What is said of it beforehand counts only what is worked on.
+expect 0 "a small region of it" "$program" enhance "$work/large.ply" --method model --pixel-size 0.005 --mode classic \
+  --region 0,0,0,0.1 -o "$work/region.ply" --yes
+says stderr "640,000 Gaussians become up to 6"
+rm "$work/large.ply" "$work/region.ply"
 # Under nohup it does not end at all.
 not_hung_up() {
   (trap '' HUP && exec "$program" fit "$work/project" --init-points 300 --hold-out 5 -o "$work/nohup.ply" --steps 100 \

@@ -96,6 +96,7 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
     page.before = ViewerSplat{&before.cloud, before.name, before.bytes};
   }
   page.after = {&after.cloud, after.name, after.bytes};
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckPageSize(flags.output, page));
   LookAtSplats(page);
   ANCHORSPLAT_RETURN_IF_ERROR(WriteViewerPage(flags.output, page, WriteOptionsFrom(shared)));
 

@@ -182,6 +182,18 @@ TEST(Colmap, UnknownLensesAreRefusedByName) {
   }
 }
 
+TEST(Colmap, LensesThatMakeNoSenseAreRefusedByCamera) {
+  for (const auto& [params, words] :
+       {std::pair("50 21 14 -50", "k1 = -50"), {"50 21 14 1e6", "k1 = 1e+06"}, {"50 21 14 1e300", "k1 = 1e+300"}}) {
+    const TestFolder folder;
+    const auto set = ReadText(folder, std::string("7 SIMPLE_RADIAL 40 30 ") + params, "1 1 0 0 0 0 0 0 7 a.png\n\n");
+    ASSERT_FALSE(set.ok()) << params;
+    EXPECT_EQ(set.error().code, ErrorCode::kBadFile);
+    EXPECT_NE(set.error().message.find(words), std::string::npos) << set.error().message;
+    EXPECT_NE(set.error().message.find("cameras.txt: line 1: camera 7"), std::string::npos) << set.error().message;
+  }
+}
+
 TEST(Colmap, MalformedTextSaysWhichLine) {
   const std::string cameras = "7 PINHOLE 40 30 50 60 21 14\n", image = "1 1 0 0 0 0 0 0 7 a.png\n\n";
   const struct {

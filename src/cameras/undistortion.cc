@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
+#include <string>
 #include <utility>
 
 #include "cameras/camera_checks.h"
@@ -16,6 +18,10 @@ namespace {
 constexpr double kShortest = 0.2, kLongest = 2;  // sides of the pinhole's picture, in those of the lens's
 constexpr int kMostBorderPoints = 4096;          // that are looked at per side
 constexpr int kRowsPerTask = 8;
+// Of the circle that fits into the picture, what a lens must draw. Polynomials of true lenses fold beyond what they
+// were fitted to, if at all; a fisheye's circle may be smaller than the picture.
+constexpr double kLeastOfRadial = 0.75, kLeastOfFisheye = 0.5;
+constexpr int kDirections = 64;  // in which that is looked at
 
 // Along one axis: how far from the principal point the picture's two borders are seen by the pinhole, at their nearest
 // to it.
@@ -24,10 +30,38 @@ struct Borders {
   double high = std::numeric_limits<double>::infinity();
 };
 
+// The pinhole's side, in those of the lens's, where nothing bounds it.
 double SideScale(const Borders& borders, double size, double principal) {
-  const double shrink = std::max(principal / borders.low, (size - 0.5 - principal) / borders.high);
-  const double scale = 1 / shrink;
-  return scale >= kShortest ? std::min(scale, kLongest) : kShortest;
+  return 1 / std::max(principal / borders.low, (size - 0.5 - principal) / borders.high);
+}
+
+// "k1 = -50, p2 = 0.1": what the lens does not have at 0.
+std::string Coefficients(const Lens& lens) {
+  std::string text;
+  const auto add = [&text](const char* name, size_t number, double value) {
+    if (value != 0) text += Cat(text.empty() ? "" : ", ", name, number, " = ", value);
+  };
+  for (size_t i = 0; i < lens.radial.size(); ++i) add("k", i + 1, lens.radial[i]);
+  // As FULL_OPENCV and transforms.json call them.
+  for (size_t i = 0; i < lens.denominator.size(); ++i) add("k", i + 4, lens.denominator[i]);
+  for (size_t i = 0; i < lens.tangential.size(); ++i) add("p", i + 1, lens.tangential[i]);
+  return text.empty() ? "all coefficients 0" : text;
+}
+
+Error BadLens(const Lens& lens, const std::string& what) {
+  return Error{ErrorCode::kBadFile, Cat("lens distortion (", Coefficients(lens), ") ", what,
+                                        "; no lens draws so: mend the coefficients, or undistort the pictures first")};
+}
+
+// Whether every place on a circle around the picture's middle is one that the lens draws.
+bool DrawsTheMiddle(const LensInverse& inverse, const Pinhole& bent, double share) {
+  const double radius = share * 0.5 * std::min(bent.width, bent.height);
+  for (int i = 0; i < kDirections; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kDirections;
+    const double u = 0.5 * bent.width + radius * std::cos(angle), v = 0.5 * bent.height + radius * std::sin(angle);
+    if (!inverse.Undistort({(u - bent.cx) / bent.fx, (v - bent.cy) / bent.fy})) return false;
+  }
+  return true;
 }
 
 std::array<float, 4> CatmullRom(float t) {
@@ -66,7 +100,13 @@ Result<Pinhole> StraightPinhole(const Lens& lens, const Pinhole& bent) {
   if (lens.IsStraight()) return bent;
   const LensInverse inverse(lens);
   if (!(inverse.largest_radius() > 0)) {
-    return Error{ErrorCode::kBadFile, "lens distortion that folds the picture at its middle; no lens draws so"};
+    return BadLens(lens, "folds the picture at its middle");
+  }
+  const double least = lens.model == LensModel::kFisheye ? kLeastOfFisheye : kLeastOfRadial;
+  if (!DrawsTheMiddle(inverse, bent, least)) {
+    return BadLens(lens,
+                   Cat("cannot be undone: it draws less than ", std::lround(100 * least), "% of the way from the ",
+                       bent.width, " x ", bent.height, " picture's middle to its border"));
   }
   Borders x, y;
   const auto look = [&](double u, double v, double& nearest, size_t axis, double sign) {
@@ -85,9 +125,14 @@ Result<Pinhole> StraightPinhole(const Lens& lens, const Pinhole& bent) {
     look(u, 0.5, y.low, 1, -1);
     look(u, bent.height - 0.5, y.high, 1, 1);
   });
+  const double wide = SideScale(x, bent.width, bent.cx), high = SideScale(y, bent.height, bent.cy);
+  if (!(wide >= kShortest && high >= kShortest)) {
+    return BadLens(lens, Cat("leaves less than a fifth of the ", bent.width, " x ", bent.height,
+                             " picture's side when it is undone"));
+  }
   Pinhole out = bent;
-  out.width = std::max(1, static_cast<int>(SideScale(x, bent.width, bent.cx) * bent.width));
-  out.height = std::max(1, static_cast<int>(SideScale(y, bent.height, bent.cy) * bent.height));
+  out.width = std::max(1, static_cast<int>(std::min(wide, kLongest) * bent.width));
+  out.height = std::max(1, static_cast<int>(std::min(high, kLongest) * bent.height));
   out.cx = bent.cx * out.width / bent.width;
   out.cy = bent.cy * out.height / bent.height;
   if (const Status status = CheckIntrinsics(out); !status.ok()) {

@@ -10,6 +10,8 @@
 #include <iostream>
 #include <optional>
 #include <string>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "cameras/camera_io.h"
@@ -197,6 +199,57 @@ TEST(Undistortion, LensesThatCannotBeAreErrorsOrBounded) {
     EXPECT_GE(straight->width, 12);
     EXPECT_LE(straight->width, 128);
     (void)Undistort({Image(64, 48, 3), {}}, lens, {64, 48, 50, 50, 32, 24}, *straight);
+  }
+}
+
+TEST(Undistortion, LensesThatMakeNoSenseAreRefusedWithTheirCoefficients) {
+  const Pinhole bent{400, 300, 400, 400, 200, 150};
+  const auto radial = [](double k1, double k2 = 0) {
+    return Lens{.model = LensModel::kRadial, .radial = {k1, k2, 0, 0}};
+  };
+  const std::pair<Lens, const char*> bad[] = {
+      {radial(1e300), "k1 = 1e+300"},
+      {radial(1e6), "k1 = 1e+06"},
+      {radial(-50), "k1 = -50"},
+      {radial(-3), "k1 = -3"},
+      {radial(0.1, -1e4), "k1 = 0.1, k2 = -10000"},
+      {{.model = LensModel::kRadial, .denominator = {-1e3, 0, 0}}, "k4 = -1000"},
+      {{.model = LensModel::kRadial, .tangential = {0, 1e4}}, "p2 = 10000"},
+      {{.model = LensModel::kFisheye, .radial = {-100, 0, 0, 0}}, "k1 = -100"},
+      {{.model = LensModel::kFisheye, .radial = {1e9, 0, 0, 0}}, "k1 = 1e+09"},
+  };
+  for (const auto& [lens, words] : bad) {
+    const auto straight = StraightPinhole(lens, bent);
+    ASSERT_FALSE(straight.ok()) << words << ": " << straight->width << " x " << straight->height;
+    EXPECT_EQ(straight.error().code, ErrorCode::kBadFile);
+    EXPECT_NE(straight.error().message.find(words), std::string::npos) << straight.error().message;
+  }
+}
+
+// Lenses as cameras that people have are calibrated to.
+TEST(Undistortion, RealLensesAreNotRefused) {
+  const std::tuple<const char*, Lens, Pinhole> real[] = {
+      {"phone", {.model = LensModel::kRadial, .radial = {0.05, -0.08, 0, 0}}, {4032, 3024, 3100, 3100, 2016, 1512}},
+      {"phone, ultra wide",
+       {.model = LensModel::kRadial, .radial = {-0.03, 0.01, 0, 0}},
+       {4032, 3024, 1600, 1600, 2016, 1512}},
+      {"GoPro, OPENCV",
+       {.model = LensModel::kRadial, .radial = {-0.26, 0.08, 0, 0}, .tangential = {0.001, -0.001}},
+       {4000, 3000, 1760, 1760, 2000, 1500}},
+      {"GoPro, SIMPLE_RADIAL",
+       {.model = LensModel::kRadial, .radial = {-0.3, 0, 0, 0}},
+       {4000, 3000, 1840, 1840, 2000, 1500}},
+      {"GoPro, fisheye",
+       {.model = LensModel::kFisheye, .radial = {0.04, 0.02, -0.01, 0.001}},
+       {2704, 2028, 1190, 1190, 1352, 1014}},
+      {"pincushion", {.model = LensModel::kRadial, .radial = {0.3, 0.1, 0, 0}}, {6000, 4000, 5000, 5000, 3000, 2000}},
+      {"whole circle in 16:9", {.model = LensModel::kFisheye}, {3840, 2160, 687, 687, 1920, 1080}},
+      {"whole circle in 2:1", {.model = LensModel::kFisheye}, {3840, 1920, 611, 611, 1920, 960}},
+      {"cropped", {.model = LensModel::kRadial, .radial = {-0.1, 0.02, 0, 0}}, {500, 400, 900, 900, 700, 450}},
+  };
+  for (const auto& [name, lens, bent] : real) {
+    const auto straight = StraightPinhole(lens, bent);
+    EXPECT_TRUE(straight.ok()) << name << ": " << straight.error().message;
   }
 }
 

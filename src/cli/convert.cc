@@ -83,9 +83,9 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
     }
     jobs.push_back({flags.paths[0], flags.paths[1]});
     if (!flags.lod) return jobs;
-    // The folder of a scene, as it is or will be, stands for the file that programs look for in it.
+    // The folder of a scene, as it is or will be ("scene.v2" is one), stands for the file that programs look for in it.
     fs::path& output = jobs.back().output;
-    if (IsFolder(output) || !output.has_filename() || !output.has_extension()) output /= kStreamedName;
+    if (IsFolder(output) || FormatOfExtension(output) == nullptr) output /= kStreamedName;
     if (output.filename() == kStreamedName) return jobs;
     return Error{ErrorCode::kBadArgument,
                  Cat("--lod writes a folder or the lod-meta.json in one, not ", output.string())};
@@ -169,12 +169,11 @@ Status ConvertModel(const ConvertWords& flags, const SharedFlags& shared) {
   return {};
 }
 
-// Says what will come out, as far as the header tells.
-Status AnnounceConversion(const ConvertWords& flags, const SharedFlags& shared, const ConvertOptions& options,
-                          const Job& job) {
+// What will come out, as far as the header tells.
+std::optional<OutputPlan> PlanOf(const ConvertOptions& options, const Job& job) {
   const std::optional<CloudExtent> extent = ExtentOf(job.input, options.input_format);
   const SplatFormat* const to = FormatOfExtension(job.output);
-  if (!extent || to == nullptr || to->predicted_size == nullptr) return {};
+  if (!extent || to == nullptr || to->predicted_size == nullptr) return std::nullopt;
   OutputPlan plan{.input = job.input.string(), .output = job.output, .gaussians_in = extent->gaussians};
   plan.gaussians = std::min(extent->gaussians, options.max_gaussians.value_or(extent->gaussians));
   const int degree = options.sh_degree.value_or(extent->sh_degree);
@@ -182,7 +181,7 @@ Status AnnounceConversion(const ConvertWords& flags, const SharedFlags& shared, 
   plan.roughly = to->size_is_estimate;
   plan.needed = static_cast<uint64_t>(extent->gaussians) * RowBytes(extent->sh_degree);
   plan.seconds = static_cast<double>(plan.gaussians) * (to->seconds_per_gaussian + kSecondsToRead) / ThreadCount();
-  return SayAndAsk(plan, flags.size, shared);
+  return plan;
 }
 
 // One file: converted, measured where asked for, told. A row of the JSON document.
@@ -207,11 +206,12 @@ Status RunConvert(const ConvertWords& flags, Program& program) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckConvertEffects(flags.how, outputs));
   std::vector<BatchItem> items;
   for (const Job& job : jobs) items.push_back({job.input.string(), job.output.string()});
-  for (const Job& job : jobs) ANCHORSPLAT_RETURN_IF_ERROR(AnnounceConversion(flags, shared, options, job));
-  // Levels of detail take long, and what there is of them when one stops it is taken away.
-  std::optional<StopSignal> stop_signal;
-  if (std::ranges::any_of(outputs, [](const fs::path& output) { return output.filename() == kStreamedName; }))
-    stop_signal.emplace();
+  std::vector<OutputPlan> plans;
+  for (const Job& job : jobs) {
+    if (std::optional<OutputPlan> plan = PlanOf(options, job)) plans.push_back(*std::move(plan));
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(SayAndAsk(plans, flags.size, shared));
+  const StopSignal stop_signal(StopSignal::Leaves::kNothing);
   const auto run = [&](size_t k) {
     fs::path folder = jobs[k].output.parent_path();
     if (!folder.empty() && !IsFolder(folder)) folder = folder.parent_path();  // it is made with the output

@@ -1,3 +1,4 @@
+#include "cli/output_plan.h"
 #include "cli/run_for_test.h"
 #include "cli/small_scan_for_test.h"
 #include "core/text.h"
@@ -61,6 +62,8 @@ TEST_F(ConvertVerb, LevelsOfDetail) {
       ExpectJson({"convert", scene, folder_ / "again.sog", "--report", "--report-views", "1"})[0];
   EXPECT_GT(row["psnr"]["mean"], 30);
   ExpectRefused({"convert", scan_, "--lod", folder_ / "scan.sog"}, ErrorCode::kBadArgument, {"--lod writes a folder"});
+  ExpectDone({"convert", scan_, "--lod", folder_ / "scene.v2"});
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "scene.v2/lod-meta.json"));
 }
 
 TEST_F(ConvertVerb, AsksBeforeLargeFiles) {
@@ -76,7 +79,46 @@ TEST_F(ConvertVerb, AsksBeforeLargeFiles) {
   ExpectRefused({"convert", huge, folder_ / "out.ply"}, ErrorCode::kBadFile, {"ends too early"});
 }
 
+TEST_F(ConvertVerb, AsksBeforeManyFilesThatAreLargeTogether) {
+  const std::string one = WriteHugeScan(folder_ / "one.ply", 10'000'000);
+  const std::string two = WriteHugeScan(folder_ / "two.ply", 10'000'000);
+  ExpectRefused({"convert", one, two, "--out-dir", folder_ / "out"}, ErrorCode::kBadArgument,
+                {"all 2 together take 5.0 GB, more than 4.0 GB", "--yes"});
+}
+
+TEST_F(ConvertVerb, AsksBeforeLargeTables) {
+  const std::string huge = WriteHugeScan(folder_ / "huge.ply", 10'000'000);
+  ExpectRefused({"convert", huge, folder_ / "out.csv"}, ErrorCode::kBadArgument,
+                {"out.csv takes about 7.7 GB", "more than 4.0 GB"});
+}
+
+TEST(OutputPlan, KnowsTheRoomOfFoldersToBe) {
+  const TestFolder folder;
+  EXPECT_TRUE(RoomFor(folder / "scan.ply").has_value());
+  EXPECT_TRUE(RoomFor(folder / "new/and newer/lod-meta.json").has_value());
+  EXPECT_TRUE(RoomFor("nowhere-yet/lod-meta.json").has_value());
+  EXPECT_FALSE(RoomFor("/proc/new/scan.ply").has_value());
+}
+
+TEST(OutputPlan, MemoryIsAPositiveSize) {
+  const std::pair<const char*, uint64_t> good[] = {
+      {"2G", 2'000'000'000},   {"0.5G", 500'000'000},       {"500M", 500'000'000}, {"64000000", 64'000'000},
+      {"1 GB", 1'000'000'000}, {"1GiB", uint64_t{1} << 30}, {"70000k", 70'000'000}};
+  for (const auto& [text, bytes] : good) {
+    const auto parsed = ParseMemory(text);
+    ASSERT_TRUE(parsed.ok()) << text << ": " << parsed.error().message;
+    EXPECT_EQ(*parsed, bytes) << text;
+  }
+  for (const char* bad :
+       {"", "G", "much", "-1", "-2G", "0", "1", "63M", "1e40", "nan", "inf", "2X", "2GG", "2 G B", "1bb", "5ib"}) {
+    EXPECT_FALSE(ParseMemory(bad).ok()) << bad;
+  }
+  EXPECT_THAT(ParseMemory("10M").error().message, HasSubstr("10M is less than the 64.0 MB that work needs at least"));
+}
+
 TEST_F(ConvertVerb, MaxMemoryIsASize) {
+  ExpectRefused({"convert", scan_, folder_ / "two.spz", "--max-memory", "-1"}, ErrorCode::kBadArgument, {"-1 is less"});
+  ExpectDone({"convert", scan_, folder_ / "half.spz", "--max-memory", "0.5G"});
   ExpectDone({"convert", scan_, folder_ / "out.spz", "--max-memory", "500M"});
   ExpectRefused({"convert", scan_, folder_ / "two.spz", "--max-memory", "much"}, ErrorCode::kBadArgument, {"much"});
 }

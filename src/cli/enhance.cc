@@ -50,12 +50,13 @@ struct EnhanceWords {
 // Of neighbours, their frames and the choice of copies, per Gaussian of the input; measured (docs/benchmarks.md).
 constexpr uint64_t kWorkingBytes = 300;
 
-// Arrays that are there at the same time.
-uint64_t NeededBytes(int64_t in, int64_t out, int sh_degree) {
+// Arrays that are there at the same time, where `worked` of the Gaussians are worked on.
+uint64_t NeededBytes(int64_t in, int64_t worked, int64_t out, int sh_degree) {
   const uint64_t own = static_cast<uint64_t>(in) * RowBytes(sh_degree);
   if (out <= in) return own;  // changed in place
   const uint64_t made = static_cast<uint64_t>(out) * RowBytes(sh_degree);
-  return std::max(own + static_cast<uint64_t>(in) * kWorkingBytes + made, 2 * made);  // it is put in order at the end
+  return std::max(own + static_cast<uint64_t>(worked) * kWorkingBytes + made,
+                  2 * made);  // it is put in order at the end
 }
 
 // What can be known to fail before anything is read.
@@ -125,19 +126,28 @@ Status MakeOutDir(const EnhanceWords& flags) {
   return {};
 }
 
-// What will come out. A Gaussian of the output has all harmonics where a network of the published architecture makes
-// it.
-Status AnnounceResult(const EnhanceWords& flags, const SharedFlags& shared, const EnhanceOptions& options,
-                      const std::string& input, const fs::path& output, const CloudExtent& extent) {
+// What will come out, where `outside` of the Gaussians lie out of the region. A Gaussian of the output has all
+// harmonics where a network of the published architecture makes it.
+OutputPlan PlanOf(const EnhanceOptions& options, const std::string& input, const fs::path& output,
+                  const CloudExtent& extent, int64_t outside = 0) {
   const SplatFormat& to = *FormatOfExtension(output);
   OutputPlan plan{.input = input, .output = output, .gaussians_in = extent.gaussians};
-  plan.gaussians = std::max<int64_t>(0, ExpectedGaussians(extent.gaussians, options));
+  const int64_t worked = extent.gaussians - outside;
+  EnhanceOptions within = options;
+  if (options.max_gaussians > outside) SetBudget(within, options.max_gaussians - outside);
+  plan.gaussians = outside + std::max<int64_t>(0, ExpectedGaussians(worked, within));
   if (to.predicted_size != nullptr) plan.bytes = to.predicted_size(plan.gaussians, extent.sh_degree);
   plan.roughly = to.size_is_estimate;
-  plan.needed = NeededBytes(extent.gaussians, plan.gaussians, extent.sh_degree);
-  plan.seconds = ExpectedSeconds(extent.gaussians, options, ThreadCount());
+  plan.needed = NeededBytes(extent.gaussians, worked, plan.gaussians, extent.sh_degree);
+  plan.seconds = ExpectedSeconds(worked, options, ThreadCount());
   if (plan.seconds) *plan.seconds += static_cast<double>(plan.gaussians) * to.seconds_per_gaussian;
-  return SayAndAsk(plan, flags.size, shared);
+  return plan;
+}
+
+int64_t CountOutside(const std::optional<Region>& region, const GaussianCloud& cloud) {
+  int64_t outside = 0;
+  for (int64_t i = 0; region && i < cloud.size(); ++i) outside += region->Holds(cloud.means.data() + 3 * i) ? 0 : 1;
+  return outside;
 }
 
 // What the method worked with, where it is the filter's business.
@@ -174,11 +184,15 @@ Error WithWayOn(Error error, const fs::path& checkpoint) {
 Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& shared, EnhanceOptions options,
                                   const std::string& input, const fs::path& output, bool said) {
   const MemoryLimit limit(flags.size.arrays(), output.parent_path());
+  std::optional<StopSignal> stop_signal(std::in_place, StopSignal::Leaves::kNothing);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(input));
   ExtraProperties extras;
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read({}, &extras));
+  stop_signal.reset();  // a question is asked of who can end it
   if (!said) {
-    ANCHORSPLAT_RETURN_IF_ERROR(AnnounceResult(flags, shared, options, input, output, {cloud.size(), cloud.sh_degree}));
+    const OutputPlan plan =
+        PlanOf(options, input, output, {cloud.size(), cloud.sh_degree}, CountOutside(options.region, cloud));
+    ANCHORSPLAT_RETURN_IF_ERROR(SayAndAsk({&plan, 1}, flags.size, shared));
   }
   if (flags.how.mode) cloud.render_mode = flags.how.mode;
   Buffer<float> means = KeepUsable(extras, cloud);
@@ -194,9 +208,10 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   options.control.checkpoint = checkpoint;
   options.control.outputs = OutputFiles(flags, output);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto lock, HoldCheckpoint(checkpoint));
-  std::optional<StopSignal> stop_signal(std::in_place);
+  const bool leaves_something = !checkpoint.empty();
+  stop_signal.emplace(leaves_something ? StopSignal::Leaves::kWhatIsDone : StopSignal::Leaves::kNothing);
   auto result = Enhance(std::move(cloud), options);
-  stop_signal.reset();
+  if (leaves_something) stop_signal.reset();
   if (!result.ok()) return WithWayOn(result.error(), checkpoint);
   Enhanced enhanced = *std::move(result);
   if (!extras.empty() && enhanced.report.cleaned) {
@@ -275,13 +290,15 @@ Status RunEnhance(const EnhanceWords& flags, Program& program) {
 
   std::vector<BatchItem> items;
   std::vector<bool> said;
+  std::vector<OutputPlan> plans;
   for (size_t i = 0; i < outputs.size(); ++i) {
     items.push_back({flags.inputs[i], outputs[i].string()});
-    const std::optional<CloudExtent> extent = ExtentOf(flags.inputs[i]);
+    // How many lie in a region, no header says.
+    const std::optional<CloudExtent> extent = options.region ? std::nullopt : ExtentOf(flags.inputs[i]);
     said.push_back(extent.has_value());
-    if (!extent) continue;
-    ANCHORSPLAT_RETURN_IF_ERROR(AnnounceResult(flags, shared, options, flags.inputs[i], outputs[i], *extent));
+    if (extent) plans.push_back(PlanOf(options, flags.inputs[i], outputs[i], *extent));
   }
+  ANCHORSPLAT_RETURN_IF_ERROR(SayAndAsk(plans, flags.size, shared));
   return RunBatch(
       items, [&](size_t i) { return EnhanceOne(flags, shared, options, flags.inputs[i], outputs[i], said[i]); },
       program);

@@ -57,6 +57,18 @@ TEST_F(EnhanceVerb, AsksBeforeLargeFiles) {
   EXPECT_EQ(folder_.Entries(), 2);
 }
 
+TEST_F(EnhanceVerb, AsksBeforeManyFilesThatAreLargeTogether) {
+  const std::string one = WriteHugeScan(folder_ / "one.ply", 6'000'000);
+  const std::string two = WriteHugeScan(folder_ / "two.ply", 6'000'000);
+  const std::string out = folder_ / "out";
+  ExpectRefused({"enhance", one, two, "--out-dir", out, "--model", compact_}, ErrorCode::kBadArgument,
+                {"all 2 together take 6.0 GB, more than 4.0 GB"});
+}
+
+TEST_F(EnhanceVerb, AnEmptyRegionIsNoRegion) {
+  ExpectRefused(Enhance({"--method", "filter", "--region", ""}), ErrorCode::kBadArgument, {"--region"});
+}
+
 TEST_F(EnhanceVerb, OverwritesOnlyWhenTold) {
   ExpectDone(Enhance({"--method", "filter"}));
   const std::string before = FileBytes(folder_ / "out.ply");

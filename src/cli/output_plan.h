@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "cli/verb.h"
@@ -47,8 +48,17 @@ struct OutputPlan {
 // From here on a file is asked for.
 inline constexpr uint64_t kLargeOutput = 4'000'000'000;
 
-// Says what will come out and what it takes, unless that is little; asks where that is more than kLargeOutput or than
-// the disk has room for. kBadArgument: nobody can be asked (no terminal) or the answer was no, and there is no --yes.
-Status SayAndAsk(const OutputPlan& plan, const SizeFlags& flags, const SharedFlags& shared);
+// Says what will come out of one command and what it takes, unless that is little; asks where all of it together is
+// more than kLargeOutput or than the disk has room for. kBadArgument: nobody can be asked (no terminal) or the answer
+// was no, and there is no --yes.
+Status SayAndAsk(std::span<const OutputPlan> plans, const SizeFlags& flags, const SharedFlags& shared);
+
+// Bytes that can be stored where this file will be, in a folder that may not be there yet. Nothing where the system
+// does not say, nor where nothing can be stored at all (/proc), which writing says better.
+std::optional<uint64_t> RoomFor(const std::filesystem::path& output);
+
+// "2G", "500M", "0.5G", "1GiB" or bytes as a number. kBadArgument: none, or less than kLeastMemory.
+Result<uint64_t> ParseMemory(const std::string& text);
+inline constexpr uint64_t kLeastMemory = 64'000'000;
 
 }  // namespace anchorsplat

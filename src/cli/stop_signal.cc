@@ -24,7 +24,8 @@ void SetUnlessIgnored(int signal, void (*handler)(int)) {
 
 }  // namespace
 
-StopSignal::StopSignal() : run_({.stop = &stop_requested}) {
+StopSignal::StopSignal(Leaves leaves)
+    : run_({.stop = &stop_requested, .abandon = leaves == Leaves::kNothing ? &stop_requested : nullptr}) {
   std::signal(SIGINT, RequestStop);
   std::signal(SIGTERM, RequestStop);
   SetUnlessIgnored(SIGHUP, RequestStop);

@@ -117,6 +117,8 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
     std::cout.flush();
     if (!std::cout) return Fail(flags, {ErrorCode::kIo, "standard output could not be written"});
     return program.exit_code;
+  } catch (const RunAbandoned&) {
+    return Fail(flags, {ErrorCode::kInterrupted, "stopped; what was being written is gone"});
   } catch (const NoDiskRoom& none) {
     return Fail(flags, {ErrorCode::kIo, none.what()});
   } catch (const std::bad_alloc&) {

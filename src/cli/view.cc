@@ -88,8 +88,7 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
   page.folder = flags.folder;
   page.smaller = flags.folder ? "leave out some of the true pictures (--views)"
                               : Cat("--folder writes a page of any size with its data beside it; or ", page.smaller);
-  std::optional<StopSignal> stop_signal;  // what there is of a folder is taken away
-  if (page.folder) stop_signal.emplace();
+  const StopSignal stop_signal(StopSignal::Leaves::kNothing);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown after, ReadShown(flags.after, flags.how.mode));
   Shown before;
   if (!flags.before.empty()) {
@@ -97,6 +96,7 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
     page.before = ViewerSplat{&before.cloud, before.name, before.bytes};
   }
   page.after = {&after.cloud, after.name, after.bytes};
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckPageSize(flags.output, page));
   LookAtSplats(page);
   ANCHORSPLAT_RETURN_IF_ERROR(WriteViewerPage(flags.output, page, WriteOptionsFrom(shared)));
 

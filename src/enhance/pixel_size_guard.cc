@@ -113,9 +113,10 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   const double most = MostGaussiansPerPixel(evidence.gaussians);
   const double crowd = evidence.spacing > 0 ? std::pow(estimate.size / evidence.spacing, 2) : 0;
   if (crowd > most) {
-    finding.contradictions.push_back(Cat("there would be ", Number(crowd),
-                                         " Gaussians on every pixel of the surface, and a fit of ",
-                                         WithThousands(evidence.gaussians), " keeps at most ", Number(most)));
+    finding.contradictions.push_back(
+        Cat("there would be ", Number(crowd), " Gaussians on every pixel of the surface, and fits of ",
+            WithThousands(evidence.gaussians), evidence.gaussians >= int64_t{kMostShowing} ? " and more" : "",
+            " keep at most ", Number(most)));
   }
   if (evidence.small_axis < kSmallestAxis * estimate.size) {
     finding.contradictions.push_back(Cat("its small Gaussians measure ", Fixed(evidence.small_axis / estimate.size, 2),

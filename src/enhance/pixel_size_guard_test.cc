@@ -110,6 +110,9 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   PixelSizeEvidence crowded = plain;
   crowded.spacing = 0.006;  // 2.8 on a pixel
   EXPECT_TRUE(Judge(estimate, crowded).contradicted());
+  EXPECT_NE(Judge(estimate, crowded).contradictions[0].find("fits of 20,000 keep"), std::string::npos);
+  crowded.gaussians = 200'000;  // of a sample that is as large as it may be
+  EXPECT_NE(Judge(estimate, crowded).contradictions[0].find("fits of 200,000 and more keep"), std::string::npos);
   crowded.gaussians = 3000;  // a thin thing in few pixels keeps as many
   crowded.spacing = 0.007;
   EXPECT_FALSE(Judge(estimate, crowded).contradicted());

@@ -1,8 +1,10 @@
 #include "fit/checkpoint_guard.h"
 
 #include <algorithm>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -31,18 +33,59 @@ bool IsFingerprint(const nlohmann::json& value) {
          value.get_ref<const std::string&>().find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
+// Settings as the command line and Python call them. Others follow from these, which are therefore compared first;
+// those in front change what those behind are by default.
+constexpr std::pair<std::string_view, std::string_view> kOptions[] = {
+    {"steps", "--steps"},
+    {"seed", "--seed"},
+    {"strategy", "--strategy"},
+    {"mode", "--mode"},
+    {"pixel", "--pixel"},
+    {"pixel_upscale", "--upscale"},
+    {"max_gaussians", "--max-gaussians"},
+    {"cap_max", "--max-gaussians"},
+    {"mip_filter", "--mip-filter"},
+    {"exposure_from", "--exposure"},
+    {"sh_degree", "--sh-degree"},
+    {"ssim_weight", "--ssim-weight"},
+    {"profile", "--profile"},
+    {"background", "--background"},
+    {"opacity_reset", "--opacity-reset"},
+    {"grow_grad2d", "--grow-grad2d"},
+    {"revised_opacity", "--revised-opacity"},
+    {"min_opacity", "--min-opacity"},
+};
+
+// The setting's own name where the command line has no word for it.
+std::string Spoken(const std::string& key) {
+  const auto found = std::ranges::find(kOptions, key, &std::pair<std::string_view, std::string_view>::first);
+  return std::string(found == std::end(kOptions) ? std::string_view(key) : found->second);
+}
+
+// A value as it is asked for: that of --exposure is the step from which on it works, and negative without it.
+std::string SpokenValue(const std::string& key, const nlohmann::json& value) {
+  if (key != "exposure_from" || !value.is_number()) return Printable(value.dump());
+  return value.get<double>() < 0 ? "off" : Cat("on from step ", value.dump());
+}
+
 }  // namespace
 
 Status CompareSettings(const std::string& file, const std::string& theirs, const std::string& ours) {
   if (theirs == ours) return {};
   const auto a = nlohmann::json::parse(theirs, nullptr, false), b = nlohmann::json::parse(ours, nullptr, false);
   if (a.is_object() && b.is_object()) {
-    for (const auto& [key, value] : b.items()) {
-      const auto found = a.find(key);
-      if (found == a.end() || *found == value) continue;
+    std::vector<std::string> keys;
+    for (const auto& [key, option] : kOptions) keys.emplace_back(key);
+    for (const auto& [key, value] : b.items()) keys.push_back(key);
+    for (const std::string& key : keys) {
+      const auto found = a.find(key), own = b.find(key);
+      if (found == a.end() || own == b.end() || *found == *own) continue;
+      const nlohmann::json& value = *own;
       const std::string how =
-          IsFingerprint(value) ? "another one" : Cat(Printable(found->dump()), ", this one's is ", value.dump());
-      return Error{ErrorCode::kBadArgument, Cat(file, ": is a checkpoint of another run: its ", key, " is ", how)};
+          IsFingerprint(value) ? "another one"
+                               : Cat(SpokenValue(key, *found), ", and of this command it is ", SpokenValue(key, value));
+      return Error{ErrorCode::kBadArgument,
+                   Cat(file, ": is a checkpoint of another run: its ", Spoken(key), " is ", how)};
     }
     // Only fits with a far shell say how far it is, and their start differs from others': that has been said.
     for (const auto& [key, value] : b.items()) {

@@ -11,6 +11,7 @@
 #include <system_error>
 #include <utility>
 
+#include "core/run_context.h"
 #include "core/text.h"
 #include "io/input_record.h"
 
@@ -290,6 +291,7 @@ Status CommitTogether(std::span<OutputFile> files) {
   Status status;
   size_t named = 0;
   for (size_t k = 0; k < files.size() && status.ok(); ++k) status = files[k].FinishBytes();
+  if (status.ok()) LeaveIfAbandoned();  // that took a while, and nobody has seen a name yet
   while (named < files.size() && status.ok()) {
     status = files[named].TakeName(/*keep_old=*/files.size() > 1);
     if (status.ok()) ++named;

@@ -33,7 +33,9 @@ Error EndsBefore(const std::string& name, uint64_t end) {
 // Waits for bytes, for the end, or for the run to be stopped: nobody may ever write.
 void AwaitPipe(int descriptor) {
   struct pollfd one = {.fd = descriptor, .events = POLLIN, .revents = 0};
-  while (::poll(&one, 1, kLookMilliseconds) == 0) {
+  for (;;) {
+    const int ready = ::poll(&one, 1, kLookMilliseconds);
+    if (ready > 0 || (ready < 0 && errno != EINTR)) return;  // read() says what is wrong
     LeaveIfAbandoned();
   }
 }

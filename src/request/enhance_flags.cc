@@ -87,7 +87,8 @@ void AddMethodFlags(CLI::App& verb, EnhanceFlags& flags) {
       ->capture_default_str();
   verb.add_option("--region", flags.region,
                   "Only what lies in there is enhanced, the rest stays as it is: a box X0,Y0,Z0,X1,Y1,Z1 or a sphere "
-                  "X,Y,Z,RADIUS, in the splat's unit");
+                  "X,Y,Z,RADIUS, in the splat's unit")
+      ->check(NotEmpty());
 }
 
 void AddPixelSizeFlags(CLI::App& verb, EnhanceFlags& flags) {

@@ -36,9 +36,13 @@ struct DataElement {
   std::string base64;
 };
 
-Error TooLarge(const std::filesystem::path& path, uint64_t bytes, const ViewerPage& page) {
-  return {ErrorCode::kBadArgument, Cat(path.string(), ": the page would take ", HumanBytes(bytes), ", more than the ",
-                                       HumanBytes(page.max_bytes), " a browser opens well; ", page.smaller)};
+// An estimate that is this much too large may still be wrong.
+constexpr double kSure = 0.85;
+
+Error TooLarge(const std::filesystem::path& path, uint64_t bytes, const ViewerPage& page, const char* roughly = "") {
+  return {ErrorCode::kBadArgument,
+          Cat(path.string(), ": the page would take ", roughly, HumanBytes(bytes), ", more than the ",
+              HumanBytes(page.max_bytes), " a browser opens well; ", page.smaller)};
 }
 
 // Any bytes as JSON: what is not UTF-8 becomes U+FFFD, nothing ends the script element early.
@@ -182,6 +186,31 @@ uint64_t EstimatedPageBytes(const GaussianCloud& cloud, int max_sh_degree) {
   return static_cast<uint64_t>(bytes * static_cast<double>(cloud.size()) / static_cast<double>(rows.size()));
 }
 
+Status CheckPageSize(const std::filesystem::path& path, const ViewerPage& page) {
+  if (page.folder) return {};
+  // Refused before the work is done where that is certain: means and rotations never deflate by more than half.
+  uint64_t at_least = static_cast<uint64_t>(page.after.cloud == nullptr ? 0 : page.after.cloud->size());
+  if (page.before && page.before->cloud != nullptr) at_least += static_cast<uint64_t>(page.before->cloud->size());
+  at_least *= kLeastBytes;
+  if (at_least > page.max_bytes) return TooLarge(path, at_least, page);
+  // And where a sample says so, which is far sooner than all is compressed.
+  const GaussianCloud* const both[] = {page.after.cloud, page.before ? page.before->cloud : nullptr};
+  double most = 0;
+  for (const GaussianCloud* cloud : both) {
+    if (cloud == nullptr) continue;
+    most += static_cast<double>(cloud->size()) * MostPageBytes(std::min(cloud->sh_degree, page.max_sh_degree));
+  }
+  uint64_t estimated = 0;
+  for (const GaussianCloud* cloud : both) {
+    if (cloud == nullptr || most <= static_cast<double>(page.max_bytes)) continue;
+    estimated += EstimatedPageBytes(*cloud, page.max_sh_degree);
+  }
+  if (kSure * static_cast<double>(estimated) > static_cast<double>(page.max_bytes)) {
+    return TooLarge(path, estimated, page, "about ");
+  }
+  return {};
+}
+
 Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page, const WriteOptions& options) {
   if (page.pixel_size && !(std::isfinite(*page.pixel_size) && *page.pixel_size > 0)) {
     return Error{ErrorCode::kBadArgument, "the training pixel size must be positive and finite"};
@@ -190,12 +219,7 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
     return Error{ErrorCode::kBadArgument, Cat("the page where readers open a splat of their own: '",
                                               Printable(page.own_page), "' is no address, expected https://…")};
   }
-  // Refused before the work is done where that is certain: means and rotations never deflate by more than half.
-  uint64_t at_least = static_cast<uint64_t>(page.after.cloud == nullptr ? 0 : page.after.cloud->size());
-  if (page.before && page.before->cloud != nullptr) at_least += static_cast<uint64_t>(page.before->cloud->size());
-  at_least *= kLeastBytes;
-  if (!page.folder && at_least > page.max_bytes) return TooLarge(path, at_least, page);
-
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckPageSize(path, page));
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, page.memory));
   std::vector<DataElement> elements;
   std::optional<PageFolder> folder;

@@ -56,6 +56,10 @@ struct ViewerPage {
 // an `own_page` that is no such address, a page above `max_bytes`.
 Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page, const WriteOptions& options = {});
 
+// kBadArgument: a sample of the splats shows already that a single file of them would be above `max_bytes`. The splats
+// alone are looked at, and in far less time than writing takes.
+Status CheckPageSize(const std::filesystem::path& path, const ViewerPage& page);
+
 // Bytes that a splat takes in a page, from a sample of it; 0 where nothing of it can be shown. MostPageBytes: of one
 // Gaussian at most, as if nothing could be compressed.
 uint64_t EstimatedPageBytes(const GaussianCloud& cloud, int max_sh_degree = kMaxShDegree);

@@ -429,6 +429,24 @@ TEST(PageWriter, ErrorsSayWhatToDoAndLeaveNothingBehind) {
   EXPECT_TRUE(WriteViewerPage(folder / "page.html", good, {.overwrite = true}).ok());
 }
 
+TEST(ViewerPage, ASampleTellsThatItIsTooLarge) {
+  const GaussianCloud cloud = FittedLookingCloud(20'000, 3, 5);
+  ViewerPage page;
+  page.after.cloud = &cloud;
+  page.before = ViewerSplat{&cloud, "before", {}};
+  const uint64_t both = 2 * EstimatedPageBytes(cloud);
+  page.max_bytes = 3 * both / 4;
+  const Status refused = CheckPageSize("page.html", page);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().code, ErrorCode::kBadArgument);
+  EXPECT_NE(refused.error().message.find("the page would take about "), std::string::npos) << refused.error().message;
+  page.max_bytes = both;
+  EXPECT_TRUE(CheckPageSize("page.html", page).ok());
+  page.max_bytes = 1;
+  page.folder = true;
+  EXPECT_TRUE(CheckPageSize("page.html", page).ok());
+}
+
 TEST(ViewerPage, EstimateIsNearWhatItTakes) {
   const TestFolder folder;
   const auto page_bytes = [&folder](const GaussianCloud& cloud, int degree) {

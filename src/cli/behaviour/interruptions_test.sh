@@ -87,7 +87,7 @@ expect 0 "its splat is there, too" "$program" info "$work/refined.ply"
 expect 0 "its state is there, too" test -s "$work/refined.ply.checkpoint"
 expect 5 "an interrupted refinement is not forgotten" refine --steps 9
 expect 2 "an interrupted refinement is not mistaken for another" refine --steps 9 --resume
-says stderr "its steps is"
+says stderr "its --steps is"
 hung_up_build() {
   "$program" dataset build "$work/square.obj" "$work/other.obj" -o "$work/set" --views 8 --size 24 --low-size 12 --points 60 \
     --steps $long --max-gaussians 100 --jobs 1 -q &
@@ -104,6 +104,59 @@ says stdout "other: the build that was to make it has not ended"
 says stdout "square: the build that was to make it has not ended"
 expect 0 "info counts both" "$program" dataset info "$work/set" --json
 says stdout '"unfinished": 2'
+# What nobody can go on with ends at once and leaves nothing. A splat that takes a while: the small one over and over.
+header=$(grep -aobm1 end_header "$input" | cut -d: -f1)
+head -c $((header + 11)) "$input" | sed 's/^element vertex .*/element vertex 640000/' >"$work/large.ply"
+count=$(sed -n 's/^element vertex //p;/^end_header/q' "$input")
+tail -c +$((header + 12)) "$input" >"$work/body"
+for _ in $(seq 5); do cat "$work/body" "$work/body" >"$work/twice" && mv "$work/twice" "$work/body"; done
+cat "$work/body" >>"$work/large.ply"
+sed -i "s/^element vertex 640000/element vertex $((count * 32))/" "$work/large.ply"
+rm "$work/body"
+stopped_at() {
+  local words=$1
+  shift
+  "$program" "$@" 2>"$work/log" &
+  child=$!
+  until_is says_log "$words"
+  kill -INT $child
+  wait $child
+  local code=$?
+  cat "$work/log" >&2
+  return $code
+}
+gone() { [ ! -e "$1" ] && [ -z "$(find "$work" -name '.anchorsplat*')" ]; }
+expect 130 "Ctrl-C ends the filter" stopped_at "training pixel" enhance "$work/large.ply" --method filter -o "$work/gone.ply"
+says stderr "error: stopped"
+expect 0 "there is no splat of it" gone "$work/gone.ply"
+expect 130 "and levels of detail" stopped_at '"levels of detail"' convert "$work/large.ply" "$work/lod" --lod --progress json
+says stderr "stopped; what was being written is gone"
+expect 0 "there is no folder of them" gone "$work/lod"
+# While a pipe is read that nobody ends; from when on the signal is heard, the system knows (bit 1 is SIGINT).
+mkfifo "$work/pipe"
+hears() {
+  [ "/proc/$child/exe" -ef "$program" ] || return 1  # the shell's own child, at first
+  local caught
+  caught=$(sed -n 's/^SigCgt:.*\(.\)$/\1/p' "/proc/$child/status" 2>/dev/null)
+  (((0x${caught:-0} & 2) != 0))
+}
+stopped_reading() {
+  "$program" "$@" <>"$work/pipe" &
+  child=$!
+  until_is hears
+  kill -INT $child
+  wait $child
+}
+expect 130 "Ctrl-C ends a conversion that reads" stopped_reading convert - "$work/gone.spz"
+says stderr "error: stopped"
+expect 130 "and a page" stopped_reading view - -o "$work/gone.html"
+says stderr "error: stopped"
+expect 0 "there is nothing of them" gone "$work/gone.spz"
+# What is said of it beforehand counts only what is worked on.
+expect 0 "a small region of it" "$program" enhance "$work/large.ply" --method model --pixel-size 0.005 --mode classic \
+  --region 0,0,0,0.1 -o "$work/region.ply" --yes
+says stderr "640,000 Gaussians become up to 6"
+rm "$work/large.ply" "$work/region.ply"
 # Under nohup it does not end at all.
 not_hung_up() {
   (trap '' HUP && exec "$program" fit "$work/project" --init-points 300 --hold-out 5 -o "$work/nohup.ply" --steps 100 \

@@ -16,6 +16,7 @@ namespace {
 
 constexpr int64_t kRowsPerTask = 1 << 12;
 constexpr int64_t kTasksAtOnce = 32;
+constexpr uint64_t kBytesPerNumber = 13;  // "-0.123456789" and what ends it
 
 std::string Names(int degree) {
   std::string line = "x,y,z";
@@ -47,6 +48,11 @@ void AppendRow(const CloudView& cloud, int64_t i, std::string& text) {
 }
 
 }  // namespace
+
+uint64_t EstimatedCsvSize(int64_t count, int sh_degree) {
+  const uint64_t numbers = 11 + 3 * static_cast<uint64_t>(ShCoefficients(sh_degree));
+  return Names(sh_degree).size() + static_cast<uint64_t>(count) * numbers * kBytesPerNumber;
+}
 
 Status WriteCsv(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, cloud));

@@ -16,6 +16,9 @@ namespace anchorsplat {
 // line per Gaussian with the shortest decimal numbers that read back as the same floats.
 Status WriteCsv(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options = {});
 
+// Of numbers as fits have them, 9 digits each: 0 and round ones take less, very small ones more.
+uint64_t EstimatedCsvSize(int64_t count, int sh_degree);
+
 // NumPy's archive of float32 arrays: means [N,3], log_scales [N,3], quats [N,4] wxyz, opacity_logits [N],
 // sh [N,(degree+1)²,3]. numpy.load(path)["means"].
 Status WriteNpz(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options = {});

@@ -10,11 +10,11 @@
 namespace anchorsplat {
 
 namespace {
-constexpr std::string_view kMark = "trained over: ";
+constexpr std::string_view kBackgroundMark = "trained over: ";
 
-std::optional<std::array<float, 3>> ParseComment(std::string_view text) {
-  if (!text.starts_with(kMark)) return std::nullopt;
-  text.remove_prefix(kMark.size());
+std::optional<std::array<float, 3>> ParseBackground(std::string_view text) {
+  if (!text.starts_with(kBackgroundMark)) return std::nullopt;
+  text.remove_prefix(kBackgroundMark.size());
   std::array<float, 3> background{};
   for (float& channel : background) {
     text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
@@ -30,12 +30,12 @@ std::optional<std::array<float, 3>> ParseComment(std::string_view text) {
 }  // namespace
 
 std::string BackgroundComment(const std::array<float, 3>& background) {
-  return Cat(kMark, background[0], " ", background[1], " ", background[2]);
+  return Cat(kBackgroundMark, background[0], " ", background[1], " ", background[2]);
 }
 
 std::optional<std::array<float, 3>> BackgroundOf(const std::vector<std::string>& comments) {
   for (const std::string& comment : comments) {
-    if (const auto background = ParseComment(comment)) return background;
+    if (const auto background = ParseBackground(comment)) return background;
   }
   return std::nullopt;
 }

@@ -15,8 +15,9 @@ namespace anchorsplat {
 // trained on its pictures, as 3DGS's convert.py makes them, find the very same cameras: focal lengths stay, and each
 // side is cut or lengthened until no pixel at the picture's border is without a place in it. `bent` itself for a
 // straight lens. Errors (kBadFile, the end of a sentence, with the coefficients): a lens that cannot be undone over the
-// middle of the picture (three quarters of the way to the border, half of it for a fisheye, whose circle may lie inside),
-// one that would leave less than a fifth of a side, where COLMAP stops cutting; a size that no picture may have.
+// middle of the picture (three quarters of the way to the border, half of it for a fisheye, whose circle may lie
+// inside), one that would leave less than a fifth of a side, where COLMAP stops cutting; a size that no picture may
+// have.
 Result<Pinhole> StraightPinhole(const Lens& lens, const Pinhole& bent);
 
 // A view's picture, and where it says nothing.

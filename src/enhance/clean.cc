@@ -26,8 +26,8 @@ Status Clean(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport&
         "its training views show (--cameras)");
   }
   UnseenOptions unseen{.seed = options.seed};
-  unseen.background = options.background.value_or(
-      set.background.value_or(BackgroundOf(cloud.comments).value_or(unseen.background)));
+  unseen.background =
+      options.background.value_or(set.background.value_or(BackgroundOf(cloud.comments).value_or(unseen.background)));
   ANCHORSPLAT_ASSIGN_OR_RETURN(report.cleaned, FindUnseen(cloud, set.cameras, unseen));
   if (options.region) {
     std::erase_if(report.cleaned->rows, [&](int64_t i) { return !options.region->Holds(cloud.means.data() + 3 * i); });

@@ -19,8 +19,8 @@ struct RefineOptions {
   // What the pictures' alpha is laid over, and the splat; otherwise what the cameras' file says, else the splat's own
   // comment (core/training_background.h), else black.
   std::optional<std::array<float, 3>> background;
-  int hold_out = 8;              // every Nth view is not trained on, as in fits; 0: all are
-  int downscale = 1;             // pixels of a picture per side that become one, as in fits
+  int hold_out = 8;   // every Nth view is not trained on, as in fits; 0: all are
+  int downscale = 1;  // pixels of a picture per side that become one, as in fits
   std::optional<int64_t> steps;
   std::optional<double> seconds;           // instead of steps: as many as there are in that time. Not reproducible
   std::optional<int> copies;               // K that every Gaussian is split into at the beginning

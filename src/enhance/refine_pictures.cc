@@ -190,8 +190,9 @@ Status CheckAgreement(const PictureAgreement& agreement, double least_psnr, bool
       "; are these the pictures it was fitted to, in the order of their cameras, and is the splat in the cameras' "
       "coordinates?";
   if (agreement.views == 0) {
-    return Error{ErrorCode::kBadArgument,
-                 "--images: the masks leave nothing of any picture that was looked at: black is left out, white counts"};
+    return Error{
+        ErrorCode::kBadArgument,
+        "--images: the masks leave nothing of any picture that was looked at: black is left out, white counts"};
   }
   if (!(agreement.psnr >= least_psnr)) {
     return Error{ErrorCode::kBadArgument,

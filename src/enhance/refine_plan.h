@@ -10,8 +10,8 @@ namespace anchorsplat {
 // photographs without photographs.
 Result<RefineOptions> ChooseRefineOptions(const RefineInput& input, const RefineOptions& given);
 
-// Leaves as many of all but the last `fixed` Gaussians as there may be, those of the largest opacity × size; 0: no bound.
-// How many went.
+// Leaves as many of all but the last `fixed` Gaussians as there may be, those of the largest opacity × size; 0: no
+// bound. How many went.
 int64_t KeepToBudget(int64_t max_gaussians, int64_t fixed, GaussianCloud& start);
 
 // The rest: looks at the views. `as_it_is` is the input as refinement could begin with it: within its bound. What

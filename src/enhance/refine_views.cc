@@ -58,8 +58,7 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
 
 Result<RefineViews> OpenSplat(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
   RefinePoses poses;
-  render.background =
-      BackgroundFor(options, input.cameras ? input.cameras->background : std::nullopt, input.cloud);
+  render.background = BackgroundFor(options, input.cameras ? input.cameras->background : std::nullopt, input.cloud);
   if (input.cameras && !input.cameras->cameras.empty()) {
     poses = RefinePosesAlong(input.cameras->cameras, options.between, kCheckViews);
     if (!poses.apart) {

@@ -48,9 +48,10 @@ struct CompareOptions {
 Result<std::vector<std::vector<size_t>>> MatchSources(std::span<ViewSource* const> sources,
                                                       const ViewSource& reference);
 
-// PSNR, SSIM and LPIPS of every source against the reference, view by view; one result per source. Pixels that a mask of
-// either leaves out do not count, and views of which nothing is left are in no result, which a warning says. Pictures of
-// different sizes are an error that names them, and so is it when nothing is left of any view. Shows progress.
+// PSNR, SSIM and LPIPS of every source against the reference, view by view; one result per source. Pixels that a mask
+// of either leaves out do not count, and views of which nothing is left are in no result, which a warning says.
+// Pictures of different sizes are an error that names them, and so is it when nothing is left of any view. Shows
+// progress.
 Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> sources, ViewSource& reference,
                                                    const CompareOptions& options = {});
 

@@ -12,8 +12,9 @@ namespace anchorsplat {
 // does it, under its names: Gaussians are samples, those that are transparent move to where others are, noise lets them
 // look around, and nothing is split, cloned, pruned or reset. Counts of steps are for 30,000 of them (ScaledTo).
 struct McmcOptions {
-  int64_t cap_max = 1'000'000;        // Gaussians: growth stops there. A start with more is cut to it when growth ends (Fitter)
-  double noise_lr = 5e5;              // × the rate of the means: of the noise
+  int64_t cap_max =
+      1'000'000;          // Gaussians: growth stops there. A start with more is cut to it when growth ends (Fitter)
+  double noise_lr = 5e5;  // × the rate of the means: of the noise
   int64_t refine_start_iter = 500;    // relocation and growth in steps after this …
   int64_t refine_stop_iter = 25'000;  // … and before this. Noise never stops
   int64_t refine_every = 100;

@@ -13,8 +13,8 @@ namespace anchorsplat {
 // How alike renders and pictures are, as means over views; renders clamped to 0–1, not quantised.
 struct ViewQuality {
   int64_t views = 0;  // that were measured
-  double psnr = 0;  // dB; 0 without views
-  double ssim = 0;  // of metrics/image_metrics.h
+  double psnr = 0;    // dB; 0 without views
+  double ssim = 0;    // of metrics/image_metrics.h
 };
 
 // Over all views of `pictures`, pixels as `pixel` says; ignored ones do not count. Views of which a mask leaves nothing

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "core/log.h"
+#include "core/messages_for_test.h"
 #include "core/parallel.h"
 #include "formats/blocks_for_test.h"
-#include "core/messages_for_test.h"
 
 namespace anchorsplat {
 

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "core/messages_for_test.h"
 #include "core/text.h"
 #include "formats/convert.h"
-#include "core/messages_for_test.h"
 #include "formats/opened_splat.h"
 #include "formats/ply/ply_reader.h"
 #include "formats/ply/ply_writer.h"

@@ -25,7 +25,8 @@ struct SsimRows {
   const uint8_t* ignored = nullptr;  // [H,W] 1: the pixel does not count; null: all count
 };
 
-// Σ (1 − SSIM) over the pixels of the rows that count: small for pictures that are alike, so that floats keep its digits.
+// Σ (1 − SSIM) over the pixels of the rows that count: small for pictures that are alike, so that floats keep its
+// digits.
 double SumOfDissimilarity(const SsimRows& rows);
 
 }  // namespace anchorsplat

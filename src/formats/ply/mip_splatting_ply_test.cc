@@ -6,10 +6,10 @@
 #include <limits>
 #include <string>
 
+#include "core/messages_for_test.h"
 #include "core/smoothing_filter.h"
 #include "formats/cloud_io.h"
 #include "formats/extra_properties.h"
-#include "core/messages_for_test.h"
 #include "formats/opened_splat.h"
 #include "formats/ply/ply_reader.h"
 #include "formats/ply/ply_writer.h"

@@ -12,12 +12,12 @@
 #include <string>
 #include <vector>
 
+#include "core/messages_for_test.h"
 #include "core/parallel.h"
 #include "core/rotation.h"
 #include "formats/attribute_error.h"
 #include "formats/cloud_io.h"
 #include "formats/convert.h"
-#include "core/messages_for_test.h"
 #include "formats/opened_splat.h"
 #include "formats/sog/clustered_cloud_for_test.h"
 #include "formats/streamed_sog/lod_tree.h"

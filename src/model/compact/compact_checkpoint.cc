@@ -38,16 +38,12 @@ struct BlockHeader {
 };
 static_assert(sizeof(BlockHeader) == 64);
 
-constexpr std::array<Buffer<float> GaussianCloud::*, 5> kArrays = {&GaussianCloud::means, &GaussianCloud::log_scales,
-                                                                   &GaussianCloud::quats,
-                                                                   &GaussianCloud::opacity_logits, &GaussianCloud::sh};
-
 uint64_t ChecksumOf(const BlockHeader& header, const CompactPart& part) {
   Fingerprint print;
   print.Add(std::array{header.block, header.outside, header.partly, header.not_finite, header.inside, header.made,
                        header.rows});
   print.Add(part.keys);
-  for (const auto array : kArrays) print.AddWords(part.cloud.*array);
+  for (const auto array : kCloudArrays) print.AddWords(part.cloud.*array);
   return print.value();
 }
 
@@ -211,7 +207,7 @@ Result<bool> CompactCheckpoint::Next(const GaussianCloud& of, CompactBlockResult
     return all;
   };
   bool all = read(part.keys);
-  for (const auto array : kArrays) all = all && read(part.cloud.*array);
+  for (const auto array : kCloudArrays) all = all && read(part.cloud.*array);
   if (!all) return CannotOpen(path_);
   if (ChecksumOf(header, part) != header.checksum) return false;
   at_ = at;
@@ -233,7 +229,7 @@ void CompactCheckpoint::Append(const CompactBlockResult& result) {
   };
   // What a kill tore apart goes first, and a block's header comes last: without it there is none.
   bool all = ::ftruncate(descriptor_, static_cast<off_t>(at_)) == 0 && write(part.keys);
-  for (const auto array : kArrays) all = all && write(part.cloud.*array);
+  for (const auto array : kCloudArrays) all = all && write(part.cloud.*array);
   all = all && WriteAll(descriptor_, &header, sizeof header, at_);
   if (all) {
     at_ = size_ = at;

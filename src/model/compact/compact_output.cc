@@ -15,10 +15,7 @@ namespace {
 
 constexpr int64_t kPieceRows = int64_t{1} << 20;
 
-// The five arrays, with their floats per Gaussian.
-constexpr std::array<Buffer<float> GaussianCloud::*, 5> kArrays = {&GaussianCloud::means, &GaussianCloud::log_scales,
-                                                                   &GaussianCloud::quats,
-                                                                   &GaussianCloud::opacity_logits, &GaussianCloud::sh};
+// Floats per Gaussian of kCloudArrays.
 std::array<int64_t, 5> Widths(const GaussianCloud& cloud) { return {3, 3, 4, 1, cloud.sh_stride()}; }
 
 // How many keys are less than another.
@@ -64,8 +61,8 @@ CompactOutput::Piece& CompactOutput::PieceFor(int64_t rows, const GaussianCloud&
   const int64_t room = std::max(rows, std::min(kPieceRows, count_ * copies_));
   piece.cloud.sh_degree = block.sh_degree;
   piece.cloud.render_mode = block.render_mode;
-  for (size_t a = 0; a < kArrays.size(); ++a) {
-    (piece.cloud.*kArrays[a]).reserve(static_cast<size_t>(room * Widths(block)[a]));
+  for (size_t a = 0; a < kCloudArrays.size(); ++a) {
+    (piece.cloud.*kCloudArrays[a]).reserve(static_cast<size_t>(room * Widths(block)[a]));
   }
   piece.keys.reserve(static_cast<size_t>(room));
   return piece;
@@ -102,7 +99,7 @@ void CompactOutput::Append(const CompactPart& part, CopyGroups groups) {
   made_ += part.made;
   Piece& piece = PieceFor(part.cloud.size(), part.cloud);
   const int64_t first = piece.cloud.size();
-  for (const auto array : kArrays) {
+  for (const auto array : kCloudArrays) {
     const Buffer<float>& from = part.cloud.*array;
     (piece.cloud.*array).insert((piece.cloud.*array).end(), from.begin(), from.end());
   }
@@ -149,13 +146,13 @@ GaussianCloud CompactOutput::Finish(ChosenCopies& chosen) {
     for (const int64_t key : piece.keys) places.push_back(ranks.Of(key));
     piece.keys = {};
   }
-  for (size_t a = 0; a < kArrays.size() && !pieces_.empty(); ++a) {
+  for (size_t a = 0; a < kCloudArrays.size() && !pieces_.empty(); ++a) {
     out.sh_degree = pieces_.front().cloud.sh_degree;
     out.render_mode = pieces_.front().cloud.render_mode;
     std::vector<std::span<const float>> arrays;
-    for (const Piece& piece : pieces_) arrays.emplace_back(piece.cloud.*kArrays[a]);
-    out.*kArrays[a] = ScatterRows(arrays, Widths(out)[a], places);
-    for (Piece& piece : pieces_) piece.cloud.*kArrays[a] = {};
+    for (const Piece& piece : pieces_) arrays.emplace_back(piece.cloud.*kCloudArrays[a]);
+    out.*kCloudArrays[a] = ScatterRows(arrays, Widths(out)[a], places);
+    for (Piece& piece : pieces_) piece.cloud.*kCloudArrays[a] = {};
   }
   chosen.merged = made_ - total;
   chosen.left_out = LeaveOutLeastVisible(choice_.max_gaussians, out);

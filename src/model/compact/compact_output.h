@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -8,6 +9,11 @@
 #include "model/compact/copy_choice.h"
 
 namespace anchorsplat {
+
+// All that a cloud has per Gaussian.
+inline constexpr std::array<Buffer<float> GaussianCloud::*, 5> kCloudArrays = {
+    &GaussianCloud::means, &GaussianCloud::log_scales, &GaussianCloud::quats, &GaussianCloud::opacity_logits,
+    &GaussianCloud::sh};
 
 struct ChosenCopies {
   int64_t merged = 0;    // copies that are gone: others stand for them, or they were invisible

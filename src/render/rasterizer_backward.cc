@@ -230,7 +230,16 @@ Result<SeenGradient> Rasterizer::BackwardToSeen(const RenderGradient& output_gra
   try {
     Stopwatch watch;
     CloudGradient unused;
-    state_->BlendBackward(output_gradient, unused);
+    // Slots are added up for visible Gaussians alone; all others have learned nothing.
+    BlendGradient* sums = Room(state_->gradients, kept.count);
+    ParallelFor(0, kept.count, int64_t{1} << 16,
+                [&](int64_t first, int64_t last) { std::fill(sums + first, sums + last, BlendGradient{}); });
+    if (const std::optional<State::SlotsLeft> left = state_->BlendBackward(output_gradient, unused)) {
+      float* absolute = kept.options.absgrad ? unused.means2d_abs.data() : nullptr;
+      ParallelFor(0, ProjectChunks(kept.count), 1, [&](int64_t chunk, int64_t) {
+        SumSlots(left->params, left->slots, chunk, /*first_run=*/true, sums, absolute);
+      });
+    }
     state_->statistics.blend_backward = watch.Lap();
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kIo,

@@ -67,7 +67,7 @@ def fit(
     NeRF-synthetic scene.
 
     steps: of the optimisation; all schedules follow.
-    max_gaussians: growth stops there; 0: no bound. Otherwise none, a million with mcmc.
+    max_gaussians: growth stops there, and a start with more is cut to it; 0: no bound. Otherwise none, a million with mcmc.
     strategy: who comes and goes: Kerbl et al.; the same by absolute gradients; a number of Gaussians that move.
     mip_filter: smooths every Gaussian by the pixel of the closest camera, as Mip-Splatting does; implies mode="mip".
     exposure: pictures differ in brightness and tint; each has a gain and a bias per channel of its own.

@@ -200,8 +200,10 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const RefineOptions options, ChooseRefineOptions(input, given));
   const int64_t left_out = KeepToBudget(options.max_gaussians, input.fixed, input.start);
-  std::optional<GaussianCloud> fewer;  // of the input, where there may not be all
-  if (options.max_gaussians > 0 && input.cloud.size() - input.fixed > options.max_gaussians) {
+  // Of the input, where there may not be all. Only pictures can tell that it is what to begin with.
+  std::optional<GaussianCloud> fewer;
+  const int64_t changing = input.cloud.size() - input.fixed;
+  if (!options.images.empty() && options.max_gaussians > 0 && changing > options.max_gaussians) {
     fewer = input.cloud;
     KeepToBudget(options.max_gaussians, input.fixed, *fewer);
   }

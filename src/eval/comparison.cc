@@ -6,6 +6,7 @@
 
 #include "core/log.h"
 #include "core/text.h"
+#include "fit/picture_cache.h"
 #include "metrics/color_correction.h"
 #include "metrics/compare.h"
 #include "metrics/image_metrics.h"
@@ -55,13 +56,6 @@ Status CheckSizes(std::span<ViewSource* const> sources, const std::vector<std::v
   return Error{ErrorCode::kBadArgument, Cat("pictures of different sizes: ", list, "; --size sets that of renders")};
 }
 
-// Makes both pictures the same where there is nothing to compare.
-void LeaveOut(const Buffer<uint8_t>& ignored, const Image& truth, Image& image) {
-  for (size_t i = 0; i < ignored.size(); ++i) {
-    for (int c = 0; c < 3 && ignored[i] != 0; ++c) image.channel(c)[i] = truth.channel(c)[i];
-  }
-}
-
 // Where either picture says nothing.
 Buffer<uint8_t> EitherIgnored(const Buffer<uint8_t>& a, const Buffer<uint8_t>& b) {
   if (a.size() != b.size()) return a.empty() ? b : a;  // pictures of one size: one has no mask
@@ -74,7 +68,7 @@ Result<CorrectedScore> CorrectColors(Image image, const Image& truth, const Buff
                                      const Lpips* lpips) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ColorMap map, FitColors(image, truth));
   ApplyColors(map, image);
-  LeaveOut(ignored, truth, image);
+  FillIgnored(ignored, truth, image);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const MaskedQuality quality, MeasureMasked(image, truth, ignored));
   CorrectedScore score{quality.psnr, quality.ssim, std::nullopt};
   if (lpips != nullptr) {
@@ -86,7 +80,7 @@ Result<CorrectedScore> CorrectColors(Image image, const Image& truth, const Buff
 // Nothing: the masks leave nothing to compare.
 Result<std::optional<ViewScore>> Score(Image image, const Image& truth, const Buffer<uint8_t>& ignored,
                                        const CompareOptions& options) {
-  LeaveOut(ignored, truth, image);
+  FillIgnored(ignored, truth, image);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const MaskedQuality quality, MeasureMasked(image, truth, ignored));
   if (quality.counted == 0) return std::optional<ViewScore>();
   ViewScore score;

@@ -105,7 +105,8 @@ void FitFlags::AddTo(CLI::App& verb) {
   verb.add_option("--steps", steps, "Optimisation steps; all schedules follow")
       ->check(CLI::Range(int64_t{1}, kMostSteps))
       ->capture_default_str();
-  verb.add_option("--max-gaussians", max_gaussians, "Growth stops there; 0: no bound (default: 0; 1000000 with mcmc)")
+  verb.add_option("--max-gaussians", max_gaussians,
+                  "Growth stops there, and a start with more is cut to it; 0: no bound (default: 0; 1000000 with mcmc)")
       ->check(NotNegative());
   AddChoice(verb, "--strategy", strategy,
             {{"default", FitPreset::kDefault}, {"absgrad", FitPreset::kAbsgrad}, {"mcmc", FitPreset::kMcmc}},

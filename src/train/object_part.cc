@@ -10,6 +10,8 @@ namespace anchorsplat {
 
 namespace {
 
+// Windows do not become smaller than this, pixels a side: SSIM needs some, and a spot shows little else.
+constexpr int kLeastSide = 64;
 // How far a Gaussian shows, in standard deviations: an opaque one falls below 1/255 at 3.33.
 constexpr double kReach = 3.4;
 // Added to that for what filter, dilation and crops do to it, pixels.
@@ -54,6 +56,36 @@ PixelBox WindowAround(double x, double y, const Pinhole& pinhole, int side) {
   return {x0, y0, x0 + w, y0 + h};
 }
 
+// Windows of `side` around the spot in the part's views, and the Gaussians there.
+void Look(const GaussianCloud& cloud, std::span<const Camera> cameras, const SeenGaussians& seen, int64_t spot,
+          int side, ObjectPart& part) {
+  part.windows.clear();
+  part.wanted.clear();
+  part.others.clear();
+  for (const size_t view : part.views) {
+    const Pinhole& pinhole = cameras[view].intrinsics;
+    const Projected p = Project(cloud, spot, 0, cameras[view]);
+    part.windows.push_back(p.in_front ? WindowAround(p.x, p.y, pinhole, side)
+                                      : WindowAround(pinhole.width / 2.0, pinhole.height / 2.0, pinhole, side));
+  }
+
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    bool wanted = false, shows = false;
+    const double size = LongestAxis(cloud, i);
+    for (size_t v = 0; v < part.views.size() && !wanted; ++v) {
+      const Projected p = Project(cloud, i, size, cameras[part.views[v]]);
+      shows = shows || Inside(p, part.windows[v], p.reach);
+      wanted = seen.In(part.views[v], i) && Inside(p, part.windows[v], 0);
+    }
+    wanted = wanted || i == spot;  // a view may see it without its centre
+    if (wanted) {
+      part.wanted.push_back(i);
+    } else if (shows) {
+      part.others.push_back(i);
+    }
+  }
+}
+
 }  // namespace
 
 PixelBox RandomWindow(int width, int height, const PixelBox& object, int side, Random& random) {
@@ -82,27 +114,14 @@ ObjectPart ChoosePart(const GaussianCloud& cloud, std::span<const Camera> camera
   part.views.assign(order.begin(), order.end());
   std::stable_partition(part.views.begin() + 1, part.views.end(), [&](size_t view) { return seen.In(view, spot); });
   part.views.resize(std::min(part.views.size(), request.views));
-  for (const size_t view : part.views) {
-    const Pinhole& pinhole = cameras[view].intrinsics;
-    const Projected p = Project(cloud, spot, 0, cameras[view]);
-    part.windows.push_back(p.in_front ? WindowAround(p.x, p.y, pinhole, request.side)
-                                      : WindowAround(pinhole.width / 2.0, pinhole.height / 2.0, pinhole, request.side));
-  }
-
-  for (int64_t i = 0; i < n; ++i) {
-    bool wanted = false, shows = false;
-    const double size = LongestAxis(cloud, i);
-    for (size_t v = 0; v < part.views.size() && !wanted; ++v) {
-      const Projected p = Project(cloud, i, size, cameras[part.views[v]]);
-      shows = shows || Inside(p, part.windows[v], p.reach);
-      wanted = seen.In(part.views[v], i) && Inside(p, part.windows[v], 0);
-    }
-    wanted = wanted || i == spot;  // a view may see it without its centre
-    if (wanted) {
-      part.wanted.push_back(i);
-    } else if (shows) {
-      part.others.push_back(i);
-    }
+  // Where Gaussians are dense the windows become smaller: what is no copy of the network's is drawn as the filter makes
+  // it, and a window full of that shows the network's own behind a haze that will not be there in use.
+  int side = request.side;
+  Look(cloud, cameras, seen, spot, side, part);
+  while (side > kLeastSide && static_cast<int64_t>(part.wanted.size()) > request.most) {
+    const double share = static_cast<double>(request.most) / static_cast<double>(part.wanted.size());
+    side = std::max(kLeastSide, static_cast<int>(side * std::clamp(std::sqrt(share), 0.5, 0.95)));
+    Look(cloud, cameras, seen, spot, side, part);
   }
   if (static_cast<int64_t>(part.wanted.size()) > request.most) {
     const float* at = cloud.means.data() + 3 * spot;

@@ -25,7 +25,7 @@ struct ObjectPart {
 
 struct PartRequest {
   size_t views = 1;  // at most
-  int side = 0;      // of a window, pixels; 0: the whole picture
+  int side = 0;      // of a window, pixels; 0: the whole picture. Smaller, down to 64, where more than `most` are seen
   int64_t most = 0;  // Gaussians wanted
 };
 

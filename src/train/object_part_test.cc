@@ -97,6 +97,31 @@ TEST(ObjectPart, TooManyAreThoseNearTheSpot) {
   EXPECT_GE(centers, 1) << "none of them is the spot";
 }
 
+TEST(ObjectPart, WindowsBecomeSmallerWhereGaussiansAreDense) {
+  Setting s;
+  s.cameras = Around(240);
+  s.seen = *SeenGaussians::Look(s.cloud, s.cameras, s.order);
+  const PartRequest request{.views = 3, .side = 200, .most = 100000};
+  Random one(3);
+  const auto seen = static_cast<int64_t>(ChoosePart(s.cloud, s.cameras, s.order, s.seen, request, one).wanted.size());
+  const PartRequest half{.views = 3, .side = 200, .most = seen / 2}, whole{.views = 3, .side = 0, .most = seen / 2};
+  Random two(3), three(3), four(3);
+  const ObjectPart part = ChoosePart(s.cloud, s.cameras, s.order, s.seen, half, two);
+  const int side = part.windows[0].x1 - part.windows[0].x0;
+  EXPECT_GE(side, 64);
+  EXPECT_LT(side, 200);
+  EXPECT_LE(static_cast<int64_t>(part.wanted.size()), seen / 2);
+  EXPECT_GT(static_cast<int64_t>(part.wanted.size()), seen / 5) << "no smaller than they must be";
+  // What it would be with windows of that size from the start: nothing that is seen in them is left out.
+  const ObjectPart same =
+      ChoosePart(s.cloud, s.cameras, s.order, s.seen, {.views = 3, .side = side, .most = 100000}, three);
+  EXPECT_EQ(part.windows, same.windows);
+  EXPECT_EQ(part.wanted, same.wanted);
+  EXPECT_EQ(part.others, same.others);
+  const ObjectPart pictures = ChoosePart(s.cloud, s.cameras, s.order, s.seen, whole, four);
+  EXPECT_EQ(pictures.windows[0], (PixelBox{0, 0, 240, 240})) << "who asks for whole pictures gets them";
+}
+
 TEST(ObjectPart, WholePicturesAndViewsThatSeeNothing) {
   const Setting s;
   Random random(1);

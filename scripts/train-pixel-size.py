@@ -38,6 +38,7 @@ LANDMARKS = 64  # kCorrectionLandmarks
 KERNEL, STRAIGHT = 0.5, 0.3  # width of a kernel, and how much the straight part may say
 CORRECTION_RIDGE = 0.05
 MOST_CORRECTION = 0.5  # kMostCorrection
+UPWARDS = 0.5  # kUpwards
 STANDARD, OTHER = 0.6, 0.9  # kStandard, kOther in pixel_size_estimate.cc
 PLAUSIBLE, IMPLAUSIBLE = 1.5, 2.2  # kPlausible, kImplausible
 
@@ -211,7 +212,7 @@ def train_correction(objects, both, share):
         for group in sorted({o[by] for o in objects}):
             out = np.array([o[by] == group for o in objects])
             step = correct(fit_correction(x[~out], -both[~out]), x[out])
-            corrected[out] += np.where(step > 0, (1 - share[out]) * step, step)
+            corrected[out] += np.where(step > 0, (1 - (1 - UPWARDS) * share[out]) * step, step)
         results.append(corrected)
     return fit_correction(x, -both), *results
 

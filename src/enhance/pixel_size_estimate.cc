@@ -34,6 +34,8 @@ constexpr double kAntialiasedLook = 0.8;
 
 // No correction of what both say is larger; ln.
 constexpr double kMostCorrection = 0.5;
+// How much of a correction upwards is left for a splat that is unlike standard fits: pixels that are too large blur.
+constexpr double kUpwards = 0.5;
 
 struct Guess {
   double step = 0;  // ln(pixel size / d)
@@ -149,8 +151,7 @@ Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional
   if (mode != RenderMode::kAntialiased) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double correction,
                                  Correction(kPixelSizeCorrection, probe, std::exp(settled.log_size)));
-    // Upwards only as far as the splat is like standard fits: pixels that are too large blur.
-    settled.log_size += correction > 0 ? (1 - share) * correction : correction;
+    settled.log_size += correction > 0 ? std::lerp(1.0, kUpwards, share) * correction : correction;
   }
   double size = std::exp(settled.log_size);
   if (mode == RenderMode::kAntialiased) size /= kAntialiasedLook;

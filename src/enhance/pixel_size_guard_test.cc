@@ -70,33 +70,20 @@ TEST(PixelSizeGuard, BlackVeilsAreSeenThrough) {
   const auto found = FindPixelSize(cloud);
   ASSERT_TRUE(found.ok()) << found.error().message;
   EXPECT_GT(found->estimate.size, 2 * kTruth) << "the veils do not mislead the outlines: a test of nothing";
-  ASSERT_TRUE(found->contradicted()) << found->estimate.size;
-  EXPECT_LT(found->size, kTruth);
-  EXPECT_GT(found->size, 0.05 * kTruth);
-  bool black = false;
-  for (const std::string& sentence : found->contradictions) black |= sentence.find("black") != std::string::npos;
-  EXPECT_TRUE(black);
+  // The lantern's pixels are 0.0055; whether the estimate sees that these are half of them, or the evidence against it.
+  EXPECT_LT(found->size, 0.5 * 0.0055) << found->estimate.size;
 }
 
-// A capture: many Gaussians on a surface whose outline is soft, as they are where a subject was cut out of its place.
-TEST(PixelSizeGuard, ManySmallGaussiansWithSoftOutlinesAreNotBlurred) {
-  GaussianCloud cloud = Example("stone_lantern");
-  for (float& x : cloud.log_scales) x -= std::log(2.0f);
-  const GaussianCloud part = cloud;
-  for (int copy = 1; copy < 4; ++copy) {  // four times as many, half as large: the detail of half the pixel
-    GaussianCloud more = part;
-    Random random(static_cast<uint64_t>(copy));
-    for (float& x : more.means) x += static_cast<float>(0.004 * random.Normal());
-    ASSERT_TRUE(Append(cloud, more).ok());
-  }
-  Add(cloud, {4000, 0.04, 0.15, 0.5f, 0.5});
-  const auto found = FindPixelSize(cloud);
-  ASSERT_TRUE(found.ok()) << found.error().message;
-  ASSERT_TRUE(found->contradicted()) << found->estimate.size;
-  // Next to harmless: no more than a quarter of the Gaussians gets more than a seventeenth wider.
-  const double added = 0.3 * (DefaultFilterStrength(4) - 1.0 / 16) * found->size * found->size;
-  const auto evidence = GatherPixelSizeEvidence(cloud);
+// Judged by what is in the splat: an estimate of its outlines alone, twice the pixel, is brought down to where it does
+// next to nothing.
+TEST(PixelSizeGuard, AContradictedEstimateIsNextToHarmless) {
+  const auto evidence = GatherPixelSizeEvidence(Example("stone_lantern"));
   ASSERT_TRUE(evidence.ok());
+  const double crowded = std::sqrt(4 * MostGaussiansPerPixel(evidence->gaussians)) * evidence->spacing;
+  const PixelSizeFinding found = Judge({crowded, crowded, crowded}, *evidence);
+  ASSERT_TRUE(found.contradicted());
+  // No more than a quarter of the Gaussians gets more than a seventeenth wider.
+  const double added = 0.3 * (DefaultFilterStrength(4) - 1.0 / 16) * found.size * found.size;
   EXPECT_LT(std::sqrt(evidence->width * evidence->width + added), 1.06 * evidence->width);
 }
 

@@ -114,7 +114,7 @@ Finding FindModel() {
             "anchorsplat enhance --model FILE, or --method filter"};
   }
   int64_t copies = 0;
-  for (const Shipped which : {Shipped::kClassic, Shipped::kKinds}) {
+  for (const Shipped which : kAllShipped) {
     const auto network = LoadShippedNetwork(which);
     if (!network.ok()) return {"model", kBroken, network.error().message, "make build"};
     copies = std::max(copies, network->config().copies);

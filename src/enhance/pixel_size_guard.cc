@@ -111,7 +111,8 @@ Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud) {
 PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidence& evidence) {
   PixelSizeFinding finding{estimate.size, std::max(estimate.size, evidence.without_black), estimate, {}};
   const double most = MostGaussiansPerPixel(evidence.gaussians);
-  const double crowd = evidence.spacing > 0 ? std::pow(estimate.size / evidence.spacing, 2) : 0;
+  const auto crowd_at = [&](double size) { return evidence.spacing > 0 ? std::pow(size / evidence.spacing, 2) : 0; };
+  const double crowd = crowd_at(estimate.size);
   if (crowd > most) {
     finding.contradictions.push_back(
         Cat("there would be ", Number(crowd), " Gaussians on every pixel of the surface, and fits of ",
@@ -130,6 +131,11 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     double size = kHarmless * evidence.width;
     const bool crowd_alone = crowd > most && finding.contradictions.size() == 1;
     if (crowd_alone) size = std::max(size, estimate.size * std::pow(most / crowd, kCrowdedFall));
+    // Without its black Gaussians the outlines say a size, too; it counts where nothing contradicts that one.
+    const double without = evidence.without_black;
+    if (without > 0 && crowd_at(without) <= most && evidence.small_axis >= kSmallestAxis * without) {
+      size = std::max(size, without);
+    }
     finding.size = std::min(estimate.size, size);
   }
   return finding;

@@ -70,6 +70,28 @@ TEST(PixelSizeGuard, BlackVeilsAreSeenThrough) {
   const auto found = FindPixelSize(cloud);
   ASSERT_TRUE(found.ok()) << found.error().message;
   EXPECT_GT(found->estimate.size, 2 * kTruth) << "the veils do not mislead the outlines: a test of nothing";
+  ASSERT_TRUE(found->contradicted()) << found->estimate.size;
+  EXPECT_LT(found->size, kTruth);
+  EXPECT_GT(found->size, 0.8 * kTruth) << "without them the outlines tell";
+  bool black = false;
+  for (const std::string& sentence : found->contradictions) black |= sentence.find("black") != std::string::npos;
+  EXPECT_TRUE(black);
+}
+
+// A capture: many Gaussians on a surface whose outline is soft, as they are where a subject was cut out of its place.
+TEST(PixelSizeGuard, ManySmallGaussiansWithSoftOutlinesAreNotBlurred) {
+  GaussianCloud cloud = Example("stone_lantern");
+  for (float& x : cloud.log_scales) x -= std::log(2.0f);
+  const GaussianCloud part = cloud;
+  for (int copy = 1; copy < 4; ++copy) {  // four times as many, half as large: the detail of half the pixel
+    GaussianCloud more = part;
+    Random random(static_cast<uint64_t>(copy));
+    for (float& x : more.means) x += static_cast<float>(0.004 * random.Normal());
+    ASSERT_TRUE(Append(cloud, more).ok());
+  }
+  Add(cloud, {4000, 0.04, 0.15, 0.5f, 0.5});
+  const auto found = FindPixelSize(cloud);
+  ASSERT_TRUE(found.ok()) << found.error().message;
   // The lantern's pixels are 0.0055; whether the estimate sees that these are half of them, or the evidence against it.
   EXPECT_LT(found->size, 0.5 * 0.0055) << found->estimate.size;
 }
@@ -118,7 +140,9 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   crowded.spacing = 0.01 / std::sqrt(2 * 10.0);
   EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.0007);
   crowded.spacing = 0.01 / std::sqrt(2 * 1.25);
-  crowded.without_black = 0.005;  // more than one thing speaks against it
+  crowded.without_black = 0.005;  // more than one thing speaks against it, and nothing against this
+  EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.005);
+  crowded.spacing = 0.005 / std::sqrt(2 * 1.01);  // crowded without the black ones, too
   EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.0007);
 
   PixelSizeEvidence small = plain;
@@ -129,7 +153,10 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   black.without_black = 0.005;
   const PixelSizeFinding finding = Judge(estimate, black);
   ASSERT_EQ(finding.contradictions.size(), 1u);
-  EXPECT_LT(finding.size, 0.004);
+  EXPECT_EQ(finding.size, 0.005);
+  black.small_axis = 0.0005;  // a tenth of that
+  EXPECT_LT(Judge(estimate, black).size, 0.004);
+  black.small_axis = plain.small_axis;
   black.without_black = 0.02;  // the estimate is the smaller one: it cannot blur
   EXPECT_FALSE(Judge(estimate, black).contradicted());
 

@@ -29,7 +29,8 @@ namespace {
 
 // Shares worth a word.
 constexpr double kNotable = 0.01, kMost = 0.5;
-// From here on a classic splat is enhanced by the network for all kinds, which is better on all but standard fits.
+// From here on a classic splat is enhanced by the network for all that are classic, which is better on all but standard
+// fits.
 constexpr double kUnlikeStandard = 0.75;
 
 // Whether it is certainly of that kind; what cannot be read is for loading to tell.
@@ -114,7 +115,7 @@ Result<AnyNetwork> Load(const ModelSettings& model, Shipped shipped) {
 class LastNetwork {
  public:
   // `shipped`: where no file is named.
-  Result<std::shared_ptr<const AnyNetwork>> Get(const ModelSettings& model, Shipped shipped = Shipped::kClassic) {
+  Result<std::shared_ptr<const AnyNetwork>> Get(const ModelSettings& model, Shipped shipped = Shipped::kStandard) {
     const std::lock_guard lock(mutex_);
     // Before it is read: what changes meanwhile is read again at the next call.
     const std::optional<FileVersion> version = VersionOf(model.file);
@@ -133,7 +134,7 @@ class LastNetwork {
  private:
   std::mutex mutex_;
   std::filesystem::path file_;
-  Shipped shipped_ = Shipped::kClassic;
+  Shipped shipped_ = Shipped::kStandard;
   std::optional<FileVersion> version_;
   WeightPrecision precision_ = WeightPrecision::kFloat;
   std::shared_ptr<const AnyNetwork> network_;
@@ -259,8 +260,9 @@ void RegisterModelMethod() {
          return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};
        },
        .run = [last](EnhanceInput input, const EnhanceOptions& options, StepReport& report) -> Result<GaussianCloud> {
-         const bool standard = !IsCompensated(input.cloud.render_mode) && input.unlike_standard < kUnlikeStandard;
-         const Shipped shipped = standard ? Shipped::kClassic : Shipped::kKinds;
+         const Shipped shipped = IsCompensated(input.cloud.render_mode)     ? Shipped::kAntialiased
+                                 : input.unlike_standard >= kUnlikeStandard ? Shipped::kClassic
+                                                                            : Shipped::kStandard;
          ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const AnyNetwork> network,
                                       last->Get(options.model, shipped));
          if (const auto* published = std::get_if<PublishedNetwork>(network.get())) {
@@ -269,7 +271,8 @@ void RegisterModelMethod() {
          Result<GaussianCloud> out =
              EnhanceWithCompactNetwork(std::move(input), options.upscale, std::get<CompactNetwork>(*network),
                                        options.model, report, options.control);
-         if (options.model.file.empty()) report.facts.emplace_back("network_for_all_kinds", shipped == Shipped::kKinds);
+         if (options.model.file.empty())
+           report.facts.emplace_back("network_for_standard_fits", shipped == Shipped::kStandard);
          return out;
        }});
 }

@@ -311,11 +311,11 @@ TEST_F(SmallModel, EveryOptionBelongsToAnArchitecture) {
 }
 
 TEST_F(SmallModel, TheShippedNetworksOpen) {
-  for (const Shipped which : {Shipped::kClassic, Shipped::kKinds}) {
+  for (const Shipped which : kAllShipped) {
     const auto shipped = LoadShippedNetwork(which);
     EXPECT_EQ(shipped.ok(), HasShippedNetwork());
     if (shipped.ok()) {
-      EXPECT_EQ(shipped->config().knows_kind, which == Shipped::kKinds);
+      EXPECT_EQ(shipped->config().knows_kind, which != Shipped::kStandard);
     } else {
       EXPECT_EQ(shipped.error().code, ErrorCode::kNotFound);
     }

@@ -44,14 +44,19 @@
       ".byte 0\n"                             \
       ".text\n")
 #endif
-ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_classic",
+ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_standard",
                           ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-compact.safetensors");
-ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_kinds", ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-kinds.safetensors");
+ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_classic",
+                          ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-classic.safetensors");
+ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_antialiased",
+                          ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-antialiased.safetensors");
 extern "C" {
+extern const std::byte anchorsplat_shipped_standard[];
+extern const std::byte anchorsplat_shipped_standard_end[];
 extern const std::byte anchorsplat_shipped_classic[];
 extern const std::byte anchorsplat_shipped_classic_end[];
-extern const std::byte anchorsplat_shipped_kinds[];
-extern const std::byte anchorsplat_shipped_kinds_end[];
+extern const std::byte anchorsplat_shipped_antialiased[];
+extern const std::byte anchorsplat_shipped_antialiased_end[];
 }
 #endif
 
@@ -61,8 +66,15 @@ namespace {
 
 std::span<const std::byte> ShippedBytes([[maybe_unused]] Shipped which) {
 #ifdef ANCHORSPLAT_SHIPPED_NETWORKS
-  if (which == Shipped::kKinds) return {anchorsplat_shipped_kinds, anchorsplat_shipped_kinds_end};
-  return {anchorsplat_shipped_classic, anchorsplat_shipped_classic_end};
+  switch (which) {
+    case Shipped::kStandard:
+      return {anchorsplat_shipped_standard, anchorsplat_shipped_standard_end};
+    case Shipped::kClassic:
+      return {anchorsplat_shipped_classic, anchorsplat_shipped_classic_end};
+    case Shipped::kAntialiased:
+      return {anchorsplat_shipped_antialiased, anchorsplat_shipped_antialiased_end};
+  }
+  return {};
 #else
   return {};
 #endif
@@ -70,13 +82,17 @@ std::span<const std::byte> ShippedBytes([[maybe_unused]] Shipped which) {
 
 }  // namespace
 
-bool HasShippedNetwork() { return !ShippedBytes(Shipped::kClassic).empty(); }
+bool HasShippedNetwork() { return !ShippedBytes(Shipped::kStandard).empty(); }
 
 std::string ShippedNetworkIdentity() {
   if (!HasShippedNetwork()) return "";
   Fingerprint print;
-  for (const Shipped which : {Shipped::kClassic, Shipped::kKinds}) print.Add(ShippedBytes(which));
-  return Cat(ShippedBytes(Shipped::kClassic).size(), " ", ShippedBytes(Shipped::kKinds).size(), " ", print.value());
+  std::string identity;
+  for (const Shipped which : kAllShipped) {
+    print.Add(ShippedBytes(which));
+    identity += Cat(ShippedBytes(which).size(), " ");
+  }
+  return Cat(identity, print.value());
 }
 
 Result<CompactNetwork> LoadShippedNetwork(Shipped which) {

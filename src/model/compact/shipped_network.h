@@ -9,9 +9,11 @@
 namespace anchorsplat {
 
 // The compact networks that are part of the program itself, of the folder models/ of the source tree when the program
-// was built (docs/network.md): anchorsplat-compact.safetensors for classic splats, which knows standard fits best, and
-// anchorsplat-kinds.safetensors, which knows antialiased ones, too. There are both or none.
-enum class Shipped { kClassic, kKinds };
+// was built (docs/network.md): anchorsplat-compact.safetensors for splats like standard fits,
+// anchorsplat-classic.safetensors for all other classic ones, and anchorsplat-antialiased.safetensors for those whose
+// render mode makes up for the dilation (IsCompensated). There are all or none.
+enum class Shipped { kStandard, kClassic, kAntialiased };
+inline constexpr Shipped kAllShipped[] = {Shipped::kStandard, Shipped::kClassic, Shipped::kAntialiased};
 
 bool HasShippedNetwork();
 
@@ -20,6 +22,6 @@ bool HasShippedNetwork();
 std::string ShippedNetworkIdentity();
 
 // Errors: kNotFound when there is none; those of LoadCompactNetwork.
-Result<CompactNetwork> LoadShippedNetwork(Shipped which = Shipped::kClassic);
+Result<CompactNetwork> LoadShippedNetwork(Shipped which = Shipped::kStandard);
 
 }  // namespace anchorsplat

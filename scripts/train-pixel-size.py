@@ -250,7 +250,7 @@ def train_kinds(objects, arguments):
     if arguments.correction:
         write_correction(arguments.correction, correction, len(objects))
     if arguments.output:
-        write(arguments.output, fit(objects, best, standard), np.sqrt(np.mean(alone[share > 0] ** 2)), len(objects),
+        write(arguments.output, fit(objects, best, standard), np.sqrt(np.mean(corrected[share > 0] ** 2)), len(objects),
               "<kKindsPixelSizeFeatures> kKindsPixelSize")
 
 

@@ -57,7 +57,7 @@ const PixelSizeCoefficients<kKindsPixelSizeFeatures> kKindsPixelSize = {
       -0.0178494, -0.00266428, 0.00110553, 0.0370346, 0.00614159, 0.00602816, -0.0120596, 0.0431623, 0.00942316,
       -0.0105525, -0.0194407, -0.0155699, 0.0050253, 0.0163712, -0.00277704},
     .intercept = 0.0130408,
-    .error = 0.2943,
+    .error = 0.218,
 };
 
 }  // namespace anchorsplat

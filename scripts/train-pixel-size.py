@@ -12,10 +12,13 @@ records in the data set say, count `--short-weight` times. Needs numpy.
 
 With `--kinds` the regression is that for splats unlike standard fits. It looks at more features, and its ridge pulls
 towards the regression of standard fits instead of towards zero. What is printed is what both together say, as in
-src/enhance/pixel_size_estimate.cc, with all fits of a mesh left out and with all of a kind. Antialiased fits, for which
-their tag makes up, have no part in it. `--keep FILE` writes all features to one small file. With `--correction FILE` a
+src/enhance/pixel_size_estimate.cc, with all fits of a mesh left out and with all of a kind. Antialiased fits have no
+part in it. `--keep FILE` writes all features to one small file. With `--correction FILE` a
 third regression learns what those two leave, by kernels, and is written there; it is cross-validated, too, from
 estimates that were themselves made without the mesh.
+
+With `--antialiased` regression and correction are those of antialiased fits, and only of these. The regression looks at
+outlines as the antialiased rasterizer draws them, and at sizes.
 """
 
 import argparse
@@ -31,6 +34,7 @@ SAME_MESH = {"biplane": "BlendSwap-CC-0-cartoon_biplane", "stone_lantern": "Blen
 SAMPLE_WIDTH = 0.35  # ln: samples count by exp(-½ (ln(size / true) / SAMPLE_WIDTH)²)
 OUTLINE = 72  # features of one look
 ALPHA = np.arange(OUTLINE)
+ANTIALIASED = np.r_[np.arange(OUTLINE, 2 * OUTLINE), np.arange(3 * OUTLINE, 3 * OUTLINE + 16)]
 KINDS = np.r_[np.arange(2 * OUTLINE), np.arange(3 * OUTLINE, 3 * OUTLINE + 16)]  # as kKindsPixelSize
 STANDARD_FILE = pathlib.Path(__file__).parent.parent / "src/enhance/pixel_size_coefficients.cc"
 SIZES, LENGTHS = slice(3 * OUTLINE, 3 * OUTLINE + 16), 12  # the first twelve of the sizes are in units of the pixel
@@ -248,10 +252,31 @@ def train_kinds(objects, arguments):
         for o, s, e, c in zip(objects, said, both, corrected):
             print(f"  {np.exp(s):.2f} → {np.exp(e):.2f} → {np.exp(c):.2f}  {o['kind']} {o['name']}")
     if arguments.correction:
-        write_correction(arguments.correction, correction, len(objects))
+        write_correction(arguments.correction, correction, len(objects), "kPixelSizeCorrection")
     if arguments.output:
         write(arguments.output, fit(objects, best, standard), np.sqrt(np.mean(corrected[share > 0] ** 2)), len(objects),
               "<kKindsPixelSizeFeatures> kKindsPixelSize")
+
+
+def train_antialiased(objects, arguments):
+    standard = read_standard()
+    select(objects, ANTIALIASED)
+    results = {ridge: cross_validate(objects, ridge, prior=standard) for ridge in arguments.ridge}
+    for ridge, alone in results.items():
+        print(f"ridge {ridge:g}: {describe(alone)}")
+        print(f"  kinds left out: {describe(cross_validate(objects, ridge, by='kind', prior=standard))}")
+    ridge = arguments.ridge[0]
+    correction, corrected, unknown = train_correction(objects, results[ridge], np.zeros(len(objects)))
+    print(f"corrected, ridge {ridge:g}: {describe(corrected)}")
+    print(f"  kinds left out of the correction: {describe(unknown)}")
+    for kind in sorted({o["kind"] for o in objects}):
+        ratios = sorted(np.exp(c) for c, o in zip(corrected, objects) if o["kind"] == kind)
+        print(f"  {kind}: " + " ".join(f"{r:.2f}" for r in ratios))
+    if arguments.correction:
+        write_correction(arguments.correction, correction, len(objects), "kAntialiasedPixelSizeCorrection")
+    if arguments.output:
+        write(arguments.output, fit(objects, ridge, standard), np.sqrt(np.mean(corrected**2)), len(objects),
+              "<kAntialiasedPixelSizeFeatures> kAntialiasedPixelSize")
 
 
 def describe(errors):
@@ -292,7 +317,7 @@ const PixelSizeCoefficients{name} = {{
 ''')
 
 
-def write_correction(path, model, count):
+def write_correction(path, model, count, name):
     def numbers(values, decimals):
         text = ", ".join(f"{v:.{decimals}f}".rstrip("0").rstrip(".").replace("-0,", "0,") for v in values)
         lines, line = [], "     "
@@ -310,7 +335,7 @@ def write_correction(path, model, count):
 namespace anchorsplat {{
 
 // Written by scripts/train-pixel-size.py from {count} fits; not to be edited.
-const PixelSizeCorrection kPixelSizeCorrection = {{
+const PixelSizeCorrection {name} = {{
     .mean = {{
 {numbers(model["mean"], 5)}}},
     .deviation = {{
@@ -340,6 +365,7 @@ def main():
     parser.add_argument("--lean", type=float, default=0.0, help="ln, added to the estimate: negative is cautious")
     parser.add_argument("--list", action="store_true", help="the cross-validated error of every object")
     parser.add_argument("--kinds", action="store_true", help="the regression for splats unlike standard fits")
+    parser.add_argument("--antialiased", action="store_true", help="the regressions for antialiased splats")
     parser.add_argument("--correction", metavar="FILE.cc", help="write the third regression")
     parser.add_argument("--keep", metavar="FILE.json.gz", help="write the features to one file")
     arguments = parser.parse_args()
@@ -347,6 +373,9 @@ def main():
         keep(arguments.features, arguments.keep)
     objects = load(arguments.features, (w.split("=") for w in arguments.weight))
     print(f"{len(objects)} fits of {len({o['mesh'] for o in objects})} meshes")
+    if arguments.antialiased:
+        train_antialiased([o for o in objects if o["mode"] == "antialiased"], arguments)
+        return
     if arguments.kinds:
         train_kinds([o for o in objects if o["mode"] != "antialiased"], arguments)
         return

@@ -80,6 +80,12 @@ Status DropUnusable(GaussianCloud& cloud) {
   return {};
 }
 
+// Networks are chosen by it.
+void Remember(const PixelSizeEstimate& estimate, EnhanceInput& input) {
+  input.showing = estimate.showing;
+  input.spacing = estimate.spacing;
+}
+
 Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
   std::optional<int> train_width = options.train_width;
   if (train_width) {
@@ -115,7 +121,7 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
     LogInfo(Cat("--camera-rule ", report.camera_rule, ": ", from_cameras.why));
   }
   const auto found = FindPixelSize(input.cloud);
-  if (found.ok()) input.unlike_standard = found->estimate.unlike_standard;
+  if (found.ok()) Remember(found->estimate, input);
   if (found.ok() && !found->contradicted()) {
     const double ratio = found->size / from_cameras.median, most = found->largest / from_cameras.median;
     if (!options.filter_strength && !input.cloud.render_mode && most < kSharperThanClassic) {
@@ -194,11 +200,10 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
   if (options.pixel_size) {
     report.pixel_size = *options.pixel_size;
     report.pixel_size_source = "given";
-    // Networks are chosen by it.
     if (says && !IsCompensated(input.cloud.render_mode)) {
       const auto estimate = EstimatePixelSize(input.cloud);
       if (estimate.ok()) {
-        input.unlike_standard = estimate->unlike_standard;
+        Remember(*estimate, input);
         // Too small ones harm nobody.
         if (report.pixel_size > kSuspiciousRatio * estimate->high) {
           LogWarning(Cat("a training pixel of ", report.pixel_size, " was given, the splat itself looks like ",
@@ -217,7 +222,7 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
       return {};
     }
     report.finding = *found;
-    input.unlike_standard = found->estimate.unlike_standard;
+    Remember(found->estimate, input);
     report.pixel_size = found->size;
     report.pixel_size_source = found->contradicted() ? kCautiousPixelSize : "estimated";
     if (says) SayWhatWasFound(*found);

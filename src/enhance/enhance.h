@@ -107,7 +107,8 @@ struct EnhanceInput {
   GaussianCloud cloud;
   Buffer<float> pixel_sizes;   // one for all, or one per Gaussian
   double pixel_size = 0;       // their median
-  double unlike_standard = 0;  // PixelSizeEstimate::unlike_standard; 0 where nothing was estimated
+  double showing = 1;          // PixelSizeEstimate::showing
+  double spacing = 0;          // PixelSizeEstimate::spacing; 0 where nothing was estimated
   double filter_strength = 0;
   std::vector<char> inside;       // which of the cloud's Gaussians are enhanced: results are of these; empty: all
   GaussianCloud start;            // what the method before it made, of "A+B"; else empty

@@ -36,4 +36,10 @@ struct PixelSizeCorrection {
 };
 extern const PixelSizeCorrection kPixelSizeCorrection;
 
+// Of antialiased fits: the features of Look::kAntialiased and SizeFeatures without the number of Gaussians; and what is
+// still wrong where that ends.
+inline constexpr size_t kAntialiasedPixelSizeFeatures = kPixelSizeFeatures + kSizeFeatures - 1;
+extern const PixelSizeCoefficients<kAntialiasedPixelSizeFeatures> kAntialiasedPixelSize;
+extern const PixelSizeCorrection kAntialiasedPixelSizeCorrection;
+
 }  // namespace anchorsplat

@@ -28,10 +28,10 @@ constexpr double kStandard = 0.6, kOther = 0.9;
 // The same of the Gaussians' sizes in units of the standard regression's estimate, by the deviations of fits of many
 // kinds with their true pixels: 1 on average, and much more where the estimate is several times too large.
 constexpr double kPlausible = 1.5, kImplausible = 2.2;
-// Outlines of antialiased fits are narrower than those of the classic ones of the regression: it says 0.44 to 0.86 of
-// the truth for eight of them. Divided by this much it is too large by at most a tenth in all of them.
-constexpr double kAntialiasedLook = 0.8;
-
+// PixelSizeProbe::showing() of fits up to which strangeness counts, and from which on not at all: of 22 fits with more
+// than 0.6, of which the two regressions differ for ten, the standard one is the nearer for all but those with a
+// smoothing filter.
+constexpr double kFewShow = 0.6, kMostShow = 0.75;
 // No correction of what both say is larger; ln.
 constexpr double kMostCorrection = 0.5;
 // How much of a correction upwards is left for a splat that is unlike standard fits: pixels that are too large blur.
@@ -128,6 +128,27 @@ double Share(double strangeness, double none, double all) {
   return std::clamp((strangeness - none) / (all - none), 0.0, 1.0);
 }
 
+PixelSizeEstimate EstimateOf(const Settled& settled, double unlike_standard, const PixelSizeProbe& probe) {
+  const double size = std::exp(settled.log_size), spread = std::exp(settled.half);
+  return PixelSizeEstimate{size, size / spread, size * spread, unlike_standard, probe.showing(), probe.spacing()};
+}
+
+// Outlines of antialiased fits are narrower than those of classic ones.
+Result<PixelSizeEstimate> EstimateAntialiased(PixelSizeProbe& probe) {
+  const auto features_at = [&](double size) -> Result<std::array<double, kAntialiasedPixelSizeFeatures>> {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeFeatures outlines, probe.At(size, Look::kAntialiased));
+    const SizeFeatures sizes = probe.SizesAt(size);
+    std::array<double, kAntialiasedPixelSizeFeatures> features;
+    std::copy_n(sizes.begin(), kSizeFeatures - 1, std::ranges::copy(outlines, features.begin()).out);
+    return features;
+  };
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Settled settled, Settle(kAntialiasedPixelSize, probe.start(), features_at));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const double correction,
+                               Correction(kAntialiasedPixelSizeCorrection, probe, std::exp(settled.log_size)));
+  settled.log_size += correction;
+  return EstimateOf(settled, 0, probe);
+}
+
 }  // namespace
 
 Result<PixelSizeEstimate> EstimatePixelSize(const GaussianCloud& cloud) {
@@ -136,10 +157,12 @@ Result<PixelSizeEstimate> EstimatePixelSize(const GaussianCloud& cloud) {
 }
 
 Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional<RenderMode> mode) {
+  if (mode == RenderMode::kAntialiased) return EstimateAntialiased(probe);
   ANCHORSPLAT_ASSIGN_OR_RETURN(Settled settled,
                                Settle(kStandardPixelSize, probe.start(), [&](double size) { return probe.At(size); }));
-  const double share = std::max(Share(settled.strangeness, kStandard, kOther),
-                                Share(StrangenessOfSizes(probe, std::exp(settled.log_size)), kPlausible, kImplausible));
+  double share = std::max(Share(settled.strangeness, kStandard, kOther),
+                          Share(StrangenessOfSizes(probe, std::exp(settled.log_size)), kPlausible, kImplausible));
+  if (!IsCompensated(mode)) share *= 1 - Share(probe.showing(), kFewShow, kMostShow);
   if (share > 0) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Settled kinds, Settle(kKindsPixelSize, probe.start(),
                                                              [&](double size) { return KindsFeatures(probe, size); }));
@@ -148,15 +171,10 @@ Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional
     settled.log_size = std::min(settled.log_size, std::lerp(settled.log_size, kinds.log_size, share));
     settled.half = std::lerp(settled.half, kinds.half, share);
   }
-  if (mode != RenderMode::kAntialiased) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double correction,
-                                 Correction(kPixelSizeCorrection, probe, std::exp(settled.log_size)));
-    settled.log_size += correction > 0 ? std::lerp(1.0, kUpwards, share) * correction : correction;
-  }
-  double size = std::exp(settled.log_size);
-  if (mode == RenderMode::kAntialiased) size /= kAntialiasedLook;
-  const double spread = std::exp(settled.half);
-  return PixelSizeEstimate{size, size / spread, size * spread, share};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const double correction,
+                               Correction(kPixelSizeCorrection, probe, std::exp(settled.log_size)));
+  settled.log_size += correction > 0 ? std::lerp(1.0, kUpwards, share) * correction : correction;
+  return EstimateOf(settled, share, probe);
 }
 
 }  // namespace anchorsplat

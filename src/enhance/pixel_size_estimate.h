@@ -21,6 +21,8 @@ struct PixelSizeEstimate {
   // 0: outlines and sizes are like those of standard fits, from surface points by Kerbl et al.'s densification; 1: they
   // are unlike those, as of MCMC, random points, photographs.
   double unlike_standard = 0;
+  double showing = 1;  // PixelSizeProbe::showing()
+  double spacing = 0;  // PixelSizeProbe::spacing()
 };
 
 // Scales with the cloud. Takes up to a second, for large clouds too, as only a part of them is looked at.

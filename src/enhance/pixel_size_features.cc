@@ -100,6 +100,11 @@ SizeFeatures SizesOf(const GaussianCloud& cloud) {
   return features;
 }
 
+double ShareShowing(const GaussianCloud& cloud) {
+  const auto shows = [](float logit) { return Sigmoid(logit) >= kShowingOpacity; };
+  return static_cast<double>(std::ranges::count_if(cloud.opacity_logits, shows)) / static_cast<double>(cloud.size());
+}
+
 }  // namespace
 
 Result<PixelSizeProbe> PixelSizeProbe::Make(const GaussianCloud& whole) { return Make(FindTellingGaussians(whole)); }
@@ -116,6 +121,8 @@ Result<PixelSizeProbe> PixelSizeProbe::Make(TellingGaussians telling) {
                  Cat("fewer than ", kLeastGaussians, " visible Gaussians to estimate a pixel size from")};
   }
   probe.start_ = *start;
+  probe.showing_ = ShareShowing(probe.cloud_);
+  probe.spacing_ = Spacing(probe.cloud_);
   probe.sizes_ = SizesOf(probe.cloud_);
   const Pinhole intrinsics = PinholeFromFov(kRenderSize, kRenderSize, kFieldOfView);
   probe.distance_ = FramingDistance({framing.target, radius}, intrinsics);

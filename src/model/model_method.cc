@@ -29,9 +29,11 @@ namespace {
 
 // Shares worth a word.
 constexpr double kNotable = 0.01, kMost = 0.5;
-// From here on a classic splat is enhanced by the network for all that are classic, which is better on all but standard
-// fits.
-constexpr double kUnlikeStandard = 0.75;
+// A classic splat of which fewer Gaussians show is unlike standard fits (PixelSizeProbe::showing), and enhanced by one
+// of the networks that have learned from such ones.
+constexpr double kStandardShow = 0.6;
+// Gaussians on every pixel of the surface from which on those are dense: there is nothing that more of them would add.
+constexpr double kDense = 1;
 
 // Whether it is certainly of that kind; what cannot be read is for loading to tell.
 bool IsCompact(const ModelSettings& model) {
@@ -139,6 +141,14 @@ class LastNetwork {
   WeightPrecision precision_ = WeightPrecision::kFloat;
   std::shared_ptr<const AnyNetwork> network_;
 };
+
+Shipped ShippedFor(const EnhanceInput& input, const ModelSettings& model) {
+  if (IsCompensated(input.cloud.render_mode)) return Shipped::kAntialiased;
+  if (input.showing >= kStandardShow) return Shipped::kStandard;
+  const double on_a_pixel = input.spacing > 0 ? std::pow(input.pixel_size / input.spacing, 2) : 0;
+  // It makes one of one; who asks for more gets them from the other.
+  return on_a_pixel >= kDense && model.copies.value_or(1) == 1 ? Shipped::kDense : Shipped::kClassic;
+}
 
 }  // namespace
 
@@ -260,9 +270,7 @@ void RegisterModelMethod() {
          return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};
        },
        .run = [last](EnhanceInput input, const EnhanceOptions& options, StepReport& report) -> Result<GaussianCloud> {
-         const Shipped shipped = IsCompensated(input.cloud.render_mode)     ? Shipped::kAntialiased
-                                 : input.unlike_standard >= kUnlikeStandard ? Shipped::kClassic
-                                                                            : Shipped::kStandard;
+         const Shipped shipped = ShippedFor(input, options.model);
          ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const AnyNetwork> network,
                                       last->Get(options.model, shipped));
          if (const auto* published = std::get_if<PublishedNetwork>(network.get())) {
@@ -271,8 +279,10 @@ void RegisterModelMethod() {
          Result<GaussianCloud> out =
              EnhanceWithCompactNetwork(std::move(input), options.upscale, std::get<CompactNetwork>(*network),
                                        options.model, report, options.control);
-         if (options.model.file.empty())
+         if (options.model.file.empty()) {
            report.facts.emplace_back("network_for_standard_fits", shipped == Shipped::kStandard);
+           report.facts.emplace_back("network_for_dense_fits", shipped == Shipped::kDense);
+         }
          return out;
        }});
 }

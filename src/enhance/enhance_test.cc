@@ -281,6 +281,17 @@ TEST_F(EnhanceDoor, EstimateIsNearTheTruthOnRealFits) {
   }
 }
 
+TEST_F(EnhanceDoor, EstimateTellsHowManyGaussiansShow) {
+  GaussianCloud ball = Ball(0.01);
+  const auto all = EstimatePixelSize(ball);
+  for (size_t i = 0; i < ball.opacity_logits.size(); i += 4) ball.opacity_logits[i] = -5;
+  const auto fewer = EstimatePixelSize(ball);
+  ASSERT_TRUE(all.ok() && fewer.ok());
+  EXPECT_NEAR(fewer->showing, 0.75 * all->showing, 0.01);
+  EXPECT_GT(all->showing, 0.9);
+  EXPECT_EQ(fewer->spacing, all->spacing) << "faint ones have a place on the surface, too";
+}
+
 // What captures of real places have behind their subject must not decide.
 TEST_F(EnhanceDoor, EstimateIsNotMovedByGiantsAndSkies) {
   const auto example = ReadCloud(SourceDirForTest().string() + "/examples/biplane/input.ply");

@@ -34,6 +34,8 @@ constexpr double kNotable = 0.01, kMost = 0.5;
 constexpr double kStandardShow = 0.6;
 // Gaussians on every pixel of the surface from which on those are dense: there is nothing that more of them would add.
 constexpr double kDense = 1;
+// Of those that the network for dense ones has learned from nearly all have fewer that show.
+constexpr double kDenseShow = 0.4;
 
 // Whether it is certainly of that kind; what cannot be read is for loading to tell.
 bool IsCompact(const ModelSettings& model) {
@@ -144,10 +146,12 @@ class LastNetwork {
 
 Shipped ShippedFor(const EnhanceInput& input, const ModelSettings& model) {
   if (IsCompensated(input.cloud.render_mode)) return Shipped::kAntialiased;
+  // Better than merging four into one.
+  if (model.copies == 1) return Shipped::kDense;
   if (input.showing >= kStandardShow) return Shipped::kStandard;
   const double on_a_pixel = input.spacing > 0 ? std::pow(input.pixel_size / input.spacing, 2) : 0;
   // It makes one of one; who asks for more gets them from the other.
-  return on_a_pixel >= kDense && model.copies.value_or(1) == 1 ? Shipped::kDense : Shipped::kClassic;
+  return on_a_pixel >= kDense && input.showing < kDenseShow && !model.copies ? Shipped::kDense : Shipped::kClassic;
 }
 
 }  // namespace

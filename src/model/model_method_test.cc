@@ -354,6 +354,37 @@ TEST_F(SmallModel, AntialiasedSplatsGetTheirOwnShippedNetwork) {
   }
 }
 
+// Where most Gaussians are faint and every pixel of the surface has one and more.
+TEST_F(SmallModel, DenseSplatsGetOneForOne) {
+  if (!HasShippedNetwork()) GTEST_SKIP() << "this program was built without weights";
+  const EnhanceMethod registered = Registered();
+  struct Case {
+    double showing, spacing;  // spacing in pixels
+    std::optional<int64_t> copies;
+    bool dense, standard;
+  };
+  for (const Case& c :
+       {Case{0.2, 0.5, {}, true, false}, Case{0.2, 0.5, 1, true, false}, Case{0.2, 0.5, 4, false, false},
+        Case{0.9, 2, 1, true, false}, Case{0.5, 0.5, {}, false, false}, Case{0.2, 2, {}, false, false},
+        Case{0.2, 0, {}, false, false}, Case{0.9, 0.5, {}, false, true}}) {
+    EnhanceInput input = SheetInput();
+    input.pixel_size = kSheetPixel;
+    input.showing = c.showing;
+    input.spacing = c.spacing * kSheetPixel;
+    EnhanceOptions options;
+    options.model.copies = c.copies;
+    StepReport report;
+    const auto enhanced = registered.run(input, options, report);
+    ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+    const std::map<std::string, FactValue> facts(report.facts.begin(), report.facts.end());
+    EXPECT_EQ(std::get<bool>(facts.at("network_for_dense_fits")), c.dense) << c.showing << ' ' << c.spacing;
+    EXPECT_EQ(std::get<bool>(facts.at("network_for_standard_fits")), c.standard) << c.showing << ' ' << c.spacing;
+    if (c.dense) {
+      EXPECT_EQ(enhanced->size(), input.cloud.size());
+    }
+  }
+}
+
 TEST_F(SmallModel, ConvertKeepsTensorsAndTellsTheArchitecture) {
   const fs::path out = folder_ / "copy.safetensors";
   const Status converted = ConvertCheckpoint(file(), out, {});

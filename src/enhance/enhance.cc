@@ -80,12 +80,6 @@ Status DropUnusable(GaussianCloud& cloud) {
   return {};
 }
 
-// Networks are chosen by it.
-void Remember(const PixelSizeEstimate& estimate, EnhanceInput& input) {
-  input.showing = estimate.showing;
-  input.spacing = estimate.spacing;
-}
-
 Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
   std::optional<int> train_width = options.train_width;
   if (train_width) {
@@ -121,7 +115,7 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
     LogInfo(Cat("--camera-rule ", report.camera_rule, ": ", from_cameras.why));
   }
   const auto found = FindPixelSize(input.cloud);
-  if (found.ok()) Remember(found->estimate, input);
+  if (found.ok()) input.showing = found->estimate.showing;
   if (found.ok() && !found->contradicted()) {
     const double ratio = found->size / from_cameras.median, most = found->largest / from_cameras.median;
     if (!options.filter_strength && !input.cloud.render_mode && most < kSharperThanClassic) {
@@ -203,7 +197,7 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
     if (says && !IsCompensated(input.cloud.render_mode)) {
       const auto estimate = EstimatePixelSize(input.cloud);
       if (estimate.ok()) {
-        Remember(*estimate, input);
+        input.showing = estimate->showing;
         // Too small ones harm nobody.
         if (report.pixel_size > kSuspiciousRatio * estimate->high) {
           LogWarning(Cat("a training pixel of ", report.pixel_size, " was given, the splat itself looks like ",
@@ -222,7 +216,7 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
       return {};
     }
     report.finding = *found;
-    Remember(found->estimate, input);
+    input.showing = found->estimate.showing;
     report.pixel_size = found->size;
     report.pixel_size_source = found->contradicted() ? kCautiousPixelSize : "estimated";
     if (says) SayWhatWasFound(*found);

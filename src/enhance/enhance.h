@@ -105,10 +105,9 @@ struct EnhanceReport {
 // The cloud as methods get it: rows that are not finite are gone; p_LR is known to those that need it.
 struct EnhanceInput {
   GaussianCloud cloud;
-  Buffer<float> pixel_sizes;   // one for all, or one per Gaussian
-  double pixel_size = 0;       // their median
-  double showing = 1;          // PixelSizeEstimate::showing
-  double spacing = 0;          // PixelSizeEstimate::spacing; 0 where nothing was estimated
+  Buffer<float> pixel_sizes;  // one for all, or one per Gaussian
+  double pixel_size = 0;      // their median
+  double showing = 1;         // PixelSizeEstimate::showing; 1 where nothing was estimated
   double filter_strength = 0;
   std::vector<char> inside;       // which of the cloud's Gaussians are enhanced: results are of these; empty: all
   GaussianCloud start;            // what the method before it made, of "A+B"; else empty

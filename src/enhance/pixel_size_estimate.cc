@@ -130,7 +130,7 @@ double Share(double strangeness, double none, double all) {
 
 PixelSizeEstimate EstimateOf(const Settled& settled, double unlike_standard, const PixelSizeProbe& probe) {
   const double size = std::exp(settled.log_size), spread = std::exp(settled.half);
-  return PixelSizeEstimate{size, size / spread, size * spread, unlike_standard, probe.showing(), probe.spacing()};
+  return PixelSizeEstimate{size, size / spread, size * spread, unlike_standard, probe.showing()};
 }
 
 // Outlines of antialiased fits are narrower than those of classic ones.

@@ -22,7 +22,6 @@ struct PixelSizeEstimate {
   // are unlike those, as of MCMC, random points, photographs.
   double unlike_standard = 0;
   double showing = 1;  // PixelSizeProbe::showing()
-  double spacing = 0;  // PixelSizeProbe::spacing()
 };
 
 // Scales with the cloud. Takes up to a second, for large clouds too, as only a part of them is looked at.

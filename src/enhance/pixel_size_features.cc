@@ -122,7 +122,6 @@ Result<PixelSizeProbe> PixelSizeProbe::Make(TellingGaussians telling) {
   }
   probe.start_ = *start;
   probe.showing_ = ShareShowing(probe.cloud_);
-  probe.spacing_ = Spacing(probe.cloud_);
   probe.sizes_ = SizesOf(probe.cloud_);
   const Pinhole intrinsics = PinholeFromFov(kRenderSize, kRenderSize, kFieldOfView);
   probe.distance_ = FramingDistance({framing.target, radius}, intrinsics);

@@ -53,8 +53,6 @@ class PixelSizeProbe {
   // theirs, as they take out the faint and lower all opacities from time to time. MCMC, random points and photographs
   // leave 0 to 0.65: what stands in no picture's way stays.
   double showing() const { return showing_; }
-  // Side of the square that each Gaussian has of the surface, faint ones too, world units; 0: there are too few.
-  double spacing() const { return spacing_; }
 
   // The features of pixels of `size` (world units at the middle of the cloud). Pictures are made at half octaves from
   // start(), within six octaves, and only once; between them the logarithms are linear. Lengths scale with the cloud:
@@ -73,7 +71,7 @@ class PixelSizeProbe {
   GaussianCloud cloud_;
   CameraSet cameras_;
   double start_ = 0, distance_ = 0;
-  double showing_ = 1, spacing_ = 0;
+  double showing_ = 1;
   double farthest_pixel_ = 0;  // world size of a picture's pixel where the whole cloud is in it; none is larger
   Rasterizer rasterizer_;
   RenderOutput output_;

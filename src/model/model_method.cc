@@ -32,10 +32,6 @@ constexpr double kNotable = 0.01, kMost = 0.5;
 // A classic splat of which fewer Gaussians show is unlike standard fits (PixelSizeProbe::showing), and enhanced by one
 // of the networks that have learned from such ones.
 constexpr double kStandardShow = 0.6;
-// Gaussians on every pixel of the surface from which on those are dense: there is nothing that more of them would add.
-constexpr double kDense = 1;
-// Of those that the network for dense ones has learned from nearly all have fewer that show.
-constexpr double kDenseShow = 0.4;
 
 // Whether it is certainly of that kind; what cannot be read is for loading to tell.
 bool IsCompact(const ModelSettings& model) {
@@ -147,11 +143,8 @@ class LastNetwork {
 Shipped ShippedFor(const EnhanceInput& input, const ModelSettings& model) {
   if (IsCompensated(input.cloud.render_mode)) return Shipped::kAntialiased;
   // Better than merging four into one.
-  if (model.copies == 1) return Shipped::kDense;
-  if (input.showing >= kStandardShow) return Shipped::kStandard;
-  const double on_a_pixel = input.spacing > 0 ? std::pow(input.pixel_size / input.spacing, 2) : 0;
-  // It makes one of one; who asks for more gets them from the other.
-  return on_a_pixel >= kDense && input.showing < kDenseShow && !model.copies ? Shipped::kDense : Shipped::kClassic;
+  if (model.copies == 1) return Shipped::kSingle;
+  return input.showing >= kStandardShow ? Shipped::kStandard : Shipped::kClassic;
 }
 
 }  // namespace
@@ -285,7 +278,6 @@ void RegisterModelMethod() {
                                        options.model, report, options.control);
          if (options.model.file.empty()) {
            report.facts.emplace_back("network_for_standard_fits", shipped == Shipped::kStandard);
-           report.facts.emplace_back("network_for_dense_fits", shipped == Shipped::kDense);
          }
          return out;
        }});

@@ -354,33 +354,30 @@ TEST_F(SmallModel, AntialiasedSplatsGetTheirOwnShippedNetwork) {
   }
 }
 
-// Where most Gaussians are faint and every pixel of the surface has one and more.
-TEST_F(SmallModel, DenseSplatsGetOneForOne) {
+// Merging four into one is worse than a network that makes one.
+TEST_F(SmallModel, OneForOneComesFromANetworkOfItsOwn) {
   if (!HasShippedNetwork()) GTEST_SKIP() << "this program was built without weights";
   const EnhanceMethod registered = Registered();
   struct Case {
-    double showing, spacing;  // spacing in pixels
+    double showing;
     std::optional<int64_t> copies;
-    bool dense, standard;
+    int64_t made;  // of each
+    bool standard;
   };
-  for (const Case& c :
-       {Case{0.2, 0.5, {}, true, false}, Case{0.2, 0.5, 1, true, false}, Case{0.2, 0.5, 4, false, false},
-        Case{0.9, 2, 1, true, false}, Case{0.5, 0.5, {}, false, false}, Case{0.2, 2, {}, false, false},
-        Case{0.2, 0, {}, false, false}, Case{0.9, 0.5, {}, false, true}}) {
+  for (const Case& c : {Case{0.2, {}, 4, false}, Case{0.2, 1, 1, false}, Case{0.2, 4, 4, false}, Case{0.9, {}, 4, true},
+                        Case{0.9, 1, 1, false}, Case{0.9, 2, 4, true}}) {
     EnhanceInput input = SheetInput();
-    input.pixel_size = kSheetPixel;
     input.showing = c.showing;
-    input.spacing = c.spacing * kSheetPixel;
     EnhanceOptions options;
     options.model.copies = c.copies;
     StepReport report;
     const auto enhanced = registered.run(input, options, report);
     ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
     const std::map<std::string, FactValue> facts(report.facts.begin(), report.facts.end());
-    EXPECT_EQ(std::get<bool>(facts.at("network_for_dense_fits")), c.dense) << c.showing << ' ' << c.spacing;
-    EXPECT_EQ(std::get<bool>(facts.at("network_for_standard_fits")), c.standard) << c.showing << ' ' << c.spacing;
-    if (c.dense) {
-      EXPECT_EQ(enhanced->size(), input.cloud.size());
+    EXPECT_EQ(std::get<int64_t>(facts.at("copies")), c.made) << c.showing;
+    EXPECT_EQ(std::get<bool>(facts.at("network_for_standard_fits")), c.standard) << c.showing;
+    if (c.copies) {
+      EXPECT_EQ(enhanced->size(), *c.copies * input.cloud.size());
     }
   }
 }

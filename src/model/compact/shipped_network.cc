@@ -48,7 +48,7 @@ ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_standard",
                           ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-compact.safetensors");
 ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_classic",
                           ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-classic.safetensors");
-ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_dense", ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-dense.safetensors");
+ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_single", ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-single.safetensors");
 ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_antialiased",
                           ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-antialiased.safetensors");
 extern "C" {
@@ -56,8 +56,8 @@ extern const std::byte anchorsplat_shipped_standard[];
 extern const std::byte anchorsplat_shipped_standard_end[];
 extern const std::byte anchorsplat_shipped_classic[];
 extern const std::byte anchorsplat_shipped_classic_end[];
-extern const std::byte anchorsplat_shipped_dense[];
-extern const std::byte anchorsplat_shipped_dense_end[];
+extern const std::byte anchorsplat_shipped_single[];
+extern const std::byte anchorsplat_shipped_single_end[];
 extern const std::byte anchorsplat_shipped_antialiased[];
 extern const std::byte anchorsplat_shipped_antialiased_end[];
 }
@@ -74,8 +74,8 @@ std::span<const std::byte> ShippedBytes([[maybe_unused]] Shipped which) {
       return {anchorsplat_shipped_standard, anchorsplat_shipped_standard_end};
     case Shipped::kClassic:
       return {anchorsplat_shipped_classic, anchorsplat_shipped_classic_end};
-    case Shipped::kDense:
-      return {anchorsplat_shipped_dense, anchorsplat_shipped_dense_end};
+    case Shipped::kSingle:
+      return {anchorsplat_shipped_single, anchorsplat_shipped_single_end};
     case Shipped::kAntialiased:
       return {anchorsplat_shipped_antialiased, anchorsplat_shipped_antialiased_end};
   }

@@ -10,11 +10,11 @@ namespace anchorsplat {
 
 // The compact networks that are part of the program itself, of the folder models/ of the source tree when the program
 // was built (docs/network.md): anchorsplat-compact.safetensors for splats like standard fits,
-// anchorsplat-dense.safetensors for dense ones of other kinds, anchorsplat-classic.safetensors for all other classic
-// ones, and anchorsplat-antialiased.safetensors for those whose render mode makes up for the dilation (IsCompensated).
-// There are all or none.
-enum class Shipped { kStandard, kClassic, kDense, kAntialiased };
-inline constexpr Shipped kAllShipped[] = {Shipped::kStandard, Shipped::kClassic, Shipped::kDense,
+// anchorsplat-classic.safetensors for all other classic ones, anchorsplat-single.safetensors for classic ones of which
+// one Gaussian is to become one, and anchorsplat-antialiased.safetensors for those whose render mode makes up for the
+// dilation (IsCompensated). There are all or none.
+enum class Shipped { kStandard, kClassic, kSingle, kAntialiased };
+inline constexpr Shipped kAllShipped[] = {Shipped::kStandard, Shipped::kClassic, Shipped::kSingle,
                                           Shipped::kAntialiased};
 
 bool HasShippedNetwork();

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Rounds the weights of a compact network to half precision, as those in models/ that are told of kinds.
+"""Rounds the weights of a compact network to half precision, as all in models/ are.
 
     scripts/half-precision.py run/model.safetensors OUT.safetensors
 

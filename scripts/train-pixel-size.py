@@ -13,12 +13,12 @@ records in the data set say, count `--short-weight` times. Needs numpy.
 With `--kinds` the regression is that for splats unlike standard fits. It looks at more features, and its ridge pulls
 towards the regression of standard fits instead of towards zero. What is printed is what both together say, as in
 src/enhance/pixel_size_estimate.cc, with all fits of a mesh left out and with all of a kind. Antialiased fits have no
-part in it. `--keep FILE` writes all features to one small file. With `--correction FILE` a
-third regression learns what those two leave, by kernels, and is written there; it is cross-validated, too, from
-estimates that were themselves made without the mesh.
+part in it. `--keep FILE` writes all features to one small file. With `--correction FILE` a third regression learns what
+those two leave, by kernels, and is written there; it is cross-validated, too, from estimates that were themselves made
+without the mesh. Fits that have no "showing" (older features) are taken as if few of their Gaussians did.
 
 With `--antialiased` regression and correction are those of antialiased fits, and only of these. The regression looks at
-outlines as the antialiased rasterizer draws them, and at sizes.
+outlines as the antialiased rasterizer draws them, and at sizes. The ridge is that of the best corrected estimates.
 """
 
 import argparse
@@ -44,6 +44,7 @@ CORRECTION_RIDGE = 0.05
 MOST_CORRECTION = 0.5  # kMostCorrection
 UPWARDS = 0.5  # kUpwards
 STANDARD, OTHER = 0.6, 0.9  # kStandard, kOther in pixel_size_estimate.cc
+FEW_SHOW, MOST_SHOW = 0.6, 0.75  # kFewShow, kMostShow
 PLAUSIBLE, IMPLAUSIBLE = 1.5, 2.2  # kPlausible, kImplausible
 
 
@@ -60,6 +61,7 @@ def load(files, weights=()):
                     "kind": item.get("kind", ""),
                     "mode": item.get("mode", "classic"),
                     "mesh": SAME_MESH.get(mesh, mesh),
+                    "showing": item.get("showing", 0.0),
                     "weight": float(weights.get(item["object"], 1)),
                     "offsets": np.log([s["size"] / item["pixel_size"] for s in samples]),
                     "all": np.array([s["features"] for s in samples]),
@@ -166,6 +168,8 @@ def believe_standard(objects, standard, kinds):
         of_sizes = np.sqrt(np.mean(((sizes - kinds["mean"][-16:]) / kinds["deviation"][-16:]) ** 2))
         share = max((strangeness - STANDARD) / (OTHER - STANDARD), (of_sizes - PLAUSIBLE) / (IMPLAUSIBLE - PLAUSIBLE))
         o["share"] = np.clip(share, 0, 1)
+        if o["mode"] != "mip":
+            o["share"] *= 1 - np.clip((o["showing"] - FEW_SHOW) / (MOST_SHOW - FEW_SHOW), 0, 1)
 
 
 def look_at(item, said):
@@ -261,14 +265,17 @@ def train_kinds(objects, arguments):
 def train_antialiased(objects, arguments):
     standard = read_standard()
     select(objects, ANTIALIASED)
-    results = {ridge: cross_validate(objects, ridge, prior=standard) for ridge in arguments.ridge}
-    for ridge, alone in results.items():
+    results = {}
+    for ridge in arguments.ridge:
+        alone = cross_validate(objects, ridge, prior=standard)
         print(f"ridge {ridge:g}: {describe(alone)}")
         print(f"  kinds left out: {describe(cross_validate(objects, ridge, by='kind', prior=standard))}")
-    ridge = arguments.ridge[0]
-    correction, corrected, unknown = train_correction(objects, results[ridge], np.zeros(len(objects)))
-    print(f"corrected, ridge {ridge:g}: {describe(corrected)}")
-    print(f"  kinds left out of the correction: {describe(unknown)}")
+        results[ridge] = train_correction(objects, alone, np.zeros(len(objects)))
+        print(f"  corrected: {describe(results[ridge][1])}")
+        print(f"  kinds left out of the correction: {describe(results[ridge][2])}")
+    ridge = min(results, key=lambda r: np.sqrt(np.mean(results[r][1] ** 2)))
+    correction, corrected, _ = results[ridge]
+    print(f"ridge {ridge:g} chosen; estimate / truth by kind:")
     for kind in sorted({o["kind"] for o in objects}):
         ratios = sorted(np.exp(c) for c, o in zip(corrected, objects) if o["kind"] == kind)
         print(f"  {kind}: " + " ".join(f"{r:.2f}" for r in ratios))

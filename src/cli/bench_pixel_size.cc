@@ -24,11 +24,17 @@ struct PixelSizeFlags {
 };
 
 nlohmann::json ToJson(const PixelSizeCheck& check, const std::string& kind) {
-  nlohmann::json json = {{"object", check.object},     {"kind", kind},
-                         {"mode", NameOf(check.mode)}, {"pixel_size", check.truth},
-                         {"start", check.start},       {"estimate", check.estimate.size},
-                         {"low", check.estimate.low},  {"high", check.estimate.high},
-                         {"seconds", check.seconds},   {"unlike_standard", check.estimate.unlike_standard}};
+  nlohmann::json json = {{"object", check.object},
+                         {"kind", kind},
+                         {"mode", NameOf(check.mode)},
+                         {"pixel_size", check.truth},
+                         {"start", check.start},
+                         {"estimate", check.estimate.size},
+                         {"low", check.estimate.low},
+                         {"high", check.estimate.high},
+                         {"seconds", check.seconds},
+                         {"unlike_standard", check.estimate.unlike_standard},
+                         {"showing", check.estimate.showing}};
   for (const PixelSizeCheck::Sample& sample : check.samples) {
     json["samples"].push_back({{"size", sample.size}, {"features", sample.features}});
   }

@@ -194,6 +194,7 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
   if (options.pixel_size) {
     report.pixel_size = *options.pixel_size;
     report.pixel_size_source = "given";
+    // It chooses the network, too.
     if (says && !IsCompensated(input.cloud.render_mode)) {
       const auto estimate = EstimatePixelSize(input.cloud);
       if (estimate.ok()) {

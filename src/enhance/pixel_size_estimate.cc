@@ -28,10 +28,8 @@ constexpr double kStandard = 0.6, kOther = 0.9;
 // The same of the Gaussians' sizes in units of the standard regression's estimate, by the deviations of fits of many
 // kinds with their true pixels: 1 on average, and much more where the estimate is several times too large.
 constexpr double kPlausible = 1.5, kImplausible = 2.2;
-// PixelSizeProbe::showing() of fits up to which strangeness counts, and from which on not at all: of 22 fits with more
-// than 0.6, of which the two regressions differ for ten, the standard one is the nearer for all but those with a
-// smoothing filter.
-constexpr double kFewShow = 0.6, kMostShow = 0.75;
+// PixelSizeProbe::showing() up to which strangeness counts, and from which on not at all.
+constexpr double kFewShow = kStandardShowing, kMostShow = 0.75;
 // No correction of what both say is larger; ln.
 constexpr double kMostCorrection = 0.5;
 // How much of a correction upwards is left for a splat that is unlike standard fits: pixels that are too large blur.
@@ -85,10 +83,13 @@ Result<Settled> Settle(const PixelSizeCoefficients<kFeatures>& coefficients, dou
   return Settled{std::log(size), half, guess.strangeness};
 }
 
-Result<std::array<double, kKindsPixelSizeFeatures>> KindsFeatures(PixelSizeProbe& probe, double size) {
-  std::array<double, kKindsPixelSizeFeatures> features;
+// What the looks show, then sizes without the number of Gaussians.
+template <size_t kLookCount>
+Result<std::array<double, kLookCount * kPixelSizeFeatures + kSizeFeatures - 1>> FeaturesOf(
+    const std::array<Look, kLookCount>& looks, PixelSizeProbe& probe, double size) {
+  std::array<double, kLookCount * kPixelSizeFeatures + kSizeFeatures - 1> features;
   auto out = features.begin();
-  for (const Look look : {Look::kAlpha, Look::kAntialiased}) {
+  for (const Look look : looks) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeFeatures of_look, probe.At(size, look));
     out = std::ranges::copy(of_look, out).out;
   }
@@ -107,10 +108,7 @@ double StrangenessOfSizes(const PixelSizeProbe& probe, double size) {
 // ln(true pixel size / size), as far as fits of many kinds tell what the regressions leave. Between two known kinds it
 // is smooth; far from all of them the landmarks say nothing, and the straight part is cut off.
 Result<double> Correction(const PixelSizeCorrection& c, PixelSizeProbe& probe, double size) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeFeatures alpha, probe.At(size));
-  const SizeFeatures sizes = probe.SizesAt(size);
-  std::array<double, kCorrectionFeatures> z;
-  std::copy_n(sizes.begin(), kSizeFeatures - 1, std::ranges::copy(alpha, z.begin()).out);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(auto z, FeaturesOf(std::array{Look::kAlpha}, probe, size));
   double sum = c.intercept;
   for (size_t k = 0; k < z.size(); ++k) {
     z[k] = std::clamp((z[k] - c.mean[k]) / c.deviation[k], -kMostDeviations, kMostDeviations);
@@ -135,14 +133,9 @@ PixelSizeEstimate EstimateOf(const Settled& settled, double unlike_standard, con
 
 // Outlines of antialiased fits are narrower than those of classic ones.
 Result<PixelSizeEstimate> EstimateAntialiased(PixelSizeProbe& probe) {
-  const auto features_at = [&](double size) -> Result<std::array<double, kAntialiasedPixelSizeFeatures>> {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeFeatures outlines, probe.At(size, Look::kAntialiased));
-    const SizeFeatures sizes = probe.SizesAt(size);
-    std::array<double, kAntialiasedPixelSizeFeatures> features;
-    std::copy_n(sizes.begin(), kSizeFeatures - 1, std::ranges::copy(outlines, features.begin()).out);
-    return features;
-  };
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Settled settled, Settle(kAntialiasedPixelSize, probe.start(), features_at));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Settled settled, Settle(kAntialiasedPixelSize, probe.start(), [&](double size) {
+                                 return FeaturesOf(std::array{Look::kAntialiased}, probe, size);
+                               }));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const double correction,
                                Correction(kAntialiasedPixelSizeCorrection, probe, std::exp(settled.log_size)));
   settled.log_size += correction;
@@ -164,8 +157,9 @@ Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional
                           Share(StrangenessOfSizes(probe, std::exp(settled.log_size)), kPlausible, kImplausible));
   if (!IsCompensated(mode)) share *= 1 - Share(probe.showing(), kFewShow, kMostShow);
   if (share > 0) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const Settled kinds, Settle(kKindsPixelSize, probe.start(),
-                                                             [&](double size) { return KindsFeatures(probe, size); }));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Settled kinds, Settle(kKindsPixelSize, probe.start(), [&](double size) {
+                                   return FeaturesOf(std::array{Look::kAlpha, Look::kAntialiased}, probe, size);
+                                 }));
     // It may only lower the estimate. Splats that have lost less width than classic ones and do not say so, such as
     // antialiased ones, look like fits of smaller pixels to the standard regression, which is what they need.
     settled.log_size = std::min(settled.log_size, std::lerp(settled.log_size, kinds.log_size, share));

@@ -27,6 +27,9 @@ using PixelSizeFeatures = std::array<double, kPixelSizeFeatures>;  // natural lo
 
 inline constexpr int64_t kLeastGaussians = 16;
 
+// Standard fits have at least this much of PixelSizeProbe::showing(), most others less.
+inline constexpr double kStandardShowing = 0.6;
+
 // What is looked at. Alpha as the classic rasterizer and as the antialiased one draw it: they differ by what a fit of
 // the other kind has given up of its width or of its opacity. And what would be seen over black, the background of most
 // fits: Gaussians that are black themselves hide what is behind them and show nothing.
@@ -51,7 +54,7 @@ class PixelSizeProbe {
 
   // Share of the Gaussians that have an opacity of 10 % or more. Standard fits and those of AbsGS keep 0.6 to 0.99 of
   // theirs, as they take out the faint and lower all opacities from time to time. MCMC, random points and photographs
-  // leave 0 to 0.65: what stands in no picture's way stays.
+  // leave 0 to 0.68, few of them more than 0.6: what stands in no picture's way stays.
   double showing() const { return showing_; }
 
   // The features of pixels of `size` (world units at the middle of the cloud). Pictures are made at half octaves from

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <utility>
 
+#include "core/parallel.h"
 #include "core/run_context.h"
 #include "core/statistics.h"
 #include "core/text.h"
@@ -14,6 +17,9 @@
 namespace anchorsplat {
 
 namespace {
+
+constexpr int64_t kNeighbours = 8;
+constexpr int64_t kGuardSamples = 256;  // of the spacing; its median is good to a few percent
 
 // Gaussians on a pixel of the surface × Gaussians. In fits of known pixels with 2,700 to 28,000 visible Gaussians there
 // are 0.1 to 1.3 on a pixel, most where thin things were seen in few; many Gaussians come of many pixels, on which they
@@ -31,6 +37,31 @@ constexpr double kHarmless = 0.7;
 // A crowd hardly above the bound says little: pixels shrink with this power of how far above it is, down to harmless
 // ones. Dense fits of small pictures are at up to 1.3 times the bound, captures from 1.7 times on.
 constexpr double kCrowdedFall = 4;
+
+// Side of the square that one Gaussian has for itself, where they lie on surfaces: kNeighbours others lie within π r².
+double Spacing(const GaussianCloud& cloud) {
+  const int64_t count = cloud.size();
+  if (count <= kNeighbours) return 0;
+  const Buffer<float>& positions = cloud.means;
+  const int64_t samples = std::min(kGuardSamples, count);
+  Buffer<float> farthest(static_cast<size_t>(samples));
+  ParallelFor(0, samples, 8, [&](int64_t first, int64_t last) {
+    for (int64_t s = first; s < last; ++s) {
+      const float* at = positions.data() + 3 * (s * count / samples);
+      std::array<double, kNeighbours + 1> nearest;  // itself is one of them; sorted
+      nearest.fill(std::numeric_limits<double>::infinity());
+      for (int64_t k = 0; k < count; ++k) {
+        const double distance = SquaredDistance(positions.data() + 3 * k, at);
+        if (distance >= nearest.back()) continue;
+        auto place = std::upper_bound(nearest.begin(), nearest.end(), distance);
+        std::move_backward(place, nearest.end() - 1, nearest.end());
+        *place = distance;
+      }
+      farthest[static_cast<size_t>(s)] = static_cast<float>(std::sqrt(nearest.back()));
+    }
+  });
+  return double{Quantile(farthest, 0.5)} * std::sqrt(std::numbers::pi / static_cast<double>(kNeighbours));
+}
 
 std::string Number(double value) { return Fixed(value, value < 10 ? 1 : 0); }
 

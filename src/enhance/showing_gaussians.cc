@@ -3,16 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <utility>
 #include <vector>
 
 #include "core/activations.h"
-#include "core/parallel.h"
 #include "core/run_context.h"
 #include "core/spherical_harmonics.h"
-#include "core/statistics.h"
 #include "enhance/nearest_gaussians.h"
 #include "enhance/pixel_size_features.h"
 
@@ -22,9 +18,7 @@ namespace {
 
 constexpr float kNearlyBlack = 0.04f;  // brightest channel of the constant colour; ten steps of 255
 constexpr double kFewBlack = 0.01;     // share of the Gaussians below which black ones cannot move an outline
-constexpr int64_t kNeighbours = 8;
-constexpr int64_t kSpacingSamples = 256;  // its median is good to a few percent
-constexpr double kLargestAxis = 0.25;     // of Gaussians that tell, in units of the radius that frames the cloud
+constexpr double kLargestAxis = 0.25;  // of Gaussians that tell, in units of the radius that frames the cloud
 
 bool IsBlack(const CloudView& rows, size_t i) {
   const float* sh = rows.sh.data() + 3 * i;
@@ -81,32 +75,6 @@ double SquaredDistance(const float* a, const float* b) {
   double sum = 0;
   for (size_t k = 0; k < 3; ++k) sum += (double{a[k]} - double{b[k]}) * (double{a[k]} - double{b[k]});
   return sum;
-}
-
-double Spacing(const GaussianCloud& cloud) {
-  LeaveIfAbandoned();
-  const int64_t count = cloud.size();
-  if (count <= kNeighbours) return 0;
-  const Buffer<float>& positions = cloud.means;
-  const int64_t samples = std::min(kSpacingSamples, count);
-  Buffer<float> farthest(static_cast<size_t>(samples));
-  ParallelFor(0, samples, 8, [&](int64_t first, int64_t last) {
-    for (int64_t s = first; s < last; ++s) {
-      const float* at = positions.data() + 3 * (s * count / samples);
-      std::array<double, kNeighbours + 1> nearest;  // itself is one of them; sorted
-      nearest.fill(std::numeric_limits<double>::infinity());
-      for (int64_t k = 0; k < count; ++k) {
-        const double distance = SquaredDistance(positions.data() + 3 * k, at);
-        if (distance >= nearest.back()) continue;
-        auto place = std::upper_bound(nearest.begin(), nearest.end(), distance);
-        std::move_backward(place, nearest.end() - 1, nearest.end());
-        *place = distance;
-      }
-      farthest[static_cast<size_t>(s)] = static_cast<float>(std::sqrt(nearest.back()));
-    }
-  });
-  // kNeighbours others lie within π r².
-  return double{Quantile(farthest, 0.5)} * std::sqrt(std::numbers::pi / static_cast<double>(kNeighbours));
 }
 
 struct ShowingStudy::State {

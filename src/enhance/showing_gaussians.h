@@ -57,10 +57,6 @@ class ShowingStudy final : public RowStudy {
 ShowingGaussians FindShowingGaussians(const CloudView& cloud);
 TellingGaussians FindTellingGaussians(const CloudView& cloud);
 
-// Side of the square that each has for itself, where they lie on surfaces, from the distances to eight neighbours: the
-// median over 256 of them. 0: there are no nine.
-double Spacing(const GaussianCloud& cloud);
-
 double SquaredDistance(const float* a, const float* b);  // of two points of three coordinates
 
 }  // namespace anchorsplat

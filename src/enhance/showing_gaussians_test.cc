@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "core/activations.h"
@@ -48,23 +47,6 @@ TEST(NearestGaussians, AreTheSameInWhateverOrderTheyCome) {
       }
     }
   }
-}
-
-// On a square grid eight neighbours lie within 1.41 of its step, and a circle of that radius holds 6.28 of its squares.
-TEST(Spacing, IsTheSideOfASquareOfTheSurface) {
-  for (const float step : {1e-3f, 1.0f, 700.0f}) {
-    GaussianCloud grid;
-    grid.Resize(900, 0);
-    for (int64_t i = 0; i < grid.size(); ++i) {
-      grid.means[static_cast<size_t>(3 * i)] = step * static_cast<float>(i % 30);
-      grid.means[static_cast<size_t>(3 * i + 1)] = step * static_cast<float>(i / 30);
-      grid.means[static_cast<size_t>(3 * i + 2)] = 5;
-    }
-    EXPECT_NEAR(Spacing(grid) / double{step}, std::sqrt(2 * std::numbers::pi / 8), 1e-4);
-    grid.Resize(8, 0);
-    EXPECT_EQ(Spacing(grid), 0) << "there are no eight others";
-  }
-  EXPECT_EQ(Spacing(GaussianCloud()), 0);
 }
 
 // A ball, a third of it black, with a few rows that are no Gaussians.

@@ -15,6 +15,7 @@
 #include "core/text.h"
 #include "enhance/filter.h"
 #include "enhance/gaussian_budget.h"
+#include "enhance/pixel_size_features.h"
 #include "enhance/unseen_gaussians.h"
 #include "io/file_version.h"
 #include "model/any_network.h"
@@ -29,9 +30,6 @@ namespace {
 
 // Shares worth a word.
 constexpr double kNotable = 0.01, kMost = 0.5;
-// A classic splat of which fewer Gaussians show is unlike standard fits (PixelSizeProbe::showing), and enhanced by one
-// of the networks that have learned from such ones.
-constexpr double kStandardShow = 0.6;
 
 // Whether it is certainly of that kind; what cannot be read is for loading to tell.
 bool IsCompact(const ModelSettings& model) {
@@ -142,9 +140,9 @@ class LastNetwork {
 
 Shipped ShippedFor(const EnhanceInput& input, const ModelSettings& model) {
   if (IsCompensated(input.cloud.render_mode)) return Shipped::kAntialiased;
-  // Better than merging four into one.
+  // Better than merging four into one, by 0.6 dB on fifteen fits (docs/results/copies.md).
   if (model.copies == 1) return Shipped::kSingle;
-  return input.showing >= kStandardShow ? Shipped::kStandard : Shipped::kClassic;
+  return input.showing >= kStandardShowing ? Shipped::kStandard : Shipped::kClassic;
 }
 
 }  // namespace

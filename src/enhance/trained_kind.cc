@@ -51,7 +51,23 @@ double OpaqueShare(std::vector<std::pair<float, float>>& items) {
   return static_cast<double>(opaque) / static_cast<double>(count);
 }
 
+// The share of sizes that a format cut off, as SPZ does at e^−10: all are the least, and few are next to it. Where a
+// width was added, more are next to the least than are it, whatever the steps of the format.
+constexpr double kCutOff = 0.01;  // less matters little
+constexpr float kNext = 0.07f;    // a step of SPZ and a little
+double ShareCutOff(std::span<const float> logarithms) {
+  const float least = *std::ranges::min_element(logarithms);
+  const auto cut = std::ranges::count(logarithms, least);
+  const auto next = std::ranges::count_if(logarithms, [&](float x) { return x > least && x <= least + kNext; });
+  const double share = static_cast<double>(cut) / static_cast<double>(logarithms.size());
+  return share >= kCutOff && cut > 2 * next ? share : 0;
+}
+
 double MeanTail(std::span<float> logarithms) {
+  if (const double cut = ShareCutOff(logarithms); cut > 0) {
+    // What is left of the tail: of some more than are cut.
+    return Tail(logarithms, std::clamp(1.3 * cut, kLonger, 0.5));
+  }
   return std::sqrt(Tail(logarithms, kShorter) * Tail(logarithms, kLonger));
 }
 

@@ -123,6 +123,29 @@ TEST(TrainedKind, DoesNotDependOnTheFormat) {
   }
 }
 
+// SPZ ends sizes at e^−10: the thinnest of a splat of a small unit all have that one, like those of a widened splat.
+TEST(TrainedKind, WhatAFormatCutOffIsNoWidth) {
+  for (const double share : {0.015, 0.03, 0.1}) {
+    for (const auto& [made, kind] : {std::pair(Example("biplane"), TrainedKind::kClassic),
+                                     std::pair(Made(0, 0), TrainedKind::kClassic),
+                                     std::pair(Made(0.3, 0), TrainedKind::kAntialiased),
+                                     std::pair(Made(0, 0.3), TrainedKind::kWidened)}) {
+      GaussianCloud cloud = made;
+      std::vector<float> smallest;
+      for (size_t i = 0; i < cloud.log_scales.size(); i += 3) {
+        smallest.push_back(std::min({cloud.log_scales[i], cloud.log_scales[i + 1], cloud.log_scales[i + 2]}));
+      }
+      const auto at = smallest.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(smallest.size()));
+      std::nth_element(smallest.begin(), at, smallest.end());
+      const float shift = -10 - *at;
+      for (float& x : cloud.means) x *= std::exp(shift);
+      for (float& s : cloud.log_scales) s = std::max(-10.0f, std::round(16 * (s + shift)) / 16);
+      const SizeTails tails = FindSizeTails(cloud);
+      EXPECT_EQ(FindTrainedKind(cloud), kind) << share << ' ' << tails.smallest << ' ' << tails.middle;
+    }
+  }
+}
+
 TEST(TrainedKind, FlatGaussiansAreNotWidened) {
   for (const float flat : {-20.0f, -std::numeric_limits<float>::infinity()}) {
     GaussianCloud cloud = Made(0, 0);

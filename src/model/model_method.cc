@@ -145,11 +145,16 @@ Shipped ShippedFor(const EnhanceInput& input, const ModelSettings& model) {
   return input.showing >= kStandardShowing ? Shipped::kStandard : Shipped::kClassic;
 }
 
+// Dense splats need few copies: of three dense fits 1.6 Gaussians for one are as good as 2.4 without (docs/results/copies.md).
+bool WantsStandIns(Shipped shipped, const ModelSettings& model) {
+  return model.file.empty() && shipped == Shipped::kClassic && !model.copies;
+}
+
 }  // namespace
 
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
                                                 const ModelSettings& model, StepReport& report,
-                                                const RefineControl& control) {
+                                                const RefineControl& control, const CompactNetwork* stand_in) {
   // Of what stays one Gaussian for one.
   const CopyChoice choice = {model.copies, model.merge_cost.value_or(kMergeCost), model.options.max_gaussians,
                              model.options.prune_opacity};
@@ -189,6 +194,7 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
                                                                       .strength = input.filter_strength,
                                                                       .choice = choice,
                                                                       .single = dust,
+                                                                      .stand_in = stand_in,
                                                                       .inside = input.inside,
                                                                       .checkpoint = control.checkpoint,
                                                                       .resume = control.resume}));
@@ -233,7 +239,7 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
 }
 
 void RegisterModelMethod() {
-  const auto last = std::make_shared<LastNetwork>();
+  const auto last = std::make_shared<LastNetwork>(), last_stand_in = std::make_shared<LastNetwork>();
   RegisterEnhanceMethod(
       {.name = "model",
        .summary = HasShippedNetwork() ? "one pass of the network of --model, or of the one that is part of this program"
@@ -264,16 +270,20 @@ void RegisterModelMethod() {
          if (!options.model.file.empty() || HasShippedNetwork()) return {};
          return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};
        },
-       .run = [last](EnhanceInput input, const EnhanceOptions& options, StepReport& report) -> Result<GaussianCloud> {
+       .run = [last, last_stand_in](EnhanceInput input, const EnhanceOptions& options, StepReport& report) -> Result<GaussianCloud> {
          const Shipped shipped = ShippedFor(input, options.model);
          ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const AnyNetwork> network,
                                       last->Get(options.model, shipped));
          if (const auto* published = std::get_if<PublishedNetwork>(network.get())) {
            return EnhanceWithPublished(std::move(input), *published, options.model.options, report);
          }
-         Result<GaussianCloud> out =
-             EnhanceWithCompactNetwork(std::move(input), options.upscale, std::get<CompactNetwork>(*network),
-                                       options.model, report, options.control);
+         std::shared_ptr<const AnyNetwork> stand_in;
+         if (WantsStandIns(shipped, options.model)) {
+           ANCHORSPLAT_ASSIGN_OR_RETURN(stand_in, last_stand_in->Get(options.model, Shipped::kSingle));
+         }
+         Result<GaussianCloud> out = EnhanceWithCompactNetwork(
+             std::move(input), options.upscale, std::get<CompactNetwork>(*network), options.model, report,
+             options.control, stand_in ? std::get_if<CompactNetwork>(stand_in.get()) : nullptr);
          if (options.model.file.empty()) {
            report.facts.emplace_back("network_for_standard_fits", shipped == Shipped::kStandard);
          }

@@ -17,9 +17,10 @@ void RegisterModelMethod();
 // nothing finite about any Gaussian; kBadArgument: of ChooseCopies. A strength of no more than the closer view's own
 // pixels add means that there is no lost width to build on (a splat that is seen no closer, or has its width): it stays
 // as it is. A network that is not told the kind of splat knows classic ones; others are filtered. `control`: what its
-// blocks make is kept there (model/compact/compact_checkpoint.h).
+// blocks make is kept there (model/compact/compact_checkpoint.h). `stand_in`: see CompactTask.
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
                                                 const ModelSettings& model, StepReport& report,
-                                                const RefineControl& control = {});
+                                                const RefineControl& control = {},
+                                                const CompactNetwork* stand_in = nullptr);
 
 }  // namespace anchorsplat

@@ -12,15 +12,16 @@ namespace anchorsplat {
 // The choice among copies of a cloud that is there as a whole: what blocks must come to as well.
 inline Result<ChosenCopies> ChooseCopies(CopyGroups groups, const CopyChoice& choice, GaussianCloud& cloud) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(choice, groups.copies));
+  const int64_t made = cloud.size() - (groups.stand_ins ? groups.count : 0);
   std::vector<CopyPlan> plans;
   plans.emplace_back(std::move(groups), choice, cloud);
   ChosenCopies done;
-  const int64_t before = cloud.size(), over = before - plans.front().merged() - choice.max_gaussians;
+  const int64_t over = made - plans.front().merged() - choice.max_gaussians;
   if (choice.max_gaussians > 0) MergeMore(plans, over, [](size_t, int64_t group) { return group; });
-  std::vector<char> keep(static_cast<size_t>(before), 1);
+  std::vector<char> keep(static_cast<size_t>(cloud.size()), 1);
   plans.front().Carry(cloud, keep);
   KeepMarked(keep, cloud);
-  done.merged = before - cloud.size();
+  done.merged = made - cloud.size();
   done.left_out = LeaveOutLeastVisible(choice.max_gaussians, cloud);
   return done;
 }

@@ -131,12 +131,14 @@ std::string CheckpointSettings(const std::string& network, const GaussianCloud& 
 }
 
 bool IsOfBlock(const CompactBlockResult& result, const Buffer<int32_t>& places, int64_t block_gaussians, int64_t copies,
-               bool waits) {
+               bool waits, bool stand_ins) {
   const auto n = static_cast<int64_t>(places.size());
   const CompactPart& part = result.part;
   const auto rows = static_cast<int64_t>(part.keys.size());
   const int64_t first = result.block * block_gaussians, own = std::min(block_gaussians, n - first);
-  if (part.made < rows || part.made > copies * own || part.inside < 0 || part.inside > own) return false;
+  if (part.inside < 0 || part.inside > own) return false;
+  const int64_t standing = waits && stand_ins ? part.inside : 0;  // rows of stand-ins that wait as well
+  if (part.made < rows - standing || part.made > copies * own) return false;
   std::vector<char> seen(static_cast<size_t>((copies + 1) * own), 0);
   for (const int64_t key : part.keys) {
     if (key < 0 || key >= (copies + 1) * n) return false;
@@ -147,8 +149,9 @@ bool IsOfBlock(const CompactBlockResult& result, const Buffer<int32_t>& places, 
     before = 1;
   }
   if (!waits) return true;
-  if (part.made != rows || copies * part.inside > rows) return false;
-  for (int64_t k = 0; k < copies; ++k) {
+  const int64_t each = copies + (stand_ins ? 1 : 0);
+  if (part.made != rows - standing || each * part.inside > rows) return false;
+  for (int64_t k = 0; k < each; ++k) {
     for (int64_t g = 0; g < part.inside; ++g) {
       if (part.keys[static_cast<size_t>(k * part.inside + g)] != k * n + part.keys[static_cast<size_t>(g)])
         return false;

@@ -22,14 +22,15 @@ struct CompactBlockResult {
   CompactPart part;
 };
 
-// All by which a run differs from another, as one JSON object of one level. `network`: fingerprint of its weights.
+// All by which a run differs from another, as one JSON object of one level. `network`: fingerprint of its weights, and
+// of those of the stand-ins.
 std::string CheckpointSettings(const std::string& network, const GaussianCloud& cloud, const CompactTask& task);
 
 // Whether what a file says is of a block of this run: rows of the block's own Gaussians, none twice, and all copies
-// where they wait for the last block. `places`: of the input's Gaussians in the order of the blocks, of
-// `block_gaussians` each.
+// where they wait for the last block, with `stand_ins` those, too. `places`: of the input's Gaussians in the order of
+// the blocks, of `block_gaussians` each.
 bool IsOfBlock(const CompactBlockResult& result, const Buffer<int32_t>& places, int64_t block_gaussians, int64_t copies,
-               bool waits);
+               bool waits, bool stand_ins);
 
 // What the blocks of a network's run have made, one behind the other in a file, so that a run that ends before its end,
 // in whatever way, is not lost: another one with the same settings reads them and makes the rest. Every block has a

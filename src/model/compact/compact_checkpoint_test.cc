@@ -117,7 +117,11 @@ TEST_F(CompactCheckpointTest, AnInterruptedRunGoesOnToTheSameBits) {
   std::vector<char> inside(kGaussians, 1);
   for (size_t i = 0; i < inside.size(); i += 3) inside[i] = 0;
   within.inside = inside;
-  for (const CompactTask& task : {Task(), bounded, within}) {
+  const auto one = CompactNetwork::Load({.copies = 1}, OpenDomain());
+  ASSERT_TRUE(one.ok());
+  CompactTask with_stand_ins = Task(), bounded_with = bounded;
+  with_stand_ins.stand_in = bounded_with.stand_in = &*one;
+  for (const CompactTask& task : {Task(), bounded, within, with_stand_ins, bounded_with}) {
     fs::remove(path_);
     const auto whole = Network().Apply(cloud_, task);
     ASSERT_TRUE(whole.ok()) << whole.error().message;
@@ -224,7 +228,10 @@ TEST_F(CompactCheckpointTest, BlocksOfAnotherRunAreNone) {
   Buffer<int32_t> places;
   for (int32_t i = 0; i < 10; ++i) places.push_back(i);
   CompactBlockResult result{.block = 1, .part = {.keys = {4, 5, 14, 15, 26}, .cloud = {}, .inside = 2, .made = 5}};
-  const auto is = [&](bool waits) { return IsOfBlock(result, places, /*block_gaussians=*/4, /*copies=*/2, waits); };
+  bool stand_ins = false;
+  const auto is = [&](bool waits) {
+    return IsOfBlock(result, places, /*block_gaussians=*/4, /*copies=*/2, waits, stand_ins);
+  };
   EXPECT_TRUE(is(false));
   EXPECT_TRUE(is(true));
   const auto with = [&](const std::function<void(CompactPart&)>& change, bool waits) {
@@ -246,6 +253,14 @@ TEST_F(CompactCheckpointTest, BlocksOfAnotherRunAreNone) {
   EXPECT_FALSE(with([](CompactPart& p) { p.made = 6; }, true));
   EXPECT_FALSE(with([](CompactPart& p) { p.inside = 3; }, true));
   EXPECT_FALSE(with([](CompactPart& p) { std::swap(p.keys[2], p.keys[3]); }, true));
+  stand_ins = true;
+  EXPECT_TRUE(is(false));  // of which none came
+  EXPECT_FALSE(is(true));
+  result.part.keys = {4, 5, 14, 15, 24, 25, 26};
+  EXPECT_TRUE(is(true));
+  EXPECT_FALSE(is(false));
+  EXPECT_FALSE(with([](CompactPart& p) { std::swap(p.keys[4], p.keys[5]); }, true));
+  EXPECT_FALSE(with([](CompactPart& p) { p.made = 7; }, true));
 }
 
 }  // namespace

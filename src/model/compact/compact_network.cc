@@ -15,7 +15,6 @@
 #include "core/stopwatch.h"
 #include "core/text.h"
 #include "model/compact/compact_checkpoint.h"
-#include "model/compact/compact_residual.h"
 #include "model/compact/compact_start.h"
 #include "model/kernels/edge_messages.h"
 #include "model/kernels/layer_norm.h"
@@ -166,7 +165,8 @@ float CompactNetwork::Fade(const float* node, const std::array<float, 3>& widths
 
 namespace {
 
-Status CheckTask(const GaussianCloud& cloud, const CompactTask& task, int64_t copies) {
+Status CheckTask(const GaussianCloud& cloud, const CompactTask& task, const CompactConfig& config) {
+  const int64_t copies = config.copies;
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   const int64_t n = cloud.size();
   if (n == 0) return Error{ErrorCode::kBadArgument, "the splat has no Gaussians"};
@@ -184,6 +184,13 @@ Status CheckTask(const GaussianCloud& cloud, const CompactTask& task, int64_t co
     }
   }
   if (task.choice) ANCHORSPLAT_RETURN_IF_ERROR(Validate(*task.choice, copies));
+  if (task.stand_in != nullptr) {
+    const CompactConfig& other = task.stand_in->config();
+    if (other.copies != 1 || other.neighbours != config.neighbours || other.rounds != config.rounds ||
+        other.context != config.context || other.knows_kind != config.knows_kind) {
+      return Error{ErrorCode::kBadArgument, "the network of the stand-ins makes more than one or sees something else"};
+    }
+  }
   if (task.block_gaussians < 1) return Error{ErrorCode::kBadArgument, "a block of no Gaussians"};
   if (!(task.upscale >= 1) || !std::isfinite(task.upscale) || !(task.strength >= 0) || !std::isfinite(task.strength)) {
     return Error{ErrorCode::kBadArgument, Cat("upscale ", task.upscale, " must be at least 1 and the filter strength ",
@@ -233,15 +240,20 @@ struct BlockPlaces {
   Buffer<int64_t> first;  // of each of the block's own, the row of its first copy
   int64_t inside = 0;     // Gaussians that have copies
   int64_t alone = 0;      // Gaussians that have none
-  int64_t made = 0;       // rows
+  int64_t made = 0;       // rows, with stand-ins
 };
 
-BlockPlaces PlacesOf(const CompactBlock& block, const Buffer<float>& fades, const Buffer<int32_t>& rows,
-                     int64_t copies) {
+// Whether Gaussians have stand-ins for their copies.
+bool HasStandIns(const CompactTask& task, int64_t copies) {
+  return task.stand_in != nullptr && copies > 1 && task.choice && !task.choice->copies;
+}
+
+// `each`: rows of one that has copies.
+BlockPlaces PlacesOf(const CompactBlock& block, const Buffer<float>& fades, const Buffer<int32_t>& rows, int64_t each) {
   BlockPlaces places;
   places.inside = std::ranges::count_if(fades, [](float fade) { return fade > 0; });
   places.alone = std::ranges::count(fades, 0.0f);
-  places.made = copies * places.inside + places.alone;
+  places.made = each * places.inside + places.alone;
   places.rows.resize(static_cast<size_t>(places.inside + places.alone));
   places.first.resize(fades.size());
   int64_t inside = 0, alone = places.inside;
@@ -250,7 +262,7 @@ BlockPlaces PlacesOf(const CompactBlock& block, const Buffer<float>& fades, cons
     const bool copied = fades[i] > 0;
     const int64_t at = copied ? inside++ : alone++;
     places.rows[static_cast<size_t>(at)] = rows[static_cast<size_t>(block.rows[i])];
-    places.first[i] = copied ? at : at + (copies - 1) * places.inside;
+    places.first[i] = copied ? at : at + (each - 1) * places.inside;
   }
   return places;
 }
@@ -258,6 +270,7 @@ BlockPlaces PlacesOf(const CompactBlock& block, const Buffer<float>& fades, cons
 // What the choice among a block's copies is told.
 CopyGroups GroupsOf(const CompactTask& task, const BlockPlaces& places, int64_t copies) {
   CopyGroups groups{.count = places.inside, .copies = copies, .pixel_sizes = {}};
+  groups.stand_ins = HasStandIns(task, copies);
   const auto closer = [&](float pixel) { return static_cast<float>(pixel / task.upscale); };
   if (task.pixel_sizes.size() == 1) groups.pixel_sizes = {closer(task.pixel_sizes.front())};
   for (int64_t g = 0; g < places.inside; ++g) {
@@ -285,22 +298,52 @@ Buffer<float> CompactNetwork::Fades(const CompactFeatures& features, const Compa
   return fades;
 }
 
-Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTask& task) const {
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckTask(cloud, task, config_.copies));
-  const int64_t n = cloud.size(), copies = config_.copies;
+int64_t CompactNetwork::Make(const CompactFeatures& features, const CompactAnchors& anchors, const CompactBlock& block,
+                             std::span<const float> fades, std::span<const int64_t> first, int64_t stride,
+                             States& states, GaussianCloud& made) const {
   CompactConfig single = config_;
   single.copies = 1;
-  const CopyStart start(copies, config_.spread), single_start(1, 0);
-  const double offset_side = config_.offset_unit == OffsetUnit::kCube ? CubeSide(cloud.means) : 0;
+  const CopyStart start(config_.copies, config_.spread), single_start(1, 0);
   const std::vector<float> nothing(static_cast<size_t>(CompactOutputs(config_)), 0.0f);
+  std::atomic<int64_t> not_finite = 0;
+  FindStates(features, block, anchors.graph->neighbours, states);
+  ParallelFor(0, block.own(), kRowsPerTask, [&](int64_t begin, int64_t end) {
+    Buffer<float> raw(static_cast<size_t>((end - begin) * out_.outputs()));
+    Head(features, block, states, begin, end, raw.data());
+    for (int64_t place = begin; place < end; ++place) {
+      const int64_t i = block.rows[static_cast<size_t>(place)];
+      const float fade = fades[static_cast<size_t>(place)];
+      const int64_t row = first[static_cast<size_t>(place)];
+      if (fade == kLeftOut) continue;
+      if (fade > 0) {
+        const float* said = raw.data() + (place - begin) * out_.outputs();
+        if (!AllFinite(said, out_.outputs())) {
+          said = nothing.data();
+          ++not_finite;
+        }
+        WriteCopies(config_, start, anchors, i, said, fade, row, stride, made);
+      } else {
+        WriteCopies(single, single_start, anchors, i, nothing.data(), 0, row, 1, made);
+      }
+    }
+  });
+  return not_finite;
+}
+
+Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTask& task) const {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckTask(cloud, task, config_));
+  const int64_t n = cloud.size(), copies = config_.copies;
+  const bool stand_ins = HasStandIns(task, copies);
+  const double offset_side = config_.offset_unit == OffsetUnit::kCube ? CubeSide(cloud.means) : 0;
   CompactResult result;
   Stopwatch watch;
   std::vector<std::string> comments = std::move(cloud.comments);
   std::optional<CompactCheckpoint> checkpoint;
   if (!task.checkpoint.empty()) {
+    const std::string network = Cat(fingerprint_, stand_ins ? task.stand_in->fingerprint_ : "");
     ANCHORSPLAT_ASSIGN_OR_RETURN(
         CompactCheckpoint opened,
-        CompactCheckpoint::Open(task.checkpoint, CheckpointSettings(fingerprint_, cloud, task), task.resume));
+        CompactCheckpoint::Open(task.checkpoint, CheckpointSettings(network, cloud, task), task.resume));
     checkpoint.emplace(std::move(opened));
   }
   try {
@@ -337,7 +380,7 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
         ANCHORSPLAT_ASSIGN_OR_RETURN(const bool more, checkpoint->Next(near.cloud, of_block));
         if (!more) break;
         if (of_block.block < next || of_block.block >= blocks.count() ||
-            !IsOfBlock(of_block, at, task.block_gaussians, copies, output.waits())) {
+            !IsOfBlock(of_block, at, task.block_gaussians, copies, output.waits(), stand_ins)) {
           return Error{ErrorCode::kBadFile, Cat(task.checkpoint.string(), ": block ", of_block.block,
                                                 " is none of this run's; -w begins anew")};
         }
@@ -364,37 +407,24 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
         const int32_t row = near.rows[static_cast<size_t>(block.rows[i])];
         if (task.inside[static_cast<size_t>(row)] == 0) fades[i] = kLeftOut;
       }
-      const BlockPlaces places = PlacesOf(block, fades, near.rows, copies);
+      const BlockPlaces places = PlacesOf(block, fades, near.rows, copies + (stand_ins ? 1 : 0));
       progress.Advance(block.own());
       if (places.made == 0) continue;
-      std::atomic<int64_t> not_finite = 0;
       made.Resize(places.made, near.cloud.sh_degree);
-      FindStates(features, block, near.graph.neighbours, states);
-      ParallelFor(0, block.own(), kRowsPerTask, [&](int64_t begin, int64_t end) {
-        Buffer<float> raw(static_cast<size_t>((end - begin) * out_.outputs()));
-        Head(features, block, states, begin, end, raw.data());
-        for (int64_t place = begin; place < end; ++place) {
-          const int64_t i = block.rows[static_cast<size_t>(place)];
-          const float fade = fades[static_cast<size_t>(place)];
-          const int64_t row = places.first[static_cast<size_t>(place)];
-          if (fade == kLeftOut) continue;
-          if (fade > 0) {
-            const float* said = raw.data() + (place - begin) * out_.outputs();
-            if (!AllFinite(said, out_.outputs())) {
-              said = nothing.data();
-              ++not_finite;
-            }
-            WriteCopies(config_, start, anchors, i, said, fade, row, places.inside, made);
-          } else {
-            WriteCopies(single, single_start, anchors, i, nothing.data(), 0, row, 1, made);
-          }
+      of_block.not_finite = Make(features, anchors, block, fades, places.first, places.inside, states, made);
+      if (stand_ins) {
+        Buffer<float> others = task.stand_in->Fades(features, block);
+        Buffer<int64_t> rows = places.first;
+        for (size_t i = 0; i < fades.size(); ++i) {
+          if (!(fades[i] > 0)) others[i] = kLeftOut;
+          rows[i] += copies * places.inside;
         }
-      });
+        task.stand_in->Make(features, anchors, block, others, rows, 1, states, made);
+      }
       result.times.network += watch.Lap();
       of_block.block = b;
       of_block.outside = places.alone;
       of_block.partly = std::ranges::count_if(fades, [](float fade) { return fade > 0 && fade < 1; });
-      of_block.not_finite = not_finite;
       CopyGroups groups = GroupsOf(task, places, copies);
       output.Merge(places.rows, groups, of_block.part);
       if (checkpoint) checkpoint->Append(of_block);

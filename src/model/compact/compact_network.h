@@ -17,6 +17,7 @@
 #include "model/compact/compact_config.h"
 #include "model/compact/compact_features.h"
 #include "model/compact/compact_output.h"
+#include "model/compact/compact_residual.h"
 #include "model/kernels/packed_weights.h"
 #include "model/shared/weights.h"
 #include "tensors/tensor_file.h"
@@ -25,6 +26,8 @@ namespace anchorsplat {
 
 // States of so many and of those around them stay in the caches of most machines.
 inline constexpr int64_t kCompactBlock = 65'536;
+
+class CompactNetwork;
 
 // What a compact network is asked for.
 struct CompactTask {
@@ -37,6 +40,9 @@ struct CompactTask {
   std::optional<CopyChoice> choice = std::nullopt;
   // Gaussians of which one copy stays where costs choose, ascending.
   std::span<const int64_t> single = {};
+  // Makes one Gaussian of one, which may stand in for all the copies where costs choose and no number of copies is
+  // given; of the same neighbours, rounds, context and features as the network itself. Nothing: none does.
+  const CompactNetwork* stand_in = nullptr;
   // 0: a Gaussian that others hear from and of which nothing comes out; one per Gaussian, empty: none.
   std::span<const char> inside = {};
   // Where what the blocks have made is kept, for a run that ends before its end; empty: nowhere.
@@ -45,7 +51,8 @@ struct CompactTask {
 };
 
 struct CompactResult {
-  GaussianCloud cloud;  // copy k of all anchors before copy k + 1, then those that stayed alone; the input's metadata
+  // Copy k of all anchors before copy k + 1, then stand-ins and those that stayed alone; the input's metadata.
+  GaussianCloud cloud;
   int64_t outside = 0;  // Gaussians unlike the training data: filtered, and nothing else
   int64_t partly = 0;   // Gaussians somewhat unlike it: a part of the residual
   int64_t not_finite = 0;  // Gaussians for which the network says something that is not finite: its start
@@ -79,8 +86,8 @@ class CompactNetwork {
   // threads. Needs about 1.5 KB per Gaussian of a block, and 150 bytes of Buffers per Gaussian of the cloud, besides
   // the cloud, which is given back before the result is put in order, and twice the result. Errors (kBadArgument): of
   // Validate(cloud) and Validate(choice); no Gaussians or 2^31 rows; a wrong number of pixel sizes, one that is not
-  // positive and finite; upscale below 1; a strength that is negative; more output than memory holds. Of
-  // the checkpoint: those of CompactCheckpoint. kInterrupted: the user stopped it; the checkpoint stays.
+  // positive and finite; upscale below 1; a strength that is negative; a stand-in of another shape; more output than
+  // memory holds. Of the checkpoint: those of CompactCheckpoint. kInterrupted: the user stopped it; the checkpoint stays.
   Result<CompactResult> Apply(GaussianCloud cloud, const CompactTask& task) const;
 
   // The raw outputs [N, CompactOutputs(config())] for the features of a cloud, before bounds and fading.
@@ -105,6 +112,12 @@ class CompactNetwork {
   // Of the block's own Gaussians begin to end.
   void Head(const CompactFeatures& features, const CompactBlock& block, const States& states, int64_t begin,
             int64_t end, float* out) const;
+  // Writes what the network makes of a block's own Gaussians into `made`: copies where the fade is more than 0, what the
+  // filter makes where it is 0, nothing where it is below. `first`: the row of the first copy of each, `stride`: from
+  // one copy to the next. Returns how many it says something not finite about.
+  int64_t Make(const CompactFeatures& features, const CompactAnchors& anchors, const CompactBlock& block,
+               std::span<const float> fades, std::span<const int64_t> first, int64_t stride, States& states,
+               GaussianCloud& made) const;
   // Of a block's own Gaussians.
   Buffer<float> Fades(const CompactFeatures& features, const CompactBlock& block) const;
   float Fade(const float* node, const std::array<float, 3>& widths) const;

@@ -78,17 +78,18 @@ void CompactOutput::Add(const Buffer<int32_t>& rows, CopyGroups groups, Gaussian
 void CompactOutput::Merge(const Buffer<int32_t>& rows, CopyGroups& groups, CompactPart& part) {
   GaussianCloud& block = part.cloud;
   part.inside = groups.count;
-  part.made = block.size();
+  part.made = block.size() - (groups.stand_ins ? part.inside : 0);
   part.keys.clear();
-  for (int64_t k = 0; k < copies_; ++k) {
+  for (int64_t k = 0; k < copies_ + (groups.stand_ins ? 1 : 0); ++k) {
     for (int64_t g = 0; g < part.inside; ++g) part.keys.push_back(k * count_ + rows[static_cast<size_t>(g)]);
   }
   for (auto alone = static_cast<size_t>(part.inside); alone < rows.size(); ++alone) {
     part.keys.push_back(copies_ * count_ + rows[alone]);
   }
   if (!merges_ || waits_ || part.inside == 0) return;
+  const bool stand_ins = groups.stand_ins;
   const CopyPlan plan(std::move(groups), choice_, block);
-  if (plan.merged() == 0) return;
+  if (plan.merged() == 0 && !stand_ins) return;
   std::vector<char> keep(static_cast<size_t>(block.size()), 1);
   plan.Carry(block, keep);
   KeepMarked(keep, block);

@@ -23,10 +23,10 @@ struct ChosenCopies {
 // What a network makes of a block.
 struct CompactPart {
   Buffer<int64_t> keys;  // by which the rows of all blocks are ordered: k·count + g of copy k of Gaussian g of the
-                         // input, copies·count + g of one that stands alone
+                         // input, copies·count + g of a stand-in for its copies, and of one that stands alone
   GaussianCloud cloud;
   int64_t inside = 0;  // Gaussians that have copies; where all of these are there, the rows of copy 0 come first
-  int64_t made = 0;    // rows before copies were merged
+  int64_t made = 0;    // rows before copies were merged, without stand-ins
 };
 
 // What a network makes of a splat, gathered block by block in any order. Copies are merged as soon as their block is
@@ -37,7 +37,8 @@ class CompactOutput {
   // `count` Gaussians become at most `copies` each.
   CompactOutput(int64_t count, int64_t copies, const CopyChoice& choice);
 
-  // Of the block's first groups.count Gaussians copy k of all before copy k + 1, then one of each of the others.
+  // Of the block's first groups.count Gaussians copy k of all before copy k + 1, then their stand-ins, if there are,
+  // then one of each of the others.
   // `rows`: all its Gaussians in the input. The block is used up, but keeps its memory.
   void Add(const Buffer<int32_t>& rows, CopyGroups groups, GaussianCloud& block);
 
@@ -49,7 +50,8 @@ class CompactOutput {
   // Whether all copies wait for the last block, so that parts have all of them.
   bool waits() const { return waits_; }
 
-  // Copy k of all Gaussians before copy k + 1, then those that stand alone, each in the order of the input.
+  // Copy k of all Gaussians before copy k + 1, then stand-ins and those that stand alone, each in the order of the
+  // input.
   GaussianCloud Finish(ChosenCopies& chosen);
 
  private:

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -100,6 +101,86 @@ TEST(CompactOutput, BlocksAreChosenAsTheWhole) {
       task.choice.reset();
       task.single = {};
     }
+  }
+}
+
+// The same where another network's Gaussian may stand for all copies.
+TEST(CompactOutput, StandInsAreChosenAsInTheWhole) {
+  const GaussianCloud cloud = Sheet();
+  const CompactNetwork network = Network();
+  // Like the network's own copies, whose filter it shares; the domain is open, or else it says nothing of some.
+  const auto one = CompactNetwork::Load({.copies = 1}, OpenDomain());
+  ASSERT_TRUE(one.ok());
+  const float pixel = kSheetPixel;
+  CompactTask task{.pixel_sizes = {&pixel, 1}, .upscale = 4, .strength = DefaultFilterStrength(4)};
+  const auto all = network.Apply(cloud, task), stand_ins = one->Apply(cloud, task);
+  ASSERT_TRUE(all.ok() && stand_ins.ok());
+  ASSERT_EQ(stand_ins->cloud.size(), kCount);
+  const int64_t inside = kCount - all->outside;
+  std::vector<int64_t> rows, of_stand_ins;
+  for (int64_t i = 0; i < 4 * inside; ++i) rows.push_back(i);
+  for (int64_t i = 0; i < kCount; ++i) {
+    if (i % 50 != 5) of_stand_ins.push_back(i);
+  }
+  GaussianCloud copies = Subset(all->cloud, rows).value();
+  ASSERT_TRUE(Append(copies, Subset(stand_ins->cloud, of_stand_ins).value()).ok());
+  task.stand_in = &*one;
+  int64_t came = 0;
+  for (const CopyChoice& choice : {CopyChoice{.merge_cost = 3e-3}, CopyChoice{.merge_cost = 3e-3, .invisible = 0.05f},
+                                   CopyChoice{.merge_cost = 1e-6, .max_gaussians = 1500},
+                                   CopyChoice{.max_gaussians = 901}}) {
+    GaussianCloud expected = copies;
+    CopyGroups groups{.count = inside, .copies = 4, .pixel_sizes = {pixel / 4}, .stand_ins = true};
+    CopyChoice of_copies = choice;
+    if (of_copies.max_gaussians > 0) of_copies.max_gaussians -= all->outside;
+    ASSERT_TRUE(ChooseCopies(groups, of_copies, expected).ok());
+    task.choice = choice;
+    for (const int64_t block : {int64_t{97}, int64_t{400}, kCount}) {
+      SCOPED_TRACE(block);
+      task.block_gaussians = block;
+      const auto blocks = network.Apply(cloud, task);
+      ASSERT_TRUE(blocks.ok());
+      EXPECT_EQ(blocks->made, 4 * inside + all->outside);
+      EXPECT_EQ(blocks->chosen.merged, blocks->made - blocks->cloud.size());
+      // Without those that stand alone, which are put in order among the stand-ins.
+      std::vector<int64_t> others;
+      for (int64_t row = 0; row < blocks->cloud.size(); ++row) {
+        const float* mean = blocks->cloud.means.data() + 3 * row;
+        bool alone = false;
+        for (int64_t i = 5; i < kCount; i += 50) alone |= std::equal(mean, mean + 3, cloud.means.data() + 3 * i);
+        if (!alone) others.push_back(row);
+      }
+      ExpectSameValues(Subset(blocks->cloud, others).value(), expected);
+      for (int64_t row = 0; row < expected.size(); ++row) {
+        for (const int64_t i : of_stand_ins) {
+          came += std::equal(expected.means.data() + 3 * row, expected.means.data() + 3 * row + 3,
+                             stand_ins->cloud.means.data() + 3 * i);
+        }
+      }
+    }
+  }
+  EXPECT_GT(came, 100);
+  // Whoever asks for a number of copies gets those.
+  for (const int64_t number : {2, 4}) {
+    task.choice = CopyChoice{.copies = number};
+    CompactTask without = task;
+    without.stand_in = nullptr;
+    ExpectSameValues(network.Apply(cloud, task)->cloud, network.Apply(cloud, without)->cloud);
+  }
+}
+
+TEST(CompactOutput, RefusesAStandInOfAnotherShape) {
+  const float pixel = kSheetPixel;
+  CompactTask task{.pixel_sizes = {&pixel, 1}, .choice = CopyChoice{}};
+  for (const CompactConfig& config : {CompactConfig{.copies = 2}, CompactConfig{.copies = 1, .rounds = 1},
+                                      CompactConfig{.copies = 1, .neighbours = 7},
+                                      CompactConfig{.copies = 1, .knows_kind = true}}) {
+    const auto other = CompactNetwork::Load(config, OpenDomain());
+    ASSERT_TRUE(other.ok());
+    task.stand_in = &*other;
+    const auto result = Network().Apply(Sheet(), task);
+    ASSERT_FALSE(result.ok());
+    EXPECT_EQ(result.error().code, ErrorCode::kBadArgument);
   }
 }
 

@@ -18,6 +18,24 @@ bool IsWanted(const CopyChoice& choice, int64_t alive, float cost) {
   return choice.copies ? alive > *choice.copies : cost <= choice.merge_cost;
 }
 
+// Makes the last of the steps one that brings a stand-in, at `cost` instead of what all steps to one copy cost: from
+// where the cost per Gaussian is greatest, which is where the hull of all costs goes to it, each of the steps that are
+// left costs its part. Where the steps cost no more, they stay.
+void EndWithStandIn(double cost, std::span<CopyGroup::Step> steps) {
+  double before = 0, greatest = -1;
+  size_t from = 0;
+  for (size_t s = 0; s < steps.size(); ++s) {
+    const double each = (cost - before) / static_cast<double>(steps.size() - s);
+    if (each > greatest) {
+      greatest = each;
+      from = s;
+    }
+    before += double{steps[s].cost};
+  }
+  if (!(cost < before)) return;
+  for (CopyGroup::Step& step : steps.subspan(from)) step.cost = static_cast<float>(std::max(0.0, greatest));
+}
+
 }  // namespace
 
 Status Validate(const CopyChoice& choice, int64_t made) {
@@ -39,7 +57,9 @@ CopyPlan::CopyPlan(CopyGroups groups, const CopyChoice& choice, const GaussianCl
     : groups_(std::move(groups)),
       invisible_(choice.invisible),
       steps_(static_cast<size_t>(groups_.count * (groups_.copies - 1))),
-      chosen_(static_cast<size_t>(groups_.count), 0) {
+      chosen_(static_cast<size_t>(groups_.count), 0),
+      usable_(static_cast<size_t>(groups_.stand_ins ? groups_.count : 0), 0) {
+  const bool all_steps = choice.max_gaussians > 0 || groups_.stand_ins;
   ParallelFor(0, groups_.count, kGroupsPerTask, [&](int64_t begin, int64_t end) {
     CopyGroup group(groups_.copies, invisible_);
     for (int64_t g = begin; g < end; ++g) {
@@ -54,9 +74,19 @@ CopyPlan::CopyPlan(CopyGroups groups, const CopyChoice& choice, const GaussianCl
         step->cost = most = std::max(most, step->cost);
         wanted = wanted && (single || IsWanted(choice, group.alive(), step->cost));
         if (wanted) ++chosen;
-        if (!wanted && choice.max_gaussians == 0) break;
+        if (!wanted && !all_steps) break;
         group.Do(*step);
       }
+      if (!groups_.stand_ins || groups_.copies == 1) continue;
+      const double cost = kStandInShare * group.CostOfStandIn(cloud, StandInOf(g));
+      if (!std::isfinite(cost)) continue;
+      const std::span<CopyGroup::Step> steps(StepsOf(g), static_cast<size_t>(groups_.copies - 1));
+      usable_[static_cast<size_t>(g)] = 1;
+      EndWithStandIn(cost, steps);
+      if (single || choice.copies) continue;
+      chosen = static_cast<uint8_t>(std::ranges::find_if(steps, [&](const CopyGroup::Step& s) {
+                                      return !(s.cost <= choice.merge_cost);
+                                    }) - steps.begin());
     }
   });
 }
@@ -72,6 +102,13 @@ void CopyPlan::Carry(GaussianCloud& cloud, std::vector<char>& keep) const {
     CopyGroup group(groups_.copies, invisible_);
     for (int64_t g = begin; g < end; ++g) {
       const int64_t chosen = chosen_[static_cast<size_t>(g)];
+      if (StandsIn(g)) {
+        for (int64_t k = 0; k < groups_.copies; ++k) {
+          keep[static_cast<size_t>(groups_.first + k * groups_.count + g)] = 0;
+        }
+        continue;
+      }
+      if (groups_.stand_ins) keep[static_cast<size_t>(StandInOf(g))] = 0;
       if (chosen == 0) continue;
       group.Load(cloud, groups_.first + g, groups_.count, groups_.copies, PixelOf(g), /*colors=*/false);
       for (int64_t s = 0; s < chosen; ++s) group.Do(StepsOf(g)[s]);

@@ -4,13 +4,16 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "core/activations.h"
 #include "core/parallel.h"
 #include "core/random.h"
 #include "core/rotation.h"
+#include "core/spherical_harmonics.h"
 #include "enhance/filter.h"
 #include "model/compact/choose_copies_for_test.h"
 #include "model/compact/compact_network.h"
@@ -209,6 +212,163 @@ TEST(CopyChoice, GaussiansThatStandAloneStay) {
   ASSERT_EQ(cloud.size(), 50);
   EXPECT_TRUE(std::equal(alone.means.begin(), alone.means.end(), cloud.means.begin() + 120));
   EXPECT_TRUE(std::equal(alone.sh.begin(), alone.sh.end(), cloud.sh.begin() + 40 * 12));
+}
+
+// Copies, then one stand-in for those of each.
+struct WithStandIns {
+  GaussianCloud cloud;
+  CopyGroups groups;
+};
+WithStandIns With(const GaussianCloud& copies, const GaussianCloud& stand_ins) {
+  WithStandIns with{copies, Groups(stand_ins.size(), copies.size() / stand_ins.size())};
+  EXPECT_TRUE(Append(with.cloud, stand_ins).ok());
+  with.groups.stand_ins = true;
+  return with;
+}
+
+// The square of the difference of the pictures over the three views along the axes, mean over these and over red, green
+// and blue, by sums over pixels. Copies and the stand-in are balls around the x axis, of degree 0.
+double CostOnAGrid(const GaussianCloud& cloud, int64_t copies, double less) {
+  const int64_t all = copies + 1;
+  std::vector<double> variance, opacity, mass;
+  double mass_of_copies = 0;
+  for (int64_t k = 0; k < all; ++k) {
+    const double stored = Sigmoid(double{cloud.opacity_logits[static_cast<size_t>(k)]});
+    const double length = std::exp(double{cloud.log_scales[static_cast<size_t>(3 * k)]}) / kClosePixel;
+    variance.push_back((length * length + 0.3) * SeenVariance(stored));
+    opacity.push_back((stored - 1.0 / 255) / SeenVariance(stored));
+    mass.push_back(opacity.back() * variance.back());
+    if (k < copies) mass_of_copies += mass.back();
+  }
+  std::array<double, 3> mean{};
+  for (int64_t k = 0; k < copies; ++k) {
+    for (size_t c = 0; c < 3; ++c) {
+      mean[c] += mass[static_cast<size_t>(k)] / mass_of_copies * cloud.sh[static_cast<size_t>(3 * k) + c];
+    }
+  }
+  double cost = 0;
+  constexpr double kStep = 0.1;
+  for (int view = 0; view < 3; ++view) {  // along x, where all are at one place, along y and along z
+    for (double u = -12; u <= 12; u += kStep) {
+      for (double v = -12; v <= 12; v += kStep) {
+        double alpha = 0;
+        std::array<double, 3> color{};
+        for (int64_t k = 0; k < all; ++k) {
+          const auto at = static_cast<size_t>(k);
+          const double x = view == 0 ? 0 : (cloud.means[3 * at] - cloud.means[0]) / kClosePixel;
+          const double square = (u - x) * (u - x) + v * v;
+          const double a = (k < copies ? less : -1) * opacity[at] * std::exp(-0.5 * square / variance[at]);
+          alpha += a;
+          for (size_t c = 0; c < 3; ++c) color[c] += a * (cloud.sh[3 * at + c] - mean[c]);
+        }
+        for (size_t c = 0; c < 3; ++c) {
+          cost += kStep * kStep / 9 * (kSh0 * kSh0 * color[c] * color[c] + kBehind * kBehind * alpha * alpha);
+        }
+      }
+    }
+  }
+  return cost;
+}
+
+TEST(CopyChoice, AStandInCostsWhatThePictureChanges) {
+  GaussianCloud cloud;
+  cloud.Resize(4, 0);
+  std::ranges::fill(cloud.means, 0.0f);
+  std::ranges::fill(cloud.quats, 0.0f);
+  for (size_t k = 0; k < 4; ++k) cloud.quats[4 * k] = 1;
+  for (const double apart : {0.0, 0.7, 2.0}) {
+    for (const double other : {0.0, 0.5}) {  // than the middle of the copies
+      for (size_t k = 0; k < 4; ++k) {
+        cloud.means[3 * k] = static_cast<float>(kClosePixel * (k < 3 ? apart * (double(k) - 1) : 2 * other));
+        const double length = (k < 3 ? 1.2 + 0.2 * double(k) : 1.6 + other) * kClosePixel;
+        for (size_t c = 0; c < 3; ++c) {
+          cloud.log_scales[3 * k + c] = static_cast<float>(std::log(length));
+          cloud.sh[3 * k + c] = static_cast<float>(0.3 * double(c) + (k == 1 ? 0.4 : 0) + (k == 3 ? other : 0.1));
+        }
+        cloud.opacity_logits[k] = k < 3 ? -1.0f : 0.5f;
+      }
+      CopyGroup group(3, 0);
+      group.Load(cloud, 0, 1, 3, kClosePixel, /*colors=*/true);
+      double before = 0;
+      for (size_t k = 0; k < 3; ++k) {
+        const double seen = SeenVariance(Sigmoid(-1.0));
+        MergeGaussian g;
+        const double length = (1.2 + 0.2 * double(k)), variance = (length * length + 0.3) * seen;
+        g.covariance = {variance, 0, 0, variance, 0, variance};
+        g.opacity = (Sigmoid(-1.0) - 1.0 / 255) / seen;
+        Measure(g);
+        before += g.mass;
+      }
+      while (group.alive() > 1) group.Do(group.Next());
+      const double less = group.Mass() / before;
+      EXPECT_LT(less, 1);
+      const double cost = group.CostOfStandIn(cloud, 3), expected = CostOnAGrid(cloud, 3, less);
+      EXPECT_NEAR(cost, expected, 1e-3 * expected + 1e-6) << apart << ' ' << other;
+    }
+  }
+}
+
+TEST(CopyChoice, StandInsComeWhereTheyAreCheap) {
+  const GaussianCloud made = Copies(500, 4, 0.2);
+  GaussianCloud merged = made;
+  ASSERT_TRUE(ChooseCopies(Groups(500, 4), {.copies = 1}, merged).ok());
+  ASSERT_EQ(merged.size(), 500);
+  GaussianCloud wrong = merged;
+  for (size_t i = 0; i < wrong.sh.size(); ++i) wrong.sh[i] += 3;
+  for (const double cost : {0.0, 1e-4, 1e-3, 1e-2}) {
+    GaussianCloud without = made;
+    ASSERT_TRUE(ChooseCopies(Groups(500, 4), {.merge_cost = cost}, without).ok());
+    WithStandIns good = With(made, merged), bad = With(made, wrong);
+    ASSERT_TRUE(ChooseCopies(good.groups, {.merge_cost = cost}, good.cloud).ok());
+    ASSERT_TRUE(ChooseCopies(bad.groups, {.merge_cost = cost}, bad.cloud).ok());
+    // What stands for all copies is counted at a part of what it costs, and so comes before the merges do, or as they.
+    EXPECT_LE(good.cloud.size(), bad.cloud.size()) << cost;
+    EXPECT_LE(bad.cloud.size(), without.size()) << cost;
+    if (cost == 1e-2) {
+      EXPECT_LT(good.cloud.size(), without.size() - 20);
+      EXPECT_LT(good.cloud.size(), bad.cloud.size() - 20);
+    }
+  }
+}
+
+TEST(CopyChoice, WhereOneStaysItIsTheStandIn) {
+  const GaussianCloud made = Copies(300, 4, 0.2), others = SheetCloud(300, 1, 9);
+  for (const CopyChoice& choice : {CopyChoice{.merge_cost = 1e9}, CopyChoice{.merge_cost = 0, .max_gaussians = 300},
+                                   CopyChoice{.copies = 1}}) {
+    WithStandIns with = With(made, others);
+    ASSERT_TRUE(ChooseCopies(with.groups, choice, with.cloud).ok());
+    EXPECT_TRUE(SameValues(with.cloud, others));
+  }
+  WithStandIns dust = With(made, others);
+  dust.groups.single.assign(300, 0);
+  for (size_t g = 0; g < 300; g += 3) dust.groups.single[g] = 1;
+  ASSERT_TRUE(ChooseCopies(dust.groups, {.merge_cost = 0}, dust.cloud).ok());
+  EXPECT_EQ(std::ranges::count(dust.cloud.means, others.means[3 * 297]), 1);
+  // A budget is kept exactly.
+  for (const int64_t most : {299, 301, 700, 1199}) {
+    WithStandIns budget = With(made, others);
+    const auto done = ChooseCopies(budget.groups, {.copies = 4, .max_gaussians = most}, budget.cloud);
+    ASSERT_TRUE(done.ok());
+    EXPECT_EQ(budget.cloud.size(), most);
+    EXPECT_EQ(done->merged + done->left_out, 1200 - most);
+  }
+}
+
+// Of which there is no telling what they would look like.
+TEST(CopyChoice, AStandInThatIsNoneLeavesTheCopies) {
+  const GaussianCloud made = Copies(40, 4, 0.2);
+  GaussianCloud broken = SheetCloud(40, 1, 9);
+  for (float& x : broken.means) x = 3e38f;
+  for (const CopyChoice& choice : {CopyChoice{.merge_cost = 1e-3}, CopyChoice{.merge_cost = 0, .max_gaussians = 40}}) {
+    WithStandIns with = With(made, broken);
+    GaussianCloud without = made;
+    ASSERT_TRUE(ChooseCopies(with.groups, choice, with.cloud).ok());
+    ASSERT_TRUE(ChooseCopies(Groups(40, 4), choice, without).ok());
+    for (int64_t i = 0; i < with.cloud.size(); ++i) EXPECT_TRUE(IsUsable(with.cloud, i));
+    if (choice.max_gaussians > 0) {
+      EXPECT_EQ(with.cloud.size(), 40);
+    }
+  }
 }
 
 TEST(CopyChoice, OddGaussiansStayUsable) {

@@ -51,6 +51,36 @@ CopyGroup::CopyGroup(int64_t most, float invisible) : invisible_(std::max(invisi
   color_products_.resize(count * count);
   weights_.resize(count * count);
   costs_.resize(count * count);
+  loaded_.resize(count + 1);
+  stand_in_products_.resize((count + 1) * (count + 1));
+}
+
+MergeGaussian CopyGroup::Seen(const GaussianCloud& cloud, int64_t row, double& stored_opacity) const {
+  MergeGaussian g;
+  const std::array<double, 9> turn = Relative(frame_, RotationOf(cloud, row));
+  std::array<double, 3> shift, variance;
+  for (size_t c = 0; c < 3; ++c) {
+    shift[c] = (cloud.means[static_cast<size_t>(3 * row) + c] - origin_[c]) / pixel_;
+    const double length = std::exp(double{cloud.log_scales[static_cast<size_t>(3 * row) + c]}) / pixel_;
+    variance[c] = length * length;
+  }
+  g.thinnest = std::min({variance[0], variance[1], variance[2]});
+  for (size_t c = 0; c < 3; ++c) {
+    g.mean[c] = frame_[c] * shift[0] + frame_[3 + c] * shift[1] + frame_[6 + c] * shift[2];
+  }
+  size_t at = 0;
+  for (size_t i = 0; i < 3; ++i) {
+    for (size_t j = i; j < 3; ++j, ++at) {
+      g.covariance[at] = i == j ? dilation_ : 0;
+      for (size_t c = 0; c < 3; ++c) g.covariance[at] += turn[3 * i + c] * variance[c] * turn[3 * j + c];
+    }
+  }
+  stored_opacity = Sigmoid(double{cloud.opacity_logits[static_cast<size_t>(row)]});
+  const double seen = SeenVariance(stored_opacity);
+  for (double& x : g.covariance) x *= seen;
+  g.opacity = std::max(0.0, stored_opacity - kMinAlpha) / seen;
+  Measure(g);
+  return g;
 }
 
 void CopyGroup::Load(const GaussianCloud& cloud, int64_t first, int64_t stride, int64_t copies, double pixel,
@@ -69,31 +99,7 @@ void CopyGroup::Load(const GaussianCloud& cloud, int64_t first, int64_t stride, 
   for (size_t k = 0; k < copies_.size(); ++k) {
     const int64_t row = first + static_cast<int64_t>(k) * stride;
     copies_[k] = {};
-    MergeGaussian& g = copies_[k].gaussian;
-    const std::array<double, 9> turn = Relative(frame_, RotationOf(cloud, row));
-    std::array<double, 3> shift, variance;
-    for (size_t c = 0; c < 3; ++c) {
-      shift[c] = (cloud.means[static_cast<size_t>(3 * row) + c] - origin_[c]) / pixel;
-      const double length = std::exp(double{cloud.log_scales[static_cast<size_t>(3 * row) + c]}) / pixel;
-      variance[c] = length * length;
-    }
-    g.thinnest = std::min({variance[0], variance[1], variance[2]});
-    for (size_t c = 0; c < 3; ++c) {
-      g.mean[c] = frame_[c] * shift[0] + frame_[3 + c] * shift[1] + frame_[6 + c] * shift[2];
-    }
-    size_t at = 0;
-    for (size_t i = 0; i < 3; ++i) {
-      for (size_t j = i; j < 3; ++j, ++at) {
-        g.covariance[at] = i == j ? dilation_ : 0;
-        for (size_t c = 0; c < 3; ++c) g.covariance[at] += turn[3 * i + c] * variance[c] * turn[3 * j + c];
-      }
-    }
-    const double opacity = Sigmoid(double{cloud.opacity_logits[static_cast<size_t>(row)]});
-    copies_[k].stored_opacity = opacity;
-    const double seen = SeenVariance(opacity);
-    for (double& x : g.covariance) x *= seen;
-    g.opacity = std::max(0.0, opacity - kMinAlpha) / seen;
-    Measure(g);
+    copies_[k].gaussian = loaded_[k] = Seen(cloud, row, copies_[k].stored_opacity);
     weights_[At(k, k)] = 1;
   }
   if (!colors) return;
@@ -122,6 +128,52 @@ void CopyGroup::FindCost(size_t a, size_t b) {
   const double found = MergeCost(first, second, overlaps, merged,
                                  {color_products_[At(a, a)], color_products_[At(a, b)], color_products_[At(b, b)]});
   if (found < kInfinity) cost = found;  // NaN is none
+}
+
+double CopyGroup::Mass() const {
+  double mass = 0;
+  for (const Copy& copy : copies_) mass += copy.alive ? copy.gaussian.mass : 0;
+  return mass;
+}
+
+double CopyGroup::CostOfStandIn(const GaussianCloud& cloud, int64_t row) {
+  const size_t n = copies_.size(), all = n + 1;
+  double stored_opacity = 0;
+  loaded_[n] = Seen(cloud, row, stored_opacity);
+  const int64_t floats = cloud.sh_stride();
+  const auto colors = [&](size_t k) {
+    return cloud.sh.data() + (k < n ? first_ + static_cast<int64_t>(k) * stride_ : row) * floats;
+  };
+  for (size_t i = 0; i < all; ++i) {
+    for (size_t j = i; j < all; ++j) {
+      const double product = ColorProduct(colors(i), colors(j), floats);
+      stand_in_products_[i * all + j] = stand_in_products_[j * all + i] = product;
+    }
+  }
+  // Where several copies absorb, each does so of less: as if all had less opacity.
+  double sum = 0;
+  for (size_t k = 0; k < n; ++k) sum += loaded_[k].mass;
+  const double less = Mass() / sum;
+  // Colours around the one that the copies have together, as in MergeCost().
+  const auto with_mean = [&](size_t i) {
+    double product = 0;
+    for (size_t k = 0; k < n; ++k) product += loaded_[k].mass / sum * stand_in_products_[i * all + k];
+    return product;
+  };
+  double mean_square = 0;
+  for (size_t k = 0; k < n; ++k) mean_square += loaded_[k].mass / sum * with_mean(k);
+  double cost = 0;
+  for (size_t i = 0; i < all; ++i) {
+    const double of_i = i < n ? less * loaded_[i].opacity : -loaded_[i].opacity;
+    for (size_t j = 0; j <= i; ++j) {
+      const double of_j = j < n ? less * loaded_[j].opacity : -loaded_[j].opacity;
+      const std::array<double, 3> overlaps = Overlaps(loaded_[i], loaded_[j]);
+      const double color = stand_in_products_[i * all + j] - with_mean(i) - with_mean(j) + mean_square;
+      cost += (i == j ? 1 : 2) * of_i * of_j * (overlaps[0] + overlaps[1] + overlaps[2]) *
+              (color + 3 * kBehind * kBehind);
+    }
+  }
+  return std::isfinite(cost) ? std::max(0.0, cost / 9) : kInfinity;
 }
 
 CopyGroup::Step CopyGroup::Next() const {

@@ -24,9 +24,14 @@ class CopyGroup {
     uint8_t keep = 0, gone = 0;  // copies; the same one: it goes and leaves no trace
   };
   int64_t alive() const { return alive_; }
+  double Mass() const;  // of what is left, as MergeGaussian::mass
   // What to do next, for alive() > 1: the invisible first, then the cheapest pair.
   Step Next() const;
   void Do(const Step& step);
+
+  // What it costs of the picture of the loaded copies to show row `row` of the cloud instead, as the cost of a step; not
+  // finite: there is no telling. Of a group that was loaded with colours and has been merged into one.
+  double CostOfStandIn(const GaussianCloud& cloud, int64_t row);
 
   // Writes the merged copies into the rows of those that stay, and 0 into keep[row] of the others.
   void Write(GaussianCloud& cloud, std::vector<char>& keep) const;
@@ -40,6 +45,8 @@ class CopyGroup {
   };
   size_t At(size_t a, size_t b) const { return a * copies_.size() + b; }
   void FindCost(size_t a, size_t b);  // a < b
+  // A row as it is seen in the frame.
+  MergeGaussian Seen(const GaussianCloud& cloud, int64_t row, double& stored_opacity) const;
   bool WriteMerged(const Copy& copy, const double* weights, int64_t row, GaussianCloud& cloud) const;
 
   double invisible_;
@@ -51,6 +58,8 @@ class CopyGroup {
   std::vector<Copy> copies_;
   std::vector<double> color_products_, weights_;  // [K,K]; weights: of the loaded colours in each copy's
   std::vector<double> costs_;                     // [K,K], of a < b
+  std::vector<MergeGaussian> loaded_;             // as the copies were, then the stand-in
+  std::vector<double> stand_in_products_;         // [K+1,K+1], of their colours
 };
 
 }  // namespace anchorsplat

@@ -420,6 +420,7 @@ Result<GaussianCloud> RunPlan(const MethodPlan& plan, const SizedMethods& sized,
     if (!sized.start) first.pixel_sizes.clear();
     EnhanceOptions of_first = options;
     of_first.control = {};  // the checkpoint is the last one's
+    first.is_refined = true;
     ANCHORSPLAT_ASSIGN_OR_RETURN(input.start, RunStep(*plan.start, std::move(first), of_first, report));
     input.start_has_detail = plan.start->adds_detail;
   }

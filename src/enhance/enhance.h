@@ -112,6 +112,7 @@ struct EnhanceInput {
   std::vector<char> inside;       // which of the cloud's Gaussians are enhanced: results are of these; empty: all
   GaussianCloud start;            // what the method before it made, of "A+B"; else empty
   bool start_has_detail = false;  // EnhanceMethod::adds_detail of that method
+  bool is_refined = false;        // refinement goes on from what the method makes
 };
 
 // For methods that look at no others: leaves those inside.

@@ -146,8 +146,8 @@ Shipped ShippedFor(const EnhanceInput& input, const ModelSettings& model) {
 }
 
 // Dense splats need few copies: of three dense fits 1.6 Gaussians for one are as good as 2.4 without (docs/results/copies.md).
-bool WantsStandIns(Shipped shipped, const ModelSettings& model) {
-  return model.file.empty() && shipped == Shipped::kClassic && !model.copies;
+bool WantsStandIns(Shipped shipped, const EnhanceInput& input, const ModelSettings& model) {
+  return model.file.empty() && shipped == Shipped::kClassic && !model.copies && !input.is_refined;
 }
 
 }  // namespace
@@ -156,7 +156,7 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
                                                 const ModelSettings& model, StepReport& report,
                                                 const RefineControl& control, const CompactNetwork* stand_in) {
   // Of what stays one Gaussian for one.
-  const CopyChoice choice = {model.copies, model.merge_cost.value_or(kMergeCost), model.options.max_gaussians,
+  const CopyChoice choice = {model.copies, model.merge_cost.value_or(input.is_refined ? kMergeCostOfStart : kMergeCost), model.options.max_gaussians,
                              model.options.prune_opacity};
   const auto within_budget = [&]() -> Result<GaussianCloud> {
     ANCHORSPLAT_RETURN_IF_ERROR(Validate(CopyChoice{.max_gaussians = choice.max_gaussians}, 1));
@@ -278,7 +278,7 @@ void RegisterModelMethod() {
            return EnhanceWithPublished(std::move(input), *published, options.model.options, report);
          }
          std::shared_ptr<const AnyNetwork> stand_in;
-         if (WantsStandIns(shipped, options.model)) {
+         if (WantsStandIns(shipped, input, options.model)) {
            ANCHORSPLAT_ASSIGN_OR_RETURN(stand_in, last_stand_in->Get(options.model, Shipped::kSingle));
          }
          Result<GaussianCloud> out = EnhanceWithCompactNetwork(

@@ -150,12 +150,12 @@ void AddModelFlags(CLI::App& verb, EnhanceFlags& flags) {
                       "Orders of the space-filling curves: identity, a seed of PyTorch's, or five permutations"))
       ->capture_default_str();
   model_option(verb.add_option("--copies", flags.copies,
-                               "Gaussians that a compact network makes of each, at most; auto: merged where nobody "
-                               "would see the difference"))
+                               "Gaussians that a compact network makes of each, at most; auto: fewer where hardly "
+                               "anybody would see the difference"))
       ->capture_default_str();
   model_option(verb.add_option("--merge-cost", flags.options.model.merge_cost,
-                               "Of --copies auto: what a merge may cost, in pixels of the closer view times the square "
-                               "of the difference; more is fewer Gaussians (default: 0.00002)"))
+                               "Of --copies auto: what each Gaussian less may cost, in pixels of the closer view times "
+                               "the square of the difference; more is fewer Gaussians (default: 0.0004)"))
       ->check(NotNegative());
   verb.add_option("--prune-opacity", model.prune_opacity,
                   "Leave Gaussians of less opacity out of what the model makes; 1/255 = 0.0039 is invisible")

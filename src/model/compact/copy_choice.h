@@ -16,6 +16,8 @@ namespace anchorsplat {
 // What a merge may cost where nobody says otherwise: pixels of the closer view times the square of a colour in 0–1, of
 // MergeCost(). Chosen on training objects (docs/results/copies.md).
 inline constexpr double kMergeCost = 4e-4;
+// Where refinement goes on: what it begins with has to show all, and is split again.
+inline constexpr double kMergeCostOfStart = 2e-5;
 
 // What a stand-in's difference from the copies counts for. It was trained to look like the truth and not like them, so
 // that most of the difference is none of the truth's. Chosen on training objects, too.

@@ -155,7 +155,8 @@ Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional
                                Settle(kStandardPixelSize, probe.start(), [&](double size) { return probe.At(size); }));
   double share = std::max(Share(settled.strangeness, kStandard, kOther),
                           Share(StrangenessOfSizes(probe, std::exp(settled.log_size)), kPlausible, kImplausible));
-  if (!IsCompensated(mode)) share *= 1 - Share(probe.showing(), kFewShow, kMostShow);
+  const double like_standard = IsCompensated(mode) ? 0 : Share(probe.showing(), kFewShow, kMostShow);
+  share *= 1 - like_standard;
   if (share > 0) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Settled kinds, Settle(kKindsPixelSize, probe.start(), [&](double size) {
                                    return FeaturesOf(std::array{Look::kAlpha, Look::kAntialiased}, probe, size);
@@ -167,7 +168,7 @@ Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const double correction,
                                Correction(kPixelSizeCorrection, probe, std::exp(settled.log_size)));
-  settled.log_size += correction > 0 ? std::lerp(1.0, kUpwards, share) * correction : correction;
+  settled.log_size += (1 - like_standard) * (correction > 0 ? std::lerp(1.0, kUpwards, share) * correction : correction);
   return EstimateOf(settled, share, probe);
 }
 

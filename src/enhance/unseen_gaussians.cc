@@ -28,7 +28,7 @@ constexpr size_t kMostCleanViews = 48;
 constexpr int kMostCleanPixels = 512;  // a side
 constexpr int kOrbitViews = 24;
 constexpr int kPredictingViews = 8, kPredictingPixels = 128;
-constexpr double kPredictedPsnr = 56;
+constexpr double kPredictedPsnr = 75;
 constexpr double kReachesViews = 0.01;  // of the squares that it would have with nothing in front of it
 constexpr int kMostTrials = 10;
 constexpr int64_t kRowsAtOnce = 1 << 14;

@@ -167,9 +167,9 @@ def believe_standard(objects, standard, kinds):
         sizes[:LENGTHS] -= o["said"] - o["offsets"][0]
         of_sizes = np.sqrt(np.mean(((sizes - kinds["mean"][-16:]) / kinds["deviation"][-16:]) ** 2))
         share = max((strangeness - STANDARD) / (OTHER - STANDARD), (of_sizes - PLAUSIBLE) / (IMPLAUSIBLE - PLAUSIBLE))
-        o["share"] = np.clip(share, 0, 1)
-        if o["mode"] != "mip":
-            o["share"] *= 1 - np.clip((o["showing"] - FEW_SHOW) / (MOST_SHOW - FEW_SHOW), 0, 1)
+        like = np.clip((o["showing"] - FEW_SHOW) / (MOST_SHOW - FEW_SHOW), 0, 1) if o["mode"] != "mip" else 0.0
+        o["unlike"] = 1 - like  # which has no part in the correction either
+        o["share"] = np.clip(share, 0, 1) * o["unlike"]
 
 
 def look_at(item, said):
@@ -220,7 +220,8 @@ def train_correction(objects, both, share):
         for group in sorted({o[by] for o in objects}):
             out = np.array([o[by] == group for o in objects])
             step = correct(fit_correction(x[~out], -both[~out]), x[out])
-            corrected[out] += np.where(step > 0, (1 - (1 - UPWARDS) * share[out]) * step, step)
+            unlike = np.array([o.get("unlike", 1.0) for o in objects])[out]
+            corrected[out] += unlike * np.where(step > 0, (1 - (1 - UPWARDS) * share[out]) * step, step)
         results.append(corrected)
     return fit_correction(x, -both), *results
 

@@ -145,7 +145,7 @@ Shipped ShippedFor(const EnhanceInput& input, const ModelSettings& model) {
   return input.showing >= kStandardShowing ? Shipped::kStandard : Shipped::kClassic;
 }
 
-// Dense splats need few copies: of three dense fits 1.6 Gaussians for one are as good as 2.4 without (docs/results/copies.md).
+// Of eight dense fits 2.0 Gaussians for one are as good with them as 2.8 are without (docs/results/copies.md).
 bool WantsStandIns(Shipped shipped, const EnhanceInput& input, const ModelSettings& model) {
   return model.file.empty() && shipped == Shipped::kClassic && !model.copies && !input.is_refined;
 }

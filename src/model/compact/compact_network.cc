@@ -231,16 +231,6 @@ NearCloud BringTogether(GaussianCloud cloud, const CompactTask& task, const Comp
   return near;
 }
 
-// What the costs of each of the input's Gaussians count.
-Buffer<float> WeightsOfInput(const NearCloud& near) {
-  const Buffer<float> weights = CrowdWeights(near.cloud, near.graph, near.pixel_sizes);
-  Buffer<float> of_input(weights.size());
-  for (size_t place = 0; place < weights.size(); ++place) {
-    of_input[static_cast<size_t>(near.rows[place])] = weights[place];
-  }
-  return of_input;
-}
-
 // In the place of a fade, of Gaussians of which nothing comes out.
 constexpr float kLeftOut = -1;
 
@@ -278,15 +268,13 @@ BlockPlaces PlacesOf(const CompactBlock& block, const Buffer<float>& fades, cons
 }
 
 // What the choice among a block's copies is told.
-// `weights`: of the input's Gaussians.
-CopyGroups GroupsOf(const CompactTask& task, const BlockPlaces& places, const Buffer<float>& weights, int64_t copies) {
+CopyGroups GroupsOf(const CompactTask& task, const BlockPlaces& places, int64_t copies) {
   CopyGroups groups{.count = places.inside, .copies = copies, .pixel_sizes = {}};
   groups.stand_ins = HasStandIns(task, copies);
   const auto closer = [&](float pixel) { return static_cast<float>(pixel / task.upscale); };
   if (task.pixel_sizes.size() == 1) groups.pixel_sizes = {closer(task.pixel_sizes.front())};
   for (int64_t g = 0; g < places.inside; ++g) {
     const int32_t row = places.rows[static_cast<size_t>(g)];
-    groups.weights.push_back(weights[static_cast<size_t>(row)]);
     if (task.pixel_sizes.size() > 1) groups.pixel_sizes.push_back(closer(task.pixel_sizes[static_cast<size_t>(row)]));
     if (!task.single.empty()) groups.single.push_back(std::ranges::binary_search(task.single, row) ? 1 : 0);
   }
@@ -360,7 +348,6 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
   }
   try {
     NearCloud near = BringTogether(std::move(cloud), task, config_);
-    const Buffer<float> weights = WeightsOfInput(near);
     const CompactFeatures features(near.cloud, near.graph,
                                    {.pixel_sizes = near.pixel_sizes,
                                     .upscale = task.upscale,
@@ -402,7 +389,7 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
           BlockPlaces places;
           places.inside = of_block.part.inside;
           places.rows.assign(of_block.part.keys.begin(), of_block.part.keys.begin() + places.inside);
-          groups = GroupsOf(task, places, weights, copies);
+          groups = GroupsOf(task, places, copies);
         }
         add(std::move(groups));
         const int64_t before = next * task.block_gaussians;
@@ -438,7 +425,7 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
       of_block.block = b;
       of_block.outside = places.alone;
       of_block.partly = std::ranges::count_if(fades, [](float fade) { return fade > 0 && fade < 1; });
-      CopyGroups groups = GroupsOf(task, places, weights, copies);
+      CopyGroups groups = GroupsOf(task, places, copies);
       output.Merge(places.rows, groups, of_block.part);
       if (checkpoint) checkpoint->Append(of_block);
       add(std::move(groups));

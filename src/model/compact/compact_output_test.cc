@@ -74,13 +74,11 @@ TEST(CompactOutput, BlocksAreChosenAsTheWhole) {
     const auto all = network.Apply(cloud, task);
     ASSERT_TRUE(all.ok());
     ASSERT_EQ(all->outside, 18);
-    const Buffer<float> weights = CrowdWeights(cloud, BuildCompactGraph(cloud, 8), task.pixel_sizes);
     for (const CopyChoice& choice : choices) {
       const int64_t inside = kCount - all->outside;
       CopyGroups groups{.count = inside, .copies = 4, .pixel_sizes = {}};
       for (int64_t i = 0; i < kCount; ++i) {
         if (i % 50 == 5) continue;  // stays alone
-        groups.weights.push_back(weights[static_cast<size_t>(i)]);
         const float pixel = task.pixel_sizes[each ? static_cast<size_t>(i) : 0];
         groups.pixel_sizes.push_back(static_cast<float>(pixel / task.upscale));
         if (!choice.copies) groups.single.push_back(i % 7 == 3 ? 1 : 0);
@@ -121,12 +119,8 @@ TEST(CompactOutput, StandInsAreChosenAsInTheWhole) {
   const int64_t inside = kCount - all->outside;
   std::vector<int64_t> rows, of_stand_ins;
   for (int64_t i = 0; i < 4 * inside; ++i) rows.push_back(i);
-  const Buffer<float> weights = CrowdWeights(cloud, BuildCompactGraph(cloud, 8), task.pixel_sizes);
-  Buffer<float> of_inside;
   for (int64_t i = 0; i < kCount; ++i) {
-    if (i % 50 == 5) continue;
-    of_stand_ins.push_back(i);
-    of_inside.push_back(weights[static_cast<size_t>(i)]);
+    if (i % 50 != 5) of_stand_ins.push_back(i);
   }
   GaussianCloud copies = Subset(all->cloud, rows).value();
   ASSERT_TRUE(Append(copies, Subset(stand_ins->cloud, of_stand_ins).value()).ok());
@@ -136,7 +130,7 @@ TEST(CompactOutput, StandInsAreChosenAsInTheWhole) {
                                    CopyChoice{.merge_cost = 1e-6, .max_gaussians = 1500},
                                    CopyChoice{.max_gaussians = 901}}) {
     GaussianCloud expected = copies;
-    CopyGroups groups{.count = inside, .copies = 4, .pixel_sizes = {pixel / 4}, .weights = of_inside, .stand_ins = true};
+    CopyGroups groups{.count = inside, .copies = 4, .pixel_sizes = {pixel / 4}, .stand_ins = true};
     CopyChoice of_copies = choice;
     if (of_copies.max_gaussians > 0) of_copies.max_gaussians -= all->outside;
     ASSERT_TRUE(ChooseCopies(groups, of_copies, expected).ok());

@@ -52,25 +52,6 @@ Status Validate(const CopyChoice& choice, int64_t made) {
   return {};
 }
 
-Buffer<float> CrowdWeights(const GaussianCloud& cloud, const CompactGraph& graph, std::span<const float> pixel_sizes) {
-  Buffer<float> weights(static_cast<size_t>(graph.count), 1.0f);
-  if (graph.neighbours == 0) return weights;
-  ParallelFor(0, graph.count, kGroupsPerTask, [&](int64_t begin, int64_t end) {
-    for (int64_t i = begin; i < end; ++i) {
-      const int64_t j = graph.index[static_cast<size_t>((i + 1) * graph.neighbours - 1)];
-      double square = 0;
-      for (int64_t a = 0; a < 3; ++a) {
-        const double apart = double{cloud.means[static_cast<size_t>(3 * i + a)]} - cloud.means[static_cast<size_t>(3 * j + a)];
-        square += apart * apart;
-      }
-      const double uncrowded = kUncrowded * pixel_sizes[pixel_sizes.size() == 1 ? 0 : static_cast<size_t>(i)];
-      weights[static_cast<size_t>(i)] =
-          static_cast<float>(std::clamp(square / (uncrowded * uncrowded), kLeastWeight, 1.0));
-    }
-  });
-  return weights;
-}
-
 // Steps stand in the order in which a group would go on, so that what they cost never falls.
 CopyPlan::CopyPlan(CopyGroups groups, const CopyChoice& choice, const GaussianCloud& cloud)
     : groups_(std::move(groups)),
@@ -84,14 +65,12 @@ CopyPlan::CopyPlan(CopyGroups groups, const CopyChoice& choice, const GaussianCl
     for (int64_t g = begin; g < end; ++g) {
       group.Load(cloud, groups_.first + g, groups_.count, groups_.copies, PixelOf(g), /*colors=*/true);
       CopyGroup::Step* step = StepsOf(g);
-      const float weight = groups_.weights.empty() ? 1 : groups_.weights[static_cast<size_t>(g)];
       float most = 0;
       uint8_t& chosen = chosen_[static_cast<size_t>(g)];
       bool wanted = true;
       const bool single = !groups_.single.empty() && groups_.single[static_cast<size_t>(g)] != 0;
       for (; group.alive() > 1; ++step) {
         *step = group.Next();
-        step->cost *= weight;
         step->cost = most = std::max(most, step->cost);
         wanted = wanted && (single || IsWanted(choice, group.alive(), step->cost));
         if (wanted) ++chosen;
@@ -99,7 +78,7 @@ CopyPlan::CopyPlan(CopyGroups groups, const CopyChoice& choice, const GaussianCl
         group.Do(*step);
       }
       if (!groups_.stand_ins || groups_.copies == 1) continue;
-      const double cost = double{weight} * kStandInShare * group.CostOfStandIn(cloud, StandInOf(g));
+      const double cost = kStandInShare * group.CostOfStandIn(cloud, StandInOf(g));
       if (!std::isfinite(cost)) continue;
       const std::span<CopyGroup::Step> steps(StepsOf(g), static_cast<size_t>(groups_.copies - 1));
       usable_[static_cast<size_t>(g)] = 1;

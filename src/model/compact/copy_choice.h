@@ -9,14 +9,13 @@
 #include "core/buffer.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
-#include "model/compact/compact_graph.h"
 #include "model/compact/copy_group.h"
 
 namespace anchorsplat {
 
 // What a merge may cost where nobody says otherwise: pixels of the closer view times the square of a colour in 0–1, of
 // MergeCost(). Chosen on training objects (docs/results/copies.md).
-inline constexpr double kMergeCost = 2e-4;
+inline constexpr double kMergeCost = 1e-4;
 // Where refinement goes on: what it begins with has to show all, and is split again.
 inline constexpr double kMergeCostOfStart = 2e-5;
 
@@ -43,18 +42,10 @@ struct CopyGroups {
   int64_t count = 0;
   int64_t copies = 1;             // 1–64
   Buffer<float> pixel_sizes;      // of the closer view, world units, one for all or one per group
-  Buffer<float> weights = {};     // what costs count, one per group; empty: 1 (CrowdWeights)
   std::vector<char> single = {};  // not 0: all its copies are merged into one; one per group, empty: none
   int64_t first = 0;
   bool stand_ins = false;
 };
-
-// What costs count where Gaussians stand close: 1 for those whose farthest neighbour in the graph is kUncrowded of the
-// training pixels away and more, below in proportion to the square of the distance, down to kLeastWeight. Where several
-// share a pixel there is little for copies to draw, and fewer of them cost less of what is right in the picture than
-// they change of it. [N] in the order of the cloud. `pixel_sizes`: p_LR, one for all or one per Gaussian.
-inline constexpr double kUncrowded = 1.5, kLeastWeight = 0.125;
-Buffer<float> CrowdWeights(const GaussianCloud& cloud, const CompactGraph& graph, std::span<const float> pixel_sizes);
 
 // Merges copies of one Gaussian, always the pair that can be spared best (model/compact/merge_gaussians.h): until the
 // next pair would cost too much or there are no more than CopyChoice::copies. Where max_gaussians is set, it knows what

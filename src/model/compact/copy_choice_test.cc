@@ -308,48 +308,6 @@ TEST(CopyChoice, AStandInCostsWhatThePictureChanges) {
   }
 }
 
-// Where Gaussians share pixels, fewer stay.
-TEST(CopyChoice, CrowdsKeepFewer) {
-  GaussianCloud cloud;
-  cloud.Resize(40, 0);
-  std::ranges::fill(cloud.means, 0.0f);
-  std::ranges::fill(cloud.log_scales, -4.0f);
-  std::ranges::fill(cloud.quats, 0.5f);
-  // Rows along x, 8 neighbours: 2 pixels, 0.3 and 0.01 apart; the last row has pixels of its own.
-  const double apart[] = {2, 0.3, 0.01, 0.3};
-  std::vector<float> pixels;
-  for (size_t i = 0; i < 40; ++i) {
-    cloud.means[3 * i] = static_cast<float>(apart[i / 10] * static_cast<double>(i % 10));
-    cloud.means[3 * i + 1] = static_cast<float>(1000 * (i / 10));
-    pixels.push_back(i < 30 ? 1.0f : 2.0f);
-  }
-  const CompactGraph graph = BuildCompactGraph(cloud, 8);
-  const Buffer<float> weights = CrowdWeights(cloud, graph, pixels);
-  ASSERT_EQ(weights.size(), 40u);
-  for (size_t i = 0; i < 40; ++i) {
-    std::vector<double> others;
-    for (size_t k = 0; k < 10; ++k) {
-      if (k != i % 10) others.push_back(apart[i / 10] * std::abs(static_cast<double>(k) - static_cast<double>(i % 10)));
-    }
-    std::sort(others.begin(), others.end());
-    const double of_pixel = others[7] / double{pixels[i]} / kUncrowded;
-    EXPECT_NEAR(weights[i], std::clamp(of_pixel * of_pixel, kLeastWeight, 1.0), 1e-5) << i;
-  }
-  EXPECT_EQ(weights[5], 1);
-  EXPECT_LT(weights[35], weights[15]);
-  EXPECT_FLOAT_EQ(weights[25], kLeastWeight);
-  for (const float w : CrowdWeights(SheetCloud(1), BuildCompactGraph(SheetCloud(1), 8), {pixels.data(), 1})) {
-    EXPECT_EQ(w, 1);
-  }
-  const GaussianCloud made = Copies(300, 4, 0.2);
-  CopyGroups groups = Groups(300, 4);
-  groups.weights.assign(300, 0.125f);
-  GaussianCloud crowd = made, eighth = made;
-  ASSERT_TRUE(ChooseCopies(groups, {.merge_cost = 1e-3}, crowd).ok());
-  ASSERT_TRUE(ChooseCopies(Groups(300, 4), {.merge_cost = 8e-3}, eighth).ok());
-  EXPECT_TRUE(SameValues(crowd, eighth));
-}
-
 TEST(CopyChoice, StandInsComeWhereTheyAreCheap) {
   const GaussianCloud made = Copies(500, 4, 0.2);
   GaussianCloud merged = made;

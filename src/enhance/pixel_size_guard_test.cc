@@ -70,6 +70,8 @@ TEST(PixelSizeGuard, SpacingIsTheSideOfASquareOfTheSurface) {
     std::fill(grid.log_scales.begin(), grid.log_scales.end(), std::log(0.3f * step));
     std::fill(grid.quats.begin(), grid.quats.end(), 0.5f);
     std::fill(grid.opacity_logits.begin(), grid.opacity_logits.end(), 3.0f);
+    std::fill(grid.sh.begin(), grid.sh.end(), 0.0f);
+    std::fill(grid.means.begin(), grid.means.end(), 0.0f);
     for (int64_t i = 0; i < grid.size(); ++i) {
       grid.means[static_cast<size_t>(3 * i)] = step * static_cast<float>(i % 60);
       grid.means[static_cast<size_t>(3 * i + 1)] = step * static_cast<float>(i / 60);
@@ -148,20 +150,20 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   crowded.spacing = 0.012;  // 0.7
   EXPECT_TRUE(Judge(estimate, crowded).contradicted());
 
-  // Hardly above the bound of two on a pixel, it makes pixels a little smaller; far above it, harmless.
+  // Hardly above the bound of 2.4 on a pixel, it makes pixels a little smaller; far above it, harmless.
   crowded = plain;
   crowded.width = 0.001;
-  crowded.spacing = 0.01 / std::sqrt(2 * 1.001);
+  crowded.spacing = 0.01 / std::sqrt(2.4 * 1.001);
   EXPECT_LT(Judge(estimate, crowded).size, 0.01);
   EXPECT_GT(Judge(estimate, crowded).size, 0.0099);
-  crowded.spacing = 0.01 / std::sqrt(2 * 1.25);
+  crowded.spacing = 0.01 / std::sqrt(2.4 * 1.25);
   EXPECT_NEAR(Judge(estimate, crowded).size, 0.01 / 2.4414, 1e-5);
-  crowded.spacing = 0.01 / std::sqrt(2 * 10.0);
+  crowded.spacing = 0.01 / std::sqrt(2.4 * 10.0);
   EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.0007);
-  crowded.spacing = 0.01 / std::sqrt(2 * 1.25);
+  crowded.spacing = 0.01 / std::sqrt(2.4 * 1.25);
   crowded.without_black = 0.005;  // more than one thing speaks against it, and nothing against this
   EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.005);
-  crowded.spacing = 0.005 / std::sqrt(2 * 1.01);  // crowded without the black ones, too
+  crowded.spacing = 0.005 / std::sqrt(2.4 * 1.01);  // crowded without the black ones, too
   EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.0007);
 
   PixelSizeEvidence small = plain;

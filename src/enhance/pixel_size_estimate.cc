@@ -168,7 +168,8 @@ Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const double correction,
                                Correction(kPixelSizeCorrection, probe, std::exp(settled.log_size)));
-  settled.log_size += (1 - like_standard) * (correction > 0 ? std::lerp(1.0, kUpwards, share) * correction : correction);
+  settled.log_size +=
+      (1 - like_standard) * (correction > 0 ? std::lerp(1.0, kUpwards, share) * correction : correction);
   return EstimateOf(settled, share, probe);
 }
 

@@ -23,7 +23,8 @@ constexpr int64_t kGuardSamples = 256;  // of the spacing; its median is good to
 
 // Gaussians on a pixel of the surface × Gaussians. In fits of known pixels with 2,700 to 28,000 visible Gaussians there
 // are 0.1 to 1.3 on a pixel, most where thin things were seen in few, and 2.0 in one of 82,000 from random points; many
-// Gaussians come of many pixels, on which they stand sparsely. An estimate that is k times too large says k² times as many.
+// Gaussians come of many pixels, on which they stand sparsely. An estimate that is k times too large says k² times as
+// many.
 constexpr double kCrowded = 48'000;
 constexpr double kMostCrowded = 2.5, kNeverCrowded = 0.35;
 // √(largest × middle axis) of the smallest tenth lies between 0.3 and 2.3 pixels in the 152 fits of the regression, and

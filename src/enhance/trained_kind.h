@@ -27,8 +27,8 @@ std::string_view NameOf(TrainedKind kind);
 
 // How long the tail of an axis is: the mean of max(0, ln(q / x)) over the share of the Gaussians below the quantile q;
 // the geometric mean of that of the 2 % and that of the 5 % quantile. 0: they all end there. Does not depend on the
-// unit, and hardly on formats that keep logarithms in steps. Where a format has cut the tail off (all below e^−10 of SPZ
-// become that), it is that of the 5 % quantile, or of 1.3 times the share that was cut.
+// unit, and hardly on formats that keep logarithms in steps. Where a format has cut the tail off (all below e^−10 of
+// SPZ become that), it is that of the 5 % quantile, or of 1.3 times the share that was cut.
 struct SizeTails {
   int64_t gaussians = 0;  // that show (ShowingGaussians::all) and have three positive axes
   double middle = 0;      // of the middle axis

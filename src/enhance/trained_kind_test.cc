@@ -126,10 +126,9 @@ TEST(TrainedKind, DoesNotDependOnTheFormat) {
 // SPZ ends sizes at e^−10: the thinnest of a splat of a small unit all have that one, like those of a widened splat.
 TEST(TrainedKind, WhatAFormatCutOffIsNoWidth) {
   for (const double share : {0.015, 0.03, 0.1}) {
-    for (const auto& [made, kind] : {std::pair(Example("biplane"), TrainedKind::kClassic),
-                                     std::pair(Made(0, 0), TrainedKind::kClassic),
-                                     std::pair(Made(0.3, 0), TrainedKind::kAntialiased),
-                                     std::pair(Made(0, 0.3), TrainedKind::kWidened)}) {
+    for (const auto& [made, kind] :
+         {std::pair(Example("biplane"), TrainedKind::kClassic), std::pair(Made(0, 0), TrainedKind::kClassic),
+          std::pair(Made(0.3, 0), TrainedKind::kAntialiased), std::pair(Made(0, 0.3), TrainedKind::kWidened)}) {
       GaussianCloud cloud = made;
       std::vector<float> smallest;
       for (size_t i = 0; i < cloud.log_scales.size(); i += 3) {

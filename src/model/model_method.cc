@@ -156,8 +156,8 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
                                                 const ModelSettings& model, StepReport& report,
                                                 const RefineControl& control, const CompactNetwork* stand_in) {
   // Of what stays one Gaussian for one.
-  const CopyChoice choice = {model.copies, model.merge_cost.value_or(input.is_refined ? kMergeCostOfStart : kMergeCost), model.options.max_gaussians,
-                             model.options.prune_opacity};
+  const CopyChoice choice = {model.copies, model.merge_cost.value_or(input.is_refined ? kMergeCostOfStart : kMergeCost),
+                             model.options.max_gaussians, model.options.prune_opacity};
   const auto within_budget = [&]() -> Result<GaussianCloud> {
     ANCHORSPLAT_RETURN_IF_ERROR(Validate(CopyChoice{.max_gaussians = choice.max_gaussians}, 1));
     LeaveRegion(input);
@@ -270,7 +270,8 @@ void RegisterModelMethod() {
          if (!options.model.file.empty() || HasShippedNetwork()) return {};
          return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};
        },
-       .run = [last, last_stand_in](EnhanceInput input, const EnhanceOptions& options, StepReport& report) -> Result<GaussianCloud> {
+       .run = [last, last_stand_in](EnhanceInput input, const EnhanceOptions& options,
+                                    StepReport& report) -> Result<GaussianCloud> {
          const Shipped shipped = ShippedFor(input, options.model);
          ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const AnyNetwork> network,
                                       last->Get(options.model, shipped));

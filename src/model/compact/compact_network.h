@@ -53,8 +53,8 @@ struct CompactTask {
 struct CompactResult {
   // Copy k of all anchors before copy k + 1, then stand-ins and those that stayed alone; the input's metadata.
   GaussianCloud cloud;
-  int64_t outside = 0;  // Gaussians unlike the training data: filtered, and nothing else
-  int64_t partly = 0;   // Gaussians somewhat unlike it: a part of the residual
+  int64_t outside = 0;     // Gaussians unlike the training data: filtered, and nothing else
+  int64_t partly = 0;      // Gaussians somewhat unlike it: a part of the residual
   int64_t not_finite = 0;  // Gaussians for which the network says something that is not finite: its start
   int64_t made = 0;        // Gaussians before the choice among copies
   int64_t resumed = 0;     // blocks that a checkpoint brought
@@ -87,7 +87,8 @@ class CompactNetwork {
   // the cloud, which is given back before the result is put in order, and twice the result. Errors (kBadArgument): of
   // Validate(cloud) and Validate(choice); no Gaussians or 2^31 rows; a wrong number of pixel sizes, one that is not
   // positive and finite; upscale below 1; a strength that is negative; a stand-in of another shape; more output than
-  // memory holds. Of the checkpoint: those of CompactCheckpoint. kInterrupted: the user stopped it; the checkpoint stays.
+  // memory holds. Of the checkpoint: those of CompactCheckpoint. kInterrupted: the user stopped it; the checkpoint
+  // stays.
   Result<CompactResult> Apply(GaussianCloud cloud, const CompactTask& task) const;
 
   // The raw outputs [N, CompactOutputs(config())] for the features of a cloud, before bounds and fading.
@@ -112,9 +113,9 @@ class CompactNetwork {
   // Of the block's own Gaussians begin to end.
   void Head(const CompactFeatures& features, const CompactBlock& block, const States& states, int64_t begin,
             int64_t end, float* out) const;
-  // Writes what the network makes of a block's own Gaussians into `made`: copies where the fade is more than 0, what the
-  // filter makes where it is 0, nothing where it is below. `first`: the row of the first copy of each, `stride`: from
-  // one copy to the next. Returns how many it says something not finite about.
+  // Writes what the network makes of a block's own Gaussians into `made`: copies where the fade is more than 0, what
+  // the filter makes where it is 0, nothing where it is below. `first`: the row of the first copy of each, `stride`:
+  // from one copy to the next. Returns how many it says something not finite about.
   int64_t Make(const CompactFeatures& features, const CompactAnchors& anchors, const CompactBlock& block,
                std::span<const float> fades, std::span<const int64_t> first, int64_t stride, States& states,
                GaussianCloud& made) const;

@@ -126,9 +126,9 @@ TEST(CompactOutput, StandInsAreChosenAsInTheWhole) {
   ASSERT_TRUE(Append(copies, Subset(stand_ins->cloud, of_stand_ins).value()).ok());
   task.stand_in = &*one;
   int64_t came = 0;
-  for (const CopyChoice& choice : {CopyChoice{.merge_cost = 3e-3}, CopyChoice{.merge_cost = 3e-3, .invisible = 0.05f},
-                                   CopyChoice{.merge_cost = 1e-6, .max_gaussians = 1500},
-                                   CopyChoice{.max_gaussians = 901}}) {
+  for (const CopyChoice& choice :
+       {CopyChoice{.merge_cost = 3e-3}, CopyChoice{.merge_cost = 3e-3, .invisible = 0.05f},
+        CopyChoice{.merge_cost = 1e-6, .max_gaussians = 1500}, CopyChoice{.max_gaussians = 901}}) {
     GaussianCloud expected = copies;
     CopyGroups groups{.count = inside, .copies = 4, .pixel_sizes = {pixel / 4}, .stand_ins = true};
     CopyChoice of_copies = choice;
@@ -172,9 +172,9 @@ TEST(CompactOutput, StandInsAreChosenAsInTheWhole) {
 TEST(CompactOutput, RefusesAStandInOfAnotherShape) {
   const float pixel = kSheetPixel;
   CompactTask task{.pixel_sizes = {&pixel, 1}, .choice = CopyChoice{}};
-  for (const CompactConfig& config : {CompactConfig{.copies = 2}, CompactConfig{.copies = 1, .rounds = 1},
-                                      CompactConfig{.copies = 1, .neighbours = 7},
-                                      CompactConfig{.copies = 1, .knows_kind = true}}) {
+  for (const CompactConfig& config :
+       {CompactConfig{.copies = 2}, CompactConfig{.copies = 1, .rounds = 1},
+        CompactConfig{.copies = 1, .neighbours = 7}, CompactConfig{.copies = 1, .knows_kind = true}}) {
     const auto other = CompactNetwork::Load(config, OpenDomain());
     ASSERT_TRUE(other.ok());
     task.stand_in = &*other;

@@ -84,9 +84,9 @@ CopyPlan::CopyPlan(CopyGroups groups, const CopyChoice& choice, const GaussianCl
       usable_[static_cast<size_t>(g)] = 1;
       EndWithStandIn(cost, steps);
       if (single || choice.copies) continue;
-      chosen = static_cast<uint8_t>(std::ranges::find_if(steps, [&](const CopyGroup::Step& s) {
-                                      return !(s.cost <= choice.merge_cost);
-                                    }) - steps.begin());
+      chosen = static_cast<uint8_t>(
+          std::ranges::find_if(steps, [&](const CopyGroup::Step& s) { return !(s.cost <= choice.merge_cost); }) -
+          steps.begin());
     }
   });
 }

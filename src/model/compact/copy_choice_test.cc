@@ -333,8 +333,8 @@ TEST(CopyChoice, StandInsComeWhereTheyAreCheap) {
 
 TEST(CopyChoice, WhereOneStaysItIsTheStandIn) {
   const GaussianCloud made = Copies(300, 4, 0.2), others = SheetCloud(300, 1, 9);
-  for (const CopyChoice& choice : {CopyChoice{.merge_cost = 1e9}, CopyChoice{.merge_cost = 0, .max_gaussians = 300},
-                                   CopyChoice{.copies = 1}}) {
+  for (const CopyChoice& choice :
+       {CopyChoice{.merge_cost = 1e9}, CopyChoice{.merge_cost = 0, .max_gaussians = 300}, CopyChoice{.copies = 1}}) {
     WithStandIns with = With(made, others);
     ASSERT_TRUE(ChooseCopies(with.groups, choice, with.cloud).ok());
     EXPECT_TRUE(SameValues(with.cloud, others));

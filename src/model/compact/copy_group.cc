@@ -169,8 +169,8 @@ double CopyGroup::CostOfStandIn(const GaussianCloud& cloud, int64_t row) {
       const double of_j = j < n ? less * loaded_[j].opacity : -loaded_[j].opacity;
       const std::array<double, 3> overlaps = Overlaps(loaded_[i], loaded_[j]);
       const double color = stand_in_products_[i * all + j] - with_mean(i) - with_mean(j) + mean_square;
-      cost += (i == j ? 1 : 2) * of_i * of_j * (overlaps[0] + overlaps[1] + overlaps[2]) *
-              (color + 3 * kBehind * kBehind);
+      cost +=
+          (i == j ? 1 : 2) * of_i * of_j * (overlaps[0] + overlaps[1] + overlaps[2]) * (color + 3 * kBehind * kBehind);
     }
   }
   return std::isfinite(cost) ? std::max(0.0, cost / 9) : kInfinity;

@@ -29,8 +29,8 @@ class CopyGroup {
   Step Next() const;
   void Do(const Step& step);
 
-  // What it costs of the picture of the loaded copies to show row `row` of the cloud instead, as the cost of a step; not
-  // finite: there is no telling. Of a group that was loaded with colours and has been merged into one.
+  // What it costs of the picture of the loaded copies to show row `row` of the cloud instead, as the cost of a step;
+  // not finite: there is no telling. Of a group that was loaded with colours and has been merged into one.
   double CostOfStandIn(const GaussianCloud& cloud, int64_t row);
 
   // Writes the merged copies into the rows of those that stay, and 0 into keep[row] of the others.

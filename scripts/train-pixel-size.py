@@ -211,7 +211,7 @@ def correct(model, x):
     return np.clip(step, -MOST_CORRECTION, MOST_CORRECTION)
 
 
-def train_correction(objects, both, share):
+def train_correction(objects, both, upwards=UPWARDS):
     """The correction of all, and what the estimates become: of cross-validation by mesh, and by kind."""
     x = np.array([look_at(o, e) for o, e in zip(objects, both)])
     results = []
@@ -221,7 +221,7 @@ def train_correction(objects, both, share):
             out = np.array([o[by] == group for o in objects])
             step = correct(fit_correction(x[~out], -both[~out]), x[out])
             unlike = np.array([o.get("unlike", 1.0) for o in objects])[out]
-            corrected[out] += unlike * np.where(step > 0, (1 - (1 - UPWARDS) * share[out]) * step, step)
+            corrected[out] += unlike * np.where(step > 0, upwards * step, step)
         results.append(corrected)
     return fit_correction(x, -both), *results
 
@@ -245,7 +245,7 @@ def train_kinds(objects, arguments):
     best = min(results, key=lambda r: np.sqrt(np.mean(results[r][1] ** 2)))
     alone, both = results[best]
     print(f"ridge {best:g} chosen; estimate / truth by kind:")
-    correction, corrected, unknown = train_correction(objects, both, share)
+    correction, corrected, unknown = train_correction(objects, both)
     print(f"corrected: {describe(corrected)}")
     print(f"  kinds left out: {describe(unknown)}")
     for kind in sorted({o["kind"] for o in objects}):
@@ -271,7 +271,7 @@ def train_antialiased(objects, arguments):
         alone = cross_validate(objects, ridge, prior=standard)
         print(f"ridge {ridge:g}: {describe(alone)}")
         print(f"  kinds left out: {describe(cross_validate(objects, ridge, by='kind', prior=standard))}")
-        results[ridge] = train_correction(objects, alone, np.zeros(len(objects)))
+        results[ridge] = train_correction(objects, alone, upwards=1)
         print(f"  corrected: {describe(results[ridge][1])}")
         print(f"  kinds left out of the correction: {describe(results[ridge][2])}")
     ridge = min(results, key=lambda r: np.sqrt(np.mean(results[r][1] ** 2)))

@@ -32,7 +32,7 @@ constexpr double kPlausible = 1.5, kImplausible = 2.2;
 constexpr double kFewShow = kStandardShowing, kMostShow = 0.75;
 // No correction of what both say is larger; ln.
 constexpr double kMostCorrection = 0.5;
-// How much of a correction upwards is left for a splat that is unlike standard fits: pixels that are too large blur.
+// How much of a correction upwards is left: pixels that are too large blur.
 constexpr double kUpwards = 0.5;
 
 struct Guess {
@@ -168,8 +168,7 @@ Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const double correction,
                                Correction(kPixelSizeCorrection, probe, std::exp(settled.log_size)));
-  settled.log_size +=
-      (1 - like_standard) * (correction > 0 ? std::lerp(1.0, kUpwards, share) * correction : correction);
+  settled.log_size += (1 - like_standard) * (correction > 0 ? kUpwards : 1) * correction;
   return EstimateOf(settled, share, probe);
 }
 

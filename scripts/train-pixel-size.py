@@ -214,14 +214,14 @@ def correct(model, x):
 def train_correction(objects, both, upwards=UPWARDS):
     """The correction of all, and what the estimates become: of cross-validation by mesh, and by kind."""
     x = np.array([look_at(o, e) for o, e in zip(objects, both)])
+    unlike = np.array([o.get("unlike", 1.0) for o in objects])
     results = []
     for by in ("mesh", "kind"):
         corrected = both.copy()
         for group in sorted({o[by] for o in objects}):
             out = np.array([o[by] == group for o in objects])
             step = correct(fit_correction(x[~out], -both[~out]), x[out])
-            unlike = np.array([o.get("unlike", 1.0) for o in objects])[out]
-            corrected[out] += unlike * np.where(step > 0, upwards * step, step)
+            corrected[out] += unlike[out] * np.where(step > 0, upwards * step, step)
         results.append(corrected)
     return fit_correction(x, -both), *results
 

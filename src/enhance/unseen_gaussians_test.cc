@@ -161,12 +161,13 @@ TEST(Unseen, WhatNoViewDrawsStays) {
 }
 
 TEST(Unseen, PredictsDustWithoutTrying) {
-  const GaussianCloud cloud = Dusty(0);
+  GaussianCloud cloud = Dusty(0);
+  for (size_t k = 0; k < 3 * kObject; ++k) cloud.means[k] *= 0.6f;  // less that is bright behind the dust
   const auto found = PredictUnseen(cloud);
   ASSERT_TRUE(found.ok()) << found.error().message;
-  EXPECT_GT(std::ssize(*found), kDust / 40);
+  EXPECT_GT(std::ssize(*found), kDust / 20);
   for (const int64_t i : *found) EXPECT_GE(i, kObject);
-  EXPECT_GE(PsnrWithout(cloud, *found, {}), 50);  // they add up, which the sum of squares does not know
+  EXPECT_GE(PsnrWithout(cloud, *found, {}), 42);  // they add up, which the sum of squares does not know
   // The same dust inside of an opaque bright shell reaches no view: who knows what is seen from within.
   GaussianCloud within = orbit_scene::Ball(kDust, 6), shell = orbit_scene::Ball(2000, 5);
   Paint(within, 0);

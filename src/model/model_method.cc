@@ -145,7 +145,7 @@ Shipped ShippedFor(const EnhanceInput& input, const ModelSettings& model) {
   return input.showing >= kStandardShowing ? Shipped::kStandard : Shipped::kClassic;
 }
 
-// Of eight dense fits 2.0 Gaussians for one are as good with them as 2.8 are without (docs/results/copies.md).
+// What they are worth is in docs/results/copies.md: much for dense splats, nothing for standard fits.
 bool WantsStandIns(Shipped shipped, const EnhanceInput& input, const ModelSettings& model) {
   return model.file.empty() && shipped == Shipped::kClassic && !model.copies && !input.is_refined;
 }

@@ -6,6 +6,7 @@
 mkdir "$work/project"
 cp "$cameras" "$work/project/transforms.json"
 expect 0 "pictures to fit" "$program" render "$input" -o "$work/project/hr" --cameras "$cameras" --size 48x48
+some=5000  # three seconds with a checkpoint after each: a busy machine still stops one in the middle
 long=1000000
 fit() { "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 "$@"; }
 # Waits until the test is true or the child has ended.
@@ -16,19 +17,19 @@ says_log() { grep -qF -- "$1" "$work/log"; }
 
 # Ctrl-C while it runs, then on from there: the same file as in one go.
 stopped() {
-  "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 -o "$work/part.ply" --steps 200 \
+  "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 -o "$work/part.ply" --steps $some \
     --checkpoint-every 1 -q "$@" &
   child=$!
   until_is test -e "$work/part.ply.checkpoint"
   kill -INT $child
   wait $child
 }
-resumed() { fit -o "$work/part.ply" --steps 200 --resume "$@"; }
-expect 0 "fit in one go" fit -o "$work/whole.ply" --steps 200 -q
+resumed() { fit -o "$work/part.ply" --steps $some --resume "$@"; }
+expect 0 "fit in one go" fit -o "$work/whole.ply" --steps $some -q
 expect 130 "an interrupted fit" stopped
 says stderr "--resume"
 expect 0 "what an interrupted fit leaves" "$program" info "$work/part.ply"
-expect 5 "an interrupted fit is not forgotten" fit -o "$work/part.ply" --steps 200
+expect 5 "an interrupted fit is not forgotten" fit -o "$work/part.ply" --steps $some
 expect 2 "an interrupted fit is not mistaken for another" resumed --seed 8
 says stderr "seed"
 expect 0 "an interrupted fit goes on" resumed
@@ -71,6 +72,7 @@ expect 0 "its splat is there" "$program" info "$work/hung.ply"
 expect 0 "its state is there" test -s "$work/hung.ply.checkpoint"
 refine() { "$program" enhance "$input" --upscale 2 --pixel-size 0.02 -o "$work/refined.ply" --images "$work/project" --k 1 "$@"; }
 refine_hung_up() {
+  rm -f "$work/log"
   "$program" enhance "$input" --upscale 2 --pixel-size 0.02 -o "$work/refined.ply" --images "$work/project" --k 1 \
     --steps $long 2>"$work/log" &
   child=$!
@@ -116,6 +118,7 @@ rm "$work/body"
 stopped_at() {
   local words=$1
   shift
+  rm -f "$work/log"  # an earlier one may say the words, and the child would be hit before it is the program
   "$program" "$@" 2>"$work/log" &
   child=$!
   until_is says_log "$words"
@@ -210,6 +213,7 @@ expect 0 "a fit without room for its checkpoints" no_room fit -o "$work/room.ply
 says stderr "there is no new checkpoint"
 expect 0 "its splat" "$program" info "$work/room.ply"
 no_room_stopped() {
+  rm -f "$work/log"
   (ulimit -f 200 && exec "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 \
     -o "$work/room2.ply" --steps $long --checkpoint-every 1 2>"$work/log") &
   child=$!
@@ -227,7 +231,7 @@ expect 0 "its splat as it was" "$program" info "$work/room2.ply"
 # Nowhere to write the splat: the state is kept.
 mkdir "$work/gone"
 homeless() {
-  "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 -o "$work/gone/splat.ply" --steps 200 \
+  "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 -o "$work/gone/splat.ply" --steps $some \
     --checkpoint "$work/state" --checkpoint-every 1 &
   child=$!
   until_is test -e "$work/state"
@@ -235,14 +239,14 @@ homeless() {
   wait $child
 }
 expect 3 "a fit that loses its folder" homeless
-says stderr "the state after 200 steps is kept in $work/state"
+says stderr "the state after 5,000 steps is kept in $work/state"
 mkdir "$work/gone"
-expect 0 "it is finished at once" fit -o "$work/gone/splat.ply" --steps 200 --checkpoint "$work/state" --resume
+expect 0 "it is finished at once" fit -o "$work/gone/splat.ply" --steps $some --checkpoint "$work/state" --resume
 expect 0 "its splat is there at last" "$program" info "$work/gone/splat.ply"
 
 # A file that comes into being while a fit runs, and what a fit that goes on may replace.
 running() {
-  "$program" fit "$work/project" --init-points 100 --hold-out 5 --steps 2000 --max-gaussians 100 --checkpoint-every 1 \
+  "$program" fit "$work/project" --init-points 100 --hold-out 5 --steps $some --max-gaussians 100 --checkpoint-every 1 \
     --checkpoint "$work/running" -q "$@" &
   child=$!
   until_is test -e "$work/running"
@@ -250,7 +254,7 @@ running() {
   kill -INT $child
   wait $child
 }
-goes_on() { "$program" fit "$work/project" --init-points 100 --hold-out 5 --steps 2000 --max-gaussians 100 --checkpoint "$work/running" --resume -q "$@"; }
+goes_on() { "$program" fit "$work/project" --init-points 100 --hold-out 5 --steps $some --max-gaussians 100 --checkpoint "$work/running" --resume -q "$@"; }
 meanwhile=$work/taken.ply
 expect 5 "a file that came into being meanwhile" running -o "$work/taken.ply"
 says stderr "taken-2.ply"

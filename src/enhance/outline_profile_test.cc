@@ -135,6 +135,23 @@ TEST(OutlineProfile, MatchesTheReferenceOnRandomBlobs) {
   }
 }
 
+// Stretches of a row that are empty or opaque are passed over; outlines begin and end anywhere in them.
+TEST(OutlineProfile, MatchesTheReferenceBetweenPlateaus) {
+  for (uint64_t seed = 0; seed < 10; ++seed) {
+    Random random(seed);
+    const double x0 = 20 + 60 * random.Uniform(), y0 = 20 + 60 * random.Uniform(), radius = 8 + 20 * random.Uniform();
+    const double soft = 1 + 2 * random.Uniform();
+    const Image picture = Picture(117, 101, [&](double x, double y) {
+      return std::clamp((radius - std::hypot(x - x0, y - y0)) / soft + 0.5, 0.0, 1.0);
+    });
+    OutlineProfile profile;
+    profile.Add(picture, 0.4);
+    const auto values = profile.Values(), expected = Reference(picture, 0.4);
+    for (size_t k = 0; k < kFirstBand; ++k) EXPECT_NEAR(values[k], expected[k], 0.11) << seed << " " << k;
+    for (size_t k = kFirstBand; k < kOutlineValues; ++k) EXPECT_NEAR(values[k], expected[k], 1e-9) << seed << " " << k;
+  }
+}
+
 TEST(OutlineProfile, PicturesWithoutOutlines) {
   for (const double alpha : {0.0, 0.5, 1.0}) {
     for (const int size : {1, 2, 3, 33}) {

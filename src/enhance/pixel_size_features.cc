@@ -140,21 +140,17 @@ Result<PixelSizeProbe::OutlineValues> PixelSizeProbe::AtStep(int step, Look look
   options.mode = look == Look::kAntialiased ? RenderMode::kAntialiased : RenderMode::kClassic;
   options.near_plane = static_cast<float>(kNearPlane * distance_);  // scales with the cloud, as all does
   options.far_plane = static_cast<float>(distance_ / kNearPlane);
-  OutlineProfile alpha, over_black;
+  OutlineProfile profile;
   for (Camera& camera : cameras_.cameras) {
     camera.intrinsics.fx = camera.intrinsics.fy = distance_ / pixel;
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud_, camera, options, output_));
-    alpha.Add(output_.alpha, pixel / size);
-    if (look == Look::kAntialiased) continue;
-    output_.color.pixels.resize(output_.alpha.pixels.size());  // all channels are equal
-    output_.color.channels = 1;
-    over_black.Add(output_.color, pixel / size);
+    if (look == Look::kOverBlack) {
+      output_.color.pixels.resize(output_.alpha.pixels.size());  // all channels are equal
+      output_.color.channels = 1;
+    }
+    profile.Add(look == Look::kOverBlack ? output_.color : output_.alpha, pixel / size);
   }
-  if (look == Look::kAntialiased) return known_[{look, step}] = alpha.Values();
-  // The classic picture shows both.
-  known_[{Look::kAlpha, step}] = alpha.Values();
-  known_[{Look::kOverBlack, step}] = over_black.Values();
-  return known_[{look, step}];
+  return known_[{look, step}] = profile.Values();
 }
 
 Result<PixelSizeProbe::OutlineValues> PixelSizeProbe::ProfileAt(double size, Look look) {

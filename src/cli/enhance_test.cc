@@ -130,7 +130,10 @@ TEST_F(EnhanceVerb, PageThatNoBrowserOpens) {
 }
 
 TEST_F(EnhanceVerb, NetworkThatIsPartOfTheProgram) {
-  EXPECT_THAT(ExpectDone(Enhance({})).out, HasSubstr("200 Gaussians in, 800 out; model"));
+  EXPECT_THAT(ExpectDone(Enhance({"--copies", "4"})).out, HasSubstr("200 Gaussians in, 800 out; model"));
+  const int64_t by_default = ExpectJson(Enhance({"-w"}))[0]["gaussians"]["out"];
+  EXPECT_LE(by_default, 800);
+  EXPECT_GT(by_default, 400);
   const std::string real = folder_ / "real.ply";
   ExpectDone({"convert", Biplane() / "input.ply", real, "--max-gaussians", "200", "--sh-degree", "1", "-q"});
   const nlohmann::json pruned =

@@ -19,7 +19,7 @@ struct ModelSettings {
   PublishedOptions options;
   // Of compact networks: see CopyChoice of model/compact/copy_choice.h.
   std::optional<int64_t> copies;     // nothing: auto
-  std::optional<double> merge_cost;  // nothing: kMergeCost, or kMergeCostOfStart
+  std::optional<double> merge_cost;  // nothing: as model/compact/copy_choice.h says
 };
 
 }  // namespace anchorsplat

@@ -107,8 +107,9 @@ Result<std::string> Identity(const fs::path& path) {
 
 // What becomes of a network's copies.
 std::string ChoiceText(const ModelSettings& model) {
-  std::string text =
-      model.copies ? Cat(" copies ", *model.copies) : Cat(" cost ", model.merge_cost.value_or(kMergeCost));
+  std::string text = Cat(" cost ", kMergeCost, " or ", kMergeCostOfStandard);
+  if (model.merge_cost) text = Cat(" cost ", *model.merge_cost);
+  if (model.copies) text = Cat(" copies ", *model.copies);
   if (model.options.max_gaussians > 0) text += Cat(" most ", model.options.max_gaussians);
   return text;
 }

@@ -150,6 +150,12 @@ bool WantsStandIns(Shipped shipped, const EnhanceInput& input, const ModelSettin
   return model.file.empty() && shipped == Shipped::kClassic && !model.copies && !input.is_refined;
 }
 
+double MergeCost(Shipped shipped, const EnhanceInput& input, const ModelSettings& model) {
+  if (model.merge_cost) return *model.merge_cost;
+  if (input.is_refined) return kMergeCostOfStart;
+  return model.file.empty() && shipped == Shipped::kStandard ? kMergeCostOfStandard : kMergeCost;
+}
+
 }  // namespace
 
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
@@ -282,9 +288,11 @@ void RegisterModelMethod() {
          if (WantsStandIns(shipped, input, options.model)) {
            ANCHORSPLAT_ASSIGN_OR_RETURN(stand_in, last_stand_in->Get(options.model, Shipped::kSingle));
          }
+         ModelSettings model = options.model;
+         model.merge_cost = MergeCost(shipped, input, model);
          Result<GaussianCloud> out = EnhanceWithCompactNetwork(
-             std::move(input), options.upscale, std::get<CompactNetwork>(*network), options.model, report,
-             options.control, stand_in ? std::get_if<CompactNetwork>(stand_in.get()) : nullptr);
+             std::move(input), options.upscale, std::get<CompactNetwork>(*network), model, report, options.control,
+             stand_in ? std::get_if<CompactNetwork>(stand_in.get()) : nullptr);
          if (options.model.file.empty()) {
            report.facts.emplace_back("network_for_standard_fits", shipped == Shipped::kStandard);
          }

@@ -16,6 +16,8 @@ namespace anchorsplat {
 // What a merge may cost where nobody says otherwise: pixels of the closer view times the square of a colour in 0–1, of
 // MergeCost(). Chosen on training objects (docs/results/copies.md).
 inline constexpr double kMergeCost = 1e-4;
+// Of the network for standard fits: each Gaussian that goes costs them less.
+inline constexpr double kMergeCostOfStandard = 6e-4;
 // Where refinement goes on: what it begins with has to show all, and is split again.
 inline constexpr double kMergeCostOfStart = 2e-5;
 

@@ -131,9 +131,10 @@ TEST_F(EnhanceVerb, PageThatNoBrowserOpens) {
 
 TEST_F(EnhanceVerb, NetworkThatIsPartOfTheProgram) {
   EXPECT_THAT(ExpectDone(Enhance({"--copies", "4"})).out, HasSubstr("200 Gaussians in, 800 out; model"));
-  const int64_t by_default = ExpectJson(Enhance({"-w"}))[0]["gaussians"]["out"];
-  EXPECT_LE(by_default, 800);
-  EXPECT_GT(by_default, 400);
+  const nlohmann::json by_default = ExpectJson(Enhance({"-w"}))[0];
+  EXPECT_EQ(by_default["model"]["copies_made"], 800);
+  EXPECT_EQ(by_default["gaussians"]["out"], 800 - by_default["model"]["merged"].get<int64_t>());
+  EXPECT_LT(by_default["model"]["merged"], 20);  // of which hardly any is alike
   const std::string real = folder_ / "real.ply";
   ExpectDone({"convert", Biplane() / "input.ply", real, "--max-gaussians", "200", "--sh-degree", "1", "-q"});
   const nlohmann::json pruned =

@@ -150,12 +150,6 @@ bool WantsStandIns(Shipped shipped, const EnhanceInput& input, const ModelSettin
   return model.file.empty() && shipped == Shipped::kClassic && !model.copies && !input.is_refined;
 }
 
-double MergeCost(Shipped shipped, const EnhanceInput& input, const ModelSettings& model) {
-  if (model.merge_cost) return *model.merge_cost;
-  if (input.is_refined) return kMergeCostOfStart;
-  return model.file.empty() && shipped == Shipped::kStandard ? kMergeCostOfStandard : kMergeCost;
-}
-
 }  // namespace
 
 Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upscale, const CompactNetwork& network,
@@ -289,7 +283,9 @@ void RegisterModelMethod() {
            ANCHORSPLAT_ASSIGN_OR_RETURN(stand_in, last_stand_in->Get(options.model, Shipped::kSingle));
          }
          ModelSettings model = options.model;
-         model.merge_cost = MergeCost(shipped, input, model);
+         if (model.file.empty() && shipped == Shipped::kStandard && !input.is_refined && !model.merge_cost) {
+           model.merge_cost = kMergeCostOfStandard;
+         }
          Result<GaussianCloud> out = EnhanceWithCompactNetwork(
              std::move(input), options.upscale, std::get<CompactNetwork>(*network), model, report, options.control,
              stand_in ? std::get_if<CompactNetwork>(stand_in.get()) : nullptr);

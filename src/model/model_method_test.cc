@@ -323,7 +323,7 @@ TEST_F(SmallModel, TheShippedNetworksOpen) {
   EXPECT_EQ(ShippedNetworkIdentity().empty(), !HasShippedNetwork());
 }
 
-// The default network knows classic splats only, a file of its kind filters others.
+// A network that is not told the kind of splat knows classic ones only, and others are filtered.
 TEST_F(SmallModel, AntialiasedSplatsGetTheirOwnShippedNetwork) {
   const EnhanceMethod registered = Registered();
   EnhanceInput input = SheetInput();
@@ -380,6 +380,27 @@ TEST_F(SmallModel, OneForOneComesFromANetworkOfItsOwn) {
       EXPECT_EQ(enhanced->size(), *c.copies * input.cloud.size());
     }
   }
+}
+
+// What a merge may cost by default: more for standard fits, little for what refinement begins with.
+TEST_F(SmallModel, WhatAMergeMayCostDependsOnTheNetwork) {
+  if (!HasShippedNetwork()) GTEST_SKIP() << "this program was built without weights";
+  const auto made = [](double showing, bool is_refined, std::optional<double> cost) {
+    EnhanceInput input = SheetInput();
+    input.showing = showing;
+    input.is_refined = is_refined;
+    EnhanceOptions options;
+    options.model.merge_cost = cost;
+    StepReport report;
+    const auto enhanced = Registered().run(input, options, report);
+    EXPECT_TRUE(enhanced.ok());
+    return enhanced.ok() ? enhanced->size() : 0;
+  };
+  EXPECT_EQ(made(0.9, false, {}), made(0.9, false, kMergeCostOfStandard));
+  EXPECT_LT(made(0.9, false, {}), made(0.9, false, kMergeCost));
+  EXPECT_EQ(made(0.2, false, {}), made(0.2, false, kMergeCost));
+  EXPECT_EQ(made(0.9, true, {}), made(0.9, true, kMergeCostOfStart));
+  EXPECT_LT(made(0.9, false, {}), made(0.9, true, {}));
 }
 
 TEST_F(SmallModel, ConvertKeepsTensorsAndTellsTheArchitecture) {

@@ -13,7 +13,20 @@ fit() { "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --h
 until_is() {
   while kill -0 "$child" 2>/dev/null && ! "$@"; do :; done
 }
-says_log() { grep -qF -- "$1" "$work/log"; }
+# stopped_by SIGNAL WORDS COMMAND...: sent as soon as it says the words; what it said and its exit code are passed on.
+stopped_by() {
+  local signal=$1 words=$2
+  shift 2
+  rm -f "$work/log"  # an earlier one may say the words, and the child would be hit before it is the program
+  "$@" 2>"$work/log" &
+  child=$!
+  until_is grep -qsF -- "$words" "$work/log"
+  kill -"$signal" $child
+  wait $child
+  local code=$?
+  cat "$work/log" >&2
+  return $code
+}
 
 # Ctrl-C while it runs, then on from there: the same file as in one go.
 stopped() {
@@ -71,19 +84,8 @@ expect 130 "SIGHUP ends a fit in order" hung_up
 expect 0 "its splat is there" "$program" info "$work/hung.ply"
 expect 0 "its state is there" test -s "$work/hung.ply.checkpoint"
 refine() { "$program" enhance "$input" --upscale 2 --pixel-size 0.02 -o "$work/refined.ply" --images "$work/project" --k 1 "$@"; }
-refine_hung_up() {
-  rm -f "$work/log"
-  "$program" enhance "$input" --upscale 2 --pixel-size 0.02 -o "$work/refined.ply" --images "$work/project" --k 1 \
-    --steps $long 2>"$work/log" &
-  child=$!
-  until_is says_log "views with pictures"
-  kill -HUP $child
-  wait $child
-  local code=$?
-  cat "$work/log" >&2
-  return $code
-}
-expect 130 "SIGHUP ends a refinement in order" refine_hung_up
+expect 130 "SIGHUP ends a refinement in order" stopped_by HUP "views with pictures" "$program" enhance "$input" --upscale 2 \
+  --pixel-size 0.02 -o "$work/refined.ply" --images "$work/project" --k 1 --steps $long
 says stderr "--resume"
 expect 0 "its splat is there, too" "$program" info "$work/refined.ply"
 expect 0 "its state is there, too" test -s "$work/refined.ply.checkpoint"
@@ -115,24 +117,13 @@ for _ in $(seq 5); do cat "$work/body" "$work/body" >"$work/twice" && mv "$work/
 cat "$work/body" >>"$work/large.ply"
 sed -i "s/^element vertex 640000/element vertex $((count * 32))/" "$work/large.ply"
 rm "$work/body"
-stopped_at() {
-  local words=$1
-  shift
-  rm -f "$work/log"  # an earlier one may say the words, and the child would be hit before it is the program
-  "$program" "$@" 2>"$work/log" &
-  child=$!
-  until_is says_log "$words"
-  kill -INT $child
-  wait $child
-  local code=$?
-  cat "$work/log" >&2
-  return $code
-}
 gone() { [ ! -e "$1" ] && [ -z "$(find "$work" -name '.anchorsplat*')" ]; }
-expect 130 "Ctrl-C ends the filter" stopped_at "training pixel" enhance "$work/large.ply" --method filter -o "$work/gone.ply"
+expect 130 "Ctrl-C ends the filter" stopped_by INT "training pixel" "$program" enhance "$work/large.ply" --method filter \
+  -o "$work/gone.ply"
 says stderr "error: stopped"
 expect 0 "there is no splat of it" gone "$work/gone.ply"
-expect 130 "and levels of detail" stopped_at '"levels of detail"' convert "$work/large.ply" "$work/lod" --lod --progress json
+expect 130 "and levels of detail" stopped_by INT '"levels of detail"' "$program" convert "$work/large.ply" "$work/lod" --lod \
+  --progress json
 says stderr "stopped; what was being written is gone"
 expect 0 "there is no folder of them" gone "$work/lod"
 # While a pipe is read that nobody ends; from when on the signal is heard, the system knows (bit 1 is SIGINT).
@@ -208,23 +199,13 @@ expect 1 "its state is gone" test -e "$work/net.ply.checkpoint"
 rm -f "$work"/net*.ply "$work/notes" "$work/blocks.ply"
 
 # No room for the state, which is three times as large as the splat: the splat is written.
-no_room() { (ulimit -f 200 && "$@"); }
-expect 0 "a fit without room for its checkpoints" no_room fit -o "$work/room.ply" --steps 30 --checkpoint-every 1
+limited() { ulimit -f 200 && exec "$@"; }
+no_room() { (limited "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 "$@"); }
+expect 0 "a fit without room for its checkpoints" no_room -o "$work/room.ply" --steps 30 --checkpoint-every 1
 says stderr "there is no new checkpoint"
 expect 0 "its splat" "$program" info "$work/room.ply"
-no_room_stopped() {
-  rm -f "$work/log"
-  (ulimit -f 200 && exec "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 \
-    -o "$work/room2.ply" --steps $long --checkpoint-every 1 2>"$work/log") &
-  child=$!
-  until_is says_log "there is no new checkpoint"
-  kill -INT $child
-  wait $child
-  local code=$?
-  cat "$work/log" >&2
-  return $code
-}
-expect 130 "an interrupted fit without room for its state" no_room_stopped
+expect 130 "an interrupted fit without room for its state" stopped_by INT "there is no new checkpoint" limited "$program" fit \
+  "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 -o "$work/room2.ply" --steps $long --checkpoint-every 1
 says stderr "there is nothing to resume from"
 expect 0 "its splat as it was" "$program" info "$work/room2.ply"
 

@@ -199,7 +199,15 @@ Status TakeData(const std::string& file, TableReader table, DataConfig& data) {
   table.Int("objects_in_memory", 1, 1'000'000, data.objects_in_memory);
   table.Number("least_upscale", 0, kMostUpscale, data.least_upscale);
   table.Number("greatest_upscale", 0, kMostUpscale, data.greatest_upscale);
+  table.Number("least_merge_cost", 0, 1, data.least_merge_cost);
+  table.Number("greatest_merge_cost", 0, 1, data.greatest_merge_cost);
   ANCHORSPLAT_RETURN_IF_ERROR(table.Finish());
+  if (data.greatest_merge_cost > 0 ? !(data.least_merge_cost > 0 && data.least_merge_cost <= data.greatest_merge_cost)
+                                   : data.least_merge_cost > 0) {
+    return Error{ErrorCode::kBadFile, Cat(file,
+                                          ": data.least_merge_cost and greatest_merge_cost: expected positive numbers, "
+                                          "the second not below the first, or neither")};
+  }
   const bool range = data.least_upscale >= 1 && data.greatest_upscale >= data.least_upscale;
   if (!range && (data.least_upscale > 0 || data.greatest_upscale > 0)) {
     return Error{ErrorCode::kBadFile, Cat(file,
@@ -316,6 +324,10 @@ nlohmann::json Settings(const TrainConfig& c) {
   if (c.data.least_upscale > 0) {
     json["data.least_upscale"] = c.data.least_upscale;
     json["data.greatest_upscale"] = c.data.greatest_upscale;
+  }
+  if (c.data.greatest_merge_cost > 0) {
+    json["data.least_merge_cost"] = c.data.least_merge_cost;
+    json["data.greatest_merge_cost"] = c.data.greatest_merge_cost;
   }
   for (const auto& [group, rate] : c.optimizer.groups) json[Cat("optimizer.groups.", group)] = rate;
   for (const auto& [key, value] : c.network) json[Cat("network.", key)] = ToJson(value);

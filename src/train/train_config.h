@@ -49,6 +49,9 @@ struct DataConfig {
   int64_t part = 0;
   bool fixed_views = false;  // always the first of an object's views instead of random ones
   int objects_in_memory = 64;
+  // What merges of copies may cost before a step shows them, drawn for every step, evenly in the logarithm; 0: all
+  // copies are shown. See merged_copies.h.
+  double least_merge_cost = 0, greatest_merge_cost = 0;
   // How many times closer an object's views are, drawn by its name, evenly in the logarithm; 0: as the data set has
   // them. Others than that are made on demand.
   double least_upscale = 0, greatest_upscale = 0;

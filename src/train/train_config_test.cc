@@ -38,6 +38,8 @@ crop = 256
 fixed_views = true
 least_upscale = 2
 greatest_upscale = 8
+least_merge_cost = 1e-4
+greatest_merge_cost = 1e-3
 [augmentation]
 rotate = true
 [validation]
@@ -57,6 +59,8 @@ every = 100
   EXPECT_EQ(config->optimizer.schedule, Schedule::kConstant);
   EXPECT_EQ(config->data.greatest_upscale, 8);
   EXPECT_EQ(Settings(*config)["data.least_upscale"], 2.0);
+  EXPECT_EQ(config->data.least_merge_cost, 1e-4);
+  EXPECT_EQ(Settings(*config)["data.greatest_merge_cost"], 1e-3);
   EXPECT_TRUE(config->augmentation.geometry());
   EXPECT_EQ(Settings(*config)["network.copies"], 4.0);
   const Error located = InNetworkTable(*config, {ErrorCode::kBadArgument, "copies: bad"});
@@ -81,6 +85,11 @@ TEST(TrainConfig, ComplaintsNameFileLineAndKey) {
   for (const char* range : {"least_upscale = 2", "greatest_upscale = 4", "least_upscale = 4\ngreatest_upscale = 2",
                             "least_upscale = 0.5\ngreatest_upscale = 2"}) {
     EXPECT_THAT(complaint(std::string("[data]\n") + range + "\n"), HasSubstr("x.toml: data.least_upscale and"))
+        << range;
+  }
+  for (const char* range : {"least_merge_cost = 1e-4", "greatest_merge_cost = 1e-4",
+                            "least_merge_cost = 1e-3\ngreatest_merge_cost = 1e-4"}) {
+    EXPECT_THAT(complaint(std::string("[data]\n") + range + "\n"), HasSubstr("x.toml: data.least_merge_cost and"))
         << range;
   }
   EXPECT_EQ(complaint("[loss]\nl1 = 0\n"), "x.toml: loss: all weights are 0, so there is nothing to learn");

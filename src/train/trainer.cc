@@ -19,6 +19,7 @@
 #include "io/input_record.h"
 #include "model/published/torch/point_batch_norm.h"
 #include "model/torch/make_trainable_network.h"
+#include "train/merged_copies.h"
 #include "train/optimizer.h"
 #include "train/perceptual_objective.h"
 #include "train/photometric_objective.h"
@@ -90,6 +91,7 @@ class Trainer {
  private:
   Status Step(SampleLoader& loader);
   Status Look(SampleLoader& loader);
+  GaussianTensors Merged(const GaussianTensors& all, const NetworkInput& input) const;
   Status Update();
   Status WriteLogLine();
   Status Validate();
@@ -228,6 +230,17 @@ double Trainer::PartDone() const {
   return request_.minutes ? std::max(steps, agreed_elapsed_ / (60 * *request_.minutes)) : steps;
 }
 
+// Copies as `enhance` leaves them, at a cost that the step draws.
+GaussianTensors Trainer::Merged(const GaussianTensors& all, const NetworkInput& input) const {
+  const double least = std::log(config_.data.least_merge_cost), most = std::log(config_.data.greatest_merge_cost);
+  const double drawn = torch::rand({1}, torch::kFloat64).item<double>();
+  const int64_t copies = network_->copies();
+  return MergedCopies(all, {.copies = copies,
+                            .pixel_sizes = input.pixel_sizes.narrow(0, 0, all.size() / copies) / input.upscale,
+                            .mode = input.mode.value_or(RenderMode::kClassic),
+                            .cost = std::exp(least + drawn * (most - least))});
+}
+
 // One sample's share of the gradient.
 Status Trainer::Look(SampleLoader& loader) {
   Stopwatch watch;
@@ -238,7 +251,9 @@ Status Trainer::Look(SampleLoader& loader) {
     const Autocast autocast(config_.precision, device_);
     gaussians = network_->Forward(sample.input);
   }
-  gaussians = Together(InFloat(gaussians), sample.others);
+  gaussians = InFloat(gaussians);
+  if (config_.data.greatest_merge_cost > 0) gaussians = Merged(gaussians, sample.input);
+  gaussians = Together(gaussians, sample.others);
   sums_.network += watch.Lap();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<RenderedView> views,
                                render_(gaussians, sample.cameras, sample.render));

@@ -207,10 +207,13 @@ every = 0
 views = 2
 )";
 
-TEST(Trainer, PartsTeachTheWholeAndAreResumedExactly) {
-  const fs::path config = Set() / "parts.toml";
-  std::ofstream(config) << kParts;
-  TrainRequest whole = Request("part_whole", config), parts = Request("part_parts", config);
+// `more`: lines of [data].
+void PartsTeachAndAreResumed(const std::string& name, const std::string& more) {
+  const fs::path config = Set() / (name + ".toml");
+  std::string text = kParts;
+  text.insert(text.find("[augmentation]"), more);
+  std::ofstream(config) << text;
+  TrainRequest whole = Request(name + "_whole", config), parts = Request(name + "_parts", config);
   whole.steps = parts.steps = 80;
   const auto report = Train(whole);
   ASSERT_TRUE(report.ok()) << report.error().message;
@@ -231,6 +234,12 @@ TEST(Trainer, PartsTeachTheWholeAndAreResumedExactly) {
   ASSERT_TRUE(second.ok()) << second.error().message;
   ExpectSameTensors(whole.out / "checkpoint.safetensors", parts.out / "checkpoint.safetensors");
   EXPECT_EQ(Timeless(Log(whole.out)), Timeless(Log(parts.out)));
+}
+
+TEST(Trainer, PartsTeachTheWholeAndAreResumedExactly) { PartsTeachAndAreResumed("part", ""); }
+
+TEST(Trainer, MergedCopiesTeachAndAreResumedExactly) {
+  PartsTeachAndAreResumed("merged", "least_merge_cost = 1e-4\ngreatest_merge_cost = 1e-1\n");
 }
 
 TEST(Trainer, ResumedIsTheSameAsUninterrupted) {

@@ -97,7 +97,7 @@ int64_t CopyPlan::merged() const {
   return sum;
 }
 
-void CopyPlan::Carry(GaussianCloud& cloud, std::vector<char>& keep) const {
+void CopyPlan::Carry(GaussianCloud& cloud, std::vector<char>& keep, std::vector<int64_t>* into) const {
   ParallelFor(0, groups_.count, kGroupsPerTask, [&](int64_t begin, int64_t end) {
     CopyGroup group(groups_.copies, invisible_);
     for (int64_t g = begin; g < end; ++g) {
@@ -112,7 +112,7 @@ void CopyPlan::Carry(GaussianCloud& cloud, std::vector<char>& keep) const {
       if (chosen == 0) continue;
       group.Load(cloud, groups_.first + g, groups_.count, groups_.copies, PixelOf(g), /*colors=*/false);
       for (int64_t s = 0; s < chosen; ++s) group.Do(StepsOf(g)[s]);
-      group.Write(cloud, keep);
+      group.Write(cloud, keep, into);
     }
   });
 }

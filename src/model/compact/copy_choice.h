@@ -62,8 +62,9 @@ class CopyPlan {
   int64_t merged() const;  // copies that go, but for one where a stand-in comes
 
   // Writes the merged copies into the rows of `cloud` that stay, and 0 into keep[row] of the others: copies that are
-  // gone, and stand-ins for which there is no need.
-  void Carry(GaussianCloud& cloud, std::vector<char>& keep) const;
+  // gone, and stand-ins for which there is no need. `into`, where it is asked for, one per row: of merged groups what
+  // CopyGroup::Write says.
+  void Carry(GaussianCloud& cloud, std::vector<char>& keep, std::vector<int64_t>* into = nullptr) const;
 
  private:
   friend void MergeMore(std::span<CopyPlan> plans, int64_t more,

@@ -287,9 +287,16 @@ bool CopyGroup::WriteMerged(const Copy& copy, const double* weights, int64_t row
   return true;
 }
 
-void CopyGroup::Write(GaussianCloud& cloud, std::vector<char>& keep) const {
+void CopyGroup::Write(GaussianCloud& cloud, std::vector<char>& keep, std::vector<int64_t>* into) const {
   for (size_t k = 0; k < copies_.size(); ++k) {
     const int64_t row = first_ + static_cast<int64_t>(k) * stride_;
+    if (into != nullptr && copies_[k].alive) {
+      // What a copy's colour is made of are those that it took in.
+      for (size_t from = 0; from < copies_.size(); ++from) {
+        if (weights_[At(k, from)] != 0)
+          (*into)[static_cast<size_t>(first_ + static_cast<int64_t>(from) * stride_)] = row;
+      }
+    }
     if (!copies_[k].alive) {
       keep[static_cast<size_t>(row)] = 0;
     } else if (copies_[k].merged) {

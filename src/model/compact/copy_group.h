@@ -33,8 +33,9 @@ class CopyGroup {
   // not finite: there is no telling. Of a group that was loaded with colours and has been merged into one.
   double CostOfStandIn(const GaussianCloud& cloud, int64_t row);
 
-  // Writes the merged copies into the rows of those that stay, and 0 into keep[row] of the others.
-  void Write(GaussianCloud& cloud, std::vector<char>& keep) const;
+  // Writes the merged copies into the rows of those that stay, and 0 into keep[row] of the others. `into`, where it is
+  // asked for: for each row the one that it is a part of now, or -1 where it left no trace.
+  void Write(GaussianCloud& cloud, std::vector<char>& keep, std::vector<int64_t>* into = nullptr) const;
 
  private:
   struct Copy {

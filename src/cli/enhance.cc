@@ -10,6 +10,7 @@
 #include "cli/batch.h"
 #include "cli/before_after_page.h"
 #include "cli/clean_output.h"
+#include "cli/named_messages.h"
 #include "cli/output_plan.h"
 #include "cli/stop_signal.h"
 #include "cli/verb.h"
@@ -171,6 +172,14 @@ Buffer<float> KeepUsable(ExtraProperties& extras, const GaussianCloud& cloud) {
   return means;
 }
 
+// Values that are wrong are those of a file.
+Error Of(const std::string& input, Error error) {
+  if (error.code == ErrorCode::kBadFile && error.message.starts_with(kNoneUsable)) {
+    error.message = Cat(input, ": ", error.message);
+  }
+  return error;
+}
+
 // An interruption says how to go on.
 Error WithWayOn(Error error, const fs::path& checkpoint) {
   if (error.code == ErrorCode::kInterrupted && !checkpoint.empty() && Exists(checkpoint)) {
@@ -212,7 +221,7 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   stop_signal.emplace(leaves_something ? StopSignal::Leaves::kWhatIsDone : StopSignal::Leaves::kNothing);
   auto result = Enhance(std::move(cloud), options);
   if (leaves_something) stop_signal.reset();
-  if (!result.ok()) return WithWayOn(result.error(), checkpoint);
+  if (!result.ok()) return WithWayOn(Of(input, result.error()), checkpoint);
   Enhanced enhanced = *std::move(result);
   if (!extras.empty() && enhanced.report.cleaned) {
     std::vector<char> kept(means.size() / 3, 1);
@@ -300,7 +309,12 @@ Status RunEnhance(const EnhanceWords& flags, Program& program) {
   }
   ANCHORSPLAT_RETURN_IF_ERROR(SayAndAsk(plans, flags.size, shared));
   return RunBatch(
-      items, [&](size_t i) { return EnhanceOne(flags, shared, options, flags.inputs[i], outputs[i], said[i]); },
+      items,
+      [&](size_t i) {
+        std::optional<NamedMessages> named;
+        if (items.size() > 1) named.emplace(flags.inputs[i]);
+        return EnhanceOne(flags, shared, options, flags.inputs[i], outputs[i], said[i]);
+      },
       program);
 }
 

@@ -45,7 +45,7 @@ void PrintTable(const SplatFindings& f) {
   if (!f.render_mode && !f.lost_no_width) {
     std::cout << "  it looks     " << InWords(f.looks) << "\n";
   }
-  std::cout << "  lost width   " << InWords(f.lost_width, f.pixel_size.ok() && f.pixel_size->contradicted()) << "\n";
+  std::cout << "  lost width   " << InWords(f.lost_width, f.pixel_size) << "\n";
   for (const std::string& credit : CreditsOf(f.comments)) {
     std::cout << "  credit       " << Printable(credit, kMostCredit) << "\n";
   }

@@ -29,6 +29,8 @@ constexpr double kSuspiciousRatio = 1.5;
 // A splat whose outlines are so much sharper than its cameras' pixels make them has lost less width than a classic fit:
 // antialiased ones look like 0.44 to 0.86 of their pixels, classic ones of known pixels like 0.73 and more.
 constexpr double kSharperThanClassic = 0.65;
+// Cameras whose pixels are so many times larger than the splat may look like at most do not belong to it.
+constexpr double kImpossible = 3;
 // An estimate whose range is wider than this is a rough one.
 constexpr double kVague = 3;
 
@@ -72,10 +74,13 @@ Status DropUnusable(GaussianCloud& cloud) {
   const int64_t dropped = cloud.size() - static_cast<int64_t>(kept.size());
   if (dropped == 0) return {};
   if (kept.empty()) {
-    return Error{ErrorCode::kBadFile, Cat("none of the ", WithThousands(cloud.size()), " Gaussians has finite values")};
+    return Error{ErrorCode::kBadFile, Cat(kNoneUsable, WithThousands(cloud.size()),
+                                          " Gaussians can be drawn: each has a position, scale, rotation, opacity or "
+                                          "colour that is NaN or infinite")};
   }
-  LogWarning(Cat("dropped ", WithThousands(dropped), " of ", WithThousands(cloud.size()),
-                 " Gaussians: NaN or infinite values, so that nobody draws them"));
+  LogWarning(
+      Cat("dropped ", WithThousands(dropped), " of ", WithThousands(cloud.size()),
+          " Gaussians: NaN or infinite positions, scales, rotations, opacities or colours, so that nobody draws them"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(cloud, Subset(cloud, kept));
   return {};
 }
@@ -114,19 +119,30 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
   if (!from_cameras.why.empty()) {
     LogInfo(Cat("--camera-rule ", report.camera_rule, ": ", from_cameras.why));
   }
+  report.pixel_size_source = "cameras";
   const auto found = FindPixelSize(input.cloud);
-  if (found.ok()) input.showing = found->estimate.showing;
-  if (found.ok() && !found->contradicted()) {
-    const double ratio = found->size / from_cameras.median, most = found->largest / from_cameras.median;
-    if (!options.filter_strength && !input.cloud.render_mode && most < kSharperThanClassic) {
+  if (found.ok()) {
+    input.showing = found->estimate.showing;
+    const double ratio = found->size / from_cameras.median;
+    // Whoever says a mode or a strength means these cameras.
+    const bool said = options.filter_strength || std::ranges::find(options.given, "mode") != options.given.end();
+    const bool sharper = !found->contradicted() && !IsCompensated(input.cloud.render_mode) &&
+                         found->largest < kSharperThanClassic * from_cameras.median;
+    const double largest = std::max(found->largest, found->estimate.high);
+    const bool impossible = from_cameras.median > kImpossible * largest;
+    if (!said && (sharper || impossible)) {
+      const double size = found->contradicted() ? found->size : found->largest;
       LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
-                     " (median), but the splat is sharper than a classic fit to such pixels: like one to pixels of ",
-                     found->largest,
-                     ", and only that much width is given back. Was it trained with antialiasing "
-                     "(--mode antialiased), or are these not its training cameras? --filter-strength F overrides it"));
-      for (float& size : from_cameras.sizes) size *= static_cast<float>(most);
-      from_cameras.median *= static_cast<float>(most);
-    } else if (ratio > kSuspiciousRatio || ratio < 1 / kSuspiciousRatio) {
+                     " (median), but the splat is sharper than a fit to such pixels: like one to pixels of ", size,
+                     ", and only that much width is given back. Are these its training cameras, at the size and in the "
+                     "unit it was trained in (--train-width)",
+                     input.cloud.render_mode ? "" : ", or was it trained with antialiasing (--mode antialiased)",
+                     "? --mode or --filter-strength says that they are right all the same"));
+      const auto smaller = static_cast<float>(size / from_cameras.median);
+      for (float& own : from_cameras.sizes) own *= smaller;
+      from_cameras.median *= smaller;
+      if (found->contradicted()) report.pixel_size_source = kCautiousPixelSize;
+    } else if (!found->contradicted() && (ratio > kSuspiciousRatio || ratio < 1 / kSuspiciousRatio)) {
       LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
                      " (median), the splat itself looks like ", found->size,
                      ": are these its training cameras, at the size it was trained at (--train-width)?"));
@@ -134,7 +150,6 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
   }
   report.train_width = train_width;
   report.pixel_size = from_cameras.median;
-  report.pixel_size_source = "cameras";
   input.pixel_sizes = std::move(from_cameras.sizes);
   return {};
 }
@@ -148,7 +163,7 @@ Status PixelSizesFromPictures(const EnhanceOptions& options, EnhanceInput& input
   with_cameras.cameras.emplace().cameras = std::move(project.train);
   with_cameras.camera_rule = CameraPixelRule::kMedian;
   ANCHORSPLAT_RETURN_IF_ERROR(PixelSizesFromTrainingCameras(with_cameras, input, report));
-  report.pixel_size_source = "pictures";
+  if (report.pixel_size_source == "cameras") report.pixel_size_source = "pictures";
   return {};
 }
 
@@ -270,6 +285,13 @@ void SayHowItLooks(TrainedKind looks, bool tagged) {
   }
 }
 
+// Neither file nor sizes nor caller say what kind of splat it is, nor how large its pixels were.
+bool IsUnknownOfFew(const EnhanceOptions& options, const GaussianCloud& cloud, std::optional<TrainedKind> looks) {
+  return !options.filter_strength && !options.pixel_size && !options.cameras && options.refine.images.empty() &&
+         FindLostWidth(cloud, looks, options.upscale).reason == LostWidthReason::kTooFew &&
+         cloud.size() < kFewGaussians;
+}
+
 // Of the filter. Splats that absorbed nothing have nothing to get back.
 double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud, std::optional<TrainedKind> looks) {
   if (options.filter_strength) return *options.filter_strength;
@@ -285,6 +307,10 @@ double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud,
   } else if (lost.strength > 0 && IsCompensated(cloud.render_mode) && options.upscale > 1) {
     LogInfo(Cat("the splat is ", NameOf(*cloud.render_mode), ": its fit lost less width, and less is given back (",
                 Fixed(lost.strength, 2), " of what a classic one could have lost)"));
+  }
+  // Most are classic, and who knows the pixels has an eye on the rest.
+  if (lost.reason == LostWidthReason::kTooFew && !IsUnknownOfFew(options, cloud, looks)) {
+    return DefaultFilterStrength(options.upscale);
   }
   return lost.strength;
 }
@@ -379,6 +405,10 @@ bool GivesWidth(double strength, double upscale, std::optional<RenderMode> mode)
 Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
   if (report.looks && options.upscale > 1) {
     SayHowItLooks(*report.looks, report.looks == TrainedKind::kWidened && input.cloud.render_mode.has_value());
+  } else if (IsUnknownOfFew(options, input.cloud, report.looks) && options.upscale > 1) {
+    LogWarning(Cat("it is unclear how the splat was trained, as ", WithThousands(input.cloud.size()),
+                   " Gaussians are too few to tell. Only a little width is given back; --mode classic or antialiased, "
+                   "where you know it, says more"));
   }
   input.filter_strength = ChooseStrength(options, input.cloud, report.looks);
   report.filter_strength = input.filter_strength;
@@ -452,7 +482,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   if (GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode)) {
     if (report.pixel_size_source == kCautiousPixelSize) {
       LeaveNetworksOut(plan, "measures Gaussians in pixels and goes wrong where the pixel is not known");
-    } else if (report.looks == TrainedKind::kUnclear) {
+    } else if (report.looks == TrainedKind::kUnclear || IsUnknownOfFew(options, input.cloud, report.looks)) {
       LeaveNetworksOut(plan, "has learned what splats of known kinds have lost");
     }
   }

@@ -193,6 +193,9 @@ int64_t ExpectedGaussians(int64_t count, const EnhanceOptions& options);
 // About how long it takes on `threads` cores; nothing where that depends on more than their number, as of refinements.
 std::optional<double> ExpectedSeconds(int64_t count, const EnhanceOptions& options, int threads);
 
+// With what the error of a splat begins of which no Gaussian can be drawn. Enhance() knows no file name to put before.
+inline constexpr std::string_view kNoneUsable = "none of the ";
+
 struct Enhanced {
   GaussianCloud cloud;
   EnhanceReport report;

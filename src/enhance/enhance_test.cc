@@ -218,7 +218,7 @@ TEST_F(EnhanceDoor, WarnsWhenCamerasAreNotThoseOfTheSplat) {
   options.cameras = CamerasForPixel(0.05);
   const auto cautious = Enhance(Ball(0.01), options);
   ASSERT_TRUE(cautious.ok());
-  EXPECT_TRUE(log_->Says("not its training cameras")) << log_->text();
+  EXPECT_TRUE(log_->Says("Are these its training cameras")) << log_->text();
   EXPECT_LT(cautious->report.pixel_size, 0.02) << "as it looks, so that nothing is blurred";
   // Whoever says a strength, or the mode, means these cameras.
   options.filter_strength = 0.7;
@@ -226,7 +226,10 @@ TEST_F(EnhanceDoor, WarnsWhenCamerasAreNotThoseOfTheSplat) {
   options.filter_strength.reset();
   GaussianCloud tagged = Ball(0.01);
   tagged.render_mode = RenderMode::kClassic;
+  EXPECT_LT(Enhance(tagged, options)->report.pixel_size, 0.02) << "a tag says nothing about cameras";
+  options.given = {"mode"};
   EXPECT_GT(Enhance(tagged, options)->report.pixel_size, 0.04);
+  options.given.clear();
   // Larger than the cameras' pixels it may look: that is only said.
   options.cameras = CamerasForPixel(0.001);
   EXPECT_LT(Enhance(Ball(0.01), options)->report.pixel_size, 0.004);

@@ -36,10 +36,13 @@ LostWidth FindLostWidth(const CloudView& cloud, std::optional<TrainedKind> looks
     if (cloud.render_mode == RenderMode::kAntialiased) return {0, LostWidthReason::kWidenedButTagged};
   }
   if (cloud.render_mode) return {DefaultFilterStrength(upscale, cloud.render_mode), LostWidthReason::kTagged};
-  if (!looks) return {DefaultFilterStrength(upscale), LostWidthReason::kTooFew};
-  if (looks == TrainedKind::kUnclear) {
-    return {DefaultFilterStrength(upscale, RenderMode::kAntialiased), LostWidthReason::kUnclear};
+  const double little = DefaultFilterStrength(upscale, RenderMode::kAntialiased);
+  if (!looks) {
+    // Of many Gaussians of which few show, as MCMC leaves them, nearly all are of classic fits.
+    const bool many = cloud.size() >= kFewGaussians;
+    return {many ? DefaultFilterStrength(upscale) : little, LostWidthReason::kTooFew};
   }
+  if (looks == TrainedKind::kUnclear) return {little, LostWidthReason::kUnclear};
   const auto mode = looks == TrainedKind::kAntialiased ? RenderMode::kAntialiased : RenderMode::kClassic;
   return {DefaultFilterStrength(upscale, mode), LostWidthReason::kSizes};
 }

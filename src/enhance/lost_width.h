@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string_view>
 
@@ -8,12 +9,15 @@
 
 namespace anchorsplat {
 
+// Fewer than that are less than any fit has that our estimates have learned from.
+inline constexpr int64_t kFewGaussians = 2000;
+
 // What `enhance` gives back to a splat, and why.
 enum class LostWidthReason {
   kTagged,            // the file says how it was trained
   kSizes,             // its sizes say it
   kUnclear,           // they are like those of no kind: only a little, which harms none of them
-  kTooFew,            // too few Gaussians to tell: taken for a classic one
+  kTooFew,            // too few Gaussians to tell: taken for a classic one where there are kFewGaussians, else little
   kFittedToAreas,     // nothing was lost
   kMarkedEnhanced,    // nothing is lost any more
   kWidened,           // the same, by its sizes

@@ -36,8 +36,11 @@ TEST(LostWidth, IsThatOfItsKindWithoutATag) {
   EXPECT_EQ(unclear.strength, antialiased.strength);
   EXPECT_FALSE(unclear.likely());
   const LostWidth few = FindLostWidth(Tagged({}), {}, kUpscale);
-  EXPECT_EQ(few.strength, classic.strength);
+  EXPECT_EQ(few.strength, antialiased.strength);
   EXPECT_FALSE(few.likely());
+  GaussianCloud faint = Tagged({});  // many of which few show
+  faint.Resize(kFewGaussians, 0);
+  EXPECT_EQ(FindLostWidth(faint, {}, kUpscale).strength, classic.strength);
 }
 
 TEST(LostWidth, IsNoneWhereItHasBeenGivenBack) {

@@ -23,6 +23,9 @@ constexpr double kInterval = 2;
 // Root mean square of the features' deviations from which on a splat counts as unlike those of the regression (they
 // have 1 on average), and how much wider the interval becomes for each one more.
 constexpr double kFamiliar = 1.4, kWidening = 0.25;
+// At least that much on either side (ln) for compensated splats: of a kind that nobody has seen their estimate is off
+// by 24 % in the median (docs/results/pixel-size.md).
+constexpr double kLeastHalfOfCompensated = 0.5;
 // Strangeness up to which the regression of standard fits is believed, and from which on that of many kinds is alone.
 constexpr double kStandard = 0.6, kOther = 0.9;
 // The same of the Gaussians' sizes in units of the standard regression's estimate, by the deviations of fits of many
@@ -139,6 +142,7 @@ Result<PixelSizeEstimate> EstimateAntialiased(PixelSizeProbe& probe) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const double correction,
                                Correction(kAntialiasedPixelSizeCorrection, probe, std::exp(settled.log_size)));
   settled.log_size += correction;
+  settled.half = std::max(settled.half, kLeastHalfOfCompensated);
   return EstimateOf(settled, 0, probe);
 }
 
@@ -169,6 +173,7 @@ Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional
   ANCHORSPLAT_ASSIGN_OR_RETURN(const double correction,
                                Correction(kPixelSizeCorrection, probe, std::exp(settled.log_size)));
   settled.log_size += (1 - like_standard) * (correction > 0 ? kUpwards : 1) * correction;
+  if (IsCompensated(mode)) settled.half = std::max(settled.half, kLeastHalfOfCompensated);
   return EstimateOf(settled, share, probe);
 }
 

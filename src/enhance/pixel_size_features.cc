@@ -118,7 +118,8 @@ Result<PixelSizeProbe> PixelSizeProbe::Make(TellingGaussians telling) {
   const std::optional<double> start = AxisOfSmallGaussians(probe.cloud_);
   if (!start) {
     return Error{ErrorCode::kBadArgument,
-                 Cat("fewer than ", kLeastGaussians, " visible Gaussians to estimate a pixel size from")};
+                 Cat("fewer than ", kLeastGaussians,
+                     " Gaussians that show and are small beside the splat, to estimate a pixel size from")};
   }
   probe.start_ = *start;
   probe.showing_ = ShareShowing(probe.cloud_);

@@ -11,6 +11,7 @@
 #include "core/run_context.h"
 #include "core/statistics.h"
 #include "core/text.h"
+#include "enhance/lost_width.h"
 #include "enhance/pixel_size_features.h"
 #include "enhance/showing_gaussians.h"
 
@@ -24,8 +25,10 @@ constexpr int64_t kGuardSamples = 256;  // of the spacing; its median is good to
 // Gaussians on a pixel of the surface × Gaussians. In fits of known pixels with 2,700 to 28,000 visible Gaussians there
 // are 0.1 to 1.3 on a pixel, most where thin things were seen in few, and 2.0 in one of 82,000 from random points; many
 // Gaussians come of many pixels, on which they stand sparsely. An estimate that is k times too large says k² times as
-// many.
-constexpr double kCrowded = 48'000;
+// many. Where most Gaussians show, fits of known pixels have half as many at most (0.48 times the bound, of 100 fits):
+// what is dense there is a capture that others have thinned out.
+constexpr double kCrowded = 48'000, kCrowdedShowing = 25'000;
+constexpr double kFaintShowing = 0.45, kMostlyShowing = 0.6;  // shares that show, between which the bound changes
 constexpr double kMostCrowded = 2.5, kNeverCrowded = 0.35;
 // √(largest × middle axis) of the smallest tenth lies between 0.3 and 2.3 pixels in the 152 fits of the regression, and
 // at 0.2 in one of a chair whose slats are thinner than a pixel.
@@ -38,6 +41,10 @@ constexpr double kHarmless = 0.7;
 // A crowd hardly above the bound says little: pixels shrink with this power of how far above it is, down to harmless
 // ones. Dense fits of small pictures are at up to 1.3 times the bound, captures from 1.7 times on.
 constexpr double kCrowdedFall = 4;
+// The regressions have learned from fits of 4,000 Gaussians and more. Outlines of few Gaussians are as soft as those
+// are far apart: fits of 1,000 and 380 look like pixels 1.6 and 2.7 times too large, one of 2,500 like 1.1
+// (table_football).
+constexpr int64_t kEnough = 2500;
 
 // Side of the square that one Gaussian has for itself, where they lie on surfaces: kNeighbours others lie within π r².
 double Spacing(const GaussianCloud& cloud) {
@@ -67,13 +74,15 @@ double Spacing(const GaussianCloud& cloud) {
 std::string Number(double value) { return Fixed(value, value < 10 ? 1 : 0); }
 
 // `probe`: of showing.telling. What is left of that is used up.
-Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, const Result<PixelSizeProbe>& probe,
+Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, int64_t all, const Result<PixelSizeProbe>& probe,
                                  std::optional<RenderMode> mode) {
   PixelSizeEvidence evidence;
   evidence.gaussians = showing.bright.size();
+  evidence.all = all;
   if (evidence.gaussians < kLeastGaussians) {
     return Error{ErrorCode::kBadArgument,
-                 Cat("fewer than ", kLeastGaussians, " visible Gaussians to estimate a pixel size from")};
+                 Cat("fewer than ", kLeastGaussians,
+                     " Gaussians that show and are small beside the splat, to estimate a pixel size from")};
   }
   evidence.spacing = Spacing(showing.bright);
   if (!probe.ok()) return probe.error();
@@ -99,19 +108,22 @@ Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, const Result<PixelSi
 
 }  // namespace
 
-double MostGaussiansPerPixel(int64_t gaussians) {
-  return std::clamp(kCrowded / static_cast<double>(std::max<int64_t>(1, gaussians)), kNeverCrowded, kMostCrowded);
+double MostGaussiansPerPixel(int64_t gaussians, double showing) {
+  const double share = std::clamp((showing - kFaintShowing) / (kMostlyShowing - kFaintShowing), 0.0, 1.0);
+  const double crowded = std::lerp(kCrowded, kCrowdedShowing, share);
+  return std::clamp(crowded / static_cast<double>(std::max<int64_t>(1, gaussians)), kNeverCrowded, kMostCrowded);
 }
 
 Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud) {
   ShowingGaussians showing = FindShowingGaussians(cloud);
+  const int64_t all = showing.telling.cloud.size();
   const Result<PixelSizeProbe> probe = PixelSizeProbe::Make(std::move(showing.telling));
-  return Gather(showing, probe, cloud.render_mode);
+  return Gather(showing, all, probe, cloud.render_mode);
 }
 
 PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidence& evidence) {
   PixelSizeFinding finding{estimate.size, std::max(estimate.size, evidence.without_black), estimate, {}};
-  const double most = MostGaussiansPerPixel(evidence.gaussians);
+  const double most = MostGaussiansPerPixel(evidence.gaussians, estimate.showing);
   const auto crowd_at = [&](double size) { return evidence.spacing > 0 ? std::pow(size / evidence.spacing, 2) : 0; };
   const double crowd = crowd_at(estimate.size);
   if (crowd > most) {
@@ -139,6 +151,14 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     }
     finding.size = std::min(estimate.size, size);
   }
+  if (evidence.all > 0 && evidence.all < kEnough) {
+    const double apart = std::sqrt(static_cast<double>(evidence.all) / static_cast<double>(kEnough));
+    finding.size = std::min(finding.size, estimate.size * apart);
+    if (evidence.all < kFewGaussians) {
+      finding.contradictions.push_back(
+          Cat("it has ", WithThousands(evidence.all), " Gaussians, and outlines of so few are soft at any pixel"));
+    }
+  }
   return finding;
 }
 
@@ -147,10 +167,11 @@ Result<PixelSizeFinding> FindPixelSize(const GaussianCloud& cloud) {
 }
 
 Result<PixelSizeFinding> FindPixelSize(ShowingGaussians showing, std::optional<RenderMode> mode) {
+  const int64_t all = showing.telling.cloud.size();
   Result<PixelSizeProbe> probe = PixelSizeProbe::Make(std::move(showing.telling));
   if (!probe.ok()) return probe.error();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEstimate estimate, EstimatePixelSize(*probe, mode));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEvidence evidence, Gather(showing, probe, mode));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEvidence evidence, Gather(showing, all, probe, mode));
   return Judge(estimate, evidence);
 }
 

@@ -27,6 +27,7 @@ struct PixelSizeFinding {
 // Fits on black keep black Gaussians around the object that no picture shows (where nothing else is there, all count).
 struct PixelSizeEvidence {
   int64_t gaussians = 0;     // that show, near the middle of the cloud; no more than 200,000 of them
+  int64_t all = 0;           // of any opacity and colour; 0: not counted
   double spacing = 0;        // side of the square that each has of the surface: from the distances to 8 neighbours
   double small_axis = 0;     // of the smallest tenth by area: PixelSizeProbe::start
   double width = 0;          // the middle axis that three of four exceed
@@ -35,8 +36,8 @@ struct PixelSizeEvidence {
 Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud);
 
 // Gaussians on every pixel of the surface that fits keep at most: a cloud of `gaussians` that has more of them with a
-// pixel size was fitted to smaller pixels.
-double MostGaussiansPerPixel(int64_t gaussians);
+// pixel size was fitted to smaller pixels. `showing`: PixelSizeEstimate::showing.
+double MostGaussiansPerPixel(int64_t gaussians, double showing);
 
 // What to make of an estimate in the light of the evidence.
 PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidence& evidence);

@@ -122,7 +122,7 @@ TEST(PixelSizeGuard, ManySmallGaussiansWithSoftOutlinesAreNotBlurred) {
 TEST(PixelSizeGuard, AContradictedEstimateIsNextToHarmless) {
   const auto evidence = GatherPixelSizeEvidence(Example("stone_lantern"));
   ASSERT_TRUE(evidence.ok());
-  const double crowded = std::sqrt(4 * MostGaussiansPerPixel(evidence->gaussians)) * evidence->spacing;
+  const double crowded = std::sqrt(4 * MostGaussiansPerPixel(evidence->gaussians, 1)) * evidence->spacing;
   const PixelSizeFinding found = Judge({crowded, crowded, crowded}, *evidence);
   ASSERT_TRUE(found.contradicted());
   // No more than a quarter of the Gaussians gets more than a seventeenth wider.
@@ -131,9 +131,10 @@ TEST(PixelSizeGuard, AContradictedEstimateIsNextToHarmless) {
 }
 
 TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
-  const PixelSizeEstimate estimate = {0.01, 0.008, 0.012};
+  PixelSizeEstimate estimate = {0.01, 0.008, 0.012};
+  estimate.showing = 0.3;
   const PixelSizeEvidence plain = {
-      .gaussians = 20'000, .spacing = 0.02, .small_axis = 0.01, .width = 0.004, .without_black = 0};
+      .gaussians = 20'000, .all = 30'000, .spacing = 0.02, .small_axis = 0.01, .width = 0.004, .without_black = 0};
   EXPECT_FALSE(Judge(estimate, plain).contradicted());
   EXPECT_EQ(Judge(estimate, plain).size, 0.01);
 
@@ -165,6 +166,26 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.005);
   crowded.spacing = 0.005 / std::sqrt(2.4 * 1.01);  // crowded without the black ones, too
   EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.0007);
+
+  // Where most of them show, there are half as many.
+  crowded = plain;
+  crowded.spacing = 0.01 / std::sqrt(2.3);
+  EXPECT_FALSE(Judge(estimate, crowded).contradicted());
+  estimate.showing = 0.8;
+  EXPECT_TRUE(Judge(estimate, crowded).contradicted());
+  EXPECT_LT(Judge(estimate, crowded).size, 0.01 / 3);
+  crowded.spacing = 0.01 / std::sqrt(1.2);
+  EXPECT_FALSE(Judge(estimate, crowded).contradicted());
+  estimate.showing = 0.3;
+
+  // As soft as few Gaussians are far apart.
+  PixelSizeEvidence few = plain;
+  few.all = 1000;
+  EXPECT_TRUE(Judge(estimate, few).contradicted());
+  EXPECT_NEAR(Judge(estimate, few).size, 0.01 / 1.58, 1e-5);
+  few.all = 2400;
+  EXPECT_FALSE(Judge(estimate, few).contradicted());
+  EXPECT_LT(Judge(estimate, few).size, 0.01);
 
   PixelSizeEvidence small = plain;
   small.small_axis = 0.001;

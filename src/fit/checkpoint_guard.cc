@@ -68,11 +68,21 @@ std::string SpokenValue(const std::string& key, const nlohmann::json& value) {
   return value.get<double>() < 0 ? "off" : Cat("on from step ", value.dump());
 }
 
+// --strategy absgrad is the default strategy with other gradients.
+nlohmann::json WithPreset(nlohmann::json settings) {
+  if (settings.is_object() && settings.value("strategy", nlohmann::json()) == "default" &&
+      settings.value("absgrad", nlohmann::json()) == true) {
+    settings["strategy"] = "absgrad";
+  }
+  return settings;
+}
+
 }  // namespace
 
 Status CompareSettings(const std::string& file, const std::string& theirs, const std::string& ours) {
   if (theirs == ours) return {};
-  const auto a = nlohmann::json::parse(theirs, nullptr, false), b = nlohmann::json::parse(ours, nullptr, false);
+  const auto a = WithPreset(nlohmann::json::parse(theirs, nullptr, false)),
+             b = WithPreset(nlohmann::json::parse(ours, nullptr, false));
   if (a.is_object() && b.is_object()) {
     std::vector<std::string> keys;
     for (const auto& [key, option] : kOptions) keys.emplace_back(key);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "core/lost_nothing_mark.h"
 #include "core/parallel.h"
 #include "core/text.h"
 
@@ -12,7 +13,6 @@ namespace anchorsplat {
 namespace {
 
 constexpr int kRowsPerTask = 16;
-constexpr std::string_view kPixelAreas = "fitted to pixel areas, seen ";
 
 void Shape(int width, int height, int channels, Image& image) {
   if (image.width == width && image.height == height && image.channels == channels) return;
@@ -50,12 +50,9 @@ Status Validate(const PixelModel& model) {
 
 PixelModel AreaModel(double upscale) { return {static_cast<int>(std::ceil(upscale)), upscale}; }
 
-std::string PixelAreaComment(double upscale) { return Cat(kPixelAreas, upscale, " times closer"); }
+std::string PixelAreaComment(double upscale) { return Cat(kPixelAreaMark, upscale, " times closer"); }
 
-bool IsFittedToPixelAreas(const CloudView& cloud) {
-  return std::any_of(cloud.comments.begin(), cloud.comments.end(),
-                     [](const std::string& comment) { return comment.starts_with(kPixelAreas); });
-}
+bool IsFittedToPixelAreas(const CloudView& cloud) { return HasMark(cloud.comments, kPixelAreaMark); }
 
 Status Validate(const PixelSchedule& schedule) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(PixelModel{1, schedule.upscale}));

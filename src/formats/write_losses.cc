@@ -6,6 +6,7 @@
 #include <span>
 
 #include "core/credit.h"
+#include "core/lost_nothing_mark.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
 #include "core/text.h"
@@ -61,6 +62,16 @@ std::string CreditLoss(const SplatFormat& format, std::span<const std::string> c
   return Cat(AFileOf(format), " has no place for credits: give ", list, " beside it");
 }
 
+// Read back, the splat looks as if it had lost width.
+std::string MarkLoss(const SplatFormat& format, std::span<const std::string> comments) {
+  if (format.comments == CommentPlace::kAll) return {};
+  const bool enhanced = HasMark(comments, kEnhancedMark);
+  if (!enhanced && !HasMark(comments, kPixelAreaMark)) return {};
+  return Cat(AFileOf(format), " has no place for the word that the splat has ",
+             enhanced ? "been enhanced" : "been fitted to the areas of pixels",
+             ": enhance that file again, and it may become worse (keep a PLY for that)");
+}
+
 // Without its tag a splat is drawn as a classic one.
 std::string ModeLoss(const SplatFormat& format, std::optional<RenderMode> mode) {
   if (!IsCompensated(mode) || format.mode_tag == ModeTag::kEach) return {};
@@ -97,6 +108,7 @@ std::vector<std::string> WriteLosses(const SplatFormat& format, const CloudView&
   add(clamped.harmonics, Cat("spherical harmonics beyond ±", range.harmonics));
   if (std::string loss = ModeLoss(format, cloud.render_mode); !loss.empty()) losses.push_back(std::move(loss));
   if (std::string loss = CreditLoss(format, cloud.comments); !loss.empty()) losses.push_back(std::move(loss));
+  if (std::string loss = MarkLoss(format, cloud.comments); !loss.empty()) losses.push_back(std::move(loss));
   if (format.mean_loss != nullptr) {
     if (std::string loss = format.mean_loss(cloud); !loss.empty()) losses.push_back(std::move(loss));
   }

@@ -145,9 +145,11 @@ Shipped ShippedFor(const EnhanceInput& input, const ModelSettings& model) {
   return input.showing >= kStandardShowing ? Shipped::kStandard : Shipped::kClassic;
 }
 
-// What they are worth is in docs/results/copies.md: much for dense splats, nothing for standard fits.
+// What they are worth is in docs/results/copies.md: much for dense splats, nothing for standard fits but where a budget
+// leaves few copies of each.
 bool WantsStandIns(Shipped shipped, const EnhanceInput& input, const ModelSettings& model) {
-  return model.file.empty() && shipped == Shipped::kClassic && !model.copies && !input.is_refined;
+  const bool pays = shipped == Shipped::kClassic || (shipped == Shipped::kStandard && model.options.max_gaussians > 0);
+  return model.file.empty() && pays && !model.copies && !input.is_refined;
 }
 
 }  // namespace

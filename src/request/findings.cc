@@ -12,6 +12,7 @@
 #include "core/file_system.h"
 #include "core/text.h"
 #include "enhance/enhanced_mark.h"
+#include "enhance/filter.h"
 #include "enhance/showing_gaussians.h"
 #include "formats/registry.h"
 #include "io/input_file.h"
@@ -113,8 +114,20 @@ std::string_view InWords(const std::optional<TrainedKind>& kind) {
   }
 }
 
+namespace {
+
+std::string_view Doubts(const Result<PixelSizeFinding>& pixel_size) {
+  if (!pixel_size.ok()) {
+    return ", but of a pixel of which nothing is known: enhance leaves the splat alone without --pixel-size or "
+           "--cameras";
+  }
+  return pixel_size->contradicted() ? ", but of a pixel whose size is doubtful: see below" : "";
+}
+
+}  // namespace
+
 // What `enhance` would do about it.
-std::string InWords(const LostWidth& lost, bool pixel_doubted) {
+std::string InWords(const LostWidth& lost, const Result<PixelSizeFinding>& pixel_size) {
   const auto share = [&] {
     return Cat(Fixed(lost.strength, 2), " of 0.3 px² at ", kInfoUpscale, "x",
                lost.likely() ? " (likely)" : " (unsure, so little)");
@@ -129,11 +142,13 @@ std::string InWords(const LostWidth& lost, bool pixel_doubted) {
     case LostWidthReason::kWidenedButTagged:
       return "none (likely): tagged antialiased, but even the thinnest Gaussians have a width; enhance leaves it alone";
     case LostWidthReason::kTooFew:
-      return Cat(Fixed(lost.strength, 2), " of 0.3 px² at ", kInfoUpscale, "x (unsure: taken for a classic one)");
+      if (lost.strength < DefaultFilterStrength(kInfoUpscale)) break;
+      return Cat(Fixed(lost.strength, 2), " of 0.3 px² at ", kInfoUpscale, "x (unsure: taken for a classic one)",
+                 Doubts(pixel_size));
     default:
       break;
   }
-  return share() + (pixel_doubted ? ", but of a pixel whose size is doubtful: see below" : "");
+  return Cat(share(), Doubts(pixel_size));
 }
 
 Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& name) {

@@ -41,7 +41,7 @@ inline constexpr double kInfoUpscale = 4;  // the default zoom of `enhance`
 // Ends of sentences. "It looks like a classic one"; "lost width: 0.73 of 0.3 px² at 4x (likely)", with what `enhance`
 // would do about it. `pixel_doubted`: the size of a training pixel is contradicted.
 std::string_view InWords(const std::optional<TrainedKind>& looks);
-std::string InWords(const LostWidth& lost, bool pixel_doubted);
+std::string InWords(const LostWidth& lost, const Result<PixelSizeFinding>& pixel_size);
 
 // `name` is the file's, for people. The same numbers with any number of threads, whatever of the file is in memory.
 // Errors: of reading.

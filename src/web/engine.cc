@@ -301,8 +301,7 @@ Result<Engine::Answer> Engine::Info(const Json& request) {
   Answer answer;
   answer.json = ToJson(findings);
   answer.json["looks_in_words"] = InWords(findings.looks);
-  answer.json["lost_width_in_words"] =
-      InWords(findings.lost_width, findings.pixel_size.ok() && findings.pixel_size->contradicted());
+  answer.json["lost_width_in_words"] = InWords(findings.lost_width, findings.pixel_size);
   return answer;
 }
 

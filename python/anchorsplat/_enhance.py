@@ -48,7 +48,7 @@ def enhance(
     prune_opacity: float = 0,
     block_gaussians: int = 200_000,
     images: PathLike | None = None,
-    hold_out: int = 8,
+    hold_out: int | None = None,
     downscale: int = 1,
     steps: int | None = None,
     seconds: float | None = None,
@@ -95,10 +95,11 @@ def enhance(
     precision: of the network's arithmetic.
     compat, normalisation, attention_rounding, curve_depth, shuffles: of the published architecture (docs/network.md).
 
-    Of refinement: images: the project with the pictures it was fitted to. hold_out: every Nth view is not trained on. downscale:
-    N × N pixels of the pictures become one. steps or seconds: how long. k: Gaussians that each becomes at first. poses, between: where to look from
-    without pictures. half_from, all_from: parts of the run from which on more rays are rendered. rate, rate_decay: learning
-    rates, as a part of those of ``fit``. ssim_weight: of the loss. exposure, robust, align: pictures that differ in brightness,
+    Of refinement: images: the project with the pictures it was fitted to. hold_out: every Nth view is not trained on
+    (None: 8, or 0 where the splat was fitted to all of them, as it looks). downscale: N × N pixels of the pictures become
+    one. steps or seconds: how long. k: Gaussians that each becomes at first. poses, between: where to look from without
+    pictures. half_from, all_from: parts of the run from which on more rays are rendered. rate, rate_decay: learning rates,
+    as a part of those of ``fit``. ssim_weight: of the loss. exposure, robust, align: pictures that differ in brightness,
     show what is not in the scene, or whose poses are a little off.
 
     checkpoint, resume: file for the state of a refinement when it is stopped (Ctrl-C: it is written, then KeyboardInterrupt; every
@@ -132,7 +133,7 @@ def refine(
     camera_rule: Literal["auto", "smallest", "median"] = "auto",
     filter_strength: float | None = None,
     background: Color | None = None,
-    hold_out: int = 8,
+    hold_out: int | None = None,
     downscale: int = 1,
     steps: int | None = None,
     seconds: float | None = None,

@@ -34,7 +34,7 @@ def whole(biplane: pathlib.Path) -> anchorsplat.Cloud:
 @pytest.fixture
 def cloud(whole: anchorsplat.Cloud) -> anchorsplat.Cloud:
     """Some of it, so that tests take little; nobody else's."""
-    return whole[:1500].copy()
+    return whole[:2500].copy()
 
 
 @pytest.fixture(scope="session")

@@ -125,19 +125,19 @@ def test_the_engine_checks_what_it_is_given(cloud):
 def test_gsplats_parameters(cloud):
     params = cloud.to_gsplat("numpy")
     assert {name: values.shape for name, values in params.items()} == {
-        "means": (1500, 3),
-        "scales": (1500, 3),
-        "quats": (1500, 4),
-        "opacities": (1500,),
-        "sh0": (1500, 1, 3),
-        "shN": (1500, 15, 3),
+        "means": (2500, 3),
+        "scales": (2500, 3),
+        "quats": (2500, 4),
+        "opacities": (2500,),
+        "sh0": (2500, 1, 3),
+        "shN": (2500, 15, 3),
     }
     assert np.shares_memory(params["shN"], cloud.sh)
     assert same(Cloud.from_gsplat(params), cloud)
     assert same(Cloud.from_gsplat({"step": 3, "splats": params}), cloud)
     with pytest.raises(anchorsplat.BadArgumentError, match="no sh0; gsplat's parameters are"):
         Cloud.from_gsplat({name: values for name, values in params.items() if name != "sh0"})
-    with pytest.raises(anchorsplat.BadArgumentError, match=r"sh0: expected \[N, 1, 3\], found \[1500, 15, 3\]"):
+    with pytest.raises(anchorsplat.BadArgumentError, match=r"sh0: expected \[N, 1, 3\], found \[2500, 15, 3\]"):
         Cloud.from_gsplat({**params, "sh0": params["shN"]})
 
 

@@ -20,9 +20,9 @@ TORCH = os.environ.get("ANCHORSPLAT_TEST_TORCH") != "0"
 def scan(whole, tmp_path, monkeypatch):
     """A folder with scan.ply and the pictures of its capture."""
     monkeypatch.chdir(tmp_path)
-    anchorsplat.write("scan.ply", whole[:1500])
+    anchorsplat.write("scan.ply", whole[:2500])
     os.mkdir("capture")
-    project(tmp_path / "capture", whole[:1500], views=6, side=48, images="images")
+    project(tmp_path / "capture", whole[:2500], views=6, side=48, images="images")
     warnings.simplefilter("ignore", anchorsplat.SplatWarning)  # of a splat that is a torso of one
     return tmp_path
 
@@ -58,7 +58,7 @@ def test_readme(sources, scan):
     assert found
     for line, code in found:
         run(code, f"README.md:{line}", {})
-    assert len(anchorsplat.read(scan / "scan-4x.ply")) >= 1500
+    assert len(anchorsplat.read(scan / "scan-4x.ply")) >= 2500
 
 
 def test_the_notebook(sources, monkeypatch):

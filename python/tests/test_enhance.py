@@ -13,7 +13,7 @@ def without_seconds(report):
     return {name: without_seconds(value) if isinstance(value, dict) else value for name, value in rest.items()}
 
 
-@pytest.mark.parametrize("options", [{}, {"method": "filter", "upscale": 2}, {"copies": 2, "max_gaussians": 2000}])
+@pytest.mark.parametrize("options", [{}, {"method": "filter", "upscale": 2}, {"copies": 2, "max_gaussians": 3000}])
 def test_the_result_is_the_programs(cloud, program, tmp_path, options):
     anchorsplat.write(tmp_path / "in.ply", cloud)
     words = [w for name, value in options.items() for w in (f"--{name.replace('_', '-')}", value)]
@@ -32,7 +32,7 @@ def test_cameras_say_the_pixel_size(cloud):
     cameras = anchorsplat.Cameras.orbit(cloud, 8, size=(200, 200))
     _, report = anchorsplat.enhance(cloud, method="filter", cameras=cameras, train_width=100)
     assert report["pixel_size"]["source"] == "cameras" and report["train_width"] == 100
-    assert report["gaussians"] == {"in": 1500, "dropped": 0, "out": 1500}
+    assert report["gaussians"] == {"in": 2500, "dropped": 0, "out": 2500}
     assert len(report) == len(dict(report)) and "method" in report
 
 

@@ -26,6 +26,7 @@ namespace {
 
 constexpr int64_t kNoteEvery = 10;        // steps
 constexpr int64_t kShownSteps = 1000;     // of a progress bar over seconds
+constexpr double kAboutTheSame = 0.1;     // dB
 constexpr float kInvisible = 1.0f / 255;  // opacity below which a Gaussian can be left out
 
 // What a continuation must have in common with what it continues.
@@ -171,13 +172,21 @@ Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianClou
   return result;
 }
 
-// Whether the result is better than what it began with; says why not.
-bool IsWorthIt(const RefinePlan& plan, double after) {
-  if (after > plan.before + plan.least_gain) return true;
-  LogInfo(after > plan.before
-              ? Cat("the splat had lost no width, and the pictures gain it little (", Fixed(plan.before, 2), " to ",
-                    Fixed(after, 2), " dB at their resolution): it knows more than they show, and is kept")
-              : "the start agreed with the views as well as the result does, and is kept");
+// Whether the result is better than what it began with; says why not. Of photographs that were not learned from PSNR
+// measures light and poses first: at about the same PSNR, SSIM tells.
+bool IsWorthIt(const RefinePlan& plan, const Consistency& after) {
+  const Consistency& before = plan.start;
+  if (after.psnr > before.psnr + plan.least_gain) return true;
+  if (!plan.options.images.empty() && plan.least_gain == 0 && after.ssim > before.ssim &&
+      after.psnr > before.psnr - kAboutTheSame) {
+    return true;
+  }
+  const std::string numbers = Cat(Fixed(before.psnr, 2), " dB and SSIM ", Fixed(before.ssim, 4), " before, ",
+                                  Fixed(after.psnr, 2), " and ", Fixed(after.ssim, 4), " after, at their resolution");
+  LogInfo(after.psnr > before.psnr
+              ? Cat("the splat had lost no width, and the pictures gain it little (", numbers,
+                    "): it knows more than they show, and is kept")
+              : Cat("the start agreed with the views as well as the result does (", numbers, "), and is kept"));
   return false;
 }
 
@@ -220,16 +229,17 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
   if (!plan.why.empty()) LogInfo(plan.why);
   report.views = static_cast<int64_t>(views.train.views().size());
   report.input_psnr = views.input_psnr;
-  report.before = plan.before;
+  report.before = plan.start.psnr;
   GaussianCloud start = plan.from_input ? as_it_is : std::move(input.start);
   if (plan.nothing_to_do) return timed(KeptStart(WithoutLast(std::move(start), input.fixed), std::move(report)));
   report.copies = *plan.options.copies;
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud result, RunRefinement(input, start, resumes, control, views, report));
 
-  ANCHORSPLAT_ASSIGN_OR_RETURN(report.after,
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Consistency after,
                                MeasureConsistency(result, input.upscale, input.cloud, plan.options, views));
-  if (!IsWorthIt(plan, report.after)) {
+  report.after = after.psnr;
+  if (!IsWorthIt(plan, after)) {
     return timed(KeptStart(WithoutLast(std::move(start), input.fixed), std::move(report)));
   }
   return timed({WithoutLast(std::move(result), input.fixed), std::move(report)});

@@ -86,7 +86,7 @@ Status Validate(const RefineOptions& o) {
   if (o.copies && (*o.copies < 1 || *o.copies > kMostCopies)) return bad(Cat("K must be 1 to ", kMostCopies));
   if (o.max_gaussians < 0) return bad("the bound of Gaussians must not be negative");
   if (o.downscale < 1 || o.downscale > kMostDownscale) return bad(Cat("downscale must be 1 to ", kMostDownscale));
-  if (o.hold_out < 0) return bad("hold-out must not be negative");
+  if (o.hold_out && *o.hold_out < 0) return bad("hold-out must not be negative");
   if (o.poses < 1) return bad("there must be at least one pose");
   if (o.between < 0) return bad("poses between cameras must not be negative");
   if (o.rate && !(*o.rate > 0 && std::isfinite(*o.rate))) return bad("the learning rate must be positive");
@@ -102,7 +102,7 @@ std::string ToJsonText(const RefineOptions& o) {
   // One level, so that what differs can be named by one word.
   nlohmann::json json = {
       {"images", !o.images.empty()},
-      {"hold_out", o.hold_out},
+      {"hold_out", o.hold_out.value_or(-1)},
       {"steps", o.steps.value_or(0)},
       {"copies", o.copies.value_or(0)},
       {"max_gaussians", o.max_gaussians},

@@ -19,7 +19,9 @@ struct RefineOptions {
   // What the pictures' alpha is laid over, and the splat; otherwise what the cameras' file says, else the splat's own
   // comment (core/training_background.h), else black.
   std::optional<std::array<float, 3>> background;
-  int hold_out = 8;   // every Nth view is not trained on, as in fits; 0: all are
+  // Every Nth view is not trained on, as in fits; 0: all are. Nothing: every eighth, or, where the splat agrees with
+  // those as well as with the others, so that its fit has seen them, all: then they could not tell what is better.
+  std::optional<int> hold_out;
   int downscale = 1;  // pixels of a picture per side that become one, as in fits
   std::optional<int64_t> steps;
   std::optional<double> seconds;           // instead of steps: as many as there are in that time. Not reproducible
@@ -46,12 +48,19 @@ struct RefineControl {
   std::vector<std::filesystem::path> outputs;  // that its caller writes, also when it was interrupted
 };
 
+// How well a splat agrees with views, seen closer and averaged down to their resolution. SSIM is 0 for views without
+// room for its window.
+struct Consistency {
+  double psnr = 0;  // dB
+  double ssim = 0;
+};
+
 // What a refinement is going to do, decided before anything is optimised.
 struct RefinePlan {
   RefineOptions options;       // steps (unless it runs for seconds), copies and rate are chosen
   bool from_input = false;     // it begins with the splat as it was fitted, not with the start that it was given
   bool nothing_to_do = false;  // the start shows what the splat does already, or there is no width to give back
-  double before = 0;           // dB, of what it begins with
+  Consistency start;           // of what it begins with
   // dB that it has to gain, or else the start is kept. More than 0 for a splat that may know more than the pictures
   // show.
   double least_gain = 0;

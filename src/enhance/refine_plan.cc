@@ -78,7 +78,7 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const GaussianCloud&
   RefinePlan plan;
   plan.options = chosen;
   const bool pictures = HasPictures(chosen);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(plan.before, MeasureConsistency(input.start, input.upscale, input.cloud, chosen, views));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(plan.start, MeasureConsistency(input.start, input.upscale, input.cloud, chosen, views));
 
   // A splat that was trained on larger pictures than these, or without dilation, knows details that these do not show;
   // learning them by heart costs it those. Measured with fits to views four times as large (docs/refine.md): one that
@@ -86,15 +86,15 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const GaussianCloud&
   if (pictures && IsCompensated(views.render.mode)) plan.least_gain = kGainOverFine;
   if (pictures) {
     // A splat that has lost no width is spoiled by what gives it back: the pictures tell.
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double agreement,
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Consistency agreement,
                                  MeasureConsistency(as_it_is, input.upscale, input.cloud, chosen, views));
-    if (agreement > plan.before) {
+    if (agreement.psnr > plan.start.psnr) {
       plan.why = "the splat agrees better with the pictures as it is: the refinement begins with that";
-      plan.before = agreement;
+      plan.start = agreement;
       plan.from_input = true;
       plan.least_gain = kGainOverFine;
     }
-  } else if (plan.before >= kIndistinguishable) {
+  } else if (plan.start.psnr >= kIndistinguishable) {
     plan.why = "the start shows what the splat does already, and is kept";
     plan.nothing_to_do = true;
     return plan;

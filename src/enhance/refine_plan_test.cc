@@ -48,6 +48,24 @@ TEST_F(Refinement, OfANetworksResultIsGentle) {
   EXPECT_EQ(Refine(input_, options_, {})->report.copies, 8);
 }
 
+// A fit has seen what it agrees with as well as with the rest. Views that it does not agree with it has not.
+TEST_F(Refinement, HoldsOutWhatTheSplatHasNotSeen) {
+  options_.hold_out.reset();
+  options_.steps = 2;
+  EXPECT_EQ(Refine(input_, options_, {})->report.views, 12);
+  options_.hold_out = 8;
+  EXPECT_EQ(Refine(input_, options_, {})->report.views, 10);
+  options_.hold_out.reset();
+  for (const size_t held_out : {size_t{0}, size_t{8}}) {  // every eighth, by name
+    const std::filesystem::path path = project() / (cameras_.cameras[held_out].name + ".png");
+    auto picture = ReadImage(path);
+    ASSERT_TRUE(picture.ok());
+    for (float& x : picture->pixels) x = 0.8f * x + 0.05f;
+    ASSERT_TRUE(WritePng(path, *picture, {.overwrite = true}).ok());
+  }
+  EXPECT_EQ(Refine(input_, options_, {})->report.views, 10);
+}
+
 // 20,000 Gaussians in pictures of 28² pixels, which are 84² when seen closer.
 TEST_F(Refinement, SplitsNothingThatNoPixelWouldShow) {
   input_.cloud = orbit_scene::Ball(20'000, 1);

@@ -26,6 +26,8 @@ namespace {
 constexpr int64_t kCheckViews = 8;
 constexpr int64_t kResidualViews = 64;
 constexpr int kCheckAlignSteps = 4;
+constexpr int kHeldOutByDefault = 8;
+constexpr double kSeen = 0.3;     // dB
 constexpr double kPerfect = 100;  // dB that stand for identical pictures in means
 
 std::array<float, 3> BackgroundFor(const RefineOptions& options, const std::optional<std::array<float, 3>>& of_cameras,
@@ -34,9 +36,13 @@ std::array<float, 3> BackgroundFor(const RefineOptions& options, const std::opti
   return of_cameras.value_or(BackgroundOf(cloud.comments).value_or(std::array<float, 3>{}));
 }
 
+// Views that a fit has seen agree with it as well as others do, those that it has not less.
+bool HasSeen(double seen_psnr, double held_out_psnr) { return held_out_psnr > seen_psnr - kSeen; }
+
 Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.images, {.hold_out = options.hold_out,
-                                                                                   .downscale = options.downscale}));
+  const ProjectOptions as_asked = {.hold_out = options.hold_out.value_or(kHeldOutByDefault),
+                                   .downscale = options.downscale};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.images, as_asked));
   if (!project.without_picture.empty()) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--images ", options.images.string(), ": ", project.without_picture.size(), " of its ",
@@ -50,6 +56,20 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
   LogInfo(Cat(project.train.size(), " views with pictures, ", project.held_out.size(),
               " held out; the splat's own renders agree with them to ", Fixed(agreement.psnr, 2), " dB"));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckAgreement(agreement, kLeastInputPsnr, options.align));
+  if (!options.hold_out && !project.held_out.empty()) {
+    PictureCache held_out(project.held_out, render.background);
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement others, MeasureAgreement(input.cloud, render, held_out));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews all,
+                                 OpenProject(options.images, {.hold_out = 0, .downscale = options.downscale}));
+    // A project with test views of its own has them held out for good.
+    if (all.held_out.empty() && HasSeen(agreement.psnr, others.psnr)) {
+      LogInfo(
+          Cat("with those held out they agree as well, to ", Fixed(others.psnr, 2),
+              " dB: the splat was fitted to them, too, and all views are learned from (--hold-out N holds some out)"));
+      project = std::move(all);
+      pictures = PictureCache(project.train, render.background);
+    }
+  }
   const auto& check = project.held_out.empty() ? project.train : project.held_out;
   return RefineViews{RefineTargets(std::move(pictures)),
                      RefineTargets(PictureCache(Thinned(check, kCheckViews), render.background)), agreement.psnr,
@@ -87,13 +107,13 @@ Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOption
   return options.images.empty() ? OpenSplat(input, options, render) : OpenPictures(input, options, render);
 }
 
-Result<double> MeasureConsistency(const GaussianCloud& cloud, double upscale, const GaussianCloud& input,
-                                  const RefineOptions& options, RefineViews& views) {
+Result<Consistency> MeasureConsistency(const GaussianCloud& cloud, double upscale, const GaussianCloud& input,
+                                       const RefineOptions& options, RefineViews& views) {
   RefineTargets& targets = views.check;
   ViewObjective objective;
   PoseAligner aligner;
   RefineTarget target;
-  double sum = 0;
+  Consistency sum;
   const auto count = static_cast<int64_t>(targets.views().size());
   for (int64_t view = 0; view < count; ++view) {
     const Camera& camera = targets.views()[static_cast<size_t>(view)];
@@ -122,9 +142,12 @@ Result<double> MeasureConsistency(const GaussianCloud& cloud, double upscale, co
       for (int c = 0; c < 3; ++c) shown.channel(c)[i] = target.picture.channel(c)[i];
     }
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, Psnr(shown, target.picture));
-    sum += std::min(psnr, kPerfect);
+    sum.psnr += std::min(psnr, kPerfect);
+    const Result<double> ssim = Ssim(shown, target.picture);
+    sum.ssim += ssim.ok() ? *ssim : 0;  // too small for a window
   }
-  return count > 0 ? sum / static_cast<double>(count) : 0;
+  if (count == 0) return Consistency{};
+  return Consistency{sum.psnr / static_cast<double>(count), sum.ssim / static_cast<double>(count)};
 }
 
 Result<std::vector<double>> Residuals(const GaussianCloud& cloud, double upscale, RefineViews& views) {

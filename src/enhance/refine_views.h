@@ -23,11 +23,11 @@ struct RefineViews {
 // Those that `options` and `input` name: pictures, cameras, or places around the splat. Errors: see Refine.
 Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOptions& options);
 
-// How well `cloud`, seen closer and averaged down, agrees with views.check: mean PSNR, dB. `input` is the splat that is
-// refined. Pictures that may differ in brightness, or whose poses may be off (`options`), are measured where and as
-// bright as they agree with `cloud` best.
-Result<double> MeasureConsistency(const GaussianCloud& cloud, double upscale, const GaussianCloud& input,
-                                  const RefineOptions& options, RefineViews& views);
+// How well `cloud`, seen closer and averaged down, agrees with views.check, means over the views. `input` is the splat
+// that is refined. Pictures that may differ in brightness, or whose poses may be off (`options`), are measured where
+// and as bright as they agree with `cloud` best.
+Result<Consistency> MeasureConsistency(const GaussianCloud& cloud, double upscale, const GaussianCloud& input,
+                                       const RefineOptions& options, RefineViews& views);
 
 // What every Gaussian has to do with what the views find wrong: Σ over up to kResidualViews views and their pixels of
 // its weight in the pixel × how far the picture is off there, 0–1. That weight is how the picture depends on its

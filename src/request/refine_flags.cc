@@ -13,9 +13,10 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
           "Project with the pictures it was fitted to (as of `fit`): the best there is to refine against")
       ->check(NotEmpty())
       ->group(group);
-  verb.add_option("--hold-out", options.hold_out, "Of --images: every Nth view is not trained on; 0: all are")
+  verb.add_option("--hold-out", options.hold_out,
+                  "Of --images: every Nth view is not trained on; 0: all are (default: 8, or 0 where the splat was "
+                  "fitted to all of them, as it looks)")
       ->check(CLI::Range(0, 1 << 30))
-      ->capture_default_str()
       ->group(group);
   verb.add_option("--downscale", options.downscale,
                   "Of --images: N x N pixels become one, where the splat was fitted to smaller pictures")

@@ -35,8 +35,10 @@ Status Clean(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport&
   const UnseenGaussians& found = *report.cleaned;
   const auto count = static_cast<int64_t>(found.rows.size());
   LogInfo(Cat("cleaned: ", WithThousands(count), " of ", WithThousands(cloud.size()),
-              " Gaussians taken out, which have the background's colour and are missed in none of ", found.views,
-              " views over it"));
+              " Gaussians taken out, which have the background's colour",
+              count == 0 ? std::string()
+                         : Cat("; over it ", found.views, " views agree without them to ", Fixed(found.psnr, 1),
+                               " dB, all taken together")));
   if (count == 0) return {};
   if (count == cloud.size()) {
     return Error{

@@ -8,8 +8,8 @@
 namespace anchorsplat {
 
 // What an enhanced splat says about itself in its comments (GaussianCloud::comments): enhanced once more, it would be
-// blurred, as the width that its fit lost has been given back already. PLY and compressed PLY keep comments; the other
-// formats have no place for them, so there the word is lost.
+// blurred, as the width that its fit lost has been given back already. Formats without a place for it lose the word
+// (core/lost_nothing_mark.h).
 //
 // `method` as in EnhanceReport::method.
 std::string EnhancedComment(const std::string& method, double upscale);

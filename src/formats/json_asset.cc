@@ -4,30 +4,59 @@
 #include <optional>
 
 #include "core/credit.h"
+#include "core/lost_nothing_mark.h"
 #include "core/text.h"
 
 namespace anchorsplat {
 
+namespace {
+
+// What else is in there is another program's.
+void AddMarks(const JsonValue& asset, std::vector<std::string>& comments) {
+  constexpr size_t kMost = 16, kMostBytes = 1000;
+  const std::optional<JsonValue> extras = asset.Find("extras");
+  const std::optional<JsonValue> list = extras ? extras->Find("comments") : std::nullopt;
+  if (!list || !list->raw().is_array()) return;
+  size_t marks = 0;
+  for (const nlohmann::json& one : list->raw()) {
+    if (!one.is_string() || marks == kMost) continue;
+    const auto& text = one.get_ref<const std::string&>();
+    if (text.size() > kMostBytes || !IsMark(text)) continue;
+    comments.push_back(text);
+    ++marks;
+  }
+}
+
+}  // namespace
+
 nlohmann::json AssetOf(std::span<const std::string> comments) {
   nlohmann::json asset = {{"generator", "anchorsplat " ANCHORSPLAT_VERSION}};
-  const std::string copyright = CopyrightOf(comments);
-  if (copyright.empty()) return asset;
   // Comments are bytes, JSON is UTF-8.
-  const auto replace = nlohmann::json::error_handler_t::replace;
-  asset["copyright"] = nlohmann::json::parse(nlohmann::json(copyright).dump(-1, ' ', false, replace));
+  const auto in_utf8 = [](const std::string& text) {
+    return nlohmann::json::parse(nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  };
+  if (const std::string copyright = CopyrightOf(comments); !copyright.empty()) asset["copyright"] = in_utf8(copyright);
+  for (const std::string& comment : comments) {
+    if (IsMark(comment)) asset["extras"]["comments"].push_back(in_utf8(comment));
+  }
   return asset;
 }
 
 Result<std::vector<std::string>> CommentsOfAsset(const JsonValue& root) {
   constexpr size_t kMostBytes = size_t{1} << 20;  // as much as the header of a PLY may have
   const std::optional<JsonValue> asset = root.Find("asset");
-  const std::optional<JsonValue> copyright = asset ? asset->Find("copyright") : std::nullopt;
-  if (!copyright || !copyright->raw().is_string()) return std::vector<std::string>();
-  const auto& text = copyright->raw().get_ref<const std::string&>();
-  if (text.size() > kMostBytes) {
-    return copyright->Complain(Cat("is a text of ", HumanBytes(text.size()), ", longer than ", HumanBytes(kMostBytes)));
+  std::vector<std::string> comments;
+  if (!asset) return comments;
+  if (const std::optional<JsonValue> copyright = asset->Find("copyright"); copyright && copyright->raw().is_string()) {
+    const auto& text = copyright->raw().get_ref<const std::string&>();
+    if (text.size() > kMostBytes) {
+      return copyright->Complain(
+          Cat("is a text of ", HumanBytes(text.size()), ", longer than ", HumanBytes(kMostBytes)));
+    }
+    comments = CommentsOfCopyright(text);
   }
-  return CommentsOfCopyright(text);
+  AddMarks(*asset, comments);
+  return comments;
 }
 
 }  // namespace anchorsplat

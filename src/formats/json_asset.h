@@ -11,10 +11,12 @@
 namespace anchorsplat {
 
 // The member "asset" of a file that is JSON, as glTF defines it and SOG took it over: what made the file, and whose it
-// is. `generator` is ours; `copyright` are the credits, a line each, and is not there where there are none.
+// is. `generator` is ours; `copyright` are the credits, a line each, and `extras.comments` the
+// marks of core/lost_nothing_mark.h; neither is there where there are none.
 nlohmann::json AssetOf(std::span<const std::string> comments);
 
-// The credits that such a file says, as comments; none where it says nothing, or no text. kBadFile: a mebibyte of them.
+// The credits and marks that such a file says, as comments; none where it says nothing, or no text. kBadFile: a mebibyte
+// of credits.
 Result<std::vector<std::string>> CommentsOfAsset(const JsonValue& root);
 
 }  // namespace anchorsplat

@@ -64,7 +64,7 @@ std::string CreditLoss(const SplatFormat& format, std::span<const std::string> c
 
 // Read back, the splat looks as if it had lost width.
 std::string MarkLoss(const SplatFormat& format, std::span<const std::string> comments) {
-  if (format.comments == CommentPlace::kAll) return {};
+  if (format.comments != CommentPlace::kNone) return {};
   const bool enhanced = HasMark(comments, kEnhancedMark);
   if (!enhanced && !HasMark(comments, kPixelAreaMark)) return {};
   return Cat(AFileOf(format), " has no place for the word that the splat has ",

@@ -52,6 +52,16 @@ TEST(WriteLosses, NamesTheCreditsThatAFormatCannotSay) {
   }
   EXPECT_THAT(losses(".spz"), ElementsAre(HasSubstr("an SPZ file")));
   EXPECT_THAT(losses(".npz"), ElementsAre(HasSubstr("an NPZ file")));
+  for (const char* mark :
+       {"enhanced by anchorsplat: filter, 4 times closer", "fitted to pixel areas, seen 4 times closer"}) {
+    cloud.comments = {mark};
+    for (const char* format : {".ply", ".compressed.ply", ".sog", ".glb", ".gltf"}) {
+      EXPECT_THAT(losses(format), IsEmpty()) << format;
+    }
+    for (const char* format : {".spz", ".splat", ".csv", ".npz", ".pt"}) {
+      EXPECT_THAT(losses(format), ElementsAre(HasSubstr("no place for the word that the splat has been"))) << format;
+    }
+  }
 }
 
 }  // namespace

@@ -7,12 +7,16 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "core/lost_nothing_mark.h"
+#include "core/text.h"
 #include "formats/attribute_error.h"
 #include "formats/both_ways_for_test.h"
 #include "formats/gltf/gltf_blocks.h"
 #include "formats/gltf/gltf_reader.h"
 #include "formats/gltf/gltf_writer.h"
 #include "formats/random_cloud_for_test.h"
+#include "formats/registry.h"
+#include "formats/write_losses.h"
 #include "io/atomic_file.h"
 #include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
@@ -118,6 +122,26 @@ TEST(Gltf, CreditsAreItsCopyright) {
   EXPECT_NE(Read(other.bytes()).error().message.find("asset.copyright"), std::string::npos);
   other.json["asset"].erase("copyright");
   EXPECT_TRUE(Read(other.bytes())->comments.empty());
+}
+
+// A splat that has all its width, and says so.
+TEST(Gltf, MarksAreKept) {
+  const TestFolder folder;
+  GaussianCloud cloud = RandomCloud(10, 0, 3);
+  cloud.comments = {"world up: 0 1 0", Cat(kEnhancedMark, "filter, 4 times closer")};
+  const std::vector<std::string> mark = {cloud.comments[1]};
+  EXPECT_TRUE(WriteLosses(*FormatOfExtension("a.glb"), cloud).empty());
+  ASSERT_TRUE(WriteGlb(folder / "a.glb", cloud).ok());
+  Glb glb = Glb::Of(FileBytes(folder / "a.glb"));
+  EXPECT_EQ(Read(glb.bytes())->comments, mark);
+  // Of another program.
+  nlohmann::json& extras = glb.json["asset"]["extras"];
+  extras["comments"] = {7, "hello", mark[0], std::string(kEnhancedMark) + std::string(2000, 'x')};
+  EXPECT_EQ(Read(glb.bytes())->comments, mark);
+  extras["comments"] = "hello";
+  EXPECT_TRUE(Read(glb.bytes())->comments.empty());
+  extras = 3;
+  EXPECT_TRUE(Read(glb.bytes())->comments.empty());
 }
 
 TEST(Gltf, NodesMoveAndScale) {

@@ -24,6 +24,7 @@ class PlyBlocks final : public FileBlocks {
   PlyBlocks(const InputFile& file, PlyHeader header, const PlyLayout& layout, uint64_t begin)
       : file_(file),
         header_(std::move(header)),
+        vertex_(*layout.vertex),
         begin_(begin),
         row_size_(static_cast<size_t>(layout.vertex->row_size())) {
     size_ = layout.vertex->count;
@@ -92,13 +93,15 @@ class PlyBlocks final : public FileBlocks {
 
   Status EndFirst() override {
     WarnOfOddTags(file_, header_);
+    WarnOfSurplus(file_, header_, vertex_);
     if (filter_) SayFilterIsFused(file_, *render_mode_);
     return {};
   }
 
   const InputFile& file_;
   PlyHeader header_;
-  uint64_t begin_;  // byte of the first row
+  const PlyElement& vertex_;  // of header_: a vector that moves keeps its elements
+  uint64_t begin_;            // byte of the first row
   size_t row_size_;
   std::vector<Column> columns_;
   std::vector<Run> harmonics_;  // those that are no columns

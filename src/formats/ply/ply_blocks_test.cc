@@ -1,10 +1,14 @@
 #include "formats/ply/ply_blocks.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <fstream>
 #include <string>
+#include <vector>
 
+#include "core/messages_for_test.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "formats/both_ways_for_test.h"
@@ -48,6 +52,29 @@ TEST(PlyBlocks, ShowWhatReadingGives) {
       ExpectBlocksOf(folder / "a.ply");
     }
   }
+}
+
+// As of two files one behind the other.
+TEST(PlyBlocks, BytesThatNobodyReadsAreSaid) {
+  const TestFolder folder;
+  const GaussianCloud cloud = TroubledCloud(30, 1);
+  ASSERT_TRUE(WritePly(folder / "a.ply", cloud).ok());
+  const std::string whole = FileBytes(folder / "a.ply");
+  const auto warnings = [&](const std::string& behind) {
+    std::ofstream(folder / "a.ply", std::ios::binary) << whole << behind;
+    Messages messages;
+    const auto file = InputFile::Open(folder / "a.ply");
+    EXPECT_TRUE(ReadPly(*file, {}).ok());
+    const std::vector<std::string> of_reader = messages.TakeWarnings();
+    const auto blocks = BlocksOfPly(*file, {});
+    EXPECT_TRUE(blocks.ok() && (*blocks)->ForEach([](const CloudBlock&) {}).ok());
+    EXPECT_EQ(messages.warnings(), of_reader);
+    return of_reader;
+  };
+  EXPECT_THAT(warnings(""), testing::IsEmpty());
+  EXPECT_THAT(warnings("\r\n"), testing::IsEmpty());
+  EXPECT_THAT(warnings(std::string(1000, 'x')),
+              testing::ElementsAre(testing::HasSubstr("the 1,000 bytes behind its 30 Gaussians are not read")));
 }
 
 // Mip-Splatting's filter, and a property that is no float.

@@ -1,5 +1,6 @@
 #include "formats/ply/ply_body.h"
 
+#include "core/log.h"
 #include "core/text.h"
 #include "formats/ply/ply_rows.h"
 
@@ -37,6 +38,17 @@ Result<uint64_t> BeginOfPlyRows(const InputFile& file, const PlyHeader& header, 
     }
   }
   return begin;
+}
+
+void WarnOfSurplus(const InputFile& file, const PlyHeader& header, const PlyElement& vertex) {
+  constexpr uint64_t kLineEnd = 2;
+  if (header.encoding == PlyEncoding::kAscii || vertex.has_lists() || &header.elements.back() != &vertex) return;
+  const Result<uint64_t> begin = BeginOfPlyRows(file, header, vertex);
+  if (!begin.ok()) return;
+  const uint64_t end = *begin + static_cast<uint64_t>(vertex.count) * vertex.row_size();
+  if (file.size() <= end + kLineEnd) return;
+  LogWarning(Cat(file.name(), ": byte ", Thousands(end), ": the ", Thousands(file.size() - end), " bytes behind its ",
+                 WithThousands(vertex.count), " Gaussians are not read: its header knows nothing of them"));
 }
 
 Status CheckGaussianLimit(const InputFile& file, const PlyElement& vertex, const ReadLimits& limits) {

@@ -21,6 +21,10 @@ Status ReadPlyBody(const InputFile& file, const PlyHeader& header, const PlyElem
 // The byte where the rows of `vertex` begin in a binary file. Errors: as above.
 Result<uint64_t> BeginOfPlyRows(const InputFile& file, const PlyHeader& header, const PlyElement& vertex);
 
+// Warns of bytes behind the last row of a binary file whose last element is `vertex`: of a second file, or of rows that
+// the header knows nothing of. A line end is none.
+void WarnOfSurplus(const InputFile& file, const PlyHeader& header, const PlyElement& vertex);
+
 // kBadFile where the header promises more Gaussians than are wanted.
 Status CheckGaussianLimit(const InputFile& file, const PlyElement& vertex, const ReadLimits& limits);
 

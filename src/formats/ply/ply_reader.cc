@@ -36,6 +36,7 @@ Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, Extr
     extras->normals = {};
   }
   WarnOfOddTags(file, header);
+  WarnOfSurplus(file, header, vertex);
   cloud.render_mode = header.render_mode;
   cloud.comments = std::move(header.comments);
   if (layout.filter) {

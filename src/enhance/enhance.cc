@@ -9,30 +9,19 @@
 #include "core/statistics.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
+#include "enhance/choose_pixel_sizes.h"
 #include "enhance/clean.h"
 #include "enhance/enhance_region.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
 #include "enhance/gaussian_budget.h"
 #include "enhance/lost_width.h"
-#include "enhance/pixel_size_guard.h"
 #include "enhance/refine_method.h"
 #include "fit/pixel_model.h"
-#include "fit/training_views.h"
 
 namespace anchorsplat {
 
 namespace {
-
-// Cameras and estimate further apart than this are worth a word: one of them does not belong to this splat.
-constexpr double kSuspiciousRatio = 1.5;
-// A splat whose outlines are so much sharper than its cameras' pixels make them has lost less width than a classic fit:
-// antialiased ones look like 0.44 to 0.86 of their pixels, classic ones of known pixels like 0.73 and more.
-constexpr double kSharperThanClassic = 0.65;
-// Cameras whose pixels are so many times larger than the splat may look like at most do not belong to it.
-constexpr double kImpossible = 3;
-// An estimate whose range is wider than this is a rough one.
-constexpr double kVague = 3;
 
 std::vector<EnhanceMethod>& Registry() {
   static std::vector<EnhanceMethod> methods = {
@@ -82,162 +71,6 @@ Status DropUnusable(GaussianCloud& cloud) {
       Cat("dropped ", WithThousands(dropped), " of ", WithThousands(cloud.size()),
           " Gaussians: NaN or infinite positions, scales, rotations, opacities or colours, so that nobody draws them"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(cloud, Subset(cloud, kept));
-  return {};
-}
-
-Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
-  std::optional<int> train_width = options.train_width;
-  if (train_width) {
-    int widest = 0;
-    for (const Camera& camera : options.cameras->cameras) widest = std::max(widest, camera.intrinsics.width);
-    if (*train_width > widest) {
-      return Error{ErrorCode::kBadArgument, Cat("--train-width ", *train_width,
-                                                " has no effect: the cameras' views are only ", widest, " wide")};
-    }
-  }
-  if (!train_width) {
-    train_width = AssumedTrainWidth(*options.cameras);
-    if (train_width) {
-      LogWarning(Cat("the cameras are wider than ", *train_width, " pixels; assuming that training shrank them to ",
-                     *train_width, " as INRIA's trainer does. If not, give the true width with --train-width"));
-    }
-  }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes from_cameras,
-                               PixelSizesFromCameras(input.cloud, *options.cameras, train_width, options.camera_rule));
-  if (from_cameras.unseen == input.cloud.size()) {
-    return Error{
-        ErrorCode::kBadArgument,
-        "no Gaussian lies in any of the cameras' views: are these cameras of this splat, in its unit and axes?"};
-  }
-  if (from_cameras.unseen > 0) {
-    const std::string text = Cat(WithThousands(from_cameras.unseen), " of ", WithThousands(input.cloud.size()),
-                                 " Gaussians lie outside all views; their pixel size is that of the nearest camera");
-    2 * from_cameras.unseen > input.cloud.size() ? LogWarning(text + ". Are these cameras of this splat?")
-                                                 : LogInfo(text);
-  }
-  report.camera_rule = from_cameras.rule == CameraPixelRule::kMedian ? "median" : "smallest";
-  if (!from_cameras.why.empty()) {
-    LogInfo(Cat("--camera-rule ", report.camera_rule, ": ", from_cameras.why));
-  }
-  report.pixel_size_source = "cameras";
-  const auto found = FindPixelSize(input.cloud);
-  if (found.ok()) {
-    input.showing = found->estimate.showing;
-    const double ratio = found->size / from_cameras.median;
-    // Whoever says a mode or a strength means these cameras.
-    const bool said = options.filter_strength || std::ranges::find(options.given, "mode") != options.given.end();
-    const bool sharper = !found->contradicted() && !IsCompensated(input.cloud.render_mode) &&
-                         found->largest < kSharperThanClassic * from_cameras.median;
-    const double largest = std::max(found->largest, found->estimate.high);
-    const bool impossible = from_cameras.median > kImpossible * largest;
-    if (!said && (sharper || impossible)) {
-      const double size = found->contradicted() ? found->size : found->largest;
-      LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
-                     " (median), but the splat is sharper than a fit to such pixels: like one to pixels of ", size,
-                     ", and only that much width is given back. Are these its training cameras, at the size and in the "
-                     "unit it was trained in (--train-width)",
-                     input.cloud.render_mode ? "" : ", or was it trained with antialiasing (--mode antialiased)",
-                     "? --mode or --filter-strength says that they are right all the same"));
-      const auto smaller = static_cast<float>(size / from_cameras.median);
-      for (float& own : from_cameras.sizes) own *= smaller;
-      from_cameras.median *= smaller;
-      if (found->contradicted()) report.pixel_size_source = kCautiousPixelSize;
-    } else if (!found->contradicted() && (ratio > kSuspiciousRatio || ratio < 1 / kSuspiciousRatio)) {
-      LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
-                     " (median), the splat itself looks like ", found->size,
-                     ": are these its training cameras, at the size it was trained at (--train-width)?"));
-    }
-  }
-  report.train_width = train_width;
-  report.pixel_size = from_cameras.median;
-  input.pixel_sizes = std::move(from_cameras.sizes);
-  return {};
-}
-
-// Pictures to refine against come with the cameras that took them, and are as large as they were in training.
-Status PixelSizesFromPictures(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(
-      TrainingViews project,
-      OpenProject(options.refine.images, {.hold_out = 0, .downscale = options.refine.downscale}));
-  EnhanceOptions with_cameras = options;
-  with_cameras.cameras.emplace().cameras = std::move(project.train);
-  with_cameras.camera_rule = CameraPixelRule::kMedian;
-  ANCHORSPLAT_RETURN_IF_ERROR(PixelSizesFromTrainingCameras(with_cameras, input, report));
-  if (report.pixel_size_source == "cameras") report.pixel_size_source = "pictures";
-  return {};
-}
-
-void SayWhatWasFound(const PixelSizeFinding& found) {
-  const PixelSizeEstimate& estimate = found.estimate;
-  if (found.contradicted()) {
-    std::string contradictions;
-    for (const std::string& sentence : found.contradictions) {
-      contradictions += (contradictions.empty() ? "" : "; and ") + sentence;
-    }
-    LogWarning(
-        Cat("outlines say a training pixel of ", estimate.size, ", but ", contradictions,
-            ". So that nothing is blurred, a smaller pixel is taken, ", found.size,
-            "; --cameras or --pixel-size will do better. In a room or a street the pixels of what is near and of what "
-            "is far differ many times: no single size is right there, and only cameras know them"));
-    return;
-  }
-  const std::string size =
-      Cat("estimated size of a training pixel: ", estimate.size, " (likely ", estimate.low, " to ", estimate.high, ")");
-  if (estimate.high > kVague * estimate.low) {
-    LogWarning(Cat(size,
-                   ". That is rough, and rather too small: this splat says little about the pixels it was trained at; "
-                   "--cameras or --pixel-size will do better"));
-    return;
-  }
-  LogInfo(Cat(size, ", and nothing else about the splat contradicts it; --cameras or --pixel-size make it exact"));
-}
-
-// `says`: whether what is found matters to the user, as there is width to give back.
-Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says, EnhanceInput& input,
-                        EnhanceReport& report) {
-  if (options.pixel_size && !(*options.pixel_size > 0 && std::isfinite(*options.pixel_size))) {
-    return Error{ErrorCode::kBadArgument, Cat("pixel size ", *options.pixel_size, " is not a positive length")};
-  }
-  if (options.pixel_size && options.cameras) {
-    return Error{ErrorCode::kBadArgument,
-                 "a pixel size and cameras were given; the cameras already say the pixel size"};
-  }
-  if (options.train_width && !options.cameras) {
-    return Error{ErrorCode::kBadArgument, "--train-width says how cameras were shrunk; it needs --cameras"};
-  }
-  if (options.cameras) return PixelSizesFromTrainingCameras(options, input, report);
-  if (options.pixel_size) {
-    report.pixel_size = *options.pixel_size;
-    report.pixel_size_source = "given";
-    // It chooses the network, too.
-    if (says && !IsCompensated(input.cloud.render_mode)) {
-      const auto estimate = EstimatePixelSize(input.cloud);
-      if (estimate.ok()) {
-        input.showing = estimate->showing;
-        // Too small ones harm nobody.
-        if (report.pixel_size > kSuspiciousRatio * estimate->high) {
-          LogWarning(Cat("a training pixel of ", report.pixel_size, " was given, the splat itself looks like ",
-                         estimate->size, " (likely ", estimate->low, " to ", estimate->high,
-                         "): is it the world size of a pixel of the training views, in the splat's unit?"));
-        }
-      }
-    }
-  } else if (pictures) {
-    return PixelSizesFromPictures(options, input, report);
-  } else {
-    const auto found = FindPixelSize(input.cloud);
-    if (!found.ok()) {
-      LogWarning(found.error().message + ": the splat stays as it is; --pixel-size or --cameras would tell");
-      report.pixel_size_source = kUnknownPixelSize;
-      return {};
-    }
-    report.finding = *found;
-    input.showing = found->estimate.showing;
-    report.pixel_size = found->size;
-    report.pixel_size_source = found->contradicted() ? kCautiousPixelSize : "estimated";
-    if (says) SayWhatWasFound(*found);
-  }
-  input.pixel_sizes.assign(1, static_cast<float>(report.pixel_size));
   return {};
 }
 
@@ -293,7 +126,8 @@ bool IsUnknownOfFew(const EnhanceOptions& options, const GaussianCloud& cloud, s
 }
 
 // Of the filter. Splats that absorbed nothing have nothing to get back.
-double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud, std::optional<TrainedKind> looks) {
+double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud, std::optional<TrainedKind> looks,
+                      bool unknown_of_few) {
   if (options.filter_strength) return *options.filter_strength;
   const LostWidth lost = FindLostWidth(cloud, looks, options.upscale);
   if (lost.reason == LostWidthReason::kFittedToAreas) {
@@ -309,7 +143,7 @@ double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud,
                 Fixed(lost.strength, 2), " of what a classic one could have lost)"));
   }
   // Most are classic, and who knows the pixels has an eye on the rest.
-  if (lost.reason == LostWidthReason::kTooFew && !IsUnknownOfFew(options, cloud, looks)) {
+  if (lost.reason == LostWidthReason::kTooFew && !unknown_of_few) {
     return DefaultFilterStrength(options.upscale);
   }
   return lost.strength;
@@ -402,15 +236,16 @@ bool GivesWidth(double strength, double upscale, std::optional<RenderMode> mode)
 }
 
 // The filter's strength and the pixel sizes, for methods that work with them.
-Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
+Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, bool unknown_of_few, EnhanceInput& input,
+                    EnhanceReport& report) {
   if (report.looks && options.upscale > 1) {
     SayHowItLooks(*report.looks, report.looks == TrainedKind::kWidened && input.cloud.render_mode.has_value());
-  } else if (IsUnknownOfFew(options, input.cloud, report.looks) && options.upscale > 1) {
+  } else if (unknown_of_few && options.upscale > 1) {
     LogWarning(Cat("it is unclear how the splat was trained, as ", WithThousands(input.cloud.size()),
                    " Gaussians are too few to tell. Only a little width is given back; --mode classic or antialiased, "
                    "where you know it, says more"));
   }
-  input.filter_strength = ChooseStrength(options, input.cloud, report.looks);
+  input.filter_strength = ChooseStrength(options, input.cloud, report.looks, unknown_of_few);
   report.filter_strength = input.filter_strength;
   const bool gives_width = GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode);
   if (options.filter_strength && *options.filter_strength > 0 && !gives_width && options.upscale > 1) {
@@ -474,15 +309,16 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SizedMethods sized, FindSizedMethods(plan, options));
   if (sized.any || options.clean) RecogniseKind(options, input.cloud, report);
   if (options.clean) ANCHORSPLAT_RETURN_IF_ERROR(Clean(options, input.cloud, report));
+  const bool unknown_of_few = sized.any && IsUnknownOfFew(options, input.cloud, report.looks);
   if (sized.any) {
-    ANCHORSPLAT_RETURN_IF_ERROR(ChooseWidths(plan, options, input, report));
+    ANCHORSPLAT_RETURN_IF_ERROR(ChooseWidths(plan, options, unknown_of_few, input, report));
   } else if (IsMarkedEnhanced(input.cloud)) {
     LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
   }
   if (GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode)) {
     if (report.pixel_size_source == kCautiousPixelSize) {
       LeaveNetworksOut(plan, "measures Gaussians in pixels and goes wrong where the pixel is not known");
-    } else if (report.looks == TrainedKind::kUnclear || IsUnknownOfFew(options, input.cloud, report.looks)) {
+    } else if (report.looks == TrainedKind::kUnclear || unknown_of_few) {
       LeaveNetworksOut(plan, "has learned what splats of known kinds have lost");
     }
   }

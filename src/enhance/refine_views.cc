@@ -59,15 +59,17 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
   if (!options.hold_out && !project.held_out.empty()) {
     PictureCache held_out(project.held_out, render.background);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement others, MeasureAgreement(input.cloud, render, held_out));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews all,
-                                 OpenProject(options.images, {.hold_out = 0, .downscale = options.downscale}));
-    // A project with test views of its own has them held out for good.
-    if (all.held_out.empty() && HasSeen(agreement.psnr, others.psnr)) {
-      LogInfo(
-          Cat("with those held out they agree as well, to ", Fixed(others.psnr, 2),
-              " dB: the splat was fitted to them, too, and all views are learned from (--hold-out N holds some out)"));
-      project = std::move(all);
-      pictures = PictureCache(project.train, render.background);
+    if (HasSeen(agreement.psnr, others.psnr)) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews all,
+                                   OpenProject(options.images, {.hold_out = 0, .downscale = options.downscale}));
+      // A project with test views of its own has them held out for good.
+      if (all.held_out.empty()) {
+        LogInfo(Cat("with those held out they agree as well, to ", Fixed(others.psnr, 2),
+                    " dB: the splat was fitted to them, too, and all views are learned from (--hold-out N holds some "
+                    "out)"));
+        project = std::move(all);
+        pictures = PictureCache(project.train, render.background);
+      }
     }
   }
   const auto& check = project.held_out.empty() ? project.train : project.held_out;

@@ -1,6 +1,5 @@
 #include "train/trainer.h"
 
-#include <ATen/autocast_mode.h>
 #include <torch/torch.h>
 
 #include <algorithm>
@@ -19,6 +18,7 @@
 #include "io/input_record.h"
 #include "model/published/torch/point_batch_norm.h"
 #include "model/torch/make_trainable_network.h"
+#include "train/autocast.h"
 #include "train/merged_copies.h"
 #include "train/optimizer.h"
 #include "train/perceptual_objective.h"
@@ -39,27 +39,6 @@ namespace fs = std::filesystem;
 constexpr int kMostBadSteps = 50;  // on end
 constexpr double kFirstLossScale = 65536;
 constexpr int64_t kLossScaleGrowth = 2000;  // good steps before it doubles
-
-// Automatic mixed precision while it lives.
-class Autocast {
- public:
-  Autocast(Precision precision, torch::Device device) : on_(precision != Precision::kFp32), type_(device.type()) {
-    if (!on_) return;
-    at::autocast::set_autocast_dtype(type_, precision == Precision::kBf16 ? at::kBFloat16 : at::kHalf);
-    at::autocast::set_autocast_enabled(type_, true);
-  }
-  ~Autocast() {
-    if (!on_) return;
-    at::autocast::set_autocast_enabled(type_, false);
-    at::autocast::clear_cache();
-  }
-  Autocast(const Autocast&) = delete;
-  Autocast& operator=(const Autocast&) = delete;
-
- private:
-  bool on_;
-  at::DeviceType type_;
-};
 
 GaussianTensors InFloat(const GaussianTensors& g) {
   const auto host = [](const torch::Tensor& t) { return t.to(torch::kCPU, torch::kFloat32); };

@@ -42,10 +42,12 @@ Result<uint64_t> BeginOfPlyRows(const InputFile& file, const PlyHeader& header, 
 
 void WarnOfSurplus(const InputFile& file, const PlyHeader& header, const PlyElement& vertex) {
   constexpr uint64_t kLineEnd = 2;
-  if (header.encoding == PlyEncoding::kAscii || vertex.has_lists() || &header.elements.back() != &vertex) return;
-  const Result<uint64_t> begin = BeginOfPlyRows(file, header, vertex);
-  if (!begin.ok()) return;
-  const uint64_t end = *begin + static_cast<uint64_t>(vertex.count) * vertex.row_size();
+  if (header.encoding == PlyEncoding::kAscii || &header.elements.back() != &vertex) return;
+  uint64_t end = header.body;  // the file has that much: its rows have been read
+  for (const PlyElement& element : header.elements) {
+    if (element.has_lists()) return;  // of which nobody knows how long they are without reading them once more
+    end += static_cast<uint64_t>(element.count) * element.row_size();
+  }
   if (file.size() <= end + kLineEnd) return;
   LogWarning(Cat(file.name(), ": byte ", Thousands(end), ": the ", Thousands(file.size() - end), " bytes behind its ",
                  WithThousands(vertex.count), " Gaussians are not read: its header knows nothing of them"));

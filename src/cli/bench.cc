@@ -8,6 +8,7 @@
 #include "bench/io_bench.h"
 #include "bench/network_bench.h"
 #include "bench/render_bench.h"
+#include "cli/bench_looks.h"
 #include "cli/bench_pixel_size.h"
 #include "cli/table.h"
 #include "cli/verb.h"
@@ -370,6 +371,7 @@ void AddBench(CLI::App& app, Program& program) {
   AddConvertBench(verb, program);
   AddIoBench(verb, program);
   AddPixelSizeBench(verb, program);
+  AddLooksBench(verb, program);
 }
 
 }  // namespace anchorsplat

@@ -136,6 +136,23 @@ TEST_F(InfoVerb, OfUntaggedSplats) {
               HasSubstr("no width given back"));
 }
 
+// Formats that keep no comments keep what networks leave: Gaussians in twins.
+TEST_F(InfoVerb, OfEnhancedSplatsThatDoNotSaySo) {
+  const std::string enhanced = folder_ / "enhanced.ply", lost = folder_ / "lost.splat", again = folder_ / "again.ply";
+  ExpectDone({"enhance", SourceDirForTest() / "examples/tankard/input.ply", "-o", enhanced});
+  ExpectDone({"convert", enhanced, lost});
+  EXPECT_THAT(ExpectDone({"info", lost}).out, AllOf(HasSubstr("it looks     like one that a network has enhanced"),
+                                                    HasSubstr("lost width   none any more (likely)")));
+  const ProgramRun left_alone = ExpectDone({"enhance", lost, "-o", again, "--copies", "2"});
+  EXPECT_THAT(left_alone.err, AllOf(HasSubstr("in twins"), HasSubstr("--copies has no effect")));
+  EXPECT_THAT(left_alone.out, HasSubstr("no width given back"));
+  // Whoever knows better is believed.
+  EXPECT_THAT(ExpectDone({"enhance", lost, "-o", again, "-w", "--method", "filter", "--mode", "classic", "--pixel-size",
+                          "0.0055"})
+                  .out,
+              HasSubstr("strength 0.740"));
+}
+
 // What is understood of the tags, and what --mode says instead.
 TEST_F(InfoVerb, OfTheRenderMode) {
   const std::string scan = WriteScan(folder_ / "modes.ply");

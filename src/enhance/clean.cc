@@ -37,8 +37,8 @@ Status Clean(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport&
   LogInfo(Cat("cleaned: ", WithThousands(count), " of ", WithThousands(cloud.size()),
               " Gaussians taken out, which have the background's colour",
               count == 0 ? std::string()
-                         : Cat("; over it ", found.views, " views agree without them to ", Fixed(found.psnr, 1),
-                               " dB, all taken together")));
+                         : Cat("; over it each of ", found.views, " views agrees without them to ",
+                               Fixed(found.psnr, 1), " dB or more")));
   if (count == 0) return {};
   if (count == cloud.size()) {
     return Error{

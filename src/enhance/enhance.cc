@@ -78,10 +78,11 @@ Status DropUnusable(GaussianCloud& cloud) {
 void RecogniseKind(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport& report) {
   if (options.filter_strength || HasLostNoWidth(cloud)) return;
   if (cloud.render_mode) {
-    // Formats that have no word for Mip-Splatting tag its splats as antialiased.
+    // Formats that have no word for Mip-Splatting tag its splats as antialiased, and some have none for what is
+    // enhanced.
     const bool said = std::ranges::find(options.given, "mode") != options.given.end();
     if (said || cloud.render_mode != RenderMode::kAntialiased) return;
-    if (FindTrainedKind(cloud) == TrainedKind::kWidened) report.looks = TrainedKind::kWidened;
+    if (const auto looks = FindTrainedKind(cloud); IsWide(looks)) report.looks = looks;
     return;
   }
   report.looks = FindTrainedKind(cloud);
@@ -89,6 +90,13 @@ void RecogniseKind(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceR
 }
 
 void SayHowItLooks(TrainedKind looks, bool tagged) {
+  if (looks == TrainedKind::kEnhanced) {
+    LogWarning(
+        Cat("the Gaussians of the splat lie in twins, as a network leaves them that has enhanced it: it has lost no "
+            "width any more, and none is given back (--mode ",
+            tagged ? "antialiased" : "classic or antialiased, where you know it,", " if it has not been enhanced)"));
+    return;
+  }
   if (tagged) {
     LogWarning(
         "the splat is tagged antialiased, but even its thinnest Gaussians have a width, as Mip-Splatting and enhancing "
@@ -113,6 +121,7 @@ void SayHowItLooks(TrainedKind looks, bool tagged) {
           "of antialiased ones; it may have been enhanced. Only a little width is given back; --mode classic or "
           "antialiased, where you know it, says more");
       break;
+    case TrainedKind::kEnhanced:
     case TrainedKind::kClassic:
       break;
   }
@@ -239,7 +248,7 @@ bool GivesWidth(double strength, double upscale, std::optional<RenderMode> mode)
 Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, bool unknown_of_few, EnhanceInput& input,
                     EnhanceReport& report) {
   if (report.looks && options.upscale > 1) {
-    SayHowItLooks(*report.looks, report.looks == TrainedKind::kWidened && input.cloud.render_mode.has_value());
+    SayHowItLooks(*report.looks, IsWide(report.looks) && input.cloud.render_mode.has_value());
   } else if (unknown_of_few && options.upscale > 1) {
     LogWarning(Cat("it is unclear how the splat was trained, as ", WithThousands(input.cloud.size()),
                    " Gaussians are too few to tell. Only a little width is given back; --mode classic or antialiased, "

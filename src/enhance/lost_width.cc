@@ -24,6 +24,10 @@ std::string_view NameOf(LostWidthReason reason) {
       return "widened";
     case LostWidthReason::kWidenedButTagged:
       return "widened, but tagged antialiased";
+    case LostWidthReason::kLooksEnhanced:
+      return "looks enhanced";
+    case LostWidthReason::kEnhancedButTagged:
+      return "looks enhanced, but tagged antialiased";
   }
   return "";
 }
@@ -31,9 +35,12 @@ std::string_view NameOf(LostWidthReason reason) {
 LostWidth FindLostWidth(const CloudView& cloud, std::optional<TrainedKind> looks, double upscale) {
   if (IsFittedToPixelAreas(cloud)) return {0, LostWidthReason::kFittedToAreas};
   if (IsMarkedEnhanced(cloud)) return {0, LostWidthReason::kMarkedEnhanced};
-  if (looks == TrainedKind::kWidened) {
-    if (!cloud.render_mode) return {0, LostWidthReason::kWidened};
-    if (cloud.render_mode == RenderMode::kAntialiased) return {0, LostWidthReason::kWidenedButTagged};
+  if (IsWide(looks)) {
+    const bool enhanced = looks == TrainedKind::kEnhanced;
+    if (!cloud.render_mode) return {0, enhanced ? LostWidthReason::kLooksEnhanced : LostWidthReason::kWidened};
+    if (cloud.render_mode == RenderMode::kAntialiased) {
+      return {0, enhanced ? LostWidthReason::kEnhancedButTagged : LostWidthReason::kWidenedButTagged};
+    }
   }
   if (cloud.render_mode) return {DefaultFilterStrength(upscale, cloud.render_mode), LostWidthReason::kTagged};
   const double little = DefaultFilterStrength(upscale, RenderMode::kAntialiased);

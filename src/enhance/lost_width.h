@@ -14,14 +14,16 @@ inline constexpr int64_t kFewGaussians = 2000;
 
 // What `enhance` gives back to a splat, and why.
 enum class LostWidthReason {
-  kTagged,            // the file says how it was trained
-  kSizes,             // its sizes say it
-  kUnclear,           // they are like those of no kind: only a little, which harms none of them
-  kTooFew,            // too few Gaussians to tell: taken for a classic one where there are kFewGaussians, else little
-  kFittedToAreas,     // nothing was lost
-  kMarkedEnhanced,    // nothing is lost any more
-  kWidened,           // the same, by its sizes
-  kWidenedButTagged,  // by its sizes, although it is tagged antialiased: formats have no word for Mip-Splatting
+  kTagged,             // the file says how it was trained
+  kSizes,              // its sizes say it
+  kUnclear,            // they are like those of no kind: only a little, which harms none of them
+  kTooFew,             // too few Gaussians to tell: taken for a classic one where there are kFewGaussians, else little
+  kFittedToAreas,      // nothing was lost
+  kMarkedEnhanced,     // nothing is lost any more
+  kWidened,            // the same, by its sizes
+  kWidenedButTagged,   // by its sizes, although it is tagged antialiased: formats have no word for Mip-Splatting
+  kLooksEnhanced,      // the same, by what a network leaves
+  kEnhancedButTagged,  // and although it is tagged antialiased: formats have no word for what has been enhanced
 };
 
 // The words of `info`'s JSON.

@@ -48,6 +48,12 @@ TEST(LostWidth, IsNoneWhereItHasBeenGivenBack) {
   const LostWidth tagged = FindLostWidth(Tagged(RenderMode::kAntialiased), TrainedKind::kWidened, kUpscale);
   EXPECT_EQ(tagged.strength, 0);
   EXPECT_EQ(tagged.reason, LostWidthReason::kWidenedButTagged);
+  EXPECT_EQ(FindLostWidth(Tagged({}), TrainedKind::kEnhanced, kUpscale).strength, 0);
+  EXPECT_EQ(FindLostWidth(Tagged({}), TrainedKind::kEnhanced, kUpscale).reason, LostWidthReason::kLooksEnhanced);
+  const LostWidth twins = FindLostWidth(Tagged(RenderMode::kAntialiased), TrainedKind::kEnhanced, kUpscale);
+  EXPECT_EQ(twins.strength, 0);
+  EXPECT_EQ(twins.reason, LostWidthReason::kEnhancedButTagged);
+  EXPECT_GT(FindLostWidth(Tagged(RenderMode::kMip), TrainedKind::kEnhanced, kUpscale).strength, 0);
   // A classic tag is believed: classic fits of few, large Gaussians look widened.
   EXPECT_GT(FindLostWidth(Tagged(RenderMode::kClassic), TrainedKind::kWidened, kUpscale).strength, 0);
   GaussianCloud enhanced = Tagged(RenderMode::kClassic);

@@ -11,6 +11,7 @@
 #include "core/activations.h"
 #include "core/run_context.h"
 #include "core/statistics.h"
+#include "enhance/enhanced_look.h"
 #include "enhance/showing_gaussians.h"
 
 namespace anchorsplat {
@@ -30,6 +31,9 @@ constexpr double kWidenedTail = 0.12, kThinTail = 0.35;
 // A width that was added is in all axes: the smallest are nearly half as long as the middle ones then. Flat Gaussians,
 // whose third axis other programs write as nearly nothing, also end at one size.
 constexpr double kRound = 0.4, kRatherRound = 0.3;
+
+// ln of the odds. Sizes that are like those of no fit are mostly those of a network.
+constexpr double kEnhancedOdds = 0, kEnhancedOddsWhereUnclear = -2;
 
 double Tail(std::span<float> logarithms, double share) {
   const auto quantile = double{Quantile(logarithms, share)};
@@ -79,6 +83,8 @@ std::string_view NameOf(TrainedKind kind) {
       return "antialiased";
     case TrainedKind::kWidened:
       return "widened";
+    case TrainedKind::kEnhanced:
+      return "enhanced";
     case TrainedKind::kUnclear:
       return "unclear";
     default:
@@ -123,6 +129,17 @@ std::optional<TrainedKind> Judge(const SizeTails& tails) {
   return tail < (few ? kClassicTailOfFew : kClassicTail) ? TrainedKind::kUnclear : TrainedKind::kClassic;
 }
 
-std::optional<TrainedKind> FindTrainedKind(const GaussianCloud& cloud) { return Judge(FindSizeTails(cloud)); }
+std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing) {
+  const auto by_sizes = Judge(SizeTailsOf(showing));
+  if (!by_sizes || by_sizes == TrainedKind::kWidened) return by_sizes;
+  LeaveIfAbandoned();
+  const auto look = FindEnhancedLook(showing);
+  const double least = by_sizes == TrainedKind::kUnclear ? kEnhancedOddsWhereUnclear : kEnhancedOdds;
+  return look && LogOddsOfEnhanced(*look) > least ? TrainedKind::kEnhanced : by_sizes;
+}
+
+std::optional<TrainedKind> FindTrainedKind(const GaussianCloud& cloud) {
+  return TrainedKindOf(FindShowingGaussians(cloud).all);
+}
 
 }  // namespace anchorsplat

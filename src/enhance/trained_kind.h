@@ -14,12 +14,13 @@ namespace anchorsplat {
 // a long tail. An antialiased one makes a Gaussian that is thinner than a pixel along two axes fainter, by the product
 // of both, until it is gone: middle axes end somewhat below the pixel, and the thinnest Gaussians are as opaque as can
 // be. Where a width has been added to all axes, by Mip-Splatting's 3-D filter or by enhancing, the smallest axes end at
-// that width.
+// that width. What a network has enhanced has its Gaussians in twins.
 enum class TrainedKind {
   kClassic,
   kAntialiased,
-  kWidened,  // Mip-Splatting, or enhanced: has all its width
-  kUnclear,  // between these: like a splat that a network has enhanced, or that another program has changed
+  kWidened,   // Mip-Splatting, or filtered: has all its width
+  kEnhanced,  // by a network (enhance/enhanced_look.h): likewise
+  kUnclear,   // between these: like a splat that another program has changed
 };
 
 // The words of `info` and of reports.
@@ -39,9 +40,17 @@ struct SizeTails {
 SizeTails FindSizeTails(const GaussianCloud& cloud);
 SizeTails SizeTailsOf(const GaussianCloud& showing);  // of ShowingGaussians::all
 
-// Looks at sizes only, not at what the cloud says of itself. Nothing: fewer than 200 Gaussians, too few to tell; below
-// 1000 there is more that is unclear.
+// By sizes alone, so never kEnhanced. Nothing: fewer than 400 Gaussians, too few to tell; below 1000 there is more that
+// is unclear.
 std::optional<TrainedKind> Judge(const SizeTails& tails);
+
+// By sizes and by what networks leave. Looks at the Gaussians only, not at what the cloud says of itself.
 std::optional<TrainedKind> FindTrainedKind(const GaussianCloud& cloud);
+std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing);  // of ShowingGaussians::all
+
+// Has all its width.
+inline bool IsWide(std::optional<TrainedKind> kind) {
+  return kind == TrainedKind::kWidened || kind == TrainedKind::kEnhanced;
+}
 
 }  // namespace anchorsplat

@@ -37,8 +37,9 @@ GaussianCloud Grey(int64_t n) {
   return cloud;
 }
 
-// Gaussians of axes whose logarithms are normal, those that are thinner than `least` along the two smaller axes taken
-// out, as an antialiased rasterizer makes them invisible, and `widened` by that much along all axes.
+// Gaussians of any colour and direction, of axes whose logarithms are normal, those that are thinner than `least` along
+// the two smaller axes taken out, as an antialiased rasterizer makes them invisible, and `widened` by that much along
+// all axes.
 GaussianCloud Made(double least, double widened, int64_t n = 8000, uint64_t seed = 3) {
   GaussianCloud cloud = Grey(n);
   Random random(seed);
@@ -51,7 +52,9 @@ GaussianCloud Made(double least, double widened, int64_t n = 8000, uint64_t seed
     for (size_t a = 0; a < 3; ++a) {
       cloud.means[3 * i + a] = static_cast<float>(random.Normal());
       cloud.log_scales[3 * i + a] = static_cast<float>(std::log(std::hypot(axes[a], widened)) - 5);
+      cloud.sh[3 * i + a] = static_cast<float>(random.Normal());
     }
+    for (size_t a = 0; a < 4; ++a) cloud.quats[4 * i + a] = static_cast<float>(random.Normal());
   }
   return cloud;
 }

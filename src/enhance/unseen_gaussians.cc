@@ -148,21 +148,18 @@ class Comparison {
       if (StopRequested()) return Stopped();
       ANCHORSPLAT_RETURN_IF_ERROR(comparison.Render(camera));
       comparison.before_.push_back(comparison.output_.color);
-      comparison.values_ += static_cast<double>(comparison.output_.color.pixels.size());
     }
     return comparison;
   }
 
-  double values() const { return values_; }  // of all pictures
-
-  // Σ of the squared differences without `gone`.
-  Result<double> SquaresWithout(std::span<const int64_t> gone) {
+  // Of the worst view, dB, without `gone` against all.
+  Result<double> PsnrWithout(std::span<const int64_t> gone) {
     for (const int64_t i : gone) logits_[static_cast<size_t>(i)] = -std::numeric_limits<float>::infinity();
-    const Result<double> squares = Squares();
+    const Result<double> psnr = WorstPsnr();
     for (const int64_t i : gone) {
       logits_[static_cast<size_t>(i)] = cloud_->opacity_logits[static_cast<size_t>(i)];
     }
-    return squares;
+    return psnr;
   }
 
  private:
@@ -177,15 +174,15 @@ class Comparison {
     return {};
   }
 
-  Result<double> Squares() {
-    double squares = 0;
+  Result<double> WorstPsnr() {
+    double worst = std::numeric_limits<double>::infinity();
     for (size_t k = 0; k < views_.size(); ++k) {
       if (StopRequested()) return Stopped();
       ANCHORSPLAT_RETURN_IF_ERROR(Render(views_[k]));
       ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, Psnr(before_[k], output_.color));
-      squares += static_cast<double>(output_.color.pixels.size()) * std::pow(10, -psnr / 10);
+      worst = std::min(worst, psnr);
     }
-    return squares;
+    return worst;
   }
 
   const GaussianCloud* cloud_;
@@ -193,7 +190,6 @@ class Comparison {
   std::vector<Camera> views_;
   RenderOptions options_;
   std::vector<Image> before_;
-  double values_ = 0;
   Rasterizer rasterizer_;
   RenderOutput output_;
 };
@@ -250,19 +246,21 @@ Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector
   for (const size_t k : order) candidates.push_back(like[k]);
   UnseenGaussians found;
   found.views = static_cast<int64_t>(views.size());
+  double values = 0;
+  for (const Camera& camera : views) values += 3.0 * camera.intrinsics.width * camera.intrinsics.height;
   found.psnr = std::numeric_limits<double>::infinity();
   ANCHORSPLAT_ASSIGN_OR_RETURN(Comparison comparison, Comparison::Make(cloud, std::move(views), render));
-  const double most = comparison.values() * std::pow(10, -options.least_psnr / 10);
   size_t enough = 0, too_many = candidates.size() + 1;
-  size_t count = Predicted(order, shown, most);
+  // What all views together would allow, which is about the most that the worst can.
+  size_t count = Predicted(order, shown, values * std::pow(10, -options.least_psnr / 10));
   Progress progress("try without it", kMostTrials);
   for (int trial = 0; trial < kMostTrials && enough + 1 < too_many; ++trial) {
     if (static_cast<double>(too_many - enough) <= kCloseEnough * static_cast<double>(enough)) break;
     if (count <= enough || count >= too_many) count = (enough + too_many) / 2;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double squares, comparison.SquaresWithout(std::span(candidates).first(count)));
-    if (squares <= most) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, comparison.PsnrWithout(std::span(candidates).first(count)));
+    if (psnr >= options.least_psnr) {
       enough = count;
-      found.psnr = -10 * std::log10(squares / comparison.values());
+      found.psnr = psnr;
     } else {
       too_many = count;
     }

@@ -18,14 +18,14 @@ namespace anchorsplat {
 // Of dark parts of an object on black the pictures say as little: they go, too, where nothing bright is behind them.
 struct UnseenOptions {
   std::array<float, 3> background{};  // rgb 0–1, of the training views
-  double least_psnr = 50;             // dB of all views together, between the renders with and without them
+  double least_psnr = 50;             // dB of every view, between the renders with and without them
   uint64_t seed = 0;
 };
 inline constexpr float kLikeBackground = 0.1f;
 
 struct UnseenGaussians {
   std::vector<int64_t> rows;  // ascending
-  double psnr = 0;            // of all views together, without them against with them; +Inf where no pixel changes
+  double psnr = 0;            // of the worst view, without them against with them; +Inf where no pixel changes
   int64_t views = 0;          // that were looked at: at most 48, of at most 512 pixels a side
 };
 

@@ -34,25 +34,37 @@ GaussianCloud Dusty(float level) {
 
 std::vector<Camera> Views() { return orbit_scene::Cameras(12, 64, 64).cameras; }
 
-double PsnrWithout(const GaussianCloud& cloud, const std::vector<int64_t>& rows,
-                   const std::array<float, 3>& background) {
+struct Agreement {
+  double worst = 0, together = 0;  // dB: of the worst view, of all together
+};
+
+Agreement AgreementWithout(const GaussianCloud& cloud, const std::vector<int64_t>& rows,
+                           const std::array<float, 3>& background) {
   GaussianCloud without = cloud;
   for (const int64_t i : rows) without.opacity_logits[static_cast<size_t>(i)] = -100;
   Rasterizer rasterizer;
   RenderOutput a, b;
   RenderOptions options;
   options.background = background;
-  double squares = 0;
+  double worst = 0, all = 0;
   for (const Camera& camera : Views()) {
     EXPECT_TRUE(rasterizer.Render(cloud, camera, options, a).ok());
     EXPECT_TRUE(rasterizer.Render(without, camera, options, b).ok());
     Clamp01(a.color);
     Clamp01(b.color);
+    double squares = 0;
     for (size_t k = 0; k < a.color.pixels.size(); ++k) {
       squares += std::pow(double{a.color.pixels[k]} - double{b.color.pixels[k]}, 2);
     }
+    worst = std::max(worst, squares);
+    all += squares;
   }
-  return -10 * std::log10(squares / (12.0 * 64 * 64 * 3));
+  return {-10 * std::log10(worst / (64 * 64 * 3)), -10 * std::log10(all / (12.0 * 64 * 64 * 3))};
+}
+
+double PsnrWithout(const GaussianCloud& cloud, const std::vector<int64_t>& rows,
+                   const std::array<float, 3>& background) {
+  return AgreementWithout(cloud, rows, background).worst;
 }
 
 TEST(Unseen, DustOfTheBackgroundsColourGoes) {
@@ -78,7 +90,7 @@ TEST(Unseen, WhatAddsLeastGoesFirst) {
   ASSERT_TRUE(found.ok());
   double gone = 0, kept = 0;
   int64_t of_gone = 0, of_kept = 0;
-  for (int64_t i = kObject; i < kObject + kDust; i += 5) {
+  for (int64_t i = kObject; i < kObject + kDust; i += 2) {
     const double squares = std::pow(10, -PsnrWithout(cloud, {i}, {}) / 10);
     const bool is_gone = std::ranges::binary_search(found->rows, i);
     (is_gone ? gone : kept) += squares;
@@ -167,7 +179,7 @@ TEST(Unseen, PredictsDustWithoutTrying) {
   ASSERT_TRUE(found.ok()) << found.error().message;
   EXPECT_GT(std::ssize(*found), kDust / 20);
   for (const int64_t i : *found) EXPECT_GE(i, kObject);
-  EXPECT_GE(PsnrWithout(cloud, *found, {}), 42);  // they add up, which the sum of squares does not know
+  EXPECT_GE(AgreementWithout(cloud, *found, {}).together, 42);  // they add up, which the sum of squares does not know
   // The same dust inside of an opaque bright shell reaches no view: who knows what is seen from within.
   GaussianCloud within = orbit_scene::Ball(kDust, 6), shell = orbit_scene::Ball(2000, 5);
   Paint(within, 0);

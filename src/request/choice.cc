@@ -2,6 +2,7 @@
 
 #include <cerrno>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <limits>
 
@@ -21,16 +22,23 @@ CLI::Validator Finite() {
       "");
 }
 
-CLI::Validator Within64Bits(bool negative_too) {
+// What is no number at all is said by the library here, too.
+CLI::Validator Whole(bool negative_too) {
   return CLI::Validator(
       [negative_too](const std::string& text) {
+        double value = 0;
+        int64_t whole = 0;
+        if (!CLI::detail::lexical_cast(text, whole) && CLI::detail::lexical_cast(text, value) &&
+            std::abs(value) < 9e18) {
+          return "must be a whole number, found '" + text + "'";
+        }
         errno = 0;
         if (negative_too) {
           static_cast<void>(std::strtoll(text.c_str(), nullptr, 0));
         } else {
           static_cast<void>(std::strtoull(text.c_str(), nullptr, 0));
         }
-        return errno == ERANGE ? "must be a number of 64 bits, found '" + text + "'" : "";
+        return errno == ERANGE ? "must be a number of 64 bits, found '" + text + "'" : std::string();
       },
       "");
 }
@@ -41,8 +49,8 @@ void CheckNumbers(CLI::App& verb) {
   for (CLI::Option* option : verb.get_options([](const CLI::Option*) { return true; })) {
     const std::string type = option->get_type_name();  // "FLOAT:POSITIVE"
     if (type.starts_with("FLOAT")) option->check(Finite());
-    if (type.starts_with("INT")) option->check(Within64Bits(true));
-    if (type.starts_with("UINT")) option->check(Within64Bits(false));
+    if (type.starts_with("INT")) option->check(Whole(true));
+    if (type.starts_with("UINT")) option->check(Whole(false));
   }
   for (CLI::App* part : verb.get_subcommands([](const CLI::App*) { return true; })) CheckNumbers(*part);
 }

@@ -62,7 +62,7 @@ Status LookAt(CloudBlocks& blocks, SplatFindings& findings) {
   ANCHORSPLAT_RETURN_IF_ERROR(Study(blocks, studies));
   findings.statistics = statistics.Find();
   ShowingGaussians showing = study.Take();
-  findings.looks = Judge(SizeTailsOf(showing.all));
+  findings.looks = TrainedKindOf(showing.all);
   // As `enhance` takes it.
   const bool untold = !findings.render_mode && !findings.lost_no_width;
   const bool antialiased = untold && findings.looks == TrainedKind::kAntialiased;
@@ -107,6 +107,8 @@ std::string_view InWords(const std::optional<TrainedKind>& kind) {
       return "like an antialiased one";
     case TrainedKind::kWidened:
       return "like one of Mip-Splatting, or enhanced already";
+    case TrainedKind::kEnhanced:
+      return "like one that a network has enhanced already";
     case TrainedKind::kUnclear:
       return "neither like a classic nor an antialiased one, or changed since";
     default:
@@ -141,6 +143,9 @@ std::string InWords(const LostWidth& lost, const Result<PixelSizeFinding>& pixel
       return "none (likely): even the thinnest Gaussians have a width; enhance leaves it alone";
     case LostWidthReason::kWidenedButTagged:
       return "none (likely): tagged antialiased, but even the thinnest Gaussians have a width; enhance leaves it alone";
+    case LostWidthReason::kLooksEnhanced:
+    case LostWidthReason::kEnhancedButTagged:
+      return "none any more (likely): the Gaussians lie in twins, as a network leaves them; enhance leaves it alone";
     case LostWidthReason::kTooFew:
       if (lost.strength < DefaultFilterStrength(kInfoUpscale)) break;
       return Cat(Fixed(lost.strength, 2), " of 0.3 px² at ", kInfoUpscale, "x (unsure: taken for a classic one)",

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+
+#include "core/gaussian_cloud.h"
+
+namespace anchorsplat {
+
+// Whether a network has enhanced a splat that does not say so. Networks make several Gaussians of each: most have a
+// near twin, of nearly the same covariance, colour and opacity, where fits make each of its own. Sizes and opacities of
+// what a network makes are also unlike those of a fit.
+
+// Of ShowingGaussians::all, at up to 4000 of them, evenly spread over the rows. Difference of two Gaussians: the norm
+// of the difference of their covariances' logarithms, halved (log-scales as matrices). Twin: the one of the eight
+// nearest that differs least.
+//
+//   0–14   ln(x + 0.02), x the quantiles 0.1, 0.25, 0.5, 0.75, 0.9 of the difference from the twin, then from the
+//   second
+//          and the third of the eight
+//   15–23  ln(x + 0.02), x the quartiles of the distance to the twin in standard deviations, of the difference of the
+//          constant colours (SH coefficients; of the channel that differs most) and of the opacity logits
+//   24–30  sizes: ln(tail + 0.02) of the smallest and of the middle axis and ln(roundness) of enhance/trained_kind.h;
+//          medians of ln(smallest / middle) and ln(largest / middle) of the axes' quantiles; ln of the smallest axis's
+//          median over its quantiles 0.1 and 0.25
+//   31–34  opacities: SizeTails::opaque, the share above 0.95, median, first quartile
+//
+// No feature depends on the unit. Nothing: fewer than 400 Gaussians.
+inline constexpr size_t kEnhancedLookFeatures = 35;
+inline constexpr size_t kTwinUpperQuartile = 3;  // the feature that bounds what can look enhanced at all
+using EnhancedLook = std::array<double, kEnhancedLookFeatures>;
+std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing);
+
+// ln of the odds that a network has enhanced it: logistic regression on fits as they are and enhanced
+// (scripts/train-enhanced-look.py). −∞ where fewer than three in four Gaussians have a twin that differs by less than a
+// factor of e: whatever the rest looks like, no network makes that.
+double LogOddsOfEnhanced(const EnhancedLook& look);
+
+}  // namespace anchorsplat

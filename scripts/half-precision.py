@@ -12,16 +12,35 @@ Else the range stays as it is, and so does the metadata. A weight that half prec
 must not be there yet. Needs numpy.
 """
 
+import json
 import os
+import struct
 import sys
 
 import numpy as np
 
-import network_file
+TYPES = {"F32": "<f4", "F16": "<f2"}
+
+
+def read(path):
+    """Metadata, and tensors by name in the order of the file, as float32."""
+    with open(path, "rb") as file:
+        length = struct.unpack("<Q", file.read(8))[0]
+        tensors = json.loads(file.read(length))
+        data = file.read()
+    metadata = tensors.pop("__metadata__", {})
+    values = {}
+    for name in sorted(tensors, key=lambda name: tensors[name]["data_offsets"][0]):
+        tensor = tensors[name]
+        if tensor["dtype"] not in TYPES:
+            sys.exit(f"{path}: tensor {name} is {tensor['dtype']}, expected F32 or F16")
+        values[name] = np.frombuffer(data[slice(*tensor["data_offsets"])], TYPES[tensor["dtype"]]).astype("<f4")
+        values[name] = values[name].reshape(tensor["shape"])
+    return metadata, values
 
 
 def mean(values, path, share):
-    others = network_file.read(path)[1]
+    others = read(path)[1]
     for name, own in values.items():
         if name not in others or others[name].shape != own.shape:
             sys.exit(f"{path}: has no tensor {name} of shape {list(own.shape)}: a network of another shape")
@@ -35,7 +54,7 @@ def mean(values, path, share):
 def main():
     if len(sys.argv) not in (3, 5):
         sys.exit(__doc__)
-    metadata, values = network_file.read(sys.argv[1])
+    metadata, values = read(sys.argv[1])
     if len(sys.argv) == 5:
         try:
             share = float(sys.argv[4])
@@ -45,10 +64,24 @@ def main():
             sys.exit(f"{sys.argv[4]}: expected a share from 0 to 1")
         mean(values, sys.argv[3], share)
         metadata["mean"] = f"{share:g} of the weights of {os.path.basename(sys.argv[3])}, the rest of this recipe's"
-    for name, tensor in values.items():
-        if not name.startswith("domain.") and not np.all(np.abs(tensor) <= np.finfo(np.float16).max):
+    header = {"__metadata__": metadata}
+    out = bytearray()
+    # The range first: then all of it lies at multiples of four bytes.
+    for name in sorted(values, key=lambda name: not name.startswith("domain.")):
+        keeps = name.startswith("domain.")
+        if not keeps and not np.all(np.abs(values[name]) <= np.finfo(np.float16).max):
             sys.exit(f"{sys.argv[1]}: tensor {name} has values that half precision cannot hold")
-    network_file.write(sys.argv[2], metadata, values, lambda name: not name.startswith("domain."))
+        stored = values[name].tobytes() if keeps else values[name].astype("<f2").tobytes()
+        header[name] = {"dtype": "F32" if keeps else "F16", "shape": list(values[name].shape),
+                        "data_offsets": [len(out), len(out) + len(stored)]}
+        out += stored
+    text = json.dumps(header, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 8)
+    try:
+        with open(sys.argv[2], "xb") as file:
+            file.write(struct.pack("<Q", len(text)) + text + out)
+    except FileExistsError:
+        sys.exit(f"{sys.argv[2]} exists: give another name, or take it away")
 
 
 if __name__ == "__main__":

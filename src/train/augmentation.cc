@@ -56,13 +56,6 @@ void DropGaussians(double share, Random& random, AugmentedScene& scene) {
   scene.pixel_sizes = std::move(sizes);
 }
 
-// Laplace's distribution with variance 1, cut off at 4.
-double LaplaceError(Random& random) {
-  const double u = random.Uniform(-1, 1);
-  const double size = std::min(-std::log(1 - std::abs(u)) / std::sqrt(2.0), 4.0);
-  return u < 0 ? -size : size;
-}
-
 }  // namespace
 
 void RotateWorld(const std::array<double, 4>& q, AugmentedScene& scene) {
@@ -179,8 +172,7 @@ void Augment(const AugmentationConfig& config, Random& random, AugmentedScene& s
     for (float& logit : scene.cloud.opacity_logits) logit += static_cast<float>(config.opacity_noise * random.Normal());
   }
   if (config.pixel_size_noise > 0) {
-    const double error = config.pixel_size_tails ? LaplaceError(random) : std::clamp(random.Normal(), -3.0, 3.0);
-    const auto factor = static_cast<float>(std::exp(config.pixel_size_noise * error));
+    const auto factor = static_cast<float>(std::exp(config.pixel_size_noise * std::clamp(random.Normal(), -3.0, 3.0)));
     for (float& p : scene.pixel_sizes) p *= factor;
   }
   if (config.strength_noise > 0) {

@@ -100,27 +100,5 @@ TEST(Augmentation, NoiseLeavesTheTruthAlone) {
   EXPECT_EQ(untouched.cloud.opacity_logits, before.cloud.opacity_logits);
 }
 
-// Half of Laplace's errors are below ln 2 / √2 of their standard deviation, where half of normal ones are below 0.67,
-// and they are cut off at four.
-TEST(Augmentation, PixelSizeErrorsWithTails) {
-  Random random(5);
-  constexpr int kDraws = 4000;
-  int small = 0, large = 0, above = 0;
-  for (int i = 0; i < kDraws; ++i) {
-    AugmentedScene scene;
-    scene.pixel_sizes = Buffer<float>(1);
-    scene.pixel_sizes[0] = 1;
-    Augment({.pixel_size_noise = 0.1, .pixel_size_tails = true}, random, scene);
-    const double error = std::log(static_cast<double>(scene.pixel_sizes[0])) / 0.1;
-    EXPECT_LE(std::abs(error), 4 + 1e-5);
-    small += std::abs(error) < std::log(2.0) / std::sqrt(2.0) ? 1 : 0;
-    large += std::abs(error) > 2.5 ? 1 : 0;  // exp(−2.5·√2) = 2.9 %; of normal errors 1.2 %
-    above += error > 0 ? 1 : 0;
-  }
-  EXPECT_NEAR(small, kDraws / 2, 130);
-  EXPECT_NEAR(large, 0.0291 * kDraws, 43);
-  EXPECT_NEAR(above, kDraws / 2, 130);
-}
-
 }  // namespace
 }  // namespace anchorsplat

@@ -226,7 +226,6 @@ Status TakeAugmentation(TableReader table, AugmentationConfig& a) {
   table.Number("drop", 0, 0.9, a.drop);
   table.Number("opacity_noise", 0, 10, a.opacity_noise);
   table.Number("pixel_size_noise", 0, 2, a.pixel_size_noise);
-  table.Flag("pixel_size_tails", a.pixel_size_tails);
   table.Number("strength_noise", 0, 2, a.strength_noise);
   return table.Finish();
 }
@@ -321,7 +320,6 @@ nlohmann::json Settings(const TrainConfig& c) {
                          {"augmentation.opacity_noise", c.augmentation.opacity_noise},
                          {"augmentation.pixel_size_noise", c.augmentation.pixel_size_noise}};
   // Trainings of before there was such a thing can go on.
-  if (c.augmentation.pixel_size_tails) json["augmentation.pixel_size_tails"] = true;
   if (c.augmentation.strength_noise > 0) json["augmentation.strength_noise"] = c.augmentation.strength_noise;
   if (c.data.least_upscale > 0) {
     json["data.least_upscale"] = c.data.least_upscale;

@@ -59,17 +59,15 @@ struct DataConfig {
 
 // What is drawn anew each time a splat is used. Standard deviations and largest values; 0: not at all.
 struct AugmentationConfig {
-  bool rotate = false;            // the world, SH and cameras with it
-  bool mirror = false;            // every second splat
-  double scale = 0;               // σ of ln(factor) of the world, at most two σ are drawn
-  bool permute_colors = false;    // red, green and blue change places
-  double gain = 0;                // colours times 1 − gain to 1, each channel for itself
-  double drop = 0;                // largest share of Gaussians left out
-  double opacity_noise = 0;       // σ of what is added to opacity logits
-  double pixel_size_noise = 0;    // σ of ln(factor) of p_LR, one factor per splat
-  bool pixel_size_tails = false;  // that factor's logarithm is Laplace's instead of normal: mostly smaller, at times
-                                  // large, as errors of the estimate are
-  double strength_noise = 0;  // σ of ln(factor) of the filter's strength
+  bool rotate = false;          // the world, SH and cameras with it
+  bool mirror = false;          // every second splat
+  double scale = 0;             // σ of ln(factor) of the world, at most two σ are drawn
+  bool permute_colors = false;  // red, green and blue change places
+  double gain = 0;              // colours times 1 − gain to 1, each channel for itself
+  double drop = 0;              // largest share of Gaussians left out
+  double opacity_noise = 0;     // σ of what is added to opacity logits
+  double pixel_size_noise = 0;  // σ of ln(factor) of p_LR, one factor per splat
+  double strength_noise = 0;    // σ of ln(factor) of the filter's strength
 
   bool geometry() const { return rotate || mirror || scale > 0 || drop > 0 || opacity_noise > 0; }
 };

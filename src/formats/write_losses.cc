@@ -62,14 +62,15 @@ std::string CreditLoss(const SplatFormat& format, std::span<const std::string> c
   return Cat(AFileOf(format), " has no place for credits: give ", list, " beside it");
 }
 
-// Read back, the splat looks as if it had lost width.
+// Read back, the splat looks or may look as if it had lost width.
 std::string MarkLoss(const SplatFormat& format, std::span<const std::string> comments) {
   if (format.comments != CommentPlace::kNone) return {};
   const bool enhanced = HasMark(comments, kEnhancedMark);
   if (!enhanced && !HasMark(comments, kPixelAreaMark)) return {};
   return Cat(AFileOf(format), " has no place for the word that the splat has ",
-             enhanced ? "been enhanced" : "been fitted to the areas of pixels",
-             ": enhance that file again, and it may become worse (keep a PLY for that)");
+             enhanced
+                 ? "been enhanced; its Gaussians nearly always tell, but keep a PLY of what may be enhanced again"
+                 : "been fitted to the areas of pixels: enhance that file, and it becomes worse (keep a PLY for that)");
 }
 
 // Without its tag a splat is drawn as a classic one.

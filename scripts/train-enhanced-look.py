@@ -5,12 +5,10 @@
     scripts/train-enhanced-look.py fit FEATURES.jsonl... [--check FEATURES.jsonl...] [--keep FILE.json.gz]
         [-o src/enhance/enhanced_look_coefficients.cc]
 
-`make` takes every splat of data sets as it is and enhanced, with cameras, without, and in one of four other ways,
-through formats that lose the word for it, and appends what `anchorsplat bench looks --features` says; what is there
+`make` takes every splat of data sets as it is and enhanced, with cameras, without, and in other ways, through formats that lose the word for it, and appends what `anchorsplat bench looks --features` says; what is there
 already is not made again, so it goes on where it was stopped. Half a second of a core for each.
 
-`fit` is logistic regression with a ridge, on standardised features; every splat counts the same, however many ways it
-went. It prints how many are taken for what they are not, all splats of a mesh left out together, and of `--check`,
+`fit` trains a network of one small layer; every splat counts the same, however many ways it went. It prints how many are taken for what they are not, all splats of a mesh left out together, and of `--check`,
 from which nothing is learned. FEATURES may be what `--keep` wrote. Needs numpy.
 """
 
@@ -30,7 +28,9 @@ ALL = ["ply", "spz", "splat"]
 ROTATED = ["ply", "spz", "splat", "sog", "compressed"]
 BUDGET = 1.6  # Gaussians for one, where there is one
 MOST_DIFFERENT = 0.02 + 1  # as kMostDifferent in enhanced_look.cc
-UPPER_QUARTILE = 3  # kTwinUpperQuartile
+UPPER_QUARTILE, FLATNESS, ELONGATION = 3, 27, 28  # kTwinUpperQuartile, kFlatness, kElongation
+NEARLY_ROUND = 0.2  # kNearlyRound
+HIDDEN, MOST_DEVIATIONS, UNLIKE_ANY = 16, 4.0, 5.0  # kEnhancedLookHidden, kMostDeviations, kUnlikeAny
 LEAST, LEAST_WHERE_UNCLEAR = 0, -2  # kEnhancedOdds, kEnhancedOddsWhereUnclear in trained_kind.cc
 MADE = ("--enhanced", "--pixel-area", "--spz", "--sog", "--splat")  # splats of data/kinds-wide.toml made of others
 
@@ -50,9 +50,11 @@ def ways(splat, cameras):
     yield "without cameras", [], ALL
     rotated = ROTATED[number // 16 % 5]
     yield "with cameras", ["--cameras", cameras], [rotated]
-    budget = str(int(BUDGET * gaussians(splat)))
-    other = [["--copies", "1"], ["--copies", "4"], ["--max-gaussians", budget], ["--upscale", "2"]][number % 4]
-    yield other[0][2:] + (other[1] if other[0] == "--copies" else ""), other + ["--cameras", cameras], [rotated]
+    count = gaussians(splat)
+    other = [["--copies", "4"], ["--max-gaussians", str(int(BUDGET * count))], ["--upscale", "2"]][number % 3]
+    for options in [["--copies", "1"], ["--max-gaussians", str(count)], other]:
+        yield " ".join(options[:1 if "gaussians" in options[0] else 2])[2:], options + ["--cameras", cameras], [rotated]
+    yield "copies 1, without cameras", ["--copies", "1"], [rotated]
 
 
 def run(*words):
@@ -116,27 +118,38 @@ def mesh(item):
     return item["splat"].split("/")[1].split("--")[0]
 
 
-def learn(np, features, enhanced, weights, ridge):
-    """Standardised; Newton's method."""
+def learn(np, features, enhanced, weights, decay, seed=0):
+    """A network of one layer of HIDDEN tanh on standardised features; Adam on all of them at once, 3000 steps."""
+    random = np.random.default_rng(seed)
     middle, width = features.mean(0), features.std(0) + 1e-9
-    x = np.c_[(features - middle) / width, np.ones(len(features))]
-    penalty = np.r_[np.full(features.shape[1], ridge), 0]
-    w = np.zeros(x.shape[1])
-    for _ in range(60):
-        p = 1 / (1 + np.exp(-np.clip(x @ w, -30, 30)))
-        gradient = x.T @ (weights * (p - enhanced)) + penalty * w
-        hessian = (x * (weights * p * (1 - p))[:, None]).T @ x + np.diag(penalty + 1e-9)
-        step = np.linalg.solve(hessian, gradient)
-        w -= step
-        if np.abs(step).max() < 1e-9:
-            break
-    slopes = w[:-1] / width
-    return slopes, w[-1] - slopes @ middle
+    x = np.clip((features - middle) / width, -MOST_DEVIATIONS, MOST_DEVIATIONS)
+    values = [random.normal(0, 1 / np.sqrt(x.shape[1]), (x.shape[1], HIDDEN)), np.zeros(HIDDEN),
+              random.normal(0, 1 / np.sqrt(HIDDEN), HIDDEN), np.zeros(1)]
+    moments = [[np.zeros_like(v), np.zeros_like(v)] for v in values]
+    share = weights / weights.sum()
+    steps = 3000
+    for step in range(1, steps + 1):
+        hidden = np.tanh(x @ values[0] + values[1])
+        error = share * (1 / (1 + np.exp(-np.clip(hidden @ values[2] + values[3], -30, 30))) - enhanced)
+        back = np.outer(error, values[2]) * (1 - hidden ** 2)
+        gradients = [x.T @ back + decay * values[0], back.sum(0), hidden.T @ error + decay * values[2],
+                     np.array([error.sum()])]
+        rate = 0.01 * 0.5 * (1 + np.cos(np.pi * step / steps))
+        for value, gradient, (first, second) in zip(values, gradients, moments):
+            first += 0.1 * (gradient - first)
+            second += 0.001 * (gradient ** 2 - second)
+            value -= rate * (first / (1 - 0.9 ** step)) / (np.sqrt(second / (1 - 0.999 ** step)) + 1e-12)
+    return [middle, width] + values
 
 
-def odds(np, features, slopes, intercept):
-    out = features @ slopes + intercept
-    return np.where(features[:, UPPER_QUARTILE] > np.log(MOST_DIFFERENT), -np.inf, out)
+def odds(np, features, network):
+    middle, width, inner, bias, outer, last = network
+    x = (features - middle) / width
+    unlike = np.abs(x).max(1) > UNLIKE_ANY
+    x = np.clip(x, -MOST_DEVIATIONS, MOST_DEVIATIONS)
+    out = np.tanh(x @ inner + bias) @ outer + last
+    round_ones = (features[:, FLATNESS] > -NEARLY_ROUND) & (features[:, ELONGATION] < NEARLY_ROUND)
+    return np.where(unlike | round_ones | (features[:, UPPER_QUARTILE] > np.log(MOST_DIFFERENT)), -np.inf, out)
 
 
 def looks(item, score):
@@ -177,27 +190,35 @@ def fit(arguments):
     said = np.zeros(len(items))
     for fold in folds:
         out = np.isin(meshes, fold)
-        said[out] = odds(np, features[out], *learn(np, features[~out], enhanced[~out], weights[~out], arguments.ridge))
+        said[out] = odds(np, features[out], learn(np, features[~out], enhanced[~out], weights[~out], arguments.decay))
     print(f"{len(set(i['splat'] for i in items))} splats of {len(set(meshes))} meshes, {len(items)} files")
     report("Cross-validated, meshes left out:", items, said)
-    slopes, intercept = learn(np, features, enhanced, weights, arguments.ridge)
+    network = learn(np, features, enhanced, weights, arguments.decay)
     if arguments.check:
         others = load(arguments.check)
-        report("Not learned from:", others, odds(np, np.array([i["features"] for i in others]), slopes, intercept))
+        report("Not learned from:", others, odds(np, np.array([i["features"] for i in others]), network))
     if arguments.keep:
         with open(arguments.keep, "xb") as file:
             file.write(gzip.compress(json.dumps(items, separators=(",", ":")).encode(), 9, mtime=0))
     if arguments.output:
-        write(arguments.output, slopes, intercept)
+        write(arguments.output, network)
 
 
-def write(path, slopes, intercept):
-    rows = [", ".join(f"{x:.8g}" for x in slopes[k:k + 5]) for k in range(0, len(slopes), 5)]
+def write(path, network):
+    def rows(values):
+        words = [f"{x:.6g}" for x in values]
+        lines = [", ".join(words[k:k + 10]) for k in range(0, len(words), 10)]
+        return "{" + ",\n     ".join(lines) + "}"
+
+    middle, width, inner, bias, outer, last = network
     pathlib.Path(path).write_text(
         '#include "enhance/enhanced_look_coefficients.h"\n\nnamespace anchorsplat {\n\n'
-        f"const double kEnhancedLookIntercept = {intercept:.8g};\n\n// clang-format off\n"
-        "const EnhancedLook kEnhancedLookWeights = {\n    " + ",\n    ".join(rows) + "};\n// clang-format on\n\n"
-        "}  // namespace anchorsplat\n", encoding="utf-8")
+        "// Written by scripts/train-enhanced-look.py; not to be edited.\n// clang-format off\n"
+        "const EnhancedLookNetwork kEnhancedLookNetwork = {\n"
+        f"    .middle = {rows(middle)},\n    .width = {rows(width)},\n"
+        "    .inner = {{\n     " + ",\n     ".join(rows(row) for row in inner.T) + "}},\n"
+        f"    .bias = {rows(bias)},\n    .outer = {rows(outer)},\n    .last = {last[0]:.6g}}};\n"
+        "// clang-format on\n\n}  // namespace anchorsplat\n", encoding="utf-8")
 
 
 def main():
@@ -211,7 +232,7 @@ def main():
     verb = verbs.add_parser("fit")
     verb.add_argument("features", nargs="+")
     verb.add_argument("--check", nargs="+", default=[])
-    verb.add_argument("--ridge", type=float, default=1)
+    verb.add_argument("--decay", type=float, default=3e-4)
     verb.add_argument("--folds", type=int, default=10)
     verb.add_argument("--keep")
     verb.add_argument("-o", "--output")

@@ -155,7 +155,7 @@ int64_t CountOutside(const std::optional<Region>& region, const GaussianCloud& c
 std::string Details(const EnhanceReport& r) {
   if (r.pixel_size_source.empty()) return "";
   if (r.pixel_size_source == kUnknownPixelSize) return " not applied";
-  if (r.filter_strength == 0) return Cat(" x", r.upscale, ", no width given back");
+  if (r.filter_strength == 0) return ": left as it is, no width given back";
   return Cat(" x", r.upscale, ", strength ", Fixed(r.filter_strength, 3), ", pixel size ", r.pixel_size, " (",
              r.pixel_size_source, ")");
 }

@@ -26,7 +26,9 @@ constexpr double kImpossible = 3;
 // An estimate whose range is wider than this is a rough one.
 constexpr double kVague = 3;
 
-Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
+// `says`: there is width to give back, so that it matters.
+Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, EnhanceInput& input,
+                                     EnhanceReport& report) {
   std::optional<int> train_width = options.train_width;
   if (train_width) {
     int widest = 0;
@@ -61,7 +63,7 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
     LogInfo(Cat("--camera-rule ", report.camera_rule, ": ", from_cameras.why));
   }
   report.pixel_size_source = "cameras";
-  const auto found = FindPixelSize(input.cloud);
+  const auto found = says ? FindPixelSize(input.cloud) : Result<PixelSizeFinding>(Error{});
   if (found.ok()) {
     input.showing = found->estimate.showing;
     const double ratio = found->size / from_cameras.median;
@@ -96,14 +98,14 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, EnhanceInput
 }
 
 // Pictures to refine against come with the cameras that took them, and are as large as they were in training.
-Status PixelSizesFromPictures(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
+Status PixelSizesFromPictures(const EnhanceOptions& options, bool says, EnhanceInput& input, EnhanceReport& report) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(
       TrainingViews project,
       OpenProject(options.refine.images, {.hold_out = 0, .downscale = options.refine.downscale}));
   EnhanceOptions with_cameras = options;
   with_cameras.cameras.emplace().cameras = std::move(project.train);
   with_cameras.camera_rule = CameraPixelRule::kMedian;
-  ANCHORSPLAT_RETURN_IF_ERROR(PixelSizesFromTrainingCameras(with_cameras, input, report));
+  ANCHORSPLAT_RETURN_IF_ERROR(PixelSizesFromTrainingCameras(with_cameras, says, input, report));
   if (report.pixel_size_source == "cameras") report.pixel_size_source = "pictures";
   return {};
 }
@@ -147,7 +149,7 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
   if (options.train_width && !options.cameras) {
     return Error{ErrorCode::kBadArgument, "--train-width says how cameras were shrunk; it needs --cameras"};
   }
-  if (options.cameras) return PixelSizesFromTrainingCameras(options, input, report);
+  if (options.cameras) return PixelSizesFromTrainingCameras(options, says, input, report);
   if (options.pixel_size) {
     report.pixel_size = *options.pixel_size;
     report.pixel_size_source = "given";
@@ -165,7 +167,7 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
       }
     }
   } else if (pictures) {
-    return PixelSizesFromPictures(options, input, report);
+    return PixelSizesFromPictures(options, says, input, report);
   } else {
     const auto found = FindPixelSize(input.cloud);
     if (!found.ok()) {

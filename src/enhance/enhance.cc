@@ -17,6 +17,7 @@
 #include "enhance/gaussian_budget.h"
 #include "enhance/lost_width.h"
 #include "enhance/refine_method.h"
+#include "enhance/showing_gaussians.h"
 #include "fit/pixel_model.h"
 
 namespace anchorsplat {
@@ -74,34 +75,46 @@ Status DropUnusable(GaussianCloud& cloud) {
   return {};
 }
 
-// Splats of which neither file nor caller says how they were trained are looked at. An antialiased one becomes one.
-void RecogniseKind(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport& report) {
-  if (options.filter_strength || HasLostNoWidth(cloud)) return;
-  if (cloud.render_mode) {
-    // Formats that have no word for Mip-Splatting tag its splats as antialiased, and some have none for what is
-    // enhanced.
-    const bool said = std::ranges::find(options.given, "mode") != options.given.end();
-    if (said || cloud.render_mode != RenderMode::kAntialiased) return;
-    if (const auto looks = FindTrainedKind(cloud); IsWide(looks)) report.looks = looks;
-    return;
+// How it looks beside what its file says. Of a region, where that has enough Gaussians to tell: the rest may have been
+// enhanced before.
+std::optional<TrainedKind> FindLooks(const EnhanceOptions& options, const GaussianCloud& cloud) {
+  constexpr int64_t kEnoughOfRegion = 1000;
+  GaussianCloud showing = FindShowingGaussians(cloud).all;
+  if (options.region) {
+    std::vector<int64_t> inside;
+    for (int64_t i = 0; i < showing.size(); ++i) {
+      if (options.region->Holds(showing.means.data() + 3 * i)) inside.push_back(i);
+    }
+    if (std::ssize(inside) >= kEnoughOfRegion) {
+      if (auto part = Subset(showing, inside); part.ok()) showing = *std::move(part);
+    }
   }
-  report.looks = FindTrainedKind(cloud);
-  if (report.looks == TrainedKind::kAntialiased) cloud.render_mode = RenderMode::kAntialiased;
+  return BesideTag(TrainedKindOf(showing), cloud.render_mode, showing.size());
 }
 
-void SayHowItLooks(TrainedKind looks, bool tagged) {
+// Splats of which the caller does not say how they were trained are looked at. An antialiased one without a tag becomes
+// one.
+void RecogniseKind(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport& report) {
+  const bool said = std::ranges::find(options.given, "mode") != options.given.end();
+  if (said || options.filter_strength || HasLostNoWidth(cloud) || cloud.render_mode == RenderMode::kMip) return;
+  report.looks = FindLooks(options, cloud);
+  if (!cloud.render_mode && report.looks == TrainedKind::kAntialiased) cloud.render_mode = RenderMode::kAntialiased;
+}
+
+void SayHowItLooks(TrainedKind looks, std::optional<RenderMode> tag) {
   if (looks == TrainedKind::kEnhanced) {
     LogWarning(
-        Cat("the Gaussians of the splat lie in twins, as a network leaves them that has enhanced it: it has lost no "
-            "width any more, and none is given back (--mode ",
-            tagged ? "antialiased" : "classic or antialiased, where you know it,", " if it has not been enhanced)"));
+        Cat("the Gaussians of the splat lie in twins, as a network leaves them that has enhanced it: it has lost "
+            "no width any more, and none is given back (--mode ",
+            tag ? NameOf(*tag) : "classic or antialiased, where you know it,", " if it has not been enhanced)"));
     return;
   }
-  if (tagged) {
+  if (tag) {
     LogWarning(
-        "the splat is tagged antialiased, but even its thinnest Gaussians have a width, as Mip-Splatting and enhancing "
-        "give them: it has lost none, and none is given back (--mode mip if it is of Mip-Splatting, --mode antialiased "
-        "to enhance it as it is tagged)");
+        Cat("the splat is tagged ", NameOf(*tag),
+            ", but even its thinnest Gaussians have a width, as Mip-Splatting and enhancing give them: it has lost "
+            "none, and none is given back (--mode mip if it is of Mip-Splatting, --mode ",
+            NameOf(*tag), " to enhance it as it is tagged)"));
     return;
   }
   switch (looks) {
@@ -244,11 +257,25 @@ bool GivesWidth(double strength, double upscale, std::optional<RenderMode> mode)
   return strength > ShownStrength(upscale, mode);
 }
 
+// A splat that has lost nothing stays as it is, whatever was asked for.
+void SayWhatHasNoEffect(const EnhanceOptions& options) {
+  std::string names;
+  int count = 0;
+  for (const char* name : {"pixel-size", "model", "copies", "merge-cost", "prune-opacity"}) {
+    if (std::ranges::find(options.given, name) == options.given.end()) continue;
+    names += Cat(count++ > 0 ? ", --" : "--", name);
+  }
+  if (count > 0) {
+    LogWarning(
+        Cat(names, count > 1 ? " have" : " has", " no effect, as there is no width to give back: the splat stays"));
+  }
+}
+
 // The filter's strength and the pixel sizes, for methods that work with them.
 Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, bool unknown_of_few, EnhanceInput& input,
                     EnhanceReport& report) {
   if (report.looks && options.upscale > 1) {
-    SayHowItLooks(*report.looks, IsWide(report.looks) && input.cloud.render_mode.has_value());
+    SayHowItLooks(*report.looks, IsWide(report.looks) ? input.cloud.render_mode : std::nullopt);
   } else if (unknown_of_few && options.upscale > 1) {
     LogWarning(Cat("it is unclear how the splat was trained, as ", WithThousands(input.cloud.size()),
                    " Gaussians are too few to tell. Only a little width is given back; --mode classic or antialiased, "
@@ -267,6 +294,7 @@ Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, bool 
         "the filter alone can take more than it gives from an antialiased splat of many Gaussians that overlap (up to "
         "3.5 dB were seen); the default, with a network, makes up for it");
   }
+  if (!gives_width && options.upscale > 1) SayWhatHasNoEffect(options);
   ANCHORSPLAT_RETURN_IF_ERROR(ChoosePixelSizes(options, plan.method->takes_start && !options.refine.images.empty(),
                                                gives_width, input, report));
   input.pixel_size = report.pixel_size;

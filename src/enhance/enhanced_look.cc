@@ -22,7 +22,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kFewest = 400;
+constexpr int64_t kFewest = 1000;
 constexpr int64_t kSamples = 4000;
 constexpr size_t kNeighbours = 8;
 constexpr size_t kRanks = 3;  // the twin, the second and the third
@@ -30,6 +30,9 @@ constexpr std::array<double, 5> kDifferenceQuantiles = {0.1, 0.25, 0.5, 0.75, 0.
 constexpr std::array<double, 3> kQuartiles = {0.25, 0.5, 0.75};
 constexpr double kLeast = 0.02;  // below that, formats round
 constexpr double kMostDifferent = 1;
+constexpr double kMostDeviations = 4;  // that count, of a feature
+constexpr double kUnlikeAny = 5;       // beyond that it is like nothing that was learned from
+constexpr double kNearlyRound = 0.2;   // ln of the ratio of two axes
 
 double Logarithm(double x) { return std::log(x + kLeast); }
 
@@ -172,10 +175,22 @@ std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing) {
 }
 
 double LogOddsOfEnhanced(const EnhancedLook& look) {
-  if (look[kTwinUpperQuartile] > Logarithm(kMostDifferent)) return -std::numeric_limits<double>::infinity();
-  double sum = kEnhancedLookIntercept;
-  for (size_t k = 0; k < look.size(); ++k) sum += kEnhancedLookWeights[k] * look[k];
-  return sum;
+  const bool round = look[kFlatness] > -kNearlyRound && look[kElongation] < kNearlyRound;
+  if (round || look[kTwinUpperQuartile] > Logarithm(kMostDifferent)) return -std::numeric_limits<double>::infinity();
+  const EnhancedLookNetwork& network = kEnhancedLookNetwork;
+  EnhancedLook x{};
+  for (size_t k = 0; k < x.size(); ++k) {
+    const double deviation = (look[k] - network.middle[k]) / network.width[k];
+    if (!(std::abs(deviation) <= kUnlikeAny)) return -std::numeric_limits<double>::infinity();
+    x[k] = std::clamp(deviation, -kMostDeviations, kMostDeviations);
+  }
+  double odds = network.last;
+  for (size_t h = 0; h < kEnhancedLookHidden; ++h) {
+    double sum = network.bias[h];
+    for (size_t k = 0; k < x.size(); ++k) sum += network.inner[h][k] * x[k];
+    odds += network.outer[h] * std::tanh(sum);
+  }
+  return odds;
 }
 
 }  // namespace anchorsplat

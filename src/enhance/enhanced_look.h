@@ -26,15 +26,17 @@ namespace anchorsplat {
 //          median over its quantiles 0.1 and 0.25
 //   31–34  opacities: SizeTails::opaque, the share above 0.95, median, first quartile
 //
-// No feature depends on the unit. Nothing: fewer than 400 Gaussians.
+// No feature depends on the unit. Nothing: fewer than 1000 Gaussians.
 inline constexpr size_t kEnhancedLookFeatures = 35;
-inline constexpr size_t kTwinUpperQuartile = 3;  // the feature that bounds what can look enhanced at all
+// What bounds which splats can look enhanced at all.
+inline constexpr size_t kTwinUpperQuartile = 3, kFlatness = 27, kElongation = 28;
 using EnhancedLook = std::array<double, kEnhancedLookFeatures>;
 std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing);
 
-// ln of the odds that a network has enhanced it: logistic regression on fits as they are and enhanced
-// (scripts/train-enhanced-look.py). −∞ where fewer than three in four Gaussians have a twin that differs by less than a
-// factor of e: whatever the rest looks like, no network makes that.
+// ln of the odds that a network has enhanced it: a network of one small layer that has learned from fits as they are
+// and enhanced (scripts/train-enhanced-look.py). −∞ where fewer than three in four Gaussians have a twin that differs
+// by less than a factor of e, and where they are balls, as some trainers make them, which are all alike: no network
+// makes that.
 double LogOddsOfEnhanced(const EnhancedLook& look);
 
 }  // namespace anchorsplat

@@ -78,7 +78,7 @@ std::vector<double> LogCovariance(const GaussianCloud& cloud, size_t i) {
 
 // All pairs, in plain loops.
 TEST(EnhancedLook, IsThatOfAPlainSearch) {
-  const GaussianCloud cloud = Sheet(150, 3, 0.2);
+  const GaussianCloud cloud = Sheet(350, 3, 0.2);
   const auto n = static_cast<size_t>(cloud.size());
   std::vector<std::vector<float>> differences(3), others(3);
   for (size_t i = 0; i < n; ++i) {
@@ -158,15 +158,15 @@ TEST(EnhancedLook, DoesNotDependOnHowTheSplatIsKept) {
 TEST(EnhancedLook, OddClouds) {
   EXPECT_FALSE(FindEnhancedLook({}));
   EXPECT_FALSE(FindEnhancedLook(Sheet(1, 1, 0)));
-  EXPECT_FALSE(FindEnhancedLook(Sheet(399, 1, 0)));
-  GaussianCloud cloud = Sheet(500, 1, 0);
+  EXPECT_FALSE(FindEnhancedLook(Sheet(999, 1, 0)));
+  GaussianCloud cloud = Sheet(1200, 1, 0);
   for (size_t i = 0; i < 50; ++i) cloud.log_scales[3 * i] = -std::numeric_limits<float>::infinity();
   std::fill_n(cloud.quats.begin(), 400, 0.0f);
   for (const double x : LookOf(cloud)) EXPECT_TRUE(std::isfinite(x));
-  for (size_t i = 50; i < 250; ++i) cloud.log_scales[3 * i + 1] = std::nanf("");
-  EXPECT_FALSE(FindEnhancedLook(cloud)) << "250 are left";
+  for (size_t i = 50; i < 350; ++i) cloud.log_scales[3 * i + 1] = std::nanf("");
+  EXPECT_FALSE(FindEnhancedLook(cloud)) << "850 are left";
   // All at one place, and all the same.
-  GaussianCloud same = Sheet(500, 1, 0);
+  GaussianCloud same = Sheet(1200, 1, 0);
   std::ranges::fill(same.means, 1.0f);
   for (const double x : LookOf(same)) EXPECT_TRUE(std::isfinite(x));
   std::ranges::fill(same.log_scales, -3.0f);
@@ -174,8 +174,12 @@ TEST(EnhancedLook, OddClouds) {
   const EnhancedLook look = LookOf(same);
   for (const double x : look) EXPECT_TRUE(std::isfinite(x));
   EXPECT_FALSE(std::isnan(LogOddsOfEnhanced(look)));
+  // Balls are all alike.
+  GaussianCloud balls = Sheet(300, 4, 0.1);
+  for (size_t i = 0; i < balls.log_scales.size(); ++i) balls.log_scales[i] = balls.log_scales[i - i % 3];
+  EXPECT_EQ(LogOddsOfEnhanced(LookOf(balls)), -std::numeric_limits<double>::infinity());
   // Huge and tiny.
-  GaussianCloud extreme = Sheet(500, 1, 0);
+  GaussianCloud extreme = Sheet(1200, 1, 0);
   for (size_t i = 0; i < extreme.log_scales.size(); ++i) extreme.log_scales[i] = i % 2 == 0 ? 80.0f : -80.0f;
   for (const double x : LookOf(extreme)) EXPECT_TRUE(std::isfinite(x));
 }

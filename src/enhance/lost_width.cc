@@ -23,11 +23,11 @@ std::string_view NameOf(LostWidthReason reason) {
     case LostWidthReason::kWidened:
       return "widened";
     case LostWidthReason::kWidenedButTagged:
-      return "widened, but tagged antialiased";
+      return "widened, but tagged otherwise";
     case LostWidthReason::kLooksEnhanced:
       return "looks enhanced";
     case LostWidthReason::kEnhancedButTagged:
-      return "looks enhanced, but tagged antialiased";
+      return "looks enhanced, but tagged otherwise";
   }
   return "";
 }
@@ -35,12 +35,10 @@ std::string_view NameOf(LostWidthReason reason) {
 LostWidth FindLostWidth(const CloudView& cloud, std::optional<TrainedKind> looks, double upscale) {
   if (IsFittedToPixelAreas(cloud)) return {0, LostWidthReason::kFittedToAreas};
   if (IsMarkedEnhanced(cloud)) return {0, LostWidthReason::kMarkedEnhanced};
-  if (IsWide(looks)) {
+  if (IsWide(looks) && cloud.render_mode != RenderMode::kMip) {
     const bool enhanced = looks == TrainedKind::kEnhanced;
     if (!cloud.render_mode) return {0, enhanced ? LostWidthReason::kLooksEnhanced : LostWidthReason::kWidened};
-    if (cloud.render_mode == RenderMode::kAntialiased) {
-      return {0, enhanced ? LostWidthReason::kEnhancedButTagged : LostWidthReason::kWidenedButTagged};
-    }
+    return {0, enhanced ? LostWidthReason::kEnhancedButTagged : LostWidthReason::kWidenedButTagged};
   }
   if (cloud.render_mode) return {DefaultFilterStrength(upscale, cloud.render_mode), LostWidthReason::kTagged};
   const double little = DefaultFilterStrength(upscale, RenderMode::kAntialiased);

@@ -21,9 +21,9 @@ enum class LostWidthReason {
   kFittedToAreas,      // nothing was lost
   kMarkedEnhanced,     // nothing is lost any more
   kWidened,            // the same, by its sizes
-  kWidenedButTagged,   // by its sizes, although it is tagged antialiased: formats have no word for Mip-Splatting
-  kLooksEnhanced,      // the same, by what a network leaves
-  kEnhancedButTagged,  // and although it is tagged antialiased: formats have no word for what has been enhanced
+  kWidenedButTagged,   // by its sizes, although it is tagged classic or antialiased
+  kLooksEnhanced,      // by what a network leaves
+  kEnhancedButTagged,  // and although it is tagged so
 };
 
 // The words of `info`'s JSON.
@@ -37,7 +37,7 @@ struct LostWidth {
   bool likely() const { return reason != LostWidthReason::kUnclear && reason != LostWidthReason::kTooFew; }
 };
 
-// `looks`: FindTrainedKind of the cloud; nothing where the tag is to be believed. upscale ≥ 1.
+// `looks`: BesideTag of what the cloud looks like; nothing where the tag is to be believed. upscale ≥ 1.
 LostWidth FindLostWidth(const CloudView& cloud, std::optional<TrainedKind> looks, double upscale);
 
 }  // namespace anchorsplat

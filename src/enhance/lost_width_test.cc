@@ -54,8 +54,10 @@ TEST(LostWidth, IsNoneWhereItHasBeenGivenBack) {
   EXPECT_EQ(twins.strength, 0);
   EXPECT_EQ(twins.reason, LostWidthReason::kEnhancedButTagged);
   EXPECT_GT(FindLostWidth(Tagged(RenderMode::kMip), TrainedKind::kEnhanced, kUpscale).strength, 0);
-  // A classic tag is believed: classic fits of few, large Gaussians look widened.
-  EXPECT_GT(FindLostWidth(Tagged(RenderMode::kClassic), TrainedKind::kWidened, kUpscale).strength, 0);
+  // Trainers that know no other mode tag everything classic.
+  EXPECT_EQ(FindLostWidth(Tagged(RenderMode::kClassic), TrainedKind::kWidened, kUpscale).reason,
+            LostWidthReason::kWidenedButTagged);
+  EXPECT_EQ(FindLostWidth(Tagged(RenderMode::kClassic), TrainedKind::kEnhanced, kUpscale).strength, 0);
   GaussianCloud enhanced = Tagged(RenderMode::kClassic);
   enhanced.comments = {EnhancedComment("filter", kUpscale)};
   EXPECT_EQ(FindLostWidth(enhanced, TrainedKind::kClassic, kUpscale).strength, 0);

@@ -138,6 +138,12 @@ std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing) {
   return look && LogOddsOfEnhanced(*look) > least ? TrainedKind::kEnhanced : by_sizes;
 }
 
+std::optional<TrainedKind> BesideTag(std::optional<TrainedKind> kind, std::optional<RenderMode> tag, int64_t showing) {
+  if (!tag) return kind;
+  const bool counts = tag == RenderMode::kAntialiased || (tag == RenderMode::kClassic && showing >= kFew);
+  return counts && IsWide(kind) ? kind : std::nullopt;
+}
+
 std::optional<TrainedKind> FindTrainedKind(const GaussianCloud& cloud) {
   return TrainedKindOf(FindShowingGaussians(cloud).all);
 }

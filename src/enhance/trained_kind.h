@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "core/gaussian_cloud.h"
+#include "core/render_mode.h"
 
 namespace anchorsplat {
 
@@ -47,6 +48,12 @@ std::optional<TrainedKind> Judge(const SizeTails& tails);
 // By sizes and by what networks leave. Looks at the Gaussians only, not at what the cloud says of itself.
 std::optional<TrainedKind> FindTrainedKind(const GaussianCloud& cloud);
 std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing);  // of ShowingGaussians::all
+
+// What of that counts beside a tag. Trainers that know no other mode tag everything classic, and formats that have no
+// word for Mip-Splatting or for what has been enhanced tag it antialiased: where the Gaussians have a width all the
+// same, they are believed. Classic fits of few, large Gaussians look so, too, and a `mip` tag says it itself: nothing.
+// `showing`: how many Gaussians it was seen of.
+std::optional<TrainedKind> BesideTag(std::optional<TrainedKind> kind, std::optional<RenderMode> tag, int64_t showing);
 
 // Has all its width.
 inline bool IsWide(std::optional<TrainedKind> kind) {

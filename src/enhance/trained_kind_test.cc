@@ -174,6 +174,18 @@ TEST(TrainedKind, TooFewOrBrokenOnes) {
   EXPECT_EQ(FindTrainedKind(cloud), TrainedKind::kWidened);
 }
 
+TEST(TrainedKind, ATagIsDoubtedOnlyWhereThereIsAWidth) {
+  for (const TrainedKind kind : {TrainedKind::kWidened, TrainedKind::kEnhanced}) {
+    EXPECT_EQ(BesideTag(kind, {}, 500), kind);
+    EXPECT_EQ(BesideTag(kind, RenderMode::kAntialiased, 500), kind);
+    EXPECT_EQ(BesideTag(kind, RenderMode::kClassic, 5000), kind);
+    EXPECT_EQ(BesideTag(kind, RenderMode::kClassic, 500), std::nullopt) << "few large ones look so";
+    EXPECT_EQ(BesideTag(kind, RenderMode::kMip, 5000), std::nullopt);
+  }
+  EXPECT_EQ(BesideTag(TrainedKind::kAntialiased, RenderMode::kClassic, 5000), std::nullopt);
+  EXPECT_EQ(BesideTag(TrainedKind::kUnclear, {}, 5000), TrainedKind::kUnclear);
+}
+
 // What `enhance` makes of it, and that whoever says a mode is believed.
 TEST(TrainedKind, EnhanceActsOnIt) {
   EnhanceOptions options;
@@ -199,11 +211,28 @@ TEST(TrainedKind, EnhanceActsOnIt) {
   EXPECT_EQ(classic.report.looks, TrainedKind::kClassic);
   EXPECT_EQ(classic.report.filter_strength, DefaultFilterStrength(4));
 
+  // Trainers that know no other mode tag everything classic.
   GaussianCloud said = wide;
   said.render_mode = RenderMode::kClassic;
-  const Enhanced believed = run(said);
-  EXPECT_FALSE(believed.report.looks);
-  EXPECT_EQ(believed.report.filter_strength, DefaultFilterStrength(4));
+  const Enhanced tagged = run(said);
+  EXPECT_EQ(tagged.report.looks, TrainedKind::kWidened);
+  EXPECT_EQ(tagged.cloud.log_scales, wide.log_scales);
+  GaussianCloud right = Made(0, 0);
+  right.render_mode = RenderMode::kClassic;
+  EXPECT_EQ(run(right).report.filter_strength, DefaultFilterStrength(4));
+  // Of a region it is the region that is looked at.
+  GaussianCloud halves = Made(0, 0), other_half = wide;
+  for (size_t i = 0; i < other_half.means.size(); i += 3) {
+    halves.means[i] = -std::abs(halves.means[i]);
+    other_half.means[i] = std::abs(other_half.means[i]);
+  }
+  ASSERT_TRUE(Append(halves, other_half).ok());
+  halves.render_mode = RenderMode::kClassic;
+  for (const double side : {-1.0, 1.0}) {
+    options.region = RegionOf(std::vector<double>{0, -9, -9, 9 * side, 9, 9});
+    EXPECT_EQ(run(halves).report.looks == TrainedKind::kWidened, side > 0) << side;
+  }
+  options.region = std::nullopt;
   // Formats without a word for Mip-Splatting tag it antialiased. What the user says is believed.
   said.render_mode = RenderMode::kAntialiased;
   const Enhanced mistagged = run(said);

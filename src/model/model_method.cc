@@ -171,7 +171,6 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
   if (input.filter_strength <= ShownStrength(upscale, input.cloud.render_mode)) {
     LogInfo(
         "the network's residuals are on top of the filter, and there is no lost width to give back: the splat stays");
-    if (model.copies) LogWarning("no copies are made of a splat that stays as it is: --copies has no effect");
     return within_budget();
   }
   if (IsCompensated(input.cloud.render_mode) && !network.config().knows_kind) {

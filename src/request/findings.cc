@@ -63,12 +63,13 @@ Status LookAt(CloudBlocks& blocks, SplatFindings& findings) {
   findings.statistics = statistics.Find();
   ShowingGaussians showing = study.Take();
   findings.looks = TrainedKindOf(showing.all);
+  const auto beside_tag = BesideTag(findings.looks, findings.render_mode, showing.all.size());
   // As `enhance` takes it.
   const bool untold = !findings.render_mode && !findings.lost_no_width;
   const bool antialiased = untold && findings.looks == TrainedKind::kAntialiased;
   findings.pixel_size =
       FindPixelSize(std::move(showing), antialiased ? std::optional(RenderMode::kAntialiased) : findings.render_mode);
-  findings.lost_width = FindLostWidth(said, findings.looks, kInfoUpscale);
+  findings.lost_width = FindLostWidth(said, beside_tag, kInfoUpscale);
   findings.problems = Problems(findings.statistics);
   return {};
 }
@@ -142,7 +143,7 @@ std::string InWords(const LostWidth& lost, const Result<PixelSizeFinding>& pixel
     case LostWidthReason::kWidened:
       return "none (likely): even the thinnest Gaussians have a width; enhance leaves it alone";
     case LostWidthReason::kWidenedButTagged:
-      return "none (likely): tagged antialiased, but even the thinnest Gaussians have a width; enhance leaves it alone";
+      return "none (likely): whatever its tag says, even the thinnest Gaussians have a width; enhance leaves it alone";
     case LostWidthReason::kLooksEnhanced:
     case LostWidthReason::kEnhancedButTagged:
       return "none any more (likely): the Gaussians lie in twins, as a network leaves them; enhance leaves it alone";

@@ -22,6 +22,7 @@
 #include "enhance/enhance.h"
 #include "enhance/filter.h"
 #include "enhance/lost_width.h"
+#include "enhance/showing_gaussians.h"
 #include "enhance/trained_kind.h"
 #include "formats/cloud_bytes.h"
 #include "formats/opened_splat.h"
@@ -334,7 +335,9 @@ Result<Engine::Answer> Engine::Filter(const Json& request) {
   const double upscale = value != nullptr && value->is_number() ? value->get<double>() : 4;
   if (!(upscale >= 1 && upscale <= 1e6)) return BadRequest("says an 'upscale' that is not from 1 to 1000000");
   const GaussianCloud& cloud = open->cloud;
-  const LostWidth lost = FindLostWidth(cloud, FindTrainedKind(cloud), upscale);
+  const GaussianCloud showing = FindShowingGaussians(cloud).all;
+  const LostWidth lost =
+      FindLostWidth(cloud, BesideTag(TrainedKindOf(showing), cloud.render_mode, showing.size()), upscale);
   Answer answer;
   const double gain = double{kDilation} * (lost.strength - ShownStrength(upscale, cloud.render_mode));
   answer.json = {{"gain", std::max(0.0, gain)}};

@@ -17,7 +17,7 @@ namespace anchorsplat {
 // MergeCost(). Chosen on training objects (docs/results/copies.md).
 inline constexpr double kMergeCost = 1e-4;
 // Of the network for standard fits: each Gaussian that goes costs them less.
-inline constexpr double kMergeCostOfStandard = 6e-4;
+inline constexpr double kMergeCostOfStandard = 1e-3;
 // Where refinement goes on: what it begins with has to show all, and is split again.
 inline constexpr double kMergeCostOfStart = 2e-5;
 

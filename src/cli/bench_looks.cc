@@ -26,6 +26,9 @@ struct LooksFlags {
 };
 
 Status RunLooks(const LooksFlags& flags, const SharedFlags& shared) {
+  if (flags.features && !shared.json) {
+    return Error{ErrorCode::kBadArgument, "--features has no effect without --json"};
+  }
   nlohmann::json rows = nlohmann::json::array();
   std::vector<std::vector<std::string>> table = {{"file", "Gaussians that show", "looks", "ln odds of enhanced"}};
   for (const std::string& file : flags.files) {
@@ -63,7 +66,7 @@ void AddLooksBench(CLI::App& bench, Program& program) {
   CLI::App& verb = AddVerb(bench, program, "looks", "What kind of training splats look like, whatever they say",
                            "anchorsplat bench looks examples/biplane/input.ply");
   const auto flags = std::make_shared<LooksFlags>();
-  verb.add_option("files", flags->files, "Splat files")->required()->check(CLI::ExistingFile);
+  verb.add_option("files", flags->files, "Splat files")->required();
   verb.add_flag("--features", flags->features, "With --json: what tells enhanced splats");
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunLooks(*flags, program.flags); }; });
 }

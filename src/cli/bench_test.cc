@@ -35,6 +35,17 @@ TEST(BenchVerb, PixelSize) {
   EXPECT_THAT(ExpectDone({"bench", "pixel-size", Biplane()}).out, HasSubstr("% in the median"));
 }
 
+TEST(BenchVerb, Looks) {
+  const TestFolder folder;
+  const std::string scan = Biplane() / "input.ply";
+  const nlohmann::json json = ExpectJson({"bench", "looks", scan, "--features"});
+  ASSERT_EQ(json["splats"].size(), 1u);
+  EXPECT_EQ(json["splats"][0]["looks"], "classic");
+  EXPECT_EQ(json["splats"][0]["features"].size(), 35u);
+  EXPECT_THAT(ExpectDone({"bench", "looks", scan}).out, HasSubstr("classic"));
+  ExpectRefused({"bench", "looks", folder / "none.ply"}, ErrorCode::kNotFound, {"none.ply"});
+}
+
 TEST(BenchVerb, GoesOnAfterASplatThatShowsNothing) {
   const TestFolder folder;
   std::filesystem::create_directories(folder / "objects");

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "cli/table.h"
-#include "core/log.h"
 #include "core/text.h"
 #include "enhance/enhanced_look.h"
 #include "enhance/showing_gaussians.h"
@@ -35,7 +34,8 @@ Status RunLooks(const LooksFlags& flags, const SharedFlags& shared) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(file));
     const GaussianCloud showing = FindShowingGaussians(cloud).all;
     const std::optional<TrainedKind> looks = TrainedKindOf(showing);
-    const std::optional<EnhancedLook> look = FindEnhancedLook(showing);
+    const SizeTails tails = SizeTailsOf(showing);
+    const std::optional<EnhancedLook> look = FindEnhancedLook(showing, tails);
     const double odds = look ? LogOddsOfEnhanced(*look) : std::nan("");
     nlohmann::json row = {{"file", file},
                           {"showing", showing.size()},
@@ -43,7 +43,7 @@ Status RunLooks(const LooksFlags& flags, const SharedFlags& shared) {
                           {"by_sizes", nullptr},
                           {"log_odds_of_enhanced", nullptr}};
     if (looks) row["looks"] = NameOf(*looks);
-    if (const auto by_sizes = Judge(SizeTailsOf(showing))) row["by_sizes"] = NameOf(*by_sizes);
+    if (const auto by_sizes = Judge(tails)) row["by_sizes"] = NameOf(*by_sizes);
     if (std::isfinite(odds)) row["log_odds_of_enhanced"] = odds;
     if (flags.features && look) row["features"] = *look;
     rows.push_back(std::move(row));

@@ -68,7 +68,7 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
     input.showing = found->estimate.showing;
     const double ratio = found->size / from_cameras.median;
     // Whoever says a mode or a strength means these cameras.
-    const bool said = options.filter_strength || std::ranges::find(options.given, "mode") != options.given.end();
+    const bool said = options.filter_strength || IsGiven(options, "mode");
     const bool sharper = !found->contradicted() && !IsCompensated(input.cloud.render_mode) &&
                          found->largest < kSharperThanClassic * from_cameras.median;
     const double largest = std::max(found->largest, found->estimate.high);

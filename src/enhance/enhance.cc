@@ -95,8 +95,9 @@ std::optional<TrainedKind> FindLooks(const EnhanceOptions& options, const Gaussi
 // Splats of which the caller does not say how they were trained are looked at. An antialiased one without a tag becomes
 // one.
 void RecogniseKind(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport& report) {
-  const bool said = std::ranges::find(options.given, "mode") != options.given.end();
-  if (said || options.filter_strength || HasLostNoWidth(cloud) || cloud.render_mode == RenderMode::kMip) return;
+  if (IsGiven(options, "mode") || options.filter_strength || HasLostNoWidth(cloud) ||
+      cloud.render_mode == RenderMode::kMip)
+    return;
   report.looks = FindLooks(options, cloud);
   if (!cloud.render_mode && report.looks == TrainedKind::kAntialiased) cloud.render_mode = RenderMode::kAntialiased;
 }
@@ -262,7 +263,7 @@ void SayWhatHasNoEffect(const EnhanceOptions& options) {
   std::string names;
   int count = 0;
   for (const char* name : {"pixel-size", "model", "copies", "merge-cost", "prune-opacity"}) {
-    if (std::ranges::find(options.given, name) == options.given.end()) continue;
+    if (!IsGiven(options, name)) continue;
     names += Cat(count++ > 0 ? ", --" : "--", name);
   }
   if (count > 0) {

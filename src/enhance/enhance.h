@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -56,6 +57,9 @@ struct EnhanceOptions {
                                                    // cameras say otherwise, else the splat's comment, else black
   uint64_t seed = 0;
 };
+
+// Whether the caller named the option, by its name without dashes.
+bool IsGiven(const EnhanceOptions& options, std::string_view name);
 
 void SetBudget(EnhanceOptions& options, int64_t max_gaussians);
 

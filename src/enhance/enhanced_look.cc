@@ -129,7 +129,7 @@ Twins FindTwins(const GaussianCloud& cloud, std::span<const int64_t> rows) {
 
 }  // namespace
 
-std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing) {
+std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing, const SizeTails& tails) {
   std::vector<int64_t> rows;
   Buffer<float> smallest, middle, largest, opacities;
   for (int64_t row = 0; row < showing.size(); ++row) {
@@ -157,7 +157,6 @@ std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing) {
   for (Buffer<float>* values : {&twins.distance, &twins.colour, &twins.opacity}) {
     for (const double q : kQuartiles) look[next++] = Logarithm(double{Quantile(*values, q)});
   }
-  const SizeTails tails = SizeTailsOf(showing);
   look[next++] = Logarithm(tails.smallest);
   look[next++] = Logarithm(tails.middle);
   look[next++] = std::log(tails.roundness);

@@ -8,13 +8,15 @@
 
 namespace anchorsplat {
 
+struct SizeTails;  // enhance/trained_kind.h
+
 // Whether a network has enhanced a splat that does not say so. Networks make several Gaussians of each: most have a
 // near twin, of nearly the same covariance, colour and opacity, where fits make each of its own. Sizes and opacities of
 // what a network makes are also unlike those of a fit.
 
-// Of ShowingGaussians::all, at up to 4000 of them, evenly spread over the rows. Difference of two Gaussians: the norm
-// of the difference of their covariances' logarithms, halved (log-scales as matrices). Twin: the one of the eight
-// nearest that differs least.
+// Of ShowingGaussians::all and its SizeTailsOf, at up to 4000 of them, evenly spread over the rows. Difference of two
+// Gaussians: the norm of the difference of their covariances' logarithms, halved (log-scales as matrices). Twin: the
+// one of the eight nearest that differs least.
 //
 //   0–14   ln(x + 0.02), x the quantiles 0.1, 0.25, 0.5, 0.75, 0.9 of the difference from the twin, then from the
 //   second
@@ -31,7 +33,7 @@ inline constexpr size_t kEnhancedLookFeatures = 35;
 // What bounds which splats can look enhanced at all.
 inline constexpr size_t kTwinUpperQuartile = 3, kFlatness = 27, kElongation = 28;
 using EnhancedLook = std::array<double, kEnhancedLookFeatures>;
-std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing);
+std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing, const SizeTails& tails);
 
 // ln of the odds that a network has enhanced it: a network of one small layer that has learned from fits as they are
 // and enhanced (scripts/train-enhanced-look.py). −∞ where fewer than three in four Gaussians have a twin that differs

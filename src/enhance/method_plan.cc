@@ -80,6 +80,10 @@ const MethodOption* FindOption(const EnhanceMethod* method, const std::string& n
 
 }  // namespace
 
+bool IsGiven(const EnhanceOptions& options, std::string_view name) {
+  return std::ranges::find(options.given, name) != options.given.end();
+}
+
 std::vector<MethodOption> WidthOptions(const std::function<std::string(const MethodUse&)>& lacks) {
   std::vector<MethodOption> options;
   for (const char* name : {"upscale", "pixel-size", "cameras", "train-width", "camera-rule", "filter-strength"}) {

@@ -12,7 +12,6 @@
 #include "core/run_context.h"
 #include "core/statistics.h"
 #include "enhance/enhanced_look.h"
-#include "enhance/showing_gaussians.h"
 
 namespace anchorsplat {
 
@@ -92,8 +91,6 @@ std::string_view NameOf(TrainedKind kind) {
   }
 }
 
-SizeTails FindSizeTails(const GaussianCloud& cloud) { return SizeTailsOf(FindShowingGaussians(cloud).all); }
-
 SizeTails SizeTailsOf(const GaussianCloud& showing) {
   SizeTails tails;
   Buffer<float> smallest, middle;
@@ -130,10 +127,11 @@ std::optional<TrainedKind> Judge(const SizeTails& tails) {
 }
 
 std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing) {
-  const auto by_sizes = Judge(SizeTailsOf(showing));
+  const SizeTails tails = SizeTailsOf(showing);
+  const auto by_sizes = Judge(tails);
   if (!by_sizes || by_sizes == TrainedKind::kWidened) return by_sizes;
   LeaveIfAbandoned();
-  const auto look = FindEnhancedLook(showing);
+  const auto look = FindEnhancedLook(showing, tails);
   const double least = by_sizes == TrainedKind::kUnclear ? kEnhancedOddsWhereUnclear : kEnhancedOdds;
   return look && LogOddsOfEnhanced(*look) > least ? TrainedKind::kEnhanced : by_sizes;
 }
@@ -142,10 +140,6 @@ std::optional<TrainedKind> BesideTag(std::optional<TrainedKind> kind, std::optio
   if (!tag) return kind;
   const bool counts = tag == RenderMode::kAntialiased || (tag == RenderMode::kClassic && showing >= kFew);
   return counts && IsWide(kind) ? kind : std::nullopt;
-}
-
-std::optional<TrainedKind> FindTrainedKind(const GaussianCloud& cloud) {
-  return TrainedKindOf(FindShowingGaussians(cloud).all);
 }
 
 }  // namespace anchorsplat

@@ -38,16 +38,15 @@ struct SizeTails {
   double roundness = 0;   // the 5 % quantile of the smallest axis over that of the middle one
   double opaque = 0;      // the share of opacities above 0.95 among the tenth of least middle × largest axis
 };
-SizeTails FindSizeTails(const GaussianCloud& cloud);
 SizeTails SizeTailsOf(const GaussianCloud& showing);  // of ShowingGaussians::all
 
 // By sizes alone, so never kEnhanced. Nothing: fewer than 400 Gaussians, too few to tell; below 1000 there is more that
 // is unclear.
 std::optional<TrainedKind> Judge(const SizeTails& tails);
 
-// By sizes and by what networks leave. Looks at the Gaussians only, not at what the cloud says of itself.
-std::optional<TrainedKind> FindTrainedKind(const GaussianCloud& cloud);
-std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing);  // of ShowingGaussians::all
+// By sizes and by what networks leave. Of ShowingGaussians::all: looks at the Gaussians only, not at what the cloud
+// says of itself.
+std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing);
 
 // What of that counts beside a tag. Trainers that know no other mode tag everything classic, and formats that have no
 // word for Mip-Splatting or for what has been enhanced tag it antialiased: where the Gaussians have a width all the

@@ -13,6 +13,7 @@
 #include "core/source_dir_for_test.h"
 #include "enhance/enhance.h"
 #include "enhance/filter.h"
+#include "enhance/showing_gaussians.h"
 #include "formats/cloud_io.h"
 #include "io/folder_for_test.h"
 
@@ -20,6 +21,12 @@ namespace anchorsplat {
 namespace {
 
 constexpr double kPixel = 0.0055;  // of both examples, nearly
+
+SizeTails FindSizeTails(const GaussianCloud& cloud) { return SizeTailsOf(FindShowingGaussians(cloud).all); }
+
+std::optional<TrainedKind> FindTrainedKind(const GaussianCloud& cloud) {
+  return TrainedKindOf(FindShowingGaussians(cloud).all);
+}
 
 GaussianCloud Example(const char* object) {
   auto cloud = ReadCloud(SourceDirForTest() / "examples" / object / "input.ply");

@@ -22,8 +22,7 @@ Status ReadPlyBody(const InputFile& file, const PlyHeader& header, const PlyElem
 Result<uint64_t> BeginOfPlyRows(const InputFile& file, const PlyHeader& header, const PlyElement& vertex);
 
 // Warns of bytes behind the last row of a binary file that has been read, whose last element is `vertex` and none of
-// whose elements has lists: of a second file, or of rows that
-// the header knows nothing of. A line end is none.
+// whose elements has lists: of a second file, or of rows that the header knows nothing of. A line end is none.
 void WarnOfSurplus(const InputFile& file, const PlyHeader& header, const PlyElement& vertex);
 
 // kBadFile where the header promises more Gaussians than are wanted.

@@ -34,7 +34,8 @@ nlohmann::json ToJson(const PixelSizeCheck& check, const std::string& kind) {
                          {"high", check.estimate.high},
                          {"seconds", check.seconds},
                          {"unlike_standard", check.estimate.unlike_standard},
-                         {"showing", check.estimate.showing}};
+                         {"showing", check.estimate.showing},
+                         {"cut_outlines", check.estimate.cut_outlines}};
   for (const PixelSizeCheck::Sample& sample : check.samples) {
     json["samples"].push_back({{"size", sample.size}, {"features", sample.features}});
   }

@@ -69,6 +69,10 @@ void PrintTable(const SplatFindings& f) {
     if (f.pixel_size->contradicted()) {
       std::cout << "    so enhance would take a smaller pixel, " << Number(f.pixel_size->size)
                 << ", and no network; --cameras or --pixel-size would tell\n";
+    } else if (f.pixel_size->part) {
+      std::cout << "    " << Fixed(100 * f.pixel_size->estimate.cut_outlines, 0)
+                << " % of the outlines are where it was cut and do not count; enhance would take "
+                << Number(f.pixel_size->size) << " to be safe\n";
     }
   } else {
     std::cout << "  training pixel  no estimate: " << f.pixel_size.error().message << "\n";

@@ -69,7 +69,7 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
     const double ratio = found->size / from_cameras.median;
     // Whoever says a mode or a strength means these cameras.
     const bool said = options.filter_strength || IsGiven(options, "mode");
-    const bool sharper = !found->contradicted() && !IsCompensated(input.cloud.render_mode) &&
+    const bool sharper = !found->contradicted() && !found->part && !IsCompensated(input.cloud.render_mode) &&
                          found->largest < kSharperThanClassic * from_cameras.median;
     const double largest = std::max(found->largest, found->estimate.high);
     const bool impossible = from_cameras.median > kImpossible * largest;
@@ -85,7 +85,7 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
       for (float& own : from_cameras.sizes) own *= smaller;
       from_cameras.median *= smaller;
       if (found->contradicted()) report.pixel_size_source = kCautiousPixelSize;
-    } else if (!found->contradicted() && (ratio > kSuspiciousRatio || ratio < 1 / kSuspiciousRatio)) {
+    } else if (!found->contradicted() && !found->part && (ratio > kSuspiciousRatio || ratio < 1 / kSuspiciousRatio)) {
       LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
                      " (median), the splat itself looks like ", found->size,
                      ": are these its training cameras, at the size it was trained at (--train-width)?"));
@@ -125,7 +125,12 @@ void SayWhatWasFound(const PixelSizeFinding& found) {
     return;
   }
   const std::string size =
-      Cat("estimated size of a training pixel: ", estimate.size, " (likely ", estimate.low, " to ", estimate.high, ")");
+      Cat("estimated size of a training pixel: ", estimate.size, " (likely ", estimate.low, " to ", estimate.high, ")",
+          found.part ? Cat("; ", Fixed(100 * estimate.cut_outlines, 0),
+                           " % of the outlines are where it was cut and do not count, and to be safe a smaller one is "
+                           "taken, ",
+                           found.size)
+                     : "");
   if (estimate.high > kVague * estimate.low) {
     LogWarning(Cat(size,
                    ". That is rough, and rather too small: this splat says little about the pixels it was trained at; "

@@ -12,6 +12,7 @@ namespace {
 constexpr int kProfileRowsPerTask = 32;
 constexpr float kLeastGradient = 1e-4f;  // per pixel; flatter crossings are noise of a plateau
 constexpr int kStretch = 16;             // px
+constexpr float kCutShare = 0.2f;        // of alpha
 
 // Most of a picture is empty or opaque: false where a stretch of a row, with the pixels to its right and `below` it,
 // has neither a level nor a band.
@@ -26,7 +27,7 @@ bool MayShow(const float* at, int below) {
 static_assert(kOutlineBands.front() < kOutlineLevels.front() && kOutlineBands.back() > kOutlineLevels.back());
 }  // namespace
 
-void OutlineProfile::AddRows(const Image& alpha, double pixel, int first, int last, Sums& sums) {
+void OutlineProfile::AddRows(const Image& alpha, double pixel, const float* cut, int first, int last, Sums& sums) {
   const int width = alpha.width;
   for (int y = first; y < last; ++y) {
     const float* const row = alpha.pixels.data() + int64_t{y} * width;
@@ -36,7 +37,8 @@ void OutlineProfile::AddRows(const Image& alpha, double pixel, int first, int la
         x += kStretch - 1;
         continue;
       }
-      for (size_t b = 0; b + 1 < kOutlineBands.size(); ++b) {
+      const bool left_out = cut != nullptr && cut[at - alpha.pixels.data()] > kCutShare * *at;
+      for (size_t b = 0; b + 1 < kOutlineBands.size() && !left_out; ++b) {
         if (*at >= kOutlineBands[b] && *at < kOutlineBands[b + 1]) ++sums.pixels[b];
       }
       if (x < 1 || y < 1 || x + 2 >= width || y + 2 >= alpha.height) continue;
@@ -47,7 +49,8 @@ void OutlineProfile::AddRows(const Image& alpha, double pixel, int first, int la
         for (const auto& [along, across] : {std::pair(1, width), std::pair(width, 1)}) {
           const float begin = at[0], end = at[along];
           if ((begin < value) == (end < value)) continue;
-          if (value == 0.5f) ++sums.crossings;
+          if (value == 0.5f) ++(left_out ? sums.left_out : sums.crossings);
+          if (left_out) continue;
           const float t = (value - begin) / (end - begin);
           const float rise = 0.5f * ((1 - t) * (end - at[-along]) + t * (at[2 * along] - begin));
           const float aside =
@@ -62,10 +65,10 @@ void OutlineProfile::AddRows(const Image& alpha, double pixel, int first, int la
   }
 }
 
-void OutlineProfile::Add(const Image& alpha, double pixel) {
+void OutlineProfile::Add(const Image& alpha, double pixel, const float* cut) {
   std::vector<Sums> parts(static_cast<size_t>((alpha.height + kProfileRowsPerTask - 1) / kProfileRowsPerTask));
   ParallelFor(0, alpha.height, kProfileRowsPerTask, [&](int64_t first, int64_t last) {
-    AddRows(alpha, pixel, static_cast<int>(first), static_cast<int>(last),
+    AddRows(alpha, pixel, cut, static_cast<int>(first), static_cast<int>(last),
             parts[static_cast<size_t>(first / kProfileRowsPerTask)]);
   });
   for (const Sums& part : parts) {
@@ -74,9 +77,12 @@ void OutlineProfile::Add(const Image& alpha, double pixel) {
     }
     for (size_t b = 0; b < areas_.size(); ++b) areas_[b] += static_cast<double>(part.pixels[b]) * pixel * pixel;
     length_ += static_cast<double>(part.crossings) * pixel;
+    left_out_ += static_cast<double>(part.left_out) * pixel;
   }
   last_pixel_ = pixel;
 }
+
+double OutlineProfile::LeftOut() const { return left_out_ > 0 ? left_out_ / (left_out_ + length_) : 0; }
 
 std::array<double, kOutlineValues> OutlineProfile::Values() const {
   std::array<double, kOutlineValues> out{};

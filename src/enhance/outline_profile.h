@@ -22,9 +22,13 @@ inline constexpr size_t kOutlineValues = kOutlineLevels.size() * kOutlineQuantil
 
 class OutlineProfile {
  public:
-  // Adds a picture, [1,H,W], whose pixels have the side `pixel` in units of the length. The outermost pixels only serve
-  // differences. Bit-identical for any number of threads.
-  void Add(const Image& alpha, double pixel);
+  // Adds a picture, [1,H,W] or the first channel of one, whose pixels have the side `pixel` in units of the length. The
+  // outermost pixels only serve differences. Bit-identical for any number of threads. `cut`: [H,W], how much of alpha
+  // is of Gaussians that were cut; what they have a fifth of is left out.
+  void Add(const Image& alpha, double pixel, const float* cut = nullptr);
+
+  // Share of the outlines, by their length at ½, that was left out.
+  double LeftOut() const;
 
   // Natural logarithms: per level the quantiles of the widths, then per band area / (length of the outline at ½ × width
   // of the band). 0 for a level that is crossed nowhere; areas and lengths have one pixel more than there are, so that
@@ -40,12 +44,13 @@ class OutlineProfile {
     std::array<std::array<double, kBins>, kOutlineLevels.size()> widths{};  // weights
     std::array<int64_t, kOutlineBands.size() - 1> pixels{};                 // per band
     int64_t crossings = 0;                                                  // of ½
+    int64_t left_out = 0;                                                   // of those, not counted
   };
-  static void AddRows(const Image& alpha, double pixel, int first, int last, Sums& sums);
+  static void AddRows(const Image& alpha, double pixel, const float* cut, int first, int last, Sums& sums);
 
   std::array<std::array<double, kBins>, kOutlineLevels.size()> widths_{};
   std::array<double, kOutlineBands.size() - 1> areas_{};
-  double length_ = 0, last_pixel_ = 1;
+  double length_ = 0, left_out_ = 0, last_pixel_ = 1;
 };
 
 }  // namespace anchorsplat

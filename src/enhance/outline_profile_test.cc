@@ -67,6 +67,28 @@ TEST(OutlineProfile, LengthsScaleAndPicturesAdd) {
   }
 }
 
+// A sharp and a soft outline: without the soft one, what is left are the sharp one's widths.
+TEST(OutlineProfile, WhatWasCutIsLeftOut) {
+  const Image both = Picture(256, 256, [](double x, double) {
+    return x < 128 ? std::clamp((x - 60) / 16 + 0.5, 0.0, 1.0) : std::clamp((190 - x) / 48 + 0.5, 0.0, 1.0);
+  });
+  std::vector<float> cut(256 * 256);
+  for (size_t k = 0; k < cut.size(); ++k) cut[k] = k % 256 > 128 ? 0.5f * both.pixels[k] : 0.1f * both.pixels[k];
+  OutlineProfile whole, sharp;
+  whole.Add(both, 1);
+  sharp.Add(both, 1, cut.data());
+  EXPECT_EQ(whole.LeftOut(), 0);
+  EXPECT_NEAR(sharp.LeftOut(), 0.5, 0.01);
+  const auto values = sharp.Values();
+  for (size_t k = 0; k < kFirstBand; ++k) EXPECT_NEAR(values[k], std::log(16.0), 0.06) << k;
+  double area = 0;
+  for (size_t b = 0; b + 1 < kOutlineBands.size(); ++b) {
+    area += std::exp(values[kFirstBand + b]) * double{kOutlineBands[b + 1] - kOutlineBands[b]};
+  }
+  EXPECT_NEAR(area, 16, 1);
+  EXPECT_EQ(OutlineProfile().LeftOut(), 0);
+}
+
 // The same from the definition, without histograms.
 std::array<double, kOutlineValues> Reference(const Image& alpha, double pixel) {
   const auto at = [&](int x, int y) { return double{alpha.at(0, y, x)}; };

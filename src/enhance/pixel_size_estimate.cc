@@ -129,9 +129,10 @@ double Share(double strangeness, double none, double all) {
   return std::clamp((strangeness - none) / (all - none), 0.0, 1.0);
 }
 
-PixelSizeEstimate EstimateOf(const Settled& settled, double unlike_standard, const PixelSizeProbe& probe) {
+PixelSizeEstimate EstimateOf(const Settled& settled, double unlike_standard, const PixelSizeProbe& probe, Look look) {
   const double size = std::exp(settled.log_size), spread = std::exp(settled.half);
-  return PixelSizeEstimate{size, size / spread, size * spread, unlike_standard, probe.showing()};
+  return PixelSizeEstimate{
+      size, size / spread, size * spread, unlike_standard, probe.showing(), probe.CutOutlines(size, look)};
 }
 
 // Outlines of antialiased fits are narrower than those of classic ones.
@@ -143,7 +144,7 @@ Result<PixelSizeEstimate> EstimateAntialiased(PixelSizeProbe& probe) {
                                Correction(kAntialiasedPixelSizeCorrection, probe, std::exp(settled.log_size)));
   settled.log_size += correction;
   settled.half = std::max(settled.half, kLeastHalfOfCompensated);
-  return EstimateOf(settled, 0, probe);
+  return EstimateOf(settled, 0, probe, Look::kAntialiased);
 }
 
 }  // namespace
@@ -174,7 +175,7 @@ Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional
                                Correction(kPixelSizeCorrection, probe, std::exp(settled.log_size)));
   settled.log_size += (1 - like_standard) * (correction > 0 ? kUpwards : 1) * correction;
   if (IsCompensated(mode)) settled.half = std::max(settled.half, kLeastHalfOfCompensated);
-  return EstimateOf(settled, share, probe);
+  return EstimateOf(settled, share, probe, Look::kAlpha);
 }
 
 }  // namespace anchorsplat

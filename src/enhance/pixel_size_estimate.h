@@ -22,6 +22,8 @@ struct PixelSizeEstimate {
   // are unlike those, as of MCMC, random points, photographs.
   double unlike_standard = 0;
   double showing = 1;  // PixelSizeProbe::showing()
+  // Share of its outlines that are cuts and do not count: PixelSizeProbe::CutOutlines().
+  double cut_outlines = 0;
 };
 
 // Scales with the cloud. Takes up to a second, for large clouds too, as only a part of them is looked at.

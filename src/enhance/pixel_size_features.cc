@@ -2,15 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "core/activations.h"
+#include "core/parallel.h"
 #include "core/run_context.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
+#include "enhance/cuts.h"
 #include "enhance/showing_gaussians.h"
 
 namespace anchorsplat {
@@ -51,6 +55,16 @@ void ShowBrightness(GaussianCloud& cloud) {
     const float seen = std::clamp((brightness - kUnseen) / (kSeen - kUnseen), 0.0f, 1.0f);
     std::fill_n(sh, 3, (seen - 0.5f) / kSh0);
   }
+}
+
+// Instead of green: whether it was cut.
+void MarkCut(GaussianCloud& cloud, std::span<const Cut> cuts) {
+  ParallelFor(0, cloud.size(), 4096, [&](int64_t first, int64_t last) {
+    for (int64_t i = first; i < last; ++i) {
+      const bool cut = std::ranges::any_of(cuts, [&](const Cut& c) { return c.Depth(cloud, i) < kCutReach; });
+      cloud.sh[static_cast<size_t>(3 * i + 1)] = ((cut ? 1.0f : 0.0f) - 0.5f) / kSh0;
+    }
+  });
 }
 
 // √(largest × middle axis) of their 10 % quantiles over the visible Gaussians, weighted by opacity × area (product of
@@ -111,10 +125,14 @@ Result<PixelSizeProbe> PixelSizeProbe::Make(const GaussianCloud& whole) { return
 
 Result<PixelSizeProbe> PixelSizeProbe::Make(TellingGaussians telling) {
   const Framing& framing = telling.framing;
-  const double radius = telling.radius;
+  const double radius = telling.radius();
   PixelSizeProbe probe;
   probe.cloud_ = std::move(telling.cloud);
+  std::vector<Cut> cuts = FindCuts(probe.cloud_);
+  if (telling.reach) cuts.push_back({.ball = true, .direction = framing.target, .reach = *telling.reach});
   ShowBrightness(probe.cloud_);
+  probe.cut_ = !cuts.empty();
+  if (probe.cut_) MarkCut(probe.cloud_, cuts);
   const std::optional<double> start = AxisOfSmallGaussians(probe.cloud_);
   if (!start) {
     return Error{ErrorCode::kBadArgument,
@@ -132,7 +150,7 @@ Result<PixelSizeProbe> PixelSizeProbe::Make(TellingGaussians telling) {
 }
 
 Result<PixelSizeProbe::OutlineValues> PixelSizeProbe::AtStep(int step, Look look) {
-  if (const auto known = known_.find({look, step}); known != known_.end()) return known->second;
+  if (const auto known = known_.find({look, step}); known != known_.end()) return known->second.values;
   const double size = start_ * std::exp2(step * kOctavesPerStep);
   const double pixel = std::min(farthest_pixel_, size / kSamples);
   RenderOptions options;
@@ -145,17 +163,30 @@ Result<PixelSizeProbe::OutlineValues> PixelSizeProbe::AtStep(int step, Look look
   for (Camera& camera : cameras_.cameras) {
     camera.intrinsics.fx = camera.intrinsics.fy = distance_ / pixel;
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud_, camera, options, output_));
-    if (look == Look::kOverBlack) {
-      output_.color.pixels.resize(output_.alpha.pixels.size());  // all channels are equal
-      output_.color.channels = 1;
-    }
-    profile.Add(look == Look::kOverBlack ? output_.color : output_.alpha, pixel / size);
+    // Of colours, the first channel is looked at; the second is how much of a pixel the cut Gaussians make.
+    const float* cut = cut_ ? output_.color.pixels.data() + output_.alpha.pixels.size() : nullptr;
+    profile.Add(look == Look::kOverBlack ? output_.color : output_.alpha, pixel / size, cut);
   }
-  return known_[{look, step}] = profile.Values();
+  return (known_[{look, step}] = {profile.Values(), profile.LeftOut()}).values;
+}
+
+double PixelSizeProbe::StepOf(double size) const {
+  return std::clamp(std::log2(size / start_) / kOctavesPerStep, -kMostSteps, kMostSteps);
+}
+
+double PixelSizeProbe::CutOutlines(double size, Look look) const {
+  const double at = StepOf(size);
+  double nearest = std::numeric_limits<double>::infinity(), share = 0;
+  for (const auto& [key, seen] : known_) {
+    if (key.first != look || std::abs(key.second - at) >= nearest) continue;
+    nearest = std::abs(key.second - at);
+    share = seen.cut_outlines;
+  }
+  return share;
 }
 
 Result<PixelSizeProbe::OutlineValues> PixelSizeProbe::ProfileAt(double size, Look look) {
-  const double at = std::clamp(std::log2(size / start_) / kOctavesPerStep, -kMostSteps, kMostSteps);
+  const double at = StepOf(size);
   const double below = std::floor(at), part = at - below;
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutlineValues values, AtStep(static_cast<int>(below), look));
   if (part == 0) return values;

@@ -45,7 +45,8 @@ using SizeFeatures = std::array<double, kSizeFeatures>;
 class PixelSizeProbe {
  public:
   // Only Gaussians near the middle of the cloud and small beside it are looked at, and at most 200,000 of them.
-  // kBadArgument: fewer than kLeastGaussians of them have an opacity of 10 % or more and three positive scales.
+  // Outlines where the cloud was cut are left out. kBadArgument: fewer than kLeastGaussians of them have an opacity of
+  // 10 % or more and three positive scales.
   static Result<PixelSizeProbe> Make(const GaussianCloud& cloud);
   static Result<PixelSizeProbe> Make(TellingGaussians telling);
 
@@ -57,6 +58,11 @@ class PixelSizeProbe {
   // leave 0 to 0.68, few of them more than 0.6: what stands in no picture's way stays.
   double showing() const { return showing_; }
 
+  // Share of the cloud's outlines, by their length in pictures of pixels of about `size` (of those that were made),
+  // that are there because it was cut (cuts.h): by people, or here, where only the middle of a large cloud is looked
+  // at. Those outlines count nowhere.
+  double CutOutlines(double size, Look look = Look::kAlpha) const;
+
   // The features of pixels of `size` (world units at the middle of the cloud). Pictures are made at half octaves from
   // start(), within six octaves, and only once; between them the logarithms are linear. Lengths scale with the cloud:
   // a cloud made c times as large has the same features at c times the size.
@@ -67,7 +73,12 @@ class PixelSizeProbe {
 
  private:
   using OutlineValues = std::array<double, kOutlineValues>;
+  struct Seen {
+    OutlineValues values;
+    double cut_outlines;
+  };
   PixelSizeProbe() = default;
+  double StepOf(double size) const;
   Result<OutlineValues> AtStep(int step, Look look);
   Result<OutlineValues> ProfileAt(double size, Look look);
 
@@ -75,11 +86,12 @@ class PixelSizeProbe {
   CameraSet cameras_;
   double start_ = 0, distance_ = 0;
   double showing_ = 1;
+  bool cut_ = false;           // the second channel of cloud_ is 1 where a Gaussian was cut
   double farthest_pixel_ = 0;  // world size of a picture's pixel where the whole cloud is in it; none is larger
   Rasterizer rasterizer_;
   RenderOutput output_;
   SizeFeatures sizes_{};  // with d = 1
-  std::map<std::pair<Look, int>, OutlineValues> known_;
+  std::map<std::pair<Look, int>, Seen> known_;
 };
 
 }  // namespace anchorsplat

@@ -30,6 +30,15 @@ constexpr int64_t kGuardSamples = 256;  // of the spacing; its median is good to
 constexpr double kCrowded = 48'000, kCrowdedShowing = 25'000;
 constexpr double kFaintShowing = 0.45, kMostlyShowing = 0.6;  // shares that show, between which the bound changes
 constexpr double kMostCrowded = 2.5, kNeverCrowded = 0.35;
+// How many Gaussians there were before it was cut is not known: parts of captures are at 0.57 and more, of fits of
+// small pictures at 0.15 to 0.6. Cut is what has this share of its outlines at cuts; fits that nobody cut have 0.06 at
+// most.
+constexpr double kCrowdedPart = 0.55, kPart = 0.1;
+// Where a splat was cut, insides that no picture showed become outlines. Pixels of parts are taken smaller by this
+// times the share of the outlines that do not count; ln.
+constexpr double kPartCaution = 0.3;
+// Where hardly an outline is left that is not a cut's, the rest says nothing.
+constexpr double kNothingButCuts = 0.9;
 // √(largest × middle axis) of the smallest tenth lies between 0.3 and 2.3 pixels in the 152 fits of the regression, and
 // at 0.2 in one of a chair whose slats are thinner than a pixel.
 constexpr double kSmallestAxis = 0.12;  // pixels; with a margin
@@ -122,15 +131,25 @@ Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud) {
 }
 
 PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidence& evidence) {
-  PixelSizeFinding finding{estimate.size, std::max(estimate.size, evidence.without_black), estimate, {}};
-  const double most = MostGaussiansPerPixel(evidence.gaussians, estimate.showing);
+  PixelSizeFinding finding{
+      estimate.size, std::max(estimate.size, evidence.without_black), estimate, estimate.cut_outlines > kPart, {}};
+  const double of_whole = MostGaussiansPerPixel(evidence.gaussians, estimate.showing);
+  const double most = finding.part ? std::min(of_whole, kCrowdedPart) : of_whole;
   const auto crowd_at = [&](double size) { return evidence.spacing > 0 ? std::pow(size / evidence.spacing, 2) : 0; };
   const double crowd = crowd_at(estimate.size);
   if (crowd > most) {
     finding.contradictions.push_back(
-        Cat("there would be ", Number(crowd), " Gaussians on every pixel of the surface, and fits of ",
-            WithThousands(evidence.gaussians), evidence.gaussians >= int64_t{kMostShowing} ? " and more" : "",
-            " keep at most ", Number(most)));
+        most < of_whole
+            ? Cat("there would be ", Fixed(crowd, 2),
+                  " Gaussians on every pixel of the surface, and parts that were cut out of fits have at most ", most)
+            : Cat("there would be ", Number(crowd), " Gaussians on every pixel of the surface, and fits of ",
+                  WithThousands(evidence.gaussians), evidence.gaussians >= int64_t{kMostShowing} ? " and more" : "",
+                  " keep at most ", Number(most)));
+  }
+  if (estimate.cut_outlines > kNothingButCuts) {
+    finding.contradictions.push_back(
+        Cat(Fixed(100 * estimate.cut_outlines, 0),
+            " % of its outlines are where it was cut, or where the part of it ends that is looked at"));
   }
   if (evidence.small_axis < kSmallestAxis * estimate.size) {
     finding.contradictions.push_back(Cat("its small Gaussians measure ", Fixed(evidence.small_axis / estimate.size, 2),
@@ -140,6 +159,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     finding.contradictions.push_back(
         Cat("without its black Gaussians, which no picture shows, the outlines say ", evidence.without_black));
   }
+  if (finding.part) finding.size *= std::exp(-kPartCaution * estimate.cut_outlines);
   if (finding.contradicted()) {
     double size = kHarmless * evidence.width;
     const bool crowd_alone = crowd > most && finding.contradictions.size() == 1;
@@ -149,7 +169,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     if (without > 0 && crowd_at(without) <= most && evidence.small_axis >= kSmallestAxis * without) {
       size = std::max(size, without);
     }
-    finding.size = std::min(estimate.size, size);
+    finding.size = std::min(finding.size, size);
   }
   if (evidence.all > 0 && evidence.all < kEnough) {
     const double apart = std::sqrt(static_cast<double>(evidence.all) / static_cast<double>(kEnough));

@@ -18,6 +18,7 @@ struct PixelSizeFinding {
   double size = 0;                          // to act on; world units
   double largest = 0;                       // that the outlines could mean: with and without black Gaussians
   PixelSizeEstimate estimate;               // what the outlines say
+  bool part = false;                        // cut out of something larger: a tenth of its outlines and more are cuts
   std::vector<std::string> contradictions;  // sentences that say what speaks against it; empty: nothing does
 
   bool contradicted() const { return !contradictions.empty(); }

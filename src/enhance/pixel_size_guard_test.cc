@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <string>
+#include <vector>
 
 #include "core/random.h"
 #include "core/source_dir_for_test.h"
@@ -128,6 +129,53 @@ TEST(PixelSizeGuard, AContradictedEstimateIsNextToHarmless) {
   // No more than a quarter of the Gaussians gets more than a seventeenth wider.
   const double added = 0.3 * (DefaultFilterStrength(4) - 1.0 / 16) * found.size * found.size;
   EXPECT_LT(std::sqrt(evidence->width * evidence->width + added), 1.06 * evidence->width);
+}
+
+// Cutting a splat makes outlines as soft as its Gaussians are large. They do not count, and what is left is trusted
+// less.
+TEST(PixelSizeGuard, APartIsNoMoreBlurredThanTheWhole) {
+  const GaussianCloud whole = Example("stone_lantern");
+  std::vector<int64_t> rows;
+  for (int64_t i = 0; i < whole.size(); ++i) {
+    const float* p = whole.means.data() + 3 * i;
+    if (p[0] + 0.3f * p[1] < 0.05f) rows.push_back(i);
+  }
+  const auto found = FindPixelSize(Subset(whole, rows).value());
+  ASSERT_TRUE(found.ok()) << found.error().message;
+  EXPECT_TRUE(found->part);
+  EXPECT_LT(found->size, found->estimate.size);
+  EXPECT_FALSE(found->contradicted()) << found->contradictions.front();
+  EXPECT_GT(found->size, 0.6 * kTruth);
+  EXPECT_LT(found->size, 1.1 * kTruth);
+}
+
+TEST(PixelSizeGuard, PartsAreCrowdedSooner) {
+  PixelSizeEstimate estimate = {.size = 0.01, .low = 0.008, .high = 0.012, .showing = 0.7};
+  // 0.7 Gaussians on a pixel: nothing for so few, but too many for a part of no one knows how many.
+  const PixelSizeEvidence evidence = {.gaussians = 5000,
+                                      .all = 6000,
+                                      .spacing = 0.01 / std::sqrt(0.7),
+                                      .small_axis = 0.01,
+                                      .width = 0.004,
+                                      .without_black = 0};
+  EXPECT_FALSE(Judge(estimate, evidence).part);
+  EXPECT_FALSE(Judge(estimate, evidence).contradicted());
+  estimate.cut_outlines = 0.06;  // as fits have that nobody cut
+  EXPECT_FALSE(Judge(estimate, evidence).part);
+  EXPECT_EQ(Judge(estimate, evidence).size, 0.01);
+  estimate.cut_outlines = 0.3;
+  EXPECT_TRUE(Judge(estimate, evidence).part);
+  ASSERT_TRUE(Judge(estimate, evidence).contradicted());
+  EXPECT_NE(Judge(estimate, evidence).contradictions[0].find("parts that were cut out of fits"), std::string::npos);
+
+  PixelSizeEvidence sparse = evidence;
+  sparse.spacing = 0.02;
+  EXPECT_FALSE(Judge(estimate, sparse).contradicted());
+  EXPECT_NEAR(Judge(estimate, sparse).size, 0.01 * std::exp(-0.09), 1e-9);
+  estimate.cut_outlines = 0.95;
+  ASSERT_TRUE(Judge(estimate, sparse).contradicted());
+  EXPECT_NE(Judge(estimate, sparse).contradictions[0].find("95 % of its outlines"), std::string::npos);
+  EXPECT_DOUBLE_EQ(Judge(estimate, sparse).size, 0.7 * 0.004);
 }
 
 TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {

@@ -59,7 +59,7 @@ class TellingSearch {
     TellingGaussians out;
     out.cloud = nearest_.Take(&next);
     out.framing = framing_;
-    out.radius = next ? std::min(framing_.radius, std::sqrt(*next)) : framing_.radius;
+    if (next) out.reach = std::sqrt(*next);
     return out;
   }
 

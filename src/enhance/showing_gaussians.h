@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -22,7 +23,10 @@ inline constexpr size_t kMostShowing = 200'000;
 struct TellingGaussians {
   GaussianCloud cloud;  // without harmonics, in the order of the whole cloud
   Framing framing;      // of the whole cloud
-  double radius = 1;    // of the part, where it was cut, else the framing's
+  // Where there were more, they are those up to here from the framing's target; nothing where they are all.
+  std::optional<double> reach;
+
+  double radius() const { return std::min(framing.radius, reach.value_or(framing.radius)); }
 };
 
 // The Gaussians of a cloud that say something about its fit. All without harmonics, in the order of the whole cloud.

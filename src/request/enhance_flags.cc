@@ -232,6 +232,7 @@ nlohmann::json ToJson(const EnhanceReport& r) {
     if (r.finding) {
       json["pixel_size"]["estimate"] = r.finding->estimate.size;
       json["pixel_size"]["contradictions"] = r.finding->contradictions;
+      json["pixel_size"]["cut_outlines"] = r.finding->estimate.cut_outlines;
       json["pixel_size"]["unsure"] = r.finding->contradicted();
     }
     if (!r.camera_rule.empty()) json["camera_rule"] = r.camera_rule;

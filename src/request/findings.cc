@@ -227,6 +227,7 @@ nlohmann::json ToJson(const SplatFindings& f) {
                           {"low", f.pixel_size->estimate.low},
                           {"high", f.pixel_size->estimate.high},
                           {"contradictions", f.pixel_size->contradictions},
+                          {"cut_outlines", f.pixel_size->estimate.cut_outlines},
                           {"used", f.pixel_size->size}};
   }
   for (const SplatFormat& format : Formats()) {

@@ -33,6 +33,10 @@ constexpr double kBallSlack = 0.02;  // how far beyond a ball hull points may li
 constexpr double kNear = 0.5, kFar = 4;
 constexpr double kShareOfEnds = 0.05, kMore = 3;
 constexpr double kMoreOfBalls = 5;  // one of very many that were tried
+// So many within ½, and this share of all: a few large ones on the outside are no cut, and a cut of few makes few
+// outlines.
+constexpr int64_t kLeastNear = 12;
+constexpr double kLeastNearShare = 0.005;
 // Those that lie flat in it do not count, by their deviation across it in units of their middle axis: they are a face.
 constexpr double kLying = 0.5;
 
@@ -197,11 +201,12 @@ Vec3 Ray(int k) {
 }
 
 struct Evidence {
-  int64_t near = 0, far = 0;
+  int64_t near = 0, far = 0, all = 0;
 
   bool Convinces(double more = kMore) const {
     const double ends = kShareOfEnds * static_cast<double>(far);
-    return static_cast<double>(near) > ends + more * std::sqrt(ends) + more;
+    return near >= kLeastNear && static_cast<double>(near) >= kLeastNearShare * static_cast<double>(all) &&
+           static_cast<double>(near) > ends + more * std::sqrt(ends) + more;
   }
 };
 
@@ -209,6 +214,7 @@ struct Evidence {
 template <typename DepthOf>
 Evidence CountNear(const GaussianCloud& cloud, const Sample& sample, DepthOf&& depth_of) {
   Evidence evidence;
+  evidence.all = static_cast<int64_t>(sample.size());
   for (size_t k = 0; k < sample.size(); ++k) {
     const std::pair<double, Vec3> at = depth_of(k);
     if (sample.left[k] || at.first > kFar * sample.largest[k]) continue;

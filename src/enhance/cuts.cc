@@ -33,6 +33,8 @@ constexpr double kBallSlack = 0.02;  // how far beyond a ball hull points may li
 constexpr double kNear = 0.5, kFar = 4;
 constexpr double kShareOfEnds = 0.05, kMore = 3;
 constexpr double kMoreOfBalls = 5;  // one of very many that were tried
+// More than a fifth, and a bit for chance, is a straight edge that the face of the hull leans on.
+constexpr double kMostShare = 0.2, kMoreOfEdges = 1.5;
 // So many within ½, and this share of all: a few large ones on the outside are no cut, and a cut of few makes few
 // outlines.
 constexpr int64_t kLeastNear = 12;
@@ -204,7 +206,8 @@ struct Evidence {
   int64_t near = 0, far = 0, all = 0;
 
   bool Convinces(double more = kMore) const {
-    const double ends = kShareOfEnds * static_cast<double>(far);
+    const double ends = kShareOfEnds * static_cast<double>(far), edges = kMostShare * static_cast<double>(far);
+    if (static_cast<double>(near) > edges + kMoreOfEdges * std::sqrt(edges)) return false;
     return near >= kLeastNear && static_cast<double>(near) >= kLeastNearShare * static_cast<double>(all) &&
            static_cast<double>(near) > ends + more * std::sqrt(ends) + more;
   }

@@ -185,6 +185,10 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
     report.pixel_size = found->size;
     report.pixel_size_source = found->contradicted() ? kCautiousPixelSize : "estimated";
     if (says) SayWhatWasFound(*found);
+    if (found->least < found->size) {
+      input.pixel_sizes = CautiousPixelSizes(input.cloud, *found);
+      return {};
+    }
   }
   input.pixel_sizes.assign(1, static_cast<float>(report.pixel_size));
   return {};

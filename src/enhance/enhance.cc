@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/log.h"
+#include "core/lost_nothing_mark.h"
 #include "core/run_context.h"
 #include "core/statistics.h"
 #include "core/stopwatch.h"
@@ -161,6 +162,10 @@ double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud,
     LogWarning(
         "the splat says that it has been enhanced already: its lost width has been given back and none is given once "
         "more (--filter-strength F to enhance it all the same)");
+  } else if (lost.reason == LostWidthReason::kPartMarked) {
+    LogWarning(
+        "the splat says that a part of it has been enhanced already, which would be given its lost width twice: it "
+        "stays as it is (--region enhances another part, --filter-strength F all of it)");
   } else if (lost.strength > 0 && IsCompensated(cloud.render_mode) && options.upscale > 1) {
     LogInfo(Cat("the splat is ", NameOf(*cloud.render_mode), ": its fit lost less width, and less is given back (",
                 Fixed(lost.strength, 2), " of what a classic one could have lost)"));
@@ -343,6 +348,13 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   input.cloud = std::move(cloud);
   ANCHORSPLAT_RETURN_IF_ERROR(DropUnusable(input.cloud));
   report.dropped = report.gaussians_in - input.cloud.size();
+  // A mark of other parts says nothing about this one.
+  std::vector<std::string> marks_of_parts;
+  if (options.region) {
+    const auto is_mark = [](const std::string& comment) { return comment.starts_with(kPartEnhancedMark); };
+    std::ranges::copy_if(input.cloud.comments, std::back_inserter(marks_of_parts), is_mark);
+    std::erase_if(input.cloud.comments, is_mark);
+  }
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SizedMethods sized, FindSizedMethods(plan, options));
   if (sized.any || options.clean) RecogniseKind(options, input.cloud, report);
@@ -378,9 +390,11 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   if (options.region) ANCHORSPLAT_RETURN_IF_ERROR(Append(out, rest));
   report.seconds = watch.Total();
   report.gaussians_out = out.size();
-  if (options.region) return Enhanced{std::move(out), std::move(report)};
+  out.comments.insert(out.comments.end(), marks_of_parts.begin(), marks_of_parts.end());
   if (!sized.any || GivesWidth(report.filter_strength, options.upscale, out.render_mode)) {
-    out.comments.push_back(EnhancedComment(report.method, options.upscale));
+    std::string mark = options.region ? PartEnhancedComment(report.method, options.upscale)
+                                      : EnhancedComment(report.method, options.upscale);
+    if (std::ranges::find(out.comments, mark) == out.comments.end()) out.comments.push_back(std::move(mark));
   }
   return Enhanced{std::move(out), std::move(report)};
 }

@@ -9,9 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "core/lost_nothing_mark.h"
+#include "core/source_dir_for_test.h"
+#include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
 #include "enhance/refine.h"
 #include "enhance/refinement_for_test.h"
+#include "formats/cloud_io.h"
 
 namespace anchorsplat {
 namespace {
@@ -75,7 +79,8 @@ TEST_F(EnhanceRegion, IsFilteredAsInTheWholeAndTheRestStays) {
     EXPECT_EQ(part->report.gaussians_out, cloud.size());
     ExpectSameBits(Rows(part->cloud, 0, inside), Part(whole->cloud, region, true));
     ExpectSameBits(Rows(part->cloud, inside, cloud.size()), Part(cloud, region, false));
-    EXPECT_EQ(part->cloud.comments, cloud.comments) << "not marked: another part may be enhanced later";
+    EXPECT_EQ(part->cloud.comments, std::vector{PartEnhancedComment("filter", kUpscale)});
+    EXPECT_FALSE(HasMark(part->cloud.comments, kEnhancedMark)) << "another part may be enhanced later";
   }
 }
 
@@ -157,6 +162,34 @@ TEST_F(EnhanceRegion, ABudgetBoundsEveryMethod) {
       EXPECT_GE(planned, pictures ? most * 9 / 10 : most) << "what is left of it is spent, too";
     }
   }
+}
+
+// Of a part that has been enhanced the width would be given back twice.
+TEST(Region, AfterAPartTheWholeIsLeftAlone) {
+  const GaussianCloud cloud = ReadCloud(SourceDirForTest() / "examples/biplane/input.ply").value();
+  EnhanceOptions part;
+  part.method = "filter";
+  part.pixel_size = 0.0055;
+  part.region = kHalf;
+  const Enhanced first = Enhance(cloud, part).value();
+  EXPECT_TRUE(IsMarkedPartEnhanced(first.cloud));
+  EXPECT_FALSE(IsMarkedEnhanced(first.cloud));
+
+  EnhanceOptions whole = part;
+  whole.region.reset();
+  const Enhanced again = Enhance(first.cloud, whole).value();
+  EXPECT_EQ(again.cloud.log_scales, first.cloud.log_scales);
+  EXPECT_EQ(again.report.filter_strength, 0);
+  EXPECT_TRUE(IsMarkedPartEnhanced(again.cloud));
+
+  // Another part may follow, and the mark stays one.
+  EnhanceOptions other = part;
+  other.region = Region{.low = {-2, -2, -2}, .high = {0.5, 2, 2}};
+  const Enhanced second = Enhance(first.cloud, other).value();
+  EXPECT_GT(second.report.filter_strength, 0.5);
+  EXPECT_EQ(std::ranges::count_if(second.cloud.comments,
+                                  [](const std::string& c) { return c.starts_with(kPartEnhancedMark); }),
+            1);
 }
 
 }  // namespace

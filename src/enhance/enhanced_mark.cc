@@ -12,6 +12,14 @@ std::string EnhancedComment(const std::string& method, double upscale) {
 
 bool IsMarkedEnhanced(const CloudView& cloud) { return HasMark(cloud.comments, kEnhancedMark); }
 
-bool HasLostNoWidth(const CloudView& cloud) { return IsFittedToPixelAreas(cloud) || IsMarkedEnhanced(cloud); }
+std::string PartEnhancedComment(const std::string& method, double upscale) {
+  return Cat(kPartEnhancedMark, method, ", ", upscale, " times closer");
+}
+
+bool IsMarkedPartEnhanced(const CloudView& cloud) { return HasMark(cloud.comments, kPartEnhancedMark); }
+
+bool HasLostNoWidth(const CloudView& cloud) {
+  return IsFittedToPixelAreas(cloud) || IsMarkedEnhanced(cloud) || IsMarkedPartEnhanced(cloud);
+}
 
 }  // namespace anchorsplat

@@ -15,8 +15,12 @@ namespace anchorsplat {
 std::string EnhancedComment(const std::string& method, double upscale);
 bool IsMarkedEnhanced(const CloudView& cloud);
 
-// Whether there is nothing to give back, as far as the file says: it was fitted to areas of pixels or enhanced
-// before.
+// The same of a splat of which a region has been enhanced: another region may be, but not the whole.
+std::string PartEnhancedComment(const std::string& method, double upscale);
+bool IsMarkedPartEnhanced(const CloudView& cloud);
+
+// Whether there is nothing to give back to the whole of it, as far as the file says: it was fitted to areas of pixels or
+// enhanced before, or a part of it was.
 bool HasLostNoWidth(const CloudView& cloud);
 
 }  // namespace anchorsplat

@@ -20,6 +20,8 @@ std::string_view NameOf(LostWidthReason reason) {
       return "fitted to pixel areas";
     case LostWidthReason::kMarkedEnhanced:
       return "enhanced before";
+    case LostWidthReason::kPartMarked:
+      return "enhanced in part before";
     case LostWidthReason::kWidened:
       return "widened";
     case LostWidthReason::kWidenedButTagged:
@@ -35,6 +37,7 @@ std::string_view NameOf(LostWidthReason reason) {
 LostWidth FindLostWidth(const CloudView& cloud, std::optional<TrainedKind> looks, double upscale) {
   if (IsFittedToPixelAreas(cloud)) return {0, LostWidthReason::kFittedToAreas};
   if (IsMarkedEnhanced(cloud)) return {0, LostWidthReason::kMarkedEnhanced};
+  if (IsMarkedPartEnhanced(cloud)) return {0, LostWidthReason::kPartMarked};
   if (IsWide(looks) && cloud.render_mode != RenderMode::kMip) {
     const bool enhanced = looks == TrainedKind::kEnhanced;
     if (!cloud.render_mode) return {0, enhanced ? LostWidthReason::kLooksEnhanced : LostWidthReason::kWidened};

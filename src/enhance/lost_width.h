@@ -20,6 +20,7 @@ enum class LostWidthReason {
   kTooFew,             // too few Gaussians to tell: taken for a classic one where there are kFewGaussians, else little
   kFittedToAreas,      // nothing was lost
   kMarkedEnhanced,     // nothing is lost any more
+  kPartMarked,         // of a part of it nothing is lost any more
   kWidened,            // the same, by its sizes
   kWidenedButTagged,   // by its sizes, although it is tagged classic or antialiased
   kLooksEnhanced,      // by what a network leaves

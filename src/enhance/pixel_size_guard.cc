@@ -20,6 +20,7 @@ namespace anchorsplat {
 namespace {
 
 constexpr int64_t kNeighbours = 8;
+constexpr int64_t kGuardRowsPerTask = 16384;
 constexpr int64_t kGuardSamples = 256;  // of the spacing; its median is good to a few percent
 
 // Gaussians on a pixel of the surface × Gaussians. In fits of known pixels with 2,700 to 28,000 visible Gaussians there
@@ -80,6 +81,13 @@ double Spacing(const GaussianCloud& cloud) {
   return double{Quantile(farthest, 0.5)} * std::sqrt(std::numbers::pi / static_cast<double>(kNeighbours));
 }
 
+double MiddleAxis(const GaussianCloud& cloud, size_t i) {
+  std::array<float, 3> axes;
+  std::copy_n(cloud.log_scales.data() + 3 * i, 3, axes.begin());
+  std::ranges::sort(axes);
+  return std::exp(double{axes[1]});
+}
+
 std::string Number(double value) { return Fixed(value, value < 10 ? 1 : 0); }
 
 // `probe`: of showing.telling. What is left of that is used up.
@@ -99,10 +107,7 @@ Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, int64_t all, const R
   LeaveIfAbandoned();
   Buffer<float> middle;
   for (size_t i = 0; i < showing.bright.opacity_logits.size(); ++i) {
-    std::array<float, 3> axes;
-    for (size_t a = 0; a < 3; ++a) axes[a] = std::exp(showing.bright.log_scales[3 * i + a]);
-    std::sort(axes.begin(), axes.end());
-    middle.push_back(axes[1]);
+    middle.push_back(static_cast<float>(MiddleAxis(showing.bright, i)));
   }
   evidence.width = double{Quantile(middle, 0.25)};
   if (showing.telling_not_black) {
@@ -130,9 +135,24 @@ Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud) {
   return Gather(showing, all, probe, cloud.render_mode);
 }
 
+Buffer<float> CautiousPixelSizes(const GaussianCloud& cloud, const PixelSizeFinding& finding) {
+  Buffer<float> sizes(static_cast<size_t>(cloud.size()));
+  const double none = 1e-15 * finding.size;  // a pixel has some size
+  ParallelFor(0, cloud.size(), kGuardRowsPerTask, [&](int64_t first, int64_t last) {
+    for (auto i = static_cast<size_t>(first); i < static_cast<size_t>(last); ++i) {
+      sizes[i] =
+          static_cast<float>(std::clamp(kHarmless * MiddleAxis(cloud, i), std::max(none, finding.least), finding.size));
+    }
+  });
+  return sizes;
+}
+
 PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidence& evidence) {
-  PixelSizeFinding finding{
-      estimate.size, std::max(estimate.size, evidence.without_black), estimate, estimate.cut_outlines > kPart, {}};
+  PixelSizeFinding finding;
+  finding.size = estimate.size;
+  finding.largest = std::max(estimate.size, evidence.without_black);
+  finding.estimate = estimate;
+  finding.part = estimate.cut_outlines > kPart;
   const double of_whole = MostGaussiansPerPixel(evidence.gaussians, estimate.showing);
   const double most = finding.part ? std::min(of_whole, kCrowdedPart) : of_whole;
   const auto crowd_at = [&](double size) { return evidence.spacing > 0 ? std::pow(size / evidence.spacing, 2) : 0; };
@@ -160,20 +180,23 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
         Cat("without its black Gaussians, which no picture shows, the outlines say ", evidence.without_black));
   }
   if (finding.part) finding.size *= std::exp(-kPartCaution * estimate.cut_outlines);
+  finding.least = finding.size;
   if (finding.contradicted()) {
-    double size = kHarmless * evidence.width;
+    double least = 0;
     const bool crowd_alone = crowd > most && finding.contradictions.size() == 1;
-    if (crowd_alone) size = std::max(size, estimate.size * std::pow(most / crowd, kCrowdedFall));
+    if (crowd_alone) least = estimate.size * std::pow(most / crowd, kCrowdedFall);
     // Without its black Gaussians the outlines say a size, too; it counts where nothing contradicts that one.
     const double without = evidence.without_black;
     if (without > 0 && crowd_at(without) <= most && evidence.small_axis >= kSmallestAxis * without) {
-      size = std::max(size, without);
+      least = std::max(least, without);
     }
-    finding.size = std::min(finding.size, size);
+    finding.size = std::min(finding.size, std::max(least, kHarmless * evidence.width));
+    finding.least = std::min(least, finding.size);
   }
   if (evidence.all > 0 && evidence.all < kEnough) {
     const double apart = std::sqrt(static_cast<double>(evidence.all) / static_cast<double>(kEnough));
     finding.size = std::min(finding.size, estimate.size * apart);
+    finding.least = std::min(finding.least, finding.size);
     if (evidence.all < kFewGaussians) {
       finding.contradictions.push_back(
           Cat("it has ", WithThousands(evidence.all), " Gaussians, and outlines of so few are soft at any pixel"));

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/buffer.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "enhance/pixel_size_estimate.h"
@@ -15,7 +16,10 @@ namespace anchorsplat {
 // gives back less width than was lost; so the estimate of outlines is acted on only while nothing else says that the
 // pixel must be much smaller, and a pixel so small that it can hardly blur anything is taken otherwise.
 struct PixelSizeFinding {
-  double size = 0;                          // to act on; world units
+  double size = 0;  // to act on; world units
+  // Where less than `size`, a Gaussian gets the pixel that leaves it as good as it is, but no more than `size` and no
+  // less than this: CautiousPixelSizes.
+  double least = 0;
   double largest = 0;                       // that the outlines could mean: with and without black Gaussians
   PixelSizeEstimate estimate;               // what the outlines say
   bool part = false;                        // cut out of something larger: a tenth of its outlines and more are cuts
@@ -39,6 +43,10 @@ Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud);
 // Gaussians on every pixel of the surface that fits keep at most: a cloud of `gaussians` that has more of them with a
 // pixel size was fitted to smaller pixels. `showing`: PixelSizeEstimate::showing.
 double MostGaussiansPerPixel(int64_t gaussians, double showing);
+
+// Pixel sizes that do next to nothing to each Gaussian by itself, between `finding.least` and `finding.size`. One size
+// for all would blur the fine ones of a splat that is mostly made of coarse ones, as of a subject before a sky. [N]
+Buffer<float> CautiousPixelSizes(const GaussianCloud& cloud, const PixelSizeFinding& finding);
 
 // What to make of an estimate in the light of the evidence.
 PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidence& evidence);

@@ -178,6 +178,32 @@ TEST(PixelSizeGuard, PartsAreCrowdedSooner) {
   EXPECT_DOUBLE_EQ(Judge(estimate, sparse).size, 0.7 * 0.004);
 }
 
+// A subject before a sky of coarse Gaussians: what is harmless for the sky would blur the subject.
+TEST(PixelSizeGuard, FineGaussiansAmongCoarseOnesStay) {
+  GaussianCloud cloud = Example("biplane");
+  const GaussianCloud subject = cloud;
+  Add(cloud, {80'000, 0.3, 0.95, 0.6f, 8});
+  const auto found = FindPixelSize(cloud);
+  ASSERT_TRUE(found.ok()) << found.error().message;
+  ASSERT_TRUE(found->contradicted());
+  EXPECT_GT(found->size, 3 * kTruth) << "a test of nothing";
+  ASSERT_LT(found->least, found->size);
+  const Buffer<float> sizes = CautiousPixelSizes(cloud, *found);
+  ASSERT_EQ(std::ssize(sizes), cloud.size());
+  GaussianCloud filtered = cloud;
+  ASSERT_TRUE(ApplyFilter(filtered, sizes, {}).ok());
+  const auto middle = [](const GaussianCloud& c, size_t i) {
+    std::array<float, 3> axes = {c.log_scales[3 * i], c.log_scales[3 * i + 1], c.log_scales[3 * i + 2]};
+    std::ranges::sort(axes);
+    return axes[1];
+  };
+  float most = 0;
+  for (size_t i = 0; i < static_cast<size_t>(subject.size()); ++i) {
+    most = std::max(most, middle(filtered, i) - middle(subject, i));
+  }
+  EXPECT_LT(most, 0.06f) << found->least / kTruth;
+}
+
 TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   PixelSizeEstimate estimate = {0.01, 0.008, 0.012};
   estimate.showing = 0.3;

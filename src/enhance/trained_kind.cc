@@ -27,6 +27,10 @@ constexpr double kShorter = 0.02, kLonger = 0.05;
 constexpr double kAntialiasedTail = 0.335, kClassicTail = 0.36;
 constexpr double kAntialiasedTailOfFew = 0.28, kClassicTailOfFew = 0.42;
 constexpr double kWidenedTail = 0.12, kThinTail = 0.35;
+// What a training leaves is uneven: middle axes of antialiased fits have tails of 0.17 and more, and 7 % and more of
+// what shows is fainter than 0.3. Converters of meshes make Gaussians all alike, and who throws the faint ones away
+// leaves the opaque ones among the thinnest: both look antialiased, and would be drawn too faint as such.
+constexpr double kLeastTail = 0.03, kLeastFaint = 0.02, kFaintOpacity = 0.3;
 // A width that was added is in all axes: the smallest are nearly half as long as the middle ones then. Flat Gaussians,
 // whose third axis other programs write as nearly nothing, also end at one size.
 constexpr double kRound = 0.4, kRatherRound = 0.3;
@@ -113,6 +117,8 @@ SizeTails SizeTailsOf(const GaussianCloud& showing) {
   LeaveIfAbandoned();
   tails.roundness = std::exp(double{Quantile(smallest, kLonger)} - double{Quantile(middle, kLonger)});
   tails.opaque = OpaqueShare(areas);
+  const auto faint = std::ranges::count_if(areas, [](const auto& item) { return double{item.second} < kFaintOpacity; });
+  tails.faint = static_cast<double>(faint) / static_cast<double>(areas.size());
   return tails;
 }
 
@@ -122,6 +128,8 @@ std::optional<TrainedKind> Judge(const SizeTails& tails) {
   if (tails.roundness > kRatherRound && tails.smallest < kThinTail) return TrainedKind::kUnclear;
   const double tail = tails.middle * std::exp(-tails.opaque);
   const bool few = tails.gaussians < kFew;
+  if (tails.middle < kLeastTail || tails.faint < kLeastFaint)
+    return tail < kClassicTailOfFew ? TrainedKind::kUnclear : TrainedKind::kClassic;
   if (tail < (few ? kAntialiasedTailOfFew : kAntialiasedTail)) return TrainedKind::kAntialiased;
   return tail < (few ? kClassicTailOfFew : kClassicTail) ? TrainedKind::kUnclear : TrainedKind::kClassic;
 }

@@ -37,6 +37,7 @@ struct SizeTails {
   double smallest = 0;    // of the smallest one
   double roundness = 0;   // the 5 % quantile of the smallest axis over that of the middle one
   double opaque = 0;      // the share of opacities above 0.95 among the tenth of least middle × largest axis
+  double faint = 0;       // the share of opacities below 0.3 among all that show
 };
 SizeTails SizeTailsOf(const GaussianCloud& showing);  // of ShowingGaussians::all
 

@@ -49,7 +49,8 @@ GaussianCloud Grey(int64_t n) {
 // all axes.
 GaussianCloud Made(double least, double widened, int64_t n = 8000, uint64_t seed = 3) {
   GaussianCloud cloud = Grey(n);
-  Random random(seed);
+  Random random(seed), opacities(seed + 1);
+  for (float& logit : cloud.opacity_logits) logit = static_cast<float>(1 + 1.5 * opacities.Normal());
   for (size_t i = 0; i < static_cast<size_t>(n); ++i) {
     std::array<double, 3> axes;
     do {
@@ -166,11 +167,29 @@ TEST(TrainedKind, FlatGaussiansAreNotWidened) {
   }
 }
 
+// Converters of meshes make Gaussians all alike, and who throws faint ones away leaves opaque ones among the thinnest.
+TEST(TrainedKind, WhatNoTrainingLeavesIsUnclear) {
+  SizeTails tails{.gaussians = 5000, .middle = 0.2, .smallest = 0.8, .roundness = 0.2, .opaque = 0, .faint = 0.1};
+  EXPECT_EQ(Judge(tails), TrainedKind::kAntialiased);
+  tails.faint = 0;
+  EXPECT_EQ(Judge(tails), TrainedKind::kUnclear);
+  tails.middle = 0.9;
+  EXPECT_EQ(Judge(tails), TrainedKind::kClassic);
+  GaussianCloud alike = Made(0.3, 0);
+  for (size_t i = 0; i < alike.log_scales.size(); ++i) alike.log_scales[i] = i % 3 == 0 ? -9.0f : -4.0f;
+  EXPECT_EQ(FindTrainedKind(alike), TrainedKind::kUnclear);
+  // As they are, and without those below 0.3.
+  GaussianCloud pruned = Made(0.3, 0);
+  EXPECT_EQ(FindTrainedKind(pruned), TrainedKind::kAntialiased);
+  for (float& logit : pruned.opacity_logits) logit = logit < -0.8473f ? -20.0f : logit;
+  EXPECT_EQ(FindTrainedKind(pruned), TrainedKind::kUnclear);
+}
+
 TEST(TrainedKind, TooFewOrBrokenOnes) {
   EXPECT_EQ(FindTrainedKind({}), std::nullopt);
   EXPECT_EQ(FindTrainedKind(Made(0, 0.3, 150)), std::nullopt);
   EXPECT_EQ(FindTrainedKind(Made(0, 0.3, 600)), TrainedKind::kWidened);
-  SizeTails few{.gaussians = 900, .middle = 0.33, .smallest = 0.8, .roundness = 0.2, .opaque = 0};
+  SizeTails few{.gaussians = 900, .middle = 0.33, .smallest = 0.8, .roundness = 0.2, .opaque = 0, .faint = 0.1};
   EXPECT_EQ(Judge(few), TrainedKind::kUnclear);
   few.gaussians = 2000;
   EXPECT_EQ(Judge(few), TrainedKind::kAntialiased);
@@ -258,11 +277,11 @@ TEST(TrainedKind, EnhanceActsOnIt) {
 
 // Between the kinds next to nothing can be wrong.
 TEST(TrainedKind, UnclearOnesGetLittle) {
-  SizeTails tails{.gaussians = 5000, .middle = 0.35, .smallest = 0.8, .roundness = 0.2, .opaque = 0};
+  SizeTails tails{.gaussians = 5000, .middle = 0.35, .smallest = 0.8, .roundness = 0.2, .opaque = 0, .faint = 0.1};
   EXPECT_EQ(Judge(tails), TrainedKind::kUnclear);
   tails.opaque = 0.5;
   EXPECT_EQ(Judge(tails), TrainedKind::kAntialiased) << "the thinnest are opaque";
-  tails = {.gaussians = 5000, .middle = 0.6, .smallest = 0.2, .roundness = 0.5, .opaque = 0};
+  tails = {.gaussians = 5000, .middle = 0.6, .smallest = 0.2, .roundness = 0.5, .opaque = 0, .faint = 0.1};
   EXPECT_EQ(Judge(tails), TrainedKind::kUnclear);
   tails.roundness = 0.1;
   EXPECT_EQ(Judge(tails), TrainedKind::kClassic);

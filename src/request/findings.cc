@@ -140,6 +140,9 @@ std::string InWords(const LostWidth& lost, const Result<PixelSizeFinding>& pixel
       return "none: the file says that it was fitted to the areas of pixels; enhance leaves it alone";
     case LostWidthReason::kMarkedEnhanced:
       return "none any more: the file says that it has been enhanced; enhance leaves it alone";
+    case LostWidthReason::kPartMarked:
+      return "unsure: the file says that a part of it has been enhanced; enhance leaves the whole alone, and takes "
+             "another --region";
     case LostWidthReason::kWidened:
       return "none (likely): even the thinnest Gaussians have a width; enhance leaves it alone";
     case LostWidthReason::kWidenedButTagged:

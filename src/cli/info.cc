@@ -71,7 +71,7 @@ void PrintTable(const SplatFindings& f) {
                 << ", and no network; --cameras or --pixel-size would tell\n";
     } else if (f.pixel_size->part) {
       std::cout << "    " << Fixed(100 * f.pixel_size->estimate.cut_outlines, 0)
-                << " % of the outlines are where it was cut and do not count; enhance would take "
+                << " % of the outlines look as if it had been cut there and do not count; enhance would take "
                 << Number(f.pixel_size->size) << " to be safe\n";
     }
   } else {

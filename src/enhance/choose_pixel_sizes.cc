@@ -120,17 +120,19 @@ void SayWhatWasFound(const PixelSizeFinding& found) {
     LogWarning(
         Cat("outlines say a training pixel of ", estimate.size, ", but ", contradictions,
             ". So that nothing is blurred, a smaller pixel is taken, ", found.size,
+            found.least < found.size ? " at most" : "",
             "; --cameras or --pixel-size will do better. In a room or a street the pixels of what is near and of what "
             "is far differ many times: no single size is right there, and only cameras know them"));
     return;
   }
-  const std::string size =
-      Cat("estimated size of a training pixel: ", estimate.size, " (likely ", estimate.low, " to ", estimate.high, ")",
-          found.part ? Cat("; ", Fixed(100 * estimate.cut_outlines, 0),
-                           " % of the outlines are where it was cut and do not count, and to be safe a smaller one is "
-                           "taken, ",
-                           found.size)
-                     : "");
+  const std::string size = Cat(
+      "estimated size of a training pixel: ", estimate.size, " (likely ", estimate.low, " to ", estimate.high, ")",
+      found.part
+          ? Cat("; ", Fixed(100 * estimate.cut_outlines, 0),
+                " % of the outlines look as if it had been cut there and do not count, and to be safe a smaller one is "
+                "taken, ",
+                found.size)
+          : "");
   if (estimate.high > kVague * estimate.low) {
     LogWarning(Cat(size,
                    ". That is rough, and rather too small: this splat says little about the pixels it was trained at; "

@@ -51,7 +51,7 @@ struct EnhanceOptions {
   // Gaussians of the result at most; 0: no bound. SetBudget tells the methods' own options.
   int64_t max_gaussians = 0;
   // Only what lies in there is enhanced. The rest stays bit by bit, behind it, and a splat of which only a part was is
-  // not marked as enhanced.
+  // marked as enhanced in part.
   std::optional<Region> region;
   std::optional<std::array<float, 3>> background;  // of the training views, for `clean` and refinement; what the
                                                    // cameras say otherwise, else the splat's comment, else black

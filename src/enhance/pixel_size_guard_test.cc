@@ -204,6 +204,24 @@ TEST(PixelSizeGuard, FineGaussiansAmongCoarseOnesStay) {
   EXPECT_LT(most, 0.06f) << found->least / kTruth;
 }
 
+// Fitted to pixels of different size; the estimate is that of the larger one.
+TEST(PixelSizeGuard, OneThingBesideAnotherThatIsThreeTimesAsLarge) {
+  for (const float scale : {1.0f, 3.0f}) {
+    GaussianCloud cloud = Example("stone_lantern");
+    for (float& x : cloud.means) x *= scale;
+    for (float& x : cloud.log_scales) x += std::log(scale);
+    for (size_t i = 0; i < cloud.means.size(); i += 3) cloud.means[i] += 3 * scale;
+    ASSERT_TRUE(Append(cloud, Example("biplane")).ok());
+    const auto found = FindPixelSize(cloud);
+    ASSERT_TRUE(found.ok()) << found.error().message;
+    ASSERT_EQ(found->contradicted(), scale > 1);
+    if (scale > 1) {
+      EXPECT_NE(found->contradictions[0].find("times as far apart"), std::string::npos) << found->contradictions[0];
+      EXPECT_LT(found->size, 0.6 * kTruth);
+    }
+  }
+}
+
 TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   PixelSizeEstimate estimate = {0.01, 0.008, 0.012};
   estimate.showing = 0.3;

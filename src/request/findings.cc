@@ -133,7 +133,7 @@ std::string_view Doubts(const Result<PixelSizeFinding>& pixel_size) {
 std::string InWords(const LostWidth& lost, const Result<PixelSizeFinding>& pixel_size) {
   const auto share = [&] {
     return Cat(Fixed(lost.strength, 2), " of 0.3 px² at ", kInfoUpscale, "x",
-               lost.likely() ? " (likely)" : " (unsure, so little)");
+               !lost.likely() ? " (unsure, so little)" : pixel_size.ok() ? " (likely)" : "");
   };
   switch (lost.reason) {
     case LostWidthReason::kFittedToAreas:

@@ -25,6 +25,8 @@ constexpr int64_t kMostSamples = 20'000;
 constexpr int64_t kLeastSamples = 64;
 constexpr int kRays = 512;       // to look for faces of the hull along; one each 0.025 sr
 constexpr int kMostRounds = 40;  // until a face is found; a dozen are usual
+constexpr int kRaysPerTask = 64;
+constexpr double kOnFace = 1e-5;  // of a face's distance: a point this near lies in it
 constexpr int kBallDraws = 400;
 constexpr double kLargestBall = 4;   // radii, in units of the cloud's
 constexpr double kBallSlack = 0.02;  // how far beyond a ball hull points may lie, to look at it closer
@@ -128,6 +130,19 @@ size_t Farthest(const Sample& sample, const Vec3& n) {
   return 0;
 }
 
+// The same of some of the sample; 0 for none.
+size_t FarthestOf(const Sample& sample, std::span<const size_t> some, const Vec3& n) {
+  double most = -std::numeric_limits<double>::infinity();
+  size_t best = 0;
+  for (const size_t k : some) {
+    const double value = Dot(sample.At(k), n);
+    if (value <= most) continue;
+    most = value;
+    best = k;
+  }
+  return best;
+}
+
 struct Bound {  // g · y ≤ most
   Vec3 g;
   double most;
@@ -150,8 +165,9 @@ struct Face {
 
 // The face of the hull that the ray from the middle along `ray` passes: of all planes y · x = 1 with every point at
 // y · x ≤ 1 the one with the largest y · ray. Bounds are added where a point violates them most. Corners of the face go
-// to `corners`.
-std::optional<Face> FaceAlong(const Sample& sample, const Vec3& ray, std::vector<size_t>& corners) {
+// to `corners`. `outer`: points that bounded other rays, tried before the whole sample is; those of this one are added.
+std::optional<Face> FaceAlong(const Sample& sample, const Vec3& ray, std::vector<size_t>& outer,
+                              std::vector<size_t>& corners) {
   constexpr double kSteepest = 1e3;
   std::vector<Bound> bounds;
   Vec3 y;
@@ -165,13 +181,14 @@ std::optional<Face> FaceAlong(const Sample& sample, const Vec3& ray, std::vector
   }
   std::vector<size_t> points;
   for (int round = 0; round < kMostRounds; ++round) {
-    const size_t next = Farthest(sample, y);
+    size_t next = FarthestOf(sample, outer, y);
+    if (outer.empty() || Dot(sample.At(next), y) <= 1 + kOnFace) next = Farthest(sample, y);
     const Bound added{sample.At(next), 1};
-    if (Dot(added.g, y) <= 1 + 1e-5) {
+    if (Dot(added.g, y) <= 1 + kOnFace) {
       const double length = std::sqrt(Dot(y, y));
       if (length > 0.5 * kSteepest) return std::nullopt;  // the middle lies on the hull
       for (size_t p = 0; p < points.size(); ++p) {
-        if (Dot(bounds[6 + p].g, y) > 1 - 1e-5) corners.push_back(points[p]);
+        if (Dot(bounds[6 + p].g, y) > 1 - kOnFace) corners.push_back(points[p]);
       }
       return Face{{y[0] / length, y[1] / length, y[2] / length}, 1 / length};
     }
@@ -191,6 +208,7 @@ std::optional<Face> FaceAlong(const Sample& sample, const Vec3& ray, std::vector
     if (!at) return std::nullopt;
     bounds.push_back(added);
     points.push_back(next);
+    if (std::ranges::find(outer, next) == outer.end()) outer.push_back(next);
     y = *at;
   }
   return std::nullopt;
@@ -322,9 +340,11 @@ std::vector<Cut> FindCuts(const GaussianCloud& cloud) {
   if (static_cast<int64_t>(sample.size()) < kLeastSamples) return {};
   std::vector<std::optional<Face>> along(kRays);
   std::vector<std::vector<size_t>> corners(kRays);
-  ParallelFor(0, kRays, 16, [&](int64_t first, int64_t last) {
+  ParallelFor(0, kRays, kRaysPerTask, [&](int64_t first, int64_t last) {
+    std::vector<size_t> outer;
     for (int64_t k = first; k < last; ++k) {
-      along[static_cast<size_t>(k)] = FaceAlong(sample, Ray(static_cast<int>(k)), corners[static_cast<size_t>(k)]);
+      along[static_cast<size_t>(k)] =
+          FaceAlong(sample, Ray(static_cast<int>(k)), outer, corners[static_cast<size_t>(k)]);
     }
   });
   std::vector<Face> faces;

@@ -32,8 +32,8 @@ constexpr double kCrowded = 48'000, kCrowdedShowing = 25'000;
 constexpr double kFaintShowing = 0.45, kMostlyShowing = 0.6;  // shares that show, between which the bound changes
 constexpr double kMostCrowded = 2.5, kNeverCrowded = 0.35;
 // How many Gaussians there were before it was cut is not known: parts of captures are at 0.57 and more, of fits of
-// small pictures at 0.15 to 0.6. Cut is what has this share of its outlines at cuts; fits that nobody cut have 0.06 at
-// most.
+// small pictures at 0.15 to 0.6. Cut is what has this share of its outlines at cuts; of 49 fits that nobody cut none
+// has any.
 constexpr double kCrowdedPart = 0.55, kPart = 0.1;
 // Where a splat was cut, insides that no picture showed become outlines. Pixels of parts are taken smaller by this
 // times the share of the outlines that do not count; ln.

@@ -128,8 +128,9 @@ std::optional<TrainedKind> Judge(const SizeTails& tails) {
   if (tails.roundness > kRatherRound && tails.smallest < kThinTail) return TrainedKind::kUnclear;
   const double tail = tails.middle * std::exp(-tails.opaque);
   const bool few = tails.gaussians < kFew;
-  if (tails.middle < kLeastTail || tails.faint < kLeastFaint)
+  if (tails.middle < kLeastTail || tails.faint < kLeastFaint) {
     return tail < kClassicTailOfFew ? TrainedKind::kUnclear : TrainedKind::kClassic;
+  }
   if (tail < (few ? kAntialiasedTailOfFew : kAntialiasedTail)) return TrainedKind::kAntialiased;
   return tail < (few ? kClassicTailOfFew : kClassicTail) ? TrainedKind::kUnclear : TrainedKind::kClassic;
 }

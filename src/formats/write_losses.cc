@@ -65,10 +65,11 @@ std::string CreditLoss(const SplatFormat& format, std::span<const std::string> c
 // Read back, the splat looks or may look as if it had lost width.
 std::string MarkLoss(const SplatFormat& format, std::span<const std::string> comments) {
   if (format.comments != CommentPlace::kNone) return {};
-  const bool enhanced = HasMark(comments, kEnhancedMark);
-  if (!enhanced && !HasMark(comments, kPixelAreaMark)) return {};
+  if (std::ranges::none_of(comments, IsMark)) return {};
+  const bool part = HasMark(comments, kPartEnhancedMark), enhanced = HasMark(comments, kEnhancedMark);
   return Cat(AFileOf(format), " has no place for the word that the splat has ",
-             enhanced
+             part ? "been enhanced in part: enhance all of that file, and the part becomes worse (keep a PLY for that)"
+             : enhanced
                  ? "been enhanced; its Gaussians nearly always tell, but keep a PLY of what may be enhanced again"
                  : "been fitted to the areas of pixels: enhance that file, and it becomes worse (keep a PLY for that)");
 }

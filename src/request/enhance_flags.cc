@@ -176,8 +176,7 @@ void EnhanceFlags::AddTo(CLI::App& verb) {
   AddPixelSizeFlags(verb, *this);
   verb.add_flag("--clean", options.clean,
                 "First take out Gaussians of the background's colour that none of up to 48 training views would miss, "
-                "as black dust "
-                "around objects on black; dark parts of the object may go, too");
+                "as black dust around objects on black; dark parts of the object may go, too");
   verb.add_option("--background", background,
                   "R,G,B from 0 to 1, of the training views, for --clean and refinement (default: what the camera file "
                   "says, else the splat's own comment, else black)");

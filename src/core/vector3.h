@@ -4,7 +4,7 @@
 
 namespace anchorsplat {
 
-// Products of two vectors of three, in their own precision. Sums from left to right, so that what is made of them is
+// Products and differences of two vectors of three, in their own precision. Sums from left to right, so that what is made of them is
 // the same everywhere.
 
 template <typename T>
@@ -20,6 +20,11 @@ T Dot(const std::array<T, 3>& a, const std::array<T, 3>& b) {
 template <typename T>
 std::array<T, 3> Cross(const std::array<T, 3>& a, const std::array<T, 3>& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+template <typename T>
+std::array<T, 3> Minus(const std::array<T, 3>& a, const std::array<T, 3>& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 
 }  // namespace anchorsplat

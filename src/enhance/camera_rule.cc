@@ -26,7 +26,6 @@ constexpr double kMostOneSided = 0.85;
 constexpr double kLeastInside = 0.9, kInside = 0.8;
 constexpr float kVisibleLogit = -2.2f;  // opacity 0.1
 
-Vector Minus(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 double Norm(const Vector& a) { return std::sqrt(Dot(a, a)); }
 
 // The axis of a view: the third row of the rotation.
@@ -92,7 +91,7 @@ CameraRuleChoice ChooseCameraRule(const GaussianCloud& cloud, const CameraSet& s
     if (!IsUsable(cloud, i) || cloud.opacity_logits[static_cast<size_t>(i)] < kVisibleLogit) continue;
     const float* p = cloud.means.data() + 3 * i;
     ++visible;
-    if (Norm(Minus({p[0], p[1], p[2]}, *point)) < kInside * typical) ++inside;
+    if (Norm(Minus(Vector{p[0], p[1], p[2]}, *point)) < kInside * typical) ++inside;
   }
   if (static_cast<double>(inside) < kLeastInside * static_cast<double>(visible)) {
     return smallest("much of the splat lies around the cameras, not between them");

@@ -84,7 +84,14 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
       const auto smaller = static_cast<float>(size / from_cameras.median);
       for (float& own : from_cameras.sizes) own *= smaller;
       from_cameras.median *= smaller;
-      if (found->contradicted()) report.pixel_size_source = kCautiousPixelSize;
+      if (found->contradicted()) {
+        report.pixel_size_source = kCautiousPixelSize;
+        // Where these cameras are far off, so may be how they differ from Gaussian to Gaussian.
+        const Buffer<float> cautious = CautiousPixelSizes(input.cloud, *found);
+        for (size_t i = 0; i < from_cameras.sizes.size(); ++i) {
+          from_cameras.sizes[i] = std::min(from_cameras.sizes[i], cautious[i]);
+        }
+      }
     } else if (!found->contradicted() && !found->part && (ratio > kSuspiciousRatio || ratio < 1 / kSuspiciousRatio)) {
       LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
                      " (median), the splat itself looks like ", found->size,

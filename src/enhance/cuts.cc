@@ -258,12 +258,10 @@ struct Ball {
   double radius;
 };
 
-Vec3 Difference(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-
 std::optional<Ball> BallThrough(const std::array<Vec3, 4>& p) {
   std::array<Bound, 3> planes;
   for (size_t k = 0; k < 3; ++k) {
-    const Vec3 d = Difference(p[k + 1], p[0]);
+    const Vec3 d = Minus(p[k + 1], p[0]);
     planes[k] = {d, 0.5 * Dot(d, d)};
   }
   const std::optional<Vec3> to = Meeting(planes[0], planes[1], planes[2]);
@@ -272,13 +270,13 @@ std::optional<Ball> BallThrough(const std::array<Vec3, 4>& p) {
 }
 
 double Away(const Ball& ball, const Vec3& p) {
-  const Vec3 d = Difference(p, ball.middle);
+  const Vec3 d = Minus(p, ball.middle);
   return std::sqrt(Dot(d, d));
 }
 
 Evidence NearAndFar(const GaussianCloud& cloud, const Sample& sample, const Ball& ball) {
   return CountNear(cloud, sample, [&](size_t k) {
-    const Vec3 out = Difference(sample.At(k), ball.middle);
+    const Vec3 out = Minus(sample.At(k), ball.middle);
     const double away = std::max(1e-30, std::sqrt(Dot(out, out)));
     return std::pair(std::max(0.0, ball.radius - away), Vec3{out[0] / away, out[1] / away, out[2] / away});
   });
@@ -323,7 +321,7 @@ double Cut::Depth(const GaussianCloud& cloud, int64_t i) const {
   Vec3 across = direction;
   double depth = reach - Dot(direction, at);
   if (ball) {
-    across = Difference(at, direction);
+    across = Minus(at, direction);
     const double away = std::sqrt(Dot(across, across));
     depth = reach - away;
     if (away > 0) {

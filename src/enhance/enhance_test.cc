@@ -79,6 +79,20 @@ GaussianCloud Ball(double pixel, int64_t n = 6000) {
   return cloud;
 }
 
+// Black veils around a ball, as fits of photographs on black keep them: no picture shows them, but alpha does.
+GaussianCloud BallInVeils() {
+  GaussianCloud cloud = Ball(0.01, 3000), veils = Ball(0.01, 3000);
+  Random random(3);
+  for (size_t i = 0; i < size_t{3} * 3000; ++i) {
+    veils.means[i] *= static_cast<float>(random.Uniform(1.1, 1.8));
+    veils.log_scales[i] = std::log(0.08f);
+    veils.sh[i] = -2;
+  }
+  for (float& x : veils.opacity_logits) x = -0.5f;
+  EXPECT_TRUE(Append(cloud, veils).ok());
+  return cloud;
+}
+
 CameraSet CamerasForPixel(double pixel) {
   const Pinhole intrinsics = PinholeFromFov(256, 256, std::numbers::pi / 4);
   auto cameras = OrbitCameras(20, pixel * intrinsics.fx + 0.5, {0, 0, 0}, intrinsics);  // nearest point of the ball
@@ -355,7 +369,23 @@ TEST_F(EnhanceDoor, EstimateRefusesWhatSaysNothing) {
   }
 }
 
-// Black veils around a ball, as fits of photographs on black keep them: no picture shows them, but alpha does.
+// Where the estimate is contradicted, too, each Gaussian is judged by itself, as without cameras.
+TEST_F(EnhanceDoor, ImpossibleCamerasOfAContradictedSplatAreNoWorseThanNone) {
+  const GaussianCloud veiled = BallInVeils();
+  EnhanceOptions options;
+  const auto without = Enhance(veiled, options);
+  ASSERT_TRUE(without.ok()) << without.error().message;
+  ASSERT_TRUE(without->report.finding);
+  ASSERT_LT(without->report.finding->least, without->report.finding->size);
+  options.cameras = CamerasForPixel(2);
+  const auto judged = Enhance(veiled, options);
+  ASSERT_TRUE(judged.ok()) << judged.error().message;
+  EXPECT_EQ(judged->report.pixel_size_source, kCautiousPixelSize) << log_->text();
+  for (size_t k = 0; k < judged->cloud.log_scales.size(); ++k) {
+    ASSERT_LE(judged->cloud.log_scales[k], without->cloud.log_scales[k] + 1e-5f) << k;
+  }
+}
+
 TEST_F(EnhanceDoor, ContradictedEstimateIsNotActedOn) {
   constexpr uint64_t kOnlyHere = 4711;
   RegisterEnhanceMethod(
@@ -371,15 +401,7 @@ TEST_F(EnhanceDoor, ContradictedEstimateIsNotActedOn) {
        .run = [](EnhanceInput input, const EnhanceOptions&, StepReport&) -> Result<GaussianCloud> {
          return std::move(input.cloud);
        }});
-  GaussianCloud cloud = Ball(0.01, 3000), veils = Ball(0.01, 3000);
-  Random random(3);
-  for (size_t i = 0; i < size_t{3} * 3000; ++i) {
-    veils.means[i] *= static_cast<float>(random.Uniform(1.1, 1.8));
-    veils.log_scales[i] = std::log(0.08f);
-    veils.sh[i] = -2;
-  }
-  for (float& x : veils.opacity_logits) x = -0.5f;
-  ASSERT_TRUE(Append(cloud, veils).ok());
+  const GaussianCloud cloud = BallInVeils();
   EnhanceOptions options;
   options.seed = kOnlyHere;
   const auto enhanced = Enhance(cloud, options);

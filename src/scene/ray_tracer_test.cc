@@ -19,10 +19,6 @@ namespace {
 
 using Vec3 = std::array<double, 3>;
 
-Vec3 Minus(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vec3 Cross(const Vec3& a, const Vec3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 Vec3 Unit(const Vec3& a) {
   const double n = std::sqrt(Dot(a, a));
   return {a[0] / n, a[1] / n, a[2] / n};

@@ -86,21 +86,31 @@ struct KdTree::Search {
   }
 };
 
-int64_t KdTree::NearestPlaces(int64_t place, std::span<Neighbour> nearest) const {
+int64_t KdTree::Find(const std::array<float, 3>& position, int64_t self, std::span<Neighbour> nearest) const {
   if (nearest.empty()) return 0;
   std::fill(nearest.begin(), nearest.end(), Neighbour{std::numeric_limits<double>::infinity(), -1});
-  const std::array<float, 3>& from = points_[static_cast<size_t>(place)].position;
-  const Search search{*this, place, {from[0], from[1], from[2]}, nearest};
+  const Search search{*this, self, {position[0], position[1], position[2]}, nearest};
   search.Range(0, size());
-  return std::min(static_cast<int64_t>(nearest.size()), size() - 1);
+  return std::min(static_cast<int64_t>(nearest.size()), self < 0 ? size() : size() - 1);
+}
+
+void KdTree::PlacesToIndices(std::span<Neighbour> nearest) const {
+  for (Neighbour& neighbour : nearest) neighbour.index = PointAt(neighbour.index);
+}
+
+int64_t KdTree::NearestPlaces(int64_t place, std::span<Neighbour> nearest) const {
+  return Find(points_[static_cast<size_t>(place)].position, place, nearest);
 }
 
 int64_t KdTree::Nearest(int64_t place, std::span<Neighbour> nearest) const {
   const int64_t found = NearestPlaces(place, nearest);
-  for (int64_t k = 0; k < found; ++k) {
-    int64_t& index = nearest[static_cast<size_t>(k)].index;
-    index = PointAt(index);
-  }
+  PlacesToIndices(nearest.first(static_cast<size_t>(found)));
+  return found;
+}
+
+int64_t KdTree::NearestTo(const std::array<float, 3>& position, std::span<Neighbour> nearest) const {
+  const int64_t found = Find(position, -1, nearest);
+  PlacesToIndices(nearest.first(static_cast<size_t>(found)));
   return found;
 }
 

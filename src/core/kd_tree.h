@@ -30,7 +30,9 @@ class KdTree {
   // how many there are: fewer than asked for when the tree has no more. Which of several equally far ones are taken
   // depends on the order of the positions alone, and many points at one place cost no more than others.
   int64_t Nearest(int64_t place, std::span<Neighbour> nearest) const;
-  // The same with the points' places in the place of their indices.
+  // The same around any position, finite; a point that lies there is one of them.
+  int64_t NearestTo(const std::array<float, 3>& position, std::span<Neighbour> nearest) const;
+  // The first with the points' places in the place of their indices.
   int64_t NearestPlaces(int64_t place, std::span<Neighbour> nearest) const;
 
  private:
@@ -41,6 +43,8 @@ class KdTree {
   struct Search;
 
   void Build(int64_t begin, int64_t end);
+  int64_t Find(const std::array<float, 3>& position, int64_t self, std::span<Neighbour> nearest) const;
+  void PlacesToIndices(std::span<Neighbour> nearest) const;
 
   // In the order of the tree: the middle of every range divides it along its widest side, which `axis_` keeps there.
   Buffer<Point> points_;

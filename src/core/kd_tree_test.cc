@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <span>
 #include <vector>
 
 #include "core/random.h"
@@ -53,6 +55,40 @@ TEST(KdTree, MatchesSortingAllDistances) {
     for (float& v : x) v = static_cast<float>(random.Normal());
     ExpectNearest(x, 8);
   }
+}
+
+TEST(KdTree, AroundAnyPosition) {
+  Random random(5);
+  std::vector<float> x(3 * 500);
+  for (float& v : x) v = static_cast<float>(random.Normal());
+  const KdTree tree(x);
+  for (int trial = 0; trial < 50; ++trial) {
+    // A place of its own, or that of a point, which is found.
+    std::array<float, 3> at = {x[0], x[1], x[2]};
+    if (trial > 0) {
+      for (float& v : at) v = static_cast<float>(2 * random.Normal());
+    }
+    std::vector<double> expected;
+    for (size_t i = 0; i < 500; ++i) {
+      double sum = 0;
+      for (size_t k = 0; k < 3; ++k) sum += (double{x[3 * i + k]} - at[k]) * (double{x[3 * i + k]} - at[k]);
+      expected.push_back(sum);
+    }
+    const std::vector<double> distances = expected;
+    std::sort(expected.begin(), expected.end());
+    std::array<KdTree::Neighbour, 9> nearest;
+    ASSERT_EQ(tree.NearestTo(at, nearest), 9);
+    for (size_t k = 0; k < 9; ++k) {
+      EXPECT_DOUBLE_EQ(nearest[k].squared_distance, expected[k]);
+      EXPECT_DOUBLE_EQ(nearest[k].squared_distance, distances[static_cast<size_t>(nearest[k].index)]);
+    }
+    if (trial == 0) {
+      EXPECT_EQ(nearest[0].index, 0);
+    }
+  }
+  std::array<KdTree::Neighbour, 9> nearest;
+  EXPECT_EQ(KdTree(std::span(x).first(6)).NearestTo({0, 0, 0}, nearest), 2);
+  EXPECT_EQ(KdTree(std::span<const float>()).NearestTo({0, 0, 0}, nearest), 0);
 }
 
 TEST(KdTree, FarOutliersAndSharedPlaces) {

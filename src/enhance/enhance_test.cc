@@ -375,8 +375,7 @@ TEST_F(EnhanceDoor, ImpossibleCamerasOfAContradictedSplatAreNoWorseThanNone) {
   EnhanceOptions options;
   const auto without = Enhance(veiled, options);
   ASSERT_TRUE(without.ok()) << without.error().message;
-  ASSERT_TRUE(without->report.finding);
-  ASSERT_LT(without->report.finding->least, without->report.finding->size);
+  ASSERT_EQ(without->report.pixel_size_source, kCautiousPixelSize);
   options.cameras = CamerasForPixel(2);
   const auto judged = Enhance(veiled, options);
   ASSERT_TRUE(judged.ok()) << judged.error().message;

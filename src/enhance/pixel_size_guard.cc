@@ -3,14 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <numbers>
+#include <span>
 #include <utility>
+#include <vector>
 
+#include "core/kd_tree.h"
 #include "core/parallel.h"
 #include "core/run_context.h"
 #include "core/statistics.h"
 #include "core/text.h"
+#include "enhance/gaussian_regions.h"
 #include "enhance/lost_width.h"
 #include "enhance/pixel_size_features.h"
 #include "enhance/showing_gaussians.h"
@@ -19,7 +21,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kNeighbours = 8;
+constexpr int64_t kLeastForSpacing = 8;
 constexpr int64_t kGuardRowsPerTask = 16384;
 constexpr int64_t kGuardSamples = 256;  // of the spacing; its median is good to a few percent
 
@@ -40,18 +42,18 @@ constexpr double kCrowdedPart = 0.55, kPart = 0.1;
 constexpr double kPartCaution = 0.3;
 // Where hardly an outline is left that is not a cut's, the rest says nothing.
 constexpr double kNothingButCuts = 0.9;
-// 90 % over 10 % quantile of the spacings: two things of different size, fitted to pixels of different size. 5.6 at
-// most in 58 fits and three captures, but 13 in a dense one of random points, most of which do not show; 6.3 where an
-// object lies beside another that is twice as large, 9.4 and 25 where it is three and eight times as large.
-constexpr double kUneven = 7;
+// 90 % over 10 % quantile of the spacings of 256: two things of different size, or a subject and what is far behind it,
+// fitted to pixels of different size. At most 2.8 in 38 fits and three captures (one of random points), from 3.8 on
+// where an object lies beside another that is three times as large, on a ground or before a sky.
+constexpr double kUneven = 3.3, kMostUneven = 2.8;
 // √(largest × middle axis) of the smallest tenth lies between 0.3 and 2.3 pixels in the 152 fits of the regression, and
 // at 0.2 in one of a chair whose slats are thinner than a pixel.
 constexpr double kSmallestAxis = 0.12;  // pixels; with a margin
 // Black Gaussians may move the estimate this much before it counts as theirs.
 constexpr double kMoved = 1.5;
-// The filter's variance at the usual four times closer is 0.2 pixels²: with a pixel of this many widths it lengthens
-// the middle axis of three in four Gaussians by less than a twentieth.
-constexpr double kHarmless = 0.7;
+// Regions that a cloud is looked at in, and how many of them a Gaussian belongs to.
+constexpr int64_t kRegions = 8192;
+constexpr size_t kRegionsAround = 2;
 // A crowd hardly above the bound says little: pixels shrink with this power of how far above it is, down to harmless
 // ones. Dense fits of small pictures are at up to 1.3 times the bound, captures from 1.7 times on.
 constexpr double kCrowdedFall = 4;
@@ -60,43 +62,41 @@ constexpr double kCrowdedFall = 4;
 // (table_football).
 constexpr int64_t kEnough = 2500;
 
-struct Spacing {
-  double median = 0;  // 0: too few
+struct Surface {
+  double spacing = 0;  // 0: too few
   double unevenness = 1;
+  double harmless = 0;
 };
 
-// Of the squares that Gaussians have for themselves, where they lie on surfaces: kNeighbours others lie within π r².
-Spacing SpacingOf(const GaussianCloud& cloud) {
+// Of places that stand for all. What is harmless is so in nine of ten regions, as a few are anything.
+Surface SurfaceOf(const GaussianCloud& cloud) {
   const int64_t count = cloud.size();
-  if (count <= kNeighbours) return {};
-  const Buffer<float>& positions = cloud.means;
+  if (count <= kLeastForSpacing) return {};
+  const GaussianRegions regions(cloud);
   const int64_t samples = std::min(kGuardSamples, count);
-  Buffer<float> farthest(static_cast<size_t>(samples));
+  Buffer<float> spacing(static_cast<size_t>(samples)), wider = spacing, harmless = spacing;
   ParallelFor(0, samples, 8, [&](int64_t first, int64_t last) {
     for (int64_t s = first; s < last; ++s) {
-      const float* at = positions.data() + 3 * (s * count / samples);
-      std::array<double, kNeighbours + 1> nearest;  // itself is one of them; sorted
-      nearest.fill(std::numeric_limits<double>::infinity());
-      for (int64_t k = 0; k < count; ++k) {
-        const double distance = SquaredDistance(positions.data() + 3 * k, at);
-        if (distance >= nearest.back()) continue;
-        auto place = std::upper_bound(nearest.begin(), nearest.end(), distance);
-        std::move_backward(place, nearest.end() - 1, nearest.end());
-        *place = distance;
-      }
-      farthest[static_cast<size_t>(s)] = static_cast<float>(std::sqrt(nearest.back()));
+      const GaussianRegion region = regions.Around(cloud.means.data() + 3 * (s * count / samples));
+      const auto at = static_cast<size_t>(s);
+      spacing[at] = static_cast<float>(region.spacing);
+      wider[at] = static_cast<float>(region.wider);
+      harmless[at] = static_cast<float>(region.HarmlessPixel());
     }
   });
-  const double side = std::sqrt(std::numbers::pi / static_cast<double>(kNeighbours));
-  const auto dense = double{Quantile(farthest, 0.1)}, sparse = double{Quantile(farthest, 0.9)};
-  return {double{Quantile(farthest, 0.5)} * side, dense > 0 ? sparse / dense : 1};
+  const auto dense = double{Quantile(wider, 0.1)}, sparse = double{Quantile(wider, 0.9)};
+  return {double{Quantile(spacing, 0.5)}, dense > 0 ? sparse / dense : 1, double{Quantile(harmless, 0.9)}};
 }
 
-double MiddleAxis(const GaussianCloud& cloud, size_t i) {
-  std::array<float, 3> axes;
-  std::copy_n(cloud.log_scales.data() + 3 * i, 3, axes.begin());
-  std::ranges::sort(axes);
-  return std::exp(double{axes[1]});
+// Of those rows, nothing but where they are and how large.
+GaussianCloud PlacesAndScales(const GaussianCloud& cloud, const std::vector<int64_t>& rows) {
+  GaussianCloud out;
+  out.Resize(std::ssize(rows), 0);
+  for (size_t k = 0; k < rows.size(); ++k) {
+    std::copy_n(cloud.means.data() + 3 * rows[k], 3, out.means.data() + 3 * k);
+    std::copy_n(cloud.log_scales.data() + 3 * rows[k], 3, out.log_scales.data() + 3 * k);
+  }
+  return out;
 }
 
 std::string Number(double value) { return Fixed(value, value < 10 ? 1 : 0); }
@@ -112,17 +112,13 @@ Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, int64_t all, const R
                  Cat("fewer than ", kLeastGaussians,
                      " Gaussians that show and are small beside the splat, to estimate a pixel size from")};
   }
-  const Spacing spacing = SpacingOf(showing.bright);
-  evidence.spacing = spacing.median;
-  evidence.unevenness = spacing.unevenness;
+  const Surface surface = SurfaceOf(showing.bright);
+  evidence.spacing = surface.spacing;
+  evidence.unevenness = surface.unevenness;
+  evidence.harmless = surface.harmless;
   if (!probe.ok()) return probe.error();
   evidence.small_axis = probe->start();
   LeaveIfAbandoned();
-  Buffer<float> middle;
-  for (size_t i = 0; i < showing.bright.opacity_logits.size(); ++i) {
-    middle.push_back(static_cast<float>(MiddleAxis(showing.bright, i)));
-  }
-  evidence.width = double{Quantile(middle, 0.25)};
   if (showing.telling_not_black) {
     Result<PixelSizeProbe> without = PixelSizeProbe::Make(std::move(*showing.telling_not_black));
     if (without.ok()) {
@@ -149,12 +145,47 @@ Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud) {
 }
 
 Buffer<float> CautiousPixelSizes(const GaussianCloud& cloud, const PixelSizeFinding& finding) {
+  // An even sample of those that show, wherever they are.
+  std::vector<int64_t> showing;
+  std::vector<bool> usable(static_cast<size_t>(cloud.size()));
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    usable[static_cast<size_t>(i)] = IsUsable(cloud, i);
+    if (usable[static_cast<size_t>(i)] && ShowsInPictures(cloud, static_cast<size_t>(i))) showing.push_back(i);
+  }
+  const auto every = [&](int64_t most) {
+    const int64_t count = std::ssize(showing), kept = std::min(count, most);
+    std::vector<int64_t> rows(static_cast<size_t>(kept));
+    for (int64_t k = 0; k < kept; ++k) rows[static_cast<size_t>(k)] = showing[static_cast<size_t>(k * count / kept)];
+    return rows;
+  };
   Buffer<float> sizes(static_cast<size_t>(cloud.size()));
-  const double none = 1e-15 * finding.size;  // a pixel has some size
+  const double none = std::max(1e-15 * finding.size, finding.least);  // a pixel has some size
+  std::ranges::fill(sizes, static_cast<float>(none));
+  if (showing.empty()) return sizes;
+
+  const std::vector<int64_t> sample = every(int64_t{kMostShowing}), places = every(kRegions);
+  const auto thinned = static_cast<double>(showing.size()) / static_cast<double>(sample.size());
+  const GaussianRegions regions(PlacesAndScales(cloud, sample), thinned);
+  Buffer<float> harmless(places.size());
+  ParallelFor(0, std::ssize(places), 8, [&](int64_t first, int64_t last) {
+    for (auto k = static_cast<size_t>(first); k < static_cast<size_t>(last); ++k) {
+      harmless[k] = static_cast<float>(regions.Around(cloud.means.data() + 3 * places[k]).HarmlessPixel());
+    }
+  });
+  LeaveIfAbandoned();
+  // The least of the regions around, as the edge of a fine one is near a coarse one, too.
+  const KdTree nearest_place(PlacesAndScales(cloud, places).means);
   ParallelFor(0, cloud.size(), kGuardRowsPerTask, [&](int64_t first, int64_t last) {
+    std::array<KdTree::Neighbour, kRegionsAround> around;
     for (auto i = static_cast<size_t>(first); i < static_cast<size_t>(last); ++i) {
-      sizes[i] =
-          static_cast<float>(std::clamp(kHarmless * MiddleAxis(cloud, i), std::max(none, finding.least), finding.size));
+      if (!usable[i]) continue;
+      const float* p = cloud.means.data() + 3 * i;
+      const int64_t found = nearest_place.NearestTo({p[0], p[1], p[2]}, around);
+      double least = finding.size;
+      for (const auto& place : std::span(around).first(static_cast<size_t>(found))) {
+        least = std::min(least, double{harmless[static_cast<size_t>(place.index)]});
+      }
+      sizes[i] = static_cast<float>(std::clamp(least, none, finding.size));
     }
   });
   return sizes;
@@ -184,10 +215,10 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
         Cat(Fixed(100 * estimate.cut_outlines, 0),
             " % of its outlines look as if a part had been cut off there, and say nothing about pixels"));
   }
-  if (evidence.unevenness > kUneven && estimate.showing >= kFaintShowing) {
-    finding.contradictions.push_back(Cat("a tenth of its Gaussians lie ", Fixed(evidence.unevenness, 0),
+  if (evidence.unevenness > kUneven) {
+    finding.contradictions.push_back(Cat("a tenth of its Gaussians lie ", Number(evidence.unevenness),
                                          " times as far apart as another tenth, and those of one fit up to ",
-                                         Fixed(kUneven, 0), " times: they have no one pixel"));
+                                         Number(kMostUneven), " times: they have no one pixel"));
   }
   if (evidence.small_axis < kSmallestAxis * estimate.size) {
     finding.contradictions.push_back(Cat("its small Gaussians measure ", Fixed(evidence.small_axis / estimate.size, 2),
@@ -208,7 +239,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     if (without > 0 && crowd_at(without) <= most && evidence.small_axis >= kSmallestAxis * without) {
       least = std::max(least, without);
     }
-    finding.size = std::min(finding.size, std::max(least, kHarmless * evidence.width));
+    finding.size = std::min(finding.size, std::max(least, evidence.harmless));
     finding.least = std::min(least, finding.size);
   }
   if (evidence.all > 0 && evidence.all < kEnough) {

@@ -17,7 +17,7 @@ namespace anchorsplat {
 // pixel must be much smaller, and a pixel so small that it can hardly blur anything is taken otherwise.
 struct PixelSizeFinding {
   double size = 0;  // to act on; world units
-  // Where less than `size`, a Gaussian gets the pixel that leaves it as good as it is, but no more than `size` and no
+  // Where less than `size`, a Gaussian gets the pixel that does no harm in its region, but no more than `size` and no
   // less than this: CautiousPixelSizes.
   double least = 0;
   double largest = 0;                       // that the outlines could mean: with and without black Gaussians
@@ -34,9 +34,9 @@ struct PixelSizeEvidence {
   int64_t gaussians = 0;     // that show, near the middle of the cloud; no more than 200,000 of them
   int64_t all = 0;           // of any opacity and colour; 0: not counted
   double spacing = 0;        // side of the square that each has of the surface: from the distances to 8 neighbours
-  double unevenness = 1;     // 90 % over 10 % quantile of the same
+  double unevenness = 1;     // 90 % over 10 % quantile of the same from the distances to 256
   double small_axis = 0;     // of the smallest tenth by area: PixelSizeProbe::start
-  double width = 0;          // the middle axis that three of four exceed
+  double harmless = 0;       // pixel that does no harm in nine of ten regions: GaussianRegion::HarmlessPixel
   double without_black = 0;  // the estimate without black Gaussians; 0: there are few of them
 };
 Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud);
@@ -45,8 +45,9 @@ Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud);
 // pixel size was fitted to smaller pixels. `showing`: PixelSizeEstimate::showing.
 double MostGaussiansPerPixel(int64_t gaussians, double showing);
 
-// Pixel sizes that do next to nothing to each Gaussian by itself, between `finding.least` and `finding.size`. One size
-// for all would blur the fine ones of a splat that is mostly made of coarse ones, as of a subject before a sky. [N]
+// Pixel sizes that do no harm to each region (GaussianRegion::HarmlessPixel), between `finding.least` and
+// `finding.size`. One size for all would blur the fine ones of a splat that is mostly made of coarse ones, as of a
+// subject before a sky. [N]
 Buffer<float> CautiousPixelSizes(const GaussianCloud& cloud, const PixelSizeFinding& finding);
 
 // What to make of an estimate in the light of the evidence.

@@ -21,7 +21,7 @@ constexpr double kFewBlack = 0.01;     // share of the Gaussians below which bla
 constexpr double kLargestAxis = 0.25;  // of Gaussians that tell, in units of the radius that frames the cloud
 
 bool IsBlack(const CloudView& rows, size_t i) {
-  const float* sh = rows.sh.data() + 3 * i;
+  const float* sh = rows.sh.data() + rows.sh_stride() * static_cast<int64_t>(i);
   return ColorFromDc(std::max({sh[0], sh[1], sh[2]})) < kNearlyBlack;
 }
 
@@ -70,6 +70,10 @@ class TellingSearch {
 };
 
 }  // namespace
+
+bool ShowsInPictures(const CloudView& cloud, size_t i) {
+  return Sigmoid(cloud.opacity_logits[i]) >= kShowingOpacity && !IsBlack(cloud, i);
+}
 
 double SquaredDistance(const float* a, const float* b) {
   double sum = 0;

@@ -61,6 +61,9 @@ class ShowingStudy final : public RowStudy {
 ShowingGaussians FindShowingGaussians(const CloudView& cloud);
 TellingGaussians FindTellingGaussians(const CloudView& cloud);
 
+// Opacity of kShowingOpacity or more, and not nearly black; of a usable row.
+bool ShowsInPictures(const CloudView& cloud, size_t i);
+
 double SquaredDistance(const float* a, const float* b);  // of two points of three coordinates
 
 }  // namespace anchorsplat

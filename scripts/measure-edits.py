@@ -5,7 +5,8 @@
     scripts/measure-edits.py edits EXAMPLE... --work WORK [--only TEXT]
 
 parts: every fit of FOLDER (as for `anchorsplat eval`) is cut by boxes, a ball and a plane. Printed is the pixel that
-`enhance` takes over the true one; of captures, whose pixels nobody knows, over what it takes of the whole.
+`enhance` takes over the true one; of captures, whose pixels nobody knows, over what it takes of the whole. Where the
+estimate is contradicted no region gets more than it bears, and at most so much.
 edits: the splats of EXAMPLE (input.ply, transforms_hr.json, hr/) before a sky, on a ground, beside a second thing, with
 floaters, without faint Gaussians, wider, more opaque. PSNR of the subject as it was edited, then the gain; what was
 added is taken out again before it is looked at. Needs NumPy.
@@ -116,8 +117,9 @@ def parts_of(program, name, source, truth, work):
         found = pixel_taken(program, work / "part.ply", work / "out.ply")
         if found is None or found["value"] is None:
             continue
-        ratios.append(found["value"] / truth)
-        print(f"  {name}, {part}: {len(kept)} Gaussians, {ratios[-1]:.2f}", flush=True)
+        ratio, doubted = found["value"] / truth, bool(found["contradictions"])
+        ratios.append((ratio, doubted))
+        print(f"  {name}, {part}: {len(kept)} Gaussians, {ratio:.2f}{' at most' if doubted else ''}", flush=True)
     return ratios
 
 
@@ -138,9 +140,9 @@ def measure_parts(arguments):
 
 
 def summary(name, ratios):
-    r = np.array(ratios)
-    print(f"{name}: {len(r)} parts; median {np.median(r):.2f}, 90 % {np.quantile(r, 0.9):.2f}, worst {r.max():.2f}; "
-          f"{(r > 1.25).sum()} above 1.25", flush=True)
+    r, doubted = np.array([ratio for ratio, _ in ratios]), np.array([d for _, d in ratios])
+    print(f"{name}: {len(r)} parts; median {np.median(r):.2f}, 90 % {np.quantile(r, 0.9):.2f}; {doubted.sum()} contradicted; "
+          f"of the others the worst {r[~doubted].max(initial=0):.2f}, {(r[~doubted] > 1.25).sum()} above 1.25", flush=True)
 
 
 # Edits: rows of the subject, and rows that are added to it.

@@ -11,7 +11,7 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int64_t kFew = 8, kMore = 64, kMany = 256;
+constexpr int64_t kFew = 8, kMore = 64, kMany = 512;
 constexpr double kHarmlessWidth = 0.75, kHarmlessSpacing = 0.3;
 
 }  // namespace
@@ -30,26 +30,32 @@ GaussianRegions::GaussianRegions(const GaussianCloud& cloud, double thinned)
   for (size_t i = 0; i < middle_.size(); ++i) middle_[i] = static_cast<float>(MiddleAxis(cloud, i));
 }
 
+// So many others lie within π r² of the surface.
+double GaussianRegions::Side(std::span<const KdTree::Neighbour> nearest, int64_t found, int64_t count) const {
+  if (found < 2) return 0;
+  const int64_t last = std::min(count, found - 1);
+  const double squared = nearest[static_cast<size_t>(last)].squared_distance / thinned_;
+  return std::sqrt(std::numbers::pi * squared / static_cast<double>(last));
+}
+
 GaussianRegion GaussianRegions::Around(const float* place) const {
   // One that lies at the place itself has no part in how far apart they are.
-  std::array<KdTree::Neighbour, kMany + 1> nearest;
+  std::array<KdTree::Neighbour, kMore + 1> nearest;
   const int64_t found = tree_.NearestTo({place[0], place[1], place[2]}, nearest);
   GaussianRegion region;
   if (found < 2) return region;
-  // So many others lie within π r² of the surface.
-  const auto side = [&](int64_t count) {
-    const int64_t last = std::min(count, found - 1);
-    const double squared = nearest[static_cast<size_t>(last)].squared_distance / thinned_;
-    return std::sqrt(std::numbers::pi * squared / static_cast<double>(last));
-  };
-  region.spacing = side(kFew);
-  region.wide = side(kMore);
-  region.wider = side(kMany);
+  region.spacing = Side(nearest, found, kFew);
+  region.wide = Side(nearest, found, kMore);
   std::array<float, kMore + 1> middle;
-  const auto near = static_cast<size_t>(std::min(kMore + 1, found));
-  for (size_t k = 0; k < near; ++k) middle[k] = middle_[static_cast<size_t>(nearest[k].index)];
-  region.width = double{Quantile(std::span(middle).first(near), 0.5)};
+  for (size_t k = 0; k < static_cast<size_t>(found); ++k) middle[k] = middle_[static_cast<size_t>(nearest[k].index)];
+  region.width = double{Quantile(std::span(middle).first(static_cast<size_t>(found)), 0.5)};
   return region;
+}
+
+double GaussianRegions::SpacingOfMany(const float* place) const {
+  std::array<KdTree::Neighbour, kMany + 1> nearest;
+  const int64_t found = tree_.NearestTo({place[0], place[1], place[2]}, nearest);
+  return Side(nearest, found, kMany);
 }
 
 }  // namespace anchorsplat

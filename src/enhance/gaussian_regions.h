@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "core/buffer.h"
 #include "core/gaussian_cloud.h"
@@ -16,7 +17,6 @@ double MiddleAxis(const GaussianCloud& cloud, size_t i);
 struct GaussianRegion {
   double spacing = 0;  // side of the square that each of 8 has of the surface
   double wide = 0;     // the same of 64
-  double wider = 0;    // the same of 256
   double width = 0;    // median of the middle axes of 64
 
   // A pixel for which the filter does no harm there. The variance that it gives back at the usual four times closer is
@@ -32,11 +32,15 @@ class GaussianRegions {
   explicit GaussianRegions(const GaussianCloud& cloud, double thinned = 1);
 
   int64_t size() const { return tree_.size(); }
-  // Of the Gaussians nearest to `place`, fewer than 256 where there are not so many; nothing but zeros where there is
-  // none that is elsewhere.
+  // Of the Gaussians nearest to `place`, fewer than 64 where there are not so many; nothing but zeros where there is
+  // none but one.
   GaussianRegion Around(const float* place) const;
+  // GaussianRegion::spacing of 512: hardly of the detail that a fit put there, but of the size of its pixels.
+  double SpacingOfMany(const float* place) const;
 
  private:
+  double Side(std::span<const KdTree::Neighbour> nearest, int64_t found, int64_t count) const;
+
   KdTree tree_;
   Buffer<float> middle_;  // [size]
   double thinned_;

@@ -34,7 +34,7 @@ struct PixelSizeEvidence {
   int64_t gaussians = 0;     // that show, near the middle of the cloud; no more than 200,000 of them
   int64_t all = 0;           // of any opacity and colour; 0: not counted
   double spacing = 0;        // side of the square that each has of the surface: from the distances to 8 neighbours
-  double unevenness = 1;     // 90 % over 10 % quantile of the same from the distances to 256
+  double unevenness = 1;     // 90 % over 10 % quantile of the same from the distances to 512
   double small_axis = 0;     // of the smallest tenth by area: PixelSizeProbe::start
   double harmless = 0;       // pixel that does no harm in nine of ten regions: GaussianRegion::HarmlessPixel
   double without_black = 0;  // the estimate without black Gaussians; 0: there are few of them

@@ -261,7 +261,7 @@ def measure_edits(arguments):
             splat, random = wholes[example], np.random.default_rng(SEED)
             subject = changed(splat) if changed else splat.rows
             everything = np.concatenate([subject, added(splat, random)]) if added else subject
-            cells.append(gain(arguments, example, splat, subject, everything, len(everything) > len(subject)))
+            cells.append(gain(arguments, example, splat, subject, everything, added is not None))
         print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
 
 
@@ -271,17 +271,16 @@ def gain(arguments, example, splat, subject, everything, taken_out):
     splat.write(work / "before.ply", subject)
     splat.write(work / "edited.ply", everything)
     out = work / "after.ply"
-    run(arguments.program, "enhance", work / "edited.ply", "-o", out, "--json", "-q", "-w")
+    run(arguments.program, "enhance", work / "edited.ply", "-o", out, "-q", "-w")
     if taken_out:
         run(arguments.program, "convert", out, work / "plain.ply", "-w", "-q")
         after = Splat(work / "plain.ply")
         places = subject[:, splat.columns("x", "y", "z")]
         low, high = places.min(axis=0), places.max(axis=0)
         margin = 0.01 * (high - low)
-        inside = ((after.places >= low - margin) & (after.places <= high + margin)).all(axis=1)
         # Floaters lie among the subject's Gaussians, before as after.
         splat.write(work / "before.ply", cut(splat, everything, low - margin, high + margin))
-        after.write(out, after.rows[inside])
+        after.write(out, cut(after, after.rows, low - margin, high + margin))
     before = psnr(arguments, work / "before.ply", example)
     return f"{before:.2f} {psnr(arguments, out, example) - before:+.2f}"
 

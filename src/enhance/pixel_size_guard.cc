@@ -44,7 +44,8 @@ constexpr double kPartCaution = 0.3;
 constexpr double kNothingButCuts = 0.9;
 // 90 % over 10 % quantile of the spacings of 512: two things of different size, or a subject and what is far behind it,
 // fitted to pixels of different size. At most 2.4 in 69 fits (2.3 in standard ones) and 2.5 in captures; 2.5 to 2.9
-// where an object lies beside another that is twice as large, from 2.9 on one three times as large, a ground or a sky.
+// where an object lies beside one like it that is twice as large, from 2.9 on beside one three times as large, on a
+// ground or before a sky. Of a subject with less than a tenth of the Gaussians it says nothing.
 constexpr double kUneven = 2.7, kMostUneven = 2.4;
 // √(largest × middle axis) of the smallest tenth lies between 0.3 and 2.3 pixels in the 152 fits of the regression, and
 // at 0.2 in one of a chair whose slats are thinner than a pixel.
@@ -148,10 +149,8 @@ Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud) {
 Buffer<float> CautiousPixelSizes(const GaussianCloud& cloud, const PixelSizeFinding& finding) {
   // An even sample of those that show, wherever they are.
   std::vector<int64_t> showing;
-  std::vector<bool> usable(static_cast<size_t>(cloud.size()));
   for (int64_t i = 0; i < cloud.size(); ++i) {
-    usable[static_cast<size_t>(i)] = IsUsable(cloud, i);
-    if (usable[static_cast<size_t>(i)] && ShowsInPictures(cloud, static_cast<size_t>(i))) showing.push_back(i);
+    if (HasUsableShape(cloud, i) && ShowsInPictures(cloud, static_cast<size_t>(i))) showing.push_back(i);
   }
   const auto every = [&](int64_t most) {
     const int64_t count = std::ssize(showing), kept = std::min(count, most);
@@ -179,7 +178,7 @@ Buffer<float> CautiousPixelSizes(const GaussianCloud& cloud, const PixelSizeFind
   ParallelFor(0, cloud.size(), kGuardRowsPerTask, [&](int64_t first, int64_t last) {
     std::array<KdTree::Neighbour, kRegionsAround> around;
     for (auto i = static_cast<size_t>(first); i < static_cast<size_t>(last); ++i) {
-      if (!usable[i]) continue;
+      if (!HasUsableShape(cloud, static_cast<int64_t>(i))) continue;
       const float* p = cloud.means.data() + 3 * i;
       const int64_t found = nearest_place.NearestTo({p[0], p[1], p[2]}, around);
       double least = finding.size;

@@ -179,15 +179,18 @@ def ground(count, reach):
     return added
 
 
-def second(scale):
-    """The subject once more, so many times as large, beside itself."""
+def second(scale, times=1):
+    """The subject once more, so many times as large, beside itself; or several of that size in a row."""
     def added(splat, _):
-        rows = splat.rows.copy()
         middle, size = extent(splat)
         place, axes = splat.columns("x", "y", "z"), splat.columns("scale_0", "scale_1", "scale_2")
-        rows[:, place] = (rows[:, place] - middle) * scale + middle + [1.5 * scale * size, 0, 0]
-        rows[:, axes] += np.log(scale)
-        return rows
+        copies = []
+        for k in range(times):
+            rows = splat.rows.copy()
+            rows[:, place] = (rows[:, place] - middle) * scale + middle + [1.5 * (k + 1) * scale * size, 0, 0]
+            rows[:, axes] += np.log(scale)
+            copies.append(rows)
+        return np.concatenate(copies)
     return added
 
 
@@ -227,10 +230,12 @@ EDITS = {  # name: (the subject's rows, what is added)
     "a sky of 80,000, 20 times as far": (None, sky(80000, 20)),
     "a sky of 80,000, 5 times as far": (None, sky(80000, 5)),
     "a sky of 40,000, 20 times as far": (None, sky(40000, 20)),
+    "a near sky of 4,000": (None, sky(4000, 1.2)),
     "a ground of 70,000": (None, ground(70000, 5)),
     "a second one, twice as large": (None, second(2)),
     "a second one, 3 times as large": (None, second(3)),
     "a second one, 8 times as large": (None, second(8)),
+    "twelve more, 3 times as large": (None, second(3, 12)),
     "500 floaters": (None, floaters(500)),
     "5,000 floaters": (None, floaters(5000)),
     "without those below 0.1": (lambda s: s.rows[s.opacities > 0.1], None),

@@ -13,6 +13,7 @@
 #include "core/statistics.h"
 #include "core/text.h"
 #include "eval/pixel_size_check.h"
+#include "request/findings.h"
 
 namespace anchorsplat {
 
@@ -35,7 +36,9 @@ nlohmann::json ToJson(const PixelSizeCheck& check, const std::string& kind) {
                          {"seconds", check.seconds},
                          {"unlike_standard", check.estimate.unlike_standard},
                          {"showing", check.estimate.showing},
-                         {"cut_outlines", check.estimate.cut_outlines}};
+                         {"cut_outlines", check.estimate.cut_outlines},
+                         {"unevenness", check.unevenness},
+                         {"things", ToJson(check.things)}};
   for (const PixelSizeCheck::Sample& sample : check.samples) {
     json["samples"].push_back({{"size", sample.size}, {"features", sample.features}});
   }

@@ -256,7 +256,8 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   if (!shared.json && !shared.quiet) {
     std::cout << OneLine(input) << " -> " << OneLine(output) << "\n  " << WithThousands(r.gaussians_in)
               << " Gaussians in, " << WithThousands(r.gaussians_out) << " out; " << r.method << Details(r) << ", "
-              << HumanSeconds(r.seconds) << '\n';
+              << HumanSeconds(r.seconds) << " (" << HumanSeconds(r.seconds_in_all)
+              << " with what is found out before)\n";
     if (flags.view) {
       std::error_code unknown;
       std::cout << "  " << OneLine(PagePath(output)) << ": " << HumanBytes(fs::file_size(PagePath(output), unknown))

@@ -45,7 +45,7 @@ void PrintTable(const SplatFindings& f) {
   if (!f.render_mode && !f.lost_no_width) {
     std::cout << "  it looks     " << InWords(f.looks) << "\n";
   }
-  std::cout << "  lost width   " << InWords(f.lost_width, f.pixel_size) << "\n";
+  std::cout << "  lost width   " << LostWidthInWords(f) << "\n";
   for (const std::string& credit : CreditsOf(f.comments)) {
     std::cout << "  credit       " << Printable(credit, kMostCredit) << "\n";
   }
@@ -64,9 +64,11 @@ void PrintTable(const SplatFindings& f) {
   if (f.pixel_size.ok()) {
     std::cout << "  training pixel, estimated  " << Number(f.pixel_size->estimate.size) << " (likely "
               << Number(f.pixel_size->estimate.low) << " to " << Number(f.pixel_size->estimate.high) << ")\n";
-    for (const std::string& contradiction : f.pixel_size->contradictions)
-      std::cout << "    but " << contradiction << "\n";
-    if (f.pixel_size->contradicted()) {
+    if (!f.things.empty()) {
+      std::cout << "    but it is made of " << InWords(f.things) << "\n";
+    } else if (f.pixel_size->contradicted()) {
+      for (const std::string& contradiction : f.pixel_size->contradictions)
+        std::cout << "    but " << contradiction << "\n";
       std::cout << "    so enhance would take a smaller pixel, " << Number(f.pixel_size->size)
                 << ", and no network; --cameras or --pixel-size would tell\n";
     } else if (f.pixel_size->part) {

@@ -2,14 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "core/log.h"
 #include "core/render_mode.h"
+#include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/pixel_size.h"
 #include "enhance/pixel_size_guard.h"
+#include "enhance/pixel_sizes_of_things.h"
 #include "fit/training_views.h"
 
 namespace anchorsplat {
@@ -117,6 +121,13 @@ Status PixelSizesFromPictures(const EnhanceOptions& options, bool says, EnhanceI
   return {};
 }
 
+constexpr std::string_view kWillDoBetter = "--cameras or --pixel-size will do better";
+
+void SayWhatWasFound(std::span<const ThingPixelSize> things) {
+  const std::string text = Cat("the splat is made of ", InWords(things), "; ", kWillDoBetter);
+  ContradictionsOf(things).empty() ? LogInfo(text) : LogWarning(text);
+}
+
 void SayWhatWasFound(const PixelSizeFinding& found) {
   const PixelSizeEstimate& estimate = found.estimate;
   if (found.contradicted()) {
@@ -124,12 +135,12 @@ void SayWhatWasFound(const PixelSizeFinding& found) {
     for (const std::string& sentence : found.contradictions) {
       contradictions += (contradictions.empty() ? "" : "; and ") + sentence;
     }
-    LogWarning(
-        Cat("outlines say a training pixel of ", estimate.size, ", but ", contradictions,
-            ". So that nothing is blurred, a smaller pixel is taken, ", found.size,
-            found.least < found.size ? " at most" : "",
-            "; --cameras or --pixel-size will do better. In a room or a street the pixels of what is near and of what "
-            "is far differ many times: no single size is right there, and only cameras know them"));
+    LogWarning(Cat("outlines say a training pixel of ", estimate.size, ", but ", contradictions,
+                   ". So that nothing is blurred, a smaller pixel is taken, ", found.size,
+                   found.least < found.size ? " at most" : "", "; ", kWillDoBetter,
+                   found.no_one_pixel ? ". In a room or a street the pixels of what is near and of what is far differ "
+                                        "many times: no single size is right there, and only cameras know them"
+                                      : ""));
     return;
   }
   const std::string size = Cat(
@@ -139,11 +150,12 @@ void SayWhatWasFound(const PixelSizeFinding& found) {
                 " % of the outlines look as if it had been cut there and do not count, and to be safe a smaller one is "
                 "taken, ",
                 found.size)
-          : "");
+          : "",
+      found.closer > 0 ? "; where Gaussians lie much closer than elsewhere a smaller one is taken" : "");
   if (estimate.high > kVague * estimate.low) {
     LogWarning(Cat(size,
-                   ". That is rough, and rather too small: this splat says little about the pixels it was trained at; "
-                   "--cameras or --pixel-size will do better"));
+                   ". That is rough, and rather too small: this splat says little about the pixels it was trained at; ",
+                   kWillDoBetter));
     return;
   }
   LogInfo(Cat(size, ", and nothing else about the splat contradicts it; --cameras or --pixel-size make it exact"));
@@ -193,8 +205,19 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
     input.showing = found->estimate.showing;
     report.pixel_size = found->size;
     report.pixel_size_source = found->contradicted() ? kCautiousPixelSize : "estimated";
+    PixelSizesOfThings of_things = FindPixelSizesOfThings(input.cloud, *found);
+    if (!of_things.things.empty()) {
+      input.pixel_sizes = of_things.sizes;
+      report.pixel_size = double{Quantile(of_things.sizes, 0.5)};
+      const auto sure = std::ranges::count(of_things.sure, 1);
+      report.pixel_size_source = sure < input.cloud.size() ? kCautiousPixelSize : "estimated";
+      if (sure > 0 && sure < input.cloud.size()) input.sure = std::move(of_things.sure);
+      report.things = std::move(of_things.things);
+      if (says) SayWhatWasFound(report.things);
+      return {};
+    }
     if (says) SayWhatWasFound(*found);
-    if (found->least < found->size) {
+    if (!found->is_one()) {
       input.pixel_sizes = CautiousPixelSizes(input.cloud, *found);
       return {};
     }

@@ -336,9 +336,38 @@ Result<GaussianCloud> RunPlan(const MethodPlan& plan, const SizedMethods& sized,
   return RunStep(*plan.method, std::move(input), options, report);
 }
 
+// A network that nobody asked for, where pixels are known of some things of the splat only: it takes those.
+bool TakesSureOnly(const MethodPlan& plan, const EnhanceInput& input, int64_t max_gaussians) {
+  if (input.sure.empty() || plan.chosen_by.empty() || plan.start != nullptr || !plan.method->adds_detail) return false;
+  return max_gaussians == 0 || std::ranges::count(input.sure, 0) < max_gaussians;
+}
+
+// The others are the filter's.
+Result<GaussianCloud> RunOnSure(const MethodPlan& plan, EnhanceInput input, EnhanceOptions options,
+                                EnhanceReport& report) {
+  EnhanceInput others = input;
+  if (input.inside.empty()) input.inside.assign(input.sure.size(), 1);
+  others.inside = input.inside;
+  for (size_t i = 0; i < input.sure.size(); ++i) (input.sure[i] != 0 ? others : input).inside[i] = 0;
+  const auto left = std::ranges::count(others.inside, 1), taken = std::ranges::count(input.inside, 1);
+  MethodPlan filter = plan;
+  filter.method = &*std::ranges::find(EnhanceMethods(), std::string("filter"), &EnhanceMethod::name);
+  if (taken == 0) return RunStep(*filter.method, std::move(others), options, report);
+  if (left == 0) return RunStep(*plan.method, std::move(input), options, report);
+  LogInfo(Cat("the filter instead of '", plan.method->name, "' for ", WithThousands(left), " of ",
+              WithThousands(left + taken), " Gaussians, as it is not known which pixels those were trained at"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud filtered,
+                               RunStep(*filter.method, std::move(others), options, report));
+  if (options.max_gaussians > 0) SetBudget(options, options.max_gaussians - left);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, RunStep(*plan.method, std::move(input), options, report));
+  ANCHORSPLAT_RETURN_IF_ERROR(Append(out, filtered));
+  return out;
+}
+
 }  // namespace
 
 Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
+  const Stopwatch in_all;
   ANCHORSPLAT_RETURN_IF_ERROR(CheckTask(cloud, options));
   ANCHORSPLAT_ASSIGN_OR_RETURN(MethodPlan plan, PlanEnhancement(options));
   EnhanceReport report;
@@ -367,7 +396,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
     LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
   }
   if (GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode)) {
-    if (report.pixel_size_source == kCautiousPixelSize) {
+    if (report.pixel_size_source == kCautiousPixelSize && !TakesSureOnly(plan, input, options.max_gaussians)) {
       LeaveNetworksOut(plan, "measures Gaussians in pixels and goes wrong where the pixel is not known");
     } else if (report.looks == TrainedKind::kUnclear || unknown_of_few) {
       LeaveNetworksOut(plan, "has learned what splats of known kinds have lost");
@@ -378,6 +407,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   if (report.pixel_size_source == kUnknownPixelSize) {
     report.filter_strength = 0;
     report.gaussians_out = input.cloud.size();
+    report.seconds_in_all = in_all.Total();
     return Enhanced{std::move(input.cloud), std::move(report)};
   }
 
@@ -385,11 +415,15 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   const Stopwatch watch;
   EnhanceOptions within = options;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud rest, SetRestAside(options, input, within, report));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, RunPlan(plan, sized, std::move(input), within, report));
+  const bool sure_only =
+      report.pixel_size_source == kCautiousPixelSize && TakesSureOnly(plan, input, within.max_gaussians);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, sure_only ? RunOnSure(plan, std::move(input), within, report)
+                                                            : RunPlan(plan, sized, std::move(input), within, report));
   // Methods that make no copies, and what a region's border leaves of them.
   (void)LeaveOutLeastVisible(within.max_gaussians, out);
   if (options.region) ANCHORSPLAT_RETURN_IF_ERROR(Append(out, rest));
   report.seconds = watch.Total();
+  report.seconds_in_all = in_all.Total();
   report.gaussians_out = out.size();
   out.comments.insert(out.comments.end(), marks_of_parts.begin(), marks_of_parts.end());
   if (!sized.any || GivesWidth(report.filter_strength, options.upscale, out.render_mode)) {

@@ -18,6 +18,7 @@
 #include "enhance/model_settings.h"
 #include "enhance/pixel_size.h"
 #include "enhance/pixel_size_guard.h"
+#include "enhance/pixel_sizes_of_things.h"
 #include "enhance/refine_options.h"
 #include "enhance/trained_kind.h"
 #include "enhance/unseen_gaussians.h"
@@ -97,13 +98,15 @@ struct EnhanceReport {
   // "given", "cameras", "pictures" (the cameras of those to refine against), "estimated", kCautiousPixelSize or
   // kUnknownPixelSize; empty for methods that need none.
   std::string pixel_size_source;
-  std::optional<PixelSizeFinding> finding;  // where it was to be estimated
+  std::optional<PixelSizeFinding> finding;  // where it was to be estimated: of the whole splat …
+  std::vector<ThingPixelSize> things;       // … and of its things, where these have each their own
   std::optional<TrainedKind> looks;         // where neither file nor caller said how the splat was trained
   std::string camera_rule;                  // "smallest" or "median" where it came from cameras
   std::optional<int> train_width;           // pixels, given or assumed; nothing when the cameras' own size was taken
   std::vector<StepReport> steps;            // in their order; none where the splat was left alone
   bool interrupted = false;                 // one of them was
-  double seconds = 0;                       // of the method itself, without reading and writing
+  double seconds = 0;                       // of the method itself
+  double seconds_in_all = 0;                // with what is found out before, without reading and writing
 };
 
 // The cloud as methods get it: rows that are not finite are gone; p_LR is known to those that need it.
@@ -113,6 +116,9 @@ struct EnhanceInput {
   double pixel_size = 0;      // their median
   double showing = 1;         // PixelSizeEstimate::showing; 1 where nothing was estimated
   double filter_strength = 0;
+  // [N], where the splat is made of things of which some have a pixel size that nothing contradicts: whether it is of
+  // these; else empty.
+  std::vector<char> sure;
   std::vector<char> inside;       // which of the cloud's Gaussians are enhanced: results are of these; empty: all
   GaussianCloud start;            // what the method before it made, of "A+B"; else empty
   bool start_has_detail = false;  // EnhanceMethod::adds_detail of that method

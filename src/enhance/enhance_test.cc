@@ -411,7 +411,7 @@ TEST_F(EnhanceDoor, ContradictedEstimateIsNotActedOn) {
   EXPECT_LT(report.pixel_size, report.finding->estimate.size);
   EXPECT_EQ(report.method, "filter");
   EXPECT_TRUE(log_->Says("smaller pixel is taken")) << log_->text();
-  EXPECT_TRUE(log_->Says("no single size is right there")) << log_->text();
+  EXPECT_FALSE(log_->Says("no single size is right there")) << log_->text();
   EXPECT_TRUE(log_->Says("the filter instead of 'network'")) << log_->text();
 
   options.method = "network";
@@ -423,6 +423,86 @@ TEST_F(EnhanceDoor, ContradictedEstimateIsNotActedOn) {
   EXPECT_EQ(given->report.method, "network");
   EXPECT_EQ(given->report.pixel_size, 0.01);
   EXPECT_FALSE(given->report.finding);
+}
+
+// One thing whose Gaussians lie further and further apart: near and far in a street.
+TEST_F(EnhanceDoor, UnevenSpacingsHaveNoOnePixel) {
+  GaussianCloud cloud = Ball(0.01);
+  for (size_t i = 0; i < static_cast<size_t>(cloud.size()); ++i) {
+    const float grown = std::exp(2.5f * cloud.means[3 * i]);
+    for (size_t a = 0; a < 3; ++a) {
+      cloud.means[3 * i + a] *= grown;
+      cloud.log_scales[3 * i + a] += std::log(grown);
+    }
+  }
+  const auto enhanced = Enhance(cloud, {});
+  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+  EXPECT_EQ(enhanced->report.pixel_size_source, kCautiousPixelSize);
+  EXPECT_TRUE(enhanced->report.things.empty());
+  EXPECT_TRUE(log_->Says("no single size is right there")) << log_->text();
+}
+
+// A ball before a sky: what lies around has no pixels that one could know, the ball has.
+TEST_F(EnhanceDoor, ANetworkTakesTheThingsWhosePixelsAreKnown) {
+  constexpr uint64_t kOnlyHere = 4712;
+  static constexpr float kMark = 9;
+  RegisterEnhanceMethod(
+      {.name = "network",
+       .summary = "of this test",
+       .rank = 100,
+       .adds_detail = true,
+       .options = WidthOptions(),
+       .ready =
+           [](const EnhanceOptions& o) {
+             return o.seed == kOnlyHere ? Status() : Status(Error{ErrorCode::kBadArgument, "not here"});
+           },
+       .run = [](EnhanceInput input, const EnhanceOptions& o, StepReport&) -> Result<GaussianCloud> {
+         LeaveRegion(input);
+         std::ranges::fill(input.cloud.opacity_logits, kMark);
+         if (o.max_gaussians > 0 && o.max_gaussians < input.cloud.size()) input.cloud.Resize(o.max_gaussians, 0);
+         return std::move(input.cloud);
+       }});
+  constexpr int64_t kBall = 6000, kSky = 5000;
+  GaussianCloud cloud = Ball(0.01, kBall), sky = Ball(0.01, kSky);
+  for (float& x : sky.means) x *= 20;
+  for (float& x : sky.log_scales) x += std::log(20.0f);
+  ASSERT_TRUE(Append(cloud, sky).ok());
+  EnhanceOptions options;
+  options.seed = kOnlyHere;
+  const auto enhanced = Enhance(cloud, options);
+  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+  EXPECT_EQ(enhanced->report.method, "network");
+  EXPECT_EQ(enhanced->report.pixel_size_source, kCautiousPixelSize);
+  ASSERT_EQ(enhanced->report.things.size(), 2u);
+  EXPECT_EQ(enhanced->report.steps.size(), 2u);
+  EXPECT_TRUE(log_->Says("the filter instead of 'network' for 5,000 of 11,000 Gaussians")) << log_->text();
+  EXPECT_TRUE(log_->Says("2 things that lie apart")) << log_->text();
+  const auto by_network = [&](const GaussianCloud& of) { return std::ranges::count(of.opacity_logits, kMark); };
+  EXPECT_EQ(enhanced->cloud.size(), kBall + kSky);
+  EXPECT_EQ(by_network(enhanced->cloud), kBall);
+  EXPECT_GT(enhanced->report.seconds_in_all, enhanced->report.seconds);
+
+  // Of a part of both, and of one of them.
+  options.region = Region{.low = {-20, -20, -20}, .high = {0, 20, 20}};
+  const auto half = Enhance(cloud, options);
+  ASSERT_TRUE(half.ok()) << half.error().message;
+  EXPECT_EQ(half->cloud.size(), kBall + kSky);
+  EXPECT_NEAR(static_cast<double>(by_network(half->cloud)), kBall / 2, 10);
+  options.region = Region{.low = {-1, -1, -1}, .high = {1, 1, 1}};
+  const auto ball = Enhance(cloud, options);
+  ASSERT_TRUE(ball.ok()) << ball.error().message;
+  EXPECT_EQ(by_network(ball->cloud), kBall);
+  EXPECT_EQ(ball->report.steps.size(), 1u);
+
+  // The filter makes no copies, but its Gaussians count.
+  options.region.reset();
+  SetBudget(options, kSky + 1000);
+  const auto budget = Enhance(cloud, options);
+  ASSERT_TRUE(budget.ok()) << budget.error().message;
+  EXPECT_EQ(budget->cloud.size(), kSky + 1000);
+  EXPECT_EQ(by_network(budget->cloud), 1000);
+  SetBudget(options, kSky);
+  EXPECT_EQ(by_network(Enhance(cloud, options)->cloud), 0) << "nothing is left for the network";
 }
 
 TEST_F(EnhanceDoor, RefusesNonsense) {

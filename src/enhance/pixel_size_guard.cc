@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -47,6 +48,9 @@ constexpr double kNothingButCuts = 0.9;
 // where an object lies beside one like it that is twice as large, from 2.9 on beside one three times as large, on a
 // ground or before a sky. Of a subject with less than a tenth of the Gaussians it says nothing.
 constexpr double kUneven = 2.7, kMostUneven = 2.4;
+// Spacing of 512, over its median, below which Gaussians come of smaller pixels than the others. The densest place of
+// 22 fits is at 0.52 and more, of captures at 0.37.
+constexpr double kCloser = 0.45;
 // √(largest × middle axis) of the smallest tenth lies between 0.3 and 2.3 pixels in the 152 fits of the regression, and
 // at 0.2 in one of a chair whose slats are thinner than a pixel.
 constexpr double kSmallestAxis = 0.12;  // pixels; with a margin
@@ -65,7 +69,7 @@ constexpr int64_t kEnough = 2500;
 
 struct Surface {
   double spacing = 0;  // 0: too few
-  double unevenness = 1;
+  double of_many = 0, closest = 0, unevenness = 1;
   double harmless = 0;
 };
 
@@ -87,7 +91,11 @@ Surface SurfaceOf(const GaussianCloud& cloud) {
     }
   });
   const auto dense = double{Quantile(of_many, 0.1)}, sparse = double{Quantile(of_many, 0.9)};
-  return {double{Quantile(spacing, 0.5)}, dense > 0 ? sparse / dense : 1, double{Quantile(harmless, 0.9)}};
+  return {.spacing = double{Quantile(spacing, 0.5)},
+          .of_many = double{Quantile(of_many, 0.5)},
+          .closest = double{Quantile(of_many, 0.0)},
+          .unevenness = dense > 0 ? sparse / dense : std::numeric_limits<double>::infinity(),
+          .harmless = double{Quantile(harmless, 0.9)}};
 }
 
 // Of those rows, nothing but where they are and how large.
@@ -116,6 +124,8 @@ Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, int64_t all, const R
   }
   const Surface surface = SurfaceOf(showing.bright);
   evidence.spacing = surface.spacing;
+  evidence.of_many = surface.of_many;
+  evidence.closest = surface.closest;
   evidence.unevenness = surface.unevenness;
   evidence.harmless = surface.harmless;
   if (!probe.ok()) return probe.error();
@@ -159,7 +169,8 @@ Buffer<float> CautiousPixelSizes(const GaussianCloud& cloud, const PixelSizeFind
     return rows;
   };
   Buffer<float> sizes(static_cast<size_t>(cloud.size()));
-  const double none = std::max(1e-15 * finding.size, finding.least);  // a pixel has some size
+  const bool believed = finding.least >= finding.size;
+  const double none = std::max(1e-15 * finding.size, believed ? 0 : finding.least);  // a pixel has some size
   std::ranges::fill(sizes, static_cast<float>(none));
   if (showing.empty()) return sizes;
 
@@ -169,7 +180,9 @@ Buffer<float> CautiousPixelSizes(const GaussianCloud& cloud, const PixelSizeFind
   Buffer<float> harmless(places.size());
   ParallelFor(0, std::ssize(places), 8, [&](int64_t first, int64_t last) {
     for (auto k = static_cast<size_t>(first); k < static_cast<size_t>(last); ++k) {
-      harmless[k] = static_cast<float>(regions.Around(cloud.means.data() + 3 * places[k]).HarmlessPixel());
+      const float* place = cloud.means.data() + 3 * places[k];
+      const bool safe = believed && regions.SpacingOfMany(place) >= finding.closer;
+      harmless[k] = static_cast<float>(safe ? finding.size : regions.Around(place).HarmlessPixel());
     }
   });
   LeaveIfAbandoned();
@@ -215,10 +228,14 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
         Cat(Fixed(100 * estimate.cut_outlines, 0),
             " % of its outlines look as if a part had been cut off there, and say nothing about pixels"));
   }
-  if (evidence.unevenness > kUneven) {
-    finding.contradictions.push_back(Cat("a tenth of its Gaussians lie ", Number(evidence.unevenness),
-                                         " times as far apart as another tenth, and those of one fit up to ",
-                                         Number(kMostUneven), " times: they have no one pixel"));
+  const bool uneven = evidence.unevenness > kUneven;
+  if (uneven) {
+    finding.no_one_pixel = true;
+    finding.contradictions.push_back(std::isfinite(evidence.unevenness)
+                                         ? Cat("a tenth of its Gaussians lie ", Number(evidence.unevenness),
+                                               " times as far apart as another tenth, and those of one fit up to ",
+                                               Number(kMostUneven), " times: they have no one pixel")
+                                         : "a tenth of its Gaussians lie at one place, and those of fits do not");
   }
   if (evidence.small_axis < kSmallestAxis * estimate.size) {
     finding.contradictions.push_back(Cat("its small Gaussians measure ", Fixed(evidence.small_axis / estimate.size, 2),
@@ -236,12 +253,14 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     if (crowd_alone) least = estimate.size * std::pow(most / crowd, kCrowdedFall);
     // Without its black Gaussians the outlines say a size, too; it counts where nothing contradicts that one.
     const double without = evidence.without_black;
-    if (without > 0 && crowd_at(without) <= most && evidence.small_axis >= kSmallestAxis * without) {
+    const bool one_pixel = !uneven && estimate.cut_outlines <= kNothingButCuts;
+    if (without > 0 && one_pixel && crowd_at(without) <= most && evidence.small_axis >= kSmallestAxis * without) {
       least = std::max(least, without);
     }
     finding.size = std::min(finding.size, std::max(least, evidence.harmless));
     finding.least = std::min(least, finding.size);
   }
+  if (evidence.closest < kCloser * evidence.of_many) finding.closer = kCloser * evidence.of_many;
   if (evidence.all > 0 && evidence.all < kEnough) {
     const double apart = std::sqrt(static_cast<double>(evidence.all) / static_cast<double>(kEnough));
     finding.size = std::min(finding.size, estimate.size * apart);

@@ -20,12 +20,17 @@ struct PixelSizeFinding {
   // Where less than `size`, a Gaussian gets the pixel that does no harm in its region, but no more than `size` and no
   // less than this: CautiousPixelSizes.
   double least = 0;
+  // Gaussians among others that lie closer than this on the surface (GaussianRegions::SpacingOfMany) get the pixel that
+  // does no harm there, too: they come of smaller ones. 0: there are none.
+  double closer = 0;
   double largest = 0;                       // that the outlines could mean: with and without black Gaussians
   PixelSizeEstimate estimate;               // what the outlines say
+  bool no_one_pixel = false;                // its Gaussians lie too unevenly for one
   bool part = false;                        // cut out of something larger: a tenth of its outlines and more are cuts
   std::vector<std::string> contradictions;  // sentences that say what speaks against it; empty: nothing does
 
   bool contradicted() const { return !contradictions.empty(); }
+  bool is_one() const { return least >= size && closer == 0; }  // `size` is that of all Gaussians
 };
 
 // The numbers that an estimate is held against, of the Gaussians that show: opacity of 10 % or more, not nearly black.
@@ -34,7 +39,9 @@ struct PixelSizeEvidence {
   int64_t gaussians = 0;     // that show, near the middle of the cloud; no more than 200,000 of them
   int64_t all = 0;           // of any opacity and colour; 0: not counted
   double spacing = 0;        // side of the square that each has of the surface: from the distances to 8 neighbours
-  double unevenness = 1;     // 90 % over 10 % quantile of the same from the distances to 512
+  double of_many = 0;        // the same from the distances to 512: median …
+  double closest = 0;        // … and least of 256 places
+  double unevenness = 1;     // 90 % over 10 % quantile; infinite where 512 and more lie at one place
   double small_axis = 0;     // of the smallest tenth by area: PixelSizeProbe::start
   double harmless = 0;       // pixel that does no harm in nine of ten regions: GaussianRegion::HarmlessPixel
   double without_black = 0;  // the estimate without black Gaussians; 0: there are few of them
@@ -46,8 +53,8 @@ Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud);
 double MostGaussiansPerPixel(int64_t gaussians, double showing);
 
 // Pixel sizes that do no harm to each region (GaussianRegion::HarmlessPixel), between `finding.least` and
-// `finding.size`. One size for all would blur the fine ones of a splat that is mostly made of coarse ones, as of a
-// subject before a sky. [N]
+// `finding.size`; where nothing contradicts that one, only of regions that are closer than `finding.closer`. One size
+// for all would blur the fine ones of a splat that is mostly made of coarse ones, as of a subject before a sky. [N]
 Buffer<float> CautiousPixelSizes(const GaussianCloud& cloud, const PixelSizeFinding& finding);
 
 // What to make of an estimate in the light of the evidence.

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <span>
 #include <string>
@@ -233,6 +234,31 @@ TEST(PixelSizeGuard, OneThingBesideAnotherThatIsThreeTimesAsLarge) {
   }
 }
 
+// A fine thing in the midst of a coarse one that hides it from the quantiles.
+TEST(PixelSizeGuard, AFewThatLieMuchCloserAreNotBlurred) {
+  GaussianCloud cloud = Example("stone_lantern");
+  GaussianCloud fine = Example("biplane");
+  fine.Resize(1500, fine.sh_degree);
+  for (float& x : fine.means) x *= 0.05f;
+  for (float& x : fine.log_scales) x += std::log(0.05f);
+  ASSERT_TRUE(Append(cloud, fine).ok());
+  const auto found = FindPixelSize(cloud);
+  ASSERT_TRUE(found.ok()) << found.error().message;
+  ASSERT_FALSE(found->contradicted()) << found->contradictions.front();
+  ASSERT_GT(found->closer, 0);
+  const Buffer<float> sizes = CautiousPixelSizes(cloud, *found);
+  const auto of_fine = std::span(sizes).last(1500), of_coarse = std::span(sizes).first(sizes.size() - 1500);
+  EXPECT_LT(std::ranges::count_if(of_fine, LargerThan(0.1 * kTruth)), 15);
+  EXPECT_GT(std::ranges::count_if(of_coarse, LargerThan(0.9 * kTruth)), std::ssize(of_coarse) * 95 / 100);
+}
+
+TEST(PixelSizeGuard, ManyAtOnePlaceSayNothing) {
+  GaussianCloud cloud = Example("biplane");
+  std::ranges::fill(cloud.means, 0.5f);
+  const auto found = FindPixelSize(cloud);
+  ASSERT_TRUE(!found.ok() || found->contradicted());
+}
+
 TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   PixelSizeEstimate estimate = {0.01, 0.008, 0.012};
   estimate.showing = 0.3;
@@ -308,6 +334,34 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   black.small_axis = plain.small_axis;
   black.without_black = 0.02;  // the estimate is the smaller one: it cannot blur
   EXPECT_FALSE(Judge(estimate, black).contradicted());
+
+  // Gaussians that come of smaller pixels: what the outlines say without black ones is no size for all, either.
+  PixelSizeEvidence uneven = plain;
+  uneven.unevenness = 2.8;
+  EXPECT_TRUE(Judge(estimate, uneven).no_one_pixel);
+  EXPECT_DOUBLE_EQ(Judge(estimate, uneven).size, plain.harmless);
+  EXPECT_EQ(Judge(estimate, uneven).least, 0);
+  uneven.without_black = 0.006;
+  EXPECT_EQ(Judge(estimate, uneven).least, 0);
+  EXPECT_DOUBLE_EQ(Judge(estimate, uneven).size, plain.harmless);
+  uneven.unevenness = std::numeric_limits<double>::infinity();
+  ASSERT_TRUE(Judge(estimate, uneven).contradicted());
+  EXPECT_NE(Judge(estimate, uneven).contradictions[0].find("at one place"), std::string::npos);
+  uneven.unevenness = 2.6;
+  EXPECT_FALSE(Judge(estimate, uneven).no_one_pixel);
+  PixelSizeEstimate of_cuts = estimate;
+  of_cuts.cut_outlines = 0.95;
+  black.without_black = 0.005;
+  EXPECT_EQ(Judge(of_cuts, black).least, 0) << "nor is it where the outlines are cuts";
+  EXPECT_TRUE(Judge(estimate, plain).is_one());
+  PixelSizeEvidence closer = plain;
+  closer.of_many = 0.02;
+  closer.closest = 0.008;
+  EXPECT_FALSE(Judge(estimate, closer).contradicted());
+  EXPECT_FALSE(Judge(estimate, closer).is_one());
+  EXPECT_DOUBLE_EQ(Judge(estimate, closer).closer, 0.009);
+  closer.closest = 0.0091;
+  EXPECT_TRUE(Judge(estimate, closer).is_one());
 
   // Never larger than what was estimated.
   small.harmless = 1;

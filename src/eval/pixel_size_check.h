@@ -6,6 +6,7 @@
 #include "core/result.h"
 #include "enhance/pixel_size_estimate.h"
 #include "enhance/pixel_size_features.h"
+#include "enhance/pixel_sizes_of_things.h"
 #include "eval/benchmark.h"
 
 namespace anchorsplat {
@@ -17,7 +18,9 @@ struct PixelSizeCheck {
   double truth = 0;                        // median over the Gaussians (eval/filter_sweep.h), world units
   double start = 0;                        // what the search begins with
   PixelSizeEstimate estimate;
-  double seconds = 0;  // of the estimate
+  double seconds = 0;                  // of the estimate
+  double unevenness = 1;               // PixelSizeEvidence
+  std::vector<ThingPixelSize> things;  // that lie apart, empty where it is of one piece
   struct Sample {
     double size = 0;
     std::vector<double> features;  // of every Look, then SizeFeatures

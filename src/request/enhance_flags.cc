@@ -9,6 +9,7 @@
 #include "cameras/camera_io.h"
 #include "core/text.h"
 #include "request/choice.h"
+#include "request/findings.h"
 #include "request/mode_option.h"
 #include "request/parse.h"
 #include "request/refine_flags.h"
@@ -208,7 +209,8 @@ Result<EnhanceOptions> MakeEnhanceOptions(const EnhanceFlags& flags, uint64_t se
 nlohmann::json ToJson(const EnhanceReport& r) {
   nlohmann::json json = {{"method", r.method},
                          {"gaussians", {{"in", r.gaussians_in}, {"dropped", r.dropped}, {"out", r.gaussians_out}}},
-                         {"seconds", r.seconds}};
+                         {"seconds", r.seconds},
+                         {"seconds_in_all", r.seconds_in_all}};
   if (r.cleaned) {
     json["cleaned"] = {{"gaussians", r.cleaned->rows.size()}, {"views", r.cleaned->views}, {"psnr", nullptr}};
     if (std::isfinite(r.cleaned->psnr)) json["cleaned"]["psnr"] = r.cleaned->psnr;
@@ -230,10 +232,11 @@ nlohmann::json ToJson(const EnhanceReport& r) {
     if (r.pixel_size_source == kUnknownPixelSize) json["pixel_size"]["value"] = nullptr;
     if (r.finding) {
       json["pixel_size"]["estimate"] = r.finding->estimate.size;
-      json["pixel_size"]["contradictions"] = r.finding->contradictions;
+      json["pixel_size"]["contradictions"] = r.things.empty() ? r.finding->contradictions : ContradictionsOf(r.things);
       json["pixel_size"]["cut_outlines"] = r.finding->estimate.cut_outlines;
-      json["pixel_size"]["unsure"] = r.finding->contradicted();
+      json["pixel_size"]["unsure"] = r.pixel_size_source == kCautiousPixelSize;
     }
+    if (!r.things.empty()) json["pixel_size"]["things"] = ToJson(r.things);
     if (!r.camera_rule.empty()) json["camera_rule"] = r.camera_rule;
     if (r.train_width) json["train_width"] = *r.train_width;
   }

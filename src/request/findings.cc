@@ -1,5 +1,6 @@
 #include "request/findings.h"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -67,8 +68,11 @@ Status LookAt(CloudBlocks& blocks, SplatFindings& findings) {
   // As `enhance` takes it.
   const bool untold = !findings.render_mode && !findings.lost_no_width;
   const bool antialiased = untold && findings.looks == TrainedKind::kAntialiased;
-  findings.pixel_size =
-      FindPixelSize(std::move(showing), antialiased ? std::optional(RenderMode::kAntialiased) : findings.render_mode);
+  const auto mode = antialiased ? std::optional(RenderMode::kAntialiased) : findings.render_mode;
+  GaussianCloud telling = showing.telling.cloud;
+  telling.render_mode = mode;
+  findings.pixel_size = FindPixelSize(std::move(showing), mode);
+  if (findings.pixel_size.ok()) findings.things = FindPixelSizesOfThings(telling, *findings.pixel_size).things;
   findings.lost_width = FindLostWidth(said, beside_tag, kInfoUpscale);
   findings.problems = Problems(findings.statistics);
   return {};
@@ -119,21 +123,25 @@ std::string_view InWords(const std::optional<TrainedKind>& kind) {
 
 namespace {
 
-std::string_view Doubts(const Result<PixelSizeFinding>& pixel_size) {
-  if (!pixel_size.ok()) {
+std::string_view Doubts(const SplatFindings& f) {
+  if (!f.pixel_size.ok()) {
     return ", but of a pixel of which nothing is known: enhance leaves the splat alone without --pixel-size or "
            "--cameras";
   }
-  return pixel_size->contradicted() ? ", but of a pixel whose size is doubtful: see below" : "";
+  const bool doubtful = f.things.empty() ? f.pixel_size->contradicted() : !ContradictionsOf(f.things).empty();
+  return doubtful ? ", but of a pixel whose size is doubtful: see below" : "";
 }
 
 }  // namespace
 
 // What `enhance` would do about it.
-std::string InWords(const LostWidth& lost, const Result<PixelSizeFinding>& pixel_size) {
+std::string LostWidthInWords(const SplatFindings& f) {
+  const LostWidth& lost = f.lost_width;
   const auto share = [&] {
     return Cat(Fixed(lost.strength, 2), " of 0.3 px² at ", kInfoUpscale, "x",
-               !lost.likely() ? " (unsure, so little)" : pixel_size.ok() ? " (likely)" : "");
+               !lost.likely()      ? " (unsure, so little)"
+               : f.pixel_size.ok() ? " (likely)"
+                                   : "");
   };
   switch (lost.reason) {
     case LostWidthReason::kFittedToAreas:
@@ -153,11 +161,11 @@ std::string InWords(const LostWidth& lost, const Result<PixelSizeFinding>& pixel
     case LostWidthReason::kTooFew:
       if (lost.strength < DefaultFilterStrength(kInfoUpscale)) break;
       return Cat(Fixed(lost.strength, 2), " of 0.3 px² at ", kInfoUpscale, "x (unsure: taken for a classic one)",
-                 Doubts(pixel_size));
+                 Doubts(f));
     default:
       break;
   }
-  return Cat(share(), Doubts(pixel_size));
+  return Cat(share(), Doubts(f));
 }
 
 Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& name) {
@@ -178,6 +186,17 @@ SplatFindings InspectSplat(const CloudView& cloud) {
   MemoryBlocks blocks(cloud);
   (void)LookAt(blocks, findings);  // memory can be read
   return findings;
+}
+
+nlohmann::json ToJson(std::span<const ThingPixelSize> things) {
+  nlohmann::json json = nlohmann::json::array();
+  for (const auto& [gaussians, finding] : things) {
+    json.push_back({{"gaussians", gaussians},
+                    {"value", finding.size},
+                    {"estimate", finding.estimate.size},
+                    {"contradictions", finding.contradictions}});
+  }
+  return json;
 }
 
 nlohmann::json ToJson(const SplatFindings& f) {
@@ -226,12 +245,14 @@ nlohmann::json ToJson(const SplatFindings& f) {
   if (f.render_mode) json["render_mode"] = NameOf(*f.render_mode);
   if (f.looks) json["looks"] = NameOf(*f.looks);
   if (f.pixel_size.ok()) {
-    json["pixel_size"] = {{"estimate", f.pixel_size->estimate.size},
-                          {"low", f.pixel_size->estimate.low},
-                          {"high", f.pixel_size->estimate.high},
-                          {"contradictions", f.pixel_size->contradictions},
-                          {"cut_outlines", f.pixel_size->estimate.cut_outlines},
-                          {"used", f.pixel_size->size}};
+    json["pixel_size"] = {
+        {"estimate", f.pixel_size->estimate.size},
+        {"low", f.pixel_size->estimate.low},
+        {"high", f.pixel_size->estimate.high},
+        {"contradictions", f.things.empty() ? f.pixel_size->contradictions : ContradictionsOf(f.things)},
+        {"cut_outlines", f.pixel_size->estimate.cut_outlines},
+        {"used", f.pixel_size->size}};
+    if (!f.things.empty()) json["pixel_size"]["things"] = ToJson(f.things);
   }
   for (const SplatFormat& format : Formats()) {
     if (format.write == nullptr || format.predicted_size == nullptr) continue;

@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "core/statistics.h"
 #include "enhance/lost_width.h"
 #include "enhance/pixel_size_guard.h"
+#include "enhance/pixel_sizes_of_things.h"
 #include "enhance/trained_kind.h"
 #include "formats/opened_splat.h"
 
@@ -31,6 +33,7 @@ struct SplatFindings {
   bool lost_no_width = false;  // HasLostNoWidth (enhance/enhanced_mark.h)
   CloudStatistics statistics;
   Result<PixelSizeFinding> pixel_size = Error{};
+  std::vector<ThingPixelSize> things;  // that lie apart and have each a pixel size of their own; mostly none
   std::optional<TrainedKind> looks;   // by its sizes, whatever the file says; nothing where there are too few Gaussians
   LostWidth lost_width;               // at kInfoUpscale, as `enhance` gives it back
   std::vector<std::string> problems;  // sentences
@@ -39,9 +42,9 @@ struct SplatFindings {
 inline constexpr double kInfoUpscale = 4;  // the default zoom of `enhance`
 
 // Ends of sentences. "It looks like a classic one"; "lost width: 0.73 of 0.3 px² at 4x (likely)", with what `enhance`
-// would do about it. `pixel_doubted`: the size of a training pixel is contradicted.
+// would do about it.
 std::string_view InWords(const std::optional<TrainedKind>& looks);
-std::string InWords(const LostWidth& lost, const Result<PixelSizeFinding>& pixel_size);
+std::string LostWidthInWords(const SplatFindings& findings);
 
 // `name` is the file's, for people. The same numbers with any number of threads, whatever of the file is in memory.
 // Errors: of reading.
@@ -49,6 +52,7 @@ Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& n
 // Of a splat in memory: without format and size of a file.
 SplatFindings InspectSplat(const CloudView& cloud);
 nlohmann::json ToJson(const SplatFindings& findings);
+nlohmann::json ToJson(std::span<const ThingPixelSize> things);
 
 // What is in a network's weights.
 struct NetworkFindings {

@@ -302,7 +302,7 @@ Result<Engine::Answer> Engine::Info(const Json& request) {
   Answer answer;
   answer.json = ToJson(findings);
   answer.json["looks_in_words"] = InWords(findings.looks);
-  answer.json["lost_width_in_words"] = InWords(findings.lost_width, findings.pixel_size);
+  answer.json["lost_width_in_words"] = LostWidthInWords(findings);
   return answer;
 }
 

@@ -205,6 +205,11 @@ function describe({info, name, bytes}) {
     const {low, high, contradictions} = info.pixel_size;
     say(`A pixel of its training pictures covered about ${info.pixel_size.estimate.toPrecision(3)} of its units ` +
       `(likely ${low.toPrecision(2)} to ${high.toPrecision(2)}).`);
+    const things = info.pixel_size.things ?? [];
+    if (things.length > 0) {
+      say(`It is made of ${things.length} things that lie apart, and each gets what its own outlines say. ` +
+        'The preview shows the smallest size for all.');
+    }
     if (contradictions.length > 0) {
       say(`That is unsure: ${contradictions.join('; ')}. So a smaller pixel is taken; look for yourself with the slider.`);
     }

@@ -87,7 +87,13 @@ def _pixel_size(row: dict) -> list[str]:
         "estimated": f"The size of a training pixel was estimated from the splat: {value:.4g} world units. Cameras make it exact.",
         "cameras": f"The size of a training pixel is that of the cameras: {value:.4g} world units in the middle.",
     }
-    out = [known.get(source, f"The size of a training pixel is {value:.4g} world units ({source}).")]
+    things = size.get("things") or []
+    if things:
+        of_each = ", ".join(f"{t['value']:.4g} ({_count(t['gaussians'])} Gaussians)" for t in things[:4])
+        more = f" and {len(things) - 4} more" if len(things) > 4 else ""
+        out = [f"The splat is made of {len(things)} things that lie apart; training pixels of {of_each}{more} were estimated."]
+    else:
+        out = [known.get(source, f"The size of a training pixel is {value:.4g} world units ({source}).")]
     for contradiction in size.get("contradictions") or []:
         out.append(f"But {contradiction}.")
     return out

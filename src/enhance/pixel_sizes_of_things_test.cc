@@ -1,0 +1,139 @@
+#include "enhance/pixel_sizes_of_things.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/random.h"
+#include "core/source_dir_for_test.h"
+#include "formats/cloud_io.h"
+
+namespace anchorsplat {
+namespace {
+
+constexpr double kPixelOfExamples = 0.0055013;  // of both examples
+
+GaussianCloud Placed(const char* object, double scale = 1, std::array<double, 3> at = {0, 0, 0}) {
+  auto cloud = ReadCloud(SourceDirForTest() / "examples" / object / "input.ply");
+  EXPECT_TRUE(cloud.ok());
+  if (!cloud.ok()) return {};
+  for (size_t i = 0; i < cloud->means.size(); ++i) {
+    cloud->means[i] = static_cast<float>(scale * double{cloud->means[i]} + at[i % 3]);
+  }
+  for (float& x : cloud->log_scales) x += static_cast<float>(std::log(scale));
+  return *std::move(cloud);
+}
+
+// Far surroundings: opaque Gaussians on a sphere, as large as they are far apart.
+GaussianCloud Sky(int64_t count, double radius) {
+  GaussianCloud cloud;
+  cloud.Resize(count, 0);
+  const double spacing = radius * std::sqrt(12.6 / static_cast<double>(count));
+  std::ranges::fill(cloud.log_scales, static_cast<float>(std::log(0.5 * spacing)));
+  std::ranges::fill(cloud.quats, 0.5f);
+  std::ranges::fill(cloud.opacity_logits, 3.0f);
+  std::ranges::fill(cloud.sh, 0.5f);
+  Random random(5);
+  for (size_t i = 0; i < static_cast<size_t>(count); ++i) {
+    std::array<double, 3> at;
+    for (double& x : at) x = random.Normal();
+    const double norm = std::hypot(at[0], at[1], at[2]);
+    for (size_t a = 0; a < 3; ++a) cloud.means[3 * i + a] = static_cast<float>(radius * at[a] / norm);
+  }
+  return cloud;
+}
+
+PixelSizesOfThings Find(const GaussianCloud& cloud) {
+  const auto whole = FindPixelSize(cloud);
+  EXPECT_TRUE(whole.ok());
+  return whole.ok() ? FindPixelSizesOfThings(cloud, *whole) : PixelSizesOfThings{};
+}
+
+std::span<const float> FirstOf(const Buffer<float>& sizes, const GaussianCloud& part) {
+  return std::span(sizes).first(static_cast<size_t>(part.size()));
+}
+
+TEST(PixelSizesOfThings, EachGetsItsOwn) {
+  const GaussianCloud lantern = Placed("stone_lantern");
+  GaussianCloud cloud = lantern;
+  ASSERT_TRUE(Append(cloud, Placed("biplane", 3, {4, 0, 0})).ok());
+  const PixelSizesOfThings found = Find(cloud);
+  ASSERT_EQ(found.things.size(), 2u);
+  EXPECT_TRUE(ContradictionsOf(found.things).empty());
+  ASSERT_EQ(std::ssize(found.sizes), cloud.size());
+  for (const float size : FirstOf(found.sizes, lantern)) ASSERT_NEAR(size, kPixelOfExamples, 0.1 * kPixelOfExamples);
+  for (const float size : std::span(found.sizes).subspan(static_cast<size_t>(lantern.size()))) {
+    ASSERT_NEAR(size, 3 * kPixelOfExamples, 0.3 * kPixelOfExamples);
+  }
+  EXPECT_EQ(std::ranges::count(found.sure, 1), cloud.size());
+}
+
+// A twentieth of the Gaussians, so that no quantile of all sees it.
+TEST(PixelSizesOfThings, HoweverFewTheyAre) {
+  const GaussianCloud lantern = Placed("stone_lantern");
+  GaussianCloud cloud = lantern;
+  for (int k = 0; k < 6; ++k) {
+    for (int side = -1; side <= 1; side += 2) {
+      ASSERT_TRUE(Append(cloud, Placed("biplane", 3, {4.0 * (k - 2.5), 4.0 * side, 0})).ok());
+    }
+  }
+  const PixelSizesOfThings found = Find(cloud);
+  ASSERT_EQ(found.things.size(), 13u);
+  for (const float size : FirstOf(found.sizes, lantern)) ASSERT_NEAR(size, kPixelOfExamples, 0.1 * kPixelOfExamples);
+  EXPECT_NE(InWords(found.things).find("13 things that lie apart"), std::string::npos);
+  EXPECT_NE(InWords(found.things).find("; and 9 more"), std::string::npos) << InWords(found.things);
+}
+
+TEST(PixelSizesOfThings, WhatLiesAroundIsTreatedWithCaution) {
+  const GaussianCloud biplane = Placed("biplane");
+  GaussianCloud cloud = biplane;
+  ASSERT_TRUE(Append(cloud, Sky(40'000, 10)).ok());
+  const PixelSizesOfThings found = Find(cloud);
+  ASSERT_EQ(found.things.size(), 2u);
+  for (const float size : FirstOf(found.sizes, biplane)) ASSERT_NEAR(size, kPixelOfExamples, 0.1 * kPixelOfExamples);
+  EXPECT_EQ(std::ranges::count(found.sure, 1), biplane.size());
+  const std::vector<std::string> doubts = ContradictionsOf(found.things);
+  ASSERT_FALSE(doubts.empty());
+  EXPECT_EQ(doubts.back(), "of 40,000 Gaussians that lie apart: it lies around others");
+}
+
+// Black Gaussians around one of them say nothing about the other.
+TEST(PixelSizesOfThings, BlackVeilsOfOneDoNotSpeakForTheOther) {
+  const GaussianCloud lantern = Placed("stone_lantern");
+  GaussianCloud cloud = lantern, veiled = Placed("biplane", 4, {6, 0, 0});
+  GaussianCloud veils = Sky(3000, 1);
+  std::ranges::fill(veils.sh, -1.7724539f);
+  std::ranges::fill(veils.log_scales, static_cast<float>(std::log(0.2)));
+  Random random(3);
+  for (size_t i = 0; i < veils.means.size(); ++i) {
+    veils.means[i] = static_cast<float>((i % 3 == 0 ? 6.0 : 0.0) + 4 * (random.Uniform() - 0.5));
+  }
+  ASSERT_TRUE(Append(veiled, veils).ok());
+  ASSERT_TRUE(Append(cloud, veiled).ok());
+  const PixelSizesOfThings found = Find(cloud);
+  ASSERT_EQ(found.things.size(), 2u);
+  for (const float size : FirstOf(found.sizes, lantern)) ASSERT_NEAR(size, kPixelOfExamples, 0.1 * kPixelOfExamples);
+}
+
+TEST(PixelSizesOfThings, ThingsThatSayTheSameAreOfOneTraining) {
+  GaussianCloud cloud = Placed("stone_lantern");
+  ASSERT_TRUE(Append(cloud, Placed("biplane", 1, {2, 0, 0})).ok());
+  EXPECT_TRUE(Find(cloud).things.empty());
+  // A third larger: perhaps an error of the estimate. The smaller one is the safer one.
+  cloud = Placed("stone_lantern");
+  ASSERT_TRUE(Append(cloud, Placed("biplane", 1.35, {2, 0, 0})).ok());
+  const auto whole = FindPixelSize(cloud);
+  ASSERT_TRUE(whole.ok() && !whole->contradicted());
+  const PixelSizesOfThings found = FindPixelSizesOfThings(cloud, *whole);
+  ASSERT_EQ(found.things.size(), 2u);
+  EXPECT_LE(std::ranges::max(found.sizes), static_cast<float>(whole->size));
+  EXPECT_TRUE(Find(Placed("tankard")).things.empty());
+}
+
+}  // namespace
+}  // namespace anchorsplat

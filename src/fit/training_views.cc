@@ -45,6 +45,17 @@ fs::path SmallestResolution(const fs::path& folder) {
   return found;
 }
 
+// What `views` and data sets write beside the folder of a resolution, which is a COLMAP project and cannot say it:
+// chair/transforms_128.json of chair/128.
+Result<std::optional<std::array<float, 3>>> BackgroundBeside(const fs::path& resolution) {
+  fs::path folder = resolution.lexically_normal();
+  if (!folder.has_filename()) folder = folder.parent_path();
+  const fs::path file = folder.parent_path() / Cat("transforms_", folder.filename().string(), ".json");
+  if (!Exists(file)) return std::optional<std::array<float, 3>>();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraSet set, ReadCameras(file));
+  return set.background;
+}
+
 // The set's cameras with pictures, by name; the names of the others are added to `without`.
 Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source, int downscale,
                                          std::vector<std::string>& without) {
@@ -148,6 +159,9 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(source));
     out.background = set.background;
     const bool colmap = set.source == CameraSource::kColmap;
+    if (colmap && !out.background) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(out.background, BackgroundBeside(source));
+    }
     const fs::path points = set.points;
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views,
                                  WithPictures(std::move(set), source, options.downscale, out.without_picture));

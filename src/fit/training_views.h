@@ -40,6 +40,8 @@ struct ProjectOptions {
 // (cameras/photograph.h). Pictures of another size than the camera file says are taken as scaled ones when the shape
 // agrees. Points are those of a COLMAP model (points3D.bin, .txt or .ply), or of the PLY that a transforms.json names.
 //
+// A COLMAP project does not say which background its pictures have; a transforms_128.json beside a folder 128 does.
+//
 // Errors: those of ReadCameras, ReadColmapPoints, ReadPlyPoints and MatchPhotograph; kNotFound when no view has a
 // picture, or when the PLY is missing; kBadArgument when hold_out leaves nothing to train on.
 Result<TrainingViews> OpenProject(const std::filesystem::path& project, const ProjectOptions& options = {});

@@ -110,6 +110,18 @@ TEST(TrainingViews, SmallestResolutionOfADataset) {
   ASSERT_TRUE(views.ok()) << views.error().message;
   EXPECT_EQ(views->train.size() + views->held_out.size(), 4u);
   EXPECT_EQ(OpenProject(folder / "scene/1024")->train.size(), 2u);
+  EXPECT_FALSE(views->background);
+  // Beside each resolution there is what its COLMAP model cannot say.
+  Put(folder / "scene/transforms_256.json",
+      R"({"fl_x": 10, "fl_y": 10, "cx": 4, "cy": 3, "w": 8, "h": 6, "background": [1, 0.5, 1], "frames": [{
+      "file_path": "256/images/v10.png", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]})");
+  constexpr std::array<float, 3> kSaid = {1, 0.5f, 1};
+  for (const char* project : {"scene", "scene/256", "scene/256/"}) {
+    const auto with = OpenProject(folder / project);
+    ASSERT_TRUE(with.ok()) << with.error().message;
+    EXPECT_EQ(with->background, kSaid) << project;
+  }
+  EXPECT_FALSE(OpenProject(folder / "scene/1024")->background);
   EXPECT_EQ(OpenProject(folder / "scene/64").error().code, ErrorCode::kNotFound);
 }
 

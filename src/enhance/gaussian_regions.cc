@@ -16,18 +16,22 @@ constexpr double kHarmlessWidth = 0.75, kHarmlessSpacing = 0.3;
 
 }  // namespace
 
-double MiddleAxis(const GaussianCloud& cloud, size_t i) {
-  std::array<float, 3> axes;
-  std::copy_n(cloud.log_scales.data() + 3 * i, 3, axes.begin());
+std::array<double, 3> AxesOf(const GaussianCloud& cloud, size_t i) {
+  std::array<double, 3> axes;
+  for (size_t a = 0; a < 3; ++a) axes[a] = std::exp(double{cloud.log_scales[3 * i + a]});
   std::ranges::sort(axes);
-  return std::exp(double{axes[1]});
+  return axes;
 }
 
 double GaussianRegion::HarmlessPixel() const { return std::min(kHarmlessWidth * width, kHarmlessSpacing * wide); }
 
 GaussianRegions::GaussianRegions(const GaussianCloud& cloud, double thinned)
-    : tree_(cloud.means), middle_(static_cast<size_t>(cloud.size())), thinned_(thinned) {
-  for (size_t i = 0; i < middle_.size(); ++i) middle_[i] = static_cast<float>(MiddleAxis(cloud, i));
+    : tree_(cloud.means), middle_(static_cast<size_t>(cloud.size())), footprint_(middle_.size()), thinned_(thinned) {
+  for (size_t i = 0; i < middle_.size(); ++i) {
+    const auto [smallest, middle, largest] = AxesOf(cloud, i);
+    middle_[i] = static_cast<float>(middle);
+    footprint_[i] = static_cast<float>(std::sqrt(largest * middle));
+  }
 }
 
 // So many others lie within π r² of the surface.
@@ -46,9 +50,13 @@ GaussianRegion GaussianRegions::Around(const float* place) const {
   if (found < 2) return region;
   region.spacing = Side(nearest, found, kFew);
   region.wide = Side(nearest, found, kMore);
-  std::array<float, kMore + 1> middle;
-  for (size_t k = 0; k < static_cast<size_t>(found); ++k) middle[k] = middle_[static_cast<size_t>(nearest[k].index)];
-  region.width = double{Quantile(std::span(middle).first(static_cast<size_t>(found)), 0.5)};
+  const auto median = [&](const Buffer<float>& values) {
+    std::array<float, kMore + 1> own;
+    for (size_t k = 0; k < static_cast<size_t>(found); ++k) own[k] = values[static_cast<size_t>(nearest[k].index)];
+    return double{Quantile(std::span(own).first(static_cast<size_t>(found)), 0.5)};
+  };
+  region.width = median(middle_);
+  region.footprint = median(footprint_);
   return region;
 }
 

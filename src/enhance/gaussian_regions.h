@@ -10,14 +10,15 @@
 
 namespace anchorsplat {
 
-// Length of the middle axis of a Gaussian; world units.
-double MiddleAxis(const GaussianCloud& cloud, size_t i);
+// Lengths of the axes of a Gaussian, the smallest first; world units.
+std::array<double, 3> AxesOf(const GaussianCloud& cloud, size_t i);
 
 // What the Gaussians around a place of a splat's surface say, whatever it was trained at. World units.
 struct GaussianRegion {
-  double spacing = 0;  // side of the square that each of 8 has of the surface
-  double wide = 0;     // the same of 64
-  double width = 0;    // median of the middle axes of 64
+  double spacing = 0;    // side of the square that each of 8 has of the surface
+  double wide = 0;       // the same of 64
+  double width = 0;      // median of the middle axes of 64
+  double footprint = 0;  // median of their √(largest × middle axis)
 
   // A pixel for which the filter does no harm there. The variance that it gives back at the usual four times closer is
   // 0.2 pixels²: half of the Gaussians of the region become wider by less than a seventeenth, and the thinnest ones
@@ -42,7 +43,7 @@ class GaussianRegions {
   double Side(std::span<const KdTree::Neighbour> nearest, int64_t found, int64_t count) const;
 
   KdTree tree_;
-  Buffer<float> middle_;  // [size]
+  Buffer<float> middle_, footprint_;  // [size]
   double thinned_;
 };
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -28,29 +29,38 @@ TEST(GaussianRegions, MatchSortingAllDistances) {
     const GaussianCloud cloud = RandomCloud(count);
     const GaussianRegions regions(cloud);
     for (int64_t i = 0; i < count; i += 1 + count / 7) {
-      std::vector<std::pair<double, double>> others;  // squared distance, middle axis; itself is the first
+      std::vector<std::pair<double, int64_t>> others;  // squared distance, row; itself is the first
       for (int64_t j = 0; j < count; ++j) {
         double squared = 0;
         for (int64_t a = 0; a < 3; ++a) {
           const auto at = [&](int64_t row) { return double{cloud.means[static_cast<size_t>(3 * row + a)]}; };
           squared += (at(i) - at(j)) * (at(i) - at(j));
         }
-        others.emplace_back(squared, MiddleAxis(cloud, static_cast<size_t>(j)));
+        others.emplace_back(squared, j);
       }
       std::sort(others.begin(), others.end());
       const auto side = [&](int64_t wanted) {
         const int64_t last = std::min(wanted, count - 1);
         return std::sqrt(std::numbers::pi * others[static_cast<size_t>(last)].first / static_cast<double>(last));
       };
-      std::vector<double> middle;
-      for (size_t k = 0; k < std::min<size_t>(65, others.size()); ++k) middle.push_back(others[k].second);
-      std::sort(middle.begin(), middle.end());
-      const double median = 0.5 * (middle[(middle.size() - 1) / 2] + middle[middle.size() / 2]);
+      const auto median_of_64 = [&](auto&& of_scales) {
+        std::vector<double> values;
+        for (size_t k = 0; k < std::min<size_t>(65, others.size()); ++k) {
+          std::array<float, 3> scales;
+          std::copy_n(cloud.log_scales.data() + 3 * others[k].second, 3, scales.begin());
+          std::sort(scales.begin(), scales.end());
+          values.push_back(of_scales(scales));
+        }
+        std::sort(values.begin(), values.end());
+        return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
+      };
       const GaussianRegion region = regions.Around(cloud.means.data() + 3 * i);
       EXPECT_NEAR(region.spacing, side(8), 1e-9);
       EXPECT_NEAR(region.wide, side(64), 1e-9);
       EXPECT_NEAR(regions.SpacingOfMany(cloud.means.data() + 3 * i), side(512), 1e-9);
-      EXPECT_NEAR(region.width, median, 1e-6);
+      EXPECT_NEAR(region.width, median_of_64([](const auto& s) { return std::exp(double{s[1]}); }), 1e-6);
+      EXPECT_NEAR(region.footprint, median_of_64([](const auto& s) { return std::exp(0.5 * (double{s[1]} + s[2])); }),
+                  1e-6);
       EXPECT_DOUBLE_EQ(region.HarmlessPixel(), std::min(0.75 * region.width, 0.3 * region.wide));
     }
   }

@@ -69,6 +69,7 @@ constexpr int64_t kEnough = 2500;
 
 struct Surface {
   double spacing = 0;  // 0: too few
+  double footprint = 0;
   double of_many = 0, closest = 0, unevenness = 1;
   double harmless = 0;
 };
@@ -79,19 +80,21 @@ Surface SurfaceOf(const GaussianCloud& cloud) {
   if (count <= kLeastForSpacing) return {};
   const GaussianRegions regions(cloud);
   const int64_t samples = std::min(kGuardSamples, count);
-  Buffer<float> spacing(static_cast<size_t>(samples)), of_many = spacing, harmless = spacing;
+  Buffer<float> spacing(static_cast<size_t>(samples)), footprint = spacing, of_many = spacing, harmless = spacing;
   ParallelFor(0, samples, 8, [&](int64_t first, int64_t last) {
     for (int64_t s = first; s < last; ++s) {
       const float* place = cloud.means.data() + 3 * (s * count / samples);
       const GaussianRegion region = regions.Around(place);
       const auto at = static_cast<size_t>(s);
       spacing[at] = static_cast<float>(region.spacing);
+      footprint[at] = static_cast<float>(region.footprint);
       of_many[at] = static_cast<float>(regions.SpacingOfMany(place));
       harmless[at] = static_cast<float>(region.HarmlessPixel());
     }
   });
   const auto dense = double{Quantile(of_many, 0.1)}, sparse = double{Quantile(of_many, 0.9)};
   return {.spacing = double{Quantile(spacing, 0.5)},
+          .footprint = double{Quantile(footprint, 0.5)},
           .of_many = double{Quantile(of_many, 0.5)},
           .closest = double{Quantile(of_many, 0.0)},
           .unevenness = dense > 0 ? sparse / dense : std::numeric_limits<double>::infinity(),
@@ -124,6 +127,7 @@ Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, int64_t all, const R
   }
   const Surface surface = SurfaceOf(showing.bright);
   evidence.spacing = surface.spacing;
+  evidence.footprint = surface.footprint;
   evidence.of_many = surface.of_many;
   evidence.closest = surface.closest;
   evidence.unevenness = surface.unevenness;
@@ -212,14 +216,19 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   finding.part = estimate.cut_outlines > kPart;
   const double of_whole = MostGaussiansPerPixel(evidence.gaussians, estimate.showing);
   const double most = finding.part ? std::min(of_whole, kCrowdedPart) : of_whole;
-  const auto crowd_at = [&](double size) { return evidence.spacing > 0 ? std::pow(size / evidence.spacing, 2) : 0; };
+  // Those in layers above each other do not make detail.
+  const double apart = std::max(evidence.spacing, evidence.footprint);
+  const auto crowd_at = [&](double size) { return apart > 0 ? std::pow(size / apart, 2) : 0; };
   const double crowd = crowd_at(estimate.size);
   if (crowd > most) {
     finding.contradictions.push_back(
         most < of_whole
             ? Cat("there would be ", Fixed(crowd, 2),
-                  " Gaussians on every pixel of the surface, and parts that were cut out of fits have at most ", most)
-            : Cat("there would be ", Number(crowd), " Gaussians on every pixel of the surface, and fits of ",
+                  " Gaussians beside each other on every pixel of the surface, and parts that were cut out of fits "
+                  "have at most ",
+                  most)
+            : Cat("there would be ", Number(crowd),
+                  " Gaussians beside each other on every pixel of the surface, and fits of ",
                   WithThousands(evidence.gaussians), evidence.gaussians >= int64_t{kMostShowing} ? " and more" : "",
                   " keep at most ", Number(most)));
   }
@@ -262,8 +271,8 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   }
   if (evidence.closest < kCloser * evidence.of_many) finding.closer = kCloser * evidence.of_many;
   if (evidence.all > 0 && evidence.all < kEnough) {
-    const double apart = std::sqrt(static_cast<double>(evidence.all) / static_cast<double>(kEnough));
-    finding.size = std::min(finding.size, estimate.size * apart);
+    const double of_few = std::sqrt(static_cast<double>(evidence.all) / static_cast<double>(kEnough));
+    finding.size = std::min(finding.size, estimate.size * of_few);
     finding.least = std::min(finding.least, finding.size);
     if (evidence.all < kFewGaussians) {
       finding.contradictions.push_back(

@@ -36,20 +36,21 @@ struct PixelSizeFinding {
 // The numbers that an estimate is held against, of the Gaussians that show: opacity of 10 % or more, not nearly black.
 // Fits on black keep black Gaussians around the object that no picture shows (where nothing else is there, all count).
 struct PixelSizeEvidence {
-  int64_t gaussians = 0;     // that show, near the middle of the cloud; no more than 200,000 of them
-  int64_t all = 0;           // of any opacity and colour; 0: not counted
-  double spacing = 0;        // side of the square that each has of the surface: from the distances to 8 neighbours
-  double of_many = 0;        // the same from the distances to 512: median …
-  double closest = 0;        // … and least of 256 places
-  double unevenness = 1;     // 90 % over 10 % quantile; infinite where 512 and more lie at one place
-  double small_axis = 0;     // of the smallest tenth by area: PixelSizeProbe::start
-  double harmless = 0;       // pixel that does no harm in nine of ten regions: GaussianRegion::HarmlessPixel
+  int64_t gaussians = 0;  // that show, near the middle of the cloud; no more than 200,000 of them
+  int64_t all = 0;        // of any opacity and colour; 0: not counted
+  double spacing = 0;     // side of the square that each has of the surface: from the distances to 8 neighbours
+  double footprint = 0;   // √(largest × middle axis), median: where it is larger than the spacing they lie in layers
+  double of_many = 0;     // the same from the distances to 512: median …
+  double closest = 0;     // … and least of 256 places
+  double unevenness = 1;  // 90 % over 10 % quantile; infinite where 512 and more lie at one place
+  double small_axis = 0;  // of the smallest tenth by area: PixelSizeProbe::start
+  double harmless = 0;    // pixel that does no harm in nine of ten regions: GaussianRegion::HarmlessPixel
   double without_black = 0;  // the estimate without black Gaussians; 0: there are few of them
 };
 Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud);
 
-// Gaussians on every pixel of the surface that fits keep at most: a cloud of `gaussians` that has more of them with a
-// pixel size was fitted to smaller pixels. `showing`: PixelSizeEstimate::showing.
+// Gaussians beside each other on every pixel of the surface that fits keep at most: a cloud of `gaussians` that has
+// more of them with a pixel size was fitted to smaller pixels. `showing`: PixelSizeEstimate::showing.
 double MostGaussiansPerPixel(int64_t gaussians, double showing);
 
 // Pixel sizes that do no harm to each region (GaussianRegion::HarmlessPixel), between `finding.least` and

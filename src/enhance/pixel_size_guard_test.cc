@@ -300,6 +300,16 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   crowded.spacing = 0.005 / std::sqrt(2.4 * 1.01);  // crowded without the black ones, too
   EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.0007);
 
+  // In layers of wide ones there are more, and no more detail for that.
+  crowded = plain;
+  crowded.spacing = 0.005;  // four on a pixel
+  EXPECT_TRUE(Judge(estimate, crowded).contradicted());
+  crowded.footprint = 0.007;  // two
+  EXPECT_FALSE(Judge(estimate, crowded).contradicted());
+  crowded.footprint = 0.006;
+  ASSERT_TRUE(Judge(estimate, crowded).contradicted());
+  EXPECT_NE(Judge(estimate, crowded).contradictions[0].find("2.8 Gaussians beside each other"), std::string::npos);
+
   // Where most of them show, there are half as many.
   crowded = plain;
   crowded.spacing = 0.01 / std::sqrt(2.3);

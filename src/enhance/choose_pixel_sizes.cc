@@ -205,13 +205,14 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
     input.showing = found->estimate.showing;
     report.pixel_size = found->size;
     report.pixel_size_source = found->contradicted() ? kCautiousPixelSize : "estimated";
-    PixelSizesOfThings of_things = FindPixelSizesOfThings(input.cloud, *found);
+    PixelSizesOfThings of_things =
+        FindPixelSizesOfThings(input.cloud, *found, !IsGiven(options, "mode") && !options.filter_strength);
     if (!of_things.things.empty()) {
       input.pixel_sizes = of_things.sizes;
       report.pixel_size = double{Quantile(of_things.sizes, 0.5)};
-      const auto sure = std::ranges::count(of_things.sure, 1);
-      report.pixel_size_source = sure < input.cloud.size() ? kCautiousPixelSize : "estimated";
-      if (sure > 0 && sure < input.cloud.size()) input.sure = std::move(of_things.sure);
+      const bool doubtful = !ContradictionsOf(of_things.things).empty();
+      report.pixel_size_source = doubtful ? kCautiousPixelSize : "estimated";
+      if (doubtful && std::ranges::count(of_things.sure, 1) > 0) input.sure = std::move(of_things.sure);
       report.things = std::move(of_things.things);
       if (says) SayWhatWasFound(report.things);
       return {};

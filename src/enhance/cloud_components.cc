@@ -2,7 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
 #include <numeric>
+#include <optional>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "core/kd_tree.h"
@@ -23,9 +29,14 @@ constexpr int64_t kComponentSample = 16'384;
 // a hundredth at most; with a reach of 2 it is six tenths and three.
 constexpr size_t kJoined = 12, kTypical = 4;
 constexpr double kReach = 3, kMuchTheSame = 2;
-// Things of fewer Gaussians that show are pieces of others, as wheels are: so few say nothing about pixels.
-constexpr int64_t kLeastShowing = 1000;
-constexpr double kLeastOfThing = 0.005;  // and of fewer of the sample than that: its graph has gaps
+// So few Gaussians that show say nothing about pixels; and the sample's graph has gaps.
+constexpr double kLeastShowing = 1000, kLeastOfThing = 0.005;
+// Of these a piece may be a splat of its own, if it lies as far from all things as the first share of its own extent
+// and the second of the nearest one's. A wheel is nearer.
+constexpr double kLeastOfPiece = 100, kAside = 0.5, kAsideOfThing = 0.05;
+// So many times as far from a thing as its own neighbours are, a single one belongs to it.
+constexpr double kClose = 5;
+constexpr int64_t kLeastSampledOfPiece = 8;
 constexpr int64_t kComponentRowsPerTask = 16'384;
 
 // Disjoint sets; the root of each is its first member.
@@ -46,26 +57,78 @@ class DisjointSets {
   std::vector<size_t> up_;
 };
 
-DisjointSets JoinNeighbours(const Buffer<float>& places) {
+// The sample's places, which of them hang together, and how far they are from each other.
+struct Graph {
+  Buffer<float> places;    // [n,3]
+  Buffer<double> typical;  // [n] squared distances
+  std::vector<size_t> root;
+
+  const float* Place(size_t k) const { return places.data() + 3 * k; }
+  size_t size() const { return root.size(); }
+};
+
+Graph JoinNeighbours(Buffer<float> places) {
   const KdTree tree(places);
+  Graph graph;
   std::vector<std::array<KdTree::Neighbour, kJoined>> nearest(static_cast<size_t>(tree.size()));
-  Buffer<double> typical(nearest.size());  // squared distances
+  graph.typical.resize(nearest.size());
   ParallelFor(0, tree.size(), 256, [&](int64_t first, int64_t last) {
     for (int64_t place = first; place < last; ++place) {
       const auto i = static_cast<size_t>(tree.PointAt(place));
       tree.Nearest(place, nearest[i]);
-      typical[i] = nearest[i][kTypical - 1].squared_distance;
+      graph.typical[i] = nearest[i][kTypical - 1].squared_distance;
     }
   });
   DisjointSets sets(tree.size());
   for (size_t i = 0; i < nearest.size(); ++i) {
     for (const auto& [squared, index] : nearest[i]) {
       const auto j = static_cast<size_t>(index);
-      const auto [least, most] = std::minmax(typical[i], typical[j]);
+      const auto [least, most] = std::minmax(graph.typical[i], graph.typical[j]);
       if (squared <= kReach * kReach * least && most <= kMuchTheSame * kMuchTheSame * least) sets.Join(i, j);
     }
   }
-  return sets;
+  graph.root.resize(nearest.size());
+  for (size_t k = 0; k < graph.size(); ++k) graph.root[k] = sets.Root(k);
+  graph.places = std::move(places);
+  return graph;
+}
+
+// What a place of the sample belongs to, where that is no thing.
+constexpr int32_t kStray = -1, kPiece = -2;
+
+// Some of the sample, to look for the nearest one among.
+class Among {
+ public:
+  Among(const Graph& graph, const std::vector<int32_t>& label, bool things_only) {
+    Buffer<float> places;
+    for (size_t k = 0; k < graph.size(); ++k) {
+      if (things_only && label[k] < 0) continue;
+      index_.push_back(k);
+      places.insert(places.end(), graph.Place(k), graph.Place(k) + 3);
+    }
+    tree_.emplace(places);
+  }
+  // Of the sample; with its squared distance.
+  std::pair<size_t, double> Nearest(const float* p) const {
+    std::array<KdTree::Neighbour, 1> nearest;
+    tree_->NearestTo({p[0], p[1], p[2]}, nearest);
+    return {index_[static_cast<size_t>(nearest[0].index)], nearest[0].squared_distance};
+  }
+
+ private:
+  std::vector<size_t> index_;
+  std::optional<KdTree> tree_;
+};
+
+// Longest side of the box around those of a root.
+double ExtentOf(const Graph& graph, const std::vector<size_t>& members) {
+  double extent = 0;
+  for (size_t a = 0; a < 3; ++a) {
+    const auto along = [&](size_t k) { return graph.Place(k)[a]; };
+    const auto [low, high] = std::ranges::minmax(members, {}, along);
+    extent = std::max(extent, double{along(high)} - double{along(low)});
+  }
+  return extent;
 }
 
 }  // namespace
@@ -76,47 +139,72 @@ CloudComponents FindComponents(const GaussianCloud& cloud) {
     if (HasUsableShape(cloud, i) && ShowsInPictures(cloud, static_cast<size_t>(i))) showing.push_back(i);
   }
   const int64_t count = std::ssize(showing), sampled = std::min(count, kComponentSample);
-  if (count < 2 * kLeastShowing) return {};
+  if (static_cast<double>(count) < 2 * kLeastOfPiece) return {};
   Buffer<float> places(static_cast<size_t>(3 * sampled));
   for (int64_t k = 0; k < sampled; ++k) {
     std::copy_n(cloud.means.data() + 3 * showing[static_cast<size_t>(k * count / sampled)], 3, places.data() + 3 * k);
   }
-  DisjointSets sets = JoinNeighbours(places);
+  const Graph graph = JoinNeighbours(std::move(places));
   LeaveIfAbandoned();
 
-  std::vector<int64_t> members(static_cast<size_t>(sampled));
-  for (size_t k = 0; k < members.size(); ++k) ++members[sets.Root(k)];
-  const double least = std::max(kLeastOfThing * static_cast<double>(sampled),
-                                static_cast<double>(kLeastShowing * sampled) / static_cast<double>(count));
-  std::vector<size_t> roots;
-  for (size_t k = 0; k < members.size(); ++k) {
-    if (static_cast<double>(members[k]) >= least) roots.push_back(k);
+  std::vector<std::vector<size_t>> components;  // of more than a few
+  {
+    std::vector<std::vector<size_t>> of_root(graph.size());
+    for (size_t k = 0; k < graph.size(); ++k) of_root[graph.root[k]].push_back(k);
+    for (auto& members : of_root) {
+      if (std::ssize(members) >= kLeastSampledOfPiece) components.push_back(std::move(members));
+    }
   }
-  if (roots.size() < 2) return {};
-  std::ranges::stable_sort(roots, [&](size_t a, size_t b) { return members[a] > members[b]; });
-  std::vector<int32_t> thing_of_root(members.size(), -1);
-  for (size_t c = 0; c < roots.size(); ++c) thing_of_root[roots[c]] = static_cast<int32_t>(c);
-
-  Buffer<float> known;
-  std::vector<int32_t> thing;
-  for (size_t k = 0; k < members.size(); ++k) {
-    const int32_t of = thing_of_root[sets.Root(k)];
-    if (of < 0) continue;
-    thing.push_back(of);
-    known.insert(known.end(), places.begin() + static_cast<int64_t>(3 * k),
-                 places.begin() + static_cast<int64_t>(3 * k + 3));
-  }
-  const KdTree nearest_known(known);
+  if (components.size() < 2) return {};
+  std::ranges::stable_sort(components, std::ranges::greater(), [](const auto& members) { return members.size(); });
+  const double each = static_cast<double>(count) / static_cast<double>(sampled);
+  const double least = std::max(kLeastOfThing * static_cast<double>(count), kLeastShowing);
   CloudComponents out;
-  out.count = std::ssize(roots);
-  out.component.assign(static_cast<size_t>(cloud.size()), 0);
+  out.count = std::max<int64_t>(1, std::ranges::count_if(components, [&](const auto& members) {
+                                  return each * static_cast<double>(members.size()) >= least;
+                                }));
+  std::vector<int32_t> label(graph.size(), kStray);
+  for (size_t c = 0; c < static_cast<size_t>(out.count); ++c) {
+    for (const size_t k : components[c]) label[k] = static_cast<int32_t>(c);
+  }
+
+  const Among of_things(graph, label, true);
+  std::vector<double> extents;
+  for (const auto& members : std::span(components).first(static_cast<size_t>(out.count))) {
+    extents.push_back(ExtentOf(graph, members));
+  }
+  bool pieces = false;
+  std::vector<int32_t> with_near = label;
+  for (const auto& members : std::span(components).subspan(static_cast<size_t>(out.count))) {
+    std::pair<size_t, double> nearest(0, std::numeric_limits<double>::infinity());
+    for (const size_t k : members) {
+      const auto of_one = of_things.Nearest(graph.Place(k));
+      if (of_one.second < nearest.second) nearest = of_one;
+    }
+    const double gap = std::sqrt(nearest.second);
+    const bool aside = each * static_cast<double>(members.size()) >= kLeastOfPiece &&
+                       gap >= kAside * ExtentOf(graph, members) &&
+                       gap >= kAsideOfThing * extents[static_cast<size_t>(label[nearest.first])];
+    pieces |= aside;
+    for (const size_t k : members) with_near[k] = aside ? kPiece : label[nearest.first];
+  }
+  if (out.count == 1 && !pieces) return {};
+  // What is close to a thing by its own measure is a part of it.
+  for (size_t k = 0; k < graph.size(); ++k) {
+    if (with_near[k] != kStray) continue;
+    const auto [of, squared] = of_things.Nearest(graph.Place(k));
+    if (squared <= kClose * kClose * graph.typical[of]) with_near[k] = label[of];
+  }
+
+  const Among all(graph, with_near, false);
+  out.component.assign(static_cast<size_t>(cloud.size()), CloudComponents::kNone);
   ParallelFor(0, cloud.size(), kComponentRowsPerTask, [&](int64_t first, int64_t last) {
-    std::array<KdTree::Neighbour, 1> nearest;
     for (int64_t i = first; i < last; ++i) {
       if (!HasUsableShape(cloud, i)) continue;
       const float* p = cloud.means.data() + 3 * i;
-      nearest_known.NearestTo({p[0], p[1], p[2]}, nearest);
-      out.component[static_cast<size_t>(i)] = thing[static_cast<size_t>(nearest[0].index)];
+      int32_t of = with_near[all.Nearest(p).first];
+      if (of == kStray && !ShowsInPictures(cloud, static_cast<size_t>(i))) of = label[of_things.Nearest(p).first];
+      out.component[static_cast<size_t>(i)] = std::max(of, CloudComponents::kNone);
     }
   });
   return out;

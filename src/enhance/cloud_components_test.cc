@@ -98,7 +98,7 @@ TEST(CloudComponents, MatchWalkingFromNeighbourToNeighbour) {
       ASSERT_EQ(found.component[i], first[i] == 1500 ? 0 : 1) << "the largest first";
     }
   }
-  for (size_t i = 3500; i < 3800; ++i) ASSERT_EQ(found.component[i], 1) << "the nearest";
+  for (size_t i = 3500; i < 3800; ++i) ASSERT_EQ(found.component[i], CloudComponents::kNone) << "too small, and aside";
 }
 
 TEST(CloudComponents, FloatersAndBlackVeilsJoinNothing) {
@@ -122,6 +122,23 @@ TEST(CloudComponents, OneObjectIsOfOnePiece) {
     ASSERT_TRUE(cloud.ok());
     EXPECT_EQ(FindComponents(*cloud).count, 1) << object;
   }
+}
+
+// A small splat beside a large one is none of its pieces; a wheel is.
+TEST(CloudComponents, SmallPiecesAsideAreNoPartOfThings) {
+  const GaussianCloud large = Sphere(5000, 1, {0, 0, 0}, 1);
+  const CloudComponents wheel = FindComponents(Together({large, Sphere(500, 0.3, {0, 0, 1.4}, 2)}));
+  EXPECT_TRUE(wheel.component.empty());
+  const CloudComponents aside = FindComponents(Together({large, Sphere(500, 0.3, {0, 0, 2}, 2)}));
+  EXPECT_EQ(aside.count, 1);
+  ASSERT_EQ(std::ssize(aside.component), 5500);
+  for (size_t i = 0; i < 5500; ++i) ASSERT_EQ(aside.component[i], i < 5000 ? 0 : CloudComponents::kNone);
+  // Nothing but small ones.
+  const CloudComponents small = FindComponents(
+      Together({Sphere(700, 0.3, {0, 0, 0}, 1), Sphere(800, 0.3, {3, 0, 0}, 2), Sphere(600, 0.3, {6, 0, 0}, 3)}));
+  EXPECT_EQ(small.count, 1);
+  ASSERT_EQ(std::ssize(small.component), 2100);
+  EXPECT_EQ(std::ranges::count(small.component, 0), 800);
 }
 
 // More than are looked at, by a small and a large scale.

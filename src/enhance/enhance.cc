@@ -337,9 +337,8 @@ Result<GaussianCloud> RunPlan(const MethodPlan& plan, const SizedMethods& sized,
 }
 
 // A network that nobody asked for, where pixels are known of some things of the splat only: it takes those.
-bool TakesSureOnly(const MethodPlan& plan, const EnhanceInput& input, int64_t max_gaussians) {
-  if (input.sure.empty() || plan.chosen_by.empty() || plan.start != nullptr || !plan.method->adds_detail) return false;
-  return max_gaussians == 0 || std::ranges::count(input.sure, 0) < max_gaussians;
+bool TakesSureOnly(const MethodPlan& plan, const EnhanceInput& input) {
+  return !input.sure.empty() && !plan.chosen_by.empty() && plan.start == nullptr && plan.method->adds_detail;
 }
 
 // The others are the filter's.
@@ -356,9 +355,14 @@ Result<GaussianCloud> RunOnSure(const MethodPlan& plan, EnhanceInput input, Enha
   if (left == 0) return RunStep(*plan.method, std::move(input), options, report);
   LogInfo(Cat("the filter instead of '", plan.method->name, "' for ", WithThousands(left), " of ",
               WithThousands(left + taken), " Gaussians, as it is not known which pixels those were trained at"));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud filtered,
-                               RunStep(*filter.method, std::move(others), options, report));
-  if (options.max_gaussians > 0) SetBudget(options, options.max_gaussians - left);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud filtered, RunStep(*filter.method, std::move(others), options, report));
+  // Neither takes the other's share of a budget.
+  if (options.max_gaussians > 1) {
+    const auto share = static_cast<double>(left) / static_cast<double>(left + taken);
+    const auto most = static_cast<int64_t>(share * static_cast<double>(options.max_gaussians));
+    LeaveOutLeastVisible(std::clamp(most, int64_t{1}, options.max_gaussians - 1), filtered);
+    SetBudget(options, options.max_gaussians - filtered.size());
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, RunStep(*plan.method, std::move(input), options, report));
   ANCHORSPLAT_RETURN_IF_ERROR(Append(out, filtered));
   return out;
@@ -396,7 +400,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
     LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
   }
   if (GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode)) {
-    if (report.pixel_size_source == kCautiousPixelSize && !TakesSureOnly(plan, input, options.max_gaussians)) {
+    if (report.pixel_size_source == kCautiousPixelSize && !TakesSureOnly(plan, input)) {
       LeaveNetworksOut(plan, "measures Gaussians in pixels and goes wrong where the pixel is not known");
     } else if (report.looks == TrainedKind::kUnclear || unknown_of_few) {
       LeaveNetworksOut(plan, "has learned what splats of known kinds have lost");
@@ -415,8 +419,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   const Stopwatch watch;
   EnhanceOptions within = options;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud rest, SetRestAside(options, input, within, report));
-  const bool sure_only =
-      report.pixel_size_source == kCautiousPixelSize && TakesSureOnly(plan, input, within.max_gaussians);
+  const bool sure_only = report.pixel_size_source == kCautiousPixelSize && TakesSureOnly(plan, input);
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, sure_only ? RunOnSure(plan, std::move(input), within, report)
                                                             : RunPlan(plan, sized, std::move(input), within, report));
   // Methods that make no copies, and what a region's border leaves of them.

@@ -56,6 +56,7 @@ constexpr double kCloser = 0.45;
 constexpr double kSmallestAxis = 0.12;  // pixels; with a margin
 // Black Gaussians may move the estimate this much before it counts as theirs.
 constexpr double kMoved = 1.5;
+constexpr double kSomeSize = 1e-12;  // of an estimate: a pixel has some size
 // Regions that a cloud is looked at in, and how many of them a Gaussian belongs to.
 constexpr int64_t kRegions = 8192;
 constexpr size_t kRegionsAround = 2;
@@ -63,9 +64,9 @@ constexpr size_t kRegionsAround = 2;
 // ones. Dense fits of small pictures are at up to 1.3 times the bound, captures from 1.7 times on.
 constexpr double kCrowdedFall = 4;
 // The regressions have learned from fits of 4,000 Gaussians and more. Outlines of few Gaussians are as soft as those
-// are far apart: fits of 1,000 and 380 look like pixels 1.6 and 2.7 times too large, one of 2,500 like 1.1
-// (table_football).
-constexpr int64_t kEnough = 2500;
+// are far apart: fits of 1,500 look like pixels 1.4 to 2.3 times too large, of 400 like 2.7 to 5.
+constexpr int64_t kEnough = 4000;
+constexpr double kFewPower = 0.75;
 
 struct Surface {
   double spacing = 0;  // 0: too few
@@ -174,7 +175,7 @@ Buffer<float> CautiousPixelSizes(const GaussianCloud& cloud, const PixelSizeFind
   };
   Buffer<float> sizes(static_cast<size_t>(cloud.size()));
   const bool believed = finding.least >= finding.size;
-  const double none = std::max(1e-15 * finding.size, believed ? 0 : finding.least);  // a pixel has some size
+  const double none = std::max(kSomeSize * finding.size, believed ? 0 : finding.least);  // a pixel has some size
   std::ranges::fill(sizes, static_cast<float>(none));
   if (showing.empty()) return sizes;
 
@@ -269,9 +270,10 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     finding.size = std::min(finding.size, std::max(least, evidence.harmless));
     finding.least = std::min(least, finding.size);
   }
+  finding.size = std::max(finding.size, kSomeSize * estimate.size);  // also where regions bear nothing
   if (evidence.closest < kCloser * evidence.of_many) finding.closer = kCloser * evidence.of_many;
   if (evidence.all > 0 && evidence.all < kEnough) {
-    const double of_few = std::sqrt(static_cast<double>(evidence.all) / static_cast<double>(kEnough));
+    const double of_few = std::pow(static_cast<double>(evidence.all) / static_cast<double>(kEnough), kFewPower);
     finding.size = std::min(finding.size, estimate.size * of_few);
     finding.least = std::min(finding.least, finding.size);
     if (evidence.all < kFewGaussians) {

@@ -325,7 +325,7 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   PixelSizeEvidence few = plain;
   few.all = 1000;
   EXPECT_TRUE(Judge(estimate, few).contradicted());
-  EXPECT_NEAR(Judge(estimate, few).size, 0.01 / 1.58, 1e-5);
+  EXPECT_NEAR(Judge(estimate, few).size, 0.01 / std::pow(4, 0.75), 1e-5);
   few.all = 2400;
   EXPECT_FALSE(Judge(estimate, few).contradicted());
   EXPECT_LT(Judge(estimate, few).size, 0.01);

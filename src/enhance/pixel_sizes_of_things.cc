@@ -3,22 +3,27 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
 #include <utility>
 
 #include "core/run_context.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/cloud_components.h"
+#include "enhance/showing_gaussians.h"
+#include "enhance/trained_kind.h"
 
 namespace anchorsplat {
 
 namespace {
 
-// Each takes as long as a splat of its own; the smaller ones beyond are treated with caution.
+// Each takes as long as a splat of its own; those beyond are treated with caution.
 constexpr size_t kMostThings = 16;
 // Estimates that are no further apart are the same; up to the second they may be of one pixel: one estimate in twenty
 // is off by more.
 constexpr double kSame = 1.15, kAlike = 1.5;
+constexpr double kNothing = 1e-12;  // of a pixel: none of the width that it would say
+constexpr double kFew = 0.005;
 constexpr size_t kMostNamed = 4;  // as one reads
 constexpr float kWithin = 0.02f;  // quantiles between which a thing lies
 
@@ -60,13 +65,20 @@ Extent ExtentOf(const GaussianCloud& thing) {
   return extent;
 }
 
+// Regions get what they bear, and no more than the whole's.
+PixelSizeFinding Unknown(const PixelSizeFinding& whole, std::string why) {
+  PixelSizeFinding finding;
+  finding.size = whole.size;
+  finding.contradictions = {std::move(why)};
+  return finding;
+}
+
 bool Alike(double a, double b, double factor) { return a < factor * b && b < factor * a; }
 
 }  // namespace
 
 std::string InWords(std::span<const ThingPixelSize> things) {
-  std::string text =
-      Cat(things.size(), " things that lie apart, and each gets what its own outlines say of a training pixel: ");
+  std::string text = Cat(things.size(), " things that lie apart, each with a training pixel of its own: ");
   for (const auto& [gaussians, finding] : things.first(std::min(things.size(), kMostNamed))) {
     text += Cat(&finding == &things[0].finding ? "" : "; ", WithThousands(gaussians), " Gaussians, ", finding.size,
                 finding.least < finding.size ? " at most" : "");
@@ -75,8 +87,10 @@ std::string InWords(std::span<const ThingPixelSize> things) {
     }
     if (finding.contradicted()) text += ")";
   }
-  if (things.size() > kMostNamed) text += Cat("; and ", things.size() - kMostNamed, " more");
-  return text;
+  if (things.size() <= kMostNamed) return text;
+  const auto rest = things.subspan(kMostNamed);
+  const auto doubtful = std::ranges::count_if(rest, [](const auto& thing) { return thing.finding.contradicted(); });
+  return Cat(text, "; and ", rest.size(), " more", doubtful > 0 ? Cat(", ", doubtful, " of them doubtful") : "");
 }
 
 std::vector<std::string> ContradictionsOf(std::span<const ThingPixelSize> things) {
@@ -89,26 +103,29 @@ std::vector<std::string> ContradictionsOf(std::span<const ThingPixelSize> things
   return all;
 }
 
-PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const PixelSizeFinding& whole) {
+PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const PixelSizeFinding& whole, bool kinds) {
   const CloudComponents components = FindComponents(cloud);
-  if (components.count < 2) return {};
-  std::vector<std::vector<int64_t>> rows(static_cast<size_t>(components.count));
+  if (components.component.empty()) return {};
+  const auto looked_at = std::min(static_cast<size_t>(components.count), kMostThings);
+  std::vector<std::vector<int64_t>> rows(looked_at + 1);  // at last those of all others
   for (int64_t i = 0; i < cloud.size(); ++i) {
     if (!HasUsableShape(cloud, i)) continue;
-    rows[static_cast<size_t>(components.component[static_cast<size_t>(i)])].push_back(i);
+    const int32_t thing = components.component[static_cast<size_t>(i)];
+    rows[thing < 0 ? looked_at : std::min(static_cast<size_t>(thing), looked_at)].push_back(i);
   }
   PixelSizesOfThings out;
   std::vector<Extent> extents;
-  for (size_t k = 0; k < rows.size(); ++k) {
+  for (size_t k = 0; k < looked_at; ++k) {
     LeaveIfAbandoned();
     const GaussianCloud alone = ThingOf(cloud, rows[k]);
     extents.push_back(ExtentOf(alone));
-    // What is too small to be looked at gets what its regions bear.
-    PixelSizeFinding unknown;
-    unknown.size = whole.size;
-    unknown.contradictions = {"it is too small to tell"};
-    const auto found = k < kMostThings ? FindPixelSize(alone) : Result<PixelSizeFinding>(Error{});
-    out.things.push_back({std::ssize(rows[k]), found.ok() ? *found : std::move(unknown)});
+    ThingPixelSize thing{std::ssize(rows[k]), Unknown(whole, "its outlines say nothing")};
+    if (auto found = FindPixelSize(alone); found.ok()) thing.finding = *std::move(found);
+    if (kinds && IsWide(BesideTag(TrainedKindOf(FindShowingGaussians(alone).all), cloud.render_mode, alone.size()))) {
+      thing.finding = Unknown(whole, "it looks as if it had been enhanced already, or had lost no width, and stays");
+      thing.finding.size = kNothing * whole.size;
+    }
+    out.things.push_back(std::move(thing));
   }
 
   const auto all_like_whole = [&](double factor) {
@@ -116,11 +133,11 @@ PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const Pixe
       return !thing.finding.contradicted() && Alike(thing.finding.size, whole.size, factor);
     });
   };
-  if (all_like_whole(kSame)) return {};
+  // A few floaters are not worth a word.
+  const bool alone_matter = std::ssize(rows.back()) > static_cast<int64_t>(kFew * static_cast<double>(cloud.size()));
+  if (!alone_matter && all_like_whole(kSame)) return {};
   const bool one_training = all_like_whole(kAlike);
-  out.sizes.assign(static_cast<size_t>(cloud.size()), static_cast<float>(whole.size));
-  out.sure.assign(out.sizes.size(), 0);
-  for (size_t k = 0; k < rows.size(); ++k) {
+  for (size_t k = 0; k < looked_at; ++k) {
     PixelSizeFinding& finding = out.things[k].finding;
     if (std::ranges::any_of(extents, [&](const Extent& other) { return extents[k].HasInside(other); })) {
       finding.least = 0;
@@ -130,6 +147,20 @@ PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const Pixe
       finding.size = std::min(finding.size, whole.size);
       finding.least = std::min(finding.least, finding.size);
     }
+  }
+  PixelSizeFinding others = Unknown(whole, "these are pieces too small to tell, or lie by themselves");
+  if (static_cast<size_t>(components.count) > looked_at) {
+    others.contradictions = {Cat("these are of things beyond the ", kMostThings, " largest, or of pieces")};
+  }
+  for (const ThingPixelSize& thing : out.things) {
+    if (thing.finding.size > 2 * kNothing * whole.size) others.size = std::min(others.size, thing.finding.size);
+  }
+  out.things.push_back({std::ssize(rows.back()), std::move(others)});
+
+  out.sizes.assign(static_cast<size_t>(cloud.size()), static_cast<float>(kNothing * whole.size));
+  out.sure.assign(out.sizes.size(), 0);
+  for (size_t k = 0; k < out.things.size(); ++k) {
+    const PixelSizeFinding& finding = out.things[k].finding;
     const Buffer<float> own = finding.is_one() ? Buffer<float>(rows[k].size(), static_cast<float>(finding.size))
                                                : CautiousPixelSizes(ThingOf(cloud, rows[k]), finding);
     for (size_t i = 0; i < own.size(); ++i) {
@@ -138,6 +169,7 @@ PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const Pixe
       out.sure[row] = finding.contradicted() ? 0 : 1;
     }
   }
+  if (!alone_matter) out.things.pop_back();
   return out;
 }
 

@@ -18,13 +18,14 @@ struct ThingPixelSize {
 };
 
 struct PixelSizesOfThings {
-  std::vector<ThingPixelSize> things;  // the largest first; empty where one size is that of all
-  Buffer<float> sizes;                 // [N], world units; as empty
-  std::vector<char> sure;              // [N], 1: of things whose own estimate nothing contradicts; as empty
+  // The largest first, at last all that is not looked at; empty where one size is that of all.
+  std::vector<ThingPixelSize> things;
+  Buffer<float> sizes;     // [N], world units; as empty
+  std::vector<char> sure;  // [N], 1: of things whose own estimate nothing contradicts; as empty
 };
 
-// "2 things that lie apart, and each gets what its own outlines say of a training pixel: 80,000 Gaussians, 0.09 at most
-// (it lies around others); 20,000 Gaussians, 0.005"; the smaller ones of many are counted.
+// "2 things that lie apart, each with a training pixel of its own: 80,000 Gaussians, 0.09 at most (it lies around
+// others); 20,000 Gaussians, 0.005"; the smaller ones of many are counted.
 std::string InWords(std::span<const ThingPixelSize> things);
 std::vector<std::string> ContradictionsOf(std::span<const ThingPixelSize> things);
 
@@ -32,7 +33,9 @@ std::vector<std::string> ContradictionsOf(std::span<const ThingPixelSize> things
 // estimate for all of them would blur the finer ones, by whichever share of the Gaussians they are.
 // `whole`: FindPixelSize of the cloud. Where nothing contradicts that and the things say something like it, they may be
 // of one training, and each gets the smaller one of both; where they say the same, `whole` is right, and nothing is
-// found. What lies around other things has outlines that were not seen as such, and is treated with caution.
-PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const PixelSizeFinding& whole);
+// found. Treated with caution is what lies around other things, as its outlines were not seen as such, and what is too
+// small to tell. A thing that has lost no width stays as it is.
+// `kinds`: whether things are looked at for that; nobody has said how the splat was trained.
+PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const PixelSizeFinding& whole, bool kinds);
 
 }  // namespace anchorsplat

@@ -51,11 +51,17 @@ GaussianCloud Sky(int64_t count, double radius) {
 PixelSizesOfThings Find(const GaussianCloud& cloud) {
   const auto whole = FindPixelSize(cloud);
   EXPECT_TRUE(whole.ok());
-  return whole.ok() ? FindPixelSizesOfThings(cloud, *whole) : PixelSizesOfThings{};
+  return whole.ok() ? FindPixelSizesOfThings(cloud, *whole, true) : PixelSizesOfThings{};
 }
 
 std::span<const float> FirstOf(const Buffer<float>& sizes, const GaussianCloud& part) {
   return std::span(sizes).first(static_cast<size_t>(part.size()));
+}
+
+// But for a few floaters.
+void ExpectAll(std::span<const float> sizes, double truth, double tolerance = 0.1) {
+  const auto near = [&](float size) { return std::abs(double{size} - truth) < tolerance * truth; };
+  EXPECT_GE(std::ranges::count_if(sizes, near), std::ssize(sizes) * 99 / 100);
 }
 
 TEST(PixelSizesOfThings, EachGetsItsOwn) {
@@ -66,11 +72,9 @@ TEST(PixelSizesOfThings, EachGetsItsOwn) {
   ASSERT_EQ(found.things.size(), 2u);
   EXPECT_TRUE(ContradictionsOf(found.things).empty());
   ASSERT_EQ(std::ssize(found.sizes), cloud.size());
-  for (const float size : FirstOf(found.sizes, lantern)) ASSERT_NEAR(size, kPixelOfExamples, 0.1 * kPixelOfExamples);
-  for (const float size : std::span(found.sizes).subspan(static_cast<size_t>(lantern.size()))) {
-    ASSERT_NEAR(size, 3 * kPixelOfExamples, 0.3 * kPixelOfExamples);
-  }
-  EXPECT_EQ(std::ranges::count(found.sure, 1), cloud.size());
+  ExpectAll(FirstOf(found.sizes, lantern), kPixelOfExamples);
+  ExpectAll(std::span(found.sizes).subspan(static_cast<size_t>(lantern.size())), 3 * kPixelOfExamples);
+  EXPECT_GE(std::ranges::count(found.sure, 1), cloud.size() * 99 / 100);
 }
 
 // A twentieth of the Gaussians, so that no quantile of all sees it.
@@ -84,9 +88,43 @@ TEST(PixelSizesOfThings, HoweverFewTheyAre) {
   }
   const PixelSizesOfThings found = Find(cloud);
   ASSERT_EQ(found.things.size(), 13u);
-  for (const float size : FirstOf(found.sizes, lantern)) ASSERT_NEAR(size, kPixelOfExamples, 0.1 * kPixelOfExamples);
+  ExpectAll(FirstOf(found.sizes, lantern), kPixelOfExamples);
   EXPECT_NE(InWords(found.things).find("13 things that lie apart"), std::string::npos);
   EXPECT_NE(InWords(found.things).find("; and 9 more"), std::string::npos) << InWords(found.things);
+}
+
+// Too small to tell, and much finer than what lies beside it.
+TEST(PixelSizesOfThings, WhatIsTooSmallToTellIsNotBlurred) {
+  const GaussianCloud lantern = Placed("stone_lantern", 8, {8, 0, 0});
+  GaussianCloud small = Placed("biplane");
+  std::vector<int64_t> every;
+  for (int64_t i = 0; i < small.size(); i += 25) every.push_back(i);
+  small = Subset(small, every).value();
+  GaussianCloud cloud = small;
+  ASSERT_TRUE(Append(cloud, lantern).ok());
+  const PixelSizesOfThings found = Find(cloud);
+  ASSERT_EQ(found.things.size(), 2u);
+  EXPECT_GE(std::ranges::count(found.sure, 0), small.size() * 9 / 10);
+  const auto own = FirstOf(found.sizes, small);
+  EXPECT_LT(std::ranges::count_if(own, [](float size) { return size > 4 * kPixelOfExamples; }), small.size() / 10);
+  EXPECT_NE(ContradictionsOf(found.things).back().find("too small to tell"), std::string::npos);
+}
+
+// What has lost no width stays, whoever lies beside it, unless somebody says better.
+TEST(PixelSizesOfThings, WideOnesStay) {
+  GaussianCloud wide = Placed("biplane");
+  for (float& x : wide.log_scales) x = std::max(x, static_cast<float>(std::log(0.5 * kPixelOfExamples)));
+  GaussianCloud cloud = wide;
+  ASSERT_TRUE(Append(cloud, Placed("stone_lantern", 1, {2, 0, 0})).ok());
+  ASSERT_TRUE(Append(cloud, Placed("tankard", 1, {0, 3, 0})).ok());
+  const PixelSizesOfThings found = Find(cloud);
+  ASSERT_EQ(found.things.size(), 3u);
+  for (const float size : FirstOf(found.sizes, wide)) ASSERT_LT(size, 1e-6 * kPixelOfExamples);
+  const auto whole = FindPixelSize(cloud);
+  ASSERT_TRUE(whole.ok());
+  const PixelSizesOfThings said = FindPixelSizesOfThings(cloud, *whole, false);
+  const auto given_back = [](float size) { return size > 0.3 * kPixelOfExamples; };
+  EXPECT_GE(std::ranges::count_if(FirstOf(said.sizes, wide), given_back), wide.size() * 99 / 100);
 }
 
 TEST(PixelSizesOfThings, WhatLiesAroundIsTreatedWithCaution) {
@@ -95,11 +133,12 @@ TEST(PixelSizesOfThings, WhatLiesAroundIsTreatedWithCaution) {
   ASSERT_TRUE(Append(cloud, Sky(40'000, 10)).ok());
   const PixelSizesOfThings found = Find(cloud);
   ASSERT_EQ(found.things.size(), 2u);
-  for (const float size : FirstOf(found.sizes, biplane)) ASSERT_NEAR(size, kPixelOfExamples, 0.1 * kPixelOfExamples);
-  EXPECT_EQ(std::ranges::count(found.sure, 1), biplane.size());
+  ExpectAll(FirstOf(found.sizes, biplane), kPixelOfExamples);
+  EXPECT_GE(std::ranges::count(found.sure, 1), biplane.size() * 99 / 100);
+  EXPECT_LE(std::ranges::count(found.sure, 1), biplane.size());
   const std::vector<std::string> doubts = ContradictionsOf(found.things);
   ASSERT_FALSE(doubts.empty());
-  EXPECT_EQ(doubts.back(), "of 40,000 Gaussians that lie apart: it lies around others");
+  EXPECT_EQ(doubts.back(), "of 40,000 Gaussians that lie apart: it lies around others") << doubts.front();
 }
 
 // Black Gaussians around one of them say nothing about the other.
@@ -117,7 +156,7 @@ TEST(PixelSizesOfThings, BlackVeilsOfOneDoNotSpeakForTheOther) {
   ASSERT_TRUE(Append(cloud, veiled).ok());
   const PixelSizesOfThings found = Find(cloud);
   ASSERT_EQ(found.things.size(), 2u);
-  for (const float size : FirstOf(found.sizes, lantern)) ASSERT_NEAR(size, kPixelOfExamples, 0.1 * kPixelOfExamples);
+  ExpectAll(FirstOf(found.sizes, lantern), kPixelOfExamples);
 }
 
 TEST(PixelSizesOfThings, ThingsThatSayTheSameAreOfOneTraining) {
@@ -129,7 +168,7 @@ TEST(PixelSizesOfThings, ThingsThatSayTheSameAreOfOneTraining) {
   ASSERT_TRUE(Append(cloud, Placed("biplane", 1.35, {2, 0, 0})).ok());
   const auto whole = FindPixelSize(cloud);
   ASSERT_TRUE(whole.ok() && !whole->contradicted());
-  const PixelSizesOfThings found = FindPixelSizesOfThings(cloud, *whole);
+  const PixelSizesOfThings found = FindPixelSizesOfThings(cloud, *whole, true);
   ASSERT_EQ(found.things.size(), 2u);
   EXPECT_LE(std::ranges::max(found.sizes), static_cast<float>(whole->size));
   EXPECT_TRUE(Find(Placed("tankard")).things.empty());

@@ -27,7 +27,7 @@ Result<PixelSizeCheck> CheckPixelSize(const BenchmarkObject& object, bool with_s
   check.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEvidence evidence, GatherPixelSizeEvidence(object.low));
   check.unevenness = evidence.unevenness;
-  check.things = FindPixelSizesOfThings(object.low, {}).things;
+  check.things = FindPixelSizesOfThings(object.low, {}, true).things;
   ANCHORSPLAT_ASSIGN_OR_RETURN(PixelSizeProbe probe, PixelSizeProbe::Make(object.low));
   check.start = probe.start();
   for (int k = -kSamplesAside; with_samples && k <= kSamplesAside; ++k) {

@@ -72,7 +72,7 @@ Status LookAt(CloudBlocks& blocks, SplatFindings& findings) {
   GaussianCloud telling = showing.telling.cloud;
   telling.render_mode = mode;
   findings.pixel_size = FindPixelSize(std::move(showing), mode);
-  if (findings.pixel_size.ok()) findings.things = FindPixelSizesOfThings(telling, *findings.pixel_size).things;
+  if (findings.pixel_size.ok()) findings.things = FindPixelSizesOfThings(telling, *findings.pixel_size, true).things;
   findings.lost_width = FindLostWidth(said, beside_tag, kInfoUpscale);
   findings.problems = Problems(findings.statistics);
   return {};

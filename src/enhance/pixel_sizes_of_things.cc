@@ -24,8 +24,9 @@ constexpr size_t kMostThings = 16;
 constexpr double kSame = 1.15, kAlike = 1.5;
 constexpr double kNothing = 1e-12;  // of a pixel: none of the width that it would say
 constexpr double kFew = 0.005;
-constexpr size_t kMostNamed = 4;  // as one reads
-constexpr float kWithin = 0.02f;  // quantiles between which a thing lies
+constexpr double kNextToNone = 1e-6;  // of the largest: not worth a number
+constexpr size_t kMostNamed = 4;      // as one reads
+constexpr float kWithin = 0.02f;      // quantiles between which a thing lies
 
 // What is looked at of a thing: no harmonics but the constant.
 GaussianCloud ThingOf(const GaussianCloud& cloud, const std::vector<int64_t>& rows) {
@@ -78,10 +79,14 @@ bool Alike(double a, double b, double factor) { return a < factor * b && b < fac
 }  // namespace
 
 std::string InWords(std::span<const ThingPixelSize> things) {
+  if (things.empty()) return "";
   std::string text = Cat(things.size(), " things that lie apart, each with a training pixel of its own: ");
+  const double largest =
+      std::ranges::max(things, {}, [](const ThingPixelSize& thing) { return thing.finding.size; }).finding.size;
   for (const auto& [gaussians, finding] : things.first(std::min(things.size(), kMostNamed))) {
-    text += Cat(&finding == &things[0].finding ? "" : "; ", WithThousands(gaussians), " Gaussians, ", finding.size,
-                finding.least < finding.size ? " at most" : "");
+    text += Cat(&finding == &things[0].finding ? "" : "; ", WithThousands(gaussians), " Gaussians, ");
+    text += finding.size < kNextToNone * largest ? "next to none"
+                                                 : Cat(finding.size, finding.least < finding.size ? " at most" : "");
     for (const std::string& sentence : finding.contradictions) {
       text += Cat(&sentence == &finding.contradictions[0] ? " (" : ", and ", sentence);
     }

@@ -76,6 +76,9 @@ def _enhanced(row: dict) -> list[str]:
     return out
 
 
+_MOST_NAMED = 4  # as one reads
+
+
 def _pixel_size(row: dict) -> list[str]:
     size = row.get("pixel_size") or {}
     value, source = size.get("value"), size.get("source")
@@ -89,13 +92,15 @@ def _pixel_size(row: dict) -> list[str]:
     }
     things = size.get("things") or []
     if things:
-        of_each = ", ".join(f"{t['value']:.4g} ({_count(t['gaussians'])} Gaussians)" for t in things[:4])
-        more = f" and {len(things) - 4} more" if len(things) > 4 else ""
-        out = [f"The splat is made of {len(things)} things that lie apart; training pixels of {of_each}{more} were estimated."]
+        of_each = ", ".join(f"{t['value']:.4g} ({_count(t['gaussians'])} Gaussians)" for t in things[:_MOST_NAMED])
+        more = f" and {len(things) - _MOST_NAMED} more" if len(things) > _MOST_NAMED else ""
+        out = [f"The splat is made of {len(things)} things that lie apart, with training pixels of {of_each}{more}."]
     else:
         out = [known.get(source, f"The size of a training pixel is {value:.4g} world units ({source}).")]
-    for contradiction in size.get("contradictions") or []:
-        out.append(f"But {contradiction}.")
+    contradictions = list(dict.fromkeys(size.get("contradictions") or []))
+    out += [f"But {contradiction}." for contradiction in contradictions[:_MOST_NAMED]]
+    if len(contradictions) > _MOST_NAMED:
+        out.append(f"And {len(contradictions) - _MOST_NAMED} more doubts.")
     return out
 
 

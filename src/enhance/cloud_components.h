@@ -8,7 +8,7 @@
 namespace anchorsplat {
 
 // Things of a splat that lie apart, as of several splats that somebody merged, or of a subject before a sky. Each may
-// have been trained at pixels of its own. Of 22 fits and five captures none has more than one.
+// have been trained at pixels of its own. Of 71 fits and five captures none has more than one.
 struct CloudComponents {
   static constexpr int32_t kNone = -1;
 

@@ -48,6 +48,34 @@ TEST_F(InfoVerb, OfASplat) {
   EXPECT_NEAR(json["pixel_size"]["used"].get<double>(), 0.0055, 0.002);
 }
 
+// Two splats of different pixels that somebody merged.
+TEST_F(InfoVerb, OfThingsThatLieApart) {
+  auto small = ReadCloud(Biplane() / "input.ply");
+  ASSERT_TRUE(small.ok());
+  GaussianCloud merged = *small;
+  for (float& x : merged.means) x = 3 * x + 4;
+  for (float& x : merged.log_scales) x += std::log(3.0f);
+  ASSERT_TRUE(Append(merged, *small).ok());
+  const std::string input = folder_ / "merged.ply";
+  ASSERT_TRUE(WriteCloud(input, merged).ok());
+  EXPECT_THAT(ExpectDone({"info", input}).out, AllOf(HasSubstr("made of 2 things that lie apart"),
+                                                     Not(HasSubstr("doubtful")), Not(HasSubstr("smaller"))));
+  const nlohmann::json info = ExpectJson({"info", input})["pixel_size"];
+  EXPECT_EQ(info["contradictions"], nlohmann::json::array());
+  ASSERT_EQ(info["things"].size(), 2u);
+  const std::string output = folder_ / "out.ply";
+  const nlohmann::json enhanced = ExpectJson({"enhance", input, "-o", output, "--method", "filter"})[0];
+  EXPECT_EQ(enhanced["pixel_size"]["unsure"], false);
+  ASSERT_EQ(enhanced["pixel_size"]["things"].size(), 2u);
+  EXPECT_GE(enhanced["seconds_in_all"].get<double>(), enhanced["seconds"].get<double>());
+  for (const nlohmann::json& things : {info["things"], enhanced["pixel_size"]["things"]}) {
+    double sizes[2] = {things[0]["value"].get<double>(), things[1]["value"].get<double>()};
+    std::sort(sizes, sizes + 2);
+    EXPECT_NEAR(sizes[0], 0.0055, 0.0006);
+    EXPECT_NEAR(sizes[1], 3 * 0.0055, 0.0018);
+  }
+}
+
 TEST_F(InfoVerb, OfWhatFormatsSayAboutThemselves) {
   const std::string scan = WriteScan(folder_ / "scan.ply");
   for (const char* name : {"scan.spz", "scan.glb", "scan.sog"}) ExpectDone({"convert", scan, folder_ / name});

@@ -13,6 +13,7 @@
 #include "core/text.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
+#include "enhance/network_for_test.h"
 #include "enhance/pixel_size_estimate.h"
 #include "formats/cloud_io.h"
 
@@ -387,19 +388,7 @@ TEST_F(EnhanceDoor, ImpossibleCamerasOfAContradictedSplatAreNoWorseThanNone) {
 
 TEST_F(EnhanceDoor, ContradictedEstimateIsNotActedOn) {
   constexpr uint64_t kOnlyHere = 4711;
-  RegisterEnhanceMethod(
-      {.name = "network",
-       .summary = "of this test",
-       .rank = 100,
-       .adds_detail = true,
-       .options = WidthOptions(),
-       .ready =
-           [](const EnhanceOptions& o) {
-             return o.seed == kOnlyHere ? Status() : Status(Error{ErrorCode::kBadArgument, "not here"});
-           },
-       .run = [](EnhanceInput input, const EnhanceOptions&, StepReport&) -> Result<GaussianCloud> {
-         return std::move(input.cloud);
-       }});
+  RegisterNetworkForTest("network", kOnlyHere);
   const GaussianCloud cloud = BallInVeils();
   EnhanceOptions options;
   options.seed = kOnlyHere;
@@ -446,22 +435,12 @@ TEST_F(EnhanceDoor, UnevenSpacingsHaveNoOnePixel) {
 TEST_F(EnhanceDoor, ANetworkTakesTheThingsWhosePixelsAreKnown) {
   constexpr uint64_t kOnlyHere = 4712;
   static constexpr float kMark = 9;
-  RegisterEnhanceMethod(
-      {.name = "network",
-       .summary = "of this test",
-       .rank = 100,
-       .adds_detail = true,
-       .options = WidthOptions(),
-       .ready =
-           [](const EnhanceOptions& o) {
-             return o.seed == kOnlyHere ? Status() : Status(Error{ErrorCode::kBadArgument, "not here"});
-           },
-       .run = [](EnhanceInput input, const EnhanceOptions& o, StepReport&) -> Result<GaussianCloud> {
-         LeaveRegion(input);
-         std::ranges::fill(input.cloud.opacity_logits, kMark);
-         if (o.max_gaussians > 0 && o.max_gaussians < input.cloud.size()) input.cloud.Resize(o.max_gaussians, 0);
-         return std::move(input.cloud);
-       }});
+  RegisterNetworkForTest("network", kOnlyHere, [](EnhanceInput input, const EnhanceOptions& o) {
+    LeaveRegion(input);
+    std::ranges::fill(input.cloud.opacity_logits, kMark);
+    if (o.max_gaussians > 0 && o.max_gaussians < input.cloud.size()) input.cloud.Resize(o.max_gaussians, 0);
+    return std::move(input.cloud);
+  });
   constexpr int64_t kBall = 6000, kSky = 5000;
   GaussianCloud cloud = Ball(0.01, kBall), sky = Ball(0.01, kSky);
   for (float& x : sky.means) x *= 20;

@@ -125,10 +125,12 @@ PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const Pixe
     const GaussianCloud alone = ThingOf(cloud, rows[k]);
     extents.push_back(ExtentOf(alone));
     ThingPixelSize thing{std::ssize(rows[k]), Unknown(whole, "its outlines say nothing")};
-    if (auto found = FindPixelSize(alone); found.ok()) thing.finding = *std::move(found);
-    if (kinds && IsWide(BesideTag(TrainedKindOf(FindShowingGaussians(alone).all), cloud.render_mode, alone.size()))) {
+    ShowingGaussians showing = FindShowingGaussians(alone);
+    if (kinds && IsWide(BesideTag(TrainedKindOf(showing.all), cloud.render_mode, showing.all.size()))) {
       thing.finding = Unknown(whole, "it looks as if it had been enhanced already, or had lost no width, and stays");
       thing.finding.size = kNothing * whole.size;
+    } else if (auto found = FindPixelSize(std::move(showing), cloud.render_mode); found.ok()) {
+      thing.finding = *std::move(found);
     }
     out.things.push_back(std::move(thing));
   }

@@ -13,6 +13,7 @@
 #include "core/source_dir_for_test.h"
 #include "enhance/enhance.h"
 #include "enhance/filter.h"
+#include "enhance/network_for_test.h"
 #include "enhance/showing_gaussians.h"
 #include "formats/cloud_io.h"
 #include "io/folder_for_test.h"
@@ -287,19 +288,7 @@ TEST(TrainedKind, UnclearOnesGetLittle) {
   EXPECT_EQ(Judge(tails), TrainedKind::kClassic);
   // Not by a network, unless one is asked for.
   constexpr uint64_t kOnlyHere = 4712;
-  RegisterEnhanceMethod(
-      {.name = "network-of-kinds",
-       .summary = "of this test",
-       .rank = 100,
-       .adds_detail = true,
-       .options = WidthOptions(),
-       .ready =
-           [](const EnhanceOptions& o) {
-             return o.seed == kOnlyHere ? Status() : Status(Error{ErrorCode::kBadArgument, "not here"});
-           },
-       .run = [](EnhanceInput input, const EnhanceOptions&, StepReport&) -> Result<GaussianCloud> {
-         return std::move(input.cloud);
-       }});
+  RegisterNetworkForTest("network-of-kinds", kOnlyHere);
   EnhanceOptions options;
   options.seed = kOnlyHere;
   options.pixel_size = 0.01;

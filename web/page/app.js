@@ -208,7 +208,7 @@ function describe({info, name, bytes}) {
     const things = info.pixel_size.things ?? [];
     if (things.length > 0) {
       say(`It is made of ${things.length} things that lie apart, and each gets what its own outlines say. ` +
-        'The preview shows the smallest size for all.');
+        'The preview shows one size for all.');
     }
     if (contradictions.length > 0) {
       say(`That is unsure: ${contradictions.join('; ')}. So a smaller pixel is taken; look for yourself with the slider.`);

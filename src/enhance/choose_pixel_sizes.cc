@@ -73,8 +73,10 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
     const double ratio = found->size / from_cameras.median;
     // Whoever says a mode or a strength means these cameras.
     const bool said = options.filter_strength || IsGiven(options, "mode");
+    // An estimate that is unsure enough to allow for the cameras says nothing against them.
     const bool sharper = !found->contradicted() && !found->part && !IsCompensated(input.cloud.render_mode) &&
-                         found->largest < kSharperThanClassic * from_cameras.median;
+                         found->largest < kSharperThanClassic * from_cameras.median &&
+                         found->estimate.high < from_cameras.median;
     const double largest = std::max(found->largest, found->estimate.high);
     const bool impossible = from_cameras.median > kImpossible * largest;
     if (!said && (sharper || impossible)) {
@@ -153,9 +155,8 @@ void SayWhatWasFound(const PixelSizeFinding& found) {
           : "",
       found.closer > 0 ? "; where Gaussians lie much closer than elsewhere a smaller one is taken" : "");
   if (estimate.high > kVague * estimate.low) {
-    LogWarning(Cat(size,
-                   ". That is rough, and rather too small: this splat says little about the pixels it was trained at; ",
-                   kWillDoBetter));
+    LogWarning(
+        Cat(size, ". That is rough: this splat says little about the pixels it was trained at; ", kWillDoBetter));
     return;
   }
   LogInfo(Cat(size, ", and nothing else about the splat contradicts it; --cameras or --pixel-size make it exact"));

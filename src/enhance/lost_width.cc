@@ -14,6 +14,8 @@ std::string_view NameOf(LostWidthReason reason) {
       return "looks";
     case LostWidthReason::kUnclear:
       return "unclear";
+    case LostWidthReason::kRaised:
+      return "opacities raised";
     case LostWidthReason::kTooFew:
       return "too few Gaussians";
     case LostWidthReason::kFittedToAreas:
@@ -43,8 +45,9 @@ LostWidth FindLostWidth(const CloudView& cloud, std::optional<TrainedKind> looks
     if (!cloud.render_mode) return {0, enhanced ? LostWidthReason::kLooksEnhanced : LostWidthReason::kWidened};
     return {0, enhanced ? LostWidthReason::kEnhancedButTagged : LostWidthReason::kWidenedButTagged};
   }
-  if (cloud.render_mode) return {DefaultFilterStrength(upscale, cloud.render_mode), LostWidthReason::kTagged};
   const double little = DefaultFilterStrength(upscale, RenderMode::kAntialiased);
+  if (looks == TrainedKind::kRaised && cloud.render_mode != RenderMode::kMip) return {little, LostWidthReason::kRaised};
+  if (cloud.render_mode) return {DefaultFilterStrength(upscale, cloud.render_mode), LostWidthReason::kTagged};
   if (!looks) {
     // Of many Gaussians of which few show, as MCMC leaves them, nearly all are of classic fits.
     const bool many = cloud.size() >= kFewGaussians;

@@ -17,6 +17,7 @@ enum class LostWidthReason {
   kTagged,             // the file says how it was trained
   kSizes,              // its sizes say it
   kUnclear,            // they are like those of no kind: only a little, which harms none of them
+  kRaised,             // they were trained with lower opacities: likewise
   kTooFew,             // too few Gaussians to tell: taken for a classic one where there are kFewGaussians, else little
   kFittedToAreas,      // nothing was lost
   kMarkedEnhanced,     // nothing is lost any more
@@ -35,7 +36,10 @@ struct LostWidth {
   LostWidthReason reason = LostWidthReason::kSizes;
 
   // Of what is called likely nine in ten hold on every kind of fit (docs/results/recognised.md).
-  bool likely() const { return reason != LostWidthReason::kUnclear && reason != LostWidthReason::kTooFew; }
+  bool likely() const {
+    return reason != LostWidthReason::kUnclear && reason != LostWidthReason::kRaised &&
+           reason != LostWidthReason::kTooFew;
+  }
 };
 
 // `looks`: BesideTag of what the cloud looks like; nothing where the tag is to be believed. upscale ≥ 1.

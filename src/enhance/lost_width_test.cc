@@ -35,6 +35,12 @@ TEST(LostWidth, IsThatOfItsKindWithoutATag) {
   const LostWidth unclear = FindLostWidth(Tagged({}), TrainedKind::kUnclear, kUpscale);
   EXPECT_EQ(unclear.strength, antialiased.strength);
   EXPECT_FALSE(unclear.likely());
+  for (const auto tag : {std::optional<RenderMode>(), std::optional(RenderMode::kClassic)}) {
+    const LostWidth raised = FindLostWidth(Tagged(tag), TrainedKind::kRaised, kUpscale);
+    EXPECT_EQ(raised.strength, antialiased.strength);
+    EXPECT_EQ(raised.reason, LostWidthReason::kRaised);
+    EXPECT_FALSE(raised.likely());
+  }
   const LostWidth few = FindLostWidth(Tagged({}), {}, kUpscale);
   EXPECT_EQ(few.strength, antialiased.strength);
   EXPECT_FALSE(few.likely());

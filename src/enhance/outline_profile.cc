@@ -12,7 +12,7 @@ namespace {
 constexpr int kProfileRowsPerTask = 32;
 constexpr float kLeastGradient = 1e-4f;  // per pixel; flatter crossings are noise of a plateau
 constexpr int kStretch = 16;             // px
-constexpr float kCutShare = 0.2f;        // of alpha
+constexpr float kLeftOutShare = 0.2f;    // of alpha
 
 // Most of a picture is empty or opaque: false where a stretch of a row, with the pixels to its right and `below` it,
 // has neither a level nor a band.
@@ -27,7 +27,8 @@ bool MayShow(const float* at, int below) {
 static_assert(kOutlineBands.front() < kOutlineLevels.front() && kOutlineBands.back() > kOutlineLevels.back());
 }  // namespace
 
-void OutlineProfile::AddRows(const Image& alpha, double pixel, const float* cut, int first, int last, Sums& sums) {
+void OutlineProfile::AddRows(const Image& alpha, double pixel, const LeftOut& left_out, int first, int last,
+                             Sums& sums) {
   const int width = alpha.width;
   for (int y = first; y < last; ++y) {
     const float* const row = alpha.pixels.data() + int64_t{y} * width;
@@ -37,8 +38,12 @@ void OutlineProfile::AddRows(const Image& alpha, double pixel, const float* cut,
         x += kStretch - 1;
         continue;
       }
-      const bool left_out = cut != nullptr && cut[at - alpha.pixels.data()] > kCutShare * *at;
-      for (size_t b = 0; b + 1 < kOutlineBands.size() && !left_out; ++b) {
+      const auto index = at - alpha.pixels.data();
+      const float of_cut = left_out.cut == nullptr ? 0 : left_out.cut[index];
+      const float of_both = of_cut + (left_out.coarse == nullptr ? 0 : left_out.coarse[index]);
+      const bool counts = !(of_both > kLeftOutShare * *at);
+      int64_t& crossings = counts ? sums.crossings : of_cut > kLeftOutShare * *at ? sums.cut : sums.coarse;
+      for (size_t b = 0; b + 1 < kOutlineBands.size() && counts; ++b) {
         if (*at >= kOutlineBands[b] && *at < kOutlineBands[b + 1]) ++sums.pixels[b];
       }
       if (x < 1 || y < 1 || x + 2 >= width || y + 2 >= alpha.height) continue;
@@ -49,8 +54,8 @@ void OutlineProfile::AddRows(const Image& alpha, double pixel, const float* cut,
         for (const auto& [along, across] : {std::pair(1, width), std::pair(width, 1)}) {
           const float begin = at[0], end = at[along];
           if ((begin < value) == (end < value)) continue;
-          if (value == 0.5f) ++(left_out ? sums.left_out : sums.crossings);
-          if (left_out) continue;
+          if (value == 0.5f) ++crossings;
+          if (!counts) continue;
           const float t = (value - begin) / (end - begin);
           const float rise = 0.5f * ((1 - t) * (end - at[-along]) + t * (at[2 * along] - begin));
           const float aside =
@@ -65,10 +70,10 @@ void OutlineProfile::AddRows(const Image& alpha, double pixel, const float* cut,
   }
 }
 
-void OutlineProfile::Add(const Image& alpha, double pixel, const float* cut) {
+void OutlineProfile::Add(const Image& alpha, double pixel, const float* cut, const float* coarse) {
   std::vector<Sums> parts(static_cast<size_t>((alpha.height + kProfileRowsPerTask - 1) / kProfileRowsPerTask));
   ParallelFor(0, alpha.height, kProfileRowsPerTask, [&](int64_t first, int64_t last) {
-    AddRows(alpha, pixel, cut, static_cast<int>(first), static_cast<int>(last),
+    AddRows(alpha, pixel, {cut, coarse}, static_cast<int>(first), static_cast<int>(last),
             parts[static_cast<size_t>(first / kProfileRowsPerTask)]);
   });
   for (const Sums& part : parts) {
@@ -77,12 +82,11 @@ void OutlineProfile::Add(const Image& alpha, double pixel, const float* cut) {
     }
     for (size_t b = 0; b < areas_.size(); ++b) areas_[b] += static_cast<double>(part.pixels[b]) * pixel * pixel;
     length_ += static_cast<double>(part.crossings) * pixel;
-    left_out_ += static_cast<double>(part.left_out) * pixel;
+    cut_ += static_cast<double>(part.cut) * pixel;
+    coarse_ += static_cast<double>(part.coarse) * pixel;
   }
   last_pixel_ = pixel;
 }
-
-double OutlineProfile::LeftOut() const { return left_out_ > 0 ? left_out_ / (left_out_ + length_) : 0; }
 
 std::array<double, kOutlineValues> OutlineProfile::Values() const {
   std::array<double, kOutlineValues> out{};

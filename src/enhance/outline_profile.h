@@ -23,12 +23,14 @@ inline constexpr size_t kOutlineValues = kOutlineLevels.size() * kOutlineQuantil
 class OutlineProfile {
  public:
   // Adds a picture, [1,H,W] or the first channel of one, whose pixels have the side `pixel` in units of the length. The
-  // outermost pixels only serve differences. Bit-identical for any number of threads. `cut`: [H,W], how much of alpha
-  // is of Gaussians that were cut; what they have a fifth of is left out.
-  void Add(const Image& alpha, double pixel, const float* cut = nullptr);
+  // outermost pixels only serve differences. Bit-identical for any number of threads. `cut`, `coarse`: [H,W], how much
+  // of alpha is of Gaussians that were cut, and of others that are coarse; what they have a fifth of is left out.
+  void Add(const Image& alpha, double pixel, const float* cut = nullptr, const float* coarse = nullptr);
 
-  // Share of the outlines, by their length at ½, that was left out.
-  double LeftOut() const;
+  // Share of the outlines, by their length at ½, that was left out because of those that were cut, and because of the
+  // coarse ones alone.
+  double Cut() const { return ShareOf(cut_); }
+  double Coarse() const { return ShareOf(coarse_); }
 
   // Natural logarithms: per level the quantiles of the widths, then per band area / (length of the outline at ½ × width
   // of the band). 0 for a level that is crossed nowhere; areas and lengths have one pixel more than there are, so that
@@ -44,13 +46,18 @@ class OutlineProfile {
     std::array<std::array<double, kBins>, kOutlineLevels.size()> widths{};  // weights
     std::array<int64_t, kOutlineBands.size() - 1> pixels{};                 // per band
     int64_t crossings = 0;                                                  // of ½
-    int64_t left_out = 0;                                                   // of those, not counted
+    int64_t cut = 0, coarse = 0;                                            // left out
   };
-  static void AddRows(const Image& alpha, double pixel, const float* cut, int first, int last, Sums& sums);
+  struct LeftOut {
+    const float* cut;
+    const float* coarse;
+  };
+  static void AddRows(const Image& alpha, double pixel, const LeftOut& left_out, int first, int last, Sums& sums);
+  double ShareOf(double length) const { return length > 0 ? length / (cut_ + coarse_ + length_) : 0; }
 
   std::array<std::array<double, kBins>, kOutlineLevels.size()> widths_{};
   std::array<double, kOutlineBands.size() - 1> areas_{};
-  double length_ = 0, left_out_ = 0, last_pixel_ = 1;
+  double length_ = 0, cut_ = 0, coarse_ = 0, last_pixel_ = 1;
 };
 
 }  // namespace anchorsplat

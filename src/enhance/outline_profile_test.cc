@@ -77,8 +77,8 @@ TEST(OutlineProfile, WhatWasCutIsLeftOut) {
   OutlineProfile whole, sharp;
   whole.Add(both, 1);
   sharp.Add(both, 1, cut.data());
-  EXPECT_EQ(whole.LeftOut(), 0);
-  EXPECT_NEAR(sharp.LeftOut(), 0.5, 0.01);
+  EXPECT_EQ(whole.Cut(), 0);
+  EXPECT_NEAR(sharp.Cut(), 0.5, 0.01);
   const auto values = sharp.Values();
   for (size_t k = 0; k < kFirstBand; ++k) EXPECT_NEAR(values[k], std::log(16.0), 0.06) << k;
   double area = 0;
@@ -86,7 +86,16 @@ TEST(OutlineProfile, WhatWasCutIsLeftOut) {
     area += std::exp(values[kFirstBand + b]) * double{kOutlineBands[b + 1] - kOutlineBands[b]};
   }
   EXPECT_NEAR(area, 16, 1);
-  EXPECT_EQ(OutlineProfile().LeftOut(), 0);
+  EXPECT_EQ(OutlineProfile().Cut(), 0);
+  // Coarse ones likewise; what both have counts as cut.
+  OutlineProfile coarse, all;
+  coarse.Add(both, 1, nullptr, cut.data());
+  EXPECT_EQ(coarse.Cut(), 0);
+  EXPECT_NEAR(coarse.Coarse(), 0.5, 0.01);
+  EXPECT_EQ(coarse.Values(), values);
+  all.Add(both, 1, cut.data(), cut.data());
+  EXPECT_NEAR(all.Cut(), 0.5, 0.01);
+  EXPECT_LT(all.Coarse(), 0.5);
 }
 
 // The same from the definition, without histograms.

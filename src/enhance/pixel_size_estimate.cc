@@ -131,8 +131,13 @@ double Share(double strangeness, double none, double all) {
 
 PixelSizeEstimate EstimateOf(const Settled& settled, double unlike_standard, const PixelSizeProbe& probe, Look look) {
   const double size = std::exp(settled.log_size), spread = std::exp(settled.half);
-  return PixelSizeEstimate{
-      size, size / spread, size * spread, unlike_standard, probe.showing(), probe.CutOutlines(size, look)};
+  return PixelSizeEstimate{size,
+                           size / spread,
+                           size * spread,
+                           unlike_standard,
+                           probe.showing(),
+                           probe.CutOutlines(size, look),
+                           probe.CoarseOutlines(size, look)};
 }
 
 // Outlines of antialiased fits are narrower than those of classic ones.

@@ -24,6 +24,8 @@ struct PixelSizeEstimate {
   double showing = 1;  // PixelSizeProbe::showing()
   // Share of its outlines that are cuts and do not count: PixelSizeProbe::CutOutlines().
   double cut_outlines = 0;
+  // The same of those that Gaussians make which are much coarser than the others: PixelSizeProbe::CoarseOutlines().
+  double coarse_outlines = 0;
 };
 
 // Scales with the cloud. Takes up to a second, for large clouds too, as only a part of them is looked at.

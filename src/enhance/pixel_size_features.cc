@@ -1,6 +1,7 @@
 #include "enhance/pixel_size_features.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -13,6 +14,7 @@
 #include "core/parallel.h"
 #include "core/run_context.h"
 #include "core/spherical_harmonics.h"
+#include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/cuts.h"
 #include "enhance/showing_gaussians.h"
@@ -31,6 +33,9 @@ constexpr double kMostSteps = 12;  // either way from the start
 // Brightness, that of the constant colour's brightest channel, up to which a Gaussian counts as unseen over black, and
 // from which on as seen.
 constexpr float kUnseen = 0.02f, kSeen = 0.1f;
+// Times the median footprint. Nothing that was fitted to an object alone has more than 0.02 of its outlines of such
+// Gaussians; from five on some photographs have.
+constexpr float kCoarse = 6;
 constexpr std::array<double, 4> kSizeQuantiles = {0.1, 0.25, 0.5, 0.75};
 
 // Value at which `share` of the total weight is reached. `items` are (value, weight).
@@ -57,14 +62,39 @@ void ShowBrightness(GaussianCloud& cloud) {
   }
 }
 
-// Instead of green: whether it was cut.
-void MarkCut(GaussianCloud& cloud, std::span<const Cut> cuts) {
+// ln √(largest × middle axis).
+float LogFootprint(const GaussianCloud& cloud, int64_t i) {
+  const float* const scales = cloud.log_scales.data() + 3 * i;
+  const float least = std::min({scales[0], scales[1], scales[2]});
+  return 0.5f * (scales[0] + scales[1] + scales[2] - least);
+}
+
+// LogFootprint from which on a Gaussian is coarse among the others.
+float LogCoarse(const GaussianCloud& cloud) {
+  Buffer<float> showing;
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    if (Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) < kShowingOpacity) continue;
+    if (const float footprint = LogFootprint(cloud, i); std::isfinite(footprint)) showing.push_back(footprint);
+  }
+  return showing.empty() ? std::numeric_limits<float>::infinity() : Quantile(showing, 0.5) + std::log(kCoarse);
+}
+
+// Instead of green: whether it was cut; instead of blue: whether it is coarse.
+bool MarkLeftOut(GaussianCloud& cloud, std::span<const Cut> cuts) {
+  const float coarse = LogCoarse(cloud);
+  std::atomic<bool> any = false;
   ParallelFor(0, cloud.size(), 4096, [&](int64_t first, int64_t last) {
+    bool found = false;
     for (int64_t i = first; i < last; ++i) {
-      const bool cut = std::ranges::any_of(cuts, [&](const Cut& c) { return c.Depth(cloud, i) < kCutReach; });
-      cloud.sh[static_cast<size_t>(3 * i + 1)] = ((cut ? 1.0f : 0.0f) - 0.5f) / kSh0;
+      const bool is_cut = std::ranges::any_of(cuts, [&](const Cut& c) { return c.Depth(cloud, i) < kCutReach; });
+      const bool is_coarse = !is_cut && LogFootprint(cloud, i) > coarse;
+      cloud.sh[static_cast<size_t>(3 * i + 1)] = ((is_cut ? 1.0f : 0.0f) - 0.5f) / kSh0;
+      cloud.sh[static_cast<size_t>(3 * i + 2)] = ((is_coarse ? 1.0f : 0.0f) - 0.5f) / kSh0;
+      found = found || is_cut || is_coarse;
     }
+    if (found) any = true;
   });
+  return any;
 }
 
 // √(largest × middle axis) of their 10 % quantiles over the visible Gaussians, weighted by opacity × area (product of
@@ -131,8 +161,7 @@ Result<PixelSizeProbe> PixelSizeProbe::Make(TellingGaussians telling) {
   std::vector<Cut> cuts = FindCuts(probe.cloud_);
   if (telling.reach) cuts.push_back({.ball = true, .direction = framing.target, .reach = *telling.reach});
   ShowBrightness(probe.cloud_);
-  probe.cut_ = !cuts.empty();
-  if (probe.cut_) MarkCut(probe.cloud_, cuts);
+  probe.left_out_ = MarkLeftOut(probe.cloud_, cuts);
   const std::optional<double> start = AxisOfSmallGaussians(probe.cloud_);
   if (!start) {
     return Error{ErrorCode::kBadArgument,
@@ -163,26 +192,29 @@ Result<PixelSizeProbe::OutlineValues> PixelSizeProbe::AtStep(int step, Look look
   for (Camera& camera : cameras_.cameras) {
     camera.intrinsics.fx = camera.intrinsics.fy = distance_ / pixel;
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud_, camera, options, output_));
-    // Of colours, the first channel is looked at; the second is how much of a pixel the cut Gaussians make.
-    const float* cut = cut_ ? output_.color.pixels.data() + output_.alpha.pixels.size() : nullptr;
-    profile.Add(look == Look::kOverBlack ? output_.color : output_.alpha, pixel / size, cut);
+    // Of colours, the first channel is looked at; the others are how much of a pixel cut and coarse Gaussians make.
+    const size_t channel = output_.alpha.pixels.size();
+    const float* cut = left_out_ ? output_.color.pixels.data() + channel : nullptr;
+    profile.Add(look == Look::kOverBlack ? output_.color : output_.alpha, pixel / size, cut,
+                left_out_ ? cut + channel : nullptr);
   }
-  return (known_[{look, step}] = {profile.Values(), profile.LeftOut()}).values;
+  return (known_[{look, step}] = {profile.Values(), profile.Cut(), profile.Coarse()}).values;
 }
 
 double PixelSizeProbe::StepOf(double size) const {
   return std::clamp(std::log2(size / start_) / kOctavesPerStep, -kMostSteps, kMostSteps);
 }
 
-double PixelSizeProbe::CutOutlines(double size, Look look) const {
+PixelSizeProbe::Seen PixelSizeProbe::NearestTo(double size, Look look) const {
   const double at = StepOf(size);
-  double nearest = std::numeric_limits<double>::infinity(), share = 0;
+  double nearest = std::numeric_limits<double>::infinity();
+  Seen nearest_seen;
   for (const auto& [key, seen] : known_) {
     if (key.first != look || std::abs(key.second - at) >= nearest) continue;
     nearest = std::abs(key.second - at);
-    share = seen.cut_outlines;
+    nearest_seen = seen;
   }
-  return share;
+  return nearest_seen;
 }
 
 Result<PixelSizeProbe::OutlineValues> PixelSizeProbe::ProfileAt(double size, Look look) {

@@ -45,8 +45,10 @@ using SizeFeatures = std::array<double, kSizeFeatures>;
 class PixelSizeProbe {
  public:
   // Only Gaussians near the middle of the cloud and small beside it are looked at, and at most 200,000 of them.
-  // Outlines where the cloud was cut are left out. kBadArgument: fewer than kLeastGaussians of them have an opacity of
-  // 10 % or more and three positive scales.
+  // Outlines where the cloud was cut are left out, and those of Gaussians more than six times as coarse as the others
+  // (√(largest × middle axis), median of those that show): a ground, walls, clutter around the object that no picture
+  // shows. In fits of objects alone next to none of their outlines are of such ones. kBadArgument: fewer than
+  // kLeastGaussians of them have an opacity of 10 % or more and three positive scales.
   static Result<PixelSizeProbe> Make(const GaussianCloud& cloud);
   static Result<PixelSizeProbe> Make(TellingGaussians telling);
 
@@ -61,7 +63,9 @@ class PixelSizeProbe {
   // Share of the cloud's outlines, by their length in pictures of pixels of about `size` (of those that were made),
   // that are there because it was cut (cuts.h): by people, or here, where only the middle of a large cloud is looked
   // at. Those outlines count nowhere.
-  double CutOutlines(double size, Look look = Look::kAlpha) const;
+  double CutOutlines(double size, Look look = Look::kAlpha) const { return NearestTo(size, look).cut_outlines; }
+  // The same of those that are only left out because coarse Gaussians made them.
+  double CoarseOutlines(double size, Look look = Look::kAlpha) const { return NearestTo(size, look).coarse_outlines; }
 
   // The features of pixels of `size` (world units at the middle of the cloud). Pictures are made at half octaves from
   // start(), within six octaves, and only once; between them the logarithms are linear. Lengths scale with the cloud:
@@ -74,11 +78,12 @@ class PixelSizeProbe {
  private:
   using OutlineValues = std::array<double, kOutlineValues>;
   struct Seen {
-    OutlineValues values;
-    double cut_outlines;
+    OutlineValues values{};
+    double cut_outlines = 0, coarse_outlines = 0;
   };
   PixelSizeProbe() = default;
   double StepOf(double size) const;
+  Seen NearestTo(double size, Look look) const;
   Result<OutlineValues> AtStep(int step, Look look);
   Result<OutlineValues> ProfileAt(double size, Look look);
 
@@ -86,7 +91,7 @@ class PixelSizeProbe {
   CameraSet cameras_;
   double start_ = 0, distance_ = 0;
   double showing_ = 1;
-  bool cut_ = false;           // the second channel of cloud_ is 1 where a Gaussian was cut
+  bool left_out_ = false;  // the second channel of cloud_ is 1 where a Gaussian was cut, the third where it is coarse
   double farthest_pixel_ = 0;  // world size of a picture's pixel where the whole cloud is in it; none is larger
   Rasterizer rasterizer_;
   RenderOutput output_;

@@ -30,8 +30,9 @@ constexpr int64_t kGuardSamples = 256;  // of the spacing; its median is good to
 // are 0.1 to 1.3 on a pixel, most where thin things were seen in few, and 2.0 in one of 82,000 from random points; many
 // Gaussians come of many pixels, on which they stand sparsely. An estimate that is k times too large says k² times as
 // many. Where most Gaussians show, fits of known pixels have half as many at most (0.48 times the bound, of 100 fits):
-// what is dense there is a capture that others have thinned out.
-constexpr double kCrowded = 48'000, kCrowdedShowing = 25'000;
+// what is dense there is a capture that others have thinned out. Where fewer than half do, dense fits from random
+// points have up to twice the bound (69,000 of them at 200²: 2.4).
+constexpr double kCrowded = 80'000, kCrowdedShowing = 25'000;
 constexpr double kFaintShowing = 0.45, kMostlyShowing = 0.6;  // shares that show, between which the bound changes
 constexpr double kMostCrowded = 2.5, kNeverCrowded = 0.35;
 // How many Gaussians there were before it was cut is not known: parts of captures are at 0.57 and more, of fits of
@@ -41,7 +42,7 @@ constexpr double kCrowdedPart = 0.55, kPart = 0.1;
 // Where a splat was cut, insides that no picture showed become outlines. Pixels of parts are taken smaller by this
 // times the share of the outlines that do not count; ln.
 constexpr double kPartCaution = 0.3;
-// Where hardly an outline is left that is not a cut's, the rest says nothing.
+// Where hardly an outline is left that is not a cut's or of coarse Gaussians, the rest says nothing.
 constexpr double kNothingButCuts = 0.9;
 // 90 % over 10 % quantile of the spacings of 512: two things of different size, or a subject and what is far behind it,
 // fitted to pixels of different size. At most 2.4 in 69 fits (2.3 in standard ones) and 2.5 in captures; 2.5 to 2.9
@@ -233,10 +234,16 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
                   WithThousands(evidence.gaussians), evidence.gaussians >= int64_t{kMostShowing} ? " and more" : "",
                   " keep at most ", Number(most)));
   }
+  const double outlines_left = 1 - estimate.cut_outlines - estimate.coarse_outlines;
   if (estimate.cut_outlines > kNothingButCuts) {
     finding.contradictions.push_back(
         Cat(Fixed(100 * estimate.cut_outlines, 0),
             " % of its outlines look as if a part had been cut off there, and say nothing about pixels"));
+  } else if (outlines_left < 1 - kNothingButCuts) {
+    finding.contradictions.push_back(
+        Cat(Fixed(100 * (1 - outlines_left), 0),
+            " % of its outlines are of Gaussians that are much coarser than the others, or look as if a part had been "
+            "cut off there, and say nothing about pixels"));
   }
   const bool uneven = evidence.unevenness > kUneven;
   if (uneven) {
@@ -263,7 +270,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     if (crowd_alone) least = estimate.size * std::pow(most / crowd, kCrowdedFall);
     // Without its black Gaussians the outlines say a size, too; it counts where nothing contradicts that one.
     const double without = evidence.without_black;
-    const bool one_pixel = !uneven && estimate.cut_outlines <= kNothingButCuts;
+    const bool one_pixel = !uneven && outlines_left >= 1 - kNothingButCuts;
     if (without > 0 && one_pixel && crowd_at(without) <= most && evidence.small_axis >= kSmallestAxis * without) {
       least = std::max(least, without);
     }

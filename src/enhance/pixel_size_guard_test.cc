@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -213,6 +214,39 @@ TEST(PixelSizeGuard, FineGaussiansAmongCoarseOnesStay) {
   EXPECT_LT(std::ranges::count_if(own, LargerThan(0.6 * kTruth)), std::ssize(own) / 10);
 }
 
+// A ground of a few large Gaussians, or clutter around an object, says nothing about the object's pixels.
+TEST(PixelSizeGuard, OutlinesOfCoarseGaussiansDoNotCount) {
+  const GaussianCloud subject = Example("stone_lantern");
+  for (const int64_t count : {200, 500, 1000}) {
+    GaussianCloud ground;
+    ground.Resize(count, 0);
+    Random random(static_cast<uint64_t>(count));
+    for (int64_t i = 0; i < count; ++i) {
+      float* const at = ground.means.data() + 3 * i;
+      at[0] = static_cast<float>(random.Uniform(-2, 2));
+      at[1] = -0.53f;  // the lantern ends at −0.5
+      at[2] = static_cast<float>(random.Uniform(-2, 2));
+      float* const scales = ground.log_scales.data() + 3 * i;
+      scales[0] = scales[2] = std::log(0.1f);
+      scales[1] = std::log(0.002f);
+      std::copy_n(std::array{1.0f, 0.0f, 0.0f, 0.0f}.data(), 4, ground.quats.data() + 4 * i);
+    }
+    std::ranges::fill(ground.opacity_logits, 3.0f);
+    std::ranges::fill(ground.sh, 0.5f);
+    GaussianCloud cloud = subject;
+    std::erase_if(cloud.comments, [](const std::string&) { return true; });
+    ASSERT_TRUE(Append(cloud, ground).ok());
+    const auto found = FindPixelSize(cloud);
+    ASSERT_TRUE(found.ok()) << found.error().message;
+    EXPECT_GT(found->estimate.coarse_outlines, 0.3) << "a test of nothing";
+    EXPECT_LT(found->size, 1.2 * kTruth) << count;
+    EXPECT_GT(found->size, 0.8 * kTruth) << count;
+  }
+  const auto alone = FindPixelSize(subject);
+  ASSERT_TRUE(alone.ok()) << alone.error().message;
+  EXPECT_LT(alone->estimate.coarse_outlines, 0.02);
+}
+
 // Fitted to pixels of different size; the estimate is that of the larger one.
 TEST(PixelSizeGuard, OneThingBesideAnotherThatIsThreeTimesAsLarge) {
   for (const float scale : {1.0f, 3.0f}) {
@@ -360,6 +394,14 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   uneven.unevenness = 2.6;
   EXPECT_FALSE(Judge(estimate, uneven).no_one_pixel);
   PixelSizeEstimate of_cuts = estimate;
+  of_cuts.coarse_outlines = 0.95;
+  ASSERT_TRUE(Judge(of_cuts, plain).contradicted());
+  EXPECT_NE(Judge(of_cuts, plain).contradictions[0].find("95 % of its outlines are of Gaussians that are much coarser"),
+            std::string::npos);
+  of_cuts.coarse_outlines = 0.8;
+  EXPECT_FALSE(Judge(of_cuts, plain).contradicted());
+  EXPECT_FALSE(Judge(of_cuts, plain).part) << "coarse Gaussians are no cuts";
+  of_cuts.coarse_outlines = 0;
   of_cuts.cut_outlines = 0.95;
   black.without_black = 0.005;
   EXPECT_EQ(Judge(of_cuts, black).least, 0) << "nor is it where the outlines are cuts";

@@ -15,12 +15,14 @@ namespace anchorsplat {
 // a long tail. An antialiased one makes a Gaussian that is thinner than a pixel along two axes fainter, by the product
 // of both, until it is gone: middle axes end somewhat below the pixel, and the thinnest Gaussians are as opaque as can
 // be. Where a width has been added to all axes, by Mip-Splatting's 3-D filter or by enhancing, the smallest axes end at
-// that width. What a network has enhanced has its Gaussians in twins.
+// that width. What a network has enhanced has its Gaussians in twins. Opacities that were raised since, or set
+// to one, make everything wider than it was trained: little of the width that was lost is missing then.
 enum class TrainedKind {
   kClassic,
   kAntialiased,
   kWidened,   // Mip-Splatting, or filtered: has all its width
   kEnhanced,  // by a network (enhance/enhanced_look.h): likewise
+  kRaised,    // somebody has raised the opacities of what was trained
   kUnclear,   // between these: like a splat that another program has changed
 };
 
@@ -38,6 +40,10 @@ struct SizeTails {
   double roundness = 0;   // the 5 % quantile of the smallest axis over that of the middle one
   double opaque = 0;      // the share of opacities above 0.95 among the tenth of least middle × largest axis
   double faint = 0;       // the share of opacities below 0.3 among all that show
+  double cut_off = 0;     // the share of the smallest axes that a format cut off
+  // Opacities were raised: hardly one is faint, and they do not begin all at once either, as where somebody has thrown
+  // the faint ones away.
+  bool raised = false;
 };
 SizeTails SizeTailsOf(const GaussianCloud& showing);  // of ShowingGaussians::all
 
@@ -51,8 +57,8 @@ std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing);
 
 // What of that counts beside a tag. Trainers that know no other mode tag everything classic, and formats that have no
 // word for Mip-Splatting or for what has been enhanced tag it antialiased: where the Gaussians have a width all the
-// same, they are believed. Classic fits of few, large Gaussians look so, too, and a `mip` tag says it itself: nothing.
-// `showing`: how many Gaussians it was seen of.
+// same, they are believed, and where opacities were raised. Classic fits of few, large Gaussians look so, too, and a
+// `mip` tag says it itself: nothing. `showing`: how many Gaussians it was seen of.
 std::optional<TrainedKind> BesideTag(std::optional<TrainedKind> kind, std::optional<RenderMode> tag, int64_t showing);
 
 // Has all its width.

@@ -186,6 +186,43 @@ TEST(TrainedKind, WhatNoTrainingLeavesIsUnclear) {
   EXPECT_EQ(FindTrainedKind(pruned), TrainedKind::kUnclear);
 }
 
+// Opacities that somebody raised make all Gaussians wider than they were trained. Without the faint ones a splat only
+// has fewer.
+TEST(TrainedKind, RaisedOpacitiesAreSeen) {
+  const GaussianCloud trained = Example("stone_lantern");
+  const auto changed = [&](auto&& change) {
+    GaussianCloud cloud = trained;
+    for (float& logit : cloud.opacity_logits) logit = change(logit);
+    return FindTrainedKind(cloud);
+  };
+  EXPECT_EQ(changed([](float x) { return x; }), TrainedKind::kClassic);
+  EXPECT_EQ(changed([](float) { return 20.0f; }), TrainedKind::kRaised);
+  EXPECT_EQ(changed([](float x) { return x + 3; }), TrainedKind::kRaised);
+  EXPECT_EQ(changed([](float x) { return std::max(x, 2.0f); }), TrainedKind::kRaised);
+  EXPECT_EQ(changed([](float x) { return x + 0.5f; }), TrainedKind::kClassic);
+  EXPECT_EQ(changed([](float x) { return x < -0.85f ? -20.0f : x; }), TrainedKind::kClassic) << "pruned";
+  EXPECT_EQ(changed([](float x) { return x < 1.0f ? -20.0f : x; }), TrainedKind::kClassic) << "pruned";
+  // Whatever the tag, but for that of Mip-Splatting, which has all its width anyway.
+  EXPECT_EQ(BesideTag(TrainedKind::kRaised, RenderMode::kClassic, 5000), TrainedKind::kRaised);
+  EXPECT_EQ(BesideTag(TrainedKind::kRaised, RenderMode::kAntialiased, 500), TrainedKind::kRaised);
+  EXPECT_EQ(BesideTag(TrainedKind::kRaised, {}, 5000), TrainedKind::kRaised);
+  EXPECT_EQ(BesideTag(TrainedKind::kRaised, RenderMode::kMip, 5000), std::nullopt);
+}
+
+// SPZ has no lengths below e^−10: of the examples it cuts off a tenth and more of the smallest axes.
+TEST(TrainedKind, ExamplesThroughSpzAreClassic) {
+  const TestFolder folder;
+  for (const char* object : {"biplane", "stone_lantern", "tankard"}) {
+    GaussianCloud cloud = Example(object);
+    cloud.render_mode.reset();
+    ASSERT_TRUE(WriteCloud(folder / "a.spz", cloud, {.overwrite = true}).ok());
+    const auto read = ReadCloud(folder / "a.spz");
+    ASSERT_TRUE(read.ok()) << read.error().message;
+    EXPECT_GT(FindSizeTails(*read).cut_off, 0.05) << "a test of nothing";
+    EXPECT_EQ(FindTrainedKind(*read), TrainedKind::kClassic) << object;
+  }
+}
+
 TEST(TrainedKind, TooFewOrBrokenOnes) {
   EXPECT_EQ(FindTrainedKind({}), std::nullopt);
   EXPECT_EQ(FindTrainedKind(Made(0, 0.3, 150)), std::nullopt);

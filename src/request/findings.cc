@@ -114,6 +114,8 @@ std::string_view InWords(const std::optional<TrainedKind>& kind) {
       return "like one of Mip-Splatting, or enhanced already";
     case TrainedKind::kEnhanced:
       return "like one that a network has enhanced already";
+    case TrainedKind::kRaised:
+      return "like one whose opacities have been raised since";
     case TrainedKind::kUnclear:
       return "neither like a classic nor an antialiased one, or changed since";
     default:
@@ -251,6 +253,7 @@ nlohmann::json ToJson(const SplatFindings& f) {
         {"high", f.pixel_size->estimate.high},
         {"contradictions", f.things.empty() ? f.pixel_size->contradictions : ContradictionsOf(f.things)},
         {"cut_outlines", f.pixel_size->estimate.cut_outlines},
+        {"coarse_outlines", f.pixel_size->estimate.coarse_outlines},
         {"used", f.pixel_size->size}};
     if (!f.things.empty()) json["pixel_size"]["things"] = ToJson(f.things);
   }

@@ -53,7 +53,7 @@ class EnhanceDoor : public testing::Test {
 GaussianCloud Ball(double pixel, int64_t n = 6000) {
   GaussianCloud cloud;
   cloud.Resize(n, 0);
-  Random random(11);
+  Random random(11), opacities(12);
   const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
   const double spacing = std::sqrt(4 * std::numbers::pi * 0.25 / static_cast<double>(n));  // radius one half
   for (size_t i = 0; i < static_cast<size_t>(n); ++i) {
@@ -74,7 +74,7 @@ GaussianCloud Ball(double pixel, int64_t n = 6000) {
     if (i % 16 == 0) eroded *= random.Uniform(0.01, 1);  // fits shrink some to nothing
     cloud.log_scales[3 * i] = cloud.log_scales[3 * i + 1] = static_cast<float>(std::log(eroded));
     cloud.log_scales[3 * i + 2] = -9;
-    cloud.opacity_logits[i] = 2.9f;  // 0.948
+    cloud.opacity_logits[i] = i % 4 == 1 ? static_cast<float>(opacities.Uniform(-2, 2.9)) : 2.9f;  // 0.948
     for (size_t c = 0; c < 3; ++c) cloud.sh[3 * i + c] = static_cast<float>(random.Uniform(-1, 1));
   }
   return cloud;

@@ -315,23 +315,23 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   crowded.spacing = 0.007;
   EXPECT_FALSE(Judge(estimate, crowded).contradicted());
   crowded.gaussians = 100'000;
-  crowded.spacing = 0.012;  // 0.7
+  crowded.spacing = 0.0105;  // 0.9
   EXPECT_TRUE(Judge(estimate, crowded).contradicted());
 
-  // Hardly above the bound of 2.4 on a pixel, it makes pixels a little smaller; far above it, harmless.
+  // Hardly above the bound of 2.5 on a pixel, it makes pixels a little smaller; far above it, harmless.
   crowded = plain;
   crowded.harmless = 0.0007;
-  crowded.spacing = 0.01 / std::sqrt(2.4 * 1.001);
+  crowded.spacing = 0.01 / std::sqrt(2.5 * 1.001);
   EXPECT_LT(Judge(estimate, crowded).size, 0.01);
   EXPECT_GT(Judge(estimate, crowded).size, 0.0099);
-  crowded.spacing = 0.01 / std::sqrt(2.4 * 1.25);
+  crowded.spacing = 0.01 / std::sqrt(2.5 * 1.25);
   EXPECT_NEAR(Judge(estimate, crowded).size, 0.01 / 2.4414, 1e-5);
-  crowded.spacing = 0.01 / std::sqrt(2.4 * 10.0);
+  crowded.spacing = 0.01 / std::sqrt(2.5 * 10.0);
   EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.0007);
-  crowded.spacing = 0.01 / std::sqrt(2.4 * 1.25);
+  crowded.spacing = 0.01 / std::sqrt(2.5 * 1.25);
   crowded.without_black = 0.005;  // more than one thing speaks against it, and nothing against this
   EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.005);
-  crowded.spacing = 0.005 / std::sqrt(2.4 * 1.01);  // crowded without the black ones, too
+  crowded.spacing = 0.005 / std::sqrt(2.5 * 1.01);  // crowded without the black ones, too
   EXPECT_DOUBLE_EQ(Judge(estimate, crowded).size, 0.0007);
 
   // In layers of wide ones there are more, and no more detail for that.

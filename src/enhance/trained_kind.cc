@@ -62,8 +62,6 @@ double OpaqueShare(std::vector<std::pair<float, float>>& items) {
 // width was added, more are next to the least than are it, whatever the steps of the format.
 constexpr double kCutOff = 0.01;  // less matters little
 constexpr float kNext = 0.07f;    // a step of SPZ and a little
-// Where most of the smallest axes are cut off, a width was added that is smaller than the format knows.
-constexpr double kMostCutOff = 0.5;
 double ShareCutOff(std::span<const float> logarithms) {
   const float least = *std::ranges::min_element(logarithms);
   const auto cut = std::ranges::count(logarithms, least);
@@ -143,11 +141,9 @@ SizeTails SizeTailsOf(const GaussianCloud& showing) {
 
 std::optional<TrainedKind> Judge(const SizeTails& tails) {
   if (tails.gaussians < kFewest) return std::nullopt;
-  // Where a format cut off a part of the smallest axes they say nothing.
-  if (tails.cut_off == 0 || tails.cut_off > kMostCutOff) {
-    if (tails.roundness > kRound && tails.smallest < kWidenedTail) return TrainedKind::kWidened;
-    if (tails.roundness > kRatherRound && tails.smallest < kThinTail) return TrainedKind::kUnclear;
-  }
+  if (tails.roundness > kRound && tails.smallest < kWidenedTail) return TrainedKind::kWidened;
+  // Where a format cut off a part of the smallest axes, a tail that is a little shorter says nothing.
+  if (tails.roundness > kRatherRound && tails.smallest < kThinTail && tails.cut_off == 0) return TrainedKind::kUnclear;
   if (tails.raised && tails.middle >= kLeastTail) return TrainedKind::kRaised;
   const double tail = tails.middle * std::exp(-tails.opaque);
   const bool few = tails.gaussians < kFew;

@@ -156,7 +156,7 @@ void AddModelFlags(CLI::App& verb, EnhanceFlags& flags) {
       ->capture_default_str();
   model_option(verb.add_option("--merge-cost", flags.options.model.merge_cost,
                                "Of --copies auto: what each Gaussian less may cost, in pixels of the closer view times "
-                               "the square of the difference; more is fewer Gaussians (default: 0.0006 for "
+                               "the square of the difference; more is fewer Gaussians (default: 0.001 for "
                                "standard fits, 0.0001 for others)"))
       ->check(NotNegative());
   verb.add_option("--prune-opacity", model.prune_opacity,

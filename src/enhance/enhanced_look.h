@@ -29,11 +29,17 @@ struct SizeTails;  // enhance/trained_kind.h
 //   31–34  opacities: SizeTails::opaque, the share above 0.95, median, first quartile
 //
 // No feature depends on the unit. Nothing: fewer than 1000 Gaussians.
+//
+// `unrelated`: whether twins are turned as if they had nothing to do with each other, and lie on top of each other or
+// far apart. No network makes that: it turns those of one Gaussian little, and where it makes one of each, twins are as
+// far apart as in fits of many steps. In fits of few, clones of densification lie on top of each other, and all sizes
+// are still alike.
 inline constexpr size_t kEnhancedLookFeatures = 35;
 // What bounds which splats can look enhanced at all.
 inline constexpr size_t kTwinUpperQuartile = 3, kFlatness = 27, kElongation = 28;
 using EnhancedLook = std::array<double, kEnhancedLookFeatures>;
-std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing, const SizeTails& tails);
+std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing, const SizeTails& tails,
+                                             bool* unrelated = nullptr);
 
 // ln of the odds that a network has enhanced it: a network of one small layer that has learned from fits as they are
 // and enhanced (scripts/train-enhanced-look.py). −∞ where fewer than three in four Gaussians have a twin that differs

@@ -137,6 +137,27 @@ TEST(EnhancedLook, TwinsAreAlikeWhereThereAreCopies) {
 }
 
 // Nor on the unit, the order of the rows or the number of threads.
+// Clones of densification that few steps have moved lie on top of each other, and those that were not cloned are turned
+// in all directions.
+TEST(EnhancedLook, TwinsOfFewStepsAreUnrelated) {
+  const auto are_unrelated = [](const GaussianCloud& cloud) {
+    bool unrelated = true;
+    EXPECT_TRUE(FindEnhancedLook(cloud, SizeTailsOf(cloud), &unrelated).has_value());
+    return unrelated;
+  };
+  EXPECT_FALSE(are_unrelated(Sheet(2000, 3, 0.1)));
+  GaussianCloud few = Sheet(4000, 1, 0);
+  for (size_t i = 0; i < few.log_scales.size(); ++i) few.log_scales[i] = -3.5f - static_cast<float>(i % 3);
+  for (size_t i = 0; i < 4000; i += 8) {  // every eighth has a clone
+    std::copy_n(few.means.data() + 3 * i, 3, few.means.data() + 3 * i + 3);
+    std::copy_n(few.quats.data() + 4 * i, 4, few.quats.data() + 4 * i + 4);
+  }
+  EXPECT_TRUE(are_unrelated(few));
+  GaussianCloud enhanced = few;  // as they would be if each were turned as its twin
+  for (size_t i = 0; i < enhanced.quats.size(); ++i) enhanced.quats[i] = few.quats[i % 4];
+  EXPECT_FALSE(are_unrelated(enhanced));
+}
+
 TEST(EnhancedLook, DoesNotDependOnHowTheSplatIsKept) {
   const GaussianCloud cloud = Sheet(400, 3, 0.2);  // fewer than the samples
   const EnhancedLook look = LookOf(cloud);

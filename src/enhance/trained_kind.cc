@@ -159,7 +159,9 @@ std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing) {
   const auto by_sizes = Judge(tails);
   if (!by_sizes || by_sizes == TrainedKind::kWidened) return by_sizes;
   LeaveIfAbandoned();
-  const auto look = FindEnhancedLook(showing, tails);
+  bool unrelated = false;
+  const auto look = FindEnhancedLook(showing, tails, &unrelated);
+  if (unrelated) return by_sizes;
   const double least = by_sizes == TrainedKind::kUnclear ? kEnhancedOddsWhereUnclear : kEnhancedOdds;
   return look && LogOddsOfEnhanced(*look) > least ? TrainedKind::kEnhanced : by_sizes;
 }

@@ -185,14 +185,11 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
       const auto estimate = EstimatePixelSize(input.cloud);
       if (estimate.ok()) {
         input.showing = estimate->showing;
+        // Too small ones harm nobody.
         if (report.pixel_size > kSuspiciousRatio * estimate->high) {
           LogWarning(Cat("a training pixel of ", report.pixel_size, " was given, the splat itself looks like ",
                          estimate->size, " (likely ", estimate->low, " to ", estimate->high,
                          "): is it the world size of a pixel of the training views, in the splat's unit?"));
-        } else if (kSuspiciousRatio * report.pixel_size < estimate->low) {
-          LogWarning(Cat("a training pixel of ", report.pixel_size, " was given, the splat itself looks like ",
-                         estimate->size, " (likely ", estimate->low, " to ", estimate->high,
-                         "): that harms nothing, but gives back little of what it has lost"));
         }
       }
     }

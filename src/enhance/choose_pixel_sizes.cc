@@ -27,8 +27,6 @@ constexpr double kSuspiciousRatio = 1.5;
 constexpr double kSharperThanClassic = 0.65;
 // Cameras whose pixels are so many times larger than the splat may look like at most do not belong to it.
 constexpr double kImpossible = 3;
-// An estimate whose range is wider than this is a rough one.
-constexpr double kVague = 3;
 
 // `says`: there is width to give back, so that it matters.
 Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, EnhanceInput& input,
@@ -154,7 +152,7 @@ void SayWhatWasFound(const PixelSizeFinding& found) {
                 found.size)
           : "",
       found.closer > 0 ? "; where Gaussians lie much closer than elsewhere a smaller one is taken" : "");
-  if (estimate.high > kVague * estimate.low) {
+  if (found.rough()) {
     LogWarning(
         Cat(size, ". That is rough: this splat says little about the pixels it was trained at; ", kWillDoBetter));
     return;

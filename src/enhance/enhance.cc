@@ -412,6 +412,9 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   if (GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode)) {
     if (report.pixel_size_source == kCautiousPixelSize && !TakesSureOnly(plan, input)) {
       LeaveNetworksOut(plan, "measures Gaussians in pixels and goes wrong where the pixel is not known");
+    } else if (report.pixel_size_source == "estimated" && report.things.empty() && report.finding &&
+               report.finding->rough()) {
+      LeaveNetworksOut(plan, "measures Gaussians in pixels, of which this splat says little");
     } else if (report.looks == TrainedKind::kUnclear || report.looks == TrainedKind::kRaised || unknown_of_few) {
       LeaveNetworksOut(plan, "has learned what splats of known kinds have lost");
     } else if (options.upscale < kLeastUpscaleOfNetworks) {

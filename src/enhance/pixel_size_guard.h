@@ -30,6 +30,9 @@ struct PixelSizeFinding {
   std::vector<std::string> contradictions;  // sentences that say what speaks against it; empty: nothing does
 
   bool contradicted() const { return !contradictions.empty(); }
+  // The outlines say it within a factor that is wider than this: what learned from known pixels is not to act on it.
+  static constexpr double kRough = 3;
+  bool rough() const { return estimate.high > kRough * estimate.low; }
   bool is_one() const { return least >= size && closer == 0; }  // `size` is that of all Gaussians
 };
 

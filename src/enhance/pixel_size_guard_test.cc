@@ -304,6 +304,10 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
                                    .without_black = 0};
   EXPECT_FALSE(Judge(estimate, plain).contradicted());
   EXPECT_EQ(Judge(estimate, plain).size, 0.01);
+  EXPECT_FALSE(Judge(estimate, plain).rough());
+  PixelSizeEstimate wide = estimate;
+  wide.high = 3.1 * wide.low;
+  EXPECT_TRUE(Judge(wide, plain).rough());
 
   PixelSizeEvidence crowded = plain;
   crowded.spacing = 0.006;  // 2.8 on a pixel

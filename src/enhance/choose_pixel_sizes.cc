@@ -22,9 +22,6 @@ namespace {
 
 // Cameras and estimate further apart than this are worth a word: one of them does not belong to this splat.
 constexpr double kSuspiciousRatio = 1.5;
-// A splat whose outlines are so much sharper than its cameras' pixels make them has lost less width than a classic fit:
-// antialiased ones look like 0.44 to 0.86 of their pixels, classic ones of known pixels like 0.73 and more.
-constexpr double kSharperThanClassic = 0.65;
 // Cameras whose pixels are so many times larger than the splat may look like at most do not belong to it.
 constexpr double kImpossible = 3;
 
@@ -71,10 +68,7 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
     const double ratio = found->size / from_cameras.median;
     // Whoever says a mode or a strength means these cameras.
     const bool said = options.filter_strength || IsGiven(options, "mode");
-    // An estimate that is unsure enough to allow for the cameras says nothing against them.
-    const bool sharper = !found->contradicted() && !found->part && !IsCompensated(input.cloud.render_mode) &&
-                         found->largest < kSharperThanClassic * from_cameras.median &&
-                         found->estimate.high < from_cameras.median;
+    const bool sharper = !IsCompensated(input.cloud.render_mode) && IsSharperThanFitsTo(from_cameras.median, *found);
     const double largest = std::max(found->largest, found->estimate.high);
     const bool impossible = from_cameras.median > kImpossible * largest;
     if (!said && (sharper || impossible)) {

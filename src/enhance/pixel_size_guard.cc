@@ -58,6 +58,8 @@ constexpr double kSmallestAxis = 0.12;  // pixels; with a margin
 // Black Gaussians may move the estimate this much before it counts as theirs.
 constexpr double kMoved = 1.5;
 constexpr double kSomeSize = 1e-12;  // of an estimate: a pixel has some size
+// Antialiased splats look like 0.44 to 0.86 of their pixels, classic ones of known pixels like 0.73 and more.
+constexpr double kSharperThanClassic = 0.65;
 // Regions that a cloud is looked at in, and how many of them a Gaussian belongs to.
 constexpr int64_t kRegions = 8192;
 constexpr size_t kRegionsAround = 2;
@@ -289,6 +291,11 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     }
   }
   return finding;
+}
+
+bool IsSharperThanFitsTo(double pixel, const PixelSizeFinding& finding) {
+  return !finding.contradicted() && !finding.part && finding.largest < kSharperThanClassic * pixel &&
+         finding.estimate.high < pixel;
 }
 
 Result<PixelSizeFinding> FindPixelSize(const GaussianCloud& cloud) {

@@ -309,6 +309,12 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   wide.high = 3.1 * wide.low;
   EXPECT_TRUE(Judge(wide, plain).rough());
 
+  // Cameras with larger pixels than it looks like.
+  EXPECT_TRUE(IsSharperThanFitsTo(0.016, Judge(estimate, plain)));
+  EXPECT_FALSE(IsSharperThanFitsTo(0.015, Judge(estimate, plain)));
+  EXPECT_FALSE(IsSharperThanFitsTo(0.016, Judge(wide, plain))) << "they lie within its interval";
+  EXPECT_TRUE(IsSharperThanFitsTo(0.025, Judge(wide, plain)));
+
   PixelSizeEvidence crowded = plain;
   crowded.spacing = 0.006;  // 2.8 on a pixel
   EXPECT_TRUE(Judge(estimate, crowded).contradicted());

@@ -431,6 +431,25 @@ TEST_F(EnhanceDoor, UnevenSpacingsHaveNoOnePixel) {
   EXPECT_TRUE(log_->Says("no single size is right there")) << log_->text();
 }
 
+// Networks have learned zooms of 2 and more, and nearer than 1.35 they take away from what the filter has.
+TEST_F(EnhanceDoor, SmallZoomsAreTheFilters) {
+  constexpr uint64_t kOnlyHere = 4714;
+  RegisterNetworkForTest("network", kOnlyHere);
+  EnhanceOptions options;
+  options.seed = kOnlyHere;
+  options.pixel_size = 0.01;
+  for (const double upscale : {1.2, 1.4}) {
+    options.upscale = upscale;
+    const auto enhanced = Enhance(Ball(0.01), options);
+    ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+    EXPECT_EQ(enhanced->report.method, upscale < 1.35 ? "filter" : "network");
+  }
+  EXPECT_TRUE(log_->Says("2 to 8 times closer")) << log_->text();
+  options.upscale = 1.2;
+  options.method = "network";
+  EXPECT_EQ(Enhance(Ball(0.01), options)->report.method, "network") << "who asks for it gets it";
+}
+
 // A ball before a sky: what lies around has no pixels that one could know, the ball has.
 TEST_F(EnhanceDoor, ANetworkTakesTheThingsWhosePixelsAreKnown) {
   constexpr uint64_t kOnlyHere = 4712;

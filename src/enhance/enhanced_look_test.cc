@@ -136,7 +136,6 @@ TEST(EnhancedLook, TwinsAreAlikeWhereThereAreCopies) {
   EXPECT_TRUE(std::isfinite(LogOddsOfEnhanced(copies)));
 }
 
-// Nor on the unit, the order of the rows or the number of threads.
 // Clones of densification that few steps have moved lie on top of each other, and those that were not cloned are turned
 // in all directions.
 TEST(EnhancedLook, TwinsOfFewStepsAreUnrelated) {
@@ -158,6 +157,7 @@ TEST(EnhancedLook, TwinsOfFewStepsAreUnrelated) {
   EXPECT_FALSE(are_unrelated(enhanced));
 }
 
+// Nor on the unit, the order of the rows or the number of threads.
 TEST(EnhancedLook, DoesNotDependOnHowTheSplatIsKept) {
   const GaussianCloud cloud = Sheet(400, 3, 0.2);  // fewer than the samples
   const EnhancedLook look = LookOf(cloud);

@@ -33,8 +33,8 @@ constexpr double kMostSteps = 12;  // either way from the start
 // Brightness, that of the constant colour's brightest channel, up to which a Gaussian counts as unseen over black, and
 // from which on as seen.
 constexpr float kUnseen = 0.02f, kSeen = 0.1f;
-// Times the median footprint. Nothing that was fitted to an object alone has more than 0.02 of its outlines of such
-// Gaussians; from five on some photographs have.
+// Times the median footprint. Fits of objects seen from all around have at most 0.02 of their outlines of such
+// Gaussians; from five on, photographs have many.
 constexpr float kCoarse = 6;
 constexpr std::array<double, 4> kSizeQuantiles = {0.1, 0.25, 0.5, 0.75};
 
@@ -65,8 +65,9 @@ void ShowBrightness(GaussianCloud& cloud) {
 // ln √(largest × middle axis).
 float LogFootprint(const GaussianCloud& cloud, int64_t i) {
   const float* const scales = cloud.log_scales.data() + 3 * i;
-  const float least = std::min({scales[0], scales[1], scales[2]});
-  return 0.5f * (scales[0] + scales[1] + scales[2] - least);
+  std::array<float, 3> axes = {scales[0], scales[1], scales[2]};  // the smallest may be −∞
+  std::ranges::sort(axes);
+  return 0.5f * (axes[1] + axes[2]);
 }
 
 // LogFootprint from which on a Gaussian is coarse among the others.

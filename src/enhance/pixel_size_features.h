@@ -47,7 +47,7 @@ class PixelSizeProbe {
   // Only Gaussians near the middle of the cloud and small beside it are looked at, and at most 200,000 of them.
   // Outlines where the cloud was cut are left out, and those of Gaussians more than six times as coarse as the others
   // (√(largest × middle axis), median of those that show): a ground, walls, clutter around the object that no picture
-  // shows. In fits of objects alone next to none of their outlines are of such ones. kBadArgument: fewer than
+  // shows. Fits of objects seen from all around have next to no outlines of such ones. kBadArgument: fewer than
   // kLeastGaussians of them have an opacity of 10 % or more and three positive scales.
   static Result<PixelSizeProbe> Make(const GaussianCloud& cloud);
   static Result<PixelSizeProbe> Make(TellingGaussians telling);

@@ -236,14 +236,14 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
                   WithThousands(evidence.gaussians), evidence.gaussians >= int64_t{kMostShowing} ? " and more" : "",
                   " keep at most ", Number(most)));
   }
-  const double outlines_left = 1 - estimate.cut_outlines - estimate.coarse_outlines;
+  const double left_out = estimate.cut_outlines + estimate.coarse_outlines;
   if (estimate.cut_outlines > kNothingButCuts) {
     finding.contradictions.push_back(
         Cat(Fixed(100 * estimate.cut_outlines, 0),
             " % of its outlines look as if a part had been cut off there, and say nothing about pixels"));
-  } else if (outlines_left < 1 - kNothingButCuts) {
+  } else if (left_out > kNothingButCuts) {
     finding.contradictions.push_back(
-        Cat(Fixed(100 * (1 - outlines_left), 0),
+        Cat(Fixed(100 * left_out, 0),
             " % of its outlines are of Gaussians that are much coarser than the others, or look as if a part had been "
             "cut off there, and say nothing about pixels"));
   }
@@ -272,7 +272,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     if (crowd_alone) least = estimate.size * std::pow(most / crowd, kCrowdedFall);
     // Without its black Gaussians the outlines say a size, too; it counts where nothing contradicts that one.
     const double without = evidence.without_black;
-    const bool one_pixel = !uneven && outlines_left >= 1 - kNothingButCuts;
+    const bool one_pixel = !uneven && left_out <= kNothingButCuts;
     if (without > 0 && one_pixel && crowd_at(without) <= most && evidence.small_axis >= kSmallestAxis * without) {
       least = std::max(least, without);
     }

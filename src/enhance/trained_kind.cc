@@ -82,8 +82,9 @@ bool WereRaised(std::span<float> logits, double faint) {
   return tenth - least < kSameOpacity || low - least > kBeginsAtOnce * (tenth - low);
 }
 
-double MeanTail(std::span<float> logarithms) {
-  if (const double cut = ShareCutOff(logarithms); cut > 0) {
+// `cut`: ShareCutOff() of them.
+double MeanTail(std::span<float> logarithms, double cut) {
+  if (cut > 0) {
     // What is left of the tail: of some more than are cut.
     return Tail(logarithms, std::clamp(1.3 * cut, kLonger, 0.5));
   }
@@ -126,10 +127,10 @@ SizeTails SizeTailsOf(const GaussianCloud& showing) {
   tails.gaussians = static_cast<int64_t>(middle.size());
   if (middle.empty()) return tails;
   LeaveIfAbandoned();
-  tails.smallest = MeanTail(smallest);
   tails.cut_off = ShareCutOff(smallest);
+  tails.smallest = MeanTail(smallest, tails.cut_off);
   LeaveIfAbandoned();
-  tails.middle = MeanTail(middle);
+  tails.middle = MeanTail(middle, ShareCutOff(middle));
   LeaveIfAbandoned();
   tails.roundness = std::exp(double{Quantile(smallest, kLonger)} - double{Quantile(middle, kLonger)});
   tails.opaque = OpaqueShare(areas);

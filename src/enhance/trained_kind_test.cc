@@ -324,7 +324,7 @@ TEST(TrainedKind, UnclearOnesGetLittle) {
   tails.roundness = 0.1;
   EXPECT_EQ(Judge(tails), TrainedKind::kClassic);
   // Not by a network, unless one is asked for.
-  constexpr uint64_t kOnlyHere = 4712;
+  constexpr uint64_t kOnlyHere = 4713;
   RegisterNetworkForTest("network-of-kinds", kOnlyHere);
   EnhanceOptions options;
   options.seed = kOnlyHere;

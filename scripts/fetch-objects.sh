@@ -8,6 +8,10 @@
 # apt, get the two .deb files at https://packages.debian.org/ and name them: FOLDER FILE.deb...
 set -euo pipefail
 
+case "${1:-}" in
+  -h | --help) sed -n '2,8s/^# \{0,1\}//p' "$0"; exit ;;
+  -*) echo "fetch-objects: no option $1; --help says what there is" >&2; exit 2 ;;
+esac
 folder="${1:-objects}"
 shift || true
 furniture=usr/share/sweethome3d/furniture

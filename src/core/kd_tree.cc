@@ -1,7 +1,10 @@
 #include "core/kd_tree.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "core/parallel.h"
 
@@ -11,6 +14,7 @@ namespace {
 
 constexpr int64_t kLeaf = 8;  // points: fewer are searched faster than divided
 constexpr int64_t kParallelRange = 1 << 15;
+constexpr size_t kInOrder = 96;  // neighbours up to which it is quicker to keep them in order
 
 double SquaredDistance(const std::array<float, 3>& a, const std::array<double, 3>& b) {
   double sum = 0;
@@ -54,24 +58,69 @@ void KdTree::Build(int64_t begin, int64_t end) {
   end - begin > kParallelRange ? ParallelFor(0, 2, 1, build) : build(0, 2);
 }
 
+// The few nearest so far in order: what is new moves the others up.
+class KdTree::Few {
+ public:
+  explicit Few(std::span<Neighbour> nearest) : nearest_(nearest) {
+    std::ranges::fill(nearest_, Neighbour{std::numeric_limits<double>::infinity(), -1});
+  }
+  double farthest() const { return nearest_.back().squared_distance; }
+  void Add(double distance, int64_t place) {
+    size_t k = nearest_.size() - 1;
+    for (; k > 0 && distance < nearest_[k - 1].squared_distance; --k) nearest_[k] = nearest_[k - 1];
+    nearest_[k] = {distance, place};
+  }
+  void Finish() {}
+
+ private:
+  std::span<Neighbour> nearest_;  // rising distances, infinite where nothing was found yet
+};
+
+// Of many, twice as many are gathered before the farther half is dropped: a constant time for each, however many.
+class KdTree::Many {
+ public:
+  explicit Many(std::span<Neighbour> nearest) : nearest_(nearest) { pile_.reserve(2 * nearest.size()); }
+  double farthest() const { return farthest_; }
+  void Add(double distance, int64_t place) {
+    pile_.push_back({distance, place});
+    if (pile_.size() == 2 * nearest_.size()) Drop();
+  }
+  void Finish() {
+    if (pile_.size() > nearest_.size()) Drop();
+    std::ranges::sort(pile_, IsNearer);
+    std::ranges::copy(pile_, nearest_.begin());
+  }
+
+ private:
+  static bool IsNearer(const Neighbour& a, const Neighbour& b) {
+    return std::pair(a.squared_distance, a.index) < std::pair(b.squared_distance, b.index);
+  }
+  void Drop() {
+    const auto last = pile_.begin() + static_cast<std::ptrdiff_t>(nearest_.size()) - 1;
+    std::ranges::nth_element(pile_, last, IsNearer);
+    farthest_ = last->squared_distance;
+    pile_.resize(nearest_.size());
+  }
+
+  std::span<Neighbour> nearest_;
+  std::vector<Neighbour> pile_;
+  double farthest_ = std::numeric_limits<double>::infinity();
+};
+
+template <typename Nearest>
 struct KdTree::Search {
   const KdTree& tree;
   int64_t self;
   std::array<double, 3> point;
-  std::span<Neighbour> nearest;  // rising distances, infinite where nothing was found yet
+  Nearest nearest;
 
-  double farthest() const { return nearest.back().squared_distance; }
-
-  void Look(int64_t place) const {
+  void Look(int64_t place) {
     if (place == self) return;
     const double distance = SquaredDistance(tree.points_[static_cast<size_t>(place)].position, point);
-    if (!(distance < farthest())) return;
-    size_t k = nearest.size() - 1;
-    for (; k > 0 && distance < nearest[k - 1].squared_distance; --k) nearest[k] = nearest[k - 1];
-    nearest[k] = {distance, place};
+    if (distance < nearest.farthest()) nearest.Add(distance, place);
   }
 
-  void Range(int64_t begin, int64_t end) const {
+  void Range(int64_t begin, int64_t end) {
     if (end - begin <= kLeaf) {
       for (int64_t place = begin; place < end; ++place) Look(place);
       return;
@@ -82,15 +131,18 @@ struct KdTree::Search {
     Look(middle);
     side < 0 ? Range(begin, middle) : Range(middle + 1, end);
     // At equality no closer point can be on the other side.
-    if (side * side < farthest()) side < 0 ? Range(middle + 1, end) : Range(begin, middle);
+    if (side * side < nearest.farthest()) side < 0 ? Range(middle + 1, end) : Range(begin, middle);
   }
 };
 
 int64_t KdTree::Find(const std::array<float, 3>& position, int64_t self, std::span<Neighbour> nearest) const {
   if (nearest.empty()) return 0;
-  std::fill(nearest.begin(), nearest.end(), Neighbour{std::numeric_limits<double>::infinity(), -1});
-  const Search search{*this, self, {position[0], position[1], position[2]}, nearest};
-  search.Range(0, size());
+  const auto search = [&]<typename Nearest>(Nearest keeps) {
+    Search<Nearest> of{*this, self, {position[0], position[1], position[2]}, std::move(keeps)};
+    of.Range(0, size());
+    of.nearest.Finish();
+  };
+  nearest.size() <= kInOrder ? search(Few(nearest)) : search(Many(nearest));
   return std::min(static_cast<int64_t>(nearest.size()), self < 0 ? size() : size() - 1);
 }
 

@@ -40,6 +40,9 @@ class KdTree {
     std::array<float, 3> position;
     int64_t index;
   };
+  class Few;
+  class Many;
+  template <typename Nearest>
   struct Search;
 
   void Build(int64_t begin, int64_t end);

@@ -57,6 +57,15 @@ TEST(KdTree, MatchesSortingAllDistances) {
   }
 }
 
+TEST(KdTree, MatchesSortingAllDistancesToMany) {
+  Random random(3);
+  for (const size_t n : {3u, 120u, 700u}) {
+    std::vector<float> x(3 * n);
+    for (float& v : x) v = static_cast<float>(random.Normal());
+    ExpectNearest(x, 200);
+  }
+}
+
 TEST(KdTree, AroundAnyPosition) {
   Random random(5);
   std::vector<float> x(3 * 500);
@@ -99,6 +108,7 @@ TEST(KdTree, FarOutliersAndSharedPlaces) {
   }
   for (const float far : {1e6f, -3e18f, 1e-30f}) x.insert(x.end(), {far, 0, far});
   ExpectNearest(x, 12);
+  ExpectNearest(x, 150);
 }
 
 TEST(KdTree, ManyPointsAtOnePlaceAreNotAllVisited) {

@@ -367,7 +367,8 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
       result.partly += of_block.partly;
       result.not_finite += of_block.not_finite;
       result.made += of_block.part.made;
-      output.Append(of_block.part, std::move(groups));
+      blocks.count() == 1 ? output.Take(std::move(of_block.part), std::move(groups))
+                          : output.Append(of_block.part, std::move(groups));
     };
     int64_t next = 0;
     if (checkpoint) {

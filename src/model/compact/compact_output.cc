@@ -97,7 +97,6 @@ void CompactOutput::Merge(const Buffer<int32_t>& rows, CopyGroups& groups, Compa
 }
 
 void CompactOutput::Append(const CompactPart& part, CopyGroups groups) {
-  made_ += part.made;
   Piece& piece = PieceFor(part.cloud.size(), part.cloud);
   const int64_t first = piece.cloud.size();
   for (const auto array : kCloudArrays) {
@@ -105,12 +104,24 @@ void CompactOutput::Append(const CompactPart& part, CopyGroups groups) {
     (piece.cloud.*array).insert((piece.cloud.*array).end(), from.begin(), from.end());
   }
   piece.keys.insert(piece.keys.end(), part.keys.begin(), part.keys.end());
-  if (merges_ && waits_ && part.inside > 0) {
-    groups.first = first;
-    plans_.emplace_back(std::move(groups), choice_, piece.cloud);
-    piece_of_plan_.push_back(pieces_.size() - 1);
-    rows_of_plan_.emplace_back(part.keys.begin(), part.keys.begin() + part.inside);  // of copy 0
-  }
+  Count(part, first, std::move(groups));
+}
+
+void CompactOutput::Take(CompactPart part, CopyGroups groups) {
+  pieces_.push_back({std::move(part.cloud), std::move(part.keys)});
+  Count(part, 0, std::move(groups));
+}
+
+// What is last of the last piece, from row `first` on.
+void CompactOutput::Count(const CompactPart& part, int64_t first, CopyGroups groups) {
+  made_ += part.made;
+  if (!merges_ || !waits_ || part.inside == 0) return;
+  const Piece& piece = pieces_.back();
+  groups.first = first;
+  plans_.emplace_back(std::move(groups), choice_, piece.cloud);
+  piece_of_plan_.push_back(pieces_.size() - 1);
+  const auto keys = piece.keys.begin() + first;
+  rows_of_plan_.emplace_back(keys, keys + part.inside);  // of copy 0
 }
 
 void CompactOutput::MergeAll() {

@@ -46,6 +46,8 @@ class CompactOutput {
   void Merge(const Buffer<int32_t>& rows, CopyGroups& groups, CompactPart& part);
   // … and adds what is left. `groups` are those of Merge; of a part that was kept made anew.
   void Append(const CompactPart& part, CopyGroups groups);
+  // Append without a copy, which takes memory for as much once more: of what is the only part there is.
+  void Take(CompactPart part, CopyGroups groups);
 
   // Whether all copies wait for the last block, so that parts have all of them.
   bool waits() const { return waits_; }
@@ -60,6 +62,7 @@ class CompactOutput {
     Buffer<int64_t> keys;  // by which rows are ordered
   };
   Piece& PieceFor(int64_t rows, const GaussianCloud& block);
+  void Count(const CompactPart& part, int64_t first, CopyGroups groups);
   void MergeAll();
 
   int64_t count_, copies_;

@@ -45,10 +45,11 @@ constexpr double kPartCaution = 0.3;
 // Where hardly an outline is left that is not a cut's or of coarse Gaussians, the rest says nothing.
 constexpr double kNothingButCuts = 0.9;
 // 90 % over 10 % quantile of the spacings of 512: two things of different size, or a subject and what is far behind it,
-// fitted to pixels of different size. At most 2.4 in 69 fits (2.3 in standard ones) and 2.5 in captures; 2.5 to 2.9
-// where an object lies beside one like it that is twice as large, from 2.9 on beside one three times as large, on a
-// ground or before a sky. Of a subject with less than a tenth of the Gaussians it says nothing.
-constexpr double kUneven = 2.7, kMostUneven = 2.4;
+// fitted to pixels of different size. At most 2.5 in 101 fits and in captures, but 2.7 and 2.8 in a plant and a chair; 2.5
+// to 2.9 where an object lies beside one like it that is twice as large, from 2.9 on beside one three times as large, on a
+// ground or before a sky. Of a subject with less than a tenth of the Gaussians it says nothing. From the first on pixels
+// shrink with this power of it, and from the second on it contradicts.
+constexpr double kUneven = 2.7, kMostUneven = 2.85, kUnevenFall = 4;
 // Spacing of 512, over its median, below which Gaussians come of smaller pixels than the others. The densest place of
 // 22 fits is at 0.52 and more, of captures at 0.37.
 constexpr double kCloser = 0.45;
@@ -247,13 +248,13 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
             " % of its outlines are of Gaussians that are much coarser than the others, or look as if a part had been "
             "cut off there, and say nothing about pixels"));
   }
-  const bool uneven = evidence.unevenness > kUneven;
+  const bool uneven = evidence.unevenness > kMostUneven;
   if (uneven) {
     finding.no_one_pixel = true;
     finding.contradictions.push_back(std::isfinite(evidence.unevenness)
                                          ? Cat("a tenth of its Gaussians lie ", Number(evidence.unevenness),
                                                " times as far apart as another tenth, and those of one fit up to ",
-                                               Number(kMostUneven), " times: they have no one pixel")
+                                               Number(kUneven), " times: they have no one pixel")
                                          : "a tenth of its Gaussians lie at one place, and those of fits do not");
   }
   if (evidence.small_axis < kSmallestAxis * estimate.size) {
@@ -265,11 +266,13 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
         Cat("without its black Gaussians, which no picture shows, the outlines say ", evidence.without_black));
   }
   if (finding.part) finding.size *= std::exp(-kPartCaution * estimate.cut_outlines);
+  if (evidence.unevenness > kUneven) finding.size *= std::pow(kUneven / evidence.unevenness, kUnevenFall);
   finding.least = finding.size;
   if (finding.contradicted()) {
     double least = 0;
     const bool crowd_alone = crowd > most && finding.contradictions.size() == 1;
     if (crowd_alone) least = estimate.size * std::pow(most / crowd, kCrowdedFall);
+    if (uneven && finding.contradictions.size() == 1) least = finding.size;
     // Without its black Gaussians the outlines say a size, too; it counts where nothing contradicts that one.
     const double without = evidence.without_black;
     const bool one_pixel = !uneven && left_out <= kNothingButCuts;

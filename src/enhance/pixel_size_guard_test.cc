@@ -391,13 +391,18 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
 
   // Gaussians that come of smaller pixels: what the outlines say without black ones is no size for all, either.
   PixelSizeEvidence uneven = plain;
-  uneven.unevenness = 2.8;
+  uneven.unevenness = 2.7 * std::sqrt(2);
   EXPECT_TRUE(Judge(estimate, uneven).no_one_pixel);
-  EXPECT_DOUBLE_EQ(Judge(estimate, uneven).size, plain.harmless);
-  EXPECT_EQ(Judge(estimate, uneven).least, 0);
+  EXPECT_DOUBLE_EQ(Judge(estimate, uneven).size, std::max(0.0025, plain.harmless));
+  EXPECT_DOUBLE_EQ(Judge(estimate, uneven).least, 0.0025);
   uneven.without_black = 0.006;
   EXPECT_EQ(Judge(estimate, uneven).least, 0);
   EXPECT_DOUBLE_EQ(Judge(estimate, uneven).size, plain.harmless);
+  uneven.without_black = 0;
+  uneven.unevenness = 2.8;  // of single objects, too
+  EXPECT_FALSE(Judge(estimate, uneven).contradicted());
+  EXPECT_TRUE(Judge(estimate, uneven).is_one());
+  EXPECT_NEAR(Judge(estimate, uneven).size, 0.0086, 1e-4);
   uneven.unevenness = std::numeric_limits<double>::infinity();
   ASSERT_TRUE(Judge(estimate, uneven).contradicted());
   EXPECT_NE(Judge(estimate, uneven).contradictions[0].find("at one place"), std::string::npos);

@@ -143,14 +143,15 @@ Twins FindTwins(const GaussianCloud& cloud, std::span<const int64_t> rows) {
   return twins;
 }
 
-// Median angle to the twin, degrees: 3 to 25 in what networks made, but 61 to 84 where they made one of each of a
-// standard or antialiased fit; 35 to 74 in fits of 300 to 1,000 steps. The tenth that is nearest to its twin: 0.41 to
-// 0.64 standard deviations in those; 0.05 to 0.24, or 1.7, in these.
-constexpr double kMostTurned = 30, kOnTop = 0.3, kApart = 1.2;
+// Median angle to the twin, degrees, and how near the tenth is that is nearest to its twin, in standard deviations.
+// Fits of 300 to 3,000 steps are at 24 to 87, and on top of each other (0.05 to 0.24) or apart (0.65 to 1.7). What
+// networks made is at 3 to 25 and, beyond 15, at 0.37 and more; where they made one of each of a standard or
+// antialiased fit, at 56 to 84 and 0.41 to 0.64. Merged levels of detail are at 31 to 58 and 0.96.
+constexpr double kTurned = 20, kOnTop = 0.3, kTurnedFar = 30, kApart = 0.65;
 bool AreUnrelated(Twins& twins) {
   const double turn = 2 * std::acos(double{Quantile(twins.turn, 0.5)}) * 180 / std::numbers::pi;
   const auto nearest = double{Quantile(twins.distance, 0.1)};
-  return turn > kMostTurned && (nearest < kOnTop || nearest > kApart);
+  return (turn > kTurned && nearest < kOnTop) || (turn > kTurnedFar && nearest > kApart);
 }
 
 }  // namespace

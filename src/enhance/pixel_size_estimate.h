@@ -21,6 +21,12 @@ struct PixelSizeEstimate {
   // 0: outlines and sizes are like those of standard fits, from surface points by Kerbl et al.'s densification; 1: they
   // are unlike those, as of MCMC, random points, photographs.
   double unlike_standard = 0;
+  // How unlike its outlines are to those of the fits that the regression has seen: root mean square of their features'
+  // deviations, 1 on average of many kinds, 0.5 of standard fits.
+  double strangeness = 0;
+  // What the regression of many kinds says over what that of standard fits does, where the first is smaller and only the
+  // second would be believed but for that; 1 elsewhere.
+  double disagreement = 1;
   double showing = 1;  // PixelSizeProbe::showing()
   // Share of its outlines that are cuts and do not count: PixelSizeProbe::CutOutlines().
   double cut_outlines = 0;

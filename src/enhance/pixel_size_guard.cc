@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/ellipsoid.h"
 #include "core/kd_tree.h"
 #include "core/parallel.h"
 #include "core/run_context.h"
@@ -45,10 +46,10 @@ constexpr double kPartCaution = 0.3;
 // Where hardly an outline is left that is not a cut's or of coarse Gaussians, the rest says nothing.
 constexpr double kNothingButCuts = 0.9;
 // 90 % over 10 % quantile of the spacings of 512: two things of different size, or a subject and what is far behind it,
-// fitted to pixels of different size. At most 2.5 in 101 fits and in captures, but 2.7 and 2.8 in a plant and a chair; 2.5
-// to 2.9 where an object lies beside one like it that is twice as large, from 2.9 on beside one three times as large, on a
-// ground or before a sky. Of a subject with less than a tenth of the Gaussians it says nothing. From the first on pixels
-// shrink with this power of it, and from the second on it contradicts.
+// fitted to pixels of different size. At most 2.5 in 101 fits and in captures, but 2.7 and 2.8 in a plant and a
+// chair; 2.5 to 2.9 where an object lies beside one like it that is twice as large, from 2.9 on beside one three times
+// as large, on a ground or before a sky. Of a subject with less than a tenth of the Gaussians it says nothing. From the
+// first on pixels shrink with this power of it, and from the second on it contradicts.
 constexpr double kUneven = 2.7, kMostUneven = 2.85, kUnevenFall = 4;
 // Spacing of 512, over its median, below which Gaussians come of smaller pixels than the others. The densest place of
 // 22 fits is at 0.52 and more, of captures at 0.37.
@@ -59,6 +60,13 @@ constexpr double kSmallestAxis = 0.12;  // pixels; with a margin
 // Black Gaussians may move the estimate this much before it counts as theirs.
 constexpr double kMoved = 1.5;
 constexpr double kSomeSize = 1e-12;  // of an estimate: a pixel has some size
+// Land seen from above is flat (thickness over width; 0.14 for blocks of houses, 0.26 and more for 40 objects), and has
+// a rim and a lower side that no picture shows: their outlines are as soft as its Gaussians are large, at pixels two to
+// five times smaller. They are strange (0.9 and more; standard fits 0.4 to 0.8), or the two regressions disagree.
+constexpr double kFlat = 0.2, kStrangeOfFlat = 0.85, kDisagreeingOfFlat = 0.87;
+// Beyond, the two regressions are about something that neither has seen: pictures of parts of an object, whose outlines
+// hardly any of them shows. Fits like standard ones are seldom below (two of 76, palms and brooms).
+constexpr double kDisagreeing = 0.67;
 // Antialiased splats look like 0.44 to 0.86 of their pixels, classic ones of known pixels like 0.73 and more.
 constexpr double kSharperThanClassic = 0.65;
 // Regions that a cloud is looked at in, and how many of them a Gaussian belongs to.
@@ -106,6 +114,45 @@ Surface SurfaceOf(const GaussianCloud& cloud) {
           .harmless = double{Quantile(harmless, 0.9)}};
 }
 
+// Thickness over width of a cloud along its principal axes, of what lies between these quantiles: a few lie anywhere.
+constexpr double kThinnestTo = 0.05, kThickestTo = 0.95;
+double FlatnessOf(const GaussianCloud& cloud) {
+  const auto count = static_cast<size_t>(cloud.size());
+  Buffer<float> values(count);
+  std::array<double, 3> middle;
+  for (size_t a = 0; a < 3; ++a) {
+    for (size_t i = 0; i < count; ++i) values[i] = cloud.means[3 * i + a];
+    middle[a] = double{Quantile(values, 0.5)};
+  }
+  const auto away = [&](size_t i) {
+    return std::array<double, 3>{cloud.means[3 * i] - middle[0], cloud.means[3 * i + 1] - middle[1],
+                                 cloud.means[3 * i + 2] - middle[2]};
+  };
+  for (size_t i = 0; i < count; ++i) {
+    const auto [x, y, z] = away(i);
+    values[i] = static_cast<float>(x * x + y * y + z * z);
+  }
+  const float farthest = Quantile(values, kThickestTo);
+  std::array<double, 6> moments{};
+  for (size_t i = 0; i < count; ++i) {
+    if (values[i] > farthest) continue;
+    const auto [x, y, z] = away(i);
+    const std::array<double, 6> products = {x * x, x * y, x * z, y * y, y * z, z * z};
+    for (size_t k = 0; k < 6; ++k) moments[k] += products[k];
+  }
+  const Ellipsoid shape = EllipsoidOf(moments);
+  std::array<double, 3> sides;
+  for (size_t k = 0; k < 3; ++k) {
+    for (size_t i = 0; i < count; ++i) {
+      const auto at = away(i);
+      values[i] = static_cast<float>(shape.axes[k] * at[0] + shape.axes[3 + k] * at[1] + shape.axes[6 + k] * at[2]);
+    }
+    sides[k] = double{Quantile(values, kThickestTo)} - double{Quantile(values, kThinnestTo)};
+  }
+  std::ranges::sort(sides);
+  return sides[1] > 0 ? sides[0] / sides[1] : 1;
+}
+
 // Of those rows, nothing but where they are and how large.
 GaussianCloud PlacesAndScales(const GaussianCloud& cloud, const std::vector<int64_t>& rows) {
   GaussianCloud out;
@@ -137,6 +184,7 @@ Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, int64_t all, const R
   evidence.closest = surface.closest;
   evidence.unevenness = surface.unevenness;
   evidence.harmless = surface.harmless;
+  evidence.flatness = FlatnessOf(showing.bright);
   if (!probe.ok()) return probe.error();
   evidence.small_axis = probe->start();
   LeaveIfAbandoned();
@@ -257,6 +305,17 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
                                                Number(kUneven), " times: they have no one pixel")
                                          : "a tenth of its Gaussians lie at one place, and those of fits do not");
   }
+  const bool flat = evidence.flatness < kFlat &&
+                    (estimate.strangeness > kStrangeOfFlat || estimate.disagreement < kDisagreeingOfFlat);
+  if (flat) {
+    finding.contradictions.emplace_back(
+        "it is flat and its outlines are unlike those of fits, as of land seen from above: no picture may have shown "
+        "them");
+  } else if (estimate.disagreement < kDisagreeing && !(evidence.all > 0 && evidence.all < kEnough)) {
+    finding.contradictions.push_back(
+        Cat("its Gaussians and outlines together say ", Fixed(estimate.disagreement, 2),
+            " of what outlines alone do, as where pictures show no more than parts of it"));
+  }
   if (evidence.small_axis < kSmallestAxis * estimate.size) {
     finding.contradictions.push_back(Cat("its small Gaussians measure ", Fixed(evidence.small_axis / estimate.size, 2),
                                          " of such a pixel, and those of fits 0.2 to 2.3"));
@@ -266,16 +325,19 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
         Cat("without its black Gaussians, which no picture shows, the outlines say ", evidence.without_black));
   }
   if (finding.part) finding.size *= std::exp(-kPartCaution * estimate.cut_outlines);
-  if (evidence.unevenness > kUneven) finding.size *= std::pow(kUneven / evidence.unevenness, kUnevenFall);
+  const double of_uneven = evidence.unevenness > kUneven
+                               ? finding.size * std::pow(kUneven / evidence.unevenness, kUnevenFall)
+                               : finding.size;
+  if (!uneven) finding.size = of_uneven;
   finding.least = finding.size;
   if (finding.contradicted()) {
     double least = 0;
     const bool crowd_alone = crowd > most && finding.contradictions.size() == 1;
     if (crowd_alone) least = estimate.size * std::pow(most / crowd, kCrowdedFall);
-    if (uneven && finding.contradictions.size() == 1) least = finding.size;
+    if (uneven && finding.contradictions.size() == 1) least = of_uneven;
     // Without its black Gaussians the outlines say a size, too; it counts where nothing contradicts that one.
     const double without = evidence.without_black;
-    const bool one_pixel = !uneven && left_out <= kNothingButCuts;
+    const bool one_pixel = !uneven && !flat && left_out <= kNothingButCuts;
     if (without > 0 && one_pixel && crowd_at(without) <= most && evidence.small_axis >= kSmallestAxis * without) {
       least = std::max(least, without);
     }
@@ -297,8 +359,8 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
 }
 
 bool IsSharperThanFitsTo(double pixel, const PixelSizeFinding& finding) {
-  return !finding.contradicted() && !finding.part && finding.largest < kSharperThanClassic * pixel &&
-         finding.estimate.high < pixel;
+  return !finding.contradicted() && !finding.part && !finding.rough() &&
+         finding.largest < kSharperThanClassic * pixel && finding.estimate.high < pixel;
 }
 
 Result<PixelSizeFinding> FindPixelSize(const GaussianCloud& cloud) {

@@ -48,6 +48,7 @@ struct PixelSizeEvidence {
   double unevenness = 1;  // 90 % over 10 % quantile; infinite where 512 and more lie at one place
   double small_axis = 0;  // of the smallest tenth by area: PixelSizeProbe::start
   double harmless = 0;    // pixel that does no harm in nine of ten regions: GaussianRegion::HarmlessPixel
+  double flatness = 1;       // thickness over width along the principal axes, without a twentieth on every side
   double without_black = 0;  // the estimate without black Gaussians; 0: there are few of them
 };
 Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud);

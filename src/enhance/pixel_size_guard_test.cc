@@ -312,8 +312,11 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   // Cameras with larger pixels than it looks like.
   EXPECT_TRUE(IsSharperThanFitsTo(0.016, Judge(estimate, plain)));
   EXPECT_FALSE(IsSharperThanFitsTo(0.015, Judge(estimate, plain)));
-  EXPECT_FALSE(IsSharperThanFitsTo(0.016, Judge(wide, plain))) << "they lie within its interval";
-  EXPECT_TRUE(IsSharperThanFitsTo(0.025, Judge(wide, plain)));
+  PixelSizeEstimate wider = estimate;
+  wider.high = 0.017;
+  EXPECT_FALSE(IsSharperThanFitsTo(0.016, Judge(wider, plain))) << "they lie within its interval";
+  EXPECT_TRUE(IsSharperThanFitsTo(0.018, Judge(wider, plain)));
+  EXPECT_FALSE(IsSharperThanFitsTo(0.03, Judge(wide, plain))) << "a rough estimate says nothing against them";
 
   PixelSizeEvidence crowded = plain;
   crowded.spacing = 0.006;  // 2.8 on a pixel
@@ -393,12 +396,15 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   PixelSizeEvidence uneven = plain;
   uneven.unevenness = 2.7 * std::sqrt(2);
   EXPECT_TRUE(Judge(estimate, uneven).no_one_pixel);
-  EXPECT_DOUBLE_EQ(Judge(estimate, uneven).size, std::max(0.0025, plain.harmless));
+  EXPECT_DOUBLE_EQ(Judge(estimate, uneven).size, plain.harmless);
   EXPECT_DOUBLE_EQ(Judge(estimate, uneven).least, 0.0025);
   uneven.without_black = 0.006;
   EXPECT_EQ(Judge(estimate, uneven).least, 0);
   EXPECT_DOUBLE_EQ(Judge(estimate, uneven).size, plain.harmless);
   uneven.without_black = 0;
+  uneven.unevenness = 4;  // regions may bear more
+  EXPECT_DOUBLE_EQ(Judge(estimate, uneven).size, plain.harmless);
+  EXPECT_LT(Judge(estimate, uneven).least, 0.0022);
   uneven.unevenness = 2.8;  // of single objects, too
   EXPECT_FALSE(Judge(estimate, uneven).contradicted());
   EXPECT_TRUE(Judge(estimate, uneven).is_one());
@@ -446,6 +452,72 @@ TEST(PixelSizeGuard, FollowsTheScaleOfTheCloud) {
   EXPECT_NEAR(large->spacing / evidence->spacing, 1000, 1);
   EXPECT_NEAR(large->harmless / evidence->harmless, 1000, 1);
   EXPECT_NEAR(large->small_axis / evidence->small_axis, 1000, 1);
+  EXPECT_NEAR(large->flatness, evidence->flatness, 1e-3);
+}
+
+TEST(PixelSizeGuard, OutlinesThatNoPictureShows) {
+  PixelSizeEstimate estimate = {.size = 0.01, .low = 0.008, .high = 0.012, .strangeness = 0.5, .showing = 0.9};
+  PixelSizeEvidence evidence = {.gaussians = 10'000,
+                                .all = 12'000,
+                                .spacing = 0.01,
+                                .small_axis = 0.005,
+                                .harmless = 0.003,
+                                .flatness = 0.1,
+                                .without_black = 0};
+  EXPECT_FALSE(Judge(estimate, evidence).contradicted()) << "a carpet, seen from all around";
+  for (const auto& [strangeness, disagreement] : {std::pair(1.0, 1.0), std::pair(0.7, 0.8)}) {
+    estimate.strangeness = strangeness;
+    estimate.disagreement = disagreement;
+    ASSERT_EQ(Judge(estimate, evidence).contradictions.size(), 1u);
+    EXPECT_NE(Judge(estimate, evidence).contradictions[0].find("it is flat"), std::string::npos);
+    EXPECT_DOUBLE_EQ(Judge(estimate, evidence).size, 0.003);
+    EXPECT_EQ(Judge(estimate, evidence).least, 0);
+  }
+  evidence.without_black = 0.006;  // of the same outlines
+  EXPECT_EQ(Judge(estimate, evidence).least, 0);
+  evidence.without_black = 0;
+  evidence.flatness = 0.3;
+  EXPECT_FALSE(Judge(estimate, evidence).contradicted());
+  estimate.disagreement = 0.6;
+  ASSERT_EQ(Judge(estimate, evidence).contradictions.size(), 1u);
+  EXPECT_NE(Judge(estimate, evidence).contradictions[0].find("0.60 of what outlines alone do"), std::string::npos);
+  EXPECT_DOUBLE_EQ(Judge(estimate, evidence).size, 0.003);
+  evidence.all = 3000;  // pixels of few shrink anyway
+  EXPECT_FALSE(Judge(estimate, evidence).contradicted());
+}
+
+// Land seen from above: its rim and its lower side are as soft as its Gaussians are large.
+TEST(PixelSizeGuard, LandIsGivenNoMoreThanItBears) {
+  constexpr int kSide = 100;
+  constexpr float kSpacing = 0.01f;
+  GaussianCloud land;
+  land.Resize(kSide * kSide, 0);
+  Random random(4);
+  for (size_t i = 0; i < kSide * kSide; ++i) {
+    const float x = kSpacing * static_cast<float>(i % kSide), z = kSpacing * static_cast<float>(i / kSide);
+    const std::array<float, 3> at = {x, 0.03f * std::sin(12 * x) * std::cos(9 * z), z};
+    for (size_t a = 0; a < 3; ++a) {
+      land.means[3 * i + a] = at[a] + 0.003f * static_cast<float>(random.Normal());
+      land.log_scales[3 * i + a] =
+          std::log(kSpacing) + 0.5f * static_cast<float>(random.Normal()) - (a == 1 ? 2 : 0.4f);
+    }
+    land.quats[4 * i] = 1;
+    land.opacity_logits[i] = static_cast<float>(random.Normal());
+    std::fill_n(land.sh.data() + 3 * i, 3, static_cast<float>(0.5 * random.Normal()));
+  }
+  for (const bool far : {false, true}) {
+    if (far) {  // two in a hundred are floaters
+      for (size_t k = 0; k < 200; ++k) land.means[3 * 50 * k + 1] += static_cast<float>(random.Normal());
+    }
+    const auto evidence = GatherPixelSizeEvidence(land);
+    ASSERT_TRUE(evidence.ok());
+    EXPECT_LT(evidence->flatness, 0.15);
+    const auto found = FindPixelSize(land);
+    ASSERT_TRUE(found.ok());
+    ASSERT_TRUE(found->contradicted());
+    EXPECT_LT(found->size, 0.7 * double{kSpacing});
+  }
+  EXPECT_GT(GatherPixelSizeEvidence(Example("biplane"))->flatness, 0.3);
 }
 
 }  // namespace

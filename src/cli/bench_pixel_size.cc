@@ -35,6 +35,8 @@ nlohmann::json ToJson(const PixelSizeCheck& check, const std::string& kind) {
                          {"high", check.estimate.high},
                          {"seconds", check.seconds},
                          {"unlike_standard", check.estimate.unlike_standard},
+                         {"strangeness", check.estimate.strangeness},
+                         {"disagreement", check.estimate.disagreement},
                          {"showing", check.estimate.showing},
                          {"cut_outlines", check.estimate.cut_outlines},
                          {"coarse_outlines", check.estimate.coarse_outlines},

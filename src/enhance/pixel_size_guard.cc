@@ -63,7 +63,8 @@ constexpr double kSomeSize = 1e-12;  // of an estimate: a pixel has some size
 // Land seen from above is flat (thickness over width; 0.14 for blocks of houses, 0.26 and more for 40 objects), and has
 // a rim and a lower side that no picture shows: their outlines are as soft as its Gaussians are large, at pixels two to
 // five times smaller. They are strange (0.9 and more; standard fits 0.4 to 0.8), or the two regressions disagree.
-constexpr double kFlat = 0.2, kStrangeOfFlat = 0.85, kDisagreeingOfFlat = 0.87;
+// Where Gaussians lie further apart than two such pixels (land: 0.4 to 1.2), those are not too large.
+constexpr double kFlat = 0.2, kStrangeOfFlat = 0.85, kDisagreeingOfFlat = 0.87, kSparse = 2;
 // Beyond, the two regressions are about something that neither has seen: pictures of parts of an object, whose outlines
 // hardly any of them shows. Fits like standard ones are seldom below (two of 76, palms and brooms).
 constexpr double kDisagreeing = 0.67;
@@ -305,7 +306,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
                                                Number(kUneven), " times: they have no one pixel")
                                          : "a tenth of its Gaussians lie at one place, and those of fits do not");
   }
-  const bool flat = evidence.flatness < kFlat &&
+  const bool flat = evidence.flatness < kFlat && apart < kSparse * estimate.size &&
                     (estimate.strangeness > kStrangeOfFlat || estimate.disagreement < kDisagreeingOfFlat);
   if (flat) {
     finding.contradictions.emplace_back(

@@ -473,6 +473,9 @@ TEST(PixelSizeGuard, OutlinesThatNoPictureShows) {
     EXPECT_DOUBLE_EQ(Judge(estimate, evidence).size, 0.003);
     EXPECT_EQ(Judge(estimate, evidence).least, 0);
   }
+  evidence.spacing = 0.021;
+  EXPECT_FALSE(Judge(estimate, evidence).contradicted()) << "a table top of few Gaussians";
+  evidence.spacing = 0.01;
   evidence.without_black = 0.006;  // of the same outlines
   EXPECT_EQ(Judge(estimate, evidence).least, 0);
   evidence.without_black = 0;

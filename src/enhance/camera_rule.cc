@@ -17,7 +17,7 @@ namespace {
 using Vector = std::array<double, 3>;
 
 constexpr size_t kLeastCameras = 8;
-constexpr float kMostDistant = 1.6f;  // farthest camera (95 % of them) over nearest (5 %)
+constexpr float kMostDistant = 1.6f;  // farthest camera (95 % of them) over nearest (5 %); likewise of their pixels
 constexpr float kMostAside = 0.2f;    // of the distance, between an axis and the point (90 % of the axes)
 constexpr double kLeastInFront = 0.95;
 // Length of the mean direction to the cameras: 0 all around, ½ for an upper half or a ring at 30°, 1 for one place.
@@ -64,7 +64,7 @@ CameraRuleChoice ChooseCameraRule(const GaussianCloud& cloud, const CameraSet& s
   const std::optional<Vector> point = NearestToAxes(cameras);
   if (!point) return smallest("the cameras look the same way");
 
-  Buffer<float> distances, asides;
+  Buffer<float> distances, pixels, asides;
   Vector mean{};
   size_t in_front = 0;
   for (const Camera& camera : cameras) {
@@ -73,6 +73,7 @@ CameraRuleChoice ChooseCameraRule(const GaussianCloud& cloud, const CameraSet& s
     if (!(distance > 0) || !std::isfinite(distance)) return smallest("the cameras do not look at one thing");
     if (along > 0) ++in_front;
     distances.push_back(static_cast<float>(distance));
+    pixels.push_back(static_cast<float>(distance / std::sqrt(camera.intrinsics.fx * camera.intrinsics.fy)));
     asides.push_back(static_cast<float>(std::sqrt(std::max(0.0, 1 - std::pow(along / distance, 2)))));
     for (size_t a = 0; a < 3; ++a) mean[a] += to[a] / distance / static_cast<double>(cameras.size());
   }
@@ -84,6 +85,13 @@ CameraRuleChoice ChooseCameraRule(const GaussianCloud& cloud, const CameraSet& s
   const float near = Quantile(distances, 0.05), far = Quantile(distances, 0.95), typical = Quantile(distances, 0.5);
   if (far > kMostDistant * near) {
     return smallest(Cat("some cameras stand ", Fixed(far / near, 1), " times closer to what they look at than others"));
+  }
+
+  // Others may be zoomed in from where they stand.
+  const float finest = Quantile(pixels, 0.05), coarsest = Quantile(pixels, 0.95);
+  if (coarsest > kMostDistant * finest) {
+    return smallest(
+        Cat("pixels of some cameras are ", Fixed(coarsest / finest, 1), " times smaller than those of others"));
   }
 
   int64_t visible = 0, inside = 0;

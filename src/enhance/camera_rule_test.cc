@@ -104,6 +104,14 @@ TEST(CameraRule, OneSideCloseUpsAndSurroundingsAreNot) {
   const auto choice = ChooseCameraRule(object, close_ups);
   EXPECT_EQ(choice.rule, CameraPixelRule::kSmallest);
   EXPECT_NE(choice.why.find("closer"), std::string::npos) << choice.why;
+  CameraSet zoomed = Ring(middle, 2, 0.3, kTurn, 0.1);  // from the same places
+  for (size_t k = 0; k < zoomed.cameras.size(); k += 4) {
+    zoomed.cameras[k].intrinsics.fx *= 4;
+    zoomed.cameras[k].intrinsics.fy *= 4;
+  }
+  const auto of_zoomed = ChooseCameraRule(object, zoomed);
+  EXPECT_EQ(of_zoomed.rule, CameraPixelRule::kSmallest);
+  EXPECT_NE(of_zoomed.why.find("times smaller than those of others"), std::string::npos) << of_zoomed.why;
   // A table with a garden around it.
   GaussianCloud garden = object;
   ASSERT_TRUE(Append(garden, Cluster(middle, 20)).ok());

@@ -54,11 +54,15 @@ constexpr double kUneven = 2.7, kMostUneven = 2.85, kUnevenFall = 4;
 // Spacing of 512, over its median, below which Gaussians come of smaller pixels than the others. The densest place of
 // 22 fits is at 0.52 and more, of captures at 0.37.
 constexpr double kCloser = 0.45;
-// √(largest × middle axis) of the smallest tenth lies between 0.3 and 2.3 pixels in the 152 fits of the regression, and
-// at 0.2 in one of a chair whose slats are thinner than a pixel.
-constexpr double kSmallestAxis = 0.12;  // pixels; with a margin
+// √(largest × middle axis) of the smallest tenth, in pixels of the estimate: 0.39 and more in 361 of 364 fits whose
+// estimates are 0.7 to 1.8 times the truth, 0.36 in a broom (0.72), and 0.23, 0.07 and 0.02 where they are 3.7, 11 and
+// 23 times the truth. Hair and grass, whose blades are thinner than a pixel and which have no outlines: 0.13 and 0.32
+// at 4.3 and 2.6 times. Below the first pixels shrink with this power, and below the second it contradicts.
+constexpr double kSmallAxis = 0.4, kSmallestAxis = 0.3, kSmallFall = 4;
 // Black Gaussians may move the estimate this much before it counts as theirs.
 constexpr double kMoved = 1.5;
+// An interval that is wider from end to end says nothing.
+constexpr double kNoEstimate = 10;
 constexpr double kSomeSize = 1e-12;  // of an estimate: a pixel has some size
 // Land seen from above is flat (thickness over width; 0.14 for blocks of houses, 0.26 and more for 40 objects), and has
 // a rim and a lower side that no picture shows: their outlines are as soft as its Gaussians are large, at pixels two to
@@ -70,6 +74,9 @@ constexpr double kFlat = 0.2, kStrangeOfFlat = 0.85, kDisagreeingOfFlat = 0.87, 
 constexpr double kDisagreeing = 0.67;
 // Antialiased splats look like 0.44 to 0.86 of their pixels, classic ones of known pixels like 0.73 and more.
 constexpr double kSharperThanClassic = 0.65;
+// Of a thing of 20 pixels and of a table in ten pictures, whose estimates are half of the truth, outlines are at 2.1
+// and 2.5: stranger than these, they say nothing against cameras.
+constexpr double kTooStrange = 1.75;
 // Regions that a cloud is looked at in, and how many of them a Gaussian belongs to.
 constexpr int64_t kRegions = 8192;
 constexpr size_t kRegionsAround = 2;
@@ -319,23 +326,29 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   }
   if (evidence.small_axis < kSmallestAxis * estimate.size) {
     finding.contradictions.push_back(Cat("its small Gaussians measure ", Fixed(evidence.small_axis / estimate.size, 2),
-                                         " of such a pixel, and those of fits 0.2 to 2.3"));
+                                         " of such a pixel, and those of fits 0.4 to 2.3"));
+  }
+  if (estimate.high > kNoEstimate * estimate.low) {
+    finding.contradictions.push_back(
+        Cat("anything from ", estimate.low, " to ", estimate.high, " would do, which is as good as no estimate"));
   }
   if (evidence.without_black > 0 && estimate.size > kMoved * evidence.without_black) {
     finding.contradictions.push_back(
         Cat("without its black Gaussians, which no picture shows, the outlines say ", evidence.without_black));
   }
   if (finding.part) finding.size *= std::exp(-kPartCaution * estimate.cut_outlines);
-  const double of_uneven = evidence.unevenness > kUneven
-                               ? finding.size * std::pow(kUneven / evidence.unevenness, kUnevenFall)
-                               : finding.size;
-  if (!uneven) finding.size = of_uneven;
+  double shrunk = finding.size;
+  if (evidence.small_axis < kSmallAxis * estimate.size) {
+    shrunk *= std::pow(evidence.small_axis / (kSmallAxis * estimate.size), kSmallFall);
+  }
+  if (evidence.unevenness > kUneven) shrunk *= std::pow(kUneven / evidence.unevenness, kUnevenFall);
+  if (!finding.contradicted()) finding.size = shrunk;
   finding.least = finding.size;
   if (finding.contradicted()) {
     double least = 0;
     const bool crowd_alone = crowd > most && finding.contradictions.size() == 1;
     if (crowd_alone) least = estimate.size * std::pow(most / crowd, kCrowdedFall);
-    if (uneven && finding.contradictions.size() == 1) least = of_uneven;
+    if (uneven && finding.contradictions.size() == 1) least = shrunk;
     // Without its black Gaussians the outlines say a size, too; it counts where nothing contradicts that one.
     const double without = evidence.without_black;
     const bool one_pixel = !uneven && !flat && left_out <= kNothingButCuts;
@@ -360,8 +373,9 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
 }
 
 bool IsSharperThanFitsTo(double pixel, const PixelSizeFinding& finding) {
-  return !finding.contradicted() && !finding.part && !finding.rough() &&
-         finding.largest < kSharperThanClassic * pixel && finding.estimate.high < pixel;
+  if (finding.contradicted() || finding.part || finding.rough()) return false;
+  return finding.estimate.strangeness < kTooStrange && finding.largest < kSharperThanClassic * pixel &&
+         finding.estimate.high < pixel;
 }
 
 Result<PixelSizeFinding> FindPixelSize(const GaussianCloud& cloud) {

@@ -65,8 +65,8 @@ Buffer<float> CautiousPixelSizes(const GaussianCloud& cloud, const PixelSizeFind
 // What to make of an estimate in the light of the evidence.
 PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidence& evidence);
 
-// Whether a classic splat is sharper than a fit to pixels of that size could be. An estimate that is rough enough to
-// allow for them says nothing against them.
+// Whether a classic splat is sharper than a fit to pixels of that size could be. A rough estimate, one of strange
+// outlines and one whose interval reaches them say nothing against them.
 bool IsSharperThanFitsTo(double pixel, const PixelSizeFinding& finding);
 
 // Scales with the cloud. Errors: those of EstimatePixelSize.

@@ -316,6 +316,9 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   wider.high = 0.017;
   EXPECT_FALSE(IsSharperThanFitsTo(0.016, Judge(wider, plain))) << "they lie within its interval";
   EXPECT_TRUE(IsSharperThanFitsTo(0.018, Judge(wider, plain)));
+  PixelSizeEstimate strange = estimate;
+  strange.strangeness = 2;
+  EXPECT_FALSE(IsSharperThanFitsTo(0.016, Judge(strange, plain)));
   EXPECT_FALSE(IsSharperThanFitsTo(0.03, Judge(wide, plain))) << "a rough estimate says nothing against them";
 
   PixelSizeEvidence crowded = plain;
@@ -380,6 +383,17 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   PixelSizeEvidence small = plain;
   small.small_axis = 0.001;
   EXPECT_TRUE(Judge(estimate, small).contradicted());
+  EXPECT_DOUBLE_EQ(Judge(estimate, small).size, plain.harmless);
+  small.small_axis = 0.0035;
+  EXPECT_FALSE(Judge(estimate, small).contradicted());
+  EXPECT_NEAR(Judge(estimate, small).size, 0.01 * std::pow(0.35 / 0.4, 4), 1e-9);
+  small.small_axis = 0.0041;
+  EXPECT_DOUBLE_EQ(Judge(estimate, small).size, 0.01);
+  small.small_axis = 0.001;
+  PixelSizeEstimate any = estimate;
+  any.high = 11 * any.low;
+  ASSERT_EQ(Judge(any, plain).contradictions.size(), 1u);
+  EXPECT_NE(Judge(any, plain).contradictions[0].find("as good as no estimate"), std::string::npos);
 
   PixelSizeEvidence black = plain;
   black.without_black = 0.005;

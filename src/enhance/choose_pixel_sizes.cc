@@ -90,7 +90,7 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
           from_cameras.sizes[i] = std::min(from_cameras.sizes[i], cautious[i]);
         }
       }
-    } else if (!found->contradicted() && !found->part && (ratio > kSuspiciousRatio || ratio < 1 / kSuspiciousRatio)) {
+    } else if (found->sure() && (ratio > kSuspiciousRatio || ratio < 1 / kSuspiciousRatio)) {
       LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
                      " (median), the splat itself looks like ", found->size,
                      ": are these its training cameras, at the size it was trained at (--train-width)?"));

@@ -74,9 +74,6 @@ constexpr double kFlat = 0.2, kStrangeOfFlat = 0.85, kDisagreeingOfFlat = 0.87, 
 constexpr double kDisagreeing = 0.67;
 // Antialiased splats look like 0.44 to 0.86 of their pixels, classic ones of known pixels like 0.73 and more.
 constexpr double kSharperThanClassic = 0.65;
-// Of a thing of 20 pixels and of a table in ten pictures, whose estimates are half of the truth, outlines are at 2.1
-// and 2.5: stranger than these, they say nothing against cameras.
-constexpr double kTooStrange = 1.75;
 // Regions that a cloud is looked at in, and how many of them a Gaussian belongs to.
 constexpr int64_t kRegions = 8192;
 constexpr size_t kRegionsAround = 2;
@@ -373,9 +370,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
 }
 
 bool IsSharperThanFitsTo(double pixel, const PixelSizeFinding& finding) {
-  if (finding.contradicted() || finding.part || finding.rough()) return false;
-  return finding.estimate.strangeness < kTooStrange && finding.largest < kSharperThanClassic * pixel &&
-         finding.estimate.high < pixel;
+  return finding.sure() && finding.largest < kSharperThanClassic * pixel && finding.estimate.high < pixel;
 }
 
 Result<PixelSizeFinding> FindPixelSize(const GaussianCloud& cloud) {

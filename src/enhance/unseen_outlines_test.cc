@@ -1,0 +1,88 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "core/random.h"
+#include "core/source_dir_for_test.h"
+#include "enhance/pixel_size_guard.h"
+#include "formats/cloud_io.h"
+
+namespace anchorsplat {
+namespace {
+
+TEST(PixelSizeGuard, OutlinesThatNoPictureShows) {
+  PixelSizeEstimate estimate = {.size = 0.01, .low = 0.008, .high = 0.012, .strangeness = 0.5, .showing = 0.9};
+  PixelSizeEvidence evidence = {.gaussians = 10'000,
+                                .all = 12'000,
+                                .spacing = 0.01,
+                                .small_axis = 0.005,
+                                .harmless = 0.003,
+                                .flatness = 0.1,
+                                .without_black = 0};
+  EXPECT_FALSE(Judge(estimate, evidence).contradicted()) << "a carpet, seen from all around";
+  for (const auto& [strangeness, disagreement] : {std::pair(1.0, 1.0), std::pair(0.7, 0.8)}) {
+    estimate.strangeness = strangeness;
+    estimate.disagreement = disagreement;
+    ASSERT_EQ(Judge(estimate, evidence).contradictions.size(), 1u);
+    EXPECT_NE(Judge(estimate, evidence).contradictions[0].find("it is flat"), std::string::npos);
+    EXPECT_DOUBLE_EQ(Judge(estimate, evidence).size, 0.003);
+    EXPECT_EQ(Judge(estimate, evidence).least, 0);
+  }
+  evidence.spacing = 0.021;
+  EXPECT_FALSE(Judge(estimate, evidence).contradicted()) << "a table top of few Gaussians";
+  evidence.spacing = 0.01;
+  evidence.without_black = 0.006;  // of the same outlines
+  EXPECT_EQ(Judge(estimate, evidence).least, 0);
+  evidence.without_black = 0;
+  evidence.flatness = 0.3;
+  EXPECT_FALSE(Judge(estimate, evidence).contradicted());
+  estimate.disagreement = 0.6;
+  ASSERT_EQ(Judge(estimate, evidence).contradictions.size(), 1u);
+  EXPECT_NE(Judge(estimate, evidence).contradictions[0].find("0.60 of what outlines alone do"), std::string::npos);
+  EXPECT_DOUBLE_EQ(Judge(estimate, evidence).size, 0.003);
+  evidence.all = 3000;  // pixels of few shrink anyway
+  EXPECT_FALSE(Judge(estimate, evidence).contradicted());
+}
+
+// Land seen from above: its rim and its lower side are as soft as its Gaussians are large.
+TEST(PixelSizeGuard, LandIsGivenNoMoreThanItBears) {
+  constexpr int kSide = 100;
+  constexpr float kSpacing = 0.01f;
+  GaussianCloud land;
+  land.Resize(kSide * kSide, 0);
+  Random random(4);
+  for (size_t i = 0; i < kSide * kSide; ++i) {
+    const float x = kSpacing * static_cast<float>(i % kSide), z = kSpacing * static_cast<float>(i / kSide);
+    const std::array<float, 3> at = {x, 0.03f * std::sin(12 * x) * std::cos(9 * z), z};
+    for (size_t a = 0; a < 3; ++a) {
+      land.means[3 * i + a] = at[a] + 0.003f * static_cast<float>(random.Normal());
+      land.log_scales[3 * i + a] =
+          std::log(kSpacing) + 0.5f * static_cast<float>(random.Normal()) - (a == 1 ? 2 : 0.4f);
+    }
+    land.quats[4 * i] = 1;
+    land.opacity_logits[i] = static_cast<float>(random.Normal());
+    std::fill_n(land.sh.data() + 3 * i, 3, static_cast<float>(0.5 * random.Normal()));
+  }
+  for (const bool far : {false, true}) {
+    if (far) {  // two in a hundred are floaters
+      for (size_t k = 0; k < 200; ++k) land.means[3 * 50 * k + 1] += static_cast<float>(random.Normal());
+    }
+    const auto evidence = GatherPixelSizeEvidence(land);
+    ASSERT_TRUE(evidence.ok());
+    EXPECT_LT(evidence->flatness, 0.15);
+    const auto found = FindPixelSize(land);
+    ASSERT_TRUE(found.ok());
+    ASSERT_TRUE(found->contradicted());
+    EXPECT_LT(found->size, 0.7 * double{kSpacing});
+  }
+  const auto biplane = ReadCloud(SourceDirForTest() / "examples" / "biplane" / "input.ply");
+  ASSERT_TRUE(biplane.ok());
+  EXPECT_GT(GatherPixelSizeEvidence(*biplane)->flatness, 0.3);
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -30,8 +30,8 @@ def test_the_result_is_the_programs(cloud, program, tmp_path, options):
 
 def test_cameras_say_the_pixel_size(cloud):
     cameras = anchorsplat.Cameras.orbit(cloud, 8, size=(200, 200))
-    _, report = anchorsplat.enhance(cloud, method="filter", cameras=cameras, train_width=100)
-    assert report["pixel_size"]["source"] == "cameras" and report["train_width"] == 100
+    _, report = anchorsplat.enhance(cloud, method="filter", cameras=cameras, train_width=180)
+    assert report["pixel_size"]["source"] == "cameras" and report["train_width"] == 180
     assert report["gaussians"] == {"in": 2500, "dropped": 0, "out": 2500}
     assert len(report) == len(dict(report)) and "method" in report
 

@@ -24,8 +24,8 @@ struct PixelSizeEstimate {
   // How unlike its outlines are to those of the fits that the regression has seen: root mean square of their features'
   // deviations, 1 on average of many kinds, 0.5 of standard fits.
   double strangeness = 0;
-  // What the regression of many kinds says over what that of standard fits does, where the first is smaller and only the
-  // second would be believed but for that; 1 elsewhere.
+  // What the regression of many kinds says over what that of standard fits does, where the first is smaller and only
+  // the second would be believed but for that; 1 elsewhere.
   double disagreement = 1;
   double showing = 1;  // PixelSizeProbe::showing()
   // Share of its outlines that are cuts and do not count: PixelSizeProbe::CutOutlines().

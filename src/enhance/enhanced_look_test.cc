@@ -152,6 +152,17 @@ TEST(EnhancedLook, TwinsOfFewStepsAreUnrelated) {
     std::copy_n(few.quats.data() + 4 * i, 4, few.quats.data() + 4 * i + 4);
   }
   EXPECT_TRUE(are_unrelated(few));
+  // Beside each other by half a standard deviation, as with one of each of a network, and by more, as after a split.
+  for (const auto& [deviations, unrelated] : {std::pair(0.5f, false), std::pair(0.9f, true)}) {
+    GaussianCloud beside = few;
+    for (size_t i = 0; i < 4000; i += 8) {
+      const float* q = few.quats.data() + 4 * i;
+      const auto r = RotationFromQuaternion(double{q[0]}, double{q[1]}, double{q[2]}, double{q[3]});
+      const float shift = deviations * std::exp(-3.5f);  // the largest axis is the first
+      for (size_t a = 0; a < 3; ++a) beside.means[3 * i + 3 + a] += shift * static_cast<float>(r[3 * a]);
+    }
+    EXPECT_EQ(are_unrelated(beside), unrelated) << deviations;
+  }
   GaussianCloud enhanced = few;  // as they would be if each were turned as its twin
   for (size_t i = 0; i < enhanced.quats.size(); ++i) enhanced.quats[i] = few.quats[i % 4];
   EXPECT_FALSE(are_unrelated(enhanced));

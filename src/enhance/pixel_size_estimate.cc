@@ -172,16 +172,16 @@ Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional
   double share = std::max(Share(settled.strangeness, kStandard, kOther),
                           Share(StrangenessOfSizes(probe, std::exp(settled.log_size)), kPlausible, kImplausible));
   double like_standard = IsCompensated(mode) ? 0 : Share(probe.showing(), kFewShow, kMostShow);
-  const double odd = Share(settled.strangeness, kFamiliarOutlines, kOddOutlines);
+  const double doubtful = like_standard * Share(settled.strangeness, kFamiliarOutlines, kOddOutlines);
   share *= 1 - like_standard;
   double disagreement = 1;
-  if (share > 0 || like_standard * odd > 0) {
+  if (share > 0 || doubtful > 0) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Settled kinds, Settle(kKindsPixelSize, probe.start(), [&](double size) {
                                    return FeaturesOf(std::array{Look::kAlpha, Look::kAntialiased}, probe, size);
                                  }));
-    if (like_standard * odd > 0) {
+    if (doubtful > 0) {
       disagreement = std::min(1.0, std::exp(kinds.log_size - settled.log_size));
-      const double doubt = like_standard * odd * Share(disagreement, kAgreeing, kDisagreeing);
+      const double doubt = doubtful * Share(disagreement, kAgreeing, kDisagreeing);
       like_standard -= doubt;
       share = std::max(share, doubt);
     }

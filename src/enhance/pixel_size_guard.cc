@@ -46,7 +46,7 @@ constexpr double kPartCaution = 0.3;
 // Where hardly an outline is left that is not a cut's or of coarse Gaussians, the rest says nothing.
 constexpr double kNothingButCuts = 0.9;
 // 90 % over 10 % quantile of the spacings of 512: two things of different size, or a subject and what is far behind it,
-// fitted to pixels of different size. At most 2.5 in 101 fits and in captures, but 2.7 and 2.8 in a plant and a
+// fitted to pixels of different size. At most 2.6 in 101 fits and in captures, but 2.7 and 2.8 in a plant and a
 // chair; 2.5 to 2.9 where an object lies beside one like it that is twice as large, from 2.9 on beside one three times
 // as large, on a ground or before a sky. Of a subject with less than a tenth of the Gaussians it says nothing. From the
 // first on pixels shrink with this power of it, and from the second on it contradicts.
@@ -54,10 +54,11 @@ constexpr double kUneven = 2.7, kMostUneven = 2.85, kUnevenFall = 4;
 // Spacing of 512, over its median, below which Gaussians come of smaller pixels than the others. The densest place of
 // 22 fits is at 0.52 and more, of captures at 0.37.
 constexpr double kCloser = 0.45;
-// √(largest × middle axis) of the smallest tenth, in pixels of the estimate: 0.39 and more in 361 of 364 fits whose
-// estimates are 0.7 to 1.8 times the truth, 0.36 in a broom (0.72), and 0.23, 0.07 and 0.02 where they are 3.7, 11 and
-// 23 times the truth. Hair and grass, whose blades are thinner than a pixel and which have no outlines: 0.13 and 0.32
-// at 4.3 and 2.6 times. Below the first pixels shrink with this power, and below the second it contradicts.
+// √(largest × middle axis) of the smallest tenth, in pixels of the estimate: 0.39 and more in 360 of 364 fits, 0.36 in
+// a broom (taken for 0.72 of its pixel), and 0.23, 0.07 and 0.02 where the estimates are 3.7, 11 and 23 times the truth
+// (`start` and `estimate` of data/pixel-size-kinds.json.gz). Hair and grass, whose blades are thinner than a pixel and
+// which have no outlines: 0.13 and 0.32 at 4.3 and 2.6 times. Below the first pixels shrink with this power, and below
+// the second it contradicts.
 constexpr double kSmallAxis = 0.4, kSmallestAxis = 0.3, kSmallFall = 4;
 // Black Gaussians may move the estimate this much before it counts as theirs.
 constexpr double kMoved = 1.5;
@@ -70,7 +71,7 @@ constexpr double kSomeSize = 1e-12;  // of an estimate: a pixel has some size
 // Where Gaussians lie further apart than two such pixels (land: 0.4 to 1.2), those are not too large.
 constexpr double kFlat = 0.2, kStrangeOfFlat = 0.85, kDisagreeingOfFlat = 0.87, kSparse = 2;
 // Beyond, the two regressions are about something that neither has seen: pictures of parts of an object, whose outlines
-// hardly any of them shows. Fits like standard ones are seldom below (two of 76, palms and brooms).
+// hardly any of them shows. Of 76 fits like standard ones three are below: a palm, a broom, trousers.
 constexpr double kDisagreeing = 0.67;
 // Antialiased splats look like 0.44 to 0.86 of their pixels, classic ones of known pixels like 0.73 and more.
 constexpr double kSharperThanClassic = 0.65;
@@ -120,7 +121,7 @@ Surface SurfaceOf(const GaussianCloud& cloud) {
 }
 
 // Thickness over width of a cloud along its principal axes, of what lies between these quantiles: a few lie anywhere.
-constexpr double kThinnestTo = 0.05, kThickestTo = 0.95;
+constexpr double kLowest = 0.05, kHighest = 0.95;
 double FlatnessOf(const GaussianCloud& cloud) {
   const auto count = static_cast<size_t>(cloud.size());
   Buffer<float> values(count);
@@ -137,7 +138,7 @@ double FlatnessOf(const GaussianCloud& cloud) {
     const auto [x, y, z] = away(i);
     values[i] = static_cast<float>(x * x + y * y + z * z);
   }
-  const float farthest = Quantile(values, kThickestTo);
+  const float farthest = Quantile(values, kHighest);
   std::array<double, 6> moments{};
   for (size_t i = 0; i < count; ++i) {
     if (values[i] > farthest) continue;
@@ -152,7 +153,7 @@ double FlatnessOf(const GaussianCloud& cloud) {
       const auto at = away(i);
       values[i] = static_cast<float>(shape.axes[k] * at[0] + shape.axes[3 + k] * at[1] + shape.axes[6 + k] * at[2]);
     }
-    sides[k] = double{Quantile(values, kThickestTo)} - double{Quantile(values, kThinnestTo)};
+    sides[k] = double{Quantile(values, kHighest)} - double{Quantile(values, kLowest)};
   }
   std::ranges::sort(sides);
   return sides[1] > 0 ? sides[0] / sides[1] : 1;

@@ -104,16 +104,16 @@ void CompactOutput::Append(const CompactPart& part, CopyGroups groups) {
     (piece.cloud.*array).insert((piece.cloud.*array).end(), from.begin(), from.end());
   }
   piece.keys.insert(piece.keys.end(), part.keys.begin(), part.keys.end());
-  Count(part, first, std::move(groups));
+  Plan(part, first, std::move(groups));
 }
 
 void CompactOutput::Take(CompactPart part, CopyGroups groups) {
   pieces_.push_back({std::move(part.cloud), std::move(part.keys)});
-  Count(part, 0, std::move(groups));
+  Plan(part, 0, std::move(groups));
 }
 
-// What is last of the last piece, from row `first` on.
-void CompactOutput::Count(const CompactPart& part, int64_t first, CopyGroups groups) {
+// Of the part that has come last, which begins at row `first` of the last piece: plans its merges, where they wait.
+void CompactOutput::Plan(const CompactPart& part, int64_t first, CopyGroups groups) {
   made_ += part.made;
   if (!merges_ || !waits_ || part.inside == 0) return;
   const Piece& piece = pieces_.back();

@@ -62,7 +62,7 @@ class CompactOutput {
     Buffer<int64_t> keys;  // by which rows are ordered
   };
   Piece& PieceFor(int64_t rows, const GaussianCloud& block);
-  void Count(const CompactPart& part, int64_t first, CopyGroups groups);
+  void Plan(const CompactPart& part, int64_t first, CopyGroups groups);
   void MergeAll();
 
   int64_t count_, copies_;

@@ -17,6 +17,10 @@ part in it. `--keep FILE` writes all features to one small file. With `--correct
 those two leave, by kernels, and is written there; it is cross-validated, too, from estimates that were themselves made
 without the mesh. Fits that have no "showing" (older features) are taken as if few of their Gaussians did.
 
+With `--soft` the regression is the last one: what the estimate is still off by, learned from classic fits, those to soft
+pictures (kinds that begin with `soft`) among them. It looks at what the program's estimate was before that. FILE of `--keep` has
+only what it needs, and none of the fits of pixel-size-kinds.json.gz, which is given beside it.
+
 With `--antialiased` regression and correction are those of antialiased fits, and only of these. The regression looks at
 outlines as the antialiased rasterizer draws them, and at sizes. The ridge is that of the best corrected estimates.
 """
@@ -41,6 +45,11 @@ SIZES, LENGTHS = slice(3 * OUTLINE, 3 * OUTLINE + 16), 12  # the first twelve of
 LANDMARKS = 64  # kCorrectionLandmarks
 KERNEL, STRAIGHT = 0.5, 0.3  # width of a kernel, and how much the straight part may say
 CORRECTION_RIDGE = 0.05
+CORRECTION = np.r_[np.arange(OUTLINE), np.arange(3 * OUTLINE, 3 * OUTLINE + 16)]  # as kCorrectionFeatures
+SMALLEST_AXES = np.arange(OUTLINE, OUTLINE + 4)  # of CORRECTION; where they are next to nothing, as those of 2DGS, they say nothing
+SOFT_WEIGHT, WIDENED_WEIGHT = 4.0, 0.5  # of a fit to soft pictures, and of one that somebody widened
+LARGEST_STEP, LARGEST_STEP_UP = 1.0, 0.5  # that is learned, ln
+HARDLY_SOFT, SOFT = 0.3, 0.5  # kHardlySoft, kSoft in pixel_size_estimate.cc
 MOST_CORRECTION = 0.5  # kMostCorrection
 UPWARDS = 0.5  # kUpwards
 STANDARD, OTHER = 0.6, 0.9  # kStandard, kOther in pixel_size_estimate.cc
@@ -287,6 +296,90 @@ def train_antialiased(objects, arguments):
               "<kAntialiasedPixelSizeFeatures> kAntialiasedPixelSize")
 
 
+def at_estimate(item):
+    """Features of the estimate, between those of the samples; None where it lies far beyond them."""
+    if "of_estimate" in item:
+        return np.array(item["of_estimate"])
+    size = np.log(item["estimate"] / item.get("softness", 1))
+    samples = sorted((s for s in item["samples"] if None not in s["features"]), key=lambda s: s["size"])
+    if not samples:
+        return None
+    sizes = np.log([s["size"] for s in samples])
+    if not sizes[0] - 0.3 < size < sizes[-1] + 0.3:
+        return None
+    features = np.array([s["features"] for s in samples])[:, CORRECTION]
+    return np.array([np.interp(size, sizes, column) for column in features.T])
+
+
+def train_soft(arguments):
+    items = []
+    for name in arguments.features:
+        with (gzip.open if name.endswith(".gz") else open)(name, "rt", encoding="utf-8") as file:
+            items += [i | {"others": name.endswith("pixel-size-kinds.json.gz")} for i in json.load(file)["objects"]]
+    rows = []
+    for item in items:
+        features = at_estimate(item) if item.get("mode") not in ("antialiased", "mip") else None
+        if features is not None and np.isfinite(features).all():
+            kind = item.get("kind") or ""
+            mesh = re.sub(r"--.*", "", item["object"])
+            rows.append({"name": item["object"], "mesh": SAME_MESH.get(mesh, mesh), "kind": kind, "x": features, "soft": kind.startswith("soft"), "widened": kind.startswith("widened"),
+                         "off": np.log(item["pixel_size"] / item["estimate"] * item.get("softness", 1)), "item": item})
+    if arguments.keep:
+        kept = [{"object": r["name"], "kind": r["kind"], "pixel_size": r["item"]["pixel_size"],
+                 "estimate": r["item"]["estimate"] / r["item"].get("softness", 1), "of_estimate": [round(v, 4) for v in r["x"]]}
+                for r in rows if not r["item"]["others"]]
+        with gzip.GzipFile(arguments.keep, "wb", mtime=0) as out:
+            out.write(json.dumps({"objects": kept}).encode())
+    x = np.array([r["x"] for r in rows])
+    off = np.array([r["off"] for r in rows])
+    soft = np.array([r["soft"] for r in rows])
+    meshes = np.array([r["mesh"] for r in rows])
+    widened = np.array([r["widened"] for r in rows])
+    weights = np.where(soft, SOFT_WEIGHT, np.where(widened, WIDENED_WEIGHT, 1.0))
+    wanted = np.clip(off, -LARGEST_STEP, LARGEST_STEP_UP)
+    print(f"{len(rows)} fits of {len(set(meshes))} meshes, {soft.sum()} to soft pictures")
+
+    def standardised(x, mean, deviation):
+        z = (x - mean) / deviation
+        z[:, SMALLEST_AXES] = np.where(z[:, SMALLEST_AXES] < -MOST_DEVIATIONS, 0, z[:, SMALLEST_AXES])
+        return np.clip(z, -MOST_DEVIATIONS, MOST_DEVIATIONS)
+
+    def learn(of, ridge):
+        w = weights[of] / weights[of].sum()
+        mean = w @ x[of]
+        deviation = np.sqrt(w @ (x[of] - mean) ** 2) + 1e-6
+        z = standardised(x[of], mean, deviation)
+        z_mean, y_mean = w @ z, w @ wanted[of]
+        weight = np.linalg.solve(((z - z_mean) * w[:, None]).T @ (z - z_mean) + ridge * np.eye(x.shape[1]),
+                                 ((z - z_mean) * w[:, None]).T @ (wanted[of] - y_mean))
+        return {"mean": mean, "deviation": deviation, "weight": weight, "intercept": y_mean - z_mean @ weight}
+
+    def apply(model, of):
+        return standardised(x[of], model["mean"], model["deviation"]) @ model["weight"] + model["intercept"]
+
+    results = {}
+    for ridge in arguments.ridge:
+        step = np.zeros(len(rows))
+        for mesh in set(meshes):
+            step[meshes == mesh] = apply(learn(meshes != mesh, ridge), meshes == mesh)
+        share = np.clip((-step - HARDLY_SOFT) / (SOFT - HARDLY_SOFT), 0, 1)
+        lowered = share * np.clip(step, -LARGEST_STEP, 0)
+        results[ridge] = lowered
+        sharp = ~soft & ~widened & (off > -0.3)
+        print(f"ridge {ridge:g}: estimate / truth of soft ones {np.exp(np.median(-off[soft])):.2f}, worst {np.exp(np.max(-off[soft])):.2f}, "
+              f"now {np.exp(np.median((lowered - off)[soft])):.2f}, nine in ten {np.exp(np.quantile((lowered - off)[soft], 0.9)):.2f}, "
+              f"worst {np.exp(np.max((lowered - off)[soft])):.2f}; of {sharp.sum()} right ones {(lowered[sharp] < 0).sum()} lowered, "
+              f"{(lowered[sharp] < -0.2).sum()} by a fifth and more, at most to {np.exp(lowered[sharp].min()):.2f}")
+    ridge = min(results, key=lambda r: np.mean(weights * (results[r] - off).clip(-0.5, 1) ** 2))
+    print(f"ridge {ridge:g} chosen")
+    if arguments.list:
+        for r, o, l in sorted(zip(rows, off, results[ridge]), key=lambda t: t[2]):
+            print(f"  {np.exp(-o):.2f} → {np.exp(l - o):.2f}  {r['kind']} {r['name']}")
+    if arguments.output:
+        error = np.sqrt(np.mean((results[ridge] - off)[soft] ** 2))
+        write(arguments.output, learn(np.ones(len(rows), bool), ridge), error, len(rows), "<kCorrectionFeatures> kSoftPixelSize")
+
+
 def describe(errors):
     relative = np.abs(np.exp(errors) - 1)
     return (f"off by {100 * np.median(relative):.1f} % in the median, {100 * np.percentile(relative, 95):.1f} % at the "
@@ -374,9 +467,13 @@ def main():
     parser.add_argument("--list", action="store_true", help="the cross-validated error of every object")
     parser.add_argument("--kinds", action="store_true", help="the regression for splats unlike standard fits")
     parser.add_argument("--antialiased", action="store_true", help="the regressions for antialiased splats")
+    parser.add_argument("--soft", action="store_true", help="the regression for fits to soft pictures")
     parser.add_argument("--correction", metavar="FILE.cc", help="write the third regression")
     parser.add_argument("--keep", metavar="FILE.json.gz", help="write the features to one file")
     arguments = parser.parse_args()
+    if arguments.soft:
+        train_soft(arguments)
+        return
     if arguments.keep:
         keep(arguments.features, arguments.keep)
     objects = load(arguments.features, (w.split("=") for w in arguments.weight))

@@ -37,6 +37,7 @@ nlohmann::json ToJson(const PixelSizeCheck& check, const std::string& kind) {
                          {"unlike_standard", check.estimate.unlike_standard},
                          {"strangeness", check.estimate.strangeness},
                          {"disagreement", check.estimate.disagreement},
+                         {"softness", check.estimate.softness},
                          {"showing", check.estimate.showing},
                          {"cut_outlines", check.estimate.cut_outlines},
                          {"coarse_outlines", check.estimate.coarse_outlines},

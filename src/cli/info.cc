@@ -64,6 +64,10 @@ void PrintTable(const SplatFindings& f) {
   if (f.pixel_size.ok()) {
     std::cout << "  training pixel, estimated  " << Number(f.pixel_size->estimate.size) << " (likely "
               << Number(f.pixel_size->estimate.low) << " to " << Number(f.pixel_size->estimate.high) << ")\n";
+    if (f.pixel_size->estimate.softness < 1) {
+      std::cout << "    " << Fixed(f.pixel_size->estimate.softness, 2)
+                << " of what its outlines say: they are softer than its Gaussians leave them, as after soft pictures\n";
+    }
     if (!f.things.empty()) {
       std::cout << "    but it is made of " << InWords(f.things) << "\n";
     } else if (f.pixel_size->contradicted()) {

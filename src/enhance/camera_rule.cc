@@ -22,8 +22,10 @@ constexpr float kMostAside = 0.2f;    // of the distance, between an axis and th
 constexpr double kLeastInFront = 0.95;
 // Length of the mean direction to the cameras: 0 all around, ½ for an upper half or a ring at 30°, 1 for one place.
 constexpr double kMostOneSided = 0.85;
-// Share of the visible Gaussians that must lie nearer to the point than this part of the cameras' distance.
-constexpr double kLeastInside = 0.9, kInside = 0.8;
+// Share of the visible Gaussians that must lie nearer to the point than this part of the cameras' distance: pixels on
+// the side that a camera stands at are half as large as in the middle there, and the median is of those, too, that look
+// from behind.
+constexpr double kLeastInside = 0.9, kInside = 0.5;
 constexpr float kVisibleLogit = -2.2f;  // opacity 0.1
 
 double Norm(const Vector& a) { return std::sqrt(Dot(a, a)); }
@@ -102,7 +104,7 @@ CameraRuleChoice ChooseCameraRule(const GaussianCloud& cloud, const CameraSet& s
     if (Norm(Minus(Vector{p[0], p[1], p[2]}, *point)) < kInside * typical) ++inside;
   }
   if (static_cast<double>(inside) < kLeastInside * static_cast<double>(visible)) {
-    return smallest("much of the splat lies around the cameras, not between them");
+    return smallest("much of the splat lies nearer to the cameras than to what they look at");
   }
   return {CameraPixelRule::kMedian, "the cameras look at one thing from all around"};
 }

@@ -139,6 +139,10 @@ void SayWhatWasFound(const PixelSizeFinding& found) {
   }
   const std::string size = Cat(
       "estimated size of a training pixel: ", estimate.size, " (likely ", estimate.low, " to ", estimate.high, ")",
+      estimate.softness < 1
+          ? Cat(", ", Fixed(estimate.softness, 2),
+                " of what its outlines say: they are softer than its Gaussians leave them, as after soft pictures")
+          : "",
       found.part
           ? Cat("; ", Fixed(100 * estimate.cut_outlines, 0),
                 " % of the outlines look as if it had been cut there and do not count, and to be safe a smaller one is "

@@ -36,6 +36,9 @@ struct PixelSizeCorrection {
 };
 extern const PixelSizeCorrection kPixelSizeCorrection;
 
+// ln(true pixel size / estimate) of what is left then, learned from fits to soft pictures, too: features as there.
+extern const PixelSizeCoefficients<kCorrectionFeatures> kSoftPixelSize;
+
 // Of antialiased fits: the features of Look::kAntialiased and SizeFeatures without the number of Gaussians; and what is
 // still wrong where that ends.
 inline constexpr size_t kAntialiasedPixelSizeFeatures = kPixelSizeFeatures + kSizeFeatures - 1;

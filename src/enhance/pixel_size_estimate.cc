@@ -39,6 +39,9 @@ constexpr double kFewShow = kStandardShowing, kMostShow = 0.75;
 // nine with such outlines do, four of them less than 0.75.
 constexpr double kFamiliarOutlines = 0.6, kOddOutlines = 0.75;
 constexpr double kAgreeing = 0.85, kDisagreeing = 0.7;
+// Outlines of fits to soft pictures say pixels that are 1.6 to 2.2 times too large. From the first on (ln) that counts,
+// from the second on all of it.
+constexpr double kHardlySoft = 0.3, kSoft = 0.5, kMostSoft = 1;
 // No correction of what both say is larger; ln.
 constexpr double kMostCorrection = 0.5;
 // How much of a correction upwards is left: pixels that are too large blur.
@@ -135,6 +138,18 @@ double Share(double strangeness, double none, double all) {
   return std::clamp((strangeness - none) / (all - none), 0.0, 1.0);
 }
 
+// What to multiply `size` by.
+Result<double> Softness(PixelSizeProbe& probe, double size) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(auto features, FeaturesOf(std::array{Look::kAlpha}, probe, size));
+  // Smallest axes that are next to nothing, as those of 2DGS, say nothing.
+  for (size_t k = kPixelSizeFeatures; k < kPixelSizeFeatures + kSizeQuantiles; ++k) {
+    const double mean = kSoftPixelSize.mean[k];
+    if (features[k] < mean - kMostDeviations * kSoftPixelSize.deviation[k]) features[k] = mean;
+  }
+  const double step = std::max(Regress(kSoftPixelSize, features).step, -kMostSoft);
+  return std::exp(Share(-step, kHardlySoft, kSoft) * std::min(0.0, step));
+}
+
 PixelSizeEstimate EstimateOf(const Settled& settled, const PixelSizeProbe& probe, Look look) {
   const double size = std::exp(settled.log_size), spread = std::exp(settled.half);
   return PixelSizeEstimate{.size = size,
@@ -193,8 +208,16 @@ Result<PixelSizeEstimate> EstimatePixelSize(PixelSizeProbe& probe, std::optional
   ANCHORSPLAT_ASSIGN_OR_RETURN(const double correction,
                                Correction(kPixelSizeCorrection, probe, std::exp(settled.log_size)));
   settled.log_size += (1 - like_standard) * (correction > 0 ? kUpwards : 1) * correction;
-  if (IsCompensated(mode)) settled.half = std::max(settled.half, kLeastHalfOfCompensated);
+  double softness = 1;
+  if (IsCompensated(mode)) {
+    settled.half = std::max(settled.half, kLeastHalfOfCompensated);
+  } else {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(softness, Softness(probe, std::exp(settled.log_size)));
+    settled.log_size += std::log(softness);
+    settled.half -= std::log(softness) / 2;
+  }
   PixelSizeEstimate estimate = EstimateOf(settled, probe, Look::kAlpha);
+  estimate.softness = softness;
   estimate.unlike_standard = share;
   estimate.disagreement = disagreement;
   return estimate;

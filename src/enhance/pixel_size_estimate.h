@@ -27,6 +27,9 @@ struct PixelSizeEstimate {
   // What the regression of many kinds says over what that of standard fits does, where the first is smaller and only
   // the second would be believed but for that; 1 elsewhere.
   double disagreement = 1;
+  // What `size` was lowered by, as its Gaussians are larger than such outlines leave them: those of fits to pictures
+  // that are soft themselves, out of focus or enlarged. 1: not at all.
+  double softness = 1;
   double showing = 1;  // PixelSizeProbe::showing()
   // Share of its outlines that are cuts and do not count: PixelSizeProbe::CutOutlines().
   double cut_outlines = 0;

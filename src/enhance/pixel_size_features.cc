@@ -36,7 +36,7 @@ constexpr float kUnseen = 0.02f, kSeen = 0.1f;
 // Times the median footprint. Fits of objects seen from all around have at most 0.02 of their outlines of such
 // Gaussians; from five on, photographs have many.
 constexpr float kCoarse = 6;
-constexpr std::array<double, 4> kSizeQuantiles = {0.1, 0.25, 0.5, 0.75};
+constexpr std::array<double, kSizeQuantiles> kQuantilesOfSizes = {0.1, 0.25, 0.5, 0.75};
 
 // Value at which `share` of the total weight is reached. `items` are (value, weight).
 double WeightedQuantile(std::vector<std::pair<float, double>>& items, double share) {
@@ -136,7 +136,7 @@ SizeFeatures SizesOf(const GaussianCloud& cloud) {
   SizeFeatures features{};
   size_t next = 0;
   for (size_t kind = 0; kind < values.size(); ++kind) {
-    for (const double quantile : kSizeQuantiles) {
+    for (const double quantile : kQuantilesOfSizes) {
       const double value = values[kind].empty() ? 1 : WeightedQuantile(values[kind], quantile);
       features[next++] = kind == 3 ? value : std::log(std::max(value, 1e-30));
     }
@@ -243,7 +243,7 @@ Result<PixelSizeFeatures> PixelSizeProbe::At(double size, Look look) {
 
 SizeFeatures PixelSizeProbe::SizesAt(double size) const {
   SizeFeatures features = sizes_;
-  for (size_t k = 0; k < 3 * kSizeQuantiles.size(); ++k) features[k] -= std::log(size);
+  for (size_t k = 0; k < 3 * kSizeQuantiles; ++k) features[k] -= std::log(size);
   return features;
 }
 

@@ -39,7 +39,8 @@ inline constexpr size_t kLooks = 3;
 // Sizes, opacities and number of the Gaussians that show: natural logarithms of the 10, 25, 50 and 75 % quantiles of
 // the smallest, middle and largest axis in units of d, weighted by opacity × area; the quantiles of the opacity
 // (not logarithms), and ln of the number of Gaussians.
-inline constexpr size_t kSizeFeatures = 17;
+inline constexpr size_t kSizeQuantiles = 4;
+inline constexpr size_t kSizeFeatures = 4 * kSizeQuantiles + 1;
 using SizeFeatures = std::array<double, kSizeFeatures>;
 
 class PixelSizeProbe {

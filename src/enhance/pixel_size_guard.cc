@@ -39,7 +39,7 @@ constexpr double kMostCrowded = 2.5, kNeverCrowded = 0.35;
 // How many Gaussians there were before it was cut is not known: parts of captures are at 0.57 and more, of fits of
 // small pictures at 0.15 to 0.6. Cut is what has this share of its outlines at cuts; of 49 fits that nobody cut none
 // has any.
-constexpr double kCrowdedPart = 0.55, kPart = 0.1;
+constexpr double kCrowdedPart = 0.55, kPart = 0.1, kLargelyCut = 0.3;
 // Where a splat was cut, insides that no picture showed become outlines. Pixels of parts are taken smaller by this
 // times the share of the outlines that do not count; ln.
 constexpr double kPartCaution = 0.3;
@@ -198,7 +198,10 @@ Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, int64_t all, const R
     Result<PixelSizeProbe> without = PixelSizeProbe::Make(std::move(*showing.telling_not_black));
     if (without.ok()) {
       const auto estimate = EstimatePixelSize(*without, mode);
-      if (estimate.ok()) evidence.without_black = estimate->size;
+      if (estimate.ok()) {
+        evidence.without_black = estimate->size;
+        evidence.softness_without_black = estimate->softness;
+      }
     }
   }
   return evidence;
@@ -274,7 +277,8 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   finding.estimate = estimate;
   finding.part = estimate.cut_outlines > kPart;
   const double of_whole = MostGaussiansPerPixel(evidence.gaussians, estimate.showing);
-  const double most = finding.part ? std::min(of_whole, kCrowdedPart) : of_whole;
+  const double cut = std::clamp((estimate.cut_outlines - kPart) / (kLargelyCut - kPart), 0.0, 1.0);
+  const double most = std::min(of_whole, of_whole * std::pow(kCrowdedPart / of_whole, cut));
   // Those in layers above each other do not make detail.
   const double apart = std::max(evidence.spacing, evidence.footprint);
   const auto crowd_at = [&](double size) { return apart > 0 ? std::pow(size / apart, 2) : 0; };
@@ -285,7 +289,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
             ? Cat("there would be ", Fixed(crowd, 2),
                   " Gaussians beside each other on every pixel of the surface, and parts that were cut out of fits "
                   "have at most ",
-                  most)
+                  Fixed(most, 2))
             : Cat("there would be ", Number(crowd),
                   " Gaussians beside each other on every pixel of the surface, and fits of ",
                   WithThousands(evidence.gaussians), evidence.gaussians >= int64_t{kMostShowing} ? " and more" : "",
@@ -322,8 +326,10 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
         Cat("its Gaussians and outlines together say ", Fixed(estimate.disagreement, 2),
             " of what outlines alone do, as where pictures show no more than parts of it"));
   }
-  if (evidence.small_axis < kSmallestAxis * estimate.size) {
-    finding.contradictions.push_back(Cat("its small Gaussians measure ", Fixed(evidence.small_axis / estimate.size, 2),
+  // Soft pictures leave large Gaussians: where these are small, too, the outlines are of something else.
+  const double by_outlines = estimate.size / estimate.softness;
+  if (evidence.small_axis < kSmallestAxis * by_outlines) {
+    finding.contradictions.push_back(Cat("its small Gaussians measure ", Fixed(evidence.small_axis / by_outlines, 2),
                                          " of such a pixel, and those of fits 0.4 to 2.3"));
   }
   if (estimate.high > kNoEstimate * estimate.low) {
@@ -350,7 +356,8 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     // Without its black Gaussians the outlines say a size, too; it counts where nothing contradicts that one.
     const double without = evidence.without_black;
     const bool one_pixel = !uneven && !flat && left_out <= kNothingButCuts;
-    if (without > 0 && one_pixel && crowd_at(without) <= most && evidence.small_axis >= kSmallestAxis * without) {
+    if (without > 0 && one_pixel && crowd_at(without) <= most &&
+        evidence.small_axis >= kSmallestAxis * without / evidence.softness_without_black) {
       least = std::max(least, without);
     }
     finding.size = std::min(finding.size, std::max(least, evidence.harmless));

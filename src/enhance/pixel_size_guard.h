@@ -37,7 +37,9 @@ struct PixelSizeFinding {
   // and 2.5 (PixelSizeEstimate::strangeness).
   static constexpr double kTooStrange = 1.75;
   // Whether what the splat says of itself counts against cameras.
-  bool sure() const { return !contradicted() && !part && !rough() && estimate.strangeness < kTooStrange; }
+  bool sure() const {
+    return !contradicted() && !part && !rough() && estimate.strangeness < kTooStrange && estimate.softness == 1;
+  }
   bool is_one() const { return least >= size && closer == 0; }  // `size` is that of all Gaussians
 };
 
@@ -54,7 +56,8 @@ struct PixelSizeEvidence {
   double small_axis = 0;  // of the smallest tenth by area: PixelSizeProbe::start
   double harmless = 0;    // pixel that does no harm in nine of ten regions: GaussianRegion::HarmlessPixel
   double flatness = 1;    // thickness over width along the principal axes, without a twentieth on every side
-  double without_black = 0;  // the estimate without black Gaussians; 0: there are few of them
+  double without_black = 0;           // the estimate without black Gaussians; 0: there are few of them
+  double softness_without_black = 1;  // PixelSizeEstimate::softness of that
 };
 Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud);
 

@@ -181,6 +181,9 @@ TEST(PixelSizeGuard, PartsAreCrowdedSooner) {
   estimate.cut_outlines = 0.06;  // as fits have that nobody cut
   EXPECT_FALSE(Judge(estimate, evidence).part);
   EXPECT_EQ(Judge(estimate, evidence).size, 0.01);
+  estimate.cut_outlines = 0.18;  // the feet of a chair of few steps
+  EXPECT_TRUE(Judge(estimate, evidence).part);
+  EXPECT_FALSE(Judge(estimate, evidence).contradicted());
   estimate.cut_outlines = 0.3;
   EXPECT_TRUE(Judge(estimate, evidence).part);
   ASSERT_TRUE(Judge(estimate, evidence).contradicted());
@@ -319,6 +322,9 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   PixelSizeEstimate strange = estimate;
   strange.strangeness = 2;
   EXPECT_FALSE(IsSharperThanFitsTo(0.016, Judge(strange, plain)));
+  PixelSizeEstimate soft = estimate;
+  soft.softness = 0.9;
+  EXPECT_FALSE(IsSharperThanFitsTo(0.016, Judge(soft, plain))) << "it was lowered";
   EXPECT_FALSE(IsSharperThanFitsTo(0.03, Judge(wide, plain))) << "a rough estimate says nothing against them";
 
   PixelSizeEvidence crowded = plain;

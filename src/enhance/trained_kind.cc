@@ -70,11 +70,11 @@ double ShareCutOff(std::span<const float> logarithms) {
   return share >= kCutOff && cut > 2 * next ? share : 0;
 }
 
-// Opacities of fits go down to nothing: 7 % and more of those that show are fainter than 0.3. Where the faint ones were
-// thrown away they begin all at once: the lowest hundredth is 0.08 to 0.11 times as far (in logits) from the lowest as
-// the lowest tenth is from it. Where they were raised by three logits it is 0.63 to 0.72 times as far, and where they
-// were set to one, or to no less than something, a tenth have the same.
-constexpr double kFewFaint = 0.04, kBeginsAtOnce = 0.35, kSameOpacity = 0.02;
+// Opacities of fits go down to nothing: 7 % and more of those that show are fainter than 0.3 (4 in a teddy bear). Where
+// the faint ones were thrown away they begin all at once: the lowest hundredth is 0.08 to 0.11 times as far (in logits)
+// from the lowest as the lowest tenth is from it. Where they were raised by three logits it is 0.63 to 0.72 times as
+// far, and where they were set to one, or to no less than something, a tenth have the same.
+constexpr double kFewFaint = 0.03, kBeginsAtOnce = 0.35, kSameOpacity = 0.02;
 bool WereRaised(std::span<float> logits, double faint) {
   if (faint >= kFewFaint || logits.empty()) return false;
   const auto least = double{Quantile(logits, 0.001)}, low = double{Quantile(logits, 0.01)};

@@ -235,6 +235,7 @@ nlohmann::json ToJson(const EnhanceReport& r) {
       json["pixel_size"]["contradictions"] = r.things.empty() ? r.finding->contradictions : ContradictionsOf(r.things);
       json["pixel_size"]["cut_outlines"] = r.finding->estimate.cut_outlines;
       json["pixel_size"]["coarse_outlines"] = r.finding->estimate.coarse_outlines;
+      json["pixel_size"]["softness"] = r.finding->estimate.softness;
       json["pixel_size"]["unsure"] = r.pixel_size_source == kCautiousPixelSize;
     }
     if (!r.things.empty()) json["pixel_size"]["things"] = ToJson(r.things);

@@ -254,6 +254,7 @@ nlohmann::json ToJson(const SplatFindings& f) {
         {"contradictions", f.things.empty() ? f.pixel_size->contradictions : ContradictionsOf(f.things)},
         {"cut_outlines", f.pixel_size->estimate.cut_outlines},
         {"coarse_outlines", f.pixel_size->estimate.coarse_outlines},
+        {"softness", f.pixel_size->estimate.softness},
         {"used", f.pixel_size->size}};
     if (!f.things.empty()) json["pixel_size"]["things"] = ToJson(f.things);
   }

@@ -322,11 +322,13 @@ def train_soft(arguments):
         if features is not None and np.isfinite(features).all():
             kind = item.get("kind") or ""
             mesh = re.sub(r"--.*", "", item["object"])
-            rows.append({"name": item["object"], "mesh": SAME_MESH.get(mesh, mesh), "kind": kind, "x": features, "soft": kind.startswith("soft"), "widened": kind.startswith("widened"),
-                         "off": np.log(item["pixel_size"] / item["estimate"] * item.get("softness", 1)), "item": item})
+            rows.append({"name": item["object"], "mesh": SAME_MESH.get(mesh, mesh), "kind": kind, "x": features,
+                         "soft": kind.startswith("soft"), "widened": kind.startswith("widened"), "item": item,
+                         "off": np.log(item["pixel_size"] / item["estimate"] * item.get("softness", 1))})
     if arguments.keep:
         kept = [{"object": r["name"], "kind": r["kind"], "pixel_size": r["item"]["pixel_size"],
-                 "estimate": r["item"]["estimate"] / r["item"].get("softness", 1), "of_estimate": [round(v, 4) for v in r["x"]]}
+                 "estimate": r["item"]["estimate"] / r["item"].get("softness", 1),
+                 "of_estimate": [round(v, 4) for v in r["x"]]}
                 for r in rows if not r["item"]["others"]]
         with gzip.GzipFile(arguments.keep, "wb", mtime=0) as out:
             out.write(json.dumps({"objects": kept}).encode())
@@ -366,9 +368,10 @@ def train_soft(arguments):
         lowered = share * np.clip(step, -LARGEST_STEP, 0)
         results[ridge] = lowered
         sharp = ~soft & ~widened & (off > -0.3)
-        print(f"ridge {ridge:g}: estimate / truth of soft ones {np.exp(np.median(-off[soft])):.2f}, worst {np.exp(np.max(-off[soft])):.2f}, "
-              f"now {np.exp(np.median((lowered - off)[soft])):.2f}, nine in ten {np.exp(np.quantile((lowered - off)[soft], 0.9)):.2f}, "
-              f"worst {np.exp(np.max((lowered - off)[soft])):.2f}; of {sharp.sum()} right ones {(lowered[sharp] < 0).sum()} lowered, "
+        before, now = np.exp(-off[soft]), np.exp((lowered - off)[soft])
+        print(f"ridge {ridge:g}: estimate / truth of soft ones {np.median(before):.2f}, worst {before.max():.2f}, "
+              f"now {np.median(now):.2f}, nine in ten {np.quantile(now, 0.9):.2f}, worst {now.max():.2f}; "
+              f"of {sharp.sum()} right ones {(lowered[sharp] < 0).sum()} lowered, "
               f"{(lowered[sharp] < -0.2).sum()} by a fifth and more, at most to {np.exp(lowered[sharp].min()):.2f}")
     ridge = min(results, key=lambda r: np.mean(weights * (results[r] - off).clip(-0.5, 1) ** 2))
     print(f"ridge {ridge:g} chosen")
@@ -377,7 +380,8 @@ def train_soft(arguments):
             print(f"  {np.exp(-o):.2f} → {np.exp(l - o):.2f}  {r['kind']} {r['name']}")
     if arguments.output:
         error = np.sqrt(np.mean((results[ridge] - off)[soft] ** 2))
-        write(arguments.output, learn(np.ones(len(rows), bool), ridge), error, len(rows), "<kCorrectionFeatures> kSoftPixelSize")
+        model = learn(np.ones(len(rows), bool), ridge)
+        write(arguments.output, model, error, len(rows), "<kCorrectionFeatures> kSoftPixelSize")
 
 
 def describe(errors):

@@ -84,5 +84,35 @@ TEST(PixelSizeGuard, LandIsGivenNoMoreThanItBears) {
   EXPECT_GT(GatherPixelSizeEvidence(*biplane)->flatness, 0.3);
 }
 
+// What soft pictures leave: Gaussians as large as their outlines are soft. Widened ones are like that, too.
+TEST(PixelSizeEstimate, GaussiansTooLargeForTheirOutlinesLowerIt) {
+  for (const char* object : {"biplane", "stone_lantern"}) {
+    const auto cloud = ReadCloud(SourceDirForTest() / "examples" / object / "input.ply");
+    ASSERT_TRUE(cloud.ok()) << cloud.error().message;
+    EXPECT_EQ(EstimatePixelSize(*cloud)->softness, 1) << object;
+  }
+  GaussianCloud lantern = ReadCloud(SourceDirForTest() / "examples/stone_lantern/input.ply").value();
+  for (float& scale : lantern.log_scales) scale += std::log(1.5f);
+  const auto wide = EstimatePixelSize(lantern);
+  ASSERT_TRUE(wide.ok());
+  EXPECT_LT(wide->softness, 0.8);
+  EXPECT_GT(wide->high, wide->size / std::sqrt(wide->softness));
+  for (float& scale : lantern.log_scales) scale += std::log(3.0f);
+  for (float& mean : lantern.means) mean *= 3;
+  const auto large = EstimatePixelSize(lantern);
+  ASSERT_TRUE(large.ok());
+  EXPECT_NEAR(large->softness, wide->softness, 1e-3);
+  // Smallest axes that are nothing, as those of 2DGS, say nothing.
+  GaussianCloud flat = ReadCloud(SourceDirForTest() / "examples/biplane/input.ply").value();
+  for (size_t i = 0; i < static_cast<size_t>(flat.size()); ++i) {
+    float* scales = flat.log_scales.data() + 3 * i;
+    *std::min_element(scales, scales + 3) = -14;
+  }
+  EXPECT_EQ(EstimatePixelSize(flat)->softness, 1);
+  // The antialiased regression has not learned it.
+  lantern.render_mode = RenderMode::kAntialiased;
+  EXPECT_EQ(EstimatePixelSize(lantern)->softness, 1);
+}
+
 }  // namespace
 }  // namespace anchorsplat

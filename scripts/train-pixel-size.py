@@ -57,40 +57,45 @@ FEW_SHOW, MOST_SHOW = 0.6, 0.75  # kFewShow, kMostShow
 PLAUSIBLE, IMPLAUSIBLE = 1.5, 2.2  # kPlausible, kImplausible
 
 
+def read_items(name):
+    with (gzip.open if name.endswith(".gz") else open)(name, "rt", encoding="utf-8") as file:
+        return json.load(file)["objects"]
+
+
+def write_items(objects, path):
+    text = json.dumps({"objects": objects}, separators=(",", ":"))
+    with gzip.GzipFile(path, "wb", mtime=0) as out:  # the same bytes each time
+        out.write(text.encode())
+
+
 def load(files, weights=()):
     weights = dict(weights)
     objects = []
     for name in files:
-        with (gzip.open if name.endswith(".gz") else open)(name, "rt", encoding="utf-8") as file:
-            for item in json.load(file)["objects"]:
-                samples = [s for s in item["samples"] if None not in s["features"]]
-                mesh = item["object"].split("--")[0]  # recipes put the entry behind two hyphens
-                objects.append({
-                    "name": item["object"],
-                    "kind": item.get("kind", ""),
-                    "mode": item.get("mode", "classic"),
-                    "mesh": SAME_MESH.get(mesh, mesh),
-                    "showing": item.get("showing", 0.0),
-                    "weight": float(weights.get(item["object"], 1)),
-                    "offsets": np.log([s["size"] / item["pixel_size"] for s in samples]),
-                    "all": np.array([s["features"] for s in samples]),
-                    "start": np.log(item["start"] / item["pixel_size"]),
-                })
+        for item in read_items(name):
+            samples = [s for s in item["samples"] if None not in s["features"]]
+            mesh = item["object"].split("--")[0]  # recipes put the entry behind two hyphens
+            objects.append({
+                "name": item["object"],
+                "kind": item.get("kind", ""),
+                "mode": item.get("mode", "classic"),
+                "mesh": SAME_MESH.get(mesh, mesh),
+                "showing": item.get("showing", 0.0),
+                "weight": float(weights.get(item["object"], 1)),
+                "offsets": np.log([s["size"] / item["pixel_size"] for s in samples]),
+                "all": np.array([s["features"] for s in samples]),
+                "start": np.log(item["start"] / item["pixel_size"]),
+            })
     return objects
 
 
 def keep(files, path):
     """All features in one file, to four decimals, which is far below what they vary by."""
-    objects = []
-    for name in files:
-        with (gzip.open if name.endswith(".gz") else open)(name, "rt", encoding="utf-8") as file:
-            objects += json.load(file)["objects"]
+    objects = [item for name in files for item in read_items(name)]
     for o in objects:
         for sample in o["samples"]:
             sample["features"] = [None if v is None else round(v, 4) for v in sample["features"]]
-    text = json.dumps({"objects": objects}, separators=(",", ":"))
-    with gzip.GzipFile(path, "wb", mtime=0) as out:  # the same bytes each time
-        out.write(text.encode())
+    write_items(objects, path)
 
 
 def weigh_short_fits(objects, datasets, long, weight):
@@ -312,10 +317,8 @@ def at_estimate(item):
 
 
 def train_soft(arguments):
-    items = []
-    for name in arguments.features:
-        with (gzip.open if name.endswith(".gz") else open)(name, "rt", encoding="utf-8") as file:
-            items += [i | {"others": name.endswith("pixel-size-kinds.json.gz")} for i in json.load(file)["objects"]]
+    items = [item | {"others": name.endswith("pixel-size-kinds.json.gz")}
+             for name in arguments.features for item in read_items(name)]
     rows = []
     for item in items:
         features = at_estimate(item) if item.get("mode") not in ("antialiased", "mip") else None
@@ -330,8 +333,7 @@ def train_soft(arguments):
                  "estimate": r["item"]["estimate"] / r["item"].get("softness", 1),
                  "of_estimate": [round(v, 4) for v in r["x"]]}
                 for r in rows if not r["item"]["others"]]
-        with gzip.GzipFile(arguments.keep, "wb", mtime=0) as out:
-            out.write(json.dumps({"objects": kept}).encode())
+        write_items(kept, arguments.keep)
     x = np.array([r["x"] for r in rows])
     off = np.array([r["off"] for r in rows])
     soft = np.array([r["soft"] for r in rows])

@@ -36,7 +36,7 @@ const PixelSizeCoefficients<kCorrectionFeatures> kSoftPixelSize = {
                0.0935179,  0.0316005,   -0.0180383, -0.0204,     -0.034762,  0.0318399,    0.0172621,   -0.0119311,
                0.104539,   0.0234067,   -0.0550061, -0.025567,   0.0316835,  -0.0366166,   0.0560824,   0.0551771},
     .intercept = -0.454152,
-    .error = 0.2076,
+    .error = 0.2067,
 };
 
 }  // namespace anchorsplat

@@ -65,8 +65,7 @@ void PrintTable(const SplatFindings& f) {
     std::cout << "  training pixel, estimated  " << Number(f.pixel_size->estimate.size) << " (likely "
               << Number(f.pixel_size->estimate.low) << " to " << Number(f.pixel_size->estimate.high) << ")\n";
     if (f.pixel_size->estimate.softness < 1) {
-      std::cout << "    " << Fixed(f.pixel_size->estimate.softness, 2)
-                << " of what its outlines say: they are softer than its Gaussians leave them, as after soft pictures\n";
+      std::cout << "    " << f.pixel_size->SoftnessInWords() << "\n";
     }
     if (!f.things.empty()) {
       std::cout << "    but it is made of " << InWords(f.things) << "\n";
@@ -76,9 +75,8 @@ void PrintTable(const SplatFindings& f) {
       std::cout << "    so enhance would take a smaller pixel, " << Number(f.pixel_size->size)
                 << ", and no network; --cameras or --pixel-size would tell\n";
     } else if (f.pixel_size->part) {
-      std::cout << "    " << Fixed(100 * f.pixel_size->estimate.cut_outlines, 0)
-                << " % of the outlines look as if it had been cut there and do not count; enhance would take "
-                << Number(f.pixel_size->size) << " to be safe\n";
+      std::cout << "    " << f.pixel_size->CutsInWords() << "; enhance would take " << Number(f.pixel_size->size)
+                << " to be safe\n";
     }
   } else {
     std::cout << "  training pixel  no estimate: " << f.pixel_size.error().message << "\n";

@@ -137,19 +137,11 @@ void SayWhatWasFound(const PixelSizeFinding& found) {
                                       : ""));
     return;
   }
-  const std::string size = Cat(
-      "estimated size of a training pixel: ", estimate.size, " (likely ", estimate.low, " to ", estimate.high, ")",
-      estimate.softness < 1
-          ? Cat(", ", Fixed(estimate.softness, 2),
-                " of what its outlines say: they are softer than its Gaussians leave them, as after soft pictures")
-          : "",
-      found.part
-          ? Cat("; ", Fixed(100 * estimate.cut_outlines, 0),
-                " % of the outlines look as if it had been cut there and do not count, and to be safe a smaller one is "
-                "taken, ",
-                found.size)
-          : "",
-      found.closer > 0 ? "; where Gaussians lie much closer than elsewhere a smaller one is taken" : "");
+  const std::string size =
+      Cat("estimated size of a training pixel: ", estimate.size, " (likely ", estimate.low, " to ", estimate.high, ")",
+          estimate.softness < 1 ? ", " + found.SoftnessInWords() : "",
+          found.part ? Cat("; ", found.CutsInWords(), ", and to be safe a smaller one is taken, ", found.size) : "",
+          found.closer > 0 ? "; where Gaussians lie much closer than elsewhere a smaller one is taken" : "");
   if (found.rough()) {
     LogWarning(
         Cat(size, ". That is rough: this splat says little about the pixels it was trained at; ", kWillDoBetter));

@@ -52,6 +52,8 @@ constexpr double kNothingButCuts = 0.9;
 // as large, on a ground or before a sky. Of a subject with less than a tenth of the Gaussians it says nothing. From the
 // first on pixels shrink with this power of it, and from the second on it contradicts.
 constexpr double kUneven = 2.7, kMostUneven = 2.85, kUnevenFall = 4;
+// Of an uneven splat no more is taken than this times the spacing of its densest tenth.
+constexpr double kOfDense = 1 / 0.85;
 // Spacing of 512, over its median, below which Gaussians come of smaller pixels than the others. The densest place of
 // 22 fits is at 0.52 and more, of captures at 0.37.
 constexpr double kCloser = 0.45;
@@ -90,7 +92,7 @@ constexpr double kFewPower = 0.75;
 struct Surface {
   double spacing = 0;  // 0: too few
   double footprint = 0;
-  double of_many = 0, closest = 0, unevenness = 1;
+  double of_many = 0, dense = 0, closest = 0, unevenness = 1;
   double harmless = 0;
 };
 
@@ -116,6 +118,7 @@ Surface SurfaceOf(const GaussianCloud& cloud) {
   return {.spacing = double{Quantile(spacing, 0.5)},
           .footprint = double{Quantile(footprint, 0.5)},
           .of_many = double{Quantile(of_many, 0.5)},
+          .dense = dense,
           .closest = double{Quantile(of_many, 0.0)},
           .unevenness = dense > 0 ? sparse / dense : std::numeric_limits<double>::infinity(),
           .harmless = double{Quantile(harmless, 0.9)}};
@@ -188,6 +191,7 @@ Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, int64_t all, const R
   evidence.spacing = surface.spacing;
   evidence.footprint = surface.footprint;
   evidence.of_many = surface.of_many;
+  evidence.dense = surface.dense;
   evidence.closest = surface.closest;
   evidence.unevenness = surface.unevenness;
   evidence.harmless = surface.harmless;
@@ -307,7 +311,8 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
             " % of its outlines are of Gaussians that are much coarser than the others, or look as if a part had been "
             "cut off there, and say nothing about pixels"));
   }
-  const bool uneven = evidence.unevenness > kMostUneven;
+  const bool dense = evidence.dense < kSparseEnough * estimate.size;
+  const bool uneven = evidence.unevenness > kMostUneven && dense;
   if (uneven) {
     finding.no_one_pixel = true;
     finding.contradictions.push_back(std::isfinite(evidence.unevenness)
@@ -346,7 +351,10 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   if (evidence.small_axis < kSmallAxis * estimate.size) {
     shrunk *= std::pow(evidence.small_axis / (kSmallAxis * estimate.size), kSmallFall);
   }
-  if (evidence.unevenness > kUneven) shrunk *= std::pow(kUneven / evidence.unevenness, kUnevenFall);
+  if (evidence.unevenness > kUneven) {
+    const double uneven_size = shrunk * std::pow(kUneven / evidence.unevenness, kUnevenFall);
+    shrunk = dense ? uneven_size : std::clamp(kOfDense * evidence.dense, uneven_size, shrunk);
+  }
   if (!finding.contradicted()) finding.size = shrunk;
   finding.least = finding.size;
   if (finding.contradicted()) {
@@ -376,6 +384,18 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     }
   }
   return finding;
+}
+
+std::string PixelSizeFinding::SoftnessInWords() const {
+  if (estimate.softness >= 1) return "";
+  return Cat(Fixed(estimate.softness, 2),
+             " of what its outlines say: they are softer than its Gaussians leave them, as after soft pictures");
+}
+
+std::string PixelSizeFinding::CutsInWords() const {
+  if (!part) return "";
+  return Cat(Fixed(100 * estimate.cut_outlines, 0),
+             " % of the outlines look as if it had been cut there and do not count");
 }
 
 bool IsSharperThanFitsTo(double pixel, const PixelSizeFinding& finding) {

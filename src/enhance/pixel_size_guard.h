@@ -41,6 +41,10 @@ struct PixelSizeFinding {
     return !contradicted() && !part && !rough() && estimate.strangeness < kTooStrange && estimate.softness == 1;
   }
   bool is_one() const { return least >= size && closer == 0; }  // `size` is that of all Gaussians
+
+  // How the estimate comes of what outlines say, in words, for a sentence about it; empty: it is what they say.
+  std::string SoftnessInWords() const;
+  std::string CutsInWords() const;  // likewise of outlines that do not count
 };
 
 // The numbers that an estimate is held against, of the Gaussians that show: opacity of 10 % or more, not nearly black.
@@ -51,6 +55,7 @@ struct PixelSizeEvidence {
   double spacing = 0;     // side of the square that each has of the surface: from the distances to 8 neighbours
   double footprint = 0;   // √(largest × middle axis), median: where it is larger than the spacing they lie in layers
   double of_many = 0;     // the same from the distances to 512: median …
+  double dense = 0;       // … the tenth part that lies closest …
   double closest = 0;     // … and least of 256 places
   double unevenness = 1;  // 90 % over 10 % quantile; infinite where 512 and more lie at one place
   double small_axis = 0;  // of the smallest tenth by area: PixelSizeProbe::start
@@ -60,6 +65,10 @@ struct PixelSizeEvidence {
   double softness_without_black = 1;  // PixelSizeEstimate::softness of that
 };
 Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud);
+
+// Where the densest tenth of Gaussians lies as far apart as this, in pixels of a size, that size is not too large for
+// them: a splat has few Gaussians where it has little detail. Dense places of fits are at 0.6 to 1.7.
+inline constexpr double kSparseEnough = 0.75;
 
 // Gaussians beside each other on every pixel of the surface that fits keep at most: a cloud of `gaussians` that has
 // more of them with a pixel size was fitted to smaller pixels. `showing`: PixelSizeEstimate::showing.

@@ -10,6 +10,8 @@
 #include "core/statistics.h"
 #include "core/text.h"
 #include "enhance/cloud_components.h"
+#include "enhance/gaussian_regions.h"
+#include "enhance/pixel_size_guard.h"
 #include "enhance/showing_gaussians.h"
 #include "enhance/trained_kind.h"
 
@@ -27,6 +29,7 @@ constexpr double kFew = 0.005;
 constexpr double kNextToNone = 1e-6;  // of the largest: not worth a number
 constexpr size_t kMostNamed = 4;      // as one reads
 constexpr float kWithin = 0.02f;      // quantiles between which a thing lies
+constexpr int64_t kLooseSamples = 256;
 
 // What is looked at of a thing: no harmonics but the constant.
 GaussianCloud ThingOf(const GaussianCloud& cloud, const std::vector<int64_t>& rows) {
@@ -72,6 +75,20 @@ PixelSizeFinding Unknown(const PixelSizeFinding& whole, std::string why) {
   finding.size = whole.size;
   finding.contradictions = {std::move(why)};
   return finding;
+}
+
+// Whether loose Gaussians and small pieces lie so far apart that no pixel of that size is too large for them.
+bool IsSparse(const GaussianCloud& loose, double size) {
+  GaussianCloud showing = FindShowingGaussians(loose).all;
+  if (showing.empty()) return true;
+  const GaussianRegions regions(showing);
+  const int64_t count = showing.size(), samples = std::min(kLooseSamples, count);
+  Buffer<float> spacing(static_cast<size_t>(samples));
+  for (int64_t k = 0; k < samples; ++k) {
+    const float* place = showing.means.data() + 3 * (k * count / samples);
+    spacing[static_cast<size_t>(k)] = static_cast<float>(regions.Around(place).wide);
+  }
+  return double{Quantile(spacing, 0.1)} >= kSparseEnough * size;
 }
 
 bool Alike(double a, double b, double factor) { return a < factor * b && b < factor * a; }
@@ -142,8 +159,11 @@ PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const Pixe
   };
   // A few floaters are not worth a word.
   const bool alone_matter = std::ssize(rows.back()) > static_cast<int64_t>(kFew * static_cast<double>(cloud.size()));
-  if (!alone_matter && all_like_whole(kSame)) return {};
   const bool one_training = all_like_whole(kAlike);
+  const bool like_others = one_training && 2 * std::ssize(rows.back()) < cloud.size() &&
+                           static_cast<size_t>(components.count) <= looked_at &&
+                           IsSparse(ThingOf(cloud, rows.back()), whole.size);
+  if ((!alone_matter || like_others) && all_like_whole(kSame)) return {};
   for (size_t k = 0; k < looked_at; ++k) {
     PixelSizeFinding& finding = out.things[k].finding;
     if (std::ranges::any_of(extents, [&](const Extent& other) { return extents[k].HasInside(other); })) {
@@ -159,9 +179,14 @@ PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const Pixe
   if (static_cast<size_t>(components.count) > looked_at) {
     others.contradictions = {Cat("these are of things beyond the ", kMostThings, " largest, or of pieces")};
   }
+  if (like_others) {
+    others.least = others.size;
+    others.contradictions.clear();
+  }
   for (const ThingPixelSize& thing : out.things) {
     if (thing.finding.size > 2 * kNothing * whole.size) others.size = std::min(others.size, thing.finding.size);
   }
+  others.least = std::min(others.least, others.size);
   out.things.push_back({std::ssize(rows.back()), std::move(others)});
 
   out.sizes.assign(static_cast<size_t>(cloud.size()), static_cast<float>(kNothing * whole.size));

@@ -32,19 +32,20 @@ Status RunLooks(const LooksFlags& flags, const SharedFlags& shared) {
   std::vector<std::vector<std::string>> table = {{"file", "Gaussians that show", "looks", "ln odds of enhanced"}};
   for (const std::string& file : flags.files) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(file));
-    const GaussianCloud showing = FindShowingGaussians(cloud).all;
-    const std::optional<TrainedKind> looks = TrainedKindOf(showing);
+    const ShowingGaussians found = FindShowingGaussians(cloud);
+    const GaussianCloud& showing = found.all;
+    const std::optional<TrainedKind> looks = TrainedKindOf(cloud, found);
     const SizeTails tails = SizeTailsOf(showing);
-    const std::optional<EnhancedLook> look = FindEnhancedLook(showing, tails);
+    FoundTwins twins;
+    const std::optional<EnhancedLook> look = FindEnhancedLook(showing, tails, &twins);
+    const std::optional<double> harmonics = LikenessOfHarmonics(cloud, found.rows_of_all, twins);
     const double odds = look ? LogOddsOfEnhanced(*look) : std::nan("");
-    nlohmann::json row = {{"file", file},
-                          {"showing", showing.size()},
-                          {"looks", nullptr},
-                          {"by_sizes", nullptr},
-                          {"log_odds_of_enhanced", nullptr}};
+    nlohmann::json row = {{"file", file},        {"showing", showing.size()},       {"looks", nullptr},
+                          {"by_sizes", nullptr}, {"log_odds_of_enhanced", nullptr}, {"likeness_of_harmonics", nullptr}};
     if (looks) row["looks"] = NameOf(*looks);
     if (const auto by_sizes = Judge(tails)) row["by_sizes"] = NameOf(*by_sizes);
     if (std::isfinite(odds)) row["log_odds_of_enhanced"] = odds;
+    if (harmonics) row["likeness_of_harmonics"] = *harmonics;
     if (flags.features && look) row["features"] = *look;
     rows.push_back(std::move(row));
     table.push_back({file, WithThousands(showing.size()), looks ? std::string(NameOf(*looks)) : "too few",

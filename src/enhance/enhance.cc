@@ -81,17 +81,22 @@ Status DropUnusable(GaussianCloud& cloud) {
 // enhanced before.
 std::optional<TrainedKind> FindLooks(const EnhanceOptions& options, const GaussianCloud& cloud) {
   constexpr int64_t kEnoughOfRegion = 1000;
-  GaussianCloud showing = FindShowingGaussians(cloud).all;
+  ShowingGaussians showing = FindShowingGaussians(cloud);
   if (options.region) {
-    std::vector<int64_t> inside;
-    for (int64_t i = 0; i < showing.size(); ++i) {
-      if (options.region->Holds(showing.means.data() + 3 * i)) inside.push_back(i);
+    std::vector<int64_t> inside, rows;
+    for (int64_t i = 0; i < showing.all.size(); ++i) {
+      if (!options.region->Holds(showing.all.means.data() + 3 * i)) continue;
+      inside.push_back(i);
+      rows.push_back(showing.rows_of_all[static_cast<size_t>(i)]);
     }
     if (std::ssize(inside) >= kEnoughOfRegion) {
-      if (auto part = Subset(showing, inside); part.ok()) showing = *std::move(part);
+      if (auto part = Subset(showing.all, inside); part.ok()) {
+        showing.all = *std::move(part);
+        showing.rows_of_all = std::move(rows);
+      }
     }
   }
-  return BesideTag(TrainedKindOf(showing), cloud.render_mode, showing.size());
+  return BesideTag(TrainedKindOf(cloud, showing), cloud.render_mode, showing.all.size());
 }
 
 // Splats of which the caller does not say how they were trained are looked at. An antialiased one without a tag becomes

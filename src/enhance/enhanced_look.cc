@@ -34,6 +34,7 @@ constexpr double kMostDifferent = 1;
 constexpr double kMostDeviations = 4;  // that count, of a feature
 constexpr double kUnlikeAny = 5;       // beyond that it is like nothing that was learned from
 constexpr double kNearlyRound = 0.2;   // ln of the ratio of two axes
+constexpr double kNoHarmonics = 1e-8;  // product of the norms of two
 
 double Logarithm(double x) { return std::log(x + kLeast); }
 
@@ -99,6 +100,7 @@ struct Twins {
   std::array<Buffer<float>, kRanks> differences;  // rising
   Buffer<float> distance, colour, opacity;        // to the twin
   Buffer<float> turn;                             // likewise: cosine of half the angle
+  std::vector<std::array<int64_t, 2>> rows;
 };
 
 Twins FindTwins(const GaussianCloud& cloud, std::span<const int64_t> rows) {
@@ -113,6 +115,7 @@ Twins FindTwins(const GaussianCloud& cloud, std::span<const int64_t> rows) {
                        &twins.colour, &twins.opacity, &twins.turn}) {
     values->resize(static_cast<size_t>(samples));
   }
+  twins.rows.resize(static_cast<size_t>(samples));
   constexpr int64_t kPerTask = 64;
   ParallelFor(0, samples, kPerTask, [&](int64_t begin, int64_t end) {
     for (int64_t k = begin; k < end; ++k) {
@@ -133,6 +136,7 @@ Twins FindTwins(const GaussianCloud& cloud, std::span<const int64_t> rows) {
         twins.differences[rank][at] = static_cast<float>(others[rank].first);
       }
       const size_t twin = others[0].second;
+      twins.rows[at] = {static_cast<int64_t>(own), static_cast<int64_t>(twin)};
       twins.distance[at] = static_cast<float>(Deviations(cloud, own, twin));
       twins.turn[at] = static_cast<float>(HalfTurn(cloud, own, twin));
       twins.colour[at] = static_cast<float>(ColourDifference(cloud, own, twin));
@@ -156,7 +160,7 @@ bool AreUnrelated(Twins& twins) {
 
 }  // namespace
 
-std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing, const SizeTails& tails, bool* unrelated) {
+std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing, const SizeTails& tails, FoundTwins* found) {
   std::vector<int64_t> rows;
   Buffer<float> smallest, middle, largest, opacities;
   for (int64_t row = 0; row < showing.size(); ++row) {
@@ -176,7 +180,7 @@ std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing, const
   Twins twins = FindTwins(showing, rows);
   LeaveIfAbandoned();
 
-  if (unrelated != nullptr) *unrelated = AreUnrelated(twins);
+  if (found != nullptr) *found = {.unrelated = AreUnrelated(twins), .rows = std::move(twins.rows)};
   EnhancedLook look{};
   size_t next = 0;
   for (Buffer<float>& differences : twins.differences) {
@@ -199,6 +203,35 @@ std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing, const
   look[next++] = double{Quantile(opacities, 0.5)};
   look[next++] = double{Quantile(opacities, 0.25)};
   return look;
+}
+
+std::optional<double> LikenessOfHarmonics(const CloudView& whole, std::span<const int64_t> rows_of_showing,
+                                          const FoundTwins& twins) {
+  if (whole.sh_degree < 2) return std::nullopt;
+  const auto first = static_cast<size_t>(3 * ShCoefficients(1)), stride = static_cast<size_t>(whole.sh_stride());
+  const auto of = [&](int64_t row) {
+    return whole.sh.subspan(static_cast<size_t>(rows_of_showing[static_cast<size_t>(row)]) * stride + first,
+                            stride - first);
+  };
+  Buffer<float> cosines, values;
+  for (const auto& [row, twin] : twins.rows) {
+    const auto a = of(row), b = of(twin);
+    double product = 0, of_a = 0, of_b = 0;
+    for (size_t k = 0; k < a.size(); ++k) {
+      product += double{a[k]} * double{b[k]};
+      of_a += double{a[k]} * double{a[k]};
+      of_b += double{b[k]} * double{b[k]};
+    }
+    const double norms = std::sqrt(of_a * of_b);
+    if (!(norms > kNoHarmonics) || !std::isfinite(norms)) continue;
+    cosines.push_back(static_cast<float>(product / norms));
+    values.push_back(a[0]);
+  }
+  if (std::ssize(cosines) < kFewest / 4) return std::nullopt;
+  std::ranges::sort(values);
+  const auto different = std::ranges::unique(values).begin() - values.begin();
+  if (2 * different < std::ssize(cosines)) return std::nullopt;
+  return double{Quantile(cosines, 0.75)};
 }
 
 double LogOddsOfEnhanced(const EnhancedLook& look) {

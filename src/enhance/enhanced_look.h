@@ -2,8 +2,12 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
+#include <span>
+#include <vector>
 
+#include "core/cloud_view.h"
 #include "core/gaussian_cloud.h"
 
 namespace anchorsplat {
@@ -30,16 +34,29 @@ struct SizeTails;  // enhance/trained_kind.h
 //
 // No feature depends on the unit. Nothing: fewer than 1000 Gaussians.
 //
-// `unrelated`: whether twins are turned as if they had nothing to do with each other, and lie on top of each other or
-// far apart. No network makes that: it turns those of one Gaussian little, and where it makes one of each, twins are as
-// far apart as in fits of many steps. In fits of few, clones of densification lie on top of each other, and all sizes
-// are still alike.
 inline constexpr size_t kEnhancedLookFeatures = 35;
 // What bounds which splats can look enhanced at all.
 inline constexpr size_t kTwinUpperQuartile = 3, kFlatness = 27, kElongation = 28;
 using EnhancedLook = std::array<double, kEnhancedLookFeatures>;
+
+struct FoundTwins {
+  // Whether twins are turned as if they had nothing to do with each other, and lie on top of each other or far apart.
+  // No network makes that: it turns those of one Gaussian little, and where it makes one of each, twins are as far
+  // apart as in fits of many steps. In fits of few, clones of densification lie on top of each other, and all sizes are
+  // still alike.
+  bool unrelated = false;
+  std::vector<std::array<int64_t, 2>> rows;  // of the sample: a Gaussian and its twin
+};
 std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing, const SizeTails& tails,
-                                             bool* unrelated = nullptr);
+                                             FoundTwins* twins = nullptr);
+
+// How alike the harmonics of twins are: upper quartile of the cosine between those of degree 2 and 3. A network
+// multiplies those of a Gaussian for all of its copies: 0.98 and more; fits give each their own: 0.95 and less, as
+// where a network has made one of each. `rows_of_showing`: which rows of `whole` the rows of `twins` are. Nothing: the
+// cloud has none, or in the steps of a format, or too few twins have any.
+std::optional<double> LikenessOfHarmonics(const CloudView& whole, std::span<const int64_t> rows_of_showing,
+                                          const FoundTwins& twins);
+inline constexpr double kOwnHarmonics = 0.965;  // below it each has its own
 
 // ln of the odds that a network has enhanced it: a network of one small layer that has learned from fits as they are
 // and enhanced (scripts/train-enhanced-look.py). −∞ where fewer than three in four Gaussians have a twin that differs

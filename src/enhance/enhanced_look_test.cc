@@ -140,9 +140,9 @@ TEST(EnhancedLook, TwinsAreAlikeWhereThereAreCopies) {
 // in all directions.
 TEST(EnhancedLook, TwinsOfFewStepsAreUnrelated) {
   const auto are_unrelated = [](const GaussianCloud& cloud) {
-    bool unrelated = true;
-    EXPECT_TRUE(FindEnhancedLook(cloud, SizeTailsOf(cloud), &unrelated).has_value());
-    return unrelated;
+    FoundTwins twins{.unrelated = true, .rows = {}};
+    EXPECT_TRUE(FindEnhancedLook(cloud, SizeTailsOf(cloud), &twins).has_value());
+    return twins.unrelated;
   };
   EXPECT_FALSE(are_unrelated(Sheet(2000, 3, 0.1)));
   GaussianCloud few = Sheet(4000, 1, 0);
@@ -166,6 +166,47 @@ TEST(EnhancedLook, TwinsOfFewStepsAreUnrelated) {
   GaussianCloud enhanced = few;  // as they would be if each were turned as its twin
   for (size_t i = 0; i < enhanced.quats.size(); ++i) enhanced.quats[i] = few.quats[i % 4];
   EXPECT_FALSE(are_unrelated(enhanced));
+}
+
+// A network multiplies the harmonics of a Gaussian, a fit gives each its own.
+TEST(EnhancedLook, HarmonicsOfTwins) {
+  const GaussianCloud bare = Sheet(1000, 3, 0.1);
+  FoundTwins twins;
+  ASSERT_TRUE(FindEnhancedLook(bare, SizeTailsOf(bare), &twins).has_value());
+  ASSERT_FALSE(twins.rows.empty());
+  // The whole has another Gaussian before each.
+  std::vector<int64_t> rows;
+  for (int64_t i = 0; i < bare.size(); ++i) rows.push_back(2 * i + 1);
+  GaussianCloud whole;
+  whole.Resize(2 * bare.size(), 3);
+  const auto stride = static_cast<size_t>(whole.sh_stride());
+  const auto give = [&](bool own) {
+    Random random(3);
+    std::vector<float> values(stride);
+    for (size_t i = 0; i < rows.size(); ++i) {
+      if (own || i % 3 == 0) std::ranges::generate(values, [&] { return static_cast<float>(0.1 * random.Normal()); });
+      const auto times = static_cast<float>(random.Uniform(0.5, 1.5));
+      for (size_t k = 0; k < stride; ++k) whole.sh[static_cast<size_t>(rows[i]) * stride + k] = times * values[k];
+    }
+  };
+  give(false);
+  ASSERT_TRUE(LikenessOfHarmonics(whole, rows, twins).has_value());
+  EXPECT_GT(*LikenessOfHarmonics(whole, rows, twins), 0.999);
+  give(true);
+  ASSERT_TRUE(LikenessOfHarmonics(whole, rows, twins).has_value());
+  EXPECT_LT(*LikenessOfHarmonics(whole, rows, twins), 0.3);
+  GaussianCloud steps = whole;  // of a format
+  for (float& value : steps.sh) value = std::round(64 * value) / 64;
+  EXPECT_FALSE(LikenessOfHarmonics(steps, rows, twins).has_value());
+  GaussianCloud none = whole;
+  std::ranges::fill(none.sh, 0.0f);
+  EXPECT_FALSE(LikenessOfHarmonics(none, rows, twins).has_value());
+  std::ranges::fill(none.sh, std::numeric_limits<float>::infinity());
+  EXPECT_FALSE(LikenessOfHarmonics(none, rows, twins).has_value());
+  GaussianCloud low;
+  low.Resize(whole.size(), 1);
+  EXPECT_FALSE(LikenessOfHarmonics(low, rows, twins).has_value());
+  EXPECT_FALSE(LikenessOfHarmonics(CloudView(), {}, twins).has_value());
 }
 
 // Nor on the unit, the order of the rows or the number of threads.

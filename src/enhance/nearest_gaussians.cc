@@ -47,7 +47,7 @@ void NearestGaussians::Cut() {
   items_.resize(most_ + 1);
 }
 
-GaussianCloud NearestGaussians::Take(std::optional<double>* next) {
+GaussianCloud NearestGaussians::Take(std::optional<double>* next, std::vector<int64_t>* rows) {
   Cut();
   if (items_.size() > most_) {
     const auto last = items_.begin() + static_cast<std::ptrdiff_t>(most_);
@@ -59,6 +59,7 @@ GaussianCloud NearestGaussians::Take(std::optional<double>* next) {
   GaussianCloud out;
   out.Resize(std::ssize(items_), 0);
   for (size_t k = 0; k < items_.size(); ++k) {
+    if (rows != nullptr) rows->push_back(items_[k].row);
     const float* from = items_[k].values.data();
     std::copy_n(from, 3, out.means.data() + 3 * k);
     std::copy_n(from + 3, 3, out.log_scales.data() + 3 * k);

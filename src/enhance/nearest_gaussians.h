@@ -35,8 +35,8 @@ class NearestGaussians {
 
   size_t count() const { return seen_; }  // that were added, while they were no more than the most
   // The nearest, in the order of rows, without harmonics; gives the memory back. `next`: the squared distance of the
-  // nearest one that is not among them.
-  GaussianCloud Take(std::optional<double>* next = nullptr);
+  // nearest one that is not among them. `rows`: which they are.
+  GaussianCloud Take(std::optional<double>* next = nullptr, std::vector<int64_t>* rows = nullptr);
 
  private:
   void Cut();

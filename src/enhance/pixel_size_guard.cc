@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <utility>
 #include <vector>
@@ -52,6 +53,9 @@ constexpr double kNothingButCuts = 0.9;
 // as large, on a ground or before a sky. Of a subject with less than a tenth of the Gaussians it says nothing. From the
 // first on pixels shrink with this power of it, and from the second on it contradicts.
 constexpr double kUneven = 2.7, kMostUneven = 2.85, kUnevenFall = 4;
+// A splat has few Gaussians where it has little detail, and these are no larger than elsewhere: 0.5 to 1.3 times. Those
+// of larger pixels are larger.
+constexpr double kGrown = 1.6;
 // Of an uneven splat no more is taken than this times the spacing of its densest tenth.
 constexpr double kOfDense = 1 / 0.85;
 // Spacing of 512, over its median, below which Gaussians come of smaller pixels than the others. The densest place of
@@ -92,9 +96,24 @@ constexpr double kFewPower = 0.75;
 struct Surface {
   double spacing = 0;  // 0: too few
   double footprint = 0;
-  double of_many = 0, dense = 0, closest = 0, unevenness = 1;
+  double of_many = 0, dense = 0, closest = 0, unevenness = 1, growth = 1;
   double harmless = 0;
 };
+
+// Geometric mean of the `values` of the tenth of places with the largest `key`, over that of the tenth with the least.
+double Growth(const Buffer<float>& key, const Buffer<float>& values) {
+  std::vector<size_t> order(key.size());
+  std::iota(order.begin(), order.end(), size_t{0});
+  std::ranges::sort(order, {}, [&](size_t k) { return std::pair(key[k], k); });
+  const size_t tenth = std::max<size_t>(1, order.size() / 10);
+  double sum = 0;
+  for (size_t k = 0; k < tenth; ++k) {
+    const float least = values[order[k]], most = values[order[order.size() - 1 - k]];
+    if (!(least > 0 && most > 0)) return std::numeric_limits<double>::infinity();
+    sum += std::log(double{most}) - std::log(double{least});
+  }
+  return std::exp(sum / static_cast<double>(tenth));
+}
 
 // Of places that stand for all. What is harmless is so in nine of ten regions, as a few are anything.
 Surface SurfaceOf(const GaussianCloud& cloud) {
@@ -114,6 +133,7 @@ Surface SurfaceOf(const GaussianCloud& cloud) {
       harmless[at] = static_cast<float>(region.HarmlessPixel());
     }
   });
+  const double growth = Growth(of_many, footprint);  // before Quantile puts them in another order
   const auto dense = double{Quantile(of_many, 0.1)}, sparse = double{Quantile(of_many, 0.9)};
   return {.spacing = double{Quantile(spacing, 0.5)},
           .footprint = double{Quantile(footprint, 0.5)},
@@ -121,6 +141,7 @@ Surface SurfaceOf(const GaussianCloud& cloud) {
           .dense = dense,
           .closest = double{Quantile(of_many, 0.0)},
           .unevenness = dense > 0 ? sparse / dense : std::numeric_limits<double>::infinity(),
+          .growth = growth,
           .harmless = double{Quantile(harmless, 0.9)}};
 }
 
@@ -194,6 +215,7 @@ Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, int64_t all, const R
   evidence.dense = surface.dense;
   evidence.closest = surface.closest;
   evidence.unevenness = surface.unevenness;
+  evidence.growth = surface.growth;
   evidence.harmless = surface.harmless;
   evidence.flatness = FlatnessOf(showing.bright);
   if (!probe.ok()) return probe.error();
@@ -311,8 +333,8 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
             " % of its outlines are of Gaussians that are much coarser than the others, or look as if a part had been "
             "cut off there, and say nothing about pixels"));
   }
-  const bool dense = evidence.dense < kSparseEnough * estimate.size;
-  const bool uneven = evidence.unevenness > kMostUneven && dense;
+  const bool of_many_pixels = evidence.dense < kSparseEnough * estimate.size || evidence.growth > kGrown;
+  const bool uneven = evidence.unevenness > kMostUneven && of_many_pixels;
   if (uneven) {
     finding.no_one_pixel = true;
     finding.contradictions.push_back(std::isfinite(evidence.unevenness)
@@ -353,7 +375,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   }
   if (evidence.unevenness > kUneven) {
     const double uneven_size = shrunk * std::pow(kUneven / evidence.unevenness, kUnevenFall);
-    shrunk = dense ? uneven_size : std::clamp(kOfDense * evidence.dense, uneven_size, shrunk);
+    shrunk = of_many_pixels ? uneven_size : std::clamp(kOfDense * evidence.dense, uneven_size, shrunk);
   }
   if (!finding.contradicted()) finding.size = shrunk;
   finding.least = finding.size;

@@ -58,6 +58,7 @@ struct PixelSizeEvidence {
   double dense = 0;       // … the tenth part that lies closest …
   double closest = 0;     // … and least of 256 places
   double unevenness = 1;  // 90 % over 10 % quantile; infinite where 512 and more lie at one place
+  double growth = 1;      // footprint where that spacing is of the largest tenth, over that of the least
   double small_axis = 0;  // of the smallest tenth by area: PixelSizeProbe::start
   double harmless = 0;    // pixel that does no harm in nine of ten regions: GaussianRegion::HarmlessPixel
   double flatness = 1;    // thickness over width along the principal axes, without a twentieth on every side

@@ -425,6 +425,19 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   uneven.unevenness = 4;  // regions may bear more
   EXPECT_DOUBLE_EQ(Judge(estimate, uneven).size, plain.harmless);
   EXPECT_LT(Judge(estimate, uneven).least, 0.0022);
+  uneven.dense = 0.0076;  // of a pixel of 0.01: few Gaussians where there is little to see
+  EXPECT_FALSE(Judge(estimate, uneven).contradicted());
+  EXPECT_FALSE(Judge(estimate, uneven).no_one_pixel);
+  EXPECT_TRUE(Judge(estimate, uneven).is_one());
+  EXPECT_NEAR(Judge(estimate, uneven).size, 0.0076 / 0.85, 1e-9);
+  uneven.dense = 0.02;
+  EXPECT_DOUBLE_EQ(Judge(estimate, uneven).size, estimate.size);
+  uneven.growth = 1.7;  // larger ones where they lie apart: of larger pixels
+  EXPECT_TRUE(Judge(estimate, uneven).no_one_pixel);
+  uneven.growth = 1;
+  uneven.dense = 0.0074;
+  EXPECT_TRUE(Judge(estimate, uneven).no_one_pixel);
+  uneven.dense = 0;
   uneven.unevenness = 2.8;  // of single objects, too
   EXPECT_FALSE(Judge(estimate, uneven).contradicted());
   EXPECT_TRUE(Judge(estimate, uneven).is_one());

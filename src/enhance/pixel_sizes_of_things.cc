@@ -30,6 +30,7 @@ constexpr double kNextToNone = 1e-6;  // of the largest: not worth a number
 constexpr size_t kMostNamed = 4;      // as one reads
 constexpr float kWithin = 0.02f;      // quantiles between which a thing lies
 constexpr int64_t kLooseSamples = 256;
+constexpr double kAsLarge = 0.6;
 
 // What is looked at of a thing: no harmonics but the constant.
 GaussianCloud ThingOf(const GaussianCloud& cloud, const std::vector<int64_t>& rows) {
@@ -77,10 +78,21 @@ PixelSizeFinding Unknown(const PixelSizeFinding& whole, std::string why) {
   return finding;
 }
 
-// Whether loose Gaussians and small pieces lie so far apart that no pixel of that size is too large for them.
-bool IsSparse(const GaussianCloud& loose, double size) {
-  GaussianCloud showing = FindShowingGaussians(loose).all;
+double MedianFootprint(const GaussianCloud& showing) {
+  Buffer<float> footprint(static_cast<size_t>(showing.size()));
+  for (size_t i = 0; i < footprint.size(); ++i) {
+    const auto [smallest, middle, largest] = AxesOf(showing, i);
+    footprint[i] = static_cast<float>(std::sqrt(middle * largest));
+  }
+  return double{Quantile(footprint, 0.5)};
+}
+
+// Whether loose Gaussians and small pieces are as large as those of the whole, and lie so far apart that no pixel of
+// that size is too large for them.
+bool AreAsCoarse(const GaussianCloud& loose, const GaussianCloud& whole, double size) {
+  const GaussianCloud showing = FindShowingGaussians(loose).all;
   if (showing.empty()) return true;
+  if (MedianFootprint(showing) < kAsLarge * MedianFootprint(FindShowingGaussians(whole).all)) return false;
   const GaussianRegions regions(showing);
   const int64_t count = showing.size(), samples = std::min(kLooseSamples, count);
   Buffer<float> spacing(static_cast<size_t>(samples));
@@ -143,7 +155,10 @@ PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const Pixe
     extents.push_back(ExtentOf(alone));
     ThingPixelSize thing{std::ssize(rows[k]), Unknown(whole, "its outlines say nothing")};
     ShowingGaussians showing = FindShowingGaussians(alone);
-    if (kinds && IsWide(BesideTag(TrainedKindOf(showing.all), cloud.render_mode, showing.all.size()))) {
+    std::vector<int64_t> showing_rows;
+    for (const int64_t row : showing.rows_of_all) showing_rows.push_back(rows[k][static_cast<size_t>(row)]);
+    const WholeCloud harmonics{showing_rows, [&] { return CloudView(cloud); }};
+    if (kinds && IsWide(BesideTag(TrainedKindOf(showing.all, harmonics), cloud.render_mode, showing.all.size()))) {
       thing.finding = Unknown(whole, "it looks as if it had been enhanced already, or had lost no width, and stays");
       thing.finding.size = kNothing * whole.size;
     } else if (auto found = FindPixelSize(std::move(showing), cloud.render_mode); found.ok()) {
@@ -162,7 +177,7 @@ PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const Pixe
   const bool one_training = all_like_whole(kAlike);
   const bool like_others = one_training && 2 * std::ssize(rows.back()) < cloud.size() &&
                            static_cast<size_t>(components.count) <= looked_at &&
-                           IsSparse(ThingOf(cloud, rows.back()), whole.size);
+                           AreAsCoarse(ThingOf(cloud, rows.back()), cloud, whole.size);
   if ((!alone_matter || like_others) && all_like_whole(kSame)) return {};
   for (size_t k = 0; k < looked_at; ++k) {
     PixelSizeFinding& finding = out.things[k].finding;

@@ -110,6 +110,35 @@ TEST(PixelSizesOfThings, WhatIsTooSmallToTellIsNotBlurred) {
   EXPECT_NE(ContradictionsOf(found.things).back().find("too small to tell"), std::string::npos);
 }
 
+// Loose Gaussians and small pieces of one thing are of its training where they are no finer than its pixels.
+TEST(PixelSizesOfThings, SmallPiecesThatAreNoFinerAreOfTheSame) {
+  const GaussianCloud biplane = Placed("biplane");
+  const auto beside = [&](double spacing) {
+    GaussianCloud cloud = biplane, pieces;
+    constexpr int kPieces = 4, kSide = 16;
+    pieces.Resize(int64_t{kPieces} * kSide * kSide, cloud.sh_degree);
+    std::ranges::fill(pieces.quats, 0.5f);
+    std::ranges::fill(pieces.opacity_logits, 3.0f);
+    std::ranges::fill(pieces.sh, 0.5f);
+    std::ranges::fill(pieces.log_scales, static_cast<float>(std::log(0.8 * spacing)));
+    for (size_t i = 0; i < pieces.opacity_logits.size(); ++i) {
+      const double piece = std::floor(static_cast<double>(i) / (kSide * kSide));
+      pieces.means[3 * i] = static_cast<float>(0.8 + spacing * static_cast<double>(i % kSide));
+      pieces.means[3 * i + 1] = static_cast<float>(-0.6 + 0.4 * piece);
+      pieces.means[3 * i + 2] = static_cast<float>(spacing * static_cast<double>(i / kSide % kSide));
+    }
+    EXPECT_TRUE(Append(cloud, pieces).ok());
+    return cloud;
+  };
+  EXPECT_TRUE(Find(beside(2 * kPixelOfExamples)).things.empty());
+  const GaussianCloud finer = beside(0.4 * kPixelOfExamples);
+  const PixelSizesOfThings found = Find(finer);
+  ASSERT_EQ(found.things.size(), 2u);
+  EXPECT_FALSE(found.things[0].finding.contradicted());
+  EXPECT_NE(ContradictionsOf(found.things).back().find("too small to tell"), std::string::npos);
+  EXPECT_EQ(std::ranges::count(std::span(found.sure).subspan(static_cast<size_t>(biplane.size())), 1), 0);
+}
+
 // What has lost no width stays, whoever lies beside it, unless somebody says better.
 TEST(PixelSizesOfThings, WideOnesStay) {
   GaussianCloud wide = Placed("biplane");

@@ -184,7 +184,7 @@ ShowingGaussians ShowingStudy::Take() {
   ShowingGaussians out;
   const size_t bright = s.bright.count();
   out.bright = s.bright.Take();
-  out.all = s.all.Take();
+  out.all = s.all.Take(nullptr, &out.rows_of_all);
   if (bright < static_cast<size_t>(kLeastGaussians)) out.bright = out.all;
   out.telling = s.telling->Take();
   if (s.telling_not_black) out.telling_not_black = s.telling_not_black->Take();

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "core/cloud_blocks.h"
 #include "core/framing.h"
@@ -34,6 +35,7 @@ struct ShowingGaussians {
   // Usable, of kShowingOpacity or more and near the middle of the cloud; those nearest to it where there are more than
   // kMostShowing.
   GaussianCloud all;
+  std::vector<int64_t> rows_of_all;  // of the cloud
   // The same of those that are not nearly black: fits on black keep black ones around the object that no picture shows.
   // The same as `all` where fewer than kLeastGaussians are not black.
   GaussianCloud bright;

@@ -12,6 +12,7 @@
 #include "core/run_context.h"
 #include "core/statistics.h"
 #include "enhance/enhanced_look.h"
+#include "enhance/showing_gaussians.h"
 
 namespace anchorsplat {
 
@@ -35,8 +36,10 @@ constexpr double kLeastTail = 0.03, kLeastFaint = 0.02, kFaintOpacity = 0.3;
 // whose third axis other programs write as nearly nothing, also end at one size.
 constexpr double kRound = 0.4, kRatherRound = 0.3;
 
-// ln of the odds. Sizes that are like those of no fit are mostly those of a network.
-constexpr double kEnhancedOdds = 0, kEnhancedOddsWhereUnclear = -2;
+// ln of the odds. Sizes that are like those of no fit are mostly those of a network. Where twins have harmonics of
+// their own it can only be one that made one of each, which has odds of 1.5 and more (235 files); fits of 2,000 to
+// 3,000 steps are at −2 to 0.9.
+constexpr double kEnhancedOdds = 0, kEnhancedOddsWhereUnclear = -2, kEnhancedOddsOfOwnHarmonics = 1.3;
 
 double Tail(std::span<float> logarithms, double share) {
   const auto quantile = double{Quantile(logarithms, share)};
@@ -155,16 +158,25 @@ std::optional<TrainedKind> Judge(const SizeTails& tails) {
   return tail < (few ? kClassicTailOfFew : kClassicTail) ? TrainedKind::kUnclear : TrainedKind::kClassic;
 }
 
-std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing) {
+std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing, const WholeCloud& whole) {
   const SizeTails tails = SizeTailsOf(showing);
   const auto by_sizes = Judge(tails);
   if (!by_sizes || by_sizes == TrainedKind::kWidened) return by_sizes;
   LeaveIfAbandoned();
-  bool unrelated = false;
-  const auto look = FindEnhancedLook(showing, tails, &unrelated);
-  if (unrelated) return by_sizes;
-  const double least = by_sizes == TrainedKind::kUnclear ? kEnhancedOddsWhereUnclear : kEnhancedOdds;
-  return look && LogOddsOfEnhanced(*look) > least ? TrainedKind::kEnhanced : by_sizes;
+  FoundTwins twins;
+  const auto look = FindEnhancedLook(showing, tails, &twins);
+  if (!look || twins.unrelated) return by_sizes;
+  const double odds = LogOddsOfEnhanced(*look);
+  if (odds <= (by_sizes == TrainedKind::kUnclear ? kEnhancedOddsWhereUnclear : kEnhancedOdds)) return by_sizes;
+  if (odds < kEnhancedOddsOfOwnHarmonics && whole.harmonics) {
+    const auto likeness = LikenessOfHarmonics(whole.harmonics(), whole.rows, twins);
+    if (likeness && *likeness < kOwnHarmonics) return by_sizes;
+  }
+  return TrainedKind::kEnhanced;
+}
+
+std::optional<TrainedKind> TrainedKindOf(const CloudView& cloud, const ShowingGaussians& showing) {
+  return TrainedKindOf(showing.all, {showing.rows_of_all, [&] { return cloud; }});
 }
 
 std::optional<TrainedKind> BesideTag(std::optional<TrainedKind> kind, std::optional<RenderMode> tag, int64_t showing) {

@@ -1,11 +1,15 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string_view>
 
+#include "core/cloud_view.h"
 #include "core/gaussian_cloud.h"
 #include "core/render_mode.h"
+#include "enhance/showing_gaussians.h"
 
 namespace anchorsplat {
 
@@ -51,9 +55,18 @@ SizeTails SizeTailsOf(const GaussianCloud& showing);  // of ShowingGaussians::al
 // is unclear.
 std::optional<TrainedKind> Judge(const SizeTails& tails);
 
+// Where the harmonics are of what shows.
+struct WholeCloud {
+  std::span<const int64_t> rows;  // ShowingGaussians::rows_of_all
+  std::function<CloudView()>
+      harmonics;  // the cloud; called only where they decide. Empty or no harmonics: none are had
+};
+
 // By sizes and by what networks leave. Of ShowingGaussians::all: looks at the Gaussians only, not at what the cloud
 // says of itself.
-std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing);
+std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing, const WholeCloud& whole = {});
+// The same, with the harmonics of the cloud that these are of.
+std::optional<TrainedKind> TrainedKindOf(const CloudView& cloud, const ShowingGaussians& showing);
 
 // What of that counts beside a tag. Trainers that know no other mode tag everything classic, and formats that have no
 // word for Mip-Splatting or for what has been enhanced tag it antialiased: where the Gaussians have a width all the

@@ -26,7 +26,7 @@ constexpr double kPixel = 0.0055;  // of both examples, nearly
 SizeTails FindSizeTails(const GaussianCloud& cloud) { return SizeTailsOf(FindShowingGaussians(cloud).all); }
 
 std::optional<TrainedKind> FindTrainedKind(const GaussianCloud& cloud) {
-  return TrainedKindOf(FindShowingGaussians(cloud).all);
+  return TrainedKindOf(cloud, FindShowingGaussians(cloud));
 }
 
 GaussianCloud Example(const char* object) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -24,6 +25,8 @@
 namespace anchorsplat {
 
 namespace {
+
+constexpr int64_t kMostReadWhole = 2'000'000;  // half a gigabyte; of more, harmonics count as unknown
 
 std::string Rows(int64_t count, int64_t of) {
   return Cat(WithThousands(count), " of ", WithThousands(of), count == 1 ? " Gaussian" : " Gaussians");
@@ -48,8 +51,9 @@ std::vector<std::string> Problems(const CloudStatistics& s) {
   return out;
 }
 
-// Goes through the Gaussians two or three times. Errors: of reading.
-Status LookAt(CloudBlocks& blocks, SplatFindings& findings) {
+// Goes through the Gaussians two or three times. `whole`: all of them with their harmonics, which are rarely asked for.
+// Errors: of reading.
+Status LookAt(CloudBlocks& blocks, const std::function<CloudView()>& whole, SplatFindings& findings) {
   findings.render_mode = blocks.render_mode();
   findings.comments = blocks.comments();
   CloudView said;  // all but the Gaussians
@@ -63,7 +67,7 @@ Status LookAt(CloudBlocks& blocks, SplatFindings& findings) {
   ANCHORSPLAT_RETURN_IF_ERROR(Study(blocks, studies));
   findings.statistics = statistics.Find();
   ShowingGaussians showing = study.Take();
-  findings.looks = TrainedKindOf(showing.all);
+  findings.looks = TrainedKindOf(showing.all, {showing.rows_of_all, whole});
   const auto beside_tag = BesideTag(findings.looks, findings.render_mode, showing.all.size());
   // As `enhance` takes it.
   const bool untold = !findings.render_mode && !findings.lost_no_width;
@@ -176,7 +180,13 @@ Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& n
   findings.file_bytes = file.bytes();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::unique_ptr<CloudBlocks> blocks, file.Blocks());
   findings.format = file.format()->name;
-  ANCHORSPLAT_RETURN_IF_ERROR(LookAt(*blocks, findings));
+  GaussianCloud whole;
+  const auto read = [&] {
+    if (blocks->size() > kMostReadWhole) return CloudView();
+    if (auto cloud = file.Read(); cloud.ok()) whole = *std::move(cloud);
+    return CloudView(whole);
+  };
+  ANCHORSPLAT_RETURN_IF_ERROR(LookAt(*blocks, read, findings));
   if (file.format()->describe != nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(findings.facts, file.format()->describe(file.input()));
   }
@@ -186,7 +196,8 @@ Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& n
 SplatFindings InspectSplat(const CloudView& cloud) {
   SplatFindings findings;
   MemoryBlocks blocks(cloud);
-  (void)LookAt(blocks, findings);  // memory can be read
+  (void)LookAt(
+      blocks, [&] { return cloud; }, findings);  // memory can be read
   return findings;
 }
 

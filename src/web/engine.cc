@@ -335,9 +335,9 @@ Result<Engine::Answer> Engine::Filter(const Json& request) {
   const double upscale = value != nullptr && value->is_number() ? value->get<double>() : 4;
   if (!(upscale >= 1 && upscale <= 1e6)) return BadRequest("says an 'upscale' that is not from 1 to 1000000");
   const GaussianCloud& cloud = open->cloud;
-  const GaussianCloud showing = FindShowingGaussians(cloud).all;
+  const ShowingGaussians showing = FindShowingGaussians(cloud);
   const LostWidth lost =
-      FindLostWidth(cloud, BesideTag(TrainedKindOf(showing), cloud.render_mode, showing.size()), upscale);
+      FindLostWidth(cloud, BesideTag(TrainedKindOf(cloud, showing), cloud.render_mode, showing.all.size()), upscale);
   Answer answer;
   const double gain = double{kDilation} * (lost.strength - ShownStrength(upscale, cloud.render_mode));
   answer.json = {{"gain", std::max(0.0, gain)}};

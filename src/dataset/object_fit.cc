@@ -25,7 +25,8 @@ Result<GaussianCloud> InitialCloudOf(const ObjectSettings& settings, const FitOp
   const InitialCloudOptions start = StartOptions(options);
   switch (settings.start) {
     case FitStart::kRandom:
-      return InitialCloud(RandomPoints(count, views.scene_scale, settings.seed), views.scene_scale, start);
+      return InitialCloud(RandomPoints(count, views.scene_scale, settings.seed, settings.init_extent),
+                          views.scene_scale, start);
     case FitStart::kView:
       return InitialCloud(RandomPointsInView(count, views.train, views.scene_scale, settings.seed), views.scene_scale,
                           start);

@@ -123,6 +123,7 @@ Status TakeKind(const JsonValue& json, ObjectSettings& s) {
     s.start = static_cast<FitStart>(name);
   }
   if (json.has("init_points")) ANCHORSPLAT_RETURN_IF_ERROR(TakeWhole(json, "init_points", s.init_points));
+  if (json.has("init_extent")) ANCHORSPLAT_RETURN_IF_ERROR(TakeSetting(json, "init_extent", s.init_extent));
   if (json.has("sh_degree")) ANCHORSPLAT_RETURN_IF_ERROR(TakeInt(json, "sh_degree", 0, kMaxShDegree, s.sh_degree));
   if (json.has("mode")) {
     ANCHORSPLAT_RETURN_IF_ERROR(TakeNamed(json, "mode", kFitModeNames, name));
@@ -168,6 +169,7 @@ nlohmann::json ToJson(const ObjectSettings& s) {
           {"seed", std::to_string(s.seed)},
           {"init", kFitStartNames[static_cast<size_t>(s.start)]},
           {"init_points", s.init_points},
+          {"init_extent", s.init_extent},
           {"sh_degree", s.sh_degree},
           {"mode", kFitModeNames[static_cast<size_t>(s.mode)]},
           {"pixel", kFitPixelNames[s.pixel_area ? 1 : 0]},
@@ -223,6 +225,10 @@ Status Validate(const ObjectSettings& s) {
     return bad("init_points are those of init random and view; points says how many samples of the surface there are");
   }
   if (s.init_points > kMostInitPoints) return bad(Cat("a fit begins with at most ", kMostInitPoints, " points"));
+  if (!(s.init_extent >= 1e-3 && s.init_extent <= 1e3)) {
+    return bad(Cat("init_extent ", s.init_extent, " is not in 0.001 to 1000"));
+  }
+  if (s.init_extent != kRandomExtent && s.start != FitStart::kRandom) return bad("init_extent is that of init random");
   if (s.sh_degree < 0 || s.sh_degree > kMaxShDegree) return bad(Cat("sh_degree ", s.sh_degree, " is not in 0 to 3"));
   if (s.strategy == FitPreset::kMcmc && s.max_gaussians == 0) {
     return bad("strategy mcmc grows to a bound: max_gaussians says how many");

@@ -8,6 +8,7 @@
 #include "core/result.h"
 #include "dataset/picture_defects.h"
 #include "fit/fit_options.h"
+#include "fit/initial_points.h"
 #include "io/json_file.h"
 #include "scene/view_set.h"
 
@@ -36,7 +37,8 @@ struct ObjectSettings {
 
   // What makes a splat one of another kind; the defaults are those of standard fits.
   FitStart start = FitStart::kSurface;
-  int64_t init_points = 0;  // of kRandom and kView; 0: kRandomPoints
+  int64_t init_points = 0;             // of kRandom and kView; 0: kRandomPoints
+  double init_extent = kRandomExtent;  // of kRandom: half a side of the cube, scene scales
   int sh_degree = kMaxShDegree;
   RenderMode mode = RenderMode::kClassic;
   bool pixel_area = false;  // the fit's pixels are means over their area (fit/pixel_model.h)

@@ -28,8 +28,9 @@ ObjectSettings Unusual() {
   s.max_gaussians = 12345;
   s.min_train_psnr = 30.5;
   s.seed = ~uint64_t{0};
-  s.start = FitStart::kView;
+  s.start = FitStart::kRandom;
   s.init_points = 1234;
+  s.init_extent = 0.25;
   s.sh_degree = 1;
   s.mode = RenderMode::kAntialiased;
   s.pixel_area = true;
@@ -61,12 +62,12 @@ TEST(ObjectSettings, ComeBackAsTheyWere) {
 TEST(ObjectSettings, EveryMemberIsNeededAndChecked) {
   const nlohmann::json good = ToJson(Unusual());
   // Which the first data sets do not have.
-  const std::set<std::string> newer = {"downscale", "init",     "init_points", "sh_degree", "mode",
-                                       "pixel",     "strategy", "mip_filter",  "defects",   "backdrop"};
+  const std::set<std::string> newer = {"downscale", "init",     "init_points", "init_extent", "sh_degree", "mode",
+                                       "pixel",     "strategy", "mip_filter",  "defects",     "backdrop"};
   for (const auto& [key, value] : good.items()) {
     nlohmann::json missing = good;
     missing.erase(key);
-    if (key == "init") missing.erase("init_points");
+    if (key == "init") missing.erase("init_points"), missing.erase("init_extent");
     EXPECT_EQ(Back(missing).ok(), newer.contains(key)) << key;
     nlohmann::json wrong = good;
     wrong[key] = nullptr;
@@ -91,6 +92,9 @@ TEST(ObjectSettings, EveryMemberIsNeededAndChecked) {
   EXPECT_TRUE(refused("background", {0, 0, 2}));
   EXPECT_TRUE(refused("views", 1e9));
   EXPECT_TRUE(refused("init", "surface"));  // with init_points, which it has not
+  EXPECT_TRUE(refused("init", "view"));     // with init_extent, likewise
+  EXPECT_TRUE(refused("init_extent", 0));
+  EXPECT_TRUE(refused("init_extent", 1e9));
   EXPECT_TRUE(refused("init", "cube"));
   EXPECT_TRUE(refused("sh_degree", 4));
   EXPECT_TRUE(refused("mode", "sharp"));

@@ -174,6 +174,7 @@ const std::map<std::string, Take, std::less<>>& Keys() {
       {"min_train_psnr", TakeNumber<[](ObjectSettings& s) -> double& { return s.min_train_psnr; }>},
       {"init", TakeStart},
       {"init_points", TakeWhole<[](ObjectSettings& s) -> int64_t& { return s.init_points; }>},
+      {"init_extent", TakeNumber<[](ObjectSettings& s) -> double& { return s.init_extent; }>},
       {"sh_degree", TakeWhole<[](ObjectSettings& s) -> int& { return s.sh_degree; }>},
       {"mode", TakeMode},
       {"pixel", TakePixel},

@@ -111,6 +111,7 @@ name = "dense"
 objects = 2
 init = "random"
 init_points = 500
+init_extent = 0.3
 mode = "antialiased"
 noise = 4
 jpeg = 80
@@ -131,6 +132,7 @@ objects = 1
   EXPECT_EQ(DrawEntries(*recipe, "c", 2), (Entries{0}));
   const ObjectSettings &dense = recipe->entries[1].settings, &spz = recipe->entries[2].settings;
   EXPECT_EQ(dense.start, FitStart::kRandom);
+  EXPECT_EQ(dense.init_extent, 0.3);
   EXPECT_EQ(dense.mode, RenderMode::kAntialiased);
   EXPECT_EQ(dense.defects, (PictureDefects{.noise = 4, .jpeg = 80}));
   EXPECT_FALSE(dense.IsDerived());

@@ -79,6 +79,8 @@ TEST(RandomPoints, FillTheCube) {
   for (const float c : points.colors) ASSERT_TRUE(c >= 0 && c < 1);
   EXPECT_EQ(RandomPoints(10000, 0.5, 7).positions, points.positions);
   EXPECT_NE(RandomPoints(10000, 0.5, 8).positions, points.positions);
+  const InitialPoints small = RandomPoints(10000, 0.5, 7, 0.3);
+  for (size_t i = 0; i < small.positions.size(); ++i) ASSERT_NEAR(small.positions[i], 0.1f * points.positions[i], 1e-6);
 }
 
 TEST(RandomPoints, InViewLieWhereTheCamerasLook) {

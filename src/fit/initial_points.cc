@@ -11,7 +11,6 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr double kCubeHalfSide = 3;       // scene scales
 constexpr int64_t kProbes = 1 << 16;      // points that look for what the cameras see
 constexpr size_t kCamerasAsked = 64;      // of them, evenly chosen
 constexpr int64_t kTriesPerPoint = 1000;  // before a place that is hardly there is given up
@@ -57,9 +56,9 @@ InitialPoints PointsOf(std::span<const ColmapPoint> points) {
   return out;
 }
 
-InitialPoints RandomPoints(int64_t count, double scene_scale, uint64_t seed) {
+InitialPoints RandomPoints(int64_t count, double scene_scale, uint64_t seed, double extent) {
   Random random = RandomStream(seed, RandomPurpose::kInitialPoints);
-  const double side = kCubeHalfSide * scene_scale;
+  const double side = extent * scene_scale;
   InitialPoints points;
   for (int64_t i = 0; i < count; ++i) {
     AppendWithRandomColor(PointInBox(random, {-side, -side, -side}, {side, side, side}), random, points);
@@ -69,7 +68,7 @@ InitialPoints RandomPoints(int64_t count, double scene_scale, uint64_t seed) {
 
 InitialPoints RandomPointsInView(int64_t count, const std::vector<Camera>& cameras, double scene_scale, uint64_t seed) {
   Random random = RandomStream(seed, RandomPurpose::kInitialPoints, 1);
-  const double side = kCubeHalfSide * scene_scale;
+  const double side = kRandomExtent * scene_scale;
   Point cube_low{}, cube_high{};
   for (const Camera& camera : cameras) {
     const Point center = camera.Center();

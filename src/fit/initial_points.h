@@ -23,10 +23,12 @@ struct InitialPoints {
 // Points of structure from motion. Positions beyond the range of floats are left out.
 InitialPoints PointsOf(std::span<const ColmapPoint> points);
 
-// `count` points of random colours, uniform within ±3 scene scales of the origin: gsplat's `init_type = "random"`,
-// which has 100,000 of them.
+// `count` points of random colours, uniform within ±`extent` scene scales of the origin: gsplat's `init_type =
+// "random"`, which has 100,000 of them and an `init_extent` of 3. INRIA's trainer has ±1.3 units for NeRF-synthetic
+// scenes, which is 0.3 scene scales.
 inline constexpr int64_t kRandomPoints = 100000;
-InitialPoints RandomPoints(int64_t count, double scene_scale, uint64_t seed);
+inline constexpr double kRandomExtent = 3;
+InitialPoints RandomPoints(int64_t count, double scene_scale, uint64_t seed, double extent = kRandomExtent);
 
 // `count` points of random colours, uniform in the part of such a cube, around the cameras' mean centre, that many
 // cameras see: at least half as many as see the best-seen place. For views without points around something this is a

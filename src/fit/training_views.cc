@@ -183,7 +183,7 @@ const char* NameOf(FitInit init, const TrainingViews& views) {
 }
 
 Result<InitialPoints> InitialPointsOf(FitInit init, const TrainingViews& views, std::optional<int64_t> count,
-                                      uint64_t seed) {
+                                      uint64_t seed, double extent) {
   const bool has_points = views.points.size() > 0;
   if (init == FitInit::kPoints && !has_points) {
     return Error{ErrorCode::kBadArgument,
@@ -191,7 +191,7 @@ Result<InitialPoints> InitialPointsOf(FitInit init, const TrainingViews& views, 
   }
   if (init == FitInit::kPoints || (init == FitInit::kAuto && has_points)) return Thinned(views.points, count);
   const int64_t random = count.value_or(kRandomPoints);
-  if (init == FitInit::kRandom) return RandomPoints(random, views.scene_scale, seed);
+  if (init == FitInit::kRandom) return RandomPoints(random, views.scene_scale, seed, extent);
   return RandomPointsInView(random, views.train, views.scene_scale, seed);
 }
 

@@ -57,9 +57,9 @@ enum class FitInit {
 const char* NameOf(FitInit init, const TrainingViews& views);
 
 // The points of the project, thinned to `count`, or as many random ones; all of them or kRandomPoints where nobody
-// says. kBadArgument: kPoints, and the project has none.
+// says. `extent`: RandomPoints'. kBadArgument: kPoints, and the project has none.
 Result<InitialPoints> InitialPointsOf(FitInit init, const TrainingViews& views, std::optional<int64_t> count,
-                                      uint64_t seed);
+                                      uint64_t seed, double extent = kRandomExtent);
 
 // 1.1 × the largest distance of a centre from their mean; 1 when all are in one place.
 double SceneScale(const std::vector<Camera>& cameras);

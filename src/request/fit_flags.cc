@@ -132,6 +132,10 @@ void FitFlags::AddTo(CLI::App& verb) {
       ->excludes(init_option);
   verb.add_option("--init-points", init_points, "How many (default: all points; 100000 random ones)")
       ->check(CLI::Range(int64_t{1}, int64_t{1} << 28));
+  verb.add_option("--init-extent", init_extent,
+                  "With --init random: half a side of the cube, scene scales; 0.3 as INRIA's around one object")
+      ->check(CLI::Range(1e-3, 1e3))
+      ->capture_default_str();
   AddShellFlag(verb, shell);
   verb.add_option("--background", background, "R,G,B from 0 to 1 (default: what the project says, else black)");
   verb.add_option("--sh-degree", standard.objective.render.sh_degree, "Highest degree of spherical harmonics")

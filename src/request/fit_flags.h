@@ -31,6 +31,7 @@ struct FitFlags {
   FitInit init = FitInit::kAuto;
   std::string init_splat;
   std::optional<int64_t> init_points;
+  double init_extent = kRandomExtent;
   std::optional<int64_t> shell;  // nothing: auto
   std::string background;
   FitPreset strategy = FitPreset::kDefault;

@@ -32,7 +32,8 @@ Result<ChosenStart> ChooseFitStart(const FitFlags& flags, const TrainingViews& v
   if (flags.init == FitInit::kPoints && views.points.size() == 0) {
     return Error{ErrorCode::kBadArgument, Cat(project, ": --init points, but the project has none")};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(InitialPoints points, InitialPointsOf(flags.init, views, flags.init_points, seed));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(InitialPoints points,
+                               InitialPointsOf(flags.init, views, flags.init_points, seed, flags.init_extent));
   return ChosenStart{std::move(points), NameOf(flags.init, views)};
 }
 

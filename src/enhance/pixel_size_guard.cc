@@ -77,6 +77,9 @@ constexpr double kSomeSize = 1e-12;  // of an estimate: a pixel has some size
 // five times smaller. They are strange (0.9 and more; standard fits 0.4 to 0.8), or the two regressions disagree.
 // Where Gaussians lie further apart than two such pixels (land: 0.4 to 1.2), those are not too large.
 constexpr double kFlat = 0.2, kStrangeOfFlat = 0.85, kDisagreeingOfFlat = 0.87, kSparse = 2;
+// Gaussians that may only be balls are as large as they lie apart and no pixel made them so: two fits were taken
+// for 1.7 of theirs. Other fits are at 0.01 to 0.43, Gaussians that were made from the points of a mesh at 0.62 and 1.
+constexpr double kBalls = 0.9;
 // Beyond, the two regressions are about something that neither has seen: pictures of parts of an object, whose outlines
 // hardly any of them shows. Of 76 fits like standard ones three are below: a palm, a broom, trousers.
 constexpr double kDisagreeing = 0.67;
@@ -143,6 +146,15 @@ Surface SurfaceOf(const GaussianCloud& cloud) {
           .unevenness = dense > 0 ? sparse / dense : std::numeric_limits<double>::infinity(),
           .growth = growth,
           .harmless = double{Quantile(harmless, 0.9)}};
+}
+
+double RoundnessOf(const GaussianCloud& cloud) {
+  Buffer<float> ratios(static_cast<size_t>(cloud.size()));
+  for (size_t i = 0; i < ratios.size(); ++i) {
+    const auto [smallest, middle, largest] = AxesOf(cloud, i);
+    ratios[i] = largest > 0 ? static_cast<float>(smallest / largest) : 0;
+  }
+  return double{Quantile(ratios, 0.5)};
 }
 
 // Thickness over width of a cloud along its principal axes, of what lies between these quantiles: a few lie anywhere.
@@ -218,6 +230,7 @@ Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, int64_t all, const R
   evidence.growth = surface.growth;
   evidence.harmless = surface.harmless;
   evidence.flatness = FlatnessOf(showing.bright);
+  evidence.roundness = RoundnessOf(showing.bright);
   if (!probe.ok()) return probe.error();
   evidence.small_axis = probe->start();
   LeaveIfAbandoned();
@@ -354,6 +367,10 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
         Cat("its Gaussians and outlines together say ", Fixed(estimate.disagreement, 2),
             " of what outlines alone do, as where pictures show no more than parts of it"));
   }
+  const bool balls = evidence.roundness > kBalls;
+  if (balls) {
+    finding.contradictions.emplace_back("its Gaussians are balls, whose sizes say nothing about pixels");
+  }
   // Soft pictures leave large Gaussians: where these are small, too, the outlines are of something else.
   const double by_outlines = estimate.size / estimate.softness;
   if (evidence.small_axis < kSmallestAxis * by_outlines) {
@@ -386,7 +403,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     if (uneven && finding.contradictions.size() == 1) least = shrunk;
     // Without its black Gaussians the outlines say a size, too; it counts where nothing contradicts that one.
     const double without = evidence.without_black;
-    const bool one_pixel = !uneven && !flat && left_out <= kNothingButCuts;
+    const bool one_pixel = !uneven && !flat && !balls && left_out <= kNothingButCuts;
     if (without > 0 && one_pixel && crowd_at(without) <= most &&
         evidence.small_axis >= kSmallestAxis * without / evidence.softness_without_black) {
       least = std::max(least, without);

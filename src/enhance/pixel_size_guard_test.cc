@@ -412,6 +412,14 @@ TEST(PixelSizeGuard, EachEvidenceContradictsOnItsOwn) {
   black.without_black = 0.02;  // the estimate is the smaller one: it cannot blur
   EXPECT_FALSE(Judge(estimate, black).contradicted());
 
+  PixelSizeEvidence balls = plain;
+  balls.roundness = 0.95;
+  ASSERT_TRUE(Judge(estimate, balls).contradicted());
+  EXPECT_NE(Judge(estimate, balls).contradictions[0].find("balls"), std::string::npos);
+  EXPECT_DOUBLE_EQ(Judge(estimate, balls).size, plain.harmless);
+  balls.roundness = 0.85;
+  EXPECT_FALSE(Judge(estimate, balls).contradicted());
+
   // Gaussians that come of smaller pixels: what the outlines say without black ones is no size for all, either.
   PixelSizeEvidence uneven = plain;
   uneven.unevenness = 2.7 * std::sqrt(2);

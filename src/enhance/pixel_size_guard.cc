@@ -9,12 +9,12 @@
 #include <utility>
 #include <vector>
 
-#include "core/ellipsoid.h"
 #include "core/kd_tree.h"
 #include "core/parallel.h"
 #include "core/run_context.h"
 #include "core/statistics.h"
 #include "core/text.h"
+#include "enhance/cloud_shape.h"
 #include "enhance/gaussian_regions.h"
 #include "enhance/lost_width.h"
 #include "enhance/pixel_size_features.h"
@@ -76,6 +76,10 @@ constexpr double kSomeSize = 1e-12;  // of an estimate: a pixel has some size
 // a rim and a lower side that no picture shows: their outlines are as soft as its Gaussians are large, at pixels two to
 // five times smaller. They are strange (0.9 and more; standard fits 0.4 to 0.8), or the two regressions disagree.
 // Where Gaussians lie further apart than two such pixels (land: 0.4 to 1.2), those are not too large.
+// An aircraft is as flat, but fills 0.35 to 0.7 of the rectangle around it where land, facades and carpets fill 0.85
+// and more; and its small Gaussians (√(largest × middle axis)) measure 0.54 to 0.95 of the estimate, those of land 0.32
+// to 0.58. What is like aircraft in both is none of land.
+constexpr double kFills = 0.7, kSmallOfFlat = 0.5;
 constexpr double kFlat = 0.2, kStrangeOfFlat = 0.85, kDisagreeingOfFlat = 0.87, kSparse = 2;
 // Gaussians that may only be balls are as large as they lie apart and no pixel made them so: two fits were taken
 // for 1.7 of theirs. Other fits are at 0.01 to 0.43, Gaussians that were made from the points of a mesh at 0.62 and 1.
@@ -148,54 +152,6 @@ Surface SurfaceOf(const GaussianCloud& cloud) {
           .harmless = double{Quantile(harmless, 0.9)}};
 }
 
-double RoundnessOf(const GaussianCloud& cloud) {
-  Buffer<float> ratios(static_cast<size_t>(cloud.size()));
-  for (size_t i = 0; i < ratios.size(); ++i) {
-    const auto [smallest, middle, largest] = AxesOf(cloud, i);
-    ratios[i] = largest > 0 ? static_cast<float>(smallest / largest) : 0;
-  }
-  return double{Quantile(ratios, 0.5)};
-}
-
-// Thickness over width of a cloud along its principal axes, of what lies between these quantiles: a few lie anywhere.
-constexpr double kLowest = 0.05, kHighest = 0.95;
-double FlatnessOf(const GaussianCloud& cloud) {
-  const auto count = static_cast<size_t>(cloud.size());
-  Buffer<float> values(count);
-  std::array<double, 3> middle;
-  for (size_t a = 0; a < 3; ++a) {
-    for (size_t i = 0; i < count; ++i) values[i] = cloud.means[3 * i + a];
-    middle[a] = double{Quantile(values, 0.5)};
-  }
-  const auto away = [&](size_t i) {
-    return std::array<double, 3>{cloud.means[3 * i] - middle[0], cloud.means[3 * i + 1] - middle[1],
-                                 cloud.means[3 * i + 2] - middle[2]};
-  };
-  for (size_t i = 0; i < count; ++i) {
-    const auto [x, y, z] = away(i);
-    values[i] = static_cast<float>(x * x + y * y + z * z);
-  }
-  const float farthest = Quantile(values, kHighest);
-  std::array<double, 6> moments{};
-  for (size_t i = 0; i < count; ++i) {
-    if (values[i] > farthest) continue;
-    const auto [x, y, z] = away(i);
-    const std::array<double, 6> products = {x * x, x * y, x * z, y * y, y * z, z * z};
-    for (size_t k = 0; k < 6; ++k) moments[k] += products[k];
-  }
-  const Ellipsoid shape = EllipsoidOf(moments);
-  std::array<double, 3> sides;
-  for (size_t k = 0; k < 3; ++k) {
-    for (size_t i = 0; i < count; ++i) {
-      const auto at = away(i);
-      values[i] = static_cast<float>(shape.axes[k] * at[0] + shape.axes[3 + k] * at[1] + shape.axes[6 + k] * at[2]);
-    }
-    sides[k] = double{Quantile(values, kHighest)} - double{Quantile(values, kLowest)};
-  }
-  std::ranges::sort(sides);
-  return sides[1] > 0 ? sides[0] / sides[1] : 1;
-}
-
 // Of those rows, nothing but where they are and how large.
 GaussianCloud PlacesAndScales(const GaussianCloud& cloud, const std::vector<int64_t>& rows) {
   GaussianCloud out;
@@ -229,8 +185,10 @@ Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, int64_t all, const R
   evidence.unevenness = surface.unevenness;
   evidence.growth = surface.growth;
   evidence.harmless = surface.harmless;
-  evidence.flatness = FlatnessOf(showing.bright);
-  evidence.roundness = RoundnessOf(showing.bright);
+  const CloudShape shape = ShapeOf(showing.bright);
+  evidence.flatness = shape.flatness;
+  evidence.fill = shape.fill;
+  evidence.roundness = shape.roundness;
   if (!probe.ok()) return probe.error();
   evidence.small_axis = probe->start();
   LeaveIfAbandoned();
@@ -356,7 +314,9 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
                                                Number(kUneven), " times: they have no one pixel")
                                          : "a tenth of its Gaussians lie at one place, and those of fits do not");
   }
-  const bool flat = evidence.flatness < kFlat && apart < kSparse * estimate.size &&
+  const double by_outlines = estimate.size / estimate.softness;
+  const bool filled = evidence.fill > kFills || evidence.small_axis < kSmallOfFlat * by_outlines;
+  const bool flat = evidence.flatness < kFlat && filled && apart < kSparse * estimate.size &&
                     (estimate.strangeness > kStrangeOfFlat || estimate.disagreement < kDisagreeingOfFlat);
   if (flat) {
     finding.contradictions.emplace_back(
@@ -372,7 +332,6 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     finding.contradictions.emplace_back("its Gaussians are balls, whose sizes say nothing about pixels");
   }
   // Soft pictures leave large Gaussians: where these are small, too, the outlines are of something else.
-  const double by_outlines = estimate.size / estimate.softness;
   if (evidence.small_axis < kSmallestAxis * by_outlines) {
     finding.contradictions.push_back(Cat("its small Gaussians measure ", Fixed(evidence.small_axis / by_outlines, 2),
                                          " of such a pixel, and those of fits 0.4 to 2.3"));

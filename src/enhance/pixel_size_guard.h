@@ -61,10 +61,9 @@ struct PixelSizeEvidence {
   double growth = 1;      // footprint where that spacing is of the largest tenth, over that of the least
   double small_axis = 0;  // of the smallest tenth by area: PixelSizeProbe::start
   double harmless = 0;    // pixel that does no harm in nine of ten regions: GaussianRegion::HarmlessPixel
-  double flatness = 1;    // thickness over width along the principal axes, without a twentieth on every side
-  double roundness = 0;   // median of the smallest axis over the largest
-  double without_black = 0;           // the estimate without black Gaussians; 0: there are few of them
-  double softness_without_black = 1;  // PixelSizeEstimate::softness of that
+  double flatness = 1, fill = 1, roundness = 0;  // CloudShape
+  double without_black = 0;                      // the estimate without black Gaussians; 0: there are few of them
+  double softness_without_black = 1;             // PixelSizeEstimate::softness of that
 };
 Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud);
 

@@ -32,6 +32,13 @@ TEST(PixelSizeGuard, OutlinesThatNoPictureShows) {
     EXPECT_DOUBLE_EQ(Judge(estimate, evidence).size, 0.003);
     EXPECT_EQ(Judge(estimate, evidence).least, 0);
   }
+  evidence.fill = 0.6;
+  EXPECT_FALSE(Judge(estimate, evidence).contradicted()) << "an aircraft";
+  evidence.small_axis = 0.0048;
+  EXPECT_TRUE(Judge(estimate, evidence).contradicted()) << "land of any outline";
+  evidence.small_axis = 0.005;
+  evidence.fill = 0.8;
+  EXPECT_TRUE(Judge(estimate, evidence).contradicted());
   evidence.spacing = 0.021;
   EXPECT_FALSE(Judge(estimate, evidence).contradicted()) << "a table top of few Gaussians";
   evidence.spacing = 0.01;

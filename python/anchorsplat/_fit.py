@@ -26,6 +26,7 @@ def fit(
     init: Literal["auto", "points", "view", "random"] = "auto",
     init_splat: Cloud | PathLike | None = None,
     init_points: int | None = None,
+    init_extent: float = 3,
     shell: int | Literal["auto"] = "auto",
     background: Color | None = None,
     sh_degree: int = 3,
@@ -76,6 +77,7 @@ def fit(
     init: first Gaussians: the project's points, random where many cameras look, random in gsplat's cube.
     init_splat: a Cloud or a file: first Gaussians at the centres of this splat.
     init_points: how many first Gaussians; otherwise all points, 100,000 random ones.
+    init_extent: of init="random": half a side of the cube, in scene scales; 0.3 as INRIA's around one object.
     shell: Gaussians on a sphere far beyond cameras and points, for what is seen there; 0: none. "auto": some where the
         project's points leave much of the pictures open.
     background: r, g, b from 0 to 1; otherwise what the project says, else black.

@@ -255,9 +255,9 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   if (flags.view) json["view"] = PagePath(output).string();
   if (!shared.json && !shared.quiet) {
     std::cout << OneLine(input) << " -> " << OneLine(output) << "\n  " << WithThousands(r.gaussians_in)
-              << " Gaussians in, " << WithThousands(r.gaussians_out) << " out; " << r.method << Details(r) << ", "
-              << HumanSeconds(r.seconds) << " (" << HumanSeconds(r.seconds_in_all)
-              << " with what is found out before)\n";
+              << (r.gaussians_in == 1 ? " Gaussian in, " : " Gaussians in, ") << WithThousands(r.gaussians_out)
+              << " out; " << r.method << Details(r) << ", " << HumanSeconds(r.seconds) << " ("
+              << HumanSeconds(r.seconds_in_all) << " with what is found out before)\n";
     if (flags.view) {
       std::error_code unknown;
       std::cout << "  " << OneLine(PagePath(output)) << ": " << HumanBytes(fs::file_size(PagePath(output), unknown))

@@ -137,7 +137,8 @@ std::vector<std::string> ContradictionsOf(std::span<const ThingPixelSize> things
   return all;
 }
 
-PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const PixelSizeFinding& whole, bool kinds) {
+PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const PixelSizeFinding& whole, bool kinds,
+                                          const WholeCloud& harmonics) {
   const CloudComponents components = FindComponents(cloud);
   if (components.component.empty()) return {};
   const auto looked_at = std::min(static_cast<size_t>(components.count), kMostThings);
@@ -156,9 +157,13 @@ PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const Pixe
     ThingPixelSize thing{std::ssize(rows[k]), Unknown(whole, "its outlines say nothing")};
     ShowingGaussians showing = FindShowingGaussians(alone);
     std::vector<int64_t> showing_rows;
-    for (const int64_t row : showing.rows_of_all) showing_rows.push_back(rows[k][static_cast<size_t>(row)]);
-    const WholeCloud harmonics{showing_rows, [&] { return CloudView(cloud); }};
-    if (kinds && IsWide(BesideTag(TrainedKindOf(showing.all, harmonics), cloud.render_mode, showing.all.size()))) {
+    for (const int64_t own : showing.rows_of_all) {
+      const int64_t row = rows[k][static_cast<size_t>(own)];
+      showing_rows.push_back(harmonics.harmonics ? harmonics.rows[static_cast<size_t>(row)] : row);
+    }
+    const auto here = [&] { return harmonics.harmonics ? harmonics.harmonics() : CloudView(cloud); };
+    const auto kind = kinds ? TrainedKindOf(showing.all, {showing_rows, here}) : std::nullopt;
+    if (IsWide(BesideTag(kind, cloud.render_mode, showing.all.size()))) {
       thing.finding = Unknown(whole, "it looks as if it had been enhanced already, or had lost no width, and stays");
       thing.finding.size = kNothing * whole.size;
     } else if (auto found = FindPixelSize(std::move(showing), cloud.render_mode); found.ok()) {

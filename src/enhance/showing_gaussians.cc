@@ -57,7 +57,7 @@ class TellingSearch {
   TellingGaussians Take() {
     std::optional<double> next;
     TellingGaussians out;
-    out.cloud = nearest_.Take(&next);
+    out.cloud = nearest_.Take(&next, &out.rows);
     out.framing = framing_;
     if (next) out.reach = std::sqrt(*next);
     return out;

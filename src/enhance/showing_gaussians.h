@@ -22,8 +22,9 @@ inline constexpr size_t kMostShowing = 200'000;
 // opacity, and the kMostShowing nearest to it where there are more: a part of a scene has outlines enough, while every
 // so many Gaussians of it would have gaps. Giants would drown what does say something.
 struct TellingGaussians {
-  GaussianCloud cloud;  // without harmonics, in the order of the whole cloud
-  Framing framing;      // of the whole cloud
+  GaussianCloud cloud;        // without harmonics, in the order of the whole cloud
+  std::vector<int64_t> rows;  // of that
+  Framing framing;            // of the whole cloud
   // Where there were more, they are those up to here from the framing's target; nothing where they are all.
   std::optional<double> reach;
 

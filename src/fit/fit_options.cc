@@ -42,7 +42,8 @@ InitialCloudOptions StartOptions(const FitOptions& options) {
   InitialCloudOptions start{.sh_degree = options.objective.render.sh_degree, .seed = options.seed};
   if (options.strategy == Strategy::kMcmc) {
     start.opacity = kMcmcInitialOpacity;
-    start.scale = kMcmcInitialScale;
+    // The 3-D filter keeps integrals: it would make so small ones all but invisible, and they would fade to nothing.
+    if (!options.mip_filter) start.scale = kMcmcInitialScale;
   }
   return start;
 }

@@ -73,10 +73,12 @@ Status LookAt(CloudBlocks& blocks, const std::function<CloudView()>& whole, Spla
   const bool untold = !findings.render_mode && !findings.lost_no_width;
   const bool antialiased = untold && findings.looks == TrainedKind::kAntialiased;
   const auto mode = antialiased ? std::optional(RenderMode::kAntialiased) : findings.render_mode;
-  GaussianCloud telling = showing.telling.cloud;
-  telling.render_mode = mode;
+  TellingGaussians telling = showing.telling;
+  telling.cloud.render_mode = mode;
   findings.pixel_size = FindPixelSize(std::move(showing), mode);
-  if (findings.pixel_size.ok()) findings.things = FindPixelSizesOfThings(telling, *findings.pixel_size, true).things;
+  if (findings.pixel_size.ok()) {
+    findings.things = FindPixelSizesOfThings(telling.cloud, *findings.pixel_size, true, {telling.rows, whole}).things;
+  }
   findings.lost_width = FindLostWidth(said, beside_tag, kInfoUpscale);
   findings.problems = Problems(findings.statistics);
   return {};
@@ -182,7 +184,7 @@ Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& n
   findings.format = file.format()->name;
   GaussianCloud whole;
   const auto read = [&] {
-    if (blocks->size() > kMostReadWhole) return CloudView();
+    if (blocks->size() > kMostReadWhole || !whole.empty()) return CloudView(whole);
     if (auto cloud = file.Read(); cloud.ok()) whole = *std::move(cloud);
     return CloudView(whole);
   };

@@ -54,6 +54,13 @@ TEST_F(FitVerb, SaysWhatItDid) {
   EXPECT_THAT(ExpectDone(Fit("quiet.ply", {"-q"})).err, IsEmpty());
 }
 
+TEST_F(FitVerb, SaysWhereNothingIsLeft) {
+  const ProgramRun run = ExpectDone(Fit(
+      "faded.ply", {"--strategy", "mcmc", "--max-gaussians", "200", "--opacity-reg", "1000", "--rate-opacities", "1"}));
+  EXPECT_THAT(run.err, HasSubstr("faded.ply: next to nothing is left: 0 of "));
+  EXPECT_THAT(ExpectDone(Fit("fit.ply", {})).err, Not(HasSubstr("next to nothing")));
+}
+
 TEST_F(FitVerb, BeginsWhereItIsTold) {
   // Longer, and all would be pruned: few of so few are seen.
   EXPECT_EQ(ExpectJson(Fit("random.ply", {"--init", "random", "--steps", "2"}, /*few=*/false))["initial_points"],

@@ -43,7 +43,7 @@ InitialCloudOptions StartOptions(const FitOptions& options) {
   if (options.strategy == Strategy::kMcmc) {
     start.opacity = kMcmcInitialOpacity;
     // The 3-D filter keeps integrals: it would make so small ones all but invisible, and they would fade to nothing.
-    if (!options.mip_filter) start.scale = kMcmcInitialScale;
+    start.scale = options.mip_filter ? kMcmcInitialScaleOfFiltered : kMcmcInitialScale;
   }
   return start;
 }

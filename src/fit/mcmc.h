@@ -26,6 +26,7 @@ McmcOptions ScaledTo(const McmcOptions& options, int64_t steps);
 
 // What gsplat's trainer calls init_opa and init_scale in its preset "mcmc" (InitialCloudOptions).
 inline constexpr double kMcmcInitialOpacity = 0.5, kMcmcInitialScale = 0.1;
+inline constexpr double kMcmcInitialScaleOfFiltered = 0.3;  // with Mip-Splatting's 3-D filter, which is not gsplat's
 
 // A step as McmcAfterStep sees it.
 struct McmcStep {

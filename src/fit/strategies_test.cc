@@ -224,7 +224,7 @@ TEST(FitStrategies, PresetsAreGsplats) {
   EXPECT_EQ(StartOptions(mcmc).scale, 0.1);
   FitOptions smooth = mcmc;
   UseMipFilter(smooth);
-  EXPECT_EQ(StartOptions(smooth).scale, 1);
+  EXPECT_EQ(StartOptions(smooth).scale, 0.3);
   EXPECT_EQ(FitOptionsFor(15000, FitPreset::kMcmc).mcmc.refine_stop_iter, 12500);
   EXPECT_EQ(UnitOf(2.2), 2);
   EXPECT_EQ(UnitOf(0), 1);

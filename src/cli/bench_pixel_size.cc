@@ -41,7 +41,12 @@ nlohmann::json ToJson(const PixelSizeCheck& check, const std::string& kind) {
                          {"showing", check.estimate.showing},
                          {"cut_outlines", check.estimate.cut_outlines},
                          {"coarse_outlines", check.estimate.coarse_outlines},
-                         {"unevenness", check.unevenness},
+                         {"unevenness", check.evidence.unevenness},
+                         {"dense", check.evidence.dense},
+                         {"growth", check.evidence.growth},
+                         {"flatness", check.evidence.flatness},
+                         {"fill", check.evidence.fill},
+                         {"roundness", check.evidence.roundness},
                          {"things", ToJson(check.things)}};
   for (const PixelSizeCheck::Sample& sample : check.samples) {
     json["samples"].push_back({{"size", sample.size}, {"features", sample.features}});

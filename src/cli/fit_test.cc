@@ -120,6 +120,8 @@ TEST_F(FitVerb, RefusesWhatMakesNoSense) {
   refused({"--hold-out", "1"}, "");
   refused({"--init", "points"}, "has none");
   refused({"--upscale", "2"}, "--pixel");
+  refused({"--init-extent", "0.3"}, "--init random");
+  refused({"--init", "random", "--init-extent", "0"}, "--init-extent");
   refused({"--init", "view", "--init-splat", "x.ply"}, "--init");
   refused({"--background", "1"}, "--background");
   ExpectRefused(Fit("x.xyz", {}), ErrorCode::kBadArgument, {"not a format that is written"});

@@ -33,7 +33,6 @@ struct SizeTails;  // enhance/trained_kind.h
 //   31–34  opacities: SizeTails::opaque, the share above 0.95, median, first quartile
 //
 // No feature depends on the unit. Nothing: fewer than 1000 Gaussians.
-//
 inline constexpr size_t kEnhancedLookFeatures = 35;
 // What bounds which splats can look enhanced at all.
 inline constexpr size_t kTwinUpperQuartile = 3, kFlatness = 27, kElongation = 28;

@@ -68,7 +68,7 @@ struct PixelSizeEvidence {
 Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud);
 
 // Where the densest tenth of Gaussians lies as far apart as this, in pixels of a size, that size is not too large for
-// them: a splat has few Gaussians where it has little detail. Dense places of fits are at 0.6 to 1.7.
+// them: a splat has few Gaussians where it has little detail. Those of 37 fits are at 0.5 to 3.2.
 inline constexpr double kSparseEnough = 0.75;
 
 // Gaussians beside each other on every pixel of the surface that fits keep at most: a cloud of `gaussians` that has

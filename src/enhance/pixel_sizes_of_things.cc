@@ -29,8 +29,10 @@ constexpr double kFew = 0.005;
 constexpr double kNextToNone = 1e-6;  // of the largest: not worth a number
 constexpr size_t kMostNamed = 4;      // as one reads
 constexpr float kWithin = 0.02f;      // quantiles between which a thing lies
-constexpr int64_t kLooseSamples = 256;
+// Loose Gaussians and small pieces of one training are about as large as the others; of pixels half as large they are
+// half as large, and thinned ones may lie as far apart all the same.
 constexpr double kAsLarge = 0.6;
+constexpr int64_t kLooseSamples = 256;
 
 // What is looked at of a thing: no harmonics but the constant.
 GaussianCloud ThingOf(const GaussianCloud& cloud, const std::vector<int64_t>& rows) {
@@ -179,11 +181,12 @@ PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const Pixe
   };
   // A few floaters are not worth a word.
   const bool alone_matter = std::ssize(rows.back()) > static_cast<int64_t>(kFew * static_cast<double>(cloud.size()));
+  if (!alone_matter && all_like_whole(kSame)) return {};
   const bool one_training = all_like_whole(kAlike);
   const bool like_others = one_training && 2 * std::ssize(rows.back()) < cloud.size() &&
                            static_cast<size_t>(components.count) <= looked_at &&
                            AreAsCoarse(ThingOf(cloud, rows.back()), cloud, whole.size);
-  if ((!alone_matter || like_others) && all_like_whole(kSame)) return {};
+  if (like_others && all_like_whole(kSame)) return {};
   for (size_t k = 0; k < looked_at; ++k) {
     PixelSizeFinding& finding = out.things[k].finding;
     if (std::ranges::any_of(extents, [&](const Extent& other) { return extents[k].HasInside(other); })) {
@@ -199,14 +202,13 @@ PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const Pixe
   if (static_cast<size_t>(components.count) > looked_at) {
     others.contradictions = {Cat("these are of things beyond the ", kMostThings, " largest, or of pieces")};
   }
+  for (const ThingPixelSize& thing : out.things) {
+    if (thing.finding.size > 2 * kNothing * whole.size) others.size = std::min(others.size, thing.finding.size);
+  }
   if (like_others) {
     others.least = others.size;
     others.contradictions.clear();
   }
-  for (const ThingPixelSize& thing : out.things) {
-    if (thing.finding.size > 2 * kNothing * whole.size) others.size = std::min(others.size, thing.finding.size);
-  }
-  others.least = std::min(others.least, others.size);
   out.things.push_back({std::ssize(rows.back()), std::move(others)});
 
   out.sizes.assign(static_cast<size_t>(cloud.size()), static_cast<float>(kNothing * whole.size));

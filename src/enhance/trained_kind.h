@@ -58,8 +58,8 @@ std::optional<TrainedKind> Judge(const SizeTails& tails);
 // Where the harmonics are of what shows.
 struct WholeCloud {
   std::span<const int64_t> rows;  // ShowingGaussians::rows_of_all
-  std::function<CloudView()>
-      harmonics;  // the cloud; called only where they decide. Empty or no harmonics: none are had
+  // The cloud; called only where they decide. No function, or a cloud of degree 0: they are not known.
+  std::function<CloudView()> harmonics;
 };
 
 // By sizes and by what networks leave. Of ShowingGaussians::all: looks at the Gaussians only, not at what the cloud

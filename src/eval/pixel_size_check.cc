@@ -25,8 +25,7 @@ Result<PixelSizeCheck> CheckPixelSize(const BenchmarkObject& object, bool with_s
   const auto begin = std::chrono::steady_clock::now();
   ANCHORSPLAT_ASSIGN_OR_RETURN(check.estimate, EstimatePixelSize(object.low));
   check.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PixelSizeEvidence evidence, GatherPixelSizeEvidence(object.low));
-  check.unevenness = evidence.unevenness;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(check.evidence, GatherPixelSizeEvidence(object.low));
   check.things = FindPixelSizesOfThings(object.low, {}, true).things;
   ANCHORSPLAT_ASSIGN_OR_RETURN(PixelSizeProbe probe, PixelSizeProbe::Make(object.low));
   check.start = probe.start();

@@ -6,6 +6,7 @@
 #include "core/result.h"
 #include "enhance/pixel_size_estimate.h"
 #include "enhance/pixel_size_features.h"
+#include "enhance/pixel_size_guard.h"
 #include "enhance/pixel_sizes_of_things.h"
 #include "eval/benchmark.h"
 
@@ -18,8 +19,8 @@ struct PixelSizeCheck {
   double truth = 0;                        // median over the Gaussians (eval/filter_sweep.h), world units
   double start = 0;                        // what the search begins with
   PixelSizeEstimate estimate;
-  double seconds = 0;                  // of the estimate
-  double unevenness = 1;               // PixelSizeEvidence
+  double seconds = 0;  // of the estimate
+  PixelSizeEvidence evidence;
   std::vector<ThingPixelSize> things;  // that lie apart, empty where it is of one piece
   struct Sample {
     double size = 0;

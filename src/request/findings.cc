@@ -182,11 +182,14 @@ Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& n
   findings.file_bytes = file.bytes();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::unique_ptr<CloudBlocks> blocks, file.Blocks());
   findings.format = file.format()->name;
-  GaussianCloud whole;
+  std::optional<GaussianCloud> whole;
   const auto read = [&] {
-    if (blocks->size() > kMostReadWhole || !whole.empty()) return CloudView(whole);
-    if (auto cloud = file.Read(); cloud.ok()) whole = *std::move(cloud);
-    return CloudView(whole);
+    if (!whole) {
+      whole.emplace();
+      auto cloud = blocks->size() <= kMostReadWhole ? file.Read() : Result<GaussianCloud>(GaussianCloud());
+      if (cloud.ok() && cloud->size() == blocks->size()) whole = *std::move(cloud);  // nobody has changed the file
+    }
+    return CloudView(*whole);
   };
   ANCHORSPLAT_RETURN_IF_ERROR(LookAt(*blocks, read, findings));
   if (file.format()->describe != nullptr) {

@@ -194,6 +194,7 @@ Status CheckEffects(const FitFlags& flags, const FitOptions& options) {
       {"min-opacity", mcmc, "with --strategy mcmc"},
       {"noise-lr", mcmc, "with --strategy mcmc"},
       {"mode", !options.mip_filter, "without --mip-filter"},
+      {"init-extent", flags.init == FitInit::kRandom, "with --init random"},
       {"upscale", flags.pixel == FitPixel::kArea, "with --pixel area"},
       {"rate-sh-rest", harmonics, "with --sh-degree above 0"},
       {"sh-degree-interval", harmonics, "with --sh-degree above 0"},

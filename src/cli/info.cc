@@ -73,7 +73,7 @@ void PrintTable(const SplatFindings& f) {
       for (const std::string& contradiction : f.pixel_size->contradictions)
         std::cout << "    but " << contradiction << "\n";
       std::cout << "    so enhance would take a smaller pixel, " << Number(f.pixel_size->size)
-                << ", and no network; --cameras or --pixel-size would tell\n";
+                << "; --cameras or --pixel-size would tell\n";
     } else if (f.pixel_size->part) {
       std::cout << "    " << f.pixel_size->CutsInWords() << "; enhance would take " << Number(f.pixel_size->size)
                 << " to be safe\n";

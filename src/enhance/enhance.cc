@@ -323,8 +323,9 @@ Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, bool 
 // Nearer than that the network takes something from what the filter has: 0.2 dB at 1.1, 0.3 at 1.2.
 constexpr double kLeastUpscaleOfNetworks = 1.35;
 
-// Networks measure Gaussians in pixels and have learned what splats of a kind have lost: where one of them is not known
-// and nobody asked for a network, the filter takes its place.
+// Networks have learned what splats of a kind have lost: where that is not known and nobody asked for a network, the
+// filter takes its place. A pixel that is too small harms little: from a fifth of the true one on networks give back
+// more than the filter does (docs/results/pixel-size.md).
 void LeaveNetworksOut(MethodPlan& plan, const char* why) {
   const bool begins_with_network = plan.start != nullptr && plan.start->adds_detail;
   if (plan.chosen_by.empty() || !(plan.method->adds_detail || begins_with_network)) return;
@@ -349,38 +350,6 @@ Result<GaussianCloud> RunPlan(const MethodPlan& plan, const SizedMethods& sized,
     input.start_has_detail = plan.start->adds_detail;
   }
   return RunStep(*plan.method, std::move(input), options, report);
-}
-
-// A network that nobody asked for, where pixels are known of some things of the splat only: it takes those.
-bool TakesSureOnly(const MethodPlan& plan, const EnhanceInput& input) {
-  return !input.sure.empty() && !plan.chosen_by.empty() && plan.start == nullptr && plan.method->adds_detail;
-}
-
-// The others are the filter's.
-Result<GaussianCloud> RunOnSure(const MethodPlan& plan, EnhanceInput input, EnhanceOptions options,
-                                EnhanceReport& report) {
-  EnhanceInput others = input;
-  if (input.inside.empty()) input.inside.assign(input.sure.size(), 1);
-  others.inside = input.inside;
-  for (size_t i = 0; i < input.sure.size(); ++i) (input.sure[i] != 0 ? others : input).inside[i] = 0;
-  const auto left = std::ranges::count(others.inside, 1), taken = std::ranges::count(input.inside, 1);
-  MethodPlan filter = plan;
-  filter.method = &*std::ranges::find(EnhanceMethods(), std::string("filter"), &EnhanceMethod::name);
-  if (taken == 0) return RunStep(*filter.method, std::move(others), options, report);
-  if (left == 0) return RunStep(*plan.method, std::move(input), options, report);
-  LogInfo(Cat("the filter instead of '", plan.method->name, "' for ", WithThousands(left), " of ",
-              WithThousands(left + taken), " Gaussians, as it is not known which pixels those were trained at"));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud filtered, RunStep(*filter.method, std::move(others), options, report));
-  // Neither takes the other's share of a budget.
-  if (options.max_gaussians > 1) {
-    const auto share = static_cast<double>(left) / static_cast<double>(left + taken);
-    const auto most = static_cast<int64_t>(share * static_cast<double>(options.max_gaussians));
-    LeaveOutLeastVisible(std::clamp(most, int64_t{1}, options.max_gaussians - 1), filtered);
-    SetBudget(options, options.max_gaussians - filtered.size());
-  }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, RunStep(*plan.method, std::move(input), options, report));
-  ANCHORSPLAT_RETURN_IF_ERROR(Append(out, filtered));
-  return out;
 }
 
 }  // namespace
@@ -415,12 +384,11 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
     LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
   }
   if (GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode)) {
-    if (report.pixel_size_source == kCautiousPixelSize && !TakesSureOnly(plan, input)) {
-      LeaveNetworksOut(plan, "measures Gaussians in pixels and goes wrong where the pixel is not known");
-    } else if (report.pixel_size_source == "estimated" && report.things.empty() && report.finding &&
-               report.finding->rough()) {
-      LeaveNetworksOut(plan, "measures Gaussians in pixels, of which this splat says little");
-    } else if (report.looks == TrainedKind::kUnclear || report.looks == TrainedKind::kRaised || unknown_of_few) {
+    // At a pixel that was taken small for safety's sake a network harms none whose kind is unclear either.
+    const bool unclear = report.looks == TrainedKind::kUnclear && report.pixel_size_source != kCautiousPixelSize;
+    if (report.finding && report.finding->balls) {
+      LeaveNetworksOut(plan, "has learned from Gaussians that are no balls");
+    } else if (unclear || report.looks == TrainedKind::kRaised || unknown_of_few) {
       LeaveNetworksOut(plan, "has learned what splats of known kinds have lost");
     } else if (options.upscale < kLeastUpscaleOfNetworks) {
       LeaveNetworksOut(plan, "has learned what is missing 2 to 8 times closer");
@@ -439,9 +407,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
   const Stopwatch watch;
   EnhanceOptions within = options;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud rest, SetRestAside(options, input, within, report));
-  const bool sure_only = report.pixel_size_source == kCautiousPixelSize && TakesSureOnly(plan, input);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, sure_only ? RunOnSure(plan, std::move(input), within, report)
-                                                            : RunPlan(plan, sized, std::move(input), within, report));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, RunPlan(plan, sized, std::move(input), within, report));
   // Methods that make no copies, and what a region's border leaves of them.
   (void)LeaveOutLeastVisible(within.max_gaussians, out);
   if (options.region) ANCHORSPLAT_RETURN_IF_ERROR(Append(out, rest));

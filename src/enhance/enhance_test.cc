@@ -4,101 +4,18 @@
 
 #include <cmath>
 #include <limits>
-#include <memory>
-#include <numbers>
 
-#include "core/log.h"
 #include "core/random.h"
 #include "core/source_dir_for_test.h"
 #include "core/text.h"
+#include "enhance/enhance_door_for_test.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
-#include "enhance/network_for_test.h"
 #include "enhance/pixel_size_estimate.h"
 #include "formats/cloud_io.h"
 
 namespace anchorsplat {
 namespace {
-
-// Keeps what was logged for as long as it lives.
-class Recorder : public LogSink {
- public:
-  static std::shared_ptr<Recorder> Install() {
-    auto recorder = std::make_shared<Recorder>();
-    recorder->before_ = SetLogSink(recorder);
-    return recorder;
-  }
-  void Restore() { SetLogSink(before_); }
-  void Message(LogLevel, const std::string& text) override { text_ += text + "\n"; }
-  void TaskBegin(const std::string&, int64_t) override {}
-  void TaskProgress(int64_t, const std::string&) override {}
-  void TaskEnd() override {}
-  bool Says(const std::string& what) const { return text_.find(what) != std::string::npos; }
-  const std::string& text() const { return text_; }
-
- private:
-  std::shared_ptr<LogSink> before_;
-  std::string text_;
-};
-
-class EnhanceDoor : public testing::Test {
- protected:
-  void SetUp() override { log_ = Recorder::Install(); }
-  void TearDown() override { log_->Restore(); }
-  std::shared_ptr<Recorder> log_;
-};
-
-// A ball of opaque discs on its surface, as a fit of a smooth object with pixels of `pixel` leaves them: eroded, that
-// is with the variance 0.3 px² taken out of discs that closed the surface.
-GaussianCloud Ball(double pixel, int64_t n = 6000) {
-  GaussianCloud cloud;
-  cloud.Resize(n, 0);
-  Random random(11), opacities(12);
-  const double golden = std::numbers::pi * (3 - std::sqrt(5.0));
-  const double spacing = std::sqrt(4 * std::numbers::pi * 0.25 / static_cast<double>(n));  // radius one half
-  for (size_t i = 0; i < static_cast<size_t>(n); ++i) {
-    const double y = 1 - 2 * (static_cast<double>(i) + 0.5) / static_cast<double>(n), ring = std::sqrt(1 - y * y);
-    const double x = ring * std::cos(golden * static_cast<double>(i)),
-                 z = ring * std::sin(golden * static_cast<double>(i));
-    cloud.means[3 * i] = static_cast<float>(0.5 * x);
-    cloud.means[3 * i + 1] = static_cast<float>(0.5 * y);
-    cloud.means[3 * i + 2] = static_cast<float>(0.5 * z);
-    // Turns z onto the normal.
-    const double w = std::sqrt(0.5 * (1 + z)), s = w > 1e-6 ? 0.5 / w : 0;
-    cloud.quats[4 * i] = static_cast<float>(w);
-    cloud.quats[4 * i + 1] = static_cast<float>(-y * s);
-    cloud.quats[4 * i + 2] = static_cast<float>(x * s);
-    cloud.quats[4 * i + 3] = 0;
-    const double width = 0.9 * spacing * (1 + 0.2 * random.Normal());
-    double eroded = std::sqrt(std::max(0.01 * width * width, width * width - 0.3 * pixel * pixel));
-    if (i % 16 == 0) eroded *= random.Uniform(0.01, 1);  // fits shrink some to nothing
-    cloud.log_scales[3 * i] = cloud.log_scales[3 * i + 1] = static_cast<float>(std::log(eroded));
-    cloud.log_scales[3 * i + 2] = -9;
-    cloud.opacity_logits[i] = i % 4 == 1 ? static_cast<float>(opacities.Uniform(-2, 2.9)) : 2.9f;  // 0.948
-    for (size_t c = 0; c < 3; ++c) cloud.sh[3 * i + c] = static_cast<float>(random.Uniform(-1, 1));
-  }
-  return cloud;
-}
-
-// Black veils around a ball, as fits of photographs on black keep them: no picture shows them, but alpha does.
-GaussianCloud BallInVeils() {
-  GaussianCloud cloud = Ball(0.01, 3000), veils = Ball(0.01, 3000);
-  Random random(3);
-  for (size_t i = 0; i < size_t{3} * 3000; ++i) {
-    veils.means[i] *= static_cast<float>(random.Uniform(1.1, 1.8));
-    veils.log_scales[i] = std::log(0.08f);
-    veils.sh[i] = -2;
-  }
-  for (float& x : veils.opacity_logits) x = -0.5f;
-  EXPECT_TRUE(Append(cloud, veils).ok());
-  return cloud;
-}
-
-CameraSet CamerasForPixel(double pixel) {
-  const Pinhole intrinsics = PinholeFromFov(256, 256, std::numbers::pi / 4);
-  auto cameras = OrbitCameras(20, pixel * intrinsics.fx + 0.5, {0, 0, 0}, intrinsics);  // nearest point of the ball
-  return std::move(cameras).value();
-}
 
 TEST_F(EnhanceDoor, AutoWithoutANetworkIsTheFilter) {
   const GaussianCloud ball = Ball(0.01);
@@ -386,34 +303,6 @@ TEST_F(EnhanceDoor, ImpossibleCamerasOfAContradictedSplatAreNoWorseThanNone) {
   }
 }
 
-TEST_F(EnhanceDoor, ContradictedEstimateIsNotActedOn) {
-  constexpr uint64_t kOnlyHere = 4711;
-  RegisterNetworkForTest("network", kOnlyHere);
-  const GaussianCloud cloud = BallInVeils();
-  EnhanceOptions options;
-  options.seed = kOnlyHere;
-  const auto enhanced = Enhance(cloud, options);
-  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
-  const EnhanceReport& report = enhanced->report;
-  EXPECT_EQ(report.pixel_size_source, kCautiousPixelSize);
-  ASSERT_TRUE(report.finding && report.finding->contradicted());
-  EXPECT_LT(report.pixel_size, report.finding->estimate.size);
-  EXPECT_EQ(report.method, "filter");
-  EXPECT_TRUE(log_->Says("smaller pixel is taken")) << log_->text();
-  EXPECT_FALSE(log_->Says("no single size is right there")) << log_->text();
-  EXPECT_TRUE(log_->Says("the filter instead of 'network'")) << log_->text();
-
-  options.method = "network";
-  EXPECT_EQ(Enhance(cloud, options)->report.method, "network");
-  options.method = "auto";
-  options.pixel_size = 0.01;
-  const auto given = Enhance(cloud, options);
-  ASSERT_TRUE(given.ok());
-  EXPECT_EQ(given->report.method, "network");
-  EXPECT_EQ(given->report.pixel_size, 0.01);
-  EXPECT_FALSE(given->report.finding);
-}
-
 // One thing whose Gaussians lie further and further apart: near and far in a street.
 TEST_F(EnhanceDoor, UnevenSpacingsHaveNoOnePixel) {
   GaussianCloud cloud = Ball(0.01);
@@ -429,78 +318,6 @@ TEST_F(EnhanceDoor, UnevenSpacingsHaveNoOnePixel) {
   EXPECT_EQ(enhanced->report.pixel_size_source, kCautiousPixelSize);
   EXPECT_TRUE(enhanced->report.things.empty());
   EXPECT_TRUE(log_->Says("no single size is right there")) << log_->text();
-}
-
-// Networks have learned zooms of 2 and more, and nearer than 1.35 they take away from what the filter has.
-TEST_F(EnhanceDoor, SmallZoomsAreTheFilters) {
-  constexpr uint64_t kOnlyHere = 4714;
-  RegisterNetworkForTest("network", kOnlyHere);
-  EnhanceOptions options;
-  options.seed = kOnlyHere;
-  options.pixel_size = 0.01;
-  for (const double upscale : {1.2, 1.4}) {
-    options.upscale = upscale;
-    const auto enhanced = Enhance(Ball(0.01), options);
-    ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
-    EXPECT_EQ(enhanced->report.method, upscale < 1.35 ? "filter" : "network");
-  }
-  EXPECT_TRUE(log_->Says("2 to 8 times closer")) << log_->text();
-  options.upscale = 1.2;
-  options.method = "network";
-  EXPECT_EQ(Enhance(Ball(0.01), options)->report.method, "network") << "who asks for it gets it";
-}
-
-// A ball before a sky: what lies around has no pixels that one could know, the ball has.
-TEST_F(EnhanceDoor, ANetworkTakesTheThingsWhosePixelsAreKnown) {
-  constexpr uint64_t kOnlyHere = 4712;
-  static constexpr float kMark = 9;
-  RegisterNetworkForTest("network", kOnlyHere, [](EnhanceInput input, const EnhanceOptions& o) {
-    LeaveRegion(input);
-    std::ranges::fill(input.cloud.opacity_logits, kMark);
-    if (o.max_gaussians > 0 && o.max_gaussians < input.cloud.size()) input.cloud.Resize(o.max_gaussians, 0);
-    return std::move(input.cloud);
-  });
-  constexpr int64_t kBall = 6000, kSky = 5000;
-  GaussianCloud cloud = Ball(0.01, kBall), sky = Ball(0.01, kSky);
-  for (float& x : sky.means) x *= 20;
-  for (float& x : sky.log_scales) x += std::log(20.0f);
-  ASSERT_TRUE(Append(cloud, sky).ok());
-  EnhanceOptions options;
-  options.seed = kOnlyHere;
-  const auto enhanced = Enhance(cloud, options);
-  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
-  EXPECT_EQ(enhanced->report.method, "network");
-  EXPECT_EQ(enhanced->report.pixel_size_source, kCautiousPixelSize);
-  ASSERT_EQ(enhanced->report.things.size(), 2u);
-  EXPECT_EQ(enhanced->report.steps.size(), 2u);
-  EXPECT_TRUE(log_->Says("the filter instead of 'network' for 5,000 of 11,000 Gaussians")) << log_->text();
-  EXPECT_TRUE(log_->Says("2 things that lie apart")) << log_->text();
-  const auto by_network = [&](const GaussianCloud& of) { return std::ranges::count(of.opacity_logits, kMark); };
-  EXPECT_EQ(enhanced->cloud.size(), kBall + kSky);
-  EXPECT_EQ(by_network(enhanced->cloud), kBall);
-  EXPECT_GT(enhanced->report.seconds_in_all, enhanced->report.seconds);
-
-  // Of a part of both, and of one of them.
-  options.region = Region{.low = {-20, -20, -20}, .high = {0, 20, 20}};
-  const auto half = Enhance(cloud, options);
-  ASSERT_TRUE(half.ok()) << half.error().message;
-  EXPECT_EQ(half->cloud.size(), kBall + kSky);
-  EXPECT_NEAR(static_cast<double>(by_network(half->cloud)), kBall / 2, 10);
-  options.region = Region{.low = {-1, -1, -1}, .high = {1, 1, 1}};
-  const auto ball = Enhance(cloud, options);
-  ASSERT_TRUE(ball.ok()) << ball.error().message;
-  EXPECT_EQ(by_network(ball->cloud), kBall);
-  EXPECT_EQ(ball->report.steps.size(), 1u);
-
-  // The filter makes no copies, but its Gaussians count; each has its share.
-  options.region.reset();
-  SetBudget(options, (kBall + kSky) / 2);
-  const auto budget = Enhance(cloud, options);
-  ASSERT_TRUE(budget.ok()) << budget.error().message;
-  EXPECT_EQ(budget->cloud.size(), (kBall + kSky) / 2);
-  EXPECT_EQ(by_network(budget->cloud), kBall / 2);
-  SetBudget(options, 2);
-  EXPECT_EQ(by_network(Enhance(cloud, options)->cloud), 1);
 }
 
 TEST_F(EnhanceDoor, RefusesNonsense) {

@@ -327,8 +327,8 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
         Cat("its Gaussians and outlines together say ", Fixed(estimate.disagreement, 2),
             " of what outlines alone do, as where pictures show no more than parts of it"));
   }
-  const bool balls = evidence.roundness > kBalls;
-  if (balls) {
+  finding.balls = evidence.roundness > kBalls;
+  if (finding.balls) {
     finding.contradictions.emplace_back("its Gaussians are balls, whose sizes say nothing about pixels");
   }
   // Soft pictures leave large Gaussians: where these are small, too, the outlines are of something else.
@@ -362,7 +362,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     if (uneven && finding.contradictions.size() == 1) least = shrunk;
     // Without its black Gaussians the outlines say a size, too; it counts where nothing contradicts that one.
     const double without = evidence.without_black;
-    const bool one_pixel = !uneven && !flat && !balls && left_out <= kNothingButCuts;
+    const bool one_pixel = !uneven && !flat && !finding.balls && left_out <= kNothingButCuts;
     if (without > 0 && one_pixel && crowd_at(without) <= most &&
         evidence.small_axis >= kSmallestAxis * without / evidence.softness_without_black) {
       least = std::max(least, without);

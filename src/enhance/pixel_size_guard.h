@@ -26,6 +26,7 @@ struct PixelSizeFinding {
   double largest = 0;                       // that the outlines could mean: with and without black Gaussians
   PixelSizeEstimate estimate;               // what the outlines say
   bool no_one_pixel = false;                // its Gaussians lie too unevenly for one
+  bool balls = false;                       // its Gaussians are, and their sizes say nothing about pixels
   bool part = false;                        // cut out of something larger: a tenth of its outlines and more are cuts
   std::vector<std::string> contradictions;  // sentences that say what speaks against it; empty: nothing does
 

@@ -338,6 +338,7 @@ TEST(TrainedKind, UnclearOnesGetLittle) {
   EXPECT_EQ(unclear->report.filter_strength, DefaultFilterStrength(4, RenderMode::kAntialiased));
   EXPECT_FALSE(unclear->cloud.render_mode);
   EXPECT_EQ(unclear->report.method, "filter");
+  EXPECT_EQ(unclear->report.pixel_size_source, "given");
   options.method = "network-of-kinds";
   EXPECT_EQ(Enhance(Made(0, 0.04), options)->report.method, "network-of-kinds");
 }

@@ -1,0 +1,122 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <span>
+#include <utility>
+
+#include "enhance/enhance.h"
+#include "enhance/enhance_door_for_test.h"
+#include "enhance/network_for_test.h"
+
+// Which splats a network enhances that nobody asked for, and with which pixel sizes.
+namespace anchorsplat {
+namespace {
+
+TEST_F(EnhanceDoor, ContradictedEstimateIsNotActedOn) {
+  constexpr uint64_t kOnlyHere = 4711;
+  static Buffer<float> sizes;
+  RegisterNetworkForTest("network", kOnlyHere, [](EnhanceInput input, const EnhanceOptions&) {
+    sizes = input.pixel_sizes;
+    return std::move(input.cloud);
+  });
+  const GaussianCloud cloud = BallInVeils();
+  EnhanceOptions options;
+  options.seed = kOnlyHere;
+  const auto enhanced = Enhance(cloud, options);
+  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+  const EnhanceReport& report = enhanced->report;
+  EXPECT_EQ(report.pixel_size_source, kCautiousPixelSize);
+  ASSERT_TRUE(report.finding && report.finding->contradicted());
+  EXPECT_LT(report.pixel_size, report.finding->estimate.size);
+  EXPECT_TRUE(log_->Says("smaller pixel is taken")) << log_->text();
+  EXPECT_FALSE(log_->Says("no single size is right there")) << log_->text();
+  // A network at smaller pixels gives back more than the filter does.
+  EXPECT_EQ(report.method, "network");
+  ASSERT_FALSE(sizes.empty());
+  EXPECT_LE(std::ranges::max(sizes), static_cast<float>(report.finding->size));
+
+  options.pixel_size = 0.01;
+  const auto given = Enhance(cloud, options);
+  ASSERT_TRUE(given.ok());
+  EXPECT_EQ(given->report.method, "network");
+  EXPECT_EQ(given->report.pixel_size, 0.01);
+  EXPECT_FALSE(given->report.finding);
+}
+
+// As large as they lie apart, and no pixel made them so.
+TEST_F(EnhanceDoor, BallsAreTheFilters) {
+  constexpr uint64_t kOnlyHere = 4715;
+  RegisterNetworkForTest("network", kOnlyHere);
+  GaussianCloud balls = Ball(0.01);
+  for (size_t i = 0; i < static_cast<size_t>(balls.size()); ++i) balls.log_scales[3 * i + 2] = balls.log_scales[3 * i];
+  EnhanceOptions options;
+  options.seed = kOnlyHere;
+  options.filter_strength = DefaultFilterStrength(4);
+  EXPECT_EQ(Enhance(Ball(0.01), options)->report.method, "network");
+  const auto enhanced = Enhance(balls, options);
+  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+  EXPECT_EQ(enhanced->report.method, "filter");
+  EXPECT_TRUE(log_->Says("the filter instead of 'network'")) << log_->text();
+  options.method = "network";
+  EXPECT_EQ(Enhance(balls, options)->report.method, "network") << "who asks for it gets it";
+}
+
+// Networks have learned zooms of 2 and more, and nearer than 1.35 they take away from what the filter has.
+TEST_F(EnhanceDoor, SmallZoomsAreTheFilters) {
+  constexpr uint64_t kOnlyHere = 4714;
+  RegisterNetworkForTest("network", kOnlyHere);
+  EnhanceOptions options;
+  options.seed = kOnlyHere;
+  options.pixel_size = 0.01;
+  for (const double upscale : {1.2, 1.4}) {
+    options.upscale = upscale;
+    const auto enhanced = Enhance(Ball(0.01), options);
+    ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+    EXPECT_EQ(enhanced->report.method, upscale < 1.35 ? "filter" : "network");
+  }
+  EXPECT_TRUE(log_->Says("2 to 8 times closer")) << log_->text();
+  options.upscale = 1.2;
+  options.method = "network";
+  EXPECT_EQ(Enhance(Ball(0.01), options)->report.method, "network") << "who asks for it gets it";
+}
+
+// A ball before a sky: what lies around has no pixels that one could know, the ball has.
+TEST_F(EnhanceDoor, ANetworkGetsThePixelsOfEachThing) {
+  constexpr uint64_t kOnlyHere = 4712;
+  static Buffer<float> sizes;
+  RegisterNetworkForTest("network", kOnlyHere, [](EnhanceInput input, const EnhanceOptions&) {
+    sizes = input.pixel_sizes;
+    LeaveRegion(input);
+    return std::move(input.cloud);
+  });
+  constexpr int64_t kBall = 6000, kSky = 5000;
+  GaussianCloud cloud = Ball(0.01, kBall), sky = Ball(0.01, kSky);
+  for (float& x : sky.means) x *= 20;
+  for (float& x : sky.log_scales) x += std::log(20.0f);
+  ASSERT_TRUE(Append(cloud, sky).ok());
+  EnhanceOptions options;
+  options.seed = kOnlyHere;
+  const auto enhanced = Enhance(cloud, options);
+  ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
+  EXPECT_EQ(enhanced->report.method, "network");
+  EXPECT_EQ(enhanced->report.pixel_size_source, kCautiousPixelSize);
+  ASSERT_EQ(enhanced->report.things.size(), 2u);
+  EXPECT_EQ(enhanced->report.steps.size(), 1u);
+  EXPECT_TRUE(log_->Says("2 things that lie apart")) << log_->text();
+  EXPECT_EQ(enhanced->cloud.size(), kBall + kSky);
+  ASSERT_EQ(std::ssize(sizes), kBall + kSky);
+  const auto of_ball = std::span(sizes).first(kBall), of_sky = std::span(sizes).subspan(kBall);
+  EXPECT_EQ(std::ranges::max(of_ball), static_cast<float>(enhanced->report.things[0].finding.size));
+  EXPECT_LE(std::ranges::max(of_sky), static_cast<float>(enhanced->report.things[1].finding.size));
+  EXPECT_GT(enhanced->report.seconds_in_all, enhanced->report.seconds);
+
+  options.region = Region{.low = {-20, -20, -20}, .high = {0, 20, 20}};
+  const auto half = Enhance(cloud, options);
+  ASSERT_TRUE(half.ok()) << half.error().message;
+  EXPECT_EQ(half->cloud.size(), kBall + kSky);
+}
+
+}  // namespace
+}  // namespace anchorsplat

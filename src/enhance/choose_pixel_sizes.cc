@@ -201,6 +201,7 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
       report.pixel_size = double{Quantile(of_things.sizes, 0.5)};
       const bool doubtful = !ContradictionsOf(of_things.things).empty();
       report.pixel_size_source = doubtful ? kCautiousPixelSize : "estimated";
+      if (doubtful && std::ranges::count(of_things.sure, 1) > 0) input.sure = std::move(of_things.sure);
       report.things = std::move(of_things.things);
       if (says) SayWhatWasFound(report.things);
       return {};

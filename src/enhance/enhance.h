@@ -116,6 +116,9 @@ struct EnhanceInput {
   double pixel_size = 0;      // their median
   double showing = 1;         // PixelSizeEstimate::showing; 1 where nothing was estimated
   double filter_strength = 0;
+  // [N], where the splat is made of things of which some have a pixel size that nothing contradicts: whether it is of
+  // these; else empty.
+  std::vector<char> sure;
   std::vector<char> inside;       // which of the cloud's Gaussians are enhanced: results are of these; empty: all
   GaussianCloud start;            // what the method before it made, of "A+B"; else empty
   bool start_has_detail = false;  // EnhanceMethod::adds_detail of that method

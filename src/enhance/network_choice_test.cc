@@ -83,12 +83,13 @@ TEST_F(EnhanceDoor, SmallZoomsAreTheFilters) {
 }
 
 // A ball before a sky: what lies around has no pixels that one could know, the ball has.
-TEST_F(EnhanceDoor, ANetworkGetsThePixelsOfEachThing) {
+TEST_F(EnhanceDoor, ANetworkTakesTheThingsWhosePixelsAreKnown) {
   constexpr uint64_t kOnlyHere = 4712;
-  static Buffer<float> sizes;
-  RegisterNetworkForTest("network", kOnlyHere, [](EnhanceInput input, const EnhanceOptions&) {
-    sizes = input.pixel_sizes;
+  static constexpr float kMark = 9;
+  RegisterNetworkForTest("network", kOnlyHere, [](EnhanceInput input, const EnhanceOptions& o) {
     LeaveRegion(input);
+    std::ranges::fill(input.cloud.opacity_logits, kMark);
+    if (o.max_gaussians > 0 && o.max_gaussians < input.cloud.size()) input.cloud.Resize(o.max_gaussians, 0);
     return std::move(input.cloud);
   });
   constexpr int64_t kBall = 6000, kSky = 5000;
@@ -103,19 +104,35 @@ TEST_F(EnhanceDoor, ANetworkGetsThePixelsOfEachThing) {
   EXPECT_EQ(enhanced->report.method, "network");
   EXPECT_EQ(enhanced->report.pixel_size_source, kCautiousPixelSize);
   ASSERT_EQ(enhanced->report.things.size(), 2u);
-  EXPECT_EQ(enhanced->report.steps.size(), 1u);
+  EXPECT_EQ(enhanced->report.steps.size(), 2u);
+  EXPECT_TRUE(log_->Says("the filter instead of 'network' for 5,000 of 11,000 Gaussians")) << log_->text();
   EXPECT_TRUE(log_->Says("2 things that lie apart")) << log_->text();
+  const auto by_network = [&](const GaussianCloud& of) { return std::ranges::count(of.opacity_logits, kMark); };
   EXPECT_EQ(enhanced->cloud.size(), kBall + kSky);
-  ASSERT_EQ(std::ssize(sizes), kBall + kSky);
-  const auto of_ball = std::span(sizes).first(kBall), of_sky = std::span(sizes).subspan(kBall);
-  EXPECT_EQ(std::ranges::max(of_ball), static_cast<float>(enhanced->report.things[0].finding.size));
-  EXPECT_LE(std::ranges::max(of_sky), static_cast<float>(enhanced->report.things[1].finding.size));
+  EXPECT_EQ(by_network(enhanced->cloud), kBall);
   EXPECT_GT(enhanced->report.seconds_in_all, enhanced->report.seconds);
 
+  // Of a part of both, and of one of them.
   options.region = Region{.low = {-20, -20, -20}, .high = {0, 20, 20}};
   const auto half = Enhance(cloud, options);
   ASSERT_TRUE(half.ok()) << half.error().message;
   EXPECT_EQ(half->cloud.size(), kBall + kSky);
+  EXPECT_NEAR(static_cast<double>(by_network(half->cloud)), kBall / 2, 10);
+  options.region = Region{.low = {-1, -1, -1}, .high = {1, 1, 1}};
+  const auto ball = Enhance(cloud, options);
+  ASSERT_TRUE(ball.ok()) << ball.error().message;
+  EXPECT_EQ(by_network(ball->cloud), kBall);
+  EXPECT_EQ(ball->report.steps.size(), 1u);
+
+  // The filter makes no copies, but its Gaussians count; each has its share.
+  options.region.reset();
+  SetBudget(options, (kBall + kSky) / 2);
+  const auto budget = Enhance(cloud, options);
+  ASSERT_TRUE(budget.ok()) << budget.error().message;
+  EXPECT_EQ(budget->cloud.size(), (kBall + kSky) / 2);
+  EXPECT_EQ(by_network(budget->cloud), kBall / 2);
+  SetBudget(options, 2);
+  EXPECT_EQ(by_network(Enhance(cloud, options)->cloud), 1);
 }
 
 }  // namespace

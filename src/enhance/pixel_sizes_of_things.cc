@@ -212,11 +212,16 @@ PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const Pixe
   out.things.push_back({std::ssize(rows.back()), std::move(others)});
 
   out.sizes.assign(static_cast<size_t>(cloud.size()), static_cast<float>(kNothing * whole.size));
+  out.sure.assign(out.sizes.size(), 0);
   for (size_t k = 0; k < out.things.size(); ++k) {
     const PixelSizeFinding& finding = out.things[k].finding;
     const Buffer<float> own = finding.is_one() ? Buffer<float>(rows[k].size(), static_cast<float>(finding.size))
                                                : CautiousPixelSizes(ThingOf(cloud, rows[k]), finding);
-    for (size_t i = 0; i < own.size(); ++i) out.sizes[static_cast<size_t>(rows[k][i])] = own[i];
+    for (size_t i = 0; i < own.size(); ++i) {
+      const auto row = static_cast<size_t>(rows[k][i]);
+      out.sizes[row] = own[i];
+      out.sure[row] = finding.contradicted() ? 0 : 1;
+    }
   }
   if (!alone_matter) out.things.pop_back();
   return out;

@@ -21,7 +21,8 @@ struct ThingPixelSize {
 struct PixelSizesOfThings {
   // The largest first, at last all that is not looked at; empty where one size is that of all.
   std::vector<ThingPixelSize> things;
-  Buffer<float> sizes;  // [N], world units; as empty
+  Buffer<float> sizes;     // [N], world units; as empty
+  std::vector<char> sure;  // [N], 1: of things whose own estimate nothing contradicts; as empty
 };
 
 // "2 things that lie apart, each with a training pixel of its own: 80,000 Gaussians, 0.09 at most (it lies around

@@ -74,6 +74,7 @@ TEST(PixelSizesOfThings, EachGetsItsOwn) {
   ASSERT_EQ(std::ssize(found.sizes), cloud.size());
   ExpectAll(FirstOf(found.sizes, lantern), kPixelOfExamples);
   ExpectAll(std::span(found.sizes).subspan(static_cast<size_t>(lantern.size())), 3 * kPixelOfExamples);
+  EXPECT_GE(std::ranges::count(found.sure, 1), cloud.size() * 99 / 100);
 }
 
 // A twentieth of the Gaussians, so that no quantile of all sees it.
@@ -103,6 +104,7 @@ TEST(PixelSizesOfThings, WhatIsTooSmallToTellIsNotBlurred) {
   ASSERT_TRUE(Append(cloud, lantern).ok());
   const PixelSizesOfThings found = Find(cloud);
   ASSERT_EQ(found.things.size(), 2u);
+  EXPECT_GE(std::ranges::count(found.sure, 0), small.size() * 9 / 10);
   const auto own = FirstOf(found.sizes, small);
   EXPECT_LT(std::ranges::count_if(own, [](float size) { return size > 4 * kPixelOfExamples; }), small.size() / 10);
   EXPECT_NE(ContradictionsOf(found.things).back().find("too small to tell"), std::string::npos);
@@ -134,6 +136,7 @@ TEST(PixelSizesOfThings, SmallPiecesThatAreNoFinerAreOfTheSame) {
   ASSERT_EQ(found.things.size(), 2u);
   EXPECT_FALSE(found.things[0].finding.contradicted());
   EXPECT_NE(ContradictionsOf(found.things).back().find("too small to tell"), std::string::npos);
+  EXPECT_EQ(std::ranges::count(std::span(found.sure).subspan(static_cast<size_t>(biplane.size())), 1), 0);
 }
 
 // What has lost no width stays, whoever lies beside it, unless somebody says better.
@@ -160,6 +163,8 @@ TEST(PixelSizesOfThings, WhatLiesAroundIsTreatedWithCaution) {
   const PixelSizesOfThings found = Find(cloud);
   ASSERT_EQ(found.things.size(), 2u);
   ExpectAll(FirstOf(found.sizes, biplane), kPixelOfExamples);
+  EXPECT_GE(std::ranges::count(found.sure, 1), biplane.size() * 99 / 100);
+  EXPECT_LE(std::ranges::count(found.sure, 1), biplane.size());
   const std::vector<std::string> doubts = ContradictionsOf(found.things);
   ASSERT_FALSE(doubts.empty());
   EXPECT_EQ(doubts.back(), "of 40,000 Gaussians that lie apart: it lies around others") << doubts.front();

@@ -44,6 +44,9 @@ struct FitSettings {
   StartingPoints starting_points = StartingPoints::kAuto;  // without a splat to begin at
   std::optional<int64_t> initial_points =
       std::nullopt;  // thinned to as many, or random ones; 100,000 where there are none
+  // Of kRandom: half a side of the cube, in scene scales (1.1 × the largest distance of a camera from their middle);
+  // 0.001 to 1000. 3 as gsplat's where nothing is said; INRIA's trainer has 0.3 around one object.
+  std::optional<double> initial_extent = std::nullopt;
   // Gaussians on a sphere far beyond cameras and points, for what is seen there; 0: none. Some where the project's
   // points leave much of the pictures open, when nothing is said.
   std::optional<int64_t> far_shell = std::nullopt;

@@ -53,6 +53,14 @@ Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianClo
     return Error{ErrorCode::kBadArgument,
                  "a fit has at least one step and one Gaussian; max_gaussians and hold_out are not negative"};
   }
+  if (const auto extent = settings.initial_extent) {
+    if (!(*extent >= 1e-3 && *extent <= 1e3)) {
+      return Error{ErrorCode::kBadArgument, Cat("the initial extent ", *extent, " is not in 0.001 to 1000")};
+    }
+    if (start != nullptr || settings.starting_points != StartingPoints::kRandom) {
+      return Error{ErrorCode::kBadArgument, "an initial extent has no effect without StartingPoints::kRandom"};
+    }
+  }
   if (settings.downscale < 1 || settings.downscale > kMostDownscale) {
     return Error{ErrorCode::kBadArgument, Cat("the downscale of a fit is 1 to ", kMostDownscale)};
   }
@@ -76,7 +84,8 @@ Result<FitOutcome> FitTo(const std::filesystem::path& project, const GaussianClo
     points = Thinned(PointsOf(*start), settings.initial_points);
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(
-        points, InitialPointsOf(InitOf(settings.starting_points), views, settings.initial_points, settings.seed));
+        points, InitialPointsOf(InitOf(settings.starting_points), views, settings.initial_points, settings.seed,
+                                settings.initial_extent.value_or(kRandomExtent)));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial, InitialCloud(points, views.scene_scale, StartOptions(options)));
   const bool from_points =

@@ -274,7 +274,18 @@ TEST(Fit, HasItsModePixelsAndStart) {
   EXPECT_EQ(FitProject(folder.path(), other).failure().kind, FailureKind::kBadArgument);
   other = plain;
   other.starting_points = StartingPoints::kRandom;
-  EXPECT_NE(means_of(other), classic);
+  const std::vector<float> random = means_of(other);
+  EXPECT_NE(random, classic);
+  other.initial_extent = 3;
+  EXPECT_EQ(means_of(other), random);
+  other.initial_extent = 0.3;
+  EXPECT_NE(means_of(other), random);
+  other.initial_extent = 0;
+  EXPECT_EQ(FitProject(folder.path(), other).failure().kind, FailureKind::kBadArgument);
+  other = plain;
+  other.initial_extent = 0.3;
+  EXPECT_THAT(FitProject(folder.path(), other).failure().message, testing::HasSubstr("no effect"));
+  other.initial_extent.reset();
   other.starting_points = StartingPoints::kProject;
   EXPECT_THAT(FitProject(folder.path(), other).failure().message, testing::HasSubstr("it has none"));
 }

@@ -10,7 +10,6 @@
 #include "cli/clean_output.h"
 #include "cli/stop_signal.h"
 #include "cli/verb.h"
-#include "core/activations.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "fit/checkpoint_guard.h"
@@ -23,7 +22,6 @@
 #include "formats/write_losses.h"
 #include "io/atomic_file.h"
 #include "io/input_record.h"
-#include "render/constants.h"
 #include "request/choice.h"
 #include "request/fit_flags.h"
 #include "request/parse.h"
@@ -74,18 +72,6 @@ void PrintReport(const FitWords& flags, const FitReport& r) {
     std::cout << "  held-out views: " << r.held_out.views << ", " << Fixed(r.held_out.psnr, 2) << " dB, SSIM "
               << Fixed(r.held_out.ssim, 4) << "\n";
   }
-}
-
-// A fit can lose all that it began with: pruned, or faded away.
-void WarnWhereNothingIsLeft(const FitWords& flags, const Fitted& fitted) {
-  constexpr double kNextToNothing = 0.01;
-  const auto shows =
-      std::ranges::count_if(fitted.cloud.opacity_logits, [](float logit) { return Sigmoid(logit) >= kMinAlpha; });
-  if (static_cast<double>(shows) >= kNextToNothing * static_cast<double>(fitted.report.gaussians_in)) return;
-  LogWarning(Cat(flags.output, ": next to nothing is left: ", WithThousands(shows), " of ",
-                 WithThousands(fitted.cloud.size()), " Gaussians show, and it began with ",
-                 WithThousands(fitted.report.gaussians_in),
-                 ". First Gaussians nearer to what the pictures show (--init view, --init-extent) may help"));
 }
 
 // Each file that can be written is, whatever becomes of the other one.
@@ -140,7 +126,6 @@ Status RunFit(const FitWords& flags, const SharedFlags& shared) {
   stop_signal.reset();
   if (!fitted.ok()) return fitted.error();
   if (fitted->report.interrupted) return Interrupted(flags, fitted->report, options.steps, control.checkpoint);
-  WarnWhereNothingIsLeft(flags, *fitted);
   if (shared.json) {
     nlohmann::json json = ToJson(options, start.origin, first.shell, fitted->report);
     json["project"] = flags.project;

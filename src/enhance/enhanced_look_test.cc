@@ -209,6 +209,42 @@ TEST(EnhancedLook, HarmonicsOfTwins) {
   EXPECT_FALSE(LikenessOfHarmonics(CloudView(), {}, twins).has_value());
 }
 
+// Where it is a close call, harmonics of their own say that twins are of a fit, and shared ones of a network.
+TEST(EnhancedLook, OwnHarmonicsDecideCloseCalls) {
+  GaussianCloud cloud;
+  const auto is_close = [&](double spread) {
+    cloud = Sheet(1000, 3, spread);
+    // Turned less than they are apart, as related ones are.
+    for (size_t i = 0; i < cloud.quats.size(); ++i) {
+      cloud.quats[i] = std::lerp(cloud.quats[i / 12 * 12 + i % 4], cloud.quats[i], 0.5f);
+    }
+    FoundTwins twins;
+    const auto look = FindEnhancedLook(cloud, SizeTailsOf(cloud), &twins);
+    const double odds = look && !twins.unrelated ? LogOddsOfEnhanced(*look) : 0;
+    return odds > 0.1 && odds < 1.2;
+  };
+  double spread = 0.2;
+  while (spread < 0.4 && !is_close(spread)) spread += 0.005;
+  ASSERT_LT(spread, 0.4) << "no sheet is a close call";
+  const auto kind_with = [&](bool own) {
+    GaussianCloud whole = cloud;
+    whole.sh_degree = 3;
+    const auto stride = static_cast<size_t>(whole.sh_stride());
+    whole.sh.assign(static_cast<size_t>(whole.size()) * stride, 0);
+    Random random(3);
+    std::vector<float> values(stride);
+    for (size_t i = 0; i < static_cast<size_t>(whole.size()); ++i) {
+      if (own || i % 3 == 0) std::ranges::generate(values, [&] { return static_cast<float>(0.1 * random.Normal()); });
+      std::ranges::copy(values, whole.sh.begin() + static_cast<std::ptrdiff_t>(i * stride));
+      std::copy_n(cloud.sh.begin() + static_cast<std::ptrdiff_t>(3 * i), 3,
+                  whole.sh.begin() + static_cast<std::ptrdiff_t>(i * stride));
+    }
+    return TrainedKindOf(whole, FindShowingGaussians(whole));
+  };
+  EXPECT_EQ(kind_with(false), TrainedKind::kEnhanced);
+  EXPECT_NE(kind_with(true), TrainedKind::kEnhanced);
+}
+
 // Nor on the unit, the order of the rows or the number of threads.
 TEST(EnhancedLook, DoesNotDependOnHowTheSplatIsKept) {
   const GaussianCloud cloud = Sheet(400, 3, 0.2);  // fewer than the samples

@@ -8,6 +8,7 @@
 #include <system_error>
 #include <utility>
 
+#include "core/activations.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/run_context.h"
@@ -17,6 +18,7 @@
 #include "core/world_up.h"
 #include "fit/fingerprints.h"
 #include "fit/picture_cache.h"
+#include "render/constants.h"
 
 namespace anchorsplat {
 
@@ -134,6 +136,18 @@ Status Finish(const TrainingViews& views, const FitOptions& options, const FitCo
   return {};
 }
 
+// A fit can lose all that it began with: pruned, or faded away.
+void WarnWhereNothingIsLeft(const Fitted& fitted) {
+  constexpr double kNextToNothing = 0.01;
+  const auto shows =
+      std::ranges::count_if(fitted.cloud.opacity_logits, [](float logit) { return Sigmoid(logit) >= kMinAlpha; });
+  if (static_cast<double>(shows) >= kNextToNothing * static_cast<double>(fitted.report.gaussians_in)) return;
+  LogWarning(Cat("next to nothing is left of this fit: ", WithThousands(shows), " of ",
+                 WithThousands(fitted.cloud.size()), " Gaussians show, and it began with ",
+                 WithThousands(fitted.report.gaussians_in),
+                 ". First Gaussians nearer to what the pictures show (--init view, --init-extent) may help"));
+}
+
 }  // namespace
 
 Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitOptions& options,
@@ -189,6 +203,7 @@ Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitO
   }
   if (const auto up = WorldUp(views.train)) out.cloud.comments.push_back(UpComment(*up));
   out.report.gaussians_out = out.cloud.size();
+  WarnWhereNothingIsLeft(out);
   if (const Status finished = Finish(views, options, control, fitter, out); !finished.ok()) {
     return failed(finished.error());
   }

@@ -13,12 +13,12 @@
 #include "core/text.h"
 #include "enhance/choose_pixel_sizes.h"
 #include "enhance/clean.h"
-#include "enhance/cloud_shape.h"
 #include "enhance/enhance_region.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
 #include "enhance/gaussian_budget.h"
 #include "enhance/lost_width.h"
+#include "enhance/network_choice.h"
 #include "enhance/refine_method.h"
 #include "enhance/showing_gaussians.h"
 #include "fit/pixel_model.h"
@@ -321,44 +321,6 @@ Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, bool 
   return {};
 }
 
-// Nearer than that the network takes something from what the filter has: 0.2 dB at 1.1, 0.3 at 1.2.
-constexpr double kLeastUpscaleOfNetworks = 1.35;
-
-// Networks have learned what splats of a kind have lost: where that is not known and nobody asked for a network, the
-// filter takes its place. A pixel that is too small harms little: from a fifth of the true one on networks give back
-// more than the filter does (docs/results/pixel-size.md).
-void LeaveNetworksOut(MethodPlan& plan, const char* why) {
-  const bool begins_with_network = plan.start != nullptr && plan.start->adds_detail;
-  if (plan.chosen_by.empty() || !(plan.method->adds_detail || begins_with_network)) return;
-  const std::string network = begins_with_network ? plan.start->name : plan.method->name;
-  LogInfo(Cat("the filter instead of '", network, "', which ", why, " (--method ", network, " takes it all the same)"));
-  if (plan.method->adds_detail) {
-    plan.method = &*std::ranges::find(EnhanceMethods(), std::string("filter"), &EnhanceMethod::name);
-  }
-  if (begins_with_network) plan.start = nullptr;
-}
-
-// A network harms none whose kind is unclear at a pixel that is small enough: at 0.35 of theirs it gave 0.3 to 1.0 dB
-// to most of twenty such splats and took 0.1 dB at most, where the filter gave 0.2 and took 0.2
-// (docs/results/recognised.md).
-constexpr double kSmallPixel = 0.35;
-// Gaussians that are nearly balls, 0.62 and more, were made of points and fitted to no pixels; those of fits are at 0.4
-// at most (CloudShape::roundness).
-constexpr double kRound = 0.5;
-
-bool BearsSmallPixels(const MethodPlan& plan, const EnhanceInput& input) {
-  return plan.start == nullptr && input.cloud.size() >= kFewGaussians &&
-         ShapeOf(FindShowingGaussians(input.cloud).all).roundness < kRound;
-}
-
-void TakeSmallPixels(EnhanceInput& input, EnhanceReport& report) {
-  for (float& size : input.pixel_sizes) size *= static_cast<float>(kSmallPixel);
-  input.pixel_size = report.pixel_size *= kSmallPixel;
-  report.pixel_size_source = kCautiousPixelSize;
-  LogInfo(Cat("as it is not clear what the splat has lost, the network takes pixels of ", kSmallPixel,
-              " of their size, ", report.pixel_size));
-}
-
 // One method after the other.
 Result<GaussianCloud> RunPlan(const MethodPlan& plan, const SizedMethods& sized, EnhanceInput input,
                               const EnhanceOptions& options, EnhanceReport& report) {
@@ -372,12 +334,6 @@ Result<GaussianCloud> RunPlan(const MethodPlan& plan, const SizedMethods& sized,
     input.start_has_detail = plan.start->adds_detail;
   }
   return RunStep(*plan.method, std::move(input), options, report);
-}
-
-// A network that nobody asked for, where pixels are known of some things of the splat only: it takes those. Beside them
-// small pieces of finer pixels lose 0.1 dB by it.
-bool TakesSureOnly(const MethodPlan& plan, const EnhanceInput& input) {
-  return !input.sure.empty() && !plan.chosen_by.empty() && plan.start == nullptr && plan.method->adds_detail;
 }
 
 // The others are the filter's.
@@ -439,17 +395,7 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
     LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
   }
   if (GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode)) {
-    const bool unclear = report.looks == TrainedKind::kUnclear || report.looks == TrainedKind::kRaised;
-    if (report.finding && report.finding->balls) {
-      LeaveNetworksOut(plan, "has learned from Gaussians that are no balls");
-    } else if (options.upscale < kLeastUpscaleOfNetworks) {
-      LeaveNetworksOut(plan, "has learned what is missing 2 to 8 times closer");
-    } else if (unknown_of_few || (unclear && !BearsSmallPixels(plan, input))) {
-      LeaveNetworksOut(plan, "has learned what splats of known kinds have lost");
-    } else if (unclear && (report.pixel_size_source != kCautiousPixelSize || TakesSureOnly(plan, input)) &&
-               !plan.chosen_by.empty() && plan.method->adds_detail) {
-      TakeSmallPixels(input, report);
-    }
+    ChooseNetwork(options, unknown_of_few, plan, input, report);
   }
   report.method = plan.Name();
 

@@ -1,3 +1,5 @@
+#include "enhance/network_choice.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -86,7 +86,7 @@ constexpr double kFills = 0.7, kSmallOfFlat = 0.5;
 constexpr double kBalls = 0.9;
 // Beyond, the two regressions are about something that neither has seen: pictures of parts of an object, whose outlines
 // hardly any of them shows. Of 76 fits like standard ones three are below: a palm, a broom, trousers.
-constexpr double kDisagreeing = 0.67;
+constexpr double kRegressionsDisagree = 0.67;
 // Antialiased splats look like 0.44 to 0.86 of their pixels, classic ones of known pixels like 0.73 and more.
 constexpr double kSharperThanClassic = 0.65;
 // Regions that a cloud is looked at in, and how many of them a Gaussian belongs to.
@@ -322,7 +322,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
     finding.contradictions.emplace_back(
         "it is flat and its outlines are unlike those of fits, as of land seen from above: no picture may have shown "
         "them");
-  } else if (estimate.disagreement < kDisagreeing && !(evidence.all > 0 && evidence.all < kEnough)) {
+  } else if (estimate.disagreement < kRegressionsDisagree && !(evidence.all > 0 && evidence.all < kEnough)) {
     finding.contradictions.push_back(
         Cat("its Gaussians and outlines together say ", Fixed(estimate.disagreement, 2),
             " of what outlines alone do, as where pictures show no more than parts of it"));

@@ -1,0 +1,72 @@
+#include "enhance/network_choice.h"
+
+#include <algorithm>
+#include <string>
+
+#include "core/log.h"
+#include "core/text.h"
+#include "enhance/cloud_shape.h"
+#include "enhance/lost_width.h"
+#include "enhance/showing_gaussians.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// Nearer than that the network takes something from what the filter has: 0.2 dB at 1.1, 0.3 at 1.2.
+constexpr double kLeastUpscaleOfNetworks = 1.35;
+
+void LeaveNetworksOut(MethodPlan& plan, const char* why) {
+  const bool begins_with_network = plan.start != nullptr && plan.start->adds_detail;
+  if (plan.chosen_by.empty() || !(plan.method->adds_detail || begins_with_network)) return;
+  const std::string network = begins_with_network ? plan.start->name : plan.method->name;
+  LogInfo(Cat("the filter instead of '", network, "', which ", why, " (--method ", network, " takes it all the same)"));
+  if (plan.method->adds_detail) {
+    plan.method = &*std::ranges::find(EnhanceMethods(), std::string("filter"), &EnhanceMethod::name);
+  }
+  if (begins_with_network) plan.start = nullptr;
+}
+
+// A network harms none whose kind is unclear at a pixel that is small enough: at 0.35 of theirs it gave 0.3 to 1.0 dB
+// to most of twenty such splats and took 0.1 dB at most, where the filter gave 0.2 and took 0.2
+// (docs/results/recognised.md, unclear).
+constexpr double kSmallPixel = 0.35;
+// Gaussians that are nearly balls, 0.62 and more, were made of points and fitted to no pixels; those of fits are at 0.4
+// at most (CloudShape::roundness).
+constexpr double kRound = 0.5;
+
+bool BearsSmallPixels(const MethodPlan& plan, const EnhanceInput& input) {
+  return plan.start == nullptr && input.cloud.size() >= kFewGaussians &&
+         ShapeOf(FindShowingGaussians(input.cloud).all).roundness < kRound;
+}
+
+void TakeSmallPixels(EnhanceInput& input, EnhanceReport& report) {
+  for (float& size : input.pixel_sizes) size *= static_cast<float>(kSmallPixel);
+  input.pixel_size = report.pixel_size *= kSmallPixel;
+  report.pixel_size_source = kCautiousPixelSize;
+  LogInfo(Cat("as it is not clear what the splat has lost, the network takes pixels of ", kSmallPixel,
+              " of their size, ", report.pixel_size));
+}
+
+}  // namespace
+
+bool TakesSureOnly(const MethodPlan& plan, const EnhanceInput& input) {
+  return !input.sure.empty() && !plan.chosen_by.empty() && plan.start == nullptr && plan.method->adds_detail;
+}
+
+void ChooseNetwork(const EnhanceOptions& options, bool unknown_of_few, MethodPlan& plan, EnhanceInput& input,
+                   EnhanceReport& report) {
+  const bool unclear = report.looks == TrainedKind::kUnclear || report.looks == TrainedKind::kRaised;
+  if (report.finding && report.finding->balls) {
+    LeaveNetworksOut(plan, "has learned from Gaussians that are no balls");
+  } else if (options.upscale < kLeastUpscaleOfNetworks) {
+    LeaveNetworksOut(plan, "has learned what is missing 2 to 8 times closer");
+  } else if (unknown_of_few || (unclear && !BearsSmallPixels(plan, input))) {
+    LeaveNetworksOut(plan, "has learned what splats of known kinds have lost");
+  } else if (unclear && (report.pixel_size_source != kCautiousPixelSize || TakesSureOnly(plan, input)) &&
+             !plan.chosen_by.empty() && plan.method->adds_detail) {
+    TakeSmallPixels(input, report);
+  }
+}
+
+}  // namespace anchorsplat

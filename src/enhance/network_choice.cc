@@ -30,7 +30,10 @@ void LeaveNetworksOut(MethodPlan& plan, const char* why) {
 // A network harms none whose kind is unclear at a pixel that is small enough: at 0.35 of theirs it gave 0.3 to 1.0 dB
 // to most of twenty such splats and took 0.1 dB at most, where the filter gave 0.2 and took 0.2
 // (docs/results/recognised.md, unclear).
-constexpr double kSmallPixel = 0.35;
+constexpr double kPixelOfUnclear = 0.35;
+// At a rough estimate, as after soft pictures, which may be half too large, it takes up to 0.7 dB from what the filter
+// gives, and at 0.8 of it gives 0.3 dB more than the filter (docs/results/pixel-size.md, small-pixels).
+constexpr double kPixelOfRough = 0.8;
 // Gaussians that are nearly balls, 0.62 and more, were made of points and fitted to no pixels; those of fits are at 0.4
 // at most (CloudShape::roundness).
 constexpr double kRound = 0.5;
@@ -40,12 +43,11 @@ bool BearsSmallPixels(const MethodPlan& plan, const EnhanceInput& input) {
          ShapeOf(FindShowingGaussians(input.cloud).all).roundness < kRound;
 }
 
-void TakeSmallPixels(EnhanceInput& input, EnhanceReport& report) {
-  for (float& size : input.pixel_sizes) size *= static_cast<float>(kSmallPixel);
-  input.pixel_size = report.pixel_size *= kSmallPixel;
+void TakeSmallerPixels(double share, const char* why, EnhanceInput& input, EnhanceReport& report) {
+  for (float& size : input.pixel_sizes) size *= static_cast<float>(share);
+  input.pixel_size = report.pixel_size *= share;
   report.pixel_size_source = kCautiousPixelSize;
-  LogInfo(Cat("as it is not clear what the splat has lost, the network takes pixels of ", kSmallPixel,
-              " of their size, ", report.pixel_size));
+  LogInfo(Cat("as ", why, ", the network takes pixels of ", share, " of their size, ", report.pixel_size));
 }
 
 }  // namespace
@@ -56,16 +58,22 @@ bool TakesSureOnly(const MethodPlan& plan, const EnhanceInput& input) {
 
 void ChooseNetwork(const EnhanceOptions& options, bool unknown_of_few, MethodPlan& plan, EnhanceInput& input,
                    EnhanceReport& report) {
-  const bool unclear = report.looks == TrainedKind::kUnclear || report.looks == TrainedKind::kRaised;
+  const bool unclear = report.looks == TrainedKind::kUnclear, raised = report.looks == TrainedKind::kRaised;
+  const bool whole = report.pixel_size_source != kCautiousPixelSize || TakesSureOnly(plan, input);
+  const bool rough = whole && report.things.empty() && report.finding && report.finding->rough();
+  const bool network_alone = !plan.chosen_by.empty() && plan.start == nullptr && plan.method->adds_detail;
   if (report.finding && report.finding->balls) {
     LeaveNetworksOut(plan, "has learned from Gaussians that are no balls");
   } else if (options.upscale < kLeastUpscaleOfNetworks) {
     LeaveNetworksOut(plan, "has learned what is missing 2 to 8 times closer");
-  } else if (unknown_of_few || (unclear && !BearsSmallPixels(plan, input))) {
+  } else if (unknown_of_few || raised || (unclear && !BearsSmallPixels(plan, input))) {
     LeaveNetworksOut(plan, "has learned what splats of known kinds have lost");
-  } else if (unclear && (report.pixel_size_source != kCautiousPixelSize || TakesSureOnly(plan, input)) &&
-             !plan.chosen_by.empty() && plan.method->adds_detail) {
-    TakeSmallPixels(input, report);
+  } else if (unclear && whole && network_alone) {
+    TakeSmallerPixels(kPixelOfUnclear, "it is not clear what the splat has lost", input, report);
+  } else if (rough && network_alone) {
+    TakeSmallerPixels(kPixelOfRough, "that is rough", input, report);
+  } else if (rough) {
+    LeaveNetworksOut(plan, "measures Gaussians in pixels, of which this splat says little");
   }
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "enhance/enhance.h"
@@ -63,6 +64,67 @@ TEST_F(EnhanceDoor, BallsAreTheFilters) {
   EXPECT_TRUE(log_->Says("the filter instead of 'network'")) << log_->text();
   options.method = "network";
   EXPECT_EQ(Enhance(balls, options)->report.method, "network") << "who asks for it gets it";
+}
+
+class NetworkChoice : public EnhanceDoor {
+ protected:
+  static constexpr uint64_t kOnlyHere = 4716;
+  void SetUp() override {
+    EnhanceDoor::SetUp();
+    RegisterNetworkForTest("network", kOnlyHere);
+    options_.seed = kOnlyHere;
+    report_.pixel_size = 0.01;
+    report_.pixel_size_source = "estimated";
+  }
+  // The method and the pixel size that it gets.
+  std::pair<std::string, double> Choose(GaussianCloud cloud = Ball(0.01)) {
+    MethodPlan plan = PlanEnhancement(options_).value();
+    EnhanceInput input;
+    input.cloud = std::move(cloud);
+    input.pixel_sizes = {static_cast<float>(report_.pixel_size)};
+    input.pixel_size = report_.pixel_size;
+    EnhanceReport report = report_;
+    ChooseNetwork(options_, false, plan, input, report);
+    EXPECT_FLOAT_EQ(input.pixel_sizes[0], static_cast<float>(report.pixel_size));
+    EXPECT_EQ(input.pixel_size, report.pixel_size);
+    return {plan.Name(), report.pixel_size};
+  }
+
+  EnhanceOptions options_;
+  EnhanceReport report_;
+};
+
+// As after soft pictures, where outlines may say half too much.
+TEST_F(NetworkChoice, RoughEstimatesAreTakenSmaller) {
+  report_.finding.emplace().size = 0.01;
+  PixelSizeEstimate& estimate = report_.finding->estimate;
+  estimate.size = 0.01;
+  estimate.low = 0.005;
+  estimate.high = 0.014;
+  EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01));
+  estimate.high = 0.016;
+  EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01 * 0.8));
+  EXPECT_TRUE(log_->Says("that is rough")) << log_->text();
+  options_.method = "network";
+  EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01)) << "who asks for it gets it";
+}
+
+TEST_F(NetworkChoice, WhatIsUnclearTakesSmallPixels) {
+  report_.looks = TrainedKind::kUnclear;
+  EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01 * 0.35));
+  EXPECT_EQ(Choose(Ball(0.01, 1999)), std::pair(std::string("filter"), 0.01)) << "few";
+  GaussianCloud round = Ball(0.01);
+  for (size_t i = 0; i < static_cast<size_t>(round.size()); ++i) {
+    round.log_scales[3 * i + 2] = round.log_scales[3 * i] + std::log(0.6f);
+  }
+  EXPECT_EQ(Choose(round), std::pair(std::string("filter"), 0.01)) << "made of points";
+  report_.pixel_size_source = kCautiousPixelSize;  // small already
+  EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01));
+  EXPECT_EQ(Choose(round), std::pair(std::string("filter"), 0.01));
+  report_.looks = TrainedKind::kRaised;
+  EXPECT_EQ(Choose(), std::pair(std::string("filter"), 0.01));
+  report_.looks = TrainedKind::kClassic;
+  EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01));
 }
 
 // Networks have learned zooms of 2 and more, and nearer than 1.35 they take away from what the filter has.

@@ -21,6 +21,7 @@
 #include "enhance/network_choice.h"
 #include "enhance/refine_method.h"
 #include "enhance/showing_gaussians.h"
+#include "enhance/soft_pictures.h"
 #include "fit/pixel_model.h"
 
 namespace anchorsplat {
@@ -97,7 +98,8 @@ std::optional<TrainedKind> FindLooks(const EnhanceOptions& options, const Gaussi
       }
     }
   }
-  return BesideTag(TrainedKindOf(cloud, showing), cloud.render_mode, showing.all.size());
+  const auto kind = BesideSoftness(TrainedKindOf(cloud, showing), cloud.render_mode, showing);
+  return BesideTag(kind, cloud.render_mode, showing.all.size());
 }
 
 // Splats of which the caller does not say how they were trained are looked at. An antialiased one without a tag becomes

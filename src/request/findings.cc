@@ -16,6 +16,7 @@
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
 #include "enhance/showing_gaussians.h"
+#include "enhance/soft_pictures.h"
 #include "formats/registry.h"
 #include "io/input_file.h"
 #include "model/compact/compact_network.h"
@@ -67,7 +68,8 @@ Status LookAt(CloudBlocks& blocks, const std::function<CloudView()>& whole, Spla
   ANCHORSPLAT_RETURN_IF_ERROR(Study(blocks, studies));
   findings.statistics = statistics.Find();
   ShowingGaussians showing = study.Take();
-  findings.looks = TrainedKindOf(showing.all, {showing.rows_of_all, whole});
+  findings.looks =
+      BesideSoftness(TrainedKindOf(showing.all, {showing.rows_of_all, whole}), findings.render_mode, showing);
   const auto beside_tag = BesideTag(findings.looks, findings.render_mode, showing.all.size());
   // As `enhance` takes it.
   const bool untold = !findings.render_mode && !findings.lost_no_width;

@@ -23,6 +23,7 @@
 #include "enhance/filter.h"
 #include "enhance/lost_width.h"
 #include "enhance/showing_gaussians.h"
+#include "enhance/soft_pictures.h"
 #include "enhance/trained_kind.h"
 #include "formats/cloud_bytes.h"
 #include "formats/opened_splat.h"
@@ -336,8 +337,8 @@ Result<Engine::Answer> Engine::Filter(const Json& request) {
   if (!(upscale >= 1 && upscale <= 1e6)) return BadRequest("says an 'upscale' that is not from 1 to 1000000");
   const GaussianCloud& cloud = open->cloud;
   const ShowingGaussians showing = FindShowingGaussians(cloud);
-  const LostWidth lost =
-      FindLostWidth(cloud, BesideTag(TrainedKindOf(cloud, showing), cloud.render_mode, showing.all.size()), upscale);
+  const auto kind = BesideSoftness(TrainedKindOf(cloud, showing), cloud.render_mode, showing);
+  const LostWidth lost = FindLostWidth(cloud, BesideTag(kind, cloud.render_mode, showing.all.size()), upscale);
   Answer answer;
   const double gain = double{kDilation} * (lost.strength - ShownStrength(upscale, cloud.render_mode));
   answer.json = {{"gain", std::max(0.0, gain)}};

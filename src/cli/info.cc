@@ -64,8 +64,8 @@ void PrintTable(const SplatFindings& f) {
   if (f.pixel_size.ok()) {
     std::cout << "  training pixel, estimated  " << Number(f.pixel_size->estimate.size) << " (likely "
               << Number(f.pixel_size->estimate.low) << " to " << Number(f.pixel_size->estimate.high) << ")\n";
-    if (f.pixel_size->estimate.softness < 1) {
-      std::cout << "    " << f.pixel_size->SoftnessInWords() << "\n";
+    if (const std::string soft = f.pixel_size->SoftnessInWords(); !soft.empty()) {
+      std::cout << "    " << soft << "\n";
     }
     if (!f.things.empty()) {
       std::cout << "    but it is made of " << InWords(f.things) << "\n";
@@ -77,6 +77,10 @@ void PrintTable(const SplatFindings& f) {
     } else if (f.pixel_size->part) {
       std::cout << "    " << f.pixel_size->CutsInWords() << "; enhance would take " << Number(f.pixel_size->size)
                 << " to be safe\n";
+    }
+    if (f.share_for_network < 1) {
+      std::cout << "    the network of enhance would take " << f.share_for_network << " of that, "
+                << Number(f.share_for_network * f.pixel_size->size) << ", to be safe\n";
     }
   } else {
     std::cout << "  training pixel  no estimate: " << f.pixel_size.error().message << "\n";

@@ -65,6 +65,7 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
   const auto found = says ? FindPixelSize(input.cloud) : Result<PixelSizeFinding>(Error{});
   if (found.ok()) {
     input.showing = found->estimate.showing;
+    input.softness = found->estimate.softness;
     const double ratio = found->size / from_cameras.median;
     // Whoever says a mode or a strength means these cameras.
     const bool said = options.filter_strength || IsGiven(options, "mode");
@@ -137,9 +138,10 @@ void SayWhatWasFound(const PixelSizeFinding& found) {
                                       : ""));
     return;
   }
+  const std::string soft = found.SoftnessInWords();
   const std::string size =
       Cat("estimated size of a training pixel: ", estimate.size, " (likely ", estimate.low, " to ", estimate.high, ")",
-          estimate.softness < 1 ? ", " + found.SoftnessInWords() : "",
+          soft.empty() ? "" : ", " + soft,
           found.part ? Cat("; ", found.CutsInWords(), ", and to be safe a smaller one is taken, ", found.size) : "",
           found.closer > 0 ? "; where Gaussians lie much closer than elsewhere a smaller one is taken" : "");
   if (found.rough()) {
@@ -192,6 +194,7 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
     }
     report.finding = *found;
     input.showing = found->estimate.showing;
+    input.softness = found->estimate.softness;
     report.pixel_size = found->size;
     report.pixel_size_source = found->contradicted() ? kCautiousPixelSize : "estimated";
     PixelSizesOfThings of_things =

@@ -351,7 +351,7 @@ Result<GaussianCloud> RunOnSure(const MethodPlan& plan, EnhanceInput input, Enha
   if (taken == 0) return RunStep(*filter.method, std::move(others), options, report);
   if (left == 0) return RunStep(*plan.method, std::move(input), options, report);
   LogInfo(Cat("the filter instead of '", plan.method->name, "' for ", WithThousands(left), " of ",
-              WithThousands(left + taken), " Gaussians, as it is not known which pixels those were trained at"));
+              WithThousands(left + taken), " Gaussians, whose pixels are not known or which have lost no width"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud filtered, RunStep(*filter.method, std::move(others), options, report));
   // Neither takes the other's share of a budget.
   if (options.max_gaussians > 1) {

@@ -115,6 +115,7 @@ struct EnhanceInput {
   Buffer<float> pixel_sizes;  // one for all, or one per Gaussian
   double pixel_size = 0;      // their median
   double showing = 1;         // PixelSizeEstimate::showing; 1 where nothing was estimated
+  double softness = 1;        // PixelSizeEstimate::softness where cameras say the pixel or it is estimated; else 1
   double filter_strength = 0;
   // [N], where the splat is made of things of which some have a pixel size that nothing contradicts: whether it is of
   // these; else empty.

@@ -34,13 +34,19 @@ constexpr double kPixelOfUnclear = 0.35;
 // At a rough estimate, as after soft pictures, which may be half too large, it takes up to 0.7 dB from what the filter
 // gives, and at 0.8 of it gives 0.3 dB more than the filter (docs/results/pixel-size.md, small-pixels).
 constexpr double kPixelOfRough = 0.8;
+// PixelSizeEstimate::softness of fits whose pictures were all soft: 0.37 to 0.59; where a part of them is, 0.62 and
+// 0.64, and these lose 0.6 to 1.0 dB by that.
+constexpr double kSoft = 0.6;
 // Gaussians that are nearly balls, 0.62 and more, were made of points and fitted to no pixels; those of fits are at 0.4
 // at most (CloudShape::roundness).
 constexpr double kRound = 0.5;
 
+bool IsOfAFit(const GaussianCloud& showing, int64_t all) {
+  return all >= kFewGaussians && ShapeOf(showing).roundness < kRound;
+}
+
 bool BearsSmallPixels(const MethodPlan& plan, const EnhanceInput& input) {
-  return plan.start == nullptr && input.cloud.size() >= kFewGaussians &&
-         ShapeOf(FindShowingGaussians(input.cloud).all).roundness < kRound;
+  return plan.start == nullptr && IsOfAFit(FindShowingGaussians(input.cloud).all, input.cloud.size());
 }
 
 void TakeSmallerPixels(double share, const char* why, EnhanceInput& input, EnhanceReport& report) {
@@ -56,11 +62,21 @@ bool TakesSureOnly(const MethodPlan& plan, const EnhanceInput& input) {
   return !input.sure.empty() && !plan.chosen_by.empty() && plan.start == nullptr && plan.method->adds_detail;
 }
 
+double ShareForNetwork(std::optional<TrainedKind> looks, const GaussianCloud& showing, int64_t all,
+                       const PixelSizeFinding& finding) {
+  if (finding.contradicted()) return 1;
+  if (looks == TrainedKind::kUnclear) return IsOfAFit(showing, all) ? kPixelOfUnclear : 1;
+  if (looks == TrainedKind::kRaised || IsWide(looks)) return 1;
+  return finding.rough() || finding.estimate.softness < kSoft ? kPixelOfRough : 1;
+}
+
 void ChooseNetwork(const EnhanceOptions& options, bool unknown_of_few, MethodPlan& plan, EnhanceInput& input,
                    EnhanceReport& report) {
   const bool unclear = report.looks == TrainedKind::kUnclear, raised = report.looks == TrainedKind::kRaised;
   const bool whole = report.pixel_size_source != kCautiousPixelSize || TakesSureOnly(plan, input);
-  const bool rough = whole && report.things.empty() && report.finding && report.finding->rough();
+  const bool one = whole && report.things.empty();
+  const bool rough = one && report.finding && report.finding->rough();
+  const bool soft = one && input.softness < kSoft;
   const bool network_alone = !plan.chosen_by.empty() && plan.start == nullptr && plan.method->adds_detail;
   if (report.finding && report.finding->balls) {
     LeaveNetworksOut(plan, "has learned from Gaussians that are no balls");
@@ -70,8 +86,8 @@ void ChooseNetwork(const EnhanceOptions& options, bool unknown_of_few, MethodPla
     LeaveNetworksOut(plan, "has learned what splats of known kinds have lost");
   } else if (unclear && whole && network_alone) {
     TakeSmallerPixels(kPixelOfUnclear, "it is not clear what the splat has lost", input, report);
-  } else if (rough && network_alone) {
-    TakeSmallerPixels(kPixelOfRough, "that is rough", input, report);
+  } else if ((rough || soft) && network_alone) {
+    TakeSmallerPixels(kPixelOfRough, rough ? "that is rough" : "it seems to be of soft pictures", input, report);
   } else if (rough) {
     LeaveNetworksOut(plan, "measures Gaussians in pixels, of which this splat says little");
   }

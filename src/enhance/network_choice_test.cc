@@ -83,6 +83,7 @@ class NetworkChoice : public EnhanceDoor {
     input.cloud = std::move(cloud);
     input.pixel_sizes = {static_cast<float>(report_.pixel_size)};
     input.pixel_size = report_.pixel_size;
+    input.softness = softness_;
     EnhanceReport report = report_;
     ChooseNetwork(options_, false, plan, input, report);
     EXPECT_FLOAT_EQ(input.pixel_sizes[0], static_cast<float>(report.pixel_size));
@@ -92,6 +93,7 @@ class NetworkChoice : public EnhanceDoor {
 
   EnhanceOptions options_;
   EnhanceReport report_;
+  double softness_ = 1;
 };
 
 // As after soft pictures, where outlines may say half too much.
@@ -107,6 +109,33 @@ TEST_F(NetworkChoice, RoughEstimatesAreTakenSmaller) {
   EXPECT_TRUE(log_->Says("that is rough")) << log_->text();
   options_.method = "network";
   EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01)) << "who asks for it gets it";
+  options_.method = "auto";
+  estimate.high = 0.014;
+  softness_ = 0.65;
+  EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01)) << "a part of the pictures";
+  softness_ = 0.55;
+  EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01 * 0.8));
+  report_.finding.reset();
+  report_.pixel_size_source = "cameras";
+  EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01 * 0.8));
+  EXPECT_TRUE(log_->Says("soft pictures")) << log_->text();
+}
+
+TEST_F(NetworkChoice, SaysItsShareBefore) {
+  const GaussianCloud ball = Ball(0.01);
+  PixelSizeFinding finding;
+  finding.estimate.low = 0.005;
+  finding.estimate.high = 0.014;
+  EXPECT_EQ(ShareForNetwork(TrainedKind::kClassic, ball, ball.size(), finding), 1);
+  EXPECT_EQ(ShareForNetwork(std::nullopt, ball, ball.size(), finding), 1);
+  EXPECT_EQ(ShareForNetwork(TrainedKind::kUnclear, ball, ball.size(), finding), 0.35);
+  EXPECT_EQ(ShareForNetwork(TrainedKind::kUnclear, ball, 1999, finding), 1);
+  finding.estimate.high = 0.016;
+  EXPECT_EQ(ShareForNetwork(std::nullopt, ball, ball.size(), finding), 0.8);
+  EXPECT_EQ(ShareForNetwork(TrainedKind::kRaised, ball, ball.size(), finding), 1);
+  EXPECT_EQ(ShareForNetwork(TrainedKind::kEnhanced, ball, ball.size(), finding), 1);
+  finding.contradictions = {"small"};
+  EXPECT_EQ(ShareForNetwork(TrainedKind::kUnclear, ball, ball.size(), finding), 1);
 }
 
 TEST_F(NetworkChoice, WhatIsUnclearTakesSmallPixels) {

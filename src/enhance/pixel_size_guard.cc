@@ -385,7 +385,8 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
 }
 
 std::string PixelSizeFinding::SoftnessInWords() const {
-  if (estimate.softness >= 1) return "";
+  constexpr double kWorthAWord = 0.95;
+  if (estimate.softness > kWorthAWord) return "";
   return Cat(Fixed(estimate.softness, 2),
              " of what its outlines say: they are softer than its Gaussians leave them, as after soft pictures");
 }

@@ -43,7 +43,8 @@ struct PixelSizeFinding {
   }
   bool is_one() const { return least >= size && closer == 0; }  // `size` is that of all Gaussians
 
-  // How the estimate comes of what outlines say, in words, for a sentence about it; empty: it is what they say.
+  // How the estimate comes of what outlines say, in words, for a sentence about it; empty: it is what they say, or
+  // nearly.
   std::string SoftnessInWords() const;
   std::string CutsInWords() const;  // likewise of outlines that do not count
 };

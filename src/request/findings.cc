@@ -15,6 +15,7 @@
 #include "core/text.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
+#include "enhance/network_choice.h"
 #include "enhance/showing_gaussians.h"
 #include "enhance/soft_pictures.h"
 #include "formats/registry.h"
@@ -77,9 +78,14 @@ Status LookAt(CloudBlocks& blocks, const std::function<CloudView()>& whole, Spla
   const auto mode = antialiased ? std::optional(RenderMode::kAntialiased) : findings.render_mode;
   TellingGaussians telling = showing.telling;
   telling.cloud.render_mode = mode;
+  const GaussianCloud all = showing.all;
   findings.pixel_size = FindPixelSize(std::move(showing), mode);
   if (findings.pixel_size.ok()) {
     findings.things = FindPixelSizesOfThings(telling.cloud, *findings.pixel_size, true, {telling.rows, whole}).things;
+    if (findings.things.empty()) {
+      findings.share_for_network =
+          ShareForNetwork(beside_tag, all, findings.statistics.gaussians, *findings.pixel_size);
+    }
   }
   findings.lost_width = FindLostWidth(said, beside_tag, kInfoUpscale);
   findings.problems = Problems(findings.statistics);
@@ -273,7 +279,7 @@ nlohmann::json ToJson(const SplatFindings& f) {
         {"cut_outlines", f.pixel_size->estimate.cut_outlines},
         {"coarse_outlines", f.pixel_size->estimate.coarse_outlines},
         {"softness", f.pixel_size->estimate.softness},
-        {"used", f.pixel_size->size}};
+        {"used", f.share_for_network * f.pixel_size->size}};
     if (!f.things.empty()) json["pixel_size"]["things"] = ToJson(f.things);
   }
   for (const SplatFormat& format : Formats()) {

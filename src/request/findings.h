@@ -33,6 +33,7 @@ struct SplatFindings {
   bool lost_no_width = false;  // HasLostNoWidth (enhance/enhanced_mark.h)
   CloudStatistics statistics;
   Result<PixelSizeFinding> pixel_size = Error{};
+  double share_for_network = 1;        // ShareForNetwork
   std::vector<ThingPixelSize> things;  // that lie apart and have each a pixel size of their own; mostly none
   std::optional<TrainedKind> looks;   // by its sizes, whatever the file says; nothing where there are too few Gaussians
   LostWidth lost_width;               // at kInfoUpscale, as `enhance` gives it back

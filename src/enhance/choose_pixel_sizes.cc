@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "core/log.h"
 #include "core/render_mode.h"
@@ -116,6 +117,17 @@ Status PixelSizesFromPictures(const EnhanceOptions& options, bool says, EnhanceI
   return {};
 }
 
+// Outlines of what has been enhanced say nothing about the pixels of the rest.
+Result<PixelSizeFinding> FindPixelSizeInside(const Region& region, const GaussianCloud& cloud) {
+  std::vector<int64_t> inside;
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    if (region.Holds(cloud.means.data() + 3 * i)) inside.push_back(i);
+  }
+  if (inside.empty()) return FindPixelSize(cloud);  // which is refused later on
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud part, Subset(cloud, inside));
+  return FindPixelSize(part);
+}
+
 constexpr std::string_view kWillDoBetter = "--cameras or --pixel-size will do better";
 
 void SayWhatWasFound(std::span<const ThingPixelSize> things) {
@@ -186,7 +198,8 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
   } else if (pictures) {
     return PixelSizesFromPictures(options, says, input, report);
   } else {
-    const auto found = FindPixelSize(input.cloud);
+    const bool part_alone = options.region && input.partly_enhanced;
+    const auto found = part_alone ? FindPixelSizeInside(*options.region, input.cloud) : FindPixelSize(input.cloud);
     if (!found.ok()) {
       LogWarning(found.error().message + ": the splat stays as it is; --pixel-size or --cameras would tell");
       report.pixel_size_source = kUnknownPixelSize;
@@ -197,8 +210,10 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
     input.softness = found->estimate.softness;
     report.pixel_size = found->size;
     report.pixel_size_source = found->contradicted() ? kCautiousPixelSize : "estimated";
-    PixelSizesOfThings of_things =
-        FindPixelSizesOfThings(input.cloud, *found, !IsGiven(options, "mode") && !options.filter_strength);
+    PixelSizesOfThings of_things;
+    if (!part_alone) {
+      of_things = FindPixelSizesOfThings(input.cloud, *found, !IsGiven(options, "mode") && !options.filter_strength);
+    }
     if (!of_things.things.empty()) {
       input.pixel_sizes = of_things.sizes;
       report.pixel_size = double{Quantile(of_things.sizes, 0.5)};

@@ -80,9 +80,10 @@ Status DropUnusable(GaussianCloud& cloud) {
 }
 
 // How it looks beside what its file says. Of a region, where that has enough Gaussians to tell: the rest may have been
-// enhanced before.
-std::optional<TrainedKind> FindLooks(const EnhanceOptions& options, const GaussianCloud& cloud) {
-  constexpr int64_t kEnoughOfRegion = 1000;
+// enhanced before. Where it has been, of the region at any rate.
+std::optional<TrainedKind> FindLooks(const EnhanceOptions& options, const EnhanceInput& input) {
+  const GaussianCloud& cloud = input.cloud;
+  const int64_t enough_of_region = input.partly_enhanced ? 0 : 1000;
   ShowingGaussians showing = FindShowingGaussians(cloud);
   if (options.region) {
     std::vector<int64_t> inside, rows;
@@ -91,7 +92,7 @@ std::optional<TrainedKind> FindLooks(const EnhanceOptions& options, const Gaussi
       inside.push_back(i);
       rows.push_back(showing.rows_of_all[static_cast<size_t>(i)]);
     }
-    if (std::ssize(inside) >= kEnoughOfRegion) {
+    if (std::ssize(inside) >= enough_of_region) {
       if (auto part = Subset(showing.all, inside); part.ok()) {
         showing.all = *std::move(part);
         showing.rows_of_all = std::move(rows);
@@ -104,11 +105,12 @@ std::optional<TrainedKind> FindLooks(const EnhanceOptions& options, const Gaussi
 
 // Splats of which the caller does not say how they were trained are looked at. An antialiased one without a tag becomes
 // one.
-void RecogniseKind(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport& report) {
+void RecogniseKind(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
+  GaussianCloud& cloud = input.cloud;
   if (IsGiven(options, "mode") || options.filter_strength || HasLostNoWidth(cloud) ||
       cloud.render_mode == RenderMode::kMip)
     return;
-  report.looks = FindLooks(options, cloud);
+  report.looks = FindLooks(options, input);
   if (!cloud.render_mode && report.looks == TrainedKind::kAntialiased) cloud.render_mode = RenderMode::kAntialiased;
 }
 
@@ -385,10 +387,11 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
     const auto is_mark = [](const std::string& comment) { return comment.starts_with(kPartEnhancedMark); };
     std::ranges::copy_if(input.cloud.comments, std::back_inserter(marks_of_parts), is_mark);
     std::erase_if(input.cloud.comments, is_mark);
+    input.partly_enhanced = !marks_of_parts.empty();
   }
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SizedMethods sized, FindSizedMethods(plan, options));
-  if (sized.any || options.clean) RecogniseKind(options, input.cloud, report);
+  if (sized.any || options.clean) RecogniseKind(options, input, report);
   if (options.clean) ANCHORSPLAT_RETURN_IF_ERROR(Clean(options, input.cloud, report));
   const bool unknown_of_few = sized.any && IsUnknownOfFew(options, input.cloud, report.looks);
   if (sized.any) {

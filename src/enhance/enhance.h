@@ -120,6 +120,7 @@ struct EnhanceInput {
   // [N], where the splat is made of things of which some have a pixel size that nothing contradicts: whether it is of
   // these; else empty.
   std::vector<char> sure;
+  bool partly_enhanced = false;   // of another part it says that it has been enhanced: only what is inside tells
   std::vector<char> inside;       // which of the cloud's Gaussians are enhanced: results are of these; empty: all
   GaussianCloud start;            // what the method before it made, of "A+B"; else empty
   bool start_has_detail = false;  // EnhanceMethod::adds_detail of that method

@@ -13,6 +13,7 @@
 #include "core/source_dir_for_test.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
+#include "enhance/pixel_size_guard.h"
 #include "enhance/refine.h"
 #include "enhance/refinement_for_test.h"
 #include "formats/cloud_io.h"
@@ -190,6 +191,26 @@ TEST(Region, AfterAPartTheWholeIsLeftAlone) {
   EXPECT_EQ(std::ranges::count_if(second.cloud.comments,
                                   [](const std::string& c) { return c.starts_with(kPartEnhancedMark); }),
             1);
+}
+
+// What has been enhanced says nothing about the pixels of the other part.
+TEST(Region, AnotherPartIsLookedAtAlone) {
+  GaussianCloud cloud = ReadCloud(SourceDirForTest() / "examples/biplane/input.ply").value();
+  EnhanceOptions options;
+  options.method = "filter";
+  options.region = kHalf;
+  const Enhanced first = Enhance(cloud, options).value();
+  const double whole = FindPixelSize(cloud)->size;
+  ASSERT_TRUE(first.report.finding);
+  EXPECT_EQ(first.report.finding->size, whole) << "all of it says more than a part";
+  options.region = Region{.low = {-100, 0, -100}, .high = {100, 100, 100}};
+  const Enhanced second = Enhance(first.cloud, options).value();
+  ASSERT_TRUE(second.report.finding);
+  EXPECT_EQ(second.report.finding->size, FindPixelSize(Part(first.cloud, *options.region, true))->size);
+  EXPECT_LT(second.report.finding->size, 1.2 * whole);
+  EXPECT_GT(second.report.filter_strength, 0.5);
+  options.region = Region{.low = {50, 50, 50}, .high = {60, 60, 60}};
+  EXPECT_FALSE(Enhance(first.cloud, options).ok()) << "nothing lies there";
 }
 
 }  // namespace

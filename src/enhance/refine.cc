@@ -183,10 +183,10 @@ bool IsWorthIt(const RefinePlan& plan, const Consistency& after) {
   }
   const std::string numbers = Cat(Fixed(before.psnr, 2), " dB and SSIM ", Fixed(before.ssim, 4), " before, ",
                                   Fixed(after.psnr, 2), " and ", Fixed(after.ssim, 4), " after, at their resolution");
-  LogInfo(after.psnr > before.psnr
-              ? Cat("the splat had lost no width, and the pictures gain it little (", numbers,
-                    "): it knows more than they show, and is kept")
-              : Cat("the start agreed with the views as well as the result does (", numbers, "), and is kept"));
+  LogInfo(after.psnr > before.psnr ? Cat("the splat had lost no width, and the pictures gain it little (", numbers,
+                                         "): it knows more than they show, and is kept")
+                                   : Cat("the start agreed with the views at least as well as the result does (",
+                                         numbers, "), and is kept"));
   return false;
 }
 

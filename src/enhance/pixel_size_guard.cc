@@ -357,7 +357,8 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   finding.least = finding.size;
   if (finding.contradicted()) {
     double least = 0;
-    const bool crowd_alone = crowd > most && finding.contradictions.size() == 1;
+    // How many Gaussians a part had around it is not known, so how far above the bound it is says little.
+    const bool crowd_alone = crowd > most && finding.contradictions.size() == 1 && estimate.cut_outlines < kLargelyCut;
     if (crowd_alone) least = estimate.size * std::pow(most / crowd, kCrowdedFall);
     if (uneven && finding.contradictions.size() == 1) least = shrunk;
     // Without its black Gaussians the outlines say a size, too; it counts where nothing contradicts that one.

@@ -41,6 +41,8 @@ constexpr double kSoft = 0.6;
 // at most (CloudShape::roundness).
 constexpr double kRound = 0.5;
 
+bool IsOfSoftPictures(double softness) { return softness < kSoft; }
+
 bool IsOfAFit(const GaussianCloud& showing, int64_t all) {
   return all >= kFewGaussians && ShapeOf(showing).roundness < kRound;
 }
@@ -67,7 +69,7 @@ double ShareForNetwork(std::optional<TrainedKind> looks, const GaussianCloud& sh
   if (finding.contradicted()) return 1;
   if (looks == TrainedKind::kUnclear) return IsOfAFit(showing, all) ? kPixelOfUnclear : 1;
   if (looks == TrainedKind::kRaised || IsWide(looks)) return 1;
-  return finding.rough() || finding.estimate.softness < kSoft ? kPixelOfRough : 1;
+  return finding.rough() || IsOfSoftPictures(finding.estimate.softness) ? kPixelOfRough : 1;
 }
 
 void ChooseNetwork(const EnhanceOptions& options, bool unknown_of_few, MethodPlan& plan, EnhanceInput& input,
@@ -76,7 +78,7 @@ void ChooseNetwork(const EnhanceOptions& options, bool unknown_of_few, MethodPla
   const bool whole = report.pixel_size_source != kCautiousPixelSize || TakesSureOnly(plan, input);
   const bool one = whole && report.things.empty();
   const bool rough = one && report.finding && report.finding->rough();
-  const bool soft = one && input.softness < kSoft;
+  const bool soft = one && IsOfSoftPictures(input.softness);
   const bool network_alone = !plan.chosen_by.empty() && plan.start == nullptr && plan.method->adds_detail;
   if (report.finding && report.finding->balls) {
     LeaveNetworksOut(plan, "has learned from Gaussians that are no balls");

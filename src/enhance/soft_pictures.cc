@@ -1,7 +1,5 @@
 #include "enhance/soft_pictures.h"
 
-#include <utility>
-
 #include "core/run_context.h"
 #include "enhance/pixel_size_estimate.h"
 #include "enhance/pixel_size_features.h"

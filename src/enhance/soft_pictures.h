@@ -9,8 +9,8 @@
 namespace anchorsplat {
 
 // Fits to soft pictures (out of focus, enlarged) keep no thin Gaussians either, and look antialiased by their sizes.
-// But their outlines are softer than classic Gaussians of their sizes leave them, by 0.33 to 0.67 in 45 such fits,
-// which those of antialiased ones are not (1 in thirteen, 0.87 in one; PixelSizeEstimate::softness). Taken for
+// But their outlines are softer than classic Gaussians of their sizes leave them: PixelSizeEstimate::softness is 0.37
+// to 0.67 in 32 such fits (0.80 in one more), and 1 in thirteen antialiased ones (0.87 in one more). Taken for
 // antialiased their pixels would be 1.5 to 3.4 times too large.
 //
 // `kind`: TrainedKindOf. What looks antialiased without a tag and is of soft pictures is classic.

@@ -78,16 +78,17 @@ Status LookAt(CloudBlocks& blocks, const std::function<CloudView()>& whole, Spla
   const auto mode = antialiased ? std::optional(RenderMode::kAntialiased) : findings.render_mode;
   TellingGaussians telling = showing.telling;
   telling.cloud.render_mode = mode;
-  const GaussianCloud all = showing.all;
+  findings.lost_width = FindLostWidth(said, beside_tag, kInfoUpscale);
+  // What shows is looked at for it where the kind is unclear.
+  const GaussianCloud all = beside_tag == TrainedKind::kUnclear ? showing.all : GaussianCloud();
   findings.pixel_size = FindPixelSize(std::move(showing), mode);
   if (findings.pixel_size.ok()) {
     findings.things = FindPixelSizesOfThings(telling.cloud, *findings.pixel_size, true, {telling.rows, whole}).things;
-    if (findings.things.empty()) {
+    if (findings.things.empty() && findings.lost_width.strength > 0) {
       findings.share_for_network =
           ShareForNetwork(beside_tag, all, findings.statistics.gaussians, *findings.pixel_size);
     }
   }
-  findings.lost_width = FindLostWidth(said, beside_tag, kInfoUpscale);
   findings.problems = Problems(findings.statistics);
   return {};
 }

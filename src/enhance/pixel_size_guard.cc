@@ -67,6 +67,9 @@ constexpr double kCloser = 0.45;
 // which have no outlines: 0.13 and 0.32 at 4.3 and 2.6 times. Below the first pixels shrink with this power, and below
 // the second it contradicts.
 constexpr double kSmallAxis = 0.4, kSmallestAxis = 0.3, kSmallFall = 4;
+// That and how far the densest tenth lies apart, their geometric mean in pixels of the estimate: 0.49 and more in 177
+// fits, 0.34 where hills seen from above are taken for pixels seven times as large.
+constexpr double kSmallAndDense = 0.42;
 // Black Gaussians may move the estimate this much before it counts as theirs.
 constexpr double kMoved = 1.5;
 // An interval that is wider from end to end says nothing.
@@ -87,8 +90,10 @@ constexpr double kBalls = 0.9;
 // Beyond, the two regressions are about something that neither has seen: pictures of parts of an object, whose outlines
 // hardly any of them shows. Of 76 fits like standard ones three are below: a palm, a broom, trousers.
 constexpr double kRegressionsDisagree = 0.67;
-// Antialiased splats look like 0.44 to 0.86 of their pixels, classic ones of known pixels like 0.73 and more.
-constexpr double kSharperThanClassic = 0.65;
+// Antialiased splats look like 0.44 to 0.86 of their pixels, classic ones of known pixels like 0.73 and more, but small
+// ones and those of few steps like 0.59. Cameras of pixels twice as large are found out unless the estimate is 1.16
+// times the truth.
+constexpr double kSharperThanClassic = 0.58;
 // Regions that a cloud is looked at in, and how many of them a Gaussian belongs to.
 constexpr int64_t kRegions = 8192;
 constexpr size_t kRegionsAround = 2;
@@ -335,6 +340,13 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   if (evidence.small_axis < kSmallestAxis * by_outlines) {
     finding.contradictions.push_back(Cat("its small Gaussians measure ", Fixed(evidence.small_axis / by_outlines, 2),
                                          " of such a pixel, and those of fits 0.4 to 2.3"));
+  }
+  const double small_and_dense = std::sqrt(evidence.small_axis * evidence.dense);
+  if (small_and_dense > 0 && small_and_dense < kSmallAndDense * by_outlines) {
+    finding.contradictions.push_back(Cat("its small Gaussians measure ", Fixed(evidence.small_axis / by_outlines, 2),
+                                         " of such a pixel and its densest lie ",
+                                         Fixed(evidence.dense / by_outlines, 2),
+                                         " apart, and one of these is larger in fits"));
   }
   if (estimate.high > kNoEstimate * estimate.low) {
     finding.contradictions.push_back(

@@ -34,6 +34,9 @@ constexpr double kPixelOfUnclear = 0.35;
 // At a rough estimate, as after soft pictures, which may be half too large, it takes up to 0.7 dB from what the filter
 // gives, and at 0.8 of it gives 0.3 dB more than the filter (docs/results/pixel-size.md, small-pixels).
 constexpr double kPixelOfRough = 0.8;
+// Rough ones that softness has hardly lowered are no larger than the truth: a crate and a bank at 0.79 and 0.91, MCMC
+// of two rests (0.4 to 1). They are taken whole.
+constexpr double kHardlySoft = 0.9;
 // PixelSizeEstimate::softness of fits whose pictures were all soft: 0.37 to 0.59; where a part of them is, 0.62 and
 // 0.64, and these lose 0.6 to 1.0 dB by that.
 constexpr double kSoft = 0.6;
@@ -42,6 +45,10 @@ constexpr double kSoft = 0.6;
 constexpr double kRound = 0.5;
 
 bool IsOfSoftPictures(double softness) { return softness < kSoft; }
+
+bool MayBeTooLarge(const PixelSizeFinding& finding) {
+  return finding.rough() && finding.estimate.softness < kHardlySoft;
+}
 
 bool IsOfAFit(const GaussianCloud& showing, int64_t all) {
   return all >= kFewGaussians && ShapeOf(showing).roundness < kRound;
@@ -69,7 +76,7 @@ double ShareForNetwork(std::optional<TrainedKind> looks, const GaussianCloud& sh
   if (finding.contradicted()) return 1;
   if (looks == TrainedKind::kUnclear) return IsOfAFit(showing, all) ? kPixelOfUnclear : 1;
   if (looks == TrainedKind::kRaised || IsWide(looks)) return 1;
-  return finding.rough() || IsOfSoftPictures(finding.estimate.softness) ? kPixelOfRough : 1;
+  return MayBeTooLarge(finding) || IsOfSoftPictures(finding.estimate.softness) ? kPixelOfRough : 1;
 }
 
 void ChooseNetwork(const EnhanceOptions& options, bool unknown_of_few, MethodPlan& plan, EnhanceInput& input,
@@ -78,6 +85,7 @@ void ChooseNetwork(const EnhanceOptions& options, bool unknown_of_few, MethodPla
   const bool whole = report.pixel_size_source != kCautiousPixelSize || TakesSureOnly(plan, input);
   const bool one = whole && report.things.empty();
   const bool rough = one && report.finding && report.finding->rough();
+  const bool large = rough && MayBeTooLarge(*report.finding);
   const bool soft = one && IsOfSoftPictures(input.softness);
   const bool network_alone = !plan.chosen_by.empty() && plan.start == nullptr && plan.method->adds_detail;
   if (report.finding && report.finding->balls) {
@@ -88,9 +96,9 @@ void ChooseNetwork(const EnhanceOptions& options, bool unknown_of_few, MethodPla
     LeaveNetworksOut(plan, "has learned what splats of known kinds have lost");
   } else if (unclear && whole && network_alone) {
     TakeSmallerPixels(kPixelOfUnclear, "it is not clear what the splat has lost", input, report);
-  } else if ((rough || soft) && network_alone) {
-    TakeSmallerPixels(kPixelOfRough, rough ? "that is rough" : "it seems to be of soft pictures", input, report);
-  } else if (rough) {
+  } else if ((large || soft) && network_alone) {
+    TakeSmallerPixels(kPixelOfRough, large ? "that is rough" : "it seems to be of soft pictures", input, report);
+  } else if (rough && !network_alone) {
     LeaveNetworksOut(plan, "measures Gaussians in pixels, of which this splat says little");
   }
 }

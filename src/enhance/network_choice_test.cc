@@ -96,7 +96,7 @@ class NetworkChoice : public EnhanceDoor {
   double softness_ = 1;
 };
 
-// As after soft pictures, where outlines may say half too much.
+// After soft pictures outlines may say half too much.
 TEST_F(NetworkChoice, RoughEstimatesAreTakenSmaller) {
   report_.finding.emplace().size = 0.01;
   PixelSizeEstimate& estimate = report_.finding->estimate;
@@ -105,6 +105,8 @@ TEST_F(NetworkChoice, RoughEstimatesAreTakenSmaller) {
   estimate.high = 0.014;
   EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01));
   estimate.high = 0.016;
+  EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01)) << "not lowered by softness";
+  estimate.softness = 0.89;
   EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01 * 0.8));
   EXPECT_TRUE(log_->Says("that is rough")) << log_->text();
   options_.method = "network";
@@ -131,6 +133,8 @@ TEST_F(NetworkChoice, SaysItsShareBefore) {
   EXPECT_EQ(ShareForNetwork(TrainedKind::kUnclear, ball, ball.size(), finding), 0.35);
   EXPECT_EQ(ShareForNetwork(TrainedKind::kUnclear, ball, 1999, finding), 1);
   finding.estimate.high = 0.016;
+  EXPECT_EQ(ShareForNetwork(std::nullopt, ball, ball.size(), finding), 1);
+  finding.estimate.softness = 0.89;
   EXPECT_EQ(ShareForNetwork(std::nullopt, ball, ball.size(), finding), 0.8);
   EXPECT_EQ(ShareForNetwork(TrainedKind::kRaised, ball, ball.size(), finding), 1);
   EXPECT_EQ(ShareForNetwork(TrainedKind::kEnhanced, ball, ball.size(), finding), 1);

@@ -13,7 +13,8 @@ namespace anchorsplat {
 // to 0.67 in 32 such fits (0.80 in one more), and 1 in thirteen antialiased ones (0.87 in one more). Taken for
 // antialiased their pixels would be 1.5 to 3.4 times too large.
 //
-// `kind`: TrainedKindOf. What looks antialiased without a tag and is of soft pictures is classic.
+// `kind`: TrainedKindOf. What looks antialiased or unclear without a tag and is of soft pictures is classic, unless its
+// Gaussians are as thick as where a width was added.
 std::optional<TrainedKind> BesideSoftness(std::optional<TrainedKind> kind, std::optional<RenderMode> tag,
                                           const ShowingGaussians& showing);
 

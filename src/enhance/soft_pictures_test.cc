@@ -16,7 +16,7 @@
 namespace anchorsplat {
 namespace {
 
-// Of a fit, each Gaussian twice and half as opaque, moved by `blur` of a pixel, and none thinner than a fifth of one
+// Of a fit, each Gaussian twice and half as opaque, moved by `blur` of a pixel, and none thinner than a third of one
 // along two axes, as soft pictures leave them.
 GaussianCloud Softened(double blur) {
   constexpr double kPixel = 0.0055;
@@ -27,7 +27,7 @@ GaussianCloud Softened(double blur) {
   cloud = Subset(cloud, rows).value();
   cloud.render_mode.reset();
   Random random(1);
-  const auto least = static_cast<float>(std::log(0.2 * kPixel));
+  const auto least = static_cast<float>(std::log(0.32 * kPixel));
   for (size_t i = 0; i < rows.size(); ++i) {
     cloud.opacity_logits[i] -= 0.7f;
     std::array<size_t, 3> axes = {3 * i, 3 * i + 1, 3 * i + 2};
@@ -52,7 +52,12 @@ TEST(SoftPictures, AreNotTakenForAntialiased) {
   EXPECT_EQ(KindOf(soft), TrainedKind::kClassic);
   EXPECT_EQ(KindOf(soft, RenderMode::kAntialiased), TrainedKind::kAntialiased) << "a tag is believed";
   EXPECT_EQ(KindOf(sharp), TrainedKind::kAntialiased);
-  EXPECT_EQ(BesideSoftness(TrainedKind::kUnclear, {}, showing), TrainedKind::kUnclear);
+  EXPECT_EQ(BesideSoftness(TrainedKind::kUnclear, {}, showing), TrainedKind::kClassic);
+  EXPECT_EQ(BesideSoftness(TrainedKind::kUnclear, RenderMode::kClassic, showing), TrainedKind::kUnclear);
+  EXPECT_EQ(BesideSoftness(TrainedKind::kEnhanced, {}, showing), TrainedKind::kEnhanced);
+  GaussianCloud wide = soft;  // a width in all axes
+  for (float& scale : wide.log_scales) scale = std::max(scale, std::log(0.0014f));
+  EXPECT_EQ(BesideSoftness(TrainedKind::kUnclear, {}, FindShowingGaussians(wide)), TrainedKind::kUnclear);
   EXPECT_EQ(BesideSoftness(std::nullopt, {}, showing), std::nullopt);
   EXPECT_EQ(BesideSoftness(TrainedKind::kAntialiased, {}, ShowingGaussians()), TrainedKind::kAntialiased);
 

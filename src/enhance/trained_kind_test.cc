@@ -230,6 +230,8 @@ TEST(TrainedKind, TooFewOrBrokenOnes) {
   SizeTails few{.gaussians = 900, .middle = 0.33, .smallest = 0.8, .roundness = 0.2, .opaque = 0, .faint = 0.1};
   EXPECT_EQ(Judge(few), TrainedKind::kUnclear);
   few.gaussians = 2000;
+  EXPECT_EQ(Judge(few), TrainedKind::kClassic);
+  few.middle = 0.24;
   EXPECT_EQ(Judge(few), TrainedKind::kAntialiased);
   GaussianCloud cloud = Made(0.3, 0);
   for (size_t i = 0; i < cloud.log_scales.size(); i += 30) cloud.log_scales[i] = std::nanf("");
@@ -315,8 +317,13 @@ TEST(TrainedKind, EnhanceActsOnIt) {
 
 // Between the kinds next to nothing can be wrong.
 TEST(TrainedKind, UnclearOnesGetLittle) {
-  SizeTails tails{.gaussians = 5000, .middle = 0.35, .smallest = 0.8, .roundness = 0.2, .opaque = 0, .faint = 0.1};
+  SizeTails tails{.gaussians = 5000, .middle = 0.29, .smallest = 0.8, .roundness = 0.2, .opaque = 0, .faint = 0.1};
   EXPECT_EQ(Judge(tails), TrainedKind::kUnclear);
+  tails.middle = 0.31;
+  EXPECT_EQ(Judge(tails), TrainedKind::kClassic);
+  tails.gaussians = 999;
+  EXPECT_EQ(Judge(tails), TrainedKind::kUnclear) << "few say less";
+  tails.gaussians = 5000;
   tails.opaque = 0.5;
   EXPECT_EQ(Judge(tails), TrainedKind::kAntialiased) << "the thinnest are opaque";
   tails = {.gaussians = 5000, .middle = 0.6, .smallest = 0.2, .roundness = 0.5, .opaque = 0, .faint = 0.1};

@@ -10,6 +10,9 @@ namespace {
 
 constexpr double kSoftOutlines = 0.75;
 constexpr double kNotWidened = 0.3;  // SizeTails::roundness
+// Antialiased fits make their thinnest Gaussians opaque, those to soft pictures at most 7 %; tails of middle axes of
+// these are at 0.13 and more. A hedge and a hamburger, antialiased, whose outlines are soft, are at 0.55 and 0.12.
+constexpr double kFewOpaque = 0.2, kLeastOfSoft = 0.126;
 
 }  // namespace
 
@@ -17,8 +20,12 @@ std::optional<TrainedKind> BesideSoftness(std::optional<TrainedKind> kind, std::
                                           const ShowingGaussians& showing) {
   if (tag || !(kind == TrainedKind::kAntialiased || kind == TrainedKind::kUnclear)) return kind;
   LeaveIfAbandoned();
-  // Widths that were added soften outlines, too.
-  if (kind == TrainedKind::kUnclear && SizeTailsOf(showing.all).roundness > kNotWidened) return kind;
+  const SizeTails tails = SizeTailsOf(showing.all);
+  // Widths that were added soften outlines, too, and so do leaves.
+  const bool widened = kind == TrainedKind::kUnclear && tails.roundness > kNotWidened;
+  const bool antialiased =
+      kind == TrainedKind::kAntialiased && (tails.opaque > kFewOpaque || tails.middle < kLeastOfSoft);
+  if (widened || antialiased) return kind;
   Result<PixelSizeProbe> probe = PixelSizeProbe::Make(showing.telling);
   if (!probe.ok()) return kind;
   const auto estimate = EstimatePixelSize(*probe, RenderMode::kClassic);

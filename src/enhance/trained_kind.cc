@@ -22,19 +22,20 @@ constexpr int64_t kFewest = 400;  // eight in the shorter tail: enough to see wh
 constexpr int64_t kFew = 1000;    // below, there is more doubt
 constexpr double kShorter = 0.02, kLonger = 0.05;
 
-// docs/results/recognised.md has the tails of fits. Of middle axes, times exp(−opaque): up to 0.23 in 75 antialiased
-// ones, 0.34 and more in classic ones of 6,000 steps, and 0.25 and more in most of few steps or of small pictures. An
-// antialiased one that is taken for classic gains 1.0 dB in the mean (−0.6 to +2.5 of four), a classic one that is
-// taken for antialiased nothing (down to −1.3).
-struct TailBounds {
-  double antialiased, classic;  // below the first; from the second on
-};
-constexpr TailBounds kTails = {0.25, 0.30}, kTailsOfFew = {0.25, 0.42};
-// What networks made of one or the other lies between. Here sizes say little, and weaker odds of that are enough.
-constexpr TailBounds kTailsOfEnhanced = {0.335, 0.36}, kTailsOfFewEnhanced = {0.28, 0.42};
 // Of smallest axes: 0.30 and more in both, up to 0.08 in those of Mip-Splatting, 0.15 to 0.31 in what the network
 // makes.
 constexpr double kWidenedTail = 0.12, kThinTail = 0.35;
+// docs/results/recognised.md has the tails of fits. Of middle axes, times exp(−opaque): up to 0.23 in 75 antialiased
+// ones, 0.34 and more in classic ones of 6,000 steps, and 0.25 and more in most of few steps or of small pictures. An
+// antialiased one that is taken for classic gains 1.1 dB in the mean (−0.6 to +2.5 of five), a classic one that is
+// taken for antialiased nothing (down to −1.3), and one that is unclear a fifth of what it could.
+struct TailBounds {
+  double antialiased, classic;  // of middle axes: below the first; from the second on
+  double thin;                  // of smallest axes, rather round ones: below, nothing is clear
+};
+constexpr TailBounds kTails = {0.25, 0.25, 0.31}, kTailsOfFew = {0.25, 0.42, 0.31};
+// What networks made of one or the other lies between. Here sizes say little, and weaker odds of that are enough.
+constexpr TailBounds kTailsOfEnhanced = {0.335, 0.36, kThinTail}, kTailsOfFewEnhanced = {0.28, 0.42, kThinTail};
 // What a training leaves is uneven: middle axes of antialiased fits have tails of 0.17 and more, and 7 % and more of
 // what shows is fainter than 0.3. Converters of meshes make Gaussians all alike, and who throws the faint ones away
 // leaves the opaque ones among the thinnest: both look antialiased, and would be drawn too faint as such.
@@ -104,15 +105,16 @@ double MeanTail(std::span<float> logarithms, double cut) {
 std::optional<TrainedKind> JudgeBy(const SizeTails& tails, const TailBounds& of_many, const TailBounds& of_few) {
   if (tails.gaussians < kFewest) return std::nullopt;
   if (tails.roundness > kRound && tails.smallest < kWidenedTail) return TrainedKind::kWidened;
+  const TailBounds& bounds = tails.gaussians < kFew ? of_few : of_many;
   // Where a format cut off a part of the smallest axes, a tail that is a little shorter says nothing.
-  if (tails.roundness > kRatherRound && tails.smallest < kThinTail && tails.cut_off == 0) return TrainedKind::kUnclear;
+  const bool rather_thick = tails.roundness > kRatherRound && tails.smallest < kThinTail && tails.cut_off == 0;
+  if (rather_thick && tails.smallest < bounds.thin) return TrainedKind::kUnclear;
   if (tails.raised && tails.middle >= kLeastTail) return TrainedKind::kRaised;
   const double tail = tails.middle * std::exp(-tails.opaque);
   if (tails.middle < kLeastTail || tails.faint < kLeastFaint) {
     return tail < of_few.classic ? TrainedKind::kUnclear : TrainedKind::kClassic;
   }
-  const TailBounds& bounds = tails.gaussians < kFew ? of_few : of_many;
-  if (tail < bounds.antialiased) return TrainedKind::kAntialiased;
+  if (tail < bounds.antialiased) return rather_thick ? TrainedKind::kUnclear : TrainedKind::kAntialiased;
   return tail < bounds.classic ? TrainedKind::kUnclear : TrainedKind::kClassic;
 }
 

@@ -317,11 +317,18 @@ TEST(TrainedKind, EnhanceActsOnIt) {
 
 // Between the kinds next to nothing can be wrong.
 TEST(TrainedKind, UnclearOnesGetLittle) {
-  SizeTails tails{.gaussians = 5000, .middle = 0.29, .smallest = 0.8, .roundness = 0.2, .opaque = 0, .faint = 0.1};
-  EXPECT_EQ(Judge(tails), TrainedKind::kUnclear);
-  tails.middle = 0.31;
+  SizeTails tails{.gaussians = 5000, .middle = 0.26, .smallest = 0.8, .roundness = 0.2, .opaque = 0, .faint = 0.1};
   EXPECT_EQ(Judge(tails), TrainedKind::kClassic);
-  tails.gaussians = 999;
+  tails.middle = 0.24;
+  EXPECT_EQ(Judge(tails), TrainedKind::kAntialiased);
+  tails.roundness = 0.35;
+  tails.smallest = 0.34;
+  EXPECT_EQ(Judge(tails), TrainedKind::kUnclear) << "as thick as where a width was added";
+  tails.middle = 0.4;
+  EXPECT_EQ(Judge(tails), TrainedKind::kClassic);
+  tails.smallest = 0.3;
+  EXPECT_EQ(Judge(tails), TrainedKind::kUnclear);
+  tails = {.gaussians = 999, .middle = 0.31, .smallest = 0.8, .roundness = 0.2, .opaque = 0, .faint = 0.1};
   EXPECT_EQ(Judge(tails), TrainedKind::kUnclear) << "few say less";
   tails.gaussians = 5000;
   tails.opaque = 0.5;

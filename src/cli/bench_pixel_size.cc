@@ -47,6 +47,8 @@ nlohmann::json ToJson(const PixelSizeCheck& check, const std::string& kind) {
                          {"flatness", check.evidence.flatness},
                          {"fill", check.evidence.fill},
                          {"roundness", check.evidence.roundness},
+                         {"shared", check.evidence.sides.shared},
+                         {"coarser", check.evidence.sides.coarser},
                          {"things", ToJson(check.things)}};
   for (const PixelSizeCheck::Sample& sample : check.samples) {
     json["samples"].push_back({{"size", sample.size}, {"features", sample.features}});

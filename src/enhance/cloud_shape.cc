@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <utility>
 
 #include "core/buffer.h"
 #include "core/ellipsoid.h"
@@ -17,45 +18,6 @@ constexpr double kLowest = 0.05, kHighest = 0.95;  // quantiles between which it
 constexpr double kPlanLowest = 0.02, kPlanHighest = 0.98;
 constexpr size_t kCells = 16;
 constexpr double kLeastOfCell = 0.1;
-
-// Places along the principal axes through the middle: [3][N].
-std::array<Buffer<float>, 3> AlongPrincipalAxes(const GaussianCloud& cloud) {
-  const auto count = static_cast<size_t>(cloud.size());
-  Buffer<float> values(count);
-  std::array<double, 3> middle;
-  for (size_t a = 0; a < 3; ++a) {
-    for (size_t i = 0; i < count; ++i) values[i] = cloud.means[3 * i + a];
-    middle[a] = double{Quantile(values, 0.5)};
-  }
-  const auto away = [&](size_t i) {
-    return std::array<double, 3>{cloud.means[3 * i] - middle[0], cloud.means[3 * i + 1] - middle[1],
-                                 cloud.means[3 * i + 2] - middle[2]};
-  };
-  Buffer<float> squared(count);
-  for (size_t i = 0; i < count; ++i) {
-    const auto [x, y, z] = away(i);
-    squared[i] = static_cast<float>(x * x + y * y + z * z);
-  }
-  values = squared;
-  const float farthest = Quantile(values, kHighest);
-  std::array<double, 6> moments{};
-  for (size_t i = 0; i < count; ++i) {
-    if (squared[i] > farthest) continue;
-    const auto [x, y, z] = away(i);
-    const std::array<double, 6> products = {x * x, x * y, x * z, y * y, y * z, z * z};
-    for (size_t k = 0; k < 6; ++k) moments[k] += products[k];
-  }
-  const Ellipsoid shape = EllipsoidOf(moments);
-  std::array<Buffer<float>, 3> along;
-  for (size_t k = 0; k < 3; ++k) {
-    along[k].resize(count);
-    for (size_t i = 0; i < count; ++i) {
-      const auto at = away(i);
-      along[k][i] = static_cast<float>(shape.axes[k] * at[0] + shape.axes[3 + k] * at[1] + shape.axes[6 + k] * at[2]);
-    }
-  }
-  return along;
-}
 
 // Cells between the quantiles of either axis; those beyond count for the cells at the edge.
 double Fill(const Buffer<float>& a, const Buffer<float>& b) {
@@ -86,19 +48,62 @@ double RoundnessOf(const GaussianCloud& cloud) {
 
 }  // namespace
 
-CloudShape ShapeOf(const GaussianCloud& cloud) {
-  if (cloud.empty()) return {};
-  const std::array<Buffer<float>, 3> along = AlongPrincipalAxes(cloud);
+PrincipalPlaces AlongPrincipalAxes(const GaussianCloud& cloud) {
+  const auto count = static_cast<size_t>(cloud.size());
+  Buffer<float> values(count);
+  std::array<double, 3> middle;
+  for (size_t a = 0; a < 3; ++a) {
+    for (size_t i = 0; i < count; ++i) values[i] = cloud.means[3 * i + a];
+    middle[a] = double{Quantile(values, 0.5)};
+  }
+  const auto away = [&](size_t i) {
+    return std::array<double, 3>{cloud.means[3 * i] - middle[0], cloud.means[3 * i + 1] - middle[1],
+                                 cloud.means[3 * i + 2] - middle[2]};
+  };
+  Buffer<float> squared(count);
+  for (size_t i = 0; i < count; ++i) {
+    const auto [x, y, z] = away(i);
+    squared[i] = static_cast<float>(x * x + y * y + z * z);
+  }
+  values = squared;
+  const float farthest = Quantile(values, kHighest);
+  std::array<double, 6> moments{};
+  for (size_t i = 0; i < count; ++i) {
+    if (squared[i] > farthest) continue;
+    const auto [x, y, z] = away(i);
+    const std::array<double, 6> products = {x * x, x * y, x * z, y * y, y * z, z * z};
+    for (size_t k = 0; k < 6; ++k) moments[k] += products[k];
+  }
+  const Ellipsoid shape = EllipsoidOf(moments);
+  std::array<Buffer<float>, 3> along;
   std::array<double, 3> sides;
   for (size_t k = 0; k < 3; ++k) {
-    Buffer<float> values = along[k];
+    along[k].resize(count);
+    for (size_t i = 0; i < count; ++i) {
+      const auto at = away(i);
+      along[k][i] = static_cast<float>(shape.axes[k] * at[0] + shape.axes[3 + k] * at[1] + shape.axes[6 + k] * at[2]);
+    }
+    values = along[k];
     const auto high = double{Quantile(values, kHighest)};
     sides[k] = high - double{Quantile(values, kLowest)};
   }
   std::array<size_t, 3> order = {0, 1, 2};
   std::ranges::sort(order, {}, [&](size_t k) { return sides[k]; });
-  return {.flatness = sides[order[1]] > 0 ? sides[order[0]] / sides[order[1]] : 1,
-          .fill = Fill(along[order[1]], along[order[2]]),
+  PrincipalPlaces places;
+  for (size_t k = 0; k < 3; ++k) {
+    const size_t from = order[k];
+    places.along[k] = std::move(along[from]);
+    places.sides[k] = sides[from];
+    places.axes[k] = {shape.axes[from], shape.axes[3 + from], shape.axes[6 + from]};
+  }
+  return places;
+}
+
+CloudShape ShapeOf(const GaussianCloud& cloud) {
+  if (cloud.empty()) return {};
+  const PrincipalPlaces places = AlongPrincipalAxes(cloud);
+  return {.flatness = places.sides[1] > 0 ? places.sides[0] / places.sides[1] : 1,
+          .fill = Fill(places.along[1], places.along[2]),
           .roundness = RoundnessOf(cloud)};
 }
 

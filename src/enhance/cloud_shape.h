@@ -1,8 +1,19 @@
 #pragma once
 
+#include <array>
+
+#include "core/buffer.h"
 #include "core/gaussian_cloud.h"
 
 namespace anchorsplat {
+
+// Along the principal axes of what is not far away, from the middle; the axis along which it is thinnest comes first.
+struct PrincipalPlaces {
+  std::array<Buffer<float>, 3> along;         // [N] each
+  std::array<std::array<double, 3>, 3> axes;  // unit vectors
+  std::array<double, 3> sides;                // how wide it is without a twentieth on every side
+};
+PrincipalPlaces AlongPrincipalAxes(const GaussianCloud& cloud);
 
 // What a cloud and its Gaussians look like from afar. Neither unit nor orientation matters.
 struct CloudShape {

@@ -194,6 +194,7 @@ Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, int64_t all, const R
   evidence.flatness = shape.flatness;
   evidence.fill = shape.fill;
   evidence.roundness = shape.roundness;
+  if (shape.flatness < kFlat) evidence.sides = TwoSidesOf(showing.bright);
   if (!probe.ok()) return probe.error();
   evidence.small_axis = probe->start();
   LeaveIfAbandoned();
@@ -321,7 +322,8 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   }
   const double by_outlines = estimate.size / estimate.softness;
   const bool filled = evidence.fill > kFills || evidence.small_axis < kSmallOfFlat * by_outlines;
-  const bool flat = evidence.flatness < kFlat && filled && apart < kSparse * estimate.size &&
+  const bool flat = evidence.flatness < kFlat && filled && !evidence.sides.both_were_shown() &&
+                    apart < kSparse * estimate.size &&
                     (estimate.strangeness > kStrangeOfFlat || estimate.disagreement < kDisagreeingOfFlat);
   if (flat) {
     finding.contradictions.emplace_back(

@@ -9,6 +9,7 @@
 #include "core/result.h"
 #include "enhance/pixel_size_estimate.h"
 #include "enhance/showing_gaussians.h"
+#include "enhance/two_sides.h"
 
 namespace anchorsplat {
 
@@ -64,6 +65,7 @@ struct PixelSizeEvidence {
   double small_axis = 0;  // of the smallest tenth by area: PixelSizeProbe::start
   double harmless = 0;    // pixel that does no harm in nine of ten regions: GaussianRegion::HarmlessPixel
   double flatness = 1, fill = 1, roundness = 0;  // CloudShape
+  TwoSides sides = {};                           // of what is flat
   double without_black = 0;                      // the estimate without black Gaussians; 0: there are few of them
   double softness_without_black = 1;             // PixelSizeEstimate::softness of that
 };

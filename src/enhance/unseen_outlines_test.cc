@@ -32,6 +32,12 @@ TEST(PixelSizeGuard, OutlinesThatNoPictureShows) {
     EXPECT_DOUBLE_EQ(Judge(estimate, evidence).size, 0.003);
     EXPECT_EQ(Judge(estimate, evidence).least, 0);
   }
+  evidence.sides = {.shared = 0.1, .coarser = 1.3};
+  EXPECT_FALSE(Judge(estimate, evidence).contradicted()) << "a door";
+  evidence.sides = {.shared = 0.1, .coarser = 1.5};
+  EXPECT_TRUE(Judge(estimate, evidence).contradicted()) << "a coarse lower side";
+  evidence.sides = {.shared = 0.7, .coarser = 1};
+  EXPECT_TRUE(Judge(estimate, evidence).contradicted()) << "none at all";
   evidence.fill = 0.6;
   EXPECT_FALSE(Judge(estimate, evidence).contradicted()) << "an aircraft";
   evidence.small_axis = 0.0048;

@@ -72,8 +72,9 @@ void PrintTable(const SplatFindings& f) {
     } else if (f.pixel_size->contradicted()) {
       for (const std::string& contradiction : f.pixel_size->contradictions)
         std::cout << "    but " << contradiction << "\n";
-      std::cout << "    so enhance would take a smaller pixel, " << Number(f.pixel_size->size)
-                << "; --cameras or --pixel-size would tell\n";
+      const bool smaller = f.pixel_size->size < f.pixel_size->estimate.size;
+      std::cout << "    so enhance would take " << (smaller ? "a smaller pixel, " : "no more than that, ")
+                << Number(f.pixel_size->size) << "; --cameras or --pixel-size would tell\n";
     } else if (f.pixel_size->part) {
       std::cout << "    " << f.pixel_size->CutsInWords() << "; enhance would take " << Number(f.pixel_size->size)
                 << " to be safe\n";

@@ -143,8 +143,9 @@ void SayWhatWasFound(const PixelSizeFinding& found) {
       contradictions += (contradictions.empty() ? "" : "; and ") + sentence;
     }
     LogWarning(Cat("outlines say a training pixel of ", estimate.size, ", but ", contradictions,
-                   ". So that nothing is blurred, a smaller pixel is taken, ", found.size,
-                   found.least < found.size ? " at most" : "", "; ", kWillDoBetter,
+                   ". So that nothing is blurred, ",
+                   found.size < estimate.size ? "a smaller pixel is taken, " : "no larger pixel is taken than ",
+                   found.size, found.least < found.size ? " at most" : "", "; ", kWillDoBetter,
                    found.no_one_pixel ? ". In a room or a street the pixels of what is near and of what is far differ "
                                         "many times: no single size is right there, and only cameras know them"
                                       : ""));

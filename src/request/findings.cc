@@ -281,7 +281,11 @@ nlohmann::json ToJson(const SplatFindings& f) {
         {"coarse_outlines", f.pixel_size->estimate.coarse_outlines},
         {"softness", f.pixel_size->estimate.softness},
         {"used", f.share_for_network * f.pixel_size->size}};
-    if (!f.things.empty()) json["pixel_size"]["things"] = ToJson(f.things);
+    if (!f.things.empty()) {
+      const auto size_of = [](const ThingPixelSize& thing) { return thing.finding.size; };
+      json["pixel_size"]["used"] = f.share_for_network * size_of(std::ranges::max(f.things, {}, size_of));
+      json["pixel_size"]["things"] = ToJson(f.things);
+    }
   }
   for (const SplatFormat& format : Formats()) {
     if (format.write == nullptr || format.predicted_size == nullptr) continue;

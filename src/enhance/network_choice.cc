@@ -36,7 +36,7 @@ constexpr double kPixelOfUnclear = 0.35;
 constexpr double kPixelOfRough = 0.8;
 // Rough ones that softness has hardly lowered are no larger than the truth: a crate and a bank at 0.79 and 0.91, MCMC
 // of two rests (0.4 to 1). They are taken whole.
-constexpr double kHardlySoft = 0.9;
+constexpr double kHardlyLowered = 0.9;
 // PixelSizeEstimate::softness of fits whose pictures were all soft: 0.37 to 0.59; where a part of them is, 0.62 and
 // 0.64, and these lose 0.6 to 1.0 dB by that.
 constexpr double kSoft = 0.6;
@@ -47,7 +47,7 @@ constexpr double kRound = 0.5;
 bool IsOfSoftPictures(double softness) { return softness < kSoft; }
 
 bool MayBeTooLarge(const PixelSizeFinding& finding) {
-  return finding.rough() && finding.estimate.softness < kHardlySoft;
+  return finding.rough() && finding.estimate.softness < kHardlyLowered;
 }
 
 bool IsOfAFit(const GaussianCloud& showing, int64_t all) {

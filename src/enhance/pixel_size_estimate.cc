@@ -42,7 +42,7 @@ constexpr double kAgreeing = 0.85, kDisagreeing = 0.7;
 // The regression of many kinds may come to rest at two sizes, the smaller of them 0.3 to 0.5 of the truth: MCMC of few
 // steps, whose noise has left it with Gaussians of all sizes. Where it ends so far below the standard one (ln), it is
 // begun there, too, and the larger size is taken if the smaller one is strange and it is hardly stranger itself. Of 600
-// splats that is so in four, all for the better; of those whose standard estimate is three times too large and more,
+// splats that is so in six, all for the better; of those whose standard estimate is three times too large and more,
 // the smaller size is at 0.7 to 1.1 (but grass, 1.3), or the larger one 1.6 times as strange, or 25 times as large.
 constexpr double kFarBelow = 0.4, kOfSmaller = 1.25, kStrangeRest = 1.25, kHardlyStranger = 1.2;
 constexpr double kHalfOfTwo = 0.6;  // of the interval then, at least; ln

@@ -338,13 +338,14 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   if (finding.balls) {
     finding.contradictions.emplace_back("its Gaussians are balls, whose sizes say nothing about pixels");
   }
+  const bool small = evidence.small_axis < kSmallestAxis * by_outlines;
   // Soft pictures leave large Gaussians: where these are small, too, the outlines are of something else.
-  if (evidence.small_axis < kSmallestAxis * by_outlines) {
+  if (small) {
     finding.contradictions.push_back(Cat("its small Gaussians measure ", Fixed(evidence.small_axis / by_outlines, 2),
                                          " of such a pixel, and those of fits 0.4 to 2.3"));
   }
   const double small_and_dense = std::sqrt(evidence.small_axis * evidence.dense);
-  if (small_and_dense > 0 && small_and_dense < kSmallAndDense * by_outlines) {
+  if (!small && small_and_dense > 0 && small_and_dense < kSmallAndDense * by_outlines) {
     finding.contradictions.push_back(Cat("its small Gaussians measure ", Fixed(evidence.small_axis / by_outlines, 2),
                                          " of such a pixel and its densest lie ",
                                          Fixed(evidence.dense / by_outlines, 2),

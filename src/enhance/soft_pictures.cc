@@ -9,7 +9,6 @@ namespace anchorsplat {
 namespace {
 
 constexpr double kSoftOutlines = 0.75;
-constexpr double kNotWidened = 0.3;  // SizeTails::roundness
 // Antialiased fits make their thinnest Gaussians opaque, those to soft pictures at most 7 %; tails of middle axes of
 // these are at 0.13 and more. A hedge and a hamburger, antialiased, whose outlines are soft, are at 0.55 and 0.12.
 constexpr double kFewOpaque = 0.2, kLeastOfSoft = 0.126;
@@ -22,7 +21,7 @@ std::optional<TrainedKind> BesideSoftness(std::optional<TrainedKind> kind, std::
   LeaveIfAbandoned();
   const SizeTails tails = SizeTailsOf(showing.all);
   // Widths that were added soften outlines, too, and so do leaves.
-  const bool widened = kind == TrainedKind::kUnclear && tails.roundness > kNotWidened;
+  const bool widened = kind == TrainedKind::kUnclear && tails.rather_round();
   const bool antialiased =
       kind == TrainedKind::kAntialiased && (tails.opaque > kFewOpaque || tails.middle < kLeastOfSoft);
   if (widened || antialiased) return kind;

@@ -58,6 +58,13 @@ TEST(SoftPictures, AreNotTakenForAntialiased) {
   GaussianCloud wide = soft;  // a width in all axes
   for (float& scale : wide.log_scales) scale = std::max(scale, std::log(0.0014f));
   EXPECT_EQ(BesideSoftness(TrainedKind::kUnclear, {}, FindShowingGaussians(wide)), TrainedKind::kUnclear);
+  // As in an antialiased hedge: opaque ones among the thinnest, or a shorter tail.
+  GaussianCloud hedge = soft, even = soft;
+  for (float& logit : hedge.opacity_logits) logit = 5;
+  EXPECT_EQ(BesideSoftness(TrainedKind::kAntialiased, {}, FindShowingGaussians(hedge)), TrainedKind::kAntialiased);
+  EXPECT_EQ(BesideSoftness(TrainedKind::kAntialiased, {}, showing), TrainedKind::kClassic);
+  for (float& scale : even.log_scales) scale = std::max(scale, std::log(0.0022f));
+  EXPECT_EQ(BesideSoftness(TrainedKind::kAntialiased, {}, FindShowingGaussians(even)), TrainedKind::kAntialiased);
   EXPECT_EQ(BesideSoftness(std::nullopt, {}, showing), std::nullopt);
   EXPECT_EQ(BesideSoftness(TrainedKind::kAntialiased, {}, ShowingGaussians()), TrainedKind::kAntialiased);
 

@@ -25,24 +25,26 @@ constexpr double kShorter = 0.02, kLonger = 0.05;
 // Of smallest axes: 0.30 and more in both, up to 0.08 in those of Mip-Splatting, 0.15 to 0.31 in what the network
 // makes.
 constexpr double kWidenedTail = 0.12, kThinTail = 0.35;
-// docs/results/recognised.md has the tails of fits. Of middle axes, times exp(−opaque): up to 0.23 in 75 antialiased
-// ones, 0.34 and more in classic ones of 6,000 steps, and 0.25 and more in most of few steps or of small pictures. An
-// antialiased one that is taken for classic gains 1.1 dB in the mean (−0.6 to +2.5 of five), a classic one that is
-// taken for antialiased nothing (down to −1.3), and one that is unclear a fifth of what it could.
+// docs/results/recognised.md has the tails of fits. Of middle axes, times exp(−opaque): up to 0.24 in 58 antialiased
+// ones and 0.29 in a dense one, 0.34 and more in classic ones of 6,000 steps, and 0.25 and more in most of few steps or
+// of small pictures. An antialiased one that is taken for classic gains 1.1 dB in the mean (−0.6 to +2.5 of five), a
+// classic one that is taken for antialiased nothing (down to −1.3), and one that is unclear a fifth of what it could.
 struct TailBounds {
   double antialiased, classic;  // of middle axes: below the first; from the second on
-  double thin;                  // of smallest axes, rather round ones: below, nothing is clear
+  double antialiased_of_few;
+  double thin;  // of smallest axes, rather round ones: below, nothing is clear
 };
-constexpr TailBounds kTails = {0.25, 0.25, 0.31}, kTailsOfFew = {0.25, 0.42, 0.31};
+constexpr TailBounds kTails = {0.25, 0.25, 0.25, 0.31};
 // What networks made of one or the other lies between. Here sizes say little, and weaker odds of that are enough.
-constexpr TailBounds kTailsOfEnhanced = {0.335, 0.36, kThinTail}, kTailsOfFewEnhanced = {0.28, 0.42, kThinTail};
-// What a training leaves is uneven: middle axes of antialiased fits have tails of 0.17 and more, and 7 % and more of
+constexpr TailBounds kTailsOfEnhanced = {0.335, 0.36, 0.28, kThinTail};
+constexpr double kClassicTailOfFew = 0.42;
+// What a training leaves is uneven: middle axes of antialiased fits have tails of 0.08 and more, and 7 % and more of
 // what shows is fainter than 0.3. Converters of meshes make Gaussians all alike, and who throws the faint ones away
 // leaves the opaque ones among the thinnest: both look antialiased, and would be drawn too faint as such.
 constexpr double kLeastTail = 0.03, kLeastFaint = 0.02, kFaintOpacity = 0.3;
 // A width that was added is in all axes: the smallest are nearly half as long as the middle ones then. Flat Gaussians,
 // whose third axis other programs write as nearly nothing, also end at one size.
-constexpr double kRound = 0.4, kRatherRound = 0.3;
+constexpr double kRound = 0.4;
 
 // ln of the odds. Sizes that are like those of no fit are mostly those of a network. Where twins have harmonics of
 // their own it can only be one that made one of each, which has odds of 1.5 and more (235 files); fits of 2,000 to
@@ -102,20 +104,22 @@ double MeanTail(std::span<float> logarithms, double cut) {
   return std::sqrt(Tail(logarithms, kShorter) * Tail(logarithms, kLonger));
 }
 
-std::optional<TrainedKind> JudgeBy(const SizeTails& tails, const TailBounds& of_many, const TailBounds& of_few) {
+std::optional<TrainedKind> JudgeBy(const SizeTails& tails, const TailBounds& bounds) {
   if (tails.gaussians < kFewest) return std::nullopt;
   if (tails.roundness > kRound && tails.smallest < kWidenedTail) return TrainedKind::kWidened;
-  const TailBounds& bounds = tails.gaussians < kFew ? of_few : of_many;
   // Where a format cut off a part of the smallest axes, a tail that is a little shorter says nothing.
-  const bool rather_thick = tails.roundness > kRatherRound && tails.smallest < kThinTail && tails.cut_off == 0;
+  const bool rather_thick = tails.rather_round() && tails.smallest < kThinTail && tails.cut_off == 0;
   if (rather_thick && tails.smallest < bounds.thin) return TrainedKind::kUnclear;
   if (tails.raised && tails.middle >= kLeastTail) return TrainedKind::kRaised;
   const double tail = tails.middle * std::exp(-tails.opaque);
   if (tails.middle < kLeastTail || tails.faint < kLeastFaint) {
-    return tail < of_few.classic ? TrainedKind::kUnclear : TrainedKind::kClassic;
+    return tail < kClassicTailOfFew ? TrainedKind::kUnclear : TrainedKind::kClassic;
   }
-  if (tail < bounds.antialiased) return rather_thick ? TrainedKind::kUnclear : TrainedKind::kAntialiased;
-  return tail < bounds.classic ? TrainedKind::kUnclear : TrainedKind::kClassic;
+  const bool few = tails.gaussians < kFew;
+  if (tail < (few ? bounds.antialiased_of_few : bounds.antialiased)) {
+    return rather_thick ? TrainedKind::kUnclear : TrainedKind::kAntialiased;
+  }
+  return tail < (few ? kClassicTailOfFew : bounds.classic) ? TrainedKind::kUnclear : TrainedKind::kClassic;
 }
 
 }  // namespace
@@ -167,7 +171,7 @@ SizeTails SizeTailsOf(const GaussianCloud& showing) {
   return tails;
 }
 
-std::optional<TrainedKind> Judge(const SizeTails& tails) { return JudgeBy(tails, kTails, kTailsOfFew); }
+std::optional<TrainedKind> Judge(const SizeTails& tails) { return JudgeBy(tails, kTails); }
 
 std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing, const WholeCloud& whole) {
   const SizeTails tails = SizeTailsOf(showing);
@@ -178,7 +182,7 @@ std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing, const Who
   const auto look = FindEnhancedLook(showing, tails, &twins);
   if (!look || twins.unrelated) return by_sizes;
   const double odds = LogOddsOfEnhanced(*look);
-  const bool unclear = JudgeBy(tails, kTailsOfEnhanced, kTailsOfFewEnhanced) == TrainedKind::kUnclear;
+  const bool unclear = JudgeBy(tails, kTailsOfEnhanced) == TrainedKind::kUnclear;
   if (odds <= (unclear ? kEnhancedOddsWhereUnclear : kEnhancedOdds)) return by_sizes;
   if (odds < kEnhancedOddsOfOwnHarmonics && whole.harmonics) {
     const auto likeness = LikenessOfHarmonics(whole.harmonics(), whole.rows, twins);

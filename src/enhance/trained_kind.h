@@ -48,6 +48,9 @@ struct SizeTails {
   // Opacities were raised: hardly one is faint, and they do not begin all at once either, as where somebody has thrown
   // the faint ones away.
   bool raised = false;
+
+  // The smallest axes as those of widened splats, nearly.
+  bool rather_round() const { return roundness > 0.3; }
 };
 SizeTails SizeTailsOf(const GaussianCloud& showing);  // of ShowingGaussians::all
 

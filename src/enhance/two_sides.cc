@@ -11,6 +11,7 @@
 #include "core/activations.h"
 #include "core/buffer.h"
 #include "core/rotation.h"
+#include "core/run_context.h"
 #include "core/statistics.h"
 #include "enhance/cloud_shape.h"
 #include "enhance/gaussian_regions.h"
@@ -22,8 +23,8 @@ namespace {
 constexpr int64_t kPlaces = 512;
 constexpr double kLeastAlpha = 1.0 / 255, kMostAlpha = 0.99;
 constexpr double kReach = 3.33;  // standard deviations, where an alpha of one is the least
-constexpr double kSoftened =
-    0.27;                         // of the median size, added to all in squares: what is seen on edge has a width, too
+// Of the median size, added to all in squares: what is seen on edge has a width, too.
+constexpr double kSoftened = 0.27;
 constexpr double kCovered = 0.5;  // places where less than that is covered are none of the thing
 
 // As seen along the thickness.
@@ -86,12 +87,13 @@ TwoSides TwoSidesOf(const GaussianCloud& cloud) {
   std::vector<Flat> flat(count);
   for (size_t i = 0; i < count; ++i) flat[i] = Flatten(cloud, places, softened, i);
 
-  // One place after the other: sums do not depend on the number of threads, and this is a few hundredths of a second.
+  // One place after the other: sums do not depend on the number of threads.
   std::vector<float> alphas(count), front(count), back(count);
   std::vector<std::pair<float, size_t>> met;
   const int64_t samples = std::min<int64_t>(kPlaces, cloud.size());
   for (int64_t s = 0; s < samples; ++s) {
     const auto& at = flat[static_cast<size_t>(s * cloud.size() / samples)].at;
+    LeaveIfAbandoned();
     met.clear();
     double left = 1;
     for (size_t i = 0; i < count; ++i) {

@@ -97,6 +97,53 @@ TEST(PixelSizeGuard, LandIsGivenNoMoreThanItBears) {
   EXPECT_GT(GatherPixelSizeEvidence(*biplane)->flatness, 0.3);
 }
 
+// Of hills under which no picture looked.
+TEST(PixelSizeGuard, SmallGaussiansAndADenseTenthTogether) {
+  const PixelSizeEstimate estimate = {.size = 0.01, .low = 0.008, .high = 0.012, .showing = 0.3};
+  const PixelSizeEvidence plain = {.gaussians = 20'000,
+                                   .all = 30'000,
+                                   .spacing = 0.02,
+                                   .small_axis = 0.0041,
+                                   .harmless = 0.7 * 0.004,
+                                   .without_black = 0};
+  PixelSizeEvidence small = plain;
+  small.dense = 0.0044;
+  EXPECT_FALSE(Judge(estimate, small).contradicted());
+  small.dense = 0.0042;
+  ASSERT_EQ(Judge(estimate, small).contradictions.size(), 1u);
+  EXPECT_NE(
+      Judge(estimate, small).contradictions[0].find("measure 0.41 of such a pixel and its densest lie 0.42 apart"),
+      std::string::npos);
+  EXPECT_DOUBLE_EQ(Judge(estimate, small).size, plain.harmless);
+  small.dense = 0;  // not looked at
+  EXPECT_FALSE(Judge(estimate, small).contradicted());
+  // Soft pictures leave large ones.
+  small.small_axis = 0.01;
+  small.dense = 0.006;
+  EXPECT_FALSE(Judge(estimate, small).contradicted());
+  PixelSizeEstimate softened = estimate;
+  softened.softness = 0.5;
+  EXPECT_TRUE(Judge(softened, small).contradicted());
+  // Where they are smaller, that alone is said.
+  small = plain;
+  small.small_axis = 0.001;
+  small.dense = 0.001;
+  ASSERT_EQ(Judge(estimate, small).contradictions.size(), 1u);
+  EXPECT_NE(Judge(estimate, small).contradictions[0].find("those of fits 0.4 to 2.3"), std::string::npos);
+}
+
+// The regression of many kinds rests at 0.53 and 0.91 of this pixel, the standard one at 0.94.
+TEST(PixelSizeGuard, OfTwoRestsTheLarger) {
+  const auto cloud = ReadCloud(SourceDirForTest() / "testdata/splats/table.mcmc.spz");
+  ASSERT_TRUE(cloud.ok());
+  const auto found = FindPixelSize(*cloud);
+  ASSERT_TRUE(found.ok());
+  const double by_outlines = found->estimate.size / found->estimate.softness;
+  EXPECT_NEAR(by_outlines, 0.01467, 0.2 * 0.01467);
+  EXPECT_GT(found->estimate.high, 0.01467);
+  EXPECT_TRUE(found->rough()) << "one of two says little";
+}
+
 // What soft pictures leave: Gaussians as large as their outlines are soft. Widened ones are like that, too.
 TEST(PixelSizeEstimate, GaussiansTooLargeForTheirOutlinesLowerIt) {
   for (const char* object : {"biplane", "stone_lantern"}) {

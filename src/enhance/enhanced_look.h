@@ -38,6 +38,12 @@ inline constexpr size_t kEnhancedLookFeatures = 35;
 inline constexpr size_t kTwinUpperQuartile = 3, kFlatness = 27, kElongation = 28;
 using EnhancedLook = std::array<double, kEnhancedLookFeatures>;
 
+// Whether trained quaternions are still there: trainers use their direction alone and leave them at any length (half of
+// them and more are off by over a hundredth). Networks write unit quaternions, ours and the published one, and so do
+// the formats besides PLY; what is refined after a network stays within a four-hundredth. What has lengths of its own
+// no network has made.
+bool HasQuaternionsOfTraining(const GaussianCloud& showing);
+
 struct FoundTwins {
   // Whether twins are turned as if they had nothing to do with each other, and lie on top of each other or far apart.
   // No network makes that: it turns those of one Gaussian little, and where it makes one of each, twins are as far

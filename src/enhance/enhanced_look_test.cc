@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -51,6 +52,16 @@ GaussianCloud Sheet(int64_t n, int64_t copies, double spread, uint64_t seed = 7)
     }
   }
   return cloud;
+}
+
+// Of lengths as `length` says of each Gaussian.
+void SetQuaternionLengths(GaussianCloud& cloud, const std::function<double(size_t)>& length) {
+  for (size_t i = 0; i < cloud.opacity_logits.size(); ++i) {
+    const std::span<float> q(&cloud.quats[4 * i], 4);
+    double squares = 0;
+    for (const float x : q) squares += double{x} * double{x};
+    for (float& x : q) x = static_cast<float>(x * length(i) / std::sqrt(squares));
+  }
 }
 
 std::optional<EnhancedLook> LookAt(const GaussianCloud& cloud) { return FindEnhancedLook(cloud, SizeTailsOf(cloud)); }
@@ -218,6 +229,7 @@ TEST(EnhancedLook, OwnHarmonicsDecideCloseCalls) {
     for (size_t i = 0; i < cloud.quats.size(); ++i) {
       cloud.quats[i] = std::lerp(cloud.quats[i / 12 * 12 + i % 4], cloud.quats[i], 0.5f);
     }
+    SetQuaternionLengths(cloud, [](size_t) { return 1; });
     FoundTwins twins;
     const auto look = FindEnhancedLook(cloud, SizeTailsOf(cloud), &twins);
     const double odds = look && !twins.unrelated ? LogOddsOfEnhanced(*look) : 0;
@@ -243,6 +255,31 @@ TEST(EnhancedLook, OwnHarmonicsDecideCloseCalls) {
   };
   EXPECT_EQ(kind_with(false), TrainedKind::kEnhanced);
   EXPECT_NE(kind_with(true), TrainedKind::kEnhanced);
+  // What shares them and still has the quaternions of a training is a fit's, too.
+  Random random(5);
+  SetQuaternionLengths(cloud, [&](size_t) { return random.Uniform(0.5, 1.5); });
+  EXPECT_NE(kind_with(false), TrainedKind::kEnhanced);
+}
+
+TEST(EnhancedLook, QuaternionsOfTrainingHaveAnyLength) {
+  GaussianCloud cloud = Sheet(1000, 1, 0);
+  EXPECT_TRUE(HasQuaternionsOfTraining(cloud));
+  SetQuaternionLengths(cloud, [](size_t) { return 1; });
+  EXPECT_FALSE(HasQuaternionsOfTraining(cloud));
+  SetQuaternionLengths(cloud, [](size_t i) { return i % 2 == 0 ? 0.992 : 1.008; });  // as .splat rounds
+  EXPECT_FALSE(HasQuaternionsOfTraining(cloud));
+  SetQuaternionLengths(cloud, [](size_t i) { return i < 500 ? 1 : 1.2; });  // half of them are a network's
+  EXPECT_FALSE(HasQuaternionsOfTraining(cloud));
+  SetQuaternionLengths(cloud, [](size_t i) { return i < 499 ? 1 : 1.02; });
+  EXPECT_TRUE(HasQuaternionsOfTraining(cloud));
+  EXPECT_FALSE(HasQuaternionsOfTraining({}));
+  std::ranges::fill(cloud.quats, std::nanf(""));
+  EXPECT_FALSE(HasQuaternionsOfTraining(cloud));
+  for (const char* object : {"biplane", "stone_lantern", "tankard"}) {
+    const auto fit = ReadCloud(SourceDirForTest() / "examples" / object / "input.ply");
+    ASSERT_TRUE(fit.ok());
+    EXPECT_TRUE(HasQuaternionsOfTraining(*fit)) << object;
+  }
 }
 
 // Nor on the unit, the order of the rows or the number of threads.

@@ -176,7 +176,7 @@ std::optional<TrainedKind> Judge(const SizeTails& tails) { return JudgeBy(tails,
 std::optional<TrainedKind> TrainedKindOf(const GaussianCloud& showing, const WholeCloud& whole) {
   const SizeTails tails = SizeTailsOf(showing);
   const auto by_sizes = Judge(tails);
-  if (!by_sizes || by_sizes == TrainedKind::kWidened) return by_sizes;
+  if (!by_sizes || by_sizes == TrainedKind::kWidened || HasQuaternionsOfTraining(showing)) return by_sizes;
   LeaveIfAbandoned();
   FoundTwins twins;
   const auto look = FindEnhancedLook(showing, tails, &twins);

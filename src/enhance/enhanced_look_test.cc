@@ -60,7 +60,8 @@ void SetQuaternionLengths(GaussianCloud& cloud, const std::function<double(size_
     const std::span<float> q(&cloud.quats[4 * i], 4);
     double squares = 0;
     for (const float x : q) squares += double{x} * double{x};
-    for (float& x : q) x = static_cast<float>(x * length(i) / std::sqrt(squares));
+    const double factor = length(i) / std::sqrt(squares);
+    for (float& x : q) x = static_cast<float>(x * factor);
   }
 }
 

@@ -1,0 +1,79 @@
+#include "enhance/choose_pixel_sizes.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "cameras/camera_io.h"
+#include "core/random.h"
+#include "core/rotation.h"
+#include "core/source_dir_for_test.h"
+#include "enhance/enhance.h"
+#include "enhance/enhanced_look.h"
+#include "enhance/pixel_size_guard.h"
+#include "formats/cloud_io.h"
+
+namespace anchorsplat {
+namespace {
+
+constexpr double kBedPixel = 0.01467;  // of the pictures, 96² from a distance of 1.7 at 45°
+
+// As its training left it: SPZ keeps unit quaternions.
+GaussianCloud BedOfSoftPictures() {
+  auto cloud = ReadCloud(SourceDirForTest() / "testdata/splats/bed.soft-antialiased.spz");
+  EXPECT_TRUE(cloud.ok());
+  Random random(3);
+  for (size_t i = 0; i < static_cast<size_t>(cloud->size()); ++i) {
+    const auto length = static_cast<float>(random.Uniform(0.5, 1.5));
+    for (size_t k = 0; k < 4; ++k) cloud->quats[4 * i + k] *= length;
+  }
+  return *std::move(cloud);
+}
+
+CameraSet TrainingCameras() {
+  CameraSet set;
+  const double focal = 48 / std::tan(std::numbers::pi / 8);
+  for (int i = 0; i < 12; ++i) {
+    const double angle = 2 * std::numbers::pi * i / 12;
+    Camera& camera = set.cameras.emplace_back();
+    camera.intrinsics = {96, 96, focal, focal, 48, 48};
+    camera.world_to_camera =
+        *LookAt({1.6 * std::cos(angle), 0.57, 1.6 * std::sin(angle)}, {0.0, 0.0, 0.0}, {0.0, 1.0, 0.0});
+  }
+  return set;
+}
+
+TEST(ChoosePixelSizes, AntialiasedFitsToSoftPicturesAreTakenForLessThanTheirCamerasSay) {
+  const GaussianCloud bed = BedOfSoftPictures();
+  ASSERT_EQ(bed.render_mode, RenderMode::kAntialiased);
+  ASSERT_TRUE(HasQuaternionsOfTraining(bed));
+  const auto found = FindPixelSize(bed);
+  ASSERT_TRUE(found.ok());
+  EXPECT_FALSE(found->contradicted());
+  EXPECT_LT(found->size, 0.6 * kBedPixel);
+  EnhanceOptions options;
+  options.method = "filter";
+  options.cameras = TrainingCameras();
+  const auto softer = Enhance(GaussianCloud(bed), options);
+  ASSERT_TRUE(softer.ok()) << softer.error().message;
+  EXPECT_NEAR(softer->report.pixel_size, found->size, 1e-3 * found->size);
+  EXPECT_EQ(softer->report.pixel_size_source, "cameras");
+  // Whoever says that it is antialiased means these cameras.
+  options.given = {"mode"};
+  const auto said = Enhance(GaussianCloud(bed), options);
+  ASSERT_TRUE(said.ok());
+  EXPECT_NEAR(said->report.pixel_size, kBedPixel, 0.1 * kBedPixel);
+  // Cameras of smaller pixels are believed.
+  options.given.clear();
+  for (Camera& camera : options.cameras->cameras)
+    camera.intrinsics = {192, 192, 2 * camera.intrinsics.fx, 2 * camera.intrinsics.fy, 96, 96};
+  const auto fine = Enhance(GaussianCloud(bed), options);
+  ASSERT_TRUE(fine.ok());
+  EXPECT_NEAR(fine->report.pixel_size, kBedPixel / 2, 0.05 * kBedPixel);
+}
+
+}  // namespace
+}  // namespace anchorsplat

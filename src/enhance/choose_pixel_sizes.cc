@@ -25,13 +25,15 @@ namespace {
 constexpr double kSuspiciousRatio = 1.5;
 // Cameras whose pixels are so many times larger than the splat may look like at most do not belong to it.
 constexpr double kImpossible = 3;
-// Antialiased fits to soft pictures are taken for a third of their pixels, as they have lost next to nothing. Of
-// sixteen such fits ten are below that, of 110 to sharp ones six; the outlines of soft ones are the stranger.
-constexpr double kSofterThanCameras = 0.62, kStrangeAsOfSoft = 0.65;
+// Antialiased fits to soft pictures are taken for 0.3 to 0.7 of their pixels, as they have lost next to nothing, and
+// even their small Gaussians are 1.8 to 3.5 times as large as what they are taken for (18 of 20). Those of fits to
+// sharp ones are 0.5 to 1.4 times (one in eighty more). Small things of few Gaussians may be taken for less.
+constexpr double kSofterThanCameras = 0.7, kSoftest = 0.28, kSmallOfSoft = 1.7;
 
 bool IsOfSoftPictures(const GaussianCloud& cloud, double pixel, const PixelSizeFinding& found) {
   return cloud.render_mode == RenderMode::kAntialiased && !found.contradicted() &&
-         found.size < kSofterThanCameras * pixel && found.estimate.strangeness > kStrangeAsOfSoft;
+         found.size < kSofterThanCameras * pixel && found.size > kSoftest * pixel &&
+         found.small_axis > kSmallOfSoft * found.size;
 }
 
 void ScaleTo(double median, CameraPixelSizes& sizes) {

@@ -279,6 +279,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   finding.size = estimate.size;
   finding.largest = std::max(estimate.size, evidence.without_black);
   finding.estimate = estimate;
+  finding.small_axis = evidence.small_axis;
   finding.part = estimate.cut_outlines > kPart;
   const double of_whole = MostGaussiansPerPixel(evidence.gaussians, estimate.showing);
   const double cut = std::clamp((estimate.cut_outlines - kPart) / (kLargelyCut - kPart), 0.0, 1.0);

@@ -26,6 +26,7 @@ struct PixelSizeFinding {
   double closer = 0;
   double largest = 0;                       // that the outlines could mean: with and without black Gaussians
   PixelSizeEstimate estimate;               // what the outlines say
+  double small_axis = 0;                    // PixelSizeEvidence::small_axis
   bool no_one_pixel = false;                // its Gaussians lie too unevenly for one
   bool balls = false;                       // its Gaussians are, and their sizes say nothing about pixels
   bool part = false;                        // cut out of something larger: a tenth of its outlines and more are cuts

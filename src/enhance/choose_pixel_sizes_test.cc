@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "cameras/camera_io.h"
@@ -73,6 +74,30 @@ TEST(ChoosePixelSizes, AntialiasedFitsToSoftPicturesAreTakenForLessThanTheirCame
   const auto fine = Enhance(GaussianCloud(bed), options);
   ASSERT_TRUE(fine.ok());
   EXPECT_NEAR(fine->report.pixel_size, kBedPixel / 2, 0.05 * kBedPixel);
+}
+
+// Who does not say how it was trained may have an antialiased splat that looks classic. The estimate of this one is
+// rough, and says nothing against cameras else.
+TEST(ChoosePixelSizes, UntaggedSplatsOfFarFinerLooksAreNotWidenedByTheirCameras) {
+  const GaussianCloud table = ReadCloud(SourceDirForTest() / "testdata/splats/table.mcmc.spz").value();
+  const auto found = FindPixelSize(table);
+  ASSERT_TRUE(found.ok());
+  ASSERT_TRUE(found->rough());
+  const double own = found->estimate.size;
+  EnhanceOptions options;
+  options.method = "filter";
+  const auto pixel_with = [&](double of_cameras, std::optional<RenderMode> tag) {
+    options.cameras = TrainingCameras();
+    for (Camera& camera : options.cameras->cameras) camera.intrinsics.fx = camera.intrinsics.fy = 1.7 / of_cameras;
+    GaussianCloud cloud = table;
+    cloud.render_mode = tag;
+    const auto enhanced = Enhance(std::move(cloud), options);
+    EXPECT_TRUE(enhanced.ok());
+    return enhanced->report.pixel_size;
+  };
+  EXPECT_NEAR(pixel_with(2 * own, {}), 2 * own, 0.2 * own);
+  EXPECT_NEAR(pixel_with(2.9 * own, RenderMode::kClassic), 2.9 * own, 0.3 * own);
+  EXPECT_LT(pixel_with(2.9 * own, {}), 1.5 * own);
 }
 
 }  // namespace

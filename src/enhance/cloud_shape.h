@@ -21,6 +21,9 @@ struct CloudShape {
   double fill = 1;       // share of the rectangle around it, seen along its thickness, that has Gaussians: of 16 × 16
                          // cells those with a tenth of an even share
   double roundness = 0;  // of its Gaussians: median of the smallest axis over the largest
+
+  static constexpr double kFlat = 0.2;
+  bool is_flat() const { return flatness < kFlat; }
 };
 CloudShape ShapeOf(const GaussianCloud& cloud);
 

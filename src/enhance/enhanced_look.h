@@ -40,8 +40,8 @@ using EnhancedLook = std::array<double, kEnhancedLookFeatures>;
 
 // Whether trained quaternions are still there: trainers use their direction alone and leave them at any length (half of
 // them and more are off by over a hundredth). Networks write unit quaternions, ours and the published one, and so do
-// the formats besides PLY; what is refined after a network stays within a four-hundredth. What has lengths of its own
-// no network has made.
+// the formats besides PLY; what is refined after a network stays near, with pictures a quarter to two fifths of it are
+// off by over a hundredth. What has lengths of its own no network has made.
 bool HasQuaternionsOfTraining(const GaussianCloud& showing);
 
 struct FoundTwins {

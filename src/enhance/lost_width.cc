@@ -36,7 +36,8 @@ std::string_view NameOf(LostWidthReason reason) {
   return "";
 }
 
-LostWidth FindLostWidth(const CloudView& cloud, std::optional<TrainedKind> looks, double upscale) {
+LostWidth FindLostWidth(const CloudView& cloud, std::optional<TrainedKind> looks, double upscale,
+                        std::optional<int64_t> gaussians) {
   if (IsFittedToPixelAreas(cloud)) return {0, LostWidthReason::kFittedToAreas};
   if (IsMarkedEnhanced(cloud)) return {0, LostWidthReason::kMarkedEnhanced};
   if (IsMarkedPartEnhanced(cloud)) return {0, LostWidthReason::kPartMarked};
@@ -50,7 +51,7 @@ LostWidth FindLostWidth(const CloudView& cloud, std::optional<TrainedKind> looks
   if (cloud.render_mode) return {DefaultFilterStrength(upscale, cloud.render_mode), LostWidthReason::kTagged};
   if (!looks) {
     // Of many Gaussians of which few show, as MCMC leaves them, nearly all are of classic fits.
-    const bool many = cloud.size() >= kFewGaussians;
+    const bool many = gaussians.value_or(cloud.size()) >= kFewGaussians;
     return {many ? DefaultFilterStrength(upscale) : little, LostWidthReason::kTooFew};
   }
   if (looks == TrainedKind::kUnclear) return {little, LostWidthReason::kUnclear};

@@ -42,7 +42,9 @@ struct LostWidth {
   }
 };
 
-// `looks`: BesideTag of what the cloud looks like; nothing where the tag is to be believed. upscale ≥ 1.
-LostWidth FindLostWidth(const CloudView& cloud, std::optional<TrainedKind> looks, double upscale);
+// `looks`: BesideTag of what the cloud looks like; nothing where the tag is to be believed. upscale ≥ 1. `gaussians`:
+// how many it has, where `cloud` is only what its file says; else its size.
+LostWidth FindLostWidth(const CloudView& cloud, std::optional<TrainedKind> looks, double upscale,
+                        std::optional<int64_t> gaussians = {});
 
 }  // namespace anchorsplat

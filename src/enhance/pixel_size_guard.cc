@@ -79,7 +79,7 @@ constexpr double kSomeSize = 1e-12;  // of an estimate: a pixel has some size
 // a rim and a lower side that no picture shows: their outlines are as soft as its Gaussians are large, at pixels two to
 // five times smaller. They are strange (0.9 and more; standard fits 0.4 to 0.8), or the two regressions disagree.
 // Where Gaussians lie further apart than two such pixels (land: 0.4 to 1.2), those are not too large.
-constexpr double kFlat = 0.2, kStrangeOfFlat = 0.85, kDisagreeingOfFlat = 0.87, kSparse = 2;
+constexpr double kStrangeOfFlat = 0.85, kDisagreeingOfFlat = 0.87, kSparse = 2;
 // An aircraft is as flat, but fills 0.35 to 0.7 of the rectangle around it where land, facades and carpets fill 0.85
 // and more; and its small Gaussians (√(largest × middle axis)) measure 0.54 to 0.95 of the estimate, those of land 0.32
 // to 0.58. What is like aircraft in both is none of land.
@@ -194,7 +194,7 @@ Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, int64_t all, const R
   evidence.flatness = shape.flatness;
   evidence.fill = shape.fill;
   evidence.roundness = shape.roundness;
-  if (shape.flatness < kFlat) evidence.sides = TwoSidesOf(showing.bright);
+  if (shape.is_flat()) evidence.sides = TwoSidesOf(showing.bright);
   if (!probe.ok()) return probe.error();
   evidence.small_axis = probe->start();
   LeaveIfAbandoned();
@@ -323,7 +323,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   }
   const double by_outlines = estimate.size / estimate.softness;
   const bool filled = evidence.fill > kFills || evidence.small_axis < kSmallOfFlat * by_outlines;
-  const bool flat = evidence.flatness < kFlat && filled && !evidence.sides.both_were_shown() &&
+  const bool flat = evidence.flatness < CloudShape::kFlat && filled && !evidence.sides.both_were_shown() &&
                     apart < kSparse * estimate.size &&
                     (estimate.strangeness > kStrangeOfFlat || estimate.disagreement < kDisagreeingOfFlat);
   if (flat) {

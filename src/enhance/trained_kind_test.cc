@@ -316,6 +316,24 @@ TEST(TrainedKind, EnhanceActsOnIt) {
 }
 
 // Between the kinds next to nothing can be wrong.
+// Antialiased fits by MCMC to land from above have tails as classic ones of few steps.
+TEST(TrainedKind, OfLandSizesSayLess) {
+  GaussianCloud cloud;
+  double least = 0.3, tail = 0;
+  for (; least > 0 && !(tail > 0.27 && tail < 0.35); least -= 0.005) {
+    cloud = Made(least, 0);
+    const SizeTails tails = FindSizeTails(cloud);
+    tail = tails.middle * std::exp(-tails.opaque);
+  }
+  ASSERT_GT(least, 0) << "none has such a tail";
+  EXPECT_EQ(FindTrainedKind(cloud), TrainedKind::kClassic);
+  for (size_t i = 2; i < cloud.means.size(); i += 3) cloud.means[i] *= 0.02f;
+  EXPECT_EQ(FindTrainedKind(cloud), TrainedKind::kUnclear);
+  GaussianCloud thin = Made(0, 0);
+  for (size_t i = 2; i < thin.means.size(); i += 3) thin.means[i] *= 0.02f;
+  EXPECT_EQ(FindTrainedKind(thin), TrainedKind::kClassic) << "there are thinner ones than antialiased fits have";
+}
+
 TEST(TrainedKind, UnclearOnesGetLittle) {
   SizeTails tails{.gaussians = 5000, .middle = 0.26, .smallest = 0.8, .roundness = 0.2, .opaque = 0, .faint = 0.1};
   EXPECT_EQ(Judge(tails), TrainedKind::kClassic);

@@ -78,7 +78,7 @@ Status LookAt(CloudBlocks& blocks, const std::function<CloudView()>& whole, Spla
   const auto mode = antialiased ? std::optional(RenderMode::kAntialiased) : findings.render_mode;
   TellingGaussians telling = showing.telling;
   telling.cloud.render_mode = mode;
-  findings.lost_width = FindLostWidth(said, beside_tag, kInfoUpscale);
+  findings.lost_width = FindLostWidth(said, beside_tag, kInfoUpscale, findings.statistics.gaussians);
   // What shows is looked at for it where the kind is unclear.
   const GaussianCloud all = beside_tag == TrainedKind::kUnclear ? showing.all : GaussianCloud();
   findings.pixel_size = FindPixelSize(std::move(showing), mode);

@@ -26,8 +26,9 @@ constexpr double kSuspiciousRatio = 1.5;
 // Cameras whose pixels are so many times larger than the splat may look like at most do not belong to it.
 constexpr double kImpossible = 3;
 // Antialiased fits to soft pictures are taken for 0.3 to 0.7 of their pixels, as they have lost next to nothing, and
-// even their small Gaussians are 1.8 to 3.5 times as large as what they are taken for (18 of 20). Those of fits to
-// sharp ones are 0.5 to 1.4 times (one in eighty more). Small things of few Gaussians may be taken for less.
+// even their small Gaussians are 1.8 to 3.5 times as large as what they are taken for (all 17). Those of fits to sharp
+// ones that are taken for so little are 0.5 to 1.4 times as large (one of twenty is at 3.1). Small things of few
+// Gaussians may be taken for less.
 constexpr double kSofterThanCameras = 0.7, kSoftest = 0.28, kSmallOfSoft = 1.7;
 
 // Without a tag an antialiased splat may look classic, and its estimate is a third of its pixel then: cameras would

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/activations.h"
+#include "core/quaternion_length.h"
 #include "core/rank_search.h"
 #include "core/statistics.h"
 
@@ -97,12 +98,10 @@ struct Tally {
   void Count(const CloudView& rows, size_t i) {
     ++usable;
     if (!IsPlausible(rows, i)) ++sums.implausible;
-    const float* q = rows.quats.data() + 4 * i;
-    const double norm =
-        std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] + double{q[2]} * q[2] + double{q[3]} * q[3]);
-    if (norm < 1e-12) {
+    const double length = QuaternionLength(rows.quats.data() + 4 * i);
+    if (length < 1e-12) {
       ++sums.zero_quaternions;
-    } else if (std::abs(norm - 1) > 0.01) {
+    } else if (IsNotNormalised(length)) {
       ++sums.unnormalised_quaternions;
     }
     const float logit = rows.opacity_logits[i];

@@ -35,7 +35,8 @@ constexpr double kSofterThanCameras = 0.7, kSoftest = 0.28, kSmallOfSoft = 1.7;
 // widen it by six times too much. Few classic ones are taken for so little.
 constexpr double kLeastUntagged = 0.38;
 
-bool IsOfSoftPictures(const GaussianCloud& cloud, double pixel, const PixelSizeFinding& found) {
+// As IsSharperThanFitsTo, of antialiased ones that are softer.
+bool IsSofterThanFitsTo(const GaussianCloud& cloud, double pixel, const PixelSizeFinding& found) {
   return cloud.render_mode == RenderMode::kAntialiased && !found.contradicted() &&
          found.size < kSofterThanCameras * pixel && found.size > kSoftest * pixel &&
          found.small_axis > kSmallOfSoft * found.size;
@@ -92,17 +93,18 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
     // Whoever says a mode or a strength means these cameras.
     const bool said = options.filter_strength || IsGiven(options, "mode");
     const bool sharper = !IsCompensated(input.cloud.render_mode) && IsSharperThanFitsTo(from_cameras.median, *found);
-    const bool untagged = !input.cloud.render_mode && found->estimate.size < kLeastUntagged * from_cameras.median;
+    const bool untagged_and_finer =
+        !input.cloud.render_mode && found->estimate.size < kLeastUntagged * from_cameras.median;
     const double largest = std::max(found->largest, found->estimate.high);
     const bool impossible = from_cameras.median > kImpossible * largest;
-    const bool softer = !impossible && IsOfSoftPictures(input.cloud, from_cameras.median, *found);
+    const bool softer = !impossible && IsSofterThanFitsTo(input.cloud, from_cameras.median, *found);
     if (!said && softer) {
       LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
                      " (median), but the splat looks like one of soft pictures, out of focus or enlarged, which has "
                      "lost less: the width of pixels of ",
                      found->size, " is given back. --mode antialiased says that the pictures were sharp"));
       ScaleTo(found->size, from_cameras);
-    } else if (!said && (sharper || impossible || untagged)) {
+    } else if (!said && (sharper || impossible || untagged_and_finer)) {
       const double size = found->contradicted() ? found->size : found->largest;
       LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
                      " (median), but the splat is sharper than a fit to such pixels: like one to pixels of ", size,

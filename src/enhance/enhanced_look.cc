@@ -13,6 +13,7 @@
 #include "core/buffer.h"
 #include "core/kd_tree.h"
 #include "core/parallel.h"
+#include "core/quaternion_length.h"
 #include "core/rotation.h"
 #include "core/run_context.h"
 #include "core/statistics.h"
@@ -34,7 +35,6 @@ constexpr double kMostDifferent = 1;
 constexpr double kMostDeviations = 4;  // that count, of a feature
 constexpr double kUnlikeAny = 5;       // beyond that it is like nothing that was learned from
 constexpr double kNearlyRound = 0.2;   // ln of the ratio of two axes
-constexpr double kUnitLength = 0.01;   // .splat rounds lengths of one by up to 0.008
 constexpr double kNoHarmonics = 1e-8;  // product of the norms of two
 
 double Logarithm(double x) { return std::log(x + kLeast); }
@@ -209,11 +209,7 @@ std::optional<EnhancedLook> FindEnhancedLook(const GaussianCloud& showing, const
 bool HasQuaternionsOfTraining(const GaussianCloud& showing) {
   const size_t count = showing.opacity_logits.size();
   size_t own = 0;
-  for (size_t i = 0; i < count; ++i) {
-    double squares = 0;
-    for (size_t k = 0; k < 4; ++k) squares += double{showing.quats[4 * i + k]} * double{showing.quats[4 * i + k]};
-    own += std::abs(std::sqrt(squares) - 1) > kUnitLength;
-  }
+  for (size_t i = 0; i < count; ++i) own += IsNotNormalised(QuaternionLength(showing.quats.data() + 4 * i));
   return 2 * own > count;
 }
 

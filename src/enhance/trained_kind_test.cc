@@ -315,7 +315,6 @@ TEST(TrainedKind, EnhanceActsOnIt) {
   EXPECT_FALSE(run(wide).report.looks);
 }
 
-// Between the kinds next to nothing can be wrong.
 // Antialiased fits by MCMC to land from above have tails as classic ones of few steps.
 TEST(TrainedKind, OfLandSizesSayLess) {
   GaussianCloud cloud;
@@ -334,6 +333,7 @@ TEST(TrainedKind, OfLandSizesSayLess) {
   EXPECT_EQ(FindTrainedKind(thin), TrainedKind::kClassic) << "there are thinner ones than antialiased fits have";
 }
 
+// Between the kinds next to nothing can be wrong.
 TEST(TrainedKind, UnclearOnesGetLittle) {
   SizeTails tails{.gaussians = 5000, .middle = 0.26, .smallest = 0.8, .roundness = 0.2, .opaque = 0, .faint = 0.1};
   EXPECT_EQ(Judge(tails), TrainedKind::kClassic);

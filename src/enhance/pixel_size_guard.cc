@@ -390,6 +390,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   finding.size = std::max(finding.size, kSomeSize * estimate.size);  // also where regions bear nothing
   if (evidence.closest < kCloser * evidence.of_many) finding.closer = kCloser * evidence.of_many;
   if (evidence.all > 0 && evidence.all < kEnough) {
+    if (!finding.contradicted()) finding.of_more = finding.size;
     const double of_few = std::pow(static_cast<double>(evidence.all) / static_cast<double>(kEnough), kFewPower);
     finding.size = std::min(finding.size, estimate.size * of_few);
     finding.least = std::min(finding.least, finding.size);

@@ -25,6 +25,7 @@ struct PixelSizeFinding {
   // does no harm there, too: they come of smaller ones. 0: there are none.
   double closer = 0;
   double largest = 0;                       // that the outlines could mean: with and without black Gaussians
+  double of_more = 0;                       // `size` if it were of Gaussians enough; 0: it is, or more contradicts it
   PixelSizeEstimate estimate;               // what the outlines say
   double small_axis = 0;                    // PixelSizeEvidence::small_axis
   bool no_one_pixel = false;                // its Gaussians lie too unevenly for one

@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/random.h"
 #include "core/source_dir_for_test.h"
+#include "enhance/cloud_components.h"
 #include "formats/cloud_io.h"
 
 namespace anchorsplat {
@@ -19,7 +21,8 @@ namespace {
 constexpr double kPixelOfExamples = 0.0055013;  // of both examples
 
 GaussianCloud Placed(const char* object, double scale = 1, std::array<double, 3> at = {0, 0, 0}) {
-  auto cloud = ReadCloud(SourceDirForTest() / "examples" / object / "input.ply");
+  const std::filesystem::path path = SourceDirForTest() / object;
+  auto cloud = ReadCloud(path.extension().empty() ? SourceDirForTest() / "examples" / object / "input.ply" : path);
   EXPECT_TRUE(cloud.ok());
   if (!cloud.ok()) return {};
   for (size_t i = 0; i < cloud->means.size(); ++i) {
@@ -186,6 +189,28 @@ TEST(PixelSizesOfThings, BlackVeilsOfOneDoNotSpeakForTheOther) {
   const PixelSizesOfThings found = Find(cloud);
   ASSERT_EQ(found.things.size(), 2u);
   ExpectAll(FirstOf(found.sizes, lantern), kPixelOfExamples);
+}
+
+// 2,707 Gaussians of the horse lie apart; outlines of so few count less where they are alone.
+TEST(PixelSizesOfThings, FewThatSayTheSameAreOfThatTraining) {
+  const GaussianCloud horse = Placed("testdata/splats/rocking-horse.spz");
+  EXPECT_TRUE(Find(horse).things.empty());
+  // The same few from finer pictures: what they say is another size, and they are believed no more than before.
+  const auto components = FindComponents(horse);
+  ASSERT_EQ(components.count, 2);
+  GaussianCloud finer = horse;
+  for (size_t i = 0; i < static_cast<size_t>(horse.size()); ++i) {
+    if (components.component[i] != 1) continue;
+    for (size_t a = 0; a < 3; ++a) {
+      finer.means[3 * i + a] = 0.5f * finer.means[3 * i + a] - (a == 1 ? 1.0f : 0.0f);
+      finer.log_scales[3 * i + a] -= std::log(2.0f);
+    }
+  }
+  const PixelSizesOfThings found = Find(finer);
+  ASSERT_GE(found.things.size(), 2u);
+  const PixelSizeFinding& few = found.things[1].finding;
+  EXPECT_GT(few.of_more, 0);
+  EXPECT_LT(few.size, 0.8 * few.of_more);
 }
 
 TEST(PixelSizesOfThings, ThingsThatSayTheSameAreOfOneTraining) {

@@ -163,6 +163,12 @@ float CompactNetwork::Fade(const float* node, const std::array<float, 3>& widths
   return std::clamp((kFadeEnd - farthest) / (kFadeEnd - kFadeBegin), 0.0f, 1.0f);
 }
 
+float CompactNetwork::ShareOfLarge(const std::array<float, 3>& widths) const {
+  if (config_.copies == 1) return 1;
+  const float middle = 2 * widths[1];  // ln, pixels
+  return std::clamp((std::log(kVeryLarge) - middle) / std::log(kVeryLarge / kLarge), 0.0f, 1.0f);
+}
+
 namespace {
 
 Status CheckTask(const GaussianCloud& cloud, const CompactTask& task, const CompactConfig& config) {
@@ -291,8 +297,8 @@ Buffer<float> CompactNetwork::Fades(const CompactFeatures& features, const Compa
     features.Nodes(std::span(block.rows).subspan(static_cast<size_t>(begin), static_cast<size_t>(end - begin)),
                    nodes.data());
     for (int64_t i = begin; i < end; ++i) {
-      fades[static_cast<size_t>(i)] =
-          Fade(nodes.data() + (i - begin) * told, features.Widths(block.rows[static_cast<size_t>(i)]));
+      const auto widths = features.Widths(block.rows[static_cast<size_t>(i)]);
+      fades[static_cast<size_t>(i)] = std::min(Fade(nodes.data() + (i - begin) * told, widths), ShareOfLarge(widths));
     }
   });
   return fades;
@@ -424,8 +430,11 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
       }
       result.times.network += watch.Lap();
       of_block.block = b;
-      of_block.outside = places.alone;
-      of_block.partly = std::ranges::count_if(fades, [](float fade) { return fade > 0 && fade < 1; });
+      of_block.outside = of_block.partly = 0;
+      for (size_t i = 0; i < fades.size(); ++i) {
+        if (!(fades[i] >= 0 && fades[i] < 1) || ShareOfLarge(features.Widths(block.rows[i])) < 1) continue;
+        ++(fades[i] > 0 ? of_block.partly : of_block.outside);
+      }
       CopyGroups groups = GroupsOf(task, places, copies);
       output.Merge(places.rows, groups, of_block.part);
       if (checkpoint) checkpoint->Append(of_block);

@@ -53,7 +53,7 @@ struct CompactTask {
 struct CompactResult {
   // Copy k of all anchors before copy k + 1, then stand-ins and those that stayed alone; the input's metadata.
   GaussianCloud cloud;
-  int64_t outside = 0;     // Gaussians unlike the training data: filtered, and nothing else
+  int64_t outside = 0;     // Gaussians unlike the training data: filtered, and nothing else; not those too large
   int64_t partly = 0;      // Gaussians somewhat unlike it: a part of the residual
   int64_t not_finite = 0;  // Gaussians for which the network says something that is not finite: its start
   int64_t made = 0;        // Gaussians before the choice among copies
@@ -71,6 +71,10 @@ struct CompactResult {
 // of it keeps a part of the residual that falls from 1 to 0 with its distance (kFadeBegin to kFadeEnd, in feature units
 // of model/compact/compact_features.h; widths count as they are, beyond the bounds of their features too); at 0 it is
 // what the filter makes of it, one Gaussian.
+//
+// So does one of several copies whose middle axis measures kLarge pixels and more, none of it from kVeryLarge on:
+// pixels hid nothing of it, and copies whose centres lie far apart may come before or behind others than it did, and
+// show what it hid.
 class CompactNetwork {
  public:
   // Errors: of Validate(config) and of `source`; kBadFile naming the tensor when a weight is NaN or infinite.
@@ -122,6 +126,7 @@ class CompactNetwork {
   // Of a block's own Gaussians.
   Buffer<float> Fades(const CompactFeatures& features, const CompactBlock& block) const;
   float Fade(const float* node, const std::array<float, 3>& widths) const;
+  float ShareOfLarge(const std::array<float, 3>& widths) const;
 
   CompactConfig config_;
   std::string fingerprint_;  // of the configuration and all weights
@@ -133,6 +138,7 @@ class CompactNetwork {
 };
 
 inline constexpr float kFadeBegin = 0.25f, kFadeEnd = 0.75f;
+inline constexpr float kLarge = 4, kVeryLarge = 8;
 
 // True when the metadata of a tensor file is that of a compact network.
 bool IsCompactNetwork(const TensorFile& file);

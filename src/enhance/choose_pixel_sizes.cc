@@ -23,8 +23,9 @@ namespace {
 
 // Cameras and estimate further apart than this are worth a word: one of them does not belong to this splat.
 constexpr double kSuspiciousRatio = 1.5;
-// Cameras whose pixels are so many times larger than the splat may look like at most do not belong to it.
-constexpr double kImpossible = 3;
+// Cameras whose pixels are so many times larger than the splat may look like at most do not belong to it. Fits to sharp
+// pictures that are antialiased are taken for 0.42 of their pixels and more (160; by MCMC of 2,000 steps one for 0.29).
+constexpr double kImpossible = 3, kImpossibleOfAntialiased = 2;
 // Antialiased fits to soft pictures are taken for 0.3 to 0.7 of their pixels, as they have lost next to nothing, and
 // even their small Gaussians are 1.8 to 3.5 times as large as what they are taken for (all 17). Those of fits to sharp
 // ones that are taken for so little are 0.5 to 1.4 times as large (one of twenty is at 3.1). Small things of few
@@ -96,7 +97,9 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
     const bool untagged_and_finer =
         !input.cloud.render_mode && found->estimate.size < kLeastUntagged * from_cameras.median;
     const double largest = std::max(found->largest, found->estimate.high);
-    const bool impossible = from_cameras.median > kImpossible * largest;
+    const bool antialiased = input.cloud.render_mode == RenderMode::kAntialiased;
+    const bool impossible =
+        !found->too_sparse && from_cameras.median > (antialiased ? kImpossibleOfAntialiased : kImpossible) * largest;
     const bool softer = !impossible && IsSofterThanFitsTo(input.cloud, from_cameras.median, *found);
     if (!said && softer) {
       LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
@@ -104,6 +107,7 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
                      "lost less: the width of pixels of ",
                      found->size, " is given back. --mode antialiased says that the pictures were sharp"));
       ScaleTo(found->size, from_cameras);
+      report.pixel_size_source = "estimated";
     } else if (!said && (sharper || impossible || untagged_and_finer)) {
       const double size = found->contradicted() ? found->size : found->largest;
       LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
@@ -113,8 +117,8 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
                      input.cloud.render_mode ? "" : ", or was it trained with antialiasing (--mode antialiased)",
                      "? --mode or --filter-strength says that they are right all the same"));
       ScaleTo(size, from_cameras);
+      report.pixel_size_source = found->contradicted() ? kCautiousPixelSize : "estimated";
       if (found->contradicted()) {
-        report.pixel_size_source = kCautiousPixelSize;
         // Where these cameras are far off, so may be how they differ from Gaussian to Gaussian.
         const Buffer<float> cautious = CautiousPixelSizes(input.cloud, *found);
         for (size_t i = 0; i < from_cameras.sizes.size(); ++i) {

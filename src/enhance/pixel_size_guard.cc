@@ -70,6 +70,9 @@ constexpr double kSmallAxis = 0.4, kSmallestAxis = 0.3, kSmallFall = 4;
 // That and how far the densest tenth lies apart, their geometric mean in pixels of the estimate: 0.49 and more in 177
 // fits, 0.34 where hills seen from above are taken for pixels seven times as large.
 constexpr double kSmallAndDense = 0.42;
+// Where the densest tenth lies further apart, the estimate is too small if anything: 0.5 to 2.7 in 60 fits and 0.5 to
+// 1.1 in captures; 4.8, 6.9 and 7.7 in bushes whose leaves are taken for 0.25, 0.16 and 0.12 of their pixels.
+constexpr double kTooSparse = 4;
 // Black Gaussians may move the estimate this much before it counts as theirs.
 constexpr double kMoved = 1.5;
 // An interval that is wider from end to end says nothing.
@@ -104,6 +107,9 @@ constexpr double kCrowdedFall = 4;
 // are far apart: fits of 1,500 look like pixels 1.4 to 2.3 times too large, of 400 like 2.7 to 5.
 constexpr int64_t kEnough = 4000;
 constexpr double kFewPower = 0.75;
+// Spacing of fits that were kept to 800 to 3,500 Gaussians, in pixels of the estimate: 1.5 to 2.2 (eight), and 0.7 to
+// 1.7 where there were enough.
+constexpr double kClose = 1.3;
 
 struct Surface {
   double spacing = 0;  // 0: too few
@@ -280,6 +286,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   finding.largest = std::max(estimate.size, evidence.without_black);
   finding.estimate = estimate;
   finding.small_axis = evidence.small_axis;
+  finding.too_sparse = evidence.dense > kTooSparse * estimate.size;
   finding.part = estimate.cut_outlines > kPart;
   const double of_whole = MostGaussiansPerPixel(evidence.gaussians, estimate.showing);
   const double cut = std::clamp((estimate.cut_outlines - kPart) / (kLargelyCut - kPart), 0.0, 1.0);
@@ -390,7 +397,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   finding.size = std::max(finding.size, kSomeSize * estimate.size);  // also where regions bear nothing
   if (evidence.closest < kCloser * evidence.of_many) finding.closer = kCloser * evidence.of_many;
   if (evidence.all > 0 && evidence.all < kEnough) {
-    if (!finding.contradicted()) finding.of_more = finding.size;
+    if (!finding.contradicted() && evidence.spacing < kClose * estimate.size) finding.of_more = finding.size;
     const double of_few = std::pow(static_cast<double>(evidence.all) / static_cast<double>(kEnough), kFewPower);
     finding.size = std::min(finding.size, estimate.size * of_few);
     finding.least = std::min(finding.least, finding.size);

@@ -24,10 +24,13 @@ struct PixelSizeFinding {
   // Gaussians among others that lie closer than this on the surface (GaussianRegions::SpacingOfMany) get the pixel that
   // does no harm there, too: they come of smaller ones. 0: there are none.
   double closer = 0;
-  double largest = 0;                       // that the outlines could mean: with and without black Gaussians
-  double of_more = 0;                       // `size` if it were of Gaussians enough; 0: it is, or more contradicts it
+  double largest = 0;  // that the outlines could mean: with and without black Gaussians
+  // `size` if it were of Gaussians enough, where these lie so close that they do not make its outlines soft. 0: it is
+  // of enough, they lie further apart, or more contradicts it.
+  double of_more = 0;
   PixelSizeEstimate estimate;               // what the outlines say
   double small_axis = 0;                    // PixelSizeEvidence::small_axis
+  bool too_sparse = false;                  // its densest Gaussians lie further apart than in fits to such pixels
   bool no_one_pixel = false;                // its Gaussians lie too unevenly for one
   bool balls = false;                       // its Gaussians are, and their sizes say nothing about pixels
   bool part = false;                        // cut out of something larger: a tenth of its outlines and more are cuts
@@ -42,7 +45,8 @@ struct PixelSizeFinding {
   static constexpr double kTooStrange = 1.75;
   // Whether what the splat says of itself counts against cameras.
   bool sure() const {
-    return !contradicted() && !part && !rough() && estimate.strangeness < kTooStrange && estimate.softness == 1;
+    return !contradicted() && !part && !rough() && !too_sparse && estimate.strangeness < kTooStrange &&
+           estimate.softness == 1;
   }
   bool is_one() const { return least >= size && closer == 0; }  // `size` is that of all Gaussians
 

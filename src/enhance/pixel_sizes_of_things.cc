@@ -81,7 +81,6 @@ PixelSizeFinding Unknown(const PixelSizeFinding& whole, std::string why) {
 }
 
 double MedianFootprint(const GaussianCloud& showing) {
-  if (showing.empty()) return 0;
   Buffer<float> footprint(static_cast<size_t>(showing.size()));
   for (size_t i = 0; i < footprint.size(); ++i) {
     const auto [smallest, middle, largest] = AxesOf(showing, i);
@@ -90,16 +89,12 @@ double MedianFootprint(const GaussianCloud& showing) {
   return double{Quantile(footprint, 0.5)};
 }
 
-bool IsAsLarge(double footprint, const GaussianCloud& whole) {
-  return footprint >= kAsLarge * MedianFootprint(FindShowingGaussians(whole).all);
-}
-
 // Whether loose Gaussians and small pieces are as large as those of the whole, and lie so far apart that no pixel of
 // that size is too large for them.
 bool AreAsCoarse(const GaussianCloud& loose, const GaussianCloud& whole, double size) {
   const GaussianCloud showing = FindShowingGaussians(loose).all;
   if (showing.empty()) return true;
-  if (!IsAsLarge(MedianFootprint(showing), whole)) return false;
+  if (MedianFootprint(showing) < kAsLarge * MedianFootprint(FindShowingGaussians(whole).all)) return false;
   const GaussianRegions regions(showing);
   const int64_t count = showing.size(), samples = std::min(kLooseSamples, count);
   Buffer<float> spacing(static_cast<size_t>(samples));
@@ -112,11 +107,10 @@ bool AreAsCoarse(const GaussianCloud& loose, const GaussianCloud& whole, double 
 
 bool Alike(double a, double b, double factor) { return a < factor * b && b < factor * a; }
 
-// A thing of few Gaussians may be of the whole's training: its outlines say the same, and its Gaussians are as large.
-void BelieveFew(double footprint, const GaussianCloud& cloud, const PixelSizeFinding& whole,
-                PixelSizeFinding& finding) {
+// A thing of few Gaussians may be of the whole's training: its outlines say about the same.
+void BelieveFew(const PixelSizeFinding& whole, PixelSizeFinding& finding) {
   if (whole.contradicted() || whole.of_more > 0 || !(finding.of_more > 0)) return;
-  if (!Alike(finding.of_more, whole.size, kSame) || !IsAsLarge(footprint, cloud)) return;
+  if (!Alike(finding.of_more, whole.size, kAlike)) return;
   finding.size = finding.least = std::min(finding.of_more, whole.size);
   finding.contradictions.clear();
 }
@@ -172,7 +166,6 @@ PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const Pixe
     extents.push_back(ExtentOf(alone));
     ThingPixelSize thing{std::ssize(rows[k]), Unknown(whole, "its outlines say nothing")};
     ShowingGaussians showing = FindShowingGaussians(alone);
-    const double footprint = MedianFootprint(showing.all);
     std::vector<int64_t> showing_rows;
     for (const int64_t own : showing.rows_of_all) {
       const int64_t row = rows[k][static_cast<size_t>(own)];
@@ -185,7 +178,7 @@ PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const Pixe
       thing.finding.size = kNothing * whole.size;
     } else if (auto found = FindPixelSize(std::move(showing), cloud.render_mode); found.ok()) {
       thing.finding = *std::move(found);
-      BelieveFew(footprint, cloud, whole, thing.finding);
+      BelieveFew(whole, thing.finding);
     }
     out.things.push_back(std::move(thing));
   }

@@ -53,6 +53,7 @@ HARDLY_SOFT, SOFT = 0.3, 0.5  # kHardlySoft, kSoft in pixel_size_estimate.cc
 MOST_CORRECTION = 0.5  # kMostCorrection
 UPWARDS = 0.5  # kUpwards
 INTERVAL = 2  # kInterval
+LEAST_HALF_OF_COMPENSATED = 0.5
 # Antialiased fits to soft pictures have lost next to nothing, those of few steps less than a pixel of theirs. What is learned
 # for them is the share of the pixel that gives most.
 SOFT_ANTIALIASED, HARMLESS = "aa-soft", 0.35
@@ -127,7 +128,7 @@ def read_standard(path=STANDARD_FILE):
     text = path.read_text(encoding="utf-8")
     array = {key: np.array([float(v) for v in re.search(rf"\.{key} = {{(.*?)}}", text, re.S)[1].split(",")])
              for key in ("mean", "deviation", "weight")}
-    return array | {"intercept": float(re.search(r"\.intercept = ([-+.\de]+)", text)[1])}
+    return array | {key: float(re.search(rf"\.{key} = ([-+.\de]+)", text)[1]) for key in ("intercept", "error")}
 
 
 def fit(objects, ridge, prior=None):
@@ -269,19 +270,22 @@ def train_kinds(objects, arguments):
     correction, corrected, unknown = train_correction(objects, both)
     print(f"corrected: {describe(corrected)}")
     print(f"  kinds left out: {describe(unknown)}")
+    error = np.sqrt(np.mean(corrected[share > 0] ** 2))
+    inside = np.abs(corrected) < INTERVAL * ((1 - share) * standard["error"] + share * error)
+    print(f"inside of the interval: {inside.sum()} of {len(inside)}")
     for kind in sorted({o["kind"] for o in objects}):
         mine = [k for k, o in enumerate(objects) if o["kind"] == kind]
         ratios = " ".join(f"{r:.2f}" for r in sorted(np.exp(corrected[mine])))
         two = f"{np.exp(both[mine]).min():.2f}–{np.exp(both[mine]).max():.2f}"
-        print(f"  {kind or 'others'}: {np.exp(said[mine]).min():.2f}–{np.exp(said[mine]).max():.2f} → {two} → {ratios}")
+        print(f"  {kind or 'others'}: {np.exp(said[mine]).min():.2f}–{np.exp(said[mine]).max():.2f} → {two} → {ratios}; "
+              f"{inside[mine].sum()} of {len(mine)} inside")
     if arguments.list:
         for o, s, e, c in zip(objects, said, both, corrected):
             print(f"  {np.exp(s):.2f} → {np.exp(e):.2f} → {np.exp(c):.2f}  {o['kind']} {o['name']}")
     if arguments.correction:
         write_correction(arguments.correction, correction, len(objects), "kPixelSizeCorrection")
     if arguments.output:
-        write(arguments.output, fit(objects, best, standard), np.sqrt(np.mean(corrected[share > 0] ** 2)), len(objects),
-              "<kKindsPixelSizeFeatures> kKindsPixelSize")
+        write(arguments.output, fit(objects, best, standard), error, len(objects), "<kKindsPixelSizeFeatures> kKindsPixelSize")
 
 
 def train_antialiased(objects, arguments):
@@ -297,15 +301,17 @@ def train_antialiased(objects, arguments):
         print(f"  kinds left out of the correction: {describe(results[ridge][2])}")
     ridge = min(results, key=lambda r: np.sqrt(np.mean(results[r][1] ** 2)))
     correction, corrected, _ = results[ridge]
-    print(f"ridge {ridge:g} chosen; estimate / truth by kind:")
+    print(f"ridge {ridge:g} chosen; estimate / what it should learn, by kind:")
+    sharp = np.array([not o["kind"].startswith(SOFT_ANTIALIASED) for o in objects])
+    error = np.quantile(np.abs(corrected[sharp]), 0.9) / INTERVAL  # the interval holds nine in ten
+    half = max(INTERVAL * error, LEAST_HALF_OF_COMPENSATED)
     for kind in sorted({o["kind"] for o in objects}):
-        ratios = sorted(np.exp(c) for c, o in zip(corrected, objects) if o["kind"] == kind)
-        print(f"  {kind}: " + " ".join(f"{r:.2f}" for r in ratios))
+        mine = sorted(c for c, o in zip(corrected, objects) if o["kind"] == kind)
+        print(f"  {kind}: {' '.join(f'{np.exp(c):.2f}' for c in mine)}; "
+              f"{sum(abs(c) < half for c in mine)} of {len(mine)} inside")
     if arguments.correction:
         write_correction(arguments.correction, correction, len(objects), "kAntialiasedPixelSizeCorrection")
     if arguments.output:
-        sharp = np.array([not o["kind"].startswith(SOFT_ANTIALIASED) for o in objects])
-        error = np.quantile(np.abs(corrected[sharp]), 0.9) / INTERVAL  # the interval holds nine in ten
         write(arguments.output, fit(objects, ridge, standard), error, len(objects),
               "<kAntialiasedPixelSizeFeatures> kAntialiasedPixelSize")
 

@@ -337,7 +337,12 @@ Recipe SingleRecipe(const ObjectSettings& settings) {
 Result<Recipe> ReadRecipe(const std::filesystem::path& path, const ObjectSettings& defaults) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, ReadFileBytes(path, kMaxBytes));
   try {
-    return RecipeFrom(path.string(), toml::parse(text), defaults);
+    const toml::table root = toml::parse(text);
+    if (root.empty()) {
+      return Error{ErrorCode::kBadFile,
+                   Cat(path.string(), ": sets nothing; without a recipe the options' defaults count")};
+    }
+    return RecipeFrom(path.string(), root, defaults);
   } catch (const toml::parse_error& error) {
     return Error{ErrorCode::kBadFile,
                  Cat(path.string(), ": line ", error.source().begin.line, ": not TOML: ", error.description())};

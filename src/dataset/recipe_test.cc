@@ -62,6 +62,16 @@ TEST(Recipe, WithoutMixIsOneEntry) {
   EXPECT_EQ(recipe->entries[0].settings.fit_steps, 500);
 }
 
+// Half an hour of fits by the defaults is not what somebody means who gives an empty file.
+TEST(Recipe, EmptyIsNone) {
+  for (const char* text : {"", "# nothing yet\n"}) {
+    const auto recipe = Read(text);
+    ASSERT_FALSE(recipe.ok());
+    EXPECT_EQ(recipe.error().code, ErrorCode::kBadFile);
+    EXPECT_NE(recipe.error().message.find("sets nothing"), std::string::npos);
+  }
+}
+
 TEST(Recipe, MistakesNameTheirLine) {
   const auto complains = [](const std::string& text, const std::string& about) {
     const auto recipe = Read(text);

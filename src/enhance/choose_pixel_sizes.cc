@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/activations.h"
 #include "core/log.h"
 #include "core/render_mode.h"
 #include "core/statistics.h"
@@ -16,6 +17,7 @@
 #include "enhance/pixel_size_guard.h"
 #include "enhance/pixel_sizes_of_things.h"
 #include "fit/training_views.h"
+#include "render/constants.h"
 
 namespace anchorsplat {
 
@@ -41,6 +43,10 @@ bool IsSofterThanFitsTo(const GaussianCloud& cloud, double pixel, const PixelSiz
   return cloud.render_mode == RenderMode::kAntialiased && !found.contradicted() &&
          found.size < kSofterThanCameras * pixel && found.size > kSoftest * pixel &&
          found.small_axis > kSmallOfSoft * found.size;
+}
+
+bool ShowsNothing(const GaussianCloud& cloud) {
+  return std::ranges::none_of(cloud.opacity_logits, [](float logit) { return Sigmoid(logit) >= kMinAlpha; });
 }
 
 void ScaleTo(double median, CameraPixelSizes& sizes) {
@@ -211,6 +217,12 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
   }
   if (options.train_width && !options.cameras) {
     return Error{ErrorCode::kBadArgument, "--train-width says how cameras were shrunk; it needs --cameras"};
+  }
+  if (input.cloud.size() > 0 && ShowsNothing(input.cloud)) {
+    LogWarning(Cat("all of its ", WithThousands(input.cloud.size()),
+                   " Gaussians are less opaque than 1/255: nothing of the splat shows, and it stays as it is"));
+    report.pixel_size_source = kUnknownPixelSize;
+    return {};
   }
   if (options.cameras) return PixelSizesFromTrainingCameras(options, says, input, report);
   if (options.pixel_size) {

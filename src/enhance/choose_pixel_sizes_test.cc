@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -99,6 +100,42 @@ TEST(ChoosePixelSizes, UntaggedSplatsOfFarFinerLooksAreNotWidenedByTheirCameras)
   EXPECT_NEAR(pixel_with(2 * own, {}), 2 * own, 0.2 * own);
   EXPECT_NEAR(pixel_with(2.9 * own, RenderMode::kClassic), 2.9 * own, 0.3 * own);
   EXPECT_LT(pixel_with(2.9 * own, {}), 1.5 * own);
+}
+
+// MCMC of a black object over black ends so.
+TEST(ChoosePixelSizes, WhatShowsNothingStaysAsItIs) {
+  GaussianCloud cloud = BedOfSoftPictures();
+  for (float& logit : cloud.opacity_logits) logit = -15;
+  EnhanceOptions options;
+  options.method = "filter";
+  for (const bool cameras : {false, true}) {
+    if (cameras) options.cameras = TrainingCameras();
+    const auto same = Enhance(GaussianCloud(cloud), options);
+    ASSERT_TRUE(same.ok()) << same.error().message;
+    EXPECT_EQ(same->report.pixel_size_source, kUnknownPixelSize);
+    EXPECT_TRUE(std::ranges::equal(same->cloud.log_scales, cloud.log_scales));
+  }
+}
+
+// Leaves and twigs are taken for a seventh of their pixels, and lie seven of such apart: that says nothing against
+// cameras.
+TEST(ChoosePixelSizes, CamerasOfGaussiansThatLieFarApartAreBelieved) {
+  const GaussianCloud bed = [] {
+    GaussianCloud cloud = BedOfSoftPictures();
+    cloud.render_mode = RenderMode::kClassic;
+    return cloud;
+  }();
+  const auto found = FindPixelSize(bed);
+  ASSERT_TRUE(found.ok());
+  EXPECT_FALSE(found->too_sparse);
+  PixelSizeEvidence evidence = *GatherPixelSizeEvidence(bed);
+  PixelSizeFinding far = Judge(found->estimate, evidence);
+  EXPECT_FALSE(far.too_sparse);
+  evidence.dense = 4.6 * found->estimate.size;
+  far = Judge(found->estimate, evidence);
+  EXPECT_TRUE(far.too_sparse);
+  EXPECT_FALSE(far.sure());
+  EXPECT_FALSE(IsSharperThanFitsTo(10 * found->estimate.size, far));
 }
 
 }  // namespace

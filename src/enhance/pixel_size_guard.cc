@@ -72,7 +72,7 @@ constexpr double kSmallAxis = 0.4, kSmallestAxis = 0.3, kSmallFall = 4;
 constexpr double kSmallAndDense = 0.42;
 // Where the densest tenth lies further apart, the estimate is too small if anything: 0.5 to 2.7 in 60 fits and 0.5 to
 // 1.1 in captures; 4.8, 6.9 and 7.7 in bushes whose leaves are taken for 0.25, 0.16 and 0.12 of their pixels.
-constexpr double kTooSparse = 4;
+constexpr double kTooSparse = 4.5;
 // Black Gaussians may move the estimate this much before it counts as theirs.
 constexpr double kMoved = 1.5;
 // An interval that is wider from end to end says nothing.

@@ -289,19 +289,19 @@ CopyGroups GroupsOf(const CompactTask& task, const BlockPlaces& places, int64_t 
 
 }  // namespace
 
-Buffer<float> CompactNetwork::Fades(const CompactFeatures& features, const CompactBlock& block) const {
-  Buffer<float> fades(static_cast<size_t>(block.own()));
+Buffer<float> CompactNetwork::Familiarity(const CompactFeatures& features, const CompactBlock& block) const {
+  Buffer<float> shares(static_cast<size_t>(block.own()));
   const int64_t told = NodeFeatures(config_);
   ParallelFor(0, block.own(), kRowsPerTask, [&](int64_t begin, int64_t end) {
     Buffer<float> nodes(static_cast<size_t>((end - begin) * told));
     features.Nodes(std::span(block.rows).subspan(static_cast<size_t>(begin), static_cast<size_t>(end - begin)),
                    nodes.data());
     for (int64_t i = begin; i < end; ++i) {
-      const auto widths = features.Widths(block.rows[static_cast<size_t>(i)]);
-      fades[static_cast<size_t>(i)] = std::min(Fade(nodes.data() + (i - begin) * told, widths), ShareOfLarge(widths));
+      shares[static_cast<size_t>(i)] =
+          Fade(nodes.data() + (i - begin) * told, features.Widths(block.rows[static_cast<size_t>(i)]));
     }
   });
-  return fades;
+  return shares;
 }
 
 int64_t CompactNetwork::Make(const CompactFeatures& features, const CompactAnchors& anchors, const CompactBlock& block,
@@ -409,10 +409,17 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
     for (int64_t b = next; b < blocks.count(); ++b) {
       if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped"};
       const CompactBlock& block = blocks.Find(b);
-      Buffer<float> fades = Fades(features, block);
-      for (size_t i = 0; i < fades.size() && !task.inside.empty(); ++i) {
+      const Buffer<float> familiar = Familiarity(features, block);
+      Buffer<float> fades = familiar;
+      of_block.outside = of_block.partly = 0;
+      for (size_t i = 0; i < fades.size(); ++i) {
         const int32_t row = near.rows[static_cast<size_t>(block.rows[i])];
-        if (task.inside[static_cast<size_t>(row)] == 0) fades[i] = kLeftOut;
+        if (!task.inside.empty() && task.inside[static_cast<size_t>(row)] == 0) {
+          fades[i] = kLeftOut;
+          continue;
+        }
+        fades[i] = std::min(familiar[i], ShareOfLarge(features.Widths(block.rows[i])));
+        if (familiar[i] < 1) ++(familiar[i] > 0 ? of_block.partly : of_block.outside);
       }
       const BlockPlaces places = PlacesOf(block, fades, near.rows, copies + (stand_ins ? 1 : 0));
       progress.Advance(block.own());
@@ -420,7 +427,7 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
       made.Resize(places.made, near.cloud.sh_degree);
       of_block.not_finite = Make(features, anchors, block, fades, places.first, places.inside, states, made);
       if (stand_ins) {
-        Buffer<float> others = task.stand_in->Fades(features, block);
+        Buffer<float> others = task.stand_in->Familiarity(features, block);
         Buffer<int64_t> rows = places.first;
         for (size_t i = 0; i < fades.size(); ++i) {
           if (!(fades[i] > 0)) others[i] = kLeftOut;
@@ -430,11 +437,6 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
       }
       result.times.network += watch.Lap();
       of_block.block = b;
-      of_block.outside = of_block.partly = 0;
-      for (size_t i = 0; i < fades.size(); ++i) {
-        if (!(fades[i] >= 0 && fades[i] < 1) || ShareOfLarge(features.Widths(block.rows[i])) < 1) continue;
-        ++(fades[i] > 0 ? of_block.partly : of_block.outside);
-      }
       CopyGroups groups = GroupsOf(task, places, copies);
       output.Merge(places.rows, groups, of_block.part);
       if (checkpoint) checkpoint->Append(of_block);

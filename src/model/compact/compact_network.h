@@ -53,7 +53,7 @@ struct CompactTask {
 struct CompactResult {
   // Copy k of all anchors before copy k + 1, then stand-ins and those that stayed alone; the input's metadata.
   GaussianCloud cloud;
-  int64_t outside = 0;     // Gaussians unlike the training data: filtered, and nothing else; not those too large
+  int64_t outside = 0;     // Gaussians unlike the training data: filtered, and nothing else
   int64_t partly = 0;      // Gaussians somewhat unlike it: a part of the residual
   int64_t not_finite = 0;  // Gaussians for which the network says something that is not finite: its start
   int64_t made = 0;        // Gaussians before the choice among copies
@@ -123,8 +123,8 @@ class CompactNetwork {
   int64_t Make(const CompactFeatures& features, const CompactAnchors& anchors, const CompactBlock& block,
                std::span<const float> fades, std::span<const int64_t> first, int64_t stride, States& states,
                GaussianCloud& made) const;
-  // Of a block's own Gaussians.
-  Buffer<float> Fades(const CompactFeatures& features, const CompactBlock& block) const;
+  // Of a block's own Gaussians: 1 within the range of the training data, 0 far outside.
+  Buffer<float> Familiarity(const CompactFeatures& features, const CompactBlock& block) const;
   float Fade(const float* node, const std::array<float, 3>& widths) const;
   float ShareOfLarge(const std::array<float, 3>& widths) const;
 

@@ -134,7 +134,8 @@ TEST(CompactNetwork, OddCloudsStayFinite) {
         task.pixel_sizes = {&pixel, 1};
         const auto result = network.Apply(cloud, task);
         ASSERT_TRUE(result.ok()) << result.error().message;
-        EXPECT_EQ(result->cloud.size(), config.copies * cloud.size());
+        const bool wider = pixel < kPixel;  // all of them, by far, and stay one
+        EXPECT_EQ(result->cloud.size(), (wider ? 1 : config.copies) * cloud.size());
         for (int64_t i = 0; i < result->cloud.size(); ++i) EXPECT_TRUE(IsUsable(result->cloud, i)) << i;
       }
     }
@@ -192,6 +193,36 @@ TEST(CompactNetwork, WidthsBeyondTheFeaturesBoundsAreUnlikeTheTrainingData) {
   GaussianCloud cloud = SheetCloud(60);
   for (float& s : cloud.log_scales) s = std::log(kPixel) - 12;
   EXPECT_EQ(wide.Apply(cloud, Task())->outside, 0);
+}
+
+// Their copies might come before what was in front of them.
+TEST(CompactNetwork, WhatIsWiderThanPixelsStaysOne) {
+  const CompactNetwork network = Network({});
+  const auto made = [&](float middle) {
+    GaussianCloud cloud = SheetCloud(60);
+    for (size_t i = 0; i < 60; ++i) {
+      for (size_t a = 0; a < 3; ++a) {
+        cloud.log_scales[3 * i + a] = std::log(kPixel * (a == 0 ? 12.0f : a == 1 ? middle : 0.1f));
+      }
+    }
+    const auto result = network.Apply(cloud, Task());
+    EXPECT_TRUE(result.ok());
+    EXPECT_EQ(result->outside + result->partly, 0) << "it is nothing that training had not";
+    return result.ok() ? result->cloud : GaussianCloud{};
+  };
+  EXPECT_EQ(made(kLarge - 1).size(), 4 * 60);
+  EXPECT_EQ(made(kVeryLarge + 1).size(), 60);
+  const GaussianCloud half = made(0.5f * (kLarge + kVeryLarge));
+  EXPECT_EQ(half.size(), 4 * 60) << "copies that have hardly moved";
+  // One of several copies only: what makes one of each moves nothing apart.
+  const CompactNetwork single = Network({.copies = 1});
+  GaussianCloud cloud = SheetCloud(60);
+  for (float& s : cloud.log_scales) s = std::log(kPixel * 10);
+  const auto same = single.Apply(cloud, Task());
+  ASSERT_TRUE(same.ok());
+  EXPECT_EQ(same->outside, 0);
+  EXPECT_NE(std::vector<float>(same->cloud.sh.begin(), same->cloud.sh.end()),
+            std::vector<float>(cloud.sh.begin(), cloud.sh.end()));
 }
 
 TEST(CompactNetwork, SaysWhenItsOutputIsNotFinite) {

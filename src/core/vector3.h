@@ -4,8 +4,8 @@
 
 namespace anchorsplat {
 
-// Products and differences of two vectors of three, in their own precision. Sums from left to right, so that what is made of them is
-// the same everywhere.
+// Products and differences of two vectors of three, in their own precision. Sums from left to right, so that what is
+// made of them is the same everywhere.
 
 template <typename T>
 T Dot(const T* a, const T* b) {

@@ -19,8 +19,8 @@ bool IsMarkedEnhanced(const CloudView& cloud);
 std::string PartEnhancedComment(const std::string& method, double upscale);
 bool IsMarkedPartEnhanced(const CloudView& cloud);
 
-// Whether there is nothing to give back to the whole of it, as far as the file says: it was fitted to areas of pixels or
-// enhanced before, or a part of it was.
+// Whether there is nothing to give back to the whole of it, as far as the file says: it was fitted to areas of pixels
+// or enhanced before, or a part of it was.
 bool HasLostNoWidth(const CloudView& cloud);
 
 }  // namespace anchorsplat

@@ -15,8 +15,8 @@ namespace anchorsplat {
 // marks of core/lost_nothing_mark.h; neither is there where there are none.
 nlohmann::json AssetOf(std::span<const std::string> comments);
 
-// The credits and marks that such a file says, as comments; none where it says nothing, or no text. kBadFile: a mebibyte
-// of credits.
+// The credits and marks that such a file says, as comments; none where it says nothing, or no text. kBadFile: a
+// mebibyte of credits.
 Result<std::vector<std::string>> CommentsOfAsset(const JsonValue& root);
 
 }  // namespace anchorsplat

@@ -27,7 +27,7 @@ namespace {
 constexpr double kSuspiciousRatio = 1.5;
 // Cameras whose pixels are so many times larger than the splat may look like at most do not belong to it. Fits to sharp
 // pictures that are antialiased are taken for 0.42 of their pixels and more (160; by MCMC of 2,000 steps one for 0.29).
-constexpr double kImpossible = 3, kImpossibleOfAntialiased = 2;
+constexpr double kImpossible = 2.5, kImpossibleOfAntialiased = 2;
 // Antialiased fits to soft pictures are taken for 0.3 to 0.7 of their pixels, as they have lost next to nothing, and
 // even their small Gaussians are 1.8 to 3.5 times as large as what they are taken for (all 17). Those of fits to sharp
 // ones that are taken for so little are 0.5 to 1.4 times as large (one of twenty is at 3.1). Small things of few
@@ -99,13 +99,15 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
     const double ratio = found->size / from_cameras.median;
     // Whoever says a mode or a strength means these cameras.
     const bool said = options.filter_strength || IsGiven(options, "mode");
-    const bool sharper = !IsCompensated(input.cloud.render_mode) && IsSharperThanFitsTo(from_cameras.median, *found);
+    const bool sharper =
+        (!IsCompensated(input.cloud.render_mode) && IsSharperThanFitsTo(from_cameras.median, *found)) ||
+        LiesTooCloseFor(from_cameras.median, *found);
     const bool untagged_and_finer =
         !input.cloud.render_mode && found->estimate.size < kLeastUntagged * from_cameras.median;
     const double largest = std::max(found->largest, found->estimate.high);
     const bool antialiased = input.cloud.render_mode == RenderMode::kAntialiased;
-    const bool impossible =
-        !found->too_sparse && from_cameras.median > (antialiased ? kImpossibleOfAntialiased : kImpossible) * largest;
+    const bool impossible = !LiesAsFitsTo(from_cameras.median, *found) &&
+                            from_cameras.median > (antialiased ? kImpossibleOfAntialiased : kImpossible) * largest;
     const bool softer = !impossible && IsSofterThanFitsTo(input.cloud, from_cameras.median, *found);
     if (!said && softer) {
       LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
@@ -131,7 +133,8 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
           from_cameras.sizes[i] = std::min(from_cameras.sizes[i], cautious[i]);
         }
       }
-    } else if (found->sure() && (ratio > kSuspiciousRatio || ratio < 1 / kSuspiciousRatio)) {
+    } else if ((found->sure() && (ratio > kSuspiciousRatio || ratio < 1 / kSuspiciousRatio)) ||
+               from_cameras.median > kSuspiciousRatio * found->estimate.high) {
       LogWarning(Cat("the cameras say a training pixel of ", from_cameras.median,
                      " (median), the splat itself looks like ", found->size,
                      ": are these its training cameras, at the size it was trained at (--train-width)?"));
@@ -218,7 +221,7 @@ Status ChoosePixelSizes(const EnhanceOptions& options, bool pictures, bool says,
   if (options.train_width && !options.cameras) {
     return Error{ErrorCode::kBadArgument, "--train-width says how cameras were shrunk; it needs --cameras"};
   }
-  if (input.cloud.size() > 0 && ShowsNothing(input.cloud)) {
+  if (!input.cloud.empty() && ShowsNothing(input.cloud)) {
     LogWarning(Cat("all of its ", WithThousands(input.cloud.size()),
                    " Gaussians are less opaque than 1/255: nothing of the splat shows, and it stays as it is"));
     report.pixel_size_source = kUnknownPixelSize;

@@ -118,24 +118,23 @@ TEST(ChoosePixelSizes, WhatShowsNothingStaysAsItIs) {
 }
 
 // Leaves and twigs are taken for a seventh of their pixels, and lie seven of such apart: that says nothing against
-// cameras.
+// cameras of pixels that they lie one of apart.
 TEST(ChoosePixelSizes, CamerasOfGaussiansThatLieFarApartAreBelieved) {
-  const GaussianCloud bed = [] {
-    GaussianCloud cloud = BedOfSoftPictures();
-    cloud.render_mode = RenderMode::kClassic;
-    return cloud;
-  }();
-  const auto found = FindPixelSize(bed);
-  ASSERT_TRUE(found.ok());
-  EXPECT_FALSE(found->too_sparse);
-  PixelSizeEvidence evidence = *GatherPixelSizeEvidence(bed);
-  PixelSizeFinding far = Judge(found->estimate, evidence);
-  EXPECT_FALSE(far.too_sparse);
-  evidence.dense = 4.6 * found->estimate.size;
-  far = Judge(found->estimate, evidence);
-  EXPECT_TRUE(far.too_sparse);
-  EXPECT_FALSE(far.sure());
-  EXPECT_FALSE(IsSharperThanFitsTo(10 * found->estimate.size, far));
+  PixelSizeEvidence evidence;
+  evidence.gaussians = evidence.all = 20'000;
+  evidence.spacing = evidence.footprint = evidence.of_many = evidence.dense = evidence.closest = 0.007;
+  evidence.small_axis = 0.001;
+  const PixelSizeEstimate leaves{.size = 0.001, .low = 0.0008, .high = 0.0012};
+  const PixelSizeFinding found = Judge(leaves, evidence);
+  EXPECT_TRUE(LiesAsFitsTo(0.007, found));
+  EXPECT_FALSE(IsSharperThanFitsTo(0.007, found));
+  EXPECT_FALSE(LiesTooCloseFor(0.007, found));
+  // Not of pixels that they lie a third of apart.
+  EXPECT_FALSE(LiesAsFitsTo(0.021, found));
+  EXPECT_TRUE(IsSharperThanFitsTo(0.021, found));
+  EXPECT_TRUE(LiesTooCloseFor(0.021, found));
+  evidence.dense = 0.004;
+  EXPECT_FALSE(LiesAsFitsTo(0.007, Judge(leaves, evidence))) << "as far apart as in other fits";
 }
 
 }  // namespace

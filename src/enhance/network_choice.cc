@@ -87,12 +87,14 @@ void ChooseNetwork(const EnhanceOptions& options, bool unknown_of_few, MethodPla
   const bool rough = one && report.finding && report.finding->rough();
   const bool large = rough && MayBeTooLarge(*report.finding);
   const bool soft = one && IsOfSoftPictures(input.softness);
+  // Of captures of which neither kind nor pixel is known networks make spots and haze that pictures do not have.
+  const bool doubtful = report.finding && report.finding->contradicted();
   const bool network_alone = !plan.chosen_by.empty() && plan.start == nullptr && plan.method->adds_detail;
   if (report.finding && report.finding->balls) {
     LeaveNetworksOut(plan, "has learned from Gaussians that are no balls");
   } else if (options.upscale < kLeastUpscaleOfNetworks) {
     LeaveNetworksOut(plan, "has learned what is missing 2 to 8 times closer");
-  } else if (unknown_of_few || raised || (unclear && !BearsSmallPixels(plan, input))) {
+  } else if (unknown_of_few || raised || (unclear && (doubtful || !BearsSmallPixels(plan, input)))) {
     LeaveNetworksOut(plan, "has learned what splats of known kinds have lost");
   } else if (unclear && whole && network_alone) {
     TakeSmallerPixels(kPixelOfUnclear, "it is not clear what the splat has lost", input, report);

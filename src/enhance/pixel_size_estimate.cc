@@ -179,6 +179,7 @@ PixelSizeEstimate EstimateOf(const Settled& settled, const PixelSizeProbe& probe
                            .high = size * spread,
                            .strangeness = settled.strangeness,
                            .showing = probe.showing(),
+                           .of_antialiased = look == Look::kAntialiased,
                            .cut_outlines = probe.CutOutlines(size, look),
                            .coarse_outlines = probe.CoarseOutlines(size, look)};
 }

@@ -30,7 +30,8 @@ struct PixelSizeEstimate {
   // What `size` was lowered by, as its Gaussians are larger than such outlines leave them: those of fits to pictures
   // that are soft themselves, out of focus or enlarged. 1: not at all.
   double softness = 1;
-  double showing = 1;  // PixelSizeProbe::showing()
+  double showing = 1;           // PixelSizeProbe::showing()
+  bool of_antialiased = false;  // by the regression of these
   // Share of its outlines that are cuts and do not count: PixelSizeProbe::CutOutlines().
   double cut_outlines = 0;
   // The same of those that Gaussians make which are much coarser than the others: PixelSizeProbe::CoarseOutlines().

@@ -71,8 +71,14 @@ constexpr double kSmallAxis = 0.4, kSmallestAxis = 0.3, kSmallFall = 4;
 // fits, 0.34 where hills seen from above are taken for pixels seven times as large.
 constexpr double kSmallAndDense = 0.42;
 // Where the densest tenth lies further apart, the estimate is too small if anything: 0.5 to 2.7 in 60 fits and 0.5 to
-// 1.1 in captures; 4.8, 6.9 and 7.7 in bushes whose leaves are taken for 0.25, 0.16 and 0.12 of their pixels.
-constexpr double kTooSparse = 4.5;
+// 1.1 in captures; 4.8, 6.9 and 7.7 in bushes whose leaves are taken for 0.25, 0.16 and 0.12 of their pixels. Of true
+// pixels it is 0.52 to 3.2.
+constexpr double kTooSparse = 4.5, kDensest = 0.45;
+constexpr double kFarFromAll = 1.5;  // of what outlines say at most
+// A room around an object has outlines of its own, most of them of coarse Gaussians; of such antialiased fits three are
+// taken for 2.0, 2.1 and 4.2 of their pixels. Objects alone have 0.02 of such outlines at most, and strangeness 0.3 to
+// 0.92.
+constexpr double kCoarseOfRoom = 0.05, kStrangeOfRoom = 0.95;
 // Black Gaussians may move the estimate this much before it counts as theirs.
 constexpr double kMoved = 1.5;
 // An interval that is wider from end to end says nothing.
@@ -286,7 +292,7 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
   finding.largest = std::max(estimate.size, evidence.without_black);
   finding.estimate = estimate;
   finding.small_axis = evidence.small_axis;
-  finding.too_sparse = evidence.dense > kTooSparse * estimate.size;
+  finding.dense = evidence.dense;
   finding.part = estimate.cut_outlines > kPart;
   const double of_whole = MostGaussiansPerPixel(evidence.gaussians, estimate.showing);
   const double cut = std::clamp((estimate.cut_outlines - kPart) / (kLargelyCut - kPart), 0.0, 1.0);
@@ -317,6 +323,12 @@ PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidenc
         Cat(Fixed(100 * left_out, 0),
             " % of its outlines are of Gaussians that are much coarser than the others, or look as if a part had been "
             "cut off there, and say nothing about pixels"));
+  }
+  if (estimate.of_antialiased && estimate.coarse_outlines > kCoarseOfRoom && estimate.strangeness > kStrangeOfRoom) {
+    finding.contradictions.push_back(Cat(
+        Fixed(100 * estimate.coarse_outlines, 0),
+        " % of its outlines are of Gaussians that are much coarser than the others, and the rest is unlike those of "
+        "fits, as of an object in a room"));
   }
   const bool of_many_pixels = evidence.dense < kSparseEnough * estimate.size || evidence.growth > kGrown;
   const bool uneven = evidence.unevenness > kMostUneven && of_many_pixels;
@@ -422,8 +434,17 @@ std::string PixelSizeFinding::CutsInWords() const {
              " % of the outlines look as if it had been cut there and do not count");
 }
 
+bool LiesAsFitsTo(double pixel, const PixelSizeFinding& finding) {
+  return finding.dense > kTooSparse * finding.estimate.size && finding.dense > kDensest * pixel;
+}
+
+bool LiesTooCloseFor(double pixel, const PixelSizeFinding& finding) {
+  return finding.dense > 0 && finding.dense < kDensest * pixel && pixel > kFarFromAll * finding.estimate.high;
+}
+
 bool IsSharperThanFitsTo(double pixel, const PixelSizeFinding& finding) {
-  return finding.sure() && finding.largest < kSharperThanClassic * pixel && finding.estimate.high < pixel;
+  return finding.sure() && !LiesAsFitsTo(pixel, finding) && finding.largest < kSharperThanClassic * pixel &&
+         finding.estimate.high < pixel;
 }
 
 Result<PixelSizeFinding> FindPixelSize(const GaussianCloud& cloud) {

@@ -30,7 +30,7 @@ struct PixelSizeFinding {
   double of_more = 0;
   PixelSizeEstimate estimate;               // what the outlines say
   double small_axis = 0;                    // PixelSizeEvidence::small_axis
-  bool too_sparse = false;                  // its densest Gaussians lie further apart than in fits to such pixels
+  double dense = 0;                         // PixelSizeEvidence::dense
   bool no_one_pixel = false;                // its Gaussians lie too unevenly for one
   bool balls = false;                       // its Gaussians are, and their sizes say nothing about pixels
   bool part = false;                        // cut out of something larger: a tenth of its outlines and more are cuts
@@ -45,8 +45,7 @@ struct PixelSizeFinding {
   static constexpr double kTooStrange = 1.75;
   // Whether what the splat says of itself counts against cameras.
   bool sure() const {
-    return !contradicted() && !part && !rough() && !too_sparse && estimate.strangeness < kTooStrange &&
-           estimate.softness == 1;
+    return !contradicted() && !part && !rough() && estimate.strangeness < kTooStrange && estimate.softness == 1;
   }
   bool is_one() const { return least >= size && closer == 0; }  // `size` is that of all Gaussians
 
@@ -92,6 +91,13 @@ Buffer<float> CautiousPixelSizes(const GaussianCloud& cloud, const PixelSizeFind
 
 // What to make of an estimate in the light of the evidence.
 PixelSizeFinding Judge(const PixelSizeEstimate& estimate, const PixelSizeEvidence& evidence);
+
+// Whether the Gaussians lie as far apart as those of fits to pixels of that size, and too far for those that outlines
+// say: leaves and twigs.
+bool LiesAsFitsTo(double pixel, const PixelSizeFinding& finding);
+
+// Whether they lie closer than in any fit to such pixels, and outlines say much smaller ones at most.
+bool LiesTooCloseFor(double pixel, const PixelSizeFinding& finding);
 
 // Whether a classic splat is sharper than a fit to pixels of that size could be. A rough estimate, one of strange
 // outlines and one whose interval reaches them say nothing against them.

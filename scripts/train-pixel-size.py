@@ -53,7 +53,7 @@ HARDLY_SOFT, SOFT = 0.3, 0.5  # kHardlySoft, kSoft in pixel_size_estimate.cc
 MOST_CORRECTION = 0.5  # kMostCorrection
 UPWARDS = 0.5  # kUpwards
 INTERVAL = 2  # kInterval
-LEAST_HALF_OF_COMPENSATED = 0.5
+LEAST_HALF_OF_COMPENSATED = 0.5  # kLeastHalfOfCompensated
 # Antialiased fits to soft pictures have lost next to nothing, those of few steps less than a pixel of theirs. What is learned
 # for them is the share of the pixel that gives most.
 SOFT_ANTIALIASED, HARMLESS = "aa-soft", 0.35

@@ -137,5 +137,26 @@ TEST(ChoosePixelSizes, CamerasOfGaussiansThatLieFarApartAreBelieved) {
   EXPECT_FALSE(LiesAsFitsTo(0.007, Judge(leaves, evidence))) << "as far apart as in other fits";
 }
 
+// The regression of antialiased splats has seen objects alone.
+TEST(ChoosePixelSizes, RoomsAroundAntialiasedObjectsContradict) {
+  PixelSizeEvidence evidence;
+  evidence.gaussians = evidence.all = 7000;
+  evidence.spacing = evidence.footprint = evidence.of_many = evidence.dense = evidence.closest = 0.12;
+  evidence.small_axis = 0.05;
+  PixelSizeEstimate rabbit{.size = 0.1, .low = 0.06, .high = 0.17, .strangeness = 1.1};
+  rabbit.of_antialiased = true;
+  rabbit.coarse_outlines = 0.12;
+  EXPECT_TRUE(Judge(rabbit, evidence).contradicted());
+  PixelSizeEstimate alone = rabbit;
+  alone.coarse_outlines = 0.02;
+  EXPECT_FALSE(Judge(alone, evidence).contradicted());
+  PixelSizeEstimate familiar = rabbit;
+  familiar.strangeness = 0.9;
+  EXPECT_FALSE(Judge(familiar, evidence).contradicted());
+  PixelSizeEstimate classic = rabbit;
+  classic.of_antialiased = false;
+  EXPECT_FALSE(Judge(classic, evidence).contradicted());
+}
+
 }  // namespace
 }  // namespace anchorsplat

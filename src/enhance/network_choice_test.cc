@@ -154,6 +154,11 @@ TEST_F(NetworkChoice, WhatIsUnclearTakesSmallPixels) {
   report_.pixel_size_source = kCautiousPixelSize;  // small already
   EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01));
   EXPECT_EQ(Choose(round), std::pair(std::string("filter"), 0.01));
+  report_.finding.emplace().contradictions = {"crowded"};
+  EXPECT_EQ(Choose(), std::pair(std::string("filter"), 0.01)) << "nothing is known, as of captures";
+  report_.looks = TrainedKind::kClassic;
+  EXPECT_EQ(Choose(), std::pair(std::string("network"), 0.01)) << "its kind is";
+  report_.finding.reset();
   report_.looks = TrainedKind::kRaised;
   EXPECT_EQ(Choose(), std::pair(std::string("filter"), 0.01));
   report_.looks = TrainedKind::kClassic;

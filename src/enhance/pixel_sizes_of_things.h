@@ -36,8 +36,9 @@ std::vector<std::string> ContradictionsOf(std::span<const ThingPixelSize> things
 // of one training, and each gets the smaller one of both; where they say the same, `whole` is right, and nothing is
 // found. What has few Gaussians, whose outlines are not believed in full, and says about what `whole` does is
 // of that training. Treated with caution is what lies around other things, as its outlines were not seen as such, and
-// what is too small to tell. A thing that has lost no width stays as it is. `kinds`: whether things are looked at for
-// that; nobody has said how the splat was trained. `harmonics`: where those of the cloud are if it has none.
+// what is too small to tell. A thing that has lost no width stays as it is.
+// `kinds`: whether things are looked at for that; nobody has said how the splat was trained. `harmonics`: where those
+// of the cloud are if it has none.
 PixelSizesOfThings FindPixelSizesOfThings(const GaussianCloud& cloud, const PixelSizeFinding& whole, bool kinds,
                                           const WholeCloud& harmonics = {});
 

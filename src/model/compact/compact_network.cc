@@ -409,8 +409,7 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
     for (int64_t b = next; b < blocks.count(); ++b) {
       if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped"};
       const CompactBlock& block = blocks.Find(b);
-      const Buffer<float> familiar = Familiarity(features, block);
-      Buffer<float> fades = familiar;
+      Buffer<float> fades = Familiarity(features, block);
       of_block.outside = of_block.partly = 0;
       for (size_t i = 0; i < fades.size(); ++i) {
         const int32_t row = near.rows[static_cast<size_t>(block.rows[i])];
@@ -418,8 +417,8 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
           fades[i] = kLeftOut;
           continue;
         }
-        fades[i] = std::min(familiar[i], ShareOfLarge(features.Widths(block.rows[i])));
-        if (familiar[i] < 1) ++(familiar[i] > 0 ? of_block.partly : of_block.outside);
+        if (fades[i] < 1) ++(fades[i] > 0 ? of_block.partly : of_block.outside);
+        fades[i] = std::min(fades[i], ShareOfLarge(features.Widths(block.rows[i])));
       }
       const BlockPlaces places = PlacesOf(block, fades, near.rows, copies + (stand_ins ? 1 : 0));
       progress.Advance(block.own());

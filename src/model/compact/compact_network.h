@@ -72,9 +72,9 @@ struct CompactResult {
 // of model/compact/compact_features.h; widths count as they are, beyond the bounds of their features too); at 0 it is
 // what the filter makes of it, one Gaussian.
 //
-// So does one of several copies whose middle axis measures kLarge pixels and more, none of it from kVeryLarge on:
-// pixels hid nothing of it, and copies whose centres lie far apart may come before or behind others than it did, and
-// show what it hid.
+// A network that makes several copies says less of Gaussians whose middle axis measures more than kLarge pixels, too,
+// and nothing from kVeryLarge on: pixels hid nothing of these, and copies whose centres lie far apart may come before
+// or behind others than one did, and show what it hid.
 class CompactNetwork {
  public:
   // Errors: of Validate(config) and of `source`; kBadFile naming the tensor when a weight is NaN or infinite.
@@ -126,6 +126,7 @@ class CompactNetwork {
   // Of a block's own Gaussians: 1 within the range of the training data, 0 far outside.
   Buffer<float> Familiarity(const CompactFeatures& features, const CompactBlock& block) const;
   float Fade(const float* node, const std::array<float, 3>& widths) const;
+  // Of the residual that a Gaussian of such widths (half logarithms, pixels) keeps.
   float ShareOfLarge(const std::array<float, 3>& widths) const;
 
   CompactConfig config_;

@@ -3,6 +3,7 @@
 #include <anchorsplat/error.h>
 #include <anchorsplat/export.h>
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -21,7 +22,7 @@ enum class Rasterization { kClassic, kAntialiased, kMip };
 // takes this, and copies nothing. The arrays must stay where they are, unchanged, until the call returns.
 struct SplatView {
   int sh_degree = 0;                      // 0–3
-  std::span<const float> means;           // [N,3] world units
+  std::span<const float> means;           // [N,3] world units, from `origin` on
   std::span<const float> log_scales;      // [N,3] ln(world units), one per axis of the rotation
   std::span<const float> quats;           // [N,4] wxyz, any norm
   std::span<const float> opacity_logits;  // [N] ln(o / (1 − o))
@@ -29,6 +30,9 @@ struct SplatView {
 
   std::optional<Rasterization> rasterization = std::nullopt;  // nothing where nobody said
   std::span<const std::string> comments;                      // of the file, and of what was done to the splat
+  // A Gaussian's position in the world is origin + mean, in double. Zero, but for coordinates that are too large for
+  // floats, such as those of maps. Cameras and regions are in the world.
+  std::array<double, 3> origin = {0, 0, 0};
 
   int64_t size() const { return static_cast<int64_t>(opacity_logits.size()); }
 };
@@ -62,6 +66,7 @@ class ANCHORSPLAT_PUBLIC Splat {
   std::span<float> sh();              // [N,(sh_degree+1)²,3]
   void set_rasterization(std::optional<Rasterization> rasterization);
   void set_comments(std::vector<std::string> comments);
+  void set_origin(const std::array<double, 3>& origin);
 
   // Valid until the splat is moved, assigned to or gone.
   SplatView view() const;

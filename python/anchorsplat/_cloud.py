@@ -40,6 +40,13 @@ def _column(name: str, values: Any, shape: tuple[int | None, ...]) -> FloatArray
     return array
 
 
+def _point(name: str, values: Sequence[float]) -> tuple[float, float, float]:
+    point = tuple(float(value) for value in values)
+    if len(point) != 3 or not np.isfinite(point).all():
+        raise BadArgumentError(f"{name}: expected three finite numbers, found {values!r}")
+    return point
+
+
 class Cloud:
     """A splat: N Gaussians as five NumPy arrays of float32, row i of each belonging to Gaussian i.
 
@@ -54,7 +61,17 @@ class Cloud:
     Raises BadArgumentError for arrays that do not fit together.
     """
 
-    __slots__ = ("_means", "_log_scales", "_quats", "_opacity_logits", "_sh", "_render_mode", "_comments", "__weakref__")
+    __slots__ = (
+        "_means",
+        "_log_scales",
+        "_quats",
+        "_opacity_logits",
+        "_sh",
+        "_render_mode",
+        "_comments",
+        "_origin",
+        "__weakref__",
+    )
 
     def __init__(
         self,
@@ -66,6 +83,7 @@ class Cloud:
         *,
         render_mode: RenderMode | None = None,
         comments: Sequence[str] = (),
+        origin: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> None:
         self._means = _column("means", means, (None, 3))
         self._log_scales = _column("log_scales", log_scales, (None, 3))
@@ -83,6 +101,7 @@ class Cloud:
             )
         self.render_mode = render_mode
         self._comments = tuple(comments)
+        self._origin = _point("origin", origin)
 
     @classmethod
     def from_arrays(
@@ -95,9 +114,12 @@ class Cloud:
         *,
         render_mode: RenderMode | None = None,
         comments: Sequence[str] = (),
+        origin: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> Cloud:
         """A Cloud of your own arrays: what ``Cloud(...)`` is, too."""
-        return cls(means, log_scales, quats, opacity_logits, sh, render_mode=render_mode, comments=comments)
+        return cls(
+            means, log_scales, quats, opacity_logits, sh, render_mode=render_mode, comments=comments, origin=origin
+        )
 
     @classmethod
     def _of(cls, parts: tuple[Any, ...]) -> Cloud:
@@ -106,11 +128,12 @@ class Cloud:
         (_, cloud._means, cloud._log_scales, cloud._quats, cloud._opacity_logits, cloud._sh) = parts[:6]
         cloud._render_mode = parts[6]
         cloud._comments = tuple(parts[7])
+        cloud._origin = tuple(parts[8])
         return cloud
 
     @property
     def means(self) -> FloatArray:
-        """[N,3] centres, world units."""
+        """[N,3] centres, world units, from :attr:`origin` on."""
         return self._means
 
     @property
@@ -155,6 +178,13 @@ class Cloud:
         return self._comments
 
     @property
+    def origin(self) -> tuple[float, float, float]:
+        """What a centre is relative to: its world position is ``numpy.asarray(cloud.origin) + cloud.means``, in float64. Zero,
+        but for coordinates that are too large for float32, such as those of maps. Cameras, regions and orbits are in the world.
+        """
+        return self._origin
+
+    @property
     def nbytes(self) -> int:
         """Of the five arrays."""
         return sum(a.nbytes for a in (self._means, self._log_scales, self._quats, self._opacity_logits, self._sh))
@@ -175,6 +205,7 @@ class Cloud:
             self._sh[rows],
             render_mode=self._render_mode,
             comments=self._comments,
+            origin=self._origin,
         )
 
     def __iter__(self) -> Iterator[Cloud]:
@@ -194,6 +225,7 @@ class Cloud:
             self._sh.copy(),
             render_mode=self._render_mode,
             comments=self._comments,
+            origin=self._origin,
         )
 
     @classmethod
@@ -207,7 +239,8 @@ class Cloud:
 
     def to_gsplat(self, arrays: Literal["torch", "numpy"] = "torch") -> dict[str, Any]:
         """The parameters of gsplat's trainer, by its names and in its layout (see :meth:`from_gsplat`): tensors that share this
-        Cloud's memory, or NumPy's arrays. To train, make them parameters of their own: ``torch.nn.Parameter(t.clone())``."""
+        Cloud's memory, or NumPy's arrays; "means" are relative to :attr:`origin`. To train, make them parameters of their own:
+        ``torch.nn.Parameter(t.clone())``."""
         from ._gsplat import to_gsplat
 
         return to_gsplat(self, arrays)

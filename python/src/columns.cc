@@ -1,5 +1,6 @@
 #include "columns.h"
 
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/string.h>
 
 #include <iterator>
@@ -52,6 +53,7 @@ Columns::Columns(nb::handle cloud) {
   view_.render_mode = ModeOf(cloud.attr("render_mode"));
   for (const nb::handle comment : cloud.attr("comments")) comments_.push_back(BytesOf(comment));
   view_.comments = comments_;
+  view_.origin = nb::cast<WorldOrigin>(cloud.attr("origin"));
 }
 
 nb::object ToArray(Buffer<float> values, const std::vector<size_t>& shape) {
@@ -73,7 +75,8 @@ nb::tuple ToPython(GaussianCloud cloud) {
   const nb::object mode = c.render_mode ? nb::cast(std::string(NameOf(*c.render_mode))) : nb::none();
   return nb::make_tuple(c.sh_degree, Lent(c.means.data(), {n, 3}, owner), Lent(c.log_scales.data(), {n, 3}, owner),
                         Lent(c.quats.data(), {n, 4}, owner), Lent(c.opacity_logits.data(), {n}, owner),
-                        Lent(c.sh.data(), {n, static_cast<size_t>(c.coefficients()), 3}, owner), mode, comments);
+                        Lent(c.sh.data(), {n, static_cast<size_t>(c.coefficients()), 3}, owner), mode, comments,
+                        nb::make_tuple(c.origin[0], c.origin[1], c.origin[2]));
 }
 
 }  // namespace anchorsplat::python

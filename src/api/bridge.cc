@@ -62,6 +62,7 @@ CloudView ToCloud(const SplatView& view) {
   cloud.sh = view.sh;
   cloud.render_mode = ToMode(view.rasterization);
   cloud.comments = view.comments;
+  cloud.origin = view.origin;
   return cloud;
 }
 
@@ -73,7 +74,8 @@ SplatView ToView(const CloudView& cloud) {
           .opacity_logits = cloud.opacity_logits,
           .sh = cloud.sh,
           .rasterization = ToRasterization(cloud.render_mode),
-          .comments = cloud.comments};
+          .comments = cloud.comments,
+          .origin = cloud.origin};
 }
 
 std::optional<RenderMode> ToMode(std::optional<Rasterization> rasterization) {

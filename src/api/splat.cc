@@ -58,6 +58,10 @@ void Splat::set_comments(std::vector<std::string> comments) {
   if (owned_) owned_->cloud.comments = std::move(comments);
 }
 
+void Splat::set_origin(const std::array<double, 3>& origin) {
+  if (owned_) owned_->cloud.origin = origin;
+}
+
 SplatView Splat::view() const { return owned_ ? ToView(owned_->cloud) : SplatView(); }
 
 }  // namespace anchorsplat

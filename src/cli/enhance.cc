@@ -147,7 +147,9 @@ OutputPlan PlanOf(const EnhanceOptions& options, const std::string& input, const
 
 int64_t CountOutside(const std::optional<Region>& region, const GaussianCloud& cloud) {
   int64_t outside = 0;
-  for (int64_t i = 0; region && i < cloud.size(); ++i) outside += region->Holds(cloud.means.data() + 3 * i) ? 0 : 1;
+  if (!region) return 0;
+  const Region from_origin = FromOrigin(*region, cloud.origin);
+  for (int64_t i = 0; i < cloud.size(); ++i) outside += from_origin.Holds(cloud.means.data() + 3 * i) ? 0 : 1;
   return outside;
 }
 
@@ -230,8 +232,10 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
     KeepRows(extras, kept);
   }
   if (!extras.empty() && enhanced.cloud.means != means) {
-    LogWarning(Cat(input, ": other properties of its Gaussians are dropped, as those of the result are others: ",
-                   extras.lost(/*writer_keeps=*/false)));
+    if (const std::string lost = extras.lost(/*writer_keeps=*/false); !lost.empty()) {
+      LogWarning(Cat(input, ": other properties of its Gaussians are dropped, as those of the result are others: ",
+                     lost));
+    }
     extras = {};
   }
   if (options.cameras && !UpOf(enhanced.cloud.comments)) {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <iostream>
@@ -34,6 +35,15 @@ std::string Number(double value) {
   return text;
 }
 
+// In the world, with as many digits as `mean` alone would have.
+std::string Coordinate(float mean, double origin) {
+  if (origin == 0) return Number(mean);
+  char text[400];
+  const int decimals = mean == 0 ? 0 : std::clamp(3 - static_cast<int>(std::floor(std::log10(std::fabs(mean)))), 0, 9);
+  std::snprintf(text, sizeof text, "%.*f", decimals, origin + double{mean});
+  return text;
+}
+
 constexpr size_t kMostCredit = 1000;  // bytes of one that are shown
 
 void PrintTable(const SplatFindings& f) {
@@ -50,6 +60,9 @@ void PrintTable(const SplatFindings& f) {
     std::cout << "  credit       " << Printable(credit, kMostCredit) << "\n";
   }
   for (const auto& [name, value] : f.facts.all()) std::cout << "  " << name << "  " << value << "\n";
+  if (!IsZero(f.origin)) {
+    std::cout << "  origin       " << TextOf(f.origin) << " (positions are kept relative to it; all others are in the world)\n";
+  }
   if (s.bounds) {
     std::cout << "  bounds      ";
     for (size_t a = 0; a < 3; ++a) {
@@ -57,7 +70,7 @@ void PrintTable(const SplatFindings& f) {
                 << (a == 1   ? "y "
                     : a == 2 ? "z "
                              : "")
-                << Number(s.bounds->min[a]) << " to " << Number(s.bounds->max[a]);
+                << Coordinate(s.bounds->min[a], f.origin[a]) << " to " << Coordinate(s.bounds->max[a], f.origin[a]);
     }
     std::cout << "\n";
   }

@@ -47,6 +47,34 @@ std::array<double, 3> Camera::ToCamera(const std::array<double, 3>& p) const {
           r[6] * p[0] + r[7] * p[1] + r[8] * p[2] + t[2]};
 }
 
+Pose FromOrigin(const Pose& world_to_camera, const WorldOrigin& origin) {
+  Pose pose = world_to_camera;
+  for (size_t r = 0; r < 3; ++r) {
+    const double* row = pose.rotation.data() + 3 * r;
+    pose.translation[r] += row[0] * origin[0] + row[1] * origin[1] + row[2] * origin[2];
+  }
+  return pose;
+}
+
+Camera FromOrigin(Camera camera, const WorldOrigin& origin) {
+  camera.world_to_camera = FromOrigin(camera.world_to_camera, origin);
+  return camera;
+}
+
+CameraSet FromOrigin(CameraSet set, const WorldOrigin& origin) {
+  for (Camera& camera : set.cameras) camera.world_to_camera = FromOrigin(camera.world_to_camera, origin);
+  return set;
+}
+
+WorldOrigin ChooseOrigin(const std::vector<Camera>& cameras) {
+  std::vector<double> centers;
+  for (const Camera& camera : cameras) {
+    const auto center = camera.Center();
+    centers.insert(centers.end(), center.begin(), center.end());
+  }
+  return ChooseOrigin(std::span<const double>(centers));
+}
+
 Pinhole Scaled(const Pinhole& intrinsics, double factor) {
   Pinhole out;
   out.width = std::max(1, static_cast<int>(std::lround(intrinsics.width * factor)));

@@ -9,6 +9,7 @@
 #include "core/image.h"
 #include "core/lens.h"
 #include "core/result.h"
+#include "core/world_origin.h"
 
 namespace anchorsplat {
 
@@ -60,6 +61,13 @@ struct CameraSet {
   std::optional<std::array<float, 3>> background;  // rgb 0–1, where the file says which one the views have
   std::filesystem::path points;                    // a PLY with points of the scene, where the file names one
 };
+
+// The camera in a world that begins at `origin`: what a splat's means are in (core/world_origin.h).
+Pose FromOrigin(const Pose& world_to_camera, const WorldOrigin& origin);
+Camera FromOrigin(Camera camera, const WorldOrigin& origin);
+CameraSet FromOrigin(CameraSet set, const WorldOrigin& origin);
+// ChooseOrigin of the cameras' centres.
+WorldOrigin ChooseOrigin(const std::vector<Camera>& cameras);
 
 // The same view with `factor` times as many pixels per side (width and height rounded, at least 1); the rays through
 // the image corners stay where they were, up to that rounding.

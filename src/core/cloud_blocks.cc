@@ -15,6 +15,7 @@ MemoryBlocks::MemoryBlocks(const CloudView& cloud) : cloud_(cloud) {
   sh_degree_ = cloud.sh_degree;
   render_mode_ = cloud.render_mode;
   comments_.assign(cloud.comments.begin(), cloud.comments.end());
+  origin_ = cloud.origin;
 }
 
 MemoryBlocks::MemoryBlocks(GaussianCloud cloud) : MemoryBlocks(CloudView()) {
@@ -24,6 +25,7 @@ MemoryBlocks::MemoryBlocks(GaussianCloud cloud) : MemoryBlocks(CloudView()) {
   sh_degree_ = cloud_.sh_degree;
   render_mode_ = owned_.render_mode;
   comments_ = owned_.comments;
+  origin_ = owned_.origin;
 }
 
 Status MemoryBlocks::ForEach(const Look& look) {

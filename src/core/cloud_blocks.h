@@ -16,7 +16,7 @@ namespace anchorsplat {
 // Some neighbouring rows of a splat, without the harmonics that depend on the direction. Valid during a call.
 struct CloudBlock {
   int64_t first = 0;                // the row of the splat that is row 0 here; a multiple of kCloudBlockRows
-  CloudView rows;                   // SH degree 0
+  CloudView rows;                   // SH degree 0; means from CloudBlocks::origin on
   std::span<const uint8_t> usable;  // per row: 1 where IsUsable, looking at all of its harmonics
 
   int64_t size() const { return rows.size(); }
@@ -35,6 +35,7 @@ class CloudBlocks {
   int sh_degree() const { return sh_degree_; }
   const std::optional<RenderMode>& render_mode() const { return render_mode_; }
   const std::vector<std::string>& comments() const { return comments_; }
+  const WorldOrigin& origin() const { return origin_; }
 
   // Calls `look` with every block once, from several threads in any order. May be called again. Errors: of reading.
   using Look = std::function<void(const CloudBlock&)>;
@@ -47,6 +48,7 @@ class CloudBlocks {
   int sh_degree_ = 0;
   std::optional<RenderMode> render_mode_;
   std::vector<std::string> comments_;
+  WorldOrigin origin_ = {0, 0, 0};
   // [N] CloudBlock::usable, known after ForEach has been through all rows for the first time.
   std::vector<uint8_t> usable_;
   bool usable_known_ = false;

@@ -50,6 +50,8 @@ GaussianCloud CopyOf(const CloudView& view) {
   cloud.sh.assign(view.sh.begin(), view.sh.end());
   cloud.render_mode = view.render_mode;
   cloud.comments.assign(view.comments.begin(), view.comments.end());
+  cloud.origin = view.origin;
+  cloud.double_means = view.double_means;
   return cloud;
 }
 

@@ -15,7 +15,7 @@ namespace anchorsplat {
 // looked at. Valid as long as the arrays stay where they are.
 struct CloudView {
   int sh_degree = 0;                      // 0–3
-  std::span<const float> means;           // [N,3]
+  std::span<const float> means;           // [N,3] from `origin` on
   std::span<const float> log_scales;      // [N,3]
   std::span<const float> quats;           // [N,4]
   std::span<const float> opacity_logits;  // [N]
@@ -23,6 +23,8 @@ struct CloudView {
 
   std::optional<RenderMode> render_mode;
   std::span<const std::string> comments;
+  WorldOrigin origin = {0, 0, 0};
+  bool double_means = false;
 
   CloudView() = default;
   CloudView(const GaussianCloud& cloud)  // NOLINT: implicit on purpose
@@ -33,7 +35,9 @@ struct CloudView {
         opacity_logits(cloud.opacity_logits),
         sh(cloud.sh),
         render_mode(cloud.render_mode),
-        comments(cloud.comments) {}
+        comments(cloud.comments),
+        origin(cloud.origin),
+        double_means(cloud.double_means) {}
 
   int64_t size() const { return static_cast<int64_t>(opacity_logits.size()); }
   bool empty() const { return opacity_logits.empty(); }

@@ -70,7 +70,9 @@ Framing FrameSample(std::span<const float> means, std::span<const float> opacity
 
 }  // namespace
 
-Framing FrameCloud(const CloudView& cloud) {
+namespace {
+
+Framing FrameFromOrigin(const CloudView& cloud) {
   const int64_t step = StepOf(cloud.size());
   const auto reach = [&](float least_logit) { return LargestReach(cloud, least_logit); };
   if (step == 1) return FrameSample(cloud.means, cloud.opacity_logits, reach);
@@ -81,6 +83,14 @@ Framing FrameCloud(const CloudView& cloud) {
     opacity_logits.push_back(cloud.opacity_logits[static_cast<size_t>(i)]);
   }
   return FrameSample(means, opacity_logits, reach);
+}
+
+}  // namespace
+
+Framing FrameCloud(const CloudView& cloud) {
+  Framing framing = FrameFromOrigin(cloud);
+  for (size_t a = 0; a < 3; ++a) framing.target[a] += cloud.origin[a];
+  return framing;
 }
 
 FramingStudy::FramingStudy(int64_t gaussians) : step_(StepOf(gaussians)) {

@@ -25,7 +25,7 @@ class FramingStudy {
  public:
   explicit FramingStudy(int64_t gaussians);
   void Look(int64_t first, const CloudView& rows);  // Gaussians from number `first` on; from several threads
-  Framing Find() const;                             // once all were shown
+  Framing Find() const;                             // once all were shown; the target from their origin on
 
  private:
   int64_t step_;

@@ -59,6 +59,8 @@ Result<GaussianCloud> Subset(const GaussianCloud& cloud, std::span<const int64_t
   out.sh_degree = cloud.sh_degree;
   out.render_mode = cloud.render_mode;
   out.comments = cloud.comments;
+  out.origin = cloud.origin;
+  out.double_means = cloud.double_means;
   GatherRows(cloud.means, 3, rows, out.means);
   GatherRows(cloud.log_scales, 3, rows, out.log_scales);
   GatherRows(cloud.quats, 4, rows, out.quats);
@@ -71,7 +73,14 @@ Status Append(GaussianCloud& cloud, const GaussianCloud& more) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(more));
   if (cloud.sh_degree < more.sh_degree) cloud = WithShDegree(cloud, more.sh_degree);
+  const auto first = static_cast<int64_t>(cloud.means.size());
   AppendRows(cloud.means, more.means);
+  if (more.origin != cloud.origin) {
+    for (int64_t i = first; i < std::ssize(cloud.means); i += 3) {
+      const std::array<double, 3> at = FromOrigin(ToWorld(cloud.means.data() + i, more.origin), cloud.origin);
+      std::ranges::transform(at, cloud.means.data() + i, [](double x) { return static_cast<float>(x); });
+    }
+  }
   AppendRows(cloud.log_scales, more.log_scales);
   AppendRows(cloud.quats, more.quats);
   AppendRows(cloud.opacity_logits, more.opacity_logits);

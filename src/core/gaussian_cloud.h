@@ -10,6 +10,7 @@
 #include "core/buffer.h"
 #include "core/render_mode.h"
 #include "core/result.h"
+#include "core/world_origin.h"
 
 namespace anchorsplat {
 
@@ -21,14 +22,17 @@ constexpr int ShCoefficients(int degree) { return (degree + 1) * (degree + 1); }
 // INRIA PLY keeps it. Row i of every array belongs to Gaussian i. Plain data: use Validate() at the doors.
 struct GaussianCloud {
   int sh_degree = 0;             // 0–3
-  Buffer<float> means;           // [N,3] world
+  Buffer<float> means;           // [N,3] world, from `origin` on
   Buffer<float> log_scales;      // [N,3] ln(world units), one per axis of the rotation
   Buffer<float> quats;           // [N,4] wxyz, any norm, not normalised
   Buffer<float> opacity_logits;  // [N] logit(opacity)
   Buffer<float> sh;              // [N,(sh_degree+1)²,3] coefficient-major, rgb fastest; [.,0,.] is f_dc
 
   std::optional<RenderMode> render_mode;  // as the file says; nothing when it does not say
-  std::vector<std::string> comments;      // of the file, without the render-mode tag
+  std::vector<std::string> comments;      // of the file, without the tags of render mode and origin
+
+  WorldOrigin origin = {0, 0, 0};  // world position = origin + mean
+  bool double_means = false;       // a PLY of it has world coordinates in double, as the file had that it is from
 
   int64_t size() const { return static_cast<int64_t>(opacity_logits.size()); }
   bool empty() const { return opacity_logits.empty(); }
@@ -43,7 +47,7 @@ struct GaussianCloud {
 // Array sizes agree with each other and the degree is 0–3. (kBadArgument otherwise; values are not looked at.)
 Status Validate(const GaussianCloud& cloud);
 
-// Axis-aligned box of the finite means; nothing when there are none.
+// Axis-aligned box of the finite means, from the origin on; nothing when there are none.
 struct Bounds {
   std::array<float, 3> min;
   std::array<float, 3> max;
@@ -53,7 +57,7 @@ std::optional<Bounds> ComputeBounds(const GaussianCloud& cloud);
 // The Gaussians at `rows`, in that order, repetition allowed; metadata is kept. Rows must be in range (kBadArgument).
 Result<GaussianCloud> Subset(const GaussianCloud& cloud, std::span<const int64_t> rows);
 
-// Appends `more` to `cloud`. A lower SH degree on either side is raised by zero coefficients.
+// Appends `more` to `cloud`, whose origin stays. A lower SH degree on either side is raised by zero coefficients.
 Status Append(GaussianCloud& cloud, const GaussianCloud& more);
 
 // A copy with another SH degree: higher coefficients dropped, or zeros added.

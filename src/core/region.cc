@@ -5,6 +5,12 @@
 
 namespace anchorsplat {
 
+Region FromOrigin(Region region, const WorldOrigin& origin) {
+  region.low = FromOrigin(region.low, origin);
+  region.high = FromOrigin(region.high, origin);
+  return region;
+}
+
 std::optional<Region> RegionOf(std::span<const double> numbers) {
   if (numbers.size() != 4 && numbers.size() != 6) return std::nullopt;
   if (!std::ranges::all_of(numbers, [](double x) { return std::isfinite(x); })) return std::nullopt;

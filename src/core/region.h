@@ -5,6 +5,8 @@
 #include <optional>
 #include <span>
 
+#include "core/world_origin.h"
+
 namespace anchorsplat {
 
 // A part of space in world units: a box, or a sphere around `low`.
@@ -24,6 +26,9 @@ struct Region {
     return radius ? square <= *radius * *radius : inside;
   }
 };
+
+// The region in a world that begins at `origin` (core/world_origin.h).
+Region FromOrigin(Region region, const WorldOrigin& origin);
 
 // Four numbers are a sphere, its centre and a radius above 0, six a box by any two corners across. Nothing: any other
 // count, a value that is not finite, a radius that is not positive.

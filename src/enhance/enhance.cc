@@ -369,7 +369,10 @@ Result<GaussianCloud> RunOnSure(const MethodPlan& plan, EnhanceInput input, Enha
 
 }  // namespace
 
-Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
+namespace {
+
+// Of a splat whose means are the world.
+Result<Enhanced> EnhanceFromOrigin(GaussianCloud cloud, const EnhanceOptions& options) {
   const Stopwatch in_all;
   ANCHORSPLAT_RETURN_IF_ERROR(CheckTask(cloud, options));
   ANCHORSPLAT_ASSIGN_OR_RETURN(MethodPlan plan, PlanEnhancement(options));
@@ -431,6 +434,21 @@ Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
     if (std::ranges::find(out.comments, mark) == out.comments.end()) out.comments.push_back(std::move(mark));
   }
   return Enhanced{std::move(out), std::move(report)};
+}
+
+}  // namespace
+
+Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options) {
+  const WorldOrigin origin = std::exchange(cloud.origin, {});
+  const bool double_means = std::exchange(cloud.double_means, false);
+  EnhanceOptions from_origin = options;
+  from_origin.refine.origin = origin;
+  if (options.cameras) from_origin.cameras = FromOrigin(*options.cameras, origin);
+  if (options.region) from_origin.region = FromOrigin(*options.region, origin);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, EnhanceFromOrigin(std::move(cloud), from_origin));
+  enhanced.cloud.origin = origin;
+  enhanced.cloud.double_means = double_means;
+  return enhanced;
 }
 
 }  // namespace anchorsplat

@@ -145,6 +145,32 @@ TEST_F(EnhanceDoor, PixelSizeFromCameras) {
   EXPECT_FALSE(Enhance(Ball(0.01), options).ok());  // both
 }
 
+// Cameras and regions are in the world, wherever the means begin.
+TEST_F(EnhanceDoor, FromAnOriginIsTheSame) {
+  const WorldOrigin origin = {500000, 4500000, 0}, back = {-500000, -4500000, 0};
+  EnhanceOptions options;
+  options.method = "filter";
+  options.cameras = CamerasForPixel(0.01);
+  options.region = Region{.low = {0.5, 0, 0}, .high = {}, .radius = 0.4};
+  const auto at_zero = Enhance(Ball(0.01), options);
+  ASSERT_TRUE(at_zero.ok()) << at_zero.error().message;
+  ASSERT_GT(at_zero->report.region_in, 100);
+  GaussianCloud far = Ball(0.01);
+  far.origin = origin;
+  far.double_means = true;
+  options.cameras = FromOrigin(*options.cameras, back);
+  options.region = FromOrigin(*options.region, back);
+  const auto from_origin = Enhance(far, options);
+  ASSERT_TRUE(from_origin.ok()) << from_origin.error().message;
+  EXPECT_EQ(from_origin->cloud.origin, origin);
+  EXPECT_TRUE(from_origin->cloud.double_means);
+  EXPECT_EQ(from_origin->report.region_in, at_zero->report.region_in);
+  EXPECT_EQ(from_origin->cloud.means, at_zero->cloud.means);
+  for (size_t i = 0; i < at_zero->cloud.log_scales.size(); ++i) {
+    EXPECT_NEAR(from_origin->cloud.log_scales[i], at_zero->cloud.log_scales[i], 1e-4);
+  }
+}
+
 TEST_F(EnhanceDoor, WarnsWhenCamerasAreNotThoseOfTheSplat) {
   EnhanceOptions options;
   options.cameras = CamerasForPixel(0.05);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/result.h"
+#include "core/world_origin.h"
 
 namespace anchorsplat {
 
@@ -16,6 +17,7 @@ namespace anchorsplat {
 // it begins and on how many Gaussians there are.
 struct RefineOptions {
   std::filesystem::path images;  // project with the training pictures (fit/training_views.h); empty: without any
+  WorldOrigin origin = {0, 0, 0};  // of the splat's means, for the pictures' cameras; set by Enhance()
   // What the pictures' alpha is laid over, and the splat; otherwise what the cameras' file says, else the splat's own
   // comment (core/training_background.h), else black.
   std::optional<std::array<float, 3>> background;

@@ -41,7 +41,8 @@ bool HasSeen(double seen_psnr, double held_out_psnr) { return held_out_psnr > se
 
 Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& options, RenderOptions render) {
   const ProjectOptions as_asked = {.hold_out = options.hold_out.value_or(kHeldOutByDefault),
-                                   .downscale = options.downscale};
+                                   .downscale = options.downscale,
+                                   .origin = options.origin};
   ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews project, OpenProject(options.images, as_asked));
   if (!project.without_picture.empty()) {
     return Error{ErrorCode::kBadArgument,
@@ -61,7 +62,7 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
     ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement others, MeasureAgreement(input.cloud, render, held_out));
     if (HasSeen(agreement.psnr, others.psnr)) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews all,
-                                   OpenProject(options.images, {.hold_out = 0, .downscale = options.downscale}));
+                                   OpenProject(options.images, {.hold_out = 0, .downscale = options.downscale, .origin = options.origin}));
       // A project with test views of its own has them held out for good.
       if (all.held_out.empty()) {
         LogInfo(Cat("with those held out they agree as well, to ", Fixed(others.psnr, 2),

@@ -197,6 +197,7 @@ Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitO
 
   Fitted out{fitter.UsableCloud(), report};
   out.cloud.render_mode = options.objective.render.mode;
+  out.cloud.origin = views.origin;
   if (options.pixel.upscale > 1) out.cloud.comments.push_back(PixelAreaComment(options.pixel.upscale));
   if (const auto& background = options.objective.render.background; background != std::array<float, 3>{}) {
     out.cloud.comments.push_back(BackgroundComment(background));

@@ -20,8 +20,10 @@
 #include "fit/orbit_scene_for_test.h"
 #include "formats/cloud_io.h"
 #include "formats/random_cloud_for_test.h"
+#include "images/image_io.h"
 #include "io/flip_bit_for_test.h"
 #include "io/folder_for_test.h"
+#include "metrics/image_metrics.h"
 #include "tensors/safetensors.h"
 #include "tensors/tensor_checksum.h"
 
@@ -127,6 +129,36 @@ TEST_F(Fits, LearnsAKnownSplat) {
   EXPECT_EQ(fitted->cloud.render_mode, RenderMode::kClassic);
   EXPECT_GT(report.train.psnr, 25);
   EXPECT_GT(report.held_out.psnr, 20);
+}
+
+TEST_F(Fits, MapsAreFittedAsWellAsWhatLiesAtZero) {
+  const std::array<double, 3> place = {500000, 4500000, 120};
+  const TestFolder folder;
+  CameraSet set = orbit_scene::Write(folder.path(), orbit_scene::Ball(150, 5), 12, 32);
+  const auto psnr = [&] {
+    const auto views = OpenProject(folder.path(), {.hold_out = 0});
+    EXPECT_TRUE(views.ok());
+    InitialPoints points = RandomPointsInView(200, views->train, views->scene_scale, 1);
+    const auto fitted = Fit(*views, InitialCloud(points, views->scene_scale, {}).value(), FitOptionsFor(150));
+    EXPECT_TRUE(fitted.ok()) << fitted.error().message;
+    EXPECT_EQ(fitted->cloud.origin, views->origin);
+    // The result is seen by cameras of the world.
+    Rasterizer rasterizer;
+    RenderOutput output;
+    double sum = 0;
+    for (const Camera& camera : set.cameras) {
+      EXPECT_TRUE(rasterizer.Render(fitted->cloud, camera, {}, output).ok());
+      const auto truth = ReadImage(folder / (camera.name + ".png"));
+      Clamp01(output.color);
+      sum += Psnr(output.color, *truth).value() / static_cast<double>(set.cameras.size());
+    }
+    EXPECT_NEAR(sum, fitted->report.train.psnr, 0.1);
+    return sum;
+  };
+  const double at_zero = psnr();
+  for (Camera& camera : set.cameras) camera = FromOrigin(camera, {-place[0], -place[1], -place[2]});
+  ASSERT_TRUE(WriteTransforms(folder / "transforms.json", set, {.overwrite = true}).ok());
+  EXPECT_NEAR(psnr(), at_zero, 0.5);
 }
 
 TEST_F(Fits, AnInterruptionLosesNothing) {

@@ -43,15 +43,31 @@ int64_t CamerasThatSee(const Point& p, const std::vector<Camera>& cameras) {
   return count;
 }
 
+// Whether floats can hold it.
+bool AppendPosition(const Point& world, const WorldOrigin& origin, InitialPoints& points) {
+  const Point p = FromOrigin(world, origin);
+  if (!std::ranges::all_of(p, [](double x) { return std::isfinite(static_cast<float>(x)); })) return false;
+  for (const double x : p) points.positions.push_back(static_cast<float>(x));
+  return true;
+}
+
 }  // namespace
 
-InitialPoints PointsOf(std::span<const ColmapPoint> points) {
+InitialPoints PointsOf(std::span<const ColmapPoint> points, const WorldOrigin& origin) {
   InitialPoints out;
   for (const ColmapPoint& point : points) {
-    const auto& p = point.position;
-    if (!std::all_of(p.begin(), p.end(), [](double x) { return std::isfinite(static_cast<float>(x)); })) continue;
-    for (const double x : p) out.positions.push_back(static_cast<float>(x));
+    if (!AppendPosition(point.position, origin, out)) continue;
     for (const uint8_t c : point.color) out.colors.push_back(static_cast<float>(c) / 255);
+  }
+  return out;
+}
+
+InitialPoints PointsOf(std::span<const double> positions, std::span<const float> colors, const WorldOrigin& origin) {
+  InitialPoints out;
+  for (size_t i = 0; i + 2 < positions.size(); i += 3) {
+    if (!AppendPosition({positions[i], positions[i + 1], positions[i + 2]}, origin, out)) continue;
+    out.colors.insert(out.colors.end(), colors.begin() + static_cast<ptrdiff_t>(i),
+                      colors.begin() + static_cast<ptrdiff_t>(i) + 3);
   }
   return out;
 }
@@ -102,12 +118,12 @@ InitialPoints RandomPointsInView(int64_t count, const std::vector<Camera>& camer
   return points.size() > 0 ? points : RandomPoints(count, scene_scale, seed);
 }
 
-InitialPoints PointsOf(const GaussianCloud& cloud) {
+InitialPoints PointsOf(const GaussianCloud& cloud, const WorldOrigin& origin) {
   InitialPoints points;
   for (int64_t i = 0; i < cloud.size(); ++i) {
-    if (!IsUsable(cloud, i)) continue;
+    if (!IsUsable(cloud, i) || !AppendPosition(ToWorld(cloud.means.data() + 3 * i, cloud.origin), origin, points))
+      continue;
     for (int64_t k = 0; k < 3; ++k) {
-      points.positions.push_back(cloud.means[static_cast<size_t>(3 * i + k)]);
       const float color = cloud.sh[static_cast<size_t>(cloud.sh_stride() * i + k)] * kSh0 + 0.5f;
       points.colors.push_back(std::clamp(color, 0.0f, 1.0f));
     }

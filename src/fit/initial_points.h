@@ -14,14 +14,16 @@ namespace anchorsplat {
 
 // Where a fit's first Gaussians stand.
 struct InitialPoints {
-  Buffer<float> positions;  // [M,3] world
+  Buffer<float> positions;  // [M,3] world, from an origin on (core/world_origin.h)
   Buffer<float> colors;     // [M,3] rgb 0–1
 
   int64_t size() const { return static_cast<int64_t>(positions.size() / 3); }
 };
 
-// Points of structure from motion. Positions beyond the range of floats are left out.
-InitialPoints PointsOf(std::span<const ColmapPoint> points);
+// Points of structure from motion, seen from `origin`. Positions beyond the range of floats are left out.
+InitialPoints PointsOf(std::span<const ColmapPoint> points, const WorldOrigin& origin);
+// The same of world positions with rgb 0–1, [M,3] each.
+InitialPoints PointsOf(std::span<const double> positions, std::span<const float> colors, const WorldOrigin& origin);
 
 // `count` points of random colours, uniform within ±`extent` scene scales of the origin: gsplat's `init_type =
 // "random"`, which has 100,000 of them and an `init_extent` of 3. INRIA's trainer has ±1.3 units for NeRF-synthetic
@@ -36,8 +38,8 @@ InitialPoints RandomPoints(int64_t count, double scene_scale, uint64_t seed, dou
 // of it.
 InitialPoints RandomPointsInView(int64_t count, const std::vector<Camera>& cameras, double scene_scale, uint64_t seed);
 
-// Centres and constant colours of a splat, to begin another fit from; of rows that are finite.
-InitialPoints PointsOf(const GaussianCloud& cloud);
+// Centres, seen from `origin`, and constant colours of a splat, to begin another fit from; of rows that are finite.
+InitialPoints PointsOf(const GaussianCloud& cloud, const WorldOrigin& origin);
 
 // `count` of the points, evenly spread over their order; all of them when there are not as many, or nobody says.
 InitialPoints Thinned(const InitialPoints& points, std::optional<int64_t> count);

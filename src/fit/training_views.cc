@@ -90,24 +90,36 @@ fs::path ModelFolder(const fs::path& project) {
 }
 
 // A PLY of points; of an empty path there are none.
-Status ReadPoints(const fs::path& path, InitialPoints& points) {
+Status ReadPoints(const fs::path& path, const WorldOrigin& origin, InitialPoints& points) {
   if (path.empty()) return {};
   ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(PlyPoints read, ReadPlyPoints(file));
-  points = {std::move(read.positions), std::move(read.colors)};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyPoints read, ReadPlyPoints(file));
+  points = PointsOf(read.positions, read.colors, origin);
   return {};
 }
 
 // Those of a sparse model as COLMAP writes it, else as 3DGS leaves them beside it. There may be none.
-Status ReadPointsOfModel(const fs::path& model, InitialPoints& points) {
+Status ReadPointsOfModel(const fs::path& model, const WorldOrigin& origin, InitialPoints& points) {
   const auto read = ReadColmapPoints(model);
   if (read.ok()) {
-    points = PointsOf(*read);
+    points = PointsOf(*read, origin);
     return {};
   }
   if (read.error().code != ErrorCode::kNotFound) return read.error();
   const fs::path ply = model / "points3D.ply";
-  return Exists(ply) ? ReadPoints(ply, points) : Status();
+  return Exists(ply) ? ReadPoints(ply, origin, points) : Status();
+}
+
+// The views as seen from the origin, and how large the scene is.
+void MoveToOrigin(const fs::path& source, const ProjectOptions& options, std::vector<Camera>& views,
+                  TrainingViews& out) {
+  out.origin = options.origin ? *options.origin : ChooseOrigin(views);
+  if (!options.origin && !IsZero(out.origin)) {
+    LogInfo(Cat(source.string(), ": coordinates are too large for 32-bit floats; positions are kept relative to ",
+                TextOf(out.origin)));
+  }
+  for (Camera& view : views) view = FromOrigin(std::move(view), out.origin);
+  out.scene_scale = SceneScale(views);
 }
 
 void HoldOut(int every, std::vector<Camera> views, TrainingViews& out) {
@@ -145,16 +157,17 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
     const fs::path points = set.points;
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views,
                                  WithPictures(std::move(set), train_file, options.downscale, out.without_picture));
-    out.scene_scale = SceneScale(views);
+    MoveToOrigin(train_file, options, views, out);
     if (Exists(test_file)) {
       out.train = std::move(views);
       ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet test, ReadCameras(test_file));
       ANCHORSPLAT_ASSIGN_OR_RETURN(out.held_out,
                                    WithPictures(std::move(test), test_file, options.downscale, out.without_picture));
+      for (Camera& view : out.held_out) view = FromOrigin(std::move(view), out.origin);
     } else {
       HoldOut(options.hold_out, std::move(views), out);
     }
-    ANCHORSPLAT_RETURN_IF_ERROR(ReadPoints(points, out.points));
+    ANCHORSPLAT_RETURN_IF_ERROR(ReadPoints(points, out.origin, out.points));
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(source));
     out.background = set.background;
@@ -165,10 +178,10 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
     const fs::path points = set.points;
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views,
                                  WithPictures(std::move(set), source, options.downscale, out.without_picture));
-    out.scene_scale = SceneScale(views);
+    MoveToOrigin(source, options, views, out);
     HoldOut(options.hold_out, std::move(views), out);
-    ANCHORSPLAT_RETURN_IF_ERROR(colmap ? ReadPointsOfModel(ModelFolder(source), out.points)
-                                       : ReadPoints(points, out.points));
+    ANCHORSPLAT_RETURN_IF_ERROR(colmap ? ReadPointsOfModel(ModelFolder(source), out.origin, out.points)
+                                       : ReadPoints(points, out.origin, out.points));
   }
   if (out.train.empty()) {
     return Error{ErrorCode::kBadArgument,

@@ -14,8 +14,10 @@
 namespace anchorsplat {
 
 // What a fit starts from: views with pictures, and points where the project has them. World coordinates are the
-// project's own; nothing is centred, turned or scaled.
+// project's own; nothing is turned or scaled. Cameras and points are seen from `origin`, which is zero but where the
+// project's coordinates are too large for floats (core/world_origin.h).
 struct TrainingViews {
+  WorldOrigin origin = {0, 0, 0};
   std::vector<Camera> train;     // sorted by name; every one has a picture, and intrinsics for the picture's size
   std::vector<Camera> held_out;  // the same, never trained on
   std::optional<std::array<float, 3>> background;  // where the project says which one its pictures have
@@ -29,6 +31,7 @@ struct ProjectOptions {
   // transforms_test.json hold out those instead.
   int hold_out = 8;
   int downscale = 1;  // pixels of a picture per side that become one, their mean; 1 to kMostDownscale
+  std::optional<WorldOrigin> origin = {};  // of a splat that is there already; nothing: ChooseOrigin of the cameras
 };
 
 // Opens a project: a folder with transforms_train.json and perhaps transforms_test.json (NeRF-synthetic), a COLMAP

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "core/messages_for_test.h"
+#include "core/text.h"
 #include "fit/fit.h"
 #include "fit/initial_cloud.h"
 #include "fit/orbit_scene_for_test.h"
@@ -59,6 +60,29 @@ TEST(TrainingViews, ColmapProject) {
   EXPECT_EQ(OpenProject(folder.path()).error().code, ErrorCode::kBadFile);
   fs::remove(folder / "sparse/0/points3D.txt");
   EXPECT_EQ(OpenProject(folder.path())->points.size(), 0);
+}
+
+// The same project where the world's coordinates are those of a map.
+TEST(TrainingViews, MapsBeginAtAnOrigin) {
+  const TestFolder folder;
+  WriteColmap(folder.path(), 10);
+  std::string images;
+  for (int i = 0; i < 10; ++i) {
+    images += Cat(i + 1, " 1 0 0 0 ", -(500000 + i), " -4500000 -120 1 v", 10 + i, ".png\n\n");
+  }
+  Put(folder / "sparse/0/images.txt", images);
+  Put(folder / "sparse/0/points3D.txt", "1 500000.125 4500001.25 122 255 0 0 0.1\n");
+  const auto views = OpenProject(folder.path());
+  ASSERT_TRUE(views.ok()) << views.error().message;
+  EXPECT_EQ(views->origin, (WorldOrigin{500000, 4500000, 100}));
+  EXPECT_EQ(views->points.positions, (Buffer<float>{0.125f, 1.25f, 22}));
+  EXPECT_NEAR(views->scene_scale, 1.1 * 4.5, 1e-6);
+  EXPECT_NEAR(views->train[0].Center()[0], 1, 1e-6);
+  EXPECT_NEAR(views->held_out[0].Center()[2], 20, 1e-6);
+  // Of a splat that is there already.
+  const auto beside = OpenProject(folder.path(), {.origin = WorldOrigin{500000, 0, 0}});
+  ASSERT_TRUE(beside.ok());
+  EXPECT_EQ(beside->points.positions, (Buffer<float>{0.125f, 4500001.0f, 122}));
 }
 
 TEST(TrainingViews, LensMaskPointsAndDownscale) {

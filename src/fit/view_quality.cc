@@ -17,11 +17,13 @@ Result<ViewQuality> MeasureQuality(const GaussianCloud& cloud, const RenderOptio
   Buffer<uint8_t> ignored;
   ViewQuality sum;
   std::vector<std::string> masked;
+  CloudView from_origin = cloud;
+  from_origin.origin = {};
   const auto count = static_cast<int64_t>(pictures.views().size());
   for (int64_t view = 0; view < count; ++view) {
     const Camera& camera = pictures.views()[static_cast<size_t>(view)];
     ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(view, picture, ignored));
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, RaysOf(pixel, camera), RaysOf(pixel, options), output));
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(from_origin, RaysOf(pixel, camera), RaysOf(pixel, options), output));
     if (pixel.samples > 1) AverageRays(output.color, pixel.samples, average);
     Image& shown = pixel.samples > 1 ? average : output.color;
     Clamp01(shown);

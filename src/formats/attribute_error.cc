@@ -60,10 +60,14 @@ double AngleBetween(const float* p, const float* q) {
   return 4 * std::asin(std::min(1.0, std::sqrt(std::min(minus, plus)) / 2));
 }
 
-void CompareRow(const CloudView& a, int64_t i, const CloudView& b, int64_t j, Sums& sums) {
+// `world` is where Gaussian j of `b` is.
+void CompareRow(const CloudView& a, int64_t i, const CloudView& b, int64_t j, const std::array<double, 3>& world,
+                Sums& sums) {
   double distance = 0;
   for (int k = 0; k < 3; ++k) {
-    const double d = double{a.means[static_cast<size_t>(3 * i + k)]} - double{b.means[static_cast<size_t>(3 * j + k)]};
+    // The difference of the origins first: it is exact, and often zero.
+    const auto axis = static_cast<size_t>(k);
+    const double d = double{a.means[static_cast<size_t>(3 * i + k)]} - (world[axis] - a.origin[axis]);
     distance += d * d;
     sums.attribute[1].Add(double{std::max(kLowestLogScale, a.log_scales[static_cast<size_t>(3 * i + k)])} -
                           double{std::max(kLowestLogScale, b.log_scales[static_cast<size_t>(3 * j + k)])});
@@ -87,7 +91,8 @@ void CompareRow(const CloudView& a, int64_t i, const CloudView& b, int64_t j, Su
 
 }  // namespace
 
-Result<AttributeError> CompareAttributes(const CloudView& a, const CloudView& b, const Buffer<uint32_t>& rows) {
+Result<AttributeError> CompareAttributes(const CloudView& a, const CloudView& b, const Buffer<uint32_t>& rows,
+                                         const Buffer<double>& world) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(a));
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(b));
   if (a.size() != b.size() || (!rows.empty() && rows.size() != static_cast<size_t>(a.size()))) {
@@ -99,7 +104,10 @@ Result<AttributeError> CompareAttributes(const CloudView& a, const CloudView& b,
     Sums& sums = parts[static_cast<size_t>(first / kGrain)];
     for (int64_t i = first; i < last; ++i) {
       const int64_t j = rows.empty() ? i : int64_t{rows[static_cast<size_t>(i)]};
-      if (j < b.size() && IsUsable(a, i) && IsUsable(b, j)) CompareRow(a, i, b, j, sums);
+      if (j >= b.size() || !IsUsable(a, i) || !IsUsable(b, j)) continue;
+      std::array<double, 3> at = ToWorld(b.means.data() + 3 * j, b.origin);
+      if (!world.empty()) std::copy_n(world.data() + 3 * j, 3, at.begin());
+      CompareRow(a, i, b, j, at, sums);
     }
   });
   Sums total;

@@ -26,8 +26,10 @@ struct AttributeError {
   Deviation harmonics;   // SH of degree ≥ 1 as stored, per coefficient; missing ones count as zero
 };
 
-// Row i of `a` against row rows[i] of `b` (empty `rows`: row i). kBadArgument when the sizes differ.
-Result<AttributeError> CompareAttributes(const CloudView& a, const CloudView& b, const Buffer<uint32_t>& rows = {});
+// Row i of `a` against row rows[i] of `b` (empty `rows`: row i), in the world. `world`, [N,3]: where those of `b` are,
+// if its means are rounded; may be empty. kBadArgument when the sizes differ.
+Result<AttributeError> CompareAttributes(const CloudView& a, const CloudView& b, const Buffer<uint32_t>& rows = {},
+                                         const Buffer<double>& world = {});
 
 // One line per attribute, for people.
 std::string FormatAttributeError(const AttributeError& error);

@@ -53,6 +53,7 @@ AxisFlip FlipBetween(const Axes& from, const Axes& to) {
 void FlipAxes(GaussianCloud& cloud, const AxisFlip& flip) {
   if (flip.changes_nothing()) return;
   FlipUp(flip.mean, cloud.comments);
+  for (size_t k = 0; k < 3; ++k) cloud.origin[k] *= flip.mean[k];
   ParallelFor(0, cloud.size(), 1 << 14, [&](int64_t first, int64_t last) {
     for (int64_t i = first; i < last; ++i) {
       float* mean = cloud.means.data() + 3 * i;

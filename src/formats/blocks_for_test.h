@@ -58,6 +58,7 @@ inline std::string DifferenceOfBlocks(BlocksFunction open, const InputFile& file
     if (shown.size() != read->size() || (*blocks)->sh_degree() != read->sh_degree) return "another size or degree";
     if ((*blocks)->render_mode() != read->render_mode) return "another render mode";
     if ((*blocks)->comments() != read->comments) return "other comments";
+    if ((*blocks)->origin() != read->origin) return "another origin";
     const GaussianCloud flat = WithShDegree(*read, 0);
     for (const auto array : {&GaussianCloud::means, &GaussianCloud::log_scales, &GaussianCloud::quats,
                              &GaussianCloud::opacity_logits, &GaussianCloud::sh}) {

@@ -102,6 +102,12 @@ void Reorder(GaussianCloud& cloud, const Buffer<uint32_t>& rows, ExtraProperties
   if (extras != nullptr) ReorderRows(*extras, rows);
 }
 
+Result<GaussianCloud> ReadBack(const fs::path& output, const SplatFormat& format, const CloudView& written) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud back, ReadCloud(output));
+  if (!format.keeps_origin) back.origin = written.origin;  // a warning has said where it is
+  return back;
+}
+
 Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output, const ConvertOptions& options,
                                   GaussianCloud* kept) try {
   ConvertReport report;
@@ -134,6 +140,7 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   }
 
   if (options.render_mode) cloud.render_mode = options.render_mode;
+  cloud.double_means |= options.double_means;
   if (options.sh_degree) SetShDegree(cloud, *options.sh_degree);
   DropFaint(cloud, options.min_opacity, &extras);
   if (options.max_gaussians) KeepMostImportant(cloud, *options.max_gaussians, &extras);
@@ -171,15 +178,20 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   }
   report.predicted_roughly = to->size_is_estimate;
   if (options.measure && to->read != nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadCloud(output));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadBack(output, *to, cloud));
     if (to->written_rows != nullptr) {
       const Buffer<uint32_t> rows = to->written_rows(cloud, write);
       const Buffer<int64_t> kept_rows(rows.begin(), rows.end());
       ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud written_cloud, Subset(cloud, kept_rows));
-      ANCHORSPLAT_ASSIGN_OR_RETURN(report.error, CompareAttributes(back, written_cloud));
+      Buffer<double> world;
+      for (const uint32_t row : extras.world.empty() ? Buffer<uint32_t>() : rows) {
+        const auto at = extras.world.begin() + 3 * int64_t{row};
+        world.insert(world.end(), at, at + 3);
+      }
+      ANCHORSPLAT_ASSIGN_OR_RETURN(report.error, CompareAttributes(back, written_cloud, {}, world));
     } else {
       ANCHORSPLAT_ASSIGN_OR_RETURN(report.error,
-                                   CompareAttributes(back, cloud, WriteOrder(cloud, write.order, to->order)));
+                                   CompareAttributes(back, cloud, WriteOrder(cloud, write.order, to->order), extras.world));
     }
   }
   if (kept != nullptr) *kept = std::move(cloud);

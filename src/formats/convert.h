@@ -27,7 +27,8 @@ struct ConvertOptions {
   std::optional<Axes> input_axes = {}, output_axes = {};
   int lod_level = 0;  // of a streamed SOG that is read; 0 is the finest
   CloudWriteOptions write = {};
-  bool measure = false;  // read the output back and compare
+  bool double_means = false;  // of a PLY that is written
+  bool measure = false;       // read the output back and compare
 };
 
 // "IN:OUT", "IN:" or ":OUT", or "IN" alone, each three letters as in AxesFromName: sets the axes of `options`.
@@ -50,6 +51,10 @@ struct ConvertReport {
 // warning. `kept` takes the cloud as it was written, for comparisons, if not null.
 Result<ConvertReport> ConvertFile(const std::filesystem::path& input, const std::filesystem::path& output,
                                   const ConvertOptions& options, GaussianCloud* kept = nullptr);
+
+// What was written, for comparisons: positions of a format that keeps no origin are relative to that of `written`.
+Result<GaussianCloud> ReadBack(const std::filesystem::path& output, const SplatFormat& format,
+                               const CloudView& written);
 
 // The parts of it that change a cloud, in the order in which they are done. In place.
 // `extras` are changed alike, if not null.

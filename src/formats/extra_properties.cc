@@ -15,7 +15,8 @@ size_t ExtraProperties::row_size() const {
 
 bool ExtraProperties::fits(int64_t gaussians) const {
   const auto n = static_cast<size_t>(gaussians);
-  return rows.size() == n * row_size() && (normals.empty() || normals.size() == 3 * n);
+  return rows.size() == n * row_size() && (normals.empty() || normals.size() == 3 * n) &&
+         (world.empty() || world.size() == 3 * n);
 }
 
 std::string ExtraProperties::names() const {
@@ -34,18 +35,24 @@ std::string ExtraProperties::lost(bool writer_keeps) const {
 void KeepRows(ExtraProperties& extras, const std::vector<char>& keep) {
   if (!extras.properties.empty()) KeepRows(extras.rows, static_cast<int64_t>(extras.row_size()), keep);
   if (!extras.normals.empty()) KeepRows(extras.normals, 3, keep);
+  if (!extras.world.empty()) KeepRows(extras.world, 3, keep);
 }
 
 void ReorderRows(ExtraProperties& extras, const Buffer<uint32_t>& rows) {
   if (!extras.properties.empty()) ReorderRows(extras.rows, static_cast<int64_t>(extras.row_size()), rows);
   if (!extras.normals.empty()) ReorderRows(extras.normals, 3, rows);
+  if (!extras.world.empty()) ReorderRows(extras.world, 3, rows);
 }
 
 void FlipAxes(ExtraProperties& extras, const AxisFlip& flip) {
   if (flip.changes_nothing()) return;
-  ParallelFor(0, static_cast<int64_t>(extras.normals.size() / 3), 1 << 14, [&](int64_t first, int64_t last) {
-    for (int64_t i = 3 * first; i < 3 * last; ++i) extras.normals[static_cast<size_t>(i)] *= flip.mean[i % 3];
-  });
+  const auto turn = [&](auto& vectors) {
+    ParallelFor(0, std::ssize(vectors) / 3, 1 << 14, [&](int64_t first, int64_t last) {
+      for (int64_t i = 3 * first; i < 3 * last; ++i) vectors[static_cast<size_t>(i)] *= flip.mean[i % 3];
+    });
+  };
+  turn(extras.normals);
+  turn(extras.world);
 }
 
 }  // namespace anchorsplat

@@ -25,10 +25,13 @@ struct ExtraProperties {
   std::vector<Property> properties;   // scalars in the order of the file, without normals
   Buffer<std::byte> rows;             // [N, row_size()] the values one after the other, little-endian
   Buffer<float> normals;              // [N,3]; empty where there are none, or where all are zero
+  // [N,3] world positions as the file has them, of which the means are rounded differences to the cloud's origin; empty
+  // where means are all there is to know.
+  Buffer<double> world;
   std::vector<std::string> not_kept;  // what no writer has a place for, for messages: `list "neighbours"`
 
   size_t row_size() const;  // bytes
-  bool empty() const { return properties.empty() && normals.empty(); }
+  bool empty() const { return properties.empty() && normals.empty() && world.empty(); }
   bool fits(int64_t gaussians) const;  // has a row for each of them
   // For messages: "label, confidence, normals".
   std::string names() const;

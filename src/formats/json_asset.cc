@@ -21,7 +21,7 @@ void AddMarks(const JsonValue& asset, std::vector<std::string>& comments) {
   for (const nlohmann::json& one : list->raw()) {
     if (!one.is_string() || marks == kMost) continue;
     const auto& text = one.get_ref<const std::string&>();
-    if (text.size() > kMostBytes || !IsMark(text)) continue;
+    if (text.size() > kMostBytes || !(IsMark(text) || OriginOfComment(text))) continue;
     comments.push_back(text);
     ++marks;
   }
@@ -29,7 +29,7 @@ void AddMarks(const JsonValue& asset, std::vector<std::string>& comments) {
 
 }  // namespace
 
-nlohmann::json AssetOf(std::span<const std::string> comments) {
+nlohmann::json AssetOf(std::span<const std::string> comments, const WorldOrigin& origin) {
   nlohmann::json asset = {{"generator", "anchorsplat " ANCHORSPLAT_VERSION}};
   // Comments are bytes, JSON is UTF-8.
   const auto in_utf8 = [](const std::string& text) {
@@ -39,6 +39,7 @@ nlohmann::json AssetOf(std::span<const std::string> comments) {
   for (const std::string& comment : comments) {
     if (IsMark(comment)) asset["extras"]["comments"].push_back(in_utf8(comment));
   }
+  if (!IsZero(origin)) asset["extras"]["comments"].push_back(OriginComment(origin));
   return asset;
 }
 

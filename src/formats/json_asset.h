@@ -6,16 +6,18 @@
 #include <vector>
 
 #include "core/result.h"
+#include "core/world_origin.h"
 #include "io/json_file.h"
 
 namespace anchorsplat {
 
 // The member "asset" of a file that is JSON, as glTF defines it and SOG took it over: what made the file, and whose it
 // is. `generator` is ours; `copyright` are the credits, a line each, and `extras.comments` the
-// marks of core/lost_nothing_mark.h; neither is there where there are none.
-nlohmann::json AssetOf(std::span<const std::string> comments);
+// marks of core/lost_nothing_mark.h and, where it is not zero, the origin of the means (core/world_origin.h); neither
+// is there where there are none.
+nlohmann::json AssetOf(std::span<const std::string> comments, const WorldOrigin& origin);
 
-// The credits and marks that such a file says, as comments; none where it says nothing, or no text. kBadFile: a
+// The credits, marks and origin that such a file says, as comments; none where it says nothing, or no text. kBadFile: a
 // mebibyte of credits.
 Result<std::vector<std::string>> CommentsOfAsset(const JsonValue& root);
 

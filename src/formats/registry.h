@@ -94,6 +94,7 @@ struct SplatFormat {
   FormatRange range = {};
   ModeTag mode_tag = ModeTag::kNone;
   CommentPlace comments = CommentPlace::kNone;
+  bool keeps_origin = false;  // of the means (core/world_origin.h), or writes them in the world
   // A sentence where `write` must round the means of this cloud more coarsely than is usual, else nothing. May be null.
   std::string (*mean_loss)(const CloudView& cloud) = nullptr;
 };

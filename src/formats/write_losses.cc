@@ -88,6 +88,12 @@ std::string ModeLoss(const SplatFormat& format, std::optional<RenderMode> mode) 
              DilationOf(*mode), " (--mode ", name, " where a verb has it)");
 }
 
+std::string OriginLoss(const SplatFormat& format, const WorldOrigin& origin) {
+  if (format.keeps_origin || IsZero(origin)) return {};
+  return Cat(AFileOf(format), " has no place for the origin of its positions: they are relative to ", TextOf(origin),
+             "; keep these numbers beside it");
+}
+
 }  // namespace
 
 std::vector<std::string> WriteLosses(const SplatFormat& format, const CloudView& cloud) {
@@ -109,6 +115,7 @@ std::vector<std::string> WriteLosses(const SplatFormat& format, const CloudView&
   add(clamped.colors, Cat("f_dc beyond ±", range.dc));
   add(clamped.harmonics, Cat("spherical harmonics beyond ±", range.harmonics));
   if (std::string loss = ModeLoss(format, cloud.render_mode); !loss.empty()) losses.push_back(std::move(loss));
+  if (std::string loss = OriginLoss(format, cloud.origin); !loss.empty()) losses.push_back(std::move(loss));
   if (std::string loss = CreditLoss(format, cloud.comments); !loss.empty()) losses.push_back(std::move(loss));
   if (std::string loss = MarkLoss(format, cloud.comments); !loss.empty()) losses.push_back(std::move(loss));
   if (format.mean_loss != nullptr) {

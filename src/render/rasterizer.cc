@@ -67,8 +67,8 @@ void Shape(int width, int height, int channels, Image& image) {
 }  // namespace
 
 // Projection and colours. Returns how many Gaussians are visible.
-int64_t Rasterizer::State::Project(const CloudView& cloud, const Camera& camera, const RenderOptions& options,
-                                   Stopwatch& watch) {
+int64_t Rasterizer::State::Project(const CloudView& cloud, const Camera& camera, float near,
+                                   const RenderOptions& options, Stopwatch& watch) {
   const int64_t n = cloud.size();
   const int64_t chunks = ProjectChunks(n);
   ProjectParams project{};
@@ -81,7 +81,7 @@ int64_t Rasterizer::State::Project(const CloudView& cloud, const Camera& camera,
   project.world_to_camera = camera.world_to_camera;
   project.profile = options.profile;
   project.mode = options.mode;
-  project.near_plane = NearPlane(options, camera);
+  project.near_plane = near;
   project.far_plane = options.far_plane;
   project.dilation = DilationOf(options);
   project.compensated_from = options.compensated_from;
@@ -210,18 +210,22 @@ Rasterizer& Rasterizer::operator=(Rasterizer&&) noexcept = default;
 
 const RenderStatistics& Rasterizer::statistics() const { return state_->statistics; }
 
-Status Rasterizer::Render(const CloudView& cloud, const Camera& camera, const RenderOptions& options,
+Status Rasterizer::Render(const CloudView& cloud, const Camera& world_camera, const RenderOptions& options,
                           RenderOutput& output) {
   state_->kept.reset();
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckCamera(camera));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckCamera(world_camera));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
-  if (const float near = NearPlane(options, camera); !(options.far_plane > near)) {
+  const float near = NearPlane(options, world_camera);
+  if (!(options.far_plane > near)) {
     return BadArgument(Cat("far plane ", options.far_plane, " must lie behind the near plane, which is at ", near));
   }
   if (cloud.size() > std::numeric_limits<int32_t>::max()) {
     return BadArgument(Cat("cloud of ", WithThousands(cloud.size()), " Gaussians; at most 2,147,483,647 can be drawn"));
   }
+  Camera camera;
+  camera.intrinsics = world_camera.intrinsics;
+  camera.world_to_camera = FromOrigin(world_camera.world_to_camera, cloud.origin);
   const int width = camera.intrinsics.width, height = camera.intrinsics.height;
   try {
     Shape(width, height, 3, output.color);
@@ -232,7 +236,7 @@ Status Rasterizer::Render(const CloudView& cloud, const Camera& camera, const Re
       output.depth = Image();
     }
     Stopwatch watch;
-    const int64_t total = state_->Project(cloud, camera, options, watch);
+    const int64_t total = state_->Project(cloud, camera, near, options, watch);
     state_->statistics.visible = total;
     state_->Sort(cloud.size(), total);
     state_->statistics.sort = watch.Lap();

@@ -52,7 +52,8 @@ struct Rasterizer::State {
   Buffer<uint8_t> slot_touched;
   Buffer<double> tile_backgrounds;
 
-  int64_t Project(const CloudView& cloud, const Camera& camera, const RenderOptions& options, Stopwatch& watch);
+  int64_t Project(const CloudView& cloud, const Camera& camera, float near, const RenderOptions& options,
+                  Stopwatch& watch);
   void Sort(int64_t count, int64_t total);
   BinParams MakeBinParams(int64_t visible_total, const Pinhole& intrinsics, float min_alpha);
   void BinAndBlend(int64_t visible_total, const Camera& camera, const RenderOptions& options, RenderOutput& output,

@@ -24,7 +24,7 @@ Depths CountDepths(const CloudView& cloud, const Camera& camera, double near, do
   Depths depths;
   for (int64_t i = 0; i < cloud.size(); ++i) {
     const float* p = cloud.means.data() + 3 * i;
-    const double z = camera.ToCamera({p[0], p[1], p[2]})[2];
+    const double z = camera.ToCamera(ToWorld(p, cloud.origin))[2];
     if (!std::isfinite(z)) continue;
     int64_t& where = z <= 0 ? depths.behind : z < near ? depths.too_near : z > far ? depths.too_far : depths.in_range;
     ++where;

@@ -35,6 +35,9 @@ void ConvertFlags::AddTo(CLI::App& verb) {
                   "What the files' axes really are where they do not follow their format, as IN:OUT, for example RUB: "
                   "for a PLY with y up, :RDF for an SPZ as careless programs expect it")
       ->check(NotEmpty());
+  double_means = verb.add_flag("--double", options.double_means,
+                               "PLY: world coordinates in double precision instead of floats from an origin that a "
+                               "comment says (default: where the input has them)");
   spz_version = AddWriteFlags(verb, options.write);
   LodOptions& lod = options.write.lod;
   const std::string group = "Levels of detail";
@@ -78,6 +81,13 @@ Status CheckConvertEffects(const ConvertFlags& flags, std::span<const std::files
   if (flags.spz_version->count() > 0 && std::ranges::none_of(outputs, is_spz)) {
     return Error{ErrorCode::kBadArgument, "--spz-version has no effect here; it has one where a .spz is written"};
   }
+  const auto is_ply = [](const std::filesystem::path& output) {
+    const SplatFormat* const format = FormatOfExtension(output);
+    return format != nullptr && format->write_with_extras != nullptr;
+  };
+  if (flags.double_means->count() > 0 && std::ranges::none_of(outputs, is_ply)) {
+    return Error{ErrorCode::kBadArgument, "--double has no effect here; it has one where a .ply is written"};
+  }
   const auto is_streamed = [](const std::filesystem::path& output) { return output.filename() == "lod-meta.json"; };
   for (const CLI::Option* option : flags.of_streamed) {
     if (option->count() > 0 && std::ranges::none_of(outputs, is_streamed)) {
@@ -106,7 +116,7 @@ Result<Converted> ConvertAndMeasure(const std::filesystem::path& input, const st
   Converted done;
   ANCHORSPLAT_ASSIGN_OR_RETURN(done.report, ConvertFile(input, output, options, options.measure ? &cloud : nullptr));
   if (done.report.error) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadCloud(output));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadBack(output, *FormatOfExtension(output), cloud));
     ANCHORSPLAT_ASSIGN_OR_RETURN(done.loss, MeasureConversionLoss(cloud, back, views));
   } else if (options.measure) {
     LogWarning(Cat(output.string(), ": ", done.report.output_format,

@@ -22,6 +22,7 @@ struct ConvertFlags {
   bool report = false;
   ConvertOptions options;
   CLI::Option* spz_version = nullptr;     // of the verb
+  CLI::Option* double_means = nullptr;
   std::vector<CLI::Option*> of_streamed;  // likewise: those that only a streamed SOG knows
 
   void AddTo(CLI::App& verb);

@@ -58,6 +58,7 @@ std::vector<std::string> Problems(const CloudStatistics& s) {
 Status LookAt(CloudBlocks& blocks, const std::function<CloudView()>& whole, SplatFindings& findings) {
   findings.render_mode = blocks.render_mode();
   findings.comments = blocks.comments();
+  findings.origin = blocks.origin();
   CloudView said;  // all but the Gaussians
   said.render_mode = findings.render_mode;
   said.comments = findings.comments;
@@ -268,7 +269,12 @@ nlohmann::json ToJson(const SplatFindings& f) {
                          {"predicted_bytes", nlohmann::json::object()},
                          {"predicted_roughly", nlohmann::json::array()}};
   for (const auto& [name, value] : f.facts.all()) json["facts"][name] = value;
-  if (s.bounds) json["bounds"] = {{"min", s.bounds->min}, {"max", s.bounds->max}};
+  json["origin"] = f.origin;
+  if (s.bounds && IsZero(f.origin)) {
+    json["bounds"] = {{"min", s.bounds->min}, {"max", s.bounds->max}};
+  } else if (s.bounds) {
+    json["bounds"] = {{"min", ToWorld(s.bounds->min.data(), f.origin)}, {"max", ToWorld(s.bounds->max.data(), f.origin)}};
+  }
   if (f.render_mode) json["render_mode"] = NameOf(*f.render_mode);
   if (f.looks) json["looks"] = NameOf(*f.looks);
   if (f.pixel_size.ok()) {

@@ -30,6 +30,7 @@ struct SplatFindings {
   uint64_t file_bytes = 0;
   std::optional<RenderMode> render_mode;  // as the file says
   std::vector<std::string> comments;
+  WorldOrigin origin = {0, 0, 0};  // of the means
   bool lost_no_width = false;  // HasLostNoWidth (enhance/enhanced_mark.h)
   CloudStatistics statistics;
   Result<PixelSizeFinding> pixel_size = Error{};

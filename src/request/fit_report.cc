@@ -19,10 +19,10 @@ nlohmann::json ToJson(const ViewQuality& quality) {
 
 Result<ChosenStart> ChooseFitStart(const FitFlags& flags, const TrainingViews& views, const std::string& project,
                                    uint64_t seed, const GaussianCloud* splat) {
-  if (splat != nullptr) return ChosenStart{Thinned(PointsOf(*splat), flags.init_points), "splat"};
+  if (splat != nullptr) return ChosenStart{Thinned(PointsOf(*splat, views.origin), flags.init_points), "splat"};
   if (!flags.init_splat.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(flags.init_splat));
-    InitialPoints points = PointsOf(cloud);
+    InitialPoints points = PointsOf(cloud, views.origin);
     if (points.size() < cloud.size()) {
       LogWarning(Cat(flags.init_splat, ": ", WithThousands(cloud.size() - points.size()), " of ",
                      WithThousands(cloud.size()), " Gaussians are not usable and begin nothing (`info` says why)"));

@@ -50,9 +50,11 @@ std::string ScriptJson(const Json& json) {
   return EscapeJsonForScript(json.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
 
-// What the page is told of a splat, without where its data are.
-Json SplatJson(const ViewerSplat& splat, const QuantizedCloud& q) {
+// What the page is told of a splat, without where its data are. The page's world begins at `origin`.
+Json SplatJson(const ViewerSplat& splat, const QuantizedCloud& q, const WorldOrigin& origin) {
   const Framing framing = FrameCloud(*splat.cloud);
+  std::array<double, 3> center = FromOrigin(splat.cloud->origin, origin);
+  for (size_t k = 0; k < 3; ++k) center[k] += q.center[k];
   const RenderMode mode = splat.cloud->render_mode.value_or(RenderMode::kClassic);
   return Json{{"name", splat.name},
               {"fileBytes", splat.file_bytes ? Json(*splat.file_bytes) : Json()},
@@ -63,11 +65,11 @@ Json SplatJson(const ViewerSplat& splat, const QuantizedCloud& q) {
               {"mode", NameOf(mode)},
               {"compensated", IsCompensated(mode)},
               {"dilation", DilationOf(mode)},
-              {"center", q.center},
+              {"center", center},
               {"radius", q.radius},
               {"spread", q.spread},
               {"reach", q.reach},
-              {"subject", {{"target", framing.target}, {"radius", framing.radius}}},
+              {"subject", {{"target", FromOrigin(framing.target, origin)}, {"radius", framing.radius}}},
               {"logScale", q.log_scale},
               {"dc", q.dc},
               {"shMax", q.sh_max},
@@ -79,14 +81,14 @@ Json SplatJson(const ViewerSplat& splat, const QuantizedCloud& q) {
 }
 
 // Its data go to `elements`, or to `folder` where there is one.
-Result<Json> AddSplat(const ViewerSplat& splat, const std::string& id, int max_sh_degree,
+Result<Json> AddSplat(const ViewerSplat& splat, const WorldOrigin& origin, const std::string& id, int max_sh_degree,
                       std::vector<DataElement>& elements, PageFolder* folder = nullptr) {
   if (splat.cloud == nullptr) return Error{ErrorCode::kBadArgument, Cat("no cloud to show as \"", id, "\"")};
   auto measured = MeasureCloud(*splat.cloud, max_sh_degree);
   if (!measured.ok()) {
     return Error{measured.error().code, Cat(Printable(splat.name), ": ", measured.error().message)};
   }
-  Json json = SplatJson(splat, measured->scale);
+  Json json = SplatJson(splat, measured->scale, origin);
   if (folder != nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(json["parts"], folder->AddSplat(*splat.cloud, *std::move(measured), id));
     return json;
@@ -114,9 +116,10 @@ Result<Json> AddPicture(const std::filesystem::path& path, const std::string& id
   return Json{{"type", type}, {"element", id}};
 }
 
-Result<Json> AddView(const ViewerView& view, size_t index, std::vector<DataElement>& elements) {
+Result<Json> AddView(const ViewerView& view, const WorldOrigin& origin, size_t index,
+                     std::vector<DataElement>& elements) {
   const Pinhole& k = view.camera.intrinsics;
-  const Pose& pose = view.camera.world_to_camera;
+  const Pose pose = FromOrigin(view.camera.world_to_camera, origin);
   Json picture;
   if (!view.picture.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(picture, AddPicture(view.picture, Cat("picture-", index), elements));
@@ -180,7 +183,7 @@ uint64_t EstimatedPageBytes(const GaussianCloud& cloud, int max_sh_degree) {
   ViewerSplat splat;
   splat.cloud = &*sample;
   std::vector<DataElement> elements;
-  if (rows.empty() || !AddSplat(splat, "sample", max_sh_degree, elements).ok()) return 0;
+  if (rows.empty() || !AddSplat(splat, sample->origin, "sample", max_sh_degree, elements).ok()) return 0;
   double bytes = 0;
   for (const DataElement& element : elements) bytes += static_cast<double>(element.base64.size());
   return static_cast<uint64_t>(bytes * static_cast<double>(cloud.size()) / static_cast<double>(rows.size()));
@@ -228,14 +231,15 @@ Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page
     folder.emplace(std::move(made));
   }
   PageFolder* const data = folder ? &*folder : nullptr;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Json after, AddSplat(page.after, "after", page.max_sh_degree, elements, data));
+  const WorldOrigin origin = page.after.cloud == nullptr ? WorldOrigin{} : page.after.cloud->origin;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Json after, AddSplat(page.after, origin, "after", page.max_sh_degree, elements, data));
   Json before;
   if (page.before) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(before, AddSplat(*page.before, "before", page.max_sh_degree, elements, data));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(before, AddSplat(*page.before, origin, "before", page.max_sh_degree, elements, data));
   }
   Json views = Json::array();
   for (size_t k = 0; k < page.views.size(); ++k) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(Json view, AddView(page.views[k], k, elements));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(Json view, AddView(page.views[k], origin, k, elements));
     views.push_back(std::move(view));
   }
   const std::string& title = page.title.empty() ? page.after.name : page.title;

@@ -114,7 +114,8 @@ Json Described(const GaussianCloud& cloud) {
   return {{"gaussians", cloud.size()},
           {"sh_degree", cloud.sh_degree},
           {"render_mode", cloud.render_mode ? Json(NameOf(*cloud.render_mode)) : Json()},
-          {"comments", cloud.comments}};
+          {"comments", cloud.comments},
+          {"origin", cloud.origin}};
 }
 
 // Removes what was put there when it goes.
@@ -281,6 +282,12 @@ Result<Engine::Answer> Engine::Put(const Json& request, std::span<const std::byt
   OpenCloud open;
   ANCHORSPLAT_ASSIGN_OR_RETURN(open.cloud.render_mode, ModeOf(request));
   ANCHORSPLAT_ASSIGN_OR_RETURN(open.cloud.comments, WordsOf(request, "comments"));
+  if (const Json* const origin = Find(request, "origin")) {
+    const bool is_point = origin->is_array() && origin->size() == 3 &&
+                          std::ranges::all_of(*origin, [](const Json& x) { return x.is_number(); });
+    if (!is_point) return BadRequest("says an 'origin' that is not three numbers");
+    open.cloud.origin = origin->get<WorldOrigin>();
+  }
   open.cloud.Resize(count, static_cast<int>(degree));
   const std::byte* from = data.data();
   for (Buffer<float>* column :

@@ -156,7 +156,7 @@ export class Engine {
     }
     const worker = await this.home();
     const {answer} = await put(worker, blocks, {gaussians: columns.count ?? blocks[3].length, sh_degree: columns.shDegree ?? 0,
-      render_mode: columns.renderMode ?? null, comments: columns.comments ?? []});
+      render_mode: columns.renderMode ?? null, comments: columns.comments ?? [], origin: columns.origin ?? [0, 0, 0]});
     return new Splat(this, worker, answer);
   }
 
@@ -204,7 +204,7 @@ function put(worker, blocks, described, transfer = []) {
   return worker.ask({verb: 'put', ...described}, {data, transfer});
 }
 
-const describedBy = ({gaussians, sh_degree, render_mode, comments}) => ({gaussians, sh_degree, render_mode, comments});
+const describedBy = ({gaussians, sh_degree, render_mode, comments, origin}) => ({gaussians, sh_degree, render_mode, comments, origin});
 
 // A splat that the engine holds. It does not change: what makes another one returns it.
 export class Splat {
@@ -216,6 +216,7 @@ export class Splat {
     this.shDegree = answer.sh_degree;
     this.renderMode = answer.render_mode;
     this.comments = answer.comments;
+    this.origin = answer.origin;
     this.format = answer.format;
   }
 
@@ -301,7 +302,7 @@ export class Splat {
 
   async columns() {
     const {blocks} = await this.ask({verb: 'columns'});
-    const columns = {count: this.count, shDegree: this.shDegree, renderMode: this.renderMode, comments: this.comments};
+    const columns = {count: this.count, shDegree: this.shDegree, renderMode: this.renderMode, comments: this.comments, origin: this.origin};
     COLUMNS.forEach((name, k) => { columns[name] = new Float32Array(blocks[k]); });
     return columns;
   }

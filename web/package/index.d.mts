@@ -46,6 +46,8 @@ export interface Columns {
   sh: Float32Array;
   renderMode?: RenderMode | null;
   comments?: string[];
+  /** What centres are relative to, in world units: position = origin + mean. */
+  origin?: [number, number, number];
 }
 
 /** Cameras that readCameras() has read. */
@@ -136,6 +138,8 @@ export class Splat {
   readonly shDegree: 0 | 1 | 2 | 3;
   readonly renderMode: RenderMode | null;
   readonly comments: string[];
+  /** What centres are relative to, in world units: position = origin + mean. Zero but for coordinates too large for floats. */
+  readonly origin: [number, number, number];
   /** Of its file; null: it came from no file. */
   readonly format: string | null;
   /** What `anchorsplat info --json` says. */

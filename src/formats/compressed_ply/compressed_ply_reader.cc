@@ -236,6 +236,7 @@ class CompressedPlyBlocks final : public FileBlocks {
     sh_degree_ = ply_.degree;
     render_mode_ = ply_.header.render_mode;
     comments_ = ply_.header.comments;
+    origin_ = ply_.header.origin;
   }
 
  private:
@@ -279,6 +280,7 @@ Result<GaussianCloud> ReadCompressedPly(const InputFile& file, const ReadLimits&
   WarnOfOddTags(file, ply.header);
   cloud.render_mode = ply.header.render_mode;
   cloud.comments = std::move(ply.header.comments);
+  cloud.origin = ply.header.origin;
   return cloud;
 }
 

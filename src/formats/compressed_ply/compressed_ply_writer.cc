@@ -38,16 +38,7 @@ int64_t Chunks(int64_t count) { return (count + kChunk - 1) / kChunk; }
 
 std::string Header(const CloudView& cloud, int64_t count, int sh_degree) {
   std::string header = "ply\nformat binary_little_endian 1.0\n";
-  for (const std::string& comment : cloud.comments) {
-    std::string line = comment;
-    // A line end would turn the rest into header lines.
-    std::ranges::replace_if(
-        line, [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
-    header += "comment " + line + "\n";
-  }
-  if (cloud.render_mode) {
-    for (const std::string& tag : CommentsOf(*cloud.render_mode)) header += "comment " + tag + "\n";
-  }
+  header += PlyComments(cloud.comments, cloud.render_mode, cloud.origin);
   header += Cat("element chunk ", Chunks(count), "\n");
   for (const char* what : {"", "scale_"}) {
     for (const char* end : {"min_", "max_"}) {

@@ -127,7 +127,7 @@ nlohmann::json JsonOf(const CloudView& cloud, int64_t count, const std::vector<W
                                     {"sortingMethod", "cameraDistance"}};
   const nlohmann::json primitive = {
       {"attributes", names}, {"mode", 0}, {"extensions", {{"KHR_gaussian_splatting", extension}}}};
-  nlohmann::json asset = AssetOf(cloud.comments);
+  nlohmann::json asset = AssetOf(cloud.comments, {});
   asset["version"] = "2.0";
   return {{"asset", asset},
           {"extensionsUsed", {"KHR_gaussian_splatting"}},

@@ -79,6 +79,15 @@ Result<std::string_view> WordReader::NextWord() {
   }
 }
 
+// Whole numbers may be written as "3.0"; what is too large or too small for a double becomes ∞ or 0.
+bool ParseDouble(std::string_view word, double& value) {
+  if (!word.empty() && word.front() == '+') word.remove_prefix(1);
+  const auto [end, error] = FromChars(word.data(), word.data() + word.size(), value);
+  if (error == std::errc::invalid_argument || end != word.data() + word.size()) return false;
+  if (error == std::errc::result_out_of_range) value = std::strtod(std::string(word).c_str(), nullptr);
+  return true;
+}
+
 bool ParseFloat(std::string_view word, float& value) {
   if (!word.empty() && word.front() == '+') word.remove_prefix(1);
   const char* const end = word.data() + word.size();
@@ -98,14 +107,10 @@ bool ParseFloat(std::string_view word, float& value) {
   return result.ec == std::errc{} && result.ptr == end;
 }
 
-// Whole numbers may be written as "3.0".
 template <typename T>
 bool ParseAs(std::string_view word, std::byte* out) {
   double number = 0;
-  if (!word.empty() && word.front() == '+') word.remove_prefix(1);
-  const auto [end, error] = FromChars(word.data(), word.data() + word.size(), number);
-  if (error == std::errc::invalid_argument || end != word.data() + word.size()) return false;
-  if (error == std::errc::result_out_of_range) number = std::strtod(std::string(word).c_str(), nullptr);  // 0 or ∞
+  if (!ParseDouble(word, number)) return false;
   if (std::is_integral_v<T> && !(number >= double{std::numeric_limits<T>::min()} &&
                                  number <= double{std::numeric_limits<T>::max()} && number == std::floor(number))) {
     return false;
@@ -215,6 +220,7 @@ Status ReadAsciiBody(const InputFile& file, const PlyHeader& header, const PlyEl
   for (int64_t row = 0; row < vertex.count; ++row) {
     ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(vertex, row, [&](size_t p, std::string_view word) {
       if (to[p].number != nullptr) return ParseFloat(word, to[p].number[row * to[p].stride]);
+      if (to[p].wide != nullptr) return ParseDouble(word, to[p].wide[row * to[p].stride]);
       return to[p].bytes == nullptr || ParseBytes(word, vertex.properties[p].type, to[p].bytes + row * to[p].stride);
     }));
   }

@@ -32,6 +32,7 @@ class PlyBlocks final : public FileBlocks {
     render_mode_ = header_.render_mode;
     if (layout.filter && !render_mode_) render_mode_ = RenderMode::kMip;
     comments_ = header_.comments;
+    origin_ = header_.origin;
     size_t offset = 0;
     for (size_t p = 0; p < layout.targets.size(); ++p, offset += sizeof(float)) {
       if (layout.filter == p) filter_ = offset;

@@ -157,7 +157,9 @@ Status HeaderParser::Property(std::string_view rest) {
 }
 
 void HeaderParser::Comment(std::string_view rest) {
-  if (!mode_.Take(rest)) {
+  if (const std::optional<WorldOrigin> origin = OriginOfComment(rest)) {
+    header_.origin = *origin;
+  } else if (!mode_.Take(rest)) {
     header_.comments.emplace_back(rest);
     if (LooksLikeModeTag(rest)) header_.odd_tags.emplace_back(rest);
   }
@@ -192,6 +194,21 @@ const PlyElement* PlyHeader::Find(std::string_view element) const {
     if (e.name == element) return &e;
   }
   return nullptr;
+}
+
+std::string PlyComments(std::span<const std::string> comments, std::optional<RenderMode> render_mode,
+                        const WorldOrigin& origin) {
+  std::string lines;
+  for (std::string comment : comments) {
+    std::ranges::replace_if(
+        comment, [](char c) { return static_cast<unsigned char>(c) < 0x20; }, ' ');
+    lines += "comment " + comment + "\n";
+  }
+  if (render_mode) {
+    for (const std::string& tag : CommentsOf(*render_mode)) lines += "comment " + tag + "\n";
+  }
+  if (!IsZero(origin)) lines += "comment " + OriginComment(origin) + "\n";
+  return lines;
 }
 
 void WarnOfOddTags(const InputFile& file, const PlyHeader& header) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -40,8 +41,9 @@ struct PlyElement {
 struct PlyHeader {
   PlyEncoding encoding = PlyEncoding::kAscii;
   std::vector<PlyElement> elements;
-  std::vector<std::string> comments;  // without the tags of the render mode; obj_info is not kept
+  std::vector<std::string> comments;  // without the tags of render mode and origin; obj_info is not kept
   std::optional<RenderMode> render_mode;
+  WorldOrigin origin = {0, 0, 0};     // that the positions are from
   std::vector<std::string> odd_tags;  // those of the comments that look like a tag of the mode and say no known one
   uint64_t body = 0;                  // byte where the data begins
   int lines = 0;                      // of the header, end_header included
@@ -53,6 +55,11 @@ struct PlyHeader {
 // a file of another kind is not searched to its end. Errors (kBadFile) name the line.
 inline constexpr size_t kMaxPlyHeader = size_t{1} << 20;
 Result<PlyHeader> ReadPlyHeader(const InputFile& file);
+
+// The lines of a header that say what a splat says of itself: its comments (control bytes become blanks, as a line end
+// would turn the rest into header lines), its render mode and, without `origin` being zero, the origin of its means.
+std::string PlyComments(std::span<const std::string> comments, std::optional<RenderMode> render_mode,
+                        const WorldOrigin& origin);
 
 // Says which of the header's tags are not understood, and what is taken instead. For who reads the Gaussians.
 void WarnOfOddTags(const InputFile& file, const PlyHeader& header);

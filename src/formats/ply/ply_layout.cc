@@ -152,6 +152,15 @@ Result<PlyLayout> PlanPly(const InputFile& file, const PlyHeader& header) {
   return layout;
 }
 
+bool HasDoubleMeans(const PlyLayout& layout) {
+  for (size_t p = 0; p < layout.targets.size(); ++p) {
+    const auto& target = layout.targets[p];
+    const bool mean = target && target->array == &GaussianCloud::means;
+    if (mean && layout.vertex->properties[p].type == PlyType::kDouble) return true;
+  }
+  return false;
+}
+
 ExtraProperties PlanExtras(const PlyHeader& header, const PlyLayout& layout) {
   ExtraProperties extras;
   const PlyElement& vertex = *layout.vertex;
@@ -174,15 +183,17 @@ ExtraProperties PlanExtras(const PlyHeader& header, const PlyLayout& layout) {
   return extras;
 }
 
-std::vector<PlyDestination> Destinations(const PlyLayout& layout, GaussianCloud& cloud, Buffer<float>& filter,
-                                         ExtraProperties* extras) {
+std::vector<PlyDestination> Destinations(const PlyLayout& layout, GaussianCloud& cloud, Buffer<double>& world,
+                                         Buffer<float>& filter, ExtraProperties* extras) {
   std::vector<PlyDestination> out(layout.targets.size());
   const PlyElement& vertex = *layout.vertex;
   const auto extra_row = static_cast<int64_t>(extras == nullptr ? 0 : extras->row_size());
   int64_t offset = 0;
   for (size_t p = 0; p < out.size(); ++p) {
     const PlyProperty& property = vertex.properties[p];
-    if (const auto& target = layout.targets[p]) {
+    if (const auto& target = layout.targets[p]; target && target->array == &GaussianCloud::means && !world.empty()) {
+      out[p] = {.wide = world.data() + target->component, .stride = 3};
+    } else if (target) {
       out[p] = {.number = (cloud.*(target->array)).data() + target->component, .stride = target->width};
     } else if (layout.filter == p) {
       out[p] = {.number = filter.data(), .stride = 1};

@@ -31,12 +31,16 @@ struct PlyLayout {
 };
 inline constexpr std::string_view kFilter3d = "filter_3D";
 
+// Whether x, y or z of the file are doubles.
+bool HasDoubleMeans(const PlyLayout& layout);
+
 // Where the value of a property goes in memory, for row 0, and how far it is from there to row 1.
 struct PlyDestination {
   float* number = nullptr;     // as a float
   std::byte* bytes = nullptr;  // or as it is, little-endian
-  int64_t stride = 0;          // floats or bytes
-  bool skipped() const { return number == nullptr && bytes == nullptr; }
+  double* wide = nullptr;      // or as a double
+  int64_t stride = 0;          // floats, bytes or doubles
+  bool skipped() const { return number == nullptr && bytes == nullptr && wide == nullptr; }
 };
 
 // Finds the INRIA properties x y z, f_dc_0..2, f_rest_* (0, 9, 24 or 45, channel-major), opacity, scale_0..2, rot_0..3
@@ -49,8 +53,8 @@ Result<PlyLayout> PlanPly(const InputFile& file, const PlyHeader& header);
 ExtraProperties PlanExtras(const PlyHeader& header, const PlyLayout& layout);
 
 // One per property of `layout.vertex`. `cloud` has room for all rows, as has `filter` where the layout has one;
-// `extras` is of PlanExtras, or null: skipped.
-std::vector<PlyDestination> Destinations(const PlyLayout& layout, GaussianCloud& cloud, Buffer<float>& filter,
-                                         ExtraProperties* extras);
+// `extras` is of PlanExtras, or null: skipped. Means go to `world`, [N,3], where that has room.
+std::vector<PlyDestination> Destinations(const PlyLayout& layout, GaussianCloud& cloud, Buffer<double>& world,
+                                         Buffer<float>& filter, ExtraProperties* extras);
 
 }  // namespace anchorsplat

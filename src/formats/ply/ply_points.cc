@@ -62,17 +62,22 @@ Result<PlyPoints> ReadPlyPoints(const InputFile& file, const ReadLimits& limits)
     if (!colored) std::fill(read.colors.begin(), read.colors.end(), 0.5f);
     std::vector<PlyDestination> to(vertex->properties.size());
     for (size_t k = 0; k < (colored ? 6u : 3u); ++k) {
-      to[static_cast<size_t>(columns[k])] = {
-          .number = (k < 3 ? read.positions.data() : read.colors.data()) + k % 3, .bytes = nullptr, .stride = 3};
+      PlyDestination& column = to[static_cast<size_t>(columns[k])];
+      column.stride = 3;
+      if (k < 3) {
+        column.wide = read.positions.data() + k;
+      } else {
+        column.number = read.colors.data() + (k - 3);
+      }
     }
     return to;
   }));
   PlyPoints points;
   for (size_t i = 0; i < read.positions.size(); i += 3) {
-    const float* p = read.positions.data() + i;
+    const double* p = read.positions.data() + i;
     if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) continue;
     for (size_t k = 0; k < 3; ++k) {
-      points.positions.push_back(p[k]);
+      points.positions.push_back(header.origin[k] + p[k]);
       float color = read.colors[i + k];
       if (colored) color /= FullOf(vertex->properties[static_cast<size_t>(columns[3 + k])].type);
       points.colors.push_back(color > 0 ? std::min(color, 1.0f) : 0.0f);  // NaN is 0

@@ -10,8 +10,8 @@ namespace anchorsplat {
 
 // A PLY of points, as structure from motion and scanners write them.
 struct PlyPoints {
-  Buffer<float> positions;  // [M,3]
-  Buffer<float> colors;     // [M,3] rgb 0–1; grey where the file has none
+  Buffer<double> positions;  // [M,3] world
+  Buffer<float> colors;      // [M,3] rgb 0–1; grey where the file has none
 };
 
 // Properties x y z and, where there are all three, red green blue of element "vertex": whole numbers from 0 to the

@@ -1,8 +1,11 @@
 #include "formats/ply/ply_reader.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
+#include "core/parallel.h"
+#include "core/statistics.h"
 #include "core/text.h"
 #include "formats/ply/ply_body.h"
 #include "formats/ply/ply_filter.h"
@@ -15,11 +18,41 @@ namespace {
 
 // For as many Gaussians as the file is known to hold. What goes where.
 std::vector<PlyDestination> MakeRoom(const PlyHeader& header, const PlyLayout& layout, GaussianCloud& cloud,
-                                     Buffer<float>& filter, ExtraProperties* extras) {
+                                     Buffer<double>& world, Buffer<float>& filter, ExtraProperties* extras) {
   cloud.Resize(layout.vertex->count, layout.sh_degree);
+  // Text has as many digits as its writer liked, whatever the header says.
+  if (header.encoding == PlyEncoding::kAscii || HasDoubleMeans(layout)) world.resize(cloud.means.size());
   if (layout.filter) filter.resize(static_cast<size_t>(layout.vertex->count));
   if (extras != nullptr) *extras = PlanExtras(header, layout);
-  return Destinations(layout, cloud, filter, extras);
+  return Destinations(layout, cloud, world, filter, extras);
+}
+
+// Half of the Gaussians are longer; of very many, of every so many. `sample` gets where these are.
+double TypicalLength(const GaussianCloud& cloud, const Buffer<double>& world, std::vector<double>& sample) {
+  constexpr int64_t kSamples = 1 << 16;
+  const int64_t step = (cloud.size() + kSamples - 1) / kSamples;
+  std::vector<float> lengths;
+  for (int64_t i = 0; i < cloud.size(); i += step) {
+    const float* s = cloud.log_scales.data() + 3 * i;
+    const float longest = std::max({s[0], s[1], s[2]});
+    if (std::isfinite(longest)) lengths.push_back(longest);
+    sample.insert(sample.end(), world.data() + 3 * i, world.data() + 3 * i + 3);
+  }
+  return lengths.empty() ? 0 : std::exp(double{Quantile(lengths, 0.5)});
+}
+
+// Floats from an origin on, where floats need one.
+void MeansFromWorld(const Buffer<double>& world, GaussianCloud& cloud) {
+  std::vector<double> sample;
+  const double length = TypicalLength(cloud, world, sample);
+  const WorldOrigin origin = ChooseOrigin(sample, length);
+  for (size_t k = 0; k < 3; ++k) cloud.origin[k] += origin[k];
+  ParallelFor(0, cloud.size(), 1 << 14, [&](int64_t first, int64_t last) {
+    for (int64_t i = 3 * first; i < 3 * last; ++i) {
+      const auto at = static_cast<size_t>(i);
+      cloud.means[at] = static_cast<float>(world[at] - origin[at % 3]);
+    }
+  });
 }
 
 Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, ExtraProperties* extras) {
@@ -28,9 +61,14 @@ Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, Extr
   const PlyElement& vertex = *layout.vertex;
   ANCHORSPLAT_RETURN_IF_ERROR(CheckGaussianLimit(file, vertex, limits));
   GaussianCloud cloud;
+  Buffer<double> world;
   Buffer<float> filter;
   ANCHORSPLAT_RETURN_IF_ERROR(
-      ReadPlyBody(file, header, vertex, [&] { return MakeRoom(header, layout, cloud, filter, extras); }));
+      ReadPlyBody(file, header, vertex, [&] { return MakeRoom(header, layout, cloud, world, filter, extras); }));
+  cloud.origin = header.origin;
+  if (!world.empty()) MeansFromWorld(world, cloud);
+  cloud.double_means = HasDoubleMeans(layout) && !IsZero(cloud.origin);
+  if (extras != nullptr && cloud.double_means && IsZero(header.origin)) extras->world = std::move(world);
   // Trainers write normals of zero: there is nothing in them to keep.
   if (extras != nullptr && std::ranges::all_of(extras->normals, [](float x) { return x == 0; })) {
     extras->normals = {};
@@ -79,6 +117,7 @@ Result<FormatFacts> DescribePly(const InputFile& file) {
     if (!layout.targets[k] && layout.filter != k)
       others += (others.empty() ? "" : " ") + layout.vertex->properties[k].name;
   }
+  if (HasDoubleMeans(layout)) facts.Add("positions", "in double precision");
   for (const PlyElement& element : header.elements) {
     if (&element != layout.vertex) others += Cat(others.empty() ? "" : " ", "(element ", element.name, ")");
   }

@@ -28,8 +28,9 @@ bool NeedsSwap(PlyEncoding encoding) {
   return (encoding == PlyEncoding::kBigEndian) != (std::endian::native == std::endian::big);
 }
 
-// The value of a property as a float; those of Gaussians are floats or doubles, normals may be anything.
-float LoadNumber(PlyType type, const char* from, bool swap) {
+// The value of a property; those of Gaussians are floats or doubles, points and normals may be anything.
+template <typename Number>
+Number LoadNumber(PlyType type, const char* from, bool swap) {
   switch (type) {
     case PlyType::kInt8:
       return Load<int8_t>(from, swap);
@@ -40,13 +41,13 @@ float LoadNumber(PlyType type, const char* from, bool swap) {
     case PlyType::kUint16:
       return Load<uint16_t>(from, swap);
     case PlyType::kInt32:
-      return static_cast<float>(Load<int32_t>(from, swap));
+      return static_cast<Number>(Load<int32_t>(from, swap));
     case PlyType::kUint32:
-      return static_cast<float>(Load<uint32_t>(from, swap));
+      return static_cast<Number>(Load<uint32_t>(from, swap));
     case PlyType::kFloat:
-      return Load<float>(from, swap);
+      return static_cast<Number>(Load<float>(from, swap));
     case PlyType::kDouble:
-      return static_cast<float>(Load<double>(from, swap));
+      return static_cast<Number>(Load<double>(from, swap));
   }
   return 0;
 }
@@ -54,7 +55,9 @@ float LoadNumber(PlyType type, const char* from, bool swap) {
 // Kept bytes are little-endian, as the program is.
 void Store(PlyType type, const char* from, bool swap, const PlyDestination& to, int64_t row) {
   if (to.number != nullptr) {
-    to.number[row * to.stride] = LoadNumber(type, from, swap);
+    to.number[row * to.stride] = LoadNumber<float>(type, from, swap);
+  } else if (to.wide != nullptr) {
+    to.wide[row * to.stride] = LoadNumber<double>(type, from, swap);
   } else if (to.bytes != nullptr) {
     const auto size = static_cast<size_t>(PlyTypeSize(type));
     auto* const out = reinterpret_cast<char*>(to.bytes + row * to.stride);

@@ -1,6 +1,7 @@
 #include "formats/ply/ply_writer.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstring>
 #include <mutex>
@@ -20,22 +21,14 @@ static_assert(std::endian::native == std::endian::little, "rows are copied as th
 // x y z nx ny nz, f_dc and f_rest, opacity scale rot
 int64_t RowFloats(int sh_degree) { return 6 + 3 * ShCoefficients(sh_degree) + 8; }
 
-std::string Header(int64_t count, int sh_degree, std::optional<RenderMode> render_mode,
-                   std::span<const std::string> comments, const ExtraProperties& extras) {
-  std::string header = "ply\nformat binary_little_endian 1.0\n";
-  for (const std::string& comment : comments) {
-    std::string line = comment;
-    for (char& c : line) {
-      if (static_cast<unsigned char>(c) < 0x20) c = ' ';  // a line end would turn the rest into header lines
-    }
-    header += "comment " + line + "\n";
-  }
-  if (render_mode) {
-    for (const std::string& tag : CommentsOf(*render_mode)) header += "comment " + tag + "\n";
-  }
+// `comments`: lines of the header.
+std::string Header(int64_t count, int sh_degree, bool double_means, const std::string& comments,
+                   const ExtraProperties& extras) {
+  std::string header = "ply\nformat binary_little_endian 1.0\n" + comments;
   header += Cat("element vertex ", count, "\n");
   const auto property = [&header](const auto&... name) { header += Cat("property float ", name..., "\n"); };
-  for (const char* name : {"x", "y", "z", "nx", "ny", "nz"}) property(name);
+  for (const char* name : {"x", "y", "z"}) header += Cat("property ", double_means ? "double " : "float ", name, "\n");
+  for (const char* name : {"nx", "ny", "nz"}) property(name);
   for (int k = 0; k < 3; ++k) property("f_dc_", k);
   for (int k = 0; k < 3 * (ShCoefficients(sh_degree) - 1); ++k) property("f_rest_", k);
   property("opacity");
@@ -46,8 +39,9 @@ std::string Header(int64_t count, int sh_degree, std::optional<RenderMode> rende
 }
 
 // Bytes of a row.
-size_t RowSize(int sh_degree, const ExtraProperties& extras) {
-  return static_cast<size_t>(RowFloats(sh_degree)) * sizeof(float) + extras.row_size();
+size_t RowSize(int sh_degree, bool double_means, const ExtraProperties& extras) {
+  const size_t wider = double_means ? 3 * (sizeof(double) - sizeof(float)) : 0;
+  return static_cast<size_t>(RowFloats(sh_degree)) * sizeof(float) + wider + extras.row_size();
 }
 
 template <int kDegree>
@@ -84,17 +78,25 @@ void Pack(const CloudView& cloud, int64_t first, int64_t last, float* out) {
   }
 }
 
-// Rows of `floats` values each with those of `extras` put in and behind.
-void PackExtras(const ExtraProperties& extras, int64_t first, int64_t last, float* rows, size_t floats,
-                std::byte* wide) {
-  constexpr size_t kNormals = 3;  // floats before them
-  const size_t own = floats * sizeof(float), extra = extras.row_size();
+// Rows of `floats` values each with those of `extras` put in and behind, and with the means as doubles.
+void PackExtras(const CloudView& cloud, const ExtraProperties& extras, int64_t first, int64_t last, float* rows,
+                size_t floats, std::byte* wide) {
+  constexpr size_t kMeans = 3;  // floats before the normals
+  const size_t extra = extras.row_size();
+  const size_t skipped = cloud.double_means ? kMeans : 0;
+  const auto put = [&wide](const void* from, size_t bytes) {
+    if (bytes > 0) std::memcpy(wide, from, bytes);
+    wide += bytes;
+  };
   for (int64_t i = first; i < last; ++i, rows += floats) {
-    if (!extras.normals.empty()) std::copy_n(extras.normals.data() + 3 * i, 3, rows + kNormals);
-    if (extra == 0) continue;
-    std::memcpy(wide, rows, own);
-    std::memcpy(wide + own, extras.rows.data() + static_cast<size_t>(i) * extra, extra);
-    wide += own + extra;
+    if (!extras.normals.empty()) std::copy_n(extras.normals.data() + 3 * i, 3, rows + kMeans);
+    if (extra == 0 && skipped == 0) continue;
+    if (skipped > 0) {
+      const std::array<double, 3> at = ToWorld(rows, cloud.origin);
+      put(extras.world.empty() ? at.data() : extras.world.data() + 3 * i, sizeof at);
+    }
+    put(rows + skipped, (floats - skipped) * sizeof(float));
+    put(extras.rows.data() + static_cast<size_t>(i) * extra, extra);
   }
 }
 
@@ -102,8 +104,8 @@ void PackExtras(const ExtraProperties& extras, int64_t first, int64_t last, floa
 
 uint64_t PredictedPlySize(int64_t count, int sh_degree, std::optional<RenderMode> render_mode,
                           std::span<const std::string> comments) {
-  return Header(count, sh_degree, render_mode, comments, {}).size() +
-         static_cast<uint64_t>(count) * RowSize(sh_degree, {});
+  return Header(count, sh_degree, false, PlyComments(comments, render_mode, {}), {}).size() +
+         static_cast<uint64_t>(count) * RowSize(sh_degree, false, {});
 }
 
 Status WritePly(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {
@@ -120,7 +122,9 @@ Status WritePlyWithExtras(const std::filesystem::path& path, const CloudView& cl
     return Error{ErrorCode::kBadArgument, Cat(path.string(), ": the other properties (", extras.names(),
                                               ") are not of these ", WithThousands(cloud.size()), " Gaussians")};
   }
-  const std::string header = Header(cloud.size(), cloud.sh_degree, cloud.render_mode, cloud.comments, extras);
+  const std::string comments =
+      PlyComments(cloud.comments, cloud.render_mode, cloud.double_means ? WorldOrigin{} : cloud.origin);
+  const std::string header = Header(cloud.size(), cloud.sh_degree, cloud.double_means, comments, extras);
   if (header.size() > kMaxPlyHeader) {
     return Error{ErrorCode::kBadArgument,
                  Cat(path.string(), ": comments and names of properties of ", HumanBytes(header.size()),
@@ -128,8 +132,8 @@ Status WritePlyWithExtras(const std::filesystem::path& path, const CloudView& cl
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   const auto floats = static_cast<size_t>(RowFloats(cloud.sh_degree));
-  const size_t row_size = RowSize(cloud.sh_degree, extras);
-  const bool wider = !extras.properties.empty();
+  const size_t row_size = RowSize(cloud.sh_degree, cloud.double_means, extras);
+  const bool wider = !extras.properties.empty() || cloud.double_means;
   ANCHORSPLAT_RETURN_IF_ERROR(file.Reserve(header.size() + static_cast<uint64_t>(cloud.size()) * row_size));
   ANCHORSPLAT_RETURN_IF_ERROR(file.WriteAt(0, header.data(), header.size()));
 
@@ -144,7 +148,7 @@ Status WritePlyWithExtras(const std::filesystem::path& path, const CloudView& cl
     for (int64_t i = first; i < last; i += block) {
       const int64_t end = std::min(last, i + block);
       Pack(cloud, i, end, rows.data());
-      if (!extras.empty()) PackExtras(extras, i, end, rows.data(), floats, wide.data());
+      if (wider || !extras.normals.empty()) PackExtras(cloud, extras, i, end, rows.data(), floats, wide.data());
       const void* const packed = wider ? static_cast<const void*>(wide.data()) : rows.data();
       const Status status = file.WriteAt(header.size() + static_cast<uint64_t>(i) * row_size, packed,
                                          static_cast<size_t>(static_cast<uint64_t>(end - i) * row_size));

@@ -14,7 +14,8 @@
 namespace anchorsplat {
 
 // Writes a Gaussian splat as the INRIA code does: binary little-endian floats in the order x y z, nx ny nz (zeros),
-// f_dc_0..2, f_rest_* (channel-major), opacity, scale_0..2, rot_0..3. The values are the stored ones, bit by bit. The
+// f_dc_0..2, f_rest_* (channel-major), opacity, scale_0..2, rot_0..3. The values are the stored ones, bit by bit, but
+// for a cloud of `double_means`, whose x y z are world coordinates in double; otherwise a comment says the origin. The
 // render mode and the comments go to the header (control bytes in comments become blanks, so that they stay comments).
 // Streamed in blocks: needs no second copy of the cloud.
 // Errors: kExists, kIo, kBadArgument (arrays that disagree, no Gaussians, comments longer than a header may be).

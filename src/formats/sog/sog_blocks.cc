@@ -52,6 +52,7 @@ class SogBlocks final : public FileBlocks, public SogVisitor {
   void Harmonics(const SogChannel&, const ByteImage&, const SogPalette&) override {}
   void End(std::optional<RenderMode> mode, std::vector<std::string> comments) override {
     render_mode_ = mode;
+    origin_ = TakeOrigin(comments);
     comments_ = std::move(comments);
   }
 

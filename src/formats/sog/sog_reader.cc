@@ -61,6 +61,7 @@ class SogCloud final : public SogVisitor {
   }
   void End(std::optional<RenderMode> mode, std::vector<std::string> comments) override {
     cloud_.render_mode = mode;
+    cloud_.origin = TakeOrigin(comments);
     cloud_.comments = std::move(comments);
   }
 

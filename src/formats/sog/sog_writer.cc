@@ -226,7 +226,7 @@ Status WriteSog(const std::filesystem::path& path, const CloudView& cloud, const
 
   const Pictures pictures{cloud, WriteOrder(cloud, options.order, SplatOrder::kMorton), static_cast<int>(width),
                           static_cast<int>(height)};
-  nlohmann::json meta = {{"version", 2}, {"asset", AssetOf(cloud.comments)}, {"count", cloud.size()}};
+  nlohmann::json meta = {{"version", 2}, {"asset", AssetOf(cloud.comments, cloud.origin)}, {"count", cloud.size()}};
   if (IsCompensated(cloud.render_mode)) meta["model"] = "antialiased";  // as splat-transform has it
   std::vector<Picture> drawn;
   if (cloud.sh_degree > 0) meta["shN"] = DrawHarmonics(pictures, drawn);

@@ -377,7 +377,7 @@ Status WriteStreamedSog(const fs::path& path, const CloudView& cloud, const Clou
   Box box;
   OrderedJson root = TreeJson(tree, 0, leaves, facts, chunks, box);
   const OrderedJson json = {{"version", 1},
-                            {"asset", OrderedJson(AssetOf(cloud.comments))},
+                            {"asset", OrderedJson(AssetOf(cloud.comments, cloud.origin))},
                             {"count", sum},
                             {"counts", std::move(counts)},
                             {"lodLevels", options.lod.levels},

@@ -29,13 +29,18 @@ std::string Names(int degree) {
 }
 
 void AppendRow(const CloudView& cloud, int64_t i, std::string& text) {
-  const auto append = [&text](float value) {
+  const auto append = [&text](auto value) {
     char digits[32];
     const auto [end, error] = std::to_chars(digits, digits + sizeof digits, value);
     text.append(digits, end);
     text += ',';
   };
-  for (int64_t k = 0; k < 3; ++k) append(cloud.means[static_cast<size_t>(3 * i + k)]);
+  const float* mean = cloud.means.data() + 3 * i;
+  if (IsZero(cloud.origin)) {
+    std::for_each_n(mean, 3, append);
+  } else {
+    std::ranges::for_each(ToWorld(mean, cloud.origin), append);
+  }
   const float* sh = cloud.sh.data() + i * cloud.sh_stride();
   for (int64_t k = 0; k < 3; ++k) append(sh[k]);
   for (int64_t channel = 0; channel < 3; ++channel) {

@@ -17,8 +17,8 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "arrays are written as they lie in memory");
 
 // What comes before the values in a .npy file of version 1.0: a Python dictionary, filled up to a multiple of 64 bytes.
-std::string NpyHeader(const std::string& shape) {
-  std::string text = Cat("{'descr': '<f4', 'fortran_order': False, 'shape': (", shape, "), }");
+std::string NpyHeader(const std::string& shape, const char* type = "<f4") {
+  std::string text = Cat("{'descr': '", type, "', 'fortran_order': False, 'shape': (", shape, "), }");
   constexpr size_t kPreamble = 10;
   text.append(63 - (kPreamble + text.size()) % 64, ' ');
   text += '\n';
@@ -65,6 +65,12 @@ Status WriteNpz(const std::filesystem::path& path, const CloudView& cloud, const
     const std::string_view parts[] = {
         header, {reinterpret_cast<const char*>(array.values), static_cast<size_t>(4 * array.floats)}};
     ANCHORSPLAT_RETURN_IF_ERROR(archive.Add(array.name, parts));
+  }
+  if (!IsZero(cloud.origin)) {
+    const std::string header = NpyHeader("3,", "<f8");
+    const std::string_view parts[] = {header,
+                                      {reinterpret_cast<const char*>(cloud.origin.data()), sizeof cloud.origin}};
+    ANCHORSPLAT_RETURN_IF_ERROR(archive.Add("origin.npy", parts));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(archive.Finish());
   return file.Commit();

@@ -21,7 +21,7 @@ struct InitialPoints {
 };
 
 // Points of structure from motion, seen from `origin`. Positions beyond the range of floats are left out.
-InitialPoints PointsOf(std::span<const ColmapPoint> points, const WorldOrigin& origin);
+InitialPoints PointsOf(std::span<const ColmapPoint> points, const WorldOrigin& origin = {});
 // The same of world positions with rgb 0–1, [M,3] each.
 InitialPoints PointsOf(std::span<const double> positions, std::span<const float> colors, const WorldOrigin& origin);
 
@@ -39,7 +39,7 @@ InitialPoints RandomPoints(int64_t count, double scene_scale, uint64_t seed, dou
 InitialPoints RandomPointsInView(int64_t count, const std::vector<Camera>& cameras, double scene_scale, uint64_t seed);
 
 // Centres, seen from `origin`, and constant colours of a splat, to begin another fit from; of rows that are finite.
-InitialPoints PointsOf(const GaussianCloud& cloud, const WorldOrigin& origin);
+InitialPoints PointsOf(const GaussianCloud& cloud, const WorldOrigin& origin = {});
 
 // `count` of the points, evenly spread over their order; all of them when there are not as many, or nobody says.
 InitialPoints Thinned(const InitialPoints& points, std::optional<int64_t> count);

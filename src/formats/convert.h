@@ -52,7 +52,7 @@ Result<ConvertReport> ConvertFile(const std::filesystem::path& input, const std:
                                   const ConvertOptions& options, GaussianCloud* kept = nullptr);
 
 // The parts of it that change a cloud, in the order in which they are done. In place.
-// `extras` are changed alike, if not null.
+// `extras` are changed alike, if not null. Gaussians that nobody draws have no opacity to DropFaint and no importance.
 void DropFaint(GaussianCloud& cloud, float min_opacity, ExtraProperties* extras = nullptr);
 void KeepMostImportant(GaussianCloud& cloud, int64_t most, ExtraProperties* extras = nullptr);  // their order stays
 void SetShDegree(GaussianCloud& cloud, int degree);

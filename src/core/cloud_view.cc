@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/finite.h"
+#include "core/statistics.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -29,8 +29,8 @@ std::optional<Bounds> ComputeBounds(const CloudView& cloud) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   Bounds box{{kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}};
   for (int64_t i = 0; i < cloud.size(); ++i) {
+    if (!HasUsableShape(cloud, i)) continue;
     const float* p = &cloud.means[static_cast<size_t>(3 * i)];
-    if (!AllFinite(p, 3)) continue;
     for (size_t a = 0; a < 3; ++a) {
       box.min[a] = std::min(box.min[a], p[a]);
       box.max[a] = std::max(box.max[a], p[a]);

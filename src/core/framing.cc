@@ -4,8 +4,11 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <utility>
+#include <vector>
 
-#include "core/finite.h"
+#include "core/kd_tree.h"
+#include "core/parallel.h"
 #include "core/statistics.h"
 
 namespace anchorsplat {
@@ -17,78 +20,162 @@ constexpr float kVisibleLogit = -2.2f;  // opacity 10 %: haze around an object s
 constexpr int64_t kMostLookedAt = 1'000'000;
 
 constexpr float kAnyLogit = -std::numeric_limits<float>::infinity();
+constexpr float kLeastLogSize = -170;  // of two axes: points and needles have a size, too
 
 int64_t StepOf(int64_t gaussians) { return std::max<int64_t>(1, (gaussians + kMostLookedAt - 1) / kMostLookedAt); }
 
-// 3 σ of the longest axis among Gaussians of `least_logit` or more.
-double LargestReach(const CloudView& cloud, float least_logit) {
-  double largest = 0;
-  for (int64_t i = 0; i < cloud.size(); ++i) {
-    if (!(cloud.opacity_logits[static_cast<size_t>(i)] >= least_logit)) continue;
-    for (size_t a = 0; a < 3; ++a) {
-      const double reach = 3 * std::exp(double{cloud.log_scales[static_cast<size_t>(3 * i) + a]});
-      if (std::isfinite(reach)) largest = std::max(largest, reach);
-    }
-  }
-  return largest;
+// ---- what a picture is of
+
+constexpr size_t kFewest = 64;  // Gaussians: of fewer all count
+constexpr size_t kMostSearched = 20'000;
+constexpr size_t kNeighbours = 8;
+// Farther from their neighbours than usual by this, in world units and in their own size.
+constexpr double kLonely = 5;
+constexpr double kGap = 3;       // between distances from the middle a hundredth of the Gaussians apart
+constexpr double kBeyondGap = 4; // of half of what lies beyond, to the distance at which the gap begins
+constexpr double kFewDirections = 0.35;
+constexpr double kWorthIt = 0.5;
+
+using Rows = std::vector<uint32_t>;
+
+double Distance(const float* p, const std::array<double, 3>& from) {
+  return std::hypot(p[0] - from[0], p[1] - from[1], p[2] - from[2]);
 }
 
-// Of the Gaussians that are looked at. `reach` (least logit): LargestReach of all.
-template <typename Reach>
-Framing FrameSample(std::span<const float> means, std::span<const float> opacity_logits, Reach&& reach) {
-  const auto collect = [&](auto&& value, float least_logit) {
-    Buffer<float> out;
-    for (size_t k = 0; k < opacity_logits.size(); ++k) {
-      const float* p = means.data() + 3 * k;
-      if (AllFinite(p, 3) && opacity_logits[k] >= least_logit) out.push_back(value(p));
-    }
-    return out;
-  };
-  // A cloud of haze only is framed whole.
-  const float least = collect([](const float*) { return 0.0f; }, kVisibleLogit).empty() ? kAnyLogit : kVisibleLogit;
-  Framing framing;
+std::array<double, 3> MedianOf(const Buffer<float>& means, const Rows& rows) {
+  std::array<double, 3> middle{};
+  Buffer<float> values(rows.size());
   for (size_t a = 0; a < 3; ++a) {
-    Buffer<float> axis = collect([a](const float* p) { return p[a]; }, least);
-    if (axis.empty()) return framing;
-    framing.target[a] = 0.5 * (double{Quantile(axis, 0.01)} + Quantile(axis, 0.99));
+    for (size_t k = 0; k < rows.size(); ++k) values[k] = means[3 * rows[k] + a];
+    middle[a] = Quantile(values, 0.5);
   }
-  Buffer<float> distances = collect(
-      [&](const float* p) {
-        double sum = 0;
-        for (size_t a = 0; a < 3; ++a) sum += (p[a] - framing.target[a]) * (p[a] - framing.target[a]);
-        return static_cast<float>(std::sqrt(sum));
-      },
-      least);
-  const double radius = Quantile(distances, 0.98);
+  return middle;
+}
+
+// Without floaters: surfaces are tiled by Gaussians as large as they are apart, floaters have nothing around them.
+Rows WithoutLonely(const Buffer<float>& means, const Buffer<float>& log_sizes, const Rows& rows) {
+  Buffer<float> points;
+  points.reserve(3 * rows.size());
+  for (const uint32_t row : rows) points.insert(points.end(), means.data() + 3 * row, means.data() + 3 * row + 3);
+  const KdTree tree(points);
+  Buffer<float> apart(rows.size()), in_sizes(rows.size());  // logarithms
+  ParallelFor(0, tree.size(), 1 << 10, [&](int64_t first, int64_t last) {
+    std::array<KdTree::Neighbour, kNeighbours> nearest;
+    for (int64_t place = first; place < last; ++place) {
+      const auto found = static_cast<size_t>(tree.Nearest(place, nearest));
+      const auto k = static_cast<size_t>(tree.PointAt(place));
+      const double squared = nearest[found - 1].squared_distance;
+      apart[k] = static_cast<float>(0.5 * std::log(std::max(squared, double{std::numeric_limits<float>::min()})));
+      in_sizes[k] = apart[k] - log_sizes[rows[k]];
+    }
+  });
+  const float margin = std::log(static_cast<float>(kLonely));
+  Buffer<float> sorted = apart;
+  const float most_apart = Quantile(sorted, 0.5) + margin;
+  sorted = in_sizes;
+  const float most_in_sizes = Quantile(sorted, 0.5) + margin;
+  Rows kept;
+  for (size_t k = 0; k < rows.size(); ++k) {
+    if (!(apart[k] > most_apart && in_sizes[k] > most_in_sizes)) kept.push_back(rows[k]);
+  }
+  return kept;
+}
+
+// Whether what lies at `rows` is seen from `middle` in few directions, as other objects are and skies are not: of the
+// 96 parts of a cube's faces, to as many as so many points would hit that lie all around.
+bool InFewDirections(const Buffer<float>& means, std::span<const uint32_t> rows, const std::array<double, 3>& middle) {
+  constexpr int kSide = 4, kParts = 6 * kSide * kSide;
+  std::array<bool, kParts> seen{};
+  for (const uint32_t row : rows) {
+    const float* p = means.data() + 3 * row;
+    const std::array<double, 3> d = {p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]};
+    size_t face = 0;
+    for (size_t a = 1; a < 3; ++a) face = std::abs(d[a]) > std::abs(d[face]) ? a : face;
+    if (d[face] == 0) continue;
+    const auto part = [&](size_t a) {
+      return std::clamp(static_cast<int>((d[a] / std::abs(d[face]) + 1) / 2 * kSide), 0, kSide - 1);
+    };
+    const int side = static_cast<int>(2 * face) + (d[face] > 0 ? 1 : 0);
+    seen[static_cast<size_t>((side * kSide + part((face + 1) % 3)) * kSide + part((face + 2) % 3))] = true;
+  }
+  const double all_around = kParts * (1 - std::exp(-static_cast<double>(rows.size()) / kParts));
+  return static_cast<double>(std::ranges::count(seen, true)) < kFewDirections * all_around;
+}
+
+// Without what lies beyond a gap, the outermost first.
+Rows WithinGaps(const Buffer<float>& means, Rows rows) {
+  while (rows.size() >= kFewest) {
+    const std::array<double, 3> middle = MedianOf(means, rows);
+    std::ranges::sort(rows, {}, [&](uint32_t row) { return std::pair(Distance(means.data() + 3 * row, middle), row); });
+    const auto distance = [&](size_t k) { return Distance(means.data() + 3 * rows[k], middle); };
+    const size_t window = std::max<size_t>(1, rows.size() / 100), half = rows.size() / 2;
+    size_t begin = rows.size() - window;  // one behind the place that is looked at
+    while (begin > half && !(distance(begin - 1 + window) >= kGap * distance(begin - 1))) --begin;
+    if (begin == half) return rows;
+    // The widest step of the window.
+    size_t end = begin;
+    double widest = 0;
+    for (size_t k = begin; k < begin + window; ++k) {
+      const double step = distance(k) / distance(k - 1);  // infinite from a middle of many
+      if (step > widest) {
+        widest = step;
+        end = k;
+      }
+    }
+    if (!(distance((end + rows.size()) / 2) >= kBeyondGap * distance(end - 1))) return rows;
+    if (InFewDirections(means, std::span(rows).subspan(end), middle)) return rows;
+    rows.resize(end);
+  }
+  return rows;
+}
+
+// Of the Gaussians at `rows`.
+Framing FrameRows(const Buffer<float>& means, const Rows& rows, double reach) {
+  Framing framing;
+  if (rows.empty()) return framing;
+  Buffer<float> values(rows.size());
+  for (size_t a = 0; a < 3; ++a) {
+    for (size_t k = 0; k < rows.size(); ++k) values[k] = means[3 * size_t{rows[k]} + a];
+    framing.target[a] = 0.5 * (double{Quantile(values, 0.01)} + Quantile(values, 0.99));
+  }
+  for (size_t k = 0; k < rows.size(); ++k) {
+    const float* p = means.data() + 3 * size_t{rows[k]};
+    double sum = 0;
+    for (size_t a = 0; a < 3; ++a) sum += (p[a] - framing.target[a]) * (p[a] - framing.target[a]);
+    values[k] = static_cast<float>(std::sqrt(sum));
+  }
+  const double radius = Quantile(values, 0.98);
   if (radius > 0 && std::isfinite(radius)) {
     framing.radius = radius;
-  } else if (const double largest = reach(least); largest > 0) {
-    framing.radius = largest;
+  } else if (reach > 0) {
+    framing.radius = reach;
   }
   return framing;
 }
 
 }  // namespace
 
-namespace {
-
-Framing FrameFromOrigin(const CloudView& cloud) {
-  const int64_t step = StepOf(cloud.size());
-  const auto reach = [&](float least_logit) { return LargestReach(cloud, least_logit); };
-  if (step == 1) return FrameSample(cloud.means, cloud.opacity_logits, reach);
-  Buffer<float> means, opacity_logits;
-  for (int64_t i = 0; i < cloud.size(); i += step) {
-    const float* p = cloud.means.data() + 3 * i;
-    means.insert(means.end(), p, p + 3);
-    opacity_logits.push_back(cloud.opacity_logits[static_cast<size_t>(i)]);
-  }
-  return FrameSample(means, opacity_logits, reach);
+Framing FrameMeans(const CloudView& cloud) {
+  FramingStudy study(cloud.size());
+  ParallelFor(0, cloud.size(), 1 << 16, [&](int64_t first, int64_t last) {
+    const auto begin = static_cast<size_t>(first), count = static_cast<size_t>(last - first);
+    CloudView rows;
+    rows.means = cloud.means.subspan(3 * begin, 3 * count);
+    rows.log_scales = cloud.log_scales.subspan(3 * begin, 3 * count);
+    rows.quats = cloud.quats.subspan(4 * begin, 4 * count);
+    rows.opacity_logits = cloud.opacity_logits.subspan(begin, count);
+    study.Look(first, rows);
+  });
+  return study.Find();
 }
 
-}  // namespace
+bool IsFarOut(const Framing& framing, const float* mean) {
+  constexpr double kFarOut = 10;
+  return Distance(mean, framing.target) > kFarOut * framing.radius;
+}
 
 Framing FrameCloud(const CloudView& cloud) {
-  Framing framing = FrameFromOrigin(cloud);
+  Framing framing = FrameMeans(cloud);
   for (size_t a = 0; a < 3; ++a) framing.target[a] += cloud.origin[a];
   return framing;
 }
@@ -97,22 +184,26 @@ FramingStudy::FramingStudy(int64_t gaussians) : step_(StepOf(gaussians)) {
   const auto looked_at = static_cast<size_t>((gaussians + step_ - 1) / step_);
   means_.resize(3 * looked_at);
   opacity_logits_.resize(looked_at);
+  log_sizes_.resize(looked_at);
 }
 
 void FramingStudy::Look(int64_t first, const CloudView& rows) {
   const int64_t next = (first + step_ - 1) / step_ * step_;
   for (int64_t i = next; i < first + rows.size(); i += step_) {
-    std::copy_n(rows.means.data() + 3 * (i - first), 3, means_.data() + 3 * (i / step_));
-    opacity_logits_[static_cast<size_t>(i / step_)] = rows.opacity_logits[static_cast<size_t>(i - first)];
+    const auto row = static_cast<size_t>(i - first), to = static_cast<size_t>(i / step_);
+    std::copy_n(rows.means.data() + 3 * row, 3, means_.data() + 3 * to);
+    const bool usable = HasUsableShape(rows, i - first);
+    opacity_logits_[to] = usable ? rows.opacity_logits[row] : std::numeric_limits<float>::quiet_NaN();
+    const float* s = rows.log_scales.data() + 3 * row;
+    log_sizes_[to] = 0.5f * std::max({s[0] + s[1], s[0] + s[2], s[1] + s[2], kLeastLogSize});
   }
   // Of all rows only what is longest matters; exponentials are for few.
   float any = kAnyLogit, visible = kAnyLogit;
   double reach = 0, visible_reach = 0;
   for (size_t k = 0; k < rows.log_scales.size(); ++k) {
     const float scale = rows.log_scales[k], logit = rows.opacity_logits[k / 3];
-    if (!(scale > any || scale > visible) || std::isnan(logit)) continue;
+    if (!(scale > any || scale > visible) || !HasUsableShape(rows, static_cast<int64_t>(k / 3))) continue;
     const double here = 3 * std::exp(double{scale});
-    if (!std::isfinite(here)) continue;
     if (scale > any) {
       any = scale;
       reach = here;
@@ -128,8 +219,28 @@ void FramingStudy::Look(int64_t first, const CloudView& rows) {
 }
 
 Framing FramingStudy::Find() const {
-  return FrameSample(means_, opacity_logits_,
-                     [&](float least_logit) { return least_logit == kVisibleLogit ? visible_reach_ : reach_; });
+  const auto collect = [&](float least_logit) {
+    Rows rows;
+    for (uint32_t k = 0; k < opacity_logits_.size(); ++k) {
+      if (opacity_logits_[k] >= least_logit) rows.push_back(k);
+    }
+    return rows;
+  };
+  Rows rows = collect(kVisibleLogit);
+  double reach = visible_reach_;
+  if (rows.empty()) {  // a cloud of haze only is framed whole
+    rows = collect(kAnyLogit);
+    reach = reach_;
+  }
+  const Framing whole = FrameRows(means_, rows, reach);
+  if (rows.size() < kFewest) return whole;
+  const size_t step = (rows.size() + kMostSearched - 1) / kMostSearched;
+  Rows some;
+  for (size_t k = 0; k < rows.size(); k += step) some.push_back(rows[k]);
+  Rows neighbours = WithoutLonely(means_, log_sizes_, some);
+  if (2 * neighbours.size() < some.size()) neighbours = std::move(some);
+  const Framing subject = FrameRows(means_, WithinGaps(means_, std::move(neighbours)), reach);
+  return subject.radius < kWorthIt * whole.radius ? subject : whole;
 }
 
 double FramingDistance(const Framing& framing, const Pinhole& intrinsics) {

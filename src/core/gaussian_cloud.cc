@@ -6,6 +6,7 @@
 #include <limits>
 #include <new>
 
+#include "core/activations.h"
 #include "core/cloud_view.h"
 #include "core/finite.h"
 #include "core/statistics.h"
@@ -22,8 +23,6 @@ void GatherRows(const Buffer<float>& from, int64_t width, std::span<const int64_
 }
 
 void AppendRows(Buffer<float>& to, const Buffer<float>& from) { to.insert(to.end(), from.begin(), from.end()); }
-
-bool FiniteOrMinusInf(float x) { return std::isfinite(x) || x == -std::numeric_limits<float>::infinity(); }
 
 }  // namespace
 
@@ -106,7 +105,8 @@ namespace {
 template <typename Cloud>
 bool ShapeIsUsable(const Cloud& cloud, int64_t i) {
   const float* scales = cloud.log_scales.data() + 3 * i;
-  return AllFinite(cloud.means.data() + 3 * i, 3) && std::all_of(scales, scales + 3, FiniteOrMinusInf) &&
+  return AllFinite(cloud.means.data() + 3 * i, 3) && 
+         std::all_of(scales, scales + 3, [](float x) { return x <= kLargestLogScale; }) &&  // false for NaN
          AllFinite(cloud.quats.data() + 4 * i, 4) && !std::isnan(cloud.opacity_logits[static_cast<size_t>(i)]);
 }
 
@@ -121,10 +121,17 @@ bool HasUsableShape(const CloudView& cloud, int64_t i) { return ShapeIsUsable(cl
 bool IsUsable(const CloudView& cloud, int64_t i) { return ShapeIsUsable(cloud, i) && HarmonicsAreFinite(cloud, i); }
 bool IsUsable(const GaussianCloud& cloud, int64_t i) { return ShapeIsUsable(cloud, i) && HarmonicsAreFinite(cloud, i); }
 
+bool IsOpaqueEnough(float logit) { return Sigmoid(logit) >= kLeastOpacity; }
+bool IsDrawn(const CloudView& cloud, int64_t i) {
+  return IsOpaqueEnough(cloud.opacity_logits[static_cast<size_t>(i)]) && IsUsable(cloud, i);
+}
+bool IsDrawn(const GaussianCloud& cloud, int64_t i) {
+  return IsOpaqueEnough(cloud.opacity_logits[static_cast<size_t>(i)]) && IsUsable(cloud, i);
+}
+
 bool IsFinite(const GaussianCloud& cloud, int64_t i) {
-  return AllFinite(cloud.means.data() + 3 * i, 3) && AllFinite(cloud.log_scales.data() + 3 * i, 3) &&
-         AllFinite(cloud.quats.data() + 4 * i, 4) && std::isfinite(cloud.opacity_logits[static_cast<size_t>(i)]) &&
-         AllFinite(cloud.sh.data() + i * cloud.sh_stride(), cloud.sh_stride());
+  return IsUsable(cloud, i) && AllFinite(cloud.log_scales.data() + 3 * i, 3) &&
+         std::isfinite(cloud.opacity_logits[static_cast<size_t>(i)]);
 }
 
 }  // namespace anchorsplat

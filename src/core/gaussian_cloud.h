@@ -47,7 +47,8 @@ struct GaussianCloud {
 // Array sizes agree with each other and the degree is 0–3. (kBadArgument otherwise; values are not looked at.)
 Status Validate(const GaussianCloud& cloud);
 
-// Axis-aligned box of the finite means, from the origin on; nothing when there are none.
+// Axis-aligned box of the means of usable Gaussians (as far as HasUsableShape tells), from the origin on; nothing when
+// there are none.
 struct Bounds {
   std::array<float, 3> min;
   std::array<float, 3> max;
@@ -63,11 +64,21 @@ Status Append(GaussianCloud& cloud, const GaussianCloud& more);
 // A copy with another SH degree: higher coefficients dropped, or zeros added.
 GaussianCloud WithShDegree(const GaussianCloud& cloud, int degree);
 
-// True when every stored value of row i is finite, except that a log-scale may be −Inf (a flat Gaussian) and an opacity
-// logit ±Inf (opacity 1 or 0): legal, and written by some tools. What it is false for is nowhere drawn
-// (docs/formats.md).
+// The one rule for what can be drawn; the rasterizer follows it, and everything that chooses, counts, measures or writes
+// Gaussians asks it here (core/statistics.h has the same of views).
+//
+// Lengths beyond e to this are not drawn: the square, of which covariances are made, leaves the range of floats
+// (½·ln of the largest is 44.36), in which the field's rasterizers calculate.
+inline constexpr float kLargestLogScale = 44;
+// Opacities below are not drawn: no eight-bit picture shows them.
+inline constexpr float kLeastOpacity = 1.0f / 255;
+// True when every stored value of row i is finite and no log-scale beyond kLargestLogScale, except that a log-scale may
+// be −Inf (a flat Gaussian) and an opacity logit ±Inf (opacity 1 or 0): legal, and written by some tools. What it is
+// false for is nowhere drawn, whatever its opacity (docs/formats.md).
 bool IsUsable(const GaussianCloud& cloud, int64_t i);
-// True when all of them are.
+// Whether any picture can show row i: usable, and of kLeastOpacity or more.
+bool IsDrawn(const GaussianCloud& cloud, int64_t i);
+// True when it is usable and every value is finite.
 bool IsFinite(const GaussianCloud& cloud, int64_t i);
 
 }  // namespace anchorsplat

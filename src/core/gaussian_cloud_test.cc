@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/most_visible.h"
 #include "core/random.h"
 
 namespace anchorsplat {
@@ -107,6 +108,41 @@ TEST(GaussianCloud, InfinityIsLegalOnlyWhereItMeansZeroOrOne) {
     (cloud.*array).back() = std::nanf("");
     EXPECT_FALSE(IsUsable(cloud, 0));
   }
+}
+
+TEST(GaussianCloud, IsDrawnWhereSizeAndOpacityAllow) {
+  GaussianCloud cloud = RandomCloud(1, 0, 7);
+  cloud.opacity_logits = {0};
+  for (const float scale : {40.0f, 44.0f, 44.1f, 60.0f, 88.0f, 128.0f}) {
+    for (size_t a = 0; a < 3; ++a) {
+      GaussianCloud large = cloud;
+      large.log_scales[a] = scale;
+      EXPECT_EQ(IsUsable(large, 0), scale <= 44) << scale;
+      EXPECT_EQ(IsDrawn(large, 0), scale <= 44) << scale;
+      EXPECT_EQ(IsFinite(large, 0), scale <= 44) << scale;
+      EXPECT_EQ(ComputeBounds(large).has_value(), scale <= 44) << scale;
+    }
+  }
+  for (const float logit : {-5.6f, -100.0f, -std::numeric_limits<float>::infinity()}) {
+    cloud.opacity_logits = {logit};
+    EXPECT_TRUE(IsUsable(cloud, 0));
+    EXPECT_FALSE(IsDrawn(cloud, 0));
+  }
+  cloud.opacity_logits = {-5.5f};
+  EXPECT_TRUE(IsDrawn(cloud, 0));
+}
+
+TEST(MostVisible, WhatNobodyDrawsComesLast) {
+  GaussianCloud cloud = RandomCloud(8, 0, 9);
+  for (float& x : cloud.opacity_logits) x = 1;
+  cloud.log_scales[0] = std::numeric_limits<float>::infinity();
+  cloud.log_scales[4] = 95;
+  for (size_t k = 6; k < 9; ++k) cloud.log_scales[k] = 30;
+  cloud.opacity_logits[2] = -6;  // enormous, and too faint to be drawn
+  cloud.sh[9] = std::nanf("");
+  for (size_t k = 12; k < 15; ++k) cloud.log_scales[k] = -std::numeric_limits<float>::infinity();  // a point, drawn
+  EXPECT_EQ(MostVisible(cloud, 4), (std::vector<int64_t>{4, 5, 6, 7}));
+  EXPECT_EQ(MostVisible(cloud, 5).front(), 0);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "core/most_visible.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 
 #include "core/activations.h"
@@ -10,10 +11,16 @@ namespace anchorsplat {
 std::vector<int64_t> MostVisible(const GaussianCloud& cloud, std::span<const int64_t> rows, int64_t count) {
   std::vector<float> log_weight(rows.size());
   for (size_t j = 0; j < rows.size(); ++j) {
+    if (!IsDrawn(cloud, rows[j])) {
+      log_weight[j] = -std::numeric_limits<float>::infinity();
+      continue;
+    }
     const float* s = cloud.log_scales.data() + 3 * rows[j];
     const float logit = cloud.opacity_logits[static_cast<size_t>(rows[j])];
-    // Without the smallest; a flat Gaussian's is −Inf, which a difference would not take off.
-    log_weight[j] = LogSigmoid(logit) + std::max({s[0] + s[1], s[0] + s[2], s[1] + s[2]});
+    // Without the smallest; a flat Gaussian's is −Inf, which a difference would not take off. Needles and points have
+    // more than what is not drawn at all.
+    const float largest = std::max({s[0] + s[1], s[0] + s[2], s[1] + s[2]});
+    log_weight[j] = LogSigmoid(logit) + std::max(largest, std::numeric_limits<float>::lowest());
   }
   std::vector<size_t> order(rows.size());
   std::iota(order.begin(), order.end(), size_t{0});

@@ -9,7 +9,7 @@
 namespace anchorsplat {
 
 // The `count` of `rows` with the largest opacity × size (product of the two largest scales), in the order of `rows`; of
-// equal ones the first.
+// equal ones the first. Those that are not drawn (IsDrawn) come after all others.
 std::vector<int64_t> MostVisible(const GaussianCloud& cloud, std::span<const int64_t> rows, int64_t count);
 // Of all rows.
 std::vector<int64_t> MostVisible(const GaussianCloud& cloud, int64_t count);

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string_view>
 
 #include "core/cloud_blocks.h"
 #include "core/cloud_view.h"
@@ -23,13 +24,19 @@ using Percentiles = std::array<float, kPercentiles.size()>;
 // is damaged, of another kind, or in coordinates (of the Earth, say) that floats are too coarse for.
 inline constexpr float kPlausibleExtent = 1e6f;
 
-// IsUsable of core/gaussian_cloud.h for the Gaussians of a view.
+// IsUsable and IsDrawn of core/gaussian_cloud.h for the Gaussians of a view.
 bool IsUsable(const CloudView& cloud, int64_t i);
+bool IsDrawn(const CloudView& cloud, int64_t i);
+// What opacity says to it: kLeastOpacity or more.
+bool IsOpaqueEnough(float logit);
 
-// The same, as far as position, scales, rotation and opacity go.
+// IsUsable, as far as position, scales, rotation and opacity go.
 bool HasUsableShape(const CloudView& cloud, int64_t i);
 
-// Rows that nobody draws (not IsUsable). Without `harmonics` those whose SH alone is to blame are not counted: it is
+// Why rows are not usable, in a message: "… Gaussians are not drawn: " and this.
+inline constexpr std::string_view kWhyUnusable = "NaN, infinite or overflowing values";
+
+// Rows that nobody draws, whatever their opacity (not IsUsable). Without `harmonics` those whose SH alone is to blame are not counted: it is
 // most of a cloud's memory.
 int64_t CountUnusable(const CloudView& cloud, bool harmonics = true);
 
@@ -38,26 +45,26 @@ int64_t CountUnusable(const CloudView& cloud, bool harmonics = true);
 struct CloudStatistics {
   int64_t gaussians = 0;
   int sh_degree = 0;
-  std::optional<Bounds> bounds;  // of all finite means
+  std::optional<Bounds> bounds;  // of the means of usable rows
   Percentiles largest_axis{};    // exp of the largest log-scale, world units
   Percentiles smallest_axis{};   // exp of the smallest
   Percentiles axis_ratio{};      // largest / smallest
   Percentiles opacity{};         // 0–1
 
   // Problems, as row counts.
-  int64_t not_finite = 0;                 // NaN anywhere, or Inf where it has no meaning (see CountUnusable)
+  int64_t not_finite = 0;                 // not usable: NaN, Inf where it has no meaning, or too long
   int64_t zero_quaternions = 0;           // norm below 1e-12: no rotation at all
   int64_t unnormalised_quaternions = 0;   // norm off by more than 1 %: legal, but some programs expect 1
   int64_t zero_scales = 0;                // a log-scale of −Inf
   int64_t invisible = 0;                  // opacity below 1/255: no rasterizer draws them
-  int64_t outliers = 0;                   // farther out than ten times the box that holds the middle 98 % of the means
+  int64_t outliers = 0;                   // usable, and more than ten times farther out than a picture shows: IsFarOut
   int64_t implausible = 0;                // a mean or an axis beyond kPlausibleExtent
   bool linear_looking_scales = false;     // stored scales look like lengths, not logarithms
   bool linear_looking_opacities = false;  // stored opacities look like 0–1, not logits
 };
 CloudStatistics ComputeStatistics(const CloudView& cloud);
 
-// The same of a splat that is looked at block by block, twice, or three times where very many Gaussians lie far out.
+// The same of a splat that is looked at block by block, twice.
 // All numbers are exact. Memory: 50 MB at most and, the first time, 1 MB per thread.
 class StatisticsStudy final : public RowStudy {
  public:

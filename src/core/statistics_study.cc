@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/activations.h"
+#include "core/framing.h"
 #include "core/quaternion_length.h"
 #include "core/rank_search.h"
 #include "core/statistics.h"
@@ -19,20 +20,15 @@ namespace {
 
 // What quantiles are wanted of. Those of lengths and opacities are of their stored logarithms and logits: in the same
 // order, and two exponentials instead of one per Gaussian.
-enum Column : size_t { kLargest, kSmallest, kRatio, kOpacity, kX, kY, kZ, kColumns };
-
-constexpr std::array<double, 2> kMiddle = {0.01, 0.99};  // of the means, along an axis
-constexpr float kFarOut = 10;
-// Rows that may be outliers are kept until it is known; if there are more, all are looked at once more.
-constexpr size_t kMostKept = 1'000'000;
+enum Column : size_t { kLargest, kSmallest, kRatio, kOpacity, kColumns };
 
 constexpr float kEndless = std::numeric_limits<float>::infinity();
 constexpr Bounds kNowhere = {{kEndless, kEndless, kEndless}, {-kEndless, -kEndless, -kEndless}};
 
-void Widen(Bounds& box, const Bounds& other) {
+void Widen(Bounds& box, const float* low, const float* high) {
   for (size_t a = 0; a < 3; ++a) {
-    box.min[a] = std::min(box.min[a], other.min[a]);
-    box.max[a] = std::max(box.max[a], other.max[a]);
+    box.min[a] = std::min(box.min[a], low[a]);
+    box.max[a] = std::max(box.max[a], high[a]);
   }
 }
 
@@ -49,9 +45,6 @@ struct Values {
       column.reserve(rows);
     }
     for (size_t i = 0; i < rows; ++i) {
-      for (size_t a = 0; a < 3; ++a) {
-        if (const float x = block.rows.means[3 * i + a]; std::isfinite(x)) columns[kX + a].push_back(x);
-      }
       if (block.usable[i] == 0) continue;
       per_row(i);
       columns[kOpacity].push_back(block.rows.opacity_logits[i]);
@@ -105,7 +98,7 @@ struct Tally {
       ++sums.unnormalised_quaternions;
     }
     const float logit = rows.opacity_logits[i];
-    if (logit < -5 && Sigmoid(logit) < 1.0f / 255) ++sums.invisible;  // ln(1/254) is −5.5
+    if (logit < -5 && !IsOpaqueEnough(logit)) ++sums.invisible;  // ln(1/254) is −5.5
     if (logit >= 0 && logit <= 1) ++unit_opacities;
     const float* s = rows.log_scales.data() + 3 * i;
     const float low = std::min({s[0], s[1], s[2]});
@@ -118,25 +111,18 @@ struct Tally {
 
 struct StatisticsStudy::State {
   int pass = 0;
-  int64_t gaussians = 0;
+  const int64_t gaussians;
   int sh_degree = 0;
   std::mutex mutex;
   std::vector<std::unique_ptr<Tally>> tallies;  // that no thread has just now
   std::vector<Bounds> bounds;                   // of each block: which of two zeros counts must not depend on threads
   std::vector<RankSearch> searches;             // one per column
   Tally sum;
-  // A mean within this box is no outlier, wherever exactly the middle ends.
-  Bounds surely_in = kNowhere;
-  Buffer<float> maybe_out;  // [.,3]
-  bool too_many = false;
-  Bounds box = kNowhere;  // outside are the outliers
+  FramingStudy framing_study;
+  Framing framing;
   std::atomic<int64_t> outliers = 0;
 
-  bool IsOut(const float* p) const {
-    bool out = false;
-    for (size_t a = 0; a < 3; ++a) out |= std::isfinite(p[a]) && (p[a] < box.min[a] || p[a] > box.max[a]);
-    return out;
-  }
+  explicit State(int64_t count) : gaussians(count), framing_study(count) {}
 
   std::unique_ptr<Tally> Borrow() {
     {
@@ -155,16 +141,20 @@ struct StatisticsStudy::State {
   }
 
   void CountBlock(const CloudBlock& block) {
-    bounds[static_cast<size_t>(block.first / kCloudBlockRows)] = ComputeBounds(block.rows).value_or(kNowhere);
+    framing_study.Look(block.first, block.rows);
+    Bounds& box = bounds[static_cast<size_t>(block.first / kCloudBlockRows)];
+    for (size_t i = 0; i < block.usable.size(); ++i) {
+      if (block.usable[i] != 0) {
+        const float* mean = block.rows.means.data() + 3 * i;
+        Widen(box, mean, mean);
+      }
+    }
     std::unique_ptr<Tally> tally = Borrow();
     tally->Add(block);
     GiveBack(std::move(tally));
   }
   void SumUp();
-  void BoundOutliers();
   void RefineBlock(const CloudBlock& block);
-  void FindBox();
-  void CountOutliers(const CloudBlock& block);
   Percentiles PercentilesOf(Column column, float (*meaning)(float)) const;
 };
 
@@ -184,52 +174,15 @@ void StatisticsStudy::State::SumUp() {
   for (RankSearch& search : searches) search.EndCounting();
 }
 
-// Where the middle 98 % begins and ends is known to one part in a hundred by now.
-void StatisticsStudy::State::BoundOutliers() {
-  for (size_t a = 0; a < 3; ++a) {
-    const RankSearch& search = searches[kX + a];
-    const double first_least = search.LeastOf(0), first_most = search.MostOf(0);
-    const double last_least = search.LeastOf(1), last_most = search.MostOf(1);
-    const double rounding = 1e-5 * (std::abs(first_least) + std::abs(first_most) + std::abs(last_most));
-    const double grown = 0.5 * (kFarOut + 1), shrunk = 0.5 * (kFarOut - 1);
-    surely_in.min[a] = static_cast<float>(grown * first_most - shrunk * last_least + rounding);
-    surely_in.max[a] = static_cast<float>(grown * last_least - shrunk * first_most - rounding);
-  }
-}
-
 void StatisticsStudy::State::RefineBlock(const CloudBlock& block) {
   Values values;
   values.Take(block, [](size_t) {});
   for (size_t c = 0; c < kColumns; ++c) searches[c].Refine(values.columns[c]);
-  Buffer<float> maybe;
-  for (size_t i = 0; i < static_cast<size_t>(block.size()); ++i) {
-    const float* p = block.rows.means.data() + 3 * i;
-    bool in = true;
-    for (size_t a = 0; a < 3; ++a) in &= p[a] >= surely_in.min[a] && p[a] <= surely_in.max[a];
-    if (!in) maybe.insert(maybe.end(), p, p + 3);
+  int64_t far_out = 0;
+  for (size_t i = 0; i < block.usable.size(); ++i) {
+    far_out += block.usable[i] != 0 && IsFarOut(framing, block.rows.means.data() + 3 * i) ? 1 : 0;
   }
-  if (maybe.empty()) return;
-  const std::lock_guard lock(mutex);
-  too_many |= maybe_out.size() + maybe.size() > 3 * kMostKept;
-  if (!too_many) maybe_out.insert(maybe_out.end(), maybe.begin(), maybe.end());
-}
-
-void StatisticsStudy::State::FindBox() {
-  for (size_t a = 0; a < 3; ++a) {
-    const RankSearch::Place low = searches[kX + a].At(0), high = searches[kX + a].At(1);
-    const float first = Between(low.low, low.high, low.fraction), last = Between(high.low, high.high, high.fraction);
-    const float centre = 0.5f * (first + last), half = 0.5f * (last - first);
-    box.min[a] = centre - kFarOut * half;
-    box.max[a] = centre + kFarOut * half;
-  }
-  if (too_many) return;
-  for (size_t k = 0; k < maybe_out.size(); k += 3) outliers += IsOut(maybe_out.data() + k) ? 1 : 0;
-}
-
-void StatisticsStudy::State::CountOutliers(const CloudBlock& block) {
-  int64_t here = 0;
-  for (size_t i = 0; i < static_cast<size_t>(block.size()); ++i) here += IsOut(block.rows.means.data() + 3 * i) ? 1 : 0;
-  outliers += here;
+  outliers += far_out;
 }
 
 Percentiles StatisticsStudy::State::PercentilesOf(Column column, float (*meaning)(float)) const {
@@ -241,35 +194,28 @@ Percentiles StatisticsStudy::State::PercentilesOf(Column column, float (*meaning
   return out;
 }
 
-StatisticsStudy::StatisticsStudy(const CloudBlocks& blocks) : state_(std::make_unique<State>()) {
-  state_->gaussians = blocks.size();
+StatisticsStudy::StatisticsStudy(const CloudBlocks& blocks) : state_(std::make_unique<State>(blocks.size())) {
   state_->sh_degree = blocks.sh_degree();
   state_->bounds.resize(static_cast<size_t>((blocks.size() + kCloudBlockRows - 1) / kCloudBlockRows), kNowhere);
-  for (size_t c = 0; c < kColumns; ++c) {
-    c < kX ? state_->searches.emplace_back(kPercentiles) : state_->searches.emplace_back(kMiddle);
-  }
+  for (size_t c = 0; c < kColumns; ++c) state_->searches.emplace_back(kPercentiles);
 }
 
 StatisticsStudy::~StatisticsStudy() = default;
 
-bool StatisticsStudy::done() const { return state_->pass >= (state_->too_many ? 3 : 2); }
+bool StatisticsStudy::done() const { return state_->pass >= 2; }
 
 void StatisticsStudy::Look(const CloudBlock& block) {
   if (state_->pass == 0) {
     state_->CountBlock(block);
-  } else if (state_->pass == 1) {
-    state_->RefineBlock(block);
   } else {
-    state_->CountOutliers(block);
+    state_->RefineBlock(block);
   }
 }
 
 void StatisticsStudy::EndPass() {
   if (state_->pass == 0) {
     state_->SumUp();
-    state_->BoundOutliers();
-  } else if (state_->pass == 1) {
-    state_->FindBox();
+    state_->framing = state_->framing_study.Find();
   }
   ++state_->pass;
 }
@@ -280,7 +226,7 @@ CloudStatistics StatisticsStudy::Find() const {
   out.gaussians = s.gaussians;
   out.sh_degree = s.sh_degree;
   Bounds all = kNowhere;
-  for (const Bounds& box : s.bounds) Widen(all, box);
+  for (const Bounds& box : s.bounds) Widen(all, box.min.data(), box.max.data());
   if (all.min[0] <= all.max[0]) out.bounds = all;
   const auto exp = [](float x) { return std::exp(x); };
   out.largest_axis = s.PercentilesOf(kLargest, exp);

@@ -69,12 +69,10 @@ Status DropUnusable(GaussianCloud& cloud) {
   if (dropped == 0) return {};
   if (kept.empty()) {
     return Error{ErrorCode::kBadFile, Cat(kNoneUsable, WithThousands(cloud.size()),
-                                          " Gaussians can be drawn: each has a position, scale, rotation, opacity or "
-                                          "colour that is NaN or infinite")};
+                                          " Gaussians can be drawn: each has ", kWhyUnusable)};
   }
-  LogWarning(
-      Cat("dropped ", WithThousands(dropped), " of ", WithThousands(cloud.size()),
-          " Gaussians: NaN or infinite positions, scales, rotations, opacities or colours, so that nobody draws them"));
+  LogWarning(Cat("dropped ", WithThousands(dropped), " of ", WithThousands(cloud.size()), " Gaussians: ", kWhyUnusable,
+                 ", so that nobody draws them"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(cloud, Subset(cloud, kept));
   return {};
 }

@@ -201,7 +201,7 @@ ShowingGaussians FindShowingGaussians(const CloudView& cloud) {
 
 TellingGaussians FindTellingGaussians(const CloudView& cloud) {
   LeaveIfAbandoned();
-  TellingSearch search(FrameCloud(cloud));
+  TellingSearch search(FrameMeans(cloud));
   MemoryBlocks blocks(cloud);
   (void)blocks.ForEach(
       [&](const CloudBlock& block) { search.Look(block, [&](size_t i) { return block.usable[i] != 0; }); });

@@ -6,6 +6,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "formats/extra_properties.h"
+#include "formats/hidden_rows.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "formats/write_losses.h"
@@ -51,10 +52,14 @@ Status WriteCloud(const std::filesystem::path& path, const CloudView& cloud, con
                           : Cat("is ", format->article, " ", format->name, " file, which this version does not write");
     return Error{ErrorCode::kBadArgument, Cat(path.string(), ": ", what, "; it writes ", WrittenFormats())};
   }
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
+  const HiddenRows hidden = HideRows(*format, cloud);
+  const CloudView written = hidden.any() ? CloudView(hidden.written) : cloud;
   const bool keeps = format->write_with_extras != nullptr;
-  ANCHORSPLAT_RETURN_IF_ERROR(keeps ? format->write_with_extras(path, cloud, options, extras)
-                                    : format->write(path, cloud, options));
-  for (const std::string& loss : WriteLosses(*format, cloud)) LogWarning(Cat(path.string(), ": ", loss));
+  ANCHORSPLAT_RETURN_IF_ERROR(keeps ? format->write_with_extras(path, written, options, extras)
+                                    : format->write(path, written, options));
+  WarnOfHiddenRows(path, *format, hidden);
+  for (const std::string& loss : WriteLosses(*format, written)) LogWarning(Cat(path.string(), ": ", loss));
   if (const std::string lost = extras.lost(keeps); !lost.empty()) {
     LogWarning(Cat(path.string(), ": other properties of the input are dropped: ", lost));
   }

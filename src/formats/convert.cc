@@ -16,6 +16,7 @@
 #include "core/statistics.h"
 #include "core/text.h"
 #include "formats/extra_properties.h"
+#include "formats/hidden_rows.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "formats/row_arrays.h"
@@ -70,7 +71,10 @@ Status ParseAxes(std::string_view text, ConvertOptions& options) {
 void DropFaint(GaussianCloud& cloud, float min_opacity, ExtraProperties* extras) {
   if (!(min_opacity > 0)) return;
   std::vector<char> keep(static_cast<size_t>(cloud.size()));
-  for (size_t i = 0; i < keep.size(); ++i) keep[i] = Sigmoid(cloud.opacity_logits[i]) >= min_opacity ? 1 : 0;
+  for (size_t i = 0; i < keep.size(); ++i) {
+    const bool drawn = IsUsable(cloud, static_cast<int64_t>(i));
+    keep[i] = drawn && Sigmoid(cloud.opacity_logits[i]) >= min_opacity ? 1 : 0;
+  }
   KeepRows(cloud, extras, keep);
 }
 
@@ -132,11 +136,11 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   report.gaussians_read = cloud.size();
   report.sh_degree_read = cloud.sh_degree;
   report.input_bytes = file.bytes();
-  // Without harmonics: looking through them would take longer than all else here.
-  if (const int64_t bad = CountUnusable(cloud, false); bad > 0) {
-    LogWarning(
-        Cat(input.string(), ": ", WithThousands(bad), " of ", WithThousands(cloud.size()),
-            " Gaussians have a position, scale, rotation or opacity that is NaN or infinite: no verb draws them"));
+  // Without harmonics: looking through them would take longer than all else here. Other formats say what becomes of
+  // such Gaussians when they are written.
+  if (const int64_t bad = to->keeps_all_values ? CountUnusable(cloud, false) : 0; bad > 0) {
+    LogWarning(Cat(input.string(), ": ", WithThousands(bad), " of ", WithThousands(cloud.size()),
+                   " Gaussians have a position, scale, rotation or opacity that no verb draws: ", kWhyUnusable));
   }
 
   if (options.render_mode) cloud.render_mode = options.render_mode;
@@ -190,8 +194,10 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
       }
       ANCHORSPLAT_ASSIGN_OR_RETURN(report.error, CompareAttributes(back, written_cloud, {}, world));
     } else {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(report.error,
-                                   CompareAttributes(back, cloud, WriteOrder(cloud, write.order, to->order), extras.world));
+      const HiddenRows hidden = HideRows(*to, cloud);
+      const Buffer<uint32_t> order =
+          WriteOrder(hidden.any() ? CloudView(hidden.written) : CloudView(cloud), write.order, to->order);
+      ANCHORSPLAT_ASSIGN_OR_RETURN(report.error, CompareAttributes(back, cloud, order, extras.world));
     }
   }
   if (kept != nullptr) *kept = std::move(cloud);

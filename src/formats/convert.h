@@ -57,7 +57,7 @@ Result<GaussianCloud> ReadBack(const std::filesystem::path& output, const SplatF
                                const CloudView& written);
 
 // The parts of it that change a cloud, in the order in which they are done. In place.
-// `extras` are changed alike, if not null.
+// `extras` are changed alike, if not null. Gaussians that nobody draws have no opacity to DropFaint and no importance.
 void DropFaint(GaussianCloud& cloud, float min_opacity, ExtraProperties* extras = nullptr);
 void KeepMostImportant(GaussianCloud& cloud, int64_t most, ExtraProperties* extras = nullptr);  // their order stays
 void SetShDegree(GaussianCloud& cloud, int degree);

@@ -1,7 +1,12 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+
+#include "core/activations.h"
+#include "core/gaussian_cloud.h"
 
 namespace anchorsplat {
 
@@ -22,6 +27,25 @@ inline uint8_t QuantizeByte(float value) {
   return static_cast<uint8_t>(static_cast<int32_t>(bounded));
 }
 
+// The opacity of a stored logit as a byte. What is too faint to be drawn stays so: rounded up to 1/255, a large one
+// would lie over everything.
+inline uint8_t OpacityByte(float logit) {
+  const float opacity = Sigmoid(logit);
+  return opacity >= kLeastOpacity ? QuantizeByte(255 * opacity) : 0;
+}
+
+// A quaternion of the same direction whose square is a float; zero where it has none (zero, NaN).
+inline std::array<float, 4> WithinFloats(const float quat[4]) {
+  std::array<float, 4> out = {quat[0], quat[1], quat[2], quat[3]};
+  const float square = out[0] * out[0] + out[1] * out[1] + out[2] * out[2] + out[3] * out[3];
+  if (square > 1e-30f && square < 1e30f) return out;
+  float largest = 0;
+  for (const float x : out) largest = std::max(largest, std::fabs(x));
+  for (float& x : out) x = static_cast<float>(double{x} / double{largest});
+  const bool has_direction = std::isfinite(out[0] + out[1] + out[2] + out[3]);
+  return has_direction ? out : std::array<float, 4>{};
+}
+
 // A unit quaternion without its largest component, which follows from the others: the sign is chosen so that it is
 // positive. `rest` keeps the order of the components that are left; each lies in ±√½. A quaternion without direction
 // (zero, NaN) counts as (1, 0, 0, 0) of `quat`'s own order, given by `identity`.
@@ -31,10 +55,11 @@ struct SmallestThree {
 };
 inline constexpr float kSqrtHalf = 0.70710678118654752f;
 
-inline SmallestThree DropLargest(const float quat[4], uint32_t identity) {
+inline SmallestThree DropLargest(const float stored[4], uint32_t identity) {
   SmallestThree out;
+  const std::array<float, 4> quat = WithinFloats(stored);
   const float norm = std::sqrt(quat[0] * quat[0] + quat[1] * quat[1] + quat[2] * quat[2] + quat[3] * quat[3]);
-  if (!(norm > 0) || !std::isfinite(norm)) {
+  if (!(norm > 0)) {
     out.largest = identity;
     return out;
   }

@@ -26,6 +26,7 @@
 #include "formats/spz/spz_reader.h"
 #include "formats/spz/spz_writer.h"
 #include "formats/streamed_sog/streamed_sog_reader.h"
+#include "formats/strays.h"
 #include "formats/streamed_sog/streamed_sog_writer.h"
 #include "formats/tables/table_writers.h"
 
@@ -93,6 +94,7 @@ constexpr SplatFormat kFormats[] = {
      .mode_tag = ModeTag::kEach,
      .comments = CommentPlace::kAll,
      .keeps_origin = true,
+     .strays = CompressedPlyStrays,
      .mean_loss = CompressedPlyMeanLoss},
     {.name = "PLY",
      .extensions = kPlyExtensions,
@@ -104,6 +106,7 @@ constexpr SplatFormat kFormats[] = {
      .read_with_extras = ReadPlyWithExtras,
      .write = WritePly,
      .write_with_extras = WritePlyWithExtras,
+     .keeps_all_values = true,
      .predicted_size = [](int64_t count, int sh_degree) { return PredictedPlySize(count, sh_degree); },
      .mode_tag = ModeTag::kEach,
      .comments = CommentPlace::kAll,
@@ -123,12 +126,14 @@ constexpr SplatFormat kFormats[] = {
      .axes = kRub,
      .range = kSpzRange,
      .mode_tag = ModeTag::kCompensated,
+     .strays = SpzStrays,
      .mean_loss = SpzMeanLoss},
     {.name = "NPZ",
      .article = "an",
      .extensions = kNpzExtensions,
      .sniff = IsNpz,
      .write = WriteNpz,
+     .keeps_all_values = true,
      .predicted_size = PredictedNpzSize,
      .keeps_origin = true},
     {.name = "gsplat checkpoint",
@@ -169,6 +174,7 @@ constexpr SplatFormat kFormats[] = {
      .mode_tag = ModeTag::kCompensated,
      .comments = CommentPlace::kCredits,
      .keeps_origin = true,
+     .strays = SogStrays,
      .mean_loss = SogMeanLoss},
     {.name = "splat",
      .extensions = kSplatExtensions,
@@ -214,6 +220,7 @@ constexpr SplatFormat kFormats[] = {
     {.name = "CSV",
      .extensions = kCsvExtensions,
      .write = WriteCsv,
+     .keeps_all_values = true,
      .predicted_size = EstimatedCsvSize,
      .size_is_estimate = true,
      .seconds_per_gaussian = 4e-6,

@@ -21,6 +21,7 @@
 namespace anchorsplat {
 
 struct ExtraProperties;
+struct Strays;
 
 // What a format can hold; writers clamp what is beyond. Half a step of the format wider than its last values.
 struct FormatRange {
@@ -74,6 +75,9 @@ struct SplatFormat {
                   const CloudWriteOptions& options) = nullptr;
   Status (*write_with_extras)(const std::filesystem::path& path, const CloudView& cloud,
                               const CloudWriteOptions& options, const ExtraProperties& extras) = nullptr;
+  // It says every value of a Gaussian as it is stored. Others get those that nobody draws without opacity
+  // (hidden_rows.h), as what they can say of them might show.
+  bool keeps_all_values = false;
   // Rows of the cloud in the order in which `write` puts them, where that is none of SplatOrder's and some may be left
   // out. Null: WriteOrder (splat_order.h).
   Buffer<uint32_t> (*written_rows)(const CloudView& cloud, const CloudWriteOptions& options) = nullptr;
@@ -95,6 +99,9 @@ struct SplatFormat {
   ModeTag mode_tag = ModeTag::kNone;
   CommentPlace comments = CommentPlace::kNone;
   bool keeps_origin = false;  // of the means (core/world_origin.h), or writes them in the world
+  // Gaussians that `write` cannot place without making others coarser than they are worth (strays.h): they are written
+  // without opacity. Null: it places all of them.
+  Strays (*strays)(const CloudView& cloud) = nullptr;
   // A sentence where `write` must round the means of this cloud more coarsely than is usual, else nothing. May be null.
   std::string (*mean_loss)(const CloudView& cloud) = nullptr;
 };

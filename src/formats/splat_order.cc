@@ -1,12 +1,14 @@
 #include "formats/splat_order.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
+#include <optional>
 
 #include "core/activations.h"
 #include "core/parallel.h"
 #include "core/parallel_sort.h"
+#include "core/statistics.h"
+#include "formats/strays.h"
 
 namespace anchorsplat {
 
@@ -45,38 +47,82 @@ uint64_t SpreadBits(uint64_t x) {
   return (x | x << 2) & 0x1249249249249249;
 }
 
-}  // namespace
+enum class Part : uint8_t { kNear, kFarOut, kNobodyDraws };
 
-Buffer<uint32_t> MortonOrder(const CloudView& cloud) {
-  const std::optional<Bounds> bounds = ComputeBounds(cloud);
-  constexpr double kCells = 1 << 21;
-  double scale[3] = {0, 0, 0};
-  double origin[3] = {0, 0, 0};
-  for (size_t a = 0; bounds && a < 3; ++a) {
-    const double extent = double{bounds->max[a]} - double{bounds->min[a]};
-    origin[a] = bounds->min[a];
-    scale[a] = extent > 0 ? kCells / extent : 0;
-  }
-  return OrderBy<uint64_t>(cloud.size(), [&](int64_t i) {
-    const float* mean = cloud.means.data() + 3 * i;
+// Where the curve lies: its first cell, and cells per world unit.
+struct Curve {
+  static constexpr double kCells = 1 << 21;
+  double origin[3] = {0, 0, 0}, scale[3] = {0, 0, 0};
+
+  uint64_t CodeOf(const float* mean) const {
     uint64_t code = 0;
     for (int a = 0; a < 3; ++a) {
-      if (!std::isfinite(mean[a])) return std::numeric_limits<uint64_t>::max();
       const double cell = (double{mean[a]} - origin[a]) * scale[a];
       code |= SpreadBits(static_cast<uint64_t>(cell < kCells - 1 ? cell : kCells - 1)) << a;
     }
     return code;
+  }
+};
+
+// Along one curve through the box of all that is near, then along one through that of what is far out.
+template <typename PartOf>
+Buffer<uint32_t> OrderAlongCurve(std::span<const float> means, PartOf&& part_of) {
+  const int64_t count = std::ssize(means) / 3;
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Buffer<Part> parts(static_cast<size_t>(count));
+  Curve curves[2];
+  double high[2][3];
+  for (int k = 0; k < 2; ++k) {
+    std::fill_n(curves[k].origin, 3, kInfinity);
+    std::fill_n(high[k], 3, -kInfinity);
+  }
+  for (int64_t i = 0; i < count; ++i) {
+    const Part part = parts[static_cast<size_t>(i)] = part_of(i);
+    if (part == Part::kNobodyDraws) continue;
+    const int k = part == Part::kNear ? 0 : 1;
+    for (int a = 0; a < 3; ++a) {
+      const double x = means[static_cast<size_t>(3 * i + a)];
+      curves[k].origin[a] = std::min(curves[k].origin[a], x);
+      high[k][a] = std::max(high[k][a], x);
+    }
+  }
+  for (int k = 0; k < 2; ++k) {
+    for (int a = 0; a < 3; ++a) {
+      const double extent = high[k][a] - curves[k].origin[a];
+      curves[k].scale[a] = extent > 0 ? Curve::kCells / extent : 0;
+    }
+  }
+  constexpr uint64_t kFarOut = uint64_t{1} << 63;  // codes have 63 bits
+  return OrderBy<uint64_t>(count, [&](int64_t i) {
+    const Part part = parts[static_cast<size_t>(i)];
+    if (part == Part::kNobodyDraws) return std::numeric_limits<uint64_t>::max();
+    const float* mean = means.data() + 3 * i;
+    return part == Part::kNear ? curves[0].CodeOf(mean) : kFarOut | curves[1].CodeOf(mean);
   });
+}
+
+}  // namespace
+
+Buffer<uint32_t> MortonOrder(const CloudView& cloud) {
+  const std::optional<Framing> framing = FramingWithFarOut(cloud);
+  return OrderAlongCurve(cloud.means, [&](int64_t i) {
+    if (!HasUsableShape(cloud, i)) return Part::kNobodyDraws;
+    return framing && IsFarOut(*framing, cloud.means.data() + 3 * i) ? Part::kFarOut : Part::kNear;
+  });
+}
+
+Buffer<uint32_t> MortonOrder(std::span<const float> means) {
+  return OrderAlongCurve(means, [](int64_t) { return Part::kNear; });
 }
 
 Buffer<uint32_t> ImportanceOrder(const CloudView& cloud) {
   return OrderBy<float>(cloud.size(), [&](int64_t i) {
+    if (!IsDrawn(cloud, i)) return std::numeric_limits<float>::infinity();
     const float* s = cloud.log_scales.data() + 3 * i;
     const float logit = cloud.opacity_logits[static_cast<size_t>(i)];
-    // Flat Gaussians (a log-scale of −Inf) are seen all the same; NaN stays.
+    // Flat Gaussians (a log-scale of −Inf) are seen all the same.
     const auto bounded = [](float log_scale) { return std::max(log_scale, -20.0f); };
-    const float importance = bounded(s[0]) + bounded(s[1]) + bounded(s[2]) + LogSigmoid(logit);
-    return std::isnan(importance) ? std::numeric_limits<float>::infinity() : -importance;
+    return -(bounded(s[0]) + bounded(s[1]) + bounded(s[2]) + LogSigmoid(logit));
   });
 }
 

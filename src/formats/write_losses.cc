@@ -124,18 +124,17 @@ std::vector<std::string> WriteLosses(const SplatFormat& format, const CloudView&
   return losses;
 }
 
-MiddleOfMeans FindMiddleOfMeans(const CloudView& cloud) {
+MiddleOfMeans FindMiddleOfMeans(const CloudView& cloud, double share) {
   constexpr int64_t kSamples = 1 << 16;
   const int64_t step = (cloud.size() + kSamples - 1) / kSamples;
   MiddleOfMeans middle;
   for (size_t axis = 0; axis < 3 && step > 0; ++axis) {
     std::vector<float> values;
     for (int64_t i = 0; i < cloud.size(); i += step) {
-      const float x = cloud.means[static_cast<size_t>(3 * i) + axis];
-      if (std::isfinite(x)) values.push_back(x);
+      if (HasUsableShape(cloud, i)) values.push_back(cloud.means[static_cast<size_t>(3 * i) + axis]);
     }
     if (values.empty()) continue;
-    const float low = Quantile(values, 0.01), high = Quantile(values, 0.99);
+    const float low = Quantile(values, 0.5 - share / 2), high = Quantile(values, 0.5 + share / 2);
     middle.extent = std::max(middle.extent, high - low);
     middle.farthest = std::max({middle.farthest, std::fabs(low), std::fabs(high)});
   }

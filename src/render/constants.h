@@ -3,12 +3,13 @@
 #include <cstdint>
 #include <limits>
 
+#include "core/gaussian_cloud.h"
 #include "core/render_mode.h"
 
 namespace anchorsplat {
 
 // All numbers of the 3DGS rasterizer, in one place; those of the render modes are in core/render_mode.h.
-inline constexpr float kMinAlpha = 1.0f / 255;     // smaller contributions are invisible at 8 bits
+inline constexpr float kMinAlpha = kLeastOpacity;  // smaller contributions are invisible at 8 bits
 inline constexpr float kMaxAlpha = 0.999f;         // keeps 1/(1−α) of the backward pass finite (gsplat ≤ 1.5)
 inline constexpr float kMinTransmittance = 1e-4f;  // stop *before* the Gaussian that would cross it
 // gsplat's near and far plane, world units along z: what a fit draws. A splat that is shown may have any unit

@@ -131,12 +131,11 @@ HWY_INLINE hn::Mask<D> ProjectLanes(D d, const Frame& frame, RasterProfile profi
   const V logit = hn::Load(d, in.stored.logits + j);
   const auto stored = [&](const T* column) HWY_ATTR { return hn::Load(d, column + j); };
   const auto finite = [&](const T* column) HWY_ATTR { return hn::Le(hn::Abs(stored(column)), Number(d, kLargest)); };
-  const auto below_infinity = [&](const T* column) HWY_ATTR { return hn::Le(stored(column), Number(d, kLargest)); };
+  const auto fits = [&](const T* column) HWY_ATTR { return hn::Le(stored(column), Number(d, kLargestLogScale)); };
   const auto& quats = in.stored.quats;
   const auto& log_scales = in.stored.log_scales;
   M keep = hn::And(hn::And(finite(quats[0]), finite(quats[1])), hn::And(finite(quats[2]), finite(quats[3])));
-  keep = hn::And(hn::And(keep, below_infinity(log_scales[0])),
-                 hn::And(below_infinity(log_scales[1]), below_infinity(log_scales[2])));
+  keep = hn::And(hn::And(keep, fits(log_scales[0])), hn::And(fits(log_scales[1]), fits(log_scales[2])));
   keep = hn::And(keep, hn::And(hn::Gt(stored(in.drawable), zero), hn::Eq(logit, logit)));
 
   const Shape<D> shape = ShapeOf(d, view, in.stored, j);

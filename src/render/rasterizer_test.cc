@@ -401,6 +401,45 @@ TEST(Rasterizer, ExtremeValuesNeitherCrashNorSpread) {
   }
 }
 
+// One rule (core/gaussian_cloud.h) for what is drawn, whatever the view: of these, one fills the picture with it.
+TEST(Rasterizer, DrawsWhatTheRuleSays) {
+  const auto expect_alike = [](const GaussianCloud& cloud, const std::string& what) {
+    for (const double focal : {0.5, 60.0, 1e6}) {
+      for (const RenderMode mode : {RenderMode::kClassic, RenderMode::kMip}) {
+        const RenderOutput output = Render(cloud, FrontCamera(16, 16, focal), {.mode = mode});
+        EXPECT_EQ(*std::ranges::max_element(output.alpha.pixels) > 0, IsDrawn(cloud, 0)) << what << " focal " << focal;
+        for (const float x : output.color.pixels) ASSERT_TRUE(std::isfinite(x)) << what;
+      }
+    }
+  };
+  for (double scale = 40; scale < 128; scale += 0.5) {
+    for (size_t axes = 1; axes <= 3; ++axes) {
+      GaussianCloud cloud = OneGaussian(0, 0, 3, 2, 0.9);
+      std::fill_n(cloud.log_scales.begin(), axes, static_cast<float>(scale));
+      expect_alike(cloud, Cat(axes, " axes of ", scale));
+    }
+  }
+  for (const float length : {0.0f, 1e-44f, 1e-30f, 1e-20f, 1e20f, 1e30f, 3e38f}) {
+    GaussianCloud cloud = OneGaussian(0, 0, 3, 2, 0.9);
+    for (float& x : cloud.quats) x = length;
+    expect_alike(cloud, Cat("a quaternion of ", length));
+  }
+  for (const float logit : {-kInfinity, -200.0f, -5.6f, -5.5f, 200.0f, kInfinity, std::nanf("")}) {
+    GaussianCloud cloud = OneGaussian(0, 0, 3, 1e4, 0.9);
+    cloud.opacity_logits = {logit};
+    // A mode that compensates leaves less of one at the limit.
+    if (logit == -5.5f) cloud.opacity_logits = {-5.4f};
+    expect_alike(cloud, Cat("a logit of ", logit));
+  }
+  for (const float huge : {1e38f, 3e38f, -3e38f, kInfinity, std::nanf("")}) {
+    for (int degree = 0; degree <= 3; ++degree) {
+      GaussianCloud cloud = WithShDegree(OneGaussian(0, 0, 3, 2, 0.9), degree);
+      for (float& x : cloud.sh) x = huge;
+      expect_alike(cloud, Cat("coefficients of ", huge, ", degree ", degree));
+    }
+  }
+}
+
 TEST(Rasterizer, ZeroQuaternionIsTheIdentity) {
   GaussianCloud cloud = OneGaussian(0, 0, 2, 0.1, 0.6);
   cloud.log_scales[0] = -1.0f;

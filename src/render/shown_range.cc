@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/activations.h"
+#include "core/statistics.h"
 #include "core/text.h"
 #include "render/constants.h"
 
@@ -17,7 +17,7 @@ constexpr int64_t kAlmostNothing = 1000;  // one of so many Gaussians
 // Gaussians along the view's axis.
 struct Depths {
   int64_t behind = 0, too_near = 0, in_range = 0, too_far = 0;
-  int64_t faint = 0;  // of those in range: drawn by nobody
+  int64_t faint = 0, unusable = 0;  // of those in range: drawn by nobody
 };
 
 Depths CountDepths(const CloudView& cloud, const Camera& camera, double near, double far) {
@@ -28,7 +28,12 @@ Depths CountDepths(const CloudView& cloud, const Camera& camera, double near, do
     if (!std::isfinite(z)) continue;
     int64_t& where = z <= 0 ? depths.behind : z < near ? depths.too_near : z > far ? depths.too_far : depths.in_range;
     ++where;
-    if (&where == &depths.in_range && Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) < kMinAlpha) ++depths.faint;
+    if (&where != &depths.in_range) continue;
+    if (!IsUsable(cloud, i)) {
+      ++depths.unusable;
+    } else if (!IsOpaqueEnough(cloud.opacity_logits[static_cast<size_t>(i)])) {
+      ++depths.faint;
+    }
   }
   return depths;
 }
@@ -66,7 +71,8 @@ std::string NothingToSee(const CloudView& cloud, const Camera& camera, const Ren
   add(depths.too_near, Cat("before the near plane (", near, ")"));
   add(depths.too_far, Cat("beyond the far plane (", options.far_plane, ")"));
   add(depths.faint, "less opaque than 1/255");
-  add(depths.in_range - depths.faint, drawn.value_or(1) == 0 ? "in range but beside the picture" : "in range");
+  add(depths.unusable, Cat("drawn by nobody (", kWhyUnusable, ")"));
+  add(depths.in_range - depths.faint - depths.unusable, drawn.value_or(1) == 0 ? "in range but beside the picture" : "in range");
   return Cat("view ", Printable(camera.name), " shows ", drawn.value_or(1) == 0 ? "nothing" : "almost nothing",
              " of the ", WithThousands(cloud.size()), " Gaussians: ", where.empty() ? "none has a position" : where,
              "; are these cameras of this splat, in its unit and its axes?");

@@ -49,6 +49,20 @@ HWY_INLINE void Sum(const ShBasisBatch& b, size_t j, int coefficients, const flo
   for (int c = 0; c < 3; ++c) rgb[c] += b.value[last][j] * sh[3 * last + c];
 }
 
+// The same of coefficients that overflow a sum of floats: as bright as they say, but such that pictures can add some of
+// them up. False where a coefficient is not finite.
+bool SumOfHuge(const ShBasisBatch& b, size_t j, int coefficients, const float* sh, float* rgb) {
+  constexpr double kBrightest = 1e30;
+  bool finite = true;
+  for (int c = 0; c < 3; ++c) {
+    double sum = 0.5;
+    for (int k = 0; k < coefficients; ++k) sum += double{b.value[k][j]} * double{sh[3 * k + c]};
+    finite = finite && std::isfinite(sum);
+    rgb[c] = static_cast<float>(std::clamp(sum, -kBrightest, kBrightest));
+  }
+  return finite;
+}
+
 void EvaluateChunk(const SphericalHarmonicsParams& p, int64_t chunk) {
   ShBasisBatch b;
   const size_t lanes = hn::Lanes(ShTag());
@@ -70,7 +84,7 @@ void EvaluateChunk(const SphericalHarmonicsParams& p, int64_t chunk) {
         rgb[c] += 0.5f;
         finite = finite && std::abs(rgb[c]) <= std::numeric_limits<float>::max();  // false for NaN, too
       }
-      if (!finite) {
+      if (!finite && !SumOfHuge(b, j, coefficients, p.sh + i * p.stride, rgb)) {
         p.tiles[i] = TileRect{};
         continue;
       }

@@ -36,13 +36,13 @@ std::string Rows(int64_t count, int64_t of) {
 
 std::vector<std::string> Problems(const CloudStatistics& s) {
   std::vector<std::string> out;
-  const auto add = [&](int64_t count, const char* what) {
-    if (count > 0) out.push_back(Rows(count, s.gaussians) + " " + what);
+  const auto add = [&](int64_t count, std::string_view what) {
+    if (count > 0) out.push_back(Cat(Rows(count, s.gaussians), " ", what));
   };
-  add(s.not_finite, "with NaN or infinite values; no verb draws them, and enhance drops them");
+  add(s.not_finite, Cat("with ", kWhyUnusable, "; no verb draws them, and enhance drops them"));
   add(s.zero_quaternions, "with a zero quaternion; rendered without rotation");
   add(s.zero_scales, "with a scale of zero (log-scale -Inf) on some axis; legal, flat or a point");
-  add(s.outliers, "more than ten times farther out than the middle 98 %");
+  add(s.outliers, "more than ten times farther out than what an orbit shows; sky, floaters or strays");
   add(s.unnormalised_quaternions, "with quaternions that are not normalised; legal, as trainers leave them so");
   add(s.implausible, "farther out or longer than a million units: is the file damaged, or of another kind?");
   add(s.invisible, "with an opacity below 1/255; never drawn");

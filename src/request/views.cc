@@ -118,7 +118,7 @@ void WarnOfUnusable(const std::string& path, const GaussianCloud& cloud) {
   const int64_t unusable = CountUnusable(cloud);
   if (unusable == 0) return;
   LogWarning(Cat(path, ": ", WithThousands(unusable), " of ", WithThousands(cloud.size()),
-                 " Gaussians are not drawn: NaN or infinite values"));
+                 " Gaussians are not drawn: ", kWhyUnusable));
 }
 
 Result<GaussianCloud> ReadToShow(const std::string& path) {

@@ -15,6 +15,7 @@ namespace {
 constexpr int64_t kGrain = 1 << 14;
 // A Gaussian e³² times smaller than the largest is a point in any view: scale 0 (a log-scale of −Inf) ends up there.
 constexpr double kLogScaleSpan = 32;
+constexpr double kLargestLogScaleOfSpread = 20;
 // Colours are ±5 beyond black and white there; a broken file's 1e30 must not take the precision of all others.
 constexpr double kCoefficientLimit = 16;
 constexpr double kFloatMax = std::numeric_limits<float>::max();
@@ -122,6 +123,7 @@ void MeasureRanges(const CloudView& cloud, const std::vector<int64_t>& rows, Qua
   q.dc = {kInfinity, -kInfinity};
   const auto stride = static_cast<size_t>(cloud.sh_stride());
   for (const int64_t row : rows) {
+    if (!IsDrawn(cloud, row)) continue;
     const auto i = static_cast<size_t>(row);
     for (size_t k = 0; k < 3; ++k) {
       const double s = cloud.log_scales[3 * i + k];
@@ -139,6 +141,9 @@ void MeasureRanges(const CloudView& cloud, const std::vector<int64_t>& rows, Qua
     }
   }
   if (!std::isfinite(q.log_scale[1])) q.log_scale = {-kLogScaleSpan, -kLogScaleSpan};  // nothing but points
+  if (!std::isfinite(q.dc[1])) q.dc = {0, 0};                                            // nothing that is drawn
+  // Beyond that a Gaussian is the same veil over everything, and must not take the precision of all others.
+  q.log_scale[1] = std::min(q.log_scale[1], std::log(q.spread) + kLargestLogScaleOfSpread);
   q.log_scale[0] = std::max(q.log_scale[0], q.log_scale[1] - kLogScaleSpan);
 }
 

@@ -41,7 +41,7 @@ struct QuantizedCloud {
   // World units, per axis from the centre: half the size of what one wants to see, most of the Gaussians, but of a
   // scene with a far background its middle.
   double radius = 1;
-  int64_t left_out = 0;  // Gaussians with a value that is not finite: no rasterizer draws them
+  int64_t left_out = 0;  // Gaussians that are not usable: no rasterizer draws them
   // PlanesPerGaussian(sh_degree) planes of `count` bytes: mean x, y, z (3 each); log-scale 0–2, opacity, f_dc r, g, b
   // (2 each); rotation (4, lowest byte first); f_rest coefficient-major, rgb fastest (1 each, two's complement).
   std::vector<uint8_t> planes;

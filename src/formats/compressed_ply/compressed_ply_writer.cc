@@ -7,10 +7,14 @@
 #include <cstring>
 #include <limits>
 #include <mutex>
+#include <optional>
+#include <tuple>
+#include <vector>
 
 #include "core/activations.h"
 #include "core/parallel.h"
 #include "core/spherical_harmonics.h"
+#include "core/statistics.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
 #include "formats/compressed_ply/compressed_ply_reader.h"
@@ -160,7 +164,7 @@ void PackChunk(const CloudView& cloud, const Buffer<uint32_t>& order, int64_t fi
     const int64_t row = rows[static_cast<size_t>(i)];
     uint32_t color = 0;
     for (int k = 0; k < 3; ++k) color = color << 8 | colors.Quantize(i, k, 255);
-    color = color << 8 | QuantizeUnit(Sigmoid(cloud.opacity_logits[static_cast<size_t>(row)]), 255);
+    color = color << 8 | OpacityByte(cloud.opacity_logits[static_cast<size_t>(row)]);
     const uint32_t packed[4] = {means.Pack111011(i), PackQuat(cloud.quats.data() + 4 * row), scales.Pack111011(i),
                                 color};
     std::memcpy(out.vertices + static_cast<size_t>(i) * kVertexBytes, packed, sizeof packed);
@@ -225,6 +229,68 @@ Status WriteCompressedPly(const std::filesystem::path& path, const CloudView& cl
   return file.Commit();
 }
 
+Strays CompressedPlyStrays(const CloudView& cloud) {
+  Strays strays;
+  const std::optional<Framing> framing = FramingWithFarOut(cloud);
+  if (!framing) return strays;
+  const Buffer<uint32_t> order = MortonOrder(cloud);
+  struct Row {
+    int64_t row;
+    double away, weight, size;  // world units from the middle; SeenWeight, SizeOf
+    bool far;
+  };
+  std::vector<Row> rows;
+  for (int64_t first = 0; first < cloud.size(); first += kChunk) {
+    rows.clear();
+    bool any = false;
+    for (int64_t i = first; i < std::min(first + kChunk, cloud.size()); ++i) {
+      const int64_t row = order[static_cast<size_t>(i)];
+      if (!HasUsableShape(cloud, row)) continue;
+      const float* p = cloud.means.data() + 3 * row;
+      const double away = std::hypot(p[0] - framing->target[0], p[1] - framing->target[1], p[2] - framing->target[2]);
+      rows.push_back({row, away, 0, 0, IsFarOut(*framing, p)});
+      any |= rows.back().far;
+    }
+    if (!any) continue;
+    double all = 0;
+    for (Row& row : rows) {
+      row.weight = SeenWeight(cloud, row.row, *framing);
+      row.size = SizeOf(cloud, row.row);
+      all += row.weight;
+    }
+    std::ranges::sort(rows, [](const Row& a, const Row& b) { return std::tie(a.away, b.row) < std::tie(b.away, a.row); });
+    // From the nearest on: what the first ones lose in the box of them alone, and what all others are worth.
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    std::array<double, 3> low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
+    double beyond = all, least = kInfinity, whole = 0;
+    size_t best = rows.size();
+    for (size_t k = 0; k < rows.size(); ++k) {
+      for (size_t a = 0; a < 3; ++a) {
+        const double x = cloud.means[static_cast<size_t>(3 * rows[k].row) + a];
+        low[a] = std::min(low[a], x), high[a] = std::max(high[a], x);
+      }
+      beyond -= rows[k].weight;
+      const bool can_end_here = k + 1 == rows.size() || rows[k + 1].far;
+      if (!can_end_here) continue;
+      const double step = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]}) / 2047;
+      double loss = std::max(beyond, 0.0);
+      for (size_t j = 0; j <= k; ++j) loss += rows[j].weight * RoundingLoss(step, rows[j].size);
+      if (loss <= least) {
+        least = loss;
+        best = k + 1;
+      }
+      whole = loss;
+    }
+    if (whole <= kLossThatShows * all) continue;
+    for (size_t k = best; k < rows.size(); ++k) {
+      strays.rows.push_back(rows[k].row);
+      strays.farthest = std::max(strays.farthest, rows[k].away);
+    }
+  }
+  std::ranges::sort(strays.rows);
+  return strays;
+}
+
 std::string CompressedPlyMeanLoss(const CloudView& cloud) {
   constexpr double kStray = 8;       // of the box of the middle 98 %: where it ends well, nobody needs to look closer
   constexpr double kUsualChunk = 4;  // times its share of the volume: surfaces have larger ones than solids
@@ -260,7 +326,7 @@ std::string CompressedPlyMeanLoss(const CloudView& cloud) {
   if (coarse == 0) return {};
   return Cat("positions of ", WithThousands(coarse), " of ", WithThousands(cloud.size()),
              " Gaussians are rounded to steps of up to ", largest / 2047, ", as their chunks of ", kChunk,
-             " reach so far, while 98 % lie within a box of ", middle.extent, "; remove what is far out");
+             " reach so far, while 98 % lie within a box of ", middle.extent, " (a PLY keeps them)");
 }
 
 }  // namespace anchorsplat

@@ -7,6 +7,7 @@
 #include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
+#include "formats/strays.h"
 
 namespace anchorsplat {
 
@@ -19,6 +20,9 @@ Status WriteCompressedPly(const std::filesystem::path& path, const CloudView& cl
                           const CloudWriteOptions& options = {});
 
 uint64_t PredictedCompressedPlySize(int64_t count, int sh_degree);
+
+// What would make all others coarser than it is worth.
+Strays CompressedPlyStrays(const CloudView& cloud);
 
 // A sentence where chunks of this cloud reach so far that their 2047 steps are coarse; else nothing. One Gaussian far
 // out does that to those that share its chunk, and farther out still, where the Morton order tells no others apart, to

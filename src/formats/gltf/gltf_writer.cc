@@ -1,6 +1,7 @@
 #include "formats/gltf/gltf_writer.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -65,9 +66,9 @@ std::vector<WrittenAttribute> Attributes(const CloudView& cloud, const AxisFlip&
                    std::memcpy(bytes, color, sizeof color);
                  }});
   out.push_back({"KHR_gaussian_splatting:ROTATION", "VEC4", kFloatComponent, 16, [&](int64_t row, uint8_t* bytes) {
-                   const float* q = cloud.quats.data() + 4 * row;
+                   const std::array<float, 4> q = WithinFloats(cloud.quats.data() + 4 * row);
                    const float norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-                   const bool has_direction = norm > 0 && std::isfinite(norm);
+                   const bool has_direction = norm > 0;
                    float xyzw[4] = {0, 0, 0, has_direction ? q[0] / norm : 1.0f};
                    for (size_t k = 0; has_direction && k < 3; ++k) xyzw[k] = flip.quat[k + 1] * q[k + 1] / norm;
                    PutFloats(xyzw, 4, bytes);

@@ -147,7 +147,7 @@ nlohmann::json DrawColors(const Pictures& pictures, std::vector<Picture>& out) {
                    return pictures.Draw([&](int64_t row, uint8_t* rgba) {
                      const float* dc = cloud.sh.data() + row * cloud.sh_stride();
                      for (size_t k = 0; k < 3; ++k) rgba[k] = codebook.IndexOf(dc[k]);
-                     rgba[3] = QuantizeByte(255 * Sigmoid(cloud.opacity_logits[static_cast<size_t>(row)]));
+                     rgba[3] = OpacityByte(cloud.opacity_logits[static_cast<size_t>(row)]);
                    });
                  }});
   return {{"codebook", codebook.values}, {"files", {"sh0.webp"}}};
@@ -280,6 +280,11 @@ uint64_t EstimatedSogSize(int64_t count, int sh_degree) {
   return static_cast<uint64_t>(size);
 }
 
+Strays SogStrays(const CloudView& cloud) {
+  return FarthestToGiveUp(
+      cloud, [](double reach) { return 2 * std::log1p(reach) / kMeanSteps; }, [](double reach) { return 1 + reach; });
+}
+
 std::string SogMeanLoss(const CloudView& cloud) {
   const MeanRange range = RangeOfMeans(cloud);
   double widest = 0;
@@ -289,7 +294,7 @@ std::string SogMeanLoss(const CloudView& cloud) {
   constexpr double kFine = 1 << 12;
   if (step * kFine <= double{middle.extent}) return {};
   return Cat("positions are rounded to steps of up to ", step, ", while 98 % of the Gaussians lie within a box of ",
-             middle.extent, "; move the splat nearer to zero or remove what is far out");
+             middle.extent, " (a PLY or a compressed PLY keeps them better)");
 }
 
 }  // namespace anchorsplat

@@ -9,6 +9,7 @@
 #include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
+#include "formats/strays.h"
 
 namespace anchorsplat {
 
@@ -32,6 +33,9 @@ std::vector<std::filesystem::path> SogFilesBeside(const std::filesystem::path& p
 
 // From what splats of real scenes take per Gaussian, and the palette (docs/formats.md has the deviations).
 uint64_t EstimatedSogSize(int64_t count, int sh_degree);
+
+// What would make all others coarser than it is worth.
+Strays SogStrays(const CloudView& cloud);
 
 // A sentence when Gaussians far out stretch the range of the means so much that it is coarse for most of them.
 std::string SogMeanLoss(const CloudView& cloud);

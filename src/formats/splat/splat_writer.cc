@@ -1,5 +1,6 @@
 #include "formats/splat/splat_writer.h"
 
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstring>
@@ -65,12 +66,11 @@ Status WriteSplat(const std::filesystem::path& path, const CloudView& cloud, con
             bytes[24 + k] = QuantizeByte(255 * ColorFromDc(dc[k]));
           }
           std::memcpy(bytes, numbers, sizeof numbers);
-          bytes[27] = QuantizeByte(255 * Sigmoid(cloud.opacity_logits[static_cast<size_t>(row)]));
-          const float* q = cloud.quats.data() + 4 * row;
+          bytes[27] = OpacityByte(cloud.opacity_logits[static_cast<size_t>(row)]);
+          const std::array<float, 4> q = WithinFloats(cloud.quats.data() + 4 * row);
           const float norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-          const bool has_direction = norm > 0 && std::isfinite(norm);
-          for (int k = 0; k < 4; ++k) {
-            const float component = has_direction ? q[k] / norm : (k == 0 ? 1.0f : 0.0f);
+          for (size_t k = 0; k < 4; ++k) {
+            const float component = norm > 0 ? q[k] / norm : (k == 0 ? 1.0f : 0.0f);
             bytes[28 + k] = QuantizeByte(component * 128 + 128);
           }
         }

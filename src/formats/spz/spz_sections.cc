@@ -172,7 +172,7 @@ void PackSpz(const SpzLayout& layout, SpzSection section, int64_t first, int64_t
     }
     case SpzSection::kAlphas:
       for (int64_t i = first; i < last; ++i) {
-        *bytes++ = QuantizeByte(255 * Sigmoid(cloud.opacity_logits[static_cast<size_t>(row(i))]));
+        *bytes++ = OpacityByte(cloud.opacity_logits[static_cast<size_t>(row(i))]);
       }
       return;
     case SpzSection::kColors:

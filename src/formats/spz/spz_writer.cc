@@ -231,12 +231,19 @@ uint64_t EstimatedSpzSize(int64_t count, int sh_degree) {
   return 128 + static_cast<uint64_t>(kBytes[static_cast<size_t>(sh_degree)] * static_cast<double>(count));
 }
 
+Strays SpzStrays(const CloudView& cloud) {
+  const auto step = [](double reach) {
+    if (reach > double{kMaxFixed}) return std::numeric_limits<double>::infinity();  // nothing fits
+    return std::ldexp(1.0, -std::clamp(reach > 0 ? 22 - std::ilogb(reach) : kUsualBits, 0, kUsualBits));
+  };
+  return FarthestToGiveUp(cloud, step, [](double) { return 1.0; });
+}
+
 std::string SpzMeanLoss(const CloudView& cloud) {
   const MeansInSpz means = LookAtMeans(cloud);
   if (means.largest > kMaxFixed) {
     return Cat("coordinates reach ", means.largest, ", SPZ ends at ", kMaxFixed,
-               ": they are clamped, and all others rounded to ",
-               "whole numbers; move the splat nearer to zero or remove what is so far out");
+               ": they are clamped, and all others rounded to whole numbers (a PLY keeps them)");
   }
   const double step = std::ldexp(1.0, -means.fractional_bits);
   if (means.fractional_bits >= kUsualBits) return {};
@@ -245,7 +252,7 @@ std::string SpzMeanLoss(const CloudView& cloud) {
   if (step * kFine <= double{middle.extent}) return {};
   return Cat("positions are rounded to 1/", 1 << means.fractional_bits, " instead of 1/4096, as coordinates reach ",
              means.largest, " while 98 % of the Gaussians lie within a box of ", middle.extent,
-             "; move the splat nearer to zero or remove what is so far out");
+             " (a PLY or a compressed PLY keeps them better)");
 }
 
 }  // namespace anchorsplat

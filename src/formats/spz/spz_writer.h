@@ -7,6 +7,7 @@
 #include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
+#include "formats/strays.h"
 
 namespace anchorsplat {
 
@@ -23,6 +24,9 @@ Status WriteSpz(const std::filesystem::path& path, const CloudView& cloud, const
 
 // From what splats of real scenes take per Gaussian (docs/formats.md has the deviations).
 uint64_t EstimatedSpzSize(int64_t count, int sh_degree);
+
+// What would make all others coarser than it is worth.
+Strays SpzStrays(const CloudView& cloud);
 
 // A sentence when this cloud has fewer than 12 fractional bits because of coordinates far from zero, and that is coarse
 // for most of it; or when a coordinate does not fit at all. Nothing otherwise.

@@ -74,14 +74,11 @@ class TreeBuilder {
     // The order in which the median left them is the library's; that of the cloud decides where two are in one cell.
     std::sort(tree_.rows.begin() + begin, tree_.rows.begin() + end);
     const Buffer<uint32_t> own(tree_.rows.begin() + begin, tree_.rows.begin() + end);
-    CloudView places;
     Buffer<float> means(3 * own.size());
     for (size_t i = 0; i < own.size(); ++i) {
       for (size_t k = 0; k < 3; ++k) means[3 * i + k] = cloud_.means[3 * size_t{own[i]} + k];
     }
-    places.means = means;
-    places.opacity_logits = std::span(means).first(own.size());  // only their number counts
-    const Buffer<uint32_t> order = MortonOrder(places);
+    const Buffer<uint32_t> order = MortonOrder(means);
     for (size_t i = 0; i < own.size(); ++i) tree_.rows[static_cast<size_t>(begin) + i] = own[order[i]];
   }
 

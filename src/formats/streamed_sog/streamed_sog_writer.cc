@@ -18,6 +18,7 @@
 #include "core/parallel.h"
 #include "core/rotation.h"
 #include "core/run_context.h"
+#include "core/statistics.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
 #include "formats/json_asset.h"
@@ -356,7 +357,7 @@ Status WriteStreamedSog(const fs::path& path, const CloudView& cloud, const Clou
   }
   if (const int64_t dropped = cloud.size() - static_cast<int64_t>(tree.rows.size()); dropped > 0) {
     LogWarning(Cat(path.string(), ": ", WithThousands(dropped), " of ", WithThousands(cloud.size()),
-                   " Gaussians have NaN or infinite values and no place in a tree: left out"));
+                   " Gaussians have ", kWhyUnusable, " and no place in a tree: left out"));
   }
   const std::vector<int64_t> leaves = LeavesOf(tree);
   ChunkWriter chunks(staged ? staged->path() : parent, options);

@@ -9,6 +9,7 @@
 #include "core/image.h"
 #include "core/lens.h"
 #include "core/result.h"
+#include "core/similarity.h"
 
 namespace anchorsplat {
 
@@ -59,7 +60,12 @@ struct CameraSet {
   std::vector<Camera> cameras;
   std::optional<std::array<float, 3>> background;  // rgb 0–1, where the file says which one the views have
   std::filesystem::path points;                    // a PLY with points of the scene, where the file names one
+  // Where the cameras were moved to another world than that of their file and its points: how.
+  std::optional<Similarity> moved;
 };
+
+// The same view, up to scale, of a world that `move` has moved.
+Pose Moved(const Pose& world_to_camera, const Similarity& move);
 
 // The same view with `factor` times as many pixels per side (width and height rounded, at least 1); the rays through
 // the image corners stay where they were, up to that rounding.

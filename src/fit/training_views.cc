@@ -98,6 +98,16 @@ Status ReadPoints(const fs::path& path, InitialPoints& points) {
   return {};
 }
 
+// Into the world that the cameras were moved to.
+void MovePoints(const std::optional<Similarity>& moved, InitialPoints& points) {
+  if (!moved) return;
+  for (size_t i = 0; i + 2 < points.positions.size(); i += 3) {
+    float* const p = points.positions.data() + i;
+    const auto there = moved->Apply({p[0], p[1], p[2]});
+    for (size_t k = 0; k < 3; ++k) p[k] = static_cast<float>(there[k]);
+  }
+}
+
 // Those of a sparse model as COLMAP writes it, else as 3DGS leaves them beside it. There may be none.
 Status ReadPointsOfModel(const fs::path& model, InitialPoints& points) {
   const auto read = ReadColmapPoints(model);
@@ -143,6 +153,7 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(train_file));
     out.background = set.background;
     const fs::path points = set.points;
+    const std::optional<Similarity> moved = set.moved;
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views,
                                  WithPictures(std::move(set), train_file, options.downscale, out.without_picture));
     out.scene_scale = SceneScale(views);
@@ -155,6 +166,7 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
       HoldOut(options.hold_out, std::move(views), out);
     }
     ANCHORSPLAT_RETURN_IF_ERROR(ReadPoints(points, out.points));
+    MovePoints(moved, out.points);
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(source));
     out.background = set.background;
@@ -162,13 +174,14 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
     if (colmap && !out.background) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(out.background, BackgroundBeside(source));
     }
-    const fs::path points = set.points;
+    const fs::path points = set.points, model = colmap ? ModelFolder(source) : fs::path();
+    const std::optional<Similarity> moved = set.moved;
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views,
                                  WithPictures(std::move(set), source, options.downscale, out.without_picture));
     out.scene_scale = SceneScale(views);
     HoldOut(options.hold_out, std::move(views), out);
-    ANCHORSPLAT_RETURN_IF_ERROR(colmap ? ReadPointsOfModel(ModelFolder(source), out.points)
-                                       : ReadPoints(points, out.points));
+    ANCHORSPLAT_RETURN_IF_ERROR(model.empty() ? ReadPoints(points, out.points) : ReadPointsOfModel(model, out.points));
+    MovePoints(moved, out.points);
   }
   if (out.train.empty()) {
     return Error{ErrorCode::kBadArgument,

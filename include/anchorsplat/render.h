@@ -32,9 +32,9 @@ struct PinholeCamera {
 ANCHORSPLAT_PUBLIC Expected<std::vector<PinholeCamera>> OrbitAround(const SplatView& splat, int count, int width,
                                                                     int height, double fov = 45);
 
-// The cameras of a transforms.json, an INRIA cameras.json, a poses_bounds.npy or a COLMAP model, or of a folder with
-// one of them, in their order. Of a lens it is the pinhole that its pictures are undone to (docs/cameras.md). Failures:
-// kNotFound, kIo, kBadFile; kBadArgument: a folder with several.
+// The cameras of a transforms.json, an INRIA cameras.json, a poses_bounds.npy, a COLMAP model, or a file of Metashape,
+// OpenSfM or Bundler, or of a folder with one of them, in their order. Of a lens it is the pinhole that its pictures
+// are undone to (docs/cameras.md). Failures: kNotFound, kIo, kBadFile; kBadArgument: a folder with several.
 ANCHORSPLAT_PUBLIC Expected<std::vector<PinholeCamera>> ReadCameraFile(const std::filesystem::path& path);
 
 struct RenderSettings {

@@ -8,7 +8,7 @@ cd "$(dirname "$0")/../.."
 out=$PWD/build/web-libraries
 prefix=$out/prefix
 packages=(emscripten cmake ninja-build dpkg-dev patch xz-utils nlohmann-json3-dev libcli11-dev libfast-float-dev libstb-dev ccache)
-sources=(zlib libpng1.6 libjpeg-turbo libwebp libzstd highway googletest)
+sources=(zlib libpng1.6 libjpeg-turbo libwebp libzstd pugixml highway googletest)
 stamp=$out/done-$(sha256sum "$0" | cut -c1-16)
 [ ! -e "$stamp" ] || exit 0
 rm -rf "$out"
@@ -76,6 +76,10 @@ cd "$(here libzstd)"
 compile zstd emcc "$PWD/lib" "-DZSTD_DISABLE_ASM -DZSTD_LEGACY_SUPPORT=0" $(cd lib && ls {common,compress,decompress}/*.c)
 cp lib/zstd.h lib/zstd_errors.h "$prefix/include/"
 
+cd "$(here pugixml)"
+compile pugixml em++ "$PWD" "-std=c++17 -Isrc" src/pugixml.cpp
+cp src/pugixml.hpp src/pugiconfig.hpp "$prefix/include/"
+
 cd "$(here highway)"
 # shellcheck disable=SC2046
 compile hwy em++ "$PWD" "-std=c++17 -I." $(ls hwy/{abort,aligned_allocator,per_target,print,targets,timer}.cc)
@@ -105,6 +109,7 @@ notice libpng "$(here libpng1.6)/LICENSE"
 notice libjpeg-turbo "$(here libjpeg-turbo)/LICENSE.md" "$(here libjpeg-turbo)/README.ijg"
 notice libwebp "$(here libwebp)/COPYING" "$(here libwebp)/PATENTS"
 notice zstd "$(here libzstd)/LICENSE"
+notice pugixml "$(here pugixml)/LICENSE.md"
 notice highway "$(here highway)/LICENSE-BSD3"
 notice nlohmann-json /usr/share/doc/nlohmann-json3-dev/copyright
 notice cli11 /usr/share/doc/libcli11-dev/copyright

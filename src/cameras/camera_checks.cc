@@ -73,6 +73,12 @@ std::filesystem::path FindPicture(std::span<const std::filesystem::path> folders
   return {};
 }
 
+std::vector<std::filesystem::path> FoldersOfPictures(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> folders;
+  for (const char* images : {"images", ".", "../images"}) folders.push_back((folder / images).lexically_normal());
+  return folders;
+}
+
 std::filesystem::path FindMask(std::span<const std::filesystem::path> folders, const std::string& relative) {
   for (const auto& folder : folders) {
     for (const auto& masks : {folder.parent_path() / "masks", folder / "masks"}) {

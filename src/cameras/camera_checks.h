@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "core/camera.h"
 #include "core/result.h"
@@ -29,6 +30,9 @@ std::string ViewName(const std::string& image_path);
 // The first of `folder/relative` that is a file, where .png, .jpg and .jpeg are tried when there is none as such; empty
 // if there is none at all.
 std::filesystem::path FindPicture(std::span<const std::filesystem::path> folders, const std::string& relative);
+
+// Where a file in `folder` that names its pictures alone has them: `images` in it, itself, `images` beside it.
+std::vector<std::filesystem::path> FoldersOfPictures(const std::filesystem::path& folder);
 
 // The mask of a picture: `masks` beside the folder that pictures are looked for in, or within it, holds NAME.EXT.png as
 // COLMAP has it, or NAME.png; empty if there is none.

@@ -2,51 +2,146 @@
 
 #include <algorithm>
 #include <cctype>
+#include <fstream>
 #include <string>
 #include <system_error>
 #include <vector>
 
+#include "cameras/bundler_cameras.h"
 #include "cameras/colmap_model.h"
+#include "cameras/foreign_cameras.h"
 #include "cameras/inria_cameras.h"
+#include "cameras/metashape_cameras.h"
+#include "cameras/nerfstudio_frame.h"
+#include "cameras/opensfm_cameras.h"
 #include "cameras/parse_cameras.h"
 #include "cameras/poses_bounds.h"
 #include "cameras/transforms_json.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
+#include "io/file_bytes.h"
 #include "io/json_file.h"
 
 namespace anchorsplat {
 
 namespace {
 
-Result<CameraSet> CamerasFromJson(const JsonValue& root, const std::filesystem::path& folder) {
-  if (root.raw().is_array()) return CamerasFromInria(root, folder);
-  if (root.raw().is_object()) return CamerasFromTransforms(root, folder);
-  return root.Complain("expected a transforms.json (an object with \"frames\") or a cameras.json (an array)");
+constexpr uint64_t kMostCameraBytes = uint64_t{256} << 20;
+constexpr size_t kHeadBytes = 4096;
+
+std::string NotOfNerfstudio(const std::filesystem::path& frame) {
+  return Cat("nerfstudio trains with a transforms.json or a COLMAP model, so ", frame.string(),
+             " says nothing of these cameras; give those that it was trained with, or move that file away");
 }
 
-Result<CameraSet> ReadCameraJson(const std::filesystem::path& path) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile file, JsonFile::Read(path));
-  return CamerasFromJson(file.root(), path.parent_path());
+// `frame`: the dataparser_transforms.json that says where to; empty: the cameras stay in the world of their file.
+Result<CameraSet> CamerasFromJson(const JsonValue& root, const std::filesystem::path& folder,
+                                  const std::filesystem::path& frame) {
+  if (const std::string foreign = ForeignJson(root); !foreign.empty()) return root.Complain(foreign);
+  CameraSet set;
+  Similarity applied;
+  if (IsOpenSfm(root)) {
+    if (!frame.empty()) return root.Complain(NotOfNerfstudio(frame));
+    return CamerasFromOpenSfm(root, folder);
+  }
+  if (root.raw().is_array()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(set, CamerasFromInria(root, folder));
+  } else if (root.raw().is_object()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(set, CamerasFromTransforms(root, folder));
+    if (!frame.empty()) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(applied, AppliedByNerfstudio(root, folder));
+    }
+  } else {
+    return root.Complain("expected a transforms.json (an object with \"frames\") or a cameras.json (an array)");
+  }
+  if (!frame.empty()) ANCHORSPLAT_RETURN_IF_ERROR(MoveToNerfstudioFrame(frame, applied, set));
+  return set;
 }
 
-// transforms*.json and cameras.json of a folder, sorted.
-Result<std::vector<std::filesystem::path>> FindCameraJsons(const std::filesystem::path& folder) {
+// Of any file of cameras but NumPy's, by what it begins with.
+Result<CameraSet> CamerasFromBytes(const std::filesystem::path& file, std::string_view bytes,
+                                   const std::filesystem::path& folder, const std::filesystem::path& frame) {
+  std::string_view head = bytes.substr(0, kHeadBytes);
+  if (head.starts_with("\xEF\xBB\xBF")) head.remove_prefix(3);  // of UTF-8, which XML and JSON may begin with
+  head.remove_prefix(std::min(head.find_first_not_of(" \t\r\n"), head.size()));
+  if (!head.starts_with('{') && !head.starts_with('[')) {
+    const std::string foreign = ForeignCameras(file, head);
+    if (!foreign.empty()) return Error{ErrorCode::kBadFile, Cat(file.string(), ": ", foreign)};
+    const bool xml = head.starts_with('<'), bundler = LooksLikeBundler(head);
+    if ((xml || bundler) && !frame.empty()) {
+      return Error{ErrorCode::kBadFile, Cat(file.string(), ": ", NotOfNerfstudio(frame))};
+    }
+    if (xml) return CamerasFromMetashape(file.string(), bytes, folder);
+    if (bundler) return CamerasFromBundler(file, bytes);
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile parsed, JsonFile::Parse(file.string(), bytes));
+  return CamerasFromJson(parsed.root(), folder, frame);
+}
+
+Result<CameraSet> ReadCameraFile(const std::filesystem::path& path, const std::filesystem::path& frame) {
+  if (path.extension() == ".npy") {
+    if (!frame.empty()) return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", NotOfNerfstudio(frame))};
+    return ReadPosesBounds(path);
+  }
+  // Projects may be far larger than any file of cameras.
+  if (const std::string foreign = ForeignCameras(path); !foreign.empty() && IsFile(path)) {
+    return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", foreign)};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(path, kMostCameraBytes));
+  return CamerasFromBytes(path, bytes, path.parent_path(), frame);
+}
+
+Result<CameraSet> ReadModel(const std::filesystem::path& model, const std::filesystem::path& frame) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadColmapModel(model));
+  if (!frame.empty()) ANCHORSPLAT_RETURN_IF_ERROR(MoveToNerfstudioFrame(frame, {}, set));
+  return set;
+}
+
+// The first bytes of a file of a folder; none where it cannot be read.
+std::string HeadOf(const std::filesystem::path& path) {
+  std::string head(kHeadBytes, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), std::ssize(head));
+  head.resize(static_cast<size_t>(std::max<std::streamsize>(0, file.gcount())));
+  return head;
+}
+
+bool IsCameraFile(const std::filesystem::path& path) {
+  const std::string name = path.filename().string();
+  if (name == "cameras.json" || name == "reconstruction.json") return true;
+  if (name.ends_with(".json")) return name.starts_with("transforms");
+  if (name.ends_with(".xml")) return IsFile(path) && LooksLikeMetashape(HeadOf(path));
+  return name.ends_with(".out") && IsFile(path) && LooksLikeBundler(HeadOf(path));
+}
+
+// Files of cameras in a folder, sorted. OpenDroneMap and Bundler have them one folder further down.
+Result<std::vector<std::filesystem::path>> FindCameraFiles(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> found;
   std::error_code code;
   for (std::filesystem::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
-    const std::string name = it->path().filename().string();
-    const bool transforms = name.starts_with("transforms") && name.ends_with(".json");
-    if (transforms || name == "cameras.json") found.push_back(it->path());
+    if (IsCameraFile(it->path())) found.push_back(it->path());
   }
   if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": ", code.message())};
+  for (const auto& below : {folder / "opensfm" / "reconstruction.json", folder / "bundle" / "bundle.out"}) {
+    if (Exists(below)) found.push_back(below);
+  }
   std::sort(found.begin(), found.end());
   return found;
 }
 
-Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<std::filesystem::path> candidates, FindCameraJsons(folder));
+// Beside a file, or a COLMAP model or the two folders above it; empty where there is none.
+std::filesystem::path FrameBeside(const std::filesystem::path& folder, int above) {
+  std::filesystem::path up = folder.empty() ? std::filesystem::path(".") : folder;
+  for (int i = 0; i <= above; ++i, up /= "..") {
+    if (auto frame = (up / kNerfstudioFrame).lexically_normal(); Exists(frame)) return frame;
+  }
+  return {};
+}
+
+// `frame`: of nerfstudio's run that leads here; empty: what lies beside the cameras, if anything.
+Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder, std::filesystem::path frame) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<std::filesystem::path> candidates, FindCameraFiles(folder));
   // Where several models are there, they are stages of one reconstruction: the project's sparse/0 is its result, the
   // text files beside it are what it was given.
   for (const auto& model : {folder / "sparse" / "0", folder / "sparse", folder}) {
@@ -55,19 +150,30 @@ Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder) {
     break;
   }
   // LLFF makes its file from a COLMAP model, which knows the lens and the points, too.
-  if (candidates.empty() && Exists(folder / "poses_bounds.npy")) return ReadPosesBounds(folder / "poses_bounds.npy");
+  if (candidates.empty() && Exists(folder / "poses_bounds.npy")) candidates.push_back(folder / "poses_bounds.npy");
+  const std::filesystem::path own_frame = FrameBeside(folder, 0);
+  if (candidates.empty() && frame.empty() && !own_frame.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::filesystem::path data, DataOfNerfstudioRun(folder));
+    frame = own_frame;
+    return IsFolder(data) ? ReadCameraFolder(data, frame) : ReadCameraFile(data, frame);
+  }
   if (candidates.empty()) {
-    return Error{ErrorCode::kNotFound,
-                 Cat(folder.string(),
-                     ": no cameras here: expected transforms.json, cameras.json, poses_bounds.npy or a COLMAP model "
-                     "(cameras and images as .bin or .txt, also in sparse/0 or sparse)")};
+    const std::string foreign = ForeignCamerasIn(folder);
+    return Error{
+        ErrorCode::kNotFound,
+        Cat(folder.string(),
+            ": no cameras here: expected transforms.json, cameras.json, poses_bounds.npy, Metashape's XML, "
+            "OpenSfM's reconstruction.json, Bundler's bundle.out or a COLMAP model (cameras and images as .bin "
+            "or .txt, also in sparse/0 or sparse)",
+            foreign.empty() ? "" : "; ", foreign)};
   }
   if (candidates.size() > 1) {
     std::string list;
     for (const auto& candidate : candidates) list += (list.empty() ? "" : ", ") + candidate.string();
     return Error{ErrorCode::kBadArgument, Cat(folder.string(), ": several sets of cameras, name one of them: ", list)};
   }
-  return IsFolder(candidates[0]) ? ReadColmapModel(candidates[0]) : ReadCameraJson(candidates[0]);
+  if (frame.empty()) frame = candidates[0] == folder ? FrameBeside(folder, 2) : own_frame;
+  return IsFolder(candidates[0]) ? ReadModel(candidates[0], frame) : ReadCameraFile(candidates[0], frame);
 }
 
 // A folder of masks beside the pictures or among them, by any spelling; empty where there is none.
@@ -109,24 +215,24 @@ void WarnOfMissingMasks(const CameraSet& set) {
 }
 
 Result<CameraSet> ReadAnyCameras(const std::filesystem::path& path) {
-  if (IsFolder(path)) return ReadCameraFolder(path);
-  // Any file of a COLMAP model stands for the model.
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  if (IsFolder(path)) return ReadCameraFolder(path, {});
   const std::string name = path.filename().string();
+  if (name == kNerfstudioFrame && Exists(path)) return ReadCameraFolder(folder, {});
+  // Any file of a COLMAP model stands for the model.
   const bool colmap = name == "cameras.bin" || name == "images.bin" || name == "cameras.txt" || name == "images.txt";
   if (colmap && Exists(path)) {
-    const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
-    if (IsColmapModel(folder)) return ReadColmapModel(folder);
+    if (IsColmapModel(folder)) return ReadModel(folder, FrameBeside(folder, 2));
     return Error{ErrorCode::kNotFound,
                  Cat(folder.string(), ": a COLMAP model needs both cameras and images, as .bin or .txt")};
   }
-  return path.extension() == ".npy" ? ReadPosesBounds(path) : ReadCameraJson(path);
+  return ReadCameraFile(path, FrameBeside(path.parent_path(), 0));
 }
 
 }  // namespace
 
 Result<CameraSet> ParseCameras(const std::string& name, std::string_view bytes, const std::filesystem::path& folder) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile file, JsonFile::Parse(name, bytes));
-  return CamerasFromJson(file.root(), folder);
+  return CamerasFromBytes(name, bytes, folder, {});
 }
 
 Result<CameraSet> ReadCameras(const std::filesystem::path& path) {

@@ -8,16 +8,22 @@
 
 namespace anchorsplat {
 
-// Reads cameras from a NeRF/nerfstudio transforms.json, an INRIA cameras.json, LLFF's poses_bounds.npy, or a COLMAP
-// sparse model (any of its files, its folder, or a project folder that has it at sparse/0 or sparse). A folder may also
-// hold one transforms*.json or cameras.json, or poses_bounds.npy and none of the others. Order as in the file; names
-// may repeat.
+// Reads cameras from a NeRF/nerfstudio transforms.json, an INRIA cameras.json, LLFF's poses_bounds.npy, Metashape's
+// XML, OpenSfM's reconstruction.json, Bundler's bundle.out, or a COLMAP sparse model (any of its files, its folder, or
+// a project folder that has it at sparse/0 or sparse). A folder may also hold one of the others (OpenSfM's also in
+// opensfm, Bundler's in bundle), poses_bounds.npy only where there is nothing else. Order as in the file; names may
+// repeat.
+//
+// Where nerfstudio's dataparser_transforms.json lies beside a transforms.json or a COLMAP model, or is named itself, or
+// its folder (that of a run, whose config.yml says where the cameras are), they are moved into the frame that
+// nerfstudio trained in; a message says so, and `moved`.
 //
 // A camera's `intrinsics` have no lens: where the file says there was one they are those of the pinhole that its
 // pictures are undone to (cameras/undistortion.h), and ReadPhotograph makes such a picture (cameras/photograph.h).
 //
 // Errors: kNotFound; kIo; kBadFile with file, line or byte or JSON path (a lens that is not known here is refused with
-// the model's name); kBadArgument for a folder with several sets of cameras, which are listed.
+// the model's name; files of other programs with what to export instead); kBadArgument for a folder with several sets
+// of cameras, which are listed.
 Result<CameraSet> ReadCameras(const std::filesystem::path& path);
 
 // Writes a transforms.json in nerfstudio's form (fl_x, fl_y, cx, cy, w, h; OpenGL camera-to-world matrices) with our

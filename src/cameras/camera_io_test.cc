@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "cameras/parse_cameras.h"
+#include "cameras/rig_for_test.h"
 #include "core/messages_for_test.h"
 #include "core/random.h"
 #include "core/rotation.h"
@@ -213,6 +214,103 @@ TEST(ReadCameras, TakesTheOnlyCandidateOfAFolder) {
   EXPECT_EQ(set.error().code, ErrorCode::kBadArgument);
   for (const char* name : {"transforms_train.json", "cameras.json"}) {
     EXPECT_NE(set.error().message.find(name), std::string::npos) << set.error().message;
+  }
+}
+
+// Each with any other: what a folder's cameras are is never guessed.
+TEST(ReadCameras, SeveralSetsOfOtherProgramsAreListed) {
+  const std::pair<const char*, const char*> files[] = {
+      {"cameras.json", kInria},
+      {"export.xml", "<?xml version=\"1.0\"?>\n<document version=\"2.0.0\">\n  <chunk/></document>"},
+      {"reconstruction.json", "[{\"cameras\": {}, \"shots\": {}}]"},
+      {"scan.out", "# Bundle file v0.3\n0 0\n"},
+      {"opensfm/reconstruction.json", "[{\"cameras\": {}, \"shots\": {}}]"},
+      {"bundle/bundle.out", "# Bundle file v0.3\n0 0\n"}};
+  for (const auto& one : files) {
+    for (const auto& other : files) {
+      if (one == other) continue;
+      const TestFolder folder;
+      for (const auto& [name, text] : {one, other}) {
+        std::filesystem::create_directories((folder / name).parent_path());
+        Write(folder / name, text);
+      }
+      Write(folder / "settings.xml", "<document><settings/></document>");
+      Write(folder / "run.out", "stdout of something else");
+      const auto set = ReadCameras(folder.path());
+      ASSERT_FALSE(set.ok()) << one.first << " " << other.first;
+      EXPECT_EQ(set.error().code, ErrorCode::kBadArgument) << set.error().message;
+      for (const char* name : {one.first, other.first}) {
+        EXPECT_NE(set.error().message.find((folder / name).string()), std::string::npos) << set.error().message;
+      }
+      EXPECT_EQ(set.error().message.find("settings.xml"), std::string::npos);
+      EXPECT_EQ(set.error().message.find("run.out"), std::string::npos);
+    }
+  }
+}
+
+// One rig as COLMAP, Metashape, OpenSfM and nerfstudio give it: the same pinholes at the same places.
+TEST(ReadCameras, ProgramsAgree) {
+  const TestFolder folder;
+  const std::vector<Camera> rig = RigForTest(3, {1, 2, 3});
+  WritePicturesOf(rig, folder / "images");
+  std::string images, metashape, shots, frames;
+  for (const Camera& camera : rig) {
+    const auto q = QuaternionFromRotation(camera.world_to_camera.rotation);
+    const std::string t = Digits(camera.world_to_camera.translation);
+    images += std::to_string(images.size() + 1) + " " + Digits(q) + t + "1 " + camera.name + ".png\n\n";
+    metashape += "<camera sensor_id=\"0\" label=\"" + camera.name + "\"><transform>" + Digits(CameraToWorld(camera)) +
+                 "</transform></camera>";
+    const double s = std::hypot(q[1], q[2], q[3]), a = 2 * std::atan2(s, q[0]) / s;
+    const auto listed = [](std::string digits) {
+      digits.pop_back();
+      std::ranges::replace(digits, ' ', ',');
+      return "[" + digits + "]";
+    };
+    shots += std::string(shots.empty() ? "" : ",") + "\"" + camera.name +
+             ".png\": {\"camera\": \"c\", \"rotation\": " + listed(Digits(std::array{a * q[1], a * q[2], a * q[3]})) +
+             ", \"translation\": " + listed(t) + "}";
+    const auto m = OpenGlCameraToWorld(camera.world_to_camera);
+    frames += std::string(frames.empty() ? "" : ",") + "{\"file_path\": \"../images/" + camera.name +
+              ".png\", \"transform_matrix\": [";
+    for (size_t row = 0; row < 4; ++row) {
+      frames +=
+          (row > 0 ? "," : "") + listed(Digits(std::array{m[4 * row], m[4 * row + 1], m[4 * row + 2], m[4 * row + 3]}));
+    }
+    frames += "]}";
+  }
+  WriteText(folder / "sparse" / "cameras.txt",
+            "1 FULL_OPENCV 64 48 70 70 33.5 22.25 -0.1 0.02 0.001 -0.002 0.003 0 0 0\n");
+  WriteText(folder / "sparse" / "images.txt", images);
+  WriteText(folder / "metashape" / "cameras.xml",
+            R"(<document><chunk><sensors><sensor id="0" type="frame"><resolution width="64" height="48"/>
+<calibration class="adjusted"><f>70</f><cx>1.5</cx><cy>-1.75</cy><k1>-0.1</k1><k2>0.02</k2><k3>0.003</k3><p1>-0.002</p1>
+<p2>0.001</p2></calibration></sensor></sensors><cameras>)" +
+                metashape + "</cameras></chunk></document>");
+  WriteText(folder / "opensfm" / "reconstruction.json",
+            R"([{"cameras": {"c": {"projection_type": "brown", "width": 64, "height": 48, "focal_x": 1.09375,
+"focal_y": 1.09375, "c_x": 0.0234375, "c_y": -0.02734375, "k1": -0.1, "k2": 0.02, "k3": 0.003, "p1": 0.001,
+"p2": -0.002}}, "shots": {)" +
+                shots + "}}]");
+  WriteText(folder / "nerfstudio" / "transforms.json",
+            R"({"w": 64, "h": 48, "fl_x": 70, "fl_y": 70, "cx": 33.5, "cy": 22.25, "k1": -0.1, "k2": 0.02, "k3": 0.003,
+"p1": 0.001, "p2": -0.002, "frames": [)" +
+                frames + "]}");
+  const auto colmap = ReadCameras(folder / "sparse");
+  ASSERT_TRUE(colmap.ok()) << colmap.error().message;
+  for (const char* program : {"metashape", "opensfm", "nerfstudio"}) {
+    auto set = ReadCameras(folder / program);
+    ASSERT_TRUE(set.ok()) << set.error().message;
+    ASSERT_EQ(set->cameras.size(), rig.size());
+    for (size_t i = 0; i < rig.size(); ++i) {
+      const Camera &a = colmap->cameras[i], &b = set->cameras[i];
+      EXPECT_EQ(b.image, folder / "images" / (rig[i].name + ".png")) << program;
+      EXPECT_EQ(a.intrinsics.width, b.intrinsics.width) << program;
+      EXPECT_EQ(a.intrinsics.height, b.intrinsics.height) << program;
+      EXPECT_NEAR(a.intrinsics.cx, b.intrinsics.cx, 1e-9) << program;
+      EXPECT_NEAR(a.intrinsics.fy, b.intrinsics.fy, 1e-9) << program;
+      set->cameras[i].name = a.name;
+    }
+    ExpectSamePixels(set->cameras, colmap->cameras, {1, 2, 3});
   }
 }
 

@@ -5,9 +5,7 @@
 #include <system_error>
 
 #include "cameras/camera_checks.h"
-#include "cameras/undistortion.h"
 #include "core/file_system.h"
-#include "core/finite.h"
 #include "core/text.h"
 #include "images/image_io.h"
 
@@ -46,8 +44,8 @@ const ColmapCameraModel* FindColmapCameraModel(const std::string& name) {
   return found == std::end(kModels) ? nullptr : found;
 }
 
-Result<ColmapCamera> CameraFromColmap(const ColmapCameraModel& model, uint64_t width, uint64_t height,
-                                      std::span<const double> params) {
+Result<LensedPinhole> CameraFromColmap(const ColmapCameraModel& model, uint64_t width, uint64_t height,
+                                       std::span<const double> params) {
   const std::string undistort = "; undistort the images first, e.g. colmap image_undistorter";
   const std::span<const double> bent = params.subspan(model.focals + 2);
   if (!model.undone) {
@@ -65,8 +63,7 @@ Result<ColmapCamera> CameraFromColmap(const ColmapCameraModel& model, uint64_t w
   }
   const Pinhole c{static_cast<int>(width),  static_cast<int>(height), params[0],
                   params[model.focals - 1], params[model.focals],     params[model.focals + 1]};
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckIntrinsics(c));
-  if (!model.undone) return ColmapCamera{c, {}};
+  if (!model.undone) return ThroughLens({}, c);
   Lens lens{.model = model.lens};
   const bool tangential = model.lens == LensModel::kRadial && bent.size() >= 4;  // OPENCV, FULL_OPENCV: k1 k2 p1 p2 …
   for (size_t i = 0; i < bent.size(); ++i) {
@@ -80,12 +77,7 @@ Result<ColmapCamera> CameraFromColmap(const ColmapCameraModel& model, uint64_t w
       lens.denominator[i - 5] = bent[i];
     }
   }
-  if (lens.IsStraight()) return ColmapCamera{c, {}};
-  if (!AllFinite(lens.radial) || !AllFinite(lens.denominator) || !AllFinite(lens.tangential)) {
-    return BadModel("lens distortion is not finite");
-  }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Pinhole straight, StraightPinhole(lens, c));
-  return ColmapCamera{straight, {.lens = lens, .intrinsics = c, .mask = {}}};
+  return ThroughLens(lens, c);
 }
 
 Result<Camera> ViewFromColmap(const ColmapImage& image, const ColmapCameras& cameras,

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "cameras/lensed_pinhole.h"
 #include "core/camera.h"
 #include "core/result.h"
 
@@ -26,13 +27,8 @@ struct ColmapCameraModel {
 const ColmapCameraModel* FindColmapCameraModel(int id);  // nullptr: unknown
 const ColmapCameraModel* FindColmapCameraModel(const std::string& name);
 
-// A camera of a sparse model: the pinhole that its pictures are undone to, and how they come.
-struct ColmapCamera {
-  Pinhole straight;
-  Photograph photograph;
-};
 // By their COLMAP id.
-using ColmapCameras = std::map<uint32_t, ColmapCamera>;
+using ColmapCameras = std::map<uint32_t, LensedPinhole>;
 
 // A registered image as its file gives it.
 struct ColmapImage {
@@ -43,8 +39,8 @@ struct ColmapImage {
 };
 
 // The two below give sentences without file and place, which their callers know. Errors: kBadFile.
-Result<ColmapCamera> CameraFromColmap(const ColmapCameraModel& model, uint64_t width, uint64_t height,
-                                      std::span<const double> params);
+Result<LensedPinhole> CameraFromColmap(const ColmapCameraModel& model, uint64_t width, uint64_t height,
+                                       std::span<const double> params);
 Result<Camera> ViewFromColmap(const ColmapImage& image, const ColmapCameras& cameras,
                               std::span<const std::filesystem::path> picture_folders);
 

@@ -45,6 +45,7 @@ std::string Coefficients(const Lens& lens) {
   // As FULL_OPENCV and transforms.json call them.
   for (size_t i = 0; i < lens.denominator.size(); ++i) add("k", i + 4, lens.denominator[i]);
   for (size_t i = 0; i < lens.tangential.size(); ++i) add("p", i + 1, lens.tangential[i]);
+  if (lens.skew != 0) text += Cat(text.empty() ? "" : ", ", "skew = ", lens.skew);
   return text.empty() ? "all coefficients 0" : text;
 }
 

@@ -143,8 +143,10 @@ void AddFit(CLI::App& app, Program& program) {
   CLI::App& verb = AddVerb(app, program, "fit", "Optimise a splat from pictures (standard 3DGS)",
                            "anchorsplat fit scan/ -o scan.ply --max-gaussians 200000");
   const auto flags = std::make_shared<FitWords>();
-  verb.add_option("project", flags->project,
-                  "Folder with pictures and cameras: COLMAP, NeRF-synthetic, transforms.json, our data sets")
+  verb.add_option(
+          "project", flags->project,
+          "Folder with pictures and cameras: COLMAP, NeRF-synthetic, transforms.json, Metashape, OpenSfM, Bundler, "
+          "our data sets")
       ->required()
       ->check(NotEmpty());
   verb.add_option("-o,--output", flags->output, "Splat to write")->required()->check(NotEmpty());

@@ -75,6 +75,21 @@ WorldOrigin ChooseOrigin(const std::vector<Camera>& cameras) {
   return ChooseOrigin(std::span<const double>(centers));
 }
 
+Pose Moved(const Pose& pose, const Similarity& move) {
+  Pose moved;
+  const auto &r = pose.rotation, &m = move.rotation;
+  for (size_t i = 0; i < 3; ++i) {  // the camera's axes turn with the world
+    for (size_t j = 0; j < 3; ++j) {
+      moved.rotation[3 * i + j] = r[3 * i] * m[3 * j] + r[3 * i + 1] * m[3 * j + 1] + r[3 * i + 2] * m[3 * j + 2];
+    }
+  }
+  Camera camera;
+  camera.world_to_camera = pose;
+  const Vec3 center = move.Apply(camera.Center());
+  for (size_t i = 0; i < 3; ++i) moved.translation[i] = -Dot(moved.rotation.data() + 3 * i, center.data());
+  return moved;
+}
+
 Pinhole Scaled(const Pinhole& intrinsics, double factor) {
   Pinhole out;
   out.width = std::max(1, static_cast<int>(std::lround(intrinsics.width * factor)));

@@ -9,6 +9,7 @@
 #include "core/image.h"
 #include "core/lens.h"
 #include "core/result.h"
+#include "core/similarity.h"
 #include "core/world_origin.h"
 
 namespace anchorsplat {
@@ -60,6 +61,8 @@ struct CameraSet {
   std::vector<Camera> cameras;
   std::optional<std::array<float, 3>> background;  // rgb 0–1, where the file says which one the views have
   std::filesystem::path points;                    // a PLY with points of the scene, where the file names one
+  // Where the cameras were moved to another world than that of their file and its points: how.
+  std::optional<Similarity> moved;
 };
 
 // The camera in a world that begins at `origin`: what a splat's means are in (core/world_origin.h).
@@ -68,6 +71,9 @@ Camera FromOrigin(Camera camera, const WorldOrigin& origin);
 CameraSet FromOrigin(CameraSet set, const WorldOrigin& origin);
 // ChooseOrigin of the cameras' centres.
 WorldOrigin ChooseOrigin(const std::vector<Camera>& cameras);
+
+// The same view, up to scale, of a world that `move` has moved.
+Pose Moved(const Pose& world_to_camera, const Similarity& move);
 
 // The same view with `factor` times as many pixels per side (width and height rounded, at least 1); the rays through
 // the image corners stay where they were, up to that rounding.

@@ -35,10 +35,13 @@ bool Lens::IsStraight() const {
   const auto zero = [](const auto& list) {
     return std::all_of(list.begin(), list.end(), [](double x) { return x == 0; });
   };
-  return model == LensModel::kStraight || (zero(radial) && zero(denominator) && zero(tangential));
+  return model == LensModel::kStraight || (zero(radial) && zero(denominator) && zero(tangential) && skew == 0);
 }
 
-PlanePoint Distort(const Lens& lens, const PlanePoint& p) {
+namespace {
+
+// Without the skew.
+PlanePoint Bend(const Lens& lens, const PlanePoint& p) {
   const double x = p[0], y = p[1], q = x * x + y * y;
   switch (lens.model) {
     case LensModel::kStraight:
@@ -58,6 +61,13 @@ PlanePoint Distort(const Lens& lens, const PlanePoint& p) {
   return p;
 }
 
+}  // namespace
+
+PlanePoint Distort(const Lens& lens, const PlanePoint& p) {
+  const PlanePoint bent = Bend(lens, p);
+  return {bent[0] + lens.skew * bent[1], bent[1]};
+}
+
 LensInverse::LensInverse(const Lens& lens) : lens_(lens), largest_radius_(0), largest_drawn_(0) {
   for (int i = 1; i <= kAngles; ++i) {
     const double r = std::tan(kWidest * i / kAngles);
@@ -69,8 +79,9 @@ LensInverse::LensInverse(const Lens& lens) : lens_(lens), largest_radius_(0), la
   }
 }
 
-std::optional<PlanePoint> LensInverse::Undistort(const PlanePoint& distorted) const {
-  if (lens_.IsStraight()) return distorted;
+std::optional<PlanePoint> LensInverse::Undistort(const PlanePoint& place) const {
+  if (lens_.IsStraight()) return place;
+  const PlanePoint distorted = {place[0] - lens_.skew * place[1], place[1]};
   const double drawn = std::hypot(distorted[0], distorted[1]);
   if (!(drawn < 1e300)) return std::nullopt;
   if (drawn < 1e-12) return distorted;
@@ -87,12 +98,12 @@ std::optional<PlanePoint> LensInverse::Undistort(const PlanePoint& distorted) co
   // Newton's method with differences, for the last digits and for tangential terms.
   constexpr double kStep = 1e-7;
   for (int i = 0; i < 30; ++i) {
-    const PlanePoint f = Distort(lens_, p);
+    const PlanePoint f = Bend(lens_, p);
     const double ex = f[0] - distorted[0], ey = f[1] - distorted[1];
     if (std::hypot(ex, ey) < 1e-13 * (1 + drawn)) break;
     const double h = kStep * (1 + std::hypot(p[0], p[1]));
-    const PlanePoint right = Distort(lens_, {p[0] + h, p[1]}), left = Distort(lens_, {p[0] - h, p[1]});
-    const PlanePoint below = Distort(lens_, {p[0], p[1] + h}), above = Distort(lens_, {p[0], p[1] - h});
+    const PlanePoint right = Bend(lens_, {p[0] + h, p[1]}), left = Bend(lens_, {p[0] - h, p[1]});
+    const PlanePoint below = Bend(lens_, {p[0], p[1] + h}), above = Bend(lens_, {p[0], p[1] - h});
     const double a = (right[0] - left[0]) / (2 * h), b = (below[0] - above[0]) / (2 * h);
     const double c = (right[1] - left[1]) / (2 * h), d = (below[1] - above[1]) / (2 * h);
     const double determinant = a * d - b * c;
@@ -100,7 +111,7 @@ std::optional<PlanePoint> LensInverse::Undistort(const PlanePoint& distorted) co
     p[0] -= (d * ex - b * ey) / determinant;
     p[1] -= (a * ey - c * ex) / determinant;
   }
-  const PlanePoint found = Distort(lens_, p);
+  const PlanePoint found = Bend(lens_, p);
   const double off = std::hypot(found[0] - distorted[0], found[1] - distorted[1]);
   if (!(off < 1e-8 * (1 + drawn)) || !(std::hypot(p[0], p[1]) <= largest_radius_ * (1 + 1e-6))) return std::nullopt;
   return p;

@@ -12,13 +12,14 @@ namespace anchorsplat {
 //             x' = s·x + 2·p1·x·y + p2·(r² + 2x²),  y' = s·y + 2·p2·x·y + p1·(r² + 2y²)       (Brown 1971, OpenCV)
 //   kFisheye  θ' = θ·(1 + k1·θ² + k2·θ⁴ + k3·θ⁶ + k4·θ⁸),  (x', y') = θ'/r · (x, y)            (OpenCV's fisheye)
 //
-// (x', y') times the focal lengths, plus the principal point, is the place in the picture.
+// (x' + skew·y', y') times the focal lengths, plus the principal point, is the place in the picture.
 enum class LensModel { kStraight, kRadial, kFisheye };
 struct Lens {
   LensModel model = LensModel::kStraight;
   std::array<double, 4> radial = {0, 0, 0, 0};    // k1 … k4
   std::array<double, 3> denominator = {0, 0, 0};  // d1 … d3, which FULL_OPENCV calls k4, k5, k6
   std::array<double, 2> tangential = {0, 0};      // p1, p2
+  double skew = 0;                                // of rows against columns, in horizontal focal lengths
 
   // Draws what a pinhole does: no model, or a radial one of zeros. A fisheye of zeros is not straight.
   bool IsStraight() const;

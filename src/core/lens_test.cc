@@ -15,6 +15,8 @@ std::vector<Lens> Lenses() {
       {.model = LensModel::kRadial, .radial = {0.1, 0.02, 0.01, 0}, .denominator = {0.2, 0.1, 0.05}},
       {.model = LensModel::kFisheye, .radial = {0.02, -0.01, 0.004, -0.001}},
       {.model = LensModel::kFisheye},
+      {.model = LensModel::kRadial, .radial = {-0.28, 0.07, 0, 0}, .tangential = {0.001, -0.002}, .skew = 0.01},
+      {.model = LensModel::kRadial, .skew = -0.2},
   };
 }
 
@@ -40,6 +42,11 @@ TEST(Lens, KnownPoints) {
   const PlanePoint d = Distort(radial, {1, 2});  // r² = 5, s = 1 + 0.5 + 5
   EXPECT_NEAR(d[0], 6.5 + 0.04 + 0.02 * 7, 1e-12);
   EXPECT_NEAR(d[1], 13 + 0.08 + 0.01 * 13, 1e-12);
+  Lens skewed = radial;
+  skewed.skew = 0.5;
+  EXPECT_NEAR(Distort(skewed, {1, 2})[0], d[0] + 0.5 * d[1], 1e-12);
+  EXPECT_EQ(Distort(skewed, {1, 2})[1], d[1]);
+  EXPECT_FALSE((Lens{.model = LensModel::kRadial, .skew = 1e-9}.IsStraight()));
   const PlanePoint f = Distort({.model = LensModel::kFisheye, .radial = {0.1, 0, 0, 0}}, {0, 1});
   EXPECT_NEAR(f[1], M_PI / 4 * (1 + 0.1 * M_PI * M_PI / 16), 1e-12);
   EXPECT_NEAR(f[0], 0, 1e-15);

@@ -20,6 +20,10 @@ std::array<T, 9> RotationFromQuaternion(T w, T x, T y, T z) {
           2 * (x * z - w * y),     2 * (y * z + w * x),     1 - 2 * (x * x + y * y)};
 }
 
+// The rotation nearest to a matrix that is one up to rounding, to the last digits of double: what a file gives with
+// eight digits would move a camera at 4,500,000 m by centimetres.
+std::array<double, 9> NearestRotation(const std::array<double, 9>& matrix);
+
 // wxyz unit quaternion (w ≥ 0) of a row-major rotation matrix.
 std::array<double, 4> QuaternionFromRotation(const std::array<double, 9>& rotation);
 

@@ -35,6 +35,7 @@ std::string FingerprintOf(const std::vector<Camera>& cameras, double scene_scale
     print.Add(photograph.lens.radial);
     print.Add(photograph.lens.denominator);
     print.Add(photograph.lens.tangential);
+    if (photograph.lens.skew != 0) print.Add(std::array{photograph.lens.skew});
   }
   print.Add(std::array{scene_scale});
   return print.text();

@@ -89,25 +89,37 @@ fs::path ModelFolder(const fs::path& project) {
   return {};
 }
 
+// From the world of a file to the one of the cameras, and to where that begins.
+struct PointFrame {
+  std::optional<Similarity> moved;
+  WorldOrigin origin;
+
+  void Move(double* p) const {
+    if (moved) std::ranges::copy(moved->Apply({p[0], p[1], p[2]}), p);
+  }
+};
+
 // A PLY of points; of an empty path there are none.
-Status ReadPoints(const fs::path& path, const WorldOrigin& origin, InitialPoints& points) {
+Status ReadPoints(const fs::path& path, const PointFrame& frame, InitialPoints& points) {
   if (path.empty()) return {};
   ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyPoints read, ReadPlyPoints(file));
-  points = PointsOf(read.positions, read.colors, origin);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(PlyPoints read, ReadPlyPoints(file));
+  for (size_t i = 0; i + 2 < read.positions.size(); i += 3) frame.Move(read.positions.data() + i);
+  points = PointsOf(read.positions, read.colors, frame.origin);
   return {};
 }
 
 // Those of a sparse model as COLMAP writes it, else as 3DGS leaves them beside it. There may be none.
-Status ReadPointsOfModel(const fs::path& model, const WorldOrigin& origin, InitialPoints& points) {
-  const auto read = ReadColmapPoints(model);
+Status ReadPointsOfModel(const fs::path& model, const PointFrame& frame, InitialPoints& points) {
+  auto read = ReadColmapPoints(model);
   if (read.ok()) {
-    points = PointsOf(*read, origin);
+    for (ColmapPoint& point : *read) frame.Move(point.position.data());
+    points = PointsOf(*read, frame.origin);
     return {};
   }
   if (read.error().code != ErrorCode::kNotFound) return read.error();
   const fs::path ply = model / "points3D.ply";
-  return Exists(ply) ? ReadPoints(ply, origin, points) : Status();
+  return Exists(ply) ? ReadPoints(ply, frame, points) : Status();
 }
 
 // The views as seen from the origin, and how large the scene is.
@@ -155,6 +167,7 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(train_file));
     out.background = set.background;
     const fs::path points = set.points;
+    const std::optional<Similarity> moved = set.moved;
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views,
                                  WithPictures(std::move(set), train_file, options.downscale, out.without_picture));
     MoveToOrigin(train_file, options, views, out);
@@ -167,7 +180,7 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
     } else {
       HoldOut(options.hold_out, std::move(views), out);
     }
-    ANCHORSPLAT_RETURN_IF_ERROR(ReadPoints(points, out.origin, out.points));
+    ANCHORSPLAT_RETURN_IF_ERROR(ReadPoints(points, {moved, out.origin}, out.points));
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(source));
     out.background = set.background;
@@ -175,13 +188,15 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
     if (colmap && !out.background) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(out.background, BackgroundBeside(source));
     }
-    const fs::path points = set.points;
+    const fs::path points = set.points, model = colmap ? ModelFolder(source) : fs::path();
+    const std::optional<Similarity> moved = set.moved;
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views,
                                  WithPictures(std::move(set), source, options.downscale, out.without_picture));
     MoveToOrigin(source, options, views, out);
     HoldOut(options.hold_out, std::move(views), out);
-    ANCHORSPLAT_RETURN_IF_ERROR(colmap ? ReadPointsOfModel(ModelFolder(source), out.origin, out.points)
-                                       : ReadPoints(points, out.origin, out.points));
+    const PointFrame frame{moved, out.origin};
+    ANCHORSPLAT_RETURN_IF_ERROR(model.empty() ? ReadPoints(points, frame, out.points)
+                                              : ReadPointsOfModel(model, frame, out.points));
   }
   if (out.train.empty()) {
     return Error{ErrorCode::kBadArgument,

@@ -35,7 +35,7 @@ struct ProjectOptions {
 };
 
 // Opens a project: a folder with transforms_train.json and perhaps transforms_test.json (NeRF-synthetic), a COLMAP
-// project (sparse/0, images), a transforms.json, cameras.json or poses_bounds.npy or its folder, or a folder of such
+// project (sparse/0, images), any other file that ReadCameras takes or its folder, or a folder of such
 // folders named by resolution (256/ and 1024/, or 200/ and 800/), of which the smallest is taken. Views of the camera
 // file without a picture are left out with a warning.
 //

@@ -77,7 +77,8 @@ Status Resize(CameraSet& cameras, const std::string& text) {
 
 void ViewFlags::AddTo(CLI::App& verb) {
   auto* cameras_option =
-      verb.add_option("--cameras", cameras, "transforms.json, cameras.json or a COLMAP folder with the views")
+      verb.add_option("--cameras", cameras,
+                      "transforms.json, cameras.json, a COLMAP folder, or cameras of Metashape, OpenSfM or Bundler")
           ->check(NotEmpty());
   auto* orbit_option =
       verb.add_option(

@@ -207,6 +207,16 @@ void AddCameraFormats(const fs::path& folder, std::vector<FuzzReader>& readers) 
   add("transforms.json", TransformsSeeds(), JsonWords());
   add("cameras.json", InriaCamerasSeeds(), JsonWords());
   add("poses_bounds.npy", {PosesBoundsSeed()}, {"'<f4'", "True", "(2, 17)"});
+  add("metashape.xml", MetashapeSeeds(), XmlWords());
+  add("reconstruction.json", OpenSfmSeeds(), JsonWords());
+  // The sizes of Bundler's cameras are those of pictures, and nerfstudio's frame is of cameras beside it.
+  fs::create_directories(folder / "bundler");
+  fs::create_directories(folder / "nerfstudio");
+  (void)WritePng(folder / "bundler" / "a.png", Image(40, 30, 3));
+  Put(folder / "bundler" / "list.txt", "a.png\na.png 0 50\n");
+  Put(folder / "nerfstudio" / "transforms.json", TransformsSeeds().front());
+  add("bundler/bundle.out", {BundlerSeed()}, {"nan", "1e308", "-", "0"});
+  add("nerfstudio/dataparser_transforms.json", {NerfstudioFrameSeed()}, JsonWords());
   // A COLMAP model is two files: one is damaged, the other stays good.
   const auto add_colmap = [&](const char* kind, const char* damaged, const ColmapSeeds& good, bool cameras) {
     const fs::path model = folder / Cat("colmap_", kind, "_", cameras ? "cameras" : "images");

@@ -312,6 +312,51 @@ std::vector<std::string> InriaCamerasSeeds() {
   return {Cat("[", camera, "]\n"), Cat("[", camera, ",\n", camera, "]\n")};
 }
 
+std::vector<std::string> MetashapeSeeds() {
+  const std::string sensors =
+      R"(<sensors><sensor id="0" type="frame"><resolution width="40" height="30"/><calibration type="frame" class="adjusted">
+<resolution width="40" height="30"/><f>50</f><cx>1</cx><b1>0.5</b1><b2>-0.25</b2><k1>-0.1</k1><p1>0.001</p1></calibration>
+</sensor><sensor id="1" type="fisheye"><resolution width="40" height="30"/><calibration><f>20</f><k1>0.1</k1></calibration>
+</sensor></sensors>)";
+  const std::string pose = "<transform>0 0 1 3 1 0 0 2 0 1 0 1 0 0 0 1</transform></camera>";
+  const std::string transform =
+      "<transform><rotation>1 0 0 0 1 0 0 0 1</rotation><translation>4500000 1 2</translation><scale>12.5</scale>"
+      "</transform>";
+  return {Cat("<?xml version=\"1.0\"?>\n<document version=\"2.0.0\"><chunk label=\"c\">", sensors,
+              "<components><component id=\"0\">", transform, "</component></components><cameras>",
+              R"(<camera id="0" sensor_id="0" component_id="0" label="a.png">)", pose,
+              R"(<camera id="1" sensor_id="1" label="b"/></cameras></chunk></document>)"),
+          Cat("<document><chunk>", sensors, "<cameras><group>", R"(<camera sensor_id="1" label="&lt;&#65;">)", pose,
+              "</group></cameras>", transform, "</chunk><chunk/></document>")};
+}
+
+std::vector<std::string_view> XmlWords() {
+  return {"<camera",    "</camera>", "<chunk>", "<group>",   "<sensor ", "<transform>", "type=\"spherical\"",
+          "fisheye",    "adjusted",  "<f>",     "<b2>",      "<scale>",  "1e308",       "nan",
+          "&#0;",       "<![CDATA[", "<!--",    "<!DOCTYPE", "<?",       "]]>",         "/>",
+          "label=\"\"", "id=\"0\""};
+}
+
+std::vector<std::string> OpenSfmSeeds() {
+  const char* shots =
+      R"("shots": {"a.png": {"camera": "c", "rotation": [0.1, 0.2, 3.1], "translation": [1, 2, 3.5]}}, "points": {}})";
+  return {Cat(R"([{"cameras": {"c": {"projection_type": "perspective", "width": 40, "height": 30, "focal": 0.8,)",
+              R"("k1": -0.1, "k2": 0}}, "reference_lla": {"latitude": 1.5, "longitude": 2, "altitude": 3}, )", shots,
+              R"(, {"cameras": {}, "shots": {}}])"),
+          Cat(R"([{"cameras": {"c": {"projection_type": "brown", "width": 40, "height": 30, "focal_x": 0.8,)",
+              R"("focal_y": 0.75, "c_x": 0.01, "c_y": 0, "k1": -0.1, "k2": 0, "k3": 0, "p1": 0.001, "p2": 0}}, )",
+              shots, "]")};
+}
+
+std::string BundlerSeed() {
+  return "# Bundle file v0.3\n2 1\n50 -0.1 0.01\n1 0 0\n0 0 1\n0 -1 0\n1 2 -3\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n0 0 0\n"
+         "1 2 3\n255 0 0\n1 0 17 3.5 -2.25\n";
+}
+
+std::string NerfstudioFrameSeed() {
+  return R"({"transform": [[0, 1, 0, 0.5], [1, 0, 0, -2], [0, 0, -1, 3]], "scale": 0.25})";
+}
+
 std::vector<std::string_view> JsonWords() {
   return {"[",
           "]",

@@ -30,7 +30,12 @@ std::vector<std::string> SafetensorsSeeds(const std::filesystem::path& folder);
 
 std::vector<std::string> TransformsSeeds();
 std::vector<std::string> InriaCamerasSeeds();
-std::string PosesBoundsSeed();  // LLFF's, of one view
+std::string PosesBoundsSeed();              // LLFF's, of one view
+std::vector<std::string> MetashapeSeeds();  // a component, and groups with a chunk's transform
+std::vector<std::string_view> XmlWords();
+std::vector<std::string> OpenSfmSeeds();
+std::string BundlerSeed();          // of two cameras, whose list has a.png twice
+std::string NerfstudioFrameSeed();  // a dataparser_transforms.json
 std::vector<std::string_view> JsonWords();
 
 struct ColmapSeeds {

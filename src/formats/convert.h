@@ -11,6 +11,7 @@
 #include "formats/attribute_error.h"
 #include "formats/axes.h"
 #include "formats/cloud_io.h"
+#include "formats/opened_splat.h"
 
 namespace anchorsplat {
 
@@ -50,6 +51,9 @@ struct ConvertReport {
 // warning. `kept` takes the cloud as it was written, for comparisons, if not null.
 Result<ConvertReport> ConvertFile(const std::filesystem::path& input, const std::filesystem::path& output,
                                   const ConvertOptions& options, GaussianCloud* kept = nullptr);
+
+// What WriteCloud has written there: in a folder or in memory, which has to outlive it.
+Result<OpenedSplat> OpenWritten(const std::filesystem::path& output, const CloudWriteOptions& write);
 
 // The parts of it that change a cloud, in the order in which they are done. In place.
 // `extras` are changed alike, if not null.

@@ -106,7 +106,8 @@ Result<Converted> ConvertAndMeasure(const std::filesystem::path& input, const st
   Converted done;
   ANCHORSPLAT_ASSIGN_OR_RETURN(done.report, ConvertFile(input, output, options, options.measure ? &cloud : nullptr));
   if (done.report.error) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadCloud(output));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat written, OpenWritten(output, options.write));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, written.Read());
     ANCHORSPLAT_ASSIGN_OR_RETURN(done.loss, MeasureConversionLoss(cloud, back, views));
   } else if (options.measure) {
     LogWarning(Cat(output.string(), ": ", done.report.output_format,

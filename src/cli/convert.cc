@@ -11,6 +11,7 @@
 #include "cli/batch.h"
 #include "cli/clean_output.h"
 #include "cli/output_plan.h"
+#include "cli/standard_output.h"
 #include "cli/stop_signal.h"
 #include "cli/verb.h"
 #include "core/file_system.h"
@@ -40,9 +41,11 @@ struct ConvertWords {
   std::vector<std::string> paths;  // inputs, and the output as the last one without --out-dir
   std::string out_dir;
   std::string to = ".ply";
+  const CLI::Option* to_option = nullptr;
   bool lod = false;
   ConvertFlags how;
   SizeFlags size;
+  const StandardOutput* piped = nullptr;  // the one output goes there
 };
 
 // "scan.compressed.ply" without the extension of its format; "scan/meta.json", or "scan" where that is in it, is the
@@ -81,7 +84,7 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
     if (flags.paths.size() != 2) {
       return Error{ErrorCode::kBadArgument, "say IN OUT, or several inputs with --out-dir DIR"};
     }
-    jobs.push_back({flags.paths[0], flags.paths[1]});
+    jobs.push_back({flags.paths[0], flags.piped != nullptr ? flags.piped->path() : fs::path(flags.paths[1])});
     if (!flags.lod) return jobs;
     // The folder of a scene, as it is or will be ("scene.v2" is one), stands for the file that programs look for in it.
     fs::path& output = jobs.back().output;
@@ -136,19 +139,19 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
   return jobs;
 }
 
-void Print(const Job& job, const ConvertReport& r, const std::optional<ConversionLoss>& loss) {
-  std::cout << OneLine(job.input) << " (" << r.input_format << ", " << HumanBytes(r.input_bytes) << ") -> "
-            << OneLine(job.output) << " (" << r.output_format << ", " << HumanBytes(r.output_bytes);
+void Print(std::ostream& out, const Job& job, const ConvertReport& r, const std::optional<ConversionLoss>& loss) {
+  out << OneLine(job.input) << " (" << r.input_format << ", " << HumanBytes(r.input_bytes) << ") -> "
+      << OneLine(job.output) << " (" << r.output_format << ", " << HumanBytes(r.output_bytes);
   if (r.predicted_bytes) {
-    std::cout << ", predicted " << (r.predicted_roughly ? "about " : "") << HumanBytes(*r.predicted_bytes);
+    out << ", predicted " << (r.predicted_roughly ? "about " : "") << HumanBytes(*r.predicted_bytes);
   }
-  std::cout << ")\n  " << WithThousands(r.gaussians_read) << " Gaussians of SH degree " << r.sh_degree_read << " in, "
-            << WithThousands(r.gaussians_written) << " of degree " << r.sh_degree_written << " out; read in "
-            << HumanSeconds(r.read_seconds) << ", written in " << HumanSeconds(r.write_seconds) << '\n';
-  if (r.error) std::cout << FormatAttributeError(*r.error);
+  out << ")\n  " << WithThousands(r.gaussians_read) << " Gaussians of SH degree " << r.sh_degree_read << " in, "
+      << WithThousands(r.gaussians_written) << " of degree " << r.sh_degree_written << " out; read in "
+      << HumanSeconds(r.read_seconds) << ", written in " << HumanSeconds(r.write_seconds) << '\n';
+  if (r.error) out << FormatAttributeError(*r.error);
   if (loss) {
-    std::cout << "  pictures    PSNR " << Fixed(loss->mean_psnr, 2) << " dB on average, " << Fixed(loss->min_psnr, 2)
-              << " dB at worst, over " << loss->views << " views\n";
+    out << "  pictures    PSNR " << Fixed(loss->mean_psnr, 2) << " dB on average, " << Fixed(loss->min_psnr, 2)
+        << " dB at worst, over " << loss->views << " views\n";
   }
 }
 
@@ -187,19 +190,20 @@ std::optional<OutputPlan> PlanOf(const ConvertOptions& options, const Job& job) 
 // One file: converted, measured where asked for, told. A row of the JSON document.
 Result<nlohmann::json> RunJob(const Job& job, const ConvertOptions& options, int views, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Converted done, ConvertAndMeasure(job.input, job.output, options, views));
-  if (!shared.json && !shared.quiet) Print(job, done.report, done.loss);
+  if (!shared.json && !shared.quiet) Print(ResultsBeside(options.write.memory), job, done.report, done.loss);
   nlohmann::json json = ToJson(done);
   json["input"] = job.input.string();
   json["output"] = job.output.string();
   return json;
 }
 
-Status RunConvert(const ConvertWords& flags, Program& program) {
+Status RunJobs(const ConvertWords& flags, Program& program) {
   const SharedFlags& shared = program.flags;
   if (flags.out_dir.empty() && flags.paths.size() == 2 && fs::path(flags.paths[1]).extension() == ".safetensors") {
     return ConvertModel(flags, shared);
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const ConvertOptions options, MakeConvertOptions(flags.how, shared.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ConvertOptions options, MakeConvertOptions(flags.how, shared.overwrite));
+  if (flags.piped != nullptr) options.write.memory = flags.piped->memory();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto jobs, Jobs(flags, shared.overwrite));
   std::vector<fs::path> outputs;
   for (const Job& job : jobs) outputs.push_back(job.output);
@@ -221,6 +225,20 @@ Status RunConvert(const ConvertWords& flags, Program& program) {
   return RunBatch(items, run, program);
 }
 
+Status RunConvert(const ConvertWords& flags, Program& program) {
+  const bool is_piped = flags.out_dir.empty() && flags.paths.size() == 2 && IsStandardOutput(flags.paths[1]);
+  if (!is_piped && flags.out_dir.empty() && flags.to_option->count() > 0) {
+    return Error{ErrorCode::kBadArgument, "--to has an effect with --out-dir, and where the output is -"};
+  }
+  if (!is_piped) return RunJobs(flags, program);
+  if (flags.lod) return Error{ErrorCode::kBadArgument, "--lod writes several files, and standard output is one"};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const StandardOutput piped, StandardOutput::ForSplat(flags.to, program.flags));
+  ConvertWords words = flags;
+  words.piped = &piped;
+  ANCHORSPLAT_RETURN_IF_ERROR(RunJobs(words, program));
+  return piped.Send();
+}
+
 }  // namespace
 
 void AddConvert(CLI::App& app, Program& program) {
@@ -228,14 +246,15 @@ void AddConvert(CLI::App& app, Program& program) {
                            "anchorsplat convert scan.ply scan.spz --report");
   const auto flags = std::make_shared<ConvertWords>();
   verb.add_option("paths", flags->paths,
-                  Cat("IN OUT, or inputs for --out-dir; - is standard input. Written: ", WrittenFormats(),
+                  Cat("IN OUT, or inputs for --out-dir; - is standard input or output. Written: ", WrittenFormats(),
                       ", and .safetensors of a network's weights"))
       ->required();
-  auto* out_dir = verb.add_option("--out-dir", flags->out_dir, "Folder to write to, under the inputs' names");
-  verb.add_option("--to", flags->to,
-                  "Extension of the files in --out-dir; meta.json and lod-meta.json make a folder of each")
-      ->capture_default_str()
-      ->needs(out_dir);
+  verb.add_option("--out-dir", flags->out_dir, "Folder to write to, under the inputs' names");
+  flags->to_option =
+      verb.add_option("--to", flags->to,
+                      "Extension of the files in --out-dir, or of the output -; meta.json and lod-meta.json make a "
+                      "folder of each")
+          ->capture_default_str();
   verb.add_flag("--lod", flags->lod,
                 "Write levels of detail in chunks, a streamed SOG: OUT is a folder, or the lod-meta.json in one, which "
                 "says the same without this flag");

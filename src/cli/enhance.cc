@@ -12,6 +12,7 @@
 #include "cli/clean_output.h"
 #include "cli/named_messages.h"
 #include "cli/output_plan.h"
+#include "cli/standard_output.h"
 #include "cli/stop_signal.h"
 #include "cli/verb.h"
 #include "core/file_system.h"
@@ -46,6 +47,11 @@ struct EnhanceWords {
   EnhanceFlags how;
   SizeFlags size;
   bool view = false;
+  std::string to = ".ply";
+  const CLI::Option* to_option = nullptr;
+  const StandardOutput* piped = nullptr;  // the one output goes there
+
+  OutputMemory* memory() const { return piped != nullptr ? piped->memory() : nullptr; }
 };
 
 // Of neighbours, their frames and the choice of copies, per Gaussian of the input; measured (docs/benchmarks.md).
@@ -61,7 +67,7 @@ uint64_t NeededBytes(int64_t in, int64_t worked, int64_t out, int sh_degree) {
 }
 
 // What can be known to fail before anything is read.
-Status CheckOutput(const fs::path& output, bool overwrite) {
+Status CheckOutput(const fs::path& output, const CloudWriteOptions& write) {
   const SplatFormat* format = FormatOfExtension(output);
   if (format == nullptr || format->write == nullptr) {
     std::string known;
@@ -70,7 +76,7 @@ Status CheckOutput(const fs::path& output, bool overwrite) {
     }
     return Error{ErrorCode::kBadArgument, Cat(output.string(), ": not a format that is written; known are", known)};
   }
-  return CheckCanWriteCloud(output, 0, {.overwrite = overwrite});
+  return CheckCanWriteCloud(output, 0, write);
 }
 
 // Where a run for this output keeps what it needs to go on after an interruption, and what tells such a file.
@@ -79,7 +85,8 @@ struct Checkpoint {
   bool (*is_checkpoint)(const fs::path&) = nullptr;
 };
 
-Checkpoint CheckpointOf(const EnhanceOptions& options, const fs::path& output) {
+Checkpoint CheckpointOf(const EnhanceWords& flags, const EnhanceOptions& options, const fs::path& output) {
+  if (flags.piped != nullptr && options.control.checkpoint.empty()) return {};  // there is nothing to lie beside
   const auto plan = PlanEnhancement(options);
   if (!plan.ok() || !plan->KeepsCheckpoint(options)) return {};
   return {options.control.checkpoint.empty() ? fs::path(output.string() + ".checkpoint") : options.control.checkpoint,
@@ -212,10 +219,10 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
     ANCHORSPLAT_RETURN_IF_ERROR(CheckPageFits(output, cloud, options));
     before = cloud;
   }
-  const CloudWriteOptions write{.overwrite = shared.overwrite};
+  const CloudWriteOptions write{.overwrite = shared.overwrite, .memory = flags.memory()};
   // Again, now that the inputs with the files beside them are known.
   ANCHORSPLAT_RETURN_IF_ERROR(CheckCanWriteCloud(output, cloud.sh_degree, write));
-  const auto [checkpoint, is_checkpoint] = CheckpointOf(options, output);
+  const auto [checkpoint, is_checkpoint] = CheckpointOf(flags, options, output);
   options.control.checkpoint = checkpoint;
   options.control.outputs = OutputFiles(flags, output);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto lock, HoldCheckpoint(checkpoint));
@@ -258,10 +265,12 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   json["output"] = output.string();
   if (flags.view) json["view"] = PagePath(output).string();
   if (!shared.json && !shared.quiet) {
-    std::cout << OneLine(input) << " -> " << OneLine(output) << "\n  " << WithThousands(r.gaussians_in)
-              << (r.gaussians_in == 1 ? " Gaussian in, " : " Gaussians in, ") << WithThousands(r.gaussians_out)
-              << " out; " << r.method << Details(r) << ", " << HumanSeconds(r.seconds) << " ("
-              << HumanSeconds(r.seconds_in_all) << " with what is found out before)\n";
+    ResultsBeside(flags.memory()) << OneLine(input) << " -> " << OneLine(output) << "\n  "
+                                  << WithThousands(r.gaussians_in)
+                                  << (r.gaussians_in == 1 ? " Gaussian in, " : " Gaussians in, ")
+                                  << WithThousands(r.gaussians_out) << " out; " << r.method << Details(r) << ", "
+                                  << HumanSeconds(r.seconds) << " (" << HumanSeconds(r.seconds_in_all)
+                                  << " with what is found out before)\n";
     if (flags.view) {
       std::error_code unknown;
       std::cout << "  " << OneLine(PagePath(output)) << ": " << HumanBytes(fs::file_size(PagePath(output), unknown))
@@ -271,7 +280,7 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   return json;
 }
 
-Status RunEnhance(const EnhanceWords& flags, Program& program) {
+Status RunInputs(const EnhanceWords& flags, Program& program) {
   const SharedFlags& shared = program.flags;
   const EnhanceOptions& asked = flags.how.options;
   if (!asked.refine.images.empty() && flags.inputs.size() > 1) {
@@ -288,14 +297,14 @@ Status RunEnhance(const EnhanceWords& flags, Program& program) {
 
   // For all before the first is computed: a batch should not fail half-way on something known at its start.
   for (const fs::path& output : outputs) {
-    const auto [checkpoint, is_checkpoint] = CheckpointOf(options, output);
+    const auto [checkpoint, is_checkpoint] = CheckpointOf(flags, options, output);
     const std::vector<fs::path> files = OutputFiles(flags, output);
     if (!checkpoint.empty()) {
       ANCHORSPLAT_RETURN_IF_ERROR(
           CheckCheckpoint(checkpoint, files, options.control.resume, shared.overwrite, is_checkpoint));
       if (options.control.resume) RecordWhatWasLeft(checkpoint, files);
     }
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(output, shared.overwrite));
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckOutput(output, {.overwrite = shared.overwrite, .memory = flags.memory()}));
     if (shared.overwrite) {  // so that an interruption leaves them under these names
       for (const fs::path& file : files) RecordOwnFile(file);
     }
@@ -323,6 +332,23 @@ Status RunEnhance(const EnhanceWords& flags, Program& program) {
       program);
 }
 
+Status RunEnhance(const EnhanceWords& flags, Program& program) {
+  if (!IsStandardOutput(flags.output)) {
+    if (flags.to_option->count() == 0) return RunInputs(flags, program);
+    return Error{ErrorCode::kBadArgument, "--to has an effect where the output is -"};
+  }
+  if (flags.view) return Error{ErrorCode::kBadArgument, "--view writes a page beside the output, and that is -"};
+  if (flags.how.options.control.resume && flags.how.options.control.checkpoint.empty()) {
+    return Error{ErrorCode::kBadArgument, "--resume needs --checkpoint where the output is -"};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const StandardOutput piped, StandardOutput::ForSplat(flags.to, program.flags));
+  EnhanceWords words = flags;
+  words.piped = &piped;
+  words.output = piped.path().string();
+  ANCHORSPLAT_RETURN_IF_ERROR(RunInputs(words, program));
+  return piped.Send();
+}
+
 }  // namespace
 
 void AddEnhance(CLI::App& app, Program& program) {
@@ -330,7 +356,8 @@ void AddEnhance(CLI::App& app, Program& program) {
                            "anchorsplat enhance scan.ply -o scan-4x.ply --cameras transforms.json");
   const auto flags = std::make_shared<EnhanceWords>();
   verb.add_option("inputs", flags->inputs, "Splat files")->required()->check(NotEmpty());
-  auto* output = verb.add_option("-o,--output", flags->output, "File to write (one input)");
+  auto* output = verb.add_option("-o,--output", flags->output, "File to write (one input); - is standard output");
+  flags->to_option = verb.add_option("--to", flags->to, kPipedFormatHelp)->capture_default_str();
   verb.add_option("--out-dir", flags->out_dir, "Folder to write to, under the inputs' names")->excludes(output);
   verb.add_flag("--view", flags->view, "Also write an HTML page beside the output that shows before and after");
   flags->how.AddTo(verb);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "cli/clean_output.h"
+#include "cli/standard_output.h"
 #include "cli/stop_signal.h"
 #include "cli/verb.h"
 #include "core/log.h"
@@ -38,6 +39,11 @@ struct FitWords {
   std::string output;
   std::string gsplat_checkpoint;
   FitFlags how;
+  std::string to = ".ply";
+  const CLI::Option* to_option = nullptr;
+  const StandardOutput* piped = nullptr;  // the output goes there
+
+  OutputMemory* memory() const { return piped != nullptr ? piped->memory() : nullptr; }
 };
 
 // All that a fit writes.
@@ -50,13 +56,17 @@ std::vector<fs::path> OutputFiles(const FitWords& flags) {
 // What can be known to fail before hours of work, once the inputs are known.
 Status CheckOutputs(const FitWords& flags, const FitControl& control, bool overwrite) {
   const SplatFormat* format = FormatOfExtension(flags.output);
+  const auto is_piped = [&](const fs::path& path) { return flags.piped != nullptr && path == flags.piped->path(); };
   if (format == nullptr || format->write == nullptr) {
     return Error{ErrorCode::kBadArgument, Cat("-o ", flags.output, ": not a format that is written (.ply is)")};
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(control.checkpoint, control.outputs, flags.how.resume, overwrite));
+  if (!control.checkpoint.empty()) {
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckCheckpoint(control.checkpoint, control.outputs, flags.how.resume, overwrite));
+  }
   // A continued fit replaces what its interruption left.
   if (flags.how.resume) RecordWhatWasLeft(control.checkpoint, control.outputs);
   for (const fs::path& path : control.outputs) {
+    if (is_piped(path)) continue;
     ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(path, overwrite));
     if (overwrite) RecordOwnFile(path);  // so that an interruption leaves it under this name
   }
@@ -64,19 +74,19 @@ Status CheckOutputs(const FitWords& flags, const FitControl& control, bool overw
 }
 
 void PrintReport(const FitWords& flags, const FitReport& r) {
-  std::cout << OneLine(flags.output) << ": " << WithThousands(r.gaussians_out) << " Gaussians after "
-            << WithThousands(r.steps) << " steps in " << HumanSeconds(r.seconds)
-            << "\n  training views: " << r.train.views << ", " << Fixed(r.train.psnr, 2) << " dB, SSIM "
-            << Fixed(r.train.ssim, 4) << "\n";
+  std::ostream& out = ResultsBeside(flags.memory());
+  out << OneLine(flags.output) << ": " << WithThousands(r.gaussians_out) << " Gaussians after "
+      << WithThousands(r.steps) << " steps in " << HumanSeconds(r.seconds) << "\n  training views: " << r.train.views
+      << ", " << Fixed(r.train.psnr, 2) << " dB, SSIM " << Fixed(r.train.ssim, 4) << "\n";
   if (r.held_out.views > 0) {
-    std::cout << "  held-out views: " << r.held_out.views << ", " << Fixed(r.held_out.psnr, 2) << " dB, SSIM "
-              << Fixed(r.held_out.ssim, 4) << "\n";
+    out << "  held-out views: " << r.held_out.views << ", " << Fixed(r.held_out.psnr, 2) << " dB, SSIM "
+        << Fixed(r.held_out.ssim, 4) << "\n";
   }
 }
 
 // Each file that can be written is, whatever becomes of the other one.
 Status WriteResults(const FitWords& flags, const Fitted& fitted, bool overwrite) {
-  const Status splat = WriteCloudOrKeep(flags.output, fitted.cloud, {.overwrite = overwrite});
+  const Status splat = WriteCloudOrKeep(flags.output, fitted.cloud, {.overwrite = overwrite, .memory = flags.memory()});
   if (flags.gsplat_checkpoint.empty()) return splat;
   const Status checkpoint = WriteOrKeep(flags.gsplat_checkpoint, overwrite, [&](const fs::path& path, bool replace) {
     return WriteGsplatCheckpoint(path, fitted.cloud, std::max<int64_t>(0, fitted.report.steps - 1),
@@ -98,13 +108,16 @@ Error Interrupted(const FitWords& flags, const FitReport& report, int64_t steps,
   } else if (report.kept_step) {
     after = Cat("--resume goes on at step ", WithThousands(*report.kept_step), " from ", checkpoint.string());
   }
-  return {ErrorCode::kInterrupted, Cat("stopped after ", WithThousands(report.steps), " of ", WithThousands(steps),
-                                       " steps; ", flags.output, " is what there was, ", after)};
+  return {ErrorCode::kInterrupted,
+          Cat("stopped after ", WithThousands(report.steps), " of ", WithThousands(steps), " steps; ", flags.output,
+              flags.piped != nullptr ? " got nothing, " : " is what there was, ", after)};
 }
 
-Status RunFit(const FitWords& flags, const SharedFlags& shared) {
+Status RunProject(const FitWords& flags, const SharedFlags& shared) {
   FitControl control;
-  control.checkpoint = flags.how.checkpoint.empty() ? flags.output + ".checkpoint" : flags.how.checkpoint;
+  control.checkpoint = flags.how.checkpoint;
+  // Beside standard output there is nothing.
+  if (flags.how.checkpoint.empty() && flags.piped == nullptr) control.checkpoint = flags.output + ".checkpoint";
   control.checkpoint_every = flags.how.checkpoint_every;
   control.resume = flags.how.resume;
   control.deliver = [&](const Fitted& fitted) { return WriteResults(flags, fitted, shared.overwrite); };
@@ -137,6 +150,22 @@ Status RunFit(const FitWords& flags, const SharedFlags& shared) {
   return {};
 }
 
+Status RunFit(const FitWords& flags, const SharedFlags& shared) {
+  if (!IsStandardOutput(flags.output)) {
+    if (flags.to_option->count() == 0) return RunProject(flags, shared);
+    return Error{ErrorCode::kBadArgument, "--to has an effect where the output is -"};
+  }
+  if ((flags.how.resume || flags.how.checkpoint_every > 0) && flags.how.checkpoint.empty()) {
+    return Error{ErrorCode::kBadArgument, "--resume and --checkpoint-every need --checkpoint where the output is -"};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const StandardOutput piped, StandardOutput::ForSplat(flags.to, shared));
+  FitWords words = flags;
+  words.piped = &piped;
+  words.output = piped.path().string();
+  ANCHORSPLAT_RETURN_IF_ERROR(RunProject(words, shared));
+  return piped.Send();
+}
+
 }  // namespace
 
 void AddFit(CLI::App& app, Program& program) {
@@ -149,7 +178,8 @@ void AddFit(CLI::App& app, Program& program) {
           "our data sets")
       ->required()
       ->check(NotEmpty());
-  verb.add_option("-o,--output", flags->output, "Splat to write")->required()->check(NotEmpty());
+  verb.add_option("-o,--output", flags->output, "Splat to write; - is standard output")->required()->check(NotEmpty());
+  flags->to_option = verb.add_option("--to", flags->to, kPipedFormatHelp)->capture_default_str();
   verb.add_option("--gsplat-checkpoint", flags->gsplat_checkpoint,
                   "Also write a checkpoint as gsplat's trainer does (.pt)")
       ->check(NotEmpty());

@@ -14,6 +14,7 @@
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "formats/opened_splat.h"
 #include "io/input_file.h"
 #include "scene/furniture_catalog.h"
 #include "scene/mesh_reader.h"
@@ -186,7 +187,7 @@ bool LooksLikeMesh(const std::string& address) {
   if (!IsMeshAddress(address)) return false;
   const std::string ending = std::filesystem::path(address).extension().string();
   const auto contains = [&](const char* words) { return Beginning(address).find(words) != std::string::npos; };
-  if (ending == ".ply") return contains("element face");
+  if (ending == ".ply") return contains("element face") && !ExtentOf(address);  // a splat may have faces beside it
   if (ending == ".glb" || ending == ".gltf") return !contains("KHR_gaussian_splatting");
   return true;
 }

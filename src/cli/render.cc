@@ -5,8 +5,10 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "cli/clean_output.h"
+#include "cli/standard_output.h"
 #include "cli/verb.h"
 #include "core/file_system.h"
 #include "core/log.h"
@@ -66,11 +68,18 @@ Result<std::vector<fs::path>> OutputPaths(const std::string& output, const Camer
 }
 
 Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
+  std::optional<StandardOutput> piped;
+  if (IsStandardOutput(flags.output)) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(piped, StandardOutput::Open(".png", shared));
+  }
+  WriteOptions write = WriteOptionsFrom(shared);
+  write.memory = piped ? piped->memory() : nullptr;
+  const std::string output = piped ? piped->path().string() : flags.output;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadToShow(flags.input));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraSet cameras, MakeViews(flags.views, cloud));
   ANCHORSPLAT_ASSIGN_OR_RETURN(RenderOptions options, MakeRenderOptions(flags.views, cloud, cameras));
   if (flags.transparent) options.background = {0, 0, 0};
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto paths, OutputPaths(flags.output, cameras, shared.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto paths, OutputPaths(output, cameras, shared.overwrite || piped));
 
   Rasterizer rasterizer;
   RenderOutput render;
@@ -87,8 +96,7 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
       seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
       const std::string warning = NothingToSee(cloud, camera, options, rasterizer.statistics().visible);
       if (!warning.empty() && empty_views++ == 0) empty = warning;
-      ANCHORSPLAT_RETURN_IF_ERROR(
-          WritePng(paths[i], flags.transparent ? WithAlpha(render) : render.color, WriteOptionsFrom(shared)));
+      ANCHORSPLAT_RETURN_IF_ERROR(WritePng(paths[i], flags.transparent ? WithAlpha(render) : render.color, write));
       views.push_back({{"name", camera.name}, {"file", paths[i].string()}});
       progress.Advance();
     }
@@ -101,11 +109,12 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
   if (shared.json) {
     PrintJson({{"input", flags.input}, {"gaussians", cloud.size()}, {"render_seconds", seconds}, {"views", views}});
   } else if (!shared.quiet) {
-    std::cout << "rendered " << paths.size() << (paths.size() == 1 ? " view of " : " views of ")
-              << WithThousands(cloud.size()) << " Gaussians in " << HumanSeconds(seconds) << " (without reading and "
-              << "writing) to " << OneLine(flags.output) << '\n';
+    ResultsBeside(write.memory) << "rendered " << paths.size() << (paths.size() == 1 ? " view of " : " views of ")
+                                << WithThousands(cloud.size()) << " Gaussians in " << HumanSeconds(seconds)
+                                << " (without reading and "
+                                << "writing) to " << OneLine(output) << '\n';
   }
-  return {};
+  return piped ? piped->Send() : Status();
 }
 
 }  // namespace
@@ -115,7 +124,8 @@ void AddRender(CLI::App& app, Program& program) {
                            "anchorsplat render scan.ply -o views/ --orbit 8 --size 800x600 --background 1,1,1");
   const auto flags = std::make_shared<RenderFlags>();
   verb.add_option("input", flags->input, "Splat file")->required();
-  verb.add_option("-o,--output", flags->output, "A .png file for one view, a folder for several")
+  verb.add_option("-o,--output", flags->output,
+                  "A .png file for one view, or - for standard output; a folder for several")
       ->required()
       ->check(NotEmpty());
   flags->views.AddTo(verb);

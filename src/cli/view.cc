@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "cli/clean_output.h"
+#include "cli/standard_output.h"
 #include "cli/stop_signal.h"
 #include "cli/verb.h"
 #include "core/log.h"
@@ -80,11 +81,19 @@ bool IsPageName(const fs::path& path) {
 }
 
 Status RunView(const PageWords& flags, const SharedFlags& shared) {
-  if (!IsPageName(flags.output)) {
+  std::optional<StandardOutput> piped;
+  if (IsStandardOutput(flags.output)) {
+    if (flags.folder) {
+      return Error{ErrorCode::kBadArgument, "--folder writes several files, and standard output is one"};
+    }
+    ANCHORSPLAT_ASSIGN_OR_RETURN(piped, StandardOutput::Open(".html", shared));
+  } else if (!IsPageName(flags.output)) {
     return Error{ErrorCode::kBadArgument, Cat("--output: ", flags.output, " is no name for a page, expected .html")};
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(flags.output, shared.overwrite));
+  if (!piped) ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(flags.output, shared.overwrite));
   ANCHORSPLAT_ASSIGN_OR_RETURN(ViewerPage page, MakePage(flags.how));
+  page.memory = piped ? piped->memory() : nullptr;
+  const fs::path output = piped ? piped->path() : fs::path(flags.output);
   page.folder = flags.folder;
   page.smaller = flags.folder ? "leave out some of the true pictures (--views)"
                               : Cat("--folder writes a page of any size with its data beside it; or ", page.smaller);
@@ -96,11 +105,11 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
     page.before = ViewerSplat{&before.cloud, before.name, before.bytes};
   }
   page.after = {&after.cloud, after.name, after.bytes};
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckPageSize(flags.output, page));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckPageSize(output, page));
   LookAtSplats(page);
-  ANCHORSPLAT_RETURN_IF_ERROR(WriteViewerPage(flags.output, page, WriteOptionsFrom(shared)));
+  ANCHORSPLAT_RETURN_IF_ERROR(WriteViewerPage(output, page, WriteOptionsFrom(shared)));
 
-  const uint64_t bytes = FileBytes(flags.output);
+  const uint64_t bytes = piped ? piped->memory()->files.at(output).size() : FileBytes(output);
   WarnOfLargePage(flags, after.cloud.size() + before.cloud.size(), bytes);
   if (shared.json) {
     PrintJson({{"output", flags.output},
@@ -108,12 +117,12 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
                {"views", page.views.size()},
                {"pixel_size", page.pixel_size ? nlohmann::json(*page.pixel_size) : nlohmann::json()}});
   } else if (!shared.quiet) {
-    std::cout << OneLine(flags.output) << ": " << HumanBytes(bytes)
-              << (flags.folder
-                      ? ", with its data in the folder beside it: they belong together; open it in any browser\n"
-                      : ", open it in any browser\n");
+    ResultsBeside(page.memory)
+        << OneLine(output) << ": " << HumanBytes(bytes)
+        << (flags.folder ? ", with its data in the folder beside it: they belong together; open it in any browser\n"
+                         : ", open it in any browser\n");
   }
-  return {};
+  return piped ? piped->Send() : Status();
 }
 
 }  // namespace
@@ -123,7 +132,7 @@ void AddView(CLI::App& app, Program& program) {
                            "anchorsplat view scan-4x.ply --before scan.ply -o page.html");
   const auto flags = std::make_shared<PageWords>();
   verb.add_option("after", flags->after, "Splat file")->required();
-  verb.add_option("-o,--output", flags->output, "HTML file to write")->required();
+  verb.add_option("-o,--output", flags->output, "HTML file to write; - is standard output")->required();
   verb.add_option("--before", flags->before, "Splat to compare with");
   verb.add_flag("--folder", flags->folder,
                 "Put the splats' data into a folder beside the page, PAGE.data, from which it shows the largest "

@@ -22,6 +22,7 @@
 #include "formats/row_arrays.h"
 #include "formats/splat_order.h"
 #include "io/input_record.h"
+#include "io/output_memory.h"
 
 namespace anchorsplat {
 
@@ -106,9 +107,18 @@ void Reorder(GaussianCloud& cloud, const Buffer<uint32_t>& rows, ExtraProperties
   if (extras != nullptr) ReorderRows(*extras, rows);
 }
 
-Result<GaussianCloud> ReadBack(const fs::path& output, const SplatFormat& format, const CloudView& written) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud back, ReadCloud(output));
-  if (!format.keeps_origin) back.origin = written.origin;  // a warning has said where it is
+Result<OpenedSplat> OpenWritten(const fs::path& output, const CloudWriteOptions& write) {
+  const SplatFormat* const format = FormatOfExtension(output);
+  if (write.memory == nullptr) return OpenedSplat::Open(output, format);
+  const std::vector<std::byte>& bytes = write.memory->files.at(output);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  return OpenedSplat::Of(InputFile::View(output.string(), text), format);
+}
+
+Result<GaussianCloud> ReadBack(const fs::path& output, const CloudWriteOptions& write, const CloudView& written) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenWritten(output, write));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud back, file.Read());
+  if (!file.format()->keeps_origin) back.origin = written.origin;  // a warning has said where it is
   return back;
 }
 
@@ -172,7 +182,7 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   report.write_seconds = Now() - written;
   report.gaussians_written = cloud.size();
   report.sh_degree_written = std::min(cloud.sh_degree, to->range.sh_degree);
-  if (const Result<OpenedSplat> written_file = OpenedSplat::Open(output, to); written_file.ok()) {
+  if (const Result<OpenedSplat> written_file = OpenWritten(output, write); written_file.ok()) {
     report.output_bytes = written_file->bytes();
   }
   if (to->predicted_size != nullptr) {
@@ -182,7 +192,7 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   }
   report.predicted_roughly = to->size_is_estimate;
   if (options.measure && to->read != nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadBack(output, *to, cloud));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadBack(output, write, cloud));
     if (to->written_rows != nullptr) {
       const Buffer<uint32_t> rows = to->written_rows(cloud, write);
       const Buffer<int64_t> kept_rows(rows.begin(), rows.end());

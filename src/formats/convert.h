@@ -11,6 +11,7 @@
 #include "formats/attribute_error.h"
 #include "formats/axes.h"
 #include "formats/cloud_io.h"
+#include "formats/opened_splat.h"
 
 namespace anchorsplat {
 
@@ -52,8 +53,10 @@ struct ConvertReport {
 Result<ConvertReport> ConvertFile(const std::filesystem::path& input, const std::filesystem::path& output,
                                   const ConvertOptions& options, GaussianCloud* kept = nullptr);
 
-// What was written, for comparisons: positions of a format that keeps no origin are relative to that of `written`.
-Result<GaussianCloud> ReadBack(const std::filesystem::path& output, const SplatFormat& format,
+// What WriteCloud has written there: in a folder or in memory, which has to outlive it.
+Result<OpenedSplat> OpenWritten(const std::filesystem::path& output, const CloudWriteOptions& write);
+// The same, read, for comparisons: positions of a format that keeps no origin are relative to that of `written`.
+Result<GaussianCloud> ReadBack(const std::filesystem::path& output, const CloudWriteOptions& write,
                                const CloudView& written);
 
 // The parts of it that change a cloud, in the order in which they are done. In place.

@@ -8,9 +8,12 @@
 #include <utility>
 
 #include "core/file_system.h"
+#include "core/log.h"
 #include "core/memory_limit.h"
 #include "core/text.h"
 #include "formats/extra_properties.h"
+#include "formats/splat_folder.h"
+#include "formats/wrapped_splat.h"
 #include "io/input_record.h"
 
 namespace anchorsplat {
@@ -28,55 +31,56 @@ std::string ReadFormats() {
   return list;
 }
 
-// What people take for a splat, by its first bytes: "a PNG picture"; empty for anything else.
-std::string OtherKind(std::string_view head) {
-  constexpr std::pair<std::string_view, const char*> kKinds[] = {{"\x89PNG", "a PNG picture"},
-                                                                 {"\xff\xd8\xff", "a JPEG picture"},
-                                                                 {"RIFF", "a WebP picture or a sound"},
-                                                                 {"GIF8", "a GIF picture"},
-                                                                 {"%PDF", "a PDF document"},
-                                                                 {"<!DOCTYPE", "a web page"},
-                                                                 {"<!doctype", "a web page"},
-                                                                 {"<html", "a web page"},
-                                                                 {"7z\xbc\xaf", "an archive to be unpacked first"},
-                                                                 {"Rar!", "an archive to be unpacked first"}};
-  for (const auto& [mark, kind] : kKinds) {
-    if (head.starts_with(mark)) return kind;
-  }
-  return {};
+// Whether it must be unpacked, or read as a whole, before anything is known of it.
+bool IsWrapped(const fs::path& path) {
+  const Result<InputFile> file = InputFile::Open(path);
+  return file.ok() && IsWrapped(*file);
 }
 
 }  // namespace
 
-fs::path SplatPath(const fs::path& path) {
-  if (!IsFolder(path)) return path;
-  for (const char* name : {"meta.json", "lod-meta.json"}) {
-    if (fs::path meta = path / name; Exists(meta)) return meta;
-  }
-  return path;
-}
+fs::path SplatPath(const fs::path& path) { return path == "-" ? path : FindSplat(path).path; }
 
 Result<OpenedSplat> OpenedSplat::Open(const fs::path& path, const SplatFormat* format) {
-  const fs::path found = SplatPath(path);
-  if (IsFolder(found)) {
-    return Error{
-        ErrorCode::kBadFile,
-        Cat(path.string(),
-            ": is a folder without a meta.json or lod-meta.json: expected a splat file or the folder of a SOG")};
+  const FoundSplat found = path == "-" ? FoundSplat{path, {}} : FindSplat(path);
+  if (IsFolder(found.path)) {
+    return Error{ErrorCode::kBadFile,
+                 Cat(path.string(),
+                     ": is a folder without a meta.json, a lod-meta.json or results of a trainer: expected a "
+                     "splat file, or the folder of one")};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(InputFile input, InputFile::Open(found));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(InputFile input, InputFile::Open(found.path));
+  if (!found.others.empty()) {
+    LogInfo(Cat(path.string(), ": its latest splat is read, ", found.path.string(), "; there are also ", found.others));
+  }
   return Of(std::move(input), format);
 }
 
-Result<OpenedSplat> OpenedSplat::Of(InputFile input, const SplatFormat* format) {
-  if (format == nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, input.Head(kSniffBytes));
-    format = FormatOfFile(head, input.path());
+Result<OpenedSplat> OpenedSplat::Of(InputFile input, const SplatFormat* format) try {
+  const uint64_t size = input.size();
+  if (size == 0) return Error{ErrorCode::kBadFile, Cat(input.name(), ": is empty, expected a splat file")};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(UnwrappedSplat found, Unwrap(std::move(input)));
+  InputFile& file = found.file;
+  if (file.size() == 0) return Error{ErrorCode::kBadFile, Cat(file.name(), ": is empty, expected a splat file")};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
+  if (const std::string what = WhatElse(head); !what.empty()) {
+    return Error{ErrorCode::kBadFile, Cat(file.name(), ": ", what, "; expected ", ReadFormats())};
   }
-  return OpenedSplat(std::move(input), format);
+  if (format == nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(format, FormatOfFile(file, found.name));
+  }
+  OpenedSplat opened(std::move(file), format);
+  opened.packed_ = std::move(found.packed);
+  if (!opened.packed_.empty()) opened.packed_bytes_ = size;
+  return opened;
+} catch (const NoDiskRoom& none) {
+  return Error{ErrorCode::kIo, Cat("there is no room for what is unpacked: ", none.what())};
+} catch (const std::bad_alloc&) {
+  return Error{ErrorCode::kIo, "there is not enough memory for what is unpacked"};
 }
 
 uint64_t OpenedSplat::bytes() const {
+  if (!packed_.empty()) return packed_bytes_;
   return format_ != nullptr && format_->size != nullptr ? format_->size(input_) : input_.size();
 }
 
@@ -89,9 +93,6 @@ std::optional<CloudExtent> OpenedSplat::Extent() const {
 Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits, ExtraProperties* extras) const try {
   if (format_ == nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, input_.Head(16));
-    if (const std::string kind = OtherKind(head); !kind.empty()) {
-      return Error{ErrorCode::kBadFile, Cat(input_.name(), ": is ", kind, " and no splat; expected ", ReadFormats())};
-    }
     return Error{ErrorCode::kBadFile, Cat(input_.name(), ": byte 0: is no splat file of a known format: found \"",
                                           Printable(head.substr(0, 8)), "\", expected ", ReadFormats())};
   }
@@ -112,8 +113,8 @@ Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits, ExtraPropertie
 }
 
 std::optional<CloudExtent> ExtentOf(const fs::path& path, const SplatFormat* format) {
-  if (path == "-" || !IsFile(SplatPath(path))) return std::nullopt;
-  const Result<OpenedSplat> file = OpenedSplat::Open(path, format);
+  if (path == "-" || !IsFile(SplatPath(path)) || IsWrapped(SplatPath(path))) return std::nullopt;
+  const Result<OpenedSplat> file = OpenedSplat::Open(SplatPath(path), format);
   return file.ok() ? file->Extent() : std::nullopt;
 }
 
@@ -130,11 +131,10 @@ void RecordSplat(const fs::path& path) {
   if (path == "-") return RecordInput(path);
   const fs::path found = SplatPath(path);
   RecordInput(found);
-  if (!IsFile(found)) return;  // a pipe can be read only once
-  const Result<OpenedSplat> file = OpenedSplat::Open(path);
-  if (!file.ok()) return;
-  const Result<std::string> head = file->input().Head(2);
-  if (head.ok() && *head != "PK") (void)file->bytes();  // looks at all of them; an archive has none, and would be read
+  // A pipe can be read only once. What is packed would be unpacked, and has nothing beside it as a rule.
+  if (!IsFile(found) || IsWrapped(found)) return;
+  const Result<OpenedSplat> file = OpenedSplat::Open(found);
+  if (file.ok()) (void)file->bytes();  // looks at all of them
 }
 
 }  // namespace anchorsplat

@@ -34,7 +34,17 @@ namespace anchorsplat {
 
 namespace {
 
-bool IsPly(std::string_view head) { return head.starts_with("ply\n") || head.starts_with("ply\r"); }
+bool IsPly(std::string_view head) {
+  return head.starts_with("ply") && head.find_first_of("\r\n") == head.find_first_not_of(" \t", 3);
+}
+
+// Whether it is the beginning of a JSON object, behind a byte order mark or blanks.
+bool IsJsonObject(std::string_view head) {
+  if (head.starts_with("\xef\xbb\xbf")) head.remove_prefix(3);
+  const size_t first = head.find_first_not_of(" \t\r\n");
+  return first != head.npos && head[first] == '{';
+}
+bool Has(std::string_view head, std::string_view key) { return head.find(key) != head.npos; }
 
 // PlayCanvas's packed PLY keeps the ranges of its chunks in an element before the vertices.
 bool IsCompressedPly(std::string_view head) { return IsPly(head) && head.find("\nelement chunk ") != head.npos; }
@@ -44,12 +54,11 @@ bool IsSpz(std::string_view head) { return head.starts_with("NGSP") || head.star
 
 // A ZIP archive, or the JSON file of a folder: the only one of our formats that speaks of means.
 bool IsSog(std::string_view head) {
-  return head.starts_with("PK\x03\x04") ||
-         (head.starts_with("{") && head.find("\"means\"") != head.npos && head.find("\"quats\"") != head.npos);
+  return head.starts_with("PK\x03\x04") || (IsJsonObject(head) && Has(head, "\"means\"") && Has(head, "\"quats\""));
 }
 
 // The JSON file that names the chunks of a scene.
-bool IsStreamedSog(std::string_view head) { return head.starts_with("{") && head.find("\"lodLevels\"") != head.npos; }
+bool IsStreamedSog(std::string_view head) { return IsJsonObject(head) && Has(head, "\"lodLevels\""); }
 
 // NumPy's archive: a ZIP archive whose first member, whatever its name, is an array.
 bool IsNpz(std::string_view head) {
@@ -60,6 +69,14 @@ bool IsNpz(std::string_view head) {
 }
 
 bool IsGltf(std::string_view head) { return head.starts_with("glTF"); }
+
+// Its keys come in any order; a SOG has an "asset", too.
+bool IsGltfJson(std::string_view head) {
+  return IsJsonObject(head) && !IsSog(head) &&
+         (Has(head, "\"accessors\"") || Has(head, "\"bufferViews\"") || Has(head, "\"KHR_gaussian_splatting"));
+}
+
+bool IsCsv(std::string_view head) { return head.starts_with("x,y,z,f_dc_0,"); }
 
 constexpr std::string_view kCompressedPlyExtensions[] = {".compressed.ply"};
 constexpr std::string_view kPlyExtensions[] = {".ply"};
@@ -139,6 +156,7 @@ constexpr SplatFormat kFormats[] = {
     {.name = "gsplat checkpoint",
      .extensions = kGsplatExtensions,
      .sniff = IsTorchCheckpoint,
+     .size = GsplatCheckpointSize,
      .read = ReadGsplatCheckpoint},
     {.name = "streamed SOG",
      .extensions = kStreamedSogExtensions,
@@ -178,6 +196,7 @@ constexpr SplatFormat kFormats[] = {
      .mean_loss = SogMeanLoss},
     {.name = "splat",
      .extensions = kSplatExtensions,
+     .looks_like = LooksLikeSplat,
      .extent = [](const InputFile& file) -> Result<CloudExtent> {
        return CloudExtent{static_cast<int64_t>(file.size() / kSplatRecord), 0};
      },
@@ -189,6 +208,7 @@ constexpr SplatFormat kFormats[] = {
      .range = kSplatRange},
     {.name = "ksplat",
      .extensions = kKsplatExtensions,
+     .looks_like = LooksLikeKsplat,
      .describe = DescribeKsplat,
      .read = ReadKsplat,
      .blocks = BlocksOfKsplat},
@@ -206,6 +226,7 @@ constexpr SplatFormat kFormats[] = {
      .keeps_origin = true},
     {.name = "glTF as JSON",
      .extensions = kGltfJsonExtensions,
+     .sniff = IsGltfJson,
      .describe = DescribeGltf,
      .size = GltfSize,
      .read = ReadGltf,
@@ -219,6 +240,7 @@ constexpr SplatFormat kFormats[] = {
      .keeps_origin = true},
     {.name = "CSV",
      .extensions = kCsvExtensions,
+     .sniff = IsCsv,
      .write = WriteCsv,
      .keeps_all_values = true,
      .predicted_size = EstimatedCsvSize,
@@ -263,6 +285,17 @@ const SplatFormat* FormatOfFile(std::string_view head, const std::filesystem::pa
     if (format.sniff != nullptr && format.sniff(head)) return &format;
   }
   return FormatOfExtension(path);
+}
+
+Result<const SplatFormat*> FormatOfFile(const InputFile& file, const std::filesystem::path& name) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
+  const SplatFormat* const found = FormatOfFile(head, name);
+  const auto is = [&](const SplatFormat& one) {
+    return one.sniff != nullptr ? one.sniff(head) : one.looks_like != nullptr && one.looks_like(file);
+  };
+  if (found == nullptr || is(*found)) return found;
+  const auto other = std::ranges::find_if(Formats(), is);
+  return other != Formats().end() ? &*other : found;
 }
 
 }  // namespace anchorsplat

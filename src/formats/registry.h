@@ -57,6 +57,9 @@ struct SplatFormat {
   // Whether a file that begins with `head` (its first kSniffBytes bytes, or all) is of this format. Null where the
   // format has no mark of its own: then the extension decides.
   bool (*sniff)(std::string_view head) = nullptr;
+  // Whether a file without any mark is of this format all the same, by what its beginning says of the rest. Asked where
+  // the name says a format that the file is not of. Null where `sniff` says it.
+  bool (*looks_like)(const InputFile& file) = nullptr;
   // How many Gaussians there are, by the header alone. Null where that is not known before the file is read.
   Result<CloudExtent> (*extent)(const InputFile& file) = nullptr;
   // What the file says about itself beside its Gaussians. Null where there is nothing.
@@ -113,6 +116,8 @@ std::span<const SplatFormat> Formats();
 
 // By content first and extension second; null when neither is known.
 const SplatFormat* FormatOfFile(std::string_view head, const std::filesystem::path& path);
+// The same of a file that is open, of which more can be asked. `name`: what tells its extension.
+Result<const SplatFormat*> FormatOfFile(const InputFile& file, const std::filesystem::path& name);
 const SplatFormat* FormatOfExtension(const std::filesystem::path& path);
 // By what people write for one: "spz", ".spz", ".compressed.ply", "meta.json"; null for what is none.
 const SplatFormat* FormatOfName(std::string_view name);

@@ -55,7 +55,7 @@ Result<ImageSize> ReadImageSize(const std::filesystem::path& path) {
 }
 
 Status WritePng(const std::filesystem::path& path, const Image& image, const WriteOptions& options) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   auto bytes = EncodePng(image);
   if (!bytes.ok()) return Error{bytes.error().code, Cat(path.string(), ": ", bytes.error().message)};
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(*bytes));

@@ -118,6 +118,10 @@ Result<OutputFile> OutputFile::Create(const fs::path& path, bool overwrite, Outp
     file.bytes_ = std::make_unique<MemoryBytes>();
     return file;
   }
+  if (path == "-") {
+    return Error{ErrorCode::kBadArgument,
+                 "-: this is not written to standard output; give it a name (./- is a file called so)"};
+  }
 
   mode_t mode = 0666;  // less the umask, like any new file
   struct stat info {};

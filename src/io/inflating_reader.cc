@@ -4,10 +4,11 @@
 #include <zstd.h>
 
 #include <algorithm>
-#include <limits>
 #include <new>
+#include <string>
 
 #include "core/text.h"
+#include "io/little_endian.h"
 
 namespace anchorsplat {
 
@@ -35,9 +36,19 @@ class Input {
     return size;
   }
   const uint8_t* block() const { return block_.get(); }
-  Error Bad(size_t left, const std::string& what) const {
+
+  // Where the last `unused` bytes of the block have not been used: bytes behind, their first four as a number, fewer
+  // padded with zeros, and an error there.
+  uint64_t BytesBehind(size_t unused) const { return end_ - next_ + unused; }
+  Result<uint32_t> Mark(size_t unused) const {
+    uint8_t bytes[4] = {};
+    const auto size = static_cast<size_t>(std::min<uint64_t>(sizeof bytes, BytesBehind(unused)));
+    ANCHORSPLAT_RETURN_IF_ERROR(file_->ReadAt(next_ - unused, bytes, size));
+    return LoadLittle<uint32_t>(bytes);
+  }
+  Error Bad(size_t unused, const std::string& what) const {
     return {ErrorCode::kBadFile,
-            Cat(file_->name(), ": byte ", WithThousands(static_cast<int64_t>(next_ - left)), ": ", what)};
+            Cat(file_->name(), ": byte ", WithThousands(static_cast<int64_t>(next_ - unused)), ": ", what)};
   }
 
  private:
@@ -62,58 +73,37 @@ class GzipReader : public CopyableReader {
 
   std::unique_ptr<CopyableReader> Copy() const override { return std::make_unique<GzipReader>(*this); }
 
-  Status Read(void* out, size_t size) override {
-    auto* to = static_cast<Bytef*>(out);
-    while (size > 0) {
+  Result<size_t> ReadSome(void* out, size_t size) override {
+    constexpr uint32_t kGzip = 0x8b1f;
+    size_t done = 0;
+    while (done < size && !ended_) {
       if (stream_.avail_in == 0) {
         ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t filled, input_.Fill());
         if (filled == 0) return input_.Bad(0, "the file ends before its gzip stream does");
         stream_.next_in = const_cast<Bytef*>(input_.block());
         stream_.avail_in = static_cast<uInt>(filled);
       }
-      const auto chunk = static_cast<uInt>(std::min<size_t>(size, size_t{1} << 30));
-      stream_.next_out = to;
+      const auto chunk = static_cast<uInt>(std::min<size_t>(size - done, size_t{1} << 30));
+      stream_.next_out = static_cast<Bytef*>(out) + done;
       stream_.avail_out = chunk;
-      const int code = ended_ ? Z_STREAM_END : inflate(&stream_, Z_NO_FLUSH);
-      to += chunk - stream_.avail_out;
-      size -= chunk - stream_.avail_out;
-      if (code == Z_STREAM_END && size > 0) {
-        return input_.Bad(stream_.avail_in, "the gzip stream ends before its data does");
+      const int code = inflate(&stream_, Z_NO_FLUSH);
+      done += chunk - stream_.avail_out;
+      if (code == Z_STREAM_END) {
+        ANCHORSPLAT_ASSIGN_OR_RETURN(const uint32_t next, input_.Mark(stream_.avail_in));
+        ended_ = (next & 0xffff) != kGzip;
+        if (!ended_) inflateReset(&stream_);
+      } else if (code != Z_OK && code != Z_BUF_ERROR) {
+        return Bad("", Cat(" is damaged", stream_.msg != nullptr ? Cat(" (", stream_.msg, ")") : std::string()));
       }
-      ended_ = code == Z_STREAM_END;
-      if (code != Z_OK && code != Z_STREAM_END && code != Z_BUF_ERROR) return Damaged();
     }
-    return {};
+    return done;
   }
 
-  Status ExpectEnd() override {
-    Bytef beyond = 0;
-    while (!ended_) {
-      if (stream_.avail_in == 0) {
-        ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t filled, input_.Fill());
-        if (filled == 0) return input_.Bad(0, "the file ends before its gzip stream does");
-        stream_.next_in = const_cast<Bytef*>(input_.block());
-        stream_.avail_in = static_cast<uInt>(filled);
-      }
-      stream_.next_out = &beyond;
-      stream_.avail_out = 1;
-      const int code = inflate(&stream_, Z_NO_FLUSH);
-      if (code != Z_OK && code != Z_STREAM_END && code != Z_BUF_ERROR) return Damaged();
-      if (stream_.avail_out == 0) return input_.Bad(stream_.avail_in, "the gzip stream goes on behind its data");
-      ended_ = code == Z_STREAM_END;
-    }
-    if (stream_.avail_in == 0) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t filled, input_.Fill());
-      stream_.avail_in = static_cast<uInt>(filled);
-    }
-    if (stream_.avail_in > 0) return input_.Bad(stream_.avail_in, "there are bytes behind the gzip stream");
-    return {};
-  }
+  uint64_t BytesBehind() const override { return input_.BytesBehind(stream_.avail_in); }
 
  private:
-  Error Damaged() const {
-    return input_.Bad(stream_.avail_in, Cat("the gzip stream is damaged",
-                                            stream_.msg != nullptr ? Cat(" (", stream_.msg, ")") : std::string()));
+  Error Bad(std::string_view before, std::string_view after) const override {
+    return input_.Bad(stream_.avail_in, Cat(before, "the gzip stream", after));
   }
 
   Input input_;
@@ -131,47 +121,85 @@ class ZstdReader : public InflatingReader {
   ZstdReader& operator=(const ZstdReader&) = delete;
   ~ZstdReader() override { ZSTD_freeDCtx(context_); }
 
-  Status Read(void* out, size_t size) override {
+  Result<size_t> ReadSome(void* out, size_t size) override {
     ZSTD_outBuffer to{out, size, 0};
     while (to.pos < to.size) {
+      if (!in_frame_) {
+        ANCHORSPLAT_ASSIGN_OR_RETURN(const uint32_t next, input_.Mark(unused()));
+        // After the first frame, of which the library says what is wrong, what is no frame is not of the data.
+        const bool is_frame =
+            next == ZSTD_MAGICNUMBER || (next & ZSTD_MAGIC_SKIPPABLE_MASK) == ZSTD_MAGIC_SKIPPABLE_START;
+        if (!is_frame && any_frame_) break;
+        in_frame_ = any_frame_ = true;
+      }
       const size_t before = to.pos;
       const size_t code = ZSTD_decompressStream(context_, &to, &from_);
-      if (ZSTD_isError(code) != 0) return Damaged(code);
-      if (to.pos == to.size) break;
-      if (from_.pos < from_.size || to.pos > before) continue;
+      if (ZSTD_isError(code) != 0) return Bad("", Cat(" is damaged (", ZSTD_getErrorName(code), ")"));
+      in_frame_ = code != 0;
+      if (!in_frame_ || from_.pos < from_.size || to.pos > before) continue;
       ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t filled, input_.Fill());
-      if (filled == 0) return input_.Bad(0, "the zstd stream ends before its data does");
+      if (filled == 0) return Bad("", " is cut off");
       from_ = {input_.block(), filled, 0};
     }
-    return {};
+    return to.pos;
   }
 
-  Status ExpectEnd() override {
-    uint8_t beyond = 0;
-    for (;;) {
-      if (from_.pos == from_.size) {
-        ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t filled, input_.Fill());
-        if (filled == 0) return {};
-        from_ = {input_.block(), filled, 0};
-      }
-      ZSTD_outBuffer to{&beyond, 1, 0};
-      const size_t code = ZSTD_decompressStream(context_, &to, &from_);
-      if (ZSTD_isError(code) != 0) return Damaged(code);
-      if (to.pos > 0) return input_.Bad(from_.size - from_.pos, "the zstd stream goes on behind its data");
-    }
-  }
+  uint64_t BytesBehind() const override { return input_.BytesBehind(unused()); }
 
  private:
-  Error Damaged(size_t code) const {
-    return input_.Bad(from_.size - from_.pos, Cat("the zstd stream is damaged (", ZSTD_getErrorName(code), ")"));
+  size_t unused() const { return from_.size - from_.pos; }
+  Error Bad(std::string_view before, std::string_view after) const override {
+    return input_.Bad(unused(), Cat(before, "the zstd stream", after));
   }
 
   Input input_;
   ZSTD_DCtx* context_;
   ZSTD_inBuffer from_{nullptr, 0, 0};
+  bool in_frame_ = false, any_frame_ = false;
+};
+
+class PlainReader : public CopyableReader {
+ public:
+  PlainReader(const InputFile& file, uint64_t begin) : file_(&file), next_(begin) {}
+
+  std::unique_ptr<CopyableReader> Copy() const override { return std::make_unique<PlainReader>(*this); }
+
+  Result<size_t> ReadSome(void* out, size_t size) override {
+    const auto some = static_cast<size_t>(std::min<uint64_t>(size, file_->size() - next_));
+    ANCHORSPLAT_RETURN_IF_ERROR(file_->ReadAt(next_, out, some));
+    next_ += some;
+    return some;
+  }
+
+  uint64_t BytesBehind() const override { return file_->size() - next_; }
+
+ private:
+  Error Bad(std::string_view before, std::string_view after) const override {
+    return {ErrorCode::kBadFile,
+            Cat(file_->name(), ": byte ", WithThousands(static_cast<int64_t>(next_)), ": ", before, "the file", after)};
+  }
+
+  const InputFile* file_;
+  uint64_t next_;
 };
 
 }  // namespace
+
+Status InflatingReader::Read(void* out, size_t size) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t read, ReadSome(out, size));
+  return read == size ? Status() : Status(Bad("", " ends before its data does"));
+}
+
+Status InflatingReader::ExpectEnd() {
+  uint8_t beyond = 0;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t read, ReadSome(&beyond, 1));
+  if (read > 0) return Bad("", " goes on behind its data");
+  return BytesBehind() == 0 ? Status() : Status(Bad("there are bytes behind ", ""));
+}
+
+std::unique_ptr<CopyableReader> OpenPlain(const InputFile& file, uint64_t begin) {
+  return std::make_unique<PlainReader>(file, begin);
+}
 
 std::unique_ptr<CopyableReader> OpenGzip(const InputFile& file, uint64_t begin) {
   return std::make_unique<GzipReader>(file, begin);

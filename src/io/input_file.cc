@@ -40,8 +40,8 @@ void AwaitPipe(int descriptor) {
   }
 }
 
-Result<std::string> ReadPipe(int descriptor, const std::string& name) {
-  std::string bytes;
+Result<Buffer<char>> ReadPipe(int descriptor, const std::string& name) {
+  Buffer<char> bytes;
   for (;;) {
     AwaitPipe(descriptor);
     const size_t had = bytes.size();
@@ -61,8 +61,9 @@ Result<std::string> ReadPipe(int descriptor, const std::string& name) {
 Result<InputFile> InputFile::Open(const std::filesystem::path& path) {
   InputFile file;
   file.path_ = path;
+  file.name_ = path.string();
   file.has_folder_ = true;
-  const std::string name = path.string();
+  const std::string& name = file.name_;
   // Opening a pipe without a writer would wait for one without an end; its reading looks up meanwhile.
   do {
     file.descriptor_ = path == "-" ? ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)
@@ -80,9 +81,9 @@ Result<InputFile> InputFile::Open(const std::filesystem::path& path) {
   if (S_ISDIR(info.st_mode)) return Error{ErrorCode::kIo, Cat(name, ": is a folder, expected a file")};
   if (S_ISFIFO(info.st_mode) || S_ISSOCK(info.st_mode)) {
     if (path != "-") ::fcntl(file.descriptor_, F_SETFL, ::fcntl(file.descriptor_, F_GETFL) & ~O_NONBLOCK);
-    ANCHORSPLAT_ASSIGN_OR_RETURN(file.owned_, ReadPipe(file.descriptor_, name));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(Buffer<char> bytes, ReadPipe(file.descriptor_, name));
     ::close(std::exchange(file.descriptor_, -1));
-    file.size_ = file.owned_.size();
+    file.Own(std::move(bytes));
     return file;
   }
   if (!S_ISREG(info.st_mode)) return Error{ErrorCode::kIo, Cat(name, ": is a device, expected a file")};
@@ -91,19 +92,35 @@ Result<InputFile> InputFile::Open(const std::filesystem::path& path) {
   return file;
 }
 
+template <typename Bytes>
+void InputFile::Own(Bytes bytes) {
+  const auto kept = std::make_shared<const Bytes>(std::move(bytes));
+  memory_ = std::string_view(kept->data(), kept->size());
+  size_ = memory_.size();
+  owner_ = kept;
+}
+
 InputFile InputFile::FromBytes(std::string name, std::string bytes) {
-  InputFile file;
-  file.path_ = std::move(name);
-  file.size_ = bytes.size();
-  file.owned_ = std::move(bytes);
+  InputFile file = View(std::move(name), {});
+  file.Own(std::move(bytes));
   return file;
 }
 
 InputFile InputFile::View(std::string name, std::string_view bytes) {
   InputFile file;
-  file.path_ = std::move(name);
+  file.path_ = name;
+  file.name_ = std::move(name);
   file.size_ = bytes.size();
-  file.borrowed_ = bytes;
+  file.memory_ = bytes;
+  return file;
+}
+
+InputFile InputFile::Inside(const InputFile& outer, std::string name, Buffer<char> bytes) {
+  InputFile file;
+  file.path_ = outer.path_;
+  file.name_ = std::move(name);
+  file.has_folder_ = outer.has_folder_;
+  file.Own(std::move(bytes));
   return file;
 }
 
@@ -122,9 +139,10 @@ InputFile& InputFile::operator=(InputFile&& other) noexcept {
   if (descriptor_ >= 0) ::close(descriptor_);
   path_ = std::move(other.path_);
   descriptor_ = std::exchange(other.descriptor_, -1);
+  name_ = std::move(other.name_);
   has_folder_ = other.has_folder_;
-  owned_ = std::move(other.owned_);
-  borrowed_ = std::exchange(other.borrowed_, {});
+  memory_ = std::exchange(other.memory_, {});
+  owner_ = std::move(other.owner_);
   size_ = std::exchange(other.size_, 0);
   kept_ = std::move(other.kept_);
   return *this;
@@ -137,7 +155,7 @@ InputFile::~InputFile() {
 Status InputFile::ReadAt(uint64_t offset, void* out, size_t size) const {
   if (offset > size_ || size > size_ - offset) return EndsBefore(name(), size_);
   if (descriptor_ < 0) {
-    if (size > 0) std::memcpy(out, memory().data() + offset, size);
+    if (size > 0) std::memcpy(out, memory_.data() + offset, size);
     return {};
   }
   char* to = static_cast<char*>(out);
@@ -168,7 +186,7 @@ Result<std::string> InputFile::ReadAll(uint64_t max_size) const {
 }
 
 Result<std::string_view> InputFile::Whole(uint64_t max_size) const {
-  if (descriptor_ < 0 && size_ <= max_size) return memory();
+  if (descriptor_ < 0 && size_ <= max_size) return memory_;
   const std::lock_guard lock(kept_->mutex);
   if (!kept_->bytes) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(kept_->bytes, ReadAll(max_size));

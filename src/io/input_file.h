@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/buffer.h"
 #include "core/result.h"
 
 namespace anchorsplat {
@@ -25,6 +26,8 @@ class InputFile {
   static InputFile FromBytes(std::string name, std::string bytes);
   // The same of bytes that stay where they are as long as the file.
   static InputFile View(std::string name, std::string_view bytes);
+  // What `outer` holds, taken out of it: messages call it `name`, and what lies beside `outer` lies beside it.
+  static InputFile Inside(const InputFile& outer, std::string name, Buffer<char> bytes);
 
   InputFile(InputFile&& other) noexcept;
   InputFile& operator=(InputFile&& other) noexcept;
@@ -34,9 +37,10 @@ class InputFile {
   // this one is bytes in memory, beside which there are no files.
   Result<InputFile> OpenBeside(const std::filesystem::path& name) const;
 
+  bool has_folder() const { return has_folder_; }  // whether there are files beside it
   const std::filesystem::path& path() const { return path_; }
-  std::string name() const { return path_.string(); }  // for messages
-  uint64_t size() const { return size_; }              // bytes, when it was opened
+  std::string name() const { return name_; }  // for messages
+  uint64_t size() const { return size_; }     // bytes, when it was opened
 
   // Exactly `size` bytes from `offset`. kBadFile when the file ends before (it may have been cut since it was opened).
   Status ReadAt(uint64_t offset, void* out, size_t size) const;
@@ -50,13 +54,15 @@ class InputFile {
 
  private:
   InputFile() = default;
-  std::string_view memory() const { return owned_.empty() ? borrowed_ : std::string_view(owned_); }
+  template <typename Bytes>
+  void Own(Bytes bytes);
 
   std::filesystem::path path_;
+  std::string name_;
   int descriptor_ = -1;      // −1: the bytes are in memory
   bool has_folder_ = false;  // it was opened by its path
-  std::string owned_;
-  std::string_view borrowed_;  // where nothing is owned
+  std::string_view memory_;
+  std::shared_ptr<const void> owner_;  // of them; null: somebody else
   uint64_t size_ = 0;
   struct Kept {
     std::mutex mutex;

@@ -45,7 +45,7 @@ uint32_t Crc(uint32_t crc, std::string_view bytes) {
 }
 
 // The whole of a raw deflate stream, which must make exactly contents.size() bytes.
-bool Inflate(std::span<const std::byte> packed, std::string& contents) {
+bool Inflate(std::span<const std::byte> packed, std::span<char> contents) {
   z_stream stream{};
   if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw std::bad_alloc();
   constexpr size_t kMost = size_t{1} << 30;
@@ -97,7 +97,8 @@ std::vector<std::string> ZipReader::Members() const {
   return names;
 }
 
-Result<std::string> ZipReader::Read(const std::string& member, uint64_t max_size) const {
+template <typename Bytes>
+Result<Bytes> ZipReader::ContentsOf(const std::string& member, uint64_t max_size) const {
   const std::string where = Cat(name_, ": ", Printable(member));
   const auto entry = std::ranges::find(entries_, member, &ZipEntry::name);
   if (entry == entries_.end()) return Error{ErrorCode::kBadFile, Cat(where, ": is not in the archive")};
@@ -105,9 +106,10 @@ Result<std::string> ZipReader::Read(const std::string& member, uint64_t max_size
     return Error{ErrorCode::kBadFile,
                  Cat(where, ": has ", HumanBytes(entry->size), ", at most ", HumanBytes(max_size), " expected")};
   }
-  std::string contents;
+  Bytes contents;
   if (entry->method == 0) {
-    contents.assign(reinterpret_cast<const char*>(entry->data.data()), entry->data.size());
+    const auto* const data = reinterpret_cast<const char*>(entry->data.data());
+    contents.assign(data, data + entry->data.size());
   } else if (entry->method == 8) {
     ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(where, entry->data.size(), entry->size));
     contents.resize(static_cast<size_t>(entry->size));
@@ -115,10 +117,18 @@ Result<std::string> ZipReader::Read(const std::string& member, uint64_t max_size
   } else {
     return Error{ErrorCode::kBadFile, Cat(where, ": is compressed by method ", entry->method, ", expected 0 or 8")};
   }
-  if (Crc(0, contents) != entry->crc) {
+  if (Crc(0, std::string_view(contents.data(), contents.size())) != entry->crc) {
     return Error{ErrorCode::kBadFile, Cat(where, ": is damaged: its check sum is another")};
   }
   return contents;
+}
+
+Result<std::string> ZipReader::Read(const std::string& member, uint64_t max_size) const {
+  return ContentsOf<std::string>(member, max_size);
+}
+
+Result<Buffer<char>> ZipReader::ReadLarge(const std::string& member, uint64_t max_size) const {
+  return ContentsOf<Buffer<char>>(member, max_size);
 }
 
 Status ZipWriter::Add(const std::string& name, std::span<const std::string_view> parts) {

@@ -116,7 +116,7 @@ Result<Converted> ConvertAndMeasure(const std::filesystem::path& input, const st
   Converted done;
   ANCHORSPLAT_ASSIGN_OR_RETURN(done.report, ConvertFile(input, output, options, options.measure ? &cloud : nullptr));
   if (done.report.error) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadBack(output, *FormatOfExtension(output), cloud));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadBack(output, options.write, cloud));
     ANCHORSPLAT_ASSIGN_OR_RETURN(done.loss, MeasureConversionLoss(cloud, back, views));
   } else if (options.measure) {
     LogWarning(Cat(output.string(), ": ", done.report.output_format,

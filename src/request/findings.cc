@@ -18,6 +18,7 @@
 #include "enhance/network_choice.h"
 #include "enhance/showing_gaussians.h"
 #include "enhance/soft_pictures.h"
+#include "formats/gsplat_checkpoint/gsplat_checkpoint.h"
 #include "formats/registry.h"
 #include "io/input_file.h"
 #include "model/compact/compact_network.h"
@@ -205,6 +206,7 @@ Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& n
   if (file.format()->describe != nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(findings.facts, file.format()->describe(file.input()));
   }
+  if (!file.packed().empty()) findings.facts.Add("packed", file.packed());
   return findings;
 }
 
@@ -307,7 +309,7 @@ bool LooksLikeNetwork(const std::filesystem::path& path) {
   const auto beginning = in.ok() ? in->Head(16) : Result<std::string>(in.error());
   if (!beginning.ok() || !LooksLikeTensorFile(std::as_bytes(std::span(*beginning)))) return false;
   const auto file = TensorFile::Open(path);
-  if (file.ok()) return file->Find("splats.means") == nullptr;
+  if (file.ok()) return !HoldsGaussians(*file);
   const std::filesystem::path extension = path.extension();
   return extension == ".pth" || extension == ".safetensors";  // a broken one
 }

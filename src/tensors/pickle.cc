@@ -112,6 +112,15 @@ class PickleMachine {
     ANCHORSPLAT_RETURN_IF_ERROR(Read(length));
     return MakeText(uint64_t{length});
   }
+  template <typename Length>
+  Status MakeBytes() {
+    Length length = 0;
+    ANCHORSPLAT_RETURN_IF_ERROR(Read(length));
+    std::string_view ignored;
+    ANCHORSPLAT_RETURN_IF_ERROR(ReadView(uint64_t{length}, ignored));
+    Make(PickleKind::kNumpy);
+    return {};
+  }
   template <typename T>
   Status MakeInt() {
     T value = 0;
@@ -320,16 +329,21 @@ class PickleMachine {
         }
         stack_.push_back(arguments[0]);
         return {};
+      case PickleRole::kNumpy:
+        Make(PickleKind::kNumpy);
+        return {};
       default:
         return Bad(Cat("a call of \"", callee->module, ".", callee->name, "\""));
     }
   }
 
-  // Attributes of an object. OrderedDict has them for `_metadata`, module versions that no tensor depends on.
+  // Attributes of an object. OrderedDict has them for `_metadata`, module versions that no tensor depends on; NumPy's
+  // types for their byte order.
   Status Build() {
     if (Available() < 2) return Underflow();
     Pop();
-    if (Value(stack_.back()).kind != PickleKind::kDict) return Bad("attributes for something that has none");
+    const PickleKind kind = Value(stack_.back()).kind;
+    if (kind != PickleKind::kDict && kind != PickleKind::kNumpy) return Bad("attributes for something that has none");
     return {};
   }
 
@@ -378,6 +392,10 @@ class PickleMachine {
         return MakeText<uint64_t>();
       case 'T':  // BINSTRING
         return MakeText<uint32_t>();
+      case 'C':  // SHORT_BINBYTES
+        return MakeBytes<uint8_t>();
+      case 'B':  // BINBYTES
+        return MakeBytes<uint32_t>();
       case ')':  // EMPTY_TUPLE
         return MakeTuple(0);
       case 0x85:  // TUPLE1 to TUPLE3

@@ -14,7 +14,7 @@
 namespace anchorsplat {
 
 // A pickle as torch.save writes it, read as *data*: nothing is imported and nothing is called. Of Python's objects only
-// None, bools, numbers, strings, tuples, lists, dictionaries and PyTorch's tensors exist here.
+// None, bools, numbers, strings, tuples, lists, dictionaries, PyTorch's tensors and NumPy's numbers exist here.
 
 enum class PickleKind : uint8_t {
   kNone,
@@ -29,6 +29,7 @@ enum class PickleKind : uint8_t {
   kGlobal,   // an allowed class, function or dtype that is mentioned, not used
   kStorage,  // integer: index in PickleDocument::storages
   kTensor,   // integer: index in PickleDocument::tensors
+  kNumpy,    // a number or a type of NumPy, or their bytes, as learning rates are: nothing that weights depend on
 };
 
 struct PickleValue {

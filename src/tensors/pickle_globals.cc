@@ -6,6 +6,10 @@ namespace {
 
 constexpr PickleGlobal kAllowed[] = {
     {"collections", "OrderedDict", PickleRole::kOrderedDict},
+    {"numpy", "dtype", PickleRole::kNumpy},
+    {"numpy.core.multiarray", "scalar", PickleRole::kNumpy},
+    {"numpy._core.multiarray", "scalar", PickleRole::kNumpy},
+    {"_codecs", "encode", PickleRole::kNumpy},  // of bytes in protocol 2
     {"torch._utils", "_rebuild_tensor_v2", PickleRole::kRebuildTensorV2},
     {"torch._utils", "_rebuild_tensor_v3", PickleRole::kRebuildTensorV3},
     {"torch._utils", "_rebuild_parameter", PickleRole::kRebuildParameter},

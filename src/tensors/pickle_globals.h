@@ -14,6 +14,7 @@ enum class PickleRole {
   kStorageType,
   kUntypedStorage,
   kDtype,
+  kNumpy,  // makes a PickleKind::kNumpy
 };
 
 // A name of Python that a checkpoint may mention. None is imported or called: each stands for a shape of data.

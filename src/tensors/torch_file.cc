@@ -84,6 +84,7 @@ class ContentsBuilder {
       case PickleKind::kBigInt:
       case PickleKind::kGlobal:
       case PickleKind::kStorage:
+      case PickleKind::kNumpy:
         return {};  // nothing that a reader of weights could use
     }
     return {};

@@ -274,6 +274,7 @@ std::vector<std::string_view> TorchWords() {
           "system",
           "ctorch\nDoubleStorage\n",
           "ccollections\nOrderedDict\n)R",
+          "cnumpy\ndtype\n)R",
           "(",
           "Q",
           "R",

@@ -1,15 +1,23 @@
 #include "formats/gsplat_checkpoint/gsplat_checkpoint.h"
 
 #include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <limits>
 #include <optional>
+#include <set>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "core/activations.h"
+#include "core/log.h"
 #include "core/parallel.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
+#include "formats/wrapped_splat.h"
+#include "io/input_record.h"
 #include "tensors/tensor_file.h"
 
 namespace anchorsplat {
@@ -26,25 +34,36 @@ std::optional<int> DegreeOf(int64_t rest_coefficients) {
 // How a trainer calls the tensors of Gaussians, and where their shapes differ.
 struct Names {
   const char* prefix;
+  const char *means, *scales, *quats, *opacities;
   const char* constant;  // of spherical harmonics
   const char* rest;
   bool flat_opacities;      // [N], not [N,1]
   bool flat_constant;       // [N,3], not [N,1,3]
   bool degree_0_is_logits;  // without view-dependent colour the constant is the colour's logit
+  bool by_place;            // names are numbers, which say little by themselves: shapes are looked at, too
 };
 constexpr Names kNames[] = {
-    {"splats.", "sh0", "shN", true, false, false},
-    {"pipeline._model.gauss_params.", "features_dc", "features_rest", false, true, true},
-    {"pipeline._model.", "features_dc", "features_rest", false, true, true},  // nerfstudio before 1.0
+    {"splats.", "means", "scales", "quats", "opacities", "sh0", "shN", true, false, false, false},
+    {"pipeline._model.gauss_params.", "means", "scales", "quats", "opacities", "features_dc", "features_rest", false,
+     true, true, false},
+    {"pipeline._model.", "means", "scales", "quats", "opacities", "features_dc", "features_rest", false, true, true,
+     false},  // nerfstudio before 1.0
+    // INRIA's torch.save((gaussians.capture(), iteration)): places of a tuple, in one beside the iteration or alone.
+    {"0.", "1", "4", "5", "6", "2", "3", false, false, false, true},
+    {"", "1", "4", "5", "6", "2", "3", false, false, false, true},
 };
 
 // Null: of none of them.
 const Names* NamesIn(const TensorFile& file) {
   for (const Names& names : kNames) {
-    const std::string means = std::string(names.prefix) + "means";
-    if (file.Find(means) != nullptr &&
-        (file.Find(std::string(names.prefix) + names.rest) != nullptr || names.flat_opacities))
-      return &names;
+    const auto find = [&](const char* tensor) { return file.Find(Cat(names.prefix, tensor)); };
+    const TensorEntry *const means = find(names.means), *const rest = find(names.rest);
+    const TensorEntry* const quats = find(names.quats);
+    if (!names.by_place && means != nullptr && (rest != nullptr || names.flat_opacities)) return &names;
+    const auto has = [](const TensorEntry* entry, size_t rank, int64_t last) {
+      return entry != nullptr && entry->shape.size() == rank && entry->shape.back() == last;
+    };
+    if (names.by_place && has(means, 2, 3) && has(rest, 3, 3) && has(quats, 2, 4)) return &names;
   }
   return nullptr;
 }
@@ -60,7 +79,12 @@ bool IsTorchCheckpoint(std::string_view head) {
   return head.starts_with("\x80\x02\x8a\x0a\x6c\xfc\x9c\x46");  // protocol 2, then the magic number
 }
 
-Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& input, const ReadLimits& limits) {
+bool HoldsGaussians(const TensorFile& file) { return NamesIn(file) != nullptr; }
+
+namespace {
+
+// Those of one file.
+Result<GaussianCloud> ReadPart(const InputFile& input, const ReadLimits& limits) {
   const auto bad = [&](const std::string& what) { return Error{ErrorCode::kBadFile, Cat(input.name(), ": ", what)}; };
   Buffer<std::byte> bytes(static_cast<size_t>(input.size()));
   ANCHORSPLAT_RETURN_IF_ERROR(input.ReadAt(0, bytes.data(), bytes.size()));
@@ -70,11 +94,10 @@ Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& input, const ReadLim
   if (names == nullptr) {
     return bad(
         "is a PyTorch checkpoint, but neither one of gsplat with Gaussians (no tensor \"means\" in \"splats\") nor one "
-        "of "
-        "nerfstudio's splatfacto");
+        "of nerfstudio's splatfacto or INRIA's trainer");
   }
   const auto called = [&](const char* name) { return Cat(names->prefix, name); };
-  const TensorEntry* const means = file.Find(called("means"));
+  const TensorEntry* const means = file.Find(called(names->means));
   const int64_t n = means->shape.empty() ? 0 : means->shape[0];
   if (n == 0) return bad("holds no Gaussians");
   if (n > limits.max_gaussians) {
@@ -91,11 +114,16 @@ Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& input, const ReadLim
   // All shapes are checked before the cloud is allocated: N is only believed when six tensors really have it.
   using Shape = std::vector<int64_t>;
   const int64_t rest_coefficients = ShCoefficients(*degree) - 1;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values centres, file.ReadFloat32(called("means"), Shape{n, 3}));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values scales, file.ReadFloat32(called("scales"), Shape{n, 3}));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values quats, file.ReadFloat32(called("quats"), Shape{n, 4}));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values opacities,
-                               file.ReadFloat32(called("opacities"), names->flat_opacities ? Shape{n} : Shape{n, 1}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values centres, file.ReadFloat32(called(names->means), Shape{n, 3}));
+  // 2DGS has two scales: surfels, whose third axis is the normal.
+  const TensorEntry* const scale_entry = file.Find(called(names->scales));
+  const bool surfels = scale_entry != nullptr && scale_entry->shape == Shape{n, 2};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values scales,
+                               file.ReadFloat32(called(names->scales), Shape{n, surfels ? 2 : 3}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values quats, file.ReadFloat32(called(names->quats), Shape{n, 4}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      const Float32Values opacities,
+      file.ReadFloat32(called(names->opacities), names->flat_opacities ? Shape{n} : Shape{n, 1}));
   ANCHORSPLAT_ASSIGN_OR_RETURN(
       const Float32Values sh0,
       file.ReadFloat32(called(names->constant), names->flat_constant ? Shape{n, 3} : Shape{n, 1, 3}));
@@ -105,7 +133,14 @@ Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& input, const ReadLim
   GaussianCloud cloud;
   cloud.Resize(n, *degree);
   Copy(centres, cloud.means);
-  Copy(scales, cloud.log_scales);
+  if (surfels) {
+    for (size_t i = 0; i < static_cast<size_t>(n); ++i) {
+      std::copy_n(scales.values().data() + 2 * i, 2, cloud.log_scales.data() + 3 * i);
+      cloud.log_scales[3 * i + 2] = -std::numeric_limits<float>::infinity();
+    }
+  } else {
+    Copy(scales, cloud.log_scales);
+  }
   Copy(quats, cloud.quats);
   Copy(opacities, cloud.opacity_logits);
   const int64_t rest_stride = 3 * rest_coefficients;
@@ -124,6 +159,94 @@ Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& input, const ReadLim
     for (float& value : cloud.sh) value = DcFromColor(Sigmoid(value));
   }
   return cloud;
+}
+
+// "ckpt_29999_rank" and ".pt" around the number of a process, by which a trainer calls the file of its part.
+struct RankName {
+  std::string before, after;
+  int rank = 0;
+};
+
+std::optional<RankName> RankOf(const std::string& name) {
+  constexpr std::string_view kRank = "_rank";
+  const size_t at = name.rfind(kRank);
+  if (at == name.npos) return std::nullopt;
+  const char* const begin = name.data() + at + kRank.size();
+  RankName found{name.substr(0, at + kRank.size()), {}, 0};
+  const auto [end, failed] = std::from_chars(begin, name.data() + name.size(), found.rank);
+  if (failed != std::errc() || found.rank < 0 || *end != '.') return std::nullopt;
+  found.after = end;
+  return found;
+}
+
+// Numbers of the files beside this one that are parts of the same splat, and its own; just that where its name says
+// nothing of parts.
+std::set<int> RanksBeside(const InputFile& input, const RankName& own) {
+  std::set<int> ranks = {own.rank};
+  std::error_code failed;
+  const std::filesystem::path parent = input.path().parent_path();
+  std::filesystem::directory_iterator entry(parent.empty() ? "." : parent, failed), end;
+  for (; !failed && entry != end; entry.increment(failed)) {
+    const std::optional<RankName> other = RankOf(entry->path().filename().string());
+    if (other && other->before == own.before && other->after == own.after) ranks.insert(other->rank);
+  }
+  return ranks;
+}
+
+constexpr const char* kAlone = "; under a name without \"_rank\" a file is read alone";
+
+std::string NameOf(const RankName& own, int rank) { return Cat(own.before, rank, own.after); }
+
+}  // namespace
+
+Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& input, const ReadLimits& limits) {
+  const std::optional<RankName> own = input.has_folder() ? RankOf(input.path().filename().string()) : std::nullopt;
+  const std::set<int> ranks = own ? RanksBeside(input, *own) : std::set<int>{0};
+  if (!own || ranks == std::set<int>{0}) return ReadPart(input, limits);
+  int expected = 0;
+  for (const int rank : ranks) {
+    if (rank == expected++) continue;
+    return Error{ErrorCode::kBadFile, Cat(input.name(), ": is a part of a splat, of which ", NameOf(*own, expected - 1),
+                                          " is missing beside it", kAlone)};
+  }
+  GaussianCloud cloud;
+  for (const int rank : ranks) {
+    ReadLimits left = limits;
+    left.max_gaussians -= cloud.size();
+    const auto read = [&]() -> Result<GaussianCloud> {
+      if (rank == own->rank) return ReadPart(input, left);
+      ANCHORSPLAT_ASSIGN_OR_RETURN(InputFile file, input.OpenBeside(NameOf(*own, rank)));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const UnwrappedSplat part, Unwrap(std::move(file)));
+      return ReadPart(part.file, left);
+    };
+    ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud part, read());
+    if (rank == 0) {
+      cloud = std::move(part);
+    } else if (part.sh_degree != cloud.sh_degree) {
+      return Error{ErrorCode::kBadFile, Cat(input.name(), ": its parts have SH degrees ", cloud.sh_degree, " and ",
+                                            part.sh_degree, " and are not of one splat", kAlone)};
+    } else {
+      ANCHORSPLAT_RETURN_IF_ERROR(Append(cloud, part));
+    }
+  }
+  LogInfo(Cat(input.name(), ": is read with the other parts of its splat, ", ranks.size(), " in all (", NameOf(*own, 0),
+              " to ", NameOf(*own, expected - 1), ")", kAlone));
+  return cloud;
+}
+
+uint64_t GsplatCheckpointSize(const InputFile& input) {
+  uint64_t sum = input.size();
+  const std::optional<RankName> own = input.has_folder() ? RankOf(input.path().filename().string()) : std::nullopt;
+  for (const int rank : own ? RanksBeside(input, *own) : std::set<int>()) {
+    if (rank == own->rank) continue;
+    const std::filesystem::path other = input.path().parent_path() / NameOf(*own, rank);
+    std::error_code failed;
+    const uint64_t size = std::filesystem::file_size(other, failed);
+    if (failed) continue;
+    RecordInput(other);
+    sum += size;
+  }
+  return sum;
 }
 
 }  // namespace anchorsplat

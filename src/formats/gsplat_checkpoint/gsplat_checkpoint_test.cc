@@ -4,9 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
+#include "core/messages_for_test.h"
 #include "core/source_dir_for_test.h"
 #include "core/spherical_harmonics.h"
+#include "formats/opened_splat.h"
+#include "io/atomic_file.h"
+#include "io/folder_for_test.h"
+#include "io/input_record.h"
 #include "tensors/tensor_bytes_for_test.h"
 #include "tensors/tensor_entry.h"
 
@@ -90,6 +96,93 @@ TEST(GsplatCheckpoint, ReadsSplatfactos) {
       }
     }
   }
+}
+
+// A number of NumPy's as protocol 2 has it.
+std::string NumpyNumber() {
+  const std::string bytes = "c_codecs\nencode\n" + Tuple({Text("01234567"), Text("latin1")}) + "R";
+  const std::string type = "cnumpy\ndtype\n" + Tuple({Text("f8"), "\x89", "\x88"}) + "R" +
+                           Tuple({Int(3), Text("<"), "N", "N", "N", Int(-1), Int(-1), Int(0)}) + "b";
+  return "cnumpy.core.multiarray\nscalar\n" + Tuple({type, bytes}) + "R";
+}
+
+// What gaussians.capture() of INRIA's trainer gives of one Gaussian: every tensor begins at a number of its own in a
+// storage of 64 ramping ones.
+std::string Captured(int64_t rest, int64_t scales) {
+  const auto tensor = [](std::vector<int64_t> shape, int64_t at) {
+    return Tensor(shape, RowMajorStrides(shape), at, 64);
+  };
+  const std::string group = Dict({{"lr", NumpyNumber()}, {"name", Text("xyz")}, {"params", "](" + Int(0) + "e"}});
+  const std::string state = "}(" + Int(0) + Dict({{"step", tensor({}, 0)}, {"exp_avg", tensor({1, 3}, 0)}}) + "u";
+  return Tuple({Int(3), tensor({1, 3}, 0), tensor({1, 1, 3}, 3), tensor({1, rest, 3}, 6), tensor({1, scales}, 51),
+                tensor({1, 4}, 54), tensor({1, 1}, 58), tensor({1}, 0), tensor({1, 1}, 0), tensor({1, 1}, 0),
+                Dict({{"state", state}, {"param_groups", "](" + group + "e"}}), NumpyNumber()});
+}
+
+std::string RampStorage() {
+  std::string storage;
+  for (int i = 0; i < 64; ++i) {
+    const float value = Ramp(0, i);
+    storage.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  return storage;
+}
+
+TEST(GsplatCheckpoint, ReadsInrias) {
+  for (const int64_t rest : {0, 3, 15}) {
+    for (const int64_t scales : {3, 2}) {
+      const std::string captured = Captured(rest, scales);
+      for (const std::string& saved : {Tuple({captured, Int(30000)}), captured}) {
+        const auto cloud = Read(MakeCheckpoint(Pickle(saved), RampStorage()));
+        ASSERT_TRUE(cloud.ok()) << cloud.error().message;
+        EXPECT_EQ(cloud->sh_degree, rest == 0 ? 0 : rest == 3 ? 1 : 3);
+        EXPECT_THAT(cloud->means, ElementsAre(Ramp(0, 0), Ramp(0, 1), Ramp(0, 2)));
+        EXPECT_EQ(cloud->sh[0], Ramp(0, 3));
+        if (rest > 0) EXPECT_EQ(cloud->sh[3], Ramp(0, 6));
+        EXPECT_EQ(cloud->log_scales[1], Ramp(0, 52));
+        const float third = scales == 3 ? Ramp(0, 53) : -std::numeric_limits<float>::infinity();
+        EXPECT_EQ(cloud->log_scales[2], third);
+        EXPECT_EQ(cloud->quats[0], Ramp(0, 54));
+        EXPECT_EQ(cloud->opacity_logits[0], Ramp(0, 58));
+      }
+    }
+  }
+  // Numbers as names alone are no splat: a list of layers.
+  EXPECT_THAT(Read(MakeCheckpoint(Pickle(Tuple({Tensor({2}, {1}), Tensor({2}, {1})})))).error().message,
+              HasSubstr("or INRIA's trainer"));
+}
+
+TEST(GsplatCheckpoint, PartsOfOneSplatAreReadTogether) {
+  const TestFolder folder;
+  const auto put = [&](const std::string& name, int degree) {
+    ASSERT_TRUE(WriteWholeFile(folder / name, ReadTestFile("ckpt_degree" + std::to_string(degree) + ".pt"), true).ok());
+  };
+  put("ckpt_9_rank0.pt", 1);
+  put("ckpt_8_rank1.pt", 0);  // of another step
+  const auto alone = ReadCloud(folder / "ckpt_9_rank0.pt");
+  ASSERT_TRUE(alone.ok()) << alone.error().message;
+  put("ckpt_9_rank1.pt", 1);
+  put("ckpt_9_rank2.pt", 1);
+  const InputRecord record;
+  for (const char* name : {"ckpt_9_rank0.pt", "ckpt_9_rank2.pt"}) {
+    const Messages messages;
+    const auto all = ReadCloud(folder / name);
+    ASSERT_TRUE(all.ok()) << all.error().message;
+    EXPECT_EQ(all->size(), 15);
+    EXPECT_EQ(all->means[15], all->means[0]);
+    ASSERT_EQ(messages.notes().size(), 1u);
+    EXPECT_THAT(messages.notes()[0], HasSubstr("3 in all (ckpt_9_rank0.pt to ckpt_9_rank2.pt); under a name without"));
+  }
+  EXPECT_FALSE(CheckIsNoInput(folder / "ckpt_9_rank1.pt").ok());
+  EXPECT_EQ(OpenedSplat::Open(folder / "ckpt_9_rank0.pt")->bytes(), 3 * ReadTestFile("ckpt_degree1.pt").size());
+  put("ckpt_9_rank4.pt", 1);
+  EXPECT_THAT(ReadCloud(folder / "ckpt_9_rank0.pt").error().message,
+              HasSubstr("is a part of a splat, of which ckpt_9_rank3.pt is missing beside it"));
+  EXPECT_THAT(ReadCloud(folder / "ckpt_8_rank1.pt").error().message, HasSubstr("ckpt_8_rank0.pt is missing"));
+  put("ckpt_9_rank3.pt", 3);
+  EXPECT_THAT(ReadCloud(folder / "ckpt_9_rank0.pt").error().message, HasSubstr("SH degrees 1 and 3"));
+  put("one.pt", 1);
+  EXPECT_EQ(ReadCloud(folder / "one.pt")->size(), 5);
 }
 
 TEST(GsplatCheckpoint, MessagesNameTheTensor) {

@@ -321,6 +321,8 @@ Result<FormatFacts> DescribeKsplat(const InputFile& file) {
   return facts;
 }
 
+bool LooksLikeKsplat(const InputFile& file) { return ReadHeaders(file, {}).ok(); }
+
 Result<GaussianCloud> ReadKsplat(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Ksplat ksplat, ReadHeaders(file, limits));
   GaussianCloud cloud;

@@ -24,6 +24,9 @@ Result<GaussianCloud> ReadKsplat(const InputFile& file, const ReadLimits& limits
 // The same, to look at block by block. Errors as ReadKsplat; a Gaussian in no bucket comes from the first ForEach.
 Result<std::unique_ptr<CloudBlocks>> BlocksOfKsplat(const InputFile& file, const ReadLimits& limits);
 
+// Whether the headers of the file and its sections are those of a KSPLAT of this size.
+bool LooksLikeKsplat(const InputFile& file);
+
 // Version, compression level, sections. Errors as ReadKsplat.
 Result<FormatFacts> DescribeKsplat(const InputFile& file);
 

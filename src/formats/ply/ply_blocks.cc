@@ -24,6 +24,7 @@ class PlyBlocks final : public FileBlocks {
   PlyBlocks(const InputFile& file, PlyHeader header, const PlyLayout& layout, uint64_t begin)
       : file_(file),
         header_(std::move(header)),
+        layout_(layout),
         vertex_(*layout.vertex),
         begin_(begin),
         row_size_(static_cast<size_t>(layout.vertex->row_size())) {
@@ -80,6 +81,7 @@ class PlyBlocks final : public FileBlocks {
             finite[static_cast<size_t>(i)] = all ? 1 : 0;
           }
         }));
+    FinishPlyRows(layout_, room.rows);
     return filter_ ? FuseFilter(file_, filter, first, room.rows) : Status();
   }
 
@@ -93,6 +95,7 @@ class PlyBlocks final : public FileBlocks {
   }
 
   Status EndFirst() override {
+    WarnOfPlyDegree(file_, layout_);
     WarnOfOddTags(file_, header_);
     WarnOfSurplus(file_, header_, vertex_);
     if (filter_) SayFilterIsFused(file_, *render_mode_);
@@ -101,6 +104,7 @@ class PlyBlocks final : public FileBlocks {
 
   const InputFile& file_;
   PlyHeader header_;
+  PlyLayout layout_;
   const PlyElement& vertex_;  // of header_: a vector that moves keeps its elements
   uint64_t begin_;            // byte of the first row
   size_t row_size_;
@@ -115,7 +119,8 @@ Result<std::unique_ptr<CloudBlocks>> BlocksOfPly(const InputFile& file, const Re
   ANCHORSPLAT_ASSIGN_OR_RETURN(PlyHeader header, ReadPlyHeader(file));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyLayout layout, PlanPly(file, header));
   const PlyElement& vertex = *layout.vertex;
-  bool floats = header.encoding == PlyEncoding::kLittleEndian && std::endian::native == std::endian::little;
+  bool floats = layout.stored_as_read() && header.encoding == PlyEncoding::kLittleEndian &&
+                std::endian::native == std::endian::little;
   for (size_t p = 0; p < layout.targets.size(); ++p) {
     const PlyProperty& property = vertex.properties[p];
     floats &= !property.list_count;

@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <limits>
 #include <string_view>
 #include <unordered_map>
 
+#include "core/activations.h"
+#include "core/log.h"
+#include "core/spherical_harmonics.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -33,8 +37,11 @@ constexpr std::array<Required, 14> kRequired = {{{"x", &GaussianCloud::means, 3,
                                                  {"rot_1", &GaussianCloud::quats, 4, 1},
                                                  {"rot_2", &GaussianCloud::quats, 4, 2},
                                                  {"rot_3", &GaussianCloud::quats, 4, 3}}};
+constexpr std::array<std::string_view, 3> kColors = {"red", "green", "blue"};
 constexpr const char* kNeeded = "(needed: x y z f_dc_0..2 opacity scale_0..2 rot_0..3)";
+constexpr std::array<std::string_view, 3> kDc = {"f_dc_0", "f_dc_1", "f_dc_2"};
 constexpr std::string_view kRest = "f_rest_";
+constexpr int kMostDegree = 4;  // in files
 
 std::string Where(const InputFile& file, int line) { return Cat(file.name(), ": line ", line, ": "); }
 
@@ -48,6 +55,46 @@ Status CheckFloating(const InputFile& file, const PlyProperty& property) {
                                           PlyTypeName(property.type), " (expected float or double)")};
   }
   return {};
+}
+
+// The properties by the names that they have in INRIA's files.
+using Properties = std::unordered_map<std::string_view, size_t>;
+
+// CloudCompare, which knows positions and colours, puts such a word before the names of all else, at each saving anew.
+std::string_view WithoutPrefix(std::string_view name) {
+  for (bool any = true; any;) {
+    any = false;
+    for (const std::string_view prefix : {std::string_view("scalar_"), std::string_view("scal_")}) {
+      if (!name.starts_with(prefix)) continue;
+      name.remove_prefix(prefix.size());
+      any = true;
+    }
+  }
+  return name;
+}
+
+bool IsOfGaussians(std::string_view name) {
+  return name.starts_with(kRest) || name == kFilter3d ||
+         std::any_of(kRequired.begin() + 3, kRequired.end(), [name](const Required& r) { return r.name == name; });
+}
+
+// The name by which a property is looked for.
+std::string_view KnownName(const PlyProperty& property) {
+  const std::string_view inner = WithoutPrefix(property.name);
+  return IsOfGaussians(inner) ? inner : std::string_view(property.name);
+}
+
+Result<Properties> FindProperties(const InputFile& file, const PlyElement& vertex) {
+  Properties found;
+  for (size_t p = 0; p < vertex.properties.size(); ++p) {
+    const PlyProperty& property = vertex.properties[p];
+    const auto [other, fresh] = found.emplace(KnownName(property), p);
+    if (fresh) continue;
+    return Error{ErrorCode::kBadFile, Cat(Where(file, property.line), "property \"", property.name, "\" and \"",
+                                          vertex.properties[other->second].name, "\" would both be the \"",
+                                          other->first, "\" of the Gaussians: remove one of them")};
+  }
+  return found;
 }
 
 // What a vertex element without Gaussians is instead.
@@ -70,7 +117,7 @@ bool HasNormals(const PlyElement& vertex) {
 }
 
 // Degree from the number of f_rest properties; their targets.
-Result<int> PlanRest(const InputFile& file, const PlyElement& vertex, std::vector<std::optional<PlyTarget>>& targets) {
+Status PlanRest(const InputFile& file, const PlyElement& vertex, PlyLayout& layout) {
   struct Rest {
     size_t property;
     int index;
@@ -78,9 +125,10 @@ Result<int> PlanRest(const InputFile& file, const PlyElement& vertex, std::vecto
   std::vector<Rest> rest;
   for (size_t p = 0; p < vertex.properties.size(); ++p) {
     const PlyProperty& property = vertex.properties[p];
-    if (!property.name.starts_with(kRest)) continue;
-    const char* const begin = property.name.data() + kRest.size();
-    const char* const end = property.name.data() + property.name.size();
+    const std::string_view name = KnownName(property);
+    if (!name.starts_with(kRest)) continue;
+    const char* const begin = name.data() + kRest.size();
+    const char* const end = name.data() + name.size();
     int index = -1;
     const auto [stop, error] = std::from_chars(begin, end, index);
     if (error != std::errc{} || stop != end || index < 0 || Cat(index).size() != static_cast<size_t>(end - begin)) {
@@ -92,12 +140,13 @@ Result<int> PlanRest(const InputFile& file, const PlyElement& vertex, std::vecto
   }
   const int count = static_cast<int>(rest.size());
   int degree = 0;
-  while (degree < kMaxShDegree && 3 * (ShCoefficients(degree) - 1) != count) ++degree;
+  while (degree < kMostDegree && 3 * (ShCoefficients(degree) - 1) != count) ++degree;
   const int per_channel = ShCoefficients(degree) - 1;
   if (3 * per_channel != count) {
     return Error{ErrorCode::kBadFile, Cat(Where(file, vertex.line), "element \"vertex\" has ", count,
-                                          " f_rest properties (expected 0, 9, 24 or 45, for SH degree 0 to 3)")};
+                                          " f_rest properties (expected 0, 9, 24 or 45, for SH degree 0 to 3, or 72)")};
   }
+  layout.sh_degree = std::min(degree, kMaxShDegree);
   for (const Rest& r : rest) {
     // Names differ, so `count` numbers below `count` are all of them.
     if (r.index >= count) {
@@ -106,9 +155,46 @@ Result<int> PlanRest(const InputFile& file, const PlyElement& vertex, std::vecto
                                             " (expected f_rest_0 to f_rest_", count - 1, " without gaps)")};
     }
     const int channel = r.index / per_channel, coefficient = 1 + r.index % per_channel;
-    targets[r.property] = PlyTarget{&GaussianCloud::sh, 3 * (per_channel + 1), 3 * coefficient + channel};
+    if (coefficient >= ShCoefficients(layout.sh_degree)) {
+      layout.dropped[r.property] = true;
+    } else {
+      layout.targets[r.property] =
+          PlyTarget{&GaussianCloud::sh, 3 * ShCoefficients(layout.sh_degree), 3 * coefficient + channel};
+    }
   }
-  return degree;
+  return {};
+}
+
+// What other programs have in place of what INRIA's files have. Names of it that then stand for the latter are added.
+void PlanDialect(const PlyElement& vertex, Properties& by_name, PlyLayout& layout) {
+  const auto type_of = [&](std::string_view name) -> std::optional<PlyType> {
+    const auto found = by_name.find(name);
+    if (found == by_name.end() || vertex.properties[found->second].list_count) return std::nullopt;
+    return vertex.properties[found->second].type;
+  };
+  for (const auto& [name, p] : by_name) layout.prefixed |= name.size() < vertex.properties[p].name.size();
+  layout.surfels = type_of("scale_0") && type_of("scale_1") && !by_name.contains("scale_2");
+  const bool has_shape = type_of("scale_0") && type_of("rot_0");
+  const bool no_dc = std::ranges::none_of(kDc, [&](std::string_view name) { return by_name.contains(name); });
+  const std::optional<PlyType> red = type_of("red");
+  const bool has_colors =
+      std::ranges::all_of(kColors, [&](std::string_view name) { return red && type_of(name) == red; });
+  if (has_shape && no_dc && layout.sh_degree == 0 && has_colors) {
+    layout.full_color = FullIntensity(*red);
+    for (size_t k = 0; k < kDc.size(); ++k) by_name.emplace(kDc[k], by_name.at(kColors[k]));
+  }
+  const std::optional<PlyType> alpha = type_of("alpha");
+  // Floats may be logits as well.
+  const bool is_whole = alpha && alpha != PlyType::kFloat && alpha != PlyType::kDouble;
+  if (has_shape && is_whole && !by_name.contains("opacity")) {
+    layout.full_alpha = FullIntensity(*alpha);
+    by_name.emplace("opacity", by_name.at("alpha"));
+  }
+}
+
+// Whether whole numbers may be stored for it.
+bool MayBeWhole(const PlyLayout& layout, std::string_view name) {
+  return (layout.full_color > 0 && name.starts_with("f_dc_")) || (layout.full_alpha > 0 && name == "opacity");
 }
 
 }  // namespace
@@ -124,20 +210,24 @@ Result<PlyLayout> PlanPly(const InputFile& file, const PlyHeader& header) {
     return Error{ErrorCode::kBadFile, Cat(byte, "the header has no element \"vertex\"")};
   }
   const PlyElement& vertex = *layout.vertex;
-  std::unordered_map<std::string_view, size_t> by_name;
-  for (size_t p = 0; p < vertex.properties.size(); ++p) by_name.emplace(vertex.properties[p].name, p);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Properties by_name, FindProperties(file, vertex));
 
   layout.targets.resize(vertex.properties.size());
-  ANCHORSPLAT_ASSIGN_OR_RETURN(layout.sh_degree, PlanRest(file, vertex, layout.targets));
+  layout.dropped.resize(vertex.properties.size());
+  ANCHORSPLAT_RETURN_IF_ERROR(PlanRest(file, vertex, layout));
   const bool any = layout.sh_degree > 0 || std::any_of(kRequired.begin() + 3, kRequired.end(),
                                                        [&](const Required& r) { return by_name.contains(r.name); });
   if (!any) return NotASplat(file, header);
+  PlanDialect(vertex, by_name, layout);
   for (const Required& r : kRequired) {
+    if (layout.surfels && r.name == "scale_2") continue;
     const auto found = by_name.find(r.name);
     if (found == by_name.end()) {
       return Error{ErrorCode::kBadFile, Cat(byte, "element \"vertex\" has no property \"", r.name, "\" ", kNeeded)};
     }
-    ANCHORSPLAT_RETURN_IF_ERROR(CheckFloating(file, vertex.properties[found->second]));
+    if (!MayBeWhole(layout, r.name)) {
+      ANCHORSPLAT_RETURN_IF_ERROR(CheckFloating(file, vertex.properties[found->second]));
+    }
     const int width = r.width > 0 ? r.width : 3 * ShCoefficients(layout.sh_degree);
     layout.targets[found->second] = PlyTarget{r.array, width, r.component};
   }
@@ -161,12 +251,28 @@ bool HasDoubleMeans(const PlyLayout& layout) {
   return false;
 }
 
+void FinishPlyRows(const PlyLayout& layout, GaussianCloud& rows) {
+  if (layout.stored_as_read() && !layout.surfels) return;
+  const int64_t stride = rows.sh_stride();
+  for (int64_t i = 0; i < rows.size(); ++i) {
+    if (layout.surfels) rows.log_scales[static_cast<size_t>(3 * i + 2)] = -std::numeric_limits<float>::infinity();
+    float* const dc = rows.sh.data() + i * stride;
+    for (int k = 0; layout.full_color > 0 && k < 3; ++k) dc[k] = DcFromColor(dc[k] / layout.full_color);
+    float& opacity = rows.opacity_logits[static_cast<size_t>(i)];
+    if (layout.full_alpha > 0) opacity = LogitFromOpacity(opacity / layout.full_alpha);
+  }
+}
+
+void WarnOfPlyDegree(const InputFile& file, const PlyLayout& layout) {
+  if (layout.has_degree_4()) LogWarning(Cat(file.name(), ": SH degree 4 is read as 3"));
+}
+
 ExtraProperties PlanExtras(const PlyHeader& header, const PlyLayout& layout) {
   ExtraProperties extras;
   const PlyElement& vertex = *layout.vertex;
   for (size_t p = 0; p < vertex.properties.size(); ++p) {
     const PlyProperty& property = vertex.properties[p];
-    if (layout.targets[p] || layout.filter == p || NormalAxis(property) >= 0) continue;
+    if (layout.targets[p] || layout.filter == p || layout.dropped[p] || NormalAxis(property) >= 0) continue;
     if (property.list_count) {
       extras.not_kept.push_back(Cat("list \"", Printable(property.name), "\""));
     } else {
@@ -197,7 +303,7 @@ std::vector<PlyDestination> Destinations(const PlyLayout& layout, GaussianCloud&
       out[p] = {.number = (cloud.*(target->array)).data() + target->component, .stride = target->width};
     } else if (layout.filter == p) {
       out[p] = {.number = filter.data(), .stride = 1};
-    } else if (extras == nullptr || property.list_count) {
+    } else if (extras == nullptr || property.list_count || layout.dropped[p]) {
       continue;
     } else if (const int axis = NormalAxis(property); axis >= 0) {
       out[p] = {.number = extras->normals.data() + axis, .stride = 3};

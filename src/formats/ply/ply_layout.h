@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -28,6 +29,14 @@ struct PlyLayout {
   // kFilter3d, where `vertex` has one: what Mip-Splatting's program keeps beside Gaussians that its 3-D smoothing
   // filter is not yet a part of, a size each (core/smoothing_filter.h).
   std::optional<size_t> filter;
+  // What other programs write in place of INRIA's properties:
+  bool surfels = false;       // 2DGS has two scales only; the third axis is the normal
+  float full_color = 0;       // red green blue in place of f_dc_*: what stands for full intensity; 0: there is f_dc
+  float full_alpha = 0;       // the same of alpha in place of opacity
+  bool prefixed = false;      // CloudCompare's "scalar_" stands before their names
+  std::vector<bool> dropped;  // by property: harmonics of degree 4, which are not read
+  bool has_degree_4() const { return std::find(dropped.begin(), dropped.end(), true) != dropped.end(); }
+  bool stored_as_read() const { return full_color == 0 && full_alpha == 0; }
 };
 inline constexpr std::string_view kFilter3d = "filter_3D";
 
@@ -43,9 +52,18 @@ struct PlyDestination {
   bool skipped() const { return number == nullptr && bytes == nullptr && wide == nullptr; }
 };
 
+// Makes of numbers as they are in a file what `layout` says they mean: called for rows once they are read. What can be
+// done without knowing other rows.
+void FinishPlyRows(const PlyLayout& layout, GaussianCloud& rows);
+
+// Says what of the harmonics is not read.
+void WarnOfPlyDegree(const InputFile& file, const PlyLayout& layout);
+
 // Finds the INRIA properties x y z, f_dc_0..2, f_rest_* (0, 9, 24 or 45, channel-major), opacity, scale_0..2, rot_0..3
-// by name, and filter_3D, and checks that they are float or double. Errors (kBadFile) say what is missing, or what the
-// file is instead. `header` must outlive the layout.
+// by name, and filter_3D, and checks that they are float or double. Also what other programs have in their place: two
+// scales (2DGS), red green blue without f_dc_*, a whole-number alpha without opacity, names behind CloudCompare's
+// "scalar_" and "scal_", 72 f_rest_*. Errors (kBadFile) say what is missing, or what the file is instead. `header` must
+// outlive the layout.
 Result<PlyLayout> PlanPly(const InputFile& file, const PlyHeader& header);
 
 // What of the file is no part of Gaussians: scalars of "vertex" become properties with room for all rows, nx ny nz

@@ -11,30 +11,6 @@
 
 namespace anchorsplat {
 
-namespace {
-
-// What stands for full intensity.
-float FullOf(PlyType type) {
-  switch (type) {
-    case PlyType::kInt8:
-      return 127;
-    case PlyType::kUint8:
-      return 255;
-    case PlyType::kInt16:
-      return 32767;
-    case PlyType::kUint16:
-      return 65535;
-    case PlyType::kInt32:
-      return 2147483647.0f;
-    case PlyType::kUint32:
-      return 4294967295.0f;
-    default:
-      return 1;
-  }
-}
-
-}  // namespace
-
 Result<PlyPoints> ReadPlyPoints(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyHeader header, ReadPlyHeader(file));
   const PlyElement* vertex = header.Find("vertex");
@@ -79,7 +55,7 @@ Result<PlyPoints> ReadPlyPoints(const InputFile& file, const ReadLimits& limits)
     for (size_t k = 0; k < 3; ++k) {
       points.positions.push_back(header.origin[k] + p[k]);
       float color = read.colors[i + k];
-      if (colored) color /= FullOf(vertex->properties[static_cast<size_t>(columns[3 + k])].type);
+      if (colored) color /= FullIntensity(vertex->properties[static_cast<size_t>(columns[3 + k])].type);
       points.colors.push_back(color > 0 ? std::min(color, 1.0f) : 0.0f);  // NaN is 0
     }
   }

@@ -65,6 +65,7 @@ Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, Extr
   Buffer<float> filter;
   ANCHORSPLAT_RETURN_IF_ERROR(
       ReadPlyBody(file, header, vertex, [&] { return MakeRoom(header, layout, cloud, world, filter, extras); }));
+  FinishPlyRows(layout, cloud);
   cloud.origin = header.origin;
   if (!world.empty()) MeansFromWorld(world, cloud);
   cloud.double_means = HasDoubleMeans(layout) && !IsZero(cloud.origin);
@@ -73,6 +74,7 @@ Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, Extr
   if (extras != nullptr && std::ranges::all_of(extras->normals, [](float x) { return x == 0; })) {
     extras->normals = {};
   }
+  WarnOfPlyDegree(file, layout);
   WarnOfOddTags(file, header);
   WarnOfSurplus(file, header, vertex);
   cloud.render_mode = header.render_mode;
@@ -114,13 +116,18 @@ Result<FormatFacts> DescribePly(const InputFile& file) {
                                                                         : "binary, big-endian");
   std::string others;
   for (size_t k = 0; k < layout.targets.size(); ++k) {
-    if (!layout.targets[k] && layout.filter != k)
+    if (!layout.targets[k] && layout.filter != k && !layout.dropped[k])
       others += (others.empty() ? "" : " ") + layout.vertex->properties[k].name;
   }
   if (HasDoubleMeans(layout)) facts.Add("positions", "in double precision");
   for (const PlyElement& element : header.elements) {
     if (&element != layout.vertex) others += Cat(others.empty() ? "" : " ", "(element ", element.name, ")");
   }
+  if (layout.surfels) facts.Add("surfels", "of 2DGS (two scales), flat along their third axis");
+  if (layout.full_color > 0) facts.Add("colours", "red green blue, in place of f_dc_*");
+  if (layout.full_alpha > 0) facts.Add("opacities", "alpha, in place of opacity");
+  if (layout.prefixed) facts.Add("names", "behind CloudCompare's \"scalar_\"");
+  if (layout.has_degree_4()) facts.Add("harmonics", "degree 4, read as 3");
   if (layout.filter) facts.Add("3-D filter", "of Mip-Splatting (", kFilter3d, "), made a part of the Gaussians");
   if (!others.empty()) facts.Add("other properties", Printable(others, 200));
   return facts;

@@ -24,6 +24,18 @@ bool IsPlainName(const std::string& member) {
 
 }  // namespace
 
+std::optional<std::string> FolderOfSog(const std::vector<std::string>& members) {
+  constexpr std::string_view kMeta = "meta.json";
+  std::optional<std::string> folder;
+  for (const std::string& member : members) {
+    if (member == kMeta) return "";
+    if (!member.ends_with("/meta.json") || member.starts_with("__MACOSX/")) continue;
+    if (folder) return std::nullopt;
+    folder = member.substr(0, member.size() - kMeta.size());
+  }
+  return folder;
+}
+
 Result<SogMembers> SogMembers::Of(const InputFile& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
   SogMembers members;
@@ -31,6 +43,7 @@ Result<SogMembers> SogMembers::Of(const InputFile& file) {
   if (head == "PK") {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string_view bytes, file.Whole(kMaxArchive));
     ANCHORSPLAT_ASSIGN_OR_RETURN(ZipReader archive, ZipReader::View(file.name(), bytes));
+    members.folder_in_archive_ = FolderOfSog(archive.Members()).value_or("");
     members.archive_.emplace(std::move(archive));
   } else {
     members.file_ = &file;
@@ -40,7 +53,7 @@ Result<SogMembers> SogMembers::Of(const InputFile& file) {
 }
 
 Result<std::string> SogMembers::Meta(const InputFile& file) const {
-  return archive_ ? archive_->Read("meta.json", kMaxMeta) : file.ReadAll(kMaxMeta);
+  return archive_ ? archive_->Read(folder_in_archive_ + "meta.json", kMaxMeta) : file.ReadAll(kMaxMeta);
 }
 
 uint64_t SogMembers::SizeBeside(const std::string& name) const {
@@ -57,7 +70,7 @@ Result<ByteImage> SogMembers::Picture(const JsonValue& name, int64_t min_pixels,
   }
   std::string bytes;
   if (archive_) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(bytes, archive_->Read(member, kMaxPicture));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(bytes, archive_->Read(folder_in_archive_ + member, kMaxPicture));
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, file_->OpenBeside(member));
     ANCHORSPLAT_ASSIGN_OR_RETURN(bytes, file.ReadAll(kMaxPicture));

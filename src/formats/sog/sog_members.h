@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/result.h"
 #include "images/webp_image.h"
@@ -12,6 +13,10 @@
 #include "io/zip_archive.h"
 
 namespace anchorsplat {
+
+// Where the one meta.json of an archive lies: "" or a folder with its slash, as of a folder that somebody has packed.
+// Nothing where there is none, or several in folders.
+std::optional<std::string> FolderOfSog(const std::vector<std::string>& members);
 
 // Where the members are: in an archive, or beside meta.json. Not longer there than the file.
 class SogMembers {
@@ -30,6 +35,7 @@ class SogMembers {
  private:
   std::string name_;
   std::optional<ZipReader> archive_;
+  std::string folder_in_archive_;
   const InputFile* file_ = nullptr;  // meta.json itself, and
   std::filesystem::path folder_;     // where it lies
 };

@@ -1,5 +1,6 @@
 #include "formats/splat/splat_reader.h"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <bit>
@@ -99,6 +100,27 @@ class SplatBlocks final : public FileBlocks {
 };
 
 }  // namespace
+
+bool LooksLikeSplat(const InputFile& file) {
+  constexpr uint64_t kLooked = 128;  // rows
+  constexpr float kFarOut = 1e7f;
+  if (file.size() == 0 || file.size() % kSplatRecord != 0) return false;
+  const auto head = file.Head(kLooked * kSplatRecord);
+  if (!head.ok()) return false;
+  for (size_t at = 0; at < head->size(); at += kSplatRecord) {
+    float numbers[6];
+    std::memcpy(numbers, head->data() + at, sizeof numbers);
+    if (IsNoSplatRow(numbers)) return false;
+    float square = 0;
+    for (size_t k = 0; k < 4; ++k) {
+      const float q = (static_cast<float>(static_cast<uint8_t>((*head)[at + 28 + k])) - 128) / 128;
+      square += q * q;
+    }
+    const bool near_by = std::ranges::all_of(numbers, [](float x) { return std::fabs(x) < kFarOut; });
+    if (!near_by || std::fabs(square - 1) > 0.1f) return false;
+  }
+  return true;
+}
 
 Result<GaussianCloud> ReadSplat(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t count, CountOfSplat(file, limits));

@@ -22,6 +22,10 @@ Result<GaussianCloud> ReadSplat(const InputFile& file, const ReadLimits& limits 
 // The same, to look at block by block. Errors as ReadSplat; what rows tell comes from the first ForEach.
 Result<std::unique_ptr<CloudBlocks>> BlocksOfSplat(const InputFile& file, const ReadLimits& limits);
 
+// Whether the size is a whole number of rows, and the first ones have positions and lengths of a scene and quaternions
+// of length one: what no file of another kind has by chance.
+bool LooksLikeSplat(const InputFile& file);
+
 inline constexpr size_t kSplatRecord = 32;  // bytes
 
 // Nobody measures a scene in units of which it has more, while most of what is no float is beyond.

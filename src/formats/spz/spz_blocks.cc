@@ -70,7 +70,7 @@ class SpzBlocks final : public FileBlocks {
 
   Result<Readers> OpenReaders() {
     Readers readers;
-    if (!spz_.gzip) {
+    if (!spz_.stream) {
       for (size_t k = 0; k < (first_time() ? spz_.sections() : kLooked); ++k) {
         readers[k] = OpenZstd(file_, spz_.begins[k], spz_.begins[k + 1]);
       }
@@ -86,7 +86,7 @@ class SpzBlocks final : public FileBlocks {
   // Goes through what rows of degree 0 need and keeps where its sections begin. Returns what reads the harmonics, which
   // follow; null where there are none.
   Result<std::unique_ptr<InflatingReader>> FindStarts() {
-    std::unique_ptr<CopyableReader> reader = spz_.gzip->Copy();
+    std::unique_ptr<CopyableReader> reader = spz_.stream->Copy();
     for (size_t k = 0; k < kLooked; ++k) {
       starts_[k] = reader->Copy();
       ANCHORSPLAT_RETURN_IF_ERROR(Drain(*reader, BytesOf(k, size_)));
@@ -132,13 +132,13 @@ class SpzBlocks final : public FileBlocks {
       batch.bytes[section].resize(static_cast<size_t>(bytes));
       ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(batch.bytes[section].data(), batch.bytes[section].size()));
     }
-    const bool has_end = !spz_.gzip || section == kHarmonics;
+    const bool has_end = !spz_.stream || section == kHarmonics;
     return has_end && batch.last == size_ ? reader.ExpectEnd() : Status();
   }
 
   // Reading looks at one section after the other, this at all of them from the first row to the last.
   Status FirstError(const Status& found) const {
-    if (spz_.gzip) return found;  // its other sections have been gone through
+    if (spz_.stream) return found;  // its other sections have been gone through
     for (size_t k = 0; k < spz_.sections(); ++k) {
       const std::unique_ptr<InflatingReader> reader = OpenZstd(file_, spz_.begins[k], spz_.begins[k + 1]);
       ANCHORSPLAT_RETURN_IF_ERROR(Drain(*reader, BytesOf(k, size_)));
@@ -161,7 +161,7 @@ class SpzBlocks final : public FileBlocks {
 
   const InputFile& file_;
   SpzFile spz_;
-  std::array<std::unique_ptr<CopyableReader>, kLooked> starts_;  // of a gzip stream
+  std::array<std::unique_ptr<CopyableReader>, kLooked> starts_;  // of one stream
   Batch now_;
   AxisFlip flip_ = FlipBetween(kRub, kRdf);
 };

@@ -10,6 +10,7 @@
 #include "formats/cloud_checks.h"
 #include "formats/spz/spz_reader.h"
 #include "io/compression_ratio.h"
+#include "io/little_endian.h"
 
 namespace anchorsplat {
 
@@ -63,14 +64,14 @@ SpzFile FileOf(const SpzHeader& header, const SpzLayout& layout) {
   return spz;
 }
 
-Result<SpzFile> OpenGzipped(const InputFile& file, const ReadLimits& limits) {
-  std::unique_ptr<CopyableReader> reader = OpenGzip(file, 0);
+// Versions 1 to 3, in gzip or taken out of it, or of what another program has put in its place.
+Result<SpzFile> OpenOneStream(const InputFile& file, std::unique_ptr<CopyableReader> reader, const ReadLimits& limits) {
   SpzHeader header;
   ANCHORSPLAT_RETURN_IF_ERROR(reader->Read(&header, sizeof header));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzLayout layout, CheckHeader(file, header, limits));
   if (layout.version > 3) return Error{ErrorCode::kBadFile, Cat(At(file, 0), ": version 4 in a gzip stream")};
   SpzFile spz = FileOf(header, layout);
-  spz.gzip = std::move(reader);
+  spz.stream = std::move(reader);
   return spz;
 }
 
@@ -80,9 +81,6 @@ Result<SpzFile> OpenStreams(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(0, &header, sizeof header));
   ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(sizeof header, &place, sizeof place));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzLayout layout, CheckHeader(file, header, limits));
-  if (layout.version < 4) {
-    return Error{ErrorCode::kBadFile, Cat(At(file, 4), ": version ", layout.version, " outside of a gzip stream")};
-  }
   SpzFile spz = FileOf(header, layout);
   const size_t streams = header.sh_degree > 0 ? 6 : 5;
   if (header.streams != streams || place.offset < sizeof header + sizeof place) {
@@ -106,7 +104,7 @@ Result<SpzFile> OpenStreams(const InputFile& file, const ReadLimits& limits) {
   return spz;
 }
 
-bool IsGzip(const std::string& head) { return head == "\x1f\x8b"; }
+bool IsGzip(const std::string& head) { return head.starts_with("\x1f\x8b"); }
 
 Result<SpzHeader> ReadHeader(const InputFile& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
@@ -125,8 +123,10 @@ int SpzFile::sh_degree() const { return std::min(layout.sh_degree, kMaxShDegree)
 size_t SpzFile::sections() const { return layout.sh_degree > 0 ? 6 : 5; }
 
 Result<SpzFile> OpenSpz(const InputFile& file, const ReadLimits& limits) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
-  return IsGzip(head) ? OpenGzipped(file, limits) : OpenStreams(file, limits);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(8));
+  if (IsGzip(head)) return OpenOneStream(file, OpenGzip(file, 0), limits);
+  const bool is_plain = head.size() == 8 && LoadLittle<uint32_t>(head.data() + 4) < 4;
+  return is_plain ? OpenOneStream(file, OpenPlain(file, 0), limits) : OpenStreams(file, limits);
 }
 
 void WarnOfSpzDegree(const InputFile& file, const SpzFile& spz) {
@@ -143,10 +143,14 @@ Result<CloudExtent> ExtentOfSpz(const InputFile& file) {
 }
 
 Result<FormatFacts> DescribeSpz(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzHeader header, ReadHeader(file));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzLayout layout, CheckHeader(file, header, {}));
   FormatFacts facts;
-  facts.Add("version", layout.version, layout.version < 4 ? ", one gzip stream" : ", a zstd stream per attribute");
+  facts.Add("version", layout.version,
+            layout.version > 3 ? ", a zstd stream per attribute"
+            : IsGzip(head)     ? ", one gzip stream"
+                               : ", not compressed itself");
   if (layout.version == 1) {
     facts.Add("positions", "half floats");
   } else {

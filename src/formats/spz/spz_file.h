@@ -17,8 +17,8 @@ struct SpzFile {
   SpzLayout layout;
   int64_t count = 0;
   bool antialiased = false;
-  // Versions 1 to 3: the stream, behind its header. Null for version 4:
-  std::unique_ptr<CopyableReader> gzip;
+  // Versions 1 to 3: the one stream of all sections, behind its header. Null for version 4:
+  std::unique_ptr<CopyableReader> stream;
   // of section k of kSpzSections are bytes begins[k] to begins[k + 1].
   std::array<uint64_t, 7> begins{};
 

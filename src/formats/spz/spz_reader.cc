@@ -33,10 +33,10 @@ Status ReadSection(const SpzLayout& layout, SpzSection section, InflatingReader&
 
 Status ReadGzipped(const SpzFile& spz, GaussianCloud& cloud) {
   for (size_t k = 0; k < spz.sections(); ++k) {
-    ANCHORSPLAT_RETURN_IF_ERROR(ReadSection(spz.layout, kSpzSections[k], *spz.gzip, cloud));
+    ANCHORSPLAT_RETURN_IF_ERROR(ReadSection(spz.layout, kSpzSections[k], *spz.stream, cloud));
   }
   // A stream that is longer than its header says is another splat than the header's.
-  return spz.gzip->ExpectEnd();
+  return spz.stream->ExpectEnd();
 }
 
 Status ReadStreams(const InputFile& file, const SpzFile& spz, GaussianCloud& cloud) {
@@ -63,7 +63,7 @@ Result<GaussianCloud> ReadSpz(const InputFile& file, const ReadLimits& limits) {
   GaussianCloud cloud;
   cloud.Resize(spz.count, spz.sh_degree());
   if (spz.antialiased) cloud.render_mode = RenderMode::kAntialiased;
-  ANCHORSPLAT_RETURN_IF_ERROR(spz.gzip ? ReadGzipped(spz, cloud) : ReadStreams(file, spz, cloud));
+  ANCHORSPLAT_RETURN_IF_ERROR(spz.stream ? ReadGzipped(spz, cloud) : ReadStreams(file, spz, cloud));
   return cloud;
 }
 

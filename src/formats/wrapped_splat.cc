@@ -1,0 +1,196 @@
+#include "formats/wrapped_splat.h"
+
+#include <algorithm>
+#include <cctype>
+#include <iterator>
+#include <optional>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/text.h"
+#include "formats/registry.h"
+#include "formats/sog/sog_members.h"
+#include "io/compression_ratio.h"
+#include "io/little_endian.h"
+#include "io/unpack.h"
+#include "io/zip_archive.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kMostWraps = 2;
+constexpr uint64_t kMaxWrap = uint64_t{8} << 30;
+constexpr uint64_t kMaxMember = uint64_t{64} << 30;  // what it promises is compared with its size as well
+
+Error Bad(const InputFile& file, const std::string& what) {
+  return {ErrorCode::kBadFile, Cat(file.name(), ": ", what)};
+}
+
+// An archive of anything, and not one of those that formats know by their beginning.
+bool IsPlainZip(std::string_view head) {
+  if (!head.starts_with("PK\x03\x04") && !head.starts_with("PK\x05\x06")) return false;
+  const SplatFormat* const format = FormatOfFile(head, {});
+  return format == nullptr || format->name == "SOG";
+}
+
+// Up to version 3 an SPZ is a gzip stream itself.
+Result<bool> IsSpzItself(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string inside, HeadInside(file, Packing::kGzip, 8));
+  return inside.size() == 8 && inside.starts_with("NGSP") && LoadLittle<uint32_t>(inside.data() + 4) < 4;
+}
+
+// "scan.ply" of "scan.ply.gz"; other names as they are.
+fs::path WithoutPacking(const fs::path& name) {
+  std::string ending = name.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const bool known = ending == ".gz" || ending == ".gzip" || ending == ".zst" || ending == ".zstd" || ending == ".zip";
+  return known ? name.stem() : name;
+}
+
+bool IsRead(const fs::path& name) {
+  const SplatFormat* const format = FormatOfExtension(WithoutPacking(name));
+  return format != nullptr && format->read != nullptr;
+}
+
+// What systems put into an archive beside what people do.
+bool IsSystems(const std::string& member) {
+  return member.ends_with('/') || member.starts_with("__MACOSX/") ||
+         fs::path(member).filename().string().starts_with('.');
+}
+
+std::string Listed(const std::vector<std::string>& names) {
+  constexpr size_t kMost = 5;
+  std::string list;
+  for (size_t k = 0; k < std::min(kMost, names.size()); ++k) list += (k == 0 ? "" : ", ") + Printable(names[k]);
+  return names.size() > kMost ? Cat(list, " and ", names.size() - kMost, " more") : list;
+}
+
+// The member of an archive that is a splat; nothing where the archive itself is one.
+Result<std::optional<std::string>> SplatIn(const InputFile& file, const ZipReader& archive) {
+  std::vector<std::string> members = archive.Members();
+  if (FolderOfSog(members)) return std::optional<std::string>();
+  std::erase_if(members, IsSystems);
+  std::vector<std::string> splats;
+  std::ranges::copy_if(members, std::back_inserter(splats), [](const std::string& name) { return IsRead(name); });
+  if (splats.empty() && members.size() == 1) splats = members;  // whatever it is called
+  if (splats.size() == 1) return std::optional(splats.front());
+  if (members.empty()) return Bad(file, "is an empty ZIP archive");
+  if (splats.empty()) return Bad(file, Cat("is a ZIP archive without a splat; in it are ", Listed(members)));
+  return Bad(file, Cat("is a ZIP archive of ", splats.size(), " splats (", Listed(splats),
+                       "): unpack it and give one of them"));
+}
+
+Result<std::optional<UnwrappedSplat>> TakeOutOfZip(const InputFile& file, uint64_t paid) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string_view bytes, file.Whole(kMaxWrap));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ZipReader archive, ZipReader::View(file.name(), bytes));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<std::string> member, SplatIn(file, archive));
+  if (!member) return std::optional<UnwrappedSplat>();
+  const fs::path name = fs::path(*member).filename();
+  if (name == "lod-meta.json") return Bad(file, "is a ZIP archive of a streamed SOG: unpack it and give its folder");
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Buffer<char> contents, archive.ReadLarge(*member, kMaxMember));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), paid, contents.size()));
+  InputFile inside = InputFile::Inside(file, Cat(file.name(), ": ", Printable(*member)), std::move(contents));
+  return std::optional(UnwrappedSplat{std::move(inside), name, Cat("ZIP archive around ", Printable(*member))});
+}
+
+Result<std::optional<UnwrappedSplat>> TakeOff(const UnwrappedSplat& outer, uint64_t paid) {
+  const InputFile& file = outer.file;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
+  if (const Packing packing = PackingOf(head); packing != Packing::kNone) {
+    if (packing == Packing::kGzip) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const bool is_spz, IsSpzItself(file));
+      if (is_spz) return std::optional<UnwrappedSplat>();
+    }
+    ANCHORSPLAT_ASSIGN_OR_RETURN(InputFile inside, Unpack(file, packing, paid));
+    fs::path name = WithoutPacking(outer.name);
+    const std::string said = packing == Packing::kGzip ? NameInGzip(head) : "";
+    if (!said.empty() && FormatOfExtension(name) == nullptr) name = fs::path(said).filename();
+    const std::string packed = Cat(NameOf(packing), " around ", HumanBytes(inside.size()));
+    return std::optional(UnwrappedSplat{std::move(inside), std::move(name), packed});
+  }
+  if (!IsPlainZip(head)) return std::optional<UnwrappedSplat>();
+  return TakeOutOfZip(file, paid);
+}
+
+struct Kind {
+  std::string_view mark;
+  const char* what;
+};
+constexpr Kind kKinds[] = {
+    {"\x89PNG", "is a PNG picture and no splat"},
+    {"\xff\xd8\xff", "is a JPEG picture and no splat"},
+    {"RIFF", "is a WebP picture or a sound and no splat"},
+    {"GIF8", "is a GIF picture and no splat"},
+    {"%PDF", "is a PDF document and no splat"},
+    {"LASF", "is a LAS point cloud and no splat"},
+    {"ASTM-E57", "is an E57 point cloud and no splat"},
+    {std::string_view("\xfd"
+                      "7zXZ\0",
+                      6),
+     "is packed with xz, which is not read: unpack it with unxz"},
+    {"\x04\x22\x4d\x18", "is packed with lz4, which is not read: unpack it with unlz4"},
+    {"7z\xbc\xaf", "is a 7z archive, which is not read: unpack it and give the splat in it"},
+    {"Rar!", "is a RAR archive, which is not read: unpack it and give the splat in it"},
+    {"version https://git-lfs", "is a pointer of Git LFS and not the file itself: git lfs pull fetches it"},
+    {"/annex/objects/", "is a pointer of git-annex and not the file itself: git annex get fetches it"},
+};
+// Behind blanks, in any case.
+constexpr Kind kTexts[] = {
+    {"<!doctype html", "is a web page and no splat: what was to be downloaded may need a login, or another address"},
+    {"<html", "is a web page and no splat: what was to be downloaded may need a login, or another address"},
+    {"<?xml", "is an XML document and no splat: a server may have sent it in place of the file"},
+};
+
+bool IsBzip2(std::string_view head) {
+  return head.starts_with("BZh") && head.size() > 10 && head.substr(4, 6) == "1AY&SY";
+}
+
+bool IsTar(std::string_view head) { return head.size() >= 262 && head.substr(257, 5) == "ustar"; }
+
+}  // namespace
+
+bool IsWrapped(const InputFile& file) {
+  const Result<std::string> head = file.Head(kSniffBytes);
+  if (!head.ok()) return false;
+  if (PackingOf(*head) != Packing::kGzip) return PackingOf(*head) != Packing::kNone || IsPlainZip(*head);
+  const Result<bool> is_spz = IsSpzItself(file);
+  return !is_spz.ok() || !*is_spz;
+}
+
+Result<UnwrappedSplat> Unwrap(InputFile input) {
+  const uint64_t paid = input.size();
+  fs::path name = input.path().filename();
+  UnwrappedSplat found{std::move(input), std::move(name), {}};
+  std::string packed;
+  for (int wraps = 0;; ++wraps) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(std::optional<UnwrappedSplat> inside, TakeOff(found, paid));
+    if (!inside) break;
+    if (wraps == kMostWraps) return Bad(found.file, "is packed more than twice: unpack it first");
+    packed += Cat(packed.empty() ? "" : ", in it ", inside->packed);
+    found = *std::move(inside);
+  }
+  found.packed = std::move(packed);
+  return found;
+}
+
+std::string WhatElse(std::string_view head) {
+  for (const auto& [mark, what] : kKinds) {
+    if (head.starts_with(mark)) return what;
+  }
+  if (IsBzip2(head)) return "is packed with bzip2, which is not read: unpack it with bunzip2";
+  if (IsTar(head)) return "is a tar archive, which is not read: unpack it with tar -xf and give the splat in it";
+  std::string text(head.substr(0, 256));
+  text.erase(0, text.starts_with("\xef\xbb\xbf") ? 3 : 0);
+  text.erase(0, text.find_first_not_of(" \t\r\n"));
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const auto& [mark, what] : kTexts) {
+    if (text.starts_with(mark)) return what;
+  }
+  return {};
+}
+
+}  // namespace anchorsplat

@@ -11,6 +11,7 @@
 #include "formats/attribute_error.h"
 #include "formats/axes.h"
 #include "formats/cloud_io.h"
+#include "formats/stored_as.h"
 
 namespace anchorsplat {
 
@@ -25,7 +26,8 @@ struct ConvertOptions {
   std::optional<int64_t> max_gaussians = {};   // the ones of the largest size × opacity stay
   // What the axes of the files really are, where a program did not follow the format's own convention.
   std::optional<Axes> input_axes = {}, output_axes = {};
-  int lod_level = 0;  // of a streamed SOG that is read; 0 is the finest
+  StoredAs stored = {};  // what the input's numbers mean
+  int lod_level = 0;     // of a streamed SOG that is read; 0 is the finest
   CloudWriteOptions write = {};
   bool measure = false;  // read the output back and compare
 };

@@ -1,5 +1,6 @@
 #include "formats/extra_properties.h"
 
+#include <array>
 #include <numeric>
 
 #include "core/parallel.h"
@@ -41,10 +42,14 @@ void ReorderRows(ExtraProperties& extras, const Buffer<uint32_t>& rows) {
   if (!extras.normals.empty()) ReorderRows(extras.normals, 3, rows);
 }
 
-void FlipAxes(ExtraProperties& extras, const AxisFlip& flip) {
-  if (flip.changes_nothing()) return;
+void TurnAxes(ExtraProperties& extras, const AxisTurn& turn) {
+  if (turn.changes_nothing()) return;
   ParallelFor(0, static_cast<int64_t>(extras.normals.size() / 3), 1 << 14, [&](int64_t first, int64_t last) {
-    for (int64_t i = 3 * first; i < 3 * last; ++i) extras.normals[static_cast<size_t>(i)] *= flip.mean[i % 3];
+    for (int64_t i = first; i < last; ++i) {
+      float* const normal = extras.normals.data() + 3 * i;
+      const std::array<float, 3> old = {normal[0], normal[1], normal[2]};
+      for (size_t k = 0; k < 3; ++k) normal[k] = turn.sign[k] * old[turn.from[k]];
+    }
   });
 }
 

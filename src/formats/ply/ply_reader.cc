@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/log.h"
 #include "core/text.h"
+#include "formats/linear_color.h"
 #include "formats/ply/ply_body.h"
+#include "formats/ply/ply_color_space.h"
 #include "formats/ply/ply_filter.h"
 #include "formats/ply/ply_header.h"
 #include "formats/ply/ply_layout.h"
@@ -39,6 +42,12 @@ Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, Extr
   WarnOfSurplus(file, header, vertex);
   cloud.render_mode = header.render_mode;
   cloud.comments = std::move(header.comments);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const bool linear, HasLinearColors(file, header));
+  if (linear) {
+    LogWarning(Cat(file.name(), ": ", LinearColorInWords(cloud.sh_degree)));
+    SrgbFromLinear(cloud, 0, cloud.size());
+    if (extras != nullptr) std::erase(extras->not_kept, Cat("element \"", kColorSpace, "\""));
+  }
   if (layout.filter) {
     ANCHORSPLAT_RETURN_IF_ERROR(FuseFilter(file, filter, 0, cloud));
     if (!cloud.render_mode) cloud.render_mode = RenderMode::kMip;
@@ -83,6 +92,10 @@ Result<FormatFacts> DescribePly(const InputFile& file) {
     if (&element != layout.vertex) others += Cat(others.empty() ? "" : " ", "(element ", element.name, ")");
   }
   if (layout.filter) facts.Add("3-D filter", "of Mip-Splatting (", kFilter3d, "), made a part of the Gaussians");
+  if (header.Find(kColorSpace) != nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const bool linear, HasLinearColors(file, header));
+    facts.Add("colour space", linear ? "linear RGB, made sRGB" : "sRGB");
+  }
   if (!others.empty()) facts.Add("other properties", Printable(others, 200));
   return facts;
 }

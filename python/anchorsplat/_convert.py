@@ -22,6 +22,9 @@ def convert(
     min_opacity: float = 0,
     max_gaussians: int | None = None,
     coords: str | None = None,
+    scales: str = "logarithms",
+    opacities: str = "logits",
+    colors: str = "harmonics",
     sort: Order = "format",
     spz_version: int = 4,
     lod_levels: int = 4,
@@ -44,6 +47,8 @@ def convert(
     min_opacity: drops Gaussians that are fainter, 0 to 1.
     max_gaussians: keeps at most so many, those of the largest size × opacity.
     coords: what the files' axes really are where they do not follow their format, as "IN:OUT", for example "RUB:".
+    scales, opacities, colors: what the source's numbers are, whatever its format wants: "logarithms" or "lengths", "logits" or
+    "0-1", "harmonics" or colours "0-1" or "0-255".
     sort: order of the Gaussians in the file. spz_version: 4, or 3 for programs that only know gzip.
     lod_levels, lod_ratio, lod_chunk_count, lod_chunk_extent: of a target named lod-meta.json, a scene at several levels of
     detail: their number, the Gaussians of each to those of the finer one, Gaussians in a chunk in units of 1,024, and the

@@ -13,6 +13,7 @@
 #include "core/credit.h"
 #include "core/statistics.h"
 #include "core/text.h"
+#include "core/world_up.h"
 #include "enhance/trained_kind.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
@@ -58,6 +59,10 @@ void PrintTable(const SplatFindings& f) {
   std::cout << "  lost width   " << LostWidthInWords(f) << "\n";
   for (const std::string& credit : CreditsOf(f.comments)) {
     std::cout << "  credit       " << Printable(credit, kMostCredit) << "\n";
+  }
+  if (const auto up = UpOf(f.comments)) {
+    std::cout << "  up           " << Number((*up)[0]) << " " << Number((*up)[1]) << " " << Number((*up)[2])
+              << ", as its comments say\n";
   }
   for (const auto& [name, value] : f.facts.all()) std::cout << "  " << name << "  " << value << "\n";
   if (!IsZero(f.origin)) {

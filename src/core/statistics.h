@@ -61,6 +61,7 @@ struct CloudStatistics {
   int64_t implausible = 0;                // a mean or an axis beyond kPlausibleExtent
   bool linear_looking_scales = false;     // stored scales look like lengths, not logarithms
   bool linear_looking_opacities = false;  // stored opacities look like 0–1, not logits
+  int color_looking_harmonics = 0;        // f_dc look like colours from 0 to 1 or to 255; 0 where they do not
 };
 CloudStatistics ComputeStatistics(const CloudView& cloud);
 

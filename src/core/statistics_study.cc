@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -13,6 +14,7 @@
 #include "core/quaternion_length.h"
 #include "core/rank_search.h"
 #include "core/statistics.h"
+#include "core/stored_values.h"
 
 namespace anchorsplat {
 
@@ -75,7 +77,7 @@ float Between(float low, float high, double fraction) {
 struct Tally {
   std::array<std::vector<uint32_t>, kColumns> counts;
   CloudStatistics sums;
-  int64_t usable = 0, positive_scales = 0, unit_opacities = 0;
+  int64_t usable = 0;
   Values values;
 
   Tally() { counts.fill(std::vector<uint32_t>(RankSearch::kCoarse)); }
@@ -99,10 +101,8 @@ struct Tally {
     }
     const float logit = rows.opacity_logits[i];
     if (logit < -5 && !IsOpaqueEnough(logit)) ++sums.invisible;  // ln(1/254) is −5.5
-    if (logit >= 0 && logit <= 1) ++unit_opacities;
     const float* s = rows.log_scales.data() + 3 * i;
     const float low = std::min({s[0], s[1], s[2]});
-    if (low >= 0) ++positive_scales;
     if (!std::isfinite(low)) ++sums.zero_scales;
   }
 };
@@ -115,6 +115,7 @@ struct StatisticsStudy::State {
   int sh_degree = 0;
   std::mutex mutex;
   std::vector<std::unique_ptr<Tally>> tallies;  // that no thread has just now
+  std::map<int64_t, StoredSample> samples;      // by the first row of their blocks: the same with any threads
   std::vector<Bounds> bounds;                   // of each block: which of two zeros counts must not depend on threads
   std::vector<RankSearch> searches;             // one per column
   Tally sum;
@@ -152,11 +153,38 @@ struct StatisticsStudy::State {
     std::unique_ptr<Tally> tally = Borrow();
     tally->Add(block);
     GiveBack(std::move(tally));
+    TakeSample(block);
   }
+  void TakeSample(const CloudBlock& block);
+  StoredSample WholeSample() const;
   void SumUp();
   void RefineBlock(const CloudBlock& block);
   Percentiles PercentilesOf(Column column, float (*meaning)(float)) const;
 };
+
+void StatisticsStudy::State::TakeSample(const CloudBlock& block) {
+  const int64_t step = StoredSample::StepOf(gaussians);
+  StoredSample sample;
+  for (int64_t row = (block.first + step - 1) / step * step; row < block.first + block.size(); row += step) {
+    const int64_t i = row - block.first;
+    if (block.usable[static_cast<size_t>(i)] != 0) sample.Add(block.rows, i);
+  }
+  if (sample.opacities.empty()) return;
+  const std::lock_guard lock(mutex);
+  samples.emplace(block.first, std::move(sample));
+}
+
+StoredSample StatisticsStudy::State::WholeSample() const {
+  StoredSample whole;
+  whole.of = gaussians;
+  for (const auto& [first, part] : samples) {
+    for (const auto array :
+         {&StoredSample::means, &StoredSample::scales, &StoredSample::opacities, &StoredSample::colors}) {
+      (whole.*array).insert((whole.*array).end(), (part.*array).begin(), (part.*array).end());
+    }
+  }
+  return whole;
+}
 
 void StatisticsStudy::State::SumUp() {
   for (const std::unique_ptr<Tally>& tally : tallies) {
@@ -167,8 +195,6 @@ void StatisticsStudy::State::SumUp() {
       sum.sums.*count += tally->sums.*count;
     }
     sum.usable += tally->usable;
-    sum.positive_scales += tally->positive_scales;
-    sum.unit_opacities += tally->unit_opacities;
   }
   tallies.clear();
   for (RankSearch& search : searches) search.EndCounting();
@@ -235,16 +261,10 @@ CloudStatistics StatisticsStudy::Find() const {
   out.opacity = s.PercentilesOf(kOpacity, [](float x) { return Sigmoid(x); });
   out.outliers = s.outliers;
 
-  // Logarithms of lengths are negative for anything shorter than one unit, and a splat whose Gaussians are all longer
-  // than the box that holds them is no splat. Logits inside 0–1 would be opacities of 50–73 % only.
-  if (out.bounds && s.sum.usable > 0) {
-    float extent = 0;
-    for (size_t a = 0; a < 3; ++a) extent = std::max(extent, out.bounds->max[a] - out.bounds->min[a]);
-    const double share = static_cast<double>(s.sum.positive_scales) / static_cast<double>(s.sum.usable);
-    out.linear_looking_scales = share > 0.99 && out.largest_axis[2] > extent;
-    out.linear_looking_opacities =
-        s.sum.usable >= 100 && static_cast<double>(s.sum.unit_opacities) > 0.99 * static_cast<double>(s.sum.usable);
-  }
+  const StoredSample sample = s.WholeSample();
+  out.linear_looking_scales = LooksLikeLengths(sample);
+  out.linear_looking_opacities = LooksLikeOpacities(sample);
+  out.color_looking_harmonics = LooksLikeColors(sample);
   return out;
 }
 

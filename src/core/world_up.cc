@@ -1,6 +1,7 @@
 #include "core/world_up.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <string_view>
 
@@ -15,6 +16,7 @@ namespace {
 using Vec3 = std::array<double, 3>;
 
 constexpr std::string_view kMark = "world up: ";
+constexpr std::string_view kVerticalAxis = "vertical axis:";
 constexpr double kAlmostAnAxis = 0.93;  // cosine of 21°: nobody holds a camera level on average to the degree
 
 double Length(const Vec3& v) { return std::hypot(v[0], v[1], v[2]); }
@@ -25,17 +27,48 @@ std::optional<Vec3> Unit(const Vec3& v, double least) {
   return Vec3{v[0] / length, v[1] / length, v[2] / length};
 }
 
-std::optional<Vec3> ParseComment(std::string_view text) {
-  if (!text.starts_with(kMark)) return std::nullopt;
-  text.remove_prefix(kMark.size());
-  Vec3 up{};
-  for (double& x : up) {
-    text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
+// Three numbers with `between` before, between and behind them, and nothing else.
+std::optional<Vec3> ThreeNumbers(std::string_view text, std::string_view between) {
+  const auto skip = [&] { text.remove_prefix(std::min(text.find_first_not_of(between), text.size())); };
+  Vec3 numbers{};
+  for (double& x : numbers) {
+    skip();
     const auto [end, code] = FromChars(text.data(), text.data() + text.size(), x);
     if (code != std::errc()) return std::nullopt;
     text.remove_prefix(static_cast<size_t>(end - text.data()));
   }
-  return text.empty() ? Unit(up, 0) : std::nullopt;
+  skip();
+  return text.empty() ? Unit(numbers, 0) : std::nullopt;
+}
+
+std::optional<Vec3> OwnUp(std::string_view text) {
+  return text.starts_with(kMark) ? ThreeNumbers(text.substr(kMark.size()), " ") : std::nullopt;
+}
+
+// What follows "vertical axis:" in any case; nothing in other comments.
+std::optional<std::string> VerticalAxis(std::string_view text) {
+  if (text.size() < kVerticalAxis.size()) return std::nullopt;
+  std::string small(text);
+  for (char& c : small) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (!small.starts_with(kVerticalAxis)) return std::nullopt;
+  small.erase(0, kVerticalAxis.size());
+  while (!small.empty() && small.back() == ' ') small.pop_back();
+  small.erase(0, std::min(small.find_first_not_of(' '), small.size()));
+  return small;
+}
+
+std::optional<Vec3> OthersUp(std::string_view text) {
+  const std::optional<std::string> said = VerticalAxis(text);
+  if (!said || *said == "y") return std::nullopt;
+  const bool has_sign = said->size() == 2 && (said->front() == '-' || said->front() == '+');
+  if (said->size() == 1 || has_sign) {
+    const size_t axis = std::string_view("xyz").find(said->back());
+    if (axis > 2) return std::nullopt;
+    Vec3 up{};
+    up[axis] = said->front() == '-' ? -1 : 1;
+    return up;
+  }
+  return ThreeNumbers(*said, " ,[]()");
 }
 
 }  // namespace
@@ -61,19 +94,29 @@ std::optional<Vec3> WorldUp(std::span<const Camera> cameras) {
 std::string UpComment(const Vec3& up) { return Cat(kMark, up[0], " ", up[1], " ", up[2]); }
 
 std::optional<Vec3> UpOf(const std::vector<std::string>& comments) {
-  for (const std::string& comment : comments) {
-    if (const auto up = ParseComment(comment)) return up;
+  for (const auto parse : {OwnUp, OthersUp}) {
+    for (const std::string& comment : comments) {
+      if (const auto up = parse(comment)) return up;
+    }
   }
   return std::nullopt;
 }
 
-void FlipUp(const std::array<float, 3>& signs, std::vector<std::string>& comments) {
+void TurnUpComments(const std::array<double, 9>& m, std::vector<std::string>& comments) {
   for (std::string& comment : comments) {
-    auto up = ParseComment(comment);
+    const auto own = OwnUp(comment);
+    const auto up = own ? own : OthersUp(comment);
     if (!up) continue;
-    for (size_t k = 0; k < 3; ++k) (*up)[k] = signs[k] < 0 && (*up)[k] != 0 ? -(*up)[k] : (*up)[k];
-    comment = UpComment(*up);
+    Vec3 turned{};
+    for (size_t k = 0; k < 3; ++k) {
+      turned[k] = m[3 * k] * (*up)[0] + m[3 * k + 1] * (*up)[1] + m[3 * k + 2] * (*up)[2];
+      if (turned[k] == 0) turned[k] = 0;  // no negative zeros for people to wonder at
+    }
+    comment = UpComment(turned);
   }
+  // An axis without a sign says nothing any more where it may be another one now.
+  const bool same_axis = m[4] != 0;
+  if (!same_axis) std::erase_if(comments, [](const std::string& comment) { return VerticalAxis(comment) == "y"; });
 }
 
 void TurnUp(const Vec3& target, const Vec3& up, std::vector<Camera>& cameras) {

@@ -18,11 +18,14 @@ inline constexpr std::array<double, 3> kUsualUp = {0, -1, 0};
 // ups cancel out.
 std::optional<std::array<double, 3>> WorldUp(std::span<const Camera> cameras);
 
-// The comment by which a splat of ours says where up is (GaussianCloud::comments), and what such comments say: a unit
-// vector, nothing where there is none or a broken one. FlipUp rewrites it for a world whose axes changed their signs.
+// The comment by which a splat of ours says where up is (GaussianCloud::comments).
 std::string UpComment(const std::array<double, 3>& up);
+// What comments say of it: a unit vector. Ours count before those of other programs, "Vertical axis: z" as nerfstudio
+// has it, or three numbers, or an axis with its sign. Nothing where there is none or a broken one, nor for the bare
+// "Vertical axis: y": Brush writes that whatever its splat, and the usual up lies along this axis anyway.
 std::optional<std::array<double, 3>> UpOf(const std::vector<std::string>& comments);
-void FlipUp(const std::array<float, 3>& signs, std::vector<std::string>& comments);
+// Rewrites them for a world that is turned or mirrored by the orthogonal `matrix` (row-major), in our words.
+void TurnUpComments(const std::array<double, 9>& matrix, std::vector<std::string>& comments);
 
 // OrbitCameras (core/camera.h) that hold `up` upright.
 Result<CameraSet> UprightOrbit(int count, double radius, const std::array<double, 3>& target,

@@ -1,6 +1,13 @@
 #include "formats/axes.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "core/rotation.h"
 #include "core/spherical_harmonics.h"
@@ -9,23 +16,60 @@
 namespace anchorsplat {
 namespace {
 
-constexpr const char* kNames[] = {"RDF", "LDF", "RUF", "LUF", "RDB", "LDB", "RUB", "LUB"};
-
-TEST(Axes, Names) {
-  for (const char* name : kNames) EXPECT_EQ(NameOfAxes(AxesFromName(name).value()), name);
-  EXPECT_EQ(AxesFromName("rub"), kRub);
-  EXPECT_EQ(AxesFromName("luf"), kLuf);
-  for (const char* name : {"", "ru", "rubx", "urb", "xyz"}) EXPECT_FALSE(AxesFromName(name)) << name;
+// All 48: three directions in any order, each one way or the other.
+std::vector<std::string> AllNames() {
+  std::vector<std::string> names;
+  std::string order = "012";
+  do {
+    for (int ways = 0; ways < 8; ++ways) {
+      std::string name;
+      for (const char axis : order) name += ((ways >> (axis - '0') & 1) != 0 ? "LUB" : "RDF")[axis - '0'];
+      names.push_back(name);
+    }
+  } while (std::ranges::next_permutation(order).found);
+  return names;
 }
 
-// Against the definition: mirror the world, and the covariance and the colour seen from any side go with it.
-TEST(Axes, CovarianceAndColourFollowTheMirroredWorld) {
-  for (const char* name : kNames) {
-    const AxisFlip flip = FlipBetween(kRdf, *AxesFromName(name));
-    const GaussianCloud before = RandomCloud(20, 3, 11);
+TEST(Axes, Names) {
+  const std::vector<std::string> names = AllNames();
+  EXPECT_EQ(std::set(names.begin(), names.end()).size(), 48u);
+  for (const std::string& name : names) EXPECT_EQ(NameOfAxes(AxesFromName(name).value()), name);
+  EXPECT_EQ(AxesFromName("rub"), kRub);
+  EXPECT_EQ(AxesFromName("luf"), kLuf);
+  for (const char* name : {"", "ru", "rubx", "rlu", "ffd", "xyz"}) EXPECT_FALSE(AxesFromName(name)) << name;
+}
+
+// What is right lies along right afterwards, and so on.
+TEST(Axes, DirectionsStayWhereTheyAre) {
+  GaussianCloud cloud = RandomCloud(1, 0, 1);
+  cloud.means = {1, 2, 3};  // right, down, front
+  TurnAxes(cloud, TurnBetween(kRdf, *AxesFromName("RFU")));
+  EXPECT_THAT(cloud.means, testing::ElementsAre(1, 3, -2));
+  TurnAxes(cloud, TurnBetween(*AxesFromName("RFU"), *AxesFromName("BLU")));
+  EXPECT_THAT(cloud.means, testing::ElementsAre(-3, -1, -2));
+  for (const std::string& a : AllNames()) {
+    for (const char* b : {"RDF", "RFU", "DBL"}) {
+      const Axes from = *AxesFromName(a), to = *AxesFromName(b);
+      EXPECT_TRUE(Both(TurnBetween(from, to), TurnBetween(to, from)).changes_nothing());
+      EXPECT_EQ(Both(TurnBetween(from, kRub), TurnBetween(kRub, to)), TurnBetween(from, to));
+    }
+  }
+}
+
+// Against the definition: turn or mirror the world, and the covariance and the colour seen from any side go with it.
+TEST(Axes, CovarianceAndColourFollowTheWorld) {
+  for (const std::string& name : AllNames()) {
+    const AxisTurn turn = TurnBetween(kRdf, *AxesFromName(name));
+    const std::array<double, 9> m = turn.matrix();
+    const GaussianCloud before = RandomCloud(5, 3, 11);
     GaussianCloud after = before;
-    FlipAxes(after, flip);
-    for (size_t i = 0; i < 20; ++i) {
+    TurnAxes(after, turn);
+    const auto turned = [&m](const std::array<double, 3>& v) {
+      std::array<double, 3> out{};
+      for (size_t k = 0; k < 3; ++k) out[k] = m[3 * k] * v[0] + m[3 * k + 1] * v[1] + m[3 * k + 2] * v[2];
+      return out;
+    };
+    for (size_t i = 0; i < 5; ++i) {
       const auto covariance = [i](const GaussianCloud& c) {
         const float* q = &c.quats[4 * i];
         const auto r = RotationFromQuaternion<double>(q[0], q[1], q[2], q[3]);
@@ -40,29 +84,35 @@ TEST(Axes, CovarianceAndColourFollowTheMirroredWorld) {
         return out;
       };
       const auto old_covariance = covariance(before), new_covariance = covariance(after);
+      const auto mean = turned({before.means[3 * i], before.means[3 * i + 1], before.means[3 * i + 2]});
       for (size_t a = 0; a < 3; ++a) {
-        EXPECT_EQ(after.means[3 * i + a], flip.mean[a] * before.means[3 * i + a]);
+        EXPECT_EQ(after.means[3 * i + a], static_cast<float>(mean[a]));
         for (size_t b = 0; b < 3; ++b) {
-          const double expected = double{flip.mean[a] * flip.mean[b]} * old_covariance[3 * a + b];
-          EXPECT_NEAR(new_covariance[3 * a + b], expected, 1e-5 * (1 + std::abs(expected))) << name;
+          double expected = 0;
+          for (size_t k = 0; k < 3; ++k) {
+            for (size_t l = 0; l < 3; ++l) expected += m[3 * a + k] * old_covariance[3 * k + l] * m[3 * b + l];
+          }
+          EXPECT_NEAR(new_covariance[3 * a + b], expected, 1e-12 * (1 + std::abs(expected))) << name;
         }
       }
       Random random(i);
-      const std::array<double, 3> d = {random.Normal(), random.Normal(), random.Normal()};
+      std::array<double, 3> d = {random.Normal(), random.Normal(), random.Normal()};
       const double norm = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
-      const auto color = [i](const GaussianCloud& c, double x, double y, double z) {
-        const auto basis = ShBasis(x, y, z);
+      for (double& x : d) x /= norm;
+      const auto color = [i](const GaussianCloud& c, const std::array<double, 3>& to) {
+        const auto basis = ShBasis(to[0], to[1], to[2]);
         double sum = 0;
         for (size_t k = 0; k < 16; ++k) sum += basis[k] * c.sh[48 * i + 3 * k + 1];
         return sum;
       };
-      EXPECT_NEAR(color(before, d[0] / norm, d[1] / norm, d[2] / norm),
-                  color(after, flip.mean[0] * d[0] / norm, flip.mean[1] * d[1] / norm, flip.mean[2] * d[2] / norm),
-                  1e-6)
-          << name;
+      EXPECT_NEAR(color(before, d), color(after, turned(d)), 1e-6) << name;
     }
-    FlipAxes(after, FlipBetween(*AxesFromName(name), kRdf));
-    ExpectSameCloud(after, before);
+    TurnAxes(after, TurnBetween(*AxesFromName(name), kRdf));
+    EXPECT_TRUE(SameBits(after.means, before.means) && SameBits(after.quats, before.quats) &&
+                SameBits(after.log_scales, before.log_scales))
+        << name;
+    for (size_t k = 0; k < before.sh.size(); ++k) ASSERT_NEAR(after.sh[k], before.sh[k], 2e-6) << name;
+    EXPECT_TRUE(!turn.only_signs() || SameBits(after.sh, before.sh)) << name;
   }
 }
 
@@ -70,8 +120,8 @@ TEST(Axes, LowerDegrees) {
   for (int degree = 0; degree < 3; ++degree) {
     GaussianCloud low = RandomCloud(5, degree, 2);
     GaussianCloud high = WithShDegree(low, 3);
-    FlipAxes(low, FlipBetween(kRdf, kRub));
-    FlipAxes(high, FlipBetween(kRdf, kRub));
+    TurnAxes(low, TurnBetween(kRdf, kRub));
+    TurnAxes(high, TurnBetween(kRdf, kRub));
     EXPECT_TRUE(SameBits(low.sh, WithShDegree(high, degree).sh));
   }
 }

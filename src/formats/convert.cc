@@ -15,12 +15,14 @@
 #include "core/memory_limit.h"
 #include "core/statistics.h"
 #include "core/text.h"
+#include "core/world_up.h"
 #include "formats/extra_properties.h"
 #include "formats/hidden_rows.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "formats/row_arrays.h"
 #include "formats/splat_order.h"
+#include "formats/spz/spz_extensions.h"
 #include "io/input_record.h"
 #include "io/output_memory.h"
 
@@ -57,10 +59,10 @@ Status ParseAxes(std::string_view text, ConvertOptions& options) {
     if (parts[k].empty()) continue;
     *axes[k] = AxesFromName(parts[k]);
     if (!*axes[k]) {
-      return Error{
-          ErrorCode::kBadArgument,
-          Cat("\"", Printable(std::string(parts[k])),
-              "\" are no axes: expected Right or Left, Up or Down, Front or Back for x, y, z, as in RDF or RUB")};
+      return Error{ErrorCode::kBadArgument, Cat("\"", Printable(std::string(parts[k])),
+                                                "\" are no axes: expected Right or Left, Up or Down, Front or Back, "
+                                                "each once, for x, y and z, as in RDF, RUB or "
+                                                "RFU")};
     }
   }
   if (parts[0].empty() && parts[1].empty()) {
@@ -146,6 +148,8 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   report.gaussians_read = cloud.size();
   report.sh_degree_read = cloud.sh_degree;
   report.input_bytes = file.bytes();
+  WarnOfStored(input.string(), cloud, options.stored);
+  MakeStored(cloud, options.stored);
   // Without harmonics: looking through them would take longer than all else here. Other formats say what becomes of
   // such Gaussians when they are written.
   if (const int64_t bad = to->keeps_all_values ? CountUnusable(cloud, false) : 0; bad > 0) {
@@ -162,13 +166,29 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
     return Error{ErrorCode::kBadArgument, Cat(input.string(), ": no Gaussian has an opacity of ", options.min_opacity,
                                               " or more: nothing to write")};
   }
-  // Readers and writers follow their formats; what the file really is comes on top.
-  const auto flip = [&](const AxisFlip& signs) {
-    FlipAxes(cloud, signs);
-    FlipAxes(extras, signs);
+  // Readers and writers follow their formats and what a file declares; what it really is comes on top.
+  const auto turn = [&](const AxisTurn& axes) {
+    TurnAxes(cloud, axes);
+    TurnAxes(extras, axes);
   };
-  if (options.input_axes) flip(FlipBetween(from != nullptr ? from->axes : kRdf, *options.input_axes));
-  if (options.output_axes) flip(FlipBetween(to->axes, *options.output_axes));
+  if (options.input_axes || options.output_axes) DropSpzPlaces(input.string(), cloud.comments);
+  if (options.input_axes) {
+    Axes taken = from != nullptr ? from->axes : kRdf;
+    if (from != nullptr && from->declared_axes != nullptr) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(taken, from->declared_axes(file.input()));
+    }
+    turn(Both(TurnBetween(kRdf, taken), TurnBetween(*options.input_axes, kRdf)));
+  }
+  if (options.output_axes) {
+    const AxisTurn written = Both(TurnBetween(kRdf, *options.output_axes), TurnBetween(to->axes, kRdf));
+    const bool said = UpOf(cloud.comments).has_value();
+    turn(written);
+    // What a reader takes for granted does not hold any more.
+    if (!said && written.matrix()[4] != 1) {
+      cloud.comments.push_back(UpComment(kUsualUp));
+      TurnUpComments(written.matrix(), cloud.comments);
+    }
+  }
   CloudWriteOptions write = options.write;
   if (write.order != SplatOrder::kFormat) {
     if (Buffer<uint32_t> rows = WriteOrder(cloud, write.order, SplatOrder::kKeep); !rows.empty()) {

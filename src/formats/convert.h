@@ -12,6 +12,7 @@
 #include "formats/axes.h"
 #include "formats/cloud_io.h"
 #include "formats/opened_splat.h"
+#include "formats/stored_as.h"
 
 namespace anchorsplat {
 
@@ -26,7 +27,8 @@ struct ConvertOptions {
   std::optional<int64_t> max_gaussians = {};   // the ones of the largest size × opacity stay
   // What the axes of the files really are, where a program did not follow the format's own convention.
   std::optional<Axes> input_axes = {}, output_axes = {};
-  int lod_level = 0;  // of a streamed SOG that is read; 0 is the finest
+  StoredAs stored = {};  // what the input's numbers mean
+  int lod_level = 0;     // of a streamed SOG that is read; 0 is the finest
   CloudWriteOptions write = {};
   bool double_means = false;  // of a PLY that is written
   bool measure = false;       // read the output back and compare

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -13,13 +14,18 @@
 #include <utility>
 #include <vector>
 
+#include "core/activations.h"
 #include "core/messages_for_test.h"
+#include "core/random.h"
+#include "core/spherical_harmonics.h"
+#include "core/world_up.h"
 #include "formats/opened_splat.h"
 #include "formats/ply/ply_writer.h"
 #include "formats/random_cloud_for_test.h"
 #include "formats/registry.h"
 #include "formats/splat_order.h"
 #include "io/atomic_file.h"
+#include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
 #include "io/input_record.h"
 
@@ -153,7 +159,89 @@ TEST(Convert, AxesOfFilesThatDoNotFollowTheirFormat) {
   const GaussianCloud back = *ReadCloud(folder / "back.ply");
   EXPECT_LT(CompareAttributes(back, cloud)->means.max, 1e-3);
   EXPECT_LT(CompareAttributes(back, cloud)->rotations.max, 0.01);
-  for (const char* bad : {"", ":", "XYZ", "RDF:abc", "RDF:RUB:LUF"}) EXPECT_FALSE(ParseAxes(bad, options).ok()) << bad;
+  for (const char* bad : {"", ":", "XYZ", "RDF:abc", "RDF:RUB:LUF", "RLF:"})
+    EXPECT_FALSE(ParseAxes(bad, options).ok()) << bad;
+}
+
+TEST(Convert, AxesInAnyOrder) {
+  const TestFolder folder;
+  const GaussianCloud cloud = RandomCloud(50, 3, 3);
+  ConvertOptions options;
+  ASSERT_TRUE(ParseAxes(":rfu", options).ok());
+  ASSERT_TRUE(ConvertFile(Ply(folder, cloud), folder / "rfu.ply", options).ok());
+  const GaussianCloud written = *ReadCloud(folder / "rfu.ply");
+  for (size_t i = 0; i < 50; ++i) {
+    EXPECT_EQ(written.means[3 * i + 1], cloud.means[3 * i + 2]);
+    EXPECT_EQ(written.means[3 * i + 2], -cloud.means[3 * i + 1]);
+  }
+  // Where up is now has to be said.
+  EXPECT_EQ(UpOf(written.comments), (std::array<double, 3>{0, 0, 1}));
+  options = {};
+  ASSERT_TRUE(ParseAxes("RFU:", options).ok());
+  ASSERT_TRUE(ConvertFile(folder / "rfu.ply", folder / "back.ply", options).ok());
+  const GaussianCloud back = *ReadCloud(folder / "back.ply");
+  EXPECT_EQ(CompareAttributes(back, cloud)->means.max, 0);
+  EXPECT_LT(CompareAttributes(back, cloud)->harmonics.max, 2e-6);
+  EXPECT_EQ(UpOf(back.comments), kUsualUp);
+}
+
+// What the user says counts more than what a file declares.
+TEST(Convert, SaidAxesInsteadOfDeclaredOnes) {
+  const TestFolder folder;
+  const GaussianCloud cloud = RandomCloud(50, 0, 3);
+  GaussianCloud turned = cloud;
+  TurnAxes(turned, Both(TurnBetween(kRdf, *AxesFromName("RFU")), TurnBetween(kRub, kRdf)));
+  ASSERT_TRUE(WriteCloud(folder / "a.spz", turned).ok());
+  std::string bytes = FileBytes(folder / "a.spz");
+  const uint32_t record[3] = {0xADBE0003, 4, 6};  // RDF, which it is not
+  bytes[14] = 2;
+  bytes[16] = 32 + sizeof record;
+  bytes.insert(32, reinterpret_cast<const char*>(record), sizeof record);
+  ASSERT_TRUE(WriteWholeFile(folder / "b.spz", bytes, false).ok());
+  ConvertOptions options;
+  ASSERT_TRUE(ParseAxes("RFU:", options).ok());
+  ASSERT_TRUE(ConvertFile(folder / "b.spz", folder / "b.ply", options).ok());
+  EXPECT_LT(CompareAttributes(*ReadCloud(folder / "b.ply"), cloud)->means.max, 1e-3);
+  EXPECT_GT(CompareAttributes(*ReadCloud(folder / "b.spz"), cloud)->means.max, 1);
+}
+
+TEST(Convert, NumbersThatMeanSomethingElse) {
+  const TestFolder folder;
+  GaussianCloud cloud = RandomCloud(500, 1, 3);
+  for (float& x : cloud.log_scales) x = 0.5f * x - 4;
+  Random random(4);
+  for (int64_t i = 0; i < 500; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      cloud.sh[static_cast<size_t>(i * cloud.sh_stride() + k)] = DcFromColor(static_cast<float>(random.Uniform()));
+    }
+  }
+  for (const float one : {1.0f, 255.0f}) {
+    GaussianCloud other = cloud;
+    for (float& x : other.log_scales) x = std::exp(x);
+    for (float& x : other.opacity_logits) x = Sigmoid(x);
+    for (int64_t i = 0; i < 500; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        float& x = other.sh[static_cast<size_t>(i * cloud.sh_stride() + k)];
+        x = one * ColorFromDc(x);
+      }
+    }
+    std::filesystem::remove(folder / "in.ply");
+    const auto input = Ply(folder, other);
+    Messages messages;
+    ConvertOptions options;
+    options.write.overwrite = true;
+    ASSERT_TRUE(ConvertFile(input, folder / "out.ply", options).ok());
+    EXPECT_THAT(messages.TakeWarnings(),
+                testing::ElementsAre(testing::HasSubstr("--scales lengths"), testing::HasSubstr("--opacities 0-1"),
+                                     testing::HasSubstr(one == 1 ? "--colors 0-1" : "--colors 0-255")));
+    options.stored = {.lengths = true, .opacities = true, .color_of_one = one};
+    ASSERT_TRUE(ConvertFile(input, folder / "out.ply", options).ok());
+    EXPECT_THAT(messages.TakeWarnings(), testing::IsEmpty());
+    const auto error = CompareAttributes(*ReadCloud(folder / "out.ply"), cloud);
+    EXPECT_LT(error->log_scales.max, 1e-5);
+    EXPECT_LT(error->opacities.max, 1e-6);
+    EXPECT_LT(error->colors.max, 1e-6);
+  }
 }
 
 TEST(Convert, SaysWhatHasNoPlaceInTheFormat) {

@@ -1,5 +1,6 @@
 #include "formats/extra_properties.h"
 
+#include <array>
 #include <numeric>
 
 #include "core/parallel.h"
@@ -44,15 +45,19 @@ void ReorderRows(ExtraProperties& extras, const Buffer<uint32_t>& rows) {
   if (!extras.world.empty()) ReorderRows(extras.world, 3, rows);
 }
 
-void FlipAxes(ExtraProperties& extras, const AxisFlip& flip) {
-  if (flip.changes_nothing()) return;
-  const auto turn = [&](auto& vectors) {
+void TurnAxes(ExtraProperties& extras, const AxisTurn& turn) {
+  if (turn.changes_nothing()) return;
+  const auto turn_all = [&](auto& vectors) {
     ParallelFor(0, std::ssize(vectors) / 3, 1 << 14, [&](int64_t first, int64_t last) {
-      for (int64_t i = 3 * first; i < 3 * last; ++i) vectors[static_cast<size_t>(i)] *= flip.mean[i % 3];
+      for (int64_t i = first; i < last; ++i) {
+        auto* const vector = vectors.data() + 3 * i;
+        const std::array old = {vector[0], vector[1], vector[2]};
+        for (size_t k = 0; k < 3; ++k) vector[k] = turn.sign[k] * old[turn.from[k]];
+      }
     });
   };
-  turn(extras.normals);
-  turn(extras.world);
+  turn_all(extras.normals);
+  turn_all(extras.world);
 }
 
 }  // namespace anchorsplat

@@ -44,7 +44,7 @@ void KeepRows(ExtraProperties& extras, const std::vector<char>& keep);
 // Row i becomes the old row rows[i]; a permutation.
 void ReorderRows(ExtraProperties& extras, const Buffer<uint32_t>& rows);
 // Normals along other axes. What else may have a direction is not known.
-void FlipAxes(ExtraProperties& extras, const AxisFlip& flip);
+void TurnAxes(ExtraProperties& extras, const AxisTurn& turn);
 
 // WriteCloud (cloud_io.h) with what the input says of the same Gaussians beside them, in the order of the cloud.
 // Formats without a place for it leave it out, and a warning names it.

@@ -141,6 +141,7 @@ constexpr SplatFormat kFormats[] = {
      .size_is_estimate = true,
      .seconds_per_gaussian = 7e-7,
      .axes = kRub,
+     .declared_axes = DeclaredAxesOfSpz,
      .range = kSpzRange,
      .mode_tag = ModeTag::kCompensated,
      .strays = SpzStrays,

@@ -98,6 +98,8 @@ struct SplatFormat {
   SplatOrder order = SplatOrder::kKeep;
   // What the axes of its files are by its own convention.
   Axes axes = kRdf;
+  // What they are in this file, where it may say so. Null: `axes`.
+  Result<Axes> (*declared_axes)(const InputFile& file) = nullptr;
   FormatRange range = {};
   ModeTag mode_tag = ModeTag::kNone;
   CommentPlace comments = CommentPlace::kNone;

@@ -10,6 +10,8 @@
 #include "core/parallel.h"
 #include "core/statistics.h"
 #include "core/text.h"
+#include "formats/spz/spz_extensions.h"
+#include "formats/spz/spz_reader.h"
 
 namespace anchorsplat {
 
@@ -74,6 +76,13 @@ std::string MarkLoss(const SplatFormat& format, std::span<const std::string> com
                  : "been fitted to the areas of pixels: enhance that file, and it becomes worse (keep a PLY for that)");
 }
 
+// What an SPZ said that comments keep, and an SPZ takes again.
+std::string SpzRecordLoss(const SplatFormat& format, std::span<const std::string> comments) {
+  if (format.comments == CommentPlace::kAll || format.declared_axes == DeclaredAxesOfSpz) return {};
+  const std::string names = NamesOfSpzExtensions(comments);
+  return names.empty() ? std::string() : Cat(AFileOf(format), " has no place for ", names, ": dropped");
+}
+
 // Without its tag a splat is drawn as a classic one.
 std::string ModeLoss(const SplatFormat& format, std::optional<RenderMode> mode) {
   if (!IsCompensated(mode) || format.mode_tag == ModeTag::kEach) return {};
@@ -118,6 +127,7 @@ std::vector<std::string> WriteLosses(const SplatFormat& format, const CloudView&
   if (std::string loss = OriginLoss(format, cloud.origin); !loss.empty()) losses.push_back(std::move(loss));
   if (std::string loss = CreditLoss(format, cloud.comments); !loss.empty()) losses.push_back(std::move(loss));
   if (std::string loss = MarkLoss(format, cloud.comments); !loss.empty()) losses.push_back(std::move(loss));
+  if (std::string loss = SpzRecordLoss(format, cloud.comments); !loss.empty()) losses.push_back(std::move(loss));
   if (format.mean_loss != nullptr) {
     if (std::string loss = format.mean_loss(cloud); !loss.empty()) losses.push_back(std::move(loss));
   }

@@ -33,8 +33,17 @@ void ConvertFlags::AddTo(CLI::App& verb) {
       ->check(AtLeastOne());
   verb.add_option("--coords", axes,
                   "What the files' axes really are where they do not follow their format, as IN:OUT, for example RUB: "
-                  "for a PLY with y up, :RDF for an SPZ as careless programs expect it")
+                  "for a PLY with y up, RFU: for one with z up, :RDF for an SPZ as careless programs expect it")
       ->check(NotEmpty());
+  verb.add_option("--scales", scales, "What the input's scales are, whatever its format wants: logarithms or lengths")
+      ->check(CLI::IsMember({"logarithms", "lengths"}))
+      ->capture_default_str();
+  verb.add_option("--opacities", opacities, "What the input's opacities are, whatever its format wants: logits or 0-1")
+      ->check(CLI::IsMember({"logits", "0-1"}))
+      ->capture_default_str();
+  verb.add_option("--colors", colors, "What the input's f_dc are: harmonics, or colours 0-1 or 0-255")
+      ->check(CLI::IsMember({"harmonics", "0-1", "0-255"}))
+      ->capture_default_str();
   double_means = verb.add_flag("--double", options.double_means,
                                "PLY: world coordinates in double precision instead of floats from an origin that a "
                                "comment says (default: where the input has them)");
@@ -68,6 +77,11 @@ Result<ConvertOptions> MakeConvertOptions(const ConvertFlags& flags, bool overwr
   ConvertOptions options = flags.options;
   options.write.overwrite = overwrite;
   options.measure = flags.report;
+  options.stored = {.lengths = flags.scales == "lengths",
+                    .opacities = flags.opacities == "0-1",
+                    .color_of_one = flags.colors == "0-1"     ? 1.0f
+                                    : flags.colors == "0-255" ? 255.0f
+                                                              : 0.0f};
   ANCHORSPLAT_ASSIGN_OR_RETURN(options.input_format, ParseInputFormat("--from", flags.from));
   if (flags.axes) {
     const Status axes = ParseAxes(*flags.axes, options);

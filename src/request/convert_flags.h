@@ -18,6 +18,7 @@ namespace anchorsplat {
 struct ConvertFlags {
   std::string from;  // name of a format; empty: found out
   std::optional<std::string> axes;
+  std::string scales = "logarithms", opacities = "logits", colors = "harmonics";
   int views = 8;
   bool report = false;
   ConvertOptions options;

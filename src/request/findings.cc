@@ -13,6 +13,7 @@
 #include "core/credit.h"
 #include "core/file_system.h"
 #include "core/text.h"
+#include "core/world_up.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
 #include "enhance/network_choice.h"
@@ -47,10 +48,13 @@ std::vector<std::string> Problems(const CloudStatistics& s) {
   add(s.unnormalised_quaternions, "with quaternions that are not normalised; legal, as trainers leave them so");
   add(s.implausible, "farther out or longer than a million units: is the file damaged, or of another kind?");
   add(s.invisible, "with an opacity below 1/255; never drawn");
-  if (s.linear_looking_scales)
-    out.push_back("scales look like lengths, not logarithms: was the file converted wrongly?");
-  if (s.linear_looking_opacities)
-    out.push_back("opacities look like 0 to 1, not logits: was the file converted wrongly?");
+  const auto suspect = [&out](bool is_so, const char* what, const char* option) {
+    if (is_so) out.push_back(Cat(what, ": was the file converted wrongly? convert ", option, " reads it so"));
+  };
+  suspect(s.linear_looking_scales, "scales look like lengths, not logarithms", "--scales lengths");
+  suspect(s.linear_looking_opacities, "opacities look like 0 to 1, not logits", "--opacities 0-1");
+  suspect(s.color_looking_harmonics == 1, "f_dc look like colours from 0 to 1, not harmonics", "--colors 0-1");
+  suspect(s.color_looking_harmonics == 255, "f_dc look like colours from 0 to 255, not harmonics", "--colors 0-255");
   return out;
 }
 
@@ -267,6 +271,8 @@ nlohmann::json ToJson(const SplatFindings& f) {
                            {"outliers", s.outliers}}},
                          {"linear_looking_scales", s.linear_looking_scales},
                          {"linear_looking_opacities", s.linear_looking_opacities},
+                         {"color_looking_harmonics", s.color_looking_harmonics},
+                         {"up", nullptr},
                          {"problems", f.problems},
                          {"predicted_bytes", nlohmann::json::object()},
                          {"predicted_roughly", nlohmann::json::array()}};
@@ -277,6 +283,7 @@ nlohmann::json ToJson(const SplatFindings& f) {
   } else if (s.bounds) {
     json["bounds"] = {{"min", ToWorld(s.bounds->min.data(), f.origin)}, {"max", ToWorld(s.bounds->max.data(), f.origin)}};
   }
+  if (const auto up = UpOf(f.comments)) json["up"] = *up;
   if (f.render_mode) json["render_mode"] = NameOf(*f.render_mode);
   if (f.looks) json["looks"] = NameOf(*f.looks);
   if (f.pixel_size.ok()) {

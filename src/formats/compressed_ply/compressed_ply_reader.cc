@@ -14,6 +14,7 @@
 #include "core/text.h"
 #include "formats/cloud_checks.h"
 #include "formats/file_blocks.h"
+#include "formats/first_failure.h"
 #include "formats/ply/ply_header.h"
 #include "formats/quantize.h"
 #include "formats/record_blocks.h"
@@ -89,6 +90,11 @@ Result<int> HarmonicsDegree(const InputFile& file, const PlyElement* sh) {
                    Cat("line ", sh->line, ": element \"sh\" has ", rest, " properties f_rest_*, expected 9, 24 or 45"));
 }
 
+Error WrongRange(const InputFile& file, int64_t chunk, size_t k, float min, float max) {
+  return {ErrorCode::kBadFile, Cat(file.name(), ": chunk ", WithThousands(chunk), " has ", kChunkProperties[k], " ",
+                                   min, " and ", kChunkProperties[k + 3], " ", max, ": a range the wrong way round")};
+}
+
 Result<std::vector<ChunkRanges>> ReadChunks(const InputFile& file, const Rows& rows) {
   const PlyElement& element = *rows.element;
   const bool has_colors = element.Find("min_r") != nullptr;
@@ -98,6 +104,7 @@ Result<std::vector<ChunkRanges>> ReadChunks(const InputFile& file, const Rows& r
   }
   std::vector<ChunkRanges> chunks(static_cast<size_t>(element.count));
   const auto row_size = static_cast<size_t>(element.row_size());
+  FirstFailure wrong;
   ANCHORSPLAT_RETURN_IF_ERROR(
       ReadRecords(file, rows.begin, element.count, row_size, [&](int64_t first, int64_t last, const uint8_t* bytes) {
         for (int64_t i = first; i < last; ++i, bytes += row_size) {
@@ -105,9 +112,13 @@ Result<std::vector<ChunkRanges>> ReadChunks(const InputFile& file, const Rows& r
           for (size_t k = 0; k < (has_colors ? values.size() : kRequiredChunkProperties); ++k) {
             std::memcpy(&values[k], bytes + offsets[k], sizeof(float));
           }
+          for (const size_t k : {0u, 1u, 2u, 6u, 7u, 8u, 12u, 13u, 14u}) {
+            if (values[k] > values[k + 3]) wrong.Report(i, WrongRange(file, i, k, values[k], values[k + 3]));
+          }
           std::memcpy(&chunks[static_cast<size_t>(i)], values.data(), sizeof values);
         }
       }));
+  ANCHORSPLAT_RETURN_IF_ERROR(wrong.status());
   return chunks;
 }
 

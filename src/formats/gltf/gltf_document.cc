@@ -6,9 +6,11 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <nlohmann/json.hpp>
 #include <system_error>
 #include <utility>
 
+#include "core/rotation.h"
 #include "core/text.h"
 
 namespace anchorsplat {
@@ -71,6 +73,67 @@ Result<uint64_t> Offset(const JsonValue& object, const char* key, std::optional<
     return value->Complain("expected a whole number of bytes");
   }
   return static_cast<uint64_t>(number);
+}
+
+using Matrix = std::array<double, 9>;
+using Vector = std::array<double, 3>;
+
+Vector Apply(const Matrix& m, const Vector& x) {
+  return {m[0] * x[0] + m[1] * x[1] + m[2] * x[2], m[3] * x[0] + m[4] * x[1] + m[5] * x[2],
+          m[6] * x[0] + m[7] * x[1] + m[8] * x[2]};
+}
+
+Matrix Product(const Matrix& a, const Matrix& b) {
+  Matrix out{};
+  for (size_t r = 0; r < 3; ++r) {
+    for (size_t c = 0; c < 3; ++c) out[3 * r + c] = a[3 * r] * b[c] + a[3 * r + 1] * b[3 + c] + a[3 * r + 2] * b[6 + c];
+  }
+  return out;
+}
+
+struct Motion {
+  Matrix matrix = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  Vector translation = {0, 0, 0};
+};
+
+// `outer` after what `node` does itself.
+Result<Motion> MotionOf(const JsonValue& node, const Motion& outer) {
+  Motion own;
+  if (const std::optional<JsonValue> matrix = node.Find("matrix")) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> m, matrix->Numbers(16));  // column by column
+    if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1) {
+      return matrix->Complain("has a last row other than 0 0 0 1, which no node may have");
+    }
+    for (size_t r = 0; r < 3; ++r) {
+      for (size_t c = 0; c < 3; ++c) own.matrix[3 * r + c] = m[4 * c + r];
+      own.translation[r] = m[12 + r];
+    }
+  }
+  if (const std::optional<JsonValue> translation = node.Find("translation")) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> t, translation->Numbers(3));
+    for (size_t k = 0; k < 3; ++k) own.translation[k] += t[k];
+  }
+  if (const std::optional<JsonValue> rotation = node.Find("rotation")) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> q, rotation->Numbers(4));  // xyzw
+    if (!(std::hypot(q[0], q[1], std::hypot(q[2], q[3])) > 0)) return rotation->Complain("is zero: no rotation");
+    own.matrix = Product(own.matrix, RotationFromQuaternion(q[3], q[0], q[1], q[2]));
+  }
+  if (const std::optional<JsonValue> scale = node.Find("scale")) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> s, scale->Numbers(3));
+    own.matrix = Product(own.matrix, {s[0], 0, 0, 0, s[1], 0, 0, 0, s[2]});
+  }
+  const Vector moved = Apply(outer.matrix, own.translation);
+  for (size_t k = 0; k < 3; ++k) own.translation[k] = outer.translation[k] + moved[k];
+  own.matrix = Product(outer.matrix, own.matrix);
+  return own;
+}
+
+// KHR_node_visibility: hides a node and all below it.
+bool IsHidden(const JsonValue& node) {
+  const std::optional<JsonValue> extensions = node.Find("extensions");
+  const std::optional<JsonValue> visibility = extensions ? extensions->Find("KHR_node_visibility") : std::nullopt;
+  const std::optional<JsonValue> visible = visibility ? visibility->Find("visible") : std::nullopt;
+  return visible && visible->raw().is_boolean() && !visible->raw().get<bool>();
 }
 
 int ComponentSize(int type) { return type <= 5121 ? 1 : type <= 5123 ? 2 : 4; }
@@ -185,6 +248,10 @@ Result<GltfDocument::Accessor> GltfDocument::FindAccessor(const JsonValue& index
   if (value.has("sparse")) return value.Complain("is sparse, which is not read");
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue view_index, value.Get("bufferView"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue view, Element("bufferViews", view_index));
+  if (const std::optional<JsonValue> extensions = view.Find("extensions");
+      extensions && extensions->raw().is_object() && !extensions->raw().empty()) {
+    return extensions->Complain(Cat("uses ", Printable(extensions->raw().begin().key()), ", which is not read"));
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue buffer_index, view.Get("buffer"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const int at, buffer_index.WholeNumber(0, kMost));
   if (static_cast<size_t>(at) >= buffers_.size()) {
@@ -206,6 +273,45 @@ Result<GltfDocument::Accessor> GltfDocument::FindAccessor(const JsonValue& index
   accessor.file = buffer.own ? &*buffer.own : file_;
   accessor.begin = buffer.begin + view_begin + begin;
   return accessor;
+}
+
+// By node: whether it is a root that the scene shows.
+Result<std::vector<char>> GltfDocument::RootsOfScene(size_t nodes, const std::vector<char>& is_child) const {
+  const std::optional<JsonValue> scenes = root().Find("scenes");
+  if (!scenes || !scenes->raw().is_array() || scenes->raw().empty()) return std::vector<char>(nodes, 1);
+  std::vector<char> roots(nodes, 0);
+  JsonValue scene = scenes->Element(0);
+  if (const std::optional<JsonValue> index = root().Find("scene")) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(scene, Element("scenes", *index));
+  }
+  const std::optional<JsonValue> list = scene.Find("nodes");
+  if (!list) return roots;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> indices, list->Elements());
+  for (const JsonValue& index : indices) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const int at, index.WholeNumber(0, kMost));
+    if (static_cast<size_t>(at) >= nodes) return index.Complain("is no node");
+    if (is_child[static_cast<size_t>(at)] != 0) return index.Complain("is a child of another node, no root");
+    roots[static_cast<size_t>(at)] = 1;
+  }
+  return roots;
+}
+
+// By node: whether an animation moves it. What is no animation moves nothing.
+std::vector<char> GltfDocument::AnimatedNodes(size_t nodes) const {
+  std::vector<char> moved(nodes, 0);
+  const nlohmann::json none = nlohmann::json::array();
+  const auto array_of = [&none](const nlohmann::json& json, const char* key) -> const nlohmann::json& {
+    return json.is_object() && json.contains(key) && json[key].is_array() ? json[key] : none;
+  };
+  for (const nlohmann::json& animation : array_of(root().raw(), "animations")) {
+    for (const nlohmann::json& channel : array_of(animation, "channels")) {
+      if (!channel.is_object() || !channel.contains("target") || !channel["target"].is_object()) continue;
+      const auto node = channel["target"].find("node");
+      if (node == channel["target"].end() || !node->is_number_unsigned() || node->get<size_t>() >= nodes) continue;
+      moved[node->get<size_t>()] = 1;
+    }
+  }
+  return moved;
 }
 
 Result<std::vector<GltfDocument::Placed>> GltfDocument::PlacedMeshes() const {
@@ -233,14 +339,16 @@ Result<std::vector<GltfDocument::Placed>> GltfDocument::PlacedMeshes() const {
       if (std::exchange(is_child[child], 1) != 0) return node.Complain("shares a child with another node");
     }
   }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<char> in_scene, RootsOfScene(nodes.size(), is_child));
+  const std::vector<char> moved = AnimatedNodes(nodes.size());
   struct Visit {
     size_t node;
-    double scale;
-    std::array<double, 3> translation;
+    Motion motion;
+    bool shown, animated;
   };
   std::vector<Visit> stack;
   for (size_t k = nodes.size(); k-- > 0;) {
-    if (is_child[k] == 0) stack.push_back({k, 1, {0, 0, 0}});
+    if (is_child[k] == 0) stack.push_back({k, {}, in_scene[k] != 0, false});
   }
   size_t visited = 0;
   while (!stack.empty()) {
@@ -248,41 +356,15 @@ Result<std::vector<GltfDocument::Placed>> GltfDocument::PlacedMeshes() const {
     stack.pop_back();
     ++visited;
     const JsonValue& node = nodes[visit.node];
-    if (node.has("matrix")) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> m, node.Find("matrix")->Numbers(16));
-      const double s = m[0];
-      const std::array<double, 12> expected = {s, 0, 0, 0, 0, s, 0, 0, 0, 0, s, 0};
-      for (size_t k = 0; k < expected.size(); ++k) {
-        if (std::fabs(m[k] - expected[k]) > 1e-6 * std::fabs(s) || !(s > 0)) {
-          return node.Complain("rotates or stretches what it shows, which is not supported: apply it to the splat");
-        }
-      }
-      for (size_t k = 0; k < 3; ++k) visit.translation[k] += visit.scale * m[12 + k];
-      visit.scale *= s;
-    }
-    if (node.has("translation")) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> t, node.Find("translation")->Numbers(3));
-      for (size_t k = 0; k < 3; ++k) visit.translation[k] += visit.scale * t[k];
-    }
-    if (node.has("rotation")) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> q, node.Find("rotation")->Numbers(4));
-      if (std::fabs(q[0]) + std::fabs(q[1]) + std::fabs(q[2]) > 1e-6) {
-        return node.Complain("rotates what it shows, which is not supported: apply it to the splat");
-      }
-    }
-    if (node.has("scale")) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> s, node.Find("scale")->Numbers(3));
-      if (!(s[0] > 0) || s[0] != s[1] || s[0] != s[2]) {
-        return node.Complain("stretches what it shows, which is not supported: apply it to the splat");
-      }
-      visit.scale *= s[0];
-    }
+    ANCHORSPLAT_ASSIGN_OR_RETURN(visit.motion, MotionOf(node, visit.motion));
+    visit.shown &= !IsHidden(node);
+    visit.animated |= moved[visit.node] != 0;
     if (const std::optional<JsonValue> mesh = node.Find("mesh")) {
-      out.push_back({*mesh, visit.scale, visit.translation});
+      out.push_back({node, *mesh, visit.motion.matrix, visit.motion.translation, visit.shown, visit.animated});
     }
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<size_t> children, children_of(node));
     for (auto child = children.rbegin(); child != children.rend(); ++child) {
-      stack.push_back({*child, visit.scale, visit.translation});
+      stack.push_back({*child, visit.motion, visit.shown, visit.animated});
     }
   }
   if (visited != nodes.size()) return list->Complain("has nodes that are their own ancestors");

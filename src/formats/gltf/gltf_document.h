@@ -33,12 +33,15 @@ class GltfDocument {
   };
   Result<Accessor> FindAccessor(const JsonValue& index) const;
 
-  // A mesh as a node of the scene shows it: mesh = index, x' = scale·x + translation.
+  // A mesh as a node of the scene shows it: x' = matrix·x + translation (row-major).
   struct Placed {
-    JsonValue mesh;
-    double scale = 1;
+    JsonValue node, mesh;
+    std::array<double, 9> matrix = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     std::array<double, 3> translation = {0, 0, 0};
+    bool shown = true;      // the scene has it, and nothing hides it
+    bool animated = false;  // an animation moves the node, or one above it
   };
+  // The scene is the document's default one, or the first; without scenes all nodes are shown.
   Result<std::vector<Placed>> PlacedMeshes() const;
 
   // Element `index` of the array `key` of the document.
@@ -50,6 +53,8 @@ class GltfDocument {
     uint64_t begin = 0, size = 0;
   };
   GltfDocument(const InputFile& file, JsonFile json) : file_(&file), json_(std::move(json)) {}
+  Result<std::vector<char>> RootsOfScene(size_t nodes, const std::vector<char>& is_child) const;
+  std::vector<char> AnimatedNodes(size_t nodes) const;
   Status OpenBuffers(uint64_t binary_begin, uint64_t binary_size);
 
   const InputFile* file_;

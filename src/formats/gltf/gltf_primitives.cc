@@ -1,12 +1,18 @@
 #include "formats/gltf/gltf_primitives.h"
 
 #include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "core/gaussian_cloud.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
+#include "formats/gltf/gltf_meanings.h"
 #include "formats/gltf/gltf_values.h"
+#include "formats/linear_color.h"
 #include "io/compression_ratio.h"
 
 namespace anchorsplat {
@@ -14,6 +20,8 @@ namespace anchorsplat {
 namespace {
 
 using Accessor = GltfDocument::Accessor;
+constexpr const char* kScale = "KHR_gaussian_splatting:SCALE";
+constexpr const char* kOpacity = "KHR_gaussian_splatting:OPACITY";
 constexpr size_t kMaxPrimitives = 1024;  // a node costs a hostile file some bytes, and us a thousand times as many
 
 Result<Accessor> Attribute(const GltfDocument& document, const JsonValue& attributes, const std::string& name,
@@ -30,10 +38,32 @@ Result<Accessor> Attribute(const GltfDocument& document, const JsonValue& attrib
   return accessor;
 }
 
+// The value of an optional word of the extension; `otherwise` where there is none.
+Result<std::string> WordOf(const JsonValue& extension, const char* key, const char* otherwise) {
+  const std::optional<JsonValue> value = extension.Find(key);
+  return value ? value->Text() : Result<std::string>(otherwise);
+}
+
+// Drafts had other names of the same two.
+Result<bool> IsLinear(const JsonValue& extension) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string name, WordOf(extension, "colorSpace", "srgb_rec709_display"));
+  if (name == "srgb_rec709_display" || name == "BT.709-sRGB" || name == "BT.709-srgb") return false;
+  if (name == "lin_rec709_display" || name == "BT.709-linear") return true;
+  return extension.Find("colorSpace")
+      ->Complain(Cat("is \"", Printable(name), "\", expected \"srgb_rec709_display\" or \"lin_rec709_display\""));
+}
+
 Result<GltfPrimitive> OpenPrimitive(const GltfDocument& document, const JsonValue& value, const JsonValue& extension) {
-  if (const std::optional<JsonValue> kernel = extension.Find("kernel")) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string name, kernel->Text());
-    if (name != "ellipse") return kernel->Complain(Cat("is \"", Printable(name), "\", expected \"ellipse\""));
+  constexpr std::array<std::pair<const char*, const char*>, 2> kOnly = {
+      {{"kernel", "ellipse"}, {"projection", "perspective"}}};
+  for (const auto& [key, only] : kOnly) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string name, WordOf(extension, key, only));
+    if (name != only) {
+      return extension.Find(key)->Complain(Cat("is \"", Printable(name), "\", expected \"", only, "\""));
+    }
+  }
+  if (const std::optional<JsonValue> targets = value.Find("targets")) {
+    return targets->Complain("morphs a splat, which is not supported");
   }
   const std::optional<JsonValue> inner = extension.Find("extensions");
   if (inner && inner->raw().is_object() && !inner->raw().empty()) {
@@ -42,10 +72,14 @@ Result<GltfPrimitive> OpenPrimitive(const GltfDocument& document, const JsonValu
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue attributes, value.Get("attributes"));
   const auto name = [](const char* what) { return Cat(kGltfSplatting, ":", what); };
   GltfPrimitive primitive;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.linear, IsLinear(extension));
   ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.means, Attribute(document, attributes, "POSITION", 3, true));
   ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.quats, Attribute(document, attributes, name("ROTATION"), 4, true));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.scales, Attribute(document, attributes, name("SCALE"), 3, true));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.opacities, Attribute(document, attributes, name("OPACITY"), 1, true));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.scales, Attribute(document, attributes, kScale, 3, true));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.opacities, Attribute(document, attributes, kOpacity, 1, true));
+  if (primitive.opacities.component_type != kGltfFloat && !primitive.opacities.normalized) {
+    return attributes.Find(kOpacity)->Complain("refers to whole numbers that are not normalized: opacities are 0 to 1");
+  }
   for (int degree = 0; degree <= kMaxShDegree; ++degree) {
     if (degree > 0 && !attributes.has(name(Cat("SH_DEGREE_", degree, "_COEF_0").c_str()).c_str())) break;
     for (int n = 0; n <= 2 * degree; ++n) {
@@ -90,21 +124,113 @@ Result<const MeshSplats::Mesh*> MeshSplats::Find(const JsonValue& index) {
   return &mesh;
 }
 
+namespace {
+
+// Those that may be required and change nothing of splats, by the beginnings of their names.
+constexpr std::array<std::string_view, 12> kHarmless = {"KHR_gaussian_splatting",
+                                                        "KHR_mesh_quantization",
+                                                        "KHR_node_visibility",
+                                                        "KHR_materials_",
+                                                        "KHR_texture_",
+                                                        "EXT_texture_",
+                                                        "KHR_lights_",
+                                                        "EXT_lights_",
+                                                        "KHR_xmp",
+                                                        "KHR_animation_pointer",
+                                                        "KHR_draco_mesh_compression",
+                                                        "MSFT_texture_"};
+
+// What is required and not known may change anything.
+Status CheckRequired(const GltfDocument& document) {
+  const std::optional<JsonValue> required = document.root().Find("extensionsRequired");
+  if (!required) return {};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> names, required->Elements());
+  for (const JsonValue& value : names) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string name, value.Text());
+    const auto begins = [&name](std::string_view known) { return name.starts_with(known); };
+    if (std::ranges::none_of(kHarmless, begins)) {
+      return value.Complain(Cat("is ", Printable(name), ", which this version does not know"));
+    }
+  }
+  return {};
+}
+
+// What a node does with a splat beside placing it.
+Status CheckNode(const GltfDocument::Placed& placed) {
+  const std::optional<JsonValue> extensions = placed.node.Find("extensions");
+  if (!extensions || !extensions->raw().is_object()) return {};
+  for (const char* name : {"EXT_mesh_gpu_instancing", "EXT_instance_features"}) {
+    if (extensions->has(name)) {
+      return extensions->Complain(Cat("uses ", name, " for a splat, which is not read: make it nodes"));
+    }
+  }
+  return {};
+}
+
+// An extension whose name speaks of splats, of a file in which nothing else does.
+std::string OtherSplatExtension(const GltfDocument& document) {
+  for (const char* key : {"extensionsRequired", "extensionsUsed"}) {
+    const std::optional<JsonValue> list = document.root().Find(key);
+    if (!list || !list->raw().is_array()) continue;
+    for (const nlohmann::json& name : list->raw()) {
+      if (!name.is_string() || name == kGltfSplatting) continue;
+      const auto& text = name.get_ref<const std::string&>();
+      if (text.find("splat") != text.npos) return Cat("; it uses ", Printable(text), ", which is not read");
+    }
+  }
+  return {};
+}
+
+// What its values mean, and what is to be said of that.
+Status FindMeanings(const JsonValue& attributes, const std::string& where, GltfPrimitive& primitive,
+                    std::vector<std::string>& warnings) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.logarithms, HoldsLogarithms(*attributes.Find(kScale), primitive.scales));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.logits, HoldsLogits(*attributes.Find(kOpacity), primitive.opacities));
+  const auto add = [&](bool is_so, const std::string& text) {
+    const std::string warning = Cat(where, ": ", text);
+    if (is_so && std::ranges::find(warnings, warning) == warnings.end()) warnings.push_back(warning);
+  };
+  add(primitive.logarithms, "SCALE has negative values, so it is read as logarithms instead of lengths");
+  add(primitive.logits, "OPACITY has values outside of 0 to 1, so it is read as logits instead of opacities");
+  add(primitive.linear, LinearColorInWords(primitive.degree));
+  return {};
+}
+
+}  // namespace
+
 Result<GltfSplats> FindGltfSplats(const InputFile& file, const GltfDocument& document, const ReadLimits& limits) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckRequired(document));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<GltfDocument::Placed> meshes, document.PlacedMeshes());
   MeshSplats splats_of(document);
   GltfSplats splats;
+  std::vector<JsonValue> attributes;
+  int64_t hidden = 0, animated = 0, skinned = 0;
   for (const GltfDocument::Placed& placed : meshes) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const MeshSplats::Mesh* mesh, splats_of.Find(placed.mesh));
+    if (mesh->splats.empty()) continue;
+    if (!placed.shown) {
+      ++hidden;
+      continue;
+    }
+    ANCHORSPLAT_RETURN_IF_ERROR(CheckNode(placed));
+    animated += placed.animated ? 1 : 0;
+    skinned += placed.node.has("skin") ? 1 : 0;
+    const std::optional<GltfPlace> place = PlaceOf(placed.matrix, placed.translation);
+    if (!place) {
+      return placed.node.Complain(
+          "stretches or slants a splat, itself or by a node above it: Gaussians can only be moved, turned, mirrored "
+          "and "
+          "scaled alike on all sides");
+    }
     for (const JsonValue& value : mesh->splats) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(GltfPrimitive primitive, OpenPrimitive(document, value, *SplatExtension(value)));
-      primitive.scale = placed.scale;
-      primitive.translation = placed.translation;
+      primitive.place = *place;
       splats.count += primitive.count();
       splats.degree = std::max(splats.degree, primitive.degree);
       // Many nodes may show one mesh, so the sum can be far more than the file holds: checked as it grows.
       ANCHORSPLAT_RETURN_IF_ERROR(CheckCount(file.name(), static_cast<uint64_t>(splats.count), limits));
       splats.primitives.push_back(std::move(primitive));
+      attributes.push_back(*value.Find("attributes"));
       if (splats.primitives.size() > kMaxPrimitives) {
         return placed.mesh.Complain(Cat("shows one of more than ", kMaxPrimitives, " primitives of splats"));
       }
@@ -112,9 +238,19 @@ Result<GltfSplats> FindGltfSplats(const InputFile& file, const GltfDocument& doc
   }
   if (splats.primitives.empty()) {
     return Error{ErrorCode::kBadFile,
-                 Cat(file.name(), ": is a glTF file without splats: no node shows a primitive with ", kGltfSplatting)};
+                 Cat(file.name(), ": is a glTF file without splats: no node of its scene shows a primitive with ",
+                     kGltfSplatting, OtherSplatExtension(document))};
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), document.bytes(), static_cast<uint64_t>(splats.count) * 4));
+  for (size_t k = 0; k < splats.primitives.size(); ++k) {
+    ANCHORSPLAT_RETURN_IF_ERROR(FindMeanings(attributes[k], file.name(), splats.primitives[k], splats.warnings));
+  }
+  const auto warn = [&](int64_t count, const char* what) {
+    if (count > 0) splats.warnings.push_back(Cat(file.name(), ": ", count, count == 1 ? " node" : " nodes", what));
+  };
+  warn(hidden, " with splats, hidden or of another scene, not read");
+  warn(animated, " with splats moved by animations: read as they stand");
+  warn(skinned, " with splats bent by skins: read as they stand");
   return splats;
 }
 

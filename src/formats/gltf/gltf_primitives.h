@@ -5,11 +5,13 @@
 #include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/result.h"
 #include "formats/cloud_io.h"
 #include "formats/gltf/gltf_document.h"
+#include "formats/gltf/gltf_place.h"
 #include "io/input_file.h"
 #include "io/json_file.h"
 
@@ -22,17 +24,21 @@ struct GltfPrimitive {
   GltfDocument::Accessor means, quats, scales, opacities;
   std::vector<GltfDocument::Accessor> sh;  // floats, by coefficient
   int degree = 0;
-  double scale = 1;
-  std::array<double, 3> translation = {0, 0, 0};
+  GltfPlace place;
+  bool logarithms = false, logits = false;  // in the place of lengths, of opacities (gltf_meanings.h)
+  bool linear = false;                      // its colours are linear light (linear_color.h)
 
+  // Its harmonics have to be seen to know its colours, or are turned.
+  bool mixes_harmonics() const { return degree > 0 && (linear || place.turns()); }
   int64_t count() const { return means.count; }
 };
 
 // All that the scene's nodes show. The accessors are the document's.
 struct GltfSplats {
   std::vector<GltfPrimitive> primitives;
-  int64_t count = 0;  // of their Gaussians
-  int degree = 0;     // the highest
+  int64_t count = 0;                  // of their Gaussians
+  int degree = 0;                     // the highest
+  std::vector<std::string> warnings;  // what is read otherwise than the file says
 };
 // Errors as ReadGltf, but for those of reading.
 Result<GltfSplats> FindGltfSplats(const InputFile& file, const GltfDocument& document, const ReadLimits& limits);

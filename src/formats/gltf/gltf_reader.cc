@@ -1,17 +1,19 @@
 #include "formats/gltf/gltf_reader.h"
 
 #include <algorithm>
-#include <atomic>
 #include <string>
 #include <vector>
 
+#include "core/log.h"
 #include "core/parallel.h"
+#include "core/sh_rotation.h"
 #include "core/text.h"
 #include "formats/axes.h"
 #include "formats/gltf/gltf_document.h"
 #include "formats/gltf/gltf_primitives.h"
 #include "formats/gltf/gltf_values.h"
 #include "formats/json_asset.h"
+#include "formats/linear_color.h"
 #include "formats/record_blocks.h"
 
 namespace anchorsplat {
@@ -50,17 +52,29 @@ Status ReadPrimitive(const GltfPrimitive& primitive, int64_t begin, GaussianClou
   for (size_t k = 0; k < primitive.sh.size(); ++k) {
     ANCHORSPLAT_RETURN_IF_ERROR(ReadValues(primitive.sh[k], sh + 3 * k, cloud.sh_stride()));
   }
-  std::atomic<bool> negative = false;
-  ParallelFor(0, 3 * count, 1 << 16, [&](int64_t first, int64_t last) {
-    if (std::any_of(columns.scales + first, columns.scales + last, [](float x) { return x < 0; })) negative = true;
-  });
-  const bool logarithms = negative;
   ParallelFor(0, count, 1 << 14, [&](int64_t first, int64_t last) {
     FinishGltfRows(
-        primitive, logarithms, last - first,
+        primitive, last - first,
         {columns.means + 3 * first, columns.quats + 4 * first, columns.scales + 3 * first, columns.opacities + first});
   });
+  if (primitive.degree > 0 && primitive.place.turns()) {
+    const ShRotation harmonics(primitive.place.turn);
+    ParallelFor(0, count, 1 << 13, [&](int64_t first, int64_t last) {
+      for (int64_t i = first; i < last; ++i) harmonics.Apply(sh + i * cloud.sh_stride(), primitive.degree);
+    });
+  }
+  if (primitive.linear) SrgbFromLinear(cloud, begin, count);
   return {};
+}
+
+// "turned, mirrored, 2 times as large, moved"; "as it is".
+std::string InWords(const GltfPlace& place) {
+  std::string text;
+  const auto add = [&text](const std::string& what) { text += Cat(text.empty() ? "" : ", ", what); };
+  if (place.turns()) add(place.mirrors() ? "mirrored" : "turned");
+  if (place.scale != 1) add(Cat(place.scale, " times as large"));
+  if (place.translation != GltfPlace{}.translation) add("moved");
+  return text.empty() ? "as it is" : text;
 }
 
 }  // namespace
@@ -85,12 +99,21 @@ Result<FormatFacts> DescribeGltf(const InputFile& file) {
       add_text("kernel", extension, "kernel");
       add_text("colour space", extension, "colorSpace");
       add_text("projection", extension, "projection");
+      add_text("sorting", extension, "sortingMethod");
       const std::optional<JsonValue> attributes = first.Find("attributes");
       const bool points = attributes && attributes->has("COLOR_0");
       facts.Add("colours for point viewers", points ? "yes (COLOR_0)" : "no");
     }
     splats += static_cast<int64_t>(mesh->splats.size());
   }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GltfSplats read, FindGltfSplats(file, document, {}));
+  const auto any = [&read](bool GltfPrimitive::*what) {
+    return std::ranges::any_of(read.primitives, [what](const GltfPrimitive& one) { return one.*what; });
+  };
+  facts.Add("scales", any(&GltfPrimitive::logarithms) ? "logarithms, against the extension" : "lengths");
+  facts.Add("opacities", any(&GltfPrimitive::logits) ? "logits, against the extension" : "0 to 1");
+  facts.Add("placed", InWords(read.primitives.front().place),
+            read.primitives.size() > 1 ? " (the first primitive)" : "");
   facts.Add("primitives", splats, " of Gaussians", others > 0 ? Cat(", ", others, " others that are not read") : "");
   return facts;
 }
@@ -103,6 +126,7 @@ uint64_t GltfSize(const InputFile& file) {
 Result<GaussianCloud> ReadGltf(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GltfDocument document, GltfDocument::Open(file));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GltfSplats splats, FindGltfSplats(file, document, limits));
+  for (const std::string& warning : splats.warnings) LogWarning(warning);
   GaussianCloud cloud;
   cloud.Resize(splats.count, splats.degree);
   int64_t begin = 0;
@@ -110,7 +134,7 @@ Result<GaussianCloud> ReadGltf(const InputFile& file, const ReadLimits& limits) 
     ANCHORSPLAT_RETURN_IF_ERROR(ReadPrimitive(primitive, begin, cloud));
     begin += primitive.count();
   }
-  FlipAxes(cloud, FlipBetween(kLuf, kRdf));
+  TurnAxes(cloud, TurnBetween(kLuf, kRdf));
   ANCHORSPLAT_ASSIGN_OR_RETURN(cloud.comments, CommentsOfAsset(document.root()));
   return cloud;
 }

@@ -1,10 +1,13 @@
 #include "formats/gltf/gltf_values.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
+#include <functional>
 
 #include "core/activations.h"
+#include "core/rotation.h"
 
 namespace anchorsplat {
 
@@ -52,17 +55,41 @@ void UnpackGltfValues(const Accessor& accessor, const uint8_t* bytes, int64_t co
   }
 }
 
-void FinishGltfRows(const GltfPrimitive& primitive, bool logarithms, int64_t count, const GltfColumns& columns) {
-  const auto log_of_scale = static_cast<float>(std::log(primitive.scale));
+Status ReadGltfBytes(const Accessor& accessor, int64_t first, int64_t last, Buffer<uint8_t>& bytes) {
+  const size_t record = GltfComponentBytes(accessor) * static_cast<size_t>(accessor.components);
+  bytes.resize(static_cast<size_t>(last - first - 1) * static_cast<size_t>(accessor.stride) + record);
+  return accessor.file->ReadAt(accessor.begin + static_cast<uint64_t>(first) * accessor.stride, bytes.data(),
+                               bytes.size());
+}
+
+// Σ' = M Σ Mᵀ with M = scale·turn: a turn that mirrors gives the same as its negative, which is a rotation.
+void FinishGltfRows(const GltfPrimitive& primitive, int64_t count, const GltfColumns& columns) {
+  const GltfPlace& place = primitive.place;
+  const bool turns = place.turns();
+  std::array<double, 9> rotation = place.turn;
+  if (place.mirrors()) std::ranges::transform(rotation, rotation.begin(), std::negate());
+  const std::array<double, 4> p = QuaternionFromRotation(rotation);
+  const auto log_of_scale = static_cast<float>(std::log(place.scale));
   for (int64_t i = 0; i < count; ++i) {
     float* q = columns.quats + 4 * i;
     std::rotate(q, q + 3, q + 4);  // xyzw to wxyz
-    columns.opacities[i] = LogitFromOpacity(columns.opacities[i]);
-    for (int64_t k = 0; k < 3; ++k) {
-      float& scale = columns.scales[3 * i + k];
-      scale = (logarithms ? scale : LogFromScale(scale)) + log_of_scale;
-      float& mean = columns.means[3 * i + k];
-      mean = static_cast<float>(primitive.scale * double{mean} + primitive.translation[static_cast<size_t>(k)]);
+    if (turns) {
+      if (q[0] == 0 && q[1] == 0 && q[2] == 0 && q[3] == 0) q[0] = 1;  // zero is no rotation, until another is added
+      const std::array<double, 4> old = {q[0], q[1], q[2], q[3]};
+      q[0] = static_cast<float>(p[0] * old[0] - p[1] * old[1] - p[2] * old[2] - p[3] * old[3]);
+      q[1] = static_cast<float>(p[0] * old[1] + p[1] * old[0] + p[2] * old[3] - p[3] * old[2]);
+      q[2] = static_cast<float>(p[0] * old[2] - p[1] * old[3] + p[2] * old[0] + p[3] * old[1]);
+      q[3] = static_cast<float>(p[0] * old[3] + p[1] * old[2] - p[2] * old[1] + p[3] * old[0]);
+    }
+    if (!primitive.logits) columns.opacities[i] = LogitFromOpacity(columns.opacities[i]);
+    float* const mean = columns.means + 3 * i;
+    const std::array<double, 3> at = {mean[0], mean[1], mean[2]};
+    for (size_t k = 0; k < 3; ++k) {
+      float& scale = columns.scales[3 * i + static_cast<int64_t>(k)];
+      scale = (primitive.logarithms ? scale : LogFromScale(scale)) + log_of_scale;
+      const double* const row = place.turn.data() + 3 * k;
+      const double along = turns ? row[0] * at[0] + row[1] * at[1] + row[2] * at[2] : at[k];
+      mean[k] = static_cast<float>(place.scale * along + place.translation[k]);
     }
   }
 }

@@ -63,6 +63,7 @@ struct Section {
 struct Ksplat {
   size_t level = 0;
   float sh_min = -kDefaultShRange, sh_max = kDefaultShRange;
+  std::array<float, 3> center{};  // where its viewer turns about; positions are not moved by it
   std::vector<Section> sections;
   uint64_t count = 0;
   int degree = 0;
@@ -119,8 +120,14 @@ Result<Ksplat> ReadHeaders(const InputFile& file, const ReadLimits& limits) {
   if (ksplat.level >= kLevels.size())
     return Bad(file, 20, Cat("compression level ", ksplat.level, ", expected 0 to 2"));
   const float min = At<float>(header, 36), max = At<float>(header, 40);
-  if (std::isfinite(min) && min != 0) ksplat.sh_min = min;
-  if (std::isfinite(max) && max != 0) ksplat.sh_max = max;
+  if (!std::isfinite(min) || !std::isfinite(max)) return Bad(file, 36, "a range of harmonics that is no number");
+  if (min != 0) ksplat.sh_min = min;
+  if (max != 0) ksplat.sh_max = max;
+  if (ksplat.sh_min > ksplat.sh_max) {
+    return Bad(file, 36,
+               Cat("a range of harmonics from ", ksplat.sh_min, " to ", ksplat.sh_max, ", the wrong way round"));
+  }
+  for (size_t k = 0; k < 3; ++k) ksplat.center[k] = At<float>(header, 24 + 4 * k);
   if (sections > (file.size() - kHeaderBytes) / kSectionHeaderBytes) {
     return Bad(file, 4, Cat(sections, " sections in a file of ", file.size(), " bytes"));
   }
@@ -318,6 +325,10 @@ Result<FormatFacts> DescribeKsplat(const InputFile& file) {
             : ksplat.level == 1 ? ": 16 bits"
                                 : ": 16 bits, harmonics of 8 bits");
   facts.Add("sections", ksplat.sections.size());
+  if (ksplat.center != std::array<float, 3>{}) {
+    facts.Add("scene centre", ksplat.center[0], " ", ksplat.center[1], " ", ksplat.center[2],
+              ", about which its viewer turns");
+  }
   return facts;
 }
 

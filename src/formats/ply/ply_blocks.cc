@@ -11,6 +11,7 @@
 
 #include "formats/file_blocks.h"
 #include "formats/ply/ply_body.h"
+#include "formats/ply/ply_color_space.h"
 #include "formats/ply/ply_filter.h"
 #include "formats/ply/ply_header.h"
 #include "formats/ply/ply_layout.h"
@@ -126,7 +127,7 @@ Result<std::unique_ptr<CloudBlocks>> BlocksOfPly(const InputFile& file, const Re
     floats &= !property.list_count;
     if (layout.targets[p] || layout.filter == p) floats &= property.type == PlyType::kFloat;
   }
-  if (!floats) return std::unique_ptr<CloudBlocks>();
+  if (!floats || header.Find(kColorSpace) != nullptr) return std::unique_ptr<CloudBlocks>();  // to be read whole
   ANCHORSPLAT_RETURN_IF_ERROR(CheckGaussianLimit(file, vertex, limits));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const uint64_t begin, BeginOfPlyRows(file, header, vertex));
   return std::unique_ptr<CloudBlocks>(std::make_unique<PlyBlocks>(file, std::move(header), layout, begin));

@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "core/words.h"
+#include "core/world_up.h"
 #include "formats/ply/render_mode_tag.h"
 
 namespace anchorsplat {
@@ -77,6 +78,7 @@ Status HeaderParser::Line(std::string_view line) {
     if (keyword != "ply" || !rest.empty()) return Unexpected("\"ply\" (this is no PLY file)", line);
     return {};
   }
+  if (keyword == "obj_info" && UpOf({std::string(rest)})) header_.comments.emplace_back(rest);  // the rest is not kept
   if (keyword.empty() || keyword == "obj_info") return {};
   if (keyword == "comment") {
     Comment(rest);

@@ -4,10 +4,13 @@
 #include <cmath>
 #include <vector>
 
+#include "core/log.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
 #include "core/text.h"
+#include "formats/linear_color.h"
 #include "formats/ply/ply_body.h"
+#include "formats/ply/ply_color_space.h"
 #include "formats/ply/ply_filter.h"
 #include "formats/ply/ply_header.h"
 #include "formats/ply/ply_layout.h"
@@ -79,6 +82,12 @@ Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, Extr
   WarnOfSurplus(file, header, vertex);
   cloud.render_mode = header.render_mode;
   cloud.comments = std::move(header.comments);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const bool linear, HasLinearColors(file, header));
+  if (linear) {
+    LogWarning(Cat(file.name(), ": ", LinearColorInWords(cloud.sh_degree)));
+    SrgbFromLinear(cloud, 0, cloud.size());
+    if (extras != nullptr) std::erase(extras->not_kept, Cat("element \"", kColorSpace, "\""));
+  }
   if (layout.filter) {
     ANCHORSPLAT_RETURN_IF_ERROR(FuseFilter(file, filter, 0, cloud));
     if (!cloud.render_mode) cloud.render_mode = RenderMode::kMip;
@@ -129,6 +138,10 @@ Result<FormatFacts> DescribePly(const InputFile& file) {
   if (layout.prefixed) facts.Add("names", "behind CloudCompare's \"scalar_\"");
   if (layout.has_degree_4()) facts.Add("harmonics", "degree 4, read as 3");
   if (layout.filter) facts.Add("3-D filter", "of Mip-Splatting (", kFilter3d, "), made a part of the Gaussians");
+  if (header.Find(kColorSpace) != nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const bool linear, HasLinearColors(file, header));
+    facts.Add("colour space", linear ? "linear RGB, made sRGB" : "sRGB");
+  }
   if (!others.empty()) facts.Add("other properties", Printable(others, 200));
   return facts;
 }

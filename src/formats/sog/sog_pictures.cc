@@ -1,11 +1,17 @@
 #include "formats/sog/sog_pictures.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
 #include <utility>
 
 #include "core/activations.h"
+#include "core/log.h"
 #include "core/parallel.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
@@ -57,7 +63,11 @@ Result<std::vector<SogChannel>> Channels(const JsonValue& part, int version, siz
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> min, FloatNumbers(mins, count));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<double> max, FloatNumbers(maxs, count));
   std::vector<SogChannel> channels;
-  for (size_t k = 0; k < count; ++k) channels.push_back(Range(min[k], max[k]));
+  for (size_t k = 0; k < count; ++k) {
+    if (min[k] > max[k])
+      return part.Complain(Cat("has a range from ", min[k], " to ", max[k], ", the wrong way round"));
+    channels.push_back(Range(min[k], max[k]));
+  }
   return channels;
 }
 
@@ -109,6 +119,9 @@ Status VisitMeans(Sog& sog, SogVisitor& visitor) {
       return mins.Complain(Cat("holds ", range.min[k], ", expected -88 to 88"));
     if (std::fabs(range.max[k]) > kMaxLogarithm)
       return maxs.Complain(Cat("holds ", range.max[k], ", expected -88 to 88"));
+    if (range.min[k] > range.max[k]) {
+      return part.Complain(Cat("has a range from ", range.min[k], " to ", range.max[k], ", the wrong way round"));
+    }
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(ByteImage low, sog.Picture(part, 0, 2));
   ANCHORSPLAT_ASSIGN_OR_RETURN(ByteImage high, sog.Picture(part, 1, 2));
@@ -179,6 +192,10 @@ Status VisitHarmonics(Sog& sog, const JsonValue& part, const SogPalette& palette
     ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue maxs, part.Get("maxs"));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double min, mins.Number());
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double max, maxs.Number());
+    if (const std::optional<JsonValue> bits = part.Find("quantization"); bits && bits->raw() != 8) {
+      return bits->Complain(Cat("is ", Printable(bits->raw().dump()), ", expected 8"));
+    }
+    if (min > max) return part.Complain(Cat("has a range from ", min, " to ", max, ", the wrong way round"));
     values = Range(min, max);
     for (const float x : values) {
       if (!std::isfinite(x)) return part.Complain(Cat("has a range of ", min, " to ", max));
@@ -238,6 +255,58 @@ void UnpackSogColors(const std::vector<SogChannel>& channels, const uint8_t* pix
   }
 }
 
+namespace {
+
+// Rotations are packed in one way; the fourth byte says which component is not there.
+Status CheckQuats(const InputFile& file, const JsonValue& part, const ByteImage& picture, int64_t count) {
+  if (const std::optional<JsonValue> encoding = part.Find("encoding");
+      encoding && encoding->raw() != "quaternion_packed") {
+    return encoding->Complain(Cat("is ", Printable(encoding->raw().dump()), ", expected \"quaternion_packed\""));
+  }
+  int64_t unmarked = 0;
+  for (int64_t i = 0; i < count; ++i) unmarked += picture.rgba[static_cast<size_t>(4 * i + 3)] < 252 ? 1 : 0;
+  if (unmarked > 0) {
+    LogWarning(Cat(file.name(), ": ", WithThousands(unmarked), " of ", WithThousands(count),
+                   " rotations are none (the fourth byte is below 252): read as no rotation"));
+  }
+  return {};
+}
+
+// Whether an entry that SOG does not have may speak of axes.
+bool SpeaksOfAxes(std::string name) {
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  constexpr std::array<std::string_view, 8> kWords = {"axis",   "axes",     "coord", "transform",
+                                                      "matrix", "rotation", "up",    "frame"};
+  return std::ranges::any_of(kWords, [&name](std::string_view word) {
+    return word == "up" ? name.starts_with(word) : name.find(word) != name.npos;
+  });
+}
+
+void WarnOfMeta(const InputFile& file, const JsonValue& meta, const std::optional<JsonValue>& model) {
+  if (model && model->raw() != "antialiased" && model->raw() != "default") {
+    LogWarning(Cat(file.name(), ": model is ", Printable(model->raw().dump()),
+                   ", which this version does not know: the splat is read as a classic one"));
+  }
+  for (const std::string& name : OtherSogEntries(meta)) {
+    if (!SpeaksOfAxes(name)) continue;
+    LogWarning(Cat(file.name(), ": has an entry \"", Printable(name),
+                   "\", which SOG does not have: it is not heeded; --coords of convert says what the axes are"));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> OtherSogEntries(const JsonValue& meta) {
+  constexpr std::array<std::string_view, 10> kKnown = {"version", "count", "asset", "means", "scales",
+                                                       "quats",   "sh0",   "shN",   "model", "extras"};
+  std::vector<std::string> others;
+  if (!meta.raw().is_object()) return others;
+  for (const auto& [name, value] : meta.raw().items()) {
+    if (std::ranges::find(kKnown, name) == kKnown.end()) others.push_back(name);
+  }
+  return others;
+}
+
 Status VisitSog(const InputFile& file, const ReadLimits& limits, SogVisitor& visitor) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSog opened, OpenSog(file));
   const JsonValue meta = opened.json.root();
@@ -266,6 +335,7 @@ Status VisitSog(const InputFile& file, const ReadLimits& limits, SogVisitor& vis
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue quats, meta.Get("quats"));
   ANCHORSPLAT_RETURN_IF_ERROR(sog.CheckShape(quats));
   ANCHORSPLAT_ASSIGN_OR_RETURN(ByteImage picture, sog.Picture(quats, 0, 1));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckQuats(file, quats, picture, count));
   visitor.Begin(count, palette.degree);
   visitor.Quats(std::move(picture));
   ANCHORSPLAT_RETURN_IF_ERROR(VisitMeans(sog, visitor));
@@ -273,9 +343,9 @@ Status VisitSog(const InputFile& file, const ReadLimits& limits, SogVisitor& vis
   ANCHORSPLAT_RETURN_IF_ERROR(VisitColors(sog, visitor));
   if (palette.degree > 0) ANCHORSPLAT_RETURN_IF_ERROR(VisitHarmonics(sog, *harmonics, palette, visitor));
   std::optional<RenderMode> mode;
-  if (const std::optional<JsonValue> model = meta.Find("model"); model && model->raw() == "antialiased") {
-    mode = RenderMode::kAntialiased;
-  }
+  const std::optional<JsonValue> model = meta.Find("model");
+  if (model && model->raw() == "antialiased") mode = RenderMode::kAntialiased;
+  WarnOfMeta(file, meta, model);
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<std::string> comments, CommentsOfAsset(meta));
   visitor.End(mode, std::move(comments));
   return {};

@@ -12,6 +12,7 @@
 #include "formats/cloud_io.h"
 #include "images/webp_image.h"
 #include "io/input_file.h"
+#include "io/json_file.h"
 
 namespace anchorsplat {
 
@@ -54,6 +55,9 @@ class SogVisitor {
   virtual void Harmonics(const SogChannel& values, const ByteImage& labels, const SogPalette& palette) = 0;
   virtual void End(std::optional<RenderMode> mode, std::vector<std::string> comments) = 0;
 };
+
+// The names of entries of a meta.json that the format does not have.
+std::vector<std::string> OtherSogEntries(const JsonValue& meta);
 
 // Errors as ReadSog.
 Status VisitSog(const InputFile& file, const ReadLimits& limits, SogVisitor& visitor);

@@ -96,6 +96,9 @@ Result<FormatFacts> DescribeSog(const InputFile& file) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const int entries, count.WholeNumber(1, 65536));
     facts.Add("palette of harmonics", WithThousands(entries), " entries");
   }
+  std::string others;
+  for (const std::string& name : OtherSogEntries(meta)) others += Cat(others.empty() ? "" : ", ", Printable(name));
+  if (!others.empty()) facts.Add("other entries, not heeded", Printable(others, 200));
   return facts;
 }
 

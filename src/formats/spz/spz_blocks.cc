@@ -39,10 +39,11 @@ Status Drain(InflatingReader& reader, uint64_t bytes) {
 
 class SpzBlocks final : public FileBlocks {
  public:
-  SpzBlocks(const InputFile& file, SpzFile spz) : file_(file), spz_(std::move(spz)) {
+  SpzBlocks(const InputFile& file, SpzFile spz) : file_(file), spz_(std::move(spz)), turn_(TurnOfSpz(spz_)) {
     size_ = spz_.count;
     sh_degree_ = spz_.sh_degree();
     if (spz_.antialiased) render_mode_ = RenderMode::kAntialiased;
+    comments_ = CommentsOfSpzExtensions(spz_.extensions, spz_.axes);
   }
 
   Status ForEach(const Look& look) override {
@@ -92,7 +93,7 @@ class SpzBlocks final : public FileBlocks {
       ANCHORSPLAT_RETURN_IF_ERROR(Drain(*reader, BytesOf(k, size_)));
     }
     if (spz_.sections() > kLooked) return std::unique_ptr<InflatingReader>(std::move(reader));
-    ANCHORSPLAT_RETURN_IF_ERROR(reader->ExpectEnd());
+    if (!spz_.end_read) ANCHORSPLAT_RETURN_IF_ERROR(reader->ExpectEnd());
     return std::unique_ptr<InflatingReader>();
   }
 
@@ -132,7 +133,7 @@ class SpzBlocks final : public FileBlocks {
       batch.bytes[section].resize(static_cast<size_t>(bytes));
       ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(batch.bytes[section].data(), batch.bytes[section].size()));
     }
-    const bool has_end = !spz_.stream || section == kHarmonics;
+    const bool has_end = !spz_.stream || (section == kHarmonics && !spz_.end_read);
     return has_end && batch.last == size_ ? reader.ExpectEnd() : Status();
   }
 
@@ -150,8 +151,9 @@ class SpzBlocks final : public FileBlocks {
   Status Fill(int64_t first, int64_t last, Room& room, std::span<uint8_t>) override {
     for (size_t k = 0; k < kLooked; ++k) {
       const uint8_t* const bytes = now_.bytes[k].data() + BytesOf(k, first - now_.first);
-      UnpackSpz(spz_.layout, kSpzSections[k], 0, last - first, bytes, flip_, room.rows);
+      UnpackSpz(spz_.layout, kSpzSections[k], 0, last - first, bytes, turn_.flip, room.rows);
     }
+    TurnAxes(room.rows, turn_.turn);
     return {};
   }
 
@@ -163,14 +165,14 @@ class SpzBlocks final : public FileBlocks {
   SpzFile spz_;
   std::array<std::unique_ptr<CopyableReader>, kLooked> starts_;  // of one stream
   Batch now_;
-  AxisFlip flip_ = FlipBetween(kRub, kRdf);
+  SpzTurn turn_;
 };
 
 }  // namespace
 
 Result<std::unique_ptr<CloudBlocks>> BlocksOfSpz(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(SpzFile spz, OpenSpz(file, limits));
-  WarnOfSpzDegree(file, spz);
+  WarnOfSpz(file, spz);
   return std::unique_ptr<CloudBlocks>(std::make_unique<SpzBlocks>(file, std::move(spz)));
 }
 

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <bit>
+#include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/log.h"
+#include "core/run_context.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
 #include "formats/spz/spz_reader.h"
@@ -20,7 +23,7 @@ static_assert(std::endian::native == std::endian::little, "headers are copied as
 
 struct SpzHeader {
   uint32_t magic, version, count;
-  uint8_t sh_degree, fractional_bits, flags, streams;
+  uint8_t sh_degree, fractional_bits, flags, streams;  // `streams` is reserved before version 4
 };
 static_assert(sizeof(SpzHeader) == 16);
 
@@ -61,7 +64,27 @@ SpzFile FileOf(const SpzHeader& header, const SpzLayout& layout) {
   spz.layout = layout;
   spz.count = header.count;
   spz.antialiased = (header.flags & kSpzAntialiased) != 0;
+  spz.unknown_flags = static_cast<uint8_t>(header.flags & ~(kSpzAntialiased | kSpzHasExtensions));
   return spz;
+}
+
+// Passes over the sections of a gzip stream to what is behind them.
+Status PassOverSections(const SpzFile& spz, CopyableReader& reader) {
+  std::vector<uint8_t> scratch(size_t{64} << 10);
+  for (uint64_t left = static_cast<uint64_t>(spz.count) * spz.layout.record_size(); left > 0;) {
+    LeaveIfAbandoned();
+    const auto size = static_cast<size_t>(std::min<uint64_t>(scratch.size(), left));
+    ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(scratch.data(), size));
+    left -= size;
+  }
+  return {};
+}
+
+Status TakeExtensions(const InputFile& file, uint64_t begin, const std::string& bytes, SpzFile& spz) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(spz.extensions, ParseSpzExtensions(file.name(), begin, bytes));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Axes> axes, AxesOfSpz(file.name(), spz.extensions));
+  spz.axes = axes.value_or(kRub);
+  return {};
 }
 
 // Versions 1 to 3, in gzip or taken out of it, or of what another program has put in its place.
@@ -71,6 +94,17 @@ Result<SpzFile> OpenOneStream(const InputFile& file, std::unique_ptr<CopyableRea
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzLayout layout, CheckHeader(file, header, limits));
   if (layout.version > 3) return Error{ErrorCode::kBadFile, Cat(At(file, 0), ": version 4 in a gzip stream")};
   SpzFile spz = FileOf(header, layout);
+  spz.reserved_used = header.streams != 0;
+  if ((header.flags & kSpzHasExtensions) != 0) {
+    // They say what the numbers before them mean.
+    const std::unique_ptr<CopyableReader> behind = reader->Copy();
+    ANCHORSPLAT_RETURN_IF_ERROR(PassOverSections(spz, *behind));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string bytes, ReadSpzExtensionBytes(file.name(), *behind));
+    ANCHORSPLAT_RETURN_IF_ERROR(behind->ExpectEnd());
+    const uint64_t begin = sizeof header + static_cast<uint64_t>(spz.count) * spz.layout.record_size();
+    ANCHORSPLAT_RETURN_IF_ERROR(TakeExtensions(file, begin, bytes, spz));
+    spz.end_read = true;
+  }
   spz.stream = std::move(reader);
   return spz;
 }
@@ -88,6 +122,18 @@ Result<SpzFile> OpenStreams(const InputFile& file, const ReadLimits& limits) {
                  Cat(At(file, 15), ": has ", int{header.streams}, " streams with their table at byte ", place.offset,
                      ", expected ", streams, " and a table from byte 32 on")};
   }
+  spz.reserved_used = std::ranges::any_of(place.reserved, [](uint32_t word) { return word != 0; });
+  constexpr uint64_t kHead = sizeof header + sizeof place;
+  if (place.offset > file.size() || place.offset - kHead > kMostSpzExtensionBytes) {
+    return Error{ErrorCode::kBadFile,
+                 Cat(At(file, 16), ": has its table at byte ", place.offset, " of ", file.size(), ", behind ",
+                     place.offset - kHead, " bytes of extension records (at most ", kMostSpzExtensionBytes, ")")};
+  }
+  std::string records(static_cast<size_t>(place.offset - kHead), '\0');
+  ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(kHead, records.data(), records.size()));
+  const Status taken = TakeExtensions(file, kHead, records, spz);
+  if (!taken.ok() && ((header.flags & kSpzHasExtensions) != 0 || !spz.extensions.empty())) return taken.error();
+  spz.passed_over = taken.ok() ? 0 : records.size();
   std::array<StreamSize, 6> sizes{};
   ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(place.offset, sizes.data(), streams * sizeof(StreamSize)));
   std::array<uint64_t, 7>& begins = spz.begins;
@@ -129,8 +175,26 @@ Result<SpzFile> OpenSpz(const InputFile& file, const ReadLimits& limits) {
   return is_plain ? OpenOneStream(file, OpenPlain(file, 0), limits) : OpenStreams(file, limits);
 }
 
-void WarnOfSpzDegree(const InputFile& file, const SpzFile& spz) {
+SpzTurn TurnOfSpz(const SpzFile& spz) {
+  const AxisTurn turn = TurnBetween(spz.axes, kRdf);
+  if (turn.only_signs()) return {FlipBetween(spz.axes, kRdf), {}};
+  return {FlipBetween(kRdf, kRdf), turn};
+}
+
+void WarnOfSpz(const InputFile& file, const SpzFile& spz) {
   if (spz.layout.sh_degree > kMaxShDegree) LogWarning(Cat(file.name(), ": SH degree 4 is read as 3"));
+  if (spz.unknown_flags != 0) {
+    LogWarning(Cat(file.name(), ": byte 14 of the SPZ header: sets flags that are unknown to this version (",
+                   int{spz.unknown_flags}, "): what they say is not heeded"));
+  }
+  if (spz.reserved_used) {
+    LogWarning(Cat(file.name(), ": reserved bytes of the SPZ header are not zero: what they say is not heeded"));
+  }
+  if (spz.passed_over > 0) {
+    LogWarning(Cat(file.name(), ": byte 32: the ", WithThousands(static_cast<int64_t>(spz.passed_over)),
+                   " bytes behind the SPZ header are no extension records: passed over"));
+  }
+  WarnOfSpzExtensions(file.name(), spz.extensions, spz.axes);
 }
 
 Result<CloudExtent> ExtentOfSpz(const InputFile& file) {
@@ -144,8 +208,8 @@ Result<CloudExtent> ExtentOfSpz(const InputFile& file) {
 
 Result<FormatFacts> DescribeSpz(const InputFile& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzHeader header, ReadHeader(file));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzLayout layout, CheckHeader(file, header, {}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzFile spz, OpenSpz(file, {}));
+  const SpzLayout& layout = spz.layout;
   FormatFacts facts;
   facts.Add("version", layout.version,
             layout.version > 3 ? ", a zstd stream per attribute"
@@ -157,9 +221,16 @@ Result<FormatFacts> DescribeSpz(const InputFile& file) {
     facts.Add("positions", layout.fractional_bits, " fractional bits: steps of 1/",
               uint32_t{1} << layout.fractional_bits);
   }
-  facts.Add("antialiased", (header.flags & kSpzAntialiased) != 0 ? "yes" : "no, or not said");
+  facts.Add("antialiased", spz.antialiased ? "yes" : "no, or not said");
+  facts.Add("axes", NameOfAxes(spz.axes));
   if (layout.sh_degree > kMaxShDegree) facts.Add("harmonics", "degree ", layout.sh_degree, ", read as ", kMaxShDegree);
+  DescribeSpzExtensions(spz.extensions, facts);
   return facts;
+}
+
+Result<Axes> DeclaredAxesOfSpz(const InputFile& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzFile spz, OpenSpz(file, {}));
+  return spz.axes;
 }
 
 }  // namespace anchorsplat

@@ -17,9 +17,9 @@ namespace {
 constexpr int64_t kSpzBlock = 1 << 15;  // Gaussians that are unpacked while they are in the cache
 constexpr int64_t kSpzGrain = 1 << 12;
 
-Status ReadSection(const SpzLayout& layout, SpzSection section, InflatingReader& reader, GaussianCloud& cloud) {
+Status ReadSection(const SpzLayout& layout, SpzSection section, const AxisFlip& flip, InflatingReader& reader,
+                   GaussianCloud& cloud) {
   const size_t record = layout.record_size(section);
-  const AxisFlip flip = FlipBetween(kRub, kRdf);
   Buffer<uint8_t> bytes(static_cast<size_t>(std::min(kSpzBlock, cloud.size())) * record);
   for (int64_t begin = 0; begin < cloud.size(); begin += kSpzBlock) {
     const int64_t end = std::min(begin + kSpzBlock, cloud.size());
@@ -31,15 +31,15 @@ Status ReadSection(const SpzLayout& layout, SpzSection section, InflatingReader&
   return {};
 }
 
-Status ReadGzipped(const SpzFile& spz, GaussianCloud& cloud) {
+Status ReadGzipped(const SpzFile& spz, const AxisFlip& flip, GaussianCloud& cloud) {
   for (size_t k = 0; k < spz.sections(); ++k) {
-    ANCHORSPLAT_RETURN_IF_ERROR(ReadSection(spz.layout, kSpzSections[k], *spz.stream, cloud));
+    ANCHORSPLAT_RETURN_IF_ERROR(ReadSection(spz.layout, kSpzSections[k], flip, *spz.stream, cloud));
   }
   // A stream that is longer than its header says is another splat than the header's.
-  return spz.stream->ExpectEnd();
+  return spz.end_read ? Status() : spz.stream->ExpectEnd();
 }
 
-Status ReadStreams(const InputFile& file, const SpzFile& spz, GaussianCloud& cloud) {
+Status ReadStreams(const InputFile& file, const SpzFile& spz, const AxisFlip& flip, GaussianCloud& cloud) {
   const size_t streams = spz.sections();
   std::array<Status, 6> statuses;
   ParallelFor(0, static_cast<int64_t>(streams), 1, [&](int64_t first, int64_t last) {
@@ -47,7 +47,7 @@ Status ReadStreams(const InputFile& file, const SpzFile& spz, GaussianCloud& clo
       // The last stream is by far the longest: it goes first.
       const size_t stream = streams - 1 - k;
       const std::unique_ptr<InflatingReader> reader = OpenZstd(file, spz.begins[stream], spz.begins[stream + 1]);
-      statuses[stream] = ReadSection(spz.layout, kSpzSections[stream], *reader, cloud);
+      statuses[stream] = ReadSection(spz.layout, kSpzSections[stream], flip, *reader, cloud);
       if (statuses[stream].ok()) statuses[stream] = reader->ExpectEnd();
     }
   });
@@ -59,11 +59,14 @@ Status ReadStreams(const InputFile& file, const SpzFile& spz, GaussianCloud& clo
 
 Result<GaussianCloud> ReadSpz(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SpzFile spz, OpenSpz(file, limits));
-  WarnOfSpzDegree(file, spz);
+  WarnOfSpz(file, spz);
   GaussianCloud cloud;
   cloud.Resize(spz.count, spz.sh_degree());
   if (spz.antialiased) cloud.render_mode = RenderMode::kAntialiased;
-  ANCHORSPLAT_RETURN_IF_ERROR(spz.stream ? ReadGzipped(spz, cloud) : ReadStreams(file, spz, cloud));
+  const auto [flip, turn] = TurnOfSpz(spz);
+  ANCHORSPLAT_RETURN_IF_ERROR(spz.stream ? ReadGzipped(spz, flip, cloud) : ReadStreams(file, spz, flip, cloud));
+  TurnAxes(cloud, turn);
+  cloud.comments = CommentsOfSpzExtensions(spz.extensions, spz.axes);
   return cloud;
 }
 

@@ -26,8 +26,9 @@ inline constexpr std::array<SpzSection, 6> kSpzSections = {SpzSection::kMeans,  
                                                            SpzSection::kRotations, SpzSection::kHarmonics};
 
 inline constexpr uint32_t kSpzMagic = 0x5053474e;  // "NGSP"
-inline constexpr uint8_t kSpzAntialiased = 1;      // bit of the header's flags
-inline constexpr int kMaxSpzShDegree = 4;          // one more than a cloud has: its coefficients are dropped
+inline constexpr uint8_t kSpzAntialiased = 1;      // bits of the header's flags
+inline constexpr uint8_t kSpzHasExtensions = 2;
+inline constexpr int kMaxSpzShDegree = 4;  // one more than a cloud has: its coefficients are dropped
 
 // What the header says about the sections.
 struct SpzLayout {

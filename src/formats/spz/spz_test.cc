@@ -10,6 +10,7 @@
 #include <string>
 
 #include "core/half.h"
+#include "core/messages_for_test.h"
 #include "core/parallel.h"
 #include "formats/attribute_error.h"
 #include "formats/axes.h"
@@ -21,6 +22,7 @@
 #include "formats/spz/spz_writer.h"
 #include "io/file_bytes_for_test.h"
 #include "io/folder_for_test.h"
+#include "io/inflating_reader.h"
 #include "io/little_endian.h"
 
 namespace anchorsplat {
@@ -255,6 +257,118 @@ TEST(Spz, RefusesDamageLiesAndBombs) {
   EXPECT_EQ(Read(folder / "4.spz", {.max_gaussians = 2999}).error().code, ErrorCode::kBadFile);
   EXPECT_EQ(WriteSpz(folder / "b.spz", cloud, {.spz_version = 2}).error().code, ErrorCode::kBadArgument);
   EXPECT_EQ(folder.Entries(), 2);
+}
+
+std::string Record(uint32_t id, const std::string& payload) {
+  const uint32_t head[2] = {id, static_cast<uint32_t>(payload.size())};
+  return std::string(reinterpret_cast<const char*>(head), sizeof head) + payload;
+}
+
+std::string Number(uint32_t number) { return {reinterpret_cast<const char*>(&number), sizeof number}; }
+
+constexpr uint32_t kOrbit = 0xADBE0002, kSystem = 0xADBE0003, kPlace = 0x4E530001;
+
+// A file with records: of version 4 between header and table, of version 3 behind the sections.
+std::string WithRecords(const GaussianCloud& cloud, int version, const std::string& records, uint8_t flags = 2) {
+  const TestFolder folder;
+  EXPECT_TRUE(WriteSpz(folder / "a.spz", cloud, {.spz_version = version}).ok());
+  std::string bytes = FileBytes(folder / "a.spz");
+  if (version == 4) {
+    const auto table = static_cast<uint32_t>(32 + records.size());
+    std::memcpy(bytes.data() + 16, &table, sizeof table);
+    bytes[14] = static_cast<char>(flags);
+    return bytes.insert(32, records);
+  }
+  const size_t size = 16 + static_cast<size_t>(cloud.size()) * (20 + 3 * static_cast<size_t>(cloud.coefficients() - 1));
+  std::string raw(size, '\0');
+  const InputFile file = InputFile::FromBytes("a.spz", bytes);
+  EXPECT_TRUE(OpenGzip(file, 0)->Read(raw.data(), raw.size()).ok());
+  raw[14] = static_cast<char>(flags);
+  return Gzip(raw + records);
+}
+
+TEST(Spz, AxesThatARecordDeclares) {
+  const GaussianCloud cloud = Tame(500, 3, 6);
+  const GaussianCloud plain =
+      *ReadBothWays(ReadSpz, BlocksOfSpz, InputFile::FromBytes("a.spz", WithRecords(cloud, 4, "", 0)));
+  const char* systems[] = {"LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF",
+                           "LBD", "RBD", "LBU", "RBU", "LFD", "RFD", "LFU", "RFU"};
+  for (uint32_t k = 0; k < 16; ++k) {
+    const Axes axes = *AxesFromName(systems[k]);
+    // Stored along these axes: the writer takes RDF to RUB.
+    GaussianCloud stored = cloud;
+    TurnAxes(stored, Both(TurnBetween(kRdf, axes), TurnBetween(kRub, kRdf)));
+    for (const int version : {3, 4}) {
+      const std::string bytes = WithRecords(stored, version, Record(kSystem, Number(k + 1)));
+      const InputFile file = InputFile::FromBytes("a.spz", bytes);
+      const Messages messages;
+      const auto read = ReadBothWays(ReadSpz, BlocksOfSpz, file);
+      ASSERT_TRUE(read.ok()) << read.error().message;
+      EXPECT_THAT(messages.warnings(), testing::IsEmpty());
+      const auto error = CompareAttributes(*read, cloud);
+      EXPECT_EQ(error->compared, 500);
+      EXPECT_LT(error->means.max, 0.9 / 4096) << systems[k];
+      EXPECT_LT(error->log_scales.max, 0.5 / 16 + 1e-5) << systems[k];
+      EXPECT_LT(error->rotations.max, 0.01) << systems[k];
+      EXPECT_LT(error->harmonics.max, 0.2) << systems[k];  // steps of a sixteenth, in other directions
+      EXPECT_EQ(*DeclaredAxesOfSpz(file), axes);
+      const auto facts = DescribeSpz(file);
+      ASSERT_TRUE(facts.ok());
+      EXPECT_THAT(facts->all(), testing::Contains(testing::Pair("axes", systems[k])));
+      if (k == 3) ExpectSameCloud(*read, plain);
+    }
+  }
+}
+
+TEST(Spz, RecordsOfExtensions) {
+  const GaussianCloud cloud = Tame(100, 1, 6);
+  const float limits[] = {-0.5f, 1.25f, 0.75f};
+  const std::string orbit = Record(kOrbit, {reinterpret_cast<const char*>(limits), sizeof limits});
+  const std::string place = Record(kPlace, std::string(80, '\x01')), unknown = Record(0x12345678, "hello");
+  for (const int version : {3, 4}) {
+    const auto said = [&](const std::string& records, GaussianCloud* out = nullptr, uint8_t flags = 2) {
+      const Messages messages;
+      const auto read = ReadBothWays(ReadSpz, BlocksOfSpz,
+                                     InputFile::FromBytes("a.spz", WithRecords(cloud, version, records, flags)));
+      EXPECT_TRUE(read.ok()) << read.error().message;
+      if (read.ok() && out != nullptr) *out = *read;
+      return messages.warnings();
+    };
+    GaussianCloud read;
+    EXPECT_THAT(said(orbit + place, &read), testing::IsEmpty());
+    EXPECT_THAT(read.comments, testing::ElementsAre(testing::HasSubstr("SPZ_ADOBE_safe_orbit_camera"),
+                                                    testing::HasSubstr("SPZ_NIANTIC_georeference")));
+    // They go into another SPZ as they came.
+    const TestFolder folder;
+    for (const int other : {3, 4}) {
+      ASSERT_TRUE(WriteSpz(folder / "b.spz", read, {.overwrite = true, .spz_version = other}).ok());
+      EXPECT_EQ(Read(folder / "b.spz")->comments, read.comments);
+      EXPECT_TRUE(other == 3 || FileBytes(folder / "b.spz").find(orbit + place) != std::string::npos);
+    }
+    EXPECT_THAT(said(unknown + orbit, &read), testing::ElementsAre(testing::HasSubstr("0x12345678 of 5 bytes")));
+    EXPECT_EQ(read.comments.size(), 1u);
+    // A place is one in the axes that it was said for.
+    EXPECT_THAT(said(Record(kSystem, Number(6)) + place, &read),
+                testing::ElementsAre(testing::HasSubstr("georeference) is neither used nor kept")));
+    EXPECT_TRUE(read.comments.empty());
+    EXPECT_THAT(said(Record(kOrbit, "short")), testing::ElementsAre(testing::HasSubstr("neither used nor kept")));
+    EXPECT_THAT(said("", nullptr, 0x12), testing::ElementsAre(testing::HasSubstr("flags that are unknown")));
+    EXPECT_THAT(said(Record(kSystem, Number(0))), testing::IsEmpty());
+
+    const auto error_of = [&](const std::string& records) { return ErrorOf(WithRecords(cloud, version, records)); };
+    EXPECT_THAT(error_of(Record(kSystem, Number(17))), testing::HasSubstr("is 17, expected 1 to 16"));
+    EXPECT_THAT(error_of(Record(kSystem, "ab")), testing::HasSubstr("has 2 bytes, expected 4"));
+    EXPECT_THAT(error_of(Record(kSystem, Number(4)) + Record(kSystem, Number(6))),
+                testing::HasSubstr("says RUB and RDF"));
+    EXPECT_NE(error_of(orbit.substr(0, 13)), "accepted");
+    EXPECT_NE(error_of(orbit.substr(0, 5)), "accepted");
+    std::string longer = orbit;
+    longer[7] = '\x7f';
+    EXPECT_NE(error_of(longer), "accepted");
+  }
+  std::string far = WithRecords(cloud, 4, orbit);
+  far[19] = '\x7f';
+  EXPECT_THAT(ErrorOf(far), testing::HasSubstr("its table at byte"));
 }
 
 // Sections are looked at side by side, and the error is still that of the first one, wherever in it.

@@ -19,6 +19,7 @@
 #include "formats/axes.h"
 #include "formats/cloud_checks.h"
 #include "formats/splat_order.h"
+#include "formats/spz/spz_extensions.h"
 #include "formats/spz/spz_sections.h"
 #include "formats/write_losses.h"
 #include "io/atomic_file.h"
@@ -62,6 +63,7 @@ struct Packer {
   const CloudView& cloud;
   SpzLayout layout;
   Buffer<uint32_t> order;
+  std::string records = {};  // of extensions
   AxisFlip flip = FlipBetween(kRdf, kRub);
 
   void Pack(SpzSection section, int64_t first, int64_t last, uint8_t* bytes) const {
@@ -76,7 +78,9 @@ std::string HeaderOf(const Packer& packer) {
   std::memcpy(header.data(), numbers, sizeof numbers);
   header[12] = static_cast<char>(packer.layout.sh_degree);
   header[13] = static_cast<char>(packer.layout.fractional_bits);
-  header[14] = IsCompensated(packer.cloud.render_mode) ? static_cast<char>(kSpzAntialiased) : '\0';
+  const int flags = (IsCompensated(packer.cloud.render_mode) ? kSpzAntialiased : 0) |
+                    (packer.records.empty() ? 0 : kSpzHasExtensions);
+  header[14] = static_cast<char>(flags);
   return header;
 }
 
@@ -135,7 +139,8 @@ Status WriteGzip(const Packer& packer, OutputFile& file) {
         const GzipBlock& block = blocks[k];
         Buffer<uint8_t> bytes(static_cast<size_t>(block.last - block.first) * packer.layout.record_size(block.section));
         packer.Pack(block.section, block.first, block.last, bytes.data());
-        Deflate(bytes.data(), bytes.size(), k + 1 == blocks.size(), deflated[k - begin]);
+        const bool last = k + 1 == blocks.size() && packer.records.empty();
+        Deflate(bytes.data(), bytes.size(), last, deflated[k - begin]);
       }
     });
     for (size_t k = begin; k < end; ++k) {
@@ -144,6 +149,13 @@ Status WriteGzip(const Packer& packer, OutputFile& file) {
       crc = crc32_combine(crc, block.crc, static_cast<z_off_t>(block.raw));
       raw += block.raw;
     }
+  }
+  if (!packer.records.empty()) {
+    Deflated records;
+    Deflate(reinterpret_cast<const uint8_t*>(packer.records.data()), packer.records.size(), true, records);
+    ANCHORSPLAT_RETURN_IF_ERROR(file.Write(records.bytes.data(), records.bytes.size()));
+    crc = crc32_combine(crc, records.crc, static_cast<z_off_t>(records.raw));
+    raw += records.raw;
   }
   const uint32_t trailer[2] = {static_cast<uint32_t>(crc), static_cast<uint32_t>(raw)};
   return file.Write(trailer, sizeof trailer);
@@ -197,7 +209,9 @@ Status WriteStreams(const Packer& packer, OutputFile& file) {
   std::string header = HeaderOf(packer);
   header[15] = static_cast<char>(streams);
   header.append(16, '\0');
-  header[16] = 32;  // where the table begins: there are no extensions
+  const auto table = static_cast<uint32_t>(header.size() + packer.records.size());
+  std::memcpy(header.data() + 16, &table, sizeof table);
+  header += packer.records;
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(header));
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(sizes.data(), streams * sizeof(PackedStreamSize)));
   for (size_t k = 0; k < streams; ++k) {
@@ -220,7 +234,8 @@ Status WriteSpz(const std::filesystem::path& path, const CloudView& cloud, const
   }
   const Packer packer{.cloud = cloud,
                       .layout = {options.spz_version, cloud.sh_degree, LookAtMeans(cloud).fractional_bits},
-                      .order = WriteOrder(cloud, options.order, SplatOrder::kKeep)};
+                      .order = WriteOrder(cloud, options.order, SplatOrder::kKeep),
+                      .records = BytesOfSpzExtensions(SpzExtensionsOf(cloud.comments))};
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   ANCHORSPLAT_RETURN_IF_ERROR(options.spz_version == 3 ? WriteGzip(packer, file) : WriteStreams(packer, file));
   return file.Commit();

@@ -1,0 +1,41 @@
+#include "formats/stored_as.h"
+
+#include "core/activations.h"
+#include "core/log.h"
+#include "core/parallel.h"
+#include "core/spherical_harmonics.h"
+#include "core/stored_values.h"
+#include "core/text.h"
+
+namespace anchorsplat {
+
+void MakeStored(GaussianCloud& cloud, const StoredAs& stored) {
+  if (stored == StoredAs{}) return;
+  ParallelFor(0, cloud.size(), 1 << 14, [&](int64_t first, int64_t last) {
+    for (int64_t i = first; i < last; ++i) {
+      for (int64_t k = 3 * i; stored.lengths && k < 3 * i + 3; ++k) {
+        float& scale = cloud.log_scales[static_cast<size_t>(k)];
+        scale = LogFromScale(scale);
+      }
+      float& opacity = cloud.opacity_logits[static_cast<size_t>(i)];
+      if (stored.opacities) opacity = LogitFromOpacity(opacity);
+      float* const sh = cloud.sh.data() + i * cloud.sh_stride();
+      for (int k = 0; stored.color_of_one > 0 && k < 3; ++k) sh[k] = DcFromColor(sh[k] / stored.color_of_one);
+    }
+  });
+}
+
+void WarnOfStored(const std::string& name, const CloudView& cloud, const StoredAs& told) {
+  const StoredSample sample = SampleOf(cloud);
+  const auto warn = [&name](const char* what, const char* option) {
+    LogWarning(Cat(name, ": its ", what, "; if so, read it with ", option));
+  };
+  if (!told.lengths && LooksLikeLengths(sample)) warn("scales look like lengths, not logarithms", "--scales lengths");
+  if (!told.opacities && LooksLikeOpacities(sample)) warn("opacities look like 0 to 1, not logits", "--opacities 0-1");
+  if (told.color_of_one > 0) return;
+  const int colors = LooksLikeColors(sample);
+  if (colors == 1) warn("f_dc look like colours from 0 to 1, not harmonics", "--colors 0-1");
+  if (colors == 255) warn("f_dc look like colours from 0 to 255, not harmonics", "--colors 0-255");
+}
+
+}  // namespace anchorsplat

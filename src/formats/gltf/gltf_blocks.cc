@@ -29,6 +29,8 @@ class GltfBlocks final : public FileBlocks {
     size_ = splats.count;
     sh_degree_ = splats.degree;
     comments_ = std::move(comments);
+    const AxisFlip flip = FlipBetween(kLuf, kRdf);
+    for (size_t k = 0; k < 3; ++k) origin_[k] = double{flip.mean[k]} * splats.origin[k];
     int64_t begin = 0;
     for (const GltfPrimitive& primitive : primitives_) {
       begins_.push_back(begin);

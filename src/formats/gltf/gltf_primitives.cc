@@ -196,6 +196,20 @@ Status FindMeanings(const JsonValue& attributes, const std::string& where, GltfP
   return {};
 }
 
+// Far places, as a georeferenced scene gives them, are differences to the first one. glTF is in metres.
+void MoveToOrigin(GltfSplats& splats) {
+  constexpr double kDetail = 0.25;  // for which floats are fine enough up to eight kilometres
+  std::vector<double> places;
+  for (const GltfPrimitive& primitive : splats.primitives) {
+    places.insert(places.end(), primitive.place.translation.begin(), primitive.place.translation.end());
+  }
+  if (IsZero(ChooseOrigin(places, kDetail))) return;
+  splats.origin = splats.primitives.front().place.translation;
+  for (GltfPrimitive& primitive : splats.primitives) {
+    primitive.place.translation = FromOrigin(primitive.place.translation, splats.origin);
+  }
+}
+
 }  // namespace
 
 Result<GltfSplats> FindGltfSplats(const InputFile& file, const GltfDocument& document, const ReadLimits& limits) {
@@ -242,6 +256,7 @@ Result<GltfSplats> FindGltfSplats(const InputFile& file, const GltfDocument& doc
                      kGltfSplatting, OtherSplatExtension(document))};
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), document.bytes(), static_cast<uint64_t>(splats.count) * 4));
+  MoveToOrigin(splats);
   for (size_t k = 0; k < splats.primitives.size(); ++k) {
     ANCHORSPLAT_RETURN_IF_ERROR(FindMeanings(attributes[k], file.name(), splats.primitives[k], splats.warnings));
   }

@@ -38,6 +38,7 @@ struct GltfSplats {
   std::vector<GltfPrimitive> primitives;
   int64_t count = 0;                  // of their Gaussians
   int degree = 0;                     // the highest
+  WorldOrigin origin = {0, 0, 0};     // that the places of primitives are from, in the file's axes
   std::vector<std::string> warnings;  // what is read otherwise than the file says
 };
 // Errors as ReadGltf, but for those of reading.

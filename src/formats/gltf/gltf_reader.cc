@@ -134,6 +134,7 @@ Result<GaussianCloud> ReadGltf(const InputFile& file, const ReadLimits& limits) 
     ANCHORSPLAT_RETURN_IF_ERROR(ReadPrimitive(primitive, begin, cloud));
     begin += primitive.count();
   }
+  cloud.origin = splats.origin;
   TurnAxes(cloud, TurnBetween(kLuf, kRdf));
   ANCHORSPLAT_ASSIGN_OR_RETURN(cloud.comments, CommentsOfAsset(document.root()));
   return cloud;

@@ -130,11 +130,16 @@ nlohmann::json JsonOf(const CloudView& cloud, int64_t count, const std::vector<W
       {"attributes", names}, {"mode", 0}, {"extensions", {{"KHR_gaussian_splatting", extension}}}};
   nlohmann::json asset = AssetOf(cloud.comments, {});
   asset["version"] = "2.0";
+  nlohmann::json node = {{"mesh", 0}};
+  if (!IsZero(cloud.origin)) {
+    const AxisFlip flip = FlipBetween(kRdf, kLuf);
+    for (size_t k = 0; k < 3; ++k) node["translation"].push_back(double{flip.mean[k]} * cloud.origin[k] + 0.0);
+  }
   return {{"asset", asset},
           {"extensionsUsed", {"KHR_gaussian_splatting"}},
           {"scene", 0},
           {"scenes", {{{"nodes", {0}}}}},
-          {"nodes", {{{"mesh", 0}}}},
+          {"nodes", {node}},
           {"meshes", {{{"primitives", {primitive}}}}},
           {"buffers", {{{"byteLength", offset}}}},
           {"bufferViews", views},

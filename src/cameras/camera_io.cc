@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <span>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -20,15 +21,17 @@ namespace anchorsplat {
 
 namespace {
 
-Result<CameraSet> CamerasFromJson(const JsonValue& root, const std::filesystem::path& folder) {
+// `complete`: CamerasFromTransforms'.
+Result<CameraSet> CamerasFromJson(const JsonValue& root, const std::filesystem::path& folder, bool complete) {
   if (root.raw().is_array()) return CamerasFromInria(root, folder);
-  if (root.raw().is_object()) return CamerasFromTransforms(root, folder);
+  if (root.raw().is_object()) return CamerasFromTransforms(root, folder, complete);
   return root.Complain("expected a transforms.json (an object with \"frames\") or a cameras.json (an array)");
 }
 
 Result<CameraSet> ReadCameraJson(const std::filesystem::path& path) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile file, JsonFile::Read(path));
-  return CamerasFromJson(file.root(), path.parent_path());
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  return CamerasFromJson(file.root(), folder, path.filename() == "transforms.json");
 }
 
 // transforms*.json and cameras.json of a folder, sorted.
@@ -45,15 +48,35 @@ Result<std::vector<std::filesystem::path>> FindCameraJsons(const std::filesystem
   return found;
 }
 
+// Whether a model lies where COLMAP's and INRIA's projects have theirs.
+bool IsPlainProject(const std::filesystem::path& project, const std::filesystem::path& model) {
+  return model == project || model.parent_path() == project || model.parent_path() == project / "sparse";
+}
+
+// Models of one capture that COLMAP could not join have worlds of their own, and cannot be put together here either.
+void TellOfOtherModels(const std::filesystem::path& project, std::span<const FoundModel> models) {
+  if (models.size() < 2) return;
+  const auto pictures = [](size_t count) { return Cat(count, count == 1 ? " picture" : " pictures"); };
+  std::string others;
+  for (const FoundModel& model : models.subspan(1)) {
+    others += Cat(others.empty() ? "" : ", ", model.folder.string(), " (", pictures(model.pictures), ")");
+  }
+  const std::string text =
+      Cat(project.string(), ": of ", models.size(), " COLMAP models ", models[0].folder.string(), " is used (",
+          pictures(models[0].pictures), "); to use another, name its folder: ", others);
+  if (models.back().pictures < models[0].pictures) {
+    LogWarning(text);
+  } else {
+    LogInfo(text);
+  }
+}
+
 Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<std::filesystem::path> candidates, FindCameraJsons(folder));
-  // Where several models are there, they are stages of one reconstruction: the project's sparse/0 is its result, the
-  // text files beside it are what it was given.
-  for (const auto& model : {folder / "sparse" / "0", folder / "sparse", folder}) {
-    if (!IsColmapModel(model)) continue;
-    candidates.push_back(model);
-    break;
-  }
+  // Models that a program keeps beside its own file, as nerfstudio does in colmap, are not what it was meant to give.
+  std::vector<FoundModel> models = FindColmapModels(folder);
+  if (!candidates.empty() && !models.empty() && !IsPlainProject(folder, models[0].folder)) models.clear();
+  if (!models.empty()) candidates.push_back(models[0].folder);
   // LLFF makes its file from a COLMAP model, which knows the lens and the points, too.
   if (candidates.empty() && Exists(folder / "poses_bounds.npy")) return ReadPosesBounds(folder / "poses_bounds.npy");
   if (candidates.empty()) {
@@ -67,7 +90,9 @@ Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder) {
     for (const auto& candidate : candidates) list += (list.empty() ? "" : ", ") + candidate.string();
     return Error{ErrorCode::kBadArgument, Cat(folder.string(), ": several sets of cameras, name one of them: ", list)};
   }
-  return IsFolder(candidates[0]) ? ReadColmapModel(candidates[0]) : ReadCameraJson(candidates[0]);
+  if (!IsFolder(candidates[0])) return ReadCameraJson(candidates[0]);
+  TellOfOtherModels(folder, models);
+  return ReadColmapModel(candidates[0]);
 }
 
 // A folder of masks beside the pictures or among them, by any spelling; empty where there is none.
@@ -108,6 +133,17 @@ void WarnOfMissingMasks(const CameraSet& set) {
   }
 }
 
+// Readers leave the path at which they looked for a picture in vain; the first of these.
+std::filesystem::path ForgetMissing(CameraSet& set) {
+  std::filesystem::path first;
+  for (Camera& camera : set.cameras) {
+    if (camera.image.empty() || IsFile(camera.image)) continue;
+    if (first.empty()) first = camera.image;
+    camera.image.clear();
+  }
+  return first;
+}
+
 Result<CameraSet> ReadAnyCameras(const std::filesystem::path& path) {
   if (IsFolder(path)) return ReadCameraFolder(path);
   // Any file of a COLMAP model stands for the model.
@@ -126,11 +162,15 @@ Result<CameraSet> ReadAnyCameras(const std::filesystem::path& path) {
 
 Result<CameraSet> ParseCameras(const std::string& name, std::string_view bytes, const std::filesystem::path& folder) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile file, JsonFile::Parse(name, bytes));
-  return CamerasFromJson(file.root(), folder);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, CamerasFromJson(file.root(), folder, false));
+  ForgetMissing(set);
+  return set;
 }
 
-Result<CameraSet> ReadCameras(const std::filesystem::path& path) {
+Result<CameraSet> ReadCameras(const std::filesystem::path& path, std::filesystem::path* missing) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadAnyCameras(path));
+  const std::filesystem::path first = ForgetMissing(set);
+  if (missing != nullptr) *missing = first;
   WarnOfMissingMasks(set);
   return set;
 }

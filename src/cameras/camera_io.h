@@ -9,16 +9,18 @@
 namespace anchorsplat {
 
 // Reads cameras from a NeRF/nerfstudio transforms.json, an INRIA cameras.json, LLFF's poses_bounds.npy, or a COLMAP
-// sparse model (any of its files, its folder, or a project folder that has it at sparse/0 or sparse). A folder may also
-// hold one transforms*.json or cameras.json, or poses_bounds.npy and none of the others. Order as in the file; names
-// may repeat.
+// sparse model (any of its files, its folder, or a project folder that has it: of several models the one with most
+// pictures, FindColmapModels in cameras/colmap_model.h; a message names the others). A folder may also hold one
+// transforms*.json or cameras.json, or poses_bounds.npy and none of the others. Order as in the file; names may repeat.
+// Pictures are found as cameras/picture_search.h says; `missing`, where it is given, becomes the first path at which
+// one was looked for in vain.
 //
 // A camera's `intrinsics` have no lens: where the file says there was one they are those of the pinhole that its
 // pictures are undone to (cameras/undistortion.h), and ReadPhotograph makes such a picture (cameras/photograph.h).
 //
 // Errors: kNotFound; kIo; kBadFile with file, line or byte or JSON path (a lens that is not known here is refused with
 // the model's name); kBadArgument for a folder with several sets of cameras, which are listed.
-Result<CameraSet> ReadCameras(const std::filesystem::path& path);
+Result<CameraSet> ReadCameras(const std::filesystem::path& path, std::filesystem::path* missing = nullptr);
 
 // Writes a transforms.json in nerfstudio's form (fl_x, fl_y, cx, cy, w, h; OpenGL camera-to-world matrices) with our
 // `background`. Intrinsics are those of the first camera; other cameras repeat only what differs. `file_path` is the

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cameras/camera_checks.h"
+#include "cameras/picture_search.h"
 #include "cameras/lensed_pinhole.h"
 #include "core/file_system.h"
 #include "core/log.h"
@@ -167,7 +168,9 @@ Result<CameraSet> CamerasFromBundler(const std::filesystem::path& file, std::str
     return Error{ErrorCode::kBadFile, Cat(list->string(), ": lists ", names.size(), " pictures, and ", file.string(),
                                           " has ", cameras.size(), " cameras; their order alone says which is whose")};
   }
-  const std::vector<std::filesystem::path> folders = FoldersOfPictures(list->parent_path());
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      const std::vector<FoundPicture> pictures,
+      FindPictures({.folders = FoldersOfPictures(list->parent_path()), .project = list->parent_path()}, names));
   CameraSet set;
   size_t registered = 0;
   std::string first_missing;
@@ -176,9 +179,9 @@ Result<CameraSet> CamerasFromBundler(const std::filesystem::path& file, std::str
     const BundlerCamera& camera = cameras[i];
     if (camera.focal == 0) continue;
     ++registered;
-    std::filesystem::path picture = FindPicture(folders, names[i]);
-    if (picture.empty()) {
-      if (first_missing.empty()) first_missing = (folders.front() / names[i]).string();
+    const std::filesystem::path& picture = pictures[i].file;
+    if (!IsFile(picture)) {
+      if (first_missing.empty()) first_missing = picture.string();
       continue;
     }
     ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize size, ReadImageSize(picture));
@@ -194,8 +197,8 @@ Result<CameraSet> CamerasFromBundler(const std::filesystem::path& file, std::str
       known[key] = *std::move(through);
     }
     const LensedPinhole& lensed = known[key];
-    Camera view{ViewName(names[i]), std::move(picture), lensed.straight, camera.pose, lensed.photograph};
-    view.photograph.mask = FindMask(folders, names[i]);
+    Camera view{pictures[i].name, picture, lensed.straight, camera.pose, lensed.photograph};
+    view.photograph.mask = pictures[i].mask;
     set.cameras.push_back(std::move(view));
   }
   if (registered == 0) return Error{ErrorCode::kBadFile, Cat(file.string(), ": none of its cameras is registered")};

@@ -1,15 +1,16 @@
 #include "cameras/camera_checks.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <system_error>
 
 #include "core/file_system.h"
 #include "core/finite.h"
+#include "core/log.h"
 #include "core/rotation.h"
 #include "core/text.h"
 #include "images/image_io.h"
+#include "images/picture_names.h"
 #include "io/input_record.h"
 
 namespace anchorsplat {
@@ -17,6 +18,12 @@ namespace anchorsplat {
 namespace {
 
 Error Bad(std::string sentence) { return Error{ErrorCode::kBadFile, std::move(sentence)}; }
+
+constexpr double kLeastNorm = 0.5;  // what is farther from 1 is another column than that of a quaternion
+
+double NormOf(const std::array<double, 4>& q) {
+  return std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+}
 
 }  // namespace
 
@@ -41,24 +48,32 @@ Result<Pose> PoseFromCameraToWorld(const std::array<double, 9>& r, const std::ar
   return pose;
 }
 
-Result<Pose> PoseFromUnitQuaternion(const std::array<double, 4>& q, const std::array<double, 3>& t) {
-  const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  if (!(std::abs(norm - 1) <= 1e-3)) return Bad(Cat("quaternion has norm ", norm, ", expected 1"));
+Result<Pose> PoseFromQuaternion(const std::array<double, 4>& q, const std::array<double, 3>& t) {
+  const double norm = NormOf(q);
+  if (!(norm > kLeastNorm && norm < 1 / kLeastNorm)) return Bad(Cat("quaternion has norm ", norm, ", expected 1"));
   if (!AllFinite(t)) return Bad("translation is not finite");
   return Pose{RotationFromQuaternion(q[0], q[1], q[2], q[3]), t};
 }
 
+void QuaternionNorms::Add(const std::array<double, 4>& quaternion) {
+  constexpr double kTolerance = 1e-3;  // files with few digits
+  const double norm = NormOf(quaternion);
+  if (std::abs(norm - 1) <= kTolerance) return;
+  ++others_;
+  if (std::abs(norm - 1) > std::abs(farthest_ - 1)) farthest_ = norm;
+}
+
+void QuaternionNorms::Tell(const std::filesystem::path& file) const {
+  if (others_ == 0) return;
+  LogWarning(Cat(file.string(), ": ", others_, others_ == 1 ? " quaternion is" : " quaternions are",
+                 " not of norm 1 (the farthest has ", farthest_, "); only the direction was taken"));
+}
+
 std::string ViewName(const std::string& image_path) {
   std::string name = image_path.starts_with("./") ? image_path.substr(2) : image_path;
-  const size_t dot = name.rfind('.');
-  if (dot == std::string::npos) return name;
-  std::string extension = name.substr(dot + 1);
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  for (const char* known : {"png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp", "exr", "hdr"}) {
-    if (extension == known) return name.substr(0, dot);
-  }
-  return name;
+  std::ranges::replace(name, '\\', '/');
+  if (!HasAnyPictureExtension(name)) return name;
+  return name.substr(0, name.rfind('.'));
 }
 
 std::filesystem::path FindPicture(std::span<const std::filesystem::path> folders, const std::string& relative) {

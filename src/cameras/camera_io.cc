@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <fstream>
+#include <span>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -35,8 +36,9 @@ std::string NotOfNerfstudio(const std::filesystem::path& frame) {
              " says nothing of these cameras; give those that it was trained with, or move that file away");
 }
 
-// `frame`: the dataparser_transforms.json that says where to; empty: the cameras stay in the world of their file.
-Result<CameraSet> CamerasFromJson(const JsonValue& root, const std::filesystem::path& folder,
+// `complete`: CamerasFromTransforms'. `frame`: the dataparser_transforms.json that says where to; empty: the cameras
+// stay in the world of their file.
+Result<CameraSet> CamerasFromJson(const JsonValue& root, const std::filesystem::path& folder, bool complete,
                                   const std::filesystem::path& frame) {
   if (const std::string foreign = ForeignJson(root); !foreign.empty()) return root.Complain(foreign);
   CameraSet set;
@@ -48,7 +50,7 @@ Result<CameraSet> CamerasFromJson(const JsonValue& root, const std::filesystem::
   if (root.raw().is_array()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(set, CamerasFromInria(root, folder));
   } else if (root.raw().is_object()) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(set, CamerasFromTransforms(root, folder));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(set, CamerasFromTransforms(root, folder, complete));
     if (!frame.empty()) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(applied, AppliedByNerfstudio(root, folder));
     }
@@ -61,7 +63,8 @@ Result<CameraSet> CamerasFromJson(const JsonValue& root, const std::filesystem::
 
 // Of any file of cameras but NumPy's, by what it begins with.
 Result<CameraSet> CamerasFromBytes(const std::filesystem::path& file, std::string_view bytes,
-                                   const std::filesystem::path& folder, const std::filesystem::path& frame) {
+                                   const std::filesystem::path& folder, bool complete,
+                                   const std::filesystem::path& frame) {
   std::string_view head = bytes.substr(0, kHeadBytes);
   if (head.starts_with("\xEF\xBB\xBF")) head.remove_prefix(3);  // of UTF-8, which XML and JSON may begin with
   head.remove_prefix(std::min(head.find_first_not_of(" \t\r\n"), head.size()));
@@ -76,7 +79,7 @@ Result<CameraSet> CamerasFromBytes(const std::filesystem::path& file, std::strin
     if (bundler) return CamerasFromBundler(file, bytes);
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonFile parsed, JsonFile::Parse(file.string(), bytes));
-  return CamerasFromJson(parsed.root(), folder, frame);
+  return CamerasFromJson(parsed.root(), folder, complete, frame);
 }
 
 Result<CameraSet> ReadCameraFile(const std::filesystem::path& path, const std::filesystem::path& frame) {
@@ -89,7 +92,8 @@ Result<CameraSet> ReadCameraFile(const std::filesystem::path& path, const std::f
     return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", foreign)};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(path, kMostCameraBytes));
-  return CamerasFromBytes(path, bytes, path.parent_path(), frame);
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  return CamerasFromBytes(path, bytes, folder, path.filename() == "transforms.json", frame);
 }
 
 Result<CameraSet> ReadModel(const std::filesystem::path& model, const std::filesystem::path& frame) {
@@ -130,6 +134,29 @@ Result<std::vector<std::filesystem::path>> FindCameraFiles(const std::filesystem
   return found;
 }
 
+// Whether a model lies where COLMAP's and INRIA's projects have theirs.
+bool IsPlainProject(const std::filesystem::path& project, const std::filesystem::path& model) {
+  return model == project || model.parent_path() == project || model.parent_path() == project / "sparse";
+}
+
+// Models of one capture that COLMAP could not join have worlds of their own, and cannot be put together here either.
+void TellOfOtherModels(const std::filesystem::path& project, std::span<const FoundModel> models) {
+  if (models.size() < 2) return;
+  const auto pictures = [](size_t count) { return Cat(count, count == 1 ? " picture" : " pictures"); };
+  std::string others;
+  for (const FoundModel& model : models.subspan(1)) {
+    others += Cat(others.empty() ? "" : ", ", model.folder.string(), " (", pictures(model.pictures), ")");
+  }
+  const std::string text =
+      Cat(project.string(), ": of ", models.size(), " COLMAP models ", models[0].folder.string(), " is used (",
+          pictures(models[0].pictures), "); to use another, name its folder: ", others);
+  if (models.back().pictures < models[0].pictures) {
+    LogWarning(text);
+  } else {
+    LogInfo(text);
+  }
+}
+
 // Beside a file, or a COLMAP model or the two folders above it; empty where there is none.
 std::filesystem::path FrameBeside(const std::filesystem::path& folder, int above) {
   std::filesystem::path up = folder.empty() ? std::filesystem::path(".") : folder;
@@ -142,13 +169,10 @@ std::filesystem::path FrameBeside(const std::filesystem::path& folder, int above
 // `frame`: of nerfstudio's run that leads here; empty: what lies beside the cameras, if anything.
 Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder, std::filesystem::path frame) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<std::filesystem::path> candidates, FindCameraFiles(folder));
-  // Where several models are there, they are stages of one reconstruction: the project's sparse/0 is its result, the
-  // text files beside it are what it was given.
-  for (const auto& model : {folder / "sparse" / "0", folder / "sparse", folder}) {
-    if (!IsColmapModel(model)) continue;
-    candidates.push_back(model);
-    break;
-  }
+  // Models that a program keeps beside its own file, as nerfstudio does in colmap, are not what it was meant to give.
+  std::vector<FoundModel> models = FindColmapModels(folder);
+  if (!candidates.empty() && !models.empty() && !IsPlainProject(folder, models[0].folder)) models.clear();
+  if (!models.empty()) candidates.push_back(models[0].folder);
   // LLFF makes its file from a COLMAP model, which knows the lens and the points, too.
   if (candidates.empty() && Exists(folder / "poses_bounds.npy")) candidates.push_back(folder / "poses_bounds.npy");
   const std::filesystem::path own_frame = FrameBeside(folder, 0);
@@ -173,7 +197,9 @@ Result<CameraSet> ReadCameraFolder(const std::filesystem::path& folder, std::fil
     return Error{ErrorCode::kBadArgument, Cat(folder.string(), ": several sets of cameras, name one of them: ", list)};
   }
   if (frame.empty()) frame = candidates[0] == folder ? FrameBeside(folder, 2) : own_frame;
-  return IsFolder(candidates[0]) ? ReadModel(candidates[0], frame) : ReadCameraFile(candidates[0], frame);
+  if (!IsFolder(candidates[0])) return ReadCameraFile(candidates[0], frame);
+  TellOfOtherModels(folder, models);
+  return ReadModel(candidates[0], frame);
 }
 
 // A folder of masks beside the pictures or among them, by any spelling; empty where there is none.
@@ -214,6 +240,17 @@ void WarnOfMissingMasks(const CameraSet& set) {
   }
 }
 
+// Readers leave the path at which they looked for a picture in vain; the first of these.
+std::filesystem::path ForgetMissing(CameraSet& set) {
+  std::filesystem::path first;
+  for (Camera& camera : set.cameras) {
+    if (camera.image.empty() || IsFile(camera.image)) continue;
+    if (first.empty()) first = camera.image;
+    camera.image.clear();
+  }
+  return first;
+}
+
 Result<CameraSet> ReadAnyCameras(const std::filesystem::path& path) {
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
   if (IsFolder(path)) return ReadCameraFolder(path, {});
@@ -232,11 +269,15 @@ Result<CameraSet> ReadAnyCameras(const std::filesystem::path& path) {
 }  // namespace
 
 Result<CameraSet> ParseCameras(const std::string& name, std::string_view bytes, const std::filesystem::path& folder) {
-  return CamerasFromBytes(name, bytes, folder, {});
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, CamerasFromBytes(name, bytes, folder, false, {}));
+  ForgetMissing(set);
+  return set;
 }
 
-Result<CameraSet> ReadCameras(const std::filesystem::path& path) {
+Result<CameraSet> ReadCameras(const std::filesystem::path& path, std::filesystem::path* missing) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadAnyCameras(path));
+  const std::filesystem::path first = ForgetMissing(set);
+  if (missing != nullptr) *missing = first;
   WarnOfMissingMasks(set);
   return set;
 }

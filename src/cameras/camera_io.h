@@ -10,9 +10,11 @@ namespace anchorsplat {
 
 // Reads cameras from a NeRF/nerfstudio transforms.json, an INRIA cameras.json, LLFF's poses_bounds.npy, Metashape's
 // XML, OpenSfM's reconstruction.json, Bundler's bundle.out, or a COLMAP sparse model (any of its files, its folder, or
-// a project folder that has it at sparse/0 or sparse). A folder may also hold one of the others (OpenSfM's also in
+// a project folder that has it: of several models the one with most pictures, FindColmapModels in
+// cameras/colmap_model.h; a message names the others). A folder may also hold one of the others (OpenSfM's also in
 // opensfm, Bundler's in bundle), poses_bounds.npy only where there is nothing else. Order as in the file; names may
-// repeat.
+// repeat. Pictures are found as cameras/picture_search.h says; `missing`, where it is given, becomes the first path at
+// which one was looked for in vain.
 //
 // Where nerfstudio's dataparser_transforms.json lies beside a transforms.json or a COLMAP model, or is named itself, or
 // its folder (that of a run, whose config.yml says where the cameras are), they are moved into the frame that
@@ -24,7 +26,7 @@ namespace anchorsplat {
 // Errors: kNotFound; kIo; kBadFile with file, line or byte or JSON path (a lens that is not known here is refused with
 // the model's name; files of other programs with what to export instead); kBadArgument for a folder with several sets
 // of cameras, which are listed.
-Result<CameraSet> ReadCameras(const std::filesystem::path& path);
+Result<CameraSet> ReadCameras(const std::filesystem::path& path, std::filesystem::path* missing = nullptr);
 
 // Writes a transforms.json in nerfstudio's form (fl_x, fl_y, cx, cy, w, h; OpenGL camera-to-world matrices) with our
 // `background`. Intrinsics are those of the first camera; other cameras repeat only what differs. `file_path` is the

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "cameras/camera_checks.h"
 #include "cameras/colmap_model.h"
 #include "core/finite.h"
 #include "core/text.h"
@@ -11,6 +12,8 @@
 namespace anchorsplat {
 
 namespace {
+
+constexpr uint64_t kSmallestImage = 4 + 7 * 8 + 4 + 1 + 8;  // no name, no points
 
 // A little-endian file read from front to back. Every read is checked against what is left.
 class ByteStream {
@@ -122,14 +125,13 @@ Result<ColmapCameras> ReadColmapCamerasBinary(const std::filesystem::path& path)
   return cameras;
 }
 
-Result<std::vector<Camera>> ReadColmapImagesBinary(const std::filesystem::path& path, const ColmapCameras& cameras,
-                                                   PictureFolders picture_folders) {
+Result<std::vector<Camera>> ReadColmapImagesBinary(const std::filesystem::path& path, const ColmapCameras& cameras) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(ByteStream stream, ByteStream::Open(path));
-  constexpr uint64_t kSmallestImage = 4 + 7 * 8 + 4 + 1 + 8;  // no name, no points
   constexpr uint64_t kPoint = 8 + 8 + 8;
   uint64_t count = 0;
   ANCHORSPLAT_RETURN_IF_ERROR(stream.ReadCount(count, kSmallestImage, "the number of images"));
   std::vector<Camera> views;
+  QuaternionNorms norms;
   for (uint64_t i = 0; i < count; ++i) {
     uint32_t id = 0;
     uint64_t points = 0;
@@ -139,14 +141,23 @@ Result<std::vector<Camera>> ReadColmapImagesBinary(const std::filesystem::path& 
     for (double& x : image.translation) ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(x, "an image's translation"));
     ANCHORSPLAT_RETURN_IF_ERROR(stream.Read(image.camera, "an image's camera"));
     ANCHORSPLAT_RETURN_IF_ERROR(stream.ReadName(image.name));
-    auto camera = ViewFromColmap(image, cameras, picture_folders);
+    auto camera = ViewFromColmap(image, cameras);
     if (!camera.ok()) return stream.Complain(camera.error().message);
+    norms.Add(image.quaternion);
     views.push_back(*std::move(camera));
     ANCHORSPLAT_RETURN_IF_ERROR(stream.ReadCount(points, kPoint, "an image's number of points"));
     ANCHORSPLAT_RETURN_IF_ERROR(stream.Skip(points * kPoint));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(ExpectEnd(stream));
+  norms.Tell(path);
   return views;
+}
+
+Result<size_t> CountColmapImagesBinary(const std::filesystem::path& path) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ByteStream stream, ByteStream::Open(path));
+  uint64_t count = 0;
+  ANCHORSPLAT_RETURN_IF_ERROR(stream.ReadCount(count, kSmallestImage, "the number of images"));
+  return static_cast<size_t>(count);
 }
 
 Result<std::vector<ColmapPoint>> ReadColmapPointsBinary(const std::filesystem::path& path) {

@@ -1,10 +1,12 @@
 #include "cameras/colmap_model.h"
 
 #include <algorithm>
+#include <functional>
 #include <iterator>
 #include <system_error>
 
 #include "cameras/camera_checks.h"
+#include "cameras/picture_search.h"
 #include "core/file_system.h"
 #include "core/text.h"
 #include "images/image_io.h"
@@ -30,6 +32,38 @@ constexpr ColmapCameraModel kModels[] = {
 };
 
 Error BadModel(std::string sentence) { return Error{ErrorCode::kBadFile, std::move(sentence)}; }
+
+PicturePlaces PlacesOfModel(const std::filesystem::path& folder) {
+  PicturePlaces places{.project = ProjectAbove(folder), .complete = true};
+  // INRIA's convert.py has the model of the pictures as they were taken in PROJECT/distorted, those in PROJECT/input,
+  // and undistorted ones in PROJECT/images.
+  const std::string relative = AbsolutePath(folder).lexically_relative(AbsolutePath(places.project)).string();
+  places.originals = relative.starts_with("distorted");
+  std::vector<std::filesystem::path> usual = {folder / "images", folder / "../images", folder / "../../images"};
+  if (places.originals) usual = {places.project / "input"};
+  for (const auto& images : usual) {
+    auto pictures = images.lexically_normal();
+    if (IsFolder(pictures)) places.folders.push_back(std::move(pictures));
+  }
+  if (places.folders.empty()) places.folders.push_back(places.project / (places.originals ? "input" : "images"));
+  return places;
+}
+
+// The models in a folder whose names begin with `called`, not below that; by their names, numbers as such: "2" before
+// "10".
+std::vector<std::filesystem::path> ModelsIn(const std::filesystem::path& folder, const std::string& called) {
+  std::vector<std::filesystem::path> models;
+  std::error_code code;
+  for (std::filesystem::directory_iterator it(folder, code), end; !code && it != end; it.increment(code)) {
+    if (it->path().filename().string().starts_with(called) && IsColmapModel(it->path()))
+      models.push_back(folder / it->path().filename());
+  }
+  std::ranges::sort(models, {}, [](const std::filesystem::path& model) {
+    const std::string name = model.filename().string();
+    return std::pair(name.size(), name);
+  });
+  return models;
+}
 
 }  // namespace
 
@@ -80,18 +114,39 @@ Result<LensedPinhole> CameraFromColmap(const ColmapCameraModel& model, uint64_t 
   return ThroughLens(lens, c);
 }
 
-Result<Camera> ViewFromColmap(const ColmapImage& image, const ColmapCameras& cameras,
-                              std::span<const std::filesystem::path> picture_folders) {
+Result<Camera> ViewFromColmap(const ColmapImage& image, const ColmapCameras& cameras) {
   const std::string who = Cat("image \"", Printable(image.name), "\": ");
   if (ViewName(image.name).empty()) return BadModel("image without a name");
   const auto camera = cameras.find(image.camera);
   if (camera == cameras.end()) return BadModel(Cat(who, "camera ", image.camera, " is not in the list of cameras"));
-  auto pose = PoseFromUnitQuaternion(image.quaternion, image.translation);
+  auto pose = PoseFromQuaternion(image.quaternion, image.translation);
   if (!pose.ok()) return BadModel(who + pose.error().message);
-  Camera view{ViewName(image.name), FindPicture(picture_folders, image.name), camera->second.straight, *std::move(pose),
-              camera->second.photograph};
-  view.photograph.mask = FindMask(picture_folders, image.name);
-  return view;
+  return Camera{ViewName(image.name), image.name, camera->second.straight, *std::move(pose), camera->second.photograph};
+}
+
+std::vector<FoundModel> FindColmapModels(const std::filesystem::path& project) {
+  std::vector<FoundModel> found;
+  // Of a folder that may be anything, only those inside that are called so.
+  const auto take = [&](const std::filesystem::path& folder, const std::string& called) {
+    std::vector<std::filesystem::path> models = ModelsIn(folder, called);
+    if (IsColmapModel(folder)) models.push_back(folder);
+    for (const auto& model : models) {
+      const auto count = Exists(model / "cameras.bin") && Exists(model / "images.bin")
+                             ? CountColmapImagesBinary(model / "images.bin")
+                             : CountColmapImagesText(model / "images.txt");
+      found.push_back({model, count.ok() ? *count : 0});  // what is wrong is said where it is read
+    }
+  };
+  // Where models are there at several of these, they are stages of one reconstruction: the project's sparse is its
+  // result, the text files beside it are what it was given.
+  take(project / "sparse", "");
+  const bool sparse = AbsolutePath(project / ".").parent_path().filename().string().starts_with("sparse");
+  if (found.empty()) take(project, sparse ? "" : "sparse");
+  for (const char* place : {"colmap/sparse", "colmap", "dense/sparse", "distorted/sparse"}) {
+    if (found.empty()) take(project / place, "");
+  }
+  std::ranges::stable_sort(found, std::ranges::greater(), &FoundModel::pictures);
+  return found;
 }
 
 bool IsColmapModel(const std::filesystem::path& folder) {
@@ -100,22 +155,18 @@ bool IsColmapModel(const std::filesystem::path& folder) {
 }
 
 Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> picture_folders;
-  for (const char* images : {"images", "../images", "../../images"}) {
-    auto pictures = (folder / images).lexically_normal();
-    if (IsFolder(pictures)) picture_folders.push_back(std::move(pictures));
-  }
   const bool binary = Exists(folder / "cameras.bin") && Exists(folder / "images.bin");
   CameraSet set;
   set.source = CameraSource::kColmap;
   if (binary) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto cameras, ReadColmapCamerasBinary(folder / "cameras.bin"));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(set.cameras, ReadColmapImagesBinary(folder / "images.bin", cameras, picture_folders));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(set.cameras, ReadColmapImagesBinary(folder / "images.bin", cameras));
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto cameras, ReadColmapCamerasText(folder / "cameras.txt"));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(set.cameras, ReadColmapImagesText(folder / "images.txt", cameras, picture_folders));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(set.cameras, ReadColmapImagesText(folder / "images.txt", cameras));
   }
   if (set.cameras.empty()) return BadModel(Cat(folder.string(), ": the COLMAP model has no images"));
+  ANCHORSPLAT_RETURN_IF_ERROR(FindPicturesOf(PlacesOfModel(folder), set.cameras));
   return set;
 }
 

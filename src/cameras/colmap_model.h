@@ -41,15 +41,25 @@ struct ColmapImage {
 // The two below give sentences without file and place, which their callers know. Errors: kBadFile.
 Result<LensedPinhole> CameraFromColmap(const ColmapCameraModel& model, uint64_t width, uint64_t height,
                                        std::span<const double> params);
-Result<Camera> ViewFromColmap(const ColmapImage& image, const ColmapCameras& cameras,
-                              std::span<const std::filesystem::path> picture_folders);
+// `image` of the view is the name as the file has it.
+Result<Camera> ViewFromColmap(const ColmapImage& image, const ColmapCameras& cameras);
 
 // Whether the folder holds cameras.bin and images.bin, or the two as .txt.
 bool IsColmapModel(const std::filesystem::path& folder);
 
+// The sparse models of a project, the one with most pictures first, of equals the first of: those in `sparse` and
+// `sparse` itself; the folder itself and those in it. Where there are none of these, those below `colmap`,
+// `sparse_txt`, `dense` and `distorted`.
+struct FoundModel {
+  std::filesystem::path folder;
+  size_t pictures = 0;  // registered ones, by what the file says of itself
+};
+std::vector<FoundModel> FindColmapModels(const std::filesystem::path& project);
+
 // A sparse model: binary where both kinds are there, as COLMAP itself prefers it. Pictures are looked for in `images`
-// beside the model and up to two folders above it (PROJECT/sparse/0 → PROJECT/images), masks in `masks` beside
-// `images`: a picture's name with .png behind it, as COLMAP has it, or in place of its extension. Order as in the file.
+// beside the model and up to two folders above it (PROJECT/sparse/0 → PROJECT/images), then below the project
+// (cameras/picture_search.h); masks in `masks` beside `images`: a picture's name with .png behind it, as COLMAP has it,
+// or in place of its extension. Order as in the file. Where a picture is missing, `image` is where it was looked for.
 // Errors: kNotFound, kIo; kBadFile with byte or line.
 Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder);
 
@@ -64,13 +74,12 @@ struct ColmapPoint {
 Result<std::vector<ColmapPoint>> ReadColmapPoints(const std::filesystem::path& folder);
 
 // Parts of ReadColmapModel and ReadColmapPoints, a file per kind.
-using PictureFolders = std::span<const std::filesystem::path>;
 Result<ColmapCameras> ReadColmapCamerasText(const std::filesystem::path& path);
-Result<std::vector<Camera>> ReadColmapImagesText(const std::filesystem::path& path, const ColmapCameras& cameras,
-                                                 PictureFolders picture_folders);
+Result<std::vector<Camera>> ReadColmapImagesText(const std::filesystem::path& path, const ColmapCameras& cameras);
 Result<ColmapCameras> ReadColmapCamerasBinary(const std::filesystem::path& path);
-Result<std::vector<Camera>> ReadColmapImagesBinary(const std::filesystem::path& path, const ColmapCameras& cameras,
-                                                   PictureFolders picture_folders);
+Result<std::vector<Camera>> ReadColmapImagesBinary(const std::filesystem::path& path, const ColmapCameras& cameras);
+Result<size_t> CountColmapImagesText(const std::filesystem::path& path);
+Result<size_t> CountColmapImagesBinary(const std::filesystem::path& path);
 Result<std::vector<ColmapPoint>> ReadColmapPointsText(const std::filesystem::path& path);
 Result<std::vector<ColmapPoint>> ReadColmapPointsBinary(const std::filesystem::path& path);
 

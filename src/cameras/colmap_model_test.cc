@@ -15,6 +15,7 @@
 
 #include "cameras/camera_io.h"
 #include "cameras/colmap_writer.h"
+#include "core/messages_for_test.h"
 #include "images/image_io.h"
 #include "io/folder_for_test.h"
 
@@ -306,6 +307,45 @@ TEST(Colmap, ProjectFoldersAreUnderstood) {
       EXPECT_TRUE(set->cameras[1].image.empty());
     }
   }
+}
+
+// COLMAP makes a model for each part of a capture that it cannot join with the others.
+TEST(Colmap, OfSeveralModelsTheLargestIsTaken) {
+  for (const std::string places : {"sparse", "colmap/sparse"}) {
+    const TestFolder folder;
+    const auto project = folder / "scene";
+    Write(project / places / "0/cameras.bin", kPinhole);
+    Write(project / places / "0/images.bin", ImagesBin({{"a.png"}}));
+    Write(project / places / "10/cameras.txt", "7 PINHOLE 40 30 50 60 21 14\n");
+    Write(project / places / "10/images.txt", "1 1 0 0 0 0 0 0 7 a.png\n\n2 1 0 0 0 0 0 0 7 b.png\n\n");
+    std::filesystem::create_directories(project / "images");
+    ASSERT_TRUE(WritePng(project / "images/a.png", Image(4, 4, 3)).ok());
+    const Messages messages;
+    const auto set = ReadCameras(project);
+    ASSERT_TRUE(set.ok()) << set.error().message;
+    EXPECT_EQ(set->cameras.size(), 2u);
+    EXPECT_EQ(set->cameras[0].image, project / "images/a.png");
+    ASSERT_EQ(messages.warnings().size(), 1u);
+    EXPECT_NE(messages.warnings()[0].find((project / places / "0").string() + " (1 picture)"), std::string::npos)
+        << messages.warnings()[0];
+    EXPECT_EQ(ReadCameras(project / places)->cameras.size(), 2u);
+    const auto named = ReadCameras(project / places / "0");
+    ASSERT_TRUE(named.ok()) << named.error().message;
+    EXPECT_EQ(named->cameras.size(), 1u);
+    EXPECT_EQ(named->cameras[0].image, project / "images/a.png");
+  }
+}
+
+TEST(Colmap, QuaternionsNearNormOneAreNormalised) {
+  const TestFolder folder;
+  const Messages messages;
+  const double c = 1.01 * std::sqrt(0.5);
+  const auto set = ReadBinary(folder, kPinhole, ImagesBin({{"a.png", {c, 0, c, 0, 1, 2, 3}}, {"b.png"}}));
+  ASSERT_TRUE(set.ok()) << set.error().message;
+  EXPECT_NEAR(set->cameras[0].world_to_camera.rotation[2], 1, 1e-12);
+  ASSERT_EQ(messages.warnings().size(), 1u);
+  EXPECT_NE(messages.warnings()[0].find("1 quaternion is not of norm 1 (the farthest has 1.01)"), std::string::npos)
+      << messages.warnings()[0];
 }
 
 TEST(Colmap, HalfAModelIsAnError) {

@@ -2,6 +2,7 @@
 #include <string_view>
 #include <vector>
 
+#include "cameras/camera_checks.h"
 #include "cameras/colmap_model.h"
 #include "core/finite.h"
 #include "core/number_text.h"
@@ -108,11 +109,11 @@ Result<ColmapCameras> ReadColmapCamerasText(const std::filesystem::path& path) {
   return cameras;
 }
 
-Result<std::vector<Camera>> ReadColmapImagesText(const std::filesystem::path& path, const ColmapCameras& cameras,
-                                                 PictureFolders picture_folders) {
+Result<std::vector<Camera>> ReadColmapImagesText(const std::filesystem::path& path, const ColmapCameras& cameras) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, ReadFileBytes(path, kMaxTextBytes));
   Lines lines(path.string(), text);
   std::vector<Camera> views;
+  QuaternionNorms norms;
   std::string_view line;
   while (lines.NextStatement(line)) {
     uint32_t id = 0;
@@ -127,12 +128,23 @@ Result<std::vector<Camera>> ReadColmapImagesText(const std::filesystem::path& pa
     ANCHORSPLAT_RETURN_IF_ERROR(TakeNumber(lines, line, "the camera's id", image.camera));
     // The rest of the line: names may have spaces inside.
     image.name = Trimmed(line);
-    auto camera = ViewFromColmap(image, cameras, picture_folders);
+    auto camera = ViewFromColmap(image, cameras);
     if (!camera.ok()) return lines.Complain(camera.error().message);
+    norms.Add(image.quaternion);
     views.push_back(*std::move(camera));
     if (lines.Next(line)) ANCHORSPLAT_RETURN_IF_ERROR(CheckPoints(lines, line));
   }
+  norms.Tell(path);
   return views;
+}
+
+Result<size_t> CountColmapImagesText(const std::filesystem::path& path) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, ReadFileBytes(path, kMaxTextBytes));
+  Lines lines(path.string(), text);
+  std::string_view line;
+  size_t count = 0;
+  for (; lines.NextStatement(line); ++count) (void)lines.Next(line);  // its points
+  return count;
 }
 
 Result<std::vector<ColmapPoint>> ReadColmapPointsText(const std::filesystem::path& path) {

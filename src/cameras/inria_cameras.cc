@@ -5,20 +5,21 @@
 #include <vector>
 
 #include "cameras/camera_checks.h"
+#include "cameras/picture_search.h"
 #include "images/image_io.h"
 
 namespace anchorsplat {
 
 namespace {
 
-Result<Camera> ReadCamera(const JsonValue& entry, std::span<const std::filesystem::path> picture_folders) {
+// `image` is the name as the file has it.
+Result<Camera> ReadCamera(const JsonValue& entry) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue img_name, entry.Get("img_name"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string name, img_name.Text());
   Camera camera;
   camera.name = ViewName(name);
   if (camera.name.empty() || name.find('\0') != std::string::npos) return img_name.Complain("expected an image's name");
-  camera.image = FindPicture(picture_folders, name);
-  camera.photograph.mask = FindMask(picture_folders, name);
+  camera.image = name;
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue width, entry.Get("width"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue height, entry.Get("height"));
@@ -54,14 +55,15 @@ Result<Camera> ReadCamera(const JsonValue& entry, std::span<const std::filesyste
 Result<CameraSet> CamerasFromInria(const JsonValue& root, const std::filesystem::path& folder) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> entries, root.Elements());
   if (entries.empty()) return root.Complain("expected at least one camera");
-  const std::filesystem::path picture_folders[] = {folder, folder / "images"};
   CameraSet set;
   set.source = CameraSource::kInria;
   for (const JsonValue& entry : entries) {
-    auto camera = ReadCamera(entry, picture_folders);
+    auto camera = ReadCamera(entry);
     if (!camera.ok()) return entry.Named(camera.error(), "img_name");
     set.cameras.push_back(*std::move(camera));
   }
+  ANCHORSPLAT_RETURN_IF_ERROR(
+      FindPicturesOf({.folders = {folder, folder / "images"}, .project = folder, .complete = true}, set.cameras));
   return set;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cameras/camera_checks.h"
+#include "cameras/picture_search.h"
 #include "cameras/lensed_pinhole.h"
 #include "core/log.h"
 #include "core/number_text.h"
@@ -282,7 +283,6 @@ Result<CameraSet> CamerasOfChunk(const XmlText& xml, const std::vector<Metashape
     sensors.emplace(sensor.attribute("id").value(), sensor);
   }
   std::map<std::string, LensedPinhole> known;
-  const std::vector<std::filesystem::path> folders = FoldersOfPictures(folder);
   CameraSet set;
   for (const pugi::xml_node& node : chunk.aligned) {
     const std::string label = node.attribute("label").value(), sensor_id = node.attribute("sensor_id").value();
@@ -298,10 +298,9 @@ Result<CameraSet> CamerasOfChunk(const XmlText& xml, const std::vector<Metashape
     const auto component = placed.find(node.attribute("component_id").value());
     const Similarity world = component != placed.end() ? component->second : of_chunk.value_or(Similarity());
     ANCHORSPLAT_ASSIGN_OR_RETURN(Pose pose, PoseOf(xml, node, world));
-    Camera camera{ViewName(label), FindPicture(folders, label), lensed.straight, std::move(pose), lensed.photograph};
-    camera.photograph.mask = FindMask(folders, label);
-    set.cameras.push_back(std::move(camera));
+    set.cameras.push_back({ViewName(label), label, lensed.straight, std::move(pose), lensed.photograph});
   }
+  ANCHORSPLAT_RETURN_IF_ERROR(FindPicturesOf({.folders = FoldersOfPictures(folder), .project = folder}, set.cameras));
   return set;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cameras/camera_checks.h"
+#include "cameras/picture_search.h"
 #include "cameras/lensed_pinhole.h"
 #include "core/finite.h"
 #include "core/log.h"
@@ -133,7 +134,6 @@ Result<CameraSet> CamerasFromOpenSfm(const JsonValue& root, const std::filesyste
   SayOfOthers(all, static_cast<size_t>(largest - all.begin()));
   SayOfReference(taken);
   std::map<std::string, LensedPinhole> known;
-  const std::vector<std::filesystem::path> folders = FoldersOfPictures(folder);
   CameraSet set;
   for (const auto& [name, unused] : shots.raw().items()) {
     if (ViewName(name).empty() || name.find('\0') != std::string::npos) {
@@ -150,10 +150,9 @@ Result<CameraSet> CamerasFromOpenSfm(const JsonValue& root, const std::filesyste
     }
     const LensedPinhole& lensed = known[camera_name];
     ANCHORSPLAT_ASSIGN_OR_RETURN(Pose pose, ShotPose(shot));
-    Camera view{ViewName(name), FindPicture(folders, name), lensed.straight, std::move(pose), lensed.photograph};
-    view.photograph.mask = FindMask(folders, name);
-    set.cameras.push_back(std::move(view));
+    set.cameras.push_back({ViewName(name), name, lensed.straight, std::move(pose), lensed.photograph});
   }
+  ANCHORSPLAT_RETURN_IF_ERROR(FindPicturesOf({.folders = FoldersOfPictures(folder), .project = folder}, set.cameras));
   return set;
 }
 

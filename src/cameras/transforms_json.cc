@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cameras/camera_checks.h"
+#include "cameras/picture_search.h"
 #include "cameras/undistortion.h"
 #include "core/file_system.h"
 #include "core/text.h"
@@ -110,7 +111,10 @@ Result<Pinhole> ReadIntrinsics(const JsonValue& frame, const JsonValue& root, co
     ANCHORSPLAT_ASSIGN_OR_RETURN(c.width, width->WholeNumber(1, kMaxImageSide));
     ANCHORSPLAT_ASSIGN_OR_RETURN(c.height, height->WholeNumber(1, kMaxImageSide));
   } else {
-    if (picture.empty()) return frame.Complain("neither \"w\" and \"h\" nor a picture to take the size from");
+    if (!IsFile(picture)) {
+      return frame.Complain(Cat("neither \"w\" and \"h\" nor a picture to take the size from (looked for at ",
+                                Printable(picture.string()), ")"));
+    }
     ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize size, ReadImageSize(picture));
     c.width = size.width;
     c.height = size.height;
@@ -148,21 +152,48 @@ Result<Pose> ReadPose(const JsonValue& matrix) {
   return pose;
 }
 
-// The frame's `mask_path`, else what lies in the folder `masks`.
-Result<std::filesystem::path> FindMaskOf(const JsonValue& frame, const std::filesystem::path& folder,
-                                         const std::string& picture) {
-  const auto value = frame.Find("mask_path");
-  if (!value || value->raw().is_null()) {
-    const std::filesystem::path relative(picture);
-    const std::filesystem::path pictures = (folder / relative).lexically_normal().parent_path();
-    return FindMask({&pictures, 1}, relative.filename().string());
+// The path of a picture or a mask; empty where there is none and need not be.
+Result<std::string> PathIn(const JsonValue& frame, const char* key, bool required) {
+  const auto value = frame.Find(key);
+  if (!required && (!value || value->raw().is_null())) return std::string();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue given, frame.Get(key));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::string path, given.Text());
+  if (ViewName(path).empty() || path.find('\0') != std::string::npos) {
+    return given.Complain(required ? "expected the path of a picture" : "expected the path of a mask");
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string path, value->Text());
-  if (path.empty() || path.find('\0') != std::string::npos) return value->Complain("expected the path of a mask");
-  auto found = FindPicture({&folder, 1}, path);
-  // Without its mask a picture would be taken for right where it is said to be wrong.
-  if (found.empty() && IsFolder(folder)) {
-    return value->Complain(Cat("there is no mask ", Printable(path), " in ", folder.string()));
+  return path;
+}
+
+Result<std::vector<std::string>> PathsOf(std::span<const JsonValue> frames, const char* key, bool required) {
+  std::vector<std::string> paths;
+  for (const JsonValue& frame : frames) {
+    auto path = PathIn(frame, key, required);
+    if (!path.ok()) return frame.Named(path.error(), "file_path");
+    paths.push_back(*std::move(path));
+  }
+  return paths;
+}
+
+// The frames' pictures, and their masks where `mask_path` says them, else where they lie in the folder `masks`.
+Result<std::vector<FoundPicture>> FindPicturesOfFrames(std::span<const JsonValue> frames,
+                                                       const std::filesystem::path& folder, bool complete) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<std::string> names, PathsOf(frames, "file_path", true));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<std::string> masks, PathsOf(frames, "mask_path", false));
+  PicturePlaces places{.folders = {folder}, .project = folder, .complete = complete};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<FoundPicture> found, FindPictures(places, names));
+  if (std::ranges::all_of(masks, &std::string::empty)) return found;
+  places.complete = false;
+  places.masks = true;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<FoundPicture> found_masks, FindPictures(places, masks));
+  for (size_t i = 0; i < frames.size(); ++i) {
+    if (masks[i].empty()) continue;
+    found[i].mask = IsFile(found_masks[i].file) ? found_masks[i].file : std::filesystem::path();
+    // Without its mask a picture would be taken for right where it is said to be wrong.
+    if (found[i].mask.empty() && IsFolder(folder)) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, frames[i].Get("mask_path"));
+      return frames[i].Named(value.Complain(Cat("there is no mask ", Printable(masks[i]), " in ", folder.string())),
+                             "file_path");
+    }
   }
   return found;
 }
@@ -186,16 +217,11 @@ class StraightPinholes {
   std::optional<Known> last_;
 };
 
-Result<Camera> ReadFrame(const JsonValue& frame, const JsonValue& root, const std::filesystem::path& folder,
+Result<Camera> ReadFrame(const JsonValue& frame, const JsonValue& root, FoundPicture picture,
                          StraightPinholes& straight) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue file_path, frame.Get("file_path"));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string path, file_path.Text());
-  if (ViewName(path).empty() || path.find('\0') != std::string::npos) {
-    return file_path.Complain("expected the path of a picture");
-  }
   Camera camera;
-  camera.name = ViewName(path);
-  camera.image = FindPicture({&folder, 1}, path);
+  camera.name = std::move(picture.name);
+  camera.image = std::move(picture.file);
   ANCHORSPLAT_ASSIGN_OR_RETURN(camera.intrinsics, ReadIntrinsics(frame, root, camera.image));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Lens lens, ReadLens(frame, root));
   if (!lens.IsStraight()) {
@@ -203,7 +229,7 @@ Result<Camera> ReadFrame(const JsonValue& frame, const JsonValue& root, const st
     camera.photograph.intrinsics = camera.intrinsics;
     ANCHORSPLAT_ASSIGN_OR_RETURN(camera.intrinsics, straight.Of(lens, camera.intrinsics, frame));
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(camera.photograph.mask, FindMaskOf(frame, folder, path));
+  camera.photograph.mask = std::move(picture.mask);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue matrix, frame.Get("transform_matrix"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(camera.world_to_camera, ReadPose(matrix));
   return camera;
@@ -211,7 +237,7 @@ Result<Camera> ReadFrame(const JsonValue& frame, const JsonValue& root, const st
 
 }  // namespace
 
-Result<CameraSet> CamerasFromTransforms(const JsonValue& root, const std::filesystem::path& folder) {
+Result<CameraSet> CamerasFromTransforms(const JsonValue& root, const std::filesystem::path& folder, bool complete) {
   CameraSet set;
   set.source = CameraSource::kTransforms;
   if (const auto background = root.Find("background")) {
@@ -229,10 +255,11 @@ Result<CameraSet> CamerasFromTransforms(const JsonValue& root, const std::filesy
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue frames, root.Get("frames"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> elements, frames.Elements());
   if (elements.empty()) return frames.Complain("expected at least one frame");
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<FoundPicture> pictures, FindPicturesOfFrames(elements, folder, complete));
   StraightPinholes straight;
-  for (const JsonValue& frame : elements) {
-    auto camera = ReadFrame(frame, root, folder, straight);
-    if (!camera.ok()) return frame.Named(camera.error(), "file_path");
+  for (size_t i = 0; i < elements.size(); ++i) {
+    auto camera = ReadFrame(elements[i], root, std::move(pictures[i]), straight);
+    if (!camera.ok()) return elements[i].Named(camera.error(), "file_path");
     set.cameras.push_back(*std::move(camera));
   }
   return set;

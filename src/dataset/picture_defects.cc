@@ -8,7 +8,7 @@
 #include <system_error>
 #include <vector>
 
-#include "cameras/colmap_model.h"
+#include "cameras/camera_io.h"
 #include "cameras/colmap_writer.h"
 #include "core/parallel.h"
 #include "core/random.h"
@@ -188,7 +188,7 @@ Camera WithWrongAim(const Camera& camera, const PictureDefects& defects, uint64_
 Status WriteCapturedProject(const fs::path& low, const fs::path& to, const PictureDefects& defects,
                             const std::array<float, 3>& background, int hold_out, uint64_t seed) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(defects));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet cameras, ReadColmapModel(low / "sparse" / "0"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet cameras, ReadCameras(low / "sparse" / "0"));
   // The order in which fits count the views that they hold out.
   std::stable_sort(cameras.cameras.begin(), cameras.cameras.end(),
                    [](const Camera& a, const Camera& b) { return a.name < b.name; });

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "cameras/camera_checks.h"
+#include "cameras/camera_io.h"
 #include "cameras/colmap_model.h"
 #include "cameras/photograph.h"
 #include "core/file_system.h"
@@ -131,7 +132,7 @@ Result<Scene> Scene::Open(const SceneEntry& entry) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(scene.record_, ObjectRecordFrom(json.root()));
     scene.background_ = scene.record_->background;
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet cameras, ReadColmapModel(low / "sparse" / "0"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet cameras, ReadCameras(low / "sparse" / "0"));
   const auto by_name = [](const Camera& a, const Camera& b) {
     return a.name + a.image.extension().string() < b.name + b.image.extension().string();
   };

@@ -25,7 +25,7 @@ bool HasCameras(const fs::path& folder) {
   for (const char* name : {"transforms.json", "transforms_train.json", "cameras.json", "poses_bounds.npy"}) {
     if (Exists(folder / name)) return true;
   }
-  return IsColmapModel(folder / "sparse" / "0") || IsColmapModel(folder / "sparse") || IsColmapModel(folder);
+  return !FindColmapModels(folder).empty();
 }
 
 // The smallest of the folders in it that are named by a number and are projects; `folder` itself if there is none.
@@ -56,25 +56,37 @@ Result<std::optional<std::array<float, 3>>> BackgroundBeside(const fs::path& res
   return set.background;
 }
 
-// The set's cameras with pictures, by name; the names of the others are added to `without`.
-Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source, int downscale,
+// "0003, 0007 and 15 more": enough to see what went wrong.
+std::string FirstFew(const std::vector<std::string>& names) {
+  constexpr size_t kShown = 5;
+  std::string list;
+  for (size_t i = 0; i < std::min(names.size(), kShown); ++i) list += (i == 0 ? "" : ", ") + Printable(names[i]);
+  if (names.size() > kShown) list += Cat(" and ", names.size() - kShown, " more");
+  return list;
+}
+
+// The cameras with pictures of a file or folder, by name; the names of the others are added to `without`.
+Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source, const fs::path& missing, int downscale,
                                          std::vector<std::string>& without) {
   std::vector<Camera> views;
+  std::vector<std::string> left_out;
   for (Camera& camera : set.cameras) {
     if (!camera.image.empty()) {
       views.push_back(std::move(camera));
     } else {
-      without.push_back(camera.name);
+      left_out.push_back(camera.name);
     }
   }
+  const std::string looked = missing.empty() ? "" : Cat("; the first was looked for at ", missing.string());
   if (views.empty()) {
-    return Error{ErrorCode::kNotFound, Cat(source.string(), ": none of the ", set.cameras.size(),
-                                           " views has its picture where the file says")};
+    return Error{ErrorCode::kNotFound,
+                 Cat(source.string(), ": none of the ", set.cameras.size(), " views has its picture", looked)};
   }
-  if (views.size() < set.cameras.size()) {
-    LogWarning(Cat(source.string(), ": ", set.cameras.size() - views.size(), " of ", set.cameras.size(),
-                   " views have no picture and are left out"));
+  if (!left_out.empty()) {
+    LogWarning(Cat(source.string(), ": ", left_out.size(), " of ", set.cameras.size(),
+                   " views have no picture and are left out: ", FirstFew(left_out), looked));
   }
+  without.insert(without.end(), left_out.begin(), left_out.end());
   std::stable_sort(views.begin(), views.end(), [](const Camera& a, const Camera& b) { return a.name < b.name; });
   for (Camera& view : views) ANCHORSPLAT_RETURN_IF_ERROR(MatchPhotograph(view, downscale));
   return views;
@@ -83,10 +95,8 @@ Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source, 
 // The sparse model that ReadCameras takes for a project, if it takes one; else nothing.
 fs::path ModelFolder(const fs::path& project) {
   if (!IsFolder(project)) return project.parent_path();
-  for (const auto& model : {project / "sparse" / "0", project / "sparse", project}) {
-    if (IsColmapModel(model)) return model;
-  }
-  return {};
+  const std::vector<FoundModel> models = FindColmapModels(project);
+  return models.empty() ? fs::path() : models[0].folder;
 }
 
 // From the world of a file to the one of the cameras, and to where that begins.
@@ -162,27 +172,28 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
   if (IsFolder(project) && !HasCameras(project)) source = SmallestResolution(project);
 
   TrainingViews out;
+  fs::path missing;
   const fs::path train_file = source / "transforms_train.json", test_file = source / "transforms_test.json";
   if (Exists(train_file)) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(train_file));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(train_file, &missing));
     out.background = set.background;
     const fs::path points = set.points;
     const std::optional<Similarity> moved = set.moved;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views,
-                                 WithPictures(std::move(set), train_file, options.downscale, out.without_picture));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views, WithPictures(std::move(set), train_file, missing,
+                                                                         options.downscale, out.without_picture));
     MoveToOrigin(train_file, options, views, out);
     if (Exists(test_file)) {
       out.train = std::move(views);
-      ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet test, ReadCameras(test_file));
-      ANCHORSPLAT_ASSIGN_OR_RETURN(out.held_out,
-                                   WithPictures(std::move(test), test_file, options.downscale, out.without_picture));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet test, ReadCameras(test_file, &missing));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(
+          out.held_out, WithPictures(std::move(test), test_file, missing, options.downscale, out.without_picture));
       for (Camera& view : out.held_out) view = FromOrigin(std::move(view), out.origin);
     } else {
       HoldOut(options.hold_out, std::move(views), out);
     }
     ANCHORSPLAT_RETURN_IF_ERROR(ReadPoints(points, {moved, out.origin}, out.points));
   } else {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(source));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(source, &missing));
     out.background = set.background;
     const bool colmap = set.source == CameraSource::kColmap;
     if (colmap && !out.background) {
@@ -191,7 +202,7 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
     const fs::path points = set.points, model = colmap ? ModelFolder(source) : fs::path();
     const std::optional<Similarity> moved = set.moved;
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views,
-                                 WithPictures(std::move(set), source, options.downscale, out.without_picture));
+                                 WithPictures(std::move(set), source, missing, options.downscale, out.without_picture));
     MoveToOrigin(source, options, views, out);
     HoldOut(options.hold_out, std::move(views), out);
     const PointFrame frame{moved, out.origin};

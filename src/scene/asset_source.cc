@@ -7,7 +7,7 @@
 #include "core/file_system.h"
 #include "core/text.h"
 #include "io/file_bytes.h"
-#include "scene/small_letters.h"
+#include "core/small_letters.h"
 
 namespace anchorsplat {
 

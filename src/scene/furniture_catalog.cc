@@ -11,7 +11,7 @@
 #include "io/file_bytes.h"
 #include "scene/java_properties.h"
 #include "scene/licence.h"
-#include "scene/small_letters.h"
+#include "core/small_letters.h"
 
 namespace anchorsplat {
 

@@ -9,7 +9,7 @@
 #include "io/file_bytes.h"
 #include "scene/furniture_catalog.h"
 #include "scene/licence.h"
-#include "scene/small_letters.h"
+#include "core/small_letters.h"
 
 namespace anchorsplat {
 

@@ -141,7 +141,7 @@ void MeasureRanges(const CloudView& cloud, const std::vector<int64_t>& rows, Qua
     }
   }
   if (!std::isfinite(q.log_scale[1])) q.log_scale = {-kLogScaleSpan, -kLogScaleSpan};  // nothing but points
-  if (!std::isfinite(q.dc[1])) q.dc = {0, 0};                                            // nothing that is drawn
+  if (!std::isfinite(q.dc[1])) q.dc = {0, 0};                                          // nothing that is drawn
   // Beyond that a Gaussian is the same veil over everything, and must not take the precision of all others.
   q.log_scale[1] = std::min(q.log_scale[1], std::log(q.spread) + kLargestLogScaleOfSpread);
   q.log_scale[0] = std::max(q.log_scale[0], q.log_scale[1] - kLogScaleSpan);

@@ -179,7 +179,7 @@ TEST(Convert, SaysWhatHasNoPlaceInTheFormat) {
   cloud.log_scales[5] = 30;
   cloud.log_scales[7] = std::nanf("");
   cloud.sh[12] = 3;
-  cloud.sh[24 + 7] = 1.5f;
+  cloud.sh[36 + 7] = 1.5f;
   const auto hidden = HasSubstr("1 of 2,000 Gaussians, which no verb draws");
   EXPECT_THAT(warn(cloud, ".spz"), ElementsAre(hidden, HasSubstr("1 of 2,000 Gaussians have log-scales beyond"),
                                                AllOf(HasSubstr("1 of 2,000"), HasSubstr("harmonics beyond"))));

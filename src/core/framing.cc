@@ -27,12 +27,12 @@ int64_t StepOf(int64_t gaussians) { return std::max<int64_t>(1, (gaussians + kMo
 // ---- what a picture is of
 
 constexpr size_t kFewest = 64;  // Gaussians: of fewer all count
-constexpr size_t kMostSearched = 20'000;
+constexpr size_t kMostSearched = 10'000;
 constexpr size_t kNeighbours = 8;
 // Farther from their neighbours than usual by this, in world units and in their own size.
 constexpr double kLonely = 5;
-constexpr double kGap = 3;       // between distances from the middle a hundredth of the Gaussians apart
-constexpr double kBeyondGap = 4; // of half of what lies beyond, to the distance at which the gap begins
+constexpr double kGap = 3;        // between distances from the middle a hundredth of the Gaussians apart
+constexpr double kBeyondGap = 4;  // of half of what lies beyond, to the distance at which the gap begins
 constexpr double kFewDirections = 0.35;
 constexpr double kWorthIt = 0.5;
 
@@ -237,6 +237,13 @@ Framing FramingStudy::Find() const {
   const size_t step = (rows.size() + kMostSearched - 1) / kMostSearched;
   Rows some;
   for (size_t k = 0; k < rows.size(); k += step) some.push_back(rows[k]);
+  // Where half of them already need so much room, nothing is to be gained.
+  const std::array<double, 3> middle = MedianOf(means_, some);
+  Buffer<float> distances;
+  for (const uint32_t row : some) {
+    distances.push_back(static_cast<float>(Distance(means_.data() + 3 * size_t{row}, middle)));
+  }
+  if (kWorthIt * whole.radius < Quantile(distances, 0.5)) return whole;
   Rows neighbours = WithoutLonely(means_, log_sizes_, some);
   if (2 * neighbours.size() < some.size()) neighbours = std::move(some);
   const Framing subject = FrameRows(means_, WithinGaps(means_, std::move(neighbours)), reach);

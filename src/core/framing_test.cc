@@ -79,9 +79,9 @@ TEST(Framing, NeitherFloatersNorSkiesMakeTheObjectSmall) {
   const GaussianCloud object = Cube(3000, {0, 0, 0});
   const double alone = FrameCloud(object).radius;
   for (const size_t more : {size_t{30}, size_t{93}, size_t{333}, size_t{1285}}) {  // 1, 3, 10 and 30 %
-    for (const auto& [kind, cloud] : {std::pair("near", Shell(more, 3, 7, -2)), std::pair("far", Shell(more, 18, 60, -1)),
-                                      std::pair("sky", Shell(more, 190, 200, 3)),
-                                      std::pair("strays", Shell(more, 1e5, 1e30, 0))}) {
+    for (const auto& [kind, cloud] :
+         {std::pair("near", Shell(more, 3, 7, -2)), std::pair("far", Shell(more, 18, 60, -1)),
+          std::pair("sky", Shell(more, 190, 200, 3)), std::pair("strays", Shell(more, 1e5, 1e30, 0))}) {
       const Framing framing = FrameCloud(Together(object, cloud));
       EXPECT_LT(framing.radius, 1.7 * alone) << more << " " << kind;
       EXPECT_GT(framing.radius, 0.9 * alone) << more << " " << kind;

@@ -105,7 +105,7 @@ namespace {
 template <typename Cloud>
 bool ShapeIsUsable(const Cloud& cloud, int64_t i) {
   const float* scales = cloud.log_scales.data() + 3 * i;
-  return AllFinite(cloud.means.data() + 3 * i, 3) && 
+  return AllFinite(cloud.means.data() + 3 * i, 3) &&
          std::all_of(scales, scales + 3, [](float x) { return x <= kLargestLogScale; }) &&  // false for NaN
          AllFinite(cloud.quats.data() + 4 * i, 4) && !std::isnan(cloud.opacity_logits[static_cast<size_t>(i)]);
 }

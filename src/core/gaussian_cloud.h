@@ -64,8 +64,8 @@ Status Append(GaussianCloud& cloud, const GaussianCloud& more);
 // A copy with another SH degree: higher coefficients dropped, or zeros added.
 GaussianCloud WithShDegree(const GaussianCloud& cloud, int degree);
 
-// The one rule for what can be drawn; the rasterizer follows it, and everything that chooses, counts, measures or writes
-// Gaussians asks it here (core/statistics.h has the same of views).
+// The one rule for what can be drawn; the rasterizer follows it, and everything that chooses, counts, measures or
+// writes Gaussians asks it here (core/statistics.h has the same of views).
 //
 // Lengths beyond e to this are not drawn: the square, of which covariances are made, leaves the range of floats
 // (½·ln of the largest is 44.36), in which the field's rasterizers calculate.

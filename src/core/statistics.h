@@ -36,8 +36,8 @@ bool HasUsableShape(const CloudView& cloud, int64_t i);
 // Why rows are not usable, in a message: "… Gaussians are not drawn: " and this.
 inline constexpr std::string_view kWhyUnusable = "NaN, infinite or overflowing values";
 
-// Rows that nobody draws, whatever their opacity (not IsUsable). Without `harmonics` those whose SH alone is to blame are not counted: it is
-// most of a cloud's memory.
+// Rows that nobody draws, whatever their opacity (not IsUsable). Without `harmonics` those whose SH alone is to blame
+// are not counted: it is most of a cloud's memory.
 int64_t CountUnusable(const CloudView& cloud, bool harmonics = true);
 
 // What a person wants to know about a cloud before trusting it. Percentiles are over usable rows, those of the axes

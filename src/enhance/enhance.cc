@@ -68,8 +68,8 @@ Status DropUnusable(GaussianCloud& cloud) {
   const int64_t dropped = cloud.size() - static_cast<int64_t>(kept.size());
   if (dropped == 0) return {};
   if (kept.empty()) {
-    return Error{ErrorCode::kBadFile, Cat(kNoneUsable, WithThousands(cloud.size()),
-                                          " Gaussians can be drawn: each has ", kWhyUnusable)};
+    return Error{ErrorCode::kBadFile,
+                 Cat(kNoneUsable, WithThousands(cloud.size()), " Gaussians can be drawn: each has ", kWhyUnusable)};
   }
   LogWarning(Cat("dropped ", WithThousands(dropped), " of ", WithThousands(cloud.size()), " Gaussians: ", kWhyUnusable,
                  ", so that nobody draws them"));

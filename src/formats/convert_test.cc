@@ -267,11 +267,12 @@ TEST(Convert, SaysWhatHasNoPlaceInTheFormat) {
   cloud.log_scales[5] = 30;
   cloud.log_scales[7] = std::nanf("");
   cloud.sh[12] = 3;
-  cloud.sh[24 + 7] = 1.5f;
-  EXPECT_THAT(warn(cloud, ".spz"), ElementsAre(HasSubstr("1 of 2,000 Gaussians have log-scales beyond"),
+  cloud.sh[36 + 7] = 1.5f;
+  const auto hidden = HasSubstr("1 of 2,000 Gaussians, which no verb draws");
+  EXPECT_THAT(warn(cloud, ".spz"), ElementsAre(hidden, HasSubstr("1 of 2,000 Gaussians have log-scales beyond"),
                                                AllOf(HasSubstr("1 of 2,000"), HasSubstr("harmonics beyond"))));
-  EXPECT_THAT(warn(WithShDegree(cloud, 0), ".splat"), ElementsAre(HasSubstr("f_dc beyond")));
-  EXPECT_THAT(warn(cloud, ".sog"), ElementsAre(HasSubstr("log-scales beyond -20 to 20")));
+  EXPECT_THAT(warn(WithShDegree(cloud, 0), ".splat"), ElementsAre(hidden, HasSubstr("f_dc beyond")));
+  EXPECT_THAT(warn(cloud, ".sog"), ElementsAre(hidden, HasSubstr("log-scales beyond -20 to 20")));
   EXPECT_THAT(warn(cloud, ".ply"), IsEmpty());
 
   cloud = tame;
@@ -284,14 +285,21 @@ TEST(Convert, SaysWhatHasNoPlaceInTheFormat) {
 
   cloud = tame;
   cloud.means[0] = 30'000;  // one stray Gaussian
-  EXPECT_THAT(warn(cloud, ".compressed.ply"),
-              ElementsAre(AllOf(HasSubstr("positions of 256 of 2,000 Gaussians"), HasSubstr("98 % lie within"))));
-  EXPECT_THAT(warn(cloud, ".spz"), ElementsAre(AllOf(HasSubstr("1/256 instead of 1/4096"), HasSubstr("reach 30000"))));
+  const auto stray = AllOf(HasSubstr("1 of 2,000 Gaussians, up to 30000 from"), HasSubstr("a PLY keeps them all"));
+  EXPECT_THAT(warn(cloud, ".compressed.ply"), ElementsAre(stray));
+  EXPECT_THAT(warn(cloud, ".spz"), ElementsAre(stray));
   EXPECT_THAT(warn(cloud, ".sog"), IsEmpty());
+  EXPECT_THAT(warn(cloud, ".glb"), IsEmpty());
+  for (size_t k = 0; k < 3; ++k) cloud.log_scales[k] = 10;  // a sky: more to see than all before it
+  EXPECT_THAT(warn(cloud, ".compressed.ply"),
+              ElementsAre(AllOf(HasSubstr("positions of 208 of 2,000 Gaussians"), HasSubstr("98 % lie within"))));
+  EXPECT_THAT(warn(cloud, ".spz"), ElementsAre(HasSubstr("log-scales"),
+                                               AllOf(HasSubstr("1/256 instead of 1/4096"), HasSubstr("reach 30000"))));
+  for (size_t k = 0; k < 3; ++k) cloud.log_scales[k] = -5;
   cloud.means[0] = 1e30f;
-  EXPECT_THAT(warn(cloud, ".spz"), ElementsAre(HasSubstr("clamped")));
-  EXPECT_THAT(warn(cloud, ".sog"), ElementsAre(HasSubstr("98 %")));
-  EXPECT_THAT(warn(cloud, ".compressed.ply"), ElementsAre(HasSubstr("98 %")));
+  for (const char* lossy : {".compressed.ply", ".sog", ".spz"}) {
+    EXPECT_THAT(warn(cloud, lossy), ElementsAre(HasSubstr("up to 1e+30 from"))) << lossy;
+  }
   for (float& x : cloud.means) x *= 1e4f;  // large all over: coarse steps are right
   cloud.means[0] = 0;
   EXPECT_THAT(warn(cloud, ".spz"), IsEmpty());

@@ -79,7 +79,9 @@ Worst Compare(const GaussianCloud& a, const GaussianCloud& b, double sh_end) {
       if (std::fabs(q[k] * sign - p[k]) > std::fabs(q[largest] * sign - p[largest])) largest = k;
     }
     for (size_t k = 0; k < 4; ++k) raise(k == largest ? worst.restored : worst.stored_component, p[k], sign * q[k]);
-    raise(worst.opacity, Sigmoid(a.opacity_logits[i]), Sigmoid(b.opacity_logits[i]));
+    // What is too faint to be drawn stays so.
+    const bool drawn = IsDrawn(a, static_cast<int64_t>(i)), bytes = Sigmoid(b.opacity_logits[i]) < 2e-6f;
+    if (drawn || !bytes) raise(worst.opacity, Sigmoid(a.opacity_logits[i]), Sigmoid(b.opacity_logits[i]));
     for (size_t k = 0; k < 48; ++k) {
       if (b.sh_degree == 0 && k >= 3) break;
       const float x = a.sh[48 * i + k];

@@ -75,10 +75,10 @@ void WarnOfHiddenRows(const std::filesystem::path& path, const SplatFormat& form
                    kWhyUnusable, "), have been written with an opacity of zero"));
   }
   if (!hidden.strays.rows.empty()) {
-    LogWarning(Cat(path.string(), ": ", WithThousands(std::ssize(hidden.strays.rows)), of, ", up to ",
-                   hidden.strays.farthest, " from the middle, have been written with an opacity of zero: ",
-                   format.article, " ", format.name,
-                   " file that reaches as far would round the positions of others too coarsely (a PLY keeps them all)"));
+    LogWarning(
+        Cat(path.string(), ": ", WithThousands(std::ssize(hidden.strays.rows)), of, ", up to ", hidden.strays.farthest,
+            " from the middle, have been written with an opacity of zero: ", format.article, " ", format.name,
+            " file that reaches as far would round the positions of others too coarsely (a PLY keeps them all)"));
   }
 }
 

@@ -25,8 +25,8 @@
 #include "formats/spz/spz_blocks.h"
 #include "formats/spz/spz_reader.h"
 #include "formats/spz/spz_writer.h"
-#include "formats/streamed_sog/streamed_sog_reader.h"
 #include "formats/strays.h"
+#include "formats/streamed_sog/streamed_sog_reader.h"
 #include "formats/streamed_sog/streamed_sog_writer.h"
 #include "formats/tables/table_writers.h"
 

@@ -12,8 +12,8 @@ namespace anchorsplat {
 // Orders in which a cloud is written, as row numbers. Ties keep the order of the cloud; rows that nobody
 // draws come last. Errors do not exist: any cloud has every order.
 
-// Along a Morton (Z-order) curve of 2²¹ cells per axis through their box, so that neighbours in the file are neighbours in
-// space: ranges of chunks become small and general compressors find more. What is far out (strays.h) follows along a
+// Along a Morton (Z-order) curve of 2²¹ cells per axis through their box, so that neighbours in the file are neighbours
+// in space: ranges of chunks become small and general compressors find more. What is far out (strays.h) follows along a
 // curve of its own: no chunk with it in has more of the others than it must.
 Buffer<uint32_t> MortonOrder(const CloudView& cloud);
 // The same of places alone, [N,3], all finite.

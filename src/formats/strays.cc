@@ -97,9 +97,8 @@ Strays FarthestToGiveUp(const CloudView& cloud, const std::function<double(doubl
       rest = std::max(rest, reach);
     }
   }
-  std::ranges::sort(far, [](const FarRow& a, const FarRow& b) {
-    return std::tie(a.reach, b.row) > std::tie(b.reach, a.row);
-  });
+  std::ranges::sort(
+      far, [](const FarRow& a, const FarRow& b) { return std::tie(a.reach, b.row) > std::tie(b.reach, a.row); });
   size_t best = 0;
   double least = std::numeric_limits<double>::infinity(), given_up = 0, last = least;
   for (size_t k = 0; k <= far.size(); ++k) {
@@ -118,8 +117,8 @@ Strays FarthestToGiveUp(const CloudView& cloud, const std::function<double(doubl
   for (size_t k = 0; k < best; ++k) {
     const float* p = cloud.means.data() + 3 * far[k].row;
     strays.rows.push_back(far[k].row);
-    strays.farthest = std::max(strays.farthest, std::hypot(p[0] - framing->target[0], p[1] - framing->target[1],
-                                                           p[2] - framing->target[2]));
+    strays.farthest = std::max(
+        strays.farthest, std::hypot(p[0] - framing->target[0], p[1] - framing->target[1], p[2] - framing->target[2]));
   }
   std::ranges::sort(strays.rows);
   return strays;

@@ -30,7 +30,7 @@ double SizeOf(const CloudView& cloud, int64_t row);
 // Share of a Gaussian of `size` that is lost where its position is rounded to multiples of `step`, 0–1.
 double RoundingLoss(double step, double size);
 // Losses below this share of all that is seen are no reason to give up a Gaussian.
-inline constexpr double kLossThatShows = 1e-3;
+inline constexpr double kLossThatShows = 0.05;
 
 // For a format with one range for all positions: what to give up of the farthest ones. Positions whose coordinates have
 // magnitudes of at most `reach` are rounded to multiples of step(reach) · grain(own reach).

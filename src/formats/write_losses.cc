@@ -19,7 +19,7 @@ namespace {
 
 constexpr int64_t kLossGrain = 1 << 14;
 
-// Gaussians with a value that the format clamps.
+// Gaussians that are drawn and have a value that the format clamps.
 struct Clamped {
   int64_t log_scales = 0, colors = 0, harmonics = 0;
 };
@@ -34,6 +34,7 @@ Clamped CountClamped(const FormatRange& range, const CloudView& cloud, int sh_de
   ParallelFor(0, cloud.size(), kLossGrain, [&](int64_t first, int64_t last) {
     Clamped& part = parts[static_cast<size_t>(first / kLossGrain)];
     for (int64_t i = first; i < last; ++i) {
+      if (!HasUsableShape(cloud, i) || !IsOpaqueEnough(cloud.opacity_logits[static_cast<size_t>(i)])) continue;
       const float* sh = cloud.sh.data() + i * cloud.sh_stride();
       part.log_scales +=
           AnyBeyond(cloud.log_scales.data() + 3 * i, 3, range.log_scale_min, range.log_scale_max) ? 1 : 0;

@@ -126,9 +126,9 @@ class Rasterizer {
   // Errors (kBadArgument): an invalid cloud or one of 2^31 Gaussians or more; a camera without pixels, with more than
   // 2^19 per side, with a focal length that is not positive and finite, or with another value that is not finite; a
   // near plane that is not positive or not before the far one; options out of their range; not enough memory for the
-  // picture. Gaussians that are not usable (core/gaussian_cloud.h) are skipped, as far as the picture needs the value: SH
-  // coefficients of a degree that is not used are not looked at. −Inf is legal as a log-scale (a flat Gaussian), ±Inf
-  // as an opacity logit.
+  // picture. Gaussians that are not usable (core/gaussian_cloud.h) are skipped, as far as the picture needs the value:
+  // SH coefficients of a degree that is not used are not looked at. −Inf is legal as a log-scale (a flat Gaussian),
+  // ±Inf as an opacity logit.
   Status Render(const CloudView& cloud, const Camera& camera, const RenderOptions& options, RenderOutput& output);
 
   // The gradient of the last Render, which must have been asked to keep what this needs (RenderOptions::gradient), with

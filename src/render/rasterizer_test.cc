@@ -9,6 +9,7 @@
 
 #include "core/parallel.h"
 #include "core/simd_targets_for_test.h"
+#include "core/text.h"
 #include "render/rasterizer_reference.h"
 #include "render/scenes_for_test.h"
 

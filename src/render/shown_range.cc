@@ -72,7 +72,8 @@ std::string NothingToSee(const CloudView& cloud, const Camera& camera, const Ren
   add(depths.too_far, Cat("beyond the far plane (", options.far_plane, ")"));
   add(depths.faint, "less opaque than 1/255");
   add(depths.unusable, Cat("drawn by nobody (", kWhyUnusable, ")"));
-  add(depths.in_range - depths.faint - depths.unusable, drawn.value_or(1) == 0 ? "in range but beside the picture" : "in range");
+  add(depths.in_range - depths.faint - depths.unusable,
+      drawn.value_or(1) == 0 ? "in range but beside the picture" : "in range");
   return Cat("view ", Printable(camera.name), " shows ", drawn.value_or(1) == 0 ? "nothing" : "almost nothing",
              " of the ", WithThousands(cloud.size()), " Gaussians: ", where.empty() ? "none has a position" : where,
              "; are these cameras of this splat, in its unit and its axes?");

@@ -8,8 +8,8 @@
 namespace anchorsplat {
 
 // View-dependent colour of the visible Gaussians: max(Σ c_k Y_k(d) + 0.5, 0) with d the unit vector from the camera
-// centre to the mean (core/spherical_harmonics.h has the basis). A Gaussian with a coefficient that is not finite is culled here:
-// its tiles are emptied and it leaves the list.
+// centre to the mean (core/spherical_harmonics.h has the basis). A Gaussian with a coefficient that is not finite is
+// culled here: its tiles are emptied and it leaves the list.
 struct SphericalHarmonicsParams {
   int64_t count;                 // N Gaussians
   int degree;                    // 0–3, evaluated

@@ -122,9 +122,12 @@ void MeasureRanges(const CloudView& cloud, const std::vector<int64_t>& rows, Qua
   q.log_scale = {kInfinity, -kInfinity};
   q.dc = {kInfinity, -kInfinity};
   const auto stride = static_cast<size_t>(cloud.sh_stride());
+  double smallest = kInfinity;  // longest axis of a Gaussian
   for (const int64_t row : rows) {
     if (!IsDrawn(cloud, row)) continue;
     const auto i = static_cast<size_t>(row);
+    const float* scales = cloud.log_scales.data() + 3 * i;
+    smallest = std::min(smallest, double{std::max({scales[0], scales[1], scales[2]})});
     for (size_t k = 0; k < 3; ++k) {
       const double s = cloud.log_scales[3 * i + k];
       if (std::isfinite(s)) q.log_scale = {std::min(q.log_scale[0], s), std::max(q.log_scale[1], s)};
@@ -141,9 +144,10 @@ void MeasureRanges(const CloudView& cloud, const std::vector<int64_t>& rows, Qua
     }
   }
   if (!std::isfinite(q.log_scale[1])) q.log_scale = {-kLogScaleSpan, -kLogScaleSpan};  // nothing but points
-  if (!std::isfinite(q.dc[1])) q.dc = {0, 0};                                            // nothing that is drawn
-  // Beyond that a Gaussian is the same veil over everything, and must not take the precision of all others.
-  q.log_scale[1] = std::min(q.log_scale[1], std::log(q.spread) + kLargestLogScaleOfSpread);
+  if (!std::isfinite(q.dc[1])) q.dc = {0, 0};                                          // nothing that is drawn
+  // Longer than that beside all others a Gaussian is the same veil over everything, and must not take the precision of
+  // all others.
+  q.log_scale[1] = std::min(q.log_scale[1], std::max(std::log(q.spread), smallest) + kLargestLogScaleOfSpread);
   q.log_scale[0] = std::max(q.log_scale[0], q.log_scale[1] - kLogScaleSpan);
 }
 

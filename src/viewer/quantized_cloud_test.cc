@@ -119,6 +119,19 @@ TEST(QuantizedCloud, OneStrayGaussianCostsNobodyPrecision) {
   for (size_t i = 1; i < 1000; ++i) ASSERT_NEAR(x[i], static_cast<float>(i) * 1e-3f, 4e-5) << i;
 }
 
+TEST(QuantizedCloud, OneVeilAndWhatIsNotDrawnCostNobodySize) {
+  GaussianCloud cloud = FittedLookingCloud(1000, 0, 5);
+  const std::array<double, 2> range = Quantize(cloud, 0)->log_scale;
+  for (size_t k = 0; k < 3; ++k) cloud.log_scales[k] = 43;
+  for (size_t k = 3; k < 6; ++k) cloud.log_scales[k] = 44.5f;
+  for (size_t k = 6; k < 9; ++k) cloud.log_scales[k] = 30;
+  cloud.opacity_logits[2] = -7;
+  const QuantizedCloud q = *Quantize(cloud, 0);
+  EXPECT_EQ(q.left_out, 1);
+  EXPECT_LT(q.log_scale[1], 25);
+  EXPECT_LT(q.log_scale[0], range[0] + 5);
+}
+
 TEST(QuantizedCloud, EdgesOfWhatACloudMayHold) {
   GaussianCloud cloud = FittedLookingCloud(6, 1, 9);
   std::fill(cloud.quats.begin(), cloud.quats.begin() + 4, 0.f);  // no rotation: the identity

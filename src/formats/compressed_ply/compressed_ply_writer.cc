@@ -258,7 +258,8 @@ Strays CompressedPlyStrays(const CloudView& cloud) {
       row.size = SizeOf(cloud, row.row);
       all += row.weight;
     }
-    std::ranges::sort(rows, [](const Row& a, const Row& b) { return std::tie(a.away, b.row) < std::tie(b.away, a.row); });
+    std::ranges::sort(rows,
+                      [](const Row& a, const Row& b) { return std::tie(a.away, b.row) < std::tie(b.away, a.row); });
     // From the nearest on: what the first ones lose in the box of them alone, and what all others are worth.
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     std::array<double, 3> low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};

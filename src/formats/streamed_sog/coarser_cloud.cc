@@ -261,7 +261,8 @@ class Reduction {
         const std::array<double, 4> quat = QuaternionFromRotation(ellipsoid.axes);
         for (size_t k = 0; k < 3; ++k) {
           cloud_.means[3 * i + k] = static_cast<float>(moments_[i].mean[k]);
-          cloud_.log_scales[3 * i + k] = static_cast<float>(std::log(lengths[k]));
+          // Of two that are farther apart nothing is left to see.
+          cloud_.log_scales[3 * i + k] = std::min(static_cast<float>(std::log(lengths[k])), kLargestLogScale);
         }
         for (size_t k = 0; k < 4; ++k) cloud_.quats[4 * i + k] = static_cast<float>(quat[k]);
         cloud_.opacity_logits[i] = LogitFromOpacity(static_cast<float>(std::min(opacity, 1.0)));

@@ -132,7 +132,7 @@ TEST(CoarserCloud, FlatFaintAndCoincidentOnes) {
   for (size_t i = 50; i < 150; ++i) cloud.opacity_logits[i] = i % 2 == 0 ? kInfinity : -kInfinity;
   for (size_t i = 0; i < 3 * 120; ++i) cloud.means[i] = 1;                      // 120 at one place
   for (size_t i = 3 * 200; i < 3 * 210; ++i) cloud.log_scales[i] = -kInfinity;  // points
-  for (size_t i = 3 * 220; i < 3 * 223; ++i) cloud.log_scales[i] = 1e30f;
+  for (size_t i = 3 * 220; i < 3 * 223; ++i) cloud.log_scales[i] = 40;
   for (size_t i = 3 * 230; i < 3 * 233; ++i) cloud.means[i] = i % 2 == 0 ? 1e30f : -1e30f;
   for (size_t i = 4 * 240; i < 4 * 243; ++i) cloud.quats[i] = 0;
   ASSERT_EQ(CountUnusable(cloud), 0);

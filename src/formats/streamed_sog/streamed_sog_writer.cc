@@ -356,8 +356,8 @@ Status WriteStreamedSog(const fs::path& path, const CloudView& cloud, const Clou
                                               " Gaussians have NaN or infinite values: nothing to write")};
   }
   if (const int64_t dropped = cloud.size() - static_cast<int64_t>(tree.rows.size()); dropped > 0) {
-    LogWarning(Cat(path.string(), ": ", WithThousands(dropped), " of ", WithThousands(cloud.size()),
-                   " Gaussians have ", kWhyUnusable, " and no place in a tree: left out"));
+    LogWarning(Cat(path.string(), ": ", WithThousands(dropped), " of ", WithThousands(cloud.size()), " Gaussians have ",
+                   kWhyUnusable, " and no place in a tree: left out"));
   }
   const std::vector<int64_t> leaves = LeavesOf(tree);
   ChunkWriter chunks(staged ? staged->path() : parent, options);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from typing import Literal
 
 from . import _core
 from ._cloud import RenderMode
@@ -22,9 +23,9 @@ def convert(
     min_opacity: float = 0,
     max_gaussians: int | None = None,
     coords: str | None = None,
-    scales: str = "logarithms",
-    opacities: str = "logits",
-    colors: str = "harmonics",
+    scales: Literal["logarithms", "lengths"] = "logarithms",
+    opacities: Literal["logits", "0-1"] = "logits",
+    colors: Literal["harmonics", "0-1", "0-255"] = "harmonics",
     sort: Order = "format",
     spz_version: int = 4,
     lod_levels: int = 4,

@@ -184,7 +184,7 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
     const bool said = UpOf(cloud.comments).has_value();
     turn(written);
     // What a reader takes for granted does not hold any more.
-    if (!said && written.matrix()[4] != 1) {
+    if (!said && written.matrix()[4] != 1 && to->comments != CommentPlace::kNone) {
       cloud.comments.push_back(UpComment(kUsualUp));
       TurnUpComments(written.matrix(), cloud.comments);
     }

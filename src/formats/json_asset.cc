@@ -1,11 +1,17 @@
 #include "formats/json_asset.h"
 
+#include <algorithm>
+#include <array>
+#include <cctype>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string_view>
 
 #include "core/credit.h"
+#include "core/log.h"
 #include "core/lost_nothing_mark.h"
 #include "core/text.h"
+#include "core/world_up.h"
 
 namespace anchorsplat {
 
@@ -21,7 +27,7 @@ void AddMarks(const JsonValue& asset, std::vector<std::string>& comments) {
   for (const nlohmann::json& one : list->raw()) {
     if (!one.is_string() || marks == kMost) continue;
     const auto& text = one.get_ref<const std::string&>();
-    if (text.size() > kMostBytes || !(IsMark(text) || OriginOfComment(text))) continue;
+    if (text.size() > kMostBytes || !(IsMark(text) || OriginOfComment(text) || UpOf({text}))) continue;
     comments.push_back(text);
     ++marks;
   }
@@ -39,6 +45,7 @@ nlohmann::json AssetOf(std::span<const std::string> comments, const WorldOrigin&
   for (const std::string& comment : comments) {
     if (IsMark(comment)) asset["extras"]["comments"].push_back(in_utf8(comment));
   }
+  if (const auto up = UpOf({comments.begin(), comments.end()})) asset["extras"]["comments"].push_back(UpComment(*up));
   if (!IsZero(origin)) asset["extras"]["comments"].push_back(OriginComment(origin));
   return asset;
 }
@@ -58,6 +65,28 @@ Result<std::vector<std::string>> CommentsOfAsset(const JsonValue& root) {
   }
   AddMarks(*asset, comments);
   return comments;
+}
+
+std::vector<std::string> OtherEntries(const JsonValue& root, std::span<const std::string_view> known) {
+  std::vector<std::string> others;
+  if (!root.raw().is_object()) return others;
+  for (const auto& [name, value] : root.raw().items()) {
+    if (std::ranges::find(known, name) == known.end()) others.push_back(name);
+  }
+  return others;
+}
+
+void WarnOfAxisEntries(const std::string& file, std::span<const std::string> others) {
+  constexpr std::array<std::string_view, 7> kWords = {"axis",   "axes",     "coord", "transform",
+                                                      "matrix", "rotation", "frame"};
+  for (const std::string& name : others) {
+    std::string small = name;
+    for (char& c : small) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    const auto has = [&small](std::string_view word) { return small.find(word) != small.npos; };
+    if (!small.starts_with("up") && std::ranges::none_of(kWords, has)) continue;
+    LogWarning(Cat(file, ": has an entry \"", Printable(name),
+                   "\", which its format does not have: not heeded; --coords of convert says what the axes are"));
+  }
 }
 
 }  // namespace anchorsplat

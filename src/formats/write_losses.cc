@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "core/statistics.h"
 #include "core/text.h"
+#include "core/world_up.h"
 #include "formats/spz/spz_extensions.h"
 #include "formats/spz/spz_reader.h"
 
@@ -84,6 +85,14 @@ std::string SpzRecordLoss(const SplatFormat& format, std::span<const std::string
   return names.empty() ? std::string() : Cat(AFileOf(format), " has no place for ", names, ": dropped");
 }
 
+// Programs that read such a file take the usual axis for it.
+std::string UpLoss(const SplatFormat& format, std::span<const std::string> comments) {
+  const auto up = UpOf({comments.begin(), comments.end()});
+  if (!up || *up == kUsualUp || format.comments != CommentPlace::kNone) return {};
+  return Cat(AFileOf(format), " has no place for where up is, ", (*up)[0], " ", (*up)[1], " ", (*up)[2],
+             ": programs will take the usual axis for it (--coords of convert turns a splat)");
+}
+
 // Without its tag a splat is drawn as a classic one.
 std::string ModeLoss(const SplatFormat& format, std::optional<RenderMode> mode) {
   if (!IsCompensated(mode) || format.mode_tag == ModeTag::kEach) return {};
@@ -128,6 +137,7 @@ std::vector<std::string> WriteLosses(const SplatFormat& format, const CloudView&
   if (std::string loss = OriginLoss(format, cloud.origin); !loss.empty()) losses.push_back(std::move(loss));
   if (std::string loss = CreditLoss(format, cloud.comments); !loss.empty()) losses.push_back(std::move(loss));
   if (std::string loss = MarkLoss(format, cloud.comments); !loss.empty()) losses.push_back(std::move(loss));
+  if (std::string loss = UpLoss(format, cloud.comments); !loss.empty()) losses.push_back(std::move(loss));
   if (std::string loss = SpzRecordLoss(format, cloud.comments); !loss.empty()) losses.push_back(std::move(loss));
   if (format.mean_loss != nullptr) {
     if (std::string loss = format.mean_loss(cloud); !loss.empty()) losses.push_back(std::move(loss));

@@ -38,7 +38,7 @@ TEST(WriteLosses, NamesTheRenderModeThatAFormatCannotSay) {
 TEST(WriteLosses, NamesTheCreditsThatAFormatCannotSay) {
   GaussianCloud cloud = RandomCloud(10, 0, 1);
   for (float& x : cloud.sh) x *= 0.1f;
-  cloud.comments = {"world up: 0 1 0", "made by a test"};
+  cloud.comments = {"world up: 0 -1 0", "made by a test"};
   const auto losses = [&](const char* format) { return WriteLosses(*FormatOfName(format), cloud); };
   for (const char* format : {".spz", ".splat", ".csv", ".npz", ".pt"}) EXPECT_THAT(losses(format), IsEmpty()) << format;
   cloud.comments.insert(cloud.comments.end(), {"credit: Mug by Ann, CC BY 4.0", "credit: scanned by Bob"});
@@ -62,6 +62,23 @@ TEST(WriteLosses, NamesTheCreditsThatAFormatCannotSay) {
     for (const char* format : {".spz", ".splat", ".csv", ".npz", ".pt"}) {
       EXPECT_THAT(losses(format), ElementsAre(HasSubstr("no place for the word that the splat has been"))) << format;
     }
+  }
+}
+
+TEST(WriteLosses, NamesWhatAFileDeclaredAndAnotherCannot) {
+  GaussianCloud cloud = RandomCloud(10, 0, 1);
+  for (float& x : cloud.sh) x *= 0.1f;
+  const auto losses = [&](const char* format) { return WriteLosses(*FormatOfName(format), cloud); };
+  cloud.comments = {"Vertical Axis: z"};
+  for (const char* format : {".ply", ".compressed.ply", ".sog", ".glb"})
+    EXPECT_THAT(losses(format), IsEmpty()) << format;
+  for (const char* format : {".spz", ".splat", ".npz"}) {
+    EXPECT_THAT(losses(format), ElementsAre(HasSubstr("no place for where up is, 0 0 1"))) << format;
+  }
+  cloud.comments = {"SPZ extension SPZ_ADOBE_safe_orbit_camera (0xADBE0002): 000000000000000000000000"};
+  for (const char* format : {".ply", ".compressed.ply", ".spz"}) EXPECT_THAT(losses(format), IsEmpty()) << format;
+  for (const char* format : {".sog", ".glb", ".splat"}) {
+    EXPECT_THAT(losses(format), ElementsAre(HasSubstr("no place for SPZ_ADOBE_safe_orbit_camera"))) << format;
   }
 }
 

@@ -307,6 +307,19 @@ Result<FormatFacts> DescribeCompressedPly(const InputFile& file) {
     facts.Add("chunks", WithThousands(chunks->count), " of up to ", kCompressedPlyChunk);
     facts.Add("colours", chunks->Find("min_r") != nullptr ? "in a range per chunk" : "from 0 to 1");
   }
+  std::string others;
+  for (const PlyElement& element : header.elements) {
+    const bool known = element.name == "chunk" || element.name == "vertex" || element.name == "sh";
+    if (!known) others += Cat(others.empty() ? "" : ", ", element.name);
+    for (const PlyProperty& property : element.properties) {
+      const auto has = [&property](const auto& names) {
+        return std::ranges::find(names, property.name) != names.end();
+      };
+      if (!known || property.name.starts_with("f_rest_") || has(kVertexProperties) || has(kChunkProperties)) continue;
+      others += Cat(others.empty() ? "" : ", ", element.name, ".", property.name);
+    }
+  }
+  if (!others.empty()) facts.Add("other properties, not read", Printable(others, 200));
   const PlyElement* harmonics = header.Find("sh");
   facts.Add("harmonics", harmonics == nullptr ? "none" : Cat(harmonics->properties.size(), " bytes per Gaussian"));
   return facts;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <string>
 
@@ -159,6 +160,11 @@ TEST(CompressedPly, RefusesWhatDoesNotBelongTogether) {
   expect(ErrorOf(Replaced(good, "little_endian", "big_endian")), "little-endian");
   expect(ErrorOf(Replaced(good, "property uint packed_scale", "property list uchar uint packed_scale")), "lists");
   expect(ErrorOf(good.substr(0, good.size() - 1)), "ends too early");
+  std::string upside_down = good;
+  const float high = 1e9f;
+  // min_y of the second chunk, whose ranges are 18 floats.
+  std::memcpy(upside_down.data() + upside_down.find("end_header\n") + 11 + 18 * 4 + 4, &high, sizeof high);
+  expect(ErrorOf(upside_down), "chunk 1 has min_y 1e+09");
   EXPECT_EQ(Read(folder / "a.ply", {.max_gaussians = 299}).error().code, ErrorCode::kBadFile);
 }
 

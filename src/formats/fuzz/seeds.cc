@@ -146,6 +146,9 @@ GaussianCloud SeedCloud(int64_t count, int sh_degree) {
   }
   cloud.render_mode = RenderMode::kAntialiased;
   cloud.comments = {"a seed"};
+  // An extension record of an SPZ.
+  if (sh_degree == 1)
+    cloud.comments.push_back("SPZ extension SPZ_ADOBE_safe_orbit_camera (0xADBE0002): 000102030405060708090a0b");
   return cloud;
 }
 
@@ -373,6 +376,12 @@ std::vector<std::string_view> JsonWords() {
           "h",
           "[[[[[[[[[[",
           "transform_matrix",
+          "rotation",
+          "matrix",
+          "translation",
+          "scenes",
+          "colorSpace",
+          "lin_rec709_display",
           "k1",
           "fl_x",
           "camera_angle_x",

@@ -115,7 +115,7 @@ TEST(Gltf, CreditsAreItsCopyright) {
   ASSERT_TRUE(WriteGlb(folder / "a.glb", cloud).ok());
   const Glb glb = Glb::Of(FileBytes(folder / "a.glb"));
   EXPECT_EQ(glb.json["asset"]["copyright"], "Becher, R\xc3\xb6mer, CC BY 4.0\nscanned by \xef\xbf\xbd");
-  const std::vector<std::string> credits = {cloud.comments[0], "credit: scanned by \xef\xbf\xbd"};
+  const std::vector<std::string> credits = {cloud.comments[0], "credit: scanned by \xef\xbf\xbd", "world up: 0 1 0"};
   EXPECT_EQ(Read(glb.bytes())->comments, credits);
   ASSERT_TRUE(WriteGltf(folder / "a.gltf", cloud).ok());
   const auto json = InputFile::Open(folder / "a.gltf");
@@ -123,6 +123,7 @@ TEST(Gltf, CreditsAreItsCopyright) {
   EXPECT_EQ(ReadBothWays(ReadGltf, BlocksOfGltf, *json)->comments, credits);
 
   Glb other = glb;
+  other.json["asset"].erase("extras");
   other.json["asset"]["copyright"] = 7;
   EXPECT_TRUE(Read(other.bytes())->comments.empty());
   other.json["asset"]["copyright"] = std::string(size_t{2} << 20, 'x');
@@ -135,15 +136,15 @@ TEST(Gltf, CreditsAreItsCopyright) {
 TEST(Gltf, MarksAreKept) {
   const TestFolder folder;
   GaussianCloud cloud = RandomCloud(10, 0, 3);
-  cloud.comments = {"world up: 0 1 0", Cat(kEnhancedMark, "filter, 4 times closer")};
-  const std::vector<std::string> mark = {cloud.comments[1]};
+  cloud.comments = {"Vertical Axis: z", Cat(kEnhancedMark, "filter, 4 times closer"), "something else"};
+  const std::vector<std::string> mark = {cloud.comments[1], "world up: 0 0 1"};
   EXPECT_TRUE(WriteLosses(*FormatOfExtension("a.glb"), cloud).empty());
   ASSERT_TRUE(WriteGlb(folder / "a.glb", cloud).ok());
   Glb glb = Glb::Of(FileBytes(folder / "a.glb"));
   EXPECT_EQ(Read(glb.bytes())->comments, mark);
   // Of another program.
   nlohmann::json& extras = glb.json["asset"]["extras"];
-  extras["comments"] = {7, "hello", mark[0], std::string(kEnhancedMark) + std::string(2000, 'x')};
+  extras["comments"] = {7, "hello", mark[0], mark[1], std::string(kEnhancedMark) + std::string(2000, 'x')};
   EXPECT_EQ(Read(glb.bytes())->comments, mark);
   extras["comments"] = "hello";
   EXPECT_TRUE(Read(glb.bytes())->comments.empty());

@@ -92,6 +92,16 @@ TEST(Ksplat, ReadsEveryLevel) {
   }
 }
 
+// Its viewer turns about this place; the Gaussians are where they are.
+TEST(Ksplat, TheSceneCentreMovesNothing) {
+  std::string bytes = Example(0);
+  Put(bytes, 24, 5.0f);
+  EXPECT_THAT(Read(bytes)->means, testing::ElementsAre(0, 2, 3, 1, 2, 3, 2, 2, 3));
+  const auto facts = DescribeKsplat(InputFile::FromBytes("a.ksplat", bytes));
+  ASSERT_TRUE(facts.ok());
+  EXPECT_THAT(facts->all(), testing::Contains(testing::Pair("scene centre", testing::StartsWith("5 0 0"))));
+}
+
 TEST(Ksplat, RefusesLies) {
   const auto error_of = [](size_t at, auto value, uint16_t level = 1) {
     std::string bytes = Example(level);
@@ -107,6 +117,8 @@ TEST(Ksplat, RefusesLies) {
   expect(error_of(16, uint32_t{4}), "sections have 3");
   expect(error_of(16, uint32_t{0}), "no Gaussians");
   expect(error_of(20, uint16_t{3}), "level 3");
+  expect(error_of(36, std::nanf("")), "no number");
+  expect(error_of(36, 3.0f), "wrong way round");
   expect(error_of(4096, uint32_t{4}), "section of 4");
   expect(error_of(4096 + 4, uint32_t{0xffffffff}), "would end");
   expect(error_of(4096 + 12, uint32_t{0xffffffff}), "would end");

@@ -37,7 +37,8 @@ Result<int> LineFromEnd(const InputFile& file, int64_t line) {
       const std::string_view word = TakeWord(text);
       double value = -1;
       const auto [stop, code] = FromChars(word.data(), word.data() + word.size(), value);
-      const bool good = code == std::errc() && stop == word.data() + word.size() && (value == 0 || value == 1);
+      const bool good =
+          code == std::errc() && stop == word.data() + word.size() && text.empty() && (value == 0 || value == 1);
       return good ? static_cast<int>(value) : -1;
     }
     rest = end == rest.npos ? std::string_view() : rest.substr(0, end);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -272,26 +271,12 @@ Status CheckQuats(const InputFile& file, const JsonValue& part, const ByteImage&
   return {};
 }
 
-// Whether an entry that SOG does not have may speak of axes.
-bool SpeaksOfAxes(std::string name) {
-  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  constexpr std::array<std::string_view, 8> kWords = {"axis",   "axes",     "coord", "transform",
-                                                      "matrix", "rotation", "up",    "frame"};
-  return std::ranges::any_of(kWords, [&name](std::string_view word) {
-    return word == "up" ? name.starts_with(word) : name.find(word) != name.npos;
-  });
-}
-
 void WarnOfMeta(const InputFile& file, const JsonValue& meta, const std::optional<JsonValue>& model) {
   if (model && model->raw() != "antialiased" && model->raw() != "default") {
     LogWarning(Cat(file.name(), ": model is ", Printable(model->raw().dump()),
                    ", which this version does not know: the splat is read as a classic one"));
   }
-  for (const std::string& name : OtherSogEntries(meta)) {
-    if (!SpeaksOfAxes(name)) continue;
-    LogWarning(Cat(file.name(), ": has an entry \"", Printable(name),
-                   "\", which SOG does not have: it is not heeded; --coords of convert says what the axes are"));
-  }
+  WarnOfAxisEntries(file.name(), OtherSogEntries(meta));
 }
 
 }  // namespace
@@ -299,12 +284,7 @@ void WarnOfMeta(const InputFile& file, const JsonValue& meta, const std::optiona
 std::vector<std::string> OtherSogEntries(const JsonValue& meta) {
   constexpr std::array<std::string_view, 10> kKnown = {"version", "count", "asset", "means", "scales",
                                                        "quats",   "sh0",   "shN",   "model", "extras"};
-  std::vector<std::string> others;
-  if (!meta.raw().is_object()) return others;
-  for (const auto& [name, value] : meta.raw().items()) {
-    if (std::ranges::find(kKnown, name) == kKnown.end()) others.push_back(name);
-  }
-  return others;
+  return OtherEntries(meta, kKnown);
 }
 
 Status VisitSog(const InputFile& file, const ReadLimits& limits, SogVisitor& visitor) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/messages_for_test.h"
 #include "core/parallel.h"
 #include "formats/attribute_error.h"
 #include "formats/both_ways_for_test.h"
@@ -80,7 +81,9 @@ TEST(Sog, CreditsAreItsCopyright) {
     ASSERT_TRUE(WriteSog(folder / name, cloud).ok());
     const auto read = Read(folder / name);
     ASSERT_TRUE(read.ok()) << read.error().message;
-    EXPECT_EQ(read->comments, std::vector<std::string>(cloud.comments.begin() + 1, cloud.comments.end()));
+    std::vector<std::string> kept(cloud.comments.begin() + 1, cloud.comments.end());
+    kept.push_back(cloud.comments[0]);
+    EXPECT_EQ(read->comments, kept);
   }
   const nlohmann::json meta = nlohmann::json::parse(FileBytes(folder / "meta.json"));
   EXPECT_EQ(meta["asset"]["copyright"], "Mug by Ann, CC BY 4.0\nscanned by Bob");
@@ -187,6 +190,26 @@ TEST(Sog, RefusesLiesAndOtherFolders) {
   EXPECT_CONTAINS(error_of(with("/means/mins", {-1, 1e308, 0})), "expected -88 to 88");
   EXPECT_CONTAINS(error_of(with("/means/maxs", {100, 1, 1})), "expected -88 to 88");
   EXPECT_CONTAINS(error_of(with("/scales/codebook/7", 1e300)), "out of range");
+  EXPECT_CONTAINS(error_of(with("/scales/codebook/7", nullptr)), "codebook");
+  EXPECT_CONTAINS(error_of(with("/means/mins", {50, 0, 0})), "the wrong way round");
+  EXPECT_CONTAINS(error_of(with("/quats/encoding", "euler")), "expected \"quaternion_packed\"");
+  {
+    const Messages messages;
+    EXPECT_EQ(error_of(with("/coordinateSystem", "RFU")), "accepted");
+    EXPECT_THAT(messages.warnings(), testing::Contains(testing::HasSubstr("\"coordinateSystem\"")));
+  }
+  {
+    const Messages messages;
+    EXPECT_EQ(error_of(with("/model", "2dgs")), "accepted");
+    EXPECT_THAT(messages.warnings(), testing::Contains(testing::HasSubstr("model is \"2dgs\"")));
+  }
+  {
+    const Messages messages;
+    nlohmann::json harmless = with("/model", "default");
+    harmless["extras"] = {{"name", "mug"}};
+    EXPECT_EQ(error_of(harmless), "accepted");
+    EXPECT_THAT(messages.warnings(), testing::IsEmpty());
+  }
   ByteImage other{64, 64, {}};
   other.rgba.assign(4 * 64 * 64, 255);
   ASSERT_TRUE(WriteWholeFile(folder / "other.webp", *EncodeWebp(other), false).ok());

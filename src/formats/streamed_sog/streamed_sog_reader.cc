@@ -1,11 +1,13 @@
 #include "formats/streamed_sog/streamed_sog_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <limits>
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -177,6 +179,9 @@ Result<GaussianCloud> ReadStreamedSog(const InputFile& file, const ReadLimits& l
   // Means take four bytes at least; what is larger has to be paid for.
   ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), compressed, total * sizeof(float)));
 
+  constexpr std::array<std::string_view, 9> kKnown = {"version",   "asset", "lodLevels",   "counts", "count",
+                                                      "filenames", "tree",  "environment", "extras"};
+  WarnOfAxisEntries(file.name(), OtherEntries(index.json.root(), kKnown));
   GaussianCloud cloud;
   for (const auto& [chunk, wanted] : by_file) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile part, file.OpenBeside(index.files[chunk]));

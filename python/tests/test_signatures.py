@@ -20,14 +20,15 @@ SHARED = {
 }
 OUTPUT = {"output": "results are values"}
 SIZE = {"max-memory": "arrays are in memory already", "yes": "nobody is asked"}
-FILES = {**OUTPUT, **SIZE, "out-dir": "results are values"}
+PIPED = {"to": "results are values"}
+FILES = {**OUTPUT, **PIPED, **SIZE, "out-dir": "results are values"}
 FUNCTIONS = {
     "enhance": ("enhance", None, {}, {"view": "anchorsplat.view", "overwrite": "nothing is written", **FILES}),
     "fit": (
         "fit",
         None,
         {},
-        {"overwrite": "nothing is written", "gsplat-checkpoint": "Cloud.to_gsplat", **OUTPUT},
+        {"overwrite": "nothing is written", "gsplat-checkpoint": "Cloud.to_gsplat", **OUTPUT, **PIPED},
     ),
     "render": ("render", None, {}, {"overwrite": "nothing is written", "seed": "nothing is random", **OUTPUT}),
     "compare": (

@@ -22,6 +22,7 @@
 #include "formats/cloud_output.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
+#include "formats/wrapped_splat.h"
 #include "io/atomic_file.h"
 #include "io/input_record.h"
 #include "model/published/published_checkpoint_writer.h"
@@ -56,9 +57,10 @@ std::string Stem(const fs::path& input) {
     const std::string folder = RealPath(found.parent_path()).filename().string();
     return folder.empty() ? "meta" : folder;
   }
-  const std::string name = input.filename().string();
-  const SplatFormat* format = FormatOfExtension(input);
-  size_t longest = input.extension().string().size();
+  const fs::path plain = WithoutPacking(input.filename());
+  const std::string name = plain.string();
+  const SplatFormat* format = FormatOfExtension(plain);
+  size_t longest = plain.extension().string().size();
   for (size_t k = 0; format != nullptr && k < format->extensions.size(); ++k) {
     const std::string_view extension = format->extensions[k];
     if (name.size() > extension.size()) longest = std::max(longest, extension.size());

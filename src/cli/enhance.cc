@@ -28,6 +28,7 @@
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "formats/row_arrays.h"
+#include "formats/wrapped_splat.h"
 #include "io/atomic_file.h"
 #include "io/input_record.h"
 #include "request/choice.h"
@@ -115,7 +116,7 @@ Result<std::vector<fs::path>> OutputPaths(const EnhanceWords& flags) {
   std::vector<fs::path> outputs;
   std::map<fs::path, std::string> taken;
   for (const std::string& input : flags.inputs) {
-    const fs::path output = fs::path(flags.out_dir) / fs::path(input).filename();
+    const fs::path output = fs::path(flags.out_dir) / WithoutPacking(fs::path(input).filename());
     const auto [other, fresh] = taken.emplace(output, input);
     if (!fresh) {
       return Error{ErrorCode::kBadArgument,

@@ -15,6 +15,7 @@
 #include "core/parallel.h"
 #include "core/text.h"
 #include "formats/opened_splat.h"
+#include "formats/registry.h"
 #include "io/input_file.h"
 #include "scene/furniture_catalog.h"
 #include "scene/mesh_reader.h"
@@ -186,10 +187,13 @@ std::string Beginning(const std::string& path) {
 bool LooksLikeMesh(const std::string& address) {
   if (!IsMeshAddress(address)) return false;
   const std::string ending = std::filesystem::path(address).extension().string();
-  const auto contains = [&](const char* words) { return Beginning(address).find(words) != std::string::npos; };
-  if (ending == ".ply") return contains("element face") && !ExtentOf(address);  // a splat may have faces beside it
-  if (ending == ".glb" || ending == ".gltf") return !contains("KHR_gaussian_splatting");
-  return true;
+  const std::string beginning = Beginning(address);
+  const auto contains = [&](const char* words) { return beginning.find(words) != std::string::npos; };
+  // By content first, as splats are: a splat may have faces beside it, and any name.
+  const SplatFormat* const format = FormatOfFile(beginning, {});
+  if (format == nullptr) return ending != ".ply";
+  if (format->name == "PLY") return contains("element face") && !ExtentOf(address);
+  return format->name.starts_with("glTF") && !contains("KHR_gaussian_splatting");
 }
 
 Status RunMeshInfo(const std::string& address, const SharedFlags& shared) {

@@ -56,27 +56,34 @@ Result<OpenedSplat> OpenedSplat::Open(const fs::path& path, const SplatFormat* f
   return Of(std::move(input), format);
 }
 
-Result<OpenedSplat> OpenedSplat::Of(InputFile input, const SplatFormat* format) try {
-  const uint64_t size = input.size();
-  if (size == 0) return Error{ErrorCode::kBadFile, Cat(input.name(), ": is empty, expected a splat file")};
-  ANCHORSPLAT_ASSIGN_OR_RETURN(UnwrappedSplat found, Unwrap(std::move(input)));
-  InputFile& file = found.file;
-  if (file.size() == 0) return Error{ErrorCode::kBadFile, Cat(file.name(), ": is empty, expected a splat file")};
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
-  if (const std::string what = WhatElse(head); !what.empty()) {
-    return Error{ErrorCode::kBadFile, Cat(file.name(), ": ", what, "; expected ", ReadFormats())};
+Result<OpenedSplat> OpenedSplat::Of(InputFile input, const SplatFormat* format) {
+  const std::string name = input.name();
+  try {
+    const uint64_t size = input.size();
+    if (size == 0) return Error{ErrorCode::kBadFile, Cat(input.name(), ": is empty, expected a splat file")};
+    ANCHORSPLAT_ASSIGN_OR_RETURN(UnwrappedSplat found, Unwrap(std::move(input)));
+    InputFile& file = found.file;
+    if (file.size() == 0) return Error{ErrorCode::kBadFile, Cat(file.name(), ": is empty, expected a splat file")};
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(kSniffBytes));
+    if (const std::string what = WhatElse(head); !what.empty()) {
+      return Error{ErrorCode::kBadFile, Cat(file.name(), ": ", what, "; expected ", ReadFormats())};
+    }
+    if (format == nullptr) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(format, FormatOfFile(file, found.name));
+    }
+    if (format != nullptr && format->looks_like != nullptr && IsText(head) && !format->looks_like(file)) {
+      return Error{ErrorCode::kBadFile,
+                   Cat(file.name(), ": is text and no splat; it begins with \"", Printable(head.substr(0, 60)), "\"")};
+    }
+    OpenedSplat opened(std::move(file), format);
+    opened.packed_ = std::move(found.packed);
+    if (!opened.packed_.empty()) opened.packed_bytes_ = size;
+    return opened;
+  } catch (const NoDiskRoom& none) {
+    return Error{ErrorCode::kIo, Cat(name, ": ", none.what())};
+  } catch (const std::bad_alloc&) {
+    return Error{ErrorCode::kIo, Cat(name, ": there is not enough memory for what is packed in it")};
   }
-  if (format == nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(format, FormatOfFile(file, found.name));
-  }
-  OpenedSplat opened(std::move(file), format);
-  opened.packed_ = std::move(found.packed);
-  if (!opened.packed_.empty()) opened.packed_bytes_ = size;
-  return opened;
-} catch (const NoDiskRoom& none) {
-  return Error{ErrorCode::kIo, Cat("there is no room for what is unpacked: ", none.what())};
-} catch (const std::bad_alloc&) {
-  return Error{ErrorCode::kIo, "there is not enough memory for what is unpacked"};
 }
 
 uint64_t OpenedSplat::bytes() const {

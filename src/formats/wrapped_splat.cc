@@ -23,8 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kMostWraps = 2;
-constexpr uint64_t kMaxWrap = uint64_t{8} << 30;
-constexpr uint64_t kMaxMember = uint64_t{64} << 30;  // what it promises is compared with its size as well
+constexpr uint64_t kLargestArchive = uint64_t{8} << 30;
 
 Error Bad(const InputFile& file, const std::string& what) {
   return {ErrorCode::kBadFile, Cat(file.name(), ": ", what)};
@@ -41,14 +40,6 @@ bool IsPlainZip(std::string_view head) {
 Result<bool> IsSpzItself(const InputFile& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string inside, HeadInside(file, Packing::kGzip, 8));
   return inside.size() == 8 && inside.starts_with("NGSP") && LoadLittle<uint32_t>(inside.data() + 4) < 4;
-}
-
-// "scan.ply" of "scan.ply.gz"; other names as they are.
-fs::path WithoutPacking(const fs::path& name) {
-  std::string ending = name.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  const bool known = ending == ".gz" || ending == ".gzip" || ending == ".zst" || ending == ".zstd" || ending == ".zip";
-  return known ? name.stem() : name;
 }
 
 bool IsRead(const fs::path& name) {
@@ -85,14 +76,15 @@ Result<std::optional<std::string>> SplatIn(const InputFile& file, const ZipReade
 }
 
 Result<std::optional<UnwrappedSplat>> TakeOutOfZip(const InputFile& file, uint64_t paid) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string_view bytes, file.Whole(kMaxWrap));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string_view bytes, file.Whole(kLargestArchive));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ZipReader archive, ZipReader::View(file.name(), bytes));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<std::string> member, SplatIn(file, archive));
   if (!member) return std::optional<UnwrappedSplat>();
   const fs::path name = fs::path(*member).filename();
   if (name == "lod-meta.json") return Bad(file, "is a ZIP archive of a streamed SOG: unpack it and give its folder");
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Buffer<char> contents, archive.ReadLarge(*member, kMaxMember));
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), paid, contents.size()));
+  const uint64_t size = archive.SizeOf(*member);
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), paid, size));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Buffer<char> contents, archive.ReadLarge(*member, size));
   InputFile inside = InputFile::Inside(file, Cat(file.name(), ": ", Printable(*member)), std::move(contents));
   return std::optional(UnwrappedSplat{std::move(inside), name, Cat("ZIP archive around ", Printable(*member))});
 }
@@ -153,6 +145,13 @@ bool IsTar(std::string_view head) { return head.size() >= 262 && head.substr(257
 
 }  // namespace
 
+fs::path WithoutPacking(const fs::path& name) {
+  std::string ending = name.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const bool known = ending == ".gz" || ending == ".gzip" || ending == ".zst" || ending == ".zstd" || ending == ".zip";
+  return known ? name.stem() : name;
+}
+
 bool IsWrapped(const InputFile& file) {
   const Result<std::string> head = file.Head(kSniffBytes);
   if (!head.ok()) return false;
@@ -175,6 +174,10 @@ Result<UnwrappedSplat> Unwrap(InputFile input) {
   }
   found.packed = std::move(packed);
   return found;
+}
+
+bool IsText(std::string_view head) {
+  return std::ranges::all_of(head, [](unsigned char c) { return c >= ' ' || c == '\t' || c == '\n' || c == '\r'; });
 }
 
 std::string WhatElse(std::string_view head) {

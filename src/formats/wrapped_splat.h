@@ -23,11 +23,16 @@ struct UnwrappedSplat {
 // said.
 Result<UnwrappedSplat> Unwrap(InputFile input);
 
+// "scan.ply" of "scan.ply.gz", "scan" of "scan.zip"; other names as they are.
+std::filesystem::path WithoutPacking(const std::filesystem::path& name);
+
 // Whether Unwrap has something to take away, or all of the file to look at for it.
 bool IsWrapped(const InputFile& file);
 
 // What people take for a splat, by its first bytes, with what to do: "is a web page and no splat"; empty for anything
 // that may be one.
 std::string WhatElse(std::string_view head);
+// Whether all of it can be read by people, as an answer of a server in place of a file.
+bool IsText(std::string_view head);
 
 }  // namespace anchorsplat

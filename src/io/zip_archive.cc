@@ -97,6 +97,11 @@ std::vector<std::string> ZipReader::Members() const {
   return names;
 }
 
+uint64_t ZipReader::SizeOf(const std::string& member) const {
+  const auto entry = std::ranges::find(entries_, member, &ZipEntry::name);
+  return entry == entries_.end() ? 0 : entry->size;
+}
+
 template <typename Bytes>
 Result<Bytes> ZipReader::ContentsOf(const std::string& member, uint64_t max_size) const {
   const std::string where = Cat(name_, ": ", Printable(member));

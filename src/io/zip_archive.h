@@ -25,6 +25,8 @@ class ZipReader {
 
   // Names of all members, in the order of the directory; those that end in a slash are folders.
   std::vector<std::string> Members() const;
+  // What it promises to be; 0 where there is no such member.
+  uint64_t SizeOf(const std::string& member) const;
   // kBadFile: no such member, longer than `max_size`, damaged, packed in another way, or more than 200 times as long as
   // it is compressed.
   Result<std::string> Read(const std::string& member, uint64_t max_size) const;

@@ -144,6 +144,19 @@ void AddSpzContent(const fs::path& folder, std::vector<FuzzReader>& readers) {
   readers.push_back(std::move(reader));
 }
 
+// What is around a splat.
+void AddPackedSplats(const fs::path& folder, std::vector<FuzzReader>& readers) {
+  readers.push_back({"packed splat", PackedSeeds(folder), {}, [](const std::string& bytes) -> Status {
+                       const auto opened = OpenedSplat::Of(InputFile::FromBytes("fuzz.ply.gz", bytes));
+                       if (!opened.ok()) return CheckError(opened.error(), "fuzz.ply.gz");
+                       const auto cloud = opened->Read();
+                       if (opened->format() != nullptr) CompareBlocks(*opened->format(), opened->input(), cloud);
+                       if (!cloud.ok()) return CheckError(cloud.error(), "fuzz.ply.gz");
+                       Require(Validate(*cloud).ok(), "a cloud whose arrays disagree");
+                       return {};
+                     }});
+}
+
 // Splats of several files, of which one is damaged: SOG folders, as the members of a ZIP archive have checksums, and
 // the JSON of a glTF with its numbers beside it.
 void AddSplatsOfSeveralFiles(const fs::path& folder, std::vector<FuzzReader>& readers) {
@@ -265,6 +278,7 @@ std::vector<FuzzReader> FuzzReaders(const fs::path& folder) {
   std::vector<FuzzReader> readers;
   AddSplatFormats(folder, readers);
   AddSpzContent(folder, readers);
+  AddPackedSplats(folder, readers);
   AddSplatsOfSeveralFiles(folder, readers);
   AddTensorFormats(folder, readers);
   AddCameraFormats(folder, readers);

@@ -1,6 +1,7 @@
 #include "formats/fuzz/seeds.h"
 
 #include <zlib.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -17,7 +18,9 @@
 #include "core/text.h"
 #include "formats/spz/spz_writer.h"
 #include "images/image_io.h"
+#include "io/atomic_file.h"
 #include "io/file_bytes_for_test.h"
+#include "io/zip_archive.h"
 #include "tensors/safetensors.h"
 #include "tensors/tensor_entry.h"
 
@@ -253,6 +256,21 @@ std::string Gzip(const std::string& content) {
   packed.resize(stream.total_out);
   deflateEnd(&stream);
   return packed;
+}
+
+std::vector<std::string> PackedSeeds(const std::filesystem::path& folder) {
+  const std::string content = PlySeeds().front();
+  std::string zstd(ZSTD_compressBound(content.size()), '\0');
+  zstd.resize(ZSTD_compress(zstd.data(), zstd.size(), content.data(), content.size(), 1));
+  const std::filesystem::path archive = folder / "seed.zip";
+  if (auto file = OutputFile::Create(archive, true); file.ok()) {
+    ZipWriter zip(*file);
+    (void)zip.Add("scan.ply", content);
+    (void)zip.Finish();
+    (void)file->Commit();
+  }
+  const size_t half = content.size() / 2;
+  return {Gzip(content), Gzip(content.substr(0, half)) + Gzip(content.substr(half)), zstd, FileBytes(archive)};
 }
 
 std::vector<std::string> TorchSeeds() {

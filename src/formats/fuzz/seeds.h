@@ -19,6 +19,9 @@ std::vector<std::string_view> PlyWords();
 std::string SpzContentSeed(const std::filesystem::path& folder, int sh_degree);
 std::string Gzip(const std::string& content);
 
+// A splat in gzip, of two members, in zstd and in a ZIP archive.
+std::vector<std::string> PackedSeeds(const std::filesystem::path& folder);
+
 std::vector<std::string> TorchSeeds();       // the checkpoints of testdata/ that are good ones
 std::vector<std::string> GsplatSeeds();      // those with Gaussians
 std::vector<std::string_view> TorchWords();  // what pickles mention, and opcodes

@@ -100,9 +100,12 @@ Result<Properties> FindProperties(const InputFile& file, const PlyElement& verte
 // What a vertex element without Gaussians is instead.
 Error NotASplat(const InputFile& file, const PlyHeader& header) {
   const PlyElement* face = header.Find("face");
+  std::string names;
+  for (const PlyProperty& property : header.Find("vertex")->properties) names += " " + property.name;
   return {ErrorCode::kBadFile,
           Cat(file.name(), ": is a PLY ", face != nullptr && face->count > 0 ? "mesh" : "point cloud",
-              " without Gaussians: element \"vertex\" has no f_dc_*, opacity, scale_* or rot_* ", kNeeded)};
+              " without Gaussians: element \"vertex\" has no f_dc_*, opacity, scale_* or rot_* ", kNeeded,
+              names.empty() ? "" : Cat("; it has", Printable(names, 200)))};
 }
 
 // 0, 1, 2 for nx, ny, nz; else −1.

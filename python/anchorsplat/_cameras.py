@@ -40,8 +40,9 @@ class Cameras:
     __slots__ = ("_set",)
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Those of a transforms.json, an INRIA cameras.json, a poses_bounds.npy, a COLMAP model, or a file of Metashape, OpenSfM or
-        Bundler, or of a folder with one of them, in their order. Raises NotFoundError, IoError, BadFileError; BadArgumentError: a folder with several."""
+        """Those of a transforms.json, an INRIA cameras.json, a poses_bounds.npy, a COLMAP model, or a file of Metashape, OpenSfM
+        or Bundler, or of a folder with one of them, in their order. Raises NotFoundError, IoError, BadFileError;
+        BadArgumentError: a folder with several."""
         with run() as how:
             self._set = _core.read_cameras(path_bytes(path), how)
 

@@ -113,7 +113,9 @@ std::string HeadOf(const std::filesystem::path& path) {
 
 bool IsCameraFile(const std::filesystem::path& path) {
   const std::string name = path.filename().string();
-  if (name == "cameras.json" || name == "reconstruction.json") return true;
+  if (name == "reconstruction.json") return true;
+  // OpenDroneMap's has the lenses alone.
+  if (name == "cameras.json") return HeadOf(path).find("\"projection_type\"") == std::string::npos;
   if (name.ends_with(".json")) return name.starts_with("transforms");
   if (name.ends_with(".xml")) return IsFile(path) && LooksLikeMetashape(HeadOf(path));
   return name.ends_with(".out") && IsFile(path) && LooksLikeBundler(HeadOf(path));

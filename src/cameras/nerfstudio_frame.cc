@@ -43,7 +43,7 @@ Result<double> PositiveScale(const JsonValue& value) {
 }
 
 // A path that a config.yml has as Python's pathlib is written in YAML, "data: !!python/object/apply:pathlib.PosixPath"
-// and a line with "- PART" for each part. Empty without one.
+// and a line with "- PART" for each part; the first that has some. Empty without one.
 std::filesystem::path DataOfConfig(std::string_view yaml) {
   std::filesystem::path data;
   bool within = false;
@@ -57,9 +57,8 @@ std::filesystem::path DataOfConfig(std::string_view yaml) {
         line = line.substr(1, line.size() - 2);
       }
       data /= line;
-    } else if (within) {
-      break;
     } else {
+      if (!data.empty()) break;
       within = line.starts_with("data:") && line.find("pathlib.") != std::string_view::npos;
     }
   }

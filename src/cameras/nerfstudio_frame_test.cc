@@ -150,6 +150,10 @@ TEST(NerfstudioFrame, FolderOfARunNamesItsData) {
   for (const auto& path : {run, run / kNerfstudioFrame}) ExpectTrained(ReadCameras(path), rig);
   config("- data\n- poster\n- transforms.json\n");
   ExpectTrained(ReadCameras(run), rig);
+  WriteText(run / "config.yml",
+            "data: null\npipeline:\n  data: !!python/object/apply:pathlib.PosixPath []\n  dataparser:\n"
+            "    data: !!python/object/apply:pathlib.WindowsPath\n    - data\n    - poster\n    scale: 1\n");
+  ExpectTrained(ReadCameras(run), rig);
   std::string absolute = "- /\n";
   for (const auto& part : (folder.path() / "data" / "poster").relative_path()) absolute += "- " + part.string() + "\n";
   config(absolute);

@@ -108,6 +108,7 @@ TEST(OpenSfm, ProjectsOfOpenDroneMap) {
   const auto rig = RigForTest(2, {4.5e6, 100, -4.5e6});
   WritePicturesOf(rig, folder / "images");
   WriteText(folder / "opensfm" / "reconstruction.json", "[" + Reconstruction(rig) + "]");
+  WriteText(folder / "cameras.json", Cat("{\"c\": ", kBrown, "}"));  // the lenses, which OpenDroneMap has there, too
   for (const auto& path : {folder.path(), folder / "opensfm", folder / "opensfm/reconstruction.json"}) {
     const auto set = ReadCameras(path);
     ASSERT_TRUE(set.ok()) << set.error().message;

@@ -85,6 +85,30 @@ TEST(TrainingViews, MapsBeginAtAnOrigin) {
   EXPECT_EQ(beside->points.positions, (Buffer<float>{0.125f, 4500001.0f, 122}));
 }
 
+// In nerfstudio's frame points are where its cameras saw them.
+TEST(TrainingViews, PointsMoveWithTheCameras) {
+  const TestFolder folder;
+  WriteColmap(folder.path(), 3);
+  Put(folder / "sparse/0/points3D.txt", "1 0.5 1 2 255 0 0 0.1\n2 3 4 5 0 0 0 0.1\n");
+  const auto still = OpenProject(folder.path(), {.hold_out = 0});
+  ASSERT_TRUE(still.ok()) << still.error().message;
+  Put(folder / "dataparser_transforms.json",
+      R"({"transform": [[0, 1, 0, 0.5], [1, 0, 0, -2], [0, 0, -1, 3]], "scale": 0.5})");
+  for (const fs::path& path : {folder.path(), folder / "sparse/0"}) {
+    const auto moved = OpenProject(path, {.hold_out = 0});
+    ASSERT_TRUE(moved.ok()) << moved.error().message;
+    EXPECT_NEAR(moved->scene_scale, 0.5 * still->scene_scale, 1e-12);
+    ASSERT_EQ(moved->points.size(), 2);
+    EXPECT_NEAR(moved->points.positions[0], 0.5 * (1 + 0.5), 1e-6);
+    EXPECT_NEAR(moved->points.positions[1], 0.5 * (0.5 - 2), 1e-6);
+    EXPECT_NEAR(moved->points.positions[2], 0.5 * (3 - 2), 1e-6);
+    const auto before = still->train[1].ToCamera({3, 4, 5});
+    const float* const p = moved->points.positions.data() + 3;
+    const auto after = moved->train[1].ToCamera({p[0], p[1], p[2]});
+    for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(after[k], 0.5 * before[k], 1e-6);
+  }
+}
+
 TEST(TrainingViews, LensMaskPointsAndDownscale) {
   const TestFolder folder;
   WriteColmap(folder.path(), 4);

@@ -13,6 +13,7 @@
 #include "core/text.h"
 #include "formats/ply/ply_points.h"
 #include "io/input_file.h"
+#include "metrics/compare.h"
 
 namespace anchorsplat {
 
@@ -54,15 +55,6 @@ Result<std::optional<std::array<float, 3>>> BackgroundBeside(const fs::path& res
   if (!Exists(file)) return std::optional<std::array<float, 3>>();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraSet set, ReadCameras(file));
   return set.background;
-}
-
-// "0003, 0007 and 15 more": enough to see what went wrong.
-std::string FirstFew(const std::vector<std::string>& names) {
-  constexpr size_t kShown = 5;
-  std::string list;
-  for (size_t i = 0; i < std::min(names.size(), kShown); ++i) list += (i == 0 ? "" : ", ") + Printable(names[i]);
-  if (names.size() > kShown) list += Cat(" and ", names.size() - kShown, " more");
-  return list;
 }
 
 // The cameras with pictures of a file or folder, by name; the names of the others are added to `without`.

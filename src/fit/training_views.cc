@@ -6,6 +6,7 @@
 #include <system_error>
 #include <utility>
 
+#include "cameras/camera_axes.h"
 #include "cameras/camera_io.h"
 #include "cameras/photograph.h"
 #include "core/file_system.h"
@@ -141,10 +142,12 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
 
   TrainingViews out;
   fs::path missing;
+  CameraSource kind = CameraSource::kUnknown;
   const fs::path train_file = source / "transforms_train.json", test_file = source / "transforms_test.json";
   if (Exists(train_file)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(train_file, &missing));
     out.background = set.background;
+    kind = set.source;
     const fs::path points = set.points;
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views, WithPictures(std::move(set), train_file, missing,
                                                                          options.downscale, out.without_picture));
@@ -161,6 +164,7 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(source, &missing));
     out.background = set.background;
+    kind = set.source;
     const bool colmap = set.source == CameraSource::kColmap;
     if (colmap && !out.background) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(out.background, BackgroundBeside(source));
@@ -172,6 +176,11 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
     HoldOut(options.hold_out, std::move(views), out);
     ANCHORSPLAT_RETURN_IF_ERROR(colmap ? ReadPointsOfModel(ModelFolder(source), out.points)
                                        : ReadPoints(points, out.points));
+  }
+  if (const std::string wrong =
+          WrongAxes({.source = kind, .cameras = out.train, .background = {}, .points = {}}, out.points.positions);
+      !wrong.empty()) {
+    LogWarning(Cat(source.string(), ": ", wrong));
   }
   if (out.train.empty()) {
     return Error{ErrorCode::kBadArgument,

@@ -7,9 +7,9 @@
 set -euo pipefail
 
 packages=(g++ cmake ninja-build pkg-config
-  libhwy-dev libtbb-dev libcli11-dev nlohmann-json3-dev libpugixml-dev libpng-dev libjpeg-dev zlib1g-dev libzstd-dev libwebp-dev
+  libhwy-dev libtbb-dev libcli11-dev nlohmann-json3-dev libpugixml-dev libpng-dev libjpeg-dev zlib1g-dev libzstd-dev libwebp-dev libtiff-dev
   libassimp-dev libstb-dev libembree-dev libtomlplusplus-dev)
-headers=(hwy/highway.h tbb/parallel_for.h CLI/CLI.hpp nlohmann/json.hpp pugixml.hpp png.h jpeglib.h zlib.h zstd.h webp/decode.h
+headers=(hwy/highway.h tbb/parallel_for.h CLI/CLI.hpp nlohmann/json.hpp pugixml.hpp png.h jpeglib.h zlib.h zstd.h webp/decode.h tiffio.h
   assimp/scene.h stb/stb_image.h toml++/toml.h)
 list=
 with_torch=
@@ -58,7 +58,7 @@ if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
   [ ${#missing[@]} -eq 0 ] && exit 0
   echo "anchorsplat: this is not a Debian system, so nothing was installed. Missing: ${missing[*]}" >&2
   echo "Install a C++20 compiler, CMake >= 3.22, Ninja and the development packages of Highway (>= 1.0.3), oneTBB," >&2
-  echo "CLI11, nlohmann-json, pugixml, libpng, libjpeg, zlib, zstd, libwebp, assimp (>= 5.2), stb, Embree (>= 3.13 or 4), toml++ and, for the" >&2
+  echo "CLI11, nlohmann-json, pugixml, libpng, libjpeg, zlib, zstd, libwebp, libtiff (>= 4.5), assimp (>= 5.2), stb, Embree (>= 3.13 or 4), toml++ and, for the" >&2
   echo "tests, GoogleTest, then call make again." >&2
   exit 1
 fi

@@ -16,7 +16,7 @@ struct Picture {
   std::vector<float> pixels = {};  // [C,H,W]
 };
 
-// PNG or JPEG: 3 channels, or 4 where the file has alpha. Failures: kNotFound, kIo, kBadFile.
+// PNG, JPEG, WebP or TIFF: 3 channels, or 4 where the file has alpha. Failures: kNotFound, kIo, kBadFile.
 ANCHORSPLAT_PUBLIC Expected<Picture> ReadPicture(const std::filesystem::path& path);
 
 // An 8-bit PNG of 1, 3 or 4 channels: value·255 rounded to nearest, clamped. Whole or not at all.

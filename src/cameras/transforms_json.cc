@@ -136,7 +136,19 @@ Result<Pinhole> ReadIntrinsics(const JsonValue& frame, const JsonValue& root, co
   return c;
 }
 
-Result<Pose> ReadPose(const JsonValue& matrix) {
+// Whether the matrices are in OpenCV's axes (x right, y down, z forward): nobody's files say it but ours, for people
+// whose files are so.
+Result<bool> IsInOpenCvAxes(const JsonValue& root) {
+  const auto value = root.Find("camera_axes");
+  if (!value || value->raw().is_null()) return false;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string axes, value->Text());
+  if (axes != "opencv" && axes != "opengl") {
+    return value->Complain(Cat("expected \"opengl\" or \"opencv\", found \"", Printable(axes), "\""));
+  }
+  return axes == "opencv";
+}
+
+Result<Pose> ReadPose(const JsonValue& matrix, bool opencv_axes) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> rows, matrix.Elements());
   if (rows.size() != 4 && rows.size() != 3) {
     return matrix.Complain(Cat("expected 4 rows of 4 numbers, found ", rows.size(), " rows"));
@@ -147,6 +159,9 @@ Result<Pose> ReadPose(const JsonValue& matrix) {
     std::copy(row.begin(), row.end(), m.begin() + static_cast<ptrdiff_t>(4 * r));
   }
   if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1) return matrix.Complain("last row is not 0 0 0 1");
+  if (opencv_axes) {
+    for (const size_t k : {1, 2, 5, 6, 9, 10}) m[k] = -m[k];
+  }
   auto pose = PoseFromOpenGlCameraToWorld(m);
   if (!pose.ok()) return matrix.Complain(pose.error().message);
   return pose;
@@ -217,7 +232,7 @@ class StraightPinholes {
   std::optional<Known> last_;
 };
 
-Result<Camera> ReadFrame(const JsonValue& frame, const JsonValue& root, FoundPicture picture,
+Result<Camera> ReadFrame(const JsonValue& frame, const JsonValue& root, FoundPicture picture, bool opencv_axes,
                          StraightPinholes& straight) {
   Camera camera;
   camera.name = std::move(picture.name);
@@ -231,7 +246,7 @@ Result<Camera> ReadFrame(const JsonValue& frame, const JsonValue& root, FoundPic
   }
   camera.photograph.mask = std::move(picture.mask);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue matrix, frame.Get("transform_matrix"));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(camera.world_to_camera, ReadPose(matrix));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(camera.world_to_camera, ReadPose(matrix, opencv_axes));
   return camera;
 }
 
@@ -256,9 +271,10 @@ Result<CameraSet> CamerasFromTransforms(const JsonValue& root, const std::filesy
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<JsonValue> elements, frames.Elements());
   if (elements.empty()) return frames.Complain("expected at least one frame");
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<FoundPicture> pictures, FindPicturesOfFrames(elements, folder, complete));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const bool opencv_axes, IsInOpenCvAxes(root));
   StraightPinholes straight;
   for (size_t i = 0; i < elements.size(); ++i) {
-    auto camera = ReadFrame(elements[i], root, std::move(pictures[i]), straight);
+    auto camera = ReadFrame(elements[i], root, std::move(pictures[i]), opencv_axes, straight);
     if (!camera.ok()) return elements[i].Named(camera.error(), "file_path");
     set.cameras.push_back(*std::move(camera));
   }

@@ -137,6 +137,20 @@ TEST(TransformsJson, LensesMasksAndPoints) {
   EXPECT_TRUE(set->cameras[0].photograph.mask.empty());
 }
 
+TEST(TransformsJson, OpenCvAxesWhereTheFileSaysSo) {
+  const TestFolder folder;
+  const std::string good = R"("w": 8, "h": 8, "fl_x": 10)";
+  const auto gl = ReadText(folder, OneFrame(good)),
+             cv = ReadText(folder, OneFrame(good + R"(, "camera_axes": "opencv")"));
+  ASSERT_TRUE(cv.ok()) << cv.error().message;
+  const auto seen = cv->cameras[0].ToCamera({0.5, 1, 2}), other = gl->cameras[0].ToCamera({0.5, 1, 2});
+  EXPECT_NEAR(seen[0], other[0], 1e-12);
+  EXPECT_NEAR(seen[1], -other[1], 1e-12);
+  EXPECT_NEAR(seen[2], -other[2], 1e-12);
+  EXPECT_TRUE(ReadText(folder, OneFrame(good + R"(, "camera_axes": "opengl")")).ok());
+  EXPECT_FALSE(ReadText(folder, OneFrame(good + R"(, "camera_axes": "OpenCV axes")")).ok());
+}
+
 TEST(TransformsJson, MalformedFilesSayWhatIsWrong) {
   const TestFolder folder;
   const std::string good = R"("w": 8, "h": 8, "fl_x": 10)";

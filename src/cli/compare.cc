@@ -147,7 +147,7 @@ Status RunCompare(const CompareWords& flags, const SharedFlags& shared) {
   if (!flags.side_by_side.empty()) ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(flags.side_by_side));
   std::vector<ViewSource*> sources = {sides.a.get()};
   if (sides.truth) sources.push_back(sides.b.get());
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Lpips> lpips, OpenLpipsOrWarn(flags.lpips, flags.lpips_weights));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Lpips> lpips, OpenLpips(flags.lpips, flags.lpips_weights));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto results, CompareToReference(sources, sides.truth ? *sides.truth : *sides.b,
                                                                       {.lpips = lpips ? &*lpips : nullptr,
                                                                        .color_correct = flags.how.color_correct}));

@@ -65,9 +65,13 @@ TEST_F(CompareVerb, RefusesWhatCannotBeCompared) {
                             ErrorCode::kBadArgument)
                   .err,
               HasSubstr("different sizes: 000 (32x32 and 48x48), 001 (32x32 and 48x48);"));
-  ExpectRefused({"compare", scan_, views_, "--orbit", "3", "--size", "48x48"}, ErrorCode::kBadArgument, {"002"});
+  fs::create_directory(folder_ / "others");
+  fs::copy_file(folder_ / "views/000.png", folder_ / "others/x.png");
+  fs::copy_file(folder_ / "views/000.png", folder_ / "others/y.png");
+  ExpectRefused({"compare", views_, folder_ / "others"}, ErrorCode::kBadArgument, {"no view is on both sides", "x, y"});
   fs::create_directory(folder_ / "empty");
-  ExpectRefused({"compare", scan_, folder_ / "empty", "--orbit", "1"}, ErrorCode::kNotFound, {"no PNG or JPEG"});
+  ExpectRefused({"compare", scan_, folder_ / "empty", "--orbit", "1"}, ErrorCode::kNotFound,
+                {"no PNG, JPEG, WebP or TIFF"});
   ExpectRefused({"compare", scan_, folder_ / "none.ply", "--orbit", "1"}, ErrorCode::kNotFound, {"none.ply"});
 }
 
@@ -102,12 +106,21 @@ TEST_F(CompareVerb, ColorCorrection) {
   EXPECT_FALSE(ExpectJson({"compare", views_, photos})["mean"].contains("cc_psnr"));
 }
 
-// LPIPS is missing without its weights; the other metrics are there all the same.
+TEST_F(CompareVerb, GoesOnWithoutThePicturesThatAreMissing) {
+  const ProgramRun run = ExpectDone({"compare", scan_, views_, "--orbit", "3", "--size", "48x48"});
+  EXPECT_THAT(run.err, HasSubstr("1 view has no partner and is left out: not in the reference 002"));
+  EXPECT_EQ(ExpectJson({"compare", scan_, views_, "--orbit", "3", "--size", "48x48"})["views"].size(), 2u);
+  const ProgramRun other = ExpectDone({"compare", views_, scan_, "--orbit", "3", "--size", "48x48"});
+  EXPECT_THAT(other.err, HasSubstr("only in the reference 002"));
+}
+
+// Without its weights LPIPS is an error, unless it was asked for only if they are there.
 TEST_F(CompareVerb, LpipsWithoutItsWeights) {
   const std::string one = folder_ / "views/000.png", two = folder_ / "views/001.png";
-  const std::vector<std::string> words = {"compare",          one, two, "--lpips", "alex", "--lpips-weights",
-                                          folder_ / "weights"};
+  std::vector<std::string> words = {"compare", one, two, "--lpips", "alex", "--lpips-weights", folder_ / "weights"};
   fs::create_directory(folder_ / "weights");
+  EXPECT_THAT(ExpectRefused(words, ErrorCode::kNotFound, {"LPIPS missing", "--lpips if-there"}).out, IsEmpty());
+  words[4] = "if-there";
   EXPECT_THAT(ExpectDone(words).err, HasSubstr("LPIPS missing"));
   const nlohmann::json json = ExpectJson(words);
   EXPECT_TRUE(json["mean"].contains("ssim"));

@@ -68,7 +68,7 @@ Result<double> ChooseStrength(const std::vector<MethodSummary>& summaries) {
 Status RunEval(const EvalFlags& flags, Program& program) {
   const SharedFlags& shared = program.flags;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<EvalMethod> methods, MakeMethods(flags));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Lpips> lpips, OpenLpipsOrWarn(flags.lpips, flags.lpips_weights));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Lpips> lpips, OpenLpips(flags.lpips, flags.lpips_weights));
   EvaluationOptions options;
   options.protocol = flags.protocol;
   options.split = flags.split;

@@ -9,11 +9,11 @@
 
 namespace anchorsplat {
 
-// --lpips NET and --lpips-weights DIR.
+// --lpips NET and --lpips-weights DIR. NET may be "if-there": alex, and none where it is missing.
 void AddLpipsFlags(CLI::App& verb, std::string& net, std::string& folder);
 
-// The metric, or nothing: not asked for (`net` empty), or missing, which is a warning, because the other metrics do not
-// need it. Weights that are there and broken are an error. An empty `folder` is LpipsFolder().
-Result<std::optional<Lpips>> OpenLpipsOrWarn(const std::string& net, const std::string& folder);
+// The metric, or nothing: not asked for (`net` empty), or missing and asked for only if there, which is a warning. An
+// empty `folder` is LpipsFolder(). Errors: kNotFound where it is missing; weights that are there and broken.
+Result<std::optional<Lpips>> OpenLpips(const std::string& net, const std::string& folder);
 
 }  // namespace anchorsplat

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "cameras/view_labels.h"
 #include "cli/clean_output.h"
 #include "cli/standard_output.h"
 #include "cli/verb.h"
@@ -34,7 +35,7 @@ struct RenderFlags {
   ViewFlags views;
 };
 
-// One picture goes to a file, several to a folder under the views' names.
+// One picture goes to a file, several to a folder under the views' names, which may have folders in them.
 Result<std::vector<fs::path>> OutputPaths(const std::string& output, const CameraSet& cameras, bool overwrite) {
   const bool to_file = IsPngName(output);
   if (!to_file && IsPictureName(output)) {
@@ -46,9 +47,12 @@ Result<std::vector<fs::path>> OutputPaths(const std::string& output, const Camer
   }
   std::vector<fs::path> paths;
   std::map<fs::path, std::string> taken;
-  for (const Camera& camera : cameras.cameras) {
-    paths.push_back(to_file ? fs::path(output)
-                            : fs::path(output) / (fs::path(camera.name).filename().string() + ".png"));
+  std::vector<std::string> names;
+  for (const Camera& camera : cameras.cameras) names.push_back(camera.name);
+  const std::vector<std::string> labels = ViewLabels(names);
+  for (size_t i = 0; i < labels.size(); ++i) {
+    const Camera& camera = cameras.cameras[i];
+    paths.push_back(to_file ? fs::path(output) : fs::path(output) / (labels[i] + ".png"));
     const auto [other, fresh] = taken.emplace(paths.back(), camera.name);
     if (!fresh) {
       return Error{ErrorCode::kBadArgument,
@@ -60,9 +64,13 @@ Result<std::vector<fs::path>> OutputPaths(const std::string& output, const Camer
     }
   }
   if (!to_file) {
-    std::error_code code;
-    fs::create_directories(output, code);
-    if (code) return Error{ErrorCode::kIo, Cat(output, ": cannot make this folder: ", code.message())};
+    for (const fs::path& path : paths) {
+      std::error_code code;
+      fs::create_directories(path.parent_path(), code);
+      if (code) {
+        return Error{ErrorCode::kIo, Cat(path.parent_path().string(), ": cannot make this folder: ", code.message())};
+      }
+    }
   }
   return paths;
 }

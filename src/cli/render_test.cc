@@ -53,6 +53,27 @@ TEST_F(RenderVerb, OnePictureOfEveryCamera) {
   ExpectRefused(Render("x", {"--cameras", cameras, "--radius", "3"}), ErrorCode::kBadArgument, {"--radius"});
 }
 
+// A rig: what tells its views apart is the folder.
+TEST_F(RenderVerb, ViewsOfARig) {
+  std::string frames;
+  for (const char* name : {"images/cam0/0000.png", "images/cam1/0000.png", "images/cam1/0001.png"}) {
+    frames += std::string(frames.empty() ? "" : ",") + R"({"file_path": ")" + name +
+              R"(", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,4],[0,0,0,1]]})";
+  }
+  const std::string cameras = folder_ / "transforms.json", out = folder_ / "rig", one = folder_ / "one.png";
+  WriteText(cameras, R"({"w": 16, "h": 12, "fl_x": 20, "frames": [)" + frames + "]}");
+  ExpectDone({"render", scan_, "--cameras", cameras, "-o", out});
+  for (const char* name : {"cam0/0000.png", "cam1/0000.png", "cam1/0001.png"}) {
+    EXPECT_TRUE(fs::exists(fs::path(out) / name)) << name;
+  }
+  ExpectDone({"render", scan_, "--cameras", cameras, "-o", one, "--view", "cam1/0000"});
+  ExpectRefused({"render", scan_, "--cameras", cameras, "-o", one, "--view", "0000", "-w"}, ErrorCode::kBadArgument,
+                {"several views are called '0000'", "cam0/0000"});
+  ExpectRefused({"render", scan_, "--cameras", cameras, "-o", one, "--view", "cam2/0000", "-w"},
+                ErrorCode::kBadArgument, {"no view is called 'cam2/0000'"});
+  EXPECT_EQ(ExpectJson({"compare", scan_, out, "--cameras", cameras})["views"][1]["name"], "cam1/0000");
+}
+
 // −y unless somebody knows better.
 TEST_F(RenderVerb, UpOfAnOrbit) {
   const auto picture = [&](const std::string& name, const std::string& scan, std::vector<std::string> words) {

@@ -130,6 +130,22 @@ Result<Pose> LookAt(const Vec3& center, const Vec3& target, const Vec3& up) {
   return PoseFromAxes(right, Cross(forward, right), forward, center);
 }
 
+namespace {
+
+// Of a matrix that is no rotation: that it scales, or mirrors, or both; empty for what has no such name.
+std::string WhatIsWrong(const Vec3& right, const Vec3& up, const Vec3& back, double tolerance) {
+  const double scale = std::sqrt(Dot(right, right)), area = scale * scale;
+  if (!(scale > 0)) return "";
+  const double off = std::max({std::abs(Dot(up, up) - area), std::abs(Dot(back, back) - area), std::abs(Dot(right, up)),
+                               std::abs(Dot(right, back)), std::abs(Dot(up, back))});
+  if (off > tolerance * area) return "";
+  const bool mirrored = Dot(Cross(right, up), back) < 0;
+  if (std::abs(scale - 1) <= tolerance) return mirrored ? "it mirrors: its determinant is -1" : "";
+  return Cat("it scales by ", scale, mirrored ? " and mirrors" : "");
+}
+
+}  // namespace
+
 Result<Pose> PoseFromOpenGlCameraToWorld(const std::array<double, 16>& m) {
   if (!AllFinite(m)) return Error{ErrorCode::kBadArgument, "camera matrix has a value that is not finite"};
   const Vec3 right = {m[0], m[4], m[8]};
@@ -140,7 +156,9 @@ Result<Pose> PoseFromOpenGlCameraToWorld(const std::array<double, 16>& m) {
                                std::abs(Dot(back, back) - 1), std::abs(Dot(right, up)), std::abs(Dot(right, back)),
                                std::abs(Dot(up, back)), std::abs(Dot(Cross(right, up), back) - 1)});
   if (off > kTolerance) {
-    return Error{ErrorCode::kBadArgument, Cat("camera matrix is not a rotation (off by ", off, ")")};
+    const std::string wrong = WhatIsWrong(right, up, back, kTolerance);
+    return Error{ErrorCode::kBadArgument,
+                 Cat("camera matrix is not a rotation (", wrong.empty() ? Cat("off by ", off) : wrong, ")")};
   }
   return PoseFromAxes(right, {-up[0], -up[1], -up[2]}, {-back[0], -back[1], -back[2]}, {m[3], m[7], m[11]});
 }

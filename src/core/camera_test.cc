@@ -66,6 +66,9 @@ TEST(Camera, OpenGlMatricesMustBeRotations) {
   EXPECT_FALSE(PoseFromOpenGlCameraToWorld(m).ok());
   m[0] = -1;  // mirrored
   EXPECT_FALSE(PoseFromOpenGlCameraToWorld(m).ok());
+  EXPECT_NE(PoseFromOpenGlCameraToWorld(m).error().message.find("it mirrors"), std::string::npos);
+  for (const size_t k : {0, 5, 10}) m[k] = 1.5;
+  EXPECT_NE(PoseFromOpenGlCameraToWorld(m).error().message.find("it scales by 1.5"), std::string::npos);
   m[0] = std::nan("");
   EXPECT_FALSE(PoseFromOpenGlCameraToWorld(m).ok());
 }

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <utility>
 
+#include "cameras/camera_axes.h"
 #include "core/log.h"
 #include "core/lost_nothing_mark.h"
 #include "core/run_context.h"
@@ -382,6 +383,10 @@ Result<Enhanced> EnhanceFromOrigin(GaussianCloud cloud, const EnhanceOptions& op
   input.cloud = std::move(cloud);
   ANCHORSPLAT_RETURN_IF_ERROR(DropUnusable(input.cloud));
   report.dropped = report.gaussians_in - input.cloud.size();
+  if (options.cameras) {
+    const std::string wrong = WrongAxes(*options.cameras, input.cloud.means);
+    if (!wrong.empty()) LogWarning("--cameras: " + wrong);
+  }
   // A mark of other parts says nothing about this one.
   std::vector<std::string> marks_of_parts;
   if (options.region) {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "cameras/view_labels.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "fit/picture_cache.h"
@@ -22,14 +23,46 @@ Result<std::vector<std::vector<size_t>>> MatchSources(std::span<ViewSource* cons
       out.push_back({0});
       continue;
     }
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<ViewPair> pairs, MatchViews(source->names(), reference.names()));
-    std::vector<size_t>& partner = out.emplace_back(reference.names().size());
-    for (const ViewPair& pair : pairs) partner[pair.b] = pair.a;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewPairs matched, MatchViews(source->names(), reference.names()));
+    std::vector<size_t>& partner = out.emplace_back(reference.names().size(), kNoView);
+    for (const ViewPair& pair : matched.pairs) partner[pair.b] = pair.a;
   }
   return out;
 }
 
 namespace {
+
+bool IsWhole(const std::vector<std::vector<size_t>>& partners, size_t view) {
+  return std::ranges::none_of(partners, [view](const auto& partner) { return partner[view] == kNoView; });
+}
+
+// Views that only one side has are left out with a word; kBadArgument where no view is on all sides.
+Status TellOfMissing(std::span<ViewSource* const> sources, const std::vector<std::vector<size_t>>& partners,
+                     const ViewSource& reference) {
+  std::vector<std::string> missing, spare;  // what another side lacks, of the reference's and of the sources'
+  const std::vector<std::string> labels = ViewLabels(reference.names());
+  for (size_t r = 0; r < labels.size(); ++r) {
+    if (!IsWhole(partners, r)) missing.push_back(labels[r]);
+  }
+  for (size_t s = 0; s < sources.size(); ++s) {
+    const std::vector<std::string> own = ViewLabels(sources[s]->names());
+    for (size_t i = 0; i < own.size(); ++i) {
+      if (std::ranges::find(partners[s], i) != partners[s].end()) continue;
+      if (std::ranges::find(spare, own[i]) == spare.end()) spare.push_back(own[i]);
+    }
+  }
+  if (missing.empty() && spare.empty()) return {};
+  std::string sentence;
+  if (!missing.empty()) sentence += Cat("only in the reference ", FirstFew(missing));
+  if (!spare.empty()) sentence += Cat(missing.empty() ? "" : "; ", "not in the reference ", FirstFew(spare));
+  if (missing.size() == labels.size()) {
+    return Error{ErrorCode::kBadArgument, Cat("no view is on both sides: ", sentence)};
+  }
+  const size_t count = missing.size() + spare.size();
+  LogWarning(Cat(count, count == 1 ? " view has no partner and is" : " views have no partner and are",
+                 " left out: ", sentence));
+  return {};
+}
 
 // All views whose pictures differ in size, before any of them is made.
 Status CheckSizes(std::span<ViewSource* const> sources, const std::vector<std::vector<size_t>>& partners,
@@ -37,7 +70,9 @@ Status CheckSizes(std::span<ViewSource* const> sources, const std::vector<std::v
   constexpr int kShown = 10;
   std::string list;
   int different = 0;
+  const std::vector<std::string> labels = ViewLabels(reference.names());
   for (size_t r = 0; r < reference.names().size(); ++r) {
+    if (!IsWhole(partners, r)) continue;
     ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize truth, reference.SizeOf(r));
     std::vector<std::string> others;  // each size once
     for (size_t s = 0; s < sources.size(); ++s) {
@@ -47,7 +82,7 @@ Status CheckSizes(std::span<ViewSource* const> sources, const std::vector<std::v
       if (std::ranges::find(others, text) == others.end()) others.push_back(std::move(text));
     }
     if (others.empty() || ++different > kShown) continue;
-    list += Cat(list.empty() ? "" : ", ", ViewLabel(reference.names()[r]), " (");
+    list += Cat(list.empty() ? "" : ", ", labels[r], " (");
     for (size_t k = 0; k < others.size(); ++k) list += Cat(k == 0 ? "" : ", ", others[k]);
     list += Cat(" and ", truth.width, "x", truth.height, ")");
   }
@@ -116,12 +151,20 @@ void TakeMeans(const CompareOptions& options, Comparison& comparison) {
 Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> sources, ViewSource& reference,
                                                    const CompareOptions& options) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto partners, MatchSources(sources, reference));
+  ANCHORSPLAT_RETURN_IF_ERROR(TellOfMissing(sources, partners, reference));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckSizes(sources, partners, reference));
+  const std::vector<std::string> labels = ViewLabels(reference.names());
   std::vector<Comparison> out(sources.size());
   Progress progress("compare", static_cast<int64_t>(reference.names().size()));
   std::vector<std::string> masked;
+  int64_t count = 0;
   for (size_t r = 0; r < reference.names().size(); ++r) {
-    const std::string name = ViewLabel(reference.names()[r]);
+    const std::string& name = labels[r];
+    if (!IsWhole(partners, r)) {
+      progress.Advance();
+      continue;
+    }
+    ++count;
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Image truth, reference.Load(r));
     std::vector<ViewScore> scores;  // of every source
     for (size_t s = 0; s < sources.size(); ++s) {
@@ -140,7 +183,6 @@ Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> 
     }
     for (size_t s = 0; s < sources.size(); ++s) out[s].views.push_back(std::move(scores[s]));
   }
-  const auto count = static_cast<int64_t>(reference.names().size());
   if (!masked.empty() && std::ssize(masked) == count) {
     return Error{ErrorCode::kBadArgument,
                  "the masks leave nothing of any view to compare: black is left out, white counts"};

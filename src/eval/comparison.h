@@ -20,7 +20,7 @@ struct CorrectedScore {
 };
 
 struct ViewScore {
-  std::string name;  // stem of the view
+  std::string name;  // the view's (ViewLabels in cameras/view_labels.h)
   double psnr = 0;   // dB; infinite for identical pictures
   double ssim = 0;
   std::optional<double> lpips;                // where it was asked for
@@ -42,16 +42,17 @@ struct CompareOptions {
   bool color_correct = false;  // of every source to the reference, view by view
 };
 
-// Which view of each source shows what view r of the reference shows: [source][r]. Names match by path without folder
-// and extension; two single pictures match whatever their names. A view without a partner and a stem that appears twice
-// are errors (kBadArgument) that list them.
+// Which view of each source shows what view r of the reference shows: [source][r], kNoView for none. Names match as
+// MatchViews says (metrics/compare.h); two single pictures match whatever their names. kBadArgument: a name that
+// appears twice.
+inline constexpr size_t kNoView = static_cast<size_t>(-1);
 Result<std::vector<std::vector<size_t>>> MatchSources(std::span<ViewSource* const> sources,
                                                       const ViewSource& reference);
 
 // PSNR, SSIM and LPIPS of every source against the reference, view by view; one result per source. Pixels that a mask
-// of either leaves out do not count, and views of which nothing is left are in no result, which a warning says.
-// Pictures of different sizes are an error that names them, and so is it when nothing is left of any view. Shows
-// progress.
+// of either leaves out do not count. Views of which nothing is left, and those that one of the sources or the reference
+// lacks, are in no result, which a warning says. Errors: pictures of different sizes, which are named; nothing is left
+// of any view. Shows progress.
 Result<std::vector<Comparison>> CompareToReference(std::span<ViewSource* const> sources, ViewSource& reference,
                                                    const CompareOptions& options = {});
 

@@ -1,20 +1,21 @@
 #include "eval/view_source.h"
 
 #include <algorithm>
-#include <cctype>
 #include <functional>
 #include <map>
+#include <set>
 #include <system_error>
 #include <utility>
 
-#include "cameras/camera_checks.h"
 #include "cameras/photograph.h"
+#include "cameras/view_labels.h"
 #include "core/credit.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "images/image_io.h"
 #include "images/orientation.h"
+#include "images/picture_names.h"
 #include "io/input_record.h"
 #include "metrics/compare.h"
 #include "metrics/image_metrics.h"
@@ -117,19 +118,50 @@ std::string PlaceOf(const fs::path& file) {
   return code ? file.lexically_normal().string() : place.string();
 }
 
+// A folder's pictures, and those of the cameras in folders inside it.
+Result<std::vector<fs::path>> PicturesIn(const fs::path& folder, const CameraSet& cameras) {
+  auto files = ListPictures(folder);
+  const std::string inside = PlaceOf(folder) + "/";
+  std::set<std::string> known;
+  if (files.ok()) {
+    for (const fs::path& file : *files) known.insert(PlaceOf(file));
+  }
+  std::vector<fs::path> deeper;
+  for (const Camera& camera : cameras.cameras) {
+    const std::string place = camera.image.empty() ? "" : PlaceOf(camera.image);
+    if (place.starts_with(inside) && known.insert(place).second) deeper.push_back(camera.image);
+  }
+  if (deeper.empty()) return files;
+  if (files.ok()) deeper.insert(deeper.end(), files->begin(), files->end());
+  std::ranges::sort(deeper);
+  return deeper;
+}
+
 }  // namespace
 
-std::string ViewLabel(const std::string& name) { return fs::path(ViewName(name)).filename().string(); }
-
 Result<size_t> FindView(const std::vector<std::string>& names, const std::string& name) {
-  std::vector<size_t> found;
+  const std::vector<std::string> wanted = ViewParts(name);
+  std::vector<size_t> same, found, last;
   for (size_t i = 0; i < names.size(); ++i) {
-    if (names[i] == name || ViewLabel(names[i]) == ViewLabel(name)) found.push_back(i);
+    const std::vector<std::string> parts = ViewParts(names[i]);
+    if (parts == wanted) same.push_back(i);
+    const size_t shorter = std::min(parts.size(), wanted.size());
+    if (shorter == 0) continue;
+    if (std::equal(parts.end() - static_cast<ptrdiff_t>(shorter), parts.end(),
+                   wanted.end() - static_cast<ptrdiff_t>(shorter))) {
+      found.push_back(i);
+    }
+    if (parts.back() == wanted.back()) last.push_back(i);
   }
+  if (same.size() == 1) return same[0];
+  if (found.empty() && last.size() == 1 && ViewLabels(names)[last[0]] == wanted.back()) found = last;
   if (found.size() == 1) return found[0];
+  std::vector<std::string> several;
+  for (const size_t i : found) several.push_back(names[i]);
   return Error{ErrorCode::kBadArgument,
-               Cat(found.empty() ? "no view is called '" : "several views are called '", Printable(name),
-                   "' (there are ", names.size(), names.empty() ? "" : ", the first is " + names.front(), ")")};
+               found.empty() ? Cat("no view is called '", Printable(name), "' (there are ", names.size(),
+                                   names.empty() ? "" : ", the first is " + names.front(), ")")
+                             : Cat("several views are called '", Printable(name), "': ", FirstFew(several))};
 }
 
 std::unique_ptr<ViewSource> MakeSplatViews(GaussianCloud cloud, CameraSet cameras, const RenderOptions& options) {
@@ -140,7 +172,7 @@ Result<std::unique_ptr<ViewSource>> OpenImageViews(const fs::path& path, const s
                                                    const CameraSet& cameras) {
   std::vector<fs::path> files = {path};
   if (IsFolder(path)) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(files, ListPictures(path));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(files, PicturesIn(path, cameras));
   } else if (!Exists(path)) {
     return Error{ErrorCode::kNotFound, Cat(path.string(), ": no such file or folder")};
   }
@@ -167,12 +199,6 @@ Result<std::unique_ptr<ViewSource>> OpenImageViews(const fs::path& path, const s
   return std::unique_ptr<ViewSource>(std::make_unique<ImageViews>(std::move(views), background));
 }
 
-bool LooksLikeImages(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (extension == ".png" || extension == ".jpg" || extension == ".jpeg") return true;
-  return IsFolder(path);
-}
+bool LooksLikeImages(const fs::path& path) { return HasPictureExtension(path) || IsFolder(path); }
 
 }  // namespace anchorsplat

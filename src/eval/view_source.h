@@ -36,23 +36,21 @@ class ViewSource {
   virtual void KeepOnly(size_t view) = 0;
 };
 
-// A view's name for people: without folder and without a picture's extension.
-std::string ViewLabel(const std::string& name);
-
-// The view called `name`, with its folder and extension or without. kBadArgument when there is none, or several.
+// The view called `name`: with its folders and extension or as much of their end as tells it from the others. Where the
+// last part alone does that, other folders before it do not matter. kBadArgument when there is none, or several.
 Result<size_t> FindView(const std::vector<std::string>& names, const std::string& name);
 
 // Renders `cloud` through `cameras`; warns of the first view with nothing in it (render/shown_range.h).
 std::unique_ptr<ViewSource> MakeSplatViews(GaussianCloud cloud, CameraSet cameras, const RenderOptions& options);
 
-// A folder of PNG and JPEG pictures, or a single one. Those that are the files of `cameras`' own pictures come as these
-// cameras see them: without the lens, with their masks (cameras/photograph.h); others upright as their EXIF says.
-// Errors: kNotFound, kBadFile (no pictures in the folder); those of MatchPhotograph.
+// A folder of pictures, or a single one (ListPictures in metrics/compare.h says which). Those that are the files of
+// `cameras`' own pictures come as these cameras see them: without the lens, with their masks (cameras/photograph.h);
+// others upright as their EXIF says. Errors: kNotFound, kBadFile (no pictures in the folder); those of MatchPhotograph.
 Result<std::unique_ptr<ViewSource>> OpenImageViews(const std::filesystem::path& path,
                                                    const std::array<float, 3>& background,
                                                    const CameraSet& cameras = {});
 
-// True for a folder of pictures and for a file named .png, .jpg or .jpeg: what OpenImageViews takes.
+// True for a folder and for a file with the extension of a picture that can be read: what OpenImageViews takes.
 bool LooksLikeImages(const std::filesystem::path& path);
 
 }  // namespace anchorsplat

@@ -6,6 +6,7 @@
 #include <system_error>
 #include <utility>
 
+#include "cameras/camera_axes.h"
 #include "cameras/camera_io.h"
 #include "cameras/photograph.h"
 #include "core/file_system.h"
@@ -13,6 +14,7 @@
 #include "core/text.h"
 #include "formats/ply/ply_points.h"
 #include "io/input_file.h"
+#include "metrics/compare.h"
 
 namespace anchorsplat {
 
@@ -54,15 +56,6 @@ Result<std::optional<std::array<float, 3>>> BackgroundBeside(const fs::path& res
   if (!Exists(file)) return std::optional<std::array<float, 3>>();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraSet set, ReadCameras(file));
   return set.background;
-}
-
-// "0003, 0007 and 15 more": enough to see what went wrong.
-std::string FirstFew(const std::vector<std::string>& names) {
-  constexpr size_t kShown = 5;
-  std::string list;
-  for (size_t i = 0; i < std::min(names.size(), kShown); ++i) list += (i == 0 ? "" : ", ") + Printable(names[i]);
-  if (names.size() > kShown) list += Cat(" and ", names.size() - kShown, " more");
-  return list;
 }
 
 // The cameras with pictures of a file or folder, by name; the names of the others are added to `without`.
@@ -173,10 +166,12 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
 
   TrainingViews out;
   fs::path missing;
+  CameraSource kind = CameraSource::kUnknown;
   const fs::path train_file = source / "transforms_train.json", test_file = source / "transforms_test.json";
   if (Exists(train_file)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(train_file, &missing));
     out.background = set.background;
+    kind = set.source;
     const fs::path points = set.points;
     const std::optional<Similarity> moved = set.moved;
     ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<Camera> views, WithPictures(std::move(set), train_file, missing,
@@ -195,6 +190,7 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(source, &missing));
     out.background = set.background;
+    kind = set.source;
     const bool colmap = set.source == CameraSource::kColmap;
     if (colmap && !out.background) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(out.background, BackgroundBeside(source));
@@ -208,6 +204,11 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
     const PointFrame frame{moved, out.origin};
     ANCHORSPLAT_RETURN_IF_ERROR(model.empty() ? ReadPoints(points, frame, out.points)
                                               : ReadPointsOfModel(model, frame, out.points));
+  }
+  if (const std::string wrong =
+          WrongAxes({.source = kind, .cameras = out.train, .background = {}, .points = {}}, out.points.positions);
+      !wrong.empty()) {
+    LogWarning(Cat(source.string(), ": ", wrong));
   }
   if (out.train.empty()) {
     return Error{ErrorCode::kBadArgument,

@@ -1,13 +1,16 @@
 #include "images/image_io.h"
 
 #include <cstdio>
-#include <cstring>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "core/text.h"
 #include "images/decode_image.h"
 #include "images/jpeg_file.h"
 #include "images/png_file.h"
+#include "images/tiff_file.h"
+#include "images/webp_image.h"
 #include "io/atomic_file.h"
 #include "io/file_bytes.h"
 
@@ -15,21 +18,63 @@ namespace anchorsplat {
 
 namespace {
 
-enum class PictureKind { kPng, kJpeg };
+enum class PictureKind { kPng, kJpeg, kWebp, kTiff };
+
+// What a file that is no picture for us is, by its first bytes, for those that people try; empty: unknown.
+std::string OtherKind(std::string_view head) {
+  if (head.size() >= 12 && head.substr(4, 4) == "ftyp") {
+    const std::string_view brand = head.substr(8, 4);
+    if (brand == "avif" || brand == "avis") return "an AVIF";
+    for (const char* heic : {"heic", "heix", "heim", "heis", "hevc", "hevx", "mif1", "msf1"}) {
+      if (brand == heic) return "a HEIC";
+    }
+  }
+  const std::pair<std::string_view, const char*> kinds[] = {{"GIF8", "a GIF"},
+                                                            {"BM", "a BMP"},
+                                                            {"\x76\x2f\x31\x01", "an OpenEXR"},
+                                                            {"#?RADIANCE", "a Radiance HDR"},
+                                                            {"\xff\x0a", "a JPEG XL"},
+                                                            {std::string_view("\0\0\0\x0cJXL ", 8), "a JPEG XL"},
+                                                            {std::string_view("\0\0\0\x0cjP  ", 8), "a JPEG 2000"}};
+  for (const auto& [begin, kind] : kinds) {
+    if (head.starts_with(begin)) return kind;
+  }
+  return "";
+}
 
 // By the first bytes; leaves the file at its beginning.
 Result<PictureKind> DetectKind(const OpenedFile& file, const std::string& name) {
-  unsigned char head[8] = {};
-  const size_t count = std::fread(head, 1, sizeof head, file.handle.get());
+  char bytes[16] = {};
+  const std::string_view head(bytes, std::fread(bytes, 1, sizeof bytes, file.handle.get()));
   std::rewind(file.handle.get());
-  if (count == 8 && std::memcmp(head, "\x89PNG\r\n\x1a\n", 8) == 0) return PictureKind::kPng;
-  if (count >= 3 && std::memcmp(head, "\xff\xd8\xff", 3) == 0) return PictureKind::kJpeg;
-  return Error{ErrorCode::kBadFile, Cat(name, ": byte 0: neither a PNG nor a JPEG")};
+  if (head.starts_with("\x89PNG\r\n\x1a\n")) return PictureKind::kPng;
+  if (head.starts_with("\xff\xd8\xff")) return PictureKind::kJpeg;
+  if (head.starts_with("RIFF") && head.size() >= 12 && head.substr(8, 4) == "WEBP") return PictureKind::kWebp;
+  for (const std::string_view tiff : {std::string_view("II*\0", 4), std::string_view("MM\0*", 4),
+                                      std::string_view("II+\0", 4), std::string_view("MM\0+", 4)}) {
+    if (head.starts_with(tiff)) return PictureKind::kTiff;
+  }
+  if (const std::string other = OtherKind(head); !other.empty()) {
+    return Error{ErrorCode::kBadFile,
+                 Cat(name, ": is ", other, " picture, which is not read here; convert it to JPEG or PNG")};
+  }
+  return Error{ErrorCode::kBadFile, Cat(name, ": byte 0: neither a PNG nor a JPEG, WebP or TIFF")};
+}
+
+Result<std::string> AllOf(const OpenedFile& file, const std::string& name) {
+  std::string bytes(file.size, '\0');
+  if (std::fread(bytes.data(), 1, bytes.size(), file.handle.get()) != bytes.size()) {
+    return Error{ErrorCode::kIo, Cat(name, ": cannot be read to its end")};
+  }
+  return bytes;
 }
 
 Result<Image> Decode(const OpenedFile& file, const std::string& name) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureKind kind, DetectKind(file, name));
-  return (kind == PictureKind::kPng ? DecodePng : DecodeJpeg)(file.handle.get(), name, file.size);
+  if (kind == PictureKind::kPng) return DecodePng(file.handle.get(), name, file.size);
+  if (kind == PictureKind::kJpeg) return DecodeJpeg(file.handle.get(), name, file.size);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::string bytes, AllOf(file, name));
+  return kind == PictureKind::kWebp ? DecodeWebpPhotograph(name, bytes) : DecodeTiff(name, std::move(bytes));
 }
 
 }  // namespace
@@ -44,14 +89,18 @@ Result<Image> DecodeImage(const std::string& name, std::string_view bytes) {
   file.size = bytes.size();
   // Opened for reading only, so that nobody writes through the pointer. No bytes make no file everywhere.
   if (!bytes.empty()) file.handle.reset(::fmemopen(const_cast<char*>(bytes.data()), bytes.size(), "rb"));
-  if (!file.handle) return Error{ErrorCode::kBadFile, Cat(name, ": byte 0: neither a PNG nor a JPEG")};
+  if (!file.handle) return Error{ErrorCode::kBadFile, Cat(name, ": byte 0: neither a PNG nor a JPEG, WebP or TIFF")};
   return Decode(file, name);
 }
 
 Result<ImageSize> ReadImageSize(const std::filesystem::path& path) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedFile file, OpenForReading(path));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureKind kind, DetectKind(file, path.string()));
-  return (kind == PictureKind::kPng ? DecodePngSize : DecodeJpegSize)(file.handle.get(), path.string(), file.size);
+  const std::string name = path.string();
+  if (kind == PictureKind::kPng) return DecodePngSize(file.handle.get(), name, file.size);
+  if (kind == PictureKind::kJpeg) return DecodeJpegSize(file.handle.get(), name, file.size);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::string bytes, AllOf(file, name));
+  return kind == PictureKind::kWebp ? DecodeWebpSize(name, bytes) : DecodeTiffSize(name, std::move(bytes));
 }
 
 Status WritePng(const std::filesystem::path& path, const Image& image, const WriteOptions& options) {

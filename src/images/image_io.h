@@ -10,10 +10,10 @@
 
 namespace anchorsplat {
 
-// Reads a PNG or JPEG (found by content) as floats value/255 (16-bit: /65535): 3 channels, or 4 where the file has
-// alpha. Grey becomes rgb, a palette the colours in it, CMYK of a JPEG rgb without a profile: (1 − c)·(1 − k). Rows and
-// columns are those of the file: an EXIF orientation is for the caller to apply (images/orientation.h).
-// Errors: kNotFound, kIo, kBadFile.
+// Reads a PNG, JPEG, WebP or TIFF (found by content) as floats value/255 (16-bit: /65535): 3 channels, or 4 where the
+// file has alpha. Grey becomes rgb, a palette the colours in it, CMYK of a JPEG rgb without a profile: (1 − c)·(1 − k).
+// Rows and columns are those of the file: an EXIF orientation is for the caller to apply (images/orientation.h). Of a
+// TIFF (8 or 16 bits, grey or rgb) and a WebP the one picture that is in it. Errors: kNotFound, kIo, kBadFile.
 Result<Image> ReadImage(const std::filesystem::path& path);
 
 // Width and height as stored, without decoding the pixels, and EXIF's orientation, 1 to 8, where the file has one.

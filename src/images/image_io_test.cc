@@ -299,6 +299,11 @@ TEST(ReadImage, OtherFilesAreErrors) {
     EXPECT_EQ(ReadImage(folder / "a.png").error().code, ErrorCode::kBadFile) << text;
     EXPECT_EQ(ReadImageSize(folder / "a.png").error().code, ErrorCode::kBadFile) << text;
   }
+  Write(folder / "a.png", std::string("\0\0\0\x18"
+                                      "ftypheic\0\0\0\0",
+                                      16));
+  EXPECT_NE(ReadImage(folder / "a.png").error().message.find("is a HEIC picture, which is not read here; convert"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <webp/encode.h>
 
 #include "core/text.h"
+#include "images/orientation.h"
 
 namespace anchorsplat {
 
@@ -12,6 +13,35 @@ namespace {
 // Of 0–100 and 0–6: more makes such pictures hardly smaller, but takes many times as long.
 constexpr float kEffort = 20;
 constexpr int kMethod = 1;
+
+Result<WebPBitstreamFeatures> FeaturesOf(const std::string& where, std::string_view bytes) {
+  WebPBitstreamFeatures features;
+  if (WebPGetFeatures(reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size(), &features) != VP8_STATUS_OK) {
+    return Error{ErrorCode::kBadFile, Cat(where, ": the WebP picture is damaged or cut off")};
+  }
+  if (features.has_animation != 0) {
+    return Error{ErrorCode::kBadFile,
+                 Cat(where, ": an animated WebP; save the one picture that is meant in a file of its own")};
+  }
+  return features;
+}
+
+// Of the chunk "EXIF" of the file, which some programs begin as a JPEG's.
+int OrientationOf(std::string_view bytes) {
+  constexpr size_t kHead = 12, kChunkHead = 8;  // "RIFF", length, "WEBP"; name, length
+  for (size_t at = kHead; at + kChunkHead <= bytes.size();) {
+    size_t length = 0;
+    for (size_t k = 4; k-- > 0;) length = length << 8 | static_cast<unsigned char>(bytes[at + 4 + k]);
+    if (length > bytes.size() - at - kChunkHead) return 1;
+    if (bytes.substr(at, 4) == "EXIF") {
+      std::string_view exif = bytes.substr(at + kChunkHead, length);
+      if (exif.starts_with(std::string_view("Exif\0\0", 6))) exif.remove_prefix(6);
+      return OrientationOfExif(exif);
+    }
+    at += kChunkHead + length + length % 2;
+  }
+  return 1;
+}
 
 }  // namespace
 
@@ -61,6 +91,23 @@ Result<ByteImage> DecodeWebp(const std::string& where, std::string_view bytes, i
     return Error{ErrorCode::kBadFile, Cat(where, ": the WebP picture is damaged or cut off")};
   }
   return image;
+}
+
+Result<Image> DecodeWebpPhotograph(const std::string& where, std::string_view bytes) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const WebPBitstreamFeatures features, FeaturesOf(where, bytes));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ByteImage decoded, DecodeWebp(where, bytes, 1, kMaxImagePixels));
+  Image image(decoded.width, decoded.height, features.has_alpha != 0 ? 4 : 3);
+  for (int c = 0; c < image.channels; ++c) {
+    float* to = image.channel(c);
+    const uint8_t* from = decoded.rgba.data() + c;
+    for (int64_t i = 0; i < image.plane(); ++i) to[i] = static_cast<float>(from[4 * i]) / 255.0f;
+  }
+  return image;
+}
+
+Result<ImageSize> DecodeWebpSize(const std::string& where, std::string_view bytes) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const WebPBitstreamFeatures features, FeaturesOf(where, bytes));
+  return ImageSize{features.width, features.height, OrientationOf(bytes)};
 }
 
 }  // namespace anchorsplat

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "cameras/camera_io.h"
+#include "cameras/picture_folder.h"
+#include "cameras/view_labels.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
@@ -22,42 +24,44 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The picture of a camera in the folder: by name, whatever the folder the camera file has it in.
-std::optional<fs::path> FindPicture(const fs::path& folder, const Camera& camera) {
-  for (const fs::path& name : {camera.image, fs::path(camera.name)}) {
-    const std::string stem = name.stem().string();
-    if (stem.empty()) continue;
-    for (const char* extension : {".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"}) {
-      fs::path path = folder / (stem + extension);
-      if (!IsFile(path)) continue;
-      RecordInput(path);
-      return path;
-    }
+// The picture of a camera in the folder, by what tells the views apart ("cam0/0000"); empty: none.
+Result<fs::path> FindPictureOf(const fs::path& folder, const Camera& camera, const std::string& label) {
+  const fs::path place = (folder / label).parent_path();
+  const PictureFolder pictures(place);
+  for (const std::string& name : {camera.image.filename().string(), fs::path(label).filename().string()}) {
+    if (name.empty()) continue;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string file, pictures.Find(name));
+    if (file.empty()) continue;
+    RecordInput(place / file);
+    return place / file;
   }
-  return std::nullopt;
+  return fs::path();
 }
 
 // At most `--views` of the cameras, evenly over their order; with --truth only those that have a picture there.
 Result<std::vector<ViewerView>> ChooseViews(const PageFlags& flags, const CameraSet& cameras) {
   std::vector<ViewerView> all;
-  for (const Camera& camera : cameras.cameras) {
+  std::vector<std::string> names;
+  for (const Camera& camera : cameras.cameras) names.push_back(camera.name);
+  const std::vector<std::string> labels = ViewLabels(names);
+  for (size_t i = 0; i < labels.size(); ++i) {
+    const Camera& camera = cameras.cameras[i];
     ViewerView view{camera, {}};
     if (!flags.truth.empty()) {
-      const auto picture = FindPicture(flags.truth, camera);
-      if (!picture) continue;
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const fs::path picture, FindPictureOf(flags.truth, camera, labels[i]));
+      if (picture.empty()) continue;
       if (!camera.photograph.lens.IsStraight()) {
         return Error{ErrorCode::kBadArgument,
                      Cat("--truth: the pictures of ", flags.cameras,
                          " were taken through a lens, and the page shows pictures as they are; give undistorted ones "
                          "with their cameras")};
       }
-      view.picture = *picture;
+      view.picture = picture;
     }
     all.push_back(std::move(view));
   }
   if (all.empty() && !flags.truth.empty()) {
-    return Error{ErrorCode::kNotFound,
-                 Cat(flags.truth, ": no PNG or JPEG has the name of a camera in ", flags.cameras)};
+    return Error{ErrorCode::kNotFound, Cat(flags.truth, ": no picture has the name of a camera in ", flags.cameras)};
   }
   const size_t count = std::min(all.size(), static_cast<size_t>(flags.views));
   std::vector<ViewerView> chosen;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "cameras/camera_axes.h"
 #include "cameras/camera_io.h"
 #include "core/framing.h"
 #include "core/log.h"
@@ -134,6 +135,10 @@ Result<CameraSet> MakeViews(const ViewFlags& flags, const CloudView& cloud, cons
     cameras = *given;
   } else if (!flags.cameras.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, ReadCameras(flags.cameras));
+  }
+  if (flags.orbit == 0 && cloud.size() > 0) {
+    const std::string wrong = WrongAxes(cameras, cloud.means);
+    if (!wrong.empty()) LogWarning(Cat(flags.cameras.empty() ? "" : flags.cameras + ": ", wrong));
   }
   if (flags.cameras.empty() || flags.orbit > 0) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, OrbitViews(flags, cloud, cameras));

@@ -107,11 +107,15 @@ Result<Json> AddSplat(const ViewerSplat& splat, const WorldOrigin& origin, const
 // The picture's MIME type goes by its first bytes: a browser that is told the truth does not guess.
 Result<Json> AddPicture(const std::filesystem::path& path, const std::string& id, std::vector<DataElement>& elements) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string bytes, ReadFileBytes(path, kMaxPictureBytes));
-  const std::string_view head = std::string_view(bytes).substr(0, 8);
+  const std::string_view head = std::string_view(bytes).substr(0, 12);
   std::string type;
-  if (head == "\x89PNG\r\n\x1a\n") type = "image/png";
+  if (head.starts_with("\x89PNG\r\n\x1a\n")) type = "image/png";
   if (head.starts_with("\xff\xd8\xff")) type = "image/jpeg";
-  if (type.empty()) return Error{ErrorCode::kBadFile, Cat(path.string(), ": neither a PNG nor a JPEG")};
+  if (head.starts_with("RIFF") && head.ends_with("WEBP")) type = "image/webp";
+  if (type.empty()) {
+    return Error{ErrorCode::kBadFile,
+                 Cat(path.string(), ": browsers show PNG, JPEG and WebP; convert it to one of these")};
+  }
   elements.push_back({id, Base64({reinterpret_cast<const uint8_t*>(bytes.data()), bytes.size()})});
   return Json{{"type", type}, {"element", id}};
 }

@@ -270,6 +270,12 @@ void AddImageFormats(const fs::path& folder, std::vector<FuzzReader>& readers) {
   readers.push_back({"jpeg", JpegSeeds(), {}, [path = folder / "fuzz.jpg"](const std::string& bytes) {
                        return ReadAsImage(path, bytes);
                      }});
+  readers.push_back({"webp", WebpSeeds(), {}, [path = folder / "fuzz.webp"](const std::string& bytes) {
+                       return ReadAsImage(path, bytes);
+                     }});
+  readers.push_back({"tiff", TiffSeeds(), {}, [path = folder / "fuzz.tif"](const std::string& bytes) {
+                       return ReadAsImage(path, bytes);
+                     }});
 }
 
 }  // namespace

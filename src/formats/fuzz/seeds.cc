@@ -4,6 +4,7 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -18,6 +19,7 @@
 #include "core/text.h"
 #include "formats/spz/spz_writer.h"
 #include "images/image_io.h"
+#include "images/webp_image.h"
 #include "io/atomic_file.h"
 #include "io/file_bytes_for_test.h"
 #include "io/zip_archive.h"
@@ -480,5 +482,54 @@ std::vector<std::string> PngSeeds(const std::filesystem::path& folder) {
 }
 
 std::vector<std::string> JpegSeeds() { return {Jpeg(false), Jpeg(true)}; }
+
+std::vector<std::string> WebpSeeds() {
+  std::vector<std::string> seeds;
+  for (const uint8_t alpha : {255, 100}) {
+    ByteImage image{7, 5, {}};
+    for (int i = 0; i < 4 * 35; ++i) image.rgba.push_back(i % 4 == 3 ? alpha : static_cast<uint8_t>(11 * i));
+    seeds.push_back(*EncodeWebp(std::move(image)));
+  }
+  return seeds;
+}
+
+// Little-endian, not compressed, rgb: in strips of two rows, and in tiles of 16 x 16.
+std::vector<std::string> TiffSeeds() {
+  std::vector<std::string> seeds;
+  for (const bool tiled : {false, true}) {
+    constexpr uint32_t kWidth = 7, kHeight = 4, kRows = 2, kSide = 16;
+    const std::string pixels(3 * (tiled ? kSide * kSide : kWidth * kHeight), 'p');
+    Binary file(false);
+    file.Text(std::string_view("II*", 4));  // with a zero behind it
+    file.Put(8 + static_cast<uint32_t>(pixels.size()));
+    file.Text(pixels);
+    const uint32_t strip = 3 * kWidth * kRows;
+    using Entry = std::array<uint32_t, 4>;  // tag, type (3: 16 bits, 4: 32), count, value or where it is
+    std::vector<Entry> entries = {{256, 4, 1, kWidth}, {257, 4, 1, kHeight}, {258, 3, 1, 8},
+                                  {259, 3, 1, 1},      {262, 3, 1, 2},       {277, 3, 1, 3}};
+    const uint32_t behind = 8 + static_cast<uint32_t>(pixels.size()) + 2 + 12 * (tiled ? 10 : 9) + 4;
+    if (tiled) {
+      entries.insert(
+          entries.end(),
+          {{322, 4, 1, kSide}, {323, 4, 1, kSide}, {324, 4, 1, 8}, {325, 4, 1, static_cast<uint32_t>(pixels.size())}});
+    } else {
+      entries.insert(entries.end() - 1, {273, 4, 2, behind});
+      entries.insert(entries.end(), {{278, 4, 1, kRows}, {279, 4, 2, behind + 8}});
+    }
+    file.Put(static_cast<uint16_t>(entries.size()));
+    for (const auto& [tag, type, count, value] : entries) {
+      file.Put(static_cast<uint16_t>(tag));
+      file.Put(static_cast<uint16_t>(type));
+      file.Put(count);
+      file.Put(value);
+    }
+    file.Put(uint32_t{0});
+    for (const uint32_t number : {8u, 8 + strip, strip, strip}) {  // where the two strips are and how long
+      if (!tiled) file.Put(number);
+    }
+    seeds.push_back(file.bytes());
+  }
+  return seeds;
+}
 
 }  // namespace anchorsplat

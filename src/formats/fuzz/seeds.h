@@ -50,6 +50,8 @@ ColmapSeeds ColmapBinarySeeds();
 ColmapSeeds ColmapTextSeeds();
 
 std::vector<std::string> PngSeeds(const std::filesystem::path& folder);  // 1, 3 and 4 channels
+std::vector<std::string> WebpSeeds();                                    // opaque and with alpha
+std::vector<std::string> TiffSeeds();                                    // in strips and in tiles
 std::vector<std::string> JpegSeeds();                                    // baseline and progressive
 
 }  // namespace anchorsplat

@@ -34,7 +34,9 @@ constexpr ColmapCameraModel kModels[] = {
 Error BadModel(std::string sentence) { return Error{ErrorCode::kBadFile, std::move(sentence)}; }
 
 PicturePlaces PlacesOfModel(const std::filesystem::path& folder) {
-  PicturePlaces places{.project = ProjectAbove(folder), .complete = true};
+  PicturePlaces places;
+  places.project = ProjectAbove(folder);
+  places.complete = true;
   // INRIA's convert.py has the model of the pictures as they were taken in PROJECT/distorted, those in PROJECT/input,
   // and undistorted ones in PROJECT/images.
   const std::string relative = AbsolutePath(folder).lexically_relative(AbsolutePath(places.project)).string();

@@ -205,9 +205,10 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
     ANCHORSPLAT_RETURN_IF_ERROR(model.empty() ? ReadPoints(points, frame, out.points)
                                               : ReadPointsOfModel(model, frame, out.points));
   }
-  if (const std::string wrong =
-          WrongAxes({.source = kind, .cameras = out.train, .background = {}, .points = {}}, out.points.positions);
-      !wrong.empty()) {
+  CameraSet seen;
+  seen.source = kind;
+  seen.cameras = out.train;
+  if (const std::string wrong = WrongAxes(seen, out.points.positions); !wrong.empty()) {
     LogWarning(Cat(source.string(), ": ", wrong));
   }
   if (out.train.empty()) {

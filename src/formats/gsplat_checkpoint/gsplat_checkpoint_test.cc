@@ -138,7 +138,9 @@ TEST(GsplatCheckpoint, ReadsInrias) {
         EXPECT_EQ(cloud->sh_degree, rest == 0 ? 0 : rest == 3 ? 1 : 3);
         EXPECT_THAT(cloud->means, ElementsAre(Ramp(0, 0), Ramp(0, 1), Ramp(0, 2)));
         EXPECT_EQ(cloud->sh[0], Ramp(0, 3));
-        if (rest > 0) EXPECT_EQ(cloud->sh[3], Ramp(0, 6));
+        if (rest > 0) {
+          EXPECT_EQ(cloud->sh[3], Ramp(0, 6));
+        }
         EXPECT_EQ(cloud->log_scales[1], Ramp(0, 52));
         const float third = scales == 3 ? Ramp(0, 53) : -std::numeric_limits<float>::infinity();
         EXPECT_EQ(cloud->log_scales[2], third);

@@ -150,7 +150,7 @@ Result<SpzFile> OpenStreams(const InputFile& file, const ReadLimits& limits) {
   return spz;
 }
 
-bool IsGzip(const std::string& head) { return head.starts_with("\x1f\x8b"); }
+bool IsGzip(const std::string& head) { return head.size() > 1 && head[0] == '\x1f' && head[1] == '\x8b'; }
 
 Result<SpzHeader> ReadHeader(const InputFile& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));

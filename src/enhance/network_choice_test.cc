@@ -11,6 +11,7 @@
 
 #include "enhance/enhance.h"
 #include "enhance/enhance_door_for_test.h"
+#include "enhance/filter.h"
 #include "enhance/network_for_test.h"
 
 // Which splats a network enhances that nobody asked for, and with which pixel sizes.

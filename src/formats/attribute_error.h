@@ -17,7 +17,7 @@ struct Deviation {
 
 struct AttributeError {
   int64_t compared = 0;  // rows
-  int64_t left_out = 0;  // rows with values that are not numbers in either cloud
+  int64_t left_out = 0;  // rows that are not usable (core/gaussian_cloud.h) in either cloud
   Deviation means;       // distance, world units
   Deviation log_scales;  // per axis; scales below e⁻²⁰ count as e⁻²⁰, what no rasterizer can tell from 0
   Deviation rotations;   // angle between the two, radians, 0–π

@@ -224,10 +224,13 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
       }
       ANCHORSPLAT_ASSIGN_OR_RETURN(report.error, CompareAttributes(back, written_cloud, {}, world));
     } else {
-      const HiddenRows hidden = HideRows(*to, cloud);
-      const Buffer<uint32_t> order =
-          WriteOrder(hidden.any() ? CloudView(hidden.written) : CloudView(cloud), write.order, to->order);
-      ANCHORSPLAT_ASSIGN_OR_RETURN(report.error, CompareAttributes(back, cloud, order, extras.world));
+      HiddenRows hidden = HideRows(*to, cloud);
+      const CloudView expected = hidden.any() ? CloudView(hidden.written) : CloudView(cloud);
+      const Buffer<uint32_t> order = WriteOrder(expected, write.order, to->order);
+      for (const Buffer<int64_t>* rows : {&hidden.unusable, &hidden.strays.rows}) {  // have nothing to be compared
+        for (const int64_t row : *rows) hidden.written.opacity_logits[static_cast<size_t>(row)] = std::nanf("");
+      }
+      ANCHORSPLAT_ASSIGN_OR_RETURN(report.error, CompareAttributes(back, expected, order, extras.world));
     }
   }
   if (kept != nullptr) *kept = std::move(cloud);

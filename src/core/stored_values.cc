@@ -108,8 +108,10 @@ int LooksLikeColors(const StoredSample& sample) {
   if (sample.opacities.size() < kFewestRows) return 0;
   const auto [low, high] = std::ranges::minmax(sample.colors);
   if (!(low >= 0)) return 0;
-  if (high <= 1) return low < 0.05f && high > 0.95f ? 1 : 0;
   std::vector<float> sorted(sample.colors.begin(), sample.colors.end());
+  // As harmonics these would be light greys only, and none of them beyond the ends.
+  constexpr float kWide = 0.6f;
+  if (high <= 1) return Quantile(sorted, 0.99) - Quantile(sorted, 0.01) > kWide ? 1 : 0;
   // White is 1.8; an average of ten is beyond all light.
   return high <= 255 && Quantile(sorted, 0.5) > 10 ? 255 : 0;
 }

@@ -33,7 +33,7 @@ StoredSample SampleOf(const CloudView& cloud);
 bool LooksLikeLengths(const StoredSample& sample);
 // From 0 to 1: logits in there would be opacities of 50 to 73 % only.
 bool LooksLikeOpacities(const StoredSample& sample);
-// 1: f_dc are colours from 0 to 1, all of it and nothing beyond; 255: from 0 to 255; 0: neither.
+// 1: f_dc are colours from 0 to 1, most of it and nothing beyond; 255: from 0 to 255; 0: neither.
 int LooksLikeColors(const StoredSample& sample);
 
 }  // namespace anchorsplat

@@ -70,7 +70,7 @@ TEST(StoredValues, OpacitiesAndColors) {
   for (float& x : cloud.sh) x *= 255;
   EXPECT_EQ(LooksLikeColors(SampleOf(cloud)), 255);
   // Light grey all over.
-  for (float& x : cloud.sh) x = 0.2f + 0.6f * x / 255;
+  for (float& x : cloud.sh) x = 0.2f + 0.5f * x / 255;
   EXPECT_EQ(LooksLikeColors(SampleOf(cloud)), 0);
 }
 

@@ -73,6 +73,8 @@ Result<GltfPrimitive> OpenPrimitive(const GltfDocument& document, const JsonValu
   const auto name = [](const char* what) { return Cat(kGltfSplatting, ":", what); };
   GltfPrimitive primitive;
   ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.linear, IsLinear(extension));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string sorting, WordOf(extension, "sortingMethod", "cameraDistance"));
+  primitive.other_sorting = sorting != "cameraDistance";
   ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.means, Attribute(document, attributes, "POSITION", 3, true));
   ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.quats, Attribute(document, attributes, name("ROTATION"), 4, true));
   ANCHORSPLAT_ASSIGN_OR_RETURN(primitive.scales, Attribute(document, attributes, kScale, 3, true));
@@ -193,6 +195,7 @@ Status FindMeanings(const JsonValue& attributes, const std::string& where, GltfP
   add(primitive.logarithms, "SCALE has negative values, so it is read as logarithms instead of lengths");
   add(primitive.logits, "OPACITY has values outside of 0 to 1, so it is read as logits instead of opacities");
   add(primitive.linear, LinearColorInWords(primitive.degree));
+  add(primitive.other_sorting, "its sortingMethod is not known: Gaussians are drawn from back to front");
   return {};
 }
 

@@ -27,6 +27,7 @@ struct GltfPrimitive {
   GltfPlace place;
   bool logarithms = false, logits = false;  // in the place of lengths, of opacities (gltf_meanings.h)
   bool linear = false;                      // its colours are linear light (linear_color.h)
+  bool other_sorting = false;               // than by the distance to the camera
 
   // Its harmonics have to be seen to know its colours, or are turned.
   bool mixes_harmonics() const { return degree > 0 && (linear || place.turns()); }

@@ -452,6 +452,14 @@ TEST(Gltf, TurnedMirroredAndScaledNodesLookAsTheyShould) {
   }
 }
 
+TEST(Gltf, AnotherOrderIsSaid) {
+  Glb glb = Example(10, 0);
+  glb.json["meshes"][0]["primitives"][0]["extensions"]["KHR_gaussian_splatting"]["sortingMethod"] = "byIndex";
+  const Messages messages;
+  EXPECT_TRUE(Read(glb.bytes()).ok());
+  EXPECT_THAT(messages.warnings(), testing::ElementsAre(testing::HasSubstr("sortingMethod")));
+}
+
 TEST(Gltf, OnlyWhatTheSceneShows) {
   Glb glb = Example(10, 0);
   glb.json["nodes"] = Json::parse(R"([{"mesh":0},{"mesh":0,"translation":[9,0,0]},

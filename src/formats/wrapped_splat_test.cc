@@ -217,9 +217,9 @@ TEST_F(WrappedSplat, EachFormatUnderEachName) {
   const std::vector<std::string> extensions = {".ply", ".compressed.ply", ".splat", ".spz", ".sog", ".glb"};
   for (const std::string& is : extensions) {
     const std::string bytes = As("right" + is);
-    for (const char* const name : {".ply", ".compressed.ply", ".splat", ".ksplat", ".spz", ".sog", ".glb", ".gltf",
+    for (const std::string name : {".ply", ".compressed.ply", ".splat", ".ksplat", ".spz", ".sog", ".glb", ".gltf",
                                     ".pt", ".zip", ".csv", ".bin", ""}) {
-      const fs::path wrong = File(std::string("wrong") + name, bytes);
+      const fs::path wrong = File("wrong" + name, bytes);
       if (is == ".splat" && FormatOfExtension(wrong) == nullptr) {  // which has no mark, and --from is for
         EXPECT_CONTAINS(ErrorOf(wrong), "is no splat file of a known format");
       } else {

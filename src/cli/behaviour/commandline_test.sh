@@ -68,7 +68,7 @@ expect 2 "no format" "$program" convert "$scan" - --to obj
 expect 2 "a format for a file" "$program" enhance "$scan" -o "$work/x.ply" --to spz
 expect 6 "a full disk under it" bash -c "'$program' convert '$scan' - >/dev/full"
 says stderr "standard output could not be written"
-expect 6 "nobody reads it" bash -c "set -o pipefail; '$program' convert '$scan' - 2>'$work/err' | head -c 1 >/dev/null; exit \${PIPESTATUS[0]}"
+expect 6 "nobody reads it" bash -c "set -o pipefail; '$program' convert '$input' - 2>'$work/err' | head -c 1 >/dev/null; exit \${PIPESTATUS[0]}"
 expect 4 "nothing comes out of a bad file" out convert "$work/text.ply" - -q
 expect 0 "not a byte" test ! -s "$work/out"
 if command -v script >/dev/null; then

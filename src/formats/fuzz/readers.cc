@@ -10,6 +10,7 @@
 #include "cameras/camera_io.h"
 #include "cameras/colmap_model.h"
 #include "core/gaussian_cloud.h"
+#include "core/messages_for_test.h"
 #include "core/random.h"
 #include "core/text.h"
 #include "formats/blocks_for_test.h"
@@ -87,6 +88,7 @@ void Put(const fs::path& path, const std::string& bytes) {
 
 Status ReadAsCameras(const fs::path& file, const fs::path& target, const std::string& bytes) {
   Put(file, bytes);
+  const Messages unsaid;  // what is left out of thousands of files
   const auto set = ReadCameras(target);
   if (!set.ok()) return CheckError(set.error(), target.filename().string());
   for (const Camera& camera : set->cameras) {

@@ -107,17 +107,18 @@ Seen CountSeen(std::span<const Camera> cameras, std::span<const float> points) {
 
 std::string WrongAxes(const CameraSet& set, std::span<const float> points) {
   if (set.source != CameraSource::kTransforms || set.cameras.empty()) return "";
-  const bool away = AllLookAway(set.cameras);
   if (points.size() < 3) {
-    if (!away || IsUprightInZ(set.cameras)) return "";
+    if (!AllLookAway(set.cameras) || IsUprightInZ(set.cameras)) return "";
     return Cat(
         "all ", set.cameras.size(),
         " cameras look away from the middle between them; if they should look at it, the file has OpenCV's axes: ",
         kRemedy);
   }
-  constexpr double kEnough = 0.05, kClear = 5, kWithBoth = 1.5;
+  // Within a room cameras that look outwards see less of it than the other way, but some of it.
+  constexpr double kEnough = 0.05, kClear = 5, kSome = 0.01;
   const Seen seen = CountSeen(set.cameras, points);
-  if (seen.turned < kEnough || seen.turned < (away ? kWithBoth : kClear) * seen.read) return "";
+  if (seen.turned < kEnough || seen.turned < kClear * seen.read) return "";
+  if (seen.read > kSome && IsUprightInZ(set.cameras)) return "";
   const auto percent = [](double part) { return Cat(Fixed(100 * part, 0), " %"); };
   return Cat("the cameras see ", percent(seen.read), " of the scene and would see ", percent(seen.turned),
              " looking the other way; if the file has OpenCV's axes, ", kRemedy);

@@ -138,7 +138,7 @@ Result<std::vector<std::filesystem::path>> FindCameraFiles(const std::filesystem
 
 // Whether a model lies where COLMAP's and INRIA's projects have theirs.
 bool IsPlainProject(const std::filesystem::path& project, const std::filesystem::path& model) {
-  return model == project || model.parent_path() == project || model.parent_path() == project / "sparse";
+  return model == project || model == project / "sparse" || model.parent_path() == project / "sparse";
 }
 
 // Models of one capture that COLMAP could not join have worlds of their own, and cannot be put together here either.

@@ -314,6 +314,21 @@ TEST(ReadCameras, ProgramsAgree) {
   }
 }
 
+// nerfstudio and instant-ngp leave the models that they made a transforms.json from beside it.
+TEST(ReadCameras, ModelsBesideTheFileThatWasMadeFromThem) {
+  const TestFolder folder;
+  for (const char* place : {"colmap/sparse/0", "sparse_txt", "colmap_text"}) {
+    std::filesystem::create_directories(folder / place);
+    Write(folder / place / "cameras.txt", "1 PINHOLE 8 6 10 10 4 3\n");
+    Write(folder / place / "images.txt", "1 1 0 0 0 0 0 0 1 a.png\n\n");
+  }
+  EXPECT_EQ(ReadCameras(folder.path())->cameras.size(), 1u);
+  ASSERT_TRUE(WriteTransforms(folder / "transforms.json", RandomCameras(3, 4)).ok());
+  const auto set = ReadCameras(folder.path());
+  ASSERT_TRUE(set.ok()) << set.error().message;
+  EXPECT_EQ(set->cameras.size(), 3u);
+}
+
 // Nothing else tells of masks that were meant and are not found.
 TEST(CameraIo, WarnsOfMasksThatAreNotFound) {
   const TestFolder folder;

@@ -144,7 +144,8 @@ std::vector<FoundModel> FindColmapModels(const std::filesystem::path& project) {
   take(project / "sparse", "");
   const bool sparse = AbsolutePath(project / ".").parent_path().filename().string().starts_with("sparse");
   if (found.empty()) take(project, sparse ? "" : "sparse");
-  for (const char* place : {"colmap/sparse", "colmap", "dense/sparse", "distorted/sparse"}) {
+  for (const char* place :
+       {"colmap/sparse", "colmap", "colmap_sparse", "colmap_text", "dense/sparse", "distorted/sparse"}) {
     if (found.empty()) take(project / place, "");
   }
   std::ranges::stable_sort(found, std::ranges::greater(), &FoundModel::pictures);

@@ -97,13 +97,14 @@ Parts PartsOf(const fs::path& folder) {
   return parts;
 }
 
-// masks, depth_maps, normal-8: by its first word.
+// masks, depth_maps, normal-8, what programs render (ours_30000/renders beside gt): by its first word.
 bool IsOfOtherThings(const std::string& name) {
   std::string word =
       name.substr(0, std::ranges::find_if_not(name, [](unsigned char c) { return std::isalpha(c); }) - name.begin());
   if (word.ends_with('s')) word.pop_back();
-  for (const char* other : {"mask", "depth", "depthmap", "normal", "normalmap", "seg", "segment", "segmentation",
-                            "semantic", "label", "flow", "thumb", "thumbnail", "preview"}) {
+  for (const char* other :
+       {"mask", "depth", "depthmap", "normal", "normalmap", "seg", "segment", "segmentation", "semantic", "label",
+        "flow", "thumb", "thumbnail", "preview", "render", "gt", "our", "eval"}) {
     if (word == other) return true;
   }
   return false;

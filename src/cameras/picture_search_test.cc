@@ -33,6 +33,7 @@ TEST(FindPictures, NamesOfOtherMachines) {
   Put(project / "images_4/0001.png");
   Put(project / "masks/0001.png");
   Put(project / "depth/0001.png");
+  Put(project / "test/ours_30000/gt/0001.png");
   const PicturePlaces places{.folders = {project}, .project = project};
   for (const char* name :
        {"images/0001.png", "./images/0001.png", "images\\0001.png", ".\\images\\0001.png", "images/0001", "0001.png",

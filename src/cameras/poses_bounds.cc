@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -15,6 +14,7 @@
 #include "cameras/camera_checks.h"
 #include "core/file_system.h"
 #include "core/text.h"
+#include "images/picture_names.h"
 #include "io/file_bytes.h"
 #include "io/input_record.h"
 
@@ -112,10 +112,7 @@ Result<std::vector<fs::path>> PicturesBeside(const fs::path& file) {
     if (!IsFolder(base / name)) continue;
     std::error_code code;
     for (fs::directory_iterator it(base / name, code), end; !code && it != end; it.increment(code)) {
-      std::string extension = it->path().extension().string();
-      std::transform(extension.begin(), extension.end(), extension.begin(),
-                     [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-      if (extension == ".png" || extension == ".jpg" || extension == ".jpeg") pictures.push_back(it->path());
+      if (HasPictureExtension(it->path())) pictures.push_back(it->path());
     }
     if (code) return Error{ErrorCode::kIo, Cat((base / name).string(), ": ", code.message())};
     break;

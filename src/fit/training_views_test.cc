@@ -109,6 +109,25 @@ TEST(TrainingViews, PointsMoveWithTheCameras) {
   }
 }
 
+TEST(TrainingViews, MissingPicturesAreNamed) {
+  const TestFolder folder;
+  WriteColmap(folder.path(), 4);
+  fs::remove(folder / "images/v11.png");
+  Messages messages;
+  ASSERT_TRUE(OpenProject(folder.path()).ok());
+  ASSERT_EQ(messages.warnings().size(), 1u);
+  EXPECT_NE(
+      messages.warnings()[0].find("1 of 4 views have no picture and are left out: v11; the first was looked for at " +
+                                  (folder / "images/v11.png").string()),
+      std::string::npos)
+      << messages.warnings()[0];
+  fs::remove_all(folder / "images");
+  const auto none = OpenProject(folder.path());
+  ASSERT_FALSE(none.ok());
+  EXPECT_EQ(none.error().code, ErrorCode::kNotFound);
+  EXPECT_NE(none.error().message.find((folder / "images/v13.png").string()), std::string::npos) << none.error().message;
+}
+
 TEST(TrainingViews, LensMaskPointsAndDownscale) {
   const TestFolder folder;
   WriteColmap(folder.path(), 4);

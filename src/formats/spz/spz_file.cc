@@ -150,7 +150,7 @@ Result<SpzFile> OpenStreams(const InputFile& file, const ReadLimits& limits) {
   return spz;
 }
 
-bool IsGzip(const std::string& head) { return head.size() > 1 && head[0] == '\x1f' && head[1] == '\x8b'; }
+bool IsGzip(std::string_view head) { return head.starts_with("\x1f\x8b"); }
 
 Result<SpzHeader> ReadHeader(const InputFile& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
@@ -169,9 +169,10 @@ int SpzFile::sh_degree() const { return std::min(layout.sh_degree, kMaxShDegree)
 size_t SpzFile::sections() const { return layout.sh_degree > 0 ? 6 : 5; }
 
 Result<SpzFile> OpenSpz(const InputFile& file, const ReadLimits& limits) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(8));
-  if (IsGzip(head)) return OpenOneStream(file, OpenGzip(file, 0), limits);
-  const bool is_plain = head.size() == 8 && LoadLittle<uint32_t>(head.data() + 4) < 4;
+  const Result<std::string> head = file.Head(8);  // moved out of, GCC 12 takes it for uninitialised
+  if (!head.ok()) return head.error();
+  if (IsGzip(*head)) return OpenOneStream(file, OpenGzip(file, 0), limits);
+  const bool is_plain = head->size() == 8 && LoadLittle<uint32_t>(head->data() + 4) < 4;
   return is_plain ? OpenOneStream(file, OpenPlain(file, 0), limits) : OpenStreams(file, limits);
 }
 

@@ -125,6 +125,9 @@ size_t SpzFile::sections() const { return layout.sh_degree > 0 ? 6 : 5; }
 Result<SpzFile> OpenSpz(const InputFile& file, const ReadLimits& limits) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(8));
   if (IsGzip(head)) return OpenOneStream(file, OpenGzip(file, 0), limits);
+  if (!head.starts_with("NGSP")) {
+    return Error{ErrorCode::kBadFile, Cat(At(file, 0), ": does not begin with \"NGSP\": no SPZ file")};
+  }
   const bool is_plain = head.size() == 8 && LoadLittle<uint32_t>(head.data() + 4) < 4;
   return is_plain ? OpenOneStream(file, OpenPlain(file, 0), limits) : OpenStreams(file, limits);
 }

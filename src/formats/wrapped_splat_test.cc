@@ -255,8 +255,8 @@ TEST_F(WrappedSplat, SaysWhatIsNoSplat) {
   expect("Rar!\x1a\x07" + std::string(50, 'x'), "is a RAR archive");
   expect("7z\xbc\xaf\x27\x1c" + std::string(50, 'x'), "is a 7z archive");
   EXPECT_CONTAINS(ErrorOf(File("a.splat", "404: Not Found\n")),
-                  "is text and no splat; it begins with \"404: Not Found");
-  EXPECT_CONTAINS(ErrorOf(File("a.ksplat", "{\"message\": \"no\"}")), "is text and no splat");
+                  "is no .splat file but text; it begins with \"404: Not Found");
+  EXPECT_CONTAINS(ErrorOf(File("a.ksplat", "{\"message\": \"no\"}")), "is no .ksplat file but text");
   expect(std::string(257, 'x') + "ustar" + std::string(250, '\0'), "is a tar archive");
 }
 

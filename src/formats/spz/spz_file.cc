@@ -10,7 +10,6 @@
 #include "formats/cloud_checks.h"
 #include "formats/spz/spz_reader.h"
 #include "io/compression_ratio.h"
-#include "io/little_endian.h"
 
 namespace anchorsplat {
 
@@ -104,7 +103,7 @@ Result<SpzFile> OpenStreams(const InputFile& file, const ReadLimits& limits) {
   return spz;
 }
 
-bool IsGzip(const std::string& head) { return head.starts_with("\x1f\x8b"); }
+bool IsGzip(const std::string& head) { return head == "\x1f\x8b"; }
 
 Result<SpzHeader> ReadHeader(const InputFile& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
@@ -123,13 +122,14 @@ int SpzFile::sh_degree() const { return std::min(layout.sh_degree, kMaxShDegree)
 size_t SpzFile::sections() const { return layout.sh_degree > 0 ? 6 : 5; }
 
 Result<SpzFile> OpenSpz(const InputFile& file, const ReadLimits& limits) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(8));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
   if (IsGzip(head)) return OpenOneStream(file, OpenGzip(file, 0), limits);
-  if (!head.starts_with("NGSP")) {
+  std::array<uint32_t, 2> mark{};  // and the version
+  ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(0, mark.data(), std::min<size_t>(sizeof mark, file.size())));
+  if (mark[0] != kSpzMagic) {
     return Error{ErrorCode::kBadFile, Cat(At(file, 0), ": does not begin with \"NGSP\": no SPZ file")};
   }
-  const bool is_plain = head.size() == 8 && LoadLittle<uint32_t>(head.data() + 4) < 4;
-  return is_plain ? OpenOneStream(file, OpenPlain(file, 0), limits) : OpenStreams(file, limits);
+  return mark[1] < 4 ? OpenOneStream(file, OpenPlain(file, 0), limits) : OpenStreams(file, limits);
 }
 
 void WarnOfSpzDegree(const InputFile& file, const SpzFile& spz) {

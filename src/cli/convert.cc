@@ -233,6 +233,9 @@ Status RunConvert(const ConvertWords& flags, Program& program) {
     return Error{ErrorCode::kBadArgument, "--to has an effect with --out-dir, and where the output is -"};
   }
   if (!is_piped) return RunJobs(flags, program);
+  if (flags.to_option->count() == 0) {
+    return Error{ErrorCode::kBadArgument, "the output - has no name that tells a format: say one, as --to .ply"};
+  }
   if (flags.lod) return Error{ErrorCode::kBadArgument, "--lod writes several files, and standard output is one"};
   ANCHORSPLAT_ASSIGN_OR_RETURN(const StandardOutput piped, StandardOutput::ForSplat(flags.to, program.flags));
   ConvertWords words = flags;

@@ -201,7 +201,7 @@ TEST_F(ConvertVerb, OverwritesOnlyWhenTold) {
 TEST_F(ConvertVerb, RefusesWhatMakesNoSense) {
   const std::string out = folder_ / "out.ply";
   ExpectRefused({"convert", scan_}, ErrorCode::kBadArgument, {"say IN OUT"});
-  ExpectRefused({"convert", scan_, "-"}, ErrorCode::kBadArgument);
+  ExpectRefused({"convert", scan_, "-"}, ErrorCode::kBadArgument, {"as --to .ply"});
   ExpectRefused({"convert", scan_, folder_ / "out.obj"}, ErrorCode::kBadArgument, {"out.obj"});
   ExpectRefused({"convert", scan_, out, "--coords", "XYZ"}, ErrorCode::kBadArgument, {"--coords"});
   ExpectRefused({"convert", scan_, out, "--coords", ""}, ErrorCode::kBadArgument, {"--coords"});

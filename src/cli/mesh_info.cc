@@ -191,7 +191,7 @@ bool LooksLikeMesh(const std::string& address) {
   const auto contains = [&](const char* words) { return beginning.find(words) != std::string::npos; };
   // By content first, as splats are: a splat may have faces beside it, and any name.
   const SplatFormat* const format = FormatOfFile(beginning, {});
-  if (format == nullptr) return ending != ".ply";
+  if (format == nullptr) return ending != ".ply" && ending != ".glb" && ending != ".gltf";
   if (format->name == "PLY") return contains("element face") && !ExtentOf(address);
   return format->name.starts_with("glTF") && !contains("KHR_gaussian_splatting");
 }

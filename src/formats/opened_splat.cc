@@ -72,8 +72,8 @@ Result<OpenedSplat> OpenedSplat::Of(InputFile input, const SplatFormat* format) 
       ANCHORSPLAT_ASSIGN_OR_RETURN(format, FormatOfFile(file, found.name));
     }
     if (format != nullptr && format->looks_like != nullptr && IsText(head) && !format->looks_like(file)) {
-      return Error{ErrorCode::kBadFile,
-                   Cat(file.name(), ": is text and no splat; it begins with \"", Printable(head.substr(0, 60)), "\"")};
+      return Error{ErrorCode::kBadFile, Cat(file.name(), ": is no ", format->extensions.front(),
+                                            " file but text; it begins with \"", Printable(head.substr(0, 60)), "\"")};
     }
     OpenedSplat opened(std::move(file), format);
     opened.packed_ = std::move(found.packed);

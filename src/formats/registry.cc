@@ -72,8 +72,9 @@ bool IsGltf(std::string_view head) { return head.starts_with("glTF"); }
 
 // Its keys come in any order; a SOG has an "asset", too.
 bool IsGltfJson(std::string_view head) {
-  return IsJsonObject(head) && !IsSog(head) &&
-         (Has(head, "\"accessors\"") || Has(head, "\"bufferViews\"") || Has(head, "\"KHR_gaussian_splatting"));
+  constexpr std::string_view kKeys[] = {"\"accessors\"", "\"bufferViews\"", "\"buffers\"", "\"meshes\"", "\"scenes\""};
+  return IsJsonObject(head) && !IsSog(head) && Has(head, "\"asset\"") &&
+         std::ranges::any_of(kKeys, [head](std::string_view key) { return Has(head, key); });
 }
 
 bool IsCsv(std::string_view head) { return head.starts_with("x,y,z,f_dc_0,"); }

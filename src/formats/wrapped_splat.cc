@@ -63,8 +63,11 @@ std::string Listed(const std::vector<std::string>& names) {
 // The member of an archive that is a splat; nothing where the archive itself is one.
 Result<std::optional<std::string>> SplatIn(const InputFile& file, const ZipReader& archive) {
   std::vector<std::string> members = archive.Members();
-  if (FolderOfSog(members)) return std::optional<std::string>();
   std::erase_if(members, IsSystems);
+  if (std::ranges::any_of(members, [](const fs::path& name) { return name.filename() == "lod-meta.json"; })) {
+    return Bad(file, "is a ZIP archive of a streamed SOG: unpack it and give its folder");
+  }
+  if (FolderOfSog(members)) return std::optional<std::string>();
   std::vector<std::string> splats;
   std::ranges::copy_if(members, std::back_inserter(splats), [](const std::string& name) { return IsRead(name); });
   if (splats.empty() && members.size() == 1) splats = members;  // whatever it is called
@@ -81,11 +84,11 @@ Result<std::optional<UnwrappedSplat>> TakeOutOfZip(const InputFile& file, uint64
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<std::string> member, SplatIn(file, archive));
   if (!member) return std::optional<UnwrappedSplat>();
   const fs::path name = fs::path(*member).filename();
-  if (name == "lod-meta.json") return Bad(file, "is a ZIP archive of a streamed SOG: unpack it and give its folder");
   const uint64_t size = archive.SizeOf(*member);
   ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), paid, size));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Buffer<char> contents, archive.ReadLarge(*member, size));
-  InputFile inside = InputFile::Inside(file, Cat(file.name(), ": ", Printable(*member)), std::move(contents));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::string contents, archive.Read(*member, size));
+  // What lies beside the archive is not what lies beside its member.
+  InputFile inside = InputFile::FromBytes(Cat(file.name(), ": ", Printable(*member)), std::move(contents));
   return std::optional(UnwrappedSplat{std::move(inside), name, Cat("ZIP archive around ", Printable(*member))});
 }
 

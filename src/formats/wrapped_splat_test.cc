@@ -200,7 +200,12 @@ TEST_F(WrappedSplat, ArchivesOfOtherThings) {
                   "a.zip: is a ZIP archive of 2 splats (x/one.ply, two.spz): unpack it and give one of them");
   EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"a.txt", "a"}, {"b.txt", "b"}})), "without a splat; in it are a.txt, b.txt");
   EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {})), "is an empty ZIP archive");
-  EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"scene/lod-meta.json", "{}"}})), "ZIP archive of a streamed SOG");
+  EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"scene/0_0/meta.json", "{}"}, {"scene/lod-meta.json", "{}"}})),
+                  "ZIP archive of a streamed SOG");
+  // What lies beside the archive is nothing of what is in it.
+  As("a.gltf");
+  EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"a.gltf", FileBytes(folder_ / "a.gltf")}, {"a.bin", "x"}})),
+                  "a.gltf: consists of several files (a.bin is one of them), which cannot be read from memory or");
   EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"notes.txt", "something else"}})), "notes.txt: byte 0: is no splat file");
   EXPECT_CONTAINS(ErrorOf(Zip("a.zip", {{"deep.zip", ply}})), "accepted");  // by its content
   // A SOG is an archive itself, whatever it is called, and so is a folder that somebody has packed.
@@ -218,7 +223,7 @@ TEST_F(WrappedSplat, EachFormatUnderEachName) {
   for (const std::string& is : extensions) {
     const std::string bytes = As("right" + is);
     for (const std::string name : {".ply", ".compressed.ply", ".splat", ".ksplat", ".spz", ".sog", ".glb", ".gltf",
-                                    ".pt", ".zip", ".csv", ".bin", ""}) {
+                                   ".pt", ".zip", ".csv", ".bin", ""}) {
       const fs::path wrong = File("wrong" + name, bytes);
       if (is == ".splat" && FormatOfExtension(wrong) == nullptr) {  // which has no mark, and --from is for
         EXPECT_CONTAINS(ErrorOf(wrong), "is no splat file of a known format");
@@ -250,8 +255,8 @@ TEST_F(WrappedSplat, SaysWhatIsNoSplat) {
   expect("Rar!\x1a\x07" + std::string(50, 'x'), "is a RAR archive");
   expect("7z\xbc\xaf\x27\x1c" + std::string(50, 'x'), "is a 7z archive");
   EXPECT_CONTAINS(ErrorOf(File("a.splat", "404: Not Found\n")),
-                  "is text and no splat; it begins with \"404: Not Found");
-  EXPECT_CONTAINS(ErrorOf(File("a.ksplat", "{\"message\": \"no\"}")), "is text and no splat");
+                  "is no .splat file but text; it begins with \"404: Not Found");
+  EXPECT_CONTAINS(ErrorOf(File("a.ksplat", "{\"message\": \"no\"}")), "is no .ksplat file but text");
   expect(std::string(257, 'x') + "ustar" + std::string(250, '\0'), "is a tar archive");
 }
 

@@ -127,7 +127,7 @@ InputFile InputFile::Inside(const InputFile& outer, std::string name, Buffer<cha
 Result<InputFile> InputFile::OpenBeside(const std::filesystem::path& name) const {
   if (!has_folder_) {
     return Error{ErrorCode::kBadFile, Cat(this->name(), ": consists of several files (", Printable(name.string()),
-                                          " is one of them), which cannot be read from memory")};
+                                          " is one of them), which cannot be read from memory or an archive")};
   }
   return Open(path_.parent_path() / name);
 }

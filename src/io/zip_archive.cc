@@ -45,7 +45,7 @@ uint32_t Crc(uint32_t crc, std::string_view bytes) {
 }
 
 // The whole of a raw deflate stream, which must make exactly contents.size() bytes.
-bool Inflate(std::span<const std::byte> packed, std::span<char> contents) {
+bool Inflate(std::span<const std::byte> packed, std::string& contents) {
   z_stream stream{};
   if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw std::bad_alloc();
   constexpr size_t kMost = size_t{1} << 30;
@@ -102,8 +102,7 @@ uint64_t ZipReader::SizeOf(const std::string& member) const {
   return entry == entries_.end() ? 0 : entry->size;
 }
 
-template <typename Bytes>
-Result<Bytes> ZipReader::ContentsOf(const std::string& member, uint64_t max_size) const {
+Result<std::string> ZipReader::Read(const std::string& member, uint64_t max_size) const {
   const std::string where = Cat(name_, ": ", Printable(member));
   const auto entry = std::ranges::find(entries_, member, &ZipEntry::name);
   if (entry == entries_.end()) return Error{ErrorCode::kBadFile, Cat(where, ": is not in the archive")};
@@ -111,10 +110,9 @@ Result<Bytes> ZipReader::ContentsOf(const std::string& member, uint64_t max_size
     return Error{ErrorCode::kBadFile,
                  Cat(where, ": has ", HumanBytes(entry->size), ", at most ", HumanBytes(max_size), " expected")};
   }
-  Bytes contents;
+  std::string contents;
   if (entry->method == 0) {
-    const auto* const data = reinterpret_cast<const char*>(entry->data.data());
-    contents.assign(data, data + entry->data.size());
+    contents.assign(reinterpret_cast<const char*>(entry->data.data()), entry->data.size());
   } else if (entry->method == 8) {
     ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(where, entry->data.size(), entry->size));
     contents.resize(static_cast<size_t>(entry->size));
@@ -122,18 +120,10 @@ Result<Bytes> ZipReader::ContentsOf(const std::string& member, uint64_t max_size
   } else {
     return Error{ErrorCode::kBadFile, Cat(where, ": is compressed by method ", entry->method, ", expected 0 or 8")};
   }
-  if (Crc(0, std::string_view(contents.data(), contents.size())) != entry->crc) {
+  if (Crc(0, contents) != entry->crc) {
     return Error{ErrorCode::kBadFile, Cat(where, ": is damaged: its check sum is another")};
   }
   return contents;
-}
-
-Result<std::string> ZipReader::Read(const std::string& member, uint64_t max_size) const {
-  return ContentsOf<std::string>(member, max_size);
-}
-
-Result<Buffer<char>> ZipReader::ReadLarge(const std::string& member, uint64_t max_size) const {
-  return ContentsOf<Buffer<char>>(member, max_size);
 }
 
 Status ZipWriter::Add(const std::string& name, std::span<const std::string_view> parts) {

@@ -7,7 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include "core/buffer.h"
 #include "core/result.h"
 #include "io/atomic_file.h"
 #include "io/zip_directory.h"
@@ -30,13 +29,9 @@ class ZipReader {
   // kBadFile: no such member, longer than `max_size`, damaged, packed in another way, or more than 200 times as long as
   // it is compressed.
   Result<std::string> Read(const std::string& member, uint64_t max_size) const;
-  // The same of what may be as large as a splat.
-  Result<Buffer<char>> ReadLarge(const std::string& member, uint64_t max_size) const;
 
  private:
   ZipReader() = default;
-  template <typename Bytes>
-  Result<Bytes> ContentsOf(const std::string& member, uint64_t max_size) const;
 
   std::string name_;
   std::unique_ptr<const std::string> bytes_;  // what the entries point into, wherever the reader moves; null: a view

@@ -50,29 +50,30 @@ out() { "$program" "$@" >"$work/out" 2>"$work/err"; }
 expect 0 "convert to standard output" out convert "$scan" - --to spz
 expect 0 "it is what goes to a file" cmp "$work/scan.spz" "$work/out"
 expect 0 "what is said goes to stderr" grep -q "standard output.spz (SPZ" "$work/err"
-expect 0 "a PLY where nothing is said" out convert "$work/scan.spz" -
+expect 2 "no format is said" "$program" convert "$work/scan.spz" -
+expect 0 "a PLY" out convert "$work/scan.spz" - --to ply
 expect 0 "it begins as one" grep -qa "^ply" "$work/out"
-expect 0 "through two pipes" bash -c "'$program' convert '$scan' - -q | '$program' convert - - --to .spz -q | cmp - '$work/scan.spz'"
+expect 0 "through two pipes" bash -c "'$program' convert '$scan' - --to .ply -q | '$program' convert - - --to .spz -q | cmp - '$work/scan.spz'"
 expect 0 "enhance to standard output" out enhance "$scan" -o - --to splat --method filter --pixel-size 0.01
 expect 0 "a splat came out" "$program" info "$work/out" --from splat -q
 expect 0 "a page to standard output" out view "$scan" -o -
 expect 0 "it is one" grep -q "<html" "$work/out"
 expect 0 "a picture to standard output" out render "$scan" -o - --orbit 1 --size 32x32
 expect 0 "it is one" grep -qa "PNG" "$work/out"
-expect 2 "with JSON" "$program" convert "$scan" - --json
+expect 2 "with JSON" "$program" convert "$scan" - --to ply --json
 says stderr "--json and the output - would both go to standard output"
 expect 2 "several files" "$program" convert "$scan" - --to gltf
 says stderr "that is several files"
-expect 2 "levels of detail" "$program" convert "$scan" - --lod
+expect 2 "levels of detail" "$program" convert "$scan" - --to ply --lod
 expect 2 "no format" "$program" convert "$scan" - --to obj
 expect 2 "a format for a file" "$program" enhance "$scan" -o "$work/x.ply" --to spz
-expect 6 "a full disk under it" bash -c "'$program' convert '$scan' - >/dev/full"
+expect 6 "a full disk under it" bash -c "'$program' convert '$scan' - --to ply >/dev/full"
 says stderr "standard output could not be written"
-expect 6 "nobody reads it" bash -c "set -o pipefail; '$program' convert '$input' - 2>'$work/err' | head -c 1 >/dev/null; exit \${PIPESTATUS[0]}"
-expect 4 "nothing comes out of a bad file" out convert "$work/text.ply" - -q
+expect 6 "nobody reads it" bash -c "set -o pipefail; '$program' convert '$input' - --to ply 2>'$work/err' | head -c 1 >/dev/null; exit \${PIPESTATUS[0]}"
+expect 4 "nothing comes out of a bad file" out convert "$work/text.ply" - --to ply -q
 expect 0 "not a byte" test ! -s "$work/out"
 if command -v script >/dev/null; then
-  expect 2 "a terminal" script -qec "'$program' convert '$scan' -" /dev/null
+  expect 2 "a terminal" script -qec "'$program' convert '$scan' - --to ply" /dev/null
 fi
 expect 2 "a picture of a comparison is a file" "$program" compare "$scan" "$scan" --orbit 2 --side-by-side -
 test -e "$work/-" -o -e ./- && echo "FAILED: there is a file called -" && failures=$((failures + 1))

@@ -13,7 +13,6 @@
 #include "formats/cloud_checks.h"
 #include "formats/spz/spz_reader.h"
 #include "io/compression_ratio.h"
-#include "io/little_endian.h"
 
 namespace anchorsplat {
 
@@ -150,7 +149,7 @@ Result<SpzFile> OpenStreams(const InputFile& file, const ReadLimits& limits) {
   return spz;
 }
 
-bool IsGzip(std::string_view head) { return head.starts_with("\x1f\x8b"); }
+bool IsGzip(const std::string& head) { return head == "\x1f\x8b"; }
 
 Result<SpzHeader> ReadHeader(const InputFile& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
@@ -169,11 +168,14 @@ int SpzFile::sh_degree() const { return std::min(layout.sh_degree, kMaxShDegree)
 size_t SpzFile::sections() const { return layout.sh_degree > 0 ? 6 : 5; }
 
 Result<SpzFile> OpenSpz(const InputFile& file, const ReadLimits& limits) {
-  const Result<std::string> head = file.Head(8);  // moved out of, GCC 12 takes it for uninitialised
-  if (!head.ok()) return head.error();
-  if (IsGzip(*head)) return OpenOneStream(file, OpenGzip(file, 0), limits);
-  const bool is_plain = head->size() == 8 && LoadLittle<uint32_t>(head->data() + 4) < 4;
-  return is_plain ? OpenOneStream(file, OpenPlain(file, 0), limits) : OpenStreams(file, limits);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
+  if (IsGzip(head)) return OpenOneStream(file, OpenGzip(file, 0), limits);
+  std::array<uint32_t, 2> mark{};  // and the version
+  ANCHORSPLAT_RETURN_IF_ERROR(file.ReadAt(0, mark.data(), std::min<size_t>(sizeof mark, file.size())));
+  if (mark[0] != kSpzMagic) {
+    return Error{ErrorCode::kBadFile, Cat(At(file, 0), ": does not begin with \"NGSP\": no SPZ file")};
+  }
+  return mark[1] < 4 ? OpenOneStream(file, OpenPlain(file, 0), limits) : OpenStreams(file, limits);
 }
 
 SpzTurn TurnOfSpz(const SpzFile& spz) {

@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/buffer.h"
 #include "core/text.h"
 #include "formats/cloud_checks.h"
 #include "formats/tables/table_writers.h"
@@ -45,6 +46,16 @@ std::array<Array, 5> Arrays(const CloudView& cloud, int64_t n, int degree) {
            {"sh.npy", Cat(n, ", ", coefficients, ", 3"), 3 * coefficients * count, cloud.sh.data()}}};
 }
 
+// The means as doubles in the world.
+Status AddWorld(ZipWriter& archive, const Array& array, const CloudView& cloud) {
+  Buffer<double> world(cloud.means.size());
+  for (size_t k = 0; k < world.size(); ++k) world[k] = cloud.origin[k % 3] + double{cloud.means[k]};
+  const std::string header = NpyHeader(array.shape, "<f8");
+  const std::string_view parts[] = {header,
+                                    {reinterpret_cast<const char*>(world.data()), sizeof(double) * world.size()}};
+  return archive.Add(array.name, parts);
+}
+
 }  // namespace
 
 // Below 4 GiB, where no member needs the 64-bit extensions.
@@ -61,16 +72,14 @@ Status WriteNpz(const std::filesystem::path& path, const CloudView& cloud, const
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
   ZipWriter archive(file);
   for (const Array& array : Arrays(cloud, cloud.size(), cloud.sh_degree)) {
+    if (array.values == cloud.means.data() && !IsZero(cloud.origin)) {
+      ANCHORSPLAT_RETURN_IF_ERROR(AddWorld(archive, array, cloud));
+      continue;
+    }
     const std::string header = NpyHeader(array.shape);
     const std::string_view parts[] = {
         header, {reinterpret_cast<const char*>(array.values), static_cast<size_t>(4 * array.floats)}};
     ANCHORSPLAT_RETURN_IF_ERROR(archive.Add(array.name, parts));
-  }
-  if (!IsZero(cloud.origin)) {
-    const std::string header = NpyHeader("3,", "<f8");
-    const std::string_view parts[] = {header,
-                                      {reinterpret_cast<const char*>(cloud.origin.data()), sizeof cloud.origin}};
-    ANCHORSPLAT_RETURN_IF_ERROR(archive.Add("origin.npy", parts));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(archive.Finish());
   return file.Commit();

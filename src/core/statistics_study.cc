@@ -166,8 +166,7 @@ void StatisticsStudy::State::TakeSample(const CloudBlock& block) {
   const int64_t step = StoredSample::StepOf(gaussians);
   StoredSample sample;
   for (int64_t row = (block.first + step - 1) / step * step; row < block.first + block.size(); row += step) {
-    const int64_t i = row - block.first;
-    if (block.usable[static_cast<size_t>(i)] != 0) sample.Add(block.rows, i);
+    sample.Add(block.rows, row - block.first);
   }
   if (sample.opacities.empty()) return;
   const std::lock_guard lock(mutex);

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
+#include "core/finite.h"
 #include "core/kd_tree.h"
 #include "core/statistics.h"
 
@@ -24,6 +26,13 @@ double ShareBelow(const std::vector<float>& values, float bound) {
 
 void StoredSample::Add(const CloudView& rows, int64_t row) {
   const auto i = static_cast<size_t>(row);
+  // Lengths in the place of logarithms may be larger than any that is drawn.
+  const auto is_scale = [](float x) { return !std::isnan(x) && x < std::numeric_limits<float>::infinity(); };
+  const float* const stored = rows.log_scales.data() + 3 * row;
+  if (!AllFinite(rows.means.data() + 3 * row, 3) || !std::all_of(stored, stored + 3, is_scale) ||
+      std::isnan(rows.opacity_logits[i])) {
+    return;
+  }
   for (size_t k = 3 * i; k < 3 * i + 3; ++k) {
     means.push_back(rows.means[k]);
     scales.push_back(rows.log_scales[k]);
@@ -37,7 +46,7 @@ StoredSample SampleOf(const CloudView& cloud) {
   StoredSample sample;
   sample.of = cloud.size();
   for (int64_t i = 0; i < cloud.size(); i += StoredSample::StepOf(cloud.size())) {
-    if (HasUsableShape(cloud, i)) sample.Add(cloud, i);
+    sample.Add(cloud, i);
   }
   return sample;
 }

@@ -19,6 +19,7 @@
 #include "formats/extra_properties.h"
 #include "formats/hidden_rows.h"
 #include "formats/opened_splat.h"
+#include "formats/ply/ply_writer.h"
 #include "formats/registry.h"
 #include "formats/row_arrays.h"
 #include "formats/splat_order.h"
@@ -208,7 +209,7 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   if (to->predicted_size != nullptr) {
     report.predicted_bytes = to->predicted_size(cloud.size(), cloud.sh_degree);
     if (to->write_with_extras != nullptr)
-      *report.predicted_bytes += static_cast<uint64_t>(cloud.size()) * extras.row_size();
+      *report.predicted_bytes += ExtraPlyBytes(cloud, extras);
   }
   report.predicted_roughly = to->size_is_estimate;
   if (options.measure && to->read != nullptr) {

@@ -220,7 +220,10 @@ Status ReadAsciiBody(const InputFile& file, const PlyHeader& header, const PlyEl
   for (int64_t row = 0; row < vertex.count; ++row) {
     ANCHORSPLAT_RETURN_IF_ERROR(reader.Read(vertex, row, [&](size_t p, std::string_view word) {
       if (to[p].number != nullptr) return ParseFloat(word, to[p].number[row * to[p].stride]);
-      if (to[p].wide != nullptr) return ParseDouble(word, to[p].wide[row * to[p].stride]);
+      if (to[p].wide != nullptr) {
+        float rounded = 0;  // what is too large for any number is none
+        return ParseFloat(word, rounded) && ParseDouble(word, to[p].wide[row * to[p].stride]);
+      }
       return to[p].bytes == nullptr || ParseBytes(word, vertex.properties[p].type, to[p].bytes + row * to[p].stride);
     }));
   }

@@ -30,4 +30,7 @@ Status WritePlyWithExtras(const std::filesystem::path& path, const CloudView& cl
 uint64_t PredictedPlySize(int64_t count, int sh_degree, std::optional<RenderMode> render_mode = {},
                           std::span<const std::string> comments = {});
 
+// Bytes that WritePlyWithExtras writes beyond those, but for the names of properties and the comments.
+uint64_t ExtraPlyBytes(const CloudView& cloud, const ExtraProperties& extras);
+
 }  // namespace anchorsplat

@@ -208,6 +208,9 @@ Result<GaussianCloud> ReadStreamedSog(const InputFile& file, const ReadLimits& l
     ANCHORSPLAT_RETURN_IF_ERROR(Append(cloud, gaussians));
     AddComments(gaussians, cloud);
   }
+  // Of all chunks, which have none of their own.
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<std::string> said, CommentsOfAsset(index.json.root()));
+  cloud.origin = TakeOrigin(said);
   return cloud;
 }
 

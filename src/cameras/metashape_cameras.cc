@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "cameras/camera_checks.h"
-#include "cameras/picture_search.h"
 #include "cameras/lensed_pinhole.h"
+#include "cameras/picture_search.h"
 #include "core/log.h"
 #include "core/number_text.h"
 #include "core/rotation.h"

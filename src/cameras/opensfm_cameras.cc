@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "cameras/camera_checks.h"
-#include "cameras/picture_search.h"
 #include "cameras/lensed_pinhole.h"
+#include "cameras/picture_search.h"
 #include "core/finite.h"
 #include "core/log.h"
 #include "core/rotation.h"

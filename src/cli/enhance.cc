@@ -241,8 +241,8 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   }
   if (!extras.empty() && enhanced.cloud.means != means) {
     if (const std::string lost = extras.lost(/*writer_keeps=*/false); !lost.empty()) {
-      LogWarning(Cat(input, ": other properties of its Gaussians are dropped, as those of the result are others: ",
-                     lost));
+      LogWarning(
+          Cat(input, ": other properties of its Gaussians are dropped, as those of the result are others: ", lost));
     }
     extras = {};
   }

@@ -66,7 +66,8 @@ void PrintTable(const SplatFindings& f) {
   }
   for (const auto& [name, value] : f.facts.all()) std::cout << "  " << name << "  " << value << "\n";
   if (!IsZero(f.origin)) {
-    std::cout << "  origin       " << TextOf(f.origin) << " (positions are kept relative to it; all others are in the world)\n";
+    std::cout << "  origin       " << TextOf(f.origin)
+              << " (positions are kept relative to it; all others are in the world)\n";
   }
   if (s.bounds) {
     std::cout << "  bounds      ";

@@ -150,7 +150,8 @@ Status PixelSizesFromTrainingCameras(const EnhanceOptions& options, bool says, E
 Status PixelSizesFromPictures(const EnhanceOptions& options, bool says, EnhanceInput& input, EnhanceReport& report) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(
       TrainingViews project,
-      OpenProject(options.refine.images, {.hold_out = 0, .downscale = options.refine.downscale, .origin = options.refine.origin}));
+      OpenProject(options.refine.images,
+                  {.hold_out = 0, .downscale = options.refine.downscale, .origin = options.refine.origin}));
   EnhanceOptions with_cameras = options;
   with_cameras.cameras.emplace().cameras = std::move(project.train);
   with_cameras.camera_rule = CameraPixelRule::kMedian;

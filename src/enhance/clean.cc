@@ -16,7 +16,8 @@ Status Clean(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport&
   if (!options.refine.images.empty() && (set.cameras.empty() || !set.background)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(
         TrainingViews project,
-        OpenProject(options.refine.images, {.hold_out = 0, .downscale = options.refine.downscale, .origin = options.refine.origin}));
+        OpenProject(options.refine.images,
+                    {.hold_out = 0, .downscale = options.refine.downscale, .origin = options.refine.origin}));
     if (set.cameras.empty()) set.cameras = std::move(project.train);
     if (!set.background) set.background = project.background;
   }

@@ -61,8 +61,9 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
     PictureCache held_out(project.held_out, render.background);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement others, MeasureAgreement(input.cloud, render, held_out));
     if (HasSeen(agreement.psnr, others.psnr)) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(TrainingViews all,
-                                   OpenProject(options.images, {.hold_out = 0, .downscale = options.downscale, .origin = options.origin}));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(
+          TrainingViews all,
+          OpenProject(options.images, {.hold_out = 0, .downscale = options.downscale, .origin = options.origin}));
       // A project with test views of its own has them held out for good.
       if (all.held_out.empty()) {
         LogInfo(Cat("with those held out they agree as well, to ", Fixed(others.psnr, 2),

@@ -208,8 +208,7 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   }
   if (to->predicted_size != nullptr) {
     report.predicted_bytes = to->predicted_size(cloud.size(), cloud.sh_degree);
-    if (to->write_with_extras != nullptr)
-      *report.predicted_bytes += ExtraPlyBytes(cloud, extras);
+    if (to->write_with_extras != nullptr) *report.predicted_bytes += ExtraPlyBytes(cloud, extras);
   }
   report.predicted_roughly = to->size_is_estimate;
   if (options.measure && to->read != nullptr) {

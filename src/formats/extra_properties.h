@@ -22,9 +22,9 @@ struct ExtraProperties {
     std::string name;
     PlyType type = PlyType::kFloat;
   };
-  std::vector<Property> properties;   // scalars in the order of the file, without normals
-  Buffer<std::byte> rows;             // [N, row_size()] the values one after the other, little-endian
-  Buffer<float> normals;              // [N,3]; empty where there are none, or where all are zero
+  std::vector<Property> properties;  // scalars in the order of the file, without normals
+  Buffer<std::byte> rows;            // [N, row_size()] the values one after the other, little-endian
+  Buffer<float> normals;             // [N,3]; empty where there are none, or where all are zero
   // [N,3] world positions as the file has them, of which the means are rounded differences to the cloud's origin; empty
   // where means are all there is to know.
   Buffer<double> world;

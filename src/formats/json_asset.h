@@ -18,8 +18,8 @@ namespace anchorsplat {
 // (core/world_origin.h); neither is there where there are none.
 nlohmann::json AssetOf(std::span<const std::string> comments, const WorldOrigin& origin);
 
-// The credits, marks, ups and origin that such a file says, as comments; none where it says nothing, or no text. kBadFile: a
-// mebibyte of credits.
+// The credits, marks, ups and origin that such a file says, as comments; none where it says nothing, or no text.
+// kBadFile: a mebibyte of credits.
 Result<std::vector<std::string>> CommentsOfAsset(const JsonValue& root);
 
 // Names of members that a format does not have, and a warning for those that may speak of axes: nobody knows what they

@@ -93,7 +93,8 @@ TEST(OriginOfFiles, TextHasItsDigits) {
                            "rot_0", "rot_1", "rot_2", "rot_3"}) {
     text += std::string("property float ") + name + "\n";
   }
-  text += "end_header\n500000.125 4500000.25 1 0 0 0 1 -3 -3 -3 1 0 0 0\n500001.5 4500000.75 2 0 0 0 1 -3 -3 -3 1 0 0 0\n";
+  text +=
+      "end_header\n500000.125 4500000.25 1 0 0 0 1 -3 -3 -3 1 0 0 0\n500001.5 4500000.75 2 0 0 0 1 -3 -3 -3 1 0 0 0\n";
   const auto read = ReadPly(InputFile::FromBytes("map.ply", text));
   ASSERT_TRUE(read.ok()) << read.error().message;
   EXPECT_EQ(read->origin, kFar);
@@ -152,7 +153,8 @@ TEST(OriginOfFiles, EveryFormatKeepsItOrSaysSo) {
     const std::string extension(format.extensions.front());
     const auto output = folder / (extension.starts_with('.') ? "out" + extension : extension);
     const Messages messages;
-    const auto report = ConvertFile(input, output, {.write = {.overwrite = true, .order = SplatOrder::kKeep}, .measure = true});
+    const auto report =
+        ConvertFile(input, output, {.write = {.overwrite = true, .order = SplatOrder::kKeep}, .measure = true});
     ASSERT_TRUE(report.ok()) << report.error().message;
     const std::string said = testing::PrintToString(messages.warnings());
     if (!format.keeps_origin) {
@@ -204,7 +206,9 @@ TEST(OriginOfFiles, AxesTurnItAlong) {
 }
 
 TEST(OriginOfFiles, PointsOfAPlyAreDoubles) {
-  std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty double x\nproperty double y\nproperty double z\nend_header\n";
+  std::string bytes =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty double x\nproperty double y\nproperty double "
+      "z\nend_header\n";
   const double at[] = {500000.123, 4500000.456, 120.789};
   bytes.append(reinterpret_cast<const char*>(at), sizeof at);
   const auto points = ReadPlyPoints(InputFile::FromBytes("points.ply", bytes));

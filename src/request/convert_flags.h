@@ -22,7 +22,7 @@ struct ConvertFlags {
   int views = 8;
   bool report = false;
   ConvertOptions options;
-  CLI::Option* spz_version = nullptr;     // of the verb
+  CLI::Option* spz_version = nullptr;  // of the verb
   CLI::Option* double_means = nullptr;
   std::vector<CLI::Option*> of_streamed;  // likewise: those that only a streamed SOG knows
 

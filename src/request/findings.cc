@@ -281,7 +281,8 @@ nlohmann::json ToJson(const SplatFindings& f) {
   if (s.bounds && IsZero(f.origin)) {
     json["bounds"] = {{"min", s.bounds->min}, {"max", s.bounds->max}};
   } else if (s.bounds) {
-    json["bounds"] = {{"min", ToWorld(s.bounds->min.data(), f.origin)}, {"max", ToWorld(s.bounds->max.data(), f.origin)}};
+    json["bounds"] = {{"min", ToWorld(s.bounds->min.data(), f.origin)},
+                      {"max", ToWorld(s.bounds->max.data(), f.origin)}};
   }
   if (const auto up = UpOf(f.comments)) json["up"] = *up;
   if (f.render_mode) json["render_mode"] = NameOf(*f.render_mode);

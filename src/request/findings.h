@@ -31,7 +31,7 @@ struct SplatFindings {
   std::optional<RenderMode> render_mode;  // as the file says
   std::vector<std::string> comments;
   WorldOrigin origin = {0, 0, 0};  // of the means
-  bool lost_no_width = false;  // HasLostNoWidth (enhance/enhanced_mark.h)
+  bool lost_no_width = false;      // HasLostNoWidth (enhance/enhanced_mark.h)
   CloudStatistics statistics;
   Result<PixelSizeFinding> pixel_size = Error{};
   double share_for_network = 1;        // ShareForNetwork

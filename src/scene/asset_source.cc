@@ -5,9 +5,9 @@
 #include <system_error>
 
 #include "core/file_system.h"
+#include "core/small_letters.h"
 #include "core/text.h"
 #include "io/file_bytes.h"
-#include "core/small_letters.h"
 
 namespace anchorsplat {
 

@@ -7,11 +7,11 @@
 #include <sstream>
 #include <utility>
 
+#include "core/small_letters.h"
 #include "core/text.h"
 #include "io/file_bytes.h"
 #include "scene/java_properties.h"
 #include "scene/licence.h"
-#include "core/small_letters.h"
 
 namespace anchorsplat {
 

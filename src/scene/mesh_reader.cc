@@ -5,11 +5,11 @@
 #include <system_error>
 #include <utility>
 
+#include "core/small_letters.h"
 #include "core/text.h"
 #include "io/file_bytes.h"
 #include "scene/furniture_catalog.h"
 #include "scene/licence.h"
-#include "core/small_letters.h"
 
 namespace anchorsplat {
 

@@ -11,7 +11,8 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr std::string_view kOriginKey = "SplatOrigin: ";
+constexpr std::string_view kOriginKey = "SplatOrigin:";
+constexpr double kFarthestOrigin = 1e15;
 constexpr double kStepsPerDetail = 256;
 constexpr double kDetailsOfCameras = 128;  // to the median distance of a camera from the middle
 
@@ -93,18 +94,19 @@ std::optional<WorldOrigin> OriginOf(std::string_view text) {
   for (double& x : origin) {
     text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
     const auto [end, code] = FromChars(text.data(), text.data() + text.size(), x);
-    if (code != std::errc() || !std::isfinite(x)) return std::nullopt;
+    if (code != std::errc() || !(std::abs(x) <= kFarthestOrigin)) return std::nullopt;
     text.remove_prefix(static_cast<size_t>(end - text.data()));
   }
   return text.find_first_not_of(' ') == text.npos ? std::optional(origin) : std::nullopt;
 }
 
-std::string OriginComment(const WorldOrigin& origin) { return std::string(kOriginKey) + TextOf(origin); }
+std::string OriginComment(const WorldOrigin& origin) { return std::string(kOriginKey) + " " + TextOf(origin); }
 
 std::optional<WorldOrigin> OriginOfComment(std::string_view comment) {
-  if (!comment.starts_with(kOriginKey)) return std::nullopt;
-  return OriginOf(comment.substr(kOriginKey.size()));
+  return IsOriginComment(comment) ? OriginOf(comment.substr(kOriginKey.size())) : std::nullopt;
 }
+
+bool IsOriginComment(std::string_view comment) { return comment.starts_with(kOriginKey); }
 
 WorldOrigin TakeOrigin(std::vector<std::string>& comments) {
   WorldOrigin origin{};

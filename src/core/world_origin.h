@@ -29,7 +29,8 @@ WorldOrigin ChooseOrigin(std::span<const double> points, double detail);
 // the centres of cameras; fewer than two say nothing.
 WorldOrigin ChooseOrigin(std::span<const double> points);
 
-// "500000 4500000 120": as short as reads back the same. Nothing for other than three finite numbers.
+// "500000 4500000 120": as short as reads back the same. Nothing for other than three finite numbers up to 1e15, beyond
+// which doubles are too coarse as well.
 std::string TextOf(const WorldOrigin& origin);
 std::optional<WorldOrigin> OriginOf(std::string_view text);
 
@@ -37,6 +38,7 @@ std::optional<WorldOrigin> OriginOf(std::string_view text);
 // none, or a broken one.
 std::string OriginComment(const WorldOrigin& origin);
 std::optional<WorldOrigin> OriginOfComment(std::string_view comment);
+bool IsOriginComment(std::string_view comment);  // broken or not
 // Takes such comments out of the others. Zero where there is none; of several the last one counts.
 WorldOrigin TakeOrigin(std::vector<std::string>& comments);
 

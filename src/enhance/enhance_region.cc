@@ -37,7 +37,11 @@ Result<GaussianCloud> SetRestAside(const EnhanceOptions& options, EnhanceInput& 
   report.kept_outside = kept;
   if (kept == n) {
     const Bounds box = *ComputeBounds(input.cloud);
-    const auto corner = [](const std::array<float, 3>& c) { return Cat(c[0], ",", c[1], ",", c[2]); };
+    const auto corner = [&](const std::array<float, 3>& c) {
+      std::string world = TextOf(ToWorld(c.data(), options.refine.origin));  // as the region was said
+      std::ranges::replace(world, ' ', ',');
+      return world;
+    };
     return Error{ErrorCode::kBadArgument, Cat("--region: no Gaussian lies in it; the splat reaches from ",
                                               corner(box.min), " to ", corner(box.max))};
   }

@@ -60,15 +60,12 @@ double AngleBetween(const float* p, const float* q) {
   return 4 * std::asin(std::min(1.0, std::sqrt(std::min(minus, plus)) / 2));
 }
 
-// `world` is where Gaussian j of `b` is.
-void CompareRow(const CloudView& a, int64_t i, const CloudView& b, int64_t j, const std::array<double, 3>& world,
+// `apart`: the difference of their positions.
+void CompareRow(const CloudView& a, int64_t i, const CloudView& b, int64_t j, const std::array<double, 3>& apart,
                 Sums& sums) {
   double distance = 0;
   for (int k = 0; k < 3; ++k) {
-    // The difference of the origins first: it is exact, and often zero.
-    const auto axis = static_cast<size_t>(k);
-    const double d = double{a.means[static_cast<size_t>(3 * i + k)]} - (world[axis] - a.origin[axis]);
-    distance += d * d;
+    distance += apart[static_cast<size_t>(k)] * apart[static_cast<size_t>(k)];
     sums.attribute[1].Add(double{std::max(kLowestLogScale, a.log_scales[static_cast<size_t>(3 * i + k)])} -
                           double{std::max(kLowestLogScale, b.log_scales[static_cast<size_t>(3 * j + k)])});
   }
@@ -92,7 +89,7 @@ void CompareRow(const CloudView& a, int64_t i, const CloudView& b, int64_t j, co
 }  // namespace
 
 Result<AttributeError> CompareAttributes(const CloudView& a, const CloudView& b, const Buffer<uint32_t>& rows,
-                                         const Buffer<double>& world) {
+                                         const Buffer<double>& world_b, const Buffer<double>& world_a) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(a));
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(b));
   if (a.size() != b.size() || (!rows.empty() && rows.size() != static_cast<size_t>(a.size()))) {
@@ -105,9 +102,19 @@ Result<AttributeError> CompareAttributes(const CloudView& a, const CloudView& b,
     for (int64_t i = first; i < last; ++i) {
       const int64_t j = rows.empty() ? i : int64_t{rows[static_cast<size_t>(i)]};
       if (j >= b.size() || !IsUsable(a, i) || !IsUsable(b, j)) continue;
-      std::array<double, 3> at = ToWorld(b.means.data() + 3 * j, b.origin);
-      if (!world.empty()) std::copy_n(world.data() + 3 * j, 3, at.begin());
-      CompareRow(a, i, b, j, at, sums);
+      std::array<double, 3> difference{};
+      for (size_t k = 0; k < 3; ++k) {
+        const auto at_a = static_cast<size_t>(3 * i) + k, at_b = static_cast<size_t>(3 * j) + k;
+        if (world_a.empty()) {
+          // From a's origin on, which is exact where both have the same.
+          const double from_origin =
+              world_b.empty() ? (b.origin[k] - a.origin[k]) + double{b.means[at_b]} : world_b[at_b] - a.origin[k];
+          difference[k] = double{a.means[at_a]} - from_origin;
+        } else {
+          difference[k] = world_a[at_a] - (world_b.empty() ? b.origin[k] + double{b.means[at_b]} : world_b[at_b]);
+        }
+      }
+      CompareRow(a, i, b, j, difference, sums);
     }
   });
   Sums total;

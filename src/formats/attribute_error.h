@@ -26,10 +26,10 @@ struct AttributeError {
   Deviation harmonics;   // SH of degree ≥ 1 as stored, per coefficient; missing ones count as zero
 };
 
-// Row i of `a` against row rows[i] of `b` (empty `rows`: row i), in the world. `world`, [N,3]: where those of `b` are,
-// if its means are rounded; may be empty. kBadArgument when the sizes differ.
+// Row i of `a` against row rows[i] of `b` (empty `rows`: row i), in the world. `world_a` and `world_b`, [N,3]: where
+// they are, if means are rounded; may be empty. kBadArgument when the sizes differ.
 Result<AttributeError> CompareAttributes(const CloudView& a, const CloudView& b, const Buffer<uint32_t>& rows = {},
-                                         const Buffer<double>& world = {});
+                                         const Buffer<double>& world_b = {}, const Buffer<double>& world_a = {});
 
 // One line per attribute, for people.
 std::string FormatAttributeError(const AttributeError& error);

@@ -118,9 +118,10 @@ Result<OpenedSplat> OpenWritten(const fs::path& output, const CloudWriteOptions&
   return OpenedSplat::Of(InputFile::View(output.string(), text), format);
 }
 
-Result<GaussianCloud> ReadBack(const fs::path& output, const CloudWriteOptions& write, const CloudView& written) {
+Result<GaussianCloud> ReadBack(const fs::path& output, const CloudWriteOptions& write, const CloudView& written,
+                               ExtraProperties* extras) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenWritten(output, write));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud back, file.Read());
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud back, file.Read({}, extras));
   if (!file.format()->keeps_origin) back.origin = written.origin;  // a warning has said where it is
   return back;
 }
@@ -212,7 +213,8 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   }
   report.predicted_roughly = to->size_is_estimate;
   if (options.measure && to->read != nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadBack(output, write, cloud));
+    ExtraProperties written_extras;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadBack(output, write, cloud, &written_extras));
     if (to->written_rows != nullptr) {
       const Buffer<uint32_t> rows = to->written_rows(cloud, write);
       const Buffer<int64_t> kept_rows(rows.begin(), rows.end());
@@ -230,7 +232,8 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
       for (const Buffer<int64_t>* rows : {&hidden.unusable, &hidden.strays.rows}) {  // have nothing to be compared
         for (const int64_t row : *rows) hidden.written.opacity_logits[static_cast<size_t>(row)] = std::nanf("");
       }
-      ANCHORSPLAT_ASSIGN_OR_RETURN(report.error, CompareAttributes(back, expected, order, extras.world));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(report.error,
+                                   CompareAttributes(back, expected, order, extras.world, written_extras.world));
     }
   }
   if (kept != nullptr) *kept = std::move(cloud);

@@ -59,7 +59,7 @@ Result<ConvertReport> ConvertFile(const std::filesystem::path& input, const std:
 Result<OpenedSplat> OpenWritten(const std::filesystem::path& output, const CloudWriteOptions& write);
 // The same, read, for comparisons: positions of a format that keeps no origin are relative to that of `written`.
 Result<GaussianCloud> ReadBack(const std::filesystem::path& output, const CloudWriteOptions& write,
-                               const CloudView& written);
+                               const CloudView& written, ExtraProperties* extras = nullptr);
 
 // The parts of it that change a cloud, in the order in which they are done. In place.
 // `extras` are changed alike, if not null. Gaussians that nobody draws have no opacity to DropFaint and no importance.

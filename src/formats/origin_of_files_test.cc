@@ -83,8 +83,10 @@ TEST(OriginOfFiles, SmallDoublesStayAsTheyAre) {
   const auto read = ReadCloud(folder / "small.ply");
   ASSERT_TRUE(read.ok());
   EXPECT_EQ(read->origin, WorldOrigin{});
-  EXPECT_FALSE(read->double_means) << "there is nothing to gain";
   EXPECT_EQ(read->means, cloud.means);
+  // Doubles stay doubles, bit for bit.
+  ASSERT_TRUE(ConvertFile(folder / "small.ply", folder / "again.ply", {}).ok());
+  EXPECT_EQ(BytesOf(folder / "again.ply"), BytesOf(folder / "small.ply"));
 }
 
 TEST(OriginOfFiles, TextHasItsDigits) {
@@ -126,7 +128,7 @@ TEST(OriginOfFiles, DoublesToDoublesKeepEveryBit) {
   const auto report = ConvertFile(input, folder / "out.ply", {.measure = true});
   ASSERT_TRUE(report.ok()) << report.error().message;
   EXPECT_EQ(BytesOf(folder / "out.ply"), BytesOf(input));
-  EXPECT_LT(report->error->means.max, 1e-5);
+  EXPECT_EQ(report->error->means.max, 0);
   EXPECT_EQ(report->output_bytes, report->predicted_bytes);
 }
 
@@ -192,6 +194,36 @@ TEST(OriginOfFiles, TheReportMeasuresAgainstTheFile) {
   ASSERT_TRUE(report.ok()) << report.error().message;
   EXPECT_GT(report->error->means.max, 0.1) << "half a step of floats at ten million";
   EXPECT_LT(report->error->means.max, 2);
+}
+
+TEST(OriginOfFiles, WhatLiesTooFarApartIsSaid) {
+  const TestFolder folder;
+  Scene scene;
+  for (size_t i = 0; i < size_t{3} * 100; ++i) {
+    scene.extras.world[i] -= kFar[i % 3];  // a third of it at zero
+    scene.cloud.means[i] = static_cast<float>(scene.extras.world[i] - kFar[i % 3]);
+  }
+  const auto input = WriteDoubles(folder, scene);
+  const Messages messages;
+  const auto report = ConvertFile(input, folder / "out.ply", {.measure = true});
+  ASSERT_TRUE(report.ok());
+  EXPECT_EQ(BytesOf(folder / "out.ply"), BytesOf(input)) << "doubles are kept all the same";
+  EXPECT_EQ(report->error->means.max, 0);
+  EXPECT_THAT(testing::PrintToString(messages.warnings()), HasSubstr("positions of 100 of 300 Gaussians are rounded"));
+}
+
+TEST(OriginOfFiles, BrokenOnesAreRefused) {
+  Scene scene;
+  const TestFolder folder;
+  ASSERT_TRUE(WritePly(folder / "a.ply", RandomCloud(2, 0, 1)).ok());
+  for (const char* broken :
+       {"SplatOrigin: 1 2", "SplatOrigin: nan 0 0", "SplatOrigin:1,2,3", "SplatOrigin: 1e300 0 0"}) {
+    std::string bytes = BytesOf(folder / "a.ply");
+    bytes.insert(bytes.find("element vertex"), std::string("comment ") + broken + "\n");
+    const auto read = ReadPly(InputFile::FromBytes("a.ply", bytes));
+    ASSERT_FALSE(read.ok()) << broken;
+    EXPECT_THAT(read.error().message, HasSubstr("gives no origin"));
+  }
 }
 
 TEST(OriginOfFiles, AxesTurnItAlong) {

@@ -33,7 +33,7 @@ namespace {
 constexpr int64_t kMostReadWhole = 2'000'000;  // half a gigabyte; of more, harmonics count as unknown
 
 std::string Rows(int64_t count, int64_t of) {
-  return Cat(WithThousands(count), " of ", WithThousands(of), count == 1 ? " Gaussian" : " Gaussians");
+  return Cat(WithThousands(count), " of ", WithThousands(of), of == 1 ? " Gaussian" : " Gaussians");
 }
 
 std::vector<std::string> Problems(const CloudStatistics& s) {

@@ -199,18 +199,22 @@ Status FindMeanings(const JsonValue& attributes, const std::string& where, GltfP
   return {};
 }
 
-// Far places, as a georeferenced scene gives them, are differences to the first one. glTF is in metres.
-void MoveToOrigin(GltfSplats& splats) {
+// Far places, as a georeferenced scene gives them, are differences to that of the primitive with most Gaussians. glTF
+// is in metres.
+void MoveToOrigin(const InputFile& file, GltfSplats& splats) {
   constexpr double kDetail = 0.25;  // for which floats are fine enough up to eight kilometres
-  std::vector<double> places;
-  for (const GltfPrimitive& primitive : splats.primitives) {
-    places.insert(places.end(), primitive.place.translation.begin(), primitive.place.translation.end());
-  }
-  if (IsZero(ChooseOrigin(places, kDetail))) return;
-  splats.origin = splats.primitives.front().place.translation;
+  const auto largest = std::ranges::max_element(splats.primitives, {}, &GltfPrimitive::count);
+  const WorldOrigin place = largest->place.translation;
+  if (!IsZero(ChooseOrigin(place, kDetail))) splats.origin = place;
+  int64_t far = 0;
   for (GltfPrimitive& primitive : splats.primitives) {
     primitive.place.translation = FromOrigin(primitive.place.translation, splats.origin);
+    if (!IsZero(ChooseOrigin(primitive.place.translation, kDetail))) far += primitive.count();
   }
+  if (far == 0) return;
+  splats.warnings.push_back(Cat(file.name(), ": positions of ", WithThousands(far), " of ", WithThousands(splats.count),
+                                " Gaussians are rounded: their nodes lie more than eight kilometres from the others, "
+                                "too far for 32-bit floats. Split the file into parts that lie together"));
 }
 
 }  // namespace
@@ -259,7 +263,7 @@ Result<GltfSplats> FindGltfSplats(const InputFile& file, const GltfDocument& doc
                      kGltfSplatting, OtherSplatExtension(document))};
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckRatio(file.name(), document.bytes(), static_cast<uint64_t>(splats.count) * 4));
-  MoveToOrigin(splats);
+  MoveToOrigin(file, splats);
   for (size_t k = 0; k < splats.primitives.size(); ++k) {
     ANCHORSPLAT_RETURN_IF_ERROR(FindMeanings(attributes[k], file.name(), splats.primitives[k], splats.warnings));
   }

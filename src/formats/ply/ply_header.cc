@@ -60,7 +60,7 @@ class HeaderParser {
   Status Format(std::string_view rest);
   Status Element(std::string_view rest);
   Status Property(std::string_view rest);
-  void Comment(std::string_view rest);
+  Status Comment(std::string_view rest);
 
   std::string file_;
   PlyHeader header_;
@@ -81,8 +81,7 @@ Status HeaderParser::Line(std::string_view line) {
   if (keyword == "obj_info" && UpOf({std::string(rest)})) header_.comments.emplace_back(rest);  // the rest is not kept
   if (keyword.empty() || keyword == "obj_info") return {};
   if (keyword == "comment") {
-    Comment(rest);
-    return {};
+    return Comment(rest);
   }
   if (keyword == "format") return Format(rest);
   if (keyword == "element") return Element(rest);
@@ -158,14 +157,17 @@ Status HeaderParser::Property(std::string_view rest) {
   return {};
 }
 
-void HeaderParser::Comment(std::string_view rest) {
+Status HeaderParser::Comment(std::string_view rest) {
   if (const std::optional<WorldOrigin> origin = OriginOfComment(rest)) {
     header_.origin = *origin;
+  } else if (IsOriginComment(rest)) {
+    return Bad(Cat("\"", Printable(std::string(rest)), "\" gives no origin of the positions: expected three numbers"));
   } else if (!mode_.Take(rest)) {
     header_.comments.emplace_back(rest);
     if (LooksLikeModeTag(rest)) header_.odd_tags.emplace_back(rest);
   }
   header_.render_mode = mode_.mode();
+  return {};
 }
 
 }  // namespace

@@ -44,6 +44,28 @@ double TypicalLength(const GaussianCloud& cloud, const Buffer<double>& world, st
   return lengths.empty() ? 0 : std::exp(double{Quantile(lengths, 0.5)});
 }
 
+// Where Gaussians lie so far from each other that no origin makes floats fine enough for all. `said`: the file's own.
+void WarnOfRounding(const InputFile& file, const Buffer<double>& world, const WorldOrigin& said,
+                    const GaussianCloud& cloud) {
+  constexpr double kSeen = 1.0 / 16;  // of a Gaussian's length
+  int64_t count = 0;
+  double most = 0;
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    const std::array<double, 3> at = ToWorld(cloud.means.data() + 3 * i, cloud.origin);
+    double off = 0;
+    for (size_t k = 0; k < 3; ++k)
+      off = std::max(off, std::fabs(at[k] - said[k] - world[3 * static_cast<size_t>(i) + k]));
+    const float* s = cloud.log_scales.data() + 3 * i;
+    if (!IsUsable(cloud, i) || !(off > kSeen * std::exp(double{std::max({s[0], s[1], s[2]})}))) continue;
+    ++count;
+    most = std::max(most, off);
+  }
+  if (count == 0) return;
+  LogWarning(Cat(file.name(), ": positions of ", WithThousands(count), " of ", WithThousands(cloud.size()),
+                 " Gaussians are rounded, by up to ", most,
+                 ": they lie too far from the others for 32-bit floats. Split the file into parts that lie together"));
+}
+
 // Floats from an origin on, where floats need one.
 void MeansFromWorld(const Buffer<double>& world, GaussianCloud& cloud) {
   std::vector<double> sample;
@@ -71,7 +93,8 @@ Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, Extr
   FinishPlyRows(layout, cloud);
   cloud.origin = header.origin;
   if (!world.empty()) MeansFromWorld(world, cloud);
-  cloud.double_means = HasDoubleMeans(layout) && !IsZero(cloud.origin);
+  if (!world.empty()) WarnOfRounding(file, world, header.origin, cloud);
+  cloud.double_means = HasDoubleMeans(layout);
   if (extras != nullptr && cloud.double_means && IsZero(header.origin)) extras->world = std::move(world);
   // Trainers write normals of zero: there is nothing in them to keep.
   if (extras != nullptr && std::ranges::all_of(extras->normals, [](float x) { return x == 0; })) {

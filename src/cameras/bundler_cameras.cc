@@ -168,9 +168,8 @@ Result<CameraSet> CamerasFromBundler(const std::filesystem::path& file, std::str
     return Error{ErrorCode::kBadFile, Cat(list->string(), ": lists ", names.size(), " pictures, and ", file.string(),
                                           " has ", cameras.size(), " cameras; their order alone says which is whose")};
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(
-      const std::vector<FoundPicture> pictures,
-      FindPictures({.folders = FoldersOfPictures(list->parent_path()), .project = list->parent_path()}, names));
+  const std::vector<FoundPicture> pictures =
+      FindPictures({.folders = FoldersOfPictures(list->parent_path()), .project = list->parent_path()}, names);
   CameraSet set;
   size_t registered = 0;
   std::string first_missing;
@@ -180,6 +179,7 @@ Result<CameraSet> CamerasFromBundler(const std::filesystem::path& file, std::str
     if (camera.focal == 0) continue;
     ++registered;
     const std::filesystem::path& picture = pictures[i].file;
+    if (!pictures[i].unclear.empty()) return Error{ErrorCode::kBadArgument, pictures[i].unclear};  // its size is in it
     if (!IsFile(picture)) {
       if (first_missing.empty()) first_missing = picture.string();
       continue;

@@ -16,6 +16,7 @@
 #include "cameras/nerfstudio_frame.h"
 #include "cameras/opensfm_cameras.h"
 #include "cameras/parse_cameras.h"
+#include "cameras/picture_search.h"
 #include "cameras/poses_bounds.h"
 #include "cameras/transforms_json.h"
 #include "core/file_system.h"
@@ -152,7 +153,7 @@ void TellOfOtherModels(const std::filesystem::path& project, std::span<const Fou
   const std::string text =
       Cat(project.string(), ": of ", models.size(), " COLMAP models ", models[0].folder.string(), " is used (",
           pictures(models[0].pictures), "); to use another, name its folder: ", others);
-  if (models.back().pictures < models[0].pictures) {
+  if (std::ranges::any_of(models, [&](const auto& model) { return model.pictures != models[0].pictures; })) {
     LogWarning(text);
   } else {
     LogInfo(text);
@@ -277,7 +278,9 @@ Result<CameraSet> ParseCameras(const std::string& name, std::string_view bytes, 
 }
 
 Result<CameraSet> ReadCameras(const std::filesystem::path& path, std::filesystem::path* missing) {
+  const UnclearPictures unclear;
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadAnyCameras(path));
+  if (missing != nullptr && !unclear.first().empty()) return Error{ErrorCode::kBadArgument, unclear.first()};
   const std::filesystem::path first = ForgetMissing(set);
   if (missing != nullptr) *missing = first;
   WarnOfMissingMasks(set);

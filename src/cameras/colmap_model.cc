@@ -127,28 +127,42 @@ Result<Camera> ViewFromColmap(const ColmapImage& image, const ColmapCameras& cam
 }
 
 std::vector<FoundModel> FindColmapModels(const std::filesystem::path& project) {
-  std::vector<FoundModel> found;
-  // Of a folder that may be anything, only those inside that are called so.
+  std::vector<FoundModel> found, others;
+  // Where models are there at several of these, they are stages of one reconstruction: the project's sparse is its
+  // result, the text files beside it are what it was given. One with as many pictures is the same in another form.
   const auto take = [&](const std::filesystem::path& folder, const std::string& called) {
     std::vector<std::filesystem::path> models = ModelsIn(folder, called);
     if (IsColmapModel(folder)) models.push_back(folder);
+    std::vector<FoundModel> here;
     for (const auto& model : models) {
       const auto count = Exists(model / "cameras.bin") && Exists(model / "images.bin")
                              ? CountColmapImagesBinary(model / "images.bin")
                              : CountColmapImagesText(model / "images.txt");
-      found.push_back({model, count.ok() ? *count : 0});  // what is wrong is said where it is read
+      here.push_back({model, count.ok() ? *count : 0});  // what is wrong is said where it is read
+    }
+    std::ranges::stable_sort(here, std::ranges::greater(), &FoundModel::pictures);
+    if (found.empty()) {
+      found = std::move(here);
+      return;
+    }
+    for (FoundModel& model : here) {
+      const auto is_known = [&](const FoundModel& known) { return known.folder == model.folder; };
+      if (model.pictures == found[0].pictures || std::ranges::any_of(found, is_known) ||
+          std::ranges::any_of(others, is_known)) {
+        continue;
+      }
+      others.push_back(std::move(model));
     }
   };
-  // Where models are there at several of these, they are stages of one reconstruction: the project's sparse is its
-  // result, the text files beside it are what it was given.
   take(project / "sparse", "");
+  // Of a folder that may be anything, only those inside that are called so.
   const bool sparse = AbsolutePath(project / ".").parent_path().filename().string().starts_with("sparse");
-  if (found.empty()) take(project, sparse ? "" : "sparse");
+  take(project, sparse ? "" : "sparse");
   for (const char* place :
        {"colmap/sparse", "colmap", "colmap_sparse", "colmap_text", "dense/sparse", "distorted/sparse"}) {
-    if (found.empty()) take(project / place, "");
+    take(project / place, "");
   }
-  std::ranges::stable_sort(found, std::ranges::greater(), &FoundModel::pictures);
+  found.insert(found.end(), others.begin(), others.end());
   return found;
 }
 
@@ -169,7 +183,7 @@ Result<CameraSet> ReadColmapModel(const std::filesystem::path& folder) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(set.cameras, ReadColmapImagesText(folder / "images.txt", cameras));
   }
   if (set.cameras.empty()) return BadModel(Cat(folder.string(), ": the COLMAP model has no images"));
-  ANCHORSPLAT_RETURN_IF_ERROR(FindPicturesOf(PlacesOfModel(folder), set.cameras));
+  FindPicturesOf(PlacesOfModel(folder), set.cameras);
   return set;
 }
 

@@ -62,8 +62,7 @@ Result<CameraSet> CamerasFromInria(const JsonValue& root, const std::filesystem:
     if (!camera.ok()) return entry.Named(camera.error(), "img_name");
     set.cameras.push_back(*std::move(camera));
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(
-      FindPicturesOf({.folders = {folder, folder / "images"}, .project = folder, .complete = true}, set.cameras));
+  FindPicturesOf({.folders = {folder, folder / "images"}, .project = folder, .complete = true}, set.cameras);
   return set;
 }
 

@@ -300,7 +300,7 @@ Result<CameraSet> CamerasOfChunk(const XmlText& xml, const std::vector<Metashape
     ANCHORSPLAT_ASSIGN_OR_RETURN(Pose pose, PoseOf(xml, node, world));
     set.cameras.push_back({ViewName(label), label, lensed.straight, std::move(pose), lensed.photograph});
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(FindPicturesOf({.folders = FoldersOfPictures(folder), .project = folder}, set.cameras));
+  FindPicturesOf({.folders = FoldersOfPictures(folder), .project = folder}, set.cameras);
   return set;
 }
 

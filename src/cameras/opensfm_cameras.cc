@@ -152,7 +152,7 @@ Result<CameraSet> CamerasFromOpenSfm(const JsonValue& root, const std::filesyste
     ANCHORSPLAT_ASSIGN_OR_RETURN(Pose pose, ShotPose(shot));
     set.cameras.push_back({ViewName(name), name, lensed.straight, std::move(pose), lensed.photograph});
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(FindPicturesOf({.folders = FoldersOfPictures(folder), .project = folder}, set.cameras));
+  FindPicturesOf({.folders = FoldersOfPictures(folder), .project = folder}, set.cameras);
   return set;
 }
 

@@ -4,6 +4,7 @@
 #include <system_error>
 #include <utility>
 
+#include "core/decomposed.h"
 #include "core/file_system.h"
 #include "core/small_letters.h"
 #include "core/text.h"
@@ -36,9 +37,11 @@ bool GoesWithAnother(const std::string& name) {
 
 }  // namespace
 
+std::string NameKey(const std::string& name) { return SmallLetters(Decomposed(name)); }
+
 std::string PictureStem(const std::string& name) {
   const fs::path path(name);
-  return SmallLetters(HasAnyPictureExtension(path) ? path.stem().string() : name);
+  return NameKey(HasAnyPictureExtension(path) ? path.stem().string() : name);
 }
 
 PictureFolder::PictureFolder(fs::path folder) : path_(std::move(folder)) {
@@ -46,7 +49,7 @@ PictureFolder::PictureFolder(fs::path folder) : path_(std::move(folder)) {
   for (fs::directory_iterator it(path_.empty() ? "." : path_, code), end; !code && it != end; it.increment(code)) {
     const std::string name = it->path().filename().string();
     if (name.starts_with('.') || !IsFile(it->path())) continue;
-    by_name_[SmallLetters(name)].push_back(name);
+    by_name_[NameKey(name)].push_back(name);
     if (HasAnyPictureExtension(name)) by_stem_[PictureStem(name)].push_back(name);
   }
   for (auto* index : {&by_name_, &by_stem_}) {
@@ -59,7 +62,7 @@ Result<std::string> PictureFolder::Find(const std::string& name) const {
     return Error{ErrorCode::kBadArgument, Cat("\"", Printable(name), "\" may be ", (path_ / one).string(), " or ",
                                               (path_ / other).string(), "; rename one of them")};
   };
-  if (const auto found = by_name_.find(SmallLetters(name)); found != by_name_.end()) {
+  if (const auto found = by_name_.find(NameKey(name)); found != by_name_.end()) {
     const auto& names = found->second;
     if (std::ranges::find(names, name) != names.end()) return name;
     if (names.size() > 1) return ambiguous(names[0], names[1]);

@@ -9,7 +9,8 @@
 
 namespace anchorsplat {
 
-// The pictures of one folder, found by names that may differ in the case of letters and in the kind of picture.
+// The pictures of one folder, found by names that may differ in the case of letters, in how marks are on them
+// (core/decomposed.h) and in the kind of picture.
 class PictureFolder {
  public:
   // Of a folder that cannot be read there are none.
@@ -23,7 +24,7 @@ class PictureFolder {
   // kBadArgument: two files are as likely; the message names both.
   Result<std::string> Find(const std::string& name) const;
 
-  // Its pictures by their names in small letters, without the extension.
+  // Its pictures by their names' keys, without the extension.
   const std::map<std::string, std::vector<std::string>>& by_stem() const { return by_stem_; }
 
   // The names of photographs, sorted: no depth maps, normals or masks by their names.
@@ -31,9 +32,12 @@ class PictureFolder {
 
  private:
   std::filesystem::path path_;
-  std::map<std::string, std::vector<std::string>> by_name_;  // of small letters, with extension
+  std::map<std::string, std::vector<std::string>> by_name_;  // of NameKey, with extension
   std::map<std::string, std::vector<std::string>> by_stem_;
 };
+
+// The same for names that nobody tells apart.
+std::string NameKey(const std::string& name);
 
 // The key of by_stem() for the name of a picture.
 std::string PictureStem(const std::string& name);

@@ -15,6 +15,7 @@
 #include "core/log.h"
 #include "core/small_letters.h"
 #include "core/text.h"
+#include "images/rendering.h"
 #include "io/input_record.h"
 
 namespace anchorsplat {
@@ -60,6 +61,8 @@ std::string PercentDecoded(const std::string& text) {
   return decoded;
 }
 
+thread_local UnclearPictures* open_unclear = nullptr;
+
 // A path as the file has it, taken apart.
 struct Named {
   explicit Named(const std::string& text) : path(WithSlashes(text)), absolute(IsAbsoluteSomewhere(path)) {
@@ -85,7 +88,7 @@ struct Named {
 // How many names the ends of two paths have in common, in any letters.
 size_t CommonEnd(const Parts& a, const Parts& b) {
   size_t n = 0;
-  while (n < a.size() && n < b.size() && SmallLetters(a[a.size() - 1 - n]) == SmallLetters(b[b.size() - 1 - n])) ++n;
+  while (n < a.size() && n < b.size() && NameKey(a[a.size() - 1 - n]) == NameKey(b[b.size() - 1 - n])) ++n;
   return n;
 }
 
@@ -143,23 +146,25 @@ class Search {
     }
   }
 
-  Result<std::vector<FoundPicture>> Run() {
+  std::vector<FoundPicture> Run() {
     for (size_t i = 0; i < raw_.size(); ++i) TakeLiterally(i);
-    ANCHORSPLAT_RETURN_IF_ERROR(SearchFolders());
+    SearchFolders();
     for (size_t i = 0; i < raw_.size(); ++i) {
       const std::string decoded = PercentDecoded(raw_[i]);
-      open_[i] = found_[i].file.empty() && decoded != raw_[i];
+      open_[i] = IsOpen(i) && decoded != raw_[i];
       if (!open_[i]) continue;
       const bool settled = settled_.contains(named_[i].folder);
       named_[i] = Named(decoded);
       if (settled) settled_.insert(named_[i].folder);
     }
-    ANCHORSPLAT_RETURN_IF_ERROR(SearchFolders());
+    SearchFolders();
     NameViews();
     if (places_.complete) TellOfOthers();
     for (size_t i = 0; i < raw_.size(); ++i) {
       if (!found_[i].file.empty()) {
-        RecordInput(found_[i].file);  // the pictures are a part of what the cameras are read from, whoever opens them
+        // The pictures are a part of what the cameras are read from, whoever opens them; what was rendered through the
+        // cameras may be rendered again.
+        if (!IsOwnRendering(found_[i].file)) RecordInput(found_[i].file);
       } else {
         const fs::path& first = places_.folders.empty() ? places_.project : places_.folders[0];
         const bool drive = named_[i].absolute && !named_[i].path.starts_with('/');
@@ -201,43 +206,57 @@ class Search {
     return known != folders_.end() ? known->second : folders_.emplace(path, PictureFolder(path)).first->second;
   }
 
+  bool IsOpen(size_t i) const { return found_[i].file.empty() && found_[i].unclear.empty(); }
+
   // What is not found yet, by the folder that the file says.
   std::map<std::string, std::vector<size_t>> Groups() const {
     std::map<std::string, std::vector<size_t>> groups;
     for (size_t i = 0; i < named_.size(); ++i) {
-      if (open_[i] && found_[i].file.empty() && !named_[i].file.empty()) groups[named_[i].folder].push_back(i);
+      if (open_[i] && IsOpen(i) && !named_[i].file.empty()) groups[named_[i].folder].push_back(i);
     }
     return groups;
   }
 
-  Status SearchFolders() {
+  void SearchFolders() {
     for (const auto& [folder, group] : Groups()) {
       for (const fs::path& base : places_.folders) {
         // "images/" of a project is its folder "images", whatever it is reached by.
         fs::path place = (base / folder).lexically_normal();
         if (!place.has_filename() && place.has_parent_path() && place != place.root_path()) place = place.parent_path();
-        ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t count, TakeFrom(Folder(place), group, named_[group[0]].parts.size()));
-        if (count > 0) settled_.insert(folder);
+        if (TakeFrom(Folder(place), group, named_[group[0]].parts.size()) > 0) settled_.insert(folder);
       }
-      if (!settled_.contains(folder) && !places_.project.empty()) ANCHORSPLAT_RETURN_IF_ERROR(SearchProject(group));
+      if (!settled_.contains(folder) && !places_.project.empty()) SearchProject(group);
     }
-    return {};
   }
 
   // How many of the group are in this folder; those that are not found yet are taken.
-  Result<size_t> TakeFrom(const PictureFolder& folder, const std::vector<size_t>& group, size_t levels) {
+  size_t TakeFrom(const PictureFolder& folder, const std::vector<size_t>& group, size_t levels) {
     size_t count = 0;
     if (folder.empty()) return count;
     for (const size_t i : group) {
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string file, folder.Find(named_[i].file));
-      if (file.empty()) continue;
+      const Result<std::string> file = folder.Find(named_[i].file);
+      if (file.ok() && file->empty()) continue;
       ++count;
-      if (found_[i].file.empty()) Take(i, folder.path(), file, levels);
+      if (!IsOpen(i)) continue;
+      if (file.ok()) {
+        Take(i, folder.path(), *file, levels);
+      } else {
+        found_[i].unclear = file.error().message;
+      }
     }
     return count;
   }
 
-  Status SearchProject(const std::vector<size_t>& group) {
+  // Whether what the group means in a folder was rendered by us: by the first of its pictures there.
+  bool IsRendered(const PictureFolder& folder, const std::vector<size_t>& group) const {
+    for (const size_t i : group) {
+      const Result<std::string> file = folder.Find(named_[i].file);
+      if (file.ok() && !file->empty()) return IsOwnRendering(folder.path() / *file);
+    }
+    return false;
+  }
+
+  void SearchProject(const std::vector<size_t>& group) {
     ListProject();
     const Parts project = PartsOf(AbsolutePath(places_.project));
     std::set<const PictureFolder*> candidates;
@@ -254,26 +273,27 @@ class Search {
       Parts below(all.begin() + static_cast<ptrdiff_t>(own), all.end());
       below.resize(below.size() - std::min(common, below.size()));  // what the file itself says is right
       const auto rank = common > 0 && below.empty() ? std::optional(0) : RankOf(below, places_);
+      // Renderings may be what is trained on where everybody has pictures; elsewhere they are somebody's results.
+      if (rank > kUsualRank && IsRendered(*folder, group)) continue;
       if (rank) ranked.emplace_back(-static_cast<ptrdiff_t>(common), *rank, folder->path(), folder);
     }
-    if (ranked.empty()) return {};
+    if (ranked.empty()) return;
     std::ranges::sort(ranked);
     if (ranked.size() > 1 && std::get<0>(ranked[0]) == std::get<0>(ranked[1]) &&
         std::get<1>(ranked[0]) == std::get<1>(ranked[1])) {
-      return Error{ErrorCode::kBadArgument,
-                   Cat("the picture \"", Printable(raw_[group[0]]), "\" and those with it may be in ",
-                       std::get<2>(ranked[0]).string(), " or in ", std::get<2>(ranked[1]).string(),
-                       "; move one of these folders away")};
+      const std::string unclear = Cat("the picture \"", Printable(raw_[group[0]]), "\" and those with it may be in ",
+                                      std::get<2>(ranked[0]).string(), " or in ", std::get<2>(ranked[1]).string(),
+                                      "; move one of these folders away");
+      for (const size_t i : group) found_[i].unclear = unclear;
+      return;
     }
     const auto& [common, rank, path, folder] = ranked[0];
     if (common == 0 && rank > kUsualRank && !told_) {
       told_ = true;
       LogInfo(Cat(Printable(raw_[group[0]]), " is not where the file of the cameras says; taken from ", path.string()));
     }
-    return ToStatus(TakeFrom(*folder, group, static_cast<size_t>(-common)));
+    TakeFrom(*folder, group, static_cast<size_t>(-common));
   }
-
-  static Status ToStatus(const Result<size_t>& count) { return count.ok() ? Status() : Status(count.error()); }
 
   // All folders with pictures below the project, once. None where there are too many to look through.
   void ListProject() {
@@ -358,21 +378,28 @@ class Search {
 
 }  // namespace
 
-Result<std::vector<FoundPicture>> FindPictures(const PicturePlaces& places, std::span<const std::string> names) {
-  return Search(places, names).Run();
+std::vector<FoundPicture> FindPictures(const PicturePlaces& places, std::span<const std::string> names) {
+  std::vector<FoundPicture> found = Search(places, names).Run();
+  for (const FoundPicture& picture : found) {
+    if (open_unclear != nullptr && open_unclear->first_.empty()) open_unclear->first_ = picture.unclear;
+  }
+  return found;
 }
 
-Status FindPicturesOf(const PicturePlaces& places, std::span<Camera> cameras) {
+void FindPicturesOf(const PicturePlaces& places, std::span<Camera> cameras) {
   std::vector<std::string> names;
   for (const Camera& camera : cameras) names.push_back(camera.image.string());
-  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<FoundPicture> found, FindPictures(places, names));
-  for (size_t i = 0; i < cameras.size(); ++i) {
+  std::vector<FoundPicture> found = FindPictures(places, names);
+  for (size_t i = 0; i < found.size(); ++i) {
     cameras[i].name = std::move(found[i].name);
     cameras[i].image = std::move(found[i].file);
     cameras[i].photograph.mask = std::move(found[i].mask);
   }
-  return {};
 }
+
+UnclearPictures::UnclearPictures() : outer_(open_unclear) { open_unclear = this; }
+
+UnclearPictures::~UnclearPictures() { open_unclear = outer_; }
 
 fs::path ProjectAbove(const fs::path& folder) {
   constexpr int kHighest = 4;

@@ -7,7 +7,9 @@
 #include <vector>
 
 #include "core/messages_for_test.h"
+#include "images/rendering.h"
 #include "io/folder_for_test.h"
+#include "io/input_record.h"
 
 namespace anchorsplat {
 namespace {
@@ -21,9 +23,9 @@ void Put(const fs::path& path) {
 
 FoundPicture FindOne(const PicturePlaces& places, const std::string& name) {
   const std::vector<std::string> names = {name};
-  const auto found = FindPictures(places, names);
-  EXPECT_TRUE(found.ok()) << found.error().message;
-  return found.ok() ? found->at(0) : FoundPicture();
+  FoundPicture found = FindPictures(places, names).at(0);
+  EXPECT_EQ(found.unclear, "");
+  return found;
 }
 
 TEST(FindPictures, NamesOfOtherMachines) {
@@ -82,11 +84,10 @@ TEST(FindPictures, RigsKeepTheirFolders) {
   }
   for (const auto& given : {names, windows}) {
     const auto found = FindPictures({.folders = {folder.path()}, .project = folder.path()}, given);
-    ASSERT_TRUE(found.ok()) << found.error().message;
-    EXPECT_EQ((*found)[1].name, "cam1/0000");
-    EXPECT_EQ((*found)[0].file, folder / "images/cam0/0000.png");
-    EXPECT_EQ((*found)[1].file, folder / "images/cam1/0000.png");
-    EXPECT_EQ((*found)[2].file, folder / "images/cam1/0001.png");
+    EXPECT_EQ(found[1].name, "cam1/0000");
+    EXPECT_EQ(found[0].file, folder / "images/cam0/0000.png");
+    EXPECT_EQ(found[1].file, folder / "images/cam1/0000.png");
+    EXPECT_EQ(found[2].file, folder / "images/cam1/0001.png");
   }
 }
 
@@ -97,8 +98,7 @@ TEST(FindPictures, OneMissingPictureIsNotTakenFromElsewhere) {
   Put(folder / "renders/0001.png");
   const std::vector<std::string> names = {"images/0000.png", "images/0001.png"};
   const auto found = FindPictures({.folders = {folder.path()}, .project = folder.path()}, names);
-  ASSERT_TRUE(found.ok());
-  EXPECT_EQ((*found)[1].file, folder / "images/0001.png");
+  EXPECT_EQ(found[1].file, folder / "images/0001.png");
 }
 
 TEST(FindPictures, WhatIsAmbiguousNamesBoth) {
@@ -108,23 +108,60 @@ TEST(FindPictures, WhatIsAmbiguousNamesBoth) {
   const PicturePlaces places{.folders = {folder.path()}, .project = folder.path()};
   std::vector<std::string> names = {"/elsewhere/a.png"};
   auto found = FindPictures(places, names);
-  ASSERT_FALSE(found.ok());
-  EXPECT_EQ(found.error().code, ErrorCode::kBadArgument);
+  EXPECT_FALSE(fs::exists(found[0].file));
   for (const char* place : {"left", "right"}) {
-    EXPECT_NE(found.error().message.find((folder / place).string()), std::string::npos) << found.error().message;
+    EXPECT_NE(found[0].unclear.find((folder / place).string()), std::string::npos) << found[0].unclear;
+  }
+  {
+    const UnclearPictures unclear;
+    (void)FindPictures(places, names);
+    EXPECT_EQ(unclear.first(), found[0].unclear);
   }
   EXPECT_EQ(FindOne(places, "/elsewhere/right/a.png").file, folder / "right/a.png");
   Put(folder / "left/b.jpg");
   Put(folder / "left/b.webp");
   names = {"left/b.png"};
   found = FindPictures(places, names);
-  ASSERT_FALSE(found.ok());
   for (const char* name : {"b.jpg", "b.webp"}) {
-    EXPECT_NE(found.error().message.find(name), std::string::npos) << found.error().message;
+    EXPECT_NE(found[0].unclear.find(name), std::string::npos) << found[0].unclear;
   }
   EXPECT_EQ(FindOne(places, "left/b.jpeg").file, folder / "left/b.jpg");
   Put(folder / "left/b.png");
   EXPECT_EQ(FindOne(places, "left/b").file, folder / "left/b.png") << "as NeRF's files mean it";
+}
+
+TEST(FindPictures, WhatWeRenderedIsNoPhotograph) {
+  const TestFolder folder;
+  const auto render = [&](const std::string& place) {
+    fs::create_directories(folder / place);
+    ASSERT_TRUE(WriteRendering(folder / place / "a.png", Image(2, 2, 3), {.overwrite = true}).ok());
+  };
+  const PicturePlaces places{.folders = {folder.path()}, .project = folder.path()};
+  const InputRecord record;
+  render("before");
+  render("after/cam0");
+  EXPECT_EQ(FindOne(places, "a.png").file, folder / "a.png") << "where it was looked for";
+  EXPECT_EQ(FindOne(places, "cam0/a.png").file, folder / "cam0/a.png");
+  Put(folder / "photographs/a.png");
+  EXPECT_EQ(FindOne(places, "a.png").file, folder / "photographs/a.png");
+  EXPECT_FALSE(CheckIsNoInput(folder / "photographs/a.png").ok());
+  // Where everybody has pictures, and where the file says, they may be what is trained on; until then they may be
+  // rendered again.
+  render("images");
+  for (const char* place : {"images/a.png", "before/a.png"}) {
+    EXPECT_EQ(FindOne(places, place).file, folder / place);
+    EXPECT_TRUE(CheckIsNoInput(folder / place).ok()) << place;
+  }
+  EXPECT_EQ(FindOne(places, "a.png").file, folder / "images/a.png");
+}
+
+TEST(FindPictures, NamesFromMacs) {
+  const TestFolder folder;
+  Put(folder / "images/u\u0308ni\u0308 0.PNG");
+  Put(folder / "images/\u00E9.png");
+  const PicturePlaces places{.folders = {folder.path()}, .project = folder.path()};
+  EXPECT_EQ(FindOne(places, "images/\u00FCn\u00EF 0.png").file, folder / "images/u\u0308ni\u0308 0.PNG");
+  EXPECT_EQ(FindOne(places, "elsewhere/e\u0301.jpg").file, folder / "images/\u00E9.png");
 }
 
 TEST(FindPictures, LinksInCirclesAndStrangeNames) {

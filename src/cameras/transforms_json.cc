@@ -104,18 +104,19 @@ Result<Lens> ReadLens(const JsonValue& frame, const JsonValue& root) {
   return lens.IsStraight() ? Lens{} : lens;
 }
 
-Result<Pinhole> ReadIntrinsics(const JsonValue& frame, const JsonValue& root, const std::filesystem::path& picture) {
+Result<Pinhole> ReadIntrinsics(const JsonValue& frame, const JsonValue& root, const FoundPicture& picture) {
   Pinhole c;
   const auto width = FindEither(frame, root, "w"), height = FindEither(frame, root, "h");
   if (width && height) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(c.width, width->WholeNumber(1, kMaxImageSide));
     ANCHORSPLAT_ASSIGN_OR_RETURN(c.height, height->WholeNumber(1, kMaxImageSide));
   } else {
-    if (!IsFile(picture)) {
+    if (!IsFile(picture.file)) {
+      if (!picture.unclear.empty()) return frame.Complain(picture.unclear);
       return frame.Complain(Cat("neither \"w\" and \"h\" nor a picture to take the size from (looked for at ",
-                                Printable(picture.string()), ")"));
+                                Printable(picture.file.string()), ")"));
     }
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize size, ReadImageSize(picture));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const ImageSize size, ReadImageSize(picture.file));
     c.width = size.width;
     c.height = size.height;
   }
@@ -195,16 +196,17 @@ Result<std::vector<FoundPicture>> FindPicturesOfFrames(std::span<const JsonValue
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<std::string> names, PathsOf(frames, "file_path", true));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<std::string> masks, PathsOf(frames, "mask_path", false));
   PicturePlaces places{.folders = {folder}, .project = folder, .complete = complete};
-  ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<FoundPicture> found, FindPictures(places, names));
+  std::vector<FoundPicture> found = FindPictures(places, names);
   if (std::ranges::all_of(masks, &std::string::empty)) return found;
   places.complete = false;
   places.masks = true;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<FoundPicture> found_masks, FindPictures(places, masks));
+  const std::vector<FoundPicture> found_masks = FindPictures(places, masks);
   for (size_t i = 0; i < frames.size(); ++i) {
     if (masks[i].empty()) continue;
     found[i].mask = IsFile(found_masks[i].file) ? found_masks[i].file : std::filesystem::path();
     // Without its mask a picture would be taken for right where it is said to be wrong.
-    if (found[i].mask.empty() && IsFolder(folder)) {
+    if (found[i].unclear.empty()) found[i].unclear = found_masks[i].unclear;
+    if (found[i].mask.empty() && found[i].unclear.empty() && IsFolder(folder)) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(const JsonValue value, frames[i].Get("mask_path"));
       return frames[i].Named(value.Complain(Cat("there is no mask ", Printable(masks[i]), " in ", folder.string())),
                              "file_path");
@@ -235,9 +237,9 @@ class StraightPinholes {
 Result<Camera> ReadFrame(const JsonValue& frame, const JsonValue& root, FoundPicture picture, bool opencv_axes,
                          StraightPinholes& straight) {
   Camera camera;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(camera.intrinsics, ReadIntrinsics(frame, root, picture));
   camera.name = std::move(picture.name);
   camera.image = std::move(picture.file);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(camera.intrinsics, ReadIntrinsics(frame, root, camera.image));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Lens lens, ReadLens(frame, root));
   if (!lens.IsStraight()) {
     camera.photograph.lens = lens;

@@ -85,6 +85,19 @@ Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source, 
   return views;
 }
 
+// NeRF-synthetic's division into training and test views is what its author wants a fit to use.
+void TellOfOtherCameras(const fs::path& folder, const fs::path& used) {
+  std::string others;
+  for (const char* name : {"transforms.json", "cameras.json"}) {
+    if (Exists(folder / name)) others += Cat(others.empty() ? "" : ", ", (folder / name).string());
+  }
+  for (const FoundModel& model : FindColmapModels(folder)) {
+    others += Cat(others.empty() ? "" : ", ", model.folder.string());
+  }
+  if (others.empty()) return;
+  LogWarning(Cat(used.string(), " is used, of several sets of cameras here; to use another, name it: ", others));
+}
+
 // The sparse model that ReadCameras takes for a project, if it takes one; else nothing.
 fs::path ModelFolder(const fs::path& project) {
   if (!IsFolder(project)) return project.parent_path();
@@ -169,6 +182,7 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
   CameraSource kind = CameraSource::kUnknown;
   const fs::path train_file = source / "transforms_train.json", test_file = source / "transforms_test.json";
   if (Exists(train_file)) {
+    TellOfOtherCameras(source, train_file);
     ANCHORSPLAT_ASSIGN_OR_RETURN(CameraSet set, ReadCameras(train_file, &missing));
     out.background = set.background;
     kind = set.source;

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 
+#include "cameras/camera_io.h"
 #include "core/messages_for_test.h"
 #include "core/text.h"
 #include "fit/fit.h"
@@ -205,6 +206,32 @@ TEST(TrainingViews, NerfSyntheticHasItsOwnTestViews) {
   views = OpenProject(folder.path());
   EXPECT_EQ(views->train.size(), 9u);
   EXPECT_EQ(views->held_out.size(), 9u);
+  fs::copy(folder / "transforms_train.json", folder / "transforms.json");
+  const Messages messages;
+  views = OpenProject(folder.path());
+  EXPECT_EQ(views->train.size(), 9u);
+  ASSERT_EQ(messages.warnings().size(), 1u);
+  for (const char* said : {"transforms_train.json is used", "to use another, name it", "/transforms.json"}) {
+    EXPECT_NE(messages.warnings()[0].find(said), std::string::npos) << messages.warnings()[0];
+  }
+}
+
+TEST(TrainingViews, UnclearPicturesAreAnErrorOfWhoNeedsThem) {
+  const TestFolder folder;
+  orbit_scene::Write(folder.path(), orbit_scene::Ball(5, 1), 9, 12);
+  const fs::path images = ReadCameras(folder / "transforms.json")->cameras[0].image.parent_path();
+  fs::create_directories(folder / "left");
+  for (const auto& entry : fs::directory_iterator(images)) {
+    if (entry.path().extension() == ".png") fs::rename(entry.path(), folder / "left" / entry.path().filename());
+  }
+  fs::copy(folder / "left", folder / "right");
+  const auto cameras = ReadCameras(folder / "transforms.json");
+  ASSERT_TRUE(cameras.ok()) << cameras.error().message;
+  EXPECT_TRUE(cameras->cameras[0].image.empty());
+  const auto views = OpenProject(folder.path());
+  ASSERT_FALSE(views.ok());
+  EXPECT_EQ(views.error().code, ErrorCode::kBadArgument);
+  EXPECT_NE(views.error().message.find("may be in"), std::string::npos) << views.error().message;
 }
 
 TEST(TrainingViews, PicturesOfAnotherSize) {

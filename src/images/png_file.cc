@@ -161,7 +161,10 @@ png_byte Quantized(float value) {
   return value > 0 ? (value < 1 ? static_cast<png_byte>(value * 255.0f + 0.5f) : png_byte{255}) : png_byte{0};
 }
 
-bool WritePixels(PngWriter& writer, const Image& image) {
+// The PNG chunk with the name of the program that made a picture, and ours for what it rendered.
+constexpr std::string_view kProgram = "Software", kRendering = "anchorsplat render";
+
+bool WritePixels(PngWriter& writer, const Image& image, bool rendering) {
   writer.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &writer.errors, OnError, OnWarning);
   if (writer.png == nullptr) return false;
   if (setjmp(writer.errors.jump)) return false;  // NOLINT(cert-err52-cpp)
@@ -174,6 +177,14 @@ bool WritePixels(PngWriter& writer, const Image& image) {
                                          : PNG_COLOR_TYPE_RGBA;
   png_set_IHDR(writer.png, writer.info, static_cast<png_uint_32>(image.width), static_cast<png_uint_32>(image.height),
                8, type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  if (rendering) {
+    png_text text{};
+    text.compression = PNG_TEXT_COMPRESSION_NONE;
+    text.key = const_cast<png_charp>(kProgram.data());  // which libpng does not write to
+    text.text = const_cast<png_charp>(kRendering.data());
+    text.text_length = kRendering.size();
+    png_set_text(writer.png, writer.info, &text, 1);
+  }
   // A third of the default's time, for renders that are 6 to 19 % larger.
   png_set_compression_level(writer.png, 3);
   png_set_filter(writer.png, PNG_FILTER_TYPE_BASE, PNG_FILTER_UP);
@@ -238,7 +249,7 @@ Result<Image> DecodePng(std::FILE* file, const std::string& name, uint64_t bytes
   return std::move(reader.image);
 }
 
-Result<std::string> EncodePng(const Image& image) {
+Result<std::string> EncodePng(const Image& image, bool rendering) {
   if (image.channels != 1 && image.channels != 3 && image.channels != 4) {
     return Error{ErrorCode::kBadArgument, Cat("a PNG has 1, 3 or 4 channels, not ", image.channels)};
   }
@@ -250,8 +261,14 @@ Result<std::string> EncodePng(const Image& image) {
   }
   PngWriter writer;
   writer.row.resize(static_cast<size_t>(image.width) * static_cast<size_t>(image.channels));
-  if (!WritePixels(writer, image)) return Error{ErrorCode::kIo, Cat("PNG encoder: ", writer.errors.message)};
+  if (!WritePixels(writer, image, rendering)) return Error{ErrorCode::kIo, Cat("PNG encoder: ", writer.errors.message)};
   return std::move(writer.bytes);
+}
+
+bool IsMarkedAsRendering(std::string_view head) {
+  const std::string mark = Cat("tEXt", kProgram, '\0', kRendering);
+  // Before the pixels, which may hold any bytes.
+  return head.starts_with("\x89PNG") && head.substr(0, head.find("IDAT")).find(mark) != std::string_view::npos;
 }
 
 }  // namespace anchorsplat

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <string>
+#include <string_view>
 
 #include "core/image.h"
 #include "core/result.h"
@@ -14,7 +15,10 @@ namespace anchorsplat {
 Result<Image> DecodePng(std::FILE* file, const std::string& name, uint64_t bytes);
 Result<ImageSize> DecodePngSize(std::FILE* file, const std::string& name, uint64_t bytes);
 
-// 8-bit PNG of an image with 1, 3 or 4 channels.
-Result<std::string> EncodePng(const Image& image);
+// 8-bit PNG of an image with 1, 3 or 4 channels; marked as a `rendering` where it is one.
+Result<std::string> EncodePng(const Image& image, bool rendering = false);
+
+// Whether the first bytes of a file are those of a PNG that EncodePng marked as a rendering.
+bool IsMarkedAsRendering(std::string_view head);
 
 }  // namespace anchorsplat

@@ -39,6 +39,39 @@ TEST(MatchViews, FoldersCountWhereTheLastPartDoesNotTellViewsApart) {
   EXPECT_EQ(matched->pairs[2].b, 2u);
 }
 
+TEST(MatchViews, SomeViewsLieInFoldersAndOthersBesideThem) {
+  const Names cameras = {"a/0", "b/0", "2", "3"};
+  for (const Names& pictures : {Names{"d/images/2.png", "d/images/3.png", "d/images/a/0.png", "d/images/b/0.png"},
+                                Names{"R/2.png", "R/3.png", "R/a/0.png", "R/b/0.png"}}) {
+    const auto matched = MatchViews(cameras, pictures);
+    ASSERT_TRUE(matched.ok()) << matched.error().message;
+    ASSERT_EQ(matched->pairs.size(), 4u);
+    for (const auto& [i, j] : {std::pair(0u, 2u), std::pair(1u, 3u), std::pair(2u, 0u), std::pair(3u, 1u)}) {
+      EXPECT_EQ(matched->pairs[i].name, cameras[i]);
+      EXPECT_EQ(matched->pairs[i].b, j);
+    }
+    const auto folders = MatchViews(Names{"R/2.png", "R/3.png", "R/a/0.png", "R/b/0.png"}, pictures);
+    ASSERT_TRUE(folders.ok());
+    EXPECT_EQ(folders->pairs.size(), 4u);
+    const auto beside = MatchViews(cameras, Names{pictures[0], pictures[1]});
+    ASSERT_TRUE(beside.ok());
+    EXPECT_EQ(beside->pairs.size(), 2u);
+    EXPECT_EQ(beside->only_a, (Names{"a/0", "b/0"}));
+  }
+  // Another camera's picture of that number is another one.
+  const auto rigs = MatchViews(Names{"cam0/0", "cam1/0", "cam1/5"}, Names{"R/cam0/0.png", "R/cam0/5.png"});
+  ASSERT_TRUE(rigs.ok());
+  EXPECT_EQ(rigs->pairs.size(), 1u);
+  EXPECT_EQ(rigs->only_b, Names{"cam0/5"});
+}
+
+TEST(MatchViews, NamesFromMacsAreTheSame) {
+  const auto matched = MatchViews(Names{"\u00FC", "b"}, Names{"x/u\u0308.png", "x/b.png"});
+  ASSERT_TRUE(matched.ok());
+  ASSERT_EQ(matched->pairs.size(), 2u);
+  EXPECT_EQ(matched->pairs[0].name, "\u00FC");
+}
+
 TEST(MatchViews, ListsWhatHasNoPartner) {
   const auto matched = MatchViews(Names{"a", "b", "c"}, Names{"a", "d"});
   ASSERT_TRUE(matched.ok());

@@ -1,12 +1,18 @@
 #include "request/compare_flags.h"
 
+#include <algorithm>
 #include <array>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 
+#include "cameras/camera_io.h"
+#include "core/file_system.h"
 #include "core/text.h"
+#include "images/rendering.h"
 #include "io/json_file.h"
+#include "metrics/compare.h"
 
 namespace anchorsplat {
 
@@ -38,6 +44,14 @@ nlohmann::json ToJson(const ViewScore& score) {
 
 bool IsPictures(const SideInput& side) { return side.pictures || (!side.cloud && LooksLikeImages(side.path)); }
 
+// Of files that are not all our own renderings.
+bool NeedsPhotographs(const SideInput* side) {
+  if (side->empty() || side->pictures || !IsPictures(*side)) return false;
+  if (!IsFolder(side->path)) return !IsOwnRendering(side->path);
+  const auto files = ListPictures(side->path);
+  return files.ok() && !std::ranges::all_of(*files, IsOwnRendering);
+}
+
 }  // namespace
 
 void CompareFlags::AddTo(CLI::App& verb) {
@@ -66,6 +80,13 @@ Result<Sides> OpenSides(const CompareFlags& flags, SideInput a, SideInput b, Sid
   }
   if (first == nullptr) ANCHORSPLAT_RETURN_IF_ERROR(CheckNothingIsRendered(flags));
   const bool has_cameras = given != nullptr || !flags.views.cameras.empty();
+  // Which of the pictures are the cameras' own says what becomes of them; what we rendered is what it is.
+  std::optional<CameraSet> read;
+  if (given == nullptr && has_cameras && std::ranges::any_of(inputs, NeedsPhotographs)) {
+    std::filesystem::path missing;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(read, ReadCameras(flags.views.cameras, &missing));
+    given = &*read;
+  }
   std::optional<CameraSet> cameras;
   if (first != nullptr) {
     if (!has_cameras && flags.views.orbit == 0) {

@@ -142,7 +142,8 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
 
   const double begin = Now();
   ExtraProperties extras;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read({.lod_level = options.lod_level}, &extras));
+  const ReadLimits limits = {.lod_level = options.lod_level, .keep_stored_colors = options.stored.color_of_one > 0};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read(limits, &extras));
   report.read_seconds = Now() - begin;
   report.input_format = from != nullptr ? from->name : "";
   report.output_format = to->name;

@@ -50,8 +50,9 @@ Result<OpenedSplat> OpenedSplat::Open(const fs::path& path, const SplatFormat* f
                      "splat file, or the folder of one")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(InputFile input, InputFile::Open(found.path));
-  if (!found.others.empty()) {
-    LogInfo(Cat(path.string(), ": its latest splat is read, ", found.path.string(), "; there are also ", found.others));
+  if (found.by_step) {
+    LogInfo(Cat(path.string(), ": its latest splat is read, ", found.path.string(),
+                found.others.empty() ? "" : Cat("; there are also ", found.others)));
   }
   return Of(std::move(input), format);
 }
@@ -101,7 +102,9 @@ Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits, ExtraPropertie
   if (format_ == nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, input_.Head(16));
     return Error{ErrorCode::kBadFile, Cat(input_.name(), ": byte 0: is no splat file of a known format: found \"",
-                                          Printable(head.substr(0, 8)), "\", expected ", ReadFormats())};
+                                          Printable(head.substr(0, 8)), "\", expected ", ReadFormats(),
+                                          "; a file without a mark or a name that says what it is, as a .splat in a "
+                                          "pipe, is read by convert --from .splat")};
   }
   if (format_->read == nullptr) {
     return Error{ErrorCode::kBadFile,

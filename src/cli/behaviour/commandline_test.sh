@@ -49,7 +49,7 @@ expect 0 "it is the same" cmp "$work/told.ply" "$work/unpacked.ply"
 out() { "$program" "$@" >"$work/out" 2>"$work/err"; }
 expect 0 "convert to standard output" out convert "$scan" - --to spz
 expect 0 "it is what goes to a file" cmp "$work/scan.spz" "$work/out"
-expect 0 "what is said goes to stderr" grep -q "standard output.spz (SPZ" "$work/err"
+expect 0 "what is said goes to stderr" grep -q "standard output (SPZ" "$work/err"
 expect 2 "no format is said" "$program" convert "$work/scan.spz" -
 expect 0 "a PLY" out convert "$work/scan.spz" - --to ply
 expect 0 "it begins as one" grep -qa "^ply" "$work/out"

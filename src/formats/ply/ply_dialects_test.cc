@@ -130,7 +130,8 @@ TEST(PlyDialects, CloudCompareNames) {
 
 TEST(PlyDialects, ColoursInPlaceOfCoefficients) {
   const GaussianCloud cloud = RandomCloud(50, 0, 3);
-  for (const auto& [type, full] : {std::pair("uchar", 255), std::pair("ushort", 65535), std::pair("float", 1)}) {
+  for (const auto& [type, full] : {std::pair("uchar", 255), std::pair("ushort", 65535), std::pair("float", 1),
+                                   std::pair("float", 255), std::pair("double", 65535)}) {
     Columns columns = ColumnsOf(cloud);
     Remove(columns, "f_dc_");
     int k = 0;
@@ -151,6 +152,8 @@ TEST(PlyDialects, ColoursInPlaceOfCoefficients) {
     }
     EXPECT_TRUE(SameBits(read->means, cloud.means));
     EXPECT_CONTAINS(FactsOf(bytes)["colours"], "red green blue");
+    const auto stored = ReadPly(InputFile::FromBytes("x.ply", bytes), {.keep_stored_colors = true});
+    EXPECT_EQ(stored->sh[0], static_cast<float>(full)) << "for one who says what it means";
     // Where both are there, the colours are a preview of the coefficients.
     Columns both = ColumnsOf(cloud);
     both.insert(both.end(), columns.end() - 3, columns.end());

@@ -19,15 +19,14 @@ inline double LogSigmoid(double logit) {
 }
 
 // Logit of an opacity stored in 0–1. The ends become ∓13.8 (opacity 1e-6 and 1 − 1e-6), as infinite logits trip other
-// programs and a byte cannot tell 1 from 0.999 anyway. NaN stays what it is, which nobody draws.
+// programs and a byte cannot tell 1 from 0.999 anyway.
 inline float LogitFromOpacity(float opacity) {
   constexpr float kEnd = 1e-6f;
-  if (std::isnan(opacity)) return opacity;
-  const float inside = opacity > kEnd ? (opacity < 1 - kEnd ? opacity : 1 - kEnd) : kEnd;
+  const float inside = opacity > kEnd ? (opacity < 1 - kEnd ? opacity : 1 - kEnd) : kEnd;  // NaN: invisible
   return std::log(inside / (1 - inside));
 }
 
-// ln of a scale stored as a length; zero and negative lengths become −Inf, a Gaussian without extent. NaN stays NaN.
-inline float LogFromScale(float scale) { return scale > 0 || std::isnan(scale) ? std::log(scale) : -INFINITY; }
+// ln of a scale stored as a length; zero, negative and NaN lengths become −Inf, a Gaussian without extent.
+inline float LogFromScale(float scale) { return scale > 0 ? std::log(scale) : -INFINITY; }
 
 }  // namespace anchorsplat

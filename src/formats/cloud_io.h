@@ -16,8 +16,6 @@ struct OutputMemory;
 struct ReadLimits {
   int64_t max_gaussians = int64_t{1} << 28;  // 268 million: 63 GB at SH 3, more than any published scene
   int lod_level = 0;                         // of a streamed SOG; 0 is the finest
-  // Colours in the place of f_dc_* stay as a PLY has them, for one who knows what they are (stored_as.h).
-  bool keep_stored_colors = false;
 };
 
 // In which order Gaussians go into a file (splat_order.h).

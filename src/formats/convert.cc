@@ -142,8 +142,7 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
 
   const double begin = Now();
   ExtraProperties extras;
-  const ReadLimits limits = {.lod_level = options.lod_level, .keep_stored_colors = options.stored.color_of_one > 0};
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read(limits, &extras));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read({.lod_level = options.lod_level}, &extras));
   report.read_seconds = Now() - begin;
   report.input_format = from != nullptr ? from->name : "";
   report.output_format = to->name;
@@ -151,7 +150,7 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   report.sh_degree_read = cloud.sh_degree;
   report.input_bytes = file.bytes();
   WarnOfStored(input.string(), cloud, options.stored);
-  MakeStored(cloud, options.stored);
+  MakeStored(cloud, options.stored, extras.full_color);
   // Without harmonics: looking through them would take longer than all else here. Other formats say what becomes of
   // such Gaussians when they are written.
   if (const int64_t bad = to->keeps_all_values ? CountUnusable(cloud, false) : 0; bad > 0) {

@@ -101,10 +101,12 @@ std::optional<CloudExtent> OpenedSplat::Extent() const {
 Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits, ExtraProperties* extras) const try {
   if (format_ == nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, input_.Head(16));
-    return Error{ErrorCode::kBadFile, Cat(input_.name(), ": byte 0: is no splat file of a known format: found \"",
-                                          Printable(head.substr(0, 8)), "\", expected ", ReadFormats(),
-                                          "; a file without a mark or a name that says what it is, as a .splat in a "
-                                          "pipe, is read by convert --from .splat")};
+    return Error{
+        ErrorCode::kBadFile,
+        Cat(input_.name(), ": byte 0: is no splat file of a known format: found \"", Printable(head.substr(0, 8)),
+            "\", expected ", ReadFormats(),
+            IsText(head) ? ""
+                         : "; a .splat or .ksplat, which has no mark but its name, is read by convert --from .splat")};
   }
   if (format_->read == nullptr) {
     return Error{ErrorCode::kBadFile,

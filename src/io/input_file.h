@@ -20,8 +20,7 @@ namespace anchorsplat {
 // are taken into memory first. "-" is standard input.
 class InputFile {
  public:
-  // Errors: kNotFound; kIo for folders, devices, files we may not read and pipes with more than 4 GiB;
-  // kBadArgument for standard input where it is a pipe that an input has been read from.
+  // Errors: kNotFound; kIo for folders, devices, files we may not read and pipes with more than 4 GiB.
   static Result<InputFile> Open(const std::filesystem::path& path);
   // Bytes in memory that read like a file; `name` is what messages call it.
   static InputFile FromBytes(std::string name, std::string bytes);

@@ -25,11 +25,10 @@ float IntensityOfOne(std::span<const float> colors) {
   return kShare * beyond_bytes > lit ? 65535.0f : 255.0f;
 }
 
-void FindFullColor(const InputFile& file, const ReadLimits& limits, const GaussianCloud& rows, PlyLayout& layout) {
-  if (limits.keep_stored_colors) layout.full_color = 0;
-  if (layout.full_color == 0 || !layout.float_color) return;
-  layout.full_color = IntensityOfOne(rows.sh);  // of degree 0, as there is no f_dc
-  if (layout.full_color == 1) return;
+void FindFullColor(const InputFile& file, const GaussianCloud& rows, PlyLayout& layout, ExtraProperties* extras) {
+  if (layout.float_color) layout.full_color = IntensityOfOne(rows.sh);  // of degree 0, as there is no f_dc
+  if (extras != nullptr) extras->full_color = layout.full_color;
+  if (!layout.float_color || layout.full_color == 1) return;
   LogInfo(Cat(file.name(), ": its red green blue are floats that go beyond 1 and are read as colours from 0 to ",
               std::lround(layout.full_color), "; convert --colors 0-1 reads them as they are"));
 }

@@ -3,7 +3,7 @@
 #include <span>
 
 #include "core/gaussian_cloud.h"
-#include "formats/cloud_io.h"
+#include "formats/extra_properties.h"
 #include "formats/ply/ply_layout.h"
 #include "io/input_file.h"
 
@@ -15,7 +15,7 @@ namespace anchorsplat {
 float IntensityOfOne(std::span<const float> colors);
 
 // Finds layout.full_color, once the rows of a PLY are read, where floats do not say it by themselves, which a message
-// says where it is not 1; 0 where colours are to stay as they are.
-void FindFullColor(const InputFile& file, const ReadLimits& limits, const GaussianCloud& rows, PlyLayout& layout);
+// says where it is not 1; `extras`, which may be null, get it.
+void FindFullColor(const InputFile& file, const GaussianCloud& rows, PlyLayout& layout, ExtraProperties* extras);
 
 }  // namespace anchorsplat

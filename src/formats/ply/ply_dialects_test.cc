@@ -16,6 +16,7 @@
 #include "formats/ply/ply_blocks.h"
 #include "formats/ply/ply_reader.h"
 #include "formats/random_cloud_for_test.h"
+#include "formats/stored_as.h"
 
 // What other programs write where INRIA's has other properties, or the same ones by other names.
 namespace anchorsplat {
@@ -152,8 +153,13 @@ TEST(PlyDialects, ColoursInPlaceOfCoefficients) {
     }
     EXPECT_TRUE(SameBits(read->means, cloud.means));
     EXPECT_CONTAINS(FactsOf(bytes)["colours"], "red green blue");
-    const auto stored = ReadPly(InputFile::FromBytes("x.ply", bytes), {.keep_stored_colors = true});
-    EXPECT_EQ(stored->sh[0], static_cast<float>(full)) << "for one who says what it means";
+    ExtraProperties extras;
+    GaussianCloud told = *ReadPlyWithExtras(InputFile::FromBytes("x.ply", bytes), {}, extras);
+    EXPECT_EQ(extras.full_color, static_cast<float>(full));
+    MakeStored(told, {.color_of_one = static_cast<float>(full)}, extras.full_color);
+    ExpectSameCloud(told, *read);
+    MakeStored(told, {.color_of_one = 2.0f * static_cast<float>(full)}, extras.full_color);
+    EXPECT_NEAR(ColorFromDc(told.sh[0]), 0.5, 1e-6) << "one who knows better";
     // Where both are there, the colours are a preview of the coefficients.
     Columns both = ColumnsOf(cloud);
     both.insert(both.end(), columns.end() - 3, columns.end());

@@ -7,10 +7,10 @@
 #include <string_view>
 #include <unordered_map>
 
-#include "core/activations.h"
 #include "core/log.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
+#include "formats/number_or_nan.h"
 
 namespace anchorsplat {
 
@@ -263,7 +263,7 @@ void FinishPlyRows(const PlyLayout& layout, GaussianCloud& rows) {
     float* const dc = rows.sh.data() + i * stride;
     for (int k = 0; layout.full_color > 0 && k < 3; ++k) dc[k] = DcFromColor(dc[k] / layout.full_color);
     float& opacity = rows.opacity_logits[static_cast<size_t>(i)];
-    if (layout.full_alpha > 0) opacity = LogitFromOpacity(opacity / layout.full_alpha);
+    if (layout.full_alpha > 0) opacity = LogitFromStoredOpacity(opacity / layout.full_alpha);
   }
 }
 

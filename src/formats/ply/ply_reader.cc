@@ -69,7 +69,7 @@ Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, Extr
   Buffer<float> filter;
   ANCHORSPLAT_RETURN_IF_ERROR(
       ReadPlyBody(file, header, vertex, [&] { return MakeRoom(header, layout, cloud, world, filter, extras); }));
-  FindFullColor(file, limits, cloud, layout);
+  FindFullColor(file, cloud, layout, extras);
   FinishPlyRows(layout, cloud);
   cloud.origin = header.origin;
   if (!world.empty()) MeansFromWorld(world, cloud);

@@ -95,6 +95,7 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--lod writes a folder or the lod-meta.json in one, not ", output.string())};
   }
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckOutDir(flags.out_dir));
   // Folders of pictures get one folder each; ".spz" may be said without its dot. A slash would lead out of --out-dir.
   const bool folders = flags.lod || flags.to == "meta.json" || flags.to == kStreamedName;
   const std::string extension = flags.lod                   ? Cat("/", kStreamedName)
@@ -141,9 +142,11 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
   return jobs;
 }
 
-void Print(std::ostream& out, const Job& job, const ConvertReport& r, const std::optional<ConversionLoss>& loss) {
+void Print(const OutputMemory* piped, const Job& job, const ConvertReport& r,
+           const std::optional<ConversionLoss>& loss) {
+  std::ostream& out = ResultsBeside(piped);
   out << OneLine(job.input) << " (" << r.input_format << ", " << HumanBytes(r.input_bytes) << ") -> "
-      << OneLine(job.output) << " (" << r.output_format << ", " << HumanBytes(r.output_bytes);
+      << OutputName(job.output, piped) << " (" << r.output_format << ", " << HumanBytes(r.output_bytes);
   if (r.predicted_bytes) {
     out << ", predicted " << (r.predicted_roughly ? "about " : "") << HumanBytes(*r.predicted_bytes);
   }
@@ -192,7 +195,7 @@ std::optional<OutputPlan> PlanOf(const ConvertOptions& options, const Job& job) 
 // One file: converted, measured where asked for, told. A row of the JSON document.
 Result<nlohmann::json> RunJob(const Job& job, const ConvertOptions& options, int views, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Converted done, ConvertAndMeasure(job.input, job.output, options, views));
-  if (!shared.json && !shared.quiet) Print(ResultsBeside(options.write.memory), job, done.report, done.loss);
+  if (!shared.json && !shared.quiet) Print(options.write.memory, job, done.report, done.loss);
   nlohmann::json json = ToJson(done);
   json["input"] = job.input.string();
   json["output"] = job.output.string();

@@ -113,6 +113,7 @@ Result<std::vector<fs::path>> OutputPaths(const EnhanceWords& flags) {
     }
     return std::vector<fs::path>{flags.output};
   }
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckOutDir(flags.out_dir));
   std::vector<fs::path> outputs;
   std::map<fs::path, std::string> taken;
   for (const std::string& input : flags.inputs) {
@@ -266,7 +267,7 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   json["output"] = output.string();
   if (flags.view) json["view"] = PagePath(output).string();
   if (!shared.json && !shared.quiet) {
-    ResultsBeside(flags.memory()) << OneLine(input) << " -> " << OneLine(output) << "\n  "
+    ResultsBeside(flags.memory()) << OneLine(input) << " -> " << OutputName(output, flags.memory()) << "\n  "
                                   << WithThousands(r.gaussians_in)
                                   << (r.gaussians_in == 1 ? " Gaussian in, " : " Gaussians in, ")
                                   << WithThousands(r.gaussians_out) << " out; " << r.method << Details(r) << ", "

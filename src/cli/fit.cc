@@ -75,7 +75,7 @@ Status CheckOutputs(const FitWords& flags, const FitControl& control, bool overw
 
 void PrintReport(const FitWords& flags, const FitReport& r) {
   std::ostream& out = ResultsBeside(flags.memory());
-  out << OneLine(flags.output) << ": " << WithThousands(r.gaussians_out) << " Gaussians after "
+  out << OutputName(flags.output, flags.memory()) << ": " << WithThousands(r.gaussians_out) << " Gaussians after "
       << WithThousands(r.steps) << " steps in " << HumanSeconds(r.seconds) << "\n  training views: " << r.train.views
       << ", " << Fixed(r.train.psnr, 2) << " dB, SSIM " << Fixed(r.train.ssim, 4) << "\n";
   if (r.held_out.views > 0) {

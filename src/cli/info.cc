@@ -149,7 +149,7 @@ Status RunInfo(const InfoFlags& flags, const SharedFlags& shared) {
   const std::string& path = flags.file;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatFormat* const from, ParseInputFormat("--from", flags.from));
   if (from == nullptr && LooksLikeNetwork(path)) return RunModelInfo(path, shared);
-  if (from == nullptr && LooksLikeMesh(path)) return RunMeshInfo(path, shared);
+  if (from == nullptr && path != "-" && LooksLikeMesh(path)) return RunMeshInfo(path, shared);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(path, from));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatFindings findings, InspectSplat(file, path));
   if (shared.json) {

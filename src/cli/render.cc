@@ -120,7 +120,7 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
     ResultsBeside(write.memory) << "rendered " << paths.size() << (paths.size() == 1 ? " view of " : " views of ")
                                 << WithThousands(cloud.size()) << " Gaussians in " << HumanSeconds(seconds)
                                 << " (without reading and "
-                                << "writing) to " << OneLine(output) << '\n';
+                                << "writing) to " << OutputName(output, write.memory) << '\n';
   }
   return piped ? piped->Send() : Status();
 }

@@ -10,6 +10,7 @@
 #include <span>
 #include <system_error>
 
+#include "cli/clean_output.h"
 #include "core/gaussian_cloud.h"
 #include "core/text.h"
 #include "formats/cloud_output.h"
@@ -72,6 +73,16 @@ Result<StandardOutput> StandardOutput::ForSplat(const std::string& name, const S
 Status StandardOutput::Send() const {
   std::cout.flush();
   return WriteAll(memory_->files.at(path_));
+}
+
+std::string OutputName(const std::filesystem::path& output, const OutputMemory* piped) {
+  return piped != nullptr ? kName : OneLine(output);
+}
+
+Status CheckOutDir(const std::string& folder) {
+  if (!IsStandardOutput(folder)) return {};
+  return Error{ErrorCode::kBadArgument,
+               Cat("--out-dir ", folder, ": is standard output, not a folder (./- is a folder called so)")};
 }
 
 std::ostream& ResultsBeside(const OutputMemory* piped) { return piped != nullptr ? std::cerr : std::cout; }

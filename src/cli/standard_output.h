@@ -39,6 +39,11 @@ class StandardOutput {
   std::unique_ptr<OutputMemory> memory_;
 };
 
+// An output as people know it: nobody has seen the name that writers get for standard output.
+std::string OutputName(const std::filesystem::path& output, const OutputMemory* piped);
+// kBadArgument where a folder for outputs is called as standard output is, which cannot take several.
+Status CheckOutDir(const std::string& folder);
+
 // Where results for people go.
 std::ostream& ResultsBeside(const OutputMemory* piped);
 

@@ -118,9 +118,10 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
                {"pixel_size", page.pixel_size ? nlohmann::json(*page.pixel_size) : nlohmann::json()}});
   } else if (!shared.quiet) {
     ResultsBeside(page.memory)
-        << OneLine(output) << ": " << HumanBytes(bytes)
-        << (flags.folder ? ", with its data in the folder beside it: they belong together; open it in any browser\n"
-                         : ", open it in any browser\n");
+        << OutputName(output, page.memory) << ": " << HumanBytes(bytes)
+        << (piped          ? ", a page for any browser\n"
+            : flags.folder ? ", with its data in the folder beside it: they belong together; open it in any browser\n"
+                           : ", open it in any browser\n");
   }
   return piped ? piped->Send() : Status();
 }

@@ -53,7 +53,7 @@ struct CloudStatistics {
 
   // Problems, as row counts.
   int64_t not_finite = 0;                 // not usable: NaN, Inf where it has no meaning, or too long
-  int64_t zero_quaternions = 0;           // norm below 1e-12: no rotation at all
+  int64_t zero_quaternions = 0;           // all four are zero: no rotation at all
   int64_t unnormalised_quaternions = 0;   // norm off by more than 1 %: legal, but some programs expect 1
   int64_t zero_scales = 0;                // a log-scale of −Inf
   int64_t invisible = 0;                  // opacity below 1/255: no rasterizer draws them

@@ -94,7 +94,7 @@ struct Tally {
     ++usable;
     if (!IsPlausible(rows, i)) ++sums.implausible;
     const double length = QuaternionLength(rows.quats.data() + 4 * i);
-    if (length < 1e-12) {
+    if (length == 0) {
       ++sums.zero_quaternions;
     } else if (IsNotNormalised(length)) {
       ++sums.unnormalised_quaternions;

@@ -83,8 +83,8 @@ CloudStatistics Reference(const CloudView& cloud) {
     double norm = 0;
     for (int k = 0; k < 4; ++k) norm += double{q[k]} * q[k];
     norm = std::sqrt(norm);
-    out.zero_quaternions += norm < 1e-12 ? 1 : 0;
-    out.unnormalised_quaternions += norm >= 1e-12 && std::abs(norm - 1) > 0.01 ? 1 : 0;
+    out.zero_quaternions += norm == 0 ? 1 : 0;
+    out.unnormalised_quaternions += norm > 0 && std::abs(norm - 1) > 0.01 ? 1 : 0;
     opacity.push_back(Sigmoid(cloud.opacity_logits[row]));
     out.invisible += opacity.back() < 1.0f / 255 ? 1 : 0;
     out.zero_scales += std::isfinite(low) ? 0 : 1;

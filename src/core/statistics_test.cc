@@ -70,6 +70,7 @@ TEST(Statistics, CountsEachProblemOnce) {
   cloud.means[0] = std::nanf("");                                     // row 0
   for (size_t k = 0; k < 4; ++k) cloud.quats[4 + k] = 0;              // row 1
   cloud.quats[8] = 2;                                                 // row 2
+  std::fill_n(cloud.quats.data() + 24, 4, 1e-30f);                    // row 6: short, but a rotation
   cloud.log_scales[9] = -std::numeric_limits<float>::infinity();      // row 3
   cloud.means[12] = 1000;                                             // row 4
   cloud.opacity_logits[5] = -std::numeric_limits<float>::infinity();  // row 5
@@ -77,7 +78,7 @@ TEST(Statistics, CountsEachProblemOnce) {
   const CloudStatistics s = ComputeStatistics(cloud);
   EXPECT_EQ(s.not_finite, 1);
   EXPECT_EQ(s.zero_quaternions, 1);
-  EXPECT_EQ(s.unnormalised_quaternions, 1);
+  EXPECT_EQ(s.unnormalised_quaternions, 2);
   EXPECT_EQ(s.zero_scales, 1);
   EXPECT_EQ(s.outliers, 1);
   EXPECT_EQ(s.invisible, invisible_before + 1);

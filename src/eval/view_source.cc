@@ -193,7 +193,16 @@ Result<std::unique_ptr<ViewSource>> OpenImageViews(const fs::path& path, const s
   const auto owned = [](const ImageViews::View& view) { return view.camera.intrinsics.width > 0; };
   const auto strangers = static_cast<size_t>(std::ranges::count_if(views, std::not_fn(owned)));
   if (strangers > 0 && strangers < views.size()) {
-    LogInfo(Cat(path.string(), ": ", strangers, " of ", views.size(), " pictures are no camera's and are passed over"));
+    // Those beside the cameras' own have been spoken of when these were looked for.
+    std::set<fs::path> folders;
+    for (const auto& [place, camera] : owners) folders.insert(fs::path(place).parent_path());
+    const auto elsewhere = std::ranges::count_if(views, [&](const ImageViews::View& view) {
+      return !owned(view) && !folders.contains(fs::path(PlaceOf(view.file)).parent_path());
+    });
+    if (elsewhere > 0) {
+      LogInfo(Cat(path.string(), ": ", elsewhere, " of ", views.size(),
+                  " pictures are in folders of no camera's pictures and are not used"));
+    }
     std::erase_if(views, std::not_fn(owned));
   }
   return std::unique_ptr<ViewSource>(std::make_unique<ImageViews>(std::move(views), background));

@@ -132,6 +132,9 @@ TEST(ViewSource, WhollyMaskedViewsAndStrangersDoNotCount) {
   ASSERT_EQ(messages.warnings().size(), 1u);
   EXPECT_NE(messages.warnings()[0].find("1 of 2 views, which are left out"), std::string::npos)
       << messages.warnings()[0];
+  for (const std::string& note : messages.notes()) {
+    EXPECT_EQ(note.find("not used"), note.npos) << note << ": the search for the cameras' pictures has said it";
+  }
   cameras.cameras[1].photograph.mask = folder / "black.png";
   const auto nothing = compare();
   ASSERT_FALSE(nothing.ok());

@@ -217,6 +217,7 @@ TEST(CloudIo, SaysWhatSomethingElseIs) {
   EXPECT_CONTAINS(other("\x89PNG\r\n\x1a\n"), "is a PNG picture and no splat; expected compressed PLY");
   EXPECT_CONTAINS(other("<!DOCTYPE html>"), "is a web page and no splat");
   EXPECT_CONTAINS(other("x"), "byte 0: is no splat file of a known format: found \"x\"");
+  EXPECT_CONTAINS(other("\x01\x02\x03\x80"), "which has no mark but its name, is read by convert --from .splat");
 }
 
 TEST(Registry, RowsAreConsistent) {

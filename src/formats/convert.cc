@@ -151,7 +151,7 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   report.sh_degree_read = cloud.sh_degree;
   report.input_bytes = file.bytes();
   WarnOfStored(input.string(), cloud, options.stored);
-  MakeStored(cloud, options.stored);
+  MakeStored(cloud, options.stored, extras.full_color);
   // Without harmonics: looking through them would take longer than all else here. Other formats say what becomes of
   // such Gaussians when they are written.
   if (const int64_t bad = to->keeps_all_values ? CountUnusable(cloud, false) : 0; bad > 0) {

@@ -28,6 +28,7 @@ struct ExtraProperties {
   // [N,3] world positions as the file has them, of which the means are rounded differences to the cloud's origin; empty
   // where means are all there is to know.
   Buffer<double> world;
+  float full_color = 0;  // what red green blue in the place of f_dc_* were taken to have at most; 0: there is f_dc
   std::vector<std::string> not_kept;  // what no writer has a place for, for messages: `list "neighbours"`
 
   size_t row_size() const;  // bytes

@@ -50,8 +50,9 @@ Result<OpenedSplat> OpenedSplat::Open(const fs::path& path, const SplatFormat* f
                      "splat file, or the folder of one")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(InputFile input, InputFile::Open(found.path));
-  if (!found.others.empty()) {
-    LogInfo(Cat(path.string(), ": its latest splat is read, ", found.path.string(), "; there are also ", found.others));
+  if (found.by_step) {
+    LogInfo(Cat(path.string(), ": its latest splat is read, ", found.path.string(),
+                found.others.empty() ? "" : Cat("; there are also ", found.others)));
   }
   return Of(std::move(input), format);
 }
@@ -100,8 +101,12 @@ std::optional<CloudExtent> OpenedSplat::Extent() const {
 Result<GaussianCloud> OpenedSplat::Read(const ReadLimits& limits, ExtraProperties* extras) const try {
   if (format_ == nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, input_.Head(16));
-    return Error{ErrorCode::kBadFile, Cat(input_.name(), ": byte 0: is no splat file of a known format: found \"",
-                                          Printable(head.substr(0, 8)), "\", expected ", ReadFormats())};
+    return Error{
+        ErrorCode::kBadFile,
+        Cat(input_.name(), ": byte 0: is no splat file of a known format: found \"", Printable(head.substr(0, 8)),
+            "\", expected ", ReadFormats(),
+            IsText(head) ? ""
+                         : "; a .splat or .ksplat, which has no mark but its name, is read by convert --from .splat")};
   }
   if (format_->read == nullptr) {
     return Error{ErrorCode::kBadFile,

@@ -2,10 +2,12 @@
 
 #include <charconv>
 #include <cstdint>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include "core/file_system.h"
 
@@ -15,43 +17,75 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Names of what a trainer writes at a step: "ckpt_", its number, "_rank0.pt"; in a folder, a file of it.
+// Names of what a trainer writes at a step: "ckpt_", its number, "_rank", that of a process, ".pt"; in a folder, a file
+// of it.
 struct Steps {
-  const char* folder;  // of results
-  std::string_view before, after;
+  const char* folder;  // of results; empty: they lie beside such folders
+  std::string_view before, rank, after;
   const char* inside;
 };
-constexpr Steps kSteps[] = {{"point_cloud", "iteration_", "", "point_cloud.ply"},
-                            {"ckpts", "ckpt_", "_rank0.pt", ""},
-                            {"nerfstudio_models", "step-", ".ckpt", ""}};
+constexpr Steps kSteps[] = {{"point_cloud", "iteration_", "", "", "point_cloud.ply"},
+                            {"ckpts", "ckpt_", "_rank", ".pt", ""},
+                            {"nerfstudio_models", "step-", "", ".ckpt", ""},
+                            {"", "chkpnt", "", ".pth", ""}};
 
-std::optional<int64_t> StepOf(const Steps& steps, const std::string& name) {
-  if (!name.starts_with(steps.before) || !name.ends_with(steps.after)) return std::nullopt;
-  int64_t step = 0;
-  const char* const end = name.data() + name.size() - steps.after.size();
-  const auto [stop, failed] = std::from_chars(name.data() + steps.before.size(), end, step);
-  return failed == std::errc() && stop == end && step >= 0 ? std::optional(step) : std::nullopt;
+// A step, and the number of a process (0 where names have none).
+using StepAndRank = std::pair<int64_t, int64_t>;
+
+std::optional<int64_t> TakeNumber(std::string_view& text) {
+  int64_t number = 0;
+  const auto [stop, failed] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (failed != std::errc() || number < 0) return std::nullopt;
+  text.remove_prefix(static_cast<size_t>(stop - text.data()));
+  return number;
 }
 
-// Of the steps in this folder; nothing where there are none.
-std::optional<FoundSplat> LatestIn(const fs::path& folder, const Steps& steps) {
-  std::map<int64_t, fs::path> found;
+std::optional<StepAndRank> StepOf(const Steps& steps, std::string_view name) {
+  if (!name.starts_with(steps.before)) return std::nullopt;
+  name.remove_prefix(steps.before.size());
+  const std::optional<int64_t> step = TakeNumber(name);
+  if (!step || !name.starts_with(steps.rank)) return std::nullopt;
+  name.remove_prefix(steps.rank.size());
+  const std::optional<int64_t> rank = steps.rank.empty() ? 0 : TakeNumber(name);
+  return rank && name == steps.after ? std::optional(StepAndRank(*step, *rank)) : std::nullopt;
+}
+
+// Files in this folder by their steps, of several processes the lowest.
+std::map<int64_t, fs::path> FilesIn(const fs::path& folder, const Steps& steps) {
+  std::map<StepAndRank, fs::path> found;
   std::error_code failed;
   fs::directory_iterator entry(folder, failed), end;
   for (; !failed && entry != end; entry.increment(failed)) {
-    const std::optional<int64_t> step = StepOf(steps, entry->path().filename().string());
+    const std::optional<StepAndRank> step = StepOf(steps, entry->path().filename().string());
     if (!step) continue;
     const fs::path file = *steps.inside != '\0' ? entry->path() / steps.inside : entry->path();
     if (IsFile(file)) found[*step] = file;
   }
+  std::map<int64_t, fs::path> files;
+  for (const auto& [step, file] : found) files.emplace(step.first, file);
+  return files;
+}
+
+// Of the steps in this folder; nothing where there are none.
+std::optional<FoundSplat> LatestIn(const fs::path& folder, const Steps& steps) {
+  std::map<int64_t, fs::path> found = FilesIn(folder, steps);
   if (found.empty()) return std::nullopt;
-  FoundSplat latest{found.rbegin()->second, {}};
+  FoundSplat latest{found.rbegin()->second, {}, true};
   found.erase(std::prev(found.end()));
   for (const auto& [step, file] : found) {
     const fs::path name = *steps.inside != '\0' ? file.parent_path().filename() : file.filename();
     latest.others += (latest.others.empty() ? "" : ", ") + name.string();
   }
   return latest;
+}
+
+// Checkpoints that lie beside the folder of results which the splat is of.
+std::string CheckpointsIn(const fs::path& folder) {
+  std::string names;
+  for (const auto& [step, file] : FilesIn(folder, kSteps[std::size(kSteps) - 1])) {
+    names += (names.empty() ? "" : ", ") + file.filename().string();
+  }
+  return names;
 }
 
 }  // namespace
@@ -62,9 +96,13 @@ FoundSplat FindSplat(const fs::path& path) {
     if (fs::path meta = path / name; Exists(meta)) return {meta, {}};
   }
   for (const Steps& steps : kSteps) {
-    for (const fs::path& folder : {path / steps.folder, path}) {
-      if (const std::optional<FoundSplat> latest = LatestIn(folder, steps)) return *latest;
+    const bool has_folder = *steps.folder != '\0';
+    if (std::optional<FoundSplat> latest; has_folder && (latest = LatestIn(path / steps.folder, steps))) {
+      const std::string beside = CheckpointsIn(path);
+      latest->others += (latest->others.empty() || beside.empty() ? "" : ", ") + beside;
+      return *latest;
     }
+    if (const std::optional<FoundSplat> latest = LatestIn(path, steps)) return *latest;
     const fs::path inside = path / steps.inside;
     const fs::path named = path.has_filename() ? path : path.parent_path();  // "iteration_7000/"
     if (StepOf(steps, named.filename().string()) && IsFile(inside)) return {inside, {}};

@@ -1,26 +1,30 @@
 #include "formats/stored_as.h"
 
-#include "core/activations.h"
 #include "core/log.h"
 #include "core/parallel.h"
 #include "core/spherical_harmonics.h"
 #include "core/stored_values.h"
 #include "core/text.h"
+#include "formats/number_or_nan.h"
 
 namespace anchorsplat {
 
-void MakeStored(GaussianCloud& cloud, const StoredAs& stored) {
+void MakeStored(GaussianCloud& cloud, const StoredAs& stored, float full_color) {
   if (stored == StoredAs{}) return;
+  const bool colors = stored.color_of_one > 0 && stored.color_of_one != full_color;
   ParallelFor(0, cloud.size(), 1 << 14, [&](int64_t first, int64_t last) {
     for (int64_t i = first; i < last; ++i) {
       for (int64_t k = 3 * i; stored.lengths && k < 3 * i + 3; ++k) {
         float& scale = cloud.log_scales[static_cast<size_t>(k)];
-        scale = LogFromScale(scale);
+        scale = LogFromStoredScale(scale);
       }
       float& opacity = cloud.opacity_logits[static_cast<size_t>(i)];
-      if (stored.opacities) opacity = LogitFromOpacity(opacity);
+      if (stored.opacities) opacity = LogitFromStoredOpacity(opacity);
       float* const sh = cloud.sh.data() + i * cloud.sh_stride();
-      for (int k = 0; stored.color_of_one > 0 && k < 3; ++k) sh[k] = DcFromColor(sh[k] / stored.color_of_one);
+      for (int k = 0; colors && k < 3; ++k) {
+        const float color = full_color > 0 ? ColorFromDc(sh[k]) * full_color : sh[k];
+        sh[k] = DcFromColor(color / stored.color_of_one);
+      }
     }
   });
 }

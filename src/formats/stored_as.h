@@ -15,8 +15,9 @@ struct StoredAs {
   friend bool operator==(const StoredAs&, const StoredAs&) = default;
 };
 
-// Makes such numbers of a cloud what they ought to be. In place.
-void MakeStored(GaussianCloud& cloud, const StoredAs& stored);
+// Makes such numbers of a cloud what they ought to be. In place. `full_color`: the reader has made harmonics of colours
+// already and took this for their largest (ExtraProperties); 0: they are as stored.
+void MakeStored(GaussianCloud& cloud, const StoredAs& stored, float full_color = 0);
 
 // Warns where they look so, and `told` does not say it. `name`: the file, for people.
 void WarnOfStored(const std::string& name, const CloudView& cloud, const StoredAs& told);

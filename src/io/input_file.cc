@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <system_error>
@@ -81,7 +82,14 @@ Result<InputFile> InputFile::Open(const std::filesystem::path& path) {
   if (S_ISDIR(info.st_mode)) return Error{ErrorCode::kIo, Cat(name, ": is a folder, expected a file")};
   if (S_ISFIFO(info.st_mode) || S_ISSOCK(info.st_mode)) {
     if (path != "-") ::fcntl(file.descriptor_, F_SETFL, ::fcntl(file.descriptor_, F_GETFL) & ~O_NONBLOCK);
+    const bool is_standard_input = path == "-" || path == "/dev/stdin";
     ANCHORSPLAT_ASSIGN_OR_RETURN(Buffer<char> bytes, ReadPipe(file.descriptor_, name));
+    static std::atomic<bool> was_read = false;
+    if (is_standard_input && bytes.empty() && was_read) {
+      return Error{ErrorCode::kBadArgument,
+                   Cat(name, ": standard input is a pipe and has been read already: it can be one input only")};
+    }
+    was_read = was_read || (is_standard_input && !bytes.empty());
     ::close(std::exchange(file.descriptor_, -1));
     file.Own(std::move(bytes));
     return file;

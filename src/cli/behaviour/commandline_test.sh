@@ -46,10 +46,15 @@ expect 0 "info of a pipe" from_pipe info - --from splat
 gzip -k "$work/scan.splat" && piped=$work/scan.splat.gz
 expect 0 "a packed pipe, whose name is in it" from_pipe convert - "$work/unpacked.ply" -q
 expect 0 "it is the same" cmp "$work/told.ply" "$work/unpacked.ply"
+expect 2 "a pipe twice" from_pipe compare - - --orbit 2
+says stderr "standard input is a pipe and has been read already"
+expect 2 "no folder for outputs" "$program" convert "$scan" --out-dir - --to spz
+says stderr "--out-dir -: is standard output, not a folder"
+expect 2 "nor of enhance" "$program" enhance "$scan" --out-dir - --method filter
 out() { "$program" "$@" >"$work/out" 2>"$work/err"; }
 expect 0 "convert to standard output" out convert "$scan" - --to spz
 expect 0 "it is what goes to a file" cmp "$work/scan.spz" "$work/out"
-expect 0 "what is said goes to stderr" grep -q "standard output.spz (SPZ" "$work/err"
+expect 0 "what is said goes to stderr" grep -q "standard output (SPZ" "$work/err"
 expect 2 "no format is said" "$program" convert "$work/scan.spz" -
 expect 0 "a PLY" out convert "$work/scan.spz" - --to ply
 expect 0 "it begins as one" grep -qa "^ply" "$work/out"

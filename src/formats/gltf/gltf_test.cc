@@ -114,6 +114,19 @@ TEST(Gltf, MarksAreKept) {
   EXPECT_TRUE(Read(glb.bytes())->comments.empty());
 }
 
+TEST(Gltf, WhatIsNoNumberStaysNone) {
+  for (const char* name : {kGltfScales, kGltfOpacities}) {
+    Glb glb = Example(2, 0);
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const bool is_scale = name == kGltfScales;
+    SetAttribute(glb, name, is_scale ? std::vector{nan, 0.5f, 0.5f, 1.0f, 1.0f, 1.0f} : std::vector{nan, 0.5f});
+    const auto read = Read(glb.bytes());
+    ASSERT_TRUE(read.ok()) << read.error().message;
+    EXPECT_FALSE(IsUsable(*read, 0)) << name;
+    EXPECT_TRUE(IsUsable(*read, 1)) << name;
+  }
+}
+
 TEST(Gltf, NodesMoveAndScale) {
   Glb glb = Example(10, 1);
   const GaussianCloud plain = *Read(glb.bytes());

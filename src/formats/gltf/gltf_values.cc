@@ -6,8 +6,8 @@
 #include <cstring>
 #include <functional>
 
-#include "core/activations.h"
 #include "core/rotation.h"
+#include "formats/number_or_nan.h"
 
 namespace anchorsplat {
 
@@ -81,12 +81,12 @@ void FinishGltfRows(const GltfPrimitive& primitive, int64_t count, const GltfCol
       q[2] = static_cast<float>(p[0] * old[2] - p[1] * old[3] + p[2] * old[0] + p[3] * old[1]);
       q[3] = static_cast<float>(p[0] * old[3] + p[1] * old[2] - p[2] * old[1] + p[3] * old[0]);
     }
-    if (!primitive.logits) columns.opacities[i] = LogitFromOpacity(columns.opacities[i]);
+    if (!primitive.logits) columns.opacities[i] = LogitFromStoredOpacity(columns.opacities[i]);
     float* const mean = columns.means + 3 * i;
     const std::array<double, 3> at = {mean[0], mean[1], mean[2]};
     for (size_t k = 0; k < 3; ++k) {
       float& scale = columns.scales[3 * i + static_cast<int64_t>(k)];
-      scale = (primitive.logarithms ? scale : LogFromScale(scale)) + log_of_scale;
+      scale = (primitive.logarithms ? scale : LogFromStoredScale(scale)) + log_of_scale;
       const double* const row = place.turn.data() + 3 * k;
       const double along = turns ? row[0] * at[0] + row[1] * at[1] + row[2] * at[2] : at[k];
       mean[k] = static_cast<float>(place.scale * along + place.translation[k]);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <optional>
@@ -16,6 +17,7 @@
 #include "core/parallel.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
+#include "formats/means_from_world.h"
 #include "formats/wrapped_splat.h"
 #include "io/input_record.h"
 #include "tensors/tensor_file.h"
@@ -72,6 +74,15 @@ void Copy(const Float32Values& from, Buffer<float>& to) {
   std::copy(from.values().begin(), from.values().end(), to.begin());
 }
 
+// World coordinates, [N,3], of a tensor in double precision, which floats may be too coarse for.
+Result<Buffer<double>> CopyWorld(const TensorFile& file, const TensorEntry& means) {
+  const Result<Buffer<std::byte>> bytes = CopyContiguous(means);
+  if (!bytes.ok()) return Error{ErrorCode::kBadFile, Cat(file.name(), ": ", bytes.error().message)};
+  Buffer<double> world(bytes->size() / sizeof(double));
+  std::memcpy(world.data(), bytes->data(), bytes->size());
+  return world;
+}
+
 }  // namespace
 
 bool IsTorchCheckpoint(std::string_view head) {
@@ -83,8 +94,13 @@ bool HoldsGaussians(const TensorFile& file) { return NamesIn(file) != nullptr; }
 
 namespace {
 
+struct Part {
+  GaussianCloud cloud;
+  std::optional<int64_t> step;  // of its training, where it says that
+};
+
 // Those of one file.
-Result<GaussianCloud> ReadPart(const InputFile& input, const ReadLimits& limits) {
+Result<Part> ReadPart(const InputFile& input, const ReadLimits& limits) {
   const auto bad = [&](const std::string& what) { return Error{ErrorCode::kBadFile, Cat(input.name(), ": ", what)}; };
   Buffer<std::byte> bytes(static_cast<size_t>(input.size()));
   ANCHORSPLAT_RETURN_IF_ERROR(input.ReadAt(0, bytes.data(), bytes.size()));
@@ -114,7 +130,7 @@ Result<GaussianCloud> ReadPart(const InputFile& input, const ReadLimits& limits)
   // All shapes are checked before the cloud is allocated: N is only believed when six tensors really have it.
   using Shape = std::vector<int64_t>;
   const int64_t rest_coefficients = ShCoefficients(*degree) - 1;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values centres, file.ReadFloat32(called(names->means), Shape{n, 3}));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorEntry* const world, file.Require(called(names->means), Shape{n, 3}));
   // 2DGS has two scales: surfels, whose third axis is the normal.
   const TensorEntry* const scale_entry = file.Find(called(names->scales));
   const bool surfels = scale_entry != nullptr && scale_entry->shape == Shape{n, 2};
@@ -130,9 +146,9 @@ Result<GaussianCloud> ReadPart(const InputFile& input, const ReadLimits& limits)
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values sh_n,
                                file.ReadFloat32(called(names->rest), Shape{n, rest_coefficients, 3}));
 
-  GaussianCloud cloud;
+  Part part;
+  GaussianCloud& cloud = part.cloud;
   cloud.Resize(n, *degree);
-  Copy(centres, cloud.means);
   if (surfels) {
     for (size_t i = 0; i < static_cast<size_t>(n); ++i) {
       std::copy_n(scales.values().data() + 2 * i, 2, cloud.log_scales.data() + 3 * i);
@@ -158,7 +174,18 @@ Result<GaussianCloud> ReadPart(const InputFile& input, const ReadLimits& limits)
   if (*degree == 0 && names->degree_0_is_logits) {
     for (float& value : cloud.sh) value = DcFromColor(Sigmoid(value));
   }
-  return cloud;
+  if (world->type == TensorType::kFloat64) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Buffer<double> centres, CopyWorld(file, *world));
+    MeansFromWorld(centres, cloud);
+    cloud.double_means = !IsZero(cloud.origin);
+  } else {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values centres, file.ReadFloat32(called(names->means), Shape{n, 3}));
+    Copy(centres, cloud.means);
+  }
+  if (const auto step = file.scalars().find("step"); step != file.scalars().end()) {
+    if (const auto* const number = std::get_if<int64_t>(&step->second)) part.step = *number;
+  }
+  return part;
 }
 
 // "ckpt_29999_rank" and ".pt" around the number of a process, by which a trainer calls the file of its part.
@@ -202,7 +229,10 @@ std::string NameOf(const RankName& own, int rank) { return Cat(own.before, rank,
 Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& input, const ReadLimits& limits) {
   const std::optional<RankName> own = input.has_folder() ? RankOf(input.path().filename().string()) : std::nullopt;
   const std::set<int> ranks = own ? RanksBeside(input, *own) : std::set<int>{0};
-  if (!own || ranks == std::set<int>{0}) return ReadPart(input, limits);
+  if (!own || ranks == std::set<int>{0}) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(Part whole, ReadPart(input, limits));
+    return std::move(whole.cloud);
+  }
   int expected = 0;
   for (const int rank : ranks) {
     if (rank == expected++) continue;
@@ -210,24 +240,31 @@ Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& input, const ReadLim
                                           " is missing beside it", kAlone)};
   }
   GaussianCloud cloud;
+  std::optional<int64_t> step;
   for (const int rank : ranks) {
     ReadLimits left = limits;
     left.max_gaussians -= cloud.size();
-    const auto read = [&]() -> Result<GaussianCloud> {
+    const auto read = [&]() -> Result<Part> {
       if (rank == own->rank) return ReadPart(input, left);
       ANCHORSPLAT_ASSIGN_OR_RETURN(InputFile file, input.OpenBeside(NameOf(*own, rank)));
       ANCHORSPLAT_ASSIGN_OR_RETURN(const UnwrappedSplat part, Unwrap(std::move(file)));
       return ReadPart(part.file, left);
     };
-    ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud part, read());
+    ANCHORSPLAT_ASSIGN_OR_RETURN(Part part, read());
+    const auto differ = [&](const char* what, int64_t first, int64_t other) {
+      return Error{ErrorCode::kBadFile,
+                   Cat(input.name(), ": is a part of a splat whose parts do not belong together: ", NameOf(*own, 0),
+                       " has ", what, " ", first, " and ", NameOf(*own, rank), " has ", other, kAlone)};
+    };
     if (rank == 0) {
-      cloud = std::move(part);
-    } else if (part.sh_degree != cloud.sh_degree) {
-      return Error{ErrorCode::kBadFile, Cat(input.name(), ": its parts have SH degrees ", cloud.sh_degree, " and ",
-                                            part.sh_degree, " and are not of one splat", kAlone)};
-    } else {
-      ANCHORSPLAT_RETURN_IF_ERROR(Append(cloud, part));
+      cloud = std::move(part.cloud);
+      step = part.step;
+      continue;
     }
+    if (step && part.step && *step != *part.step) return differ("step", *step, *part.step);
+    if (part.cloud.sh_degree != cloud.sh_degree) return differ("SH degree", cloud.sh_degree, part.cloud.sh_degree);
+    ANCHORSPLAT_RETURN_IF_ERROR(Append(cloud, part.cloud));
+    cloud.double_means |= part.cloud.double_means;
   }
   LogInfo(Cat(input.name(), ": is read with the other parts of its splat, ", ranks.size(), " in all (", NameOf(*own, 0),
               " to ", NameOf(*own, expected - 1), ")", kAlone));

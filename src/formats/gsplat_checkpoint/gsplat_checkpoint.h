@@ -19,7 +19,8 @@ bool IsTorchCheckpoint(std::string_view head);
 // dictionary "splats" with means [N,3], scales [N,3] (logarithms), quats [N,4] (wxyz, any norm), opacities [N]
 // (logits), sh0 [N,1,3] and shN [N,(degree+1)²−1,3], which is our stored space; other members are left alone. Of a run
 // on several processors each file holds its own part of the Gaussians: all those beside it that differ in {r} only are
-// read along, in their order, which a message says.
+// read along, in their order, which a message says. Means in double precision are world coordinates
+// (core/world_origin.h).
 //
 // Or those of a checkpoint of nerfstudio's splatfacto (step-000029999.ckpt): the same under "pipeline" with the names
 // _model.gauss_params.means, scales, quats, opacities [N,1], features_dc [N,3], features_rest; of SH degree 0 its
@@ -31,7 +32,7 @@ bool IsTorchCheckpoint(std::string_view head);
 // The file is read into memory, not mapped: its values are copied once, and splats may come through a pipe.
 // Errors (kBadFile): as for TensorFile; a tensor missing, of another shape, or not of floating-point numbers; an SH
 // degree above 3; no Gaussians, or more than limits.max_gaussians; a part of a splat whose other parts are not all
-// there, or of another degree.
+// there, or of another degree or step.
 Result<GaussianCloud> ReadGsplatCheckpoint(const InputFile& file, const ReadLimits& limits = {});
 
 // Bytes of the file and of the other parts beside it, which are put down as inputs (input_record.h).

@@ -182,9 +182,62 @@ TEST(GsplatCheckpoint, PartsOfOneSplatAreReadTogether) {
               HasSubstr("is a part of a splat, of which ckpt_9_rank3.pt is missing beside it"));
   EXPECT_THAT(ReadCloud(folder / "ckpt_8_rank1.pt").error().message, HasSubstr("ckpt_8_rank0.pt is missing"));
   put("ckpt_9_rank3.pt", 3);
-  EXPECT_THAT(ReadCloud(folder / "ckpt_9_rank0.pt").error().message, HasSubstr("SH degrees 1 and 3"));
+  EXPECT_THAT(ReadCloud(folder / "ckpt_9_rank0.pt").error().message,
+              HasSubstr("ckpt_9_rank0.pt has SH degree 1 and ckpt_9_rank3.pt has 3"));
   put("one.pt", 1);
   EXPECT_EQ(ReadCloud(folder / "one.pt")->size(), 5);
+}
+
+// Of one Gaussian, at a step.
+std::string AtStep(int step) {
+  std::vector<std::pair<std::string, std::string>> members;
+  for (const auto& [name, shape] : std::vector<std::pair<std::string, std::vector<int64_t>>>{{"means", {1, 3}},
+                                                                                             {"scales", {1, 3}},
+                                                                                             {"quats", {1, 4}},
+                                                                                             {"opacities", {1}},
+                                                                                             {"sh0", {1, 1, 3}},
+                                                                                             {"shN", {1, 0, 3}}}) {
+    members.emplace_back(name, Tensor(shape, RowMajorStrides(shape), 0, 64));
+  }
+  return MakeCheckpoint(Pickle(Dict({{"step", Int(step)}, {"splats", Dict(members)}})), RampStorage());
+}
+
+TEST(GsplatCheckpoint, PartsOfDifferentStepsAreNotMixed) {
+  const TestFolder folder;
+  ASSERT_TRUE(WriteWholeFile(folder / "ckpt_9_rank0.pt", AtStep(29999), true).ok());
+  ASSERT_TRUE(WriteWholeFile(folder / "ckpt_9_rank1.pt", AtStep(29999), true).ok());
+  EXPECT_EQ(ReadCloud(folder / "ckpt_9_rank0.pt")->size(), 2);
+  ASSERT_TRUE(WriteWholeFile(folder / "ckpt_9_rank1.pt", AtStep(6), true).ok());
+  for (const char* name : {"ckpt_9_rank0.pt", "ckpt_9_rank1.pt"}) {
+    EXPECT_THAT(ReadCloud(folder / name).error().message,
+                HasSubstr("ckpt_9_rank0.pt has step 29999 and ckpt_9_rank1.pt has 6"));
+  }
+}
+
+TEST(GsplatCheckpoint, MeansInDoubleAreWorldCoordinates) {
+  for (const double far : {0.0, 4500000.0}) {
+    const std::vector<double> world = {far + 12.125, 17.0625, 120.5, far + 13.015625, 16.0, 121.0};
+    std::string doubles;
+    for (const double value : world) doubles += Little(value);
+    for (int i = 6; i < 64; ++i) doubles += Little(-5.0);
+    std::vector<std::pair<std::string, std::string>> members;
+    for (const auto& [name, shape] : std::vector<std::pair<std::string, std::vector<int64_t>>>{{"means", {2, 3}},
+                                                                                               {"scales", {2, 3}},
+                                                                                               {"quats", {2, 4}},
+                                                                                               {"opacities", {2}},
+                                                                                               {"sh0", {2, 1, 3}},
+                                                                                               {"shN", {2, 0, 3}}}) {
+      members.emplace_back(name, Tensor(shape, RowMajorStrides(shape), name == "means" ? 0 : 6, 64, "DoubleStorage"));
+    }
+    const auto cloud = Read(MakeCheckpoint(Pickle(Dict({{"splats", Dict(members)}})), doubles));
+    ASSERT_TRUE(cloud.ok()) << cloud.error().message;
+    EXPECT_EQ(IsZero(cloud->origin), far == 0);
+    EXPECT_EQ(cloud->double_means, far > 0);
+    for (int64_t i = 0; i < 6; ++i) {
+      const auto at = ToWorld(cloud->means.data() + i - i % 3, cloud->origin);
+      EXPECT_EQ(at[static_cast<size_t>(i % 3)], world[static_cast<size_t>(i)]);
+    }
+  }
 }
 
 TEST(GsplatCheckpoint, MessagesNameTheTensor) {

@@ -18,6 +18,7 @@
 #include "core/text.h"
 #include "formats/cloud_checks.h"
 #include "formats/file_blocks.h"
+#include "formats/number_or_nan.h"
 #include "formats/record_blocks.h"
 #include "io/little_endian.h"
 
@@ -231,7 +232,7 @@ bool UnpackKsplat(const Ksplat& ksplat, const Section& section, const Buckets& b
               : (static_cast<float>(bytes[0] + 256 * bytes[1]) - static_cast<float>(section.range)) * step + center[k];
     }
     for (int k = 0; k < 3; ++k, bytes += level.number) {
-      cloud.log_scales[static_cast<size_t>(3 * row + k)] = LogFromScale(Number(bytes, level.number));
+      cloud.log_scales[static_cast<size_t>(3 * row + k)] = LogFromStoredScale(Number(bytes, level.number));
     }
     for (int k = 0; k < 4; ++k, bytes += level.number) {
       cloud.quats[static_cast<size_t>(4 * row + k)] = Number(bytes, level.number);

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <type_traits>
 
+#include "core/log.h"
 #include "core/number_text.h"
 #include "core/text.h"
 #include "formats/ply/ply_rows.h"
@@ -153,6 +154,11 @@ class RowReader {
   // One row; a value with a target is stored through `store(property, value)`.
   template <typename Store>
   Status Read(const PlyElement& element, int64_t row, const Store& store);
+  // The line of the next row that there is; 0 at the end of the file.
+  Result<int64_t> NextLine() {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const bool more, words_.NextLine());
+    return more ? words_.line() : 0;
+  }
 
  private:
   Error Bad(const std::string& what) const {
@@ -226,6 +232,12 @@ Status ReadAsciiBody(const InputFile& file, const PlyHeader& header, const PlyEl
       }
       return to[p].bytes == nullptr || ParseBytes(word, vertex.properties[p].type, to[p].bytes + row * to[p].stride);
     }));
+  }
+  if (&header.elements.back() != &vertex) return {};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const int64_t surplus, reader.NextLine());
+  if (surplus > 0) {
+    LogWarning(Cat(file.name(), ": line ", WithThousands(surplus), ": what is behind its ", WithThousands(vertex.count),
+                   " Gaussians is not read: its header knows nothing of it"));
   }
   return {};
 }

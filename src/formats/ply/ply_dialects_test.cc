@@ -16,6 +16,7 @@
 #include "formats/ply/ply_blocks.h"
 #include "formats/ply/ply_reader.h"
 #include "formats/random_cloud_for_test.h"
+#include "formats/stored_as.h"
 
 // What other programs write where INRIA's has other properties, or the same ones by other names.
 namespace anchorsplat {
@@ -130,7 +131,8 @@ TEST(PlyDialects, CloudCompareNames) {
 
 TEST(PlyDialects, ColoursInPlaceOfCoefficients) {
   const GaussianCloud cloud = RandomCloud(50, 0, 3);
-  for (const auto& [type, full] : {std::pair("uchar", 255), std::pair("ushort", 65535), std::pair("float", 1)}) {
+  for (const auto& [type, full] : {std::pair("uchar", 255), std::pair("ushort", 65535), std::pair("float", 1),
+                                   std::pair("float", 255), std::pair("double", 65535)}) {
     Columns columns = ColumnsOf(cloud);
     Remove(columns, "f_dc_");
     int k = 0;
@@ -151,6 +153,13 @@ TEST(PlyDialects, ColoursInPlaceOfCoefficients) {
     }
     EXPECT_TRUE(SameBits(read->means, cloud.means));
     EXPECT_CONTAINS(FactsOf(bytes)["colours"], "red green blue");
+    ExtraProperties extras;
+    GaussianCloud told = *ReadPlyWithExtras(InputFile::FromBytes("x.ply", bytes), {}, extras);
+    EXPECT_EQ(extras.full_color, static_cast<float>(full));
+    MakeStored(told, {.color_of_one = static_cast<float>(full)}, extras.full_color);
+    ExpectSameCloud(told, *read);
+    MakeStored(told, {.color_of_one = 2.0f * static_cast<float>(full)}, extras.full_color);
+    EXPECT_NEAR(ColorFromDc(told.sh[0]), 0.5, 1e-6) << "one who knows better";
     // Where both are there, the colours are a preview of the coefficients.
     Columns both = ColumnsOf(cloud);
     both.insert(both.end(), columns.end() - 3, columns.end());

@@ -176,7 +176,7 @@ int PlyTypeSize(PlyType type) { return Info(type).size; }
 const char* PlyTypeName(PlyType type) { return Info(type).name.data(); }
 
 float FullIntensity(PlyType type) {
-  if (type == PlyType::kFloat || type == PlyType::kDouble) return 1;
+  if (IsFloating(type)) return 1;
   const bool is_signed = type == PlyType::kInt8 || type == PlyType::kInt16 || type == PlyType::kInt32;
   return static_cast<float>((uint64_t{1} << (8 * PlyTypeSize(type) - (is_signed ? 1 : 0))) - 1);
 }

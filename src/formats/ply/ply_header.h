@@ -18,7 +18,8 @@ enum class PlyEncoding { kAscii, kLittleEndian, kBigEndian };
 enum class PlyType { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat, kDouble };
 int PlyTypeSize(PlyType type);          // bytes in binary files
 const char* PlyTypeName(PlyType type);  // "float"
-float FullIntensity(PlyType type);      // of a colour: the largest number of the type, 1 of floats
+inline bool IsFloating(PlyType type) { return type == PlyType::kFloat || type == PlyType::kDouble; }
+float FullIntensity(PlyType type);  // of a colour: the largest number of the type, 1 of floats
 
 struct PlyProperty {
   std::string name;

@@ -7,10 +7,10 @@
 #include <string_view>
 #include <unordered_map>
 
-#include "core/activations.h"
 #include "core/log.h"
 #include "core/spherical_harmonics.h"
 #include "core/text.h"
+#include "formats/number_or_nan.h"
 
 namespace anchorsplat {
 
@@ -50,7 +50,7 @@ Status CheckFloating(const InputFile& file, const PlyProperty& property) {
     return Error{ErrorCode::kBadFile, Cat(Where(file, property.line), "property \"", property.name,
                                           "\" is a list (expected float or double)")};
   }
-  if (property.type != PlyType::kFloat && property.type != PlyType::kDouble) {
+  if (!IsFloating(property.type)) {
     return Error{ErrorCode::kBadFile, Cat(Where(file, property.line), "property \"", property.name, "\" has type ",
                                           PlyTypeName(property.type), " (expected float or double)")};
   }
@@ -184,11 +184,12 @@ void PlanDialect(const PlyElement& vertex, Properties& by_name, PlyLayout& layou
       std::ranges::all_of(kColors, [&](std::string_view name) { return red && type_of(name) == red; });
   if (has_shape && no_dc && layout.sh_degree == 0 && has_colors) {
     layout.full_color = FullIntensity(*red);
+    layout.float_color = IsFloating(*red);
     for (size_t k = 0; k < kDc.size(); ++k) by_name.emplace(kDc[k], by_name.at(kColors[k]));
   }
   const std::optional<PlyType> alpha = type_of("alpha");
   // Floats may be logits as well.
-  const bool is_whole = alpha && alpha != PlyType::kFloat && alpha != PlyType::kDouble;
+  const bool is_whole = alpha && !IsFloating(*alpha);
   if (has_shape && is_whole && !by_name.contains("opacity")) {
     layout.full_alpha = FullIntensity(*alpha);
     by_name.emplace("opacity", by_name.at("alpha"));
@@ -262,7 +263,7 @@ void FinishPlyRows(const PlyLayout& layout, GaussianCloud& rows) {
     float* const dc = rows.sh.data() + i * stride;
     for (int k = 0; layout.full_color > 0 && k < 3; ++k) dc[k] = DcFromColor(dc[k] / layout.full_color);
     float& opacity = rows.opacity_logits[static_cast<size_t>(i)];
-    if (layout.full_alpha > 0) opacity = LogitFromOpacity(opacity / layout.full_alpha);
+    if (layout.full_alpha > 0) opacity = LogitFromStoredOpacity(opacity / layout.full_alpha);
   }
 }
 

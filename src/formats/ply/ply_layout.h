@@ -32,6 +32,7 @@ struct PlyLayout {
   // What other programs write in place of INRIA's properties:
   bool surfels = false;       // 2DGS has two scales only; the third axis is the normal
   float full_color = 0;       // red green blue in place of f_dc_*: what stands for full intensity; 0: there is f_dc
+  bool float_color = false;   // these are floats, of which it takes all to tell that
   float full_alpha = 0;       // the same of alpha in place of opacity
   bool prefixed = false;      // CloudCompare's "scalar_" stands before their names
   std::vector<bool> dropped;  // by property: harmonics of degree 4, which are not read

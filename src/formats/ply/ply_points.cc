@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/text.h"
+#include "formats/ply/color_range.h"
 #include "formats/ply/ply_body.h"
 #include "formats/ply/ply_header.h"
 
@@ -48,14 +49,18 @@ Result<PlyPoints> ReadPlyPoints(const InputFile& file, const ReadLimits& limits)
     }
     return to;
   }));
+  std::array<float, 3> full = {1, 1, 1};
+  for (size_t k = 0; colored && k < 3; ++k) {
+    const PlyType type = vertex->properties[static_cast<size_t>(columns[3 + k])].type;
+    full[k] = IsFloating(type) ? IntensityOfOne(read.colors) : FullIntensity(type);
+  }
   PlyPoints points;
   for (size_t i = 0; i < read.positions.size(); i += 3) {
     const double* p = read.positions.data() + i;
     if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) continue;
     for (size_t k = 0; k < 3; ++k) {
       points.positions.push_back(header.origin[k] + p[k]);
-      float color = read.colors[i + k];
-      if (colored) color /= FullIntensity(vertex->properties[static_cast<size_t>(columns[3 + k])].type);
+      const float color = read.colors[i + k] / full[k];
       points.colors.push_back(color > 0 ? std::min(color, 1.0f) : 0.0f);  // NaN is 0
     }
   }

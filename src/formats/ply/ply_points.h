@@ -15,8 +15,8 @@ struct PlyPoints {
 };
 
 // Properties x y z and, where there are all three, red green blue of element "vertex": whole numbers from 0 to the
-// largest of their type, or floats from 0 to 1. Rows whose position is not finite are left out. Errors (kBadFile): as
-// of ReadPly; no x, y or z.
+// largest of their type, or floats from 0 to 1 or, as their values show, 255 (color_range.h). Rows whose position is
+// not finite are left out. Errors (kBadFile): as of ReadPly; no x, y or z.
 Result<PlyPoints> ReadPlyPoints(const InputFile& file, const ReadLimits& limits = {});
 
 }  // namespace anchorsplat

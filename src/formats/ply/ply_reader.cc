@@ -9,6 +9,7 @@
 #include "core/statistics.h"
 #include "core/text.h"
 #include "formats/linear_color.h"
+#include "formats/ply/color_range.h"
 #include "formats/ply/ply_body.h"
 #include "formats/ply/ply_color_space.h"
 #include "formats/ply/ply_filter.h"
@@ -82,7 +83,7 @@ void MeansFromWorld(const Buffer<double>& world, GaussianCloud& cloud) {
 
 Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, ExtraProperties* extras) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(PlyHeader header, ReadPlyHeader(file));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const PlyLayout layout, PlanPly(file, header));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(PlyLayout layout, PlanPly(file, header));
   const PlyElement& vertex = *layout.vertex;
   ANCHORSPLAT_RETURN_IF_ERROR(CheckGaussianLimit(file, vertex, limits));
   GaussianCloud cloud;
@@ -90,6 +91,7 @@ Result<GaussianCloud> Read(const InputFile& file, const ReadLimits& limits, Extr
   Buffer<float> filter;
   ANCHORSPLAT_RETURN_IF_ERROR(
       ReadPlyBody(file, header, vertex, [&] { return MakeRoom(header, layout, cloud, world, filter, extras); }));
+  FindFullColor(file, cloud, layout, extras);
   FinishPlyRows(layout, cloud);
   cloud.origin = header.origin;
   if (!world.empty()) MeansFromWorld(world, cloud);

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "core/messages_for_test.h"
 #include "core/text.h"
 #include "formats/ply/ply_header.h"
 #include "formats/random_cloud_for_test.h"
@@ -384,6 +385,24 @@ TEST_F(PlyErrors, NegativeListCount) {
   const size_t header = bytes.find("end_header\n") + 11;
   bytes = bytes.substr(0, header + 23 * 4) + "\xff" + std::string(64, '\0');
   EXPECT_ERROR(bytes, "list property \"l\" has -1 items");
+}
+
+TEST(PlyReader, RowsThatTheHeaderKnowsNothingOf) {
+  const GaussianCloud cloud = RandomCloud(3, 0, 1);
+  TestFile file;
+  file.properties = Properties(cloud, "float");
+  for (const char* encoding : {"ascii", "binary_little_endian"}) {
+    file.encoding = encoding;
+    const std::string two = file.Bytes(2), row = file.Bytes(3).substr(two.size());
+    const Messages messages;
+    ASSERT_TRUE(ReadBytes(two + "\n").ok());
+    EXPECT_TRUE(messages.warnings().empty());
+    const auto read = ReadBytes(two + row);
+    ASSERT_TRUE(read.ok()) << read.error().message;
+    EXPECT_EQ(read->size(), 2);
+    ASSERT_EQ(messages.warnings().size(), 1u) << encoding;
+    EXPECT_CONTAINS(messages.warnings()[0], "behind its 2 Gaussians");
+  }
 }
 
 }  // namespace

@@ -23,7 +23,8 @@ Status ReadRowsWithLists(SequentialReader& reader, const InputFile& file, const 
 Status SkipRowsWithLists(SequentialReader& reader, const InputFile& file, const PlyElement& element,
                          PlyEncoding encoding);
 
-// The body of an ASCII file, one row per line; elements before "vertex" are passed over.
+// The body of an ASCII file, one row per line; elements before "vertex" are passed over. Warns of what is
+// behind the last row where the header has no element there.
 Status ReadAsciiBody(const InputFile& file, const PlyHeader& header, const PlyElement& vertex,
                      const std::vector<PlyDestination>& to);
 

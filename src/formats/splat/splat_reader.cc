@@ -13,6 +13,7 @@
 #include "core/text.h"
 #include "formats/cloud_checks.h"
 #include "formats/file_blocks.h"
+#include "formats/number_or_nan.h"
 #include "formats/record_blocks.h"
 
 namespace anchorsplat {
@@ -61,7 +62,7 @@ int64_t UnpackSplat(const uint8_t* bytes, int64_t count, int64_t to, GaussianClo
     if (IsNoSplatRow(numbers)) ++absurd;
     for (int k = 0; k < 3; ++k) {
       cloud.means[static_cast<size_t>(3 * i + k)] = numbers[k];
-      cloud.log_scales[static_cast<size_t>(3 * i + k)] = LogFromScale(numbers[3 + k]);
+      cloud.log_scales[static_cast<size_t>(3 * i + k)] = LogFromStoredScale(numbers[3 + k]);
       cloud.sh[static_cast<size_t>(3 * i + k)] = kDc[bytes[24 + k]];
     }
     cloud.opacity_logits[static_cast<size_t>(i)] = kLogits[bytes[27]];

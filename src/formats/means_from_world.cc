@@ -1,11 +1,15 @@
 #include "formats/means_from_world.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <string>
 #include <vector>
 
+#include "core/log.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
+#include "core/text.h"
 #include "core/world_origin.h"
 
 namespace anchorsplat {
@@ -26,9 +30,32 @@ double TypicalLength(const GaussianCloud& cloud, const Buffer<double>& world, st
   return lengths.empty() ? 0 : std::exp(double{Quantile(lengths, 0.5)});
 }
 
+// Where Gaussians lie so far from each other that no origin makes floats fine enough for all. `said`: the file's own.
+void WarnOfRounding(const std::string& file, const Buffer<double>& world, const WorldOrigin& said,
+                    const GaussianCloud& cloud) {
+  constexpr double kSeen = 1.0 / 16;  // of a Gaussian's length
+  int64_t count = 0;
+  double most = 0;
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    const std::array<double, 3> at = ToWorld(cloud.means.data() + 3 * i, cloud.origin);
+    double off = 0;
+    for (size_t k = 0; k < 3; ++k)
+      off = std::max(off, std::fabs(at[k] - said[k] - world[3 * static_cast<size_t>(i) + k]));
+    const float* s = cloud.log_scales.data() + 3 * i;
+    if (!IsUsable(cloud, i) || !(off > kSeen * std::exp(double{std::max({s[0], s[1], s[2]})}))) continue;
+    ++count;
+    most = std::max(most, off);
+  }
+  if (count == 0) return;
+  LogWarning(Cat(file, ": positions of ", WithThousands(count), " of ", WithThousands(cloud.size()),
+                 " Gaussians are rounded, by up to ", most,
+                 ": they lie too far from the others for 32-bit floats. Split the file into parts that lie together"));
+}
+
 }  // namespace
 
-void MeansFromWorld(const Buffer<double>& world, GaussianCloud& cloud) {
+void MeansFromWorld(const std::string& file, const Buffer<double>& world, GaussianCloud& cloud) {
+  const WorldOrigin said = cloud.origin;
   std::vector<double> sample;
   const double length = TypicalLength(cloud, world, sample);
   const WorldOrigin origin = ChooseOrigin(sample, length);
@@ -39,6 +66,7 @@ void MeansFromWorld(const Buffer<double>& world, GaussianCloud& cloud) {
       cloud.means[at] = static_cast<float>(world[at] - origin[at % 3]);
     }
   });
+  WarnOfRounding(file, world, said, cloud);
 }
 
 }  // namespace anchorsplat

@@ -176,7 +176,7 @@ Result<Part> ReadPart(const InputFile& input, const ReadLimits& limits) {
   }
   if (world->type == TensorType::kFloat64) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Buffer<double> centres, CopyWorld(file, *world));
-    MeansFromWorld(centres, cloud);
+    MeansFromWorld(file.name(), centres, cloud);
     cloud.double_means = !IsZero(cloud.origin);
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Float32Values centres, file.ReadFloat32(called(names->means), Shape{n, 3}));

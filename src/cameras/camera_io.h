@@ -13,8 +13,9 @@ namespace anchorsplat {
 // a project folder that has it: of several models the one with most pictures, FindColmapModels in
 // cameras/colmap_model.h; a message names the others). A folder may also hold one of the others (OpenSfM's also in
 // opensfm, Bundler's in bundle), poses_bounds.npy only where there is nothing else. Order as in the file; names may
-// repeat. Pictures are found as cameras/picture_search.h says; `missing`, where it is given, becomes the first path at
-// which one was looked for in vain.
+// repeat. Pictures are found as cameras/picture_search.h says. Who needs them gives `missing`, which becomes the first
+// path at which one was looked for in vain; then two that are as likely are kBadArgument, and else that camera has
+// none.
 //
 // Where nerfstudio's dataparser_transforms.json lies beside a transforms.json or a COLMAP model, or is named itself, or
 // its folder (that of a run, whose config.yml says where the cameras are), they are moved into the frame that

@@ -49,7 +49,7 @@ bool IsColmapModel(const std::filesystem::path& folder);
 
 // The sparse models of a project, the one with most pictures first, of equals the first of: those in `sparse` and
 // `sparse` itself; the folder itself and those in it. Where there are none of these, those below `colmap`,
-// `sparse_txt`, `dense` and `distorted`.
+// `sparse_txt`, `dense` and `distorted`; else of these the ones with another number of pictures, behind all others.
 struct FoundModel {
   std::filesystem::path folder;
   size_t pictures = 0;  // registered ones, by what the file says of itself

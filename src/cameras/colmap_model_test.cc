@@ -336,6 +336,26 @@ TEST(Colmap, OfSeveralModelsTheLargestIsTaken) {
   }
 }
 
+TEST(Colmap, ModelsElsewhereInTheProjectAreNamed) {
+  for (const char* place : {"colmap/sparse/0", "distorted/sparse/0", "sparse_txt"}) {
+    const TestFolder folder;
+    Write(folder / "sparse/0/cameras.bin", kPinhole);
+    Write(folder / "sparse/0/images.bin", ImagesBin({{"a.png"}}));
+    Write(folder / place / "cameras.txt", "7 PINHOLE 40 30 50 60 21 14\n");
+    const std::string one = "1 1 0 0 0 0 0 0 7 a.png\n\n";
+    Write(folder / place / "images.txt", one + "2 1 0 0 0 0 0 0 7 b.png\n\n");
+    Messages messages;
+    EXPECT_EQ(ReadCameras(folder.path())->cameras.size(), 1u);
+    ASSERT_EQ(messages.warnings().size(), 1u) << place;
+    const std::string warning = messages.TakeWarnings()[0];
+    EXPECT_NE(warning.find((folder / place).string() + " (2 pictures)"), std::string::npos) << warning;
+    // As many are the same model as text, or before its pictures were undistorted.
+    Write(folder / place / "images.txt", one);
+    EXPECT_EQ(ReadCameras(folder.path())->cameras.size(), 1u);
+    EXPECT_TRUE(messages.warnings().empty()) << place;
+  }
+}
+
 TEST(Colmap, QuaternionsNearNormOneAreNormalised) {
   const TestFolder folder;
   const Messages messages;

@@ -30,8 +30,9 @@ struct FoundPicture {
 // case of letters and the kind of picture may differ (.JPG, .jpeg, .png, none). A folder of the file is one folder
 // here: the one that it says; else, below `project`, the one that has pictures of these names and the longest end of
 // its path in common, then `images`, `input`, others (`images_2` last; masks, depth maps and what this program rendered
-// into any other folder are no photographs). Pictures that are found are recorded as inputs, but for our own renderings,
-// which are inputs of who opens them. With `complete`, one message tells of pictures beside them that no name means.
+// into any other folder are no photographs). Pictures that are found are recorded as inputs, but for our own
+// renderings, which are inputs of who opens them. With `complete`, one message tells of pictures beside them that no
+// name means.
 std::vector<FoundPicture> FindPictures(const PicturePlaces& places, std::span<const std::string> names);
 
 // The same for cameras whose `image` is the path in the file: sets their names, pictures and masks. The picture of a

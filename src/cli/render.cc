@@ -104,7 +104,8 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
       seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
       const std::string warning = NothingToSee(cloud, camera, options, rasterizer.statistics().visible);
       if (!warning.empty() && empty_views++ == 0) empty = warning;
-      ANCHORSPLAT_RETURN_IF_ERROR(WriteRendering(paths[i], flags.transparent ? WithAlpha(render) : render.color, write));
+      ANCHORSPLAT_RETURN_IF_ERROR(
+          WriteRendering(paths[i], flags.transparent ? WithAlpha(render) : render.color, write));
       views.push_back({{"name", camera.name}, {"file", paths[i].string()}});
       progress.Advance();
     }

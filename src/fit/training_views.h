@@ -34,10 +34,10 @@ struct ProjectOptions {
   std::optional<WorldOrigin> origin = {};  // of a splat that is there already; nothing: ChooseOrigin of the cameras
 };
 
-// Opens a project: a folder with transforms_train.json and perhaps transforms_test.json (NeRF-synthetic), a COLMAP
-// project (sparse/0, images), any other file that ReadCameras takes or its folder, or a folder of such
-// folders named by resolution (256/ and 1024/, or 200/ and 800/), of which the smallest is taken. Views of the camera
-// file without a picture are left out with a warning.
+// Opens a project: a folder with transforms_train.json and perhaps transforms_test.json (NeRF-synthetic; a
+// message names other cameras beside them), a COLMAP project (sparse/0, images), any other file that ReadCameras takes
+// or its folder, or a folder of such folders named by resolution (256/ and 1024/, or 200/ and 800/), of which the
+// smallest is taken. Views of the camera file without a picture are left out with a warning.
 //
 // Cameras are those of the pictures that PictureCache gives: upright, without the lens, averaged down
 // (cameras/photograph.h). Pictures of another size than the camera file says are taken as scaled ones when the shape
@@ -45,8 +45,8 @@ struct ProjectOptions {
 //
 // A COLMAP project does not say which background its pictures have; a transforms_128.json beside a folder 128 does.
 //
-// Errors: those of ReadCameras, ReadColmapPoints, ReadPlyPoints and MatchPhotograph; kNotFound when no view has a
-// picture, or when the PLY is missing; kBadArgument when hold_out leaves nothing to train on.
+// Errors: those of ReadCameras for who needs pictures, ReadColmapPoints, ReadPlyPoints, MatchPhotograph; kNotFound: no
+// view has a picture, or when the PLY is missing; kBadArgument when hold_out leaves nothing to train on.
 Result<TrainingViews> OpenProject(const std::filesystem::path& project, const ProjectOptions& options = {});
 
 // Where a fit's first Gaussians stand.

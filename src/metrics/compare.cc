@@ -32,7 +32,8 @@ std::map<std::string, size_t> IndexByEnd(const std::vector<std::vector<std::stri
   std::map<std::string, size_t> index;
   for (size_t i = 0; i < views.size(); ++i) {
     const std::string name = End(views[i], count);
-    if (!index.emplace(Decomposed(name), i).second && std::ranges::find(repeated, name) == repeated.end()) repeated.push_back(name);
+    if (!index.emplace(Decomposed(name), i).second && std::ranges::find(repeated, name) == repeated.end())
+      repeated.push_back(name);
   }
   return index;
 }

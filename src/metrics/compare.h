@@ -23,8 +23,8 @@ struct ViewPairs {
 };
 
 // Pairs views (file paths or camera names) by the last part of their names where that tells them apart in both lists,
-// else by as many parts as do: "cam0/0000". kBadArgument, listing them: names that occur twice in one list, an empty
-// list.
+// else by as many parts as do: "cam0/0000"; there, views with fewer parts by all of theirs. kBadArgument, listing them:
+// names that occur twice in one list, an empty list.
 Result<ViewPairs> MatchViews(std::span<const std::string> a, std::span<const std::string> b);
 
 // "001, 002 and 15 more": enough to see what is meant.

@@ -26,7 +26,8 @@ struct TiffBytes {
 
 tmsize_t ReadBytes(thandle_t handle, void* to, tmsize_t count) {
   auto& file = *static_cast<TiffBytes*>(handle);
-  if (count < 0 || file.position > file.bytes.size()) return -1;
+  // Never -1: libtiff 4.5 counts it as bytes read, and clears what lies before its buffer.
+  if (count < 0 || file.position > file.bytes.size()) return 0;
   const size_t taken = std::min(static_cast<size_t>(count), file.bytes.size() - static_cast<size_t>(file.position));
   std::memcpy(to, file.bytes.data() + file.position, taken);
   file.position += taken;

@@ -26,6 +26,7 @@ def convert(
     scales: Literal["logarithms", "lengths"] = "logarithms",
     opacities: Literal["logits", "0-1"] = "logits",
     colors: Literal["harmonics", "0-1", "0-255"] = "harmonics",
+    double: bool = False,
     sort: Order = "format",
     spz_version: int = 4,
     lod_levels: int = 4,
@@ -50,6 +51,7 @@ def convert(
     coords: what the files' axes really are where they do not follow their format, as "IN:OUT", for example "RUB:".
     scales, opacities, colors: what the source's numbers are, whatever its format wants: "logarithms" or "lengths", "logits" or
     "0-1", "harmonics" or colours "0-1" or "0-255".
+    double: a PLY with world coordinates in double precision (see Cloud.origin); otherwise as the source has them.
     sort: order of the Gaussians in the file. spz_version: 4, or 3 for programs that only know gzip.
     lod_levels, lod_ratio, lod_chunk_count, lod_chunk_extent: of a target named lod-meta.json, a scene at several levels of
     detail: their number, the Gaussians of each to those of the finer one, Gaussians in a chunk in units of 1,024, and the

@@ -84,6 +84,7 @@ def test_values_that_are_no_numbers_come_through(cloud, tmp_path):
         assert len(anchorsplat.enhance(back, method="filter", pixel_size=0.005)[0]) == len(cloud) - 1
 
 
+@pytest.mark.filterwarnings("ignore:.*no place for where up is")
 def test_formats_convert_and_info_are_the_programs(biplane, program, tmp_path):
     import json
 

@@ -111,7 +111,7 @@ uint64_t PredictedPlySize(int64_t count, int sh_degree, std::optional<RenderMode
 uint64_t ExtraPlyBytes(const CloudView& cloud, const ExtraProperties& extras) {
   const size_t more = RowSize(cloud.sh_degree, cloud.double_means, extras) - RowSize(cloud.sh_degree, false, {});
   return static_cast<uint64_t>(cloud.size()) * more +
-         (cloud.double_means ? 3 * sizeof 'd' : 0);  // "double", not "float"
+         (cloud.double_means ? 3 : 0);  // "double" has a letter more than "float", in x, y and z
 }
 
 Status WritePly(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {

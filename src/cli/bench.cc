@@ -10,6 +10,7 @@
 #include "bench/render_bench.h"
 #include "cli/bench_looks.h"
 #include "cli/bench_pixel_size.h"
+#include "cli/bench_reading.h"
 #include "cli/table.h"
 #include "cli/verb.h"
 #include "core/parallel.h"
@@ -371,6 +372,7 @@ void AddBench(CLI::App& app, Program& program) {
   AddConvertBench(verb, program);
   AddIoBench(verb, program);
   AddPixelSizeBench(verb, program);
+  AddReadingBench(verb, program);
   AddLooksBench(verb, program);
 }
 

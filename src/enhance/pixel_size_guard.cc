@@ -185,28 +185,13 @@ std::string Number(double value) { return Fixed(value, value < 10 ? 1 : 0); }
 // `probe`: of showing.telling. What is left of that is used up.
 Result<PixelSizeEvidence> Gather(ShowingGaussians& showing, int64_t all, const Result<PixelSizeProbe>& probe,
                                  std::optional<RenderMode> mode) {
-  PixelSizeEvidence evidence;
-  evidence.gaussians = showing.bright.size();
+  PixelSizeEvidence evidence = EvidenceOfSurface(showing.bright);
   evidence.all = all;
   if (evidence.gaussians < kLeastGaussians) {
     return Error{ErrorCode::kBadArgument,
                  Cat("fewer than ", kLeastGaussians,
                      " Gaussians that show and are small beside the splat, to estimate a pixel size from")};
   }
-  const Surface surface = SurfaceOf(showing.bright);
-  evidence.spacing = surface.spacing;
-  evidence.footprint = surface.footprint;
-  evidence.of_many = surface.of_many;
-  evidence.dense = surface.dense;
-  evidence.closest = surface.closest;
-  evidence.unevenness = surface.unevenness;
-  evidence.growth = surface.growth;
-  evidence.harmless = surface.harmless;
-  const CloudShape shape = ShapeOf(showing.bright);
-  evidence.flatness = shape.flatness;
-  evidence.fill = shape.fill;
-  evidence.roundness = shape.roundness;
-  if (shape.is_flat()) evidence.sides = TwoSidesOf(showing.bright);
   if (!probe.ok()) return probe.error();
   evidence.small_axis = probe->start();
   LeaveIfAbandoned();
@@ -229,6 +214,27 @@ double MostGaussiansPerPixel(int64_t gaussians, double showing) {
   const double share = std::clamp((showing - kFaintShowing) / (kMostlyShowing - kFaintShowing), 0.0, 1.0);
   const double crowded = std::lerp(kCrowded, kCrowdedShowing, share);
   return std::clamp(crowded / static_cast<double>(std::max<int64_t>(1, gaussians)), kNeverCrowded, kMostCrowded);
+}
+
+PixelSizeEvidence EvidenceOfSurface(const GaussianCloud& bright) {
+  PixelSizeEvidence evidence;
+  evidence.gaussians = bright.size();
+  if (evidence.gaussians < kLeastGaussians) return evidence;
+  const Surface surface = SurfaceOf(bright);
+  evidence.spacing = surface.spacing;
+  evidence.footprint = surface.footprint;
+  evidence.of_many = surface.of_many;
+  evidence.dense = surface.dense;
+  evidence.closest = surface.closest;
+  evidence.unevenness = surface.unevenness;
+  evidence.growth = surface.growth;
+  evidence.harmless = surface.harmless;
+  const CloudShape shape = ShapeOf(bright);
+  evidence.flatness = shape.flatness;
+  evidence.fill = shape.fill;
+  evidence.roundness = shape.roundness;
+  if (shape.is_flat()) evidence.sides = TwoSidesOf(bright);
+  return evidence;
 }
 
 Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud) {

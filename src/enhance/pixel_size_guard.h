@@ -75,6 +75,9 @@ struct PixelSizeEvidence {
   double softness_without_black = 1;             // PixelSizeEstimate::softness of that
 };
 Result<PixelSizeEvidence> GatherPixelSizeEvidence(const GaussianCloud& cloud);
+// What of it is of how Gaussians lie and what shape that has; ShowingGaussians::bright. All but the number is as it is
+// without any where there are fewer than kLeastGaussians.
+PixelSizeEvidence EvidenceOfSurface(const GaussianCloud& bright);
 
 // Where the densest tenth of Gaussians lies as far apart as this, in pixels of a size, that size is not too large for
 // them: a splat has few Gaussians where it has little detail. Those of 37 fits are at 0.5 to 3.2.

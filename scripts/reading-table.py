@@ -1,0 +1,594 @@
+#!/usr/bin/env python3
+"""Makes the table of readings: what splats show before they are enhanced, and what helps them (docs/reading-table.md).
+
+    scripts/reading-table.py fits   --work WORK [--photos FOLDER]       fits of meshes, land, a room, photographs
+    scripts/reading-table.py splats --work WORK [--strangers FOLDER]    edits of them, and a task for every row
+    scripts/reading-table.py rows   --work WORK [--jobs N]              features and gains, the most of the work
+    scripts/reading-table.py pack   --work WORK -o data/reading.jsonl.gz
+
+Each goes on where it was stopped; `all` is the four of them. WORK/objects has the meshes (scripts/fetch-objects.sh);
+`fits` also makes land (scripts/make-land.py) and a room (scripts/make-scenes.sh). PHOTOS: a folder of projects of posed
+photographs, STRANGERS: a folder with a folder of splats for every maker. What they are called enters no row: they are
+photographs-1, maker-1 and so on, in the order of a hash of their names. Needs NumPy.
+"""
+
+import argparse
+import gzip
+import hashlib
+import json
+import pathlib
+import subprocess
+import sys
+import time
+
+import numpy as np
+
+HERE = pathlib.Path(__file__).resolve().parent.parent
+FOLDS = 8
+EDITS_PER_SPLAT = 8  # besides the splat as it is and without its tag
+DOWNSCALE = 4  # of photographs
+LANDS = {"hills-1": ("hills", 1), "relief-2": ("relief", 2), "town-3": ("town", 3), "town-4": ("town", 4)}
+LABELS = ("original", "mesh", "maker", "kind", "edit", "made")
+
+
+def digest(text):
+    return int(hashlib.sha256(text.encode()).hexdigest(), 16)
+
+
+def run(*command, **more):
+    return subprocess.run([str(c) for c in command], check=True, **more)
+
+
+def quietly(*command):
+    """Its last words are shown where it fails."""
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RuntimeError(f"{' '.join(map(str, command))}: {done.stderr.strip()[-400:]}")
+    return done.stdout
+
+
+class Clock:
+    """Core-seconds of this process's children, by stage, kept in WORK/core-seconds.json."""
+
+    def __init__(self, work, stage):
+        self.path, self.stage = work / "core-seconds.json", stage
+
+    def __enter__(self):
+        import resource
+        self.begin = resource.getrusage(resource.RUSAGE_CHILDREN)
+
+    def __exit__(self, *_):
+        import resource
+        now = resource.getrusage(resource.RUSAGE_CHILDREN)
+        seconds = now.ru_utime + now.ru_stime - self.begin.ru_utime - self.begin.ru_stime
+        kept = json.loads(self.path.read_text()) if self.path.exists() else {}
+        kept[self.stage] = kept.get(self.stage, 0) + seconds
+        self.path.write_text(json.dumps(kept))
+
+
+# Splats as rows of floats.
+
+
+class Splat:
+    """A binary PLY as `anchorsplat convert` writes it: float properties only."""
+
+    def __init__(self, path):
+        data = pathlib.Path(path).read_bytes()
+        end = data.index(b"end_header\n") + len(b"end_header\n")
+        header = data[:end].decode().splitlines()
+        self.comments = [line for line in header if line.startswith("comment")]
+        self.names = [line.split()[2] for line in header if line.startswith("property float")]
+        count = next(int(line.split()[2]) for line in header if line.startswith("element vertex"))
+        self.rows = np.frombuffer(data, "<f4", count * len(self.names), end).reshape(count, -1).copy()
+
+    def column(self, *names):
+        return [self.names.index(name) for name in names]
+
+    def get(self, *names):
+        return self.rows[:, self.column(*names)]
+
+    @property
+    def places(self):
+        return self.get("x", "y", "z")
+
+    @property
+    def opacities(self):
+        return 1 / (1 + np.exp(-self.get("opacity")[:, 0]))
+
+    def with_rows(self, rows):
+        out = object.__new__(Splat)
+        out.names, out.comments, out.rows = self.names, [], np.ascontiguousarray(rows, "<f4")
+        return out
+
+    def write(self, path, comments=()):
+        lines = ["ply", "format binary_little_endian 1.0", *comments, f"element vertex {len(self.rows)}"]
+        lines += [f"property float {name}" for name in self.names] + ["end_header"]
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part = path.with_suffix(".part")
+        part.write_bytes("\n".join(lines).encode() + b"\n" + self.rows.tobytes())
+        part.rename(path)
+
+    def gaussians(self, places, scales, opacities, colours):
+        """Rows of round Gaussians with the same columns."""
+        rows = np.zeros((len(places), len(self.names)), "<f4")
+        rows[:, self.column("x", "y", "z")] = places
+        rows[:, self.column("scale_0", "scale_1", "scale_2")] = np.log(scales)
+        rows[:, self.column("rot_0")] = 1
+        rows[:, self.column("opacity")] = np.log(opacities / (1 - opacities)).reshape(-1, 1)
+        rows[:, self.column("f_dc_0", "f_dc_1", "f_dc_2")] = (colours - 0.5) / 0.28209479177387814
+        return rows
+
+    def box(self, margin=0.02):
+        """Around what shows, but for the outermost of a thousand."""
+        shown = self.places[self.opacities > 0.1]
+        low, high = np.quantile(shown, [0.001, 0.999], axis=0)
+        return low - margin * (high - low).max(), high + margin * (high - low).max()
+
+
+# Edits. Each takes (splat, random, pixel) and returns what is left and what a task says of it. `pixel` is that of the
+# middle of the object.
+
+
+def turned(random):
+    m, _ = np.linalg.qr(random.normal(size=(3, 3)))
+    return m
+
+
+def cut(splat, inside):
+    return splat.with_rows(splat.rows[inside]), {"context": splat.with_rows(splat.rows[~inside])}
+
+
+def crop_box(splat, random, pixel, frame=np.eye(3), share=0.7):
+    along = splat.places @ frame
+    low, high = np.quantile(along[splat.opacities > 0.1], [0.5 - share / 2, 0.5 + share / 2], axis=0)
+    return cut(splat, ((along >= low) & (along <= high)).all(axis=1))
+
+
+def crop_turned_box(splat, random, pixel):
+    return crop_box(splat, random, pixel, turned(random))
+
+
+def crop_ball(splat, random, pixel):
+    away = np.linalg.norm(splat.places - np.median(splat.places[splat.opacities > 0.1], axis=0), axis=1)
+    return cut(splat, away <= np.quantile(away[splat.opacities > 0.1], 0.6))
+
+
+def crop_lasso(splat, random, pixel):
+    """A line drawn by hand around a part, as it is seen from somewhere."""
+    seen = splat.places @ turned(random)[:, :2]
+    middle = np.median(seen[splat.opacities > 0.1], axis=0)
+    d = seen - middle
+    angle, away = np.arctan2(d[:, 1], d[:, 0]), np.linalg.norm(d, axis=1)
+    phases = random.uniform(0, 2 * np.pi, 3)
+    line = 1 + sum(0.2 * np.sin((k + 2) * angle + phases[k]) for k in range(3))
+    reach = np.quantile(away[splat.opacities > 0.1], 0.65)
+    return cut(splat, away <= reach * line)
+
+
+def half(splat, random, pixel):
+    shown = splat.places[splat.opacities > 0.1]
+    axis = np.argmax(np.ptp(shown, axis=0))
+    return cut(splat, splat.places[:, axis] > np.median(shown[:, axis]))
+
+
+def thinned(share):
+    return lambda splat, random, pixel: (splat.with_rows(splat.rows[random.random(len(splat.rows)) < share]), {})
+
+
+def pruned(least):
+    return lambda splat, random, pixel: (splat.with_rows(splat.rows[splat.opacities >= least]), {})
+
+
+def raised(logits):
+    def edit(splat, random, pixel):
+        rows = splat.rows.copy()
+        rows[:, splat.column("opacity")] += logits
+        return splat.with_rows(rows), {"made": "raised"}
+    return edit
+
+
+def opaque(splat, random, pixel):
+    rows = splat.rows.copy()
+    rows[:, splat.column("opacity")] = np.maximum(rows[:, splat.column("opacity")], np.log(0.9 / 0.1))
+    return splat.with_rows(rows), {"made": "raised"}
+
+
+def scaled(splat, random, pixel):
+    factor, moved = float(random.choice([0.01, 0.3, 7, 300])), random.normal(size=3)
+    rows = splat.rows.copy()
+    rows[:, splat.column("x", "y", "z")] = factor * (rows[:, splat.column("x", "y", "z")] + moved)
+    rows[:, splat.column("scale_0", "scale_1", "scale_2")] += np.log(factor)
+    return splat.with_rows(rows), {"moved": {"scale": factor, "rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1],
+                                             "translation": (factor * moved).tolist()}}
+
+
+def without_harmonics(splat, random, pixel):
+    keep = [i for i, name in enumerate(splat.names) if not name.startswith("f_rest_")]
+    out = splat.with_rows(splat.rows[:, keep])
+    out.names = [splat.names[i] for i in keep]
+    return out, {}
+
+
+def added(splat, rows, more=None):
+    low, high = splat.box()
+    return splat.with_rows(np.concatenate([splat.rows, rows])), {"keep": [*low.tolist(), *high.tolist()]} | (more or {})
+
+
+def floaters(splat, random, pixel):
+    low, high = splat.box()
+    middle, reach = (low + high) / 2, (high - low).max()
+    places = middle + random.uniform(-1.2, 1.2, (4000, 3)) * reach
+    places = places[~((places >= low) & (places <= high)).all(axis=1)][: int(random.integers(60, 800))]
+    scales = pixel * np.exp(random.uniform(-1, 3, (len(places), 1))) * np.exp(random.normal(0, 0.5, (len(places), 3)))
+    return added(splat, splat.gaussians(places, scales, random.uniform(0.05, 0.95, len(places)), random.random((len(places), 3))))
+
+
+def on_ground(splat, random, pixel):
+    low, high = splat.box()
+    middle, side = (low + high) / 2, 1.6 * (high - low).max()
+    spacing = pixel * float(random.choice([2, 4, 8]))
+    along = np.arange(-side, side, spacing)
+    x, z = np.meshgrid(along, along)
+    places = np.stack([middle[0] + x.ravel(), np.full(x.size, low[1] - spacing), middle[2] + z.ravel()], -1)
+    places[:, [0, 2]] += random.normal(0, 0.2 * spacing, (len(places), 2))
+    scales = np.tile([0.7 * spacing, 0.1 * spacing, 0.7 * spacing], (len(places), 1))
+    colours = 0.4 + 0.1 * random.normal(size=(len(places), 1)) + np.zeros(3)
+    return added(splat, splat.gaussians(places, scales, np.full(len(places), 0.9), colours))
+
+
+def before_sky(splat, random, pixel):
+    low, high = splat.box()
+    middle, reach = (low + high) / 2, (high - low).max()
+    direction = random.normal(size=(1500, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    places = middle + direction * reach * random.uniform(6, 8, (1500, 1))
+    scales = reach * random.uniform(0.2, 0.6, (1500, 3))
+    return added(splat, splat.gaussians(places, scales, np.full(1500, 0.8), 0.5 + 0.2 * random.random((1500, 3))))
+
+
+EDITS = {
+    "crop: box": crop_box,
+    "crop: turned box": crop_turned_box,
+    "crop: ball": crop_ball,
+    "crop: lasso": crop_lasso,
+    "crop: half": half,
+    "thinned: half": thinned(0.5),
+    "thinned: fifth": thinned(0.2),
+    "pruned: faint": pruned(0.1),
+    "pruned: below 0.3": pruned(0.3),
+    "raised: by 2 logits": raised(2),
+    "raised: to 0.9": opaque,
+    "scaled and moved": scaled,
+    "without harmonics": without_harmonics,
+    "floaters": floaters,
+    "on ground": on_ground,
+    "before a sky": before_sky,
+    "merged": None,  # takes another splat of the same fold
+    "turned": None,  # these take the program
+    "through .spz": None,
+    "through .sog": None,
+    "through .splat": None,
+    "through .compressed.ply": None,
+    "through .glb": None,
+    "filtered before": None,
+    "enhanced before": None,
+    "enhanced before, one for one": None,
+}
+COMMON = ("filtered before", "enhanced before")  # twice as often: being enhanced is to be told from all else
+
+
+# Originals.
+
+
+def read_objects(folder, made_of, mesh_of=None):
+    """Fits of a data set that were not rejected."""
+    for line in sorted((folder / "manifest.jsonl").read_text().splitlines()):
+        record = json.loads(line)
+        name = record["name"]
+        mesh, kind = (name.split("--") + [record.get("recipe", "")])[:2]
+        yield {"original": name, "mesh": mesh, "maker": "", "kind": kind, "made": made_of(kind), "object": folder / name,
+               "splat": folder / name / "splat.ply"}
+
+
+def made_by(kind):
+    return "antialiased" if kind.startswith("antialiased") else "mip" if kind.startswith("mip") else "classic"
+
+
+def anonymous(folder, word):
+    """Folders in the order of a hash, with names that say nothing."""
+    found = sorted((p for p in folder.iterdir() if p.is_dir()), key=lambda p: digest(p.name))
+    return {p: f"{word}-{k + 1}" for k, p in enumerate(found)}
+
+
+def originals(arguments):
+    work = arguments.work
+    found = list(read_objects(work / "fits", made_by)) + list(read_objects(work / "land", made_by))
+    found += list(mesh_splats(work, found))
+    room = work / "scenes/room"
+    if (room / "splat.ply").exists():
+        found.append({"original": "room", "mesh": "room", "maker": "", "kind": "room", "made": "classic", "object": room,
+                      "splat": room / "splat.ply"})
+    for example in sorted((HERE / "examples").iterdir()):
+        if (example / "input.ply").exists():
+            mesh = {"biplane": "BlendSwap-CC-0-cartoon_biplane", "stone_lantern": "BlendSwap-CC-0-stoneLantern"}
+            found.append({"original": example.name, "mesh": mesh.get(example.name, example.name), "maker": "",
+                          "kind": "example", "made": "classic", "object": example, "splat": example / "input.ply"})
+    if arguments.photos:
+        for project, name in anonymous(arguments.photos, "photographs").items():
+            splat = work / "photographs" / f"{name}.ply"
+            if splat.exists():
+                found.append({"original": name, "mesh": name, "maker": name, "kind": "photographed", "made": "classic",
+                              "object": project, "downscale": DOWNSCALE, "splat": splat})
+    return found
+
+
+def mesh_splats(work, fits):
+    """What converters make of a mesh: a disc on every point of its surface, all alike. Of every third mesh."""
+    for mesh in sorted({fit["mesh"] for fit in fits if "--" in fit["original"]}):
+        if digest("points of " + mesh) % 3:
+            continue
+        fit = next(f for f in fits if f["mesh"] == mesh)
+        low = sorted(p.name for p in fit["object"].iterdir() if p.name.isdigit())
+        low = min(low, key=int)
+        out = work / "meshes" / f"{mesh}.ply"
+        if not out.exists():
+            places, colours = colmap_points(fit["object"] / low / "sparse/0/points3D.bin")
+            splat = Splat(fit["splat"])
+            away = np.sort(((places[:200, None] - places[None]) ** 2).sum(-1), axis=1)[:, 4] ** 0.5
+            scales = np.full((len(places), 3), 0.6 * np.median(away))
+            made = splat.with_rows(splat.gaussians(places, scales, np.full(len(places), 0.99), np.clip(colours, 0.01, 0.99)))
+            made, _ = without_harmonics(made, None, None)
+            made.write(out)
+        yield fit | {"original": f"{mesh}--points", "kind": "points of a mesh", "made": "mesh", "splat": out}
+
+
+def colmap_points(path):
+    data = path.read_bytes()
+    count, at = int(np.frombuffer(data, "<u8", 1)[0]), 8
+    places, colours = np.zeros((count, 3)), np.zeros((count, 3))
+    for i in range(count):
+        places[i] = np.frombuffer(data, "<f8", 3, at + 8)
+        colours[i] = np.frombuffer(data, "u1", 3, at + 32) / 255
+        at += 8 + 24 + 3 + 8
+        at += 8 + 8 * int(np.frombuffer(data, "<u8", 1, at)[0])
+    return places, colours
+
+
+def low_pixel(original):
+    """Of the middle of a mesh's views; of what is no object, a size that is about right."""
+    for name in ("transforms_64.json", "transforms_128.json", "transforms_256.json", "transforms_lr.json"):
+        path = original["object"] / name
+        if path.exists():
+            cameras = json.loads(path.read_text())
+            centres = np.array([np.array(f["transform_matrix"])[:3, 3] for f in cameras["frames"]])
+            frame = cameras | cameras["frames"][0]
+            focal = frame.get("fl_x") or 0.5 * frame["w"] / np.tan(0.5 * frame["camera_angle_x"])
+            return float(np.median(np.linalg.norm(centres, axis=1)) / focal)
+    splat = Splat(original["splat"])
+    axes = np.sort(np.exp(splat.get("scale_0", "scale_1", "scale_2")), axis=1)
+    return float(np.median(axes[:, 1]))
+
+
+# Stages.
+
+
+def make_fits(arguments):
+    work, program = arguments.work, arguments.program
+    objects = work / "objects"
+    with Clock(work, "fits"):
+        run(program, "dataset", "build", "--list", HERE / "data/reading-fits.txt", "--objects", objects, "-o",
+            work / "fits", "--recipe", HERE / "data/reading-fits.toml", "--jobs", 1)
+        meshes = [work / "land-meshes" / f"{name}.obj" for name in LANDS]
+        for mesh, (kind, seed) in zip(meshes, LANDS.values()):
+            mesh.parent.mkdir(exist_ok=True)
+            if not mesh.exists():
+                run(sys.executable, HERE / "scripts/make-land.py", kind, mesh, "--seed", seed)
+        run(program, "dataset", "build", *meshes, "-o", work / "land", "--recipe", HERE / "data/reading-land.toml",
+            "--jobs", 1, "--licence", "Apache-2.0")
+        for project, name in anonymous(arguments.photos, "photographs").items() if arguments.photos else ():
+            out = work / "photographs" / f"{name}.ply"
+            if not out.exists():
+                out.parent.mkdir(exist_ok=True)
+                run(program, "fit", project, "-o", out, "--downscale", DOWNSCALE, "--steps", 3000, "--max-gaussians",
+                    60000)
+        run(HERE / "scripts/make-scenes.sh", objects, work / "scenes", program,
+            env={"STEPS": "4000", "GAUSSIANS": "60000", "PATH": "/usr/bin:/bin"})
+
+
+def make_splats(arguments):
+    work = arguments.work
+    found = originals(arguments)
+    tasks = []
+    with Clock(work, "edits"):
+        for original in found:
+            tasks += splats_of(arguments, original, found)
+    if arguments.strangers:
+        for maker, name in anonymous(arguments.strangers, "maker").items():
+            for k, splat in enumerate(sorted(maker.iterdir(), key=lambda p: digest(p.name))):
+                tasks.append({"id": f"{name}-{k + 1}", "original": f"{name}-{k + 1}", "mesh": f"{name}-{k + 1}", "maker": name,
+                              "kind": "stranger", "edit": "", "made": "", "splat": str(splat)})
+    (work / "tasks.jsonl").write_text("".join(json.dumps(task) + "\n" for task in tasks))
+    print(f"{len(tasks)} tasks of {len(found)} splats")
+
+
+def splats_of(arguments, original, found):
+    work = arguments.work
+    labels = {key: original[key] for key in LABELS if key in original} | {"edit": ""}
+    where = {"object": str(original["object"])} | {k: original[k] for k in ("downscale",) if k in original}
+    tasks = [labels | where | {"id": original["original"], "splat": str(original["splat"])}]
+    folder = work / "edits" / original["original"]
+    splat, pixel = Splat(original["splat"]), low_pixel(original)
+    if any("SplatRenderMode" in line for line in splat.comments):
+        path = folder / "untagged.ply"
+        if not path.exists():
+            splat.with_rows(splat.rows).write(path)
+        tasks.append(labels | where | {"id": original["original"] + "--untagged", "edit": "untagged", "splat": str(path)})
+    few = 4 if len(splat.rows) > 40000 else EDITS_PER_SPLAT  # large ones take long
+    names = [name for name in (*EDITS, *COMMON) if applies(name, original)]
+    order = sorted(range(len(names)), key=lambda k: digest(f"{original['original']} {names[k]} {k}"))
+    chosen = list(dict.fromkeys(names[k] for k in order))[:few]
+    for name in chosen:
+        slug = name.replace(":", "").replace(",", "").replace(" ", "-").replace(".", "")
+        path = folder / f"{slug}.ply"
+        random = np.random.default_rng(digest(f"{original['original']} {name}") % 2**32)
+        try:
+            more = edited(arguments, original, splat, pixel, name, path, random, found)
+        except RuntimeError as error:
+            print(f"{original['original']}, {name}: {error}", file=sys.stderr)
+            continue
+        if more is not None:
+            tasks.append(labels | where | {"id": f"{original['original']}--{slug}", "edit": name} | more)
+    return tasks
+
+
+def applies(name, original):
+    if original["made"] == "mesh":  # nothing was fitted: what is enhanced or raised of it is nobody's question
+        return name.startswith(("crop", "through", "scaled", "on", "before", "floaters", "thinned"))
+    if original["kind"] in ("room", "photographed"):  # what lies around is theirs already
+        return name not in ("on ground", "before a sky", "floaters", "merged", "scaled and moved")
+    return True
+
+
+def fold_of(original):
+    return digest(original["maker"] or original["mesh"]) % FOLDS
+
+
+def edited(arguments, original, splat, pixel, name, path, random, found):
+    """Writes the splat, and what its task says; nothing where too little of it is left."""
+    program, note = arguments.program, path.with_suffix(".json")
+    if note.exists():
+        return json.loads(note.read_text())
+    path.parent.mkdir(parents=True, exist_ok=True)
+    plain = path.parent / "plain.ply"
+    if not plain.exists():
+        splat.with_rows(splat.rows).write(plain)
+    more = {}
+    if name.startswith("through"):
+        end = name.split()[1]
+        passed = path.with_suffix(end)
+        quietly(program, "convert", plain, passed, "-w", "-q")
+        more["splat"] = str(passed)
+    elif name == "turned":
+        axes = str(random.choice(["RUB:", "RFU:", "LUF:", "FLU:", "DRF:"]))
+        passed = path.with_name("turned.ply")
+        quietly(program, "convert", plain, passed, "--coords", axes, "-w", "-q")
+        after = Splat(passed)
+        turn = np.linalg.lstsq(splat.places, after.places, rcond=None)[0].T
+        if np.linalg.det(turn) < 0:  # a mirror is no move of cameras
+            return None
+        after.with_rows(after.rows).write(path)
+        more["moved"] = {"scale": 1, "rotation": np.round(turn).ravel().tolist(), "translation": [0, 0, 0]}
+    elif name in ("filtered before", "enhanced before", "enhanced before, one for one"):
+        flags = ["--method", "filter"] if name == "filtered before" else ["--method", "model"]
+        flags += ["--copies", 1] if name.endswith("one") else []
+        passed = path.with_name("passed.ply")
+        quietly(program, "enhance", original["splat"], "-o", passed, *cameras_of(original), *flags, "-w", "-q", "--threads", 1)
+        after = Splat(passed)
+        after.with_rows(after.rows).write(path)
+        passed.unlink()
+        more["made"] = "filtered" if name == "filtered before" else "enhanced"
+    elif name == "merged":
+        others = [o for o in found if fold_of(o) == fold_of(original) and o["mesh"] != original["mesh"] and
+                  o["kind"] not in ("room", "photographed", "example") and "downscale" not in o and o["made"] == original["made"]]
+        others = [o for o in others if Splat(o["splat"]).names == splat.names]
+        if not others:
+            return None
+        other = others[int(random.integers(len(others)))]
+        factor = float(random.choice([0.3, 0.5, 1, 2, 3]))
+        beside = Splat(other["splat"])
+        rows = beside.rows.copy()
+        place, scale = beside.column("x", "y", "z"), beside.column("scale_0", "scale_1", "scale_2")
+        (low, high), (other_low, other_high) = splat.box(), beside.box()
+        rows[:, place] *= factor
+        rows[:, place] += [high[0] - factor * other_low[0] + 0.15, low[1] - factor * other_low[1], 0]
+        rows[:, scale] += np.log(factor)
+        out, more = added(splat, rows, {"others": {"from": len(splat.rows), "pixel": factor * low_pixel(other)}})
+        out.write(path)
+    else:
+        out, more = EDITS[name](splat, random, pixel)
+        if (out.opacities > 0.1).sum() < 500:
+            return None
+        if "context" in more:
+            context = path.with_name(path.stem + "-context.ply")
+            more["context"].write(context)
+            more["context"] = str(context)
+        out.write(path)
+    more = {"splat": str(path)} | more
+    note.write_text(json.dumps(more))
+    return more
+
+
+def cameras_of(original):
+    if "downscale" in original:
+        return ["--images", original["object"], "--downscale", DOWNSCALE] if False else ["--cameras", original["object"], "--upscale", DOWNSCALE]
+    for name in ("transforms_64.json", "transforms_128.json", "transforms_256.json", "transforms_400.json", "transforms_lr.json"):
+        if (original["object"] / name).exists():
+            return ["--cameras", original["object"] / name]
+    raise RuntimeError(f"{original['object']}: no cameras")
+
+
+def make_rows(arguments):
+    work = arguments.work
+    (work / "rows").mkdir(exist_ok=True)
+    tasks = (work / "tasks.jsonl").read_text().splitlines()
+    waiting = [t for t in tasks if not (work / "rows" / (json.loads(t)["id"] + ".json")).exists()]
+    if arguments.only:
+        waiting = waiting[: arguments.only]
+    print(f"{len(tasks) - len(waiting)} of {len(tasks)} rows are there", flush=True)
+    with Clock(work, "rows"):
+        jobs = []
+        for job in range(arguments.jobs):
+            path = work / f"tasks-{job}.jsonl"
+            # Whole originals, so that each process renders the truth of an object once.
+            mine = [t for t in waiting if digest(json.loads(t)["original"]) % arguments.jobs == job]
+            path.write_text("\n".join(mine) + "\n" if mine else "")
+            log = open(work / f"rows-{job}.log", "w", encoding="utf-8")
+            jobs.append(subprocess.Popen([str(arguments.program), "bench", "reading", "--tasks", str(path), "-o",
+                                          str(work / "rows"), "--threads", "1"], stdout=log, stderr=log))
+        codes = [job.wait() for job in jobs]
+    if any(codes):
+        print(f"some rows failed (exit codes {codes}): see {work}/rows-*.log", file=sys.stderr)
+
+
+def pack(arguments):
+    work = arguments.work
+    names = list(json.loads(quietly(arguments.program, "bench", "reading", HERE / "examples/biplane/input.ply", "--features",
+                                    "--json"))["splats"][0]["features"])
+    rows = []
+    for line in (work / "tasks.jsonl").read_text().splitlines():
+        path = work / "rows" / (json.loads(line)["id"] + ".json")
+        if path.exists():
+            row = json.loads(path.read_text())
+            row["fold"] = fold_of(row)
+            rows.append(row)
+    kept = json.loads((work / "core-seconds.json").read_text())
+    head = {"table": "readings", "multiples": [0.25, 0.35, 0.5, 0.7, 1, 1.4, 2], "folds": FOLDS, "features": names,
+            "core_hours": {stage: round(seconds / 3600, 2) for stage, seconds in kept.items()}}
+    text = "".join(json.dumps(item, separators=(",", ":")) + "\n" for item in [head, *rows])
+    with gzip.GzipFile(arguments.output, "wb", mtime=0) as out:  # the same bytes each time
+        out.write(text.encode())
+    kinds = {row["kind"] for row in rows}
+    print(f"{len(rows)} rows, {len(kinds)} kinds, {len({row['mesh'] for row in rows})} meshes, "
+          f"{arguments.output.stat().st_size / 1e6:.1f} MB")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    stages = {"fits": [make_fits], "splats": [make_splats], "rows": [make_rows], "pack": [pack]}
+    stages["all"] = [make_fits, make_splats, make_rows, pack]
+    parser.add_argument("stage", choices=stages)
+    parser.add_argument("--work", type=pathlib.Path, required=True)
+    parser.add_argument("--program", type=pathlib.Path, default=HERE / "build/anchorsplat")
+    parser.add_argument("--photos", type=pathlib.Path)
+    parser.add_argument("--strangers", type=pathlib.Path)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--only", type=int, help="rows: no more than so many, to see how long they take")
+    parser.add_argument("-o", "--output", type=pathlib.Path, default=HERE / "data/reading.jsonl.gz")
+    arguments = parser.parse_args()
+    arguments.work = arguments.work.resolve()
+    for stage in stages[arguments.stage]:
+        stage(arguments)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,235 @@
+#include "cli/bench_reading.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cli/table.h"
+#include "core/file_system.h"
+#include "core/log.h"
+#include "core/run_context.h"
+#include "core/text.h"
+#include "enhance/reading_features.h"
+#include "eval/reading_row.h"
+#include "eval/reading_score.h"
+#include "eval/reading_table.h"
+#include "formats/cloud_io.h"
+#include "io/atomic_file.h"
+#include "io/input_file.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ReadingFlags {
+  std::vector<std::string> splats;
+  bool features = false;
+  std::string tasks, output;
+  int views = 4;
+  std::string table, decisions;
+};
+
+nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
+
+Status PrintFeatures(const ReadingFlags& flags, const SharedFlags& shared) {
+  nlohmann::json splats = nlohmann::json::array();
+  for (const std::string& file : flags.splats) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(file));
+    const auto read = ReadFeatures(cloud);
+    if (!read.ok()) return Error{read.error().code, Cat(file, ": ", read.error().message)};
+    if (shared.json) {
+      nlohmann::json& json = splats.emplace_back(nlohmann::json{{"file", file}, {"unit", read->unit}});
+      for (size_t k = 0; k < read->names.size(); ++k) json["features"][read->names[k]] = Number(read->values[k]);
+      continue;
+    }
+    std::vector<std::vector<std::string>> table = {{file, Cat("unit ", read->unit)}};
+    for (size_t k = 0; k < read->names.size(); ++k) {
+      table.push_back({read->names[k], std::isnan(read->values[k]) ? "not known" : Fixed(read->values[k], 4)});
+    }
+    std::cout << FormatTable(table);
+  }
+  if (shared.json) PrintJson({{"bench", "reading"}, {"splats", splats}});
+  return {};
+}
+
+Result<std::vector<ReadingTask>> ReadTasks(const std::string& path) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, file.ReadAll(uint64_t{1} << 28));
+  std::vector<ReadingTask> tasks;
+  int64_t line = 0;
+  for (size_t at = 0; at < text.size();) {
+    const size_t end = std::min(text.find('\n', at), text.size());
+    ++line;
+    const auto json = nlohmann::json::parse(text.begin() + static_cast<std::ptrdiff_t>(at),
+                                            text.begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
+    auto task = json.is_discarded() ? Result<ReadingTask>(Error{ErrorCode::kBadFile, "not JSON"}) : ReadingTaskFrom(json);
+    if (!task.ok()) return Error{ErrorCode::kBadFile, Cat(path, ": line ", line, ": ", task.error().message)};
+    tasks.push_back(*std::move(task));
+    at = end + 1;
+  }
+  return tasks;
+}
+
+// Every row is a file of its own, so that this goes on where it was stopped, and several may work side by side.
+Status MakeRows(const ReadingFlags& flags, Program& program) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<ReadingTask> tasks, ReadTasks(flags.tasks));
+  std::error_code code;
+  fs::create_directories(flags.output, code);
+  if (code) return Error{ErrorCode::kIo, Cat(flags.output, ": cannot make this folder: ", code.message())};
+  ReadingRows rows(flags.views);
+  int64_t made = 0, there = 0, failed = 0;
+  {
+    Progress progress("rows", std::ssize(tasks));
+    for (const ReadingTask& task : tasks) {
+      if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped; the same command goes on from here"};
+      const fs::path path = fs::path(flags.output) / (task.id + ".json");
+      if (IsFile(path) && !program.flags.overwrite) {
+        ++there;
+      } else if (const auto row = rows.Make(task); row.ok()) {
+        ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(path, row->dump() + "\n", true));
+        ++made;
+      } else {
+        LogWarning(Cat(task.id, ": ", row.error().message));
+        ++failed;
+      }
+      progress.Advance(1, task.id);
+    }
+  }
+  if (program.flags.json) {
+    PrintJson({{"bench", "reading"}, {"made", made}, {"there", there}, {"failed", failed}});
+  } else {
+    std::cout << WithThousands(made) << " rows made, " << WithThousands(there) << " were there, "
+              << WithThousands(failed) << " failed\n";
+  }
+  if (failed > 0) program.exit_code = kPartialExitCode;
+  return {};
+}
+
+std::string Share(int64_t part, int64_t whole) {
+  return whole > 0 ? Cat(Fixed(100.0 * static_cast<double>(part) / static_cast<double>(whole), 0), " %") : "";
+}
+
+nlohmann::json ToJson(const ReadingScore& score) {
+  return {{"group", score.group},
+          {"rows", score.rows},
+          {"mean", score.mean},
+          {"worst", score.worst},
+          {"worst_id", score.worst_id},
+          {"low", score.low},
+          {"losing", score.losing},
+          {"intervals", score.intervals},
+          {"held", score.held},
+          {"named", score.named},
+          {"recognised", score.recognised},
+          {"could_be_accused", score.could_be_accused},
+          {"accused", score.accused},
+          {"seconds", score.seconds}};
+}
+
+void PrintScores(const std::string& name, const std::vector<ReadingScore>& scores) {
+  std::vector<std::vector<std::string>> table = {
+      {name, "rows", "mean", "worst", "2 %", "lose", "held", "known", "accused", "s"}};
+  for (const ReadingScore& s : scores) {
+    table.push_back({s.group, WithThousands(s.rows), s.rows > 0 ? Fixed(s.mean, 2) : "",
+                     s.rows > 0 ? Fixed(s.worst, 2) : "", s.rows > 0 ? Fixed(s.low, 2) : "",
+                     s.rows > 0 ? Cat(Fixed(100 * s.losing, 1), " %") : "", Share(s.held, s.intervals),
+                     Share(s.recognised, s.named), Share(s.accused, s.could_be_accused),
+                     s.seconds > 0 ? Fixed(s.seconds, 2) : ""});
+  }
+  std::cout << FormatTable(table) << "\n";
+}
+
+Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<ReadingRow> rows, ReadReadingTable(flags.table));
+  std::vector<std::pair<std::string, Decisions>> deciders;
+  if (!flags.decisions.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto given, ReadReadingDecisions(flags.decisions));
+    int64_t named = 0;
+    for (const ReadingRow& row : rows) named += static_cast<int64_t>(given.contains(row.id));
+    if (named < std::ssize(rows)) {
+      LogWarning(Cat(flags.decisions, ": decides ", WithThousands(named), " of ", WithThousands(std::ssize(rows)),
+                     " rows; the others are left alone"));
+    }
+    deciders.emplace_back(fs::path(flags.decisions).filename().string(), GivenDecisions(rows, given));
+  }
+  deciders.emplace_back("today's list", TodaysDecisions(rows));
+  for (const char* method : {"filter", "network"}) {
+    double multiple = 0;
+    Decisions fixed = FixedDecisions(rows, method, multiple);
+    deciders.emplace_back(Cat("true pixel × ", multiple, ", ", method), std::move(fixed));
+  }
+  deciders.emplace_back("best of all", BestDecisions(rows));
+  const CurveError error = ErrorOfCurves(rows);
+  if (shared.json) {
+    nlohmann::json json = {{"bench", "reading"},
+                           {"rows", rows.size()},
+                           {"curve_error", {{"rows", error.rows}, {"median", error.median}, {"p95", error.most}}},
+                           {"deciders", nlohmann::json::array()}};
+    for (const auto& [name, decisions] : deciders) {
+      nlohmann::json& decider = json["deciders"].emplace_back(nlohmann::json{{"name", name}});
+      for (const ReadingScore& score : ScoreReadings(rows, decisions)) decider["groups"].push_back(ToJson(score));
+    }
+    PrintJson(json);
+    return {};
+  }
+  std::vector<ReadingScore> overall;
+  for (const auto& [name, decisions] : deciders) {
+    std::vector<ReadingScore> scores = ScoreReadings(rows, decisions);
+    overall.push_back(scores[0]);
+    overall.back().group = name;
+    PrintScores(name, scores);
+  }
+  PrintScores("all rows", overall);
+  std::cout << "gain over the splat as it is, dB: mean, worst, 2 % quantile, share that loses more than " << kReadingLoss
+            << "\nheld: intervals that hold the true pixel; known: taken for what it is; accused: of those that have "
+               "lost width, taken for one that has not; s: median\n"
+            << "curves are off by " << Fixed(error.median, 2) << " dB in the median and " << Fixed(error.most, 2)
+            << " dB at the 95th percentile, of " << WithThousands(error.rows) << " decisions that were measured, too\n";
+  return {};
+}
+
+Status RunReading(const ReadingFlags& flags, Program& program) {
+  const int asked = (flags.features ? 1 : 0) + (flags.tasks.empty() ? 0 : 1) + (flags.table.empty() ? 0 : 1);
+  if (asked != 1) {
+    return Error{ErrorCode::kBadArgument,
+                 "one of --features (of splats), --tasks (rows of the table) or --score (a table) has to be asked for"};
+  }
+  if (flags.features && flags.splats.empty()) return Error{ErrorCode::kBadArgument, "--features needs a splat"};
+  if (!flags.features && !flags.splats.empty()) {
+    return Error{ErrorCode::kBadArgument, "splats are for --features"};
+  }
+  if (flags.features) return PrintFeatures(flags, program.flags);
+  return flags.tasks.empty() ? Score(flags, program.flags) : MakeRows(flags, program);
+}
+
+}  // namespace
+
+void AddReadingBench(CLI::App& bench, Program& program) {
+  CLI::App& verb = AddVerb(bench, program, "reading", "What splats show before they are enhanced, and who reads it best",
+                           "anchorsplat bench reading --score data/reading.jsonl.gz");
+  const auto flags = std::make_shared<ReadingFlags>();
+  verb.add_option("splats", flags->splats, "Splat files");
+  verb.add_flag("--features", flags->features, "All numbers that tell how a splat was made and what it has lost");
+  CLI::Option* const tasks =
+      verb.add_option("--tasks", flags->tasks, "Make rows of the table: JSON lines, as scripts/reading-table.py writes");
+  verb.add_option("-o,--output", flags->output, "Folder of the rows, a file each; those that are there stay")
+      ->needs(tasks);
+  verb.add_option("--views", flags->views, "Held-out views that gains are measured in")
+      ->needs(tasks)
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  CLI::Option* const table = verb.add_option("--score", flags->table, "A table: how well today's list decides, and bounds");
+  verb.add_option("--decisions", flags->decisions, "JSON lines of another decider, to stand beside it")->needs(table);
+  verb.callback([flags, &program] { program.run = [flags, &program] { return RunReading(*flags, program); }; });
+}
+
+}  // namespace anchorsplat

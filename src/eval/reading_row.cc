@@ -1,0 +1,335 @@
+#include "eval/reading_row.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/region.h"
+#include "core/statistics.h"
+#include "core/stopwatch.h"
+#include "core/text.h"
+#include "enhance/enhance.h"
+#include "enhance/filter.h"
+#include "enhance/pixel_size.h"
+#include "enhance/reading_features.h"
+#include "eval/benchmark.h"
+#include "eval/protocol.h"
+#include "fit/picture_cache.h"
+#include "fit/training_views.h"
+#include "formats/cloud_io.h"
+#include "metrics/image_metrics.h"
+#include "render/rasterizer.h"
+#include "render/shown_range.h"
+
+namespace anchorsplat {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kPhotographsHeldOut = 8;  // every eighth
+
+nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
+
+double QuantileOf(Buffer<float> values, double q) { return double{Quantile(values, q)}; }
+
+// Enough of a gain in dB, and of a logarithm.
+double Rounded(double value) { return std::round(value * 1e4) / 1e4; }
+
+}  // namespace
+
+Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
+  ReadingTask task;
+  const auto bad = [](std::string_view what) {
+    return Error{ErrorCode::kBadFile, Cat("a task of the table of readings: ", what)};
+  };
+  if (!json.is_object()) return bad("not an object");
+  try {
+    for (const auto& [name, value] : json.items()) {
+      const auto label = std::ranges::find(kReadingLabels, name);
+      if (label != kReadingLabels.end()) {
+        task.labels[static_cast<size_t>(label - kReadingLabels.begin())] = value.get<std::string>();
+      } else if (name == "id") {
+        task.id = value.get<std::string>();
+      } else if (name == "downscale") {
+        task.downscale = value.get<int>();
+      } else if (name == "others") {
+        task.others_from = value.at("from").get<int64_t>();
+        task.others_pixel = value.at("pixel").get<double>();
+        if (task.others_from < 1 || !(task.others_pixel > 0)) return bad("others: no rows or no pixel");
+      } else if (name == "keep") {
+        const auto corners = value.get<std::vector<double>>();
+        task.keep = RegionOf(corners);
+        if (!task.keep) return bad("keep" + std::string(kNoRegion));
+      } else if (name == "moved") {
+        task.moved.scale = value.at("scale").get<double>();
+        task.moved.rotation = value.at("rotation").get<std::array<double, 9>>();
+        task.moved.translation = value.at("translation").get<std::array<double, 3>>();
+        if (!(task.moved.scale > 0)) return bad("moved: the scale is not positive");
+      } else {
+        fs::path* const path = name == "splat"     ? &task.splat
+                               : name == "object"  ? &task.object
+                               : name == "context" ? &task.context
+                                                   : nullptr;
+        if (path == nullptr) return bad(Cat("unknown property ", Printable(name)));
+        *path = value.get<std::string>();
+      }
+    }
+  } catch (const nlohmann::json::exception& e) {
+    return bad(e.what());
+  }
+  if (task.id.empty() || task.splat.empty()) return bad("it needs an id and a splat");
+  return task;
+}
+
+// Views that nobody was trained on, with their pictures.
+struct ReadingRows::Object {
+  fs::path folder;
+  int downscale = 1;
+  double upscale = 4;
+  std::array<float, 3> background{};
+  CameraSet low;  // of the pictures that were fitted
+  struct View {
+    Camera camera;
+    Image truth;
+    Buffer<uint8_t> ignored;
+  };
+  std::vector<View> views;
+};
+
+ReadingRows::ReadingRows(int views) : views_(views) {}
+ReadingRows::~ReadingRows() = default;
+
+Result<const ReadingRows::Object*> ReadingRows::Open(const ReadingTask& task) {
+  if (object_ && object_->folder == task.object && object_->downscale == task.downscale) return object_.get();
+  auto object = std::make_unique<Object>();
+  object->folder = task.object;
+  object->downscale = task.downscale;
+  const auto most = static_cast<size_t>(views_);
+  if (task.downscale > 1) {
+    const ProjectOptions low = {.hold_out = kPhotographsHeldOut, .downscale = task.downscale, .origin = WorldOrigin{}};
+    ProjectOptions high = low;
+    high.downscale = 1;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews fitted, OpenProject(task.object, low));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews whole, OpenProject(task.object, high));
+    std::vector<size_t> all(whole.held_out.size());
+    for (size_t i = 0; i < all.size(); ++i) all[i] = i;
+    object->upscale = task.downscale;
+    object->low.cameras = fitted.train;
+    object->background = whole.background.value_or(object->background);
+    PictureCache pictures(whole.held_out, object->background);
+    for (const size_t i : Thinned(all, most)) {
+      Object::View& view = object->views.emplace_back();
+      view.camera = whole.held_out[i];
+      ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(static_cast<int64_t>(i), view.truth, view.ignored));
+    }
+  } else {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const BenchmarkObject opened,
+                                 OpenObject({task.object.filename().string(), task.object}));
+    object->upscale = opened.upscale();
+    object->low = opened.low_cameras;
+    object->background = opened.background;
+    for (const size_t i : Thinned(opened.held_out, most)) {
+      Object::View& view = object->views.emplace_back();
+      view.camera = opened.views[i];
+      ANCHORSPLAT_ASSIGN_OR_RETURN(view.truth, opened.Truth(i));
+    }
+  }
+  if (object->views.empty()) return Error{ErrorCode::kBadArgument, Cat(task.object.string(), ": no view is held out")};
+  object_ = std::move(object);
+  return object_.get();
+}
+
+namespace {
+
+// What all treatments of a splat are measured with.
+struct Measuring {
+  std::vector<Camera> cameras;  // in the splat's world
+  std::vector<const Image*> truths;
+  std::vector<const Buffer<uint8_t>*> ignored;
+  std::array<float, 3> background{};
+  GaussianCloud context;
+  std::optional<Region> keep;  // from the cloud's origin on
+  Rasterizer rasterizer;
+  RenderOutput output;
+
+  // Mean PSNR over the views, dB.
+  Result<double> Measure(GaussianCloud cloud) {
+    if (keep) {
+      std::vector<int64_t> rows;
+      for (int64_t i = 0; i < cloud.size(); ++i) {
+        if (keep->Holds(cloud.means.data() + 3 * i)) rows.push_back(i);
+      }
+      ANCHORSPLAT_ASSIGN_OR_RETURN(cloud, Subset(cloud, rows));
+    }
+    if (!context.empty()) ANCHORSPLAT_RETURN_IF_ERROR(Append(cloud, context));
+    RenderOptions options = OptionsFor(cloud);
+    options.background = background;
+    double sum = 0;
+    for (size_t v = 0; v < cameras.size(); ++v) {
+      ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, cameras[v], options, output));
+      Clamp01(output.color);
+      FillIgnored(*ignored[v], *truths[v], output.color);
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, Psnr(output.color, *truths[v]));
+      sum += psnr;
+    }
+    return sum / static_cast<double>(cameras.size());
+  }
+};
+
+const EnhanceMethod* FindMethod(std::string_view name) {
+  const auto found = std::ranges::find(EnhanceMethods(), name, &EnhanceMethod::name);
+  return found == EnhanceMethods().end() ? nullptr : &*found;
+}
+
+// What a method of one step makes of the splat at those pixels, told what the splat is.
+Result<GaussianCloud> Treat(const EnhanceMethod& method, const GaussianCloud& cloud, const Buffer<float>& pixels,
+                            double multiple, double showing, const EnhanceOptions& options) {
+  EnhanceInput input;
+  input.cloud = cloud;
+  input.pixel_sizes = pixels;
+  for (float& size : input.pixel_sizes) size *= static_cast<float>(multiple);
+  input.pixel_size = QuantileOf(input.pixel_sizes, 0.5);
+  input.showing = showing;
+  input.filter_strength = DefaultFilterStrength(options.upscale, cloud.render_mode);
+  StepReport report;
+  return method.run(std::move(input), options, report);
+}
+
+// What the program does by itself.
+Result<nlohmann::json> Today(const GaussianCloud& cloud, const EnhanceOptions& options, double raw, Measuring* measuring) {
+  auto done = Enhance(cloud, options);
+  if (!done.ok()) return nlohmann::json{{"error", done.error().message}};
+  const EnhanceReport& report = done->report;
+  nlohmann::json json = {{"method", report.steps.empty() ? "none" : report.method},
+                         {"strength", Rounded(report.filter_strength)},
+                         {"source", report.pixel_size_source},
+                         {"things", report.things.size()},
+                         {"seconds", report.seconds_in_all - report.seconds},
+                         {"one_size", report.things.empty() && (!report.finding || report.finding->is_one()) &&
+                                          report.filter_strength ==
+                                              DefaultFilterStrength(options.upscale, done->cloud.render_mode)},
+                         {"looks", nullptr},
+                         {"mode", nullptr},
+                         {"pixel", Number(report.pixel_size)}};
+  if (report.looks) json["looks"] = NameOf(*report.looks);
+  if (done->cloud.render_mode) json["mode"] = NameOf(*done->cloud.render_mode);
+  if (report.finding) {
+    json["low"] = Number(report.finding->estimate.low);
+    json["high"] = Number(report.finding->estimate.high);
+    json["contradictions"] = report.finding->contradictions.size();
+  }
+  if (measuring != nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, measuring->Measure(std::move(done->cloud)));
+    json["gain"] = Rounded(psnr - raw);
+  }
+  return json;
+}
+
+// In which modes a splat may be taken to be: as it is tagged, or in either where it is not.
+std::vector<RenderMode> ModesOf(const GaussianCloud& cloud) {
+  if (cloud.render_mode) return {*cloud.render_mode};
+  return {RenderMode::kClassic, RenderMode::kAntialiased};
+}
+
+CameraSet Moved(CameraSet set, const Similarity& move, const WorldOrigin& origin) {
+  for (Camera& camera : set.cameras) {
+    camera.world_to_camera = FromOrigin(Moved(camera.world_to_camera, move), origin);
+  }
+  return set;
+}
+
+Result<Buffer<float>> TruePixels(const GaussianCloud& cloud, const CameraSet& low) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes, PixelSizesFromCameras(cloud, low, std::nullopt));
+  return std::move(sizes.sizes);
+}
+
+Result<GaussianCloud> FilteredContext(const ReadingTask& task, const CameraSet& low, double upscale,
+                                      std::optional<RenderMode> mode) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud context, ReadCloud(task.context));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Buffer<float> pixels, TruePixels(context, low));
+  const auto grown =
+      ApplyFilter(context, pixels, {.upscale = upscale, .strength = DefaultFilterStrength(upscale, mode)});
+  if (!grown.ok()) return grown.error();
+  return context;
+}
+
+}  // namespace
+
+Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(task.splat));
+  nlohmann::json row = {{"id", task.id}, {"gaussians", cloud.size()}, {"pixel", nullptr}, {"tag", nullptr}};
+  for (size_t k = 0; k < kReadingLabels.size(); ++k) row[kReadingLabels[k]] = task.labels[k];
+  if (cloud.render_mode) row["tag"] = NameOf(*cloud.render_mode);
+
+  const Stopwatch reading;
+  auto features = ReadFeatures(cloud);
+  row["seconds_reading"] = Rounded(reading.Total());
+  double showing = 1;
+  if (features.ok()) {
+    row["unit"] = features->unit;
+    nlohmann::json& values = row["features"] = nlohmann::json::array();
+    for (const double value : features->values) values.push_back(Number(Rounded(value)));
+    const auto share = std::ranges::find(features->names, "count.share_showing");
+    showing = features->values[static_cast<size_t>(share - features->names.begin())];
+  } else {
+    row["why_no_features"] = features.error().message;
+  }
+
+  EnhanceOptions options;
+  if (task.object.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(row["today"], Today(cloud, options, 0, nullptr));
+    return row;
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Object* const object, Open(task));
+  options.upscale = object->upscale;
+  Measuring measuring;
+  if (task.keep) measuring.keep = FromOrigin(*task.keep, cloud.origin);
+  measuring.background = object->background;
+  const CameraSet low = Moved(object->low, task.moved, cloud.origin);
+  CameraSet held_out;
+  for (const Object::View& view : object->views) {
+    held_out.cameras.push_back(view.camera);
+    measuring.truths.push_back(&view.truth);
+    measuring.ignored.push_back(&view.ignored);
+  }
+  measuring.cameras = Moved(std::move(held_out), task.moved, cloud.origin).cameras;
+  if (!task.context.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(measuring.context, FilteredContext(task, low, object->upscale, cloud.render_mode));
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Buffer<float> pixels, TruePixels(cloud, low));
+  if (task.others_from > 0) {
+    if (task.others_from >= cloud.size()) {
+      return Error{ErrorCode::kBadFile, Cat(task.id, ": others begin behind the last of ", cloud.size(), " Gaussians")};
+    }
+    std::fill(pixels.begin() + task.others_from, pixels.end(), static_cast<float>(task.others_pixel));
+  }
+  row["upscale"] = object->upscale;
+  row["pixel"] = QuantileOf(pixels, 0.5);
+  row["pixel_10"] = QuantileOf(pixels, 0.1);
+  row["pixel_90"] = QuantileOf(pixels, 0.9);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const double raw, measuring.Measure(cloud));
+  row["raw"] = Rounded(raw);
+  for (const RenderMode mode : ModesOf(cloud)) {
+    GaussianCloud as = cloud;
+    as.render_mode = mode;
+    for (const auto& [word, name] : {std::pair("filter", "filter"), std::pair("network", "model")}) {
+      const EnhanceMethod* const method = FindMethod(name);
+      if (method == nullptr) continue;
+      nlohmann::json& gains = row["gains"][NameOf(mode)][word] = nlohmann::json::array();
+      for (const double multiple : kReadingMultiples) {
+        ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud treated, Treat(*method, as, pixels, multiple, showing, options));
+        ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, measuring.Measure(std::move(treated)));
+        gains.push_back(Rounded(psnr - raw));
+      }
+    }
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(row["today"], Today(cloud, options, raw, &measuring));
+  return row;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+
+#include "core/region.h"
+#include "core/result.h"
+#include "core/similarity.h"
+
+namespace anchorsplat {
+
+// Rows of the table of readings (docs/reading-table.md): what a splat looks like, what helps it, and what the program
+// does with it by itself.
+
+// Pixels that are tried, in multiples of the true ones.
+inline constexpr std::array<double, 7> kReadingMultiples = {0.25, 0.35, 0.5, 0.7, 1, 1.4, 2};
+
+// A splat of which a row is to be made.
+struct ReadingTask {
+  std::string id;
+  // What is known of the splat, carried into its row as it is: original, mesh, maker, kind, edit, made.
+  std::array<std::string, 6> labels;
+  std::filesystem::path splat;
+  // What it was fitted to: an object of a benchmark (eval/benchmark.h), or a project of photographs whose pictures were
+  // averaged down by `downscale` (above 1). Its cameras say the true pixels. Empty: nobody knows, and the row has no
+  // gains.
+  std::filesystem::path object;
+  int downscale = 1;
+  // World size of the training pixels of the rows from `others_from` on, which are of something else that was merged
+  // in; all others have those that the cameras say. 0: there are none.
+  int64_t others_from = 0;
+  double others_pixel = 0;
+  // Where the splat is a part of something, or something was added to it: what is drawn beside it, filtered at its own
+  // pixels, and what is drawn of the splat and its results alone. Both in the splat's own world.
+  std::filesystem::path context;
+  std::optional<Region> keep;
+  Similarity moved;  // the object's world → the splat's
+};
+inline constexpr std::array<const char*, 6> kReadingLabels = {"original", "mesh", "maker", "kind", "edit", "made"};
+
+// kBadFile: no id, no splat, values of other types, names that are none of these.
+Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json);
+
+// Makes rows. Keeps the object that was looked at last, with the pictures of `views` held-out views of it.
+class ReadingRows {
+ public:
+  explicit ReadingRows(int views);
+  ~ReadingRows();
+
+  // The row as the table keeps it. Errors: of reading, and of what the splat is asked.
+  Result<nlohmann::json> Make(const ReadingTask& task);
+
+ private:
+  struct Object;
+  Result<const Object*> Open(const ReadingTask& task);
+
+  int views_;
+  std::unique_ptr<Object> object_;
+};
+
+}  // namespace anchorsplat

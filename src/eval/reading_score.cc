@@ -1,0 +1,170 @@
+#include "eval/reading_score.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <utility>
+
+#include "core/buffer.h"
+#include "core/statistics.h"
+#include "core/text.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr const char* kMethods[] = {"filter", "network"};
+
+bool HasGains(const ReadingRow& row) { return row.pixel > 0 && !row.gains.empty(); }
+
+// What a splat is called that was made so: whatever gave it its width, it has it.
+std::string_view Word(std::string_view made) { return made == "mip" || made == "filtered" ? "widened" : made; }
+
+bool HasItsWidth(std::string_view made) {
+  const std::string_view word = Word(made);
+  return word == "widened" || word == "enhanced" || word == "mesh" || word == "pixel-areas";
+}
+
+double GainOf(const ReadingRow& row, const ReadingDecision& decision) {
+  if (decision.gain) return *decision.gain;
+  return row.GainOf(decision.method, decision.mode.value_or(row.TrueMode()), decision.pixel / row.pixel);
+}
+
+std::string GroupOf(const ReadingRow& row) { return row.edit.empty() ? row.kind : "edit: " + row.edit; }
+
+ReadingScore ScoreGroup(std::span<const ReadingRow> rows, const Decisions& decisions, const std::vector<size_t>& of) {
+  ReadingScore score;
+  Buffer<float> gains, seconds;
+  double sum = 0;
+  score.worst = std::numeric_limits<double>::infinity();
+  for (const size_t i : of) {
+    const ReadingRow& row = rows[i];
+    const ReadingDecision& decision = decisions[i];
+    seconds.push_back(static_cast<float>(decision.seconds));
+    const std::string_view said = Word(decision.made);
+    if (!row.made.empty() && !decision.made.empty()) {
+      ++score.named;
+      if (said == Word(row.made)) ++score.recognised;
+    }
+    if (!row.made.empty() && !HasItsWidth(row.made)) {
+      ++score.could_be_accused;
+      if (HasItsWidth(said)) ++score.accused;
+    }
+    if (!HasGains(row)) continue;
+    const double gain = GainOf(row, decision);
+    ++score.rows;
+    sum += gain;
+    gains.push_back(static_cast<float>(gain));
+    if (gain < -kReadingLoss) score.losing += 1;
+    if (gain < score.worst) {
+      score.worst = gain;
+      score.worst_id = row.id;
+    }
+    if (decision.high > 0) {
+      ++score.intervals;
+      if (decision.low <= row.pixel && row.pixel <= decision.high) ++score.held;
+    }
+  }
+  if (score.rows > 0) {
+    score.mean = sum / static_cast<double>(score.rows);
+    score.low = double{Quantile(gains, 0.02)};
+    score.losing /= static_cast<double>(score.rows);
+  } else {
+    score.worst = 0;
+  }
+  score.seconds = double{Quantile(seconds, 0.5)};
+  return score;
+}
+
+}  // namespace
+
+Decisions TodaysDecisions(std::span<const ReadingRow> rows) {
+  Decisions decisions;
+  for (const ReadingRow& row : rows) decisions.push_back(row.today);
+  return decisions;
+}
+
+Decisions BestDecisions(std::span<const ReadingRow> rows) {
+  Decisions decisions;
+  for (const ReadingRow& row : rows) {
+    ReadingDecision best;
+    best.gain = 0;
+    for (const auto& [key, gains] : row.gains) {
+      for (size_t k = 0; k < gains.size(); ++k) {
+        if (!(gains[k] > *best.gain)) continue;
+        best.mode = key.first;
+        best.method = key.second;
+        best.pixel = kReadingMultiples[k] * row.pixel;
+        best.gain = gains[k];
+      }
+    }
+    decisions.push_back(std::move(best));
+  }
+  return decisions;
+}
+
+Decisions FixedDecisions(std::span<const ReadingRow> rows, const std::string& method, double& multiple) {
+  double most = -std::numeric_limits<double>::infinity();
+  for (const double tried : kReadingMultiples) {
+    double sum = 0;
+    for (const ReadingRow& row : rows) {
+      if (HasGains(row)) sum += row.GainOf(method, row.TrueMode(), tried);
+    }
+    if (sum <= most) continue;
+    most = sum;
+    multiple = tried;
+  }
+  Decisions decisions;
+  for (const ReadingRow& row : rows) {
+    ReadingDecision& decision = decisions.emplace_back();
+    decision.method = method;
+    decision.pixel = multiple * row.pixel;
+  }
+  return decisions;
+}
+
+Decisions GivenDecisions(std::span<const ReadingRow> rows, const std::map<std::string, ReadingDecision>& given) {
+  Decisions decisions;
+  for (const ReadingRow& row : rows) {
+    const auto found = given.find(row.id);
+    decisions.push_back(found == given.end() ? ReadingDecision{} : found->second);
+  }
+  return decisions;
+}
+
+std::vector<ReadingScore> ScoreReadings(std::span<const ReadingRow> rows, const Decisions& decisions) {
+  std::vector<size_t> all;
+  std::map<std::pair<bool, std::string>, std::vector<size_t>> groups;  // edits after kinds
+  for (size_t i = 0; i < rows.size(); ++i) {
+    all.push_back(i);
+    groups[{!rows[i].edit.empty(), GroupOf(rows[i])}].push_back(i);
+  }
+  std::vector<ReadingScore> scores = {ScoreGroup(rows, decisions, all)};
+  scores[0].group = kReadingAll;
+  for (const auto& [key, of] : groups) {
+    scores.push_back(ScoreGroup(rows, decisions, of));
+    scores.back().group = key.second;
+  }
+  return scores;
+}
+
+CurveError ErrorOfCurves(std::span<const ReadingRow> rows) {
+  Buffer<float> errors;
+  for (const ReadingRow& row : rows) {
+    // Those that give one pixel at the mode's own strength: what was measured at multiples of the true one.
+    if (!HasGains(row) || !row.today.gain || row.today.method == "none" || !row.today.one_size) continue;
+    ReadingDecision by_curve = row.today;
+    by_curve.gain.reset();
+    const double gain = GainOf(row, by_curve);
+    if (std::isfinite(gain)) errors.push_back(static_cast<float>(std::abs(gain - *row.today.gain)));
+  }
+  CurveError error;
+  error.rows = std::ssize(errors);
+  if (errors.empty()) return error;
+  error.median = double{Quantile(errors, 0.5)};
+  error.most = double{Quantile(errors, 0.95)};
+  return error;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/render_mode.h"
+#include "core/result.h"
+#include "eval/reading_row.h"
+
+namespace anchorsplat {
+
+// Gain in dB over the splat as it is, at kReadingMultiples of its true pixels; NaN: not measured.
+using ReadingGains = std::array<double, kReadingMultiples.size()>;
+
+// What a decider says of one splat and does with it.
+struct ReadingDecision {
+  std::string method = "none";     // none, filter, network
+  std::optional<RenderMode> mode;  // in which it is taken to be; nothing: as ReadingRow::TrueMode
+  double pixel = 0;                // that is treated, world units
+  double low = 0, high = 0;        // of the interval that is said to hold the true pixel; 0: none is
+  std::string made;                // what it is taken for; empty: nothing is said
+  std::optional<double> gain;      // measured; nothing: that of the row's curve
+  bool one_size = true;            // the pixel is that of all Gaussians, at the strength that is usual in that mode
+  double seconds = 0;
+};
+
+// A row of the table, without its features.
+struct ReadingRow {
+  std::string id, original, mesh, maker, kind, edit, made;
+  std::optional<RenderMode> tag;
+  double pixel = 0;  // true, median; 0: not known, and there are no gains
+  std::map<std::pair<RenderMode, std::string>, ReadingGains> gains;  // by mode and method, "filter" or "network"
+  ReadingDecision today;                                             // the program's own
+
+  // As the file says, else as it was trained.
+  RenderMode TrueMode() const;
+  // Of treating a `multiple` of the true pixel: linear in the logarithm between those that were measured, with the
+  // square of it below them, and going on as between the last two above. 0 where the method is "none".
+  double GainOf(const std::string& method, RenderMode mode, double multiple) const;
+};
+
+// Lines of JSON, plain or as .gz: the first says what the columns are, the others are ReadingRows' rows.
+// Errors: kNotFound, kIo, kBadFile naming the line.
+Result<std::vector<ReadingRow>> ReadReadingTable(const std::filesystem::path& path);
+
+// Lines of JSON, one per row that is decided: id, method, mode, pixel, low, high, made, seconds. Errors: the same.
+Result<std::map<std::string, ReadingDecision>> ReadReadingDecisions(const std::filesystem::path& path);
+
+}  // namespace anchorsplat

@@ -23,12 +23,15 @@
 #include "formats/cloud_io.h"
 #include "io/atomic_file.h"
 #include "io/input_file.h"
+#include "request/choice.h"
 
 namespace anchorsplat {
 
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr size_t kBounds = 3;  // the deciders that know the truth come last
 
 struct ReadingFlags {
   std::vector<std::string> splats;
@@ -71,7 +74,8 @@ Result<std::vector<ReadingTask>> ReadTasks(const std::string& path) {
     ++line;
     const auto json = nlohmann::json::parse(text.begin() + static_cast<std::ptrdiff_t>(at),
                                             text.begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
-    auto task = json.is_discarded() ? Result<ReadingTask>(Error{ErrorCode::kBadFile, "not JSON"}) : ReadingTaskFrom(json);
+    auto task =
+        json.is_discarded() ? Result<ReadingTask>(Error{ErrorCode::kBadFile, "not JSON"}) : ReadingTaskFrom(json);
     if (!task.ok()) return Error{ErrorCode::kBadFile, Cat(path, ": line ", line, ": ", task.error().message)};
     tasks.push_back(*std::move(task));
     at = end + 1;
@@ -135,17 +139,23 @@ nlohmann::json ToJson(const ReadingScore& score) {
           {"seconds", score.seconds}};
 }
 
-void PrintScores(const std::string& name, const std::vector<ReadingScore>& scores) {
-  std::vector<std::vector<std::string>> table = {
-      {name, "rows", "mean", "worst", "2 %", "lose", "held", "known", "accused", "s"}};
-  for (const ReadingScore& s : scores) {
-    table.push_back({s.group, WithThousands(s.rows), s.rows > 0 ? Fixed(s.mean, 2) : "",
-                     s.rows > 0 ? Fixed(s.worst, 2) : "", s.rows > 0 ? Fixed(s.low, 2) : "",
-                     s.rows > 0 ? Cat(Fixed(100 * s.losing, 1), " %") : "", Share(s.held, s.intervals),
-                     Share(s.recognised, s.named), Share(s.accused, s.could_be_accused),
-                     s.seconds > 0 ? Fixed(s.seconds, 2) : ""});
-  }
-  std::cout << FormatTable(table) << "\n";
+// Rows of one decider: its own numbers, and beside them what was to be had.
+std::vector<std::string> Cells(const std::string& name, const ReadingScore& s) {
+  const auto gain = [&](double value) { return s.rows > 0 ? Fixed(value, 2) : std::string(); };
+  return {name,
+          WithThousands(s.rows),
+          gain(s.mean),
+          gain(s.worst),
+          gain(s.low),
+          s.rows > 0 ? Cat(Fixed(100 * s.losing, 1), " %") : "",
+          Share(s.held, s.intervals),
+          Share(s.recognised, s.named),
+          Share(s.accused, s.could_be_accused),
+          s.seconds > 0 ? Fixed(s.seconds, 2) : ""};
+}
+
+std::vector<std::string> Heading(const std::string& name) {
+  return {name, "rows", "mean", "worst", "2 %", "lose", "held", "known", "accused", "s"};
 }
 
 Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
@@ -181,17 +191,27 @@ Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
     PrintJson(json);
     return {};
   }
-  std::vector<ReadingScore> overall;
-  for (const auto& [name, decisions] : deciders) {
-    std::vector<ReadingScore> scores = ScoreReadings(rows, decisions);
-    overall.push_back(scores[0]);
-    overall.back().group = name;
-    PrintScores(name, scores);
+  std::vector<std::vector<ReadingScore>> scores;
+  for (const auto& [name, decisions] : deciders) scores.push_back(ScoreReadings(rows, decisions));
+  std::vector<std::vector<std::string>> overall = {Heading("all rows")};
+  for (size_t d = 0; d < deciders.size(); ++d) overall.push_back(Cells(deciders[d].first, scores[d][0]));
+  for (size_t d = 0; d + kBounds < deciders.size(); ++d) {
+    std::vector<std::vector<std::string>> table = {Heading(deciders[d].first)};
+    table[0].insert(table[0].end(), {"true filter", "true network", "best"});
+    for (size_t g = 0; g < scores[d].size(); ++g) {
+      table.push_back(Cells(scores[d][g].group, scores[d][g]));
+      for (size_t bound = deciders.size() - kBounds; bound < deciders.size(); ++bound) {
+        table.back().push_back(scores[bound][g].rows > 0 ? Fixed(scores[bound][g].mean, 2) : "");
+      }
+    }
+    std::cout << FormatTable(table) << "\n";
   }
-  PrintScores("all rows", overall);
-  std::cout << "gain over the splat as it is, dB: mean, worst, 2 % quantile, share that loses more than " << kReadingLoss
+  std::cout << FormatTable(overall) << "\n";
+  std::cout << "gain over the splat as it is, dB: mean, worst, 2 % quantile, share that loses more than "
+            << kReadingLoss
             << "\nheld: intervals that hold the true pixel; known: taken for what it is; accused: of those that have "
                "lost width, taken for one that has not; s: median\n"
+            << "true: the mean gain where the true pixel is known; best: that of the best of all that was measured\n"
             << "curves are off by " << Fixed(error.median, 2) << " dB in the median and " << Fixed(error.most, 2)
             << " dB at the 95th percentile, of " << WithThousands(error.rows) << " decisions that were measured, too\n";
   return {};
@@ -214,20 +234,24 @@ Status RunReading(const ReadingFlags& flags, Program& program) {
 }  // namespace
 
 void AddReadingBench(CLI::App& bench, Program& program) {
-  CLI::App& verb = AddVerb(bench, program, "reading", "What splats show before they are enhanced, and who reads it best",
-                           "anchorsplat bench reading --score data/reading.jsonl.gz");
+  CLI::App& verb =
+      AddVerb(bench, program, "reading", "What splats show before they are enhanced, and who reads it best",
+              "anchorsplat bench reading --score data/reading.jsonl.gz");
   const auto flags = std::make_shared<ReadingFlags>();
   verb.add_option("splats", flags->splats, "Splat files");
   verb.add_flag("--features", flags->features, "All numbers that tell how a splat was made and what it has lost");
-  CLI::Option* const tasks =
-      verb.add_option("--tasks", flags->tasks, "Make rows of the table: JSON lines, as scripts/reading-table.py writes");
-  verb.add_option("-o,--output", flags->output, "Folder of the rows, a file each; those that are there stay")
-      ->needs(tasks);
+  CLI::Option* const tasks = verb.add_option("--tasks", flags->tasks,
+                                             "Make rows of the table: JSON lines, as scripts/reading-table.py writes");
+  tasks->needs(
+      verb.add_option("-o,--output", flags->output, "Folder of the rows, a file each; those that are there stay")
+          ->needs(tasks)
+          ->check(NotEmpty()));
   verb.add_option("--views", flags->views, "Held-out views that gains are measured in")
       ->needs(tasks)
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  CLI::Option* const table = verb.add_option("--score", flags->table, "A table: how well today's list decides, and bounds");
+  CLI::Option* const table =
+      verb.add_option("--score", flags->table, "A table: how well today's list decides, and bounds");
   verb.add_option("--decisions", flags->decisions, "JSON lines of another decider, to stand beside it")->needs(table);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunReading(*flags, program); }; });
 }

@@ -1,9 +1,14 @@
 #include <algorithm>
 #include <filesystem>
+#include <set>
 
+#include "cli/exit_codes.h"
 #include "cli/run_for_test.h"
 #include "cli/small_scan_for_test.h"
+#include "core/source_dir_for_test.h"
+#include "eval/reading_table.h"
 #include "formats/cloud_io.h"
+#include "io/atomic_file.h"
 #include "io/folder_for_test.h"
 
 namespace anchorsplat {
@@ -15,7 +20,8 @@ using ::testing::HasSubstr;
 TEST(BenchVerb, TakesAndRefusesWords) {
   const TestFolder folder;
   const std::string none = folder / "none.ply";
-  ExpectRefused({"bench"}, ErrorCode::kBadArgument, {"needs a verb: render, fit, network, convert, io, pixel-size"});
+  ExpectRefused({"bench"}, ErrorCode::kBadArgument,
+                {"needs a verb: render, fit, network, convert, io, pixel-size, reading"});
   ExpectRefused({"bench", "render", none}, ErrorCode::kNotFound, {"none.ply"});
   ExpectRefused({"bench", "network", none}, ErrorCode::kNotFound, {"none.ply"});
   ExpectRefused({"bench", "convert", none}, ErrorCode::kNotFound, {"none.ply"});
@@ -44,6 +50,67 @@ TEST(BenchVerb, Looks) {
   EXPECT_EQ(json["splats"][0]["features"].size(), 35u);
   EXPECT_THAT(ExpectDone({"bench", "looks", scan}).out, HasSubstr("classic"));
   ExpectRefused({"bench", "looks", folder / "none.ply"}, ErrorCode::kNotFound, {"none.ply"});
+}
+
+TEST(BenchVerb, ReadingTellsWhatASplatShows) {
+  const TestFolder folder;
+  const std::string scan = Biplane() / "input.ply";
+  const nlohmann::json json = ExpectJson({"bench", "reading", scan, "--features"});
+  ASSERT_EQ(json["splats"].size(), 1u);
+  EXPECT_GT(json["splats"][0]["unit"], 0);
+  EXPECT_GT(json["splats"][0]["features"].size(), 1000u);
+  EXPECT_THAT(ExpectDone({"bench", "reading", scan, "--features"}).out, HasSubstr("surface.spacing"));
+  ExpectRefused({"bench", "reading"}, ErrorCode::kBadArgument, {"--features", "--tasks", "--score"});
+  ExpectRefused({"bench", "reading", "--features"}, ErrorCode::kBadArgument, {"needs a splat"});
+  ExpectRefused({"bench", "reading", scan, "--score", "x"}, ErrorCode::kBadArgument, {"--features"});
+  ExpectRefused({"bench", "reading", "--views", "2", "--features"}, ErrorCode::kBadArgument, {"--tasks"});
+  ExpectRefused({"bench", "reading", folder / "none.ply", "--features"}, ErrorCode::kNotFound, {"none.ply"});
+}
+
+TEST(BenchVerb, ReadingMakesRowsAndGoesOn) {
+  const TestFolder folder;
+  const std::string tasks = folder / "tasks.jsonl", rows = folder / "rows";
+  const std::string splat = Biplane() / "input.ply";
+  ASSERT_TRUE(
+      WriteWholeFile(tasks, R"({"id":"a","splat":")" + splat + "\"}\n" + R"({"id":"b","splat":"none.ply"})", false)
+          .ok());
+  const std::vector<std::string> words = {"bench", "reading", "--tasks", tasks, "-o", rows};
+  const ProgramRun first = RunWords(words);
+  EXPECT_EQ(first.code, kPartialExitCode);
+  EXPECT_THAT(first.out, HasSubstr("1 rows made, 0 were there, 1 failed"));
+  EXPECT_THAT(first.err, HasSubstr("b: none.ply"));
+  EXPECT_THAT(RunWords(words).out, HasSubstr("0 rows made, 1 were there, 1 failed"));
+  ExpectRefused({"bench", "reading", "--tasks", tasks}, ErrorCode::kBadArgument, {"--output"});
+  ASSERT_TRUE(WriteWholeFile(tasks, "{}\n", true).ok());
+  ExpectRefused(words, ErrorCode::kBadFile, {"line 1"});
+}
+
+// The table that is part of the project: what its page says of it, and the board.
+TEST(BenchVerb, ReadingScoresTheTable) {
+  const std::string table = SourceDirForTest() / "data/reading.jsonl.gz";
+  const auto rows = ReadReadingTable(table);
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  std::set<std::string> kinds, meshes, ids;
+  for (const ReadingRow& row : *rows) {
+    kinds.insert(row.kind);
+    meshes.insert(row.mesh);
+    EXPECT_TRUE(ids.insert(row.id).second) << row.id;
+  }
+  EXPECT_GE(rows->size(), 1000u);
+  EXPECT_GE(kinds.size(), 12u);
+  EXPECT_GE(meshes.size(), 60u);
+  const std::string out = ExpectDone({"bench", "reading", "--score", table}).out;
+  EXPECT_THAT(out, HasSubstr("today's list"));
+  EXPECT_THAT(out, HasSubstr("best of all"));
+  const nlohmann::json json = ExpectJson({"bench", "reading", "--score", table});
+  EXPECT_EQ(json["deciders"].size(), 4u);
+  // Whoever decides nothing gains nothing.
+  const TestFolder folder;
+  ASSERT_TRUE(WriteWholeFile(folder / "none.jsonl", "", false).ok());
+  const nlohmann::json beside =
+      ExpectJson({"bench", "reading", "--score", table, "--decisions", folder / "none.jsonl"});
+  ASSERT_EQ(beside["deciders"].size(), 5u);
+  EXPECT_EQ(beside["deciders"][0]["groups"][0]["mean"], 0);
 }
 
 TEST(BenchVerb, GoesOnAfterASplatThatShowsNothing) {

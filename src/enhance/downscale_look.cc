@@ -36,7 +36,7 @@ Image AveragedDown(const Image& image) {
 }
 
 struct Means {
-  double alpha = 0;              // of the picture itself
+  double alpha = 0;                   // of the picture itself
   double of_alpha = 0, of_color = 0;  // of the absolute differences from another
 };
 
@@ -94,7 +94,8 @@ Result<Image> DownscaleProbe::Draw(double pixel, int side, RenderMode mode, cons
 Result<DownscaleLook> DownscaleProbe::At(double size, RenderMode mode) {
   Buffer<float> filtered;
   const auto pixel = static_cast<float>(size);
-  const auto grown = ApplyFilter(cloud_, {&pixel, 1}, {.upscale = kCloser, .strength = DefaultFilterStrength(kCloser, mode)});
+  const auto grown =
+      ApplyFilter(cloud_, {&pixel, 1}, {.upscale = kCloser, .strength = DefaultFilterStrength(kCloser, mode)});
   if (!grown.ok()) return grown.error();
   filtered = std::exchange(cloud_.log_scales, log_scales_);
   Means low, of_filtered, of_splat;

@@ -129,7 +129,8 @@ void AddColorsAndTurns(const GaussianCloud& cloud, const ShowingGaussians& showi
     }
     outside += out ? 1 : 0;
     const float* const q = cloud.quats.data() + 4 * i;
-    const double length = std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] + double{q[2]} * q[2] + double{q[3]} * q[3]);
+    const double length =
+        std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] + double{q[2]} * q[2] + double{q[3]} * q[3]);
     lengths += std::min(1.0, std::abs(length - 1));
   }
   const auto count = static_cast<double>(std::max<size_t>(1, showing.rows_of_all.size()));

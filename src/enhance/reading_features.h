@@ -29,7 +29,7 @@ namespace anchorsplat {
 //   left[k].*    shares of the outlines that cuts and coarse Gaussians make
 //   closer[k].*  DownscaleLook (enhance/downscale_look.h) of classic, then of antialiased pictures
 struct ReadingFeatures {
-  double unit = 0;  // world units
+  double unit = 0;                 // world units
   std::vector<std::string> names;  // the same of every splat
   std::vector<double> values;
 };

@@ -16,6 +16,7 @@
 #include "enhance/filter.h"
 #include "enhance/pixel_size.h"
 #include "enhance/reading_features.h"
+#include "enhance/showing_gaussians.h"
 #include "eval/benchmark.h"
 #include "eval/protocol.h"
 #include "fit/picture_cache.h"
@@ -83,6 +84,7 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
     return bad(e.what());
   }
   if (task.id.empty() || task.splat.empty()) return bad("it needs an id and a splat");
+  if (task.id.find('/') != std::string::npos) return bad(Printable(task.id) + ": an id is the name of a file");
   return task;
 }
 
@@ -201,21 +203,22 @@ Result<GaussianCloud> Treat(const EnhanceMethod& method, const GaussianCloud& cl
 }
 
 // What the program does by itself.
-Result<nlohmann::json> Today(const GaussianCloud& cloud, const EnhanceOptions& options, double raw, Measuring* measuring) {
+Result<nlohmann::json> Today(const GaussianCloud& cloud, const EnhanceOptions& options, double raw,
+                             Measuring* measuring) {
   auto done = Enhance(cloud, options);
   if (!done.ok()) return nlohmann::json{{"error", done.error().message}};
   const EnhanceReport& report = done->report;
-  nlohmann::json json = {{"method", report.steps.empty() ? "none" : report.method},
-                         {"strength", Rounded(report.filter_strength)},
-                         {"source", report.pixel_size_source},
-                         {"things", report.things.size()},
-                         {"seconds", report.seconds_in_all - report.seconds},
-                         {"one_size", report.things.empty() && (!report.finding || report.finding->is_one()) &&
-                                          report.filter_strength ==
-                                              DefaultFilterStrength(options.upscale, done->cloud.render_mode)},
-                         {"looks", nullptr},
-                         {"mode", nullptr},
-                         {"pixel", Number(report.pixel_size)}};
+  nlohmann::json json = {
+      {"method", report.steps.empty() ? "none" : report.method},
+      {"strength", Rounded(report.filter_strength)},
+      {"source", report.pixel_size_source},
+      {"things", report.things.size()},
+      {"seconds", report.seconds_in_all - report.seconds},
+      {"one_size", report.things.empty() && (!report.finding || report.finding->is_one()) &&
+                       report.filter_strength == DefaultFilterStrength(options.upscale, done->cloud.render_mode)},
+      {"looks", nullptr},
+      {"mode", nullptr},
+      {"pixel", Number(report.pixel_size)}};
   if (report.looks) json["looks"] = NameOf(*report.looks);
   if (done->cloud.render_mode) json["mode"] = NameOf(*done->cloud.render_mode);
   if (report.finding) {
@@ -309,9 +312,13 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
     std::fill(pixels.begin() + task.others_from, pixels.end(), static_cast<float>(task.others_pixel));
   }
   row["upscale"] = object->upscale;
-  row["pixel"] = QuantileOf(pixels, 0.5);
-  row["pixel_10"] = QuantileOf(pixels, 0.1);
-  row["pixel_90"] = QuantileOf(pixels, 0.9);
+  // Of what is looked at: a sky is far away, and its pixels are none of the subject's.
+  Buffer<float> seen;
+  for (const int64_t i : FindShowingGaussians(cloud).rows_of_all) seen.push_back(pixels[static_cast<size_t>(i)]);
+  if (seen.empty()) seen = pixels;
+  row["pixel"] = QuantileOf(seen, 0.5);
+  row["pixel_10"] = QuantileOf(seen, 0.1);
+  row["pixel_90"] = QuantileOf(seen, 0.9);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const double raw, measuring.Measure(cloud));
   row["raw"] = Rounded(raw);
   for (const RenderMode mode : ModesOf(cloud)) {

@@ -12,16 +12,16 @@ namespace anchorsplat {
 
 // What a decider reaches on rows of the table.
 struct ReadingScore {
-  std::string group;  // of kReadingAll: all rows; else a kind, or an edit of any kind
-  int64_t rows = 0;   // with gains
+  std::string group;                    // of kReadingAll: all rows; else a kind, or an edit of any kind
+  int64_t rows = 0;                     // with gains
   double mean = 0, worst = 0, low = 0;  // gain over the splat as it is, dB; `low`: the 2 % quantile
   std::string worst_id;
-  double losing = 0;               // share of the rows that lose more than kReadingLoss
-  int64_t intervals = 0, held = 0;  // that are said, and that hold the true pixel
+  double losing = 0;                  // share of the rows that lose more than kReadingLoss
+  int64_t intervals = 0, held = 0;    // that are said, and that hold the true pixel
   int64_t named = 0, recognised = 0;  // rows whose making is known and of which something is said; and rightly
   int64_t accused = 0;  // rows that have width to get back and are said to have none: mip, widened, enhanced, mesh
   int64_t could_be_accused = 0;  // rows that have
-  double seconds = 0;              // median
+  double seconds = 0;            // median
 };
 inline constexpr double kReadingLoss = 0.1;  // dB
 inline constexpr const char* kReadingAll = "all";

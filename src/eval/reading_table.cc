@@ -72,7 +72,9 @@ ReadingDecision TodaysDecision(const json& today, const ReadingRow& row) {
     return decision;
   }
   const std::string method = today.at("method").get<std::string>();
-  decision.method = method == "none" || NumberAt(today, "strength") == 0 ? "none" : method == "model" ? "network" : method;
+  decision.method = method == "none" || NumberAt(today, "strength") == 0 ? "none"
+                    : method == "model"                                  ? "network"
+                                                                         : method;
   decision.mode = RenderModeNamed(TextAt(today, "mode"));
   decision.pixel = NumberAt(today, "pixel");
   decision.low = NumberAt(today, "low");

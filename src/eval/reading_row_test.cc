@@ -1,0 +1,165 @@
+#include "eval/reading_row.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/source_dir_for_test.h"
+#include "enhance/reading_features.h"
+#include "formats/cloud_io.h"
+#include "io/folder_for_test.h"
+#include "model/model_method.h"
+
+namespace anchorsplat {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::filesystem::path Lantern() { return SourceDirForTest() / "examples/stone_lantern"; }
+
+// Every sixteenth Gaussian of it, without a tag.
+GaussianCloud Sparse() {
+  const GaussianCloud cloud = *ReadCloud(Lantern() / "input.ply");
+  std::vector<int64_t> rows;
+  for (int64_t i = 0; i < cloud.size(); i += 16) rows.push_back(i);
+  GaussianCloud out = *Subset(cloud, rows);
+  out.render_mode.reset();
+  out.comments.clear();
+  return out;
+}
+
+class ReadingRowMaking : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() { RegisterModelMethod(); }
+  ReadingTask Task(const GaussianCloud& cloud) {
+    ReadingTask task;
+    task.id = "it";
+    task.labels[3] = "standard";
+    task.splat = folder_ / "it.ply";
+    task.object = Lantern();
+    EXPECT_TRUE(WriteCloud(task.splat, cloud, {.overwrite = true}).ok());
+    return task;
+  }
+  nlohmann::json Make(const ReadingTask& task) {
+    ReadingRows rows(1);
+    auto row = rows.Make(task);
+    EXPECT_TRUE(row.ok()) << (row.ok() ? "" : row.error().message);
+    return row.ok() ? *row : nlohmann::json();
+  }
+  TestFolder folder_;
+};
+
+TEST_F(ReadingRowMaking, HasGainsOfBothModesAndWhatIsDoneToday) {
+  const nlohmann::json row = Make(Task(Sparse()));
+  EXPECT_EQ(row["id"], "it");
+  EXPECT_EQ(row["kind"], "standard");
+  EXPECT_EQ(row["tag"], nullptr);
+  EXPECT_EQ(row["upscale"], 4);
+  EXPECT_NEAR(row["pixel"].get<double>(), 1.7 / 309.02, 5e-4);  // distance over focal length
+  EXPECT_GT(row["raw"].get<double>(), 10);
+  for (const char* mode : {"classic", "antialiased"}) {
+    EXPECT_EQ(row["gains"][mode]["filter"].size(), 7u);
+    EXPECT_EQ(row["gains"][mode]["network"].size(), 7u);
+  }
+  EXPECT_EQ(row["features"].size(), ReadFeatures(Sparse())->names.size());
+  EXPECT_TRUE(row["today"]["gain"].is_number());
+  EXPECT_TRUE(row["today"]["method"].is_string());
+}
+
+TEST_F(ReadingRowMaking, OfATaggedSplatIsInItsMode) {
+  GaussianCloud cloud = Sparse();
+  cloud.render_mode = RenderMode::kMip;
+  const nlohmann::json row = Make(Task(cloud));
+  EXPECT_EQ(row["tag"], "mip");
+  EXPECT_EQ(row["gains"].size(), 1u);
+  EXPECT_TRUE(row["gains"].contains("mip"));
+}
+
+// Gains are those of the splat in its own place: cameras follow it.
+TEST_F(ReadingRowMaking, FollowsASplatThatWasMoved) {
+  const nlohmann::json here = Make(Task(Sparse()));
+  GaussianCloud cloud = Sparse();
+  for (size_t i = 0; i < cloud.means.size(); ++i) {
+    cloud.means[i] = 7 * cloud.means[i] + 3;
+    cloud.log_scales[i] += std::log(7.0f);
+  }
+  ReadingTask task = Task(cloud);
+  task.moved.scale = 7;
+  task.moved.translation = {3, 3, 3};
+  const nlohmann::json there = Make(task);
+  EXPECT_NEAR(there["pixel"].get<double>() / here["pixel"].get<double>(), 7, 1e-3);
+  EXPECT_NEAR(there["raw"].get<double>(), here["raw"].get<double>(), 1e-2);
+  for (size_t k = 0; k < 7; ++k) {
+    EXPECT_NEAR(there["gains"]["classic"]["filter"][k].get<double>(),
+                here["gains"]["classic"]["filter"][k].get<double>(), 1e-2);
+  }
+}
+
+// What was added is not drawn, what was cut off is: both show the whole.
+TEST_F(ReadingRowMaking, OfEditsIsMeasuredOnTheSubject) {
+  const GaussianCloud whole = Sparse();
+  const double raw = Make(Task(whole))["raw"];
+  GaussianCloud more = whole, far = whole;
+  for (size_t i = 0; i < far.means.size(); i += 3) far.means[i] += 5;
+  ASSERT_TRUE(Append(more, far).ok());
+  ReadingTask merged = Task(more);
+  merged.keep = Region{{-1, -1, -1}, {1, 1, 1}, {}};
+  merged.others_from = whole.size();
+  merged.others_pixel = 0.5;
+  const nlohmann::json row = Make(merged);
+  EXPECT_NEAR(row["raw"].get<double>(), raw, 1e-3);
+  EXPECT_GT(row["pixel_90"].get<double>(), 0.4);
+  EXPECT_LT(row["pixel_10"].get<double>(), 0.01);
+
+  std::vector<int64_t> left, right;
+  for (int64_t i = 0; i < whole.size(); ++i) (whole.means[static_cast<size_t>(3 * i)] < 0 ? left : right).push_back(i);
+  ReadingTask part = Task(*Subset(whole, left));
+  part.context = folder_ / "rest.ply";
+  ASSERT_TRUE(WriteCloud(part.context, *Subset(whole, right)).ok());
+  EXPECT_NEAR(Make(part)["raw"].get<double>(), raw, 3);  // the rest is filtered
+}
+
+TEST_F(ReadingRowMaking, OfAStrangersSplatHasFeaturesAlone) {
+  ReadingTask task = Task(Sparse());
+  task.object.clear();
+  const nlohmann::json row = Make(task);
+  EXPECT_EQ(row["pixel"], nullptr);
+  EXPECT_FALSE(row.contains("gains"));
+  EXPECT_FALSE(row["today"].contains("gain"));
+  EXPECT_GT(row["features"].size(), 1000u);
+}
+
+TEST_F(ReadingRowMaking, OfTooFewGaussiansHasGainsAlone) {
+  const nlohmann::json row = Make(Task(*Subset(Sparse(), std::vector<int64_t>{0, 1, 2})));
+  EXPECT_FALSE(row.contains("features"));
+  EXPECT_THAT(row["why_no_features"].get<std::string>(), HasSubstr("fewer than"));
+  EXPECT_EQ(row["gains"]["classic"]["filter"].size(), 7u);
+}
+
+TEST_F(ReadingRowMaking, BadTasksAreRefused) {
+  const auto refused = [](const char* text) {
+    const auto task = ReadingTaskFrom(nlohmann::json::parse(text));
+    return task.ok() ? "" : task.error().message;
+  };
+  EXPECT_EQ(refused(R"({"id":"a","splat":"a.ply","kind":"k","keep":[0,0,0,1,1,1]})"), "");
+  EXPECT_THAT(refused(R"([])"), HasSubstr("not an object"));
+  EXPECT_THAT(refused(R"({"id":"a"})"), HasSubstr("a splat"));
+  EXPECT_THAT(refused(R"({"id":"a","splat":"a.ply","pixel":3})"), HasSubstr("unknown property pixel"));
+  EXPECT_THAT(refused(R"({"id":"a","splat":"a.ply","keep":[0]})"), HasSubstr("neither a box"));
+  EXPECT_THAT(refused(R"({"id":"a","splat":3})"), HasSubstr("string"));
+  EXPECT_THAT(
+      refused(R"({"id":"a","splat":"a","moved":{"scale":0,"rotation":[1,0,0,0,1,0,0,0,1],"translation":[0,0,0]}})"),
+      HasSubstr("scale"));
+  EXPECT_THAT(refused(R"({"id":"../a","splat":"a.ply"})"), HasSubstr("id"));
+  EXPECT_THAT(refused(R"({"id":"a","splat":"a","others":{"from":0,"pixel":1}})"), HasSubstr("others"));
+  ReadingTask task = Task(Sparse());
+  task.others_from = 1'000'000;
+  task.others_pixel = 1;
+  ReadingRows rows(1);
+  EXPECT_THAT(rows.Make(task).error().message, HasSubstr("others begin behind"));
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -7,6 +7,8 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -154,6 +156,25 @@ std::vector<std::string> Cells(const std::string& name, const ReadingScore& s) {
           s.seconds > 0 ? Fixed(s.seconds, 2) : ""};
 }
 
+// Who is taken for what, a row for each way to be made.
+std::string ConfusionTable(std::span<const ReadingRow> rows, const Decisions& decisions) {
+  const auto counts = TakenFor(rows, decisions);
+  std::set<std::string> said;
+  for (const auto& [made, of] : counts) {
+    for (const auto& [word, count] : of) said.insert(word);
+  }
+  std::vector<std::vector<std::string>> table = {{"untagged, made … taken for"}};
+  table[0].insert(table[0].end(), said.begin(), said.end());
+  for (const auto& [made, of] : counts) {
+    table.push_back({made});
+    for (const std::string& word : said) {
+      const auto found = of.find(word);
+      table.back().push_back(found == of.end() ? "" : WithThousands(found->second));
+    }
+  }
+  return FormatTable(table);
+}
+
 std::vector<std::string> Heading(const std::string& name) {
   return {name, "rows", "mean", "worst", "2 %", "lose", "held", "known", "accused", "s"};
 }
@@ -185,7 +206,8 @@ Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
                            {"curve_error", {{"rows", error.rows}, {"median", error.median}, {"p95", error.most}}},
                            {"deciders", nlohmann::json::array()}};
     for (const auto& [name, decisions] : deciders) {
-      nlohmann::json& decider = json["deciders"].emplace_back(nlohmann::json{{"name", name}});
+      nlohmann::json& decider =
+          json["deciders"].emplace_back(nlohmann::json{{"name", name}, {"taken_for", TakenFor(rows, decisions)}});
       for (const ReadingScore& score : ScoreReadings(rows, decisions)) decider["groups"].push_back(ToJson(score));
     }
     PrintJson(json);
@@ -204,7 +226,7 @@ Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
         table.back().push_back(scores[bound][g].rows > 0 ? Fixed(scores[bound][g].mean, 2) : "");
       }
     }
-    std::cout << FormatTable(table) << "\n";
+    std::cout << FormatTable(table) << "\n" << ConfusionTable(rows, deciders[d].second) << "\n";
   }
   std::cout << FormatTable(overall) << "\n";
   std::cout << "gain over the splat as it is, dB: mean, worst, 2 % quantile, share that loses more than "

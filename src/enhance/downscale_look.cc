@@ -12,10 +12,10 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int kViews = 2;
+constexpr int kSides = 2;
 constexpr int kCloser = 4;    // the usual zoom
 constexpr int kLowSide = 96;  // pixels of the size that is tried
-constexpr double kFieldOfView = std::numbers::pi / 4, kNearPlane = 0.01;
+constexpr double kDownscaleFieldOfView = std::numbers::pi / 4, kDownscaleNear = 0.01;
 constexpr double kNothing = 1e-5;  // beside a mean of alpha: pictures of nothing have finite logarithms
 
 // [4,H,W]: colours over black and alpha, each pixel the mean of kCloser × kCloser.
@@ -35,13 +35,13 @@ Image AveragedDown(const Image& image) {
   return out;
 }
 
-struct Means {
+struct PictureMeans {
   double alpha = 0;                   // of the picture itself
   double of_alpha = 0, of_color = 0;  // of the absolute differences from another
 };
 
-Means Compare(const Image& image, const Image& other) {
-  Means means;
+PictureMeans Compare(const Image& image, const Image& other) {
+  PictureMeans means;
   const int64_t plane = image.plane();
   const auto pixels = static_cast<double>(plane);
   for (int c = 0; c < image.channels; ++c) {
@@ -66,10 +66,10 @@ Result<DownscaleProbe> DownscaleProbe::Make(const TellingGaussians& telling) {
   DownscaleProbe probe;
   probe.cloud_ = telling.cloud;
   probe.log_scales_ = telling.cloud.log_scales;
-  const Pinhole intrinsics = PinholeFromFov(kLowSide, kLowSide, kFieldOfView);
+  const Pinhole intrinsics = PinholeFromFov(kLowSide, kLowSide, kDownscaleFieldOfView);
   probe.distance_ = FramingDistance({telling.framing.target, telling.radius()}, intrinsics);
   ANCHORSPLAT_ASSIGN_OR_RETURN(probe.cameras_,
-                               OrbitCameras(kViews, probe.distance_, telling.framing.target, intrinsics));
+                               OrbitCameras(kSides, probe.distance_, telling.framing.target, intrinsics));
   return probe;
 }
 
@@ -83,8 +83,8 @@ Result<Image> DownscaleProbe::Draw(double pixel, int side, RenderMode mode, cons
                        .cy = side / 2.0};
   RenderOptions options;
   options.mode = mode;
-  options.near_plane = static_cast<float>(kNearPlane * distance_);
-  options.far_plane = static_cast<float>(distance_ / kNearPlane);
+  options.near_plane = static_cast<float>(kDownscaleNear * distance_);
+  options.far_plane = static_cast<float>(distance_ / kDownscaleNear);
   ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud_, camera, options, output_));
   Image image(side, side, 4);
   std::ranges::copy(output_.alpha.pixels, std::ranges::copy(output_.color.pixels, image.pixels.begin()).out);
@@ -98,8 +98,8 @@ Result<DownscaleLook> DownscaleProbe::At(double size, RenderMode mode) {
       ApplyFilter(cloud_, {&pixel, 1}, {.upscale = kCloser, .strength = DefaultFilterStrength(kCloser, mode)});
   if (!grown.ok()) return grown.error();
   filtered = std::exchange(cloud_.log_scales, log_scales_);
-  Means low, of_filtered, of_splat;
-  const auto add = [](const Means& more, Means& sum) {
+  PictureMeans low, of_filtered, of_splat;
+  const auto add = [](const PictureMeans& more, PictureMeans& sum) {
     sum.alpha += more.alpha;
     sum.of_alpha += more.of_alpha;
     sum.of_color += more.of_color;
@@ -115,7 +115,7 @@ Result<DownscaleLook> DownscaleProbe::At(double size, RenderMode mode) {
     add(Compare(AveragedDown(closer), at_size), of_splat);
     add(Compare(AveragedDown(*given_width), at_size), of_filtered);
   }
-  const double least = kNothing * kViews;
+  const double least = kNothing * kSides;
   const double all = low.alpha + least;
   return DownscaleLook{std::log((of_filtered.alpha + least) / all), of_filtered.of_alpha / all,
                        of_filtered.of_color / all, std::log((of_splat.alpha + least) / all), of_splat.of_alpha / all};

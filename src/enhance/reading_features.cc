@@ -27,9 +27,9 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int kStepsAside = 7;
-constexpr double kOctavesPerStep = 0.5;
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr int kReadingSteps = 7;
+constexpr double kReadingOctaves = 0.5;
+constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
 
 class Row {
  public:
@@ -37,7 +37,7 @@ class Row {
 
   void Add(std::string name, double value) {
     out_.names.push_back(std::move(name));
-    out_.values.push_back(std::isfinite(value) ? value : kUnknown);
+    out_.values.push_back(std::isfinite(value) ? value : kNotKnown);
   }
   void Add(std::string_view prefix, std::span<const double> values) {
     for (size_t k = 0; k < values.size(); ++k) Add(Cat(prefix, k), values[k]);
@@ -66,7 +66,7 @@ void AddCounts(const GaussianCloud& cloud, const ShowingGaussians& showing, Row&
   row.Add("count.all", Count(cloud.size()));
   row.Add("count.showing", Count(showing.all.size()));
   const auto share = [](int64_t part, int64_t whole) {
-    return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : kUnknown;
+    return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : kNotKnown;
   };
   row.Add("count.share_showing", share(showing.all.size(), showing.telling.cloud.size()));
   row.Add("count.share_bright", share(showing.bright.size(), showing.all.size()));
@@ -80,14 +80,14 @@ void AddSizes(const PixelSizeProbe& probe, const GaussianCloud& showing, Row& ro
   row.Add("size.", probe.SizesAt(probe.start()));
   Buffer<float> logits = showing.opacity_logits;
   for (int decile = 1; decile <= 9; ++decile) {
-    row.Add(Cat("size.opacity", decile), logits.empty() ? kUnknown : double{Sigmoid(Quantile(logits, decile / 10.0))});
+    row.Add(Cat("size.opacity", decile), logits.empty() ? kNotKnown : double{Sigmoid(Quantile(logits, decile / 10.0))});
   }
 }
 
 // The share of the values that are the most common one, within a thousandth: what a program set to one value.
 double ShareOfTheSame(Buffer<float> values) {
   std::erase_if(values, [](float x) { return !std::isfinite(x); });
-  if (values.empty()) return kUnknown;
+  if (values.empty()) return kNotKnown;
   constexpr float kSame = 1e-3f;
   std::ranges::sort(values);
   size_t most = 0;
@@ -109,7 +109,7 @@ void AddAxes(const GaussianCloud& showing, Row& row) {
   }
   for (size_t a = 0; a < 3; ++a) {
     for (const double q : {0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99}) {
-      row.AddLogLength(Cat("axis", a, ".", q), axes[a].empty() ? kUnknown : double{Quantile(axes[a], q)});
+      row.AddLogLength(Cat("axis", a, ".", q), axes[a].empty() ? kNotKnown : double{Quantile(axes[a], q)});
     }
   }
   row.Add("axis.same_smallest", ShareOfTheSame(axes[0]));
@@ -154,11 +154,11 @@ void AddTwins(const GaussianCloud& cloud, const ShowingGaussians& showing, const
   FoundTwins twins;
   const std::optional<EnhancedLook> look = FindEnhancedLook(showing.all, tails, &twins);
   std::array<double, kEnhancedLookFeatures> unknown;
-  unknown.fill(kUnknown);
+  unknown.fill(kNotKnown);
   row.Add("twin.", look ? *look : unknown);
-  row.Add("twin.unrelated", look ? (twins.unrelated ? 1.0 : 0.0) : kUnknown);
+  row.Add("twin.unrelated", look ? (twins.unrelated ? 1.0 : 0.0) : kNotKnown);
   row.Add("twin.likeness_of_harmonics",
-          look ? LikenessOfHarmonics(cloud, showing.rows_of_all, twins).value_or(kUnknown) : kUnknown);
+          look ? LikenessOfHarmonics(cloud, showing.rows_of_all, twins).value_or(kNotKnown) : kNotKnown);
   row.Add("twin.trained_quaternions", HasQuaternionsOfTraining(showing.all) ? 1 : 0);
 }
 
@@ -190,9 +190,9 @@ Result<OutlineValues> OutlinesAt(PixelSizeProbe& probe, double size, Look look) 
 
 // `without`: a probe of the splat without black Gaussians, where there are some.
 Status AddLooks(PixelSizeProbe& probe, std::optional<PixelSizeProbe>& without, DownscaleProbe& closer, Row& row) {
-  for (int k = -kStepsAside; k <= kStepsAside; ++k) {
+  for (int k = -kReadingSteps; k <= kReadingSteps; ++k) {
     LeaveIfAbandoned();
-    const double size = probe.start() * std::exp2(k * kOctavesPerStep);
+    const double size = probe.start() * std::exp2(k * kReadingOctaves);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const OutlineValues alpha, OutlinesAt(probe, size, Look::kAlpha));
     ANCHORSPLAT_ASSIGN_OR_RETURN(const OutlineValues thin, OutlinesAt(probe, size, Look::kAntialiased));
     OutlineValues bright{};

@@ -149,6 +149,16 @@ std::vector<ReadingScore> ScoreReadings(std::span<const ReadingRow> rows, const 
   return scores;
 }
 
+std::map<std::string, std::map<std::string, int64_t>> TakenFor(std::span<const ReadingRow> rows,
+                                                               const Decisions& decisions) {
+  std::map<std::string, std::map<std::string, int64_t>> counts;
+  for (size_t i = 0; i < rows.size(); ++i) {
+    if (rows[i].tag || rows[i].made.empty()) continue;
+    ++counts[rows[i].made][decisions[i].made.empty() ? "nothing" : decisions[i].made];
+  }
+  return counts;
+}
+
 CurveError ErrorOfCurves(std::span<const ReadingRow> rows) {
   Buffer<float> errors;
   for (const ReadingRow& row : rows) {

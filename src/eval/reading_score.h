@@ -42,6 +42,11 @@ Decisions GivenDecisions(std::span<const ReadingRow> rows, const std::map<std::s
 // of their names. Rows without gains count for seconds and for what they are taken for.
 std::vector<ReadingScore> ScoreReadings(std::span<const ReadingRow> rows, const Decisions& decisions);
 
+// How often splats that were made so, and whose files do not say how they are to be drawn, are taken for what: by
+// ReadingRow::made, then by ReadingDecision::made ("nothing": none is said).
+std::map<std::string, std::map<std::string, int64_t>> TakenFor(std::span<const ReadingRow> rows,
+                                                               const Decisions& decisions);
+
 // How far the gains that curves say are from those that were measured of the same decisions: median and 95 % quantile
 // of the absolute differences over the rows that have both, dB. What a decision that was not measured is worth is known
 // to that.

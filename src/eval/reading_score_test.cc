@@ -138,6 +138,15 @@ TEST(ReadingScore, CountsByHand) {
   EXPECT_EQ(scores[3].group, "edit: cropped");
 }
 
+TEST(ReadingScore, SaysWhatUntaggedSplatsAreTakenFor) {
+  std::vector<ReadingRow> rows = SomeRows();
+  rows[1].today.made.clear();
+  rows[2].tag = RenderMode::kMip;  // it says so itself
+  const auto counts = TakenFor(rows, TodaysDecisions(rows));
+  ASSERT_EQ(counts.size(), 1u);
+  EXPECT_EQ(counts.at("classic"), (std::map<std::string, int64_t>{{"classic", 1}, {"nothing", 1}}));
+}
+
 TEST(ReadingScore, BoundsAreAboveWhatIsDecided) {
   const std::vector<ReadingRow> rows = SomeRows();
   const double best = ScoreReadings(rows, BestDecisions(rows))[0].mean;

@@ -352,8 +352,8 @@ def make_rows(arguments):
 
 def pack(arguments):
     work = arguments.work
-    names = list(json.loads(quietly(arguments.program, "bench", "reading", HERE / "examples/biplane/input.ply", "--features",
-                                    "--json"))["splats"][0]["features"])
+    names = json.loads(quietly(arguments.program, "bench", "reading", HERE / "examples/biplane/input.ply", "--features",
+                               "--json"))["names"]
     rows = []
     for line in (work / "tasks.jsonl").read_text().splitlines():
         path = work / "rows" / (json.loads(line)["id"] + ".json")

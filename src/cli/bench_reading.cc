@@ -46,14 +46,15 @@ struct ReadingFlags {
 nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
 
 Status PrintFeatures(const ReadingFlags& flags, const SharedFlags& shared) {
-  nlohmann::json splats = nlohmann::json::array();
+  nlohmann::json splats = nlohmann::json::array(), names;
   for (const std::string& file : flags.splats) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(file));
     const auto read = ReadFeatures(cloud);
     if (!read.ok()) return Error{read.error().code, Cat(file, ": ", read.error().message)};
     if (shared.json) {
+      names = read->names;
       nlohmann::json& json = splats.emplace_back(nlohmann::json{{"file", file}, {"unit", read->unit}});
-      for (size_t k = 0; k < read->names.size(); ++k) json["features"][read->names[k]] = Number(read->values[k]);
+      for (const double value : read->values) json["features"].push_back(Number(value));
       continue;
     }
     std::vector<std::vector<std::string>> table = {{file, Cat("unit ", read->unit)}};
@@ -62,7 +63,8 @@ Status PrintFeatures(const ReadingFlags& flags, const SharedFlags& shared) {
     }
     std::cout << FormatTable(table);
   }
-  if (shared.json) PrintJson({{"bench", "reading"}, {"splats", splats}});
+  // Names apart: values keep their order, as in the rows of the table.
+  if (shared.json) PrintJson({{"bench", "reading"}, {"names", names}, {"splats", splats}});
   return {};
 }
 

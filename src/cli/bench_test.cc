@@ -10,6 +10,8 @@
 #include "formats/cloud_io.h"
 #include "io/atomic_file.h"
 #include "io/folder_for_test.h"
+#include "io/inflating_reader.h"
+#include "io/input_file.h"
 
 namespace anchorsplat {
 namespace {
@@ -59,6 +61,8 @@ TEST(BenchVerb, ReadingTellsWhatASplatShows) {
   ASSERT_EQ(json["splats"].size(), 1u);
   EXPECT_GT(json["splats"][0]["unit"], 0);
   EXPECT_GT(json["splats"][0]["features"].size(), 1000u);
+  EXPECT_EQ(json["splats"][0]["features"].size(), json["names"].size());
+  EXPECT_EQ(json["names"][0], "file.classic");  // in the order of the values
   EXPECT_THAT(ExpectDone({"bench", "reading", scan, "--features"}).out, HasSubstr("surface.spacing"));
   ExpectRefused({"bench", "reading"}, ErrorCode::kBadArgument, {"--features", "--tasks", "--score"});
   ExpectRefused({"bench", "reading", "--features"}, ErrorCode::kBadArgument, {"needs a splat"});
@@ -85,6 +89,14 @@ TEST(BenchVerb, ReadingMakesRowsAndGoesOn) {
   ExpectRefused(words, ErrorCode::kBadFile, {"line 1"});
 }
 
+std::string FirstLineOf(const std::string& gzipped) {
+  const auto file = InputFile::Open(gzipped);
+  std::string text(size_t{1} << 20, '\0');
+  const auto reader = OpenGzip(*file, 0);
+  text.resize(*reader->ReadSome(text.data(), text.size()));
+  return text.substr(0, text.find('\n'));
+}
+
 // The table that is part of the project: what its page says of it, and the board.
 TEST(BenchVerb, ReadingScoresTheTable) {
   const std::string table = SourceDirForTest() / "data/reading.jsonl.gz";
@@ -99,6 +111,9 @@ TEST(BenchVerb, ReadingScoresTheTable) {
   EXPECT_GE(rows->size(), 1000u);
   EXPECT_GE(kinds.size(), 12u);
   EXPECT_GE(meshes.size(), 60u);
+  // Its columns are those that the extractor gives today.
+  const nlohmann::json features = ExpectJson({"bench", "reading", Biplane() / "input.ply", "--features"});
+  EXPECT_EQ(nlohmann::json::parse(FirstLineOf(table))["features"], features["names"]);
   const std::string out = ExpectDone({"bench", "reading", "--score", table}).out;
   EXPECT_THAT(out, HasSubstr("today's list"));
   EXPECT_THAT(out, HasSubstr("best of all"));

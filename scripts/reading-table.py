@@ -7,9 +7,9 @@
     scripts/reading-table.py pack   --work WORK -o data/reading.jsonl.gz
 
 Each goes on where it was stopped; `all` is the four of them. WORK/objects has the meshes (scripts/fetch-objects.sh);
-`fits` also makes land (scripts/make-land.py) and a room (scripts/make-scenes.sh). PHOTOS: a folder of projects of posed
-photographs, STRANGERS: a folder with a folder of splats for every maker. What they are called enters no row: they are
-photographs-1, maker-1 and so on, in the order of a hash of their names. Needs NumPy.
+`fits` also makes land (scripts/make-land.py) and a room (scripts/make-scenes.sh). --photos: a folder of projects of posed
+photographs, --strangers: a folder with a folder of splats for every maker; later stages remember both. What they are called
+enters no row: they are photographs-1, maker-1 and so on, and stay so (WORK/names.json). Needs NumPy.
 """
 
 import argparse
@@ -17,9 +17,10 @@ import gzip
 import hashlib
 import json
 import pathlib
+import resource
+import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 
@@ -30,6 +31,7 @@ FOLDS = 8
 EDITS_PER_SPLAT = 8  # besides the splat as it is and without its tag
 DOWNSCALE = 4  # of photographs
 LANDS = {"hills-1": ("hills", 1), "relief-2": ("relief", 2), "town-3": ("town", 3), "town-4": ("town", 4)}
+SPLATS = (".ply", ".spz", ".splat", ".sog", ".ksplat", ".glb", ".gltf", ".npz", ".csv")  # of strangers
 LABELS = ("original", "mesh", "maker", "kind", "edit", "made")
 
 
@@ -56,11 +58,9 @@ class Clock:
         self.path, self.stage = work / "core-seconds.json", stage
 
     def __enter__(self):
-        import resource
         self.begin = resource.getrusage(resource.RUSAGE_CHILDREN)
 
     def __exit__(self, *_):
-        import resource
         now = resource.getrusage(resource.RUSAGE_CHILDREN)
         seconds = now.ru_utime + now.ru_stime - self.begin.ru_utime - self.begin.ru_stime
         kept = json.loads(self.path.read_text()) if self.path.exists() else {}
@@ -72,7 +72,9 @@ class Clock:
 
 
 def read_objects(folder, made_of, mesh_of=None):
-    """Fits of a data set that were not rejected."""
+    """Fits of a data set; nothing where it was not made."""
+    if not (folder / "manifest.jsonl").exists():
+        return
     for line in sorted((folder / "manifest.jsonl").read_text().splitlines()):
         record = json.loads(line)
         name = record["name"]
@@ -85,10 +87,42 @@ def made_by(kind):
     return "antialiased" if kind.startswith("antialiased") else "mip" if kind.startswith("mip") else "classic"
 
 
-def anonymous(folder, word):
-    """Folders in the order of a hash, with names that say nothing."""
-    found = sorted((p for p in folder.iterdir() if p.is_dir()), key=lambda p: digest(p.name))
-    return {p: f"{word}-{k + 1}" for k, p in enumerate(found)}
+class Names:
+    """Numbers instead of names, in the order of a hash at first; who joins later gets the next ones."""
+
+    def __init__(self, work):
+        self.path = work / "names.json"
+        self.known = json.loads(self.path.read_text()) if self.path.exists() else {}
+
+    def of(self, things, word):
+        """{thing: number} of paths, by the names of their files."""
+        numbers = self.known.setdefault(word, {})
+        for thing in sorted(things, key=lambda p: digest(p.name)):
+            numbers.setdefault(thing.name, len(numbers) + 1)
+        self.path.write_text(json.dumps(self.known, indent=1))
+        return {thing: numbers[thing.name] for thing in sorted(things, key=lambda p: numbers[p.name])}
+
+
+def folders(path):
+    return [p for p in path.iterdir() if p.is_dir()]
+
+
+def photographs(arguments):
+    """{project: name}."""
+    if not arguments.photos:
+        return {}
+    return {p: f"photographs-{k}" for p, k in Names(arguments.work).of(folders(arguments.photos), "photographs").items()}
+
+
+def strangers(arguments):
+    """(splat, its name, its maker's)."""
+    if not arguments.strangers:
+        return
+    names = Names(arguments.work)
+    for maker, k in names.of(folders(arguments.strangers), "makers").items():
+        splats = [p for p in maker.iterdir() if p.is_file() and p.name.endswith(SPLATS)]
+        for splat, n in names.of(splats, f"maker-{k}").items():
+            yield splat, f"maker-{k}-{n}", f"maker-{k}"
 
 
 def originals(arguments):
@@ -104,12 +138,11 @@ def originals(arguments):
             mesh = {"biplane": "BlendSwap-CC-0-cartoon_biplane", "stone_lantern": "BlendSwap-CC-0-stoneLantern"}
             found.append({"original": example.name, "mesh": mesh.get(example.name, example.name), "maker": "",
                           "kind": "example", "made": "classic", "object": example, "splat": example / "input.ply"})
-    if arguments.photos:
-        for project, name in anonymous(arguments.photos, "photographs").items():
-            splat = work / "photographs" / f"{name}.ply"
-            if splat.exists():
-                found.append({"original": name, "mesh": name, "maker": name, "kind": "photographed", "made": "classic",
-                              "object": project, "downscale": DOWNSCALE, "splat": splat})
+    for project, name in photographs(arguments).items():
+        splat = work / "photographs" / f"{name}.ply"
+        if splat.exists():
+            found.append({"original": name, "mesh": name, "maker": name, "kind": "photographed", "made": "classic",
+                          "object": project, "downscale": DOWNSCALE, "splat": splat})
     return found
 
 
@@ -176,7 +209,7 @@ def make_fits(arguments):
                 run(sys.executable, HERE / "scripts/make-land.py", kind, mesh, "--seed", seed)
         run(program, "dataset", "build", *meshes, "-o", work / "land", "--recipe", HERE / "data/reading-land.toml",
             "--jobs", 1, "--licence", "Apache-2.0")
-        for project, name in anonymous(arguments.photos, "photographs").items() if arguments.photos else ():
+        for project, name in photographs(arguments).items():
             out = work / "photographs" / f"{name}.ply"
             if not out.exists():
                 out.parent.mkdir(exist_ok=True)
@@ -193,11 +226,9 @@ def make_splats(arguments):
     with Clock(work, "edits"):
         for original in found:
             tasks += splats_of(arguments, original, found)
-    if arguments.strangers:
-        for maker, name in anonymous(arguments.strangers, "maker").items():
-            for k, splat in enumerate(sorted(maker.iterdir(), key=lambda p: digest(p.name))):
-                tasks.append({"id": f"{name}-{k + 1}", "original": f"{name}-{k + 1}", "mesh": f"{name}-{k + 1}", "maker": name,
-                              "kind": "stranger", "edit": "", "made": "", "splat": str(splat)})
+    for splat, name, maker in strangers(arguments):
+        tasks.append({"id": name, "original": name, "mesh": name, "maker": maker, "kind": "stranger", "edit": "", "made": "",
+                      "splat": str(splat)})
     (work / "tasks.jsonl").write_text("".join(json.dumps(task) + "\n" for task in tasks))
     print(f"{len(tasks)} tasks of {len(found)} splats")
 
@@ -330,46 +361,90 @@ def width_of_photographs(project):
 def make_rows(arguments):
     work = arguments.work
     (work / "rows").mkdir(exist_ok=True)
-    tasks = (work / "tasks.jsonl").read_text().splitlines()
-    waiting = [t for t in tasks if not (work / "rows" / (json.loads(t)["id"] + ".json")).exists()]
-    if arguments.only:
-        waiting = waiting[: arguments.only]
-    print(f"{len(tasks) - len(waiting)} of {len(tasks)} rows are there", flush=True)
+    tasks = [json.loads(t) for t in (work / "tasks.jsonl").read_text().splitlines()]
+    if arguments.only:  # of those that have no row, and nothing is looked at again
+        tasks = [t for t in tasks if not row_of(work, t).exists()][: arguments.only]
     with Clock(work, "rows"):
         jobs = []
         for job in range(arguments.jobs):
             path = work / f"tasks-{job}.jsonl"
             # Whole originals, so that each process renders the truth of an object once.
-            mine = [t for t in waiting if digest(json.loads(t)["original"]) % arguments.jobs == job]
-            path.write_text("\n".join(mine) + "\n" if mine else "")
-            log = open(work / f"rows-{job}.log", "w", encoding="utf-8")
-            jobs.append(subprocess.Popen([str(arguments.program), "bench", "reading", "--tasks", str(path), "-o",
-                                          str(work / "rows"), "--threads", "1"], stdout=log, stderr=log))
-        codes = [job.wait() for job in jobs]
+            path.write_text("".join(json.dumps(t) + "\n" for t in tasks if digest(t["original"]) % arguments.jobs == job))
+            with open(work / f"rows-{job}.log", "w", encoding="utf-8") as log:
+                jobs.append(subprocess.Popen([str(arguments.program), "bench", "reading", "--tasks", str(path), "-o",
+                                              str(work / "rows"), "--threads", "1"], stdout=log, stderr=log))
+        try:
+            codes = [job.wait() for job in jobs]
+        finally:
+            for job in jobs:  # where this was stopped, they are, too
+                job.terminate()
+                job.wait()
+    print(f"{sum(row_of(work, t).exists() for t in tasks)} of {len(tasks)} rows are there")
     if any(codes):
-        print(f"some rows failed (exit codes {codes}): see {work}/rows-*.log", file=sys.stderr)
+        raise SystemExit(f"reading-table: some rows failed: see {work}/rows-*.log")
+
+
+def row_of(work, task):
+    return work / "rows" / (task["id"] + ".json")
 
 
 def pack(arguments):
     work = arguments.work
     names = json.loads(quietly(arguments.program, "bench", "reading", HERE / "examples/biplane/input.ply", "--features",
                                "--json"))["names"]
-    rows = []
-    for line in (work / "tasks.jsonl").read_text().splitlines():
-        path = work / "rows" / (json.loads(line)["id"] + ".json")
-        if path.exists():
-            row = json.loads(path.read_text())
-            row["fold"] = fold_of(row)
-            rows.append(row)
-    kept = json.loads((work / "core-seconds.json").read_text())
+    rows, missing = [], []
+    for task in map(json.loads, (work / "tasks.jsonl").read_text().splitlines()):
+        path = row_of(work, task)
+        if not path.exists():
+            missing.append(task["id"])
+            continue
+        row = json.loads(path.read_text())
+        row.pop("state", None)  # what it was made of has paths
+        row["fold"] = fold_of(row)
+        rows.append(row)
+    if missing and not arguments.partial:
+        raise SystemExit(f"reading-table: {len(missing)} rows are missing, such as {missing[0]}: the stage `rows` makes them, "
+                         "--partial packs those that are there")
+    clock = work / "core-seconds.json"
+    kept = json.loads(clock.read_text()) if clock.exists() else {}
     head = {"table": "readings", "multiples": [0.25, 0.35, 0.5, 0.7, 1, 1.4, 2], "folds": FOLDS, "features": names,
             "core_hours": {stage: round(seconds / 3600, 2) for stage, seconds in kept.items()}}
     text = "".join(json.dumps(item, separators=(",", ":")) + "\n" for item in [head, *rows])
-    with gzip.GzipFile(arguments.output, "wb", mtime=0) as out:  # the same bytes each time
-        out.write(text.encode())
+    with open(arguments.output, "wb") as file, gzip.GzipFile("", "wb", fileobj=file, mtime=0) as out:
+        out.write(text.encode())  # the same bytes each time
     kinds = {row["kind"] for row in rows}
     print(f"{len(rows)} rows, {len(kinds)} kinds, {len({row['mesh'] for row in rows})} meshes, "
           f"{arguments.output.stat().st_size / 1e6:.1f} MB")
+
+
+def remember(arguments):
+    """Folders that an earlier stage was told of."""
+    path = arguments.work / "sources.json"
+    known = json.loads(path.read_text()) if path.exists() else {}
+    for name in ("photos", "strangers"):
+        told = getattr(arguments, name)
+        if told:
+            known[name] = str(told.resolve())
+        elif name in known:
+            setattr(arguments, name, pathlib.Path(known[name]))
+        told = getattr(arguments, name)
+        if told and not told.is_dir():
+            raise SystemExit(f"reading-table: --{name}: {told} is no folder")
+    path.write_text(json.dumps(known))
+
+
+def stop(*_):
+    raise KeyboardInterrupt
+
+
+def positive(text):
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"must be 1 or more, found '{text}'")
+    return int(text)
+
+
+NEEDS = {"fits": ("objects", "scripts/fetch-objects.sh WORK/objects"), "splats": ("fits", "the stage `fits`"),
+         "rows": ("tasks.jsonl", "the stage `splats`"), "pack": ("rows", "the stage `rows`")}
 
 
 def main():
@@ -381,14 +456,30 @@ def main():
     parser.add_argument("--program", type=pathlib.Path, default=HERE / "build/anchorsplat")
     parser.add_argument("--photos", type=pathlib.Path)
     parser.add_argument("--strangers", type=pathlib.Path)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--only", type=int, help="rows: no more than so many, to see how long they take")
+    parser.add_argument("--jobs", type=positive, default=2)
+    parser.add_argument("--only", type=positive, help="rows: no more than so many new ones, to see how long they take")
+    parser.add_argument("--partial", action="store_true", help="pack: although rows are missing")
     parser.add_argument("-o", "--output", type=pathlib.Path, default=HERE / "data/reading.jsonl.gz")
     arguments = parser.parse_args()
     arguments.work = arguments.work.resolve()
-    for stage in stages[arguments.stage]:
+    if not arguments.work.is_dir():
+        raise SystemExit(f"reading-table: {arguments.work} is no folder; {NEEDS['fits'][1]} makes it")
+    if not arguments.program.exists():
+        raise SystemExit(f"reading-table: {arguments.program} is not there: `make` builds it, --program names another")
+    signal.signal(signal.SIGTERM, stop)
+    remember(arguments)
+    names = list(NEEDS) if arguments.stage == "all" else [arguments.stage]
+    for name, stage in zip(names, stages[arguments.stage]):
+        what, maker = NEEDS[name]
+        if not (arguments.work / what).exists():
+            raise SystemExit(f"reading-table: {arguments.work / what} is missing: {maker} makes it")
         stage(arguments)
 
 
 if __name__ == "__main__":
-    main()
+    try:
+        main()
+    except KeyboardInterrupt:
+        raise SystemExit("reading-table: stopped; the same command goes on from here")
+    except (RuntimeError, subprocess.CalledProcessError) as error:
+        raise SystemExit(f"reading-table: {error}")

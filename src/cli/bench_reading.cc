@@ -10,6 +10,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -45,12 +46,20 @@ struct ReadingFlags {
 
 nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
 
-Status PrintFeatures(const ReadingFlags& flags, const SharedFlags& shared) {
+Status PrintFeatures(const ReadingFlags& flags, Program& program) {
+  const SharedFlags& shared = program.flags;
   nlohmann::json splats = nlohmann::json::array(), names;
   for (const std::string& file : flags.splats) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(file));
-    const auto read = ReadFeatures(cloud);
-    if (!read.ok()) return Error{read.error().code, Cat(file, ": ", read.error().message)};
+    const Result<GaussianCloud> cloud = ReadCloud(file);
+    const auto read = cloud.ok() ? ReadFeatures(*cloud) : Result<ReadingFeatures>(cloud.error());
+    if (!read.ok()) {
+      const std::string why =
+          cloud.ok() ? Cat(file, ": ", read.error().message) : read.error().message;  // which names the file
+      if (flags.splats.size() == 1) return Error{read.error().code, why};
+      LogWarning(why);
+      program.exit_code = kPartialExitCode;
+      continue;
+    }
     if (shared.json) {
       names = read->names;
       nlohmann::json& json = splats.emplace_back(nlohmann::json{{"file", file}, {"unit", read->unit}});
@@ -72,19 +81,33 @@ Result<std::vector<ReadingTask>> ReadTasks(const std::string& path) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, file.ReadAll(uint64_t{1} << 28));
   std::vector<ReadingTask> tasks;
+  std::set<std::string> ids;
   int64_t line = 0;
   for (size_t at = 0; at < text.size();) {
     const size_t end = std::min(text.find('\n', at), text.size());
+    const std::string_view words = std::string_view(text).substr(at, end - at);
+    at = end + 1;
     ++line;
-    const auto json = nlohmann::json::parse(text.begin() + static_cast<std::ptrdiff_t>(at),
-                                            text.begin() + static_cast<std::ptrdiff_t>(end), nullptr, false);
-    auto task =
-        json.is_discarded() ? Result<ReadingTask>(Error{ErrorCode::kBadFile, "not JSON"}) : ReadingTaskFrom(json);
+    if (words.find_first_not_of(" \t\r") == std::string_view::npos) continue;
+    auto task = ReadingTaskFrom(nlohmann::json::parse(words, nullptr, /*allow_exceptions=*/false));
+    if (task.ok() && !ids.insert(task->id).second) {
+      task = Error{ErrorCode::kBadFile, Cat(Printable(task->id), " is there twice")};
+    }
     if (!task.ok()) return Error{ErrorCode::kBadFile, Cat(path, ": line ", line, ": ", task.error().message)};
     tasks.push_back(*std::move(task));
-    at = end + 1;
   }
   return tasks;
+}
+
+// Whether a row is there that was made of the same task and the same files.
+bool IsRowOf(const fs::path& path, const std::string& state) {
+  if (!IsFile(path)) return false;
+  const auto file = InputFile::Open(path);
+  if (!file.ok()) return false;
+  const auto text = file->ReadAll(uint64_t{1} << 24);
+  if (!text.ok()) return false;
+  const auto row = nlohmann::json::parse(*text, nullptr, /*allow_exceptions=*/false);
+  return row.is_object() && row.contains("state") && row["state"] == state;
 }
 
 // Every row is a file of its own, so that this goes on where it was stopped, and several may work side by side.
@@ -100,9 +123,9 @@ Status MakeRows(const ReadingFlags& flags, Program& program) {
     for (const ReadingTask& task : tasks) {
       if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped; the same command goes on from here"};
       const fs::path path = fs::path(flags.output) / (task.id + ".json");
-      if (IsFile(path) && !program.flags.overwrite) {
+      if (!program.flags.overwrite && IsRowOf(path, rows.StateOf(task))) {
         ++there;
-      } else if (const auto row = rows.Make(task); row.ok()) {
+      } else if (auto row = rows.Make(task); row.ok()) {
         ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(path, row->dump() + "\n", true));
         ++made;
       } else {
@@ -136,6 +159,7 @@ nlohmann::json ToJson(const ReadingScore& score) {
           {"losing", score.losing},
           {"intervals", score.intervals},
           {"held", score.held},
+          {"interval_width", score.width},
           {"named", score.named},
           {"recognised", score.recognised},
           {"could_be_accused", score.could_be_accused},
@@ -153,6 +177,7 @@ std::vector<std::string> Cells(const std::string& name, const ReadingScore& s) {
           gain(s.low),
           s.rows > 0 ? Cat(Fixed(100 * s.losing, 1), " %") : "",
           Share(s.held, s.intervals),
+          s.intervals > 0 ? Cat(Fixed(s.width, 1), "×") : "",
           Share(s.recognised, s.named),
           Share(s.accused, s.could_be_accused),
           s.seconds > 0 ? Fixed(s.seconds, 2) : ""};
@@ -178,19 +203,17 @@ std::string ConfusionTable(std::span<const ReadingRow> rows, const Decisions& de
 }
 
 std::vector<std::string> Heading(const std::string& name) {
-  return {name, "rows", "mean", "worst", "2 %", "lose", "held", "known", "accused", "s"};
+  return {name, "rows", "mean", "worst", "2 %", "lose", "held", "width", "known", "accused", "s"};
 }
 
 Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<ReadingRow> rows, ReadReadingTable(flags.table));
   std::vector<std::pair<std::string, Decisions>> deciders;
   if (!flags.decisions.empty()) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto given, ReadReadingDecisions(flags.decisions));
-    int64_t named = 0;
-    for (const ReadingRow& row : rows) named += static_cast<int64_t>(given.contains(row.id));
-    if (named < std::ssize(rows)) {
-      LogWarning(Cat(flags.decisions, ": decides ", WithThousands(named), " of ", WithThousands(std::ssize(rows)),
-                     " rows; the others are left alone"));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const auto given, ReadReadingDecisions(flags.decisions, rows));
+    if (given.size() < rows.size()) {
+      LogWarning(Cat(flags.decisions, ": decides ", WithThousands(std::ssize(given)), " of ",
+                     WithThousands(std::ssize(rows)), " rows; the others are left alone"));
     }
     deciders.emplace_back(fs::path(flags.decisions).filename().string(), GivenDecisions(rows, given));
   }
@@ -231,11 +254,12 @@ Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
     std::cout << FormatTable(table) << "\n" << ConfusionTable(rows, deciders[d].second) << "\n";
   }
   std::cout << FormatTable(overall) << "\n";
-  std::cout << "gain over the splat as it is, dB: mean, worst, 2 % quantile, share that loses more than "
+  std::cout << "mean, worst, 2 % quantile: gain over the splat as it is, dB; lose: rows that lose more than "
             << kReadingLoss
-            << "\nheld: intervals that hold the true pixel; known: taken for what it is; accused: of those that have "
-               "lost width, taken for one that has not; s: median\n"
-            << "true: the mean gain where the true pixel is known; best: that of the best of all that was measured\n"
+            << "\nheld: intervals that hold the true pixel; width: how many times as long their upper end is\n"
+               "known: of splats without a tag, those that are taken for what they are\n"
+               "accused: of those that have lost width, those that are said to have all of theirs; s: median\n"
+               "true: the mean gain where the true pixel is known; best: that of the best of all that was measured\n"
             << "curves are off by " << Fixed(error.median, 2) << " dB in the median and " << Fixed(error.most, 2)
             << " dB at the 95th percentile, of " << WithThousands(error.rows) << " decisions that were measured, too\n";
   return {};
@@ -251,7 +275,7 @@ Status RunReading(const ReadingFlags& flags, Program& program) {
   if (!flags.features && !flags.splats.empty()) {
     return Error{ErrorCode::kBadArgument, "splats are for --features"};
   }
-  if (flags.features) return PrintFeatures(flags, program.flags);
+  if (flags.features) return PrintFeatures(flags, program);
   return flags.tasks.empty() ? Score(flags, program.flags) : MakeRows(flags, program);
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "cameras/photograph.h"
 #include "core/region.h"
 #include "core/statistics.h"
 #include "core/stopwatch.h"
@@ -32,7 +33,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kPhotographsHeldOut = 8;  // every eighth
+constexpr int kPhotographsHeldOut = 8;   // every eighth
+constexpr size_t kMostOfName = 200;      // bytes; file systems take 255
+constexpr double kRotationError = 1e-4;  // of R·Rᵀ − 1, and its determinant is 1
+
+bool IsRotation(const std::array<double, 9>& r) {
+  for (size_t i = 0; i < 3; ++i) {
+    for (size_t j = 0; j < 3; ++j) {
+      double sum = 0;
+      for (size_t k = 0; k < 3; ++k) sum += r[3 * i + k] * r[3 * j + k];
+      if (!(std::abs(sum - (i == j ? 1 : 0)) < kRotationError)) return false;
+    }
+  }
+  const double determinant =
+      r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) + r[2] * (r[3] * r[7] - r[4] * r[6]);
+  return determinant > 0;
+}
 
 nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
 
@@ -45,10 +61,9 @@ double Rounded(double value) { return std::round(value * 1e4) / 1e4; }
 
 Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
   ReadingTask task;
-  const auto bad = [](std::string_view what) {
-    return Error{ErrorCode::kBadFile, Cat("a task of the table of readings: ", what)};
-  };
-  if (!json.is_object()) return bad("not an object");
+  const auto bad = [](std::string_view what) { return Error{ErrorCode::kBadFile, std::string(what)}; };
+  if (!json.is_object()) return bad("not a JSON object");
+  task.words = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   try {
     for (const auto& [name, value] : json.items()) {
       const auto label = std::ranges::find(kReadingLabels, name);
@@ -58,6 +73,9 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
         task.id = value.get<std::string>();
       } else if (name == "downscale") {
         task.downscale = value.get<int>();
+        if (task.downscale < 1 || task.downscale > kMostDownscale) {
+          return bad(Cat("downscale is not from 1 to ", kMostDownscale));
+        }
       } else if (name == "others") {
         task.others_from = value.at("from").get<int64_t>();
         task.others_pixel = value.at("pixel").get<double>();
@@ -71,6 +89,7 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
         task.moved.rotation = value.at("rotation").get<std::array<double, 9>>();
         task.moved.translation = value.at("translation").get<std::array<double, 3>>();
         if (!(task.moved.scale > 0)) return bad("moved: the scale is not positive");
+        if (!IsRotation(task.moved.rotation)) return bad("moved: that is no rotation");
       } else {
         fs::path* const path = name == "splat"     ? &task.splat
                                : name == "object"  ? &task.object
@@ -80,11 +99,13 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
         *path = value.get<std::string>();
       }
     }
-  } catch (const nlohmann::json::exception& e) {
-    return bad(e.what());
+  } catch (const nlohmann::json::exception&) {
+    return bad("a property is missing or has a value of another type");
   }
   if (task.id.empty() || task.splat.empty()) return bad("it needs an id and a splat");
-  if (task.id.find('/') != std::string::npos) return bad(Printable(task.id) + ": an id is the name of a file");
+  if (task.id.size() > kMostOfName || task.id.front() == '.' || task.id.find('/') != std::string::npos) {
+    return bad(Cat(Printable(task.id), ": an id is the name of a file, of ", kMostOfName, " bytes at most"));
+  }
   return task;
 }
 
@@ -105,6 +126,17 @@ struct ReadingRows::Object {
 
 ReadingRows::ReadingRows(int views) : views_(views) {}
 ReadingRows::~ReadingRows() = default;
+
+std::string ReadingRows::StateOf(const ReadingTask& task) const {
+  std::string state = Cat(views_, " views ", task.words);
+  for (const fs::path& path : {task.splat, task.context}) {
+    std::error_code code;
+    const auto size = path.empty() ? 0 : fs::file_size(path, code);
+    const auto time = path.empty() ? fs::file_time_type() : fs::last_write_time(path, code);
+    state += Cat(" ", code ? 0 : size, " ", code ? 0 : time.time_since_epoch().count());
+  }
+  return state;
+}
 
 Result<const ReadingRows::Object*> ReadingRows::Open(const ReadingTask& task) {
   if (object_ && object_->folder == task.object && object_->downscale == task.downscale) return object_.get();
@@ -166,6 +198,7 @@ struct Measuring {
       for (int64_t i = 0; i < cloud.size(); ++i) {
         if (keep->Holds(cloud.means.data() + 3 * i)) rows.push_back(i);
       }
+      if (rows.empty()) return Error{ErrorCode::kBadFile, "no Gaussian lies in the region that is kept"};
       ANCHORSPLAT_ASSIGN_OR_RETURN(cloud, Subset(cloud, rows));
     }
     if (!context.empty()) ANCHORSPLAT_RETURN_IF_ERROR(Append(cloud, context));
@@ -265,7 +298,12 @@ Result<GaussianCloud> FilteredContext(const ReadingTask& task, const CameraSet& 
 
 Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(task.splat));
-  nlohmann::json row = {{"id", task.id}, {"gaussians", cloud.size()}, {"pixel", nullptr}, {"tag", nullptr}};
+  const Object* object = nullptr;
+  if (!task.object.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(object, Open(task));
+  }
+  nlohmann::json row = {
+      {"id", task.id}, {"state", StateOf(task)}, {"gaussians", cloud.size()}, {"pixel", nullptr}, {"tag", nullptr}};
   for (size_t k = 0; k < kReadingLabels.size(); ++k) row[kReadingLabels[k]] = task.labels[k];
   if (cloud.render_mode) row["tag"] = NameOf(*cloud.render_mode);
 
@@ -284,11 +322,10 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   }
 
   EnhanceOptions options;
-  if (task.object.empty()) {
+  if (object == nullptr) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(row["today"], Today(cloud, options, 0, nullptr));
     return row;
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Object* const object, Open(task));
   options.upscale = object->upscale;
   Measuring measuring;
   if (task.keep) measuring.keep = FromOrigin(*task.keep, cloud.origin);
@@ -307,7 +344,7 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(Buffer<float> pixels, TruePixels(cloud, low));
   if (task.others_from > 0) {
     if (task.others_from >= cloud.size()) {
-      return Error{ErrorCode::kBadFile, Cat(task.id, ": others begin behind the last of ", cloud.size(), " Gaussians")};
+      return Error{ErrorCode::kBadFile, Cat("others begin behind the last of ", cloud.size(), " Gaussians")};
     }
     std::fill(pixels.begin() + task.others_from, pixels.end(), static_cast<float>(task.others_pixel));
   }

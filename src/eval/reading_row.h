@@ -38,11 +38,12 @@ struct ReadingTask {
   // pixels, and what is drawn of the splat and its results alone. Both in the splat's own world.
   std::filesystem::path context;
   std::optional<Region> keep;
-  Similarity moved;  // the object's world → the splat's
+  Similarity moved;   // the object's world → the splat's
+  std::string words;  // all of that, as it was given
 };
 inline constexpr std::array<const char*, 6> kReadingLabels = {"original", "mesh", "maker", "kind", "edit", "made"};
 
-// kBadFile: no id, no splat, values of other types, names that are none of these.
+// kBadFile: no id that can be a file's name, no splat, values of other types or that mean nothing, unknown properties.
 Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json);
 
 // Makes rows. Keeps the object that was looked at last, with the pictures of `views` held-out views of it.
@@ -51,7 +52,12 @@ class ReadingRows {
   explicit ReadingRows(int views);
   ~ReadingRows();
 
-  // The row as the table keeps it. Errors: of reading, and of what the splat is asked.
+  // What a row depends on besides the program: the task, its files as they are now, the number of views. In a row as
+  // "state", so that one that was made of something else is made anew.
+  std::string StateOf(const ReadingTask& task) const;
+
+  // The row as the table keeps it. Errors: of reading, and of what the splat is asked; kBadFile: others that begin
+  // behind the last Gaussian, a region that keeps none.
   Result<nlohmann::json> Make(const ReadingTask& task);
 
  private:

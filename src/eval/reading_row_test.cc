@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/source_dir_for_test.h"
+#include "core/text.h"
 #include "enhance/reading_features.h"
 #include "formats/cloud_io.h"
 #include "io/folder_for_test.h"
@@ -66,6 +67,18 @@ TEST_F(ReadingRowMaking, HasGainsOfBothModesAndWhatIsDoneToday) {
   EXPECT_EQ(row["features"].size(), ReadFeatures(Sparse())->names.size());
   EXPECT_TRUE(row["today"]["gain"].is_number());
   EXPECT_TRUE(row["today"]["method"].is_string());
+}
+
+TEST_F(ReadingRowMaking, IsOfItsTaskAndItsFiles) {
+  const ReadingTask task = Task(Sparse());
+  const std::string state = ReadingRows(1).StateOf(task);
+  EXPECT_EQ(Make(task)["state"], state);
+  EXPECT_NE(ReadingRows(2).StateOf(task), state);
+  ReadingTask other = task;
+  other.words = "others";
+  EXPECT_NE(ReadingRows(1).StateOf(other), state);
+  ASSERT_TRUE(WriteCloud(task.splat, *Subset(Sparse(), std::vector<int64_t>{0, 1, 2}), {.overwrite = true}).ok());
+  EXPECT_NE(ReadingRows(1).StateOf(task), state);
 }
 
 TEST_F(ReadingRowMaking, OfATaggedSplatIsInItsMode) {
@@ -144,21 +157,31 @@ TEST_F(ReadingRowMaking, BadTasksAreRefused) {
     return task.ok() ? "" : task.error().message;
   };
   EXPECT_EQ(refused(R"({"id":"a","splat":"a.ply","kind":"k","keep":[0,0,0,1,1,1]})"), "");
-  EXPECT_THAT(refused(R"([])"), HasSubstr("not an object"));
+  EXPECT_THAT(refused(R"([])"), HasSubstr("not a JSON object"));
   EXPECT_THAT(refused(R"({"id":"a"})"), HasSubstr("a splat"));
   EXPECT_THAT(refused(R"({"id":"a","splat":"a.ply","pixel":3})"), HasSubstr("unknown property pixel"));
   EXPECT_THAT(refused(R"({"id":"a","splat":"a.ply","keep":[0]})"), HasSubstr("neither a box"));
-  EXPECT_THAT(refused(R"({"id":"a","splat":3})"), HasSubstr("string"));
+  EXPECT_THAT(refused(R"({"id":"a","splat":3})"), HasSubstr("another type"));
   EXPECT_THAT(
       refused(R"({"id":"a","splat":"a","moved":{"scale":0,"rotation":[1,0,0,0,1,0,0,0,1],"translation":[0,0,0]}})"),
       HasSubstr("scale"));
-  EXPECT_THAT(refused(R"({"id":"../a","splat":"a.ply"})"), HasSubstr("id"));
+  for (const char* id : {"../a", "..", ".a"}) {
+    EXPECT_THAT(refused(Cat(R"({"id":")", id, R"(","splat":"a.ply"})").c_str()),
+                HasSubstr("an id is the name of a file"));
+  }
+  EXPECT_THAT(refused(R"({"id":"a","splat":"a","downscale":0})"), HasSubstr("downscale"));
+  EXPECT_THAT(
+      refused(R"({"id":"a","splat":"a","moved":{"scale":1,"rotation":[0,0,0,0,0,0,0,0,0],"translation":[0,0,0]}})"),
+      HasSubstr("no rotation"));
   EXPECT_THAT(refused(R"({"id":"a","splat":"a","others":{"from":0,"pixel":1}})"), HasSubstr("others"));
   ReadingTask task = Task(Sparse());
   task.others_from = 1'000'000;
   task.others_pixel = 1;
   ReadingRows rows(1);
   EXPECT_THAT(rows.Make(task).error().message, HasSubstr("others begin behind"));
+  ReadingTask elsewhere = Task(Sparse());
+  elsewhere.keep = Region{{5, 5, 5}, {6, 6, 6}, {}};
+  EXPECT_THAT(rows.Make(elsewhere).error().message, HasSubstr("no Gaussian lies in the region"));
 }
 
 }  // namespace

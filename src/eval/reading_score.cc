@@ -19,37 +19,40 @@ constexpr const char* kMethods[] = {"filter", "network"};
 bool HasGains(const ReadingRow& row) { return row.pixel > 0 && !row.gains.empty(); }
 
 // What a splat is called that was made so: whatever gave it its width, it has it.
-std::string_view Word(std::string_view made) { return made == "mip" || made == "filtered" ? "widened" : made; }
+std::string_view Word(std::string_view made) {
+  return made == "mip" || made == "filtered" || made == "mesh" ? "widened" : made;
+}
 
 bool HasItsWidth(std::string_view made) {
   const std::string_view word = Word(made);
-  return word == "widened" || word == "enhanced" || word == "mesh" || word == "pixel-areas";
+  return word == "widened" || word == "enhanced";
 }
 
 double GainOf(const ReadingRow& row, const ReadingDecision& decision) {
   if (decision.gain) return *decision.gain;
-  return row.GainOf(decision.method, decision.mode.value_or(row.TrueMode()), decision.pixel / row.pixel);
+  return row.GainOf(decision.method, decision.mode.value_or(row.DrawnMode()), decision.pixel / row.pixel);
 }
 
 std::string GroupOf(const ReadingRow& row) { return row.edit.empty() ? row.kind : "edit: " + row.edit; }
 
 ReadingScore ScoreGroup(std::span<const ReadingRow> rows, const Decisions& decisions, const std::vector<size_t>& of) {
   ReadingScore score;
-  Buffer<float> gains, seconds;
+  Buffer<float> gains, seconds, widths;
   double sum = 0;
   score.worst = std::numeric_limits<double>::infinity();
   for (const size_t i : of) {
     const ReadingRow& row = rows[i];
     const ReadingDecision& decision = decisions[i];
     seconds.push_back(static_cast<float>(decision.seconds));
-    const std::string_view said = Word(decision.made);
-    if (!row.made.empty() && !decision.made.empty()) {
+    // What a file says of itself nobody has to recognise.
+    if (!row.made.empty() && !decision.made.empty() && !row.tag) {
+      const std::string_view said = Word(decision.made);
       ++score.named;
       if (said == Word(row.made)) ++score.recognised;
-    }
-    if (!row.made.empty() && !HasItsWidth(row.made)) {
-      ++score.could_be_accused;
-      if (HasItsWidth(said)) ++score.accused;
+      if (!HasItsWidth(row.made)) {
+        ++score.could_be_accused;
+        if (HasItsWidth(said)) ++score.accused;
+      }
     }
     if (!HasGains(row)) continue;
     const double gain = GainOf(row, decision);
@@ -64,6 +67,7 @@ ReadingScore ScoreGroup(std::span<const ReadingRow> rows, const Decisions& decis
     if (decision.high > 0) {
       ++score.intervals;
       if (decision.low <= row.pixel && row.pixel <= decision.high) ++score.held;
+      widths.push_back(static_cast<float>(decision.high / std::max(decision.low, 1e-9 * decision.high)));
     }
   }
   if (score.rows > 0) {
@@ -74,6 +78,7 @@ ReadingScore ScoreGroup(std::span<const ReadingRow> rows, const Decisions& decis
     score.worst = 0;
   }
   score.seconds = double{Quantile(seconds, 0.5)};
+  if (!widths.empty()) score.width = double{Quantile(widths, 0.5)};
   return score;
 }
 
@@ -119,6 +124,7 @@ Decisions FixedDecisions(std::span<const ReadingRow> rows, const std::string& me
   for (const ReadingRow& row : rows) {
     ReadingDecision& decision = decisions.emplace_back();
     decision.method = method;
+    decision.mode = row.TrueMode();
     decision.pixel = multiple * row.pixel;
   }
   return decisions;

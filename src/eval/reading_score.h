@@ -18,10 +18,11 @@ struct ReadingScore {
   std::string worst_id;
   double losing = 0;                  // share of the rows that lose more than kReadingLoss
   int64_t intervals = 0, held = 0;    // that are said, and that hold the true pixel
-  int64_t named = 0, recognised = 0;  // rows whose making is known and of which something is said; and rightly
-  int64_t accused = 0;  // rows that have width to get back and are said to have none: mip, widened, enhanced, mesh
-  int64_t could_be_accused = 0;  // rows that have
-  double seconds = 0;            // median
+  double width = 0;                   // median of their upper ends over their lower ones
+  int64_t named = 0, recognised = 0;  // rows without a tag of which something is said; and rightly
+  int64_t could_be_accused = 0;       // of these: that have lost width
+  int64_t accused = 0;                // and are said to have all of theirs: mip, widened, filtered, enhanced, mesh
+  double seconds = 0;                 // median
 };
 inline constexpr double kReadingLoss = 0.1;  // dB
 inline constexpr const char* kReadingAll = "all";

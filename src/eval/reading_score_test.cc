@@ -48,35 +48,58 @@ TEST(ReadingTable, GainsAreLinearInTheLogarithm) {
   EXPECT_NEAR(row.GainOf("filter", RenderMode::kClassic, std::sqrt(2.8)), 1.5, 1e-12);
   EXPECT_NEAR(row.GainOf("filter", RenderMode::kClassic, 0.125), 0.25, 1e-12);      // the square of a half
   EXPECT_NEAR(row.GainOf("filter", RenderMode::kClassic, 2 * 2 / 1.4), -6, 1e-12);  // goes on falling
+  EXPECT_EQ(row.GainOf("filter", RenderMode::kAntialiased, 1e12), 1);               // and never rising
+  EXPECT_GT(row.GainOf("filter", RenderMode::kClassic, 1e30), -100);                // nor without end
   EXPECT_EQ(row.GainOf("none", RenderMode::kClassic, 1), 0);
   EXPECT_EQ(row.GainOf("filter", RenderMode::kClassic, 0), 0);
+  EXPECT_EQ(row.DrawnMode(), RenderMode::kClassic);
   EXPECT_TRUE(std::isnan(row.GainOf("network", RenderMode::kAntialiased, 1)));
 }
 
 TEST(ReadingTable, ErrorsNameTheLine) {
   EXPECT_THAT(Read("{\"id\":1}\n").error().message, HasSubstr("line 2"));
   EXPECT_THAT(Read("nonsense").error().message, HasSubstr("line 2"));
-  EXPECT_THAT(Read("").error().message, HasSubstr("line 1"));
+  EXPECT_THAT(Read("").error().message, HasSubstr("no rows"));
   EXPECT_THAT(Read(R"({"id":"a","today":{"method":"none"},"gains":{"classic":{"filter":[1,2]}}})").error().message,
               HasSubstr("line 2"));
   const TestFolder folder;
   EXPECT_THAT(ReadReadingTable(Write(folder, "{\"table\":\"others\"}\n{}\n")).error().message, HasSubstr("line 1"));
   EXPECT_THAT(ReadReadingTable(Write(folder, "[]\n")).error().message, HasSubstr("line 1"));
+  EXPECT_THAT(Read(R"({"id":"a","today":{"method":"none"},"gains":"x"})").error().message, HasSubstr("line 2"));
   EXPECT_EQ(ReadReadingTable(folder / "none").error().code, ErrorCode::kNotFound);
 }
 
 TEST(ReadingTable, DecisionsAreReadAndRefused) {
   const TestFolder folder;
-  const auto decisions = ReadReadingDecisions(Write(
-      folder, R"({"id":"a","method":"filter","mode":"antialiased","pixel":0.02,"low":0.01,"high":0.03,"made":"mip"})"));
+  const std::vector<ReadingRow> rows = *Read(OneLine(kClassicRow));
+  const auto decisions = ReadReadingDecisions(
+      Write(
+          folder,
+          "\n"
+          R"({"id":"a","method":"filter","mode":"antialiased","pixel":0.02,"low":0.01,"high":0.03,"made":"widened"})"),
+      rows);
   ASSERT_TRUE(decisions.ok()) << decisions.error().message;
   EXPECT_EQ(decisions->at("a").mode, RenderMode::kAntialiased);
   EXPECT_EQ(decisions->at("a").pixel, 0.02);
   EXPECT_FALSE(decisions->at("a").gain);
-  EXPECT_THAT(ReadReadingDecisions(Write(folder, R"({"id":"a","method":"model"})")).error().message,
-              HasSubstr("line 1"));
-  EXPECT_THAT(ReadReadingDecisions(Write(folder, R"({"id":"a","method":"none","mode":"m"})")).error().message,
-              HasSubstr("mode 'm'"));
+  const auto refused = [&](const std::string& text) {
+    const auto wrong = ReadReadingDecisions(Write(folder, text), rows);
+    return wrong.ok() ? "" : wrong.error().message;
+  };
+  EXPECT_EQ(refused(R"({"id":"a","method":"none"})"), "");
+  EXPECT_THAT(refused(R"({"id":"a","method":"model"})"), HasSubstr("line 1: method 'model'"));
+  EXPECT_THAT(refused(R"({"id":"a","method":"none","mode":"m"})"), HasSubstr("mode 'm'"));
+  EXPECT_THAT(refused(R"({"id":"z","method":"none"})"), HasSubstr("no row is called z"));
+  EXPECT_THAT(refused(R"({"id":"a","method":"filter"})"), HasSubstr("needs a pixel"));
+  EXPECT_THAT(refused(R"({"id":"a","method":"filter","pixel":-1})"), HasSubstr("needs a pixel"));
+  EXPECT_THAT(refused(R"({"id":"a","method":"network","mode":"antialiased","pixel":1})"),
+              HasSubstr("was not measured"));
+  EXPECT_THAT(refused(R"({"id":"a","method":"none","low":2,"high":1})"), HasSubstr("no interval"));
+  EXPECT_THAT(refused(R"({"id":"a","method":"none","made":"banana"})"), HasSubstr("banana"));
+  EXPECT_THAT(refused(R"({"id":"a","method":"none","pixl":1})"), HasSubstr("unknown property pixl"));
+  EXPECT_THAT(refused(R"({"id":"a"})"), HasSubstr("line 1: a property is missing"));
+  const std::string twice = R"({"id":"a","method":"none"})";
+  EXPECT_THAT(refused(twice + "\n" + twice), HasSubstr("line 2: a is decided twice"));
 }
 
 ReadingRow Row(const std::string& id, const std::string& kind, const std::string& edit, const std::string& made,
@@ -125,6 +148,7 @@ TEST(ReadingScore, CountsByHand) {
   EXPECT_NEAR(all.losing, 1 / 3.0, 1e-12);
   EXPECT_EQ(all.intervals, 2);
   EXPECT_EQ(all.held, 1);
+  EXPECT_NEAR(all.width, 0.5 * (3 + 2.5 / 1.5), 1e-6);
   EXPECT_EQ(all.named, 3);
   EXPECT_EQ(all.recognised, 2);  // a mip splat is rightly called widened
   EXPECT_EQ(all.could_be_accused, 2);
@@ -165,6 +189,14 @@ TEST(ReadingScore, GivenDecisionsAreWhatTheCurvesSay) {
   decision.pixel = 0.7;
   const Decisions decisions = GivenDecisions(rows, {{"a", decision}});
   EXPECT_NEAR(ScoreReadings(rows, decisions)[0].mean, 3 / 3.0, 1e-12);  // the others are left alone
+}
+
+TEST(ReadingScore, WhatAFileSaysNobodyHasToRecognise) {
+  std::vector<ReadingRow> rows = SomeRows();
+  for (ReadingRow& row : rows) row.tag = RenderMode::kClassic;
+  EXPECT_EQ(ScoreReadings(rows, TodaysDecisions(rows))[0].named, 0);
+  // Nor is anybody accused by who says nothing.
+  EXPECT_EQ(ScoreReadings(SomeRows(), BestDecisions(SomeRows()))[0].could_be_accused, 0);
 }
 
 TEST(ReadingScore, CurvesAreMeasuredAgainstWhatWasDecided) {

@@ -5,6 +5,8 @@
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string_view>
 #include <utility>
 
 #include "core/text.h"
@@ -19,6 +21,8 @@ using nlohmann::json;
 namespace fs = std::filesystem;
 
 constexpr size_t kMostBytes = size_t{1} << 30;  // of a table: ours have 20 MB
+
+constexpr double kMostMultiple = 16;  // beyond, all is lost that can be
 
 Result<std::string> ReadText(const fs::path& path) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
@@ -35,7 +39,8 @@ Result<std::string> ReadText(const fs::path& path) {
   }
 }
 
-// Calls `take` (const json&, line) for every line; its exceptions of JSON become errors.
+// Calls `take` (const json&, line) for every line that is not empty; what it says is wrong becomes an error, and so do
+// its exceptions of JSON.
 template <typename Take>
 Status ForEachLine(const fs::path& path, Take&& take) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, ReadText(path));
@@ -43,13 +48,21 @@ Status ForEachLine(const fs::path& path, Take&& take) {
   for (size_t at = 0; at < text.size();) {
     const size_t end = std::min(text.find('\n', at), text.size());
     ++line;
-    try {
-      take(json::parse(text.begin() + static_cast<std::ptrdiff_t>(at), text.begin() + static_cast<std::ptrdiff_t>(end)),
-           line);
-    } catch (const json::exception& e) {
-      return Error{ErrorCode::kBadFile, Cat(path.string(), ": line ", line, ": ", e.what())};
-    }
+    const std::string_view words = std::string_view(text).substr(at, end - at);
     at = end + 1;
+    if (words.find_first_not_of(" \t\r") == std::string_view::npos) continue;
+    std::string wrong;
+    const json object = json::parse(words, nullptr, /*allow_exceptions=*/false);
+    if (!object.is_object()) {
+      wrong = "not a JSON object";
+    } else {
+      try {
+        wrong = take(object, line);
+      } catch (const json::exception&) {
+        wrong = "a property is missing or has a value of another type";
+      }
+    }
+    if (!wrong.empty()) return Error{ErrorCode::kBadFile, Cat(path.string(), ": line ", line, ": ", wrong)};
   }
   return {};
 }
@@ -65,7 +78,7 @@ std::string TextAt(const json& object, const char* name) {
 }
 
 // What `today` says in the words of a decision. The names of looks are those of how splats are made, but for "widened".
-ReadingDecision TodaysDecision(const json& today, const ReadingRow& row) {
+ReadingDecision TodaysDecision(const json& today) {
   ReadingDecision decision;
   if (today.contains("error")) {
     decision.gain = 0;
@@ -80,7 +93,6 @@ ReadingDecision TodaysDecision(const json& today, const ReadingRow& row) {
   decision.low = NumberAt(today, "low");
   decision.high = NumberAt(today, "high");
   decision.made = TextAt(today, "looks");
-  if (decision.made.empty() && row.tag) decision.made = NameOf(*row.tag);
   if (today.contains("gain")) decision.gain = NumberAt(today, "gain");
   decision.seconds = NumberAt(today, "seconds");
   decision.one_size = today.value("one_size", false);
@@ -98,10 +110,11 @@ ReadingRow RowFrom(const json& object) {
   row.tag = RenderModeNamed(TextAt(object, "tag"));
   row.pixel = NumberAt(object, "pixel");
   if (object.contains("gains")) {
-    for (const auto& [mode_name, methods] : object.at("gains").items()) {
+    // Other types throw.
+    for (const auto& [mode_name, methods] : object.at("gains").get_ref<const json::object_t&>()) {
       const std::optional<RenderMode> mode = RenderModeNamed(mode_name);
       if (!mode) continue;
-      for (const auto& [method, values] : methods.items()) {
+      for (const auto& [method, values] : methods.get_ref<const json::object_t&>()) {
         ReadingGains& gains = row.gains[{*mode, method}];
         for (size_t k = 0; k < gains.size(); ++k) {
           const json& value = values.at(k);
@@ -110,11 +123,13 @@ ReadingRow RowFrom(const json& object) {
       }
     }
   }
-  row.today = TodaysDecision(object.at("today"), row);
+  row.today = TodaysDecision(object.at("today"));
   return row;
 }
 
 }  // namespace
+
+RenderMode ReadingRow::DrawnMode() const { return tag.value_or(RenderMode::kClassic); }
 
 RenderMode ReadingRow::TrueMode() const {
   if (tag) return *tag;
@@ -122,57 +137,89 @@ RenderMode ReadingRow::TrueMode() const {
 }
 
 double ReadingRow::GainOf(const std::string& method, RenderMode mode, double multiple) const {
-  if (method == "none" || !(multiple > 0)) return 0;
+  if (method == "none") return 0;
   const auto found = gains.find({mode, method});
   if (found == gains.end()) return std::numeric_limits<double>::quiet_NaN();
   const ReadingGains& curve = found->second;
+  multiple = std::min(multiple, kMostMultiple);
   if (multiple < kReadingMultiples.front()) return curve.front() * std::pow(multiple / kReadingMultiples.front(), 2);
   const auto above = std::ranges::upper_bound(kReadingMultiples, multiple);
   const size_t k = std::clamp<size_t>(static_cast<size_t>(above - kReadingMultiples.begin()), 1, curve.size() - 1);
+  if (multiple > kReadingMultiples.back() && curve.back() >= curve[curve.size() - 2]) return curve.back();
   const double from = std::log(kReadingMultiples[k - 1]), to = std::log(kReadingMultiples[k]);
   return curve[k - 1] + (curve[k] - curve[k - 1]) * (std::log(multiple) - from) / (to - from);
 }
 
 Result<std::vector<ReadingRow>> ReadReadingTable(const fs::path& path) {
   std::vector<ReadingRow> rows;
-  bool is_table = true;
-  ANCHORSPLAT_RETURN_IF_ERROR(ForEachLine(path, [&](const json& object, int64_t line) {
-    if (line == 1) {
-      is_table = object.is_object() && object.value("table", "") == "readings" &&
-                 object.at("multiples").get<std::vector<double>>() ==
-                     std::vector<double>(kReadingMultiples.begin(), kReadingMultiples.end());
-    } else if (is_table) {
+  ANCHORSPLAT_RETURN_IF_ERROR(ForEachLine(path, [&](const json& object, int64_t line) -> std::string {
+    if (line > 1) {
       rows.push_back(RowFrom(object));
+      return "";
     }
+    const std::vector<double> multiples(kReadingMultiples.begin(), kReadingMultiples.end());
+    const bool known = object.at("table") == "readings" && object.at("multiples") == json(multiples);
+    return known ? "" : "not a table of readings of this version";
   }));
-  if (!is_table || rows.empty()) {
-    return Error{ErrorCode::kBadFile, Cat(path.string(), ": line 1: not a table of readings of this version")};
-  }
+  if (rows.empty()) return Error{ErrorCode::kBadFile, Cat(path.string(), ": no rows")};
   return rows;
 }
 
-Result<std::map<std::string, ReadingDecision>> ReadReadingDecisions(const fs::path& path) {
+namespace {
+
+// What makes a decision one that no row can judge; empty: nothing.
+std::string WrongWith(const ReadingDecision& decision, const ReadingRow& row) {
+  if (decision.method == "none") return "";
+  if (!(decision.pixel > 0) || !std::isfinite(decision.pixel)) return "a treatment needs a pixel, a length above 0";
+  const RenderMode mode = decision.mode.value_or(row.DrawnMode());
+  if (row.pixel > 0 && !row.gains.contains({mode, decision.method})) {
+    return Cat("'", decision.method, "' as ", NameOf(mode), " was not measured of this row",
+               row.tag ? Cat(", whose file says ", NameOf(*row.tag)) : "");
+  }
+  return "";
+}
+
+}  // namespace
+
+Result<std::map<std::string, ReadingDecision>> ReadReadingDecisions(const fs::path& path,
+                                                                    std::span<const ReadingRow> rows) {
+  std::map<std::string, const ReadingRow*> by_id;
+  std::set<std::string> words = {"", "widened", "unclear"};
+  for (const ReadingRow& row : rows) {
+    by_id[row.id] = &row;
+    words.insert(row.made);
+  }
+  const std::set<std::string> properties = {"id", "method", "mode", "pixel", "low", "high", "made", "seconds"};
   std::map<std::string, ReadingDecision> decisions;
-  std::string wrong;
-  ANCHORSPLAT_RETURN_IF_ERROR(ForEachLine(path, [&](const json& object, int64_t line) {
+  ANCHORSPLAT_RETURN_IF_ERROR(ForEachLine(path, [&](const json& object, int64_t) -> std::string {
+    for (const auto& [name, value] : object.items()) {
+      if (!properties.contains(name)) return Cat("unknown property ", Printable(name));
+    }
+    const auto id = object.at("id").get<std::string>();
+    const auto row = by_id.find(id);
+    if (row == by_id.end()) return Cat("no row is called ", Printable(id));
     ReadingDecision decision;
     decision.method = object.at("method").get<std::string>();
-    if (decision.method != "none" && decision.method != "filter" && decision.method != "network" && wrong.empty()) {
-      wrong = Cat("line ", line, ": method '", Printable(decision.method), "' is none of none, filter, network");
+    if (decision.method != "none" && decision.method != "filter" && decision.method != "network") {
+      return Cat("method '", Printable(decision.method), "' is none of none, filter, network");
     }
     const std::string mode = TextAt(object, "mode");
     decision.mode = RenderModeNamed(mode);
-    if (!mode.empty() && !decision.mode && wrong.empty()) {
-      wrong = Cat("line ", line, ": mode '", Printable(mode), "' is none of classic, antialiased, mip");
+    if (!mode.empty() && !decision.mode) {
+      return Cat("mode '", Printable(mode), "' is none of classic, antialiased, mip");
     }
     decision.pixel = NumberAt(object, "pixel");
     decision.low = NumberAt(object, "low");
     decision.high = NumberAt(object, "high");
+    if (!(decision.low >= 0 && decision.high >= decision.low)) return "low and high are no interval of lengths";
     decision.made = TextAt(object, "made");
+    if (!words.contains(decision.made)) return Cat("made: no row is called ", Printable(decision.made));
     decision.seconds = NumberAt(object, "seconds");
-    decisions[object.at("id").get<std::string>()] = std::move(decision);
+    if (!(decision.seconds >= 0)) return "seconds are negative";
+    if (std::string wrong = WrongWith(decision, *row->second); !wrong.empty()) return wrong;
+    if (!decisions.emplace(id, std::move(decision)).second) return Cat(Printable(id), " is decided twice");
+    return "";
   }));
-  if (!wrong.empty()) return Error{ErrorCode::kBadFile, Cat(path.string(), ": ", wrong)};
   return decisions;
 }
 

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,7 +20,7 @@ using ReadingGains = std::array<double, kReadingMultiples.size()>;
 // What a decider says of one splat and does with it.
 struct ReadingDecision {
   std::string method = "none";     // none, filter, network
-  std::optional<RenderMode> mode;  // in which it is taken to be; nothing: as ReadingRow::TrueMode
+  std::optional<RenderMode> mode;  // as which it is treated and drawn; nothing: as its file says, else classic
   double pixel = 0;                // that is treated, world units
   double low = 0, high = 0;        // of the interval that is said to hold the true pixel; 0: none is
   std::string made;                // what it is taken for; empty: nothing is said
@@ -36,10 +37,11 @@ struct ReadingRow {
   std::map<std::pair<RenderMode, std::string>, ReadingGains> gains;  // by mode and method, "filter" or "network"
   ReadingDecision today;                                             // the program's own
 
-  // As the file says, else as it was trained.
-  RenderMode TrueMode() const;
+  RenderMode DrawnMode() const;  // as its file says, else classic
+  RenderMode TrueMode() const;   // as its file says, else as it was trained
   // Of treating a `multiple` of the true pixel: linear in the logarithm between those that were measured, with the
-  // square of it below them, and going on as between the last two above. 0 where the method is "none".
+  // square of it below them, and never rising above them: nothing is known there, but that wider is worse in the end.
+  // 0 where the method is "none"; NaN where that was not measured of the row.
   double GainOf(const std::string& method, RenderMode mode, double multiple) const;
 };
 
@@ -47,7 +49,10 @@ struct ReadingRow {
 // Errors: kNotFound, kIo, kBadFile naming the line.
 Result<std::vector<ReadingRow>> ReadReadingTable(const std::filesystem::path& path);
 
-// Lines of JSON, one per row that is decided: id, method, mode, pixel, low, high, made, seconds. Errors: the same.
-Result<std::map<std::string, ReadingDecision>> ReadReadingDecisions(const std::filesystem::path& path);
+// Lines of JSON, one per row that is decided: id, method, mode, pixel, low, high, made, seconds. Errors: the same, and
+// kBadFile where a decision cannot be judged by the rows: an id that none has, a treatment that was not measured of it
+// or is without a pixel, what is neither a length nor an interval, a word for `made` that no row has.
+Result<std::map<std::string, ReadingDecision>> ReadReadingDecisions(const std::filesystem::path& path,
+                                                                    std::span<const ReadingRow> rows);
 
 }  // namespace anchorsplat

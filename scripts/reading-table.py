@@ -224,16 +224,19 @@ def make_splats(arguments):
     found = originals(arguments)
     tasks = []
     with Clock(work, "edits"):
+        failed = []
         for original in found:
-            tasks += splats_of(arguments, original, found)
+            tasks += splats_of(arguments, original, found, failed)
     for splat, name, maker in strangers(arguments):
         tasks.append({"id": name, "original": name, "mesh": name, "maker": maker, "kind": "stranger", "edit": "", "made": "",
                       "splat": str(splat)})
     (work / "tasks.jsonl").write_text("".join(json.dumps(task) + "\n" for task in tasks))
     print(f"{len(tasks)} tasks of {len(found)} splats")
+    if failed:
+        raise SystemExit(f"reading-table: {len(failed)} edits failed and have no task, such as {failed[0]}")
 
 
-def splats_of(arguments, original, found):
+def splats_of(arguments, original, found, failed):
     work = arguments.work
     labels = {key: original[key] for key in LABELS if key in original} | {"edit": ""}
     where = {"object": str(original["object"])} | {k: original[k] for k in ("downscale",) if k in original}
@@ -256,7 +259,7 @@ def splats_of(arguments, original, found):
         try:
             more = edited(arguments, original, splat, pixel, name, path, random, found)
         except RuntimeError as error:
-            print(f"{original['original']}, {name}: {error}", file=sys.stderr)
+            failed.append(f"{original['original']}, {name}: {error}")
             continue
         if more is not None:
             tasks.append(labels | where | {"id": f"{original['original']}--{slug}", "edit": name} | more)
@@ -402,6 +405,8 @@ def pack(arguments):
         row.pop("state", None)  # what it was made of has paths
         row["fold"] = fold_of(row)
         rows.append(row)
+    if not rows:
+        raise SystemExit(f"reading-table: no rows in {work}/rows")
     if missing and not arguments.partial:
         raise SystemExit(f"reading-table: {len(missing)} rows are missing, such as {missing[0]}: the stage `rows` makes them, "
                          "--partial packs those that are there")
@@ -428,7 +433,7 @@ def remember(arguments):
         elif name in known:
             setattr(arguments, name, pathlib.Path(known[name]))
         told = getattr(arguments, name)
-        if told and not told.is_dir():
+        if told and not told.is_dir() and arguments.stage in ("fits", "splats", "all"):
             raise SystemExit(f"reading-table: --{name}: {told} is no folder")
     path.write_text(json.dumps(known))
 
@@ -461,7 +466,7 @@ def main():
     parser.add_argument("--partial", action="store_true", help="pack: although rows are missing")
     parser.add_argument("-o", "--output", type=pathlib.Path, default=HERE / "data/reading.jsonl.gz")
     arguments = parser.parse_args()
-    arguments.work = arguments.work.resolve()
+    arguments.work, arguments.program = arguments.work.resolve(), arguments.program.resolve()
     if not arguments.work.is_dir():
         raise SystemExit(f"reading-table: {arguments.work} is no folder; {NEEDS['fits'][1]} makes it")
     if not arguments.program.exists():
@@ -481,5 +486,5 @@ if __name__ == "__main__":
         main()
     except KeyboardInterrupt:
         raise SystemExit("reading-table: stopped; the same command goes on from here")
-    except (RuntimeError, subprocess.CalledProcessError) as error:
-        raise SystemExit(f"reading-table: {error}")
+    except (RuntimeError, OSError, ValueError, KeyError, subprocess.CalledProcessError) as error:
+        raise SystemExit(f"reading-table: {type(error).__name__}: {error}")

@@ -26,6 +26,7 @@
 #include "formats/cloud_io.h"
 #include "io/atomic_file.h"
 #include "io/input_file.h"
+#include "io/input_record.h"
 #include "request/choice.h"
 
 namespace anchorsplat {
@@ -102,6 +103,7 @@ Result<std::vector<ReadingTask>> ReadTasks(const std::string& path) {
 // Whether a row is there that was made of the same task and the same files.
 bool IsRowOf(const fs::path& path, const std::string& state) {
   if (!IsFile(path)) return false;
+  RecordOwnFile(path);  // this command's own, to be replaced
   const auto file = InputFile::Open(path);
   if (!file.ok()) return false;
   const auto text = file->ReadAll(uint64_t{1} << 24);
@@ -125,7 +127,11 @@ Status MakeRows(const ReadingFlags& flags, Program& program) {
       const fs::path path = fs::path(flags.output) / (task.id + ".json");
       if (!program.flags.overwrite && IsRowOf(path, rows.StateOf(task))) {
         ++there;
-      } else if (auto row = rows.Make(task); row.ok()) {
+        progress.Advance(1, task.id);
+        continue;
+      }
+      fs::remove(path, code);  // of other files: no row of theirs may stay where none can be made
+      if (const auto row = rows.Make(task); row.ok()) {
         ANCHORSPLAT_RETURN_IF_ERROR(WriteWholeFile(path, row->dump() + "\n", true));
         ++made;
       } else {
@@ -254,14 +260,16 @@ Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
     std::cout << FormatTable(table) << "\n" << ConfusionTable(rows, deciders[d].second) << "\n";
   }
   std::cout << FormatTable(overall) << "\n";
-  std::cout << "mean, worst, 2 % quantile: gain over the splat as it is, dB; lose: rows that lose more than "
-            << kReadingLoss
-            << "\nheld: intervals that hold the true pixel; width: how many times as long their upper end is\n"
-               "known: of splats without a tag, those that are taken for what they are\n"
-               "accused: of those that have lost width, those that are said to have all of theirs; s: median\n"
-               "true: the mean gain where the true pixel is known; best: that of the best of all that was measured\n"
-            << "curves are off by " << Fixed(error.median, 2) << " dB in the median and " << Fixed(error.most, 2)
-            << " dB at the 95th percentile, of " << WithThousands(error.rows) << " decisions that were measured, too\n";
+  std::cout
+      << "mean, worst, 2 % quantile: gain over the splat as it is, dB; lose: rows that lose more than " << kReadingLoss
+      << "\nheld: intervals that hold the true pixel; width: their upper end divided by their lower end, mean of "
+         "logarithms\n"
+         "known: of splats without a tag, the share that is taken for what it is\n"
+         "accused: of splats without a tag that have lost width, the share that is taken for widened or enhanced\n"
+         "s: seconds before the method begins, median\n"
+         "true: the mean gain where the true pixel is known; best: that of the best of all that was measured\n"
+      << "curves are off by " << Fixed(error.median, 2) << " dB in the median and " << Fixed(error.most, 2)
+      << " dB at the 95th percentile, of " << WithThousands(error.rows) << " decisions that were measured, too\n";
   return {};
 }
 
@@ -290,10 +298,10 @@ void AddReadingBench(CLI::App& bench, Program& program) {
   verb.add_flag("--features", flags->features, "All numbers that tell how a splat was made and what it has lost");
   CLI::Option* const tasks = verb.add_option("--tasks", flags->tasks,
                                              "Make rows of the table: JSON lines, as scripts/reading-table.py writes");
-  tasks->needs(
-      verb.add_option("-o,--output", flags->output, "Folder of the rows, a file each; those that are there stay")
-          ->needs(tasks)
-          ->check(NotEmpty()));
+  tasks->needs(verb.add_option("-o,--output", flags->output,
+                               "Folder of the rows, a file each; one of the same task and files is not made again")
+                   ->needs(tasks)
+                   ->check(NotEmpty()));
   verb.add_option("--views", flags->views, "Held-out views that gains are measured in")
       ->needs(tasks)
       ->check(CLI::Range(1, 1000))

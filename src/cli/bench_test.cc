@@ -84,6 +84,15 @@ TEST(BenchVerb, ReadingMakesRowsAndGoesOn) {
   EXPECT_THAT(first.out, HasSubstr("1 rows made, 0 were there, 1 failed"));
   EXPECT_THAT(first.err, HasSubstr("b: none.ply"));
   EXPECT_THAT(RunWords(words).out, HasSubstr("0 rows made, 1 were there, 1 failed"));
+  // A row of another file is made anew, and none stays where that fails.
+  const std::string copy = folder / "copy.ply";
+  std::filesystem::copy_file(splat, copy);
+  ASSERT_TRUE(WriteWholeFile(tasks, R"({"id":"a","splat":")" + copy + "\"}\n", true).ok());
+  EXPECT_THAT(ExpectDone(words).out, HasSubstr("1 rows made, 0 were there"));
+  EXPECT_THAT(ExpectDone(words).out, HasSubstr("0 rows made, 1 were there"));
+  std::filesystem::remove(copy);
+  EXPECT_THAT(RunWords(words).out, HasSubstr("0 rows made, 0 were there, 1 failed"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "rows/a.json"));
   ExpectRefused({"bench", "reading", "--tasks", tasks}, ErrorCode::kBadArgument, {"--output"});
   ASSERT_TRUE(WriteWholeFile(tasks, "{}\n", true).ok());
   ExpectRefused(words, ErrorCode::kBadFile, {"line 1"});

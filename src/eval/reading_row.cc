@@ -50,6 +50,30 @@ bool IsRotation(const std::array<double, 9>& r) {
   return determinant > 0;
 }
 
+// Size and time of its last change; empty where it is none.
+std::string StateOfFile(const fs::path& path) {
+  std::error_code code, ignored;
+  const auto size = fs::file_size(path, code);
+  const auto time = fs::last_write_time(path, ignored);
+  return code ? "" : Cat(" ", size, " ", time.time_since_epoch().count());
+}
+
+// How many files are in it and below, their sizes together, and when the last of them changed.
+std::string StateOfFolder(const fs::path& folder) {
+  int64_t files = 0;
+  uintmax_t bytes = 0;
+  fs::file_time_type last = fs::file_time_type::min();
+  std::error_code code, ignored;
+  for (fs::recursive_directory_iterator it(folder, fs::directory_options::follow_directory_symlink, code), end;
+       !code && it != end; it.increment(code)) {
+    if (!it->is_regular_file(ignored)) continue;
+    ++files;
+    bytes += it->file_size(ignored);
+    last = std::max(last, it->last_write_time(ignored));
+  }
+  return Cat(" ", files, " files ", bytes, " ", last.time_since_epoch().count());
+}
+
 nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
 
 double QuantileOf(Buffer<float> values, double q) { return double{Quantile(values, q)}; }
@@ -72,11 +96,14 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
       } else if (name == "id") {
         task.id = value.get<std::string>();
       } else if (name == "downscale") {
+        if (!value.is_number_integer()) return bad("downscale is no whole number");
         task.downscale = value.get<int>();
         if (task.downscale < 1 || task.downscale > kMostDownscale) {
           return bad(Cat("downscale is not from 1 to ", kMostDownscale));
         }
       } else if (name == "others") {
+        if (value.size() != 2 || !value.at("from").is_number_integer())
+          return bad("others are a whole from and a pixel");
         task.others_from = value.at("from").get<int64_t>();
         task.others_pixel = value.at("pixel").get<double>();
         if (task.others_from < 1 || !(task.others_pixel > 0)) return bad("others: no rows or no pixel");
@@ -85,6 +112,9 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
         task.keep = RegionOf(corners);
         if (!task.keep) return bad("keep" + std::string(kNoRegion));
       } else if (name == "moved") {
+        if (value.size() != 3 || value.at("rotation").size() != 9 || value.at("translation").size() != 3) {
+          return bad("moved: a scale, a rotation of nine numbers and a translation of three");
+        }
         task.moved.scale = value.at("scale").get<double>();
         task.moved.rotation = value.at("rotation").get<std::array<double, 9>>();
         task.moved.translation = value.at("translation").get<std::array<double, 3>>();
@@ -103,7 +133,11 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
     return bad("a property is missing or has a value of another type");
   }
   if (task.id.empty() || task.splat.empty()) return bad("it needs an id and a splat");
-  if (task.id.size() > kMostOfName || task.id.front() == '.' || task.id.find('/') != std::string::npos) {
+  if (task.object.empty() && (task.keep || !task.context.empty() || task.others_from > 0)) {
+    return bad("keep, context and others are about gains, which need an object");
+  }
+  if (task.id.size() > kMostOfName || task.id.front() == '.' || task.id.find('/') != std::string::npos ||
+      Printable(task.id) != task.id) {
     return bad(Cat(Printable(task.id), ": an id is the name of a file, of ", kMostOfName, " bytes at most"));
   }
   return task;
@@ -129,13 +163,8 @@ ReadingRows::~ReadingRows() = default;
 
 std::string ReadingRows::StateOf(const ReadingTask& task) const {
   std::string state = Cat(views_, " views ", task.words);
-  for (const fs::path& path : {task.splat, task.context}) {
-    std::error_code code;
-    const auto size = path.empty() ? 0 : fs::file_size(path, code);
-    const auto time = path.empty() ? fs::file_time_type() : fs::last_write_time(path, code);
-    state += Cat(" ", code ? 0 : size, " ", code ? 0 : time.time_since_epoch().count());
-  }
-  return state;
+  for (const fs::path& path : {task.splat, task.context}) state += StateOfFile(path);
+  return task.object.empty() ? state : state + StateOfFolder(task.object);
 }
 
 Result<const ReadingRows::Object*> ReadingRows::Open(const ReadingTask& task) {

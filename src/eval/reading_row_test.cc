@@ -74,6 +74,9 @@ TEST_F(ReadingRowMaking, IsOfItsTaskAndItsFiles) {
   const std::string state = ReadingRows(1).StateOf(task);
   EXPECT_EQ(Make(task)["state"], state);
   EXPECT_NE(ReadingRows(2).StateOf(task), state);
+  ReadingTask elsewhere = task;
+  elsewhere.object = SourceDirForTest() / "examples/biplane";
+  EXPECT_NE(ReadingRows(1).StateOf(elsewhere), state);
   ReadingTask other = task;
   other.words = "others";
   EXPECT_NE(ReadingRows(1).StateOf(other), state);
@@ -156,7 +159,14 @@ TEST_F(ReadingRowMaking, BadTasksAreRefused) {
     const auto task = ReadingTaskFrom(nlohmann::json::parse(text));
     return task.ok() ? "" : task.error().message;
   };
-  EXPECT_EQ(refused(R"({"id":"a","splat":"a.ply","kind":"k","keep":[0,0,0,1,1,1]})"), "");
+  EXPECT_EQ(refused(R"({"id":"a","splat":"a.ply","object":"o","kind":"k","keep":[0,0,0,1,1,1]})"), "");
+  EXPECT_THAT(refused(R"({"id":"a","splat":"a.ply","keep":[0,0,0,1,1,1]})"), HasSubstr("need an object"));
+  EXPECT_THAT(refused(R"({"id":"a\nb","splat":"a.ply"})"), HasSubstr("an id is the name of a file"));
+  EXPECT_THAT(refused(R"({"id":"a","splat":"a.ply","downscale":1.5})"), HasSubstr("whole number"));
+  EXPECT_THAT(
+      refused(
+          R"({"id":"a","splat":"a.ply","moved":{"scale":1,"rotation":[1,0,0,0,1,0,0,0,1,0],"translation":[0,0,0]}})"),
+      HasSubstr("nine numbers"));
   EXPECT_THAT(refused(R"([])"), HasSubstr("not a JSON object"));
   EXPECT_THAT(refused(R"({"id":"a"})"), HasSubstr("a splat"));
   EXPECT_THAT(refused(R"({"id":"a","splat":"a.ply","pixel":3})"), HasSubstr("unknown property pixel"));

@@ -35,9 +35,17 @@ double GainOf(const ReadingRow& row, const ReadingDecision& decision) {
 
 std::string GroupOf(const ReadingRow& row) { return row.edit.empty() ? row.kind : "edit: " + row.edit; }
 
-ReadingScore ScoreGroup(std::span<const ReadingRow> rows, const Decisions& decisions, const std::vector<size_t>& of) {
+// What a decider says at all: who says it of some rows only is wrong about the others.
+struct Says {
+  bool made = false, intervals = false;
+};
+
+ReadingScore ScoreGroup(std::span<const ReadingRow> rows, const Decisions& decisions, const std::vector<size_t>& of,
+                        const Says& says) {
   ReadingScore score;
-  Buffer<float> gains, seconds, widths;
+  Buffer<float> gains, seconds;
+  double log_widths = 0;
+  int64_t widths = 0;
   double sum = 0;
   score.worst = std::numeric_limits<double>::infinity();
   for (const size_t i : of) {
@@ -45,7 +53,7 @@ ReadingScore ScoreGroup(std::span<const ReadingRow> rows, const Decisions& decis
     const ReadingDecision& decision = decisions[i];
     seconds.push_back(static_cast<float>(decision.seconds));
     // What a file says of itself nobody has to recognise.
-    if (!row.made.empty() && !decision.made.empty() && !row.tag) {
+    if (says.made && !row.made.empty() && !row.tag) {
       const std::string_view said = Word(decision.made);
       ++score.named;
       if (said == Word(row.made)) ++score.recognised;
@@ -64,10 +72,11 @@ ReadingScore ScoreGroup(std::span<const ReadingRow> rows, const Decisions& decis
       score.worst = gain;
       score.worst_id = row.id;
     }
+    if (says.intervals) ++score.intervals;
     if (decision.high > 0) {
-      ++score.intervals;
       if (decision.low <= row.pixel && row.pixel <= decision.high) ++score.held;
-      widths.push_back(static_cast<float>(decision.high / std::max(decision.low, 1e-9 * decision.high)));
+      log_widths += std::log(decision.high) - std::log(decision.low);
+      ++widths;
     }
   }
   if (score.rows > 0) {
@@ -78,7 +87,7 @@ ReadingScore ScoreGroup(std::span<const ReadingRow> rows, const Decisions& decis
     score.worst = 0;
   }
   score.seconds = double{Quantile(seconds, 0.5)};
-  if (!widths.empty()) score.width = double{Quantile(widths, 0.5)};
+  if (widths > 0) score.width = std::exp(log_widths / static_cast<double>(widths));
   return score;
 }
 
@@ -146,10 +155,15 @@ std::vector<ReadingScore> ScoreReadings(std::span<const ReadingRow> rows, const 
     all.push_back(i);
     groups[{!rows[i].edit.empty(), GroupOf(rows[i])}].push_back(i);
   }
-  std::vector<ReadingScore> scores = {ScoreGroup(rows, decisions, all)};
+  Says says;
+  for (const ReadingDecision& decision : decisions) {
+    says.made = says.made || !decision.made.empty();
+    says.intervals = says.intervals || decision.high > 0;
+  }
+  std::vector<ReadingScore> scores = {ScoreGroup(rows, decisions, all, says)};
   scores[0].group = kReadingAll;
   for (const auto& [key, of] : groups) {
-    scores.push_back(ScoreGroup(rows, decisions, of));
+    scores.push_back(ScoreGroup(rows, decisions, of, says));
     scores.back().group = key.second;
   }
   return scores;

@@ -16,10 +16,11 @@ struct ReadingScore {
   int64_t rows = 0;                     // with gains
   double mean = 0, worst = 0, low = 0;  // gain over the splat as it is, dB; `low`: the 2 % quantile
   std::string worst_id;
-  double losing = 0;                  // share of the rows that lose more than kReadingLoss
-  int64_t intervals = 0, held = 0;    // that are said, and that hold the true pixel
-  double width = 0;                   // median of their upper ends over their lower ones
-  int64_t named = 0, recognised = 0;  // rows without a tag of which something is said; and rightly
+  double losing = 0;  // share of the rows that lose more than kReadingLoss
+  // Of a decider that says intervals, or how splats were made, at all: rows of which it says nothing are wrong ones.
+  int64_t intervals = 0, held = 0;    // rows with a true pixel, and those whose interval holds it
+  double width = 0;                   // upper ends of the intervals over their lower ones, geometric mean
+  int64_t named = 0, recognised = 0;  // rows without a tag, and those that are taken for what they are
   int64_t could_be_accused = 0;       // of these: that have lost width
   int64_t accused = 0;                // and are said to have all of theirs: mip, widened, filtered, enhanced, mesh
   double seconds = 0;                 // median

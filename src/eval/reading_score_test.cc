@@ -95,6 +95,8 @@ TEST(ReadingTable, DecisionsAreReadAndRefused) {
   EXPECT_THAT(refused(R"({"id":"a","method":"network","mode":"antialiased","pixel":1})"),
               HasSubstr("was not measured"));
   EXPECT_THAT(refused(R"({"id":"a","method":"none","low":2,"high":1})"), HasSubstr("no interval"));
+  EXPECT_THAT(refused(R"({"id":"a","method":"none","low":0,"high":1})"), HasSubstr("no interval"));
+  EXPECT_THAT(refused(R"({"id":"a","method":"none","seconds":1e39})"), HasSubstr("seconds"));
   EXPECT_THAT(refused(R"({"id":"a","method":"none","made":"banana"})"), HasSubstr("banana"));
   EXPECT_THAT(refused(R"({"id":"a","method":"none","pixl":1})"), HasSubstr("unknown property pixl"));
   EXPECT_THAT(refused(R"({"id":"a"})"), HasSubstr("line 1: a property is missing"));
@@ -146,9 +148,9 @@ TEST(ReadingScore, CountsByHand) {
   EXPECT_EQ(all.worst, -0.5);
   EXPECT_EQ(all.worst_id, "b");
   EXPECT_NEAR(all.losing, 1 / 3.0, 1e-12);
-  EXPECT_EQ(all.intervals, 2);
+  EXPECT_EQ(all.intervals, 3);  // of one nothing is said
   EXPECT_EQ(all.held, 1);
-  EXPECT_NEAR(all.width, 0.5 * (3 + 2.5 / 1.5), 1e-6);
+  EXPECT_NEAR(all.width, std::sqrt(3 * 2.5 / 1.5), 1e-12);
   EXPECT_EQ(all.named, 3);
   EXPECT_EQ(all.recognised, 2);  // a mip splat is rightly called widened
   EXPECT_EQ(all.could_be_accused, 2);
@@ -160,6 +162,17 @@ TEST(ReadingScore, CountsByHand) {
   EXPECT_EQ(scores[2].rows, 0);
   EXPECT_EQ(scores[2].worst, 0);
   EXPECT_EQ(scores[3].group, "edit: cropped");
+}
+
+// Who says something of one row alone has not recognised the others.
+TEST(ReadingScore, SilenceIsNoKnowledge) {
+  const std::vector<ReadingRow> rows = SomeRows();
+  Decisions decisions(rows.size());
+  decisions[0].made = "classic";
+  const ReadingScore score = ScoreReadings(rows, decisions)[0];
+  EXPECT_EQ(score.named, 3);
+  EXPECT_EQ(score.recognised, 1);
+  EXPECT_EQ(score.intervals, 0);
 }
 
 TEST(ReadingScore, SaysWhatUntaggedSplatsAreTakenFor) {

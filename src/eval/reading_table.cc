@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr size_t kMostBytes = size_t{1} << 30;  // of a table: ours have 20 MB
 
+constexpr double kMostSeconds = 1e6;
 constexpr double kMostMultiple = 16;  // beyond, all is lost that can be
 
 Result<std::string> ReadText(const fs::path& path) {
@@ -117,8 +118,7 @@ ReadingRow RowFrom(const json& object) {
       for (const auto& [method, values] : methods.get_ref<const json::object_t&>()) {
         ReadingGains& gains = row.gains[{*mode, method}];
         for (size_t k = 0; k < gains.size(); ++k) {
-          const json& value = values.at(k);
-          gains[k] = value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
+          gains[k] = values.at(k).get<double>();  // of another type, and null: throws
         }
       }
     }
@@ -211,11 +211,12 @@ Result<std::map<std::string, ReadingDecision>> ReadReadingDecisions(const fs::pa
     decision.pixel = NumberAt(object, "pixel");
     decision.low = NumberAt(object, "low");
     decision.high = NumberAt(object, "high");
-    if (!(decision.low >= 0 && decision.high >= decision.low)) return "low and high are no interval of lengths";
+    const bool interval = decision.low > 0 && decision.high >= decision.low && std::isfinite(decision.high);
+    if (!interval && (decision.low != 0 || decision.high != 0)) return "low and high are no interval of lengths";
     decision.made = TextAt(object, "made");
     if (!words.contains(decision.made)) return Cat("made: no row is called ", Printable(decision.made));
     decision.seconds = NumberAt(object, "seconds");
-    if (!(decision.seconds >= 0)) return "seconds are negative";
+    if (!(decision.seconds >= 0 && decision.seconds < kMostSeconds)) return "seconds are no time that a reading takes";
     if (std::string wrong = WrongWith(decision, *row->second); !wrong.empty()) return wrong;
     if (!decisions.emplace(id, std::move(decision)).second) return Cat(Printable(id), " is decided twice");
     return "";

@@ -14,7 +14,7 @@
 
 namespace anchorsplat {
 
-// Gain in dB over the splat as it is, at kReadingMultiples of its true pixels; NaN: not measured.
+// Gain in dB over the splat as it is, at kReadingMultiples of its true pixels.
 using ReadingGains = std::array<double, kReadingMultiples.size()>;
 
 // What a decider says of one splat and does with it.

@@ -243,11 +243,11 @@ def splats_of(arguments, original, found, failed):
     tasks = [labels | where | {"id": original["original"], "splat": str(original["splat"])}]
     folder = work / "edits" / original["original"]
     splat, pixel = Splat(original["splat"]), low_pixel(original)
+    plain = folder / "untagged.ply"
+    if not plain.exists():
+        splat.with_rows(splat.rows).write(plain)
     if any("SplatRenderMode" in line for line in splat.comments):
-        path = folder / "untagged.ply"
-        if not path.exists():
-            splat.with_rows(splat.rows).write(path)
-        tasks.append(labels | where | {"id": original["original"] + "--untagged", "edit": "untagged", "splat": str(path)})
+        tasks.append(labels | where | {"id": original["original"] + "--untagged", "edit": "untagged", "splat": str(plain)})
     few = 4 if len(splat.rows) > 40000 else EDITS_PER_SPLAT  # large ones take long
     names = [name for name in (*EDITS, *COMMON) if applies(name, original)]
     order = sorted(range(len(names)), key=lambda k: digest(f"{original['original']} {names[k]} {k}"))
@@ -283,10 +283,7 @@ def edited(arguments, original, splat, pixel, name, path, random, found):
     program, note = arguments.program, path.with_suffix(".json")
     if note.exists():
         return json.loads(note.read_text())
-    path.parent.mkdir(parents=True, exist_ok=True)
-    plain = path.parent / "plain.ply"
-    if not plain.exists():
-        splat.with_rows(splat.rows).write(plain)
+    plain = path.parent / "untagged.ply"
     more = {}
     if name.startswith("through"):
         end = name.split()[1]

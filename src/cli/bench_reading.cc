@@ -1,16 +1,13 @@
 #include "cli/bench_reading.h"
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <span>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -45,8 +42,6 @@ struct ReadingFlags {
   std::string table, decisions;
 };
 
-nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
-
 Status PrintFeatures(const ReadingFlags& flags, Program& program) {
   const SharedFlags& shared = program.flags;
   nlohmann::json splats = nlohmann::json::array(), names;
@@ -63,8 +58,7 @@ Status PrintFeatures(const ReadingFlags& flags, Program& program) {
     }
     if (shared.json) {
       names = read->names;
-      nlohmann::json& json = splats.emplace_back(nlohmann::json{{"file", file}, {"unit", read->unit}});
-      for (const double value : read->values) json["features"].push_back(Number(value));
+      splats.push_back({{"file", file}, {"unit", read->unit}, {"features", read->values}});
       continue;
     }
     std::vector<std::vector<std::string>> table = {{file, Cat("unit ", read->unit)}};
@@ -76,28 +70,6 @@ Status PrintFeatures(const ReadingFlags& flags, Program& program) {
   // Names apart: values keep their order, as in the rows of the table.
   if (shared.json) PrintJson({{"bench", "reading"}, {"names", names}, {"splats", splats}});
   return {};
-}
-
-Result<std::vector<ReadingTask>> ReadTasks(const std::string& path) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, file.ReadAll(uint64_t{1} << 28));
-  std::vector<ReadingTask> tasks;
-  std::set<std::string> ids;
-  int64_t line = 0;
-  for (size_t at = 0; at < text.size();) {
-    const size_t end = std::min(text.find('\n', at), text.size());
-    const std::string_view words = std::string_view(text).substr(at, end - at);
-    at = end + 1;
-    ++line;
-    if (words.find_first_not_of(" \t\r") == std::string_view::npos) continue;
-    auto task = ReadingTaskFrom(nlohmann::json::parse(words, nullptr, /*allow_exceptions=*/false));
-    if (task.ok() && !ids.insert(task->id).second) {
-      task = Error{ErrorCode::kBadFile, Cat(Printable(task->id), " is there twice")};
-    }
-    if (!task.ok()) return Error{ErrorCode::kBadFile, Cat(path, ": line ", line, ": ", task.error().message)};
-    tasks.push_back(*std::move(task));
-  }
-  return tasks;
 }
 
 // Whether a row is there that was made of the same task and the same files.
@@ -114,7 +86,7 @@ bool IsRowOf(const fs::path& path, const std::string& state) {
 
 // Every row is a file of its own, so that this goes on where it was stopped, and several may work side by side.
 Status MakeRows(const ReadingFlags& flags, Program& program) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<ReadingTask> tasks, ReadTasks(flags.tasks));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<ReadingTask> tasks, ReadReadingTasks(flags.tasks));
   std::error_code code;
   fs::create_directories(flags.output, code);
   if (code) return Error{ErrorCode::kIo, Cat(flags.output, ": cannot make this folder: ", code.message())};

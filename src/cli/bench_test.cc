@@ -94,6 +94,9 @@ TEST(BenchVerb, ReadingMakesRowsAndGoesOn) {
   EXPECT_THAT(RunWords(words).out, HasSubstr("0 rows made, 0 were there, 1 failed"));
   EXPECT_FALSE(std::filesystem::exists(folder / "rows/a.json"));
   ExpectRefused({"bench", "reading", "--tasks", tasks}, ErrorCode::kBadArgument, {"--output"});
+  const std::string task = R"({"id":"a","splat":"a.ply"})";
+  ASSERT_TRUE(WriteWholeFile(tasks, task + "\n\n" + task, true).ok());
+  ExpectRefused(words, ErrorCode::kBadFile, {"line 3: a is there twice"});
   ASSERT_TRUE(WriteWholeFile(tasks, "{}\n", true).ok());
   ExpectRefused(words, ErrorCode::kBadFile, {"line 1"});
 }

@@ -4,12 +4,14 @@
 #include <cmath>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "cameras/photograph.h"
 #include "core/region.h"
+#include "core/rotation.h"
 #include "core/statistics.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
@@ -19,10 +21,12 @@
 #include "enhance/reading_features.h"
 #include "enhance/showing_gaussians.h"
 #include "eval/benchmark.h"
+#include "eval/json_lines.h"
 #include "eval/protocol.h"
 #include "fit/picture_cache.h"
 #include "fit/training_views.h"
 #include "formats/cloud_io.h"
+#include "io/file_version.h"
 #include "metrics/image_metrics.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
@@ -33,52 +37,41 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kPhotographsHeldOut = 8;   // every eighth
 constexpr size_t kMostOfName = 200;      // bytes; file systems take 255
-constexpr double kRotationError = 1e-4;  // of R·Rᵀ − 1, and its determinant is 1
+constexpr double kRotationError = 5e-5;  // of an element
 
 bool IsRotation(const std::array<double, 9>& r) {
-  for (size_t i = 0; i < 3; ++i) {
-    for (size_t j = 0; j < 3; ++j) {
-      double sum = 0;
-      for (size_t k = 0; k < 3; ++k) sum += r[3 * i + k] * r[3 * j + k];
-      if (!(std::abs(sum - (i == j ? 1 : 0)) < kRotationError)) return false;
-    }
-  }
-  const double determinant =
-      r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) + r[2] * (r[3] * r[7] - r[4] * r[6]);
-  return determinant > 0;
+  const std::array<double, 4> q = QuaternionFromRotation(r);
+  const std::array<double, 9> nearest = RotationFromQuaternion(q[0], q[1], q[2], q[3]);
+  return std::ranges::equal(r, nearest, [](double a, double b) { return std::abs(a - b) < kRotationError; });
 }
 
 // Size and time of its last change; empty where it is none.
 std::string StateOfFile(const fs::path& path) {
-  std::error_code code, ignored;
-  const auto size = fs::file_size(path, code);
-  const auto time = fs::last_write_time(path, ignored);
-  return code ? "" : Cat(" ", size, " ", time.time_since_epoch().count());
+  const std::optional<FileVersion> version = VersionOf(path);
+  return version ? Cat(" ", version->size, " ", version->changed_s, " ", version->changed_ns) : "";
 }
 
 // How many files are in it and below, their sizes together, and when the last of them changed.
 std::string StateOfFolder(const fs::path& folder) {
   int64_t files = 0;
-  uintmax_t bytes = 0;
-  fs::file_time_type last = fs::file_time_type::min();
-  std::error_code code, ignored;
+  uint64_t bytes = 0;
+  std::pair<int64_t, int64_t> last;
+  std::error_code code;
   for (fs::recursive_directory_iterator it(folder, fs::directory_options::follow_directory_symlink, code), end;
        !code && it != end; it.increment(code)) {
-    if (!it->is_regular_file(ignored)) continue;
+    const std::optional<FileVersion> version = VersionOf(it->path());
+    if (!version) continue;
     ++files;
-    bytes += it->file_size(ignored);
-    last = std::max(last, it->last_write_time(ignored));
+    bytes += version->size;
+    last = std::max(last, {version->changed_s, version->changed_ns});
   }
-  return Cat(" ", files, " files ", bytes, " ", last.time_since_epoch().count());
+  return Cat(" ", files, " files ", bytes, " ", last.first, " ", last.second);
 }
-
-nlohmann::json Number(double value) { return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr); }
 
 double QuantileOf(Buffer<float> values, double q) { return double{Quantile(values, q)}; }
 
-// Enough of a gain in dB, and of a logarithm.
+// Enough of a gain in dB, and of a logarithm. JSON has null for what is not finite.
 double Rounded(double value) { return std::round(value * 1e4) / 1e4; }
 
 }  // namespace
@@ -143,6 +136,19 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
   return task;
 }
 
+Result<std::vector<ReadingTask>> ReadReadingTasks(const fs::path& path) {
+  std::vector<ReadingTask> tasks;
+  std::set<std::string> ids;
+  ANCHORSPLAT_RETURN_IF_ERROR(ForEachJsonLine(path, [&](const nlohmann::json& json, int64_t) -> std::string {
+    Result<ReadingTask> task = ReadingTaskFrom(json);
+    if (!task.ok()) return task.error().message;
+    if (!ids.insert(task->id).second) return Cat(task->id, " is there twice");
+    tasks.push_back(*std::move(task));
+    return "";
+  }));
+  return tasks;
+}
+
 // Views that nobody was trained on, with their pictures.
 struct ReadingRows::Object {
   fs::path folder;
@@ -174,7 +180,7 @@ Result<const ReadingRows::Object*> ReadingRows::Open(const ReadingTask& task) {
   object->downscale = task.downscale;
   const auto most = static_cast<size_t>(views_);
   if (task.downscale > 1) {
-    const ProjectOptions low = {.hold_out = kPhotographsHeldOut, .downscale = task.downscale, .origin = WorldOrigin{}};
+    const ProjectOptions low = {.hold_out = kHeldOutEvery, .downscale = task.downscale, .origin = WorldOrigin{}};
     ProjectOptions high = low;
     high.downscale = 1;
     ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews fitted, OpenProject(task.object, low));
@@ -280,12 +286,12 @@ Result<nlohmann::json> Today(const GaussianCloud& cloud, const EnhanceOptions& o
                        report.filter_strength == DefaultFilterStrength(options.upscale, done->cloud.render_mode)},
       {"looks", nullptr},
       {"mode", nullptr},
-      {"pixel", Number(report.pixel_size)}};
+      {"pixel", report.pixel_size}};
   if (report.looks) json["looks"] = NameOf(*report.looks);
   if (done->cloud.render_mode) json["mode"] = NameOf(*done->cloud.render_mode);
   if (report.finding) {
-    json["low"] = Number(report.finding->estimate.low);
-    json["high"] = Number(report.finding->estimate.high);
+    json["low"] = report.finding->estimate.low;
+    json["high"] = report.finding->estimate.high;
     json["contradictions"] = report.finding->contradictions.size();
   }
   if (measuring != nullptr) {
@@ -343,7 +349,7 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   if (features.ok()) {
     row["unit"] = features->unit;
     nlohmann::json& values = row["features"] = nlohmann::json::array();
-    for (const double value : features->values) values.push_back(Number(Rounded(value)));
+    for (const double value : features->values) values.push_back(Rounded(value));
     const auto share = std::ranges::find(features->names, "count.share_showing");
     showing = features->values[static_cast<size_t>(share - features->names.begin())];
   } else {

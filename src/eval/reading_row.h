@@ -6,6 +6,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/region.h"
 #include "core/result.h"
@@ -45,6 +46,8 @@ inline constexpr std::array<const char*, 6> kReadingLabels = {"original", "mesh"
 
 // kBadFile: no id that can be a file's name, no splat, values of other types or that mean nothing, unknown properties.
 Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json);
+// A line of JSON per task, each with an id of its own. Errors: kNotFound, kIo, kBadFile naming the line.
+Result<std::vector<ReadingTask>> ReadReadingTasks(const std::filesystem::path& path);
 
 // Makes rows. Keeps the object that was looked at last, with the pictures of `views` held-out views of it.
 class ReadingRows {

@@ -3,20 +3,20 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <set>
 #include <utility>
 
 #include "core/buffer.h"
 #include "core/statistics.h"
-#include "core/text.h"
 
 namespace anchorsplat {
 
 namespace {
 
-constexpr const char* kMethods[] = {"filter", "network"};
-
 bool HasGains(const ReadingRow& row) { return row.pixel > 0 && !row.gains.empty(); }
+
+bool WasMeasured(const ReadingRow& row, const std::string& method) {
+  return HasGains(row) && row.gains.contains({row.TrueMode(), method});
+}
 
 // What a splat is called that was made so: whatever gave it its width, it has it.
 std::string_view Word(std::string_view made) {
@@ -123,7 +123,7 @@ Decisions FixedDecisions(std::span<const ReadingRow> rows, const std::string& me
   for (const double tried : kReadingMultiples) {
     double sum = 0;
     for (const ReadingRow& row : rows) {
-      if (HasGains(row)) sum += row.GainOf(method, row.TrueMode(), tried);
+      if (WasMeasured(row, method)) sum += row.GainOf(method, row.TrueMode(), tried);
     }
     if (sum <= most) continue;
     most = sum;
@@ -132,6 +132,7 @@ Decisions FixedDecisions(std::span<const ReadingRow> rows, const std::string& me
   Decisions decisions;
   for (const ReadingRow& row : rows) {
     ReadingDecision& decision = decisions.emplace_back();
+    if (!WasMeasured(row, method)) continue;
     decision.method = method;
     decision.mode = row.TrueMode();
     decision.pixel = multiple * row.pixel;

@@ -195,6 +195,16 @@ TEST(ReadingScore, BoundsAreAboveWhatIsDecided) {
   EXPECT_GT(best, fixed);
 }
 
+// As of a program without a network.
+TEST(ReadingScore, WhatWasNotMeasuredIsLeftAlone) {
+  std::vector<ReadingRow> rows = SomeRows();
+  for (ReadingRow& row : rows) row.gains.erase({RenderMode::kClassic, "network"});
+  double multiple = 0;
+  const ReadingScore score = ScoreReadings(rows, FixedDecisions(rows, "network", multiple))[0];
+  EXPECT_EQ(score.rows, 3);
+  EXPECT_EQ(score.mean, 0);
+}
+
 TEST(ReadingScore, GivenDecisionsAreWhatTheCurvesSay) {
   const std::vector<ReadingRow> rows = SomeRows();
   ReadingDecision decision;

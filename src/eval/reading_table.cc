@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string_view>
 #include <utility>
 
 #include "core/text.h"
-#include "io/inflating_reader.h"
-#include "io/input_file.h"
+#include "eval/json_lines.h"
 
 namespace anchorsplat {
 
@@ -20,53 +18,8 @@ namespace {
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-constexpr size_t kMostBytes = size_t{1} << 30;  // of a table: ours have 20 MB
-
 constexpr double kMostSeconds = 1e6;
 constexpr double kMostMultiple = 16;  // beyond, all is lost that can be
-
-Result<std::string> ReadText(const fs::path& path) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const InputFile file, InputFile::Open(path));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string head, file.Head(2));
-  const std::unique_ptr<InflatingReader> reader = head == "\x1f\x8b" ? OpenGzip(file, 0) : OpenPlain(file, 0);
-  std::string text;
-  for (std::string block(size_t{1} << 20, '\0');;) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t count, reader->ReadSome(block.data(), block.size()));
-    if (count == 0) return text;
-    if (text.size() + count > kMostBytes) {
-      return Error{ErrorCode::kBadFile, Cat(path.string(), ": larger than ", HumanBytes(kMostBytes))};
-    }
-    text.append(block, 0, count);
-  }
-}
-
-// Calls `take` (const json&, line) for every line that is not empty; what it says is wrong becomes an error, and so do
-// its exceptions of JSON.
-template <typename Take>
-Status ForEachLine(const fs::path& path, Take&& take) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string text, ReadText(path));
-  int64_t line = 0;
-  for (size_t at = 0; at < text.size();) {
-    const size_t end = std::min(text.find('\n', at), text.size());
-    ++line;
-    const std::string_view words = std::string_view(text).substr(at, end - at);
-    at = end + 1;
-    if (words.find_first_not_of(" \t\r") == std::string_view::npos) continue;
-    std::string wrong;
-    const json object = json::parse(words, nullptr, /*allow_exceptions=*/false);
-    if (!object.is_object()) {
-      wrong = "not a JSON object";
-    } else {
-      try {
-        wrong = take(object, line);
-      } catch (const json::exception&) {
-        wrong = "a property is missing or has a value of another type";
-      }
-    }
-    if (!wrong.empty()) return Error{ErrorCode::kBadFile, Cat(path.string(), ": line ", line, ": ", wrong)};
-  }
-  return {};
-}
 
 double NumberAt(const json& object, const char* name) {
   const auto found = object.find(name);
@@ -152,7 +105,7 @@ double ReadingRow::GainOf(const std::string& method, RenderMode mode, double mul
 
 Result<std::vector<ReadingRow>> ReadReadingTable(const fs::path& path) {
   std::vector<ReadingRow> rows;
-  ANCHORSPLAT_RETURN_IF_ERROR(ForEachLine(path, [&](const json& object, int64_t line) -> std::string {
+  ANCHORSPLAT_RETURN_IF_ERROR(ForEachJsonLine(path, [&](const json& object, int64_t line) -> std::string {
     if (line > 1) {
       rows.push_back(RowFrom(object));
       return "";
@@ -191,7 +144,7 @@ Result<std::map<std::string, ReadingDecision>> ReadReadingDecisions(const fs::pa
   }
   const std::set<std::string> properties = {"id", "method", "mode", "pixel", "low", "high", "made", "seconds"};
   std::map<std::string, ReadingDecision> decisions;
-  ANCHORSPLAT_RETURN_IF_ERROR(ForEachLine(path, [&](const json& object, int64_t) -> std::string {
+  ANCHORSPLAT_RETURN_IF_ERROR(ForEachJsonLine(path, [&](const json& object, int64_t) -> std::string {
     for (const auto& [name, value] : object.items()) {
       if (!properties.contains(name)) return Cat("unknown property ", Printable(name));
     }

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The curves of docs/results/pixel-size.md: PSNR of the examples over the filter's strength, and over an error of the pixel size.
+# The curves of docs/results/filter.md: PSNR of the examples over the filter's strength, and over an error of the pixel size.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 program=build/anchorsplat
@@ -11,7 +11,7 @@ true_pixel=0.0055013 # 1.7 / 309.02 px: the examples' distance and focal length 
 mean() {
   local example=examples/$1
   shift
-  "$program" enhance "$example/input.ply" -o "$work/out.ply" -w -q "$@"
+  "$program" enhance "$example/input.ply" -o "$work/out.ply" -w -q --method filter "$@"
   "$program" compare "$work/out.ply" "$example/hr" --cameras "$example/transforms_hr.json" |
     awk '$1 == "mean" {printf "%s / %s", $2, $3}'
 }

@@ -5,7 +5,7 @@
 
 Each splat is enhanced with the default method and nothing else given, and both are rendered from one place of an orbit
 (`render --orbit 4`). The number is the sum of squared differences between neighbouring pixels, after over before. A splat
-whose pixels were estimated too large comes back blurred and far below 1. Pictures stay in FOLDER. Needs numpy and
+whose pixels were taken too large comes back blurred and far below 1. Pictures stay in FOLDER. Needs numpy and
 ImageMagick.
 """
 import argparse
@@ -46,14 +46,14 @@ def main():
             folder = keep / splat.name
             folder.mkdir(parents=True, exist_ok=True)
             after = folder / "after.ply"
-            report = json.loads(run(args.program, "enhance", splat, "-o", after, "-w", "--json"))[0]["pixel_size"]
+            report = json.loads(run(args.program, "enhance", splat, "-o", after, "-w", "--json"))[0]
             energies = []
             for which, file in (("before", splat), ("after", after)):
                 run(args.program, "render", file, "-o", folder / which, "-w", "-q", "--orbit", 4, "--size",
                     f"{args.size}x{args.size}", "--view", args.view)
                 energies.append(energy(next((folder / which).rglob("*.png"))))
-            print(f"{splat.name:30} {energies[1] / energies[0]:.3f}  estimate {report['estimate']:.4g}, used "
-                  f"{report['value']:.4g}", flush=True)
+            print(f"{splat.name:30} {energies[1] / energies[0]:.3f}  read {report['reading']['pixel']:.4g}, used "
+                  f"{report['pixel_size']['value']:.4g}", flush=True)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Splats like those of photographs, with ground truth: what an estimate of the training pixel has to survive.
+"""Splats like those of photographs, with ground truth: what a reading of the training pixel has to survive.
 
     scripts/photograph-like.py WORK --objects objects [--program build/anchorsplat] [--low-size 256] [--steps 15000]
 
@@ -8,7 +8,7 @@ come near the background, veiling glare, exposure that changes from picture to p
 has, masks that cut pieces off, poses off by a fraction of a pixel. The fits begin with random points, as those of photographs without points do,
 and keep black Gaussians and floaters around the object. Every eighth view, large and without any of this but the
 darkness, is the truth. Each line says how the splat compares with it as it is, after `enhance` with nothing else given,
-and with the cameras; and what `info` made of the training pixel.
+and with the cameras; and what `info` reads.
 
 Everything is kept in WORK; the same command goes on from where it was stopped. Needs numpy and ImageMagick.
 """
@@ -126,7 +126,7 @@ def measure(args, mesh, views, seed):
     if not splat.exists():
         run(args.program, "fit", cameras, "-o", splat, "-q", "--resume", "--checkpoint-every", "1000", "--hold-out", "0",
             "--init", "view", "--init-points", args.init_points, "--max-gaussians", args.max_gaussians, "--steps", args.steps)
-    found = json.loads(run(args.program, "info", splat, "--json"))["pixel_size"]
+    found = json.loads(run(args.program, "info", splat, "--json"))["reading"]
     truth = json.loads(run(args.program, "enhance", splat, "-o", folder / "cameras.ply", "-w", "--json", "--cameras",
                            cameras))[0]["pixel_size"]["value"]
     used = json.loads(run(args.program, "enhance", splat, "-o", folder / "auto.ply", "-w", "--json"))[0]["pixel_size"]["value"]
@@ -135,9 +135,9 @@ def measure(args, mesh, views, seed):
         report = json.loads(run(args.program, "compare", folder / f"{which}.ply", folder / "hr", "--cameras",
                                 folder / "transforms_hr.json", "--json"))
         results.append(report["mean"]["psnr"])
-    print(f"{name:16} as it is {results[0]:.2f}, enhanced {results[1]:.2f}, with cameras {results[2]:.2f} dB; estimate "
-          f"{found['estimate'] / truth:.2f} and used {used / truth:.2f} of the true pixel"
-          f"{'; but ' if found['contradictions'] else ''}{'; '.join(found['contradictions'])}", flush=True)
+    print(f"{name:16} as it is {results[0]:.2f}, enhanced {results[1]:.2f}, with cameras {results[2]:.2f} dB; read as "
+          f"{found['looks']}, pixel {found['pixel'] / truth:.2f} ({found['low'] / truth:.2f} to {found['high'] / truth:.2f}) and "
+          f"used {used / truth:.2f} of the true one", flush=True)
 
 
 def main():

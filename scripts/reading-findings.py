@@ -18,19 +18,19 @@ def best(row):
 
 
 def gain(row):
-    return row["today"].get("gain", 0)
+    return row["list"].get("gain", 0)
 
 
 def contradicted(row):
     """Recognised or tagged, and treated, but at another pixel than outlines say."""
-    today = row["today"]
+    today = row["list"]
     return (row["made"] in ("classic", "antialiased") and today.get("looks") in (row["made"], None) and
             today.get("contradictions", 0) > 0 and today["method"] != "none" and today["strength"] > 0 and "low" in today)
 
 
 def held(rows):
-    told = [row for row in rows if row["today"].get("low")]
-    return np.mean([row["today"]["low"] <= row["pixel"] <= row["today"]["high"] for row in told])
+    told = [row for row in rows if row["list"].get("low")]
+    return np.mean([row["list"]["low"] <= row["pixel"] <= row["list"]["high"] for row in told])
 
 
 def say(name, rows, left=None):
@@ -47,7 +47,7 @@ def main():
     found = [row for row in rows if contradicted(row)]
     say("contradicted", found, left)
     # An interval is the estimate over and times a factor.
-    said = np.array([np.sqrt(row["today"]["low"] * row["today"]["high"]) / row["pixel"] for row in found])
+    said = np.array([np.sqrt(row["list"]["low"] * row["list"]["high"]) / row["pixel"] for row in found])
     print(f"  outlines a quarter too large at most: {100 * np.mean(said <= 1.25):.0f} %, more than twice: {100 * np.mean(said > 2):.0f} %")
     say("  land", [row for row in found if "land" in row["kind"]])
     say("  thinned to a fifth", [row for row in found if row["edit"] == "thinned: fifth"])
@@ -55,7 +55,7 @@ def main():
     around = [row for row in rows if row["kind"] in ("photographed", "room", "backdrop")]
     print(f"photographed, room, backdrop: {100 * held(around):.0f} % of the intervals hold the true pixel")
 
-    few = [row for row in rows if "features" in row and not row["tag"] and row["today"].get("looks") is None]
+    few = [row for row in rows if "features" in row and not row["tag"] and row["list"].get("looks") is None]
     print("nothing asked, as too few show:", ", ".join(f"{row['id']} {gain(row):.1f}" for row in few))
     for row in sorted(rows, key=gain)[:5]:
         print(f"  worst: {row['id']} {gain(row):.2f}")
@@ -65,7 +65,7 @@ def main():
         say(edit, some)
         print(f"  worst {min(map(gain, some)):.1f}, {100 * np.mean([gain(row) < -0.1 for row in some]):.0f} % lose")
     for made in ("filtered", "mip"):
-        alone = [row for row in rows if row["made"] == made and row["today"].get("strength") == 0 and "antialiased" in row["gains"]]
+        alone = [row for row in rows if row["made"] == made and row["list"].get("strength") == 0 and "antialiased" in row["gains"]]
         gains = [row["gains"]["antialiased"]["network"][1] for row in alone]  # at 0.35 of the pixel
         print(f"left alone, {made}: {len(alone)}, a network at 0.35 of the pixel drawn as antialiased gives {np.mean(gains):.2f} dB")
 

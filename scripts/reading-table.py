@@ -6,7 +6,9 @@
     scripts/reading-table.py rows   --work WORK [--jobs N]              features and gains, the most of the work
     scripts/reading-table.py pack   --work WORK -o data/reading.jsonl.gz
 
-Each goes on where it was stopped; `all` is the four of them. WORK/objects has the meshes (scripts/fetch-objects.sh);
+    scripts/reading-table.py measure --work WORK --folds FOLDER         what models decide and really gain: WORK/model.jsonl
+
+Each goes on where it was stopped; `all` is the first four of them. WORK/objects has the meshes (scripts/fetch-objects.sh);
 `fits` also makes land (scripts/make-land.py) and a room (scripts/make-scenes.sh). --photos: a folder of projects of posed
 photographs, --strangers: a folder with a folder of splats for every maker; later stages remember both. What they are called
 enters no row: they are photographs-1, maker-1 and so on, and stay so (WORK/names.json). Needs NumPy.
@@ -29,9 +31,13 @@ from reading_edits import COMMON, EDITS, Splat, added, without_harmonics
 HERE = pathlib.Path(__file__).resolve().parent.parent
 FOLDS = 8
 EDITS_PER_SPLAT = 8  # besides the splat as it is and without its tag
+UNMEASURED = ("pixels", "pixels-256", "pixels-standard")  # fits of which no gains are measured
+EDITS_OF_STRANGERS = ("crop: half", "crop: ball", "thinned: half", "pruned: faint", "floaters")
+EDITS_UNMEASURED = 4  # of those of which no gains are measured
 DOWNSCALE = 4  # of photographs
 LANDS = {"hills-1": ("hills", 1), "relief-2": ("relief", 2), "town-3": ("town", 3), "town-4": ("town", 4)}
 SPLATS = (".ply", ".spz", ".splat", ".sog", ".ksplat", ".glb", ".gltf", ".npz", ".csv")  # of strangers
+LOW_CAMERAS = [f"transforms_{size}.json" for size in (64, 96, 128, 192, 256, 400, "lr")]  # of the pictures that were fitted
 LABELS = ("original", "mesh", "maker", "kind", "edit", "made")
 
 
@@ -115,19 +121,22 @@ def photographs(arguments):
 
 
 def strangers(arguments):
-    """(splat, its name, its maker's)."""
+    """(splat, its name, its maker's, how it was made: what made.txt of the maker's folder says, or nothing)."""
     if not arguments.strangers:
         return
     names = Names(arguments.work)
     for maker, k in names.of(folders(arguments.strangers), "makers").items():
+        made = (maker / "made.txt").read_text().strip() if (maker / "made.txt").exists() else ""
         splats = [p for p in maker.iterdir() if p.is_file() and p.name.endswith(SPLATS)]
         for splat, n in names.of(splats, f"maker-{k}").items():
-            yield splat, f"maker-{k}-{n}", f"maker-{k}"
+            yield splat, f"maker-{k}-{n}", f"maker-{k}", made
 
 
 def originals(arguments):
     work = arguments.work
     found = list(read_objects(work / "fits", made_by)) + list(read_objects(work / "land", made_by))
+    for name in UNMEASURED:
+        found += [o | {"measure": False} for o in read_objects(work / name, made_by)]
     found += list(mesh_splats(work, found))
     room = work / "scenes/room"
     if (room / "splat.ply").exists():
@@ -180,7 +189,7 @@ def colmap_points(path):
 
 def low_pixel(original):
     """Of the middle of a mesh's views; of what is no object, a size that is about right."""
-    for name in ("transforms_64.json", "transforms_128.json", "transforms_256.json", "transforms_lr.json"):
+    for name in LOW_CAMERAS:
         path = original["object"] / name
         if path.exists():
             cameras = json.loads(path.read_text())
@@ -202,6 +211,9 @@ def make_fits(arguments):
     with Clock(work, "fits"):
         run(program, "dataset", "build", "--list", HERE / "data/reading-fits.txt", "--objects", objects, "-o",
             work / "fits", "--recipe", HERE / "data/reading-fits.toml", "--jobs", 1)
+        for name in UNMEASURED:
+            run(program, "dataset", "build", "--list", HERE / f"data/reading-{name}.txt", "--objects", objects, "-o",
+                work / name, "--recipe", HERE / f"data/reading-{name}.toml", "--jobs", 2)
         meshes = [work / "land-meshes" / f"{name}.obj" for name in LANDS]
         for mesh, (kind, seed) in zip(meshes, LANDS.values()):
             mesh.parent.mkdir(exist_ok=True)
@@ -227,19 +239,43 @@ def make_splats(arguments):
         failed = []
         for original in found:
             tasks += splats_of(arguments, original, found, failed)
-    for splat, name, maker in strangers(arguments):
-        tasks.append({"id": name, "original": name, "mesh": name, "maker": maker, "kind": "stranger", "edit": "", "made": "",
-                      "splat": str(splat)})
+        for splat, name, maker, made in strangers(arguments):
+            tasks += splats_of_stranger(arguments, splat, name, maker, made)
     (work / "tasks.jsonl").write_text("".join(json.dumps(task) + "\n" for task in tasks))
     print(f"{len(tasks)} tasks of {len(found)} splats")
     if failed:
         raise SystemExit(f"reading-table: {len(failed)} edits failed and have no task, such as {failed[0]}")
 
 
+def splats_of_stranger(arguments, splat, name, maker, made):
+    """As it is, and edited where it is known how it was made: of these, only that is known."""
+    labels = {"original": name, "mesh": name, "maker": maker, "kind": "stranger", "made": made}
+    tasks = [labels | {"id": name, "edit": "", "splat": str(splat)}]
+    folder = arguments.work / "edits" / name
+    if not made:
+        return tasks
+    plain = folder / "untagged.ply"
+    if not plain.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        quietly(arguments.program, "convert", splat, folder / "plain.ply", "-w", "-q")
+        whole = Splat(folder / "plain.ply")
+        whole.with_rows(whole.rows).write(plain)
+    whole = Splat(plain)
+    axes = np.sort(np.exp(whole.get("scale_0", "scale_1", "scale_2")), axis=1)
+    for edit in EDITS_OF_STRANGERS:
+        slug = edit.replace(":", "").replace(" ", "-")
+        path = folder / f"{slug}.ply"
+        if not path.exists():
+            random = np.random.default_rng(digest(f"{name} {edit}") % 2**32)
+            EDITS[edit](whole, random, float(np.median(axes[:, 1])))[0].write(path)
+        tasks.append(labels | {"id": f"{name}--{slug}", "edit": edit, "splat": str(path)})
+    return tasks
+
+
 def splats_of(arguments, original, found, failed):
     work = arguments.work
     labels = {key: original[key] for key in LABELS if key in original} | {"edit": ""}
-    where = {"object": str(original["object"])} | {k: original[k] for k in ("downscale",) if k in original}
+    where = {"object": str(original["object"])} | {k: original[k] for k in ("downscale", "measure") if k in original}
     tasks = [labels | where | {"id": original["original"], "splat": str(original["splat"])}]
     folder = work / "edits" / original["original"]
     splat, pixel = Splat(original["splat"]), low_pixel(original)
@@ -248,7 +284,7 @@ def splats_of(arguments, original, found, failed):
         splat.with_rows(splat.rows).write(plain)
     if any("SplatRenderMode" in line for line in splat.comments):
         tasks.append(labels | where | {"id": original["original"] + "--untagged", "edit": "untagged", "splat": str(plain)})
-    few = 4 if len(splat.rows) > 40000 else EDITS_PER_SPLAT  # large ones take long
+    few = 4 if len(splat.rows) > 40000 else EDITS_PER_SPLAT if original.get("measure", True) else EDITS_UNMEASURED
     names = [name for name in (*EDITS, *COMMON) if applies(name, original)]
     order = sorted(range(len(names)), key=lambda k: digest(f"{original['original']} {names[k]} {k}"))
     chosen = list(dict.fromkeys(names[k] for k in order))[:few]
@@ -311,7 +347,8 @@ def edited(arguments, original, splat, pixel, name, path, random, found):
         more["made"] = "filtered" if name == "filtered before" else "enhanced"
     elif name == "merged":
         others = [o for o in found if fold_of(o) == fold_of(original) and o["mesh"] != original["mesh"] and
-                  o["kind"] not in ("room", "photographed", "example") and "downscale" not in o and o["made"] == original["made"]]
+                  o["kind"] not in ("room", "photographed", "example") and "downscale" not in o and o["made"] == original["made"] and
+                  o.get("measure") == original.get("measure")]
         others = [o for o in others if Splat(o["splat"]).names == splat.names]
         if not others:
             return None
@@ -343,7 +380,7 @@ def edited(arguments, original, splat, pixel, name, path, random, found):
 def cameras_of(original):
     if "downscale" in original:
         return ["--cameras", original["object"], "--train-width", width_of_photographs(original["object"]) // DOWNSCALE]
-    for name in ("transforms_64.json", "transforms_128.json", "transforms_256.json", "transforms_400.json", "transforms_lr.json"):
+    for name in LOW_CAMERAS:
         if (original["object"] / name).exists():
             return ["--cameras", original["object"] / name]
     raise RuntimeError(f"{original['object']}: no cameras")
@@ -358,40 +395,55 @@ def width_of_photographs(project):
     return int(np.frombuffer(data, "<u8", 1, 16)[0])
 
 
+def run_tasks(arguments, tasks, folder):
+    """Rows of tasks, by several processes; their exit codes."""
+    folder.mkdir(exist_ok=True)
+    jobs = []
+    for job in range(arguments.jobs):
+        path = folder.with_suffix(f".{job}.jsonl")
+        # Whole originals, so that each process renders the truth of an object once.
+        path.write_text("".join(json.dumps(t) + "\n" for t in tasks if digest(t["original"]) % arguments.jobs == job))
+        with open(folder.with_suffix(f".{job}.log"), "w", encoding="utf-8") as log:
+            jobs.append(subprocess.Popen([str(arguments.program), "bench", "reading", "--tasks", str(path), "-o", str(folder),
+                                          "--threads", "1"], stdout=log, stderr=log))
+    try:
+        return [job.wait() for job in jobs]
+    finally:
+        for job in jobs:  # where this was stopped, they are, too
+            job.terminate()
+            job.wait()
+
+
 def make_rows(arguments):
     work = arguments.work
-    (work / "rows").mkdir(exist_ok=True)
     tasks = [json.loads(t) for t in (work / "tasks.jsonl").read_text().splitlines()]
     if arguments.only:  # of those that have no row, and nothing is looked at again
         tasks = [t for t in tasks if not row_of(work, t).exists()][: arguments.only]
     with Clock(work, "rows"):
-        jobs = []
-        for job in range(arguments.jobs):
-            path = work / f"tasks-{job}.jsonl"
-            # Whole originals, so that each process renders the truth of an object once.
-            path.write_text("".join(json.dumps(t) + "\n" for t in tasks if digest(t["original"]) % arguments.jobs == job))
-            with open(work / f"rows-{job}.log", "w", encoding="utf-8") as log:
-                jobs.append(subprocess.Popen([str(arguments.program), "bench", "reading", "--tasks", str(path), "-o",
-                                              str(work / "rows"), "--threads", "1"], stdout=log, stderr=log))
-        try:
-            codes = [job.wait() for job in jobs]
-        finally:
-            for job in jobs:  # where this was stopped, they are, too
-                job.terminate()
-                job.wait()
+        codes = run_tasks(arguments, tasks, work / "rows")
     print(f"{sum(row_of(work, t).exists() for t in tasks)} of {len(tasks)} rows are there")
     if any(codes):
-        raise SystemExit(f"reading-table: some rows failed: see {work}/rows-*.log")
+        raise SystemExit(f"reading-table: some rows failed: see {work}/rows.*.log")
 
 
 def row_of(work, task):
     return work / "rows" / (task["id"] + ".json")
 
 
+def lists_decisions(path):
+    """What the list of rules did that was there before there was a model, and what that gained. It cannot be asked any more."""
+    if not path.exists():
+        return {}
+    with gzip.open(path, "rt", encoding="utf-8") as lines:
+        next(lines)
+        return {row["id"]: row["list"] for row in map(json.loads, lines) if "list" in row}
+
+
 def pack(arguments):
     work = arguments.work
     names = json.loads(quietly(arguments.program, "bench", "reading", HERE / "examples/biplane/input.ply", "--features",
                                "--json"))["names"]
+    list_said = lists_decisions(arguments.output)
     rows, missing = [], []
     for task in map(json.loads, (work / "tasks.jsonl").read_text().splitlines()):
         path = row_of(work, task)
@@ -401,6 +453,8 @@ def pack(arguments):
         row = json.loads(path.read_text())
         row.pop("state", None)  # what it was made of has paths
         row["fold"] = fold_of(row)
+        if row["id"] in list_said:
+            row["list"] = list_said[row["id"]]
         rows.append(row)
     if not rows:
         raise SystemExit(f"reading-table: no rows in {work}/rows")
@@ -417,6 +471,27 @@ def pack(arguments):
     kinds = {row["kind"] for row in rows}
     print(f"{len(rows)} rows, {len(kinds)} kinds, {len({row['mesh'] for row in rows})} meshes, "
           f"{arguments.output.stat().st_size / 1e6:.1f} MB")
+
+
+def measure(arguments):
+    """What the decisions of the models of --folds really gain, as `bench reading --decisions` takes them."""
+    work = arguments.work
+    said = json.loads(quietly(arguments.program, "bench", "reading", "--score", arguments.output, "--folds", arguments.folds,
+                              "--json"))
+    decisions = next(d for d in said["deciders"] if d["name"] == "model")["decisions"]
+    tasks = {t["id"]: t for t in map(json.loads, (work / "tasks.jsonl").read_text().splitlines())}
+    wanted = [d for d in decisions if d["method"] != "none" and tasks.get(d["id"], {}).get("object") and
+              tasks[d["id"]].get("measure", True)]
+    run_tasks(arguments, [tasks[d["id"]] | {"treat": {k: d[k] for k in ("method", "mode", "pixel")}} for d in wanted],
+              work / "measured")
+    for decision in decisions:
+        row = work / "measured" / (decision["id"] + ".json")
+        decision["gain"] = json.loads(row.read_text())["gain"] if decision in wanted and row.exists() else 0
+        if decision["method"] != "none" and decision not in wanted:
+            del decision["gain"]
+    path = work / "model.jsonl"
+    path.write_text("".join(json.dumps(d) + "\n" for d in decisions))
+    print(f"{path}: {len(wanted)} decisions measured")
 
 
 def remember(arguments):
@@ -445,13 +520,13 @@ def positive(text):
     return int(text)
 
 
-NEEDS = {"fits": ("objects", "scripts/fetch-objects.sh WORK/objects"), "splats": ("fits", "the stage `fits`"),
+NEEDS = {"measure": ("tasks.jsonl", "the stage `splats`"), "fits": ("objects", "scripts/fetch-objects.sh WORK/objects"), "splats": ("fits", "the stage `fits`"),
          "rows": ("tasks.jsonl", "the stage `splats`"), "pack": ("rows", "the stage `rows`")}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    stages = {"fits": [make_fits], "splats": [make_splats], "rows": [make_rows], "pack": [pack]}
+    stages = {"fits": [make_fits], "splats": [make_splats], "rows": [make_rows], "pack": [pack], "measure": [measure]}
     stages["all"] = [make_fits, make_splats, make_rows, pack]
     parser.add_argument("stage", choices=stages)
     parser.add_argument("--work", type=pathlib.Path, required=True)
@@ -461,6 +536,7 @@ def main():
     parser.add_argument("--jobs", type=positive, default=2)
     parser.add_argument("--only", type=positive, help="rows: no more than so many new ones, to see how long they take")
     parser.add_argument("--partial", action="store_true", help="pack: although rows are missing")
+    parser.add_argument("--folds", type=pathlib.Path, help="measure: what scripts/train-reading.py --folds has written")
     parser.add_argument("-o", "--output", type=pathlib.Path, default=HERE / "data/reading.jsonl.gz")
     arguments = parser.parse_args()
     arguments.work, arguments.program = arguments.work.resolve(), arguments.program.resolve()
@@ -470,7 +546,7 @@ def main():
         raise SystemExit(f"reading-table: {arguments.program} is not there: `make` builds it, --program names another")
     signal.signal(signal.SIGTERM, stop)
     remember(arguments)
-    names = list(NEEDS) if arguments.stage == "all" else [arguments.stage]
+    names = ["fits", "splats", "rows", "pack"] if arguments.stage == "all" else [arguments.stage]
     for name, stage in zip(names, stages[arguments.stage]):
         what, maker = NEEDS[name]
         if not (arguments.work / what).exists():

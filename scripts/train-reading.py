@@ -1,280 +1,221 @@
 #!/usr/bin/env python3
-"""Learns from the table of readings what to do with a splat, and decides every row by what the others taught.
+"""Learns to read splats from the table of readings: what is in models/reading.safetensors, and how good that is.
 
-    scripts/train-reading.py data/reading.jsonl.gz -o decisions.jsonl [--caution 0.75]
-    anchorsplat bench reading --score data/reading.jsonl.gz --decisions decisions.jsonl
+    scripts/train-reading.py data/reading.jsonl.gz -o models/reading.safetensors [--folds FOLDER]
 
-Two ensembles of perceptrons look at a splat at pixels of a size that is tried. The first says how far that is from the true
-pixel, by outlines and sizes alone, which the tables of earlier fits have, too (data/pixel-size-*.json.gz). The second looks at
-everything, and says of filter and network, drawn either way, what they would gain there and how sure that is, and how the
-splat was made. What is done is the best of gain − caution × deviation, or nothing. Rows of a fold are decided by ensembles
-that have seen no mesh and no maker of it. Needs NumPy and PyTorch; six minutes of a core.
+An ensemble of perceptrons looks at what can be seen of a splat and says its training pixel, how it was made, and what the filter
+and a network would gain at multiples of that pixel, each with how sure that is. Rows without gains teach the pixel, rows
+without a pixel (strangers') nothing. --folds: also writes FOLDER/fold-0.safetensors to fold-7, each of which has seen no mesh
+and no maker of that fold, and prints how good these are; `anchorsplat bench reading --score TABLE --folds FOLDER` decides
+every row by the one that has not seen it. The meshes of HELD_OUT are not in the model that is
+written: a test asks it about them. Needs NumPy and PyTorch; some minutes of a core.
 """
 
 import argparse
 import gzip
-import hashlib
 import json
+import multiprocessing
 import pathlib
+import struct
 
 import numpy as np
 import torch
 
-DATA = pathlib.Path(__file__).resolve().parent.parent / "data"
 FOLDS = 8
-STEP = 0.5 * np.log(2)  # between the sizes of the features, ln
-STEPS = range(-7, 8)
-TRIED = np.arange(-6, 6.01, 0.5) * STEP  # ln(size / unit)
-FARTHEST = 2.2  # ln: sizes that are tried in training, from the true one
-TREATMENTS = [("classic", "filter"), ("classic", "network"), ("antialiased", "filter"), ("antialiased", "network")]
-MADE = ["classic", "antialiased", "mip", "filtered", "enhanced", "raised", "mesh"]
-SQUASH = 2.0  # dB: gains beyond count by their logarithm
-MOST_LOST = -25.0  # dB, beyond what was measured
+MADE = ["classic", "antialiased", "mip", "filtered", "enhanced", "raised", "mesh", "generated"]
+TREATMENTS = [(mode, method) for mode in ("classic", "antialiased", "mip") for method in ("filter", "network")]
+MULTIPLES = 7
+MOST_DEVIATIONS = 4  # that count, of a feature; kMostDeviations in src/reading/reading_model.cc
+HIDDEN, MEMBERS, EPOCHS, BATCH = 96, 4, 90, 96
+# Of which the model that is written has seen nothing, so that a test can ask it about them.
+HELD_OUT = ["Scopia-spiceTower", "BlendSwap-CC-BY-wardrobe2", "Scopia-futon", "Scopia-bathroom_vanity",
+            "BlendSwap-CC-0-emergencySign", "Scopia-mannequinMale"]
+INTERVAL = 0.8  # of the pixels that intervals hold
+FARTHEST = 0.98  # of splats not learned from that are no stranger than this
 
 
 class Table:
     def __init__(self, path):
-        lines = [json.loads(line) for line in gzip.open(path, "rt", encoding="utf-8")]
-        self.names, self.multiples = lines[0]["features"], np.array(lines[0]["multiples"])
-        self.rows = [row for row in lines[1:] if "features" in row]
-        self.values = np.array([[np.nan if v is None else v for v in row["features"]] for row in self.rows])
+        with gzip.open(path, "rt", encoding="utf-8") as lines:
+            head = json.loads(next(lines))
+            self.names = head["features"]
+            self.rows = [row for row in map(json.loads, lines) if "features" in row]
+        self.x = np.array([[np.nan if v is None else v for v in row["features"]] for row in self.rows], dtype=np.float64)
         self.fold = np.array([row["fold"] for row in self.rows])
-        place = {name: i for i, name in enumerate(self.names)}
-        sized = sorted({(name.split("[")[0], name.split("].")[1]) for name in self.names if "[" in name})
-        self.sized = np.array([[place[f"{a}[{k}].{b}"] for a, b in sized] for k in STEPS])
-        self.outlines = [np.array([[place[f"{look}[{k}].{j}"] for j in range(24)] for k in STEPS])
-                         for look in ("alpha", "thin")]
-        self.sizes = [place[f"size.{k}"] for k in range(12)]
-        self.opacities = [place[f"size.{k}"] for k in range(12, 16)]
-        lengths = ("spacing", "footprint", "of_many", "dense", "closest", "harmless")
-        self.lengths = self.sizes + [i for name, i in place.items()
-                                     if name[:5] in ("axis0", "axis1", "axis2") or name[8:] in lengths]
-        self.rest = [i for name, i in place.items() if "[" not in name and i not in self.lengths]
-
-    def at(self, row, columns, log_sizes):
-        """Between the two nearest steps."""
-        steps = np.clip(log_sizes / STEP, STEPS[0], STEPS[-1])
-        low = np.clip(np.floor(steps).astype(int), STEPS[0], STEPS[-1] - 1)
-        part = (steps - low)[:, None]
-        values = self.values[row]
-        return values[columns[low - STEPS[0]]] * (1 - part) + values[columns[low - STEPS[0] + 1]] * part
-
-    def of_pixel(self, row, t):
-        """As the features of earlier tables: a profile, what it changes by over an octave, and how that changes."""
-        parts = []
-        for columns in self.outlines:
-            middle, up, down = self.at(row, columns, t), self.at(row, columns, t + STEP), self.at(row, columns, t - STEP)
-            parts += [middle, up - down, up + down - 2 * middle]
-        opacities = np.broadcast_to(self.values[row][self.opacities], (len(t), 4))
-        return np.concatenate([*parts, self.values[row][self.sizes] - t[:, None], opacities], 1)
-
-    def of_gain(self, row, t, pixel):
-        """`pixel`: ln(pixel / unit), its deviation, and how far the ensemble is apart."""
-        log_pixel, deviation, apart = pixel
-        off = t - log_pixel
-        seen = np.stack([off, off / deviation, np.full(len(t), deviation), np.full(len(t), apart), np.minimum(off, 0),
-                         np.maximum(off, 0)], 1)
-        change = self.at(row, self.sized, t + STEP) - self.at(row, self.sized, t - STEP)
-        rest = np.broadcast_to(self.values[row][self.rest], (len(t), len(self.rest)))
-        return np.concatenate([self.at(row, self.sized, t), change, self.values[row][self.lengths] - t[:, None], rest, seen], 1)
-
-    def log_pixel(self, row):
-        return np.log(self.rows[row]["pixel"] / self.rows[row]["unit"])
-
-    def gains(self, row, t):
-        """[sizes, treatments], NaN where one was not measured."""
-        out = np.full((len(t), len(TREATMENTS)), np.nan)
-        multiple, measured = np.exp(t - self.log_pixel(row)), np.log(self.multiples)
-        for k, (mode, method) in enumerate(TREATMENTS):
-            gains = self.rows[row]["gains"].get(mode) or (mode == "classic" and self.rows[row]["gains"].get("mip"))
-            if not gains:
-                continue
-            curve = np.array(gains[method])
-            out[:, k] = np.interp(np.log(multiple), measured, curve)
-            below, beyond = multiple < self.multiples[0], multiple > self.multiples[-1]
-            out[below, k] = curve[0] * (multiple[below] / self.multiples[0]) ** 2
-            slope = min((curve[-1] - curve[-2]) / (measured[-1] - measured[-2]), -1)
-            out[beyond, k] = np.maximum(curve[-1] + slope * (np.log(multiple[beyond]) - measured[-1]), MOST_LOST)
-        return out
+        known = [row.get("pixel") and row["made"] != "mesh" for row in self.rows]
+        self.pixel = np.array([np.log(row["pixel"] / row["unit"]) if k else np.nan for row, k in zip(self.rows, known)])
+        self.made = np.array([MADE.index(row["made"]) if row["made"] in MADE else -1 for row in self.rows])
+        self.gains = np.full((len(self.rows), len(TREATMENTS), MULTIPLES), np.nan)
+        for i, row in enumerate(self.rows):
+            for k, (mode, method) in enumerate(TREATMENTS):
+                curve = (row.get("gains") or {}).get(mode)
+                if curve:
+                    self.gains[i, k] = curve[method]
+        self.gains = (2 * np.arcsinh(self.gains / 2)).reshape(len(self.rows), -1)
+        self.teaches = (self.made >= 0) | np.isfinite(self.pixel)
 
 
 class Perceptron(torch.nn.Module):
-    def __init__(self, inputs, hidden, outputs, dropout):
+    def __init__(self, inputs, outputs):
         super().__init__()
-        self.layers = torch.nn.Sequential(
-            torch.nn.Linear(inputs, hidden), torch.nn.SiLU(), torch.nn.Dropout(dropout), torch.nn.Linear(hidden, hidden),
-            torch.nn.SiLU(), torch.nn.Linear(hidden, outputs))
+        self.layers = torch.nn.ModuleList(
+            [torch.nn.Linear(inputs, HIDDEN), torch.nn.Linear(HIDDEN, HIDDEN), torch.nn.Linear(HIDDEN, outputs)])
+        self.dropout = torch.nn.Dropout(0.3)
 
     def forward(self, x):
-        return self.layers(x)
+        for layer in self.layers[:-1]:
+            x = self.dropout(torch.nn.functional.silu(layer(x)))
+        return self.layers[-1](x)
 
 
-class Model:
-    """Trained on rows of `x` with `loss` (outputs, rows) → mean."""
+def scaled(x, mean, deviation):
+    z = np.clip((x - mean) / deviation, -MOST_DEVIATIONS, MOST_DEVIATIONS)
+    return torch.tensor(np.nan_to_num(z), dtype=torch.float32)
 
-    def __init__(self, x, outputs, loss, *, hidden, dropout, noise, decay, epochs, seed):
-        torch.manual_seed(seed)
-        self.mean, self.deviation = np.nanmean(x, 0), np.nanstd(x, 0) + 1e-3
-        z = self.scaled(x)
-        self.net = Perceptron(x.shape[1], hidden, outputs, dropout)
-        optimizer = torch.optim.AdamW(self.net.parameters(), 3e-3, weight_decay=decay)
-        batches = len(z) // 256 + 1
-        schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, epochs * batches)
-        for _ in range(epochs):
-            order = torch.randperm(len(z))
-            for rows in order.split(256):
-                value = loss(self.net(z[rows] + noise * torch.randn(len(rows), z.shape[1])), rows)
-                optimizer.zero_grad()
-                value.backward()
-                optimizer.step()
-                if schedule.last_epoch < schedule.T_max:
-                    schedule.step()
-        self.net.eval()
 
-    def scaled(self, x):
-        return torch.tensor(np.nan_to_num(np.clip((x - self.mean) / self.deviation, -4, 4)), dtype=torch.float32)
+def known(values):
+    return torch.tensor(np.nan_to_num(values), dtype=torch.float32), torch.tensor(np.isfinite(values), dtype=torch.float32)
+
+
+def learn(table, rows, mean, deviation, seed, residuals=None):
+    """How sure it is it learns from `residuals` of networks that had not seen the rows: of the pixel, and of gains; else
+    from its own, which are too small."""
+    torch.manual_seed(seed)
+    z = scaled(table.x[rows], mean, deviation)
+    pixel, has_pixel = known(table.pixel[rows])
+    gains, has_gains = known(table.gains[rows])
+    made = torch.tensor(table.made[rows])
+    n, curves = len(MADE), table.gains.shape[1]
+    if residuals is not None:
+        of_pixels, of_gains = (torch.tensor(np.nan_to_num(r), dtype=torch.float32) for r in residuals)
+    net = Perceptron(z.shape[1], 2 + n + 2 * curves)
+    optimizer = torch.optim.AdamW(net.parameters(), 3e-3, weight_decay=0.1)
+    batches = (len(rows) + BATCH - 1) // BATCH
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, EPOCHS * batches)
+
+    def mean_of(values, counts):
+        return (values * counts).sum() / (counts.sum() + 1e-6)
+
+    for _ in range(EPOCHS):
+        for batch in torch.randperm(len(rows)).split(BATCH):
+            out = net(z[batch] + 0.1 * torch.randn(len(batch), z.shape[1]))
+            spread, log_deviation = out[:, 1].clamp(-3.5, 1), out[:, 2 + n + curves :].clamp(-3, 2)
+            off, wrong = (out[:, 0] - pixel[batch]).abs(), out[:, 2 + n : 2 + n + curves] - gains[batch]
+            if residuals is None:
+                loss = mean_of(off * torch.exp(-spread) + spread, has_pixel[batch])
+                loss = loss + mean_of(wrong**2 * torch.exp(-2 * log_deviation) / 2 + log_deviation, has_gains[batch])
+            else:
+                sure, surely = torch.exp(-spread.detach()), torch.exp(-2 * log_deviation.detach())
+                unseen, unseen_gains = of_pixels[batch], of_gains[batch]
+                loss = mean_of(off * sure + unseen * torch.exp(-spread) + spread, has_pixel[batch])
+                loss = loss + mean_of(wrong**2 * surely / 2 + unseen_gains**2 * torch.exp(-2 * log_deviation) / 2 + log_deviation,
+                                      has_gains[batch])
+            named = made[batch] >= 0
+            loss = loss + 0.5 * torch.nn.functional.cross_entropy(out[named][:, 2 : 2 + n], made[batch][named])
+            optimizer.zero_grad()
+            loss.backward()
+            optimizer.step()
+            schedule.step()
+    return net.eval()
+
+
+def unseen_residuals(table, rows, mean, deviation):
+    """Of every row by a network that has seen no mesh of its fold: |error| of the pixel, errors of gains."""
+    of_pixels, of_gains = np.full(len(rows), np.nan), np.full((len(rows), table.gains.shape[1]), np.nan)
+    fold, n = table.fold[rows], len(MADE)
+    for left_out in np.unique(fold):
+        net = learn(table, rows[fold != left_out], mean, deviation, 1000 + left_out)
+        own = fold == left_out
+        with torch.no_grad():
+            said = net(scaled(table.x[rows[own]], mean, deviation)).numpy()
+        of_pixels[own] = np.abs(said[:, 0] - table.pixel[rows[own]])
+        of_gains[own] = said[:, 2 + n : 2 + n + table.gains.shape[1]] - table.gains[rows[own]]
+    return of_pixels, of_gains
+
+
+class Ensemble:
+    def __init__(self, table, rows, members=MEMBERS):
+        self.mean = np.nan_to_num(np.nanmean(table.x[rows], 0)).astype(np.float16).astype(np.float64)
+        self.deviation = (np.nan_to_num(np.nanstd(table.x[rows], 0)) + 1e-2).astype(np.float16).astype(np.float64)
+        residuals = unseen_residuals(table, rows, self.mean, self.deviation)
+        self.nets = [learn(table, rows, self.mean, self.deviation, seed, residuals) for seed in range(members)]
+        self.calibration = (1.0, 1.0)
 
     def say(self, x):
+        """[members, rows, outputs]"""
         with torch.no_grad():
-            return self.net(self.scaled(x)).numpy()
+            return np.stack([net(scaled(x, self.mean, self.deviation)).numpy() for net in self.nets])
+
+    def far(self, x):
+        z = np.nan_to_num((x - self.mean) / self.deviation)
+        return np.sqrt(np.minimum(100, z**2).mean(1))
+
+    def write(self, path, names, metadata):
+        tensors = {"mean": self.mean, "deviation": self.deviation, "calibration": np.array(self.calibration)}
+        for k in range(3):
+            layers = [net.layers[k] for net in self.nets]
+            tensors[f"layer{k}.weight"] = np.stack([layer.weight.detach().numpy() for layer in layers])
+            tensors[f"layer{k}.bias"] = np.stack([layer.bias.detach().numpy() for layer in layers])
+        header, data = {"__metadata__": {"features": " ".join(names)} | metadata}, b""
+        for name, values in tensors.items():
+            values = values.astype("<f4" if name == "calibration" else "<f2")
+            header[name] = {"dtype": "F32" if name == "calibration" else "F16", "shape": list(values.shape),
+                            "data_offsets": [len(data), len(data) + values.nbytes]}
+            data += values.tobytes()
+        text = json.dumps(header, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 8)
+        path.write_bytes(struct.pack("<Q", len(text)) + text + data)
 
 
-# How far a size is from the true pixel.
-
-
-def fold_of_mesh(mesh):
-    return int(hashlib.sha256(mesh.encode()).hexdigest(), 16) % FOLDS
-
-
-def pixel_samples(table):
-    """Inputs, ln(true / tried), fold and weight."""
-    x, y, fold, weight = [], [], [], []
-    for row, item in enumerate(table.rows):
-        if "gains" not in item or item["made"] == "mesh":
-            continue
-        t = TRIED[np.abs(TRIED - table.log_pixel(row)) < FARTHEST]
-        if len(t):
-            x.append(table.of_pixel(row, t))
-            y.append(table.log_pixel(row) - t)
-            fold += [item["fold"]] * len(t)
-            weight += [1.0] * len(t)
-    for name in ("pixel-size-kinds", "pixel-size-antialiased"):
-        for item in json.load(gzip.open(DATA / f"{name}.json.gz", "rt", encoding="utf-8"))["objects"]:
-            for sample in item["samples"]:
-                if None in sample["features"]:
-                    continue
-                v = np.array(sample["features"])  # of three looks, 72 each, then sizes
-                x.append(np.concatenate([v[:144], v[216:232]])[None])
-                y.append(np.log([item["pixel_size"] / sample["size"]]))
-                fold.append(fold_of_mesh(item["object"].split("--")[0]))
-                weight.append(1.5)
-    return np.nan_to_num(np.concatenate(x)), np.concatenate(y), np.array(fold), np.array(weight)
-
-
-def learn_pixels(table, seeds):
-    """Of every row, by ensembles that have not seen its fold: ln(pixel / unit), deviation, distance of the ensemble."""
-    x, y, fold, weight = pixel_samples(table)
-    found = [None] * len(table.rows)
-    for left_out in range(FOLDS):
-        kept = fold != left_out
-        wanted = torch.tensor(y[kept], dtype=torch.float32)
-        counts = torch.tensor(weight[kept] * np.exp(-0.5 * (y[kept] / 0.8) ** 2), dtype=torch.float32)
-
-        def loss(out, rows):
-            spread = out[:, 1].clamp(-3.5, 1)
-            return (counts[rows] * ((out[:, 0] - wanted[rows]).abs() * torch.exp(-spread) + spread)).mean()
-
-        models = [Model(x[kept], 2, loss, hidden=96, dropout=0.1, noise=0.05, decay=0.05, epochs=20, seed=seed)
-                  for seed in range(seeds)]
-        for row in np.flatnonzero(table.fold == left_out):
-            seen = np.nan_to_num(table.of_pixel(row, TRIED))
-            said, spreads = [], []
-            for model in models:
-                out = model.say(seen)
-                spread = np.exp(np.clip(out[:, 1], -3.5, 1))
-                counts_here = np.exp(-0.5 * (out[:, 0] / 0.4) ** 2) / spread**2 + 1e-12
-                said.append(np.average(TRIED + out[:, 0], weights=counts_here))
-                spreads.append(np.average(spread, weights=counts_here))
-            found[row] = (np.mean(said), np.mean(spreads), np.std(said))
-        print(f"pixels: fold {left_out + 1} of {FOLDS}", flush=True)
-    return found
-
-
-# What treatments gain.
-
-
-def gain_samples(table, pixels):
-    x, gains, row_of = [], [], []
-    for row, item in enumerate(table.rows):
-        if "gains" not in item:
-            continue
-        t = TRIED[np.abs(TRIED - table.log_pixel(row)) < FARTHEST]
-        t = t if len(t) else np.array([table.log_pixel(row)])
-        x.append(table.of_gain(row, t, pixels[row]))
-        gains.append(table.gains(row, t))
-        row_of += [row] * len(t)
-    return np.concatenate(x), np.arcsinh(np.concatenate(gains) / SQUASH) * SQUASH, np.array(row_of)
-
-
-def learn_gains(table, pixels, seeds):
-    """Of every row: gains [sizes, treatments], their deviations, and probabilities of how it was made."""
-    x, gains, row_of = gain_samples(table, pixels)
-    made = torch.tensor([MADE.index(table.rows[row]["made"]) if table.rows[row]["made"] in MADE else -1 for row in row_of])
-    n = len(TREATMENTS)
-    found = [None] * len(table.rows)
-    for left_out in range(FOLDS):
-        kept = table.fold[row_of] != left_out
-        wanted, known = torch.tensor(np.nan_to_num(gains[kept]), dtype=torch.float32), torch.tensor(np.isfinite(gains[kept]))
-        kinds = made[torch.tensor(kept)]
-
-        def loss(out, rows):
-            mean, spread = out[:, :n], out[:, n:2 * n].clamp(-3, 2)
-            of_gain = (((mean - wanted[rows]) ** 2 * torch.exp(-2 * spread) / 2 + spread) * known[rows]).sum() / known[rows].sum()
-            named = kinds[rows] >= 0
-            return of_gain + 0.3 * torch.nn.functional.cross_entropy(out[named][:, 2 * n:], kinds[rows][named])
-
-        models = [Model(x[kept], 2 * n + len(MADE), loss, hidden=64, dropout=0.2, noise=0.1, decay=0.1, epochs=20, seed=seed)
-                  for seed in range(seeds)]
-        for row in np.flatnonzero(table.fold == left_out):
-            out = np.stack([model.say(table.of_gain(row, TRIED, pixels[row])) for model in models])
-            mean = out[:, :, :n]
-            variance = np.exp(2 * np.clip(out[:, :, n:2 * n], -3, 2)).mean(0) + mean.var(0)
-            kind = np.exp(out[:, :, 2 * n:] - out[:, :, 2 * n:].max(-1, keepdims=True))
-            found[row] = (mean.mean(0), np.sqrt(variance), (kind / kind.sum(-1, keepdims=True)).mean(0))
-        print(f"gains: fold {left_out + 1} of {FOLDS}", flush=True)
-    return found
-
-
-def decide(table, row, pixel, gain, caution):
-    item, (mean, deviation, kind) = table.rows[row], gain
-    tag = item["tag"]
-    score = mean - caution * deviation
-    for k, (mode, _) in enumerate(TREATMENTS):
-        if tag is not None and mode != ("classic" if tag == "mip" else tag):
-            score[:, k] = -np.inf
-    size, treatment = np.unravel_index(np.argmax(score), score.shape)
-    nearest = int(np.argmin(np.abs(TRIED - pixel[0])))
-    spread = 1.28 * np.hypot(pixel[1], pixel[2])
-    decision = {"id": item["id"], "method": "none", "made": MADE[int(np.argmax(kind[nearest]))],
-                "low": item["unit"] * np.exp(pixel[0] - spread), "high": item["unit"] * np.exp(pixel[0] + spread)}
-    if score[size, treatment] > 0:
-        mode, method = TREATMENTS[treatment]
-        decision |= {"method": method, "mode": tag or mode, "pixel": item["unit"] * float(np.exp(TRIED[size]))}
-    return decision
+def pixel_of(said):
+    """ln(pixel / unit), and half of an interval that is not calibrated."""
+    middle, spread = said[:, :, 0], np.exp(np.clip(said[:, :, 1], -3.5, 1))
+    return middle.mean(0), np.hypot(spread.mean(0), middle.std(0))
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("table", type=pathlib.Path)
-    parser.add_argument("-o", "--output", type=pathlib.Path, required=True)
-    parser.add_argument("--caution", type=float, default=0.75)
-    parser.add_argument("--seeds", type=int, default=4, help="perceptrons of each ensemble")
+    parser.add_argument("-o", "--output", type=pathlib.Path, help="the model that has seen all folds")
+    parser.add_argument("--folds", type=pathlib.Path, help="folder for those that have not")
+    parser.add_argument("--jobs", type=int, default=2, help="processes, of a core each")
     arguments = parser.parse_args()
     table = Table(arguments.table)
-    pixels = learn_pixels(table, arguments.seeds)
-    gains = learn_gains(table, pixels, arguments.seeds)
-    decisions = [decide(table, row, pixels[row], gains[row], arguments.caution) for row in range(len(table.rows))]
-    arguments.output.write_text("".join(json.dumps(d) + "\n" for d in decisions), encoding="utf-8")
+    metadata = {"table": arguments.table.name, "licence": "Apache-2.0"}
+
+    kept = [np.flatnonzero((table.fold != fold) & table.teaches) for fold in range(FOLDS)]
+    if arguments.output:
+        meshes = np.array([row["mesh"] for row in table.rows])
+        kept.append(np.flatnonzero(table.teaches & ~np.isin(meshes, HELD_OUT)))
+    with multiprocessing.get_context("fork").Pool(arguments.jobs, torch.set_num_threads, (1,)) as pool:
+        ensembles = pool.starmap(Ensemble, [(table, rows) for rows in kept], chunksize=1)
+    folds = ensembles[:FOLDS]
+    middle, half, far = np.zeros((3, len(table.rows)))
+    for fold, ensemble in enumerate(folds):
+        own = np.flatnonzero(table.fold == fold)
+        middle[own], half[own] = pixel_of(ensemble.say(table.x[own]))
+        far[own] = ensemble.far(table.x[own])
+    error = np.abs(middle - table.pixel)
+    judged = np.isfinite(error)
+
+    def calibrated(without):
+        others = table.fold != without
+        return (float(np.quantile((error / half)[judged & others], INTERVAL)),
+                float(np.quantile(far[others & table.teaches], FARTHEST)))
+
+    edited = np.array([row["edit"] != "" for row in table.rows])
+    for name, which in (("as they were fitted", judged & ~edited), ("edited", judged & edited)):
+        print(f"pixels of splats {name}: off by {np.median(error[which]):.3f} (median), {np.quantile(error[which], 0.9):.3f} (90 %), ln")
+    if arguments.folds:
+        arguments.folds.mkdir(parents=True, exist_ok=True)
+        for fold, ensemble in enumerate(folds):
+            ensemble.calibration = calibrated(fold)
+            ensemble.write(arguments.folds / f"fold-{fold}.safetensors", table.names, metadata | {"without": f"fold {fold}"})
+    if arguments.output:
+        ensemble = ensembles[FOLDS]
+        ensemble.calibration = calibrated(None)
+        ensemble.write(arguments.output, table.names, metadata | {"held_out": " ".join(HELD_OUT)})
+        print(f"{arguments.output}: {arguments.output.stat().st_size / 1e6:.2f} MB, interval {ensemble.calibration[0]:.2f}")
 
 
 if __name__ == "__main__":

@@ -33,8 +33,11 @@ struct EnhanceSettings {
   double upscale = 4;                                    // ≥ 1: how many times closer the splat will be seen
   std::optional<double> filter_strength = std::nullopt;  // share of the lost width that is given back
   // World size of a pixel of the training views at a Gaussian's depth: from here, from the cameras, from the pictures,
-  // or estimated.
+  // or read off the splat.
   std::optional<double> pixel_size = std::nullopt;
+  // How the splat was rasterized in training, where you know it: it is enhanced as such. Nothing: its own tag, else it
+  // is read off the splat.
+  std::optional<Rasterization> rasterization = std::nullopt;
   std::vector<PinholeCamera> cameras = {};  // the training cameras, with the size that was trained at
   std::filesystem::path images = {};        // project with the training pictures, for refinement
   // Of refinement, by the names of the program's options: {"steps", "200"}, {"seconds", "30"}, {"k", "4"}.
@@ -64,8 +67,8 @@ struct EnhanceOutcome {
   std::optional<int64_t> kept_outside = std::nullopt;  // of a region: the last ones of the result, as they were
   double filter_strength = 0;
   double pixel_size = 0;  // world units; the median where each Gaussian has its own
-  // "given", "cameras", "pictures", "estimated"; "cautious": the estimate is contradicted and the smallest plausible
-  // was taken; "unknown": the splat says nothing and was left as it is; empty: the method needs none.
+  // "given", "cameras", "pictures"; "read": off the splat; "unknown": the splat says nothing and was left as it is;
+  // empty: the method needs none.
   std::string pixel_size_source = {};
   std::vector<EnhanceStep> steps = {};
   bool stopped = false;  // one of them was

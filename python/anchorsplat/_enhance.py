@@ -80,7 +80,7 @@ def enhance(
         (x, y, z, radius) in the splat's unit.
 
     pixel_size: world size of a pixel of the training views, or "auto": from the cameras, the pictures or the splat.
-    mode: how the splat was rasterized in training; otherwise as it says, else as its Gaussians look.
+    mode: how the splat was rasterized in training; otherwise as it says, else as it looks.
     cameras: the training cameras: exact pixel size for every Gaussian.
     train_width: pixels of the pictures in training where they were smaller than the cameras say.
     camera_rule: which of the views that hold a Gaussian says its pixel size.

@@ -65,7 +65,7 @@ def view(
     before: a splat to compare with.
     cameras: views to jump to, at most `views` of them, evenly chosen; the first one opens the page.
     truth: folder of true pictures with the cameras' names.
-    pixel_size: world units of a training pixel, for the scale bar; "auto": estimated from `before`.
+    pixel_size: world units of a training pixel, for the scale bar; "auto": read from `before`.
     sh_degree: keeps view-dependent colour up to this degree; 0 makes small pages.
     mode: how both are rasterized; otherwise as each says, else classic.
     background: r, g, b from 0 to 1; otherwise what the camera file says, else black.

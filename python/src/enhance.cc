@@ -44,7 +44,6 @@ Result<Enhanced> EnhanceView(const CloudView& view, const EnhanceFlags& flags, c
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto lock, HoldCheckpoint(checkpoint));
   GaussianCloud cloud = CopyOf(view);
-  if (flags.mode) cloud.render_mode = flags.mode;
   ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, Enhance(std::move(cloud), options));
   if (enhanced.report.interrupted) return Error{ErrorCode::kInterrupted, "stopped"};
   if (!checkpoint.empty()) RemoveCheckpoint(checkpoint, plan.method->is_checkpoint);

@@ -29,6 +29,7 @@ Result<EnhanceOptions> ToOptions(const EnhanceSettings& settings) {
   options.upscale = settings.upscale;
   options.filter_strength = settings.filter_strength;
   options.pixel_size = settings.pixel_size;
+  options.mode = ToMode(settings.rasterization);
   options.refine.images = settings.images;
   options.model.file = settings.model;
   options.model.copies = settings.copies;
@@ -37,6 +38,7 @@ Result<EnhanceOptions> ToOptions(const EnhanceSettings& settings) {
   given(settings.upscale != EnhanceSettings().upscale, "upscale");
   given(settings.filter_strength.has_value(), "filter-strength");
   given(settings.pixel_size.has_value(), "pixel-size");
+  given(settings.rasterization.has_value(), "mode");
   given(!settings.cameras.empty(), "cameras");
   given(!settings.images.empty(), "images");
   given(!settings.model.empty(), "model");
@@ -77,7 +79,7 @@ Result<EnhanceOutcome> RunMethod(GaussianCloud cloud, const EnhanceSettings& set
                          .kept_outside = report.kept_outside,
                          .filter_strength = report.filter_strength,
                          .pixel_size = report.pixel_size,
-                         .pixel_size_source = std::move(report.pixel_size_source),
+                         .pixel_size_source = std::string(NameOf(report.pixel_size_source)),
                          .steps = {},
                          .stopped = report.interrupted,
                          .seconds = report.seconds};

@@ -55,6 +55,13 @@ TEST(Enhance, FilterAndDefault) {
   EXPECT_EQ(filtered->pixel_size_source, "given");
   EXPECT_FALSE(SameBits(filtered->splat, *splat));
   EXPECT_TRUE(SameBits(filtered->splat.view().means, splat->view().means));
+  // Fits with antialiasing have lost less.
+  const auto less =
+      Enhance(*splat, {.method = "filter", .pixel_size = 0.0055, .rasterization = Rasterization::kAntialiased});
+  ASSERT_TRUE(less.ok()) << less.failure().message;
+  EXPECT_EQ(less->splat.view().rasterization, Rasterization::kAntialiased);
+  EXPECT_GT(less->filter_strength, 0);
+  EXPECT_LT(less->filter_strength, filtered->filter_strength);
 
   std::vector<std::string> said;
   const RunSettings run{.message = [&](MessageLevel, const std::string& sentence) { said.push_back(sentence); }};
@@ -66,7 +73,7 @@ TEST(Enhance, FilterAndDefault) {
   ASSERT_EQ(enhanced->steps.size(), 1u);
   EXPECT_EQ(enhanced->steps[0].method, "model");
   EXPECT_FALSE(enhanced->steps[0].facts.empty());
-  EXPECT_THAT(said, testing::Contains(HasSubstr("training pixel")));
+  EXPECT_THAT(said, testing::Contains(HasSubstr("looks like a classic splat")));
 
   // The owner may be given away; what comes of it is the same.
   auto given = Enhance(*Splat::CopyOf(*splat));
@@ -76,7 +83,9 @@ TEST(Enhance, FilterAndDefault) {
 
 TEST(Enhance, RefinementTellsWhatItDid) {
   const Splat splat = SmallSplat(60, 0, 3);
-  EnhanceSettings settings{.method = "refine", .upscale = 2, .pixel_size = 0.2};  // so that there is something to do
+  // So that there is something to do.
+  EnhanceSettings settings{
+      .method = "refine", .upscale = 2, .pixel_size = 0.2, .rasterization = Rasterization::kClassic};
   settings.refine = {{"steps", "3"}, {"poses", "4"}, {"k", "2"}};
   const auto refined = Enhance(splat, settings);
   ASSERT_TRUE(refined.ok()) << refined.failure().message;
@@ -108,7 +117,8 @@ TEST(Enhance, OfARegionOnly) {
   }
   ASSERT_GT(inside, 0);
   ASSERT_GT(splat.size() - inside, 0);
-  EnhanceSettings settings{.method = "model", .pixel_size = 0.02, .region = {9, 9, 0, -9, -9, -9}};
+  EnhanceSettings settings{
+      .method = "model", .pixel_size = 0.02, .rasterization = Rasterization::kClassic, .region = {9, 9, 0, -9, -9, -9}};
   const auto made = Enhance(splat, settings);
   ASSERT_TRUE(made.ok()) << made.failure().message;
   EXPECT_EQ(made->kept_outside, splat.size() - inside);

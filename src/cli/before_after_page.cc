@@ -54,9 +54,10 @@ Status WritePage(const fs::path& input, const GaussianCloud& before, const fs::p
   ViewerPage page;
   page.before = ViewerSplat{&before, input.filename().string(), {}};
   page.after = {&enhanced.cloud, output.filename().string(), {}};
-  // A cautious one is no training pixel to measure by.
-  const bool cautious = enhanced.report.pixel_size_source == kCautiousPixelSize;
-  if (enhanced.report.pixel_size > 0 && !cautious) page.pixel_size = static_cast<float>(enhanced.report.pixel_size);
+  const EnhanceReport& report = enhanced.report;
+  const bool is_read = report.pixel_size_source == PixelSizeSource::kRead && report.reading;
+  const double pixel = is_read ? report.reading->pixel : report.pixel_size;
+  if (pixel > 0) page.pixel_size = static_cast<float>(pixel);
   page.smaller = kSmaller;
   const Status written = WriteViewerPage(PagePath(output), page, options);
   if (written.ok()) return {};

@@ -8,8 +8,6 @@
 #include "bench/io_bench.h"
 #include "bench/network_bench.h"
 #include "bench/render_bench.h"
-#include "cli/bench_looks.h"
-#include "cli/bench_pixel_size.h"
 #include "cli/bench_reading.h"
 #include "cli/table.h"
 #include "cli/verb.h"
@@ -371,9 +369,7 @@ void AddBench(CLI::App& app, Program& program) {
   AddNetworkBench(verb, program);
   AddConvertBench(verb, program);
   AddIoBench(verb, program);
-  AddPixelSizeBench(verb, program);
   AddReadingBench(verb, program);
-  AddLooksBench(verb, program);
 }
 
 }  // namespace anchorsplat

@@ -16,7 +16,6 @@
 #include "core/log.h"
 #include "core/run_context.h"
 #include "core/text.h"
-#include "enhance/reading_features.h"
 #include "eval/reading_row.h"
 #include "eval/reading_score.h"
 #include "eval/reading_table.h"
@@ -24,7 +23,10 @@
 #include "io/atomic_file.h"
 #include "io/input_file.h"
 #include "io/input_record.h"
+#include "reading/features.h"
+#include "reading/reading_model.h"
 #include "request/choice.h"
+#include "tensors/tensor_file.h"
 
 namespace anchorsplat {
 
@@ -39,7 +41,7 @@ struct ReadingFlags {
   bool features = false;
   std::string tasks, output;
   int views = 4;
-  std::string table, decisions;
+  std::string table, decisions, folds;
 };
 
 Status PrintFeatures(const ReadingFlags& flags, Program& program) {
@@ -47,7 +49,7 @@ Status PrintFeatures(const ReadingFlags& flags, Program& program) {
   nlohmann::json splats = nlohmann::json::array(), names;
   for (const std::string& file : flags.splats) {
     const Result<GaussianCloud> cloud = ReadCloud(file);
-    const auto read = cloud.ok() ? ReadFeatures(*cloud) : Result<ReadingFeatures>(cloud.error());
+    const auto read = cloud.ok() ? FeaturesOf(*cloud) : Result<SplatFeatures>(cloud.error());
     if (!read.ok()) {
       const std::string why =
           cloud.ok() ? Cat(file, ": ", read.error().message) : read.error().message;  // which names the file
@@ -57,13 +59,13 @@ Status PrintFeatures(const ReadingFlags& flags, Program& program) {
       continue;
     }
     if (shared.json) {
-      names = read->names;
+      names = FeatureNames();
       splats.push_back({{"file", file}, {"unit", read->unit}, {"features", read->values}});
       continue;
     }
     std::vector<std::vector<std::string>> table = {{file, Cat("unit ", read->unit)}};
-    for (size_t k = 0; k < read->names.size(); ++k) {
-      table.push_back({read->names[k], std::isnan(read->values[k]) ? "not known" : Fixed(read->values[k], 4)});
+    for (size_t k = 0; k < FeatureNames().size(); ++k) {
+      table.push_back({FeatureNames()[k], std::isnan(read->values[k]) ? "not known" : Fixed(read->values[k], 4)});
     }
     std::cout << FormatTable(table);
   }
@@ -145,6 +147,19 @@ nlohmann::json ToJson(const ReadingScore& score) {
           {"seconds", score.seconds}};
 }
 
+// As --decisions reads them.
+nlohmann::json ToJson(std::span<const ReadingRow> rows, const Decisions& decisions) {
+  nlohmann::json json = nlohmann::json::array();
+  for (size_t i = 0; i < rows.size(); ++i) {
+    const ReadingDecision& d = decisions[i];
+    json.push_back({{"id", rows[i].id}, {"method", d.method}, {"low", d.low}, {"high", d.high}, {"made", d.made}});
+    if (d.method == "none") continue;
+    json.back()["mode"] = NameOf(d.mode.value_or(rows[i].DrawnMode()));
+    json.back()["pixel"] = d.pixel;
+  }
+  return json;
+}
+
 // Rows of one decider: its own numbers, and beside them what was to be had.
 std::vector<std::string> Cells(const std::string& name, const ReadingScore& s) {
   const auto gain = [&](double value) { return s.rows > 0 ? Fixed(value, 2) : std::string(); };
@@ -195,7 +210,17 @@ Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
     }
     deciders.emplace_back(fs::path(flags.decisions).filename().string(), GivenDecisions(rows, given));
   }
-  deciders.emplace_back("today's list", TodaysDecisions(rows));
+  if (!flags.folds.empty()) {
+    std::vector<ReadingModel> models;
+    for (int fold = 0; fold < kReadingFolds; ++fold) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorFile file,
+                                   TensorFile::Open(fs::path(flags.folds) / Cat("fold-", fold, ".safetensors")));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(ReadingModel model, ReadingModel::Load(file));
+      models.push_back(std::move(model));
+    }
+    deciders.emplace_back("model", ReadDecisions(rows, models));
+  }
+  deciders.emplace_back("the list", TodaysDecisions(rows));
   for (const char* method : {"filter", "network"}) {
     double multiple = 0;
     Decisions fixed = FixedDecisions(rows, method, multiple);
@@ -212,6 +237,7 @@ Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
       nlohmann::json& decider =
           json["deciders"].emplace_back(nlohmann::json{{"name", name}, {"taken_for", TakenFor(rows, decisions)}});
       for (const ReadingScore& score : ScoreReadings(rows, decisions)) decider["groups"].push_back(ToJson(score));
+      if (name == "model") decider["decisions"] = ToJson(rows, decisions);
     }
     PrintJson(json);
     return {};
@@ -278,9 +304,12 @@ void AddReadingBench(CLI::App& bench, Program& program) {
       ->needs(tasks)
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  CLI::Option* const table =
-      verb.add_option("--score", flags->table, "A table: how well today's list decides, and bounds");
+  CLI::Option* const table = verb.add_option(
+      "--score", flags->table, "A table: how well the list of rules decided that was there before, and bounds");
   verb.add_option("--decisions", flags->decisions, "JSON lines of another decider, to stand beside it")->needs(table);
+  verb.add_option("--folds", flags->folds,
+                  "Folder of models that have not seen a fold each (scripts/train-reading.py): how they decide it")
+      ->needs(table);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunReading(*flags, program); }; });
 }
 

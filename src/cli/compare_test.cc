@@ -14,7 +14,8 @@ using ::testing::IsEmpty;
 class CompareVerb : public testing::Test {
  protected:
   void SetUp() override {
-    ExpectDone({"enhance", scan_, "-o", other_, "--method", "filter", "--pixel-size", "0.02", "-q"});
+    ExpectDone(
+        {"enhance", scan_, "-o", other_, "--method", "filter", "--pixel-size", "0.02", "--mode", "classic", "-q"});
     ExpectDone({"render", scan_, "-o", views_, "--orbit", "2", "--size", "48x48", "-q"});
   }
 

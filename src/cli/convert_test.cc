@@ -254,12 +254,15 @@ TEST_F(ConvertVerb, KeepsWhatAPlySaysBesideItsGaussians) {
   EXPECT_THAT(ExpectDone({"convert", extras, folder_ / "lost.spz"}).err,
               HasSubstr("other properties of the input are dropped: label, normals"));
   // So does the filter, which leaves the Gaussians; those of a network are others.
-  EXPECT_THAT(
-      ExpectDone({"enhance", extras, "-o", folder_ / "filtered.ply", "--method", "filter", "--pixel-size", "0.1"}).err,
-      IsEmpty());
+  EXPECT_THAT(ExpectDone({"enhance", extras, "-o", folder_ / "filtered.ply", "--method", "filter", "--pixel-size",
+                          "0.1", "--mode", "classic"})
+                  .err,
+              IsEmpty());
   EXPECT_TRUE(has_labels("filtered.ply"));
   EXPECT_THAT(
-      ExpectDone({"enhance", extras, "-o", folder_ / "others.ply", "--method", "model", "--pixel-size", "0.4"}).err,
+      ExpectDone({"enhance", extras, "-o", folder_ / "others.ply", "--method", "model", "--pixel-size", "0.4", "--mode",
+                  "classic"})
+          .err,
       HasSubstr("other properties of its Gaussians are dropped, as those of the result are others: label, normals"));
   EXPECT_FALSE(has_labels("others.ply"));
 }

@@ -164,11 +164,10 @@ int64_t CountOutside(const std::optional<Region>& region, const GaussianCloud& c
 
 // What the method worked with, where it is the filter's business.
 std::string Details(const EnhanceReport& r) {
-  if (r.pixel_size_source.empty()) return "";
-  if (r.pixel_size_source == kUnknownPixelSize) return " not applied";
-  if (r.filter_strength == 0) return ": left as it is, no width given back";
+  if (r.pixel_size_source == PixelSizeSource::kNone) return "";
+  if (r.pixel_size_source == PixelSizeSource::kUnknown || r.filter_strength == 0) return ": left as it is";
   return Cat(" x", r.upscale, ", strength ", Fixed(r.filter_strength, 3), ", pixel size ", r.pixel_size, " (",
-             r.pixel_size_source, ")");
+             NameOf(r.pixel_size_source), ")");
 }
 
 // Leaves those of `extras` that belong to Gaussians that are enhanced. The means of these Gaussians, by which the
@@ -214,7 +213,6 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
         PlanOf(options, input, output, {cloud.size(), cloud.sh_degree}, CountOutside(options.region, cloud));
     ANCHORSPLAT_RETURN_IF_ERROR(SayAndAsk({&plan, 1}, flags.size, shared));
   }
-  if (flags.how.mode) cloud.render_mode = flags.how.mode;
   Buffer<float> means = KeepUsable(extras, cloud);
   GaussianCloud before;
   if (flags.view) {
@@ -252,7 +250,7 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   }
   ANCHORSPLAT_RETURN_IF_ERROR(WriteCloudOrKeep(output, enhanced.cloud, write, extras));
   const EnhanceReport& r = enhanced.report;
-  if (r.looks == TrainedKind::kAntialiased) before.render_mode = enhanced.cloud.render_mode;  // both as it was trained
+  before.render_mode = enhanced.cloud.render_mode;  // both as it was trained
   if (flags.view) ANCHORSPLAT_RETURN_IF_ERROR(WritePage(input, before, output, enhanced, WriteOptionsFrom(shared)));
   if (r.interrupted) {
     if (!checkpoint.empty() && Exists(checkpoint)) {

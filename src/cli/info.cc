@@ -14,7 +14,6 @@
 #include "core/statistics.h"
 #include "core/text.h"
 #include "core/world_up.h"
-#include "enhance/trained_kind.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
 #include "request/choice.h"
@@ -54,9 +53,9 @@ void PrintTable(const SplatFindings& f) {
             << "  file         " << HumanBytes(f.file_bytes) << (f.format.empty() ? "" : ", " + f.format) << "\n"
             << "  render mode  " << ModeName(f.render_mode) << "\n";
   if (!f.render_mode && !f.lost_no_width) {
-    std::cout << "  it looks     " << InWords(f.looks) << "\n";
+    std::cout << "  looks like   " << LooksInWords(f) << "\n";
   }
-  std::cout << "  lost width   " << LostWidthInWords(f) << "\n";
+  std::cout << "  enhance does " << TreatmentInWords(f) << "\n";
   for (const std::string& credit : CreditsOf(f.comments)) {
     std::cout << "  credit       " << Printable(credit, kMostCredit) << "\n";
   }
@@ -80,30 +79,9 @@ void PrintTable(const SplatFindings& f) {
     }
     std::cout << "\n";
   }
-  if (f.pixel_size.ok()) {
-    std::cout << "  training pixel, estimated  " << Number(f.pixel_size->estimate.size) << " (likely "
-              << Number(f.pixel_size->estimate.low) << " to " << Number(f.pixel_size->estimate.high) << ")\n";
-    if (const std::string soft = f.pixel_size->SoftnessInWords(); !soft.empty()) {
-      std::cout << "    " << soft << "\n";
-    }
-    if (!f.things.empty()) {
-      std::cout << "    but it is made of " << InWords(f.things) << "\n";
-    } else if (f.pixel_size->contradicted()) {
-      for (const std::string& contradiction : f.pixel_size->contradictions)
-        std::cout << "    but " << contradiction << "\n";
-      const bool smaller = f.pixel_size->size < f.pixel_size->estimate.size;
-      std::cout << "    so enhance would take " << (smaller ? "a smaller pixel, " : "no more than that, ")
-                << Number(f.pixel_size->size) << "; --cameras or --pixel-size would tell\n";
-    } else if (f.pixel_size->part) {
-      std::cout << "    " << f.pixel_size->CutsInWords() << "; enhance would take " << Number(f.pixel_size->size)
-                << " to be safe\n";
-    }
-    if (f.share_for_network < 1) {
-      std::cout << "    the network of enhance would take " << f.share_for_network << " of that, "
-                << Number(f.share_for_network * f.pixel_size->size) << ", to be safe\n";
-    }
-  } else {
-    std::cout << "  training pixel  no estimate: " << f.pixel_size.error().message << "\n";
+  if (f.reading.ok()) {
+    std::cout << "  training pixel  " << Number(f.reading->pixel) << " (likely " << Number(f.reading->low) << " to "
+              << Number(f.reading->high) << ")\n";
   }
   std::cout << "\n";
   const auto row = [](const char* name, const Percentiles& p) {

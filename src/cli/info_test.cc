@@ -27,7 +27,7 @@ class InfoVerb : public testing::Test {
 TEST_F(InfoVerb, OfASplat) {
   const std::string input = Biplane() / "input.ply";
   const ProgramRun table = ExpectDone({"info", input});
-  EXPECT_THAT(table.out, AllOf(HasSubstr("20,000, SH degree 3"), HasSubstr("training pixel, estimated"),
+  EXPECT_THAT(table.out, AllOf(HasSubstr("20,000, SH degree 3"), HasSubstr("training pixel  0.00"),
                                HasSubstr("written as:"), HasSubstr("largest axis")));
   EXPECT_THAT(table.err, IsEmpty());
   const nlohmann::json json = ExpectJson({"info", input});
@@ -38,14 +38,17 @@ TEST_F(InfoVerb, OfASplat) {
   EXPECT_EQ(json["bytes"], std::filesystem::file_size(input));
   EXPECT_NEAR(json["predicted_bytes"]["PLY"].get<double>(), json["bytes"].get<double>(), 1000);  // comments
   EXPECT_EQ(json["counts"]["not_finite"], 0);
-  EXPECT_EQ(json["looks"], "classic");
-  EXPECT_THAT(table.out, Not(HasSubstr("it looks"))) << "as the file says its render mode";
-  EXPECT_THAT(table.out, HasSubstr("lost width   0.74 of 0.3 px² at 4x (likely)\n"));
-  EXPECT_NEAR(json["lost_width"]["strength"].get<double>(), 0.74, 0.001);
-  EXPECT_EQ(json["lost_width"]["likely"], true);
-  EXPECT_EQ(json["lost_width"]["because"], "tagged");
-  EXPECT_EQ(json["pixel_size"]["contradictions"], nlohmann::json::array());
-  EXPECT_NEAR(json["pixel_size"]["used"].get<double>(), 0.0055, 0.002);
+  EXPECT_THAT(table.out, Not(HasSubstr("looks like"))) << "as the file says its render mode";
+  EXPECT_THAT(table.out,
+              ContainsRegex("enhance does a network at pixels of 0.00[0-9]+; [0-9.]+ dB are expected at 4x"));
+  EXPECT_EQ(json["reading"]["looks"], "classic");
+  EXPECT_EQ(json["reading"]["probabilities"].size(), kMadeCount);
+  EXPECT_NEAR(json["reading"]["pixel"].get<double>(), 0.0055, 0.002);
+  EXPECT_LT(json["reading"]["low"], json["reading"]["pixel"]);
+  EXPECT_GT(json["reading"]["high"], json["reading"]["pixel"]);
+  EXPECT_EQ(json["treatment"]["method"], "network");
+  EXPECT_EQ(json["treatment"]["mode"], "classic");
+  EXPECT_GT(json["treatment"]["gain"], 0);
 }
 
 // Two splats of different pixels that somebody merged.
@@ -58,22 +61,22 @@ TEST_F(InfoVerb, OfThingsThatLieApart) {
   ASSERT_TRUE(Append(merged, *small).ok());
   const std::string input = folder_ / "merged.ply";
   ASSERT_TRUE(WriteCloud(input, merged).ok());
-  EXPECT_THAT(ExpectDone({"info", input}).out, AllOf(HasSubstr("made of 2 things that lie apart"),
-                                                     Not(HasSubstr("doubtful")), Not(HasSubstr("smaller"))));
-  const nlohmann::json info = ExpectJson({"info", input})["pixel_size"];
-  EXPECT_EQ(info["contradictions"], nlohmann::json::array());
-  ASSERT_EQ(info["things"].size(), 2u);
-  const std::string output = folder_ / "out.ply";
-  const nlohmann::json enhanced = ExpectJson({"enhance", input, "-o", output, "--method", "filter"})[0];
-  EXPECT_EQ(enhanced["pixel_size"]["unsure"], false);
-  ASSERT_EQ(enhanced["pixel_size"]["things"].size(), 2u);
+  const ProgramRun run =
+      ExpectDone({"enhance", input, "-o", folder_ / "out.ply", "--method", "filter", "--mode", "classic", "--json"});
+  EXPECT_THAT(run.err, HasSubstr("made of 2 things that lie apart, each read by itself"));
+  const nlohmann::json enhanced = run.json()[0];
+  EXPECT_EQ(enhanced["pixel_size"]["source"], "read");
   EXPECT_GE(enhanced["seconds_in_all"].get<double>(), enhanced["seconds"].get<double>());
-  for (const nlohmann::json& things : {info["things"], enhanced["pixel_size"]["things"]}) {
-    double sizes[2] = {things[0]["value"].get<double>(), things[1]["value"].get<double>()};
-    std::sort(sizes, sizes + 2);
-    EXPECT_NEAR(sizes[0], 0.0055, 0.0006);
-    EXPECT_NEAR(sizes[1], 3 * 0.0055, 0.0018);
+  ASSERT_EQ(enhanced["parts"].size(), 2u);
+  double sizes[2];
+  for (size_t k = 0; k < 2; ++k) {
+    sizes[k] = enhanced["parts"][k]["pixel_size"];
+    EXPECT_NEAR(enhanced["parts"][k]["gaussians"].get<double>(), 20000, 500);
+    EXPECT_EQ(enhanced["parts"][k]["by_network"], false);
   }
+  std::sort(sizes, sizes + 2);
+  EXPECT_NEAR(sizes[0], 0.0055, 0.0025);
+  EXPECT_NEAR(sizes[1] / sizes[0], 3, 0.2);
 }
 
 TEST_F(InfoVerb, OfWhatFormatsSayAboutThemselves) {
@@ -143,37 +146,52 @@ TEST_F(InfoVerb, OfASplatOfNaN) {
   const nlohmann::json json = ExpectJson({"info", scan});
   EXPECT_EQ(json["counts"]["not_finite"], 2);
   EXPECT_EQ(json["bounds"], nullptr);
-  EXPECT_EQ(json["pixel_size"], nullptr);
+  EXPECT_EQ(json["reading"], nullptr);
+  EXPECT_EQ(json["treatment"]["method"], "none");
+}
+
+// Of an example that has its width and does not say so: nothing, or less than half of its pixel is taken. What info
+// says is what enhance does.
+void ExpectLittleIsDone(const std::string& splat, const std::string& output) {
+  const nlohmann::json info = ExpectJson({"info", splat})["treatment"];
+  const ProgramRun run = ExpectDone({"enhance", splat, "-o", output, "--json"});
+  const nlohmann::json enhanced = run.json()[0];
+  if (info["method"] == "none") {
+    EXPECT_EQ(enhanced["filter_strength"], 0);
+    EXPECT_THAT(run.err, AllOf(HasSubstr("left as it is: "), HasSubstr("--mode classic")));
+    return;
+  }
+  EXPECT_LT(info["pixel"], 0.5 * 0.0055);
+  EXPECT_EQ(enhanced["method"], info["method"] == "network" ? "model" : "filter");
+  EXPECT_FLOAT_EQ(enhanced["pixel_size"]["value"].get<float>(), info["pixel"].get<float>());
 }
 
 // How a splat was trained that does not say so.
 TEST_F(InfoVerb, OfUntaggedSplats) {
   const std::string fit = folder_ / "fit.splat", filtered = folder_ / "filtered.splat";
   ExpectDone({"convert", Biplane() / "input.ply", fit});  // has no place for tags
-  EXPECT_THAT(ExpectDone({"info", fit}).out, HasSubstr("it looks     like a classic one"));
+  EXPECT_THAT(ExpectDone({"info", fit}).out, HasSubstr("looks like   a classic splat ("));
   ExpectDone({"enhance", fit, "-o", filtered, "--method", "filter", "--pixel-size", "0.0055"});
-  EXPECT_THAT(ExpectDone({"info", filtered}).out, HasSubstr("it looks     like one of Mip-Splatting, or enhanced"));
-  EXPECT_THAT(ExpectDone({"enhance", filtered, "-o", folder_ / "again.ply"}).err, HasSubstr("none is given back"));
-  EXPECT_EQ(ExpectJson({"info", filtered})["looks"], "widened");
-  EXPECT_EQ(ExpectJson({"info", filtered})["lost_width"]["because"], "widened");
+  EXPECT_EQ(ExpectJson({"info", filtered})["reading"]["looks"], "filtered");
+  ExpectLittleIsDone(filtered, folder_ / "again.ply");
+  // Files that say it need not be looked at.
   EXPECT_THAT(
       ExpectDone({"enhance", fit, "-o", folder_ / "filtered.ply", "--method", "filter", "--pixel-size", "0.0055"}).out,
       HasSubstr("strength 0.740"));
-  EXPECT_THAT(ExpectDone({"info", folder_ / "filtered.ply"}).out, HasSubstr("lost width   none any more"));
-  EXPECT_THAT(ExpectDone({"enhance", folder_ / "filtered.ply", "-o", folder_ / "twice.ply"}).out,
-              HasSubstr("no width given back"));
+  EXPECT_THAT(ExpectDone({"info", folder_ / "filtered.ply"}).out,
+              AllOf(HasSubstr("enhance does nothing: its comments say"), Not(HasSubstr("looks like"))));
+  const ProgramRun twice =
+      ExpectDone({"enhance", folder_ / "filtered.ply", "-o", folder_ / "twice.ply", "--copies", "2"});
+  EXPECT_THAT(twice.err, AllOf(HasSubstr("enhanced before"), HasSubstr("--copies has no effect")));
+  EXPECT_THAT(twice.out, HasSubstr("left as it is"));
 }
 
 // Formats that keep no comments keep what networks leave: Gaussians in twins.
 TEST_F(InfoVerb, OfEnhancedSplatsThatDoNotSaySo) {
   const std::string enhanced = folder_ / "enhanced.ply", lost = folder_ / "lost.splat", again = folder_ / "again.ply";
-  ExpectDone({"enhance", SourceDirForTest() / "examples/tankard/input.ply", "-o", enhanced});
+  ExpectDone({"enhance", SourceDirForTest() / "examples/tankard/input.ply", "-o", enhanced, "--method", "model"});
   ExpectDone({"convert", enhanced, lost});
-  EXPECT_THAT(ExpectDone({"info", lost}).out, AllOf(HasSubstr("it looks     like one that a network has enhanced"),
-                                                    HasSubstr("lost width   none any more (likely)")));
-  const ProgramRun left_alone = ExpectDone({"enhance", lost, "-o", again, "--copies", "2"});
-  EXPECT_THAT(left_alone.err, AllOf(HasSubstr("in twins"), HasSubstr("--copies has no effect")));
-  EXPECT_THAT(left_alone.out, HasSubstr("no width given back"));
+  ExpectLittleIsDone(lost, again);
   // Whoever knows better is believed.
   EXPECT_THAT(ExpectDone({"enhance", lost, "-o", again, "-w", "--method", "filter", "--mode", "classic", "--pixel-size",
                           "0.0055"})

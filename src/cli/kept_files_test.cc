@@ -208,8 +208,8 @@ TEST_P(ImpossibleNames, AreRefused) {
   Refused(fitted({"-o", New("x.ply"), "--gsplat-checkpoint", Bad(".pt")}));
   Answered(fitted({"-o", folder_ / "checked.ply", "--checkpoint", Bad(""), "-w"}));
   Answered(fitted({"-o", folder_ / "checked.ply", "--checkpoint", Bad(""), "--resume", "-w"}));
-  Answered({"enhance", scan_, "-o", folder_ / "checked.ply", "--method", "refine", "--pixel-size", "0.02", "--steps",
-            "1", "--poses", "8", "--checkpoint", Bad(""), "--resume", "-w"});
+  Answered({"enhance", scan_, "-o", folder_ / "checked.ply", "--method", "refine", "--pixel-size", "0.02", "--mode",
+            "classic", "--steps", "1", "--poses", "8", "--checkpoint", Bad(""), "--resume", "-w"});
   for (const auto& entry : fs::directory_iterator(folder_.path())) {
     EXPECT_THAT(entry.path().filename().string(), Not(testing::StartsWith("new-")));
   }

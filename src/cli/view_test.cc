@@ -23,7 +23,8 @@ class ViewVerb : public testing::Test {
 
 TEST_F(ViewVerb, BeforeAndAfterWithTruePictures) {
   const std::string project = WriteProject(folder_ / "project");
-  ExpectDone({"enhance", scan_, "-o", folder_ / "out.ply", "--method", "filter", "--pixel-size", "0.02"});
+  ExpectDone(
+      {"enhance", scan_, "-o", folder_ / "out.ply", "--method", "filter", "--pixel-size", "0.02", "--mode", "classic"});
   const std::vector<std::string> words = {
       "view",  folder_ / "out.ply", "--before", scan_, "--truth", project + "/views", "--cameras",
       project, "--views",           "3",        "-o",  page_,     "--pixel-size",     "0.02"};

@@ -15,7 +15,7 @@
 #include "core/parallel.h"
 #include "core/run_context.h"
 #include "core/statistics.h"
-#include "enhance/showing_gaussians.h"
+#include "reading/showing_gaussians.h"
 
 namespace anchorsplat {
 

@@ -12,17 +12,13 @@
 #include "core/statistics.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
-#include "enhance/choose_pixel_sizes.h"
+#include "enhance/choose_treatment.h"
 #include "enhance/clean.h"
 #include "enhance/enhance_region.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
 #include "enhance/gaussian_budget.h"
-#include "enhance/lost_width.h"
-#include "enhance/network_choice.h"
 #include "enhance/refine_method.h"
-#include "enhance/showing_gaussians.h"
-#include "enhance/soft_pictures.h"
 #include "fit/pixel_model.h"
 
 namespace anchorsplat {
@@ -78,122 +74,6 @@ Status DropUnusable(GaussianCloud& cloud) {
   return {};
 }
 
-// How it looks beside what its file says. Of a region, where that has enough Gaussians to tell: the rest may have been
-// enhanced before. Where it has been, of the region at any rate.
-std::optional<TrainedKind> FindLooks(const EnhanceOptions& options, const EnhanceInput& input) {
-  const GaussianCloud& cloud = input.cloud;
-  const int64_t enough_of_region = input.partly_enhanced ? 0 : 1000;
-  ShowingGaussians showing = FindShowingGaussians(cloud);
-  if (options.region) {
-    std::vector<int64_t> inside, rows;
-    for (int64_t i = 0; i < showing.all.size(); ++i) {
-      if (!options.region->Holds(showing.all.means.data() + 3 * i)) continue;
-      inside.push_back(i);
-      rows.push_back(showing.rows_of_all[static_cast<size_t>(i)]);
-    }
-    if (std::ssize(inside) >= enough_of_region) {
-      if (auto part = Subset(showing.all, inside); part.ok()) {
-        showing.all = *std::move(part);
-        showing.rows_of_all = std::move(rows);
-      }
-    }
-  }
-  const auto kind = BesideSoftness(TrainedKindOf(cloud, showing), cloud.render_mode, showing);
-  return BesideTag(kind, cloud.render_mode, showing.all.size());
-}
-
-// Splats of which the caller does not say how they were trained are looked at. An antialiased one without a tag becomes
-// one.
-void RecogniseKind(const EnhanceOptions& options, EnhanceInput& input, EnhanceReport& report) {
-  GaussianCloud& cloud = input.cloud;
-  if (IsGiven(options, "mode") || options.filter_strength || HasLostNoWidth(cloud) ||
-      cloud.render_mode == RenderMode::kMip)
-    return;
-  report.looks = FindLooks(options, input);
-  if (!cloud.render_mode && report.looks == TrainedKind::kAntialiased) cloud.render_mode = RenderMode::kAntialiased;
-}
-
-void SayHowItLooks(TrainedKind looks, std::optional<RenderMode> tag) {
-  if (looks == TrainedKind::kEnhanced) {
-    LogWarning(
-        Cat("the Gaussians of the splat lie in twins, as a network leaves them that has enhanced it: it has lost "
-            "no width any more, and none is given back (--mode ",
-            tag ? NameOf(*tag) : "classic or antialiased, where you know it,", " if it has not been enhanced)"));
-    return;
-  }
-  if (looks == TrainedKind::kRaised) {
-    LogWarning(
-        "the opacities of the splat have been raised since it was trained: hardly a Gaussian is faint, which makes all "
-        "wider than they were. Only a little width is given back; --mode classic or antialiased says more");
-    return;
-  }
-  if (tag) {
-    LogWarning(
-        Cat("the splat is tagged ", NameOf(*tag),
-            ", but even its thinnest Gaussians have a width, as Mip-Splatting and enhancing give them: it has lost "
-            "none, and none is given back (--mode mip if it is of Mip-Splatting, --mode ",
-            NameOf(*tag), " to enhance it as it is tagged)"));
-    return;
-  }
-  switch (looks) {
-    case TrainedKind::kAntialiased:
-      LogWarning(
-          "the splat does not say how it was trained; its thinnest Gaussians are like those of an antialiased "
-          "training, and it is enhanced and tagged as an antialiased splat (--mode classic if it is none)");
-      break;
-    case TrainedKind::kWidened:
-      LogWarning(
-          "even the thinnest Gaussians of the splat have a width, as Mip-Splatting and enhancing give them: it has "
-          "lost none, and none is given back (--mode classic if it was trained without such a width)");
-      break;
-    case TrainedKind::kUnclear:
-      LogWarning(
-          "it is unclear how the splat was trained, as its thinnest Gaussians are neither like those of classic nor "
-          "of antialiased ones; it may have been enhanced. Only a little width is given back; --mode classic or "
-          "antialiased, where you know it, says more");
-      break;
-    case TrainedKind::kEnhanced:
-    case TrainedKind::kRaised:
-    case TrainedKind::kClassic:
-      break;
-  }
-}
-
-// Neither file nor sizes nor caller say what kind of splat it is, nor how large its pixels were.
-bool IsUnknownOfFew(const EnhanceOptions& options, const GaussianCloud& cloud, std::optional<TrainedKind> looks) {
-  return !options.filter_strength && !options.pixel_size && !options.cameras && options.refine.images.empty() &&
-         FindLostWidth(cloud, looks, options.upscale).reason == LostWidthReason::kTooFew &&
-         cloud.size() < kFewGaussians;
-}
-
-// Of the filter. Splats that absorbed nothing have nothing to get back.
-double ChooseStrength(const EnhanceOptions& options, const GaussianCloud& cloud, std::optional<TrainedKind> looks,
-                      bool unknown_of_few) {
-  if (options.filter_strength) return *options.filter_strength;
-  const LostWidth lost = FindLostWidth(cloud, looks, options.upscale);
-  if (lost.reason == LostWidthReason::kFittedToAreas) {
-    LogWarning(
-        "the splat was fitted to the areas of pixels: it has lost no width and none is given back (--filter-strength F "
-        "to enhance it all the same)");
-  } else if (lost.reason == LostWidthReason::kMarkedEnhanced) {
-    LogWarning(
-        "the splat says that it has been enhanced already: its lost width has been given back and none is given once "
-        "more (--filter-strength F to enhance it all the same)");
-  } else if (lost.reason == LostWidthReason::kPartMarked) {
-    LogWarning(
-        "the splat says that a part of it has been enhanced already, which would be given its lost width twice: it "
-        "stays as it is (--region enhances another part, --filter-strength F all of it)");
-  } else if (lost.strength > 0 && IsCompensated(cloud.render_mode) && options.upscale > 1) {
-    LogInfo(Cat("the splat is ", NameOf(*cloud.render_mode), ": its fit lost less width, and less is given back (",
-                Fixed(lost.strength, 2), " of what a classic one could have lost)"));
-  }
-  // Most are classic, and who knows the pixels has an eye on the rest.
-  if (lost.reason == LostWidthReason::kTooFew && !unknown_of_few) {
-    return DefaultFilterStrength(options.upscale);
-  }
-  return lost.strength;
-}
-
 // Runs one method and adds its report.
 Result<GaussianCloud> RunStep(const EnhanceMethod& method, EnhanceInput input, const EnhanceOptions& options,
                               EnhanceReport& report) {
@@ -207,6 +87,24 @@ Result<GaussianCloud> RunStep(const EnhanceMethod& method, EnhanceInput input, c
 }
 
 }  // namespace
+
+std::string_view NameOf(PixelSizeSource source) {
+  switch (source) {
+    case PixelSizeSource::kNone:
+      return "";
+    case PixelSizeSource::kGiven:
+      return "given";
+    case PixelSizeSource::kCameras:
+      return "cameras";
+    case PixelSizeSource::kPictures:
+      return "pictures";
+    case PixelSizeSource::kRead:
+      return "read";
+    case PixelSizeSource::kUnknown:
+      return "unknown";
+  }
+  return "";
+}
 
 void RegisterEnhanceMethod(EnhanceMethod method) {
   const auto same = std::ranges::find(Registry(), method.name, &EnhanceMethod::name);
@@ -280,50 +178,6 @@ bool GivesWidth(double strength, double upscale, std::optional<RenderMode> mode)
   return strength > ShownStrength(upscale, mode);
 }
 
-// A splat that has lost nothing stays as it is, whatever was asked for.
-void SayWhatHasNoEffect(const EnhanceOptions& options) {
-  std::string names;
-  int count = 0;
-  for (const char* name : {"pixel-size", "model", "copies", "merge-cost", "prune-opacity"}) {
-    if (!IsGiven(options, name)) continue;
-    names += Cat(count++ > 0 ? ", --" : "--", name);
-  }
-  if (count > 0) {
-    LogWarning(
-        Cat(names, count > 1 ? " have" : " has", " no effect, as there is no width to give back: the splat stays"));
-  }
-}
-
-// The filter's strength and the pixel sizes, for methods that work with them.
-Status ChooseWidths(const MethodPlan& plan, const EnhanceOptions& options, bool unknown_of_few, EnhanceInput& input,
-                    EnhanceReport& report) {
-  if (report.looks && options.upscale > 1) {
-    SayHowItLooks(*report.looks, IsWide(report.looks) ? input.cloud.render_mode : std::nullopt);
-  } else if (unknown_of_few && options.upscale > 1) {
-    LogWarning(Cat("it is unclear how the splat was trained, as ", WithThousands(input.cloud.size()),
-                   " Gaussians are too few to tell. Only a little width is given back; --mode classic or antialiased, "
-                   "where you know it, says more"));
-  }
-  input.filter_strength = ChooseStrength(options, input.cloud, report.looks, unknown_of_few);
-  report.filter_strength = input.filter_strength;
-  const bool gives_width = GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode);
-  if (options.filter_strength && *options.filter_strength > 0 && !gives_width && options.upscale > 1) {
-    LogWarning(Cat("a strength of ", input.filter_strength, " is no more than what the closer view's own pixels add (",
-                   ShownStrength(options.upscale, input.cloud.render_mode), "): nothing changes"));
-  }
-  if (gives_width && plan.chosen_by.empty() && plan.Name() == "filter" && !options.filter_strength &&
-      input.cloud.render_mode == RenderMode::kAntialiased) {
-    LogWarning(
-        "the filter alone can take more than it gives from an antialiased splat of many Gaussians that overlap (up to "
-        "3.5 dB were seen); the default, with a network, makes up for it");
-  }
-  if (!gives_width && options.upscale > 1) SayWhatHasNoEffect(options);
-  ANCHORSPLAT_RETURN_IF_ERROR(ChoosePixelSizes(options, plan.method->takes_start && !options.refine.images.empty(),
-                                               gives_width, input, report));
-  input.pixel_size = report.pixel_size;
-  return {};
-}
-
 // One method after the other.
 Result<GaussianCloud> RunPlan(const MethodPlan& plan, const SizedMethods& sized, EnhanceInput input,
                               const EnhanceOptions& options, EnhanceReport& report) {
@@ -339,20 +193,18 @@ Result<GaussianCloud> RunPlan(const MethodPlan& plan, const SizedMethods& sized,
   return RunStep(*plan.method, std::move(input), options, report);
 }
 
-// The others are the filter's.
-Result<GaussianCloud> RunOnSure(const MethodPlan& plan, EnhanceInput input, EnhanceOptions options,
+// The network's are some of them, the others the filter's.
+Result<GaussianCloud> RunOnSome(const MethodPlan& plan, EnhanceInput input, EnhanceOptions options,
                                 EnhanceReport& report) {
   EnhanceInput others = input;
-  if (input.inside.empty()) input.inside.assign(input.sure.size(), 1);
+  if (input.inside.empty()) input.inside.assign(input.by_network.size(), 1);
   others.inside = input.inside;
-  for (size_t i = 0; i < input.sure.size(); ++i) (input.sure[i] != 0 ? others : input).inside[i] = 0;
+  for (size_t i = 0; i < input.by_network.size(); ++i) (input.by_network[i] != 0 ? others : input).inside[i] = 0;
   const auto left = std::ranges::count(others.inside, 1), taken = std::ranges::count(input.inside, 1);
   MethodPlan filter = plan;
   filter.method = &*std::ranges::find(EnhanceMethods(), std::string("filter"), &EnhanceMethod::name);
   if (taken == 0) return RunStep(*filter.method, std::move(others), options, report);
   if (left == 0) return RunStep(*plan.method, std::move(input), options, report);
-  LogInfo(Cat("the filter instead of '", plan.method->name, "' for ", WithThousands(left), " of ",
-              WithThousands(left + taken), " Gaussians, whose pixels are not known or which have lost no width"));
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud filtered, RunStep(*filter.method, std::move(others), options, report));
   // Neither takes the other's share of a budget.
   if (options.max_gaussians > 1) {
@@ -396,21 +248,17 @@ Result<Enhanced> EnhanceFromOrigin(GaussianCloud cloud, const EnhanceOptions& op
     input.partly_enhanced = !marks_of_parts.empty();
   }
 
+  if (options.mode) input.cloud.render_mode = options.mode;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SizedMethods sized, FindSizedMethods(plan, options));
-  if (sized.any || options.clean) RecogniseKind(options, input, report);
   if (options.clean) ANCHORSPLAT_RETURN_IF_ERROR(Clean(options, input.cloud, report));
-  const bool unknown_of_few = sized.any && IsUnknownOfFew(options, input.cloud, report.looks);
   if (sized.any) {
-    ANCHORSPLAT_RETURN_IF_ERROR(ChooseWidths(plan, options, unknown_of_few, input, report));
+    ANCHORSPLAT_RETURN_IF_ERROR(ChooseTreatment(options, plan, input, report));
   } else if (IsMarkedEnhanced(input.cloud)) {
     LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
   }
-  if (GivesWidth(input.filter_strength, options.upscale, input.cloud.render_mode)) {
-    ChooseNetwork(options, unknown_of_few, plan, input, report);
-  }
   report.method = plan.Name();
 
-  if (report.pixel_size_source == kUnknownPixelSize) {
+  if (report.pixel_size_source == PixelSizeSource::kUnknown) {
     report.filter_strength = 0;
     report.gaussians_out = input.cloud.size();
     report.seconds_in_all = in_all.Total();
@@ -421,9 +269,9 @@ Result<Enhanced> EnhanceFromOrigin(GaussianCloud cloud, const EnhanceOptions& op
   const Stopwatch watch;
   EnhanceOptions within = options;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud rest, SetRestAside(options, input, within, report));
-  const bool sure_only = report.pixel_size_source == kCautiousPixelSize && TakesSureOnly(plan, input);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, sure_only ? RunOnSure(plan, std::move(input), within, report)
-                                                            : RunPlan(plan, sized, std::move(input), within, report));
+  const bool some = !input.by_network.empty() && plan.start == nullptr;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud out, some ? RunOnSome(plan, std::move(input), within, report)
+                                                       : RunPlan(plan, sized, std::move(input), within, report));
   // Methods that make no copies, and what a region's border leaves of them.
   (void)LeaveOutLeastVisible(within.max_gaussians, out);
   if (options.region) ANCHORSPLAT_RETURN_IF_ERROR(Append(out, rest));

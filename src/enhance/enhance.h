@@ -17,18 +17,16 @@
 #include "core/result.h"
 #include "enhance/model_settings.h"
 #include "enhance/pixel_size.h"
-#include "enhance/pixel_size_guard.h"
-#include "enhance/pixel_sizes_of_things.h"
 #include "enhance/refine_options.h"
-#include "enhance/trained_kind.h"
 #include "enhance/unseen_gaussians.h"
+#include "reading/reading.h"
 
 namespace anchorsplat {
 
 // What every method is told. Spaces: the cloud in stored space, lengths in world units.
 struct EnhanceOptions {
-  // A registered name, or "auto": the best that is ready (but see kCautiousPixelSize). Or two, "A+B": B begins where A
-  // ended, if it can (EnhanceMethod::takes_start).
+  // A registered name, or "auto": what a reading of the splat says is best, of those that are ready. Or two, "A+B": B
+  // begins where A ended, if it can (EnhanceMethod::takes_start).
   std::string method = "auto";
   // Instead of a method, for those who know none: "fast", an instant one; "good", that and gentle refinement; "best",
   // refinement with the pictures of refine.images, "good" where there are none. Empty: `method` says.
@@ -36,10 +34,13 @@ struct EnhanceOptions {
   // What the user gave, by the names that the command line has for it ("filter-strength"). CheckOptions refuses those
   // that would change nothing.
   std::vector<std::string> given;
+  // How the splat was rasterized in training, by the caller, who wants it enhanced as such; else its tag says it, or a
+  // reading of the splat.
+  std::optional<RenderMode> mode;
   double upscale = 4;                     // u ≥ 1: how many times closer the splat will be seen
   std::optional<double> filter_strength;  // f of the filter; DefaultFilterStrength otherwise
   std::optional<double> pixel_size;       // p_LR for all Gaussians; from `cameras`, from the pictures to refine
-                                          // against, or estimated otherwise
+                                          // against, or read off the splat otherwise
   std::optional<CameraSet> cameras;       // the training cameras
   std::optional<int> train_width;         // pixels; see AssumedTrainWidth
   CameraPixelRule camera_rule = CameraPixelRule::kAuto;
@@ -64,10 +65,23 @@ bool IsGiven(const EnhanceOptions& options, std::string_view name);
 
 void SetBudget(EnhanceOptions& options, int64_t max_gaussians);
 
-// The splat says nothing about its pixels, so that no method can know what to do: it has been left as it is.
-inline constexpr const char* kUnknownPixelSize = "unknown";
-// The estimate is contradicted (pixel_size_guard.h); a smaller pixel was taken, and by "auto" the filter.
-inline constexpr const char* kCautiousPixelSize = "cautious";
+// Where pixel sizes are from.
+enum class PixelSizeSource {
+  kNone,      // of methods that need none
+  kGiven,     // the caller says it
+  kCameras,   // the training cameras
+  kPictures,  // the cameras of the pictures to refine against
+  kRead,      // a reading of the splat
+  kUnknown,   // nobody knows: the splat has been left as it is
+};
+std::string_view NameOf(PixelSizeSource source);  // "", "given", "cameras", "pictures", "read", "unknown"
+
+// What was done with a thing that lies apart from others.
+struct PartTreatment {
+  int64_t gaussians = 0;
+  double pixel_size = 0;  // that was taken, world units
+  bool by_network = false;
+};
 
 // Something that a method has to tell: whether it was so; counts, which are whole; measurements, which are not.
 using FactValue = std::variant<bool, int64_t, double>;
@@ -95,18 +109,15 @@ struct EnhanceReport {
   double upscale = 1;
   double filter_strength = 0;
   double pixel_size = 0;  // p_LR, the median when there is one per Gaussian
-  // "given", "cameras", "pictures" (the cameras of those to refine against), "estimated", kCautiousPixelSize or
-  // kUnknownPixelSize; empty for methods that need none.
-  std::string pixel_size_source;
-  std::optional<PixelSizeFinding> finding;  // where it was to be estimated: of the whole splat …
-  std::vector<ThingPixelSize> things;       // … and of its things, where these have each their own
-  std::optional<TrainedKind> looks;         // where neither file nor caller said how the splat was trained
-  std::string camera_rule;                  // "smallest" or "median" where it came from cameras
-  std::optional<int> train_width;           // pixels, given or assumed; nothing when the cameras' own size was taken
-  std::vector<StepReport> steps;            // in their order; none where the splat was left alone
-  bool interrupted = false;                 // one of them was
-  double seconds = 0;                       // of the method itself
-  double seconds_in_all = 0;                // with what is found out before, without reading and writing
+  PixelSizeSource pixel_size_source = PixelSizeSource::kNone;
+  std::optional<Reading> reading;    // of the splat, or of its region; nothing where too little shows
+  std::vector<PartTreatment> parts;  // things that lie apart, each read by itself; none where all is one
+  std::string camera_rule;           // "smallest" or "median" where it came from cameras
+  std::optional<int> train_width;    // pixels, given or assumed; nothing when the cameras' own size was taken
+  std::vector<StepReport> steps;     // in their order; none where the splat was left alone
+  bool interrupted = false;          // one of them was
+  double seconds = 0;                // of the method itself
+  double seconds_in_all = 0;         // with what is found out before, without reading and writing
 };
 
 // The cloud as methods get it: rows that are not finite are gone; p_LR is known to those that need it.
@@ -114,12 +125,9 @@ struct EnhanceInput {
   GaussianCloud cloud;
   Buffer<float> pixel_sizes;  // one for all, or one per Gaussian
   double pixel_size = 0;      // their median
-  double showing = 1;         // PixelSizeEstimate::showing; 1 where nothing was estimated
-  double softness = 1;        // PixelSizeEstimate::softness where cameras say the pixel or it is estimated; else 1
+  double showing = 1;         // Reading::showing; 1 where nothing was read
   double filter_strength = 0;
-  // [N], where the splat is made of things of which some have a pixel size that nothing contradicts: whether it is of
-  // these; else empty.
-  std::vector<char> sure;
+  std::vector<char> by_network;   // [N], where a network is not for all: whether it is for this one; else empty
   bool partly_enhanced = false;   // of another part it says that it has been enhanced: only what is inside tells
   std::vector<char> inside;       // which of the cloud's Gaussians are enhanced: results are of these; empty: all
   GaussianCloud start;            // what the method before it made, of "A+B"; else empty
@@ -160,7 +168,7 @@ struct EnhanceMethod {
   bool (*is_checkpoint)(const std::filesystem::path&) = nullptr;
   bool keeps_when_asked = false;      // only where a checkpoint is named, or --resume says that there may be one
   std::vector<MethodOption> options;  // all that it looks at: this is the only place that says so
-  // False: EnhanceInput::pixel_sizes may be empty, nothing is estimated. Asked once the method is ready. An error: it
+  // False: EnhanceInput::pixel_sizes may be empty, nothing is read. Asked once the method is ready. An error: it
   // could not run.
   std::function<Result<bool>(const EnhanceOptions&)> needs_pixel_size = [](const EnhanceOptions&) { return true; };
   // About how many Gaussians come of `count`, for what has to be known before the work begins.
@@ -213,8 +221,8 @@ struct Enhanced {
   EnhanceReport report;
 };
 
-// Runs the method. Logs what it assumed: pixel size and how sure it is, training width, how a splat that does not say
-// so was trained, why one that was enhanced before is left alone, how many rows were dropped. A result that was given
+// Runs the method. Logs what it assumed: what the splat was read as, training width, why one is left alone, how many
+// rows were dropped. A result that was given
 // width back says so in its comments (enhance/enhanced_mark.h). kBadArgument: that of CheckOptions, both pixel_size and
 // cameras, upscale < 1; kBadFile: no usable Gaussian; and whatever the method reports.
 Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options);

@@ -13,7 +13,6 @@
 #include "core/source_dir_for_test.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
-#include "enhance/pixel_size_guard.h"
 #include "enhance/refine.h"
 #include "enhance/refinement_for_test.h"
 #include "formats/cloud_io.h"
@@ -65,6 +64,7 @@ TEST_F(EnhanceRegion, IsFilteredAsInTheWholeAndTheRestStays) {
   EnhanceOptions options;
   options.method = "filter";
   options.upscale = kUpscale;
+  options.mode = RenderMode::kClassic;
   options.cameras = cameras_;  // a pixel size for each
   const auto whole = Enhance(cloud, options);
   ASSERT_TRUE(whole.ok()) << whole.error().message;
@@ -90,7 +90,7 @@ TEST_F(EnhanceRegion, IsRefinedAndTheRestStays) {
   EnhanceOptions options;
   options.method = "filter+refine";
   options.upscale = kUpscale;
-  options.pixel_size.reset();
+  options.mode = RenderMode::kClassic;
   options.refine = options_;
   options.region = kHalf;
   const int64_t inside = Part(cloud, kHalf, true).size(), rest = cloud.size() - inside;
@@ -116,6 +116,7 @@ TEST_F(EnhanceRegion, IsRefinedAndTheRestStays) {
 TEST_F(EnhanceRegion, TheBudgetIsThatOfTheWhole) {
   EnhanceOptions options;
   options.method = "filter";
+  options.mode = RenderMode::kClassic;
   options.pixel_size = kPixel;
   options.region = kHalf;
   const GaussianCloud rest = Part(input_.cloud, kHalf, false);
@@ -134,6 +135,7 @@ TEST_F(EnhanceRegion, TheBudgetIsThatOfTheWhole) {
 TEST_F(EnhanceRegion, RefusesARegionOfNothing) {
   EnhanceOptions options;
   options.method = "filter";
+  options.mode = RenderMode::kClassic;
   options.pixel_size = kPixel;
   options.region = Region{.low = {50, 50, 50}, .high = {60, 60, 60}};
   const auto result = Enhance(input_.cloud, options);
@@ -145,6 +147,7 @@ TEST_F(EnhanceRegion, RefusesARegionOfNothing) {
 TEST_F(EnhanceRegion, ABudgetBoundsEveryMethod) {
   EnhanceOptions options;
   options.upscale = kUpscale;
+  options.mode = RenderMode::kClassic;
   options.cameras = cameras_;
   options.method = "filter";
   SetBudget(options, 99);
@@ -170,6 +173,7 @@ TEST(Region, AfterAPartTheWholeIsLeftAlone) {
   const GaussianCloud cloud = ReadCloud(SourceDirForTest() / "examples/biplane/input.ply").value();
   EnhanceOptions part;
   part.method = "filter";
+  part.mode = RenderMode::kClassic;
   part.pixel_size = 0.0055;
   part.region = kHalf;
   const Enhanced first = Enhance(cloud, part).value();
@@ -200,14 +204,14 @@ TEST(Region, AnotherPartIsLookedAtAlone) {
   options.method = "filter";
   options.region = kHalf;
   const Enhanced first = Enhance(cloud, options).value();
-  const double whole = FindPixelSize(cloud)->size;
-  ASSERT_TRUE(first.report.finding);
-  EXPECT_EQ(first.report.finding->size, whole) << "all of it says more than a part";
+  const double whole = Read(cloud)->pixel;
+  ASSERT_TRUE(first.report.reading);
+  EXPECT_EQ(first.report.reading->pixel, whole) << "all of it says more than a part";
   options.region = Region{.low = {-100, 0, -100}, .high = {100, 100, 100}};
   const Enhanced second = Enhance(first.cloud, options).value();
-  ASSERT_TRUE(second.report.finding);
-  EXPECT_EQ(second.report.finding->size, FindPixelSize(Part(first.cloud, *options.region, true))->size);
-  EXPECT_LT(second.report.finding->size, 1.2 * whole);
+  ASSERT_TRUE(second.report.reading);
+  EXPECT_EQ(second.report.reading->pixel, Read(Part(first.cloud, *options.region, true))->pixel);
+  EXPECT_LT(second.report.reading->pixel, 1.2 * whole);
   EXPECT_GT(second.report.filter_strength, 0.5);
   options.region = Region{.low = {50, 50, 50}, .high = {60, 60, 60}};
   EXPECT_FALSE(Enhance(first.cloud, options).ok()) << "nothing lies there";

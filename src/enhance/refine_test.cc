@@ -163,6 +163,7 @@ TEST_F(Refinement, TimeCanBeTheBound) {
 
 TEST_F(Refinement, ThroughTheDoor) {
   EnhanceOptions options;
+  options.mode = RenderMode::kClassic;
   options.pixel_size = kPixel;
   options.upscale = kUpscale;
   options.refine = options_;
@@ -171,7 +172,7 @@ TEST_F(Refinement, ThroughTheDoor) {
   EXPECT_EQ(Enhance(input_.cloud, options)->report.method, "refine-images") << "there are pictures";
   options.pixel_size.reset();
   const EnhanceReport from_pictures = Enhance(input_.cloud, options)->report;
-  EXPECT_EQ(from_pictures.pixel_size_source, "pictures");
+  EXPECT_EQ(from_pictures.pixel_size_source, PixelSizeSource::kPictures);
   EXPECT_NEAR(from_pictures.pixel_size, kPixel, 0.1 * kPixel);
   options.pixel_size = kPixel;
   options.method = "filter+refine";
@@ -188,10 +189,12 @@ TEST_F(Refinement, ThroughTheDoor) {
   ASSERT_TRUE(refined.ok()) << refined.error().message;
   EXPECT_EQ(refined->report.method, "refine");
   options.upscale = 1;  // nothing was absorbed that a closer view would miss
-  ExpectSameCloud(Enhance(input_.cloud, options)->cloud, input_.cloud);
+  GaussianCloud same = Enhance(input_.cloud, options)->cloud;
+  EXPECT_EQ(std::exchange(same.render_mode, std::nullopt), RenderMode::kClassic);
+  ExpectSameCloud(same, input_.cloud);
   options.upscale = 4;
-  GaussianCloud antialiased = input_.cloud;
-  antialiased.render_mode = RenderMode::kAntialiased;
+  const GaussianCloud& antialiased = input_.cloud;
+  options.mode = RenderMode::kAntialiased;
   options.method = "filter";
   const GaussianCloud filtered = Enhance(antialiased, options)->cloud;
   for (const char* method : {"refine", "filter+refine"}) {

@@ -224,6 +224,7 @@ TEST(Unseen, EdgeCases) {
 TEST(Unseen, EnhanceCleans) {
   EnhanceOptions options;
   options.method = "filter";
+  options.mode = RenderMode::kClassic;
   options.pixel_size = 0.01;
   options.clean = true;
   const auto cleaned = Enhance(Dusty(0), options);

@@ -258,7 +258,8 @@ TEST(Evaluate, ContactSheetsCarryCredits) {
 TEST(EvalMethods, RefinementTakesOptions) {
   const TestFolder folder, out;
   MakePublishedObject(folder / "ball", ThinBall(), Ball());
-  const std::string few = "refine@steps=2@k=2@f=0.5", one = "refine-images@steps=2@k=1", longer = "refine@steps=3@k=1";
+  const std::string few = "refine@steps=2@k=2@f=0.5", one = "refine-images@steps=2@k=1",
+                    longer = "refine@steps=3@k=1@f=0.5";
   const auto evaluation = Evaluate(folder.path(), Methods({few, one, longer}), out.path(), {});
   ASSERT_TRUE(evaluation.ok() && evaluation->failures.empty());
   EXPECT_THAT(evaluation->methods, ElementsAre(few, one, longer)) << "as they were written";
@@ -270,9 +271,9 @@ TEST(EvalMethods, RefinementTakesOptions) {
   EXPECT_EQ(Evaluate(folder.path(), Methods({few, one, longer}), out.path(), {})->resumed, 3);
 
   const std::string alone = "refine-auto@steps=2@k=1";
-  const auto estimated = Evaluate(folder.path(), Methods({alone}), out.path(), {});
-  ASSERT_TRUE(estimated.ok() && estimated->failures.empty());
-  EXPECT_GT(NumberOf(estimated->Find("ball", alone)->facts.at("pixel_size_ratio")), 0);
+  const auto read = Evaluate(folder.path(), Methods({alone}), out.path(), {});
+  ASSERT_TRUE(read.ok() && read->failures.empty());
+  EXPECT_GT(NumberOf(read->Find("ball", alone)->facts.at("pixel_size_ratio")), 0);
 
   const auto error = [](const std::string& word) {
     const auto method = MakeEvalMethod(word, {});
@@ -288,7 +289,7 @@ TEST(EvalMethods, RefinementTakesOptions) {
   EXPECT_THAT(error("refine@"), HasSubstr("KEY=VALUE"));
   EXPECT_THAT(error("refine-images@hold-out=0"), HasSubstr("benchmark"));
   EXPECT_THAT(error("filter+raw@k=1"), HasSubstr("none of raw"));
-  EXPECT_THAT(error("refine-images-auto"), HasSubstr("nothing is estimated"));
+  EXPECT_THAT(error("refine-images-auto"), HasSubstr("nothing is read off the splat"));
   EXPECT_THAT(error("raw-auto"), HasSubstr("none of raw"));
 }
 
@@ -379,7 +380,9 @@ TEST(Evaluate, MethodsOfEnhanceComeByThemselves) {
          return std::move(input.cloud);
        }});
   const TestFolder folder, out;
-  MakeExampleObject(folder / "ball", ThinBall(), Ball());
+  GaussianCloud thin = ThinBall();
+  thin.render_mode = RenderMode::kClassic;
+  MakeExampleObject(folder / "ball", thin, Ball());
   const auto evaluation = Evaluate(folder.path(), Methods({"thicken"}), out.path(), {});
   ASSERT_TRUE(evaluation.ok()) << evaluation.error().message;
   ASSERT_EQ(evaluation->results.size(), 1u);

@@ -13,7 +13,6 @@
 #include "enhance/enhance.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
-#include "enhance/pixel_size_guard.h"
 #include "eval/bicubic_fit.h"
 #include "eval/filter_sweep.h"
 #include "metrics/bicubic.h"
@@ -23,6 +22,7 @@
 #include "model/compact/shipped_network.h"
 #include "model/model_method.h"
 #include "model/published/enhance_with_published.h"
+#include "reading/reading_model.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
 
@@ -163,7 +163,7 @@ struct RegisteredMethod {
   std::string word;  // as the user wrote it
   std::string name;
   bool auto_pixel_size =
-      false;  // NAME-auto: it gets no cameras and estimates p_LR, as for a user who has the splat alone
+      false;  // NAME-auto: it gets no cameras, p_LR is read off the splat, as for a user who has the splat alone
   RefineOptions refine;
   ModelSettings model;
   std::optional<double> filter_strength;
@@ -176,7 +176,7 @@ struct RegisteredMethod {
     std::string settings = refines ? Cat(ToJsonText(with_pictures), " revision ", kRefineRevision) : "";
     if (refine.seconds) settings += Cat(" ", *refine.seconds, " s");
     if (filter_strength) settings += Cat(" f ", *filter_strength);
-    if (auto_pixel_size) settings += " contradicted estimates are not acted on ";
+    settings += Cat(" reading ", ReadingModel::ShippedIdentity(), " ");  // which may leave a splat alone
     // Refinement with pictures begins with a network's result, too.
     if (name.starts_with("model") || name == "refine-images") {
       settings += ShippedNetworkIdentity() + ChoiceText(model);
@@ -271,8 +271,9 @@ Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word)
     return std::optional<RegisteredMethod>();
   }
   if (method.auto_pixel_size && method.name.ends_with("refine-images")) {
-    return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(word),
-                                              ": the pictures' cameras say the pixel size, nothing is estimated")};
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--methods ", Printable(word),
+                     ": the pictures' cameras say the pixel size, nothing is read off the splat")};
   }
   if (word.size() > name_end && method.name == "filter") {
     return Error{ErrorCode::kBadArgument,

@@ -50,15 +50,15 @@ struct MethodOptions {
 //   raw           the low-quality splat as it is
 //   filter        enhance/filter.h with the true pixel size from the training cameras and one f for all objects
 //   filter@F      the same with f = F
-//   filter-auto   the same with default f and the pixel size estimated from the splat (fact "pixel_size_ratio":
-//                 estimated / true)
+//   filter-auto   the same with default f and the pixel size read off the splat (fact "pixel_size_ratio":
+//                 read / true)
 //   filter-best   the f that measures best on this very object (fact "f"): not a method, the most a filter could do
 //   upsample      the low-resolution picture enlarged by cubic convolution, no 3-D at all
 //   bicubic       a splat fitted anew to the enlarged low-resolution pictures (eval/bicubic_fit.h): minutes per object
 //   FILE          the network of a file of weights, .safetensors or .pth, of either kind (model/any_network.h)
 //   NAME          whatever else is registered with enhance/enhance.h, given the training cameras: "model" for example
 //                 is the network that is part of the program. NAME+NAME: the second begins where the first ended.
-//                 NAME-auto gets no cameras and estimates the pixel size (fact "pixel_size_ratio").
+//                 NAME-auto gets no cameras, the pixel size is read off the splat (fact "pixel_size_ratio").
 //                 Refinement takes options: refine@k=1@steps=400@f=0.6, keys as of SetRefineOption and f of the filter
 // Errors: kBadArgument for other words; kNotFound for files that are not there.
 Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& options);

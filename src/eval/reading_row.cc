@@ -18,8 +18,6 @@
 #include "enhance/enhance.h"
 #include "enhance/filter.h"
 #include "enhance/pixel_size.h"
-#include "enhance/reading_features.h"
-#include "enhance/showing_gaussians.h"
 #include "eval/benchmark.h"
 #include "eval/json_lines.h"
 #include "eval/protocol.h"
@@ -28,6 +26,8 @@
 #include "formats/cloud_io.h"
 #include "io/file_version.h"
 #include "metrics/image_metrics.h"
+#include "reading/features.h"
+#include "reading/showing_gaussians.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
 
@@ -69,6 +69,8 @@ std::string StateOfFolder(const fs::path& folder) {
   return Cat(" ", files, " files ", bytes, " ", last.first, " ", last.second);
 }
 
+constexpr double kOnePixel = 2;  // up to which pixels of one splat count as one
+
 double QuantileOf(Buffer<float> values, double q) { return double{Quantile(values, q)}; }
 
 // Enough of a gain in dB, and of a logarithm. JSON has null for what is not finite.
@@ -93,6 +95,15 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
         task.downscale = value.get<int>();
         if (task.downscale < 1 || task.downscale > kMostDownscale) {
           return bad(Cat("downscale is not from 1 to ", kMostDownscale));
+        }
+      } else if (name == "measure") {
+        task.measure = value.get<bool>();
+      } else if (name == "treat") {
+        task.method = value.at("method").get<std::string>();
+        task.mode = RenderModeNamed(value.at("mode").get<std::string>());
+        task.pixel = value.at("pixel").get<double>();
+        if ((task.method != "filter" && task.method != "network") || !task.mode || !(task.pixel > 0)) {
+          return bad("treat: a method, filter or network, a mode and a pixel");
         }
       } else if (name == "others") {
         if (value.size() != 2 || !value.at("from").is_number_integer())
@@ -130,7 +141,7 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
     return bad("keep, context and others are about gains, which need an object");
   }
   if (task.id.size() > kMostOfName || task.id.front() == '.' || task.id.find('/') != std::string::npos ||
-      Printable(task.id) != task.id) {
+      Printable(task.id, kMostOfName) != task.id) {
     return bad(Cat(Printable(task.id), ": an id is the name of a file, of ", kMostOfName, " bytes at most"));
   }
   return task;
@@ -174,7 +185,10 @@ std::string ReadingRows::StateOf(const ReadingTask& task) const {
 }
 
 Result<const ReadingRows::Object*> ReadingRows::Open(const ReadingTask& task) {
-  if (object_ && object_->folder == task.object && object_->downscale == task.downscale) return object_.get();
+  if (object_ && object_->folder == task.object && object_->downscale == task.downscale &&
+      (!task.measure || !object_->views.empty())) {
+    return object_.get();
+  }
   auto object = std::make_unique<Object>();
   object->folder = task.object;
   object->downscale = task.downscale;
@@ -191,7 +205,7 @@ Result<const ReadingRows::Object*> ReadingRows::Open(const ReadingTask& task) {
     object->low.cameras = fitted.train;
     object->background = whole.background.value_or(object->background);
     PictureCache pictures(whole.held_out, object->background);
-    for (const size_t i : Thinned(all, most)) {
+    for (const size_t i : task.measure ? Thinned(all, most) : std::vector<size_t>()) {
       Object::View& view = object->views.emplace_back();
       view.camera = whole.held_out[i];
       ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(static_cast<int64_t>(i), view.truth, view.ignored));
@@ -202,13 +216,14 @@ Result<const ReadingRows::Object*> ReadingRows::Open(const ReadingTask& task) {
     object->upscale = opened.upscale();
     object->low = opened.low_cameras;
     object->background = opened.background;
-    for (const size_t i : Thinned(opened.held_out, most)) {
+    for (const size_t i : task.measure ? Thinned(opened.held_out, most) : std::vector<size_t>()) {
       Object::View& view = object->views.emplace_back();
       view.camera = opened.views[i];
       ANCHORSPLAT_ASSIGN_OR_RETURN(view.truth, opened.Truth(i));
     }
   }
-  if (object->views.empty()) return Error{ErrorCode::kBadArgument, Cat(task.object.string(), ": no view is held out")};
+  if (task.measure && object->views.empty())
+    return Error{ErrorCode::kBadArgument, Cat(task.object.string(), ": no view is held out")};
   object_ = std::move(object);
   return object_.get();
 }
@@ -270,37 +285,6 @@ Result<GaussianCloud> Treat(const EnhanceMethod& method, const GaussianCloud& cl
   return method.run(std::move(input), options, report);
 }
 
-// What the program does by itself.
-Result<nlohmann::json> Today(const GaussianCloud& cloud, const EnhanceOptions& options, double raw,
-                             Measuring* measuring) {
-  auto done = Enhance(cloud, options);
-  if (!done.ok()) return nlohmann::json{{"error", done.error().message}};
-  const EnhanceReport& report = done->report;
-  nlohmann::json json = {
-      {"method", report.steps.empty() ? "none" : report.method},
-      {"strength", Rounded(report.filter_strength)},
-      {"source", report.pixel_size_source},
-      {"things", report.things.size()},
-      {"seconds", report.seconds_in_all - report.seconds},
-      {"one_size", report.things.empty() && (!report.finding || report.finding->is_one()) &&
-                       report.filter_strength == DefaultFilterStrength(options.upscale, done->cloud.render_mode)},
-      {"looks", nullptr},
-      {"mode", nullptr},
-      {"pixel", report.pixel_size}};
-  if (report.looks) json["looks"] = NameOf(*report.looks);
-  if (done->cloud.render_mode) json["mode"] = NameOf(*done->cloud.render_mode);
-  if (report.finding) {
-    json["low"] = report.finding->estimate.low;
-    json["high"] = report.finding->estimate.high;
-    json["contradictions"] = report.finding->contradictions.size();
-  }
-  if (measuring != nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, measuring->Measure(std::move(done->cloud)));
-    json["gain"] = Rounded(psnr - raw);
-  }
-  return json;
-}
-
 // In which modes a splat may be taken to be: as it is tagged, or in either where it is not.
 std::vector<RenderMode> ModesOf(const GaussianCloud& cloud) {
   if (cloud.render_mode) return {*cloud.render_mode};
@@ -343,24 +327,21 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   if (cloud.render_mode) row["tag"] = NameOf(*cloud.render_mode);
 
   const Stopwatch reading;
-  auto features = ReadFeatures(cloud);
+  auto features = FeaturesOf(cloud);
   row["seconds_reading"] = Rounded(reading.Total());
   double showing = 1;
   if (features.ok()) {
     row["unit"] = features->unit;
     nlohmann::json& values = row["features"] = nlohmann::json::array();
     for (const double value : features->values) values.push_back(Rounded(value));
-    const auto share = std::ranges::find(features->names, "count.share_showing");
-    showing = features->values[static_cast<size_t>(share - features->names.begin())];
+    const auto share = std::ranges::find(FeatureNames(), "count.share_showing");
+    showing = features->values[static_cast<size_t>(share - FeatureNames().begin())];
   } else {
     row["why_no_features"] = features.error().message;
   }
 
   EnhanceOptions options;
-  if (object == nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(row["today"], Today(cloud, options, 0, nullptr));
-    return row;
-  }
+  if (object == nullptr) return row;
   options.upscale = object->upscale;
   Measuring measuring;
   if (task.keep) measuring.keep = FromOrigin(*task.keep, cloud.origin);
@@ -388,11 +369,25 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   Buffer<float> seen;
   for (const int64_t i : FindShowingGaussians(cloud).rows_of_all) seen.push_back(pixels[static_cast<size_t>(i)]);
   if (seen.empty()) seen = pixels;
-  row["pixel"] = QuantileOf(seen, 0.5);
-  row["pixel_10"] = QuantileOf(seen, 0.1);
-  row["pixel_90"] = QuantileOf(seen, 0.9);
+  // Where pixels differ many times, as in a room, one for all must be that of the finest.
+  const double finest = QuantileOf(seen, 0.1), coarsest = QuantileOf(seen, 0.9);
+  row["pixel"] = coarsest > kOnePixel * finest ? finest : QuantileOf(seen, 0.5);
+  row["pixel_10"] = finest;
+  row["pixel_90"] = coarsest;
+  if (!task.measure) return row;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const double raw, measuring.Measure(cloud));
   row["raw"] = Rounded(raw);
+  if (!task.method.empty()) {
+    GaussianCloud as = cloud;
+    as.render_mode = task.mode;
+    const EnhanceMethod* const method = FindMethod(task.method == "network" ? "model" : "filter");
+    if (method == nullptr) return Error{ErrorCode::kBadArgument, "there is no network in this program"};
+    const Buffer<float> one = {static_cast<float>(task.pixel)};
+    ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud treated, Treat(*method, as, one, 1, showing, options));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, measuring.Measure(std::move(treated)));
+    row["gain"] = Rounded(psnr - raw);
+    return row;
+  }
   for (const RenderMode mode : ModesOf(cloud)) {
     GaussianCloud as = cloud;
     as.render_mode = mode;
@@ -407,7 +402,6 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
       }
     }
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(row["today"], Today(cloud, options, raw, &measuring));
   return row;
 }
 

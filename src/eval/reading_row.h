@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/region.h"
+#include "core/render_mode.h"
 #include "core/result.h"
 #include "core/similarity.h"
 
@@ -19,6 +20,9 @@ namespace anchorsplat {
 
 // Pixels that are tried, in multiples of the true ones.
 inline constexpr std::array<double, 7> kReadingMultiples = {0.25, 0.35, 0.5, 0.7, 1, 1.4, 2};
+
+// Parts of the table, by mesh or maker: what decides one has learned from the others.
+inline constexpr int kReadingFolds = 8;
 
 // A splat of which a row is to be made.
 struct ReadingTask {
@@ -31,6 +35,12 @@ struct ReadingTask {
   // gains.
   std::filesystem::path object;
   int downscale = 1;
+  bool measure = true;  // false: of the object only the true pixels are asked for, which takes no pictures
+  // Only what this treatment gains is asked for: "filter" or "network", drawn as `mode`, one pixel for all, world
+  // units.
+  std::string method;
+  std::optional<RenderMode> mode;
+  double pixel = 0;
   // World size of the training pixels of the rows from `others_from` on, which are of something else that was merged
   // in; all others have those that the cameras say. 0: there are none.
   int64_t others_from = 0;

@@ -7,6 +7,8 @@
 
 #include "core/buffer.h"
 #include "core/statistics.h"
+#include "reading/reading.h"
+#include "reading/treatment.h"
 
 namespace anchorsplat {
 
@@ -145,6 +147,24 @@ Decisions GivenDecisions(std::span<const ReadingRow> rows, const std::map<std::s
   for (const ReadingRow& row : rows) {
     const auto found = given.find(row.id);
     decisions.push_back(found == given.end() ? ReadingDecision{} : found->second);
+  }
+  return decisions;
+}
+
+Decisions ReadDecisions(std::span<const ReadingRow> rows, std::span<const ReadingModel> models) {
+  Decisions decisions;
+  for (const ReadingRow& row : rows) {
+    ReadingDecision& decision = decisions.emplace_back();
+    if (row.features.values.empty()) continue;
+    const Reading reading = ReadFrom(row.features, models[static_cast<size_t>(row.fold) % models.size()]);
+    const Treatment treatment = Treat(reading, {.mode = row.tag});
+    decision.low = reading.low;
+    decision.high = reading.high;
+    decision.made = NameOf(reading.likeliest());
+    if (treatment.method == TreatmentMethod::kNone) continue;
+    decision.method = treatment.method == TreatmentMethod::kNetwork ? "network" : "filter";
+    decision.mode = treatment.mode;
+    decision.pixel = treatment.pixel;
   }
   return decisions;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "eval/reading_table.h"
+#include "reading/reading_model.h"
 
 namespace anchorsplat {
 
@@ -39,6 +40,9 @@ Decisions BestDecisions(std::span<const ReadingRow> rows);
 Decisions FixedDecisions(std::span<const ReadingRow> rows, const std::string& method, double& multiple);
 // Rows that `given` does not name are left alone.
 Decisions GivenDecisions(std::span<const ReadingRow> rows, const std::map<std::string, ReadingDecision>& given);
+
+// What Read and Treat say of the rows' features, of each by the model of its fold: models[row.fold] (docs/reading.md).
+Decisions ReadDecisions(std::span<const ReadingRow> rows, std::span<const ReadingModel> models);
 
 // `decisions[i]` is of rows[i]. All rows first, then kinds of splats that nobody has edited, then edits, each in order
 // of their names. Rows without gains count for seconds and for what they are taken for.

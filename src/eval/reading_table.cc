@@ -76,7 +76,14 @@ ReadingRow RowFrom(const json& object) {
       }
     }
   }
-  row.today = TodaysDecision(object.at("today"));
+  if (object.contains("list")) row.today = TodaysDecision(object.at("list"));
+  row.fold = static_cast<int>(NumberAt(object, "fold"));
+  if (object.contains("features")) {
+    row.features.unit = NumberAt(object, "unit");
+    for (const json& value : object.at("features")) {
+      row.features.values.push_back(value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>());
+    }
+  }
   return row;
 }
 
@@ -107,11 +114,13 @@ Result<std::vector<ReadingRow>> ReadReadingTable(const fs::path& path) {
   std::vector<ReadingRow> rows;
   ANCHORSPLAT_RETURN_IF_ERROR(ForEachJsonLine(path, [&](const json& object, int64_t line) -> std::string {
     if (line > 1) {
-      rows.push_back(RowFrom(object));
-      return "";
+      const ReadingRow& row = rows.emplace_back(RowFrom(object));
+      const size_t values = row.features.values.size();
+      return values == 0 || values == FeatureNames().size() ? "" : "not as many features as the first line names";
     }
     const std::vector<double> multiples(kReadingMultiples.begin(), kReadingMultiples.end());
-    const bool known = object.at("table") == "readings" && object.at("multiples") == json(multiples);
+    const bool known = object.at("table") == "readings" && object.at("multiples") == json(multiples) &&
+                       object.at("features") == json(FeatureNames());
     return known ? "" : "not a table of readings of this version";
   }));
   if (rows.empty()) return Error{ErrorCode::kBadFile, Cat(path.string(), ": no rows")};
@@ -142,7 +151,7 @@ Result<std::map<std::string, ReadingDecision>> ReadReadingDecisions(const fs::pa
     by_id[row.id] = &row;
     words.insert(row.made);
   }
-  const std::set<std::string> properties = {"id", "method", "mode", "pixel", "low", "high", "made", "seconds"};
+  const std::set<std::string> properties = {"id", "method", "mode", "pixel", "low", "high", "made", "seconds", "gain"};
   std::map<std::string, ReadingDecision> decisions;
   ANCHORSPLAT_RETURN_IF_ERROR(ForEachJsonLine(path, [&](const json& object, int64_t) -> std::string {
     for (const auto& [name, value] : object.items()) {
@@ -168,6 +177,7 @@ Result<std::map<std::string, ReadingDecision>> ReadReadingDecisions(const fs::pa
     if (!interval && (decision.low != 0 || decision.high != 0)) return "low and high are no interval of lengths";
     decision.made = TextAt(object, "made");
     if (!words.contains(decision.made)) return Cat("made: no row is called ", Printable(decision.made));
+    if (object.contains("gain")) decision.gain = object.at("gain").get<double>();
     decision.seconds = NumberAt(object, "seconds");
     if (!(decision.seconds >= 0 && decision.seconds < kMostSeconds)) return "seconds are no time that a reading takes";
     if (std::string wrong = WrongWith(decision, *row->second); !wrong.empty()) return wrong;

@@ -11,6 +11,7 @@
 #include "core/render_mode.h"
 #include "core/result.h"
 #include "eval/reading_row.h"
+#include "reading/features.h"
 
 namespace anchorsplat {
 
@@ -29,13 +30,15 @@ struct ReadingDecision {
   double seconds = 0;
 };
 
-// A row of the table, without its features.
+// A row of the table.
 struct ReadingRow {
   std::string id, original, mesh, maker, kind, edit, made;
   std::optional<RenderMode> tag;
   double pixel = 0;  // true, median; 0: not known, and there are no gains
   std::map<std::pair<RenderMode, std::string>, ReadingGains> gains;  // by mode and method, "filter" or "network"
-  ReadingDecision today;                                             // the program's own
+  ReadingDecision today;                                             // of the list of rules before there was a model
+  int fold = 0;
+  SplatFeatures features;  // no values: almost nothing of it shows
 
   RenderMode DrawnMode() const;  // as its file says, else classic
   RenderMode TrueMode() const;   // as its file says, else as it was trained

@@ -119,7 +119,7 @@ void AddObjectTable(const Evaluation& evaluation, const std::vector<MethodSummar
   const bool sizes = SummarisePixelSizes(evaluation).has_value();
   std::vector<std::string> heading = {"object"};
   for (const MethodSummary& s : summaries) heading.push_back(Cell(s.method));
-  if (sizes) heading.emplace_back("pixel size, estimated / true");
+  if (sizes) heading.emplace_back("pixel size, read / true");
   text += Row(heading) + Rule(heading.size());
   for (const std::string& object : evaluation.objects) {
     std::vector<std::string> row = {Cell(object)};
@@ -216,7 +216,7 @@ std::string ToMarkdown(const Evaluation& evaluation, const std::vector<MethodSum
   }
   if (const std::string worst = WorstSentence(evaluation); !worst.empty()) text += "\n" + Cell(worst) + "\n";
   if (const auto error = SummarisePixelSizes(evaluation)) {
-    text += Cat("\nPixel size estimated from the splat alone (`filter-auto`): off by ", Fixed(100 * error->median, 1),
+    text += Cat("\nPixel size read off the splat alone (`filter-auto`): off by ", Fixed(100 * error->median, 1),
                 " % in the median, ", Fixed(100 * error->percentile95, 1), " % at the 95th percentile.\n");
   }
   text += "\nPSNR / SSIM per object:\n\n";

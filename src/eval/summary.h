@@ -65,8 +65,8 @@ std::string KindOf(const Evaluation& evaluation, const std::string& object);
 // Mean of values with weights, and its bootstrap interval. At least one value, weights positive.
 Interval BootstrapMean(const std::vector<double>& values, const std::vector<double>& weights, uint64_t seed);
 
-// The share of objects whose estimated pixel size was off by less, as |estimated/true − 1|: median and 95th percentile
-// over the results of "filter-auto".
+// How far pixel sizes were read off the truth, |read/true − 1|, of the results of "filter-auto": median and 95th
+// percentile over the objects.
 struct PixelSizeError {
   int64_t objects = 0;
   double median = 0;

@@ -15,7 +15,6 @@
 #include "core/text.h"
 #include "enhance/filter.h"
 #include "enhance/gaussian_budget.h"
-#include "enhance/pixel_size_features.h"
 #include "enhance/unseen_gaussians.h"
 #include "io/file_version.h"
 #include "model/any_network.h"
@@ -28,6 +27,8 @@ namespace anchorsplat {
 
 namespace {
 
+// Standard fits show at least this share of their Gaussians (Reading::showing), most others less.
+constexpr double kStandardShowing = 0.6;
 // Shares worth a word.
 constexpr double kNotable = 0.01, kMost = 0.5;
 

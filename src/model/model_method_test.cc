@@ -102,13 +102,12 @@ const EnhanceMethod& Registered() {
 TEST_F(SmallModel, AutoPrefersTheModelOnceThereIsAFile) {
   RegisterModelMethod();
   EnhanceOptions options;
+  options.mode = RenderMode::kClassic;
   options.pixel_size = 0.01;
-  auto enhanced = Enhance(RandomCloud(300), options);
-  ASSERT_TRUE(enhanced.ok());
-  EXPECT_EQ(enhanced->report.method, HasShippedNetwork() ? "model" : "filter");
+  EXPECT_EQ(PlanEnhancement(options)->Name(), HasShippedNetwork() ? "model" : "filter");
 
   options.method = "model";
-  enhanced = Enhance(RandomCloud(300), options);
+  auto enhanced = Enhance(RandomCloud(300), options);
   ASSERT_EQ(enhanced.ok(), HasShippedNetwork());
   if (!enhanced.ok()) {
     EXPECT_THAT(enhanced.error().message, testing::HasSubstr("--model"));
@@ -121,7 +120,7 @@ TEST_F(SmallModel, AutoPrefersTheModelOnceThereIsAFile) {
     ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
     EXPECT_EQ(enhanced->report.method, "model");
     EXPECT_EQ(enhanced->report.gaussians_out, 600);
-    EXPECT_TRUE(enhanced->report.pixel_size_source.empty());
+    EXPECT_EQ(enhanced->report.pixel_size_source, PixelSizeSource::kNone);
   }
 }
 

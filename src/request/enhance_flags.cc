@@ -94,10 +94,9 @@ void AddMethodFlags(CLI::App& verb, EnhanceFlags& flags) {
 
 void AddPixelSizeFlags(CLI::App& verb, EnhanceFlags& flags) {
   EnhanceOptions& options = flags.options;
-  verb.add_option(
-          "--pixel-size", flags.pixel_size,
-          "World size of one pixel of the training views (depth / focal length), or auto to estimate it from the "
-          "splat; an estimate that its other features contradict is not acted on")
+  verb.add_option("--pixel-size", flags.pixel_size,
+                  "World size of one pixel of the training views (depth / focal length), or auto: it is read off the "
+                  "splat")
       ->capture_default_str();
   AddModeOption(verb, flags.mode,
                 "How the inputs were rasterized in training (default: a file's tag, else as its Gaussians look)");
@@ -193,6 +192,7 @@ Result<EnhanceOptions> MakeEnhanceOptions(const EnhanceFlags& flags, uint64_t se
     ANCHORSPLAT_ASSIGN_OR_RETURN(options.region, ParseRegion("--region", flags.region));
   }
   options.seed = seed;
+  options.mode = flags.mode;
   ANCHORSPLAT_ASSIGN_OR_RETURN(options.pixel_size, ParsePixelSize("--pixel-size", flags.pixel_size));
   if (cameras != nullptr) {
     options.cameras = *cameras;
@@ -224,21 +224,16 @@ nlohmann::json ToJson(const EnhanceReport& r) {
     }
     if (step.plan) json[key]["plan"] = ToJson(*step.plan);
   }
-  if (!r.pixel_size_source.empty()) {
+  if (r.pixel_size_source != PixelSizeSource::kNone) {
     json["upscale"] = r.upscale;
     json["filter_strength"] = r.filter_strength;
-    if (r.looks) json["looks"] = NameOf(*r.looks);
-    json["pixel_size"] = {{"value", r.pixel_size}, {"source", r.pixel_size_source}};
-    if (r.pixel_size_source == kUnknownPixelSize) json["pixel_size"]["value"] = nullptr;
-    if (r.finding) {
-      json["pixel_size"]["estimate"] = r.finding->estimate.size;
-      json["pixel_size"]["contradictions"] = r.things.empty() ? r.finding->contradictions : ContradictionsOf(r.things);
-      json["pixel_size"]["cut_outlines"] = r.finding->estimate.cut_outlines;
-      json["pixel_size"]["coarse_outlines"] = r.finding->estimate.coarse_outlines;
-      json["pixel_size"]["softness"] = r.finding->estimate.softness;
-      json["pixel_size"]["unsure"] = r.pixel_size_source == kCautiousPixelSize;
+    json["pixel_size"] = {{"value", r.pixel_size}, {"source", NameOf(r.pixel_size_source)}};
+    if (r.pixel_size_source == PixelSizeSource::kUnknown) json["pixel_size"]["value"] = nullptr;
+    if (r.reading) json["reading"] = ToJson(*r.reading);
+    for (const PartTreatment& part : r.parts) {
+      json["parts"].push_back(
+          {{"gaussians", part.gaussians}, {"pixel_size", part.pixel_size}, {"by_network", part.by_network}});
     }
-    if (!r.things.empty()) json["pixel_size"]["things"] = ToJson(r.things);
     if (!r.camera_rule.empty()) json["camera_rule"] = r.camera_rule;
     if (r.train_width) json["train_width"] = *r.train_width;
   }

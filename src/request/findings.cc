@@ -15,15 +15,12 @@
 #include "core/text.h"
 #include "core/world_up.h"
 #include "enhance/enhanced_mark.h"
-#include "enhance/filter.h"
-#include "enhance/network_choice.h"
-#include "enhance/showing_gaussians.h"
-#include "enhance/soft_pictures.h"
 #include "formats/gsplat_checkpoint/gsplat_checkpoint.h"
 #include "formats/registry.h"
 #include "io/input_file.h"
 #include "model/compact/compact_network.h"
 #include "model/published/published_checkpoint_writer.h"
+#include "reading/showing_gaussians.h"
 #include "tensors/tensor_file.h"
 
 namespace anchorsplat {
@@ -75,25 +72,16 @@ Status LookAt(CloudBlocks& blocks, const std::function<CloudView()>& whole, Spla
   ANCHORSPLAT_RETURN_IF_ERROR(Study(blocks, studies));
   findings.statistics = statistics.Find();
   ShowingGaussians showing = study.Take();
-  findings.looks =
-      BesideSoftness(TrainedKindOf(showing.all, {showing.rows_of_all, whole}), findings.render_mode, showing);
-  const auto beside_tag = BesideTag(findings.looks, findings.render_mode, showing.all.size());
-  // As `enhance` takes it.
-  const bool untold = !findings.render_mode && !findings.lost_no_width;
-  const bool antialiased = untold && findings.looks == TrainedKind::kAntialiased;
-  const auto mode = antialiased ? std::optional(RenderMode::kAntialiased) : findings.render_mode;
-  TellingGaussians telling = showing.telling;
-  telling.cloud.render_mode = mode;
-  findings.lost_width = FindLostWidth(said, beside_tag, kInfoUpscale, findings.statistics.gaussians);
-  // What shows is looked at for it where the kind is unclear.
-  const GaussianCloud all = beside_tag == TrainedKind::kUnclear ? showing.all : GaussianCloud();
-  findings.pixel_size = FindPixelSize(std::move(showing), mode);
-  if (findings.pixel_size.ok()) {
-    findings.things = FindPixelSizesOfThings(telling.cloud, *findings.pixel_size, true, {telling.rows, whole}).things;
-    if (findings.things.empty() && findings.lost_width.strength > 0) {
-      findings.share_for_network =
-          ShareForNetwork(beside_tag, all, findings.statistics.gaussians, *findings.pixel_size);
-    }
+  // Harmonics of all are looked at where all are in memory.
+  CloudView all = whole();
+  if (all.size() != blocks.size()) {
+    all = showing.all;
+    for (size_t i = 0; i < showing.rows_of_all.size(); ++i) showing.rows_of_all[i] = static_cast<int64_t>(i);
+  }
+  all.render_mode = findings.render_mode;
+  findings.reading = Read(all, showing);
+  if (findings.reading.ok() && !findings.lost_no_width) {
+    findings.treatment = Treat(*findings.reading, {.mode = findings.render_mode});
   }
   findings.problems = Problems(findings.statistics);
   return {};
@@ -126,69 +114,22 @@ Result<ModelFindings> LookAtCheckpoint(const std::string& path) {
 
 }  // namespace
 
-std::string_view InWords(const std::optional<TrainedKind>& kind) {
-  if (!kind) return "like nothing: too few Gaussians to tell";
-  switch (*kind) {
-    case TrainedKind::kAntialiased:
-      return "like an antialiased one";
-    case TrainedKind::kWidened:
-      return "like one of Mip-Splatting, or enhanced already";
-    case TrainedKind::kEnhanced:
-      return "like one that a network has enhanced already";
-    case TrainedKind::kRaised:
-      return "like one whose opacities have been raised since";
-    case TrainedKind::kUnclear:
-      return "neither like a classic nor an antialiased one, or changed since";
-    default:
-      return "like a classic one";
-  }
+std::string LooksInWords(const SplatFindings& f) {
+  if (!f.reading.ok()) return "nothing: too little of it shows";
+  const Made made = f.reading->likeliest();
+  const double share = std::min(f.reading->probability(made), 0.99);
+  return Cat(InWords(made), " (", std::lround(100 * share), " %)");
 }
 
-namespace {
-
-std::string_view Doubts(const SplatFindings& f) {
-  if (!f.pixel_size.ok()) {
-    return ", but of a pixel of which nothing is known: enhance leaves the splat alone without --pixel-size or "
-           "--cameras";
+std::string TreatmentInWords(const SplatFindings& f) {
+  if (f.lost_no_width) return "nothing: its comments say that it has lost no width";
+  if (!f.reading.ok()) return "nothing without --pixel-size or --cameras: too little of it shows";
+  if (f.treatment.method == TreatmentMethod::kNone) {
+    return HasItsWidth(f.reading->likeliest()) ? "nothing: it has its width"
+                                               : "nothing, as nothing is sure to make it better";
   }
-  const bool doubtful = f.things.empty() ? f.pixel_size->contradicted() : !ContradictionsOf(f.things).empty();
-  return doubtful ? ", but of a pixel whose size is doubtful: see below" : "";
-}
-
-}  // namespace
-
-// What `enhance` would do about it.
-std::string LostWidthInWords(const SplatFindings& f) {
-  const LostWidth& lost = f.lost_width;
-  const auto share = [&] {
-    return Cat(Fixed(lost.strength, 2), " of 0.3 px² at ", kInfoUpscale, "x",
-               !lost.likely()      ? " (unsure, so little)"
-               : f.pixel_size.ok() ? " (likely)"
-                                   : "");
-  };
-  switch (lost.reason) {
-    case LostWidthReason::kFittedToAreas:
-      return "none: the file says that it was fitted to the areas of pixels; enhance leaves it alone";
-    case LostWidthReason::kMarkedEnhanced:
-      return "none any more: the file says that it has been enhanced; enhance leaves it alone";
-    case LostWidthReason::kPartMarked:
-      return "unsure: the file says that a part of it has been enhanced; enhance leaves the whole alone, and takes "
-             "another --region";
-    case LostWidthReason::kWidened:
-      return "none (likely): even the thinnest Gaussians have a width; enhance leaves it alone";
-    case LostWidthReason::kWidenedButTagged:
-      return "none (likely): whatever its tag says, even the thinnest Gaussians have a width; enhance leaves it alone";
-    case LostWidthReason::kLooksEnhanced:
-    case LostWidthReason::kEnhancedButTagged:
-      return "none any more (likely): the Gaussians lie in twins, as a network leaves them; enhance leaves it alone";
-    case LostWidthReason::kTooFew:
-      if (lost.strength < DefaultFilterStrength(kInfoUpscale)) break;
-      return Cat(Fixed(lost.strength, 2), " of 0.3 px² at ", kInfoUpscale, "x (unsure: taken for a classic one)",
-                 Doubts(f));
-    default:
-      break;
-  }
-  return Cat(share(), Doubts(f));
+  return Cat(f.treatment.method == TreatmentMethod::kNetwork ? "a network" : "the filter", " at pixels of ",
+             f.treatment.pixel, "; ", Fixed(f.treatment.gain, 1), " dB are expected at ", kInfoUpscale, "x");
 }
 
 Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& name) {
@@ -222,15 +163,15 @@ SplatFindings InspectSplat(const CloudView& cloud) {
   return findings;
 }
 
-nlohmann::json ToJson(std::span<const ThingPixelSize> things) {
-  nlohmann::json json = nlohmann::json::array();
-  for (const auto& [gaussians, finding] : things) {
-    json.push_back({{"gaussians", gaussians},
-                    {"value", finding.size},
-                    {"estimate", finding.estimate.size},
-                    {"contradictions", finding.contradictions}});
-  }
-  return json;
+nlohmann::json ToJson(const Reading& reading) {
+  nlohmann::json made;
+  for (size_t k = 0; k < kMadeCount; ++k) made[NameOf(static_cast<Made>(k))] = reading.made[k];
+  return {{"looks", NameOf(reading.likeliest())},
+          {"probabilities", made},
+          {"pixel", reading.pixel},
+          {"low", reading.low},
+          {"high", reading.high},
+          {"strangeness", reading.strangeness}};
 }
 
 nlohmann::json ToJson(const SplatFindings& f) {
@@ -248,19 +189,14 @@ nlohmann::json ToJson(const SplatFindings& f) {
                          {"sh_degree", s.sh_degree},
                          {"bounds", nullptr},
                          {"render_mode", nullptr},
-                         {"looks", nullptr},
-                         {"lost_width",
-                          {{"strength", f.lost_width.strength},
-                           {"upscale", kInfoUpscale},
-                           {"likely", f.lost_width.likely()},
-                           {"because", NameOf(f.lost_width.reason)}}},
+                         {"reading", nullptr},
+                         {"treatment", {{"method", "none"}, {"upscale", kInfoUpscale}}},
                          {"comments", f.comments},
                          {"credits", CreditsOf(f.comments)},
                          {"largest_axis", percentiles(s.largest_axis)},
                          {"smallest_axis", percentiles(s.smallest_axis)},
                          {"axis_ratio", percentiles(s.axis_ratio)},
                          {"opacity", percentiles(s.opacity)},
-                         {"pixel_size", nullptr},
                          {"counts",
                           {{"not_finite", s.not_finite},
                            {"zero_quaternions", s.zero_quaternions},
@@ -286,22 +222,13 @@ nlohmann::json ToJson(const SplatFindings& f) {
   }
   if (const auto up = UpOf(f.comments)) json["up"] = *up;
   if (f.render_mode) json["render_mode"] = NameOf(*f.render_mode);
-  if (f.looks) json["looks"] = NameOf(*f.looks);
-  if (f.pixel_size.ok()) {
-    json["pixel_size"] = {
-        {"estimate", f.pixel_size->estimate.size},
-        {"low", f.pixel_size->estimate.low},
-        {"high", f.pixel_size->estimate.high},
-        {"contradictions", f.things.empty() ? f.pixel_size->contradictions : ContradictionsOf(f.things)},
-        {"cut_outlines", f.pixel_size->estimate.cut_outlines},
-        {"coarse_outlines", f.pixel_size->estimate.coarse_outlines},
-        {"softness", f.pixel_size->estimate.softness},
-        {"used", f.share_for_network * f.pixel_size->size}};
-    if (!f.things.empty()) {
-      const auto size_of = [](const ThingPixelSize& thing) { return thing.finding.size; };
-      json["pixel_size"]["used"] = f.share_for_network * size_of(std::ranges::max(f.things, {}, size_of));
-      json["pixel_size"]["things"] = ToJson(f.things);
-    }
+  if (f.reading.ok()) json["reading"] = ToJson(*f.reading);
+  if (f.treatment.method != TreatmentMethod::kNone) {
+    json["treatment"] = {{"method", f.treatment.method == TreatmentMethod::kNetwork ? "network" : "filter"},
+                         {"mode", NameOf(f.treatment.mode)},
+                         {"pixel", f.treatment.pixel},
+                         {"gain", f.treatment.gain},
+                         {"upscale", kInfoUpscale}};
   }
   for (const SplatFormat& format : Formats()) {
     if (format.write == nullptr || format.predicted_size == nullptr) continue;

@@ -14,11 +14,8 @@
 #include "core/cloud_view.h"
 #include "core/result.h"
 #include "core/statistics.h"
-#include "enhance/lost_width.h"
-#include "enhance/pixel_size_guard.h"
-#include "enhance/pixel_sizes_of_things.h"
-#include "enhance/trained_kind.h"
 #include "formats/opened_splat.h"
+#include "reading/treatment.h"
 
 namespace anchorsplat {
 
@@ -33,20 +30,17 @@ struct SplatFindings {
   WorldOrigin origin = {0, 0, 0};  // of the means
   bool lost_no_width = false;      // HasLostNoWidth (enhance/enhanced_mark.h)
   CloudStatistics statistics;
-  Result<PixelSizeFinding> pixel_size = Error{};
-  double share_for_network = 1;        // ShareForNetwork
-  std::vector<ThingPixelSize> things;  // that lie apart and have each a pixel size of their own; mostly none
-  std::optional<TrainedKind> looks;   // by its sizes, whatever the file says; nothing where there are too few Gaussians
-  LostWidth lost_width;               // at kInfoUpscale, as `enhance` gives it back
+  Result<Reading> reading = Error{};  // of what shows
+  Treatment treatment;                // what `enhance` would do by itself, at kInfoUpscale
   std::vector<std::string> problems;  // sentences
 };
 
 inline constexpr double kInfoUpscale = 4;  // the default zoom of `enhance`
 
-// Ends of sentences. "It looks like a classic one"; "lost width: 0.73 of 0.3 px² at 4x (likely)", with what `enhance`
-// would do about it.
-std::string_view InWords(const std::optional<TrainedKind>& looks);
-std::string LostWidthInWords(const SplatFindings& findings);
+// What it looks like and what `enhance` would do about it: "a classic splat (98 %)"; "a network at pixels of 0.01, for
+// 3.1 dB at 4x".
+std::string LooksInWords(const SplatFindings& findings);
+std::string TreatmentInWords(const SplatFindings& findings);
 
 // `name` is the file's, for people. The same numbers with any number of threads, whatever of the file is in memory.
 // Errors: of reading.
@@ -54,7 +48,7 @@ Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& n
 // Of a splat in memory: without format and size of a file.
 SplatFindings InspectSplat(const CloudView& cloud);
 nlohmann::json ToJson(const SplatFindings& findings);
-nlohmann::json ToJson(std::span<const ThingPixelSize> things);
+nlohmann::json ToJson(const Reading& reading);
 
 // What is in a network's weights.
 struct NetworkFindings {

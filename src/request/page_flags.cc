@@ -11,8 +11,8 @@
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
-#include "enhance/pixel_size_guard.h"
 #include "io/input_record.h"
+#include "reading/reading.h"
 #include "render/shown_range.h"
 #include "request/choice.h"
 #include "request/mode_option.h"
@@ -79,7 +79,7 @@ void PageFlags::AddTo(CLI::App& verb) {
       ->capture_default_str()
       ->needs(cameras_option);
   verb.add_option("--pixel-size", pixel_size,
-                  "World size of one training pixel, for the scale bar; auto: estimated from BEFORE")
+                  "World size of one training pixel, for the scale bar; auto: read off BEFORE")
       ->capture_default_str();
   verb.add_option("--sh-degree", sh_degree, "Keep view-dependent colour up to this degree: 0 makes small pages")
       ->check(CLI::Range(0, kMaxShDegree))
@@ -125,8 +125,8 @@ void LookAtSplats(ViewerPage& page) {
   }
   if (page.pixel_size || !page.before) return;
   // Of what was trained; what came out of it says less. A splat with too little to say gets no scale bar.
-  if (const auto found = FindPixelSize(*page.before->cloud); found.ok() && !found->contradicted()) {
-    page.pixel_size = static_cast<float>(found->size);
+  if (const auto reading = Read(*page.before->cloud); reading.ok()) {
+    page.pixel_size = static_cast<float>(reading->pixel);
   }
 }
 

@@ -20,11 +20,8 @@
 #include "core/text.h"
 #include "core/world_up.h"
 #include "enhance/enhance.h"
+#include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
-#include "enhance/lost_width.h"
-#include "enhance/showing_gaussians.h"
-#include "enhance/soft_pictures.h"
-#include "enhance/trained_kind.h"
 #include "formats/cloud_bytes.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
@@ -35,6 +32,7 @@
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
 #include "request/enhance_flags.h"
+#include "reading/treatment.h"
 #include "request/findings.h"
 #include "request/page_flags.h"
 #include "request/parse.h"
@@ -309,8 +307,8 @@ Result<Engine::Answer> Engine::Info(const Json& request) {
   findings.file_bytes = found->bytes;
   Answer answer;
   answer.json = ToJson(findings);
-  answer.json["looks_in_words"] = InWords(findings.looks);
-  answer.json["lost_width_in_words"] = LostWidthInWords(findings);
+  answer.json["looks_in_words"] = LooksInWords(findings);
+  answer.json["treatment_in_words"] = TreatmentInWords(findings);
   return answer;
 }
 
@@ -323,9 +321,7 @@ Result<Engine::Answer> Engine::Enhance(const Json& request) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const EnhanceOptions options,
                                MakeEnhanceOptions(flags, static_cast<uint64_t>(seed), cameras));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckAddresses(open->cloud, options));
-  GaussianCloud cloud = open->cloud;
-  if (flags.mode) cloud.render_mode = flags.mode;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, anchorsplat::Enhance(std::move(cloud), options));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, anchorsplat::Enhance(open->cloud, options));
   if (options.cameras && !UpOf(enhanced.cloud.comments)) {
     if (const auto up = WorldUp(options.cameras->cameras)) enhanced.cloud.comments.push_back(UpComment(*up));
   }
@@ -343,11 +339,12 @@ Result<Engine::Answer> Engine::Filter(const Json& request) {
   const double upscale = value != nullptr && value->is_number() ? value->get<double>() : 4;
   if (!(upscale >= 1 && upscale <= 1e6)) return BadRequest("says an 'upscale' that is not from 1 to 1000000");
   const GaussianCloud& cloud = open->cloud;
-  const ShowingGaussians showing = FindShowingGaussians(cloud);
-  const auto kind = BesideSoftness(TrainedKindOf(cloud, showing), cloud.render_mode, showing);
-  const LostWidth lost = FindLostWidth(cloud, BesideTag(kind, cloud.render_mode, showing.all.size()), upscale);
+  const auto reading = HasLostNoWidth(cloud) ? Result<Reading>(Error{}) : Read(cloud);
+  const Treatment treatment = reading.ok() ? Treat(*reading, {.mode = cloud.render_mode}) : Treatment{};
+  const bool none = treatment.method == TreatmentMethod::kNone;
+  const double strength = none ? 0 : DefaultFilterStrength(upscale, treatment.mode);
   Answer answer;
-  const double gain = double{kDilation} * (lost.strength - ShownStrength(upscale, cloud.render_mode));
+  const double gain = double{kDilation} * (strength - ShownStrength(upscale, cloud.render_mode));
   answer.json = {{"gain", std::max(0.0, gain)}};
   return answer;
 }

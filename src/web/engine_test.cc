@@ -80,8 +80,9 @@ TEST_F(EngineTest, ColumnsCanBePutBack) {
 
 TEST_F(EngineTest, EnhancesWithTheWordsOfTheCommandLine) {
   const int64_t cloud = OpenExample();
-  const Json filtered =
-      Ask({{"verb", "enhance"}, {"cloud", cloud}, {"words", {"--method=filter", "--upscale=2", "--pixel-size=0.01"}}});
+  const Json filtered = Ask({{"verb", "enhance"},
+                             {"cloud", cloud},
+                             {"words", {"--method=filter", "--upscale=2", "--pixel-size=0.01", "--mode=classic"}}});
   ASSERT_FALSE(filtered.contains("error")) << filtered;
   EXPECT_EQ(filtered.at("report").at("upscale"), 2);
   EXPECT_EQ(filtered.at("report").at("pixel_size").at("value"), 0.01);
@@ -111,9 +112,10 @@ TEST_F(EngineTest, EnhancesARegionWithinABudget) {
   const auto kept = static_cast<int64_t>(outside.size() / 3);
   ASSERT_GT(kept, 0);
   ASSERT_LT(kept, count);
-  const Json made = Ask({{"verb", "enhance"},
-                         {"cloud", cloud},
-                         {"words", {"--region=0,0,0,0.3", "--max-gaussians=" + std::to_string(count + 5)}}});
+  const Json made =
+      Ask({{"verb", "enhance"},
+           {"cloud", cloud},
+           {"words", {"--region=0,0,0,0.3", "--mode=classic", "--max-gaussians=" + std::to_string(count + 5)}}});
   ASSERT_FALSE(made.contains("error")) << made;
   EXPECT_EQ(made.at("report").at("region").at("kept_outside"), kept);
   EXPECT_LE(made.at("gaussians"), count + 5);
@@ -137,8 +139,9 @@ TEST_F(EngineTest, TheGainIsWhatTheFilterAdds) {
     return std::exp(double{value});
   };
   const double before = first_scale(cloud);
-  const Json made =
-      Ask({{"verb", "enhance"}, {"cloud", cloud}, {"words", {"--method=filter", "--upscale=3", "--pixel-size=0.02"}}});
+  const Json made = Ask({{"verb", "enhance"},
+                         {"cloud", cloud},
+                         {"words", {"--method=filter", "--upscale=3", "--pixel-size=0.02", "--mode=classic"}}});
   const double after = first_scale(made.at("cloud"));
   EXPECT_NEAR(after * after, before * before + gain * kPixel * kPixel, 1e-6 * after * after);
 }
@@ -152,7 +155,7 @@ TEST_F(EngineTest, CamerasAreReadFromTheirFiles) {
   EXPECT_GT(cameras.at("views").get<int>(), 1);
   const Json made = Ask({{"verb", "enhance"},
                          {"cloud", OpenExample()},
-                         {"words", {"--method=filter", "--camera-rule=median"}},
+                         {"words", {"--method=filter", "--camera-rule=median", "--mode=classic"}},
                          {"cameras", cameras.at("cameras")}});
   ASSERT_FALSE(made.contains("error")) << made;
   EXPECT_EQ(made.at("report").at("pixel_size").at("source"), "cameras");

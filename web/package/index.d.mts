@@ -142,7 +142,7 @@ export class Splat {
   readonly origin: [number, number, number];
   /** Of its file; null: it came from no file. */
   readonly format: string | null;
-  /** What `anchorsplat info --json` says. */
+  /** What `anchorsplat info --json` says; `reading` and `treatment` are what it looks like and what would help it. */
   info(): Promise<Record<string, unknown>>;
   enhance(options?: EnhanceOptions): Promise<{splat: Splat; report: Record<string, unknown>}>;
   /** Variance that the filter adds to every axis, for a training pixel of size 1. */

@@ -146,9 +146,10 @@ function preview() {
 
 // What the engine says as the command line does, in words of this page, a sentence each.
 function sentence(text) {
-  const here = text.replace('--pixel-size or --cameras would tell', 'the slider or training cameras would tell')
-    .replace(/[.;:]? --filter-strength F overrides it/, '').replace(/ \(--[^)]*\)/g, '')
-    .replace(/--pixel-size/g, 'the slider').replace(/--cameras/g, 'training cameras')
+  const here = text.replace('--pixel-size or --cameras tells', 'The slider or training cameras tell')
+    .replace(/--cameras, --pixel-size or --mode \w+ says more about it/, 'The slider or training cameras say more about it')
+    .replace(/[.?]? --(filter-strength F|mode \w+) enhances it all the same/, '').replace(/ --mode says that they are$/, '')
+    .replace(/ \(--[^)]*\)/g, '').replace(/--pixel-size/g, 'the slider').replace(/--cameras/g, 'training cameras')
     .replace(/--region/g, 'only a part').replace(/--max-gaussians/g, 'Gaussians at most');
   return here.charAt(0).toUpperCase() + here.slice(1) + (/[.?!]$/.test(here) ? '' : '.');
 }
@@ -156,7 +157,7 @@ function sentence(text) {
 // The pixel size.
 
 // Where the slider is 0: what the engine would take.
-const estimate = () => (input.info.pixel_size ? input.info.pixel_size.used : null);
+const estimate = () => input.info.treatment.pixel ?? input.info.reading?.pixel ?? null;
 // Nothing is known of very small or odd splats: then a person's eye goes by the size of the Gaussians.
 const middle = () => estimate() ?? (Math.max(input.info.largest_axis.p50, 1e-9) || 1e-3);
 function pixelSize() {
@@ -166,23 +167,13 @@ function pixelSize() {
 
 function tellPixelSize() {
   const size = pixelSize();
-  const unsure = input.info.pixel_size && input.info.pixel_size.contradictions.length > 0;
-  const source = chosen ? '' : unsure ? ' (made smaller)' : ' (estimated)';
+  const source = chosen ? '' : ' (read from the splat)';
   byId('pixel-value').textContent = size === null ? 'not known' : `${size.toPrecision(3)}${source}`;
   if (cameras) {
     byId('cameras-about').textContent = `${number(cameras.count)} cameras: ` + (chosen
       ? 'not used, as the slider says one size for all. Estimate takes them again.'
       : 'Enhance takes the size of every Gaussian\'s pixel from them. The preview shows one size for all.');
   }
-}
-
-// How much of what a fit in the classic mode has lost is given back.
-const CLASSIC_LOSS = 0.74;
-function lostWidth({strength, upscale, likely}) {
-  if (strength < 0.02) return `Seen ${upscale}× closer it has lost no width that could be given back.`;
-  const share = Math.round(100 * strength / CLASSIC_LOSS);
-  const much = share > 90 ? 'as much width as usual' : `${share} % of the usual width`;
-  return `Seen ${upscale}× closer its Gaussians are too thin: it is given back ${much}${likely ? '' : ', as little is sure'}.`;
 }
 
 // What the file is, in words.
@@ -199,20 +190,13 @@ function describe({info, name, bytes}) {
   };
   say(`${number(info.gaussians)} Gaussians, ${info.format}, ${sizeText(bytes)}, colour of SH degree ${info.sh_degree}.`);
   if (info.render_mode) say(`It says that it was trained as ${info.render_mode}.`);
-  else say(`It looks ${info.looks_in_words}.`);
-  say(lostWidth(info.lost_width));
-  if (info.pixel_size) {
-    const {low, high, contradictions} = info.pixel_size;
-    say(`A pixel of its training pictures covered about ${info.pixel_size.estimate.toPrecision(3)} of its units ` +
+  else say(`It looks like ${info.looks_in_words}.`);
+  say(sentence(`Enhance ${info.treatment.method === 'none' ? 'does' : 'takes'} ${info.treatment_in_words}`));
+  if (info.reading) {
+    const {pixel, low, high, strangeness} = info.reading;
+    say(`A pixel of its training pictures covered about ${pixel.toPrecision(3)} of its units ` +
       `(likely ${low.toPrecision(2)} to ${high.toPrecision(2)}).`);
-    const things = info.pixel_size.things ?? [];
-    if (things.length > 0) {
-      say(`It is made of ${things.length} things that lie apart, and each gets what its own outlines say. ` +
-        'The preview shows one size for all.');
-    }
-    if (contradictions.length > 0) {
-      say(`That is unsure: ${contradictions.join('; ')}. So a smaller pixel is taken; look for yourself with the slider.`);
-    }
+    if (strangeness > 1) say('Few splats are like it, so that may be wrong: look for yourself with the slider.');
   } else {
     say('How large a pixel of its training pictures was cannot be told: the slider decides.');
   }
@@ -246,7 +230,7 @@ async function openFile(file) {
     chosen = false;
     dropCameras();
     // Far enough for what the page says is likely, also where a smaller pixel is taken instead.
-    byId('pixel').max = String(Math.max(2.5, info.pixel_size ? Math.ceil(Math.log2(info.pixel_size.high / info.pixel_size.used)) + 1 : 0));
+    byId('pixel').max = String(Math.max(2.5, info.reading ? Math.ceil(Math.log2(info.reading.high / estimate())) + 1 : 0));
     byId('pixel').value = '0';
     byId('done').textContent = '';
     for (const before of old) if (before) await before.close().catch(() => {});

@@ -43,10 +43,10 @@ class EnhanceOptions(Options):
     )
     upscale: float = Field(4.0, ge=1, le=64, description="how many times closer it will be seen")
     pixel_size: Union[Literal["auto"], Annotated[float, Field(gt=0, lt=1e9)]] = Field(
-        "auto", description="world size of one pixel of the training views; auto: estimated, or of the cameras"
+        "auto", description="world size of one pixel of the training views; auto: of the cameras, else read from the splat"
     )
     mode: Mode | None = Field(
-        None, description="how it was rasterized in training; default: the file's tag, else as its Gaussians look"
+        None, description="how it was rasterized in training; default: the file's tag, else as the splat looks"
     )
     copies: Union[Literal["auto"], Annotated[int, Field(ge=1, le=4)]] = Field(
         "auto", description="Gaussians made of each, at most"

@@ -9,10 +9,14 @@ _METHODS = {
     "filter+refine": "the filter, then refinement",
     "refine": "refinement",
 }
-_MODES = {
-    "classic": "as a standard fit (classic rasterization)",
-    "antialiased": "with antialiasing",
-    "mip": "with Mip-Splatting's filter",
+_LOOKS = {
+    "classic": "a classic splat",
+    "antialiased": "an antialiased splat",
+    "mip": "a splat of Mip-Splatting",
+    "filtered": "a splat that was widened before",
+    "enhanced": "a splat that a network has enhanced before",
+    "raised": "a splat whose opacities were raised",
+    "mesh": "points of a mesh",
 }
 
 
@@ -53,10 +57,7 @@ def _enhanced(row: dict) -> list[str]:
             f"Of these {_count(region.get('gaussians'))} lie in the region and were enhanced; "
             f"{_count(region['kept_outside'])} outside of it stay as they were."
         )
-    if row.get("looks"):
-        out.append(
-            f"The file does not say how it was trained; it looks trained {_MODES.get(row['looks'], row['looks'])}."
-        )
+    out += _looks(row)
     out += _pixel_size(row)
     cleaned = row.get("cleaned") or {}
     if "gaussians" in cleaned:
@@ -76,32 +77,42 @@ def _enhanced(row: dict) -> list[str]:
     return out
 
 
+def _looks(row: dict) -> list[str]:
+    reading = row.get("reading") or {}
+    looks = reading.get("looks")
+    if not looks:
+        return []
+    share = round(100 * min((reading.get("probabilities") or {}).get(looks, 0), 0.99))
+    return [f"It looks like {_LOOKS.get(looks, looks)} ({share} %)."]
+
+
 _MOST_NAMED = 4  # as one reads
 
 
 def _pixel_size(row: dict) -> list[str]:
-    size = row.get("pixel_size") or {}
+    size, reading = row.get("pixel_size") or {}, row.get("reading") or {}
     value, source = size.get("value"), size.get("source")
     if not source:
         return []
     if value is None:
-        return ["How large a training pixel was is in doubt, so the width that the fit absorbed was not given back."]
+        return ["The splat stays as it is: nothing tells how large a training pixel was."]
+    parts = row.get("parts") or []
+    if parts:
+        of_each = ", ".join(f"{p['pixel_size']:.4g} ({_count(p['gaussians'])} Gaussians)" for p in parts[:_MOST_NAMED])
+        more = f" and {len(parts) - _MOST_NAMED} more" if len(parts) > _MOST_NAMED else ""
+        return [f"The splat is made of {len(parts)} things that lie apart, each treated by itself: pixels of {of_each}{more}."]
+    if source == "read" and reading:
+        taken = f"; {value:.4g} was taken" if row.get("filter_strength") else ""  # else a warning says why
+        return [
+            f"A training pixel measured about {reading['pixel']:.4g} world units, as the splat looks "
+            f"({reading['low']:.4g} to {reading['high']:.4g}){taken}. Cameras make it exact."
+        ]
     known = {
-        "estimated": f"The size of a training pixel was estimated from the splat: {value:.4g} world units. Cameras make it exact.",
+        "given": f"The size of a training pixel was given: {value:.4g} world units.",
         "cameras": f"The size of a training pixel is that of the cameras: {value:.4g} world units in the middle.",
+        "pictures": f"The size of a training pixel is that of the pictures: {value:.4g} world units in the middle.",
     }
-    things = size.get("things") or []
-    if things:
-        of_each = ", ".join(f"{t['value']:.4g} ({_count(t['gaussians'])} Gaussians)" for t in things[:_MOST_NAMED])
-        more = f" and {len(things) - _MOST_NAMED} more" if len(things) > _MOST_NAMED else ""
-        out = [f"The splat is made of {len(things)} things that lie apart, with training pixels of {of_each}{more}."]
-    else:
-        out = [known.get(source, f"The size of a training pixel is {value:.4g} world units ({source}).")]
-    contradictions = list(dict.fromkeys(size.get("contradictions") or []))
-    out += [f"But {contradiction}." for contradiction in contradictions[:_MOST_NAMED]]
-    if len(contradictions) > _MOST_NAMED:
-        out.append(f"And {len(contradictions) - _MOST_NAMED} more doubts.")
-    return out
+    return [known.get(source, f"The size of a training pixel is {value:.4g} world units ({source}).")]
 
 
 def _converted(row: dict) -> list[str]:

@@ -83,9 +83,9 @@ hung_up() {
 expect 130 "SIGHUP ends a fit in order" hung_up
 expect 0 "its splat is there" "$program" info "$work/hung.ply"
 expect 0 "its state is there" test -s "$work/hung.ply.checkpoint"
-refine() { "$program" enhance "$input" --upscale 2 --pixel-size 0.02 -o "$work/refined.ply" --images "$work/project" --k 1 "$@"; }
+refine() { "$program" enhance "$input" --upscale 2 --pixel-size 0.02 --mode classic -o "$work/refined.ply" --images "$work/project" --k 1 "$@"; }
 expect 130 "SIGHUP ends a refinement in order" stopped_by HUP "views with pictures" "$program" enhance "$input" --upscale 2 \
-  --pixel-size 0.02 -o "$work/refined.ply" --images "$work/project" --k 1 --steps $long
+  --pixel-size 0.02 --mode classic -o "$work/refined.ply" --images "$work/project" --k 1 --steps $long
 says stderr "--resume"
 expect 0 "its splat is there, too" "$program" info "$work/refined.ply"
 expect 0 "its state is there, too" test -s "$work/refined.ply.checkpoint"
@@ -118,8 +118,8 @@ cat "$work/body" >>"$work/large.ply"
 sed -i "s/^element vertex 640000/element vertex $((count * 32))/" "$work/large.ply"
 rm "$work/body"
 gone() { [ ! -e "$1" ] && [ -z "$(find "$work" -name '.anchorsplat*')" ]; }
-expect 130 "Ctrl-C ends the filter" stopped_by INT "training pixel" "$program" enhance "$work/large.ply" --method filter \
-  -o "$work/gone.ply"
+expect 130 "Ctrl-C ends the filter" stopped_by INT "looks like" "$program" enhance "$work/large.ply" --method filter \
+  --mode classic -o "$work/gone.ply"
 says stderr "error: stopped"
 expect 0 "there is no splat of it" gone "$work/gone.ply"
 expect 130 "and levels of detail" stopped_by INT '"levels of detail"' "$program" convert "$work/large.ply" "$work/lod" --lod \

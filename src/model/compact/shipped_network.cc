@@ -6,44 +6,11 @@
 
 #include "core/buffer.h"
 #include "core/fingerprint.h"
+#include "core/include_bytes.h"
 #include "core/text.h"
 #include "tensors/tensor_file.h"
 
 #ifdef ANCHORSPLAT_SHIPPED_NETWORKS
-#ifdef __wasm__
-// Of WebAssembly: every section is a segment of its own, and a symbol of data says its size.
-#define ANCHORSPLAT_INCLUDE_BYTES(NAME, PATH) \
-  asm(".section .rodata." NAME                \
-      ",\"\",@\n"                             \
-      ".p2align 6\n"                          \
-      ".globl " NAME "\n" NAME                \
-      ":\n"                                   \
-      ".incbin \"" PATH                       \
-      "\"\n"                                  \
-      ".globl " NAME "_end\n" NAME            \
-      "_end:\n"                               \
-      ".int8 0\n"                             \
-      ".size " NAME ", " NAME "_end-" NAME    \
-      "\n"                                    \
-      ".size " NAME "_end, 1\n")
-#else
-// The assembler copies a file into the constants of the program: both compilers know this, C++20 has nothing for it.
-#define ANCHORSPLAT_INCLUDE_BYTES(NAME, PATH) \
-  asm(".section .rodata\n"                    \
-      ".balign 64\n"                          \
-      ".hidden " NAME                         \
-      "\n"                                    \
-      ".hidden " NAME                         \
-      "_end\n"                                \
-      ".globl " NAME                          \
-      "\n"                                    \
-      ".globl " NAME "_end\n" NAME            \
-      ":\n"                                   \
-      ".incbin \"" PATH "\"\n" NAME           \
-      "_end:\n"                               \
-      ".byte 0\n"                             \
-      ".text\n")
-#endif
 ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_standard",
                           ANCHORSPLAT_SHIPPED_NETWORKS "/anchorsplat-compact.safetensors");
 ANCHORSPLAT_INCLUDE_BYTES("anchorsplat_shipped_classic",

@@ -1,0 +1,501 @@
+#include "reading/features.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include "core/activations.h"
+#include "core/ellipsoid.h"
+#include "core/kd_tree.h"
+#include "core/parallel.h"
+#include "core/rotation.h"
+#include "core/run_context.h"
+#include "core/spherical_harmonics.h"
+#include "core/statistics.h"
+#include "core/text.h"
+#include "reading/splat_pictures.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+constexpr int64_t kMostOfStatistics = 20'000;  // Gaussians: quantiles of more are the same
+constexpr int64_t kMostOfNeighbours = 3'000;
+constexpr double kLeastDifference = 0.02;  // below that, formats round
+constexpr double kLeastLength = -12;       // ln of the unit
+
+// Either the names or the values, in one order.
+class Row {
+ public:
+  explicit Row(std::vector<std::string>& names) : names_(&names) {}
+  Row(std::vector<double>& values, double unit) : values_(&values), log_unit_(std::log(unit)) {}
+
+  void Add(std::string_view name, double value) {
+    if (names_ != nullptr) names_->emplace_back(name);
+    if (values_ != nullptr) values_->push_back(std::isfinite(value) ? value : kUnknown);
+  }
+  // Flat ones count as being of kLeastLength.
+  void AddLogLength(std::string_view name, double log_length) {
+    Add(name, std::max(log_length - log_unit_, kLeastLength));
+  }
+
+ private:
+  std::vector<std::string>* names_ = nullptr;
+  std::vector<double>* values_ = nullptr;
+  double log_unit_ = 0;
+};
+
+// Values of every so many Gaussians, with weights.
+struct Weighted {
+  std::vector<std::pair<float, float>> items;
+  double total = 0;
+  bool sorted = false;
+
+  void Add(float value, float weight) {
+    items.emplace_back(value, weight);
+    total += double{weight};
+  }
+  // At which a share of the weight is reached.
+  double Quantile(double share) {
+    if (items.empty()) return kUnknown;
+    if (!sorted) std::sort(items.begin(), items.end());
+    sorted = true;
+    double sum = 0;
+    for (const auto& [value, weight] : items) {
+      sum += double{weight};
+      if (sum >= share * total) return double{value};
+    }
+    return double{items.back().first};
+  }
+};
+
+struct Gaussians {
+  // Of a sample of those that show, in one order: ln of the axes, the smallest first; opacity, its logit.
+  std::array<Buffer<float>, 3> axes;
+  Buffer<float> opacities, logits;
+  std::array<Weighted, 4> weighted;  // ln of the axes, opacity; by opacity × area
+};
+
+Gaussians SampleOf(const GaussianCloud& showing) {
+  Gaussians out;
+  const int64_t step = std::max<int64_t>(1, showing.size() / kMostOfStatistics);
+  for (int64_t row = 0; row < showing.size(); row += step) {
+    const auto i = static_cast<size_t>(row);
+    std::array<float, 3> own;
+    std::copy_n(showing.log_scales.data() + 3 * i, 3, own.begin());
+    std::ranges::sort(own);
+    const float opacity = Sigmoid(showing.opacity_logits[i]);
+    const float weight = opacity * std::exp(own[1] + own[2]);
+    for (size_t a = 0; a < 3; ++a) {
+      if (std::isfinite(own[a])) out.axes[a].push_back(own[a]);
+    }
+    out.opacities.push_back(opacity);
+    out.logits.push_back(std::clamp(showing.opacity_logits[i], -20.0f, 20.0f));
+    if (!(weight > 0) || !std::isfinite(weight)) continue;
+    for (size_t a = 0; a < 3; ++a) out.weighted[a].Add(std::max(own[a], -80.0f), weight);
+    out.weighted[3].Add(opacity, weight);
+  }
+  for (Buffer<float>& axis : out.axes) std::ranges::sort(axis);
+  return out;
+}
+
+double SortedQuantile(std::span<const float> sorted, double q) {
+  if (sorted.empty()) return kUnknown;
+  const double at = q * static_cast<double>(sorted.size() - 1);
+  const auto low = static_cast<size_t>(at);
+  const size_t high = std::min(low + 1, sorted.size() - 1);
+  const double part = at - static_cast<double>(low);
+  return double{sorted[low]} * (1 - part) + double{sorted[high]} * part;
+}
+
+// How far the least `share` lies below its quantile, in the mean.
+double Tail(std::span<const float> sorted, double share) {
+  const double quantile = SortedQuantile(sorted, share);
+  double sum = 0;
+  for (const float x : sorted) {
+    if (double{x} >= quantile) break;
+    sum += quantile - double{x};
+  }
+  return sum / (share * static_cast<double>(std::max<size_t>(1, sorted.size())));
+}
+
+// The share of the values that are the most common one, within a thousandth: what a program set to one value.
+double ShareOfTheSame(std::span<const float> sorted) {
+  if (sorted.empty()) return kUnknown;
+  constexpr float kSame = 1e-3f;
+  size_t most = 0;
+  for (size_t first = 0, last = 0; last < sorted.size(); ++last) {
+    while (sorted[last] - sorted[first] > kSame) ++first;
+    most = std::max(most, last - first + 1);
+  }
+  return static_cast<double>(most) / static_cast<double>(sorted.size());
+}
+
+// The share that lies within a step of a format above the least.
+double ShareOfTheLeast(std::span<const float> sorted) {
+  constexpr float kStep = 0.07f;
+  if (sorted.empty()) return kUnknown;
+  const auto end = std::ranges::upper_bound(sorted, sorted.front() + kStep);
+  return static_cast<double>(end - sorted.begin()) / static_cast<double>(sorted.size());
+}
+
+void AddFile(const CloudView& whole, Row& row) {
+  for (const RenderMode mode : {RenderMode::kClassic, RenderMode::kAntialiased, RenderMode::kMip}) {
+    row.Add(Cat("file.", NameOf(mode)), whole.render_mode == mode ? 1 : 0);
+  }
+  row.Add("file.sh_degree", whole.sh_degree);
+}
+
+// Neither their number nor the size of the whole: fits to pictures of one size have one of each, others another.
+void AddCounts(const ShowingGaussians& showing, Row& row) {
+  const auto count = [](int64_t n) { return static_cast<double>(std::max<int64_t>(1, n)); };
+  const int64_t shown = showing.all.size();
+  row.Add("count.share_showing", static_cast<double>(shown) / count(showing.telling.cloud.size()));
+  int64_t black = 0;
+  for (size_t i = 0; i < showing.all.opacity_logits.size(); ++i) black += IsNearlyBlack(showing.all, i) ? 1 : 0;
+  row.Add("count.share_bright", static_cast<double>(shown - black) / count(shown));
+}
+
+void AddSizes(Gaussians& sample, Row& row) {
+  constexpr std::array<double, 4> kShares = {0.1, 0.25, 0.5, 0.75};
+  for (size_t a = 0; a < 3; ++a) {
+    for (const double q : kShares) {
+      row.AddLogLength(Cat("size.axis", a, ".", q), sample.weighted[a].Quantile(q));
+    }
+  }
+  for (const double q : kShares) row.Add(Cat("size.opacity.", q), sample.weighted[3].Quantile(q));
+
+  Buffer<float> opacities = sample.opacities;
+  std::ranges::sort(opacities);
+  for (int decile = 1; decile <= 9; ++decile)
+    row.Add(Cat("opacity.", decile), SortedQuantile(opacities, decile / 10.0));
+  const auto faint = std::ranges::lower_bound(opacities, 0.3f) - opacities.begin();
+  row.Add("opacity.faint", static_cast<double>(faint) / static_cast<double>(std::max<size_t>(1, opacities.size())));
+  Buffer<float> logits = sample.logits;
+  std::ranges::sort(logits);
+  for (const double q : {0.001, 0.01, 0.05}) row.Add(Cat("opacity.logit.", q), SortedQuantile(logits, q));
+  row.Add("opacity.same", ShareOfTheSame(logits));
+}
+
+void AddAxes(const Gaussians& sample, Row& row) {
+  for (size_t a = 0; a < 3; ++a) {
+    for (const double q : {0.005, 0.02, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99}) {
+      row.AddLogLength(Cat("axis", a, ".", q), SortedQuantile(sample.axes[a], q));
+    }
+    for (const double share : {0.02, 0.05, 0.2}) {
+      row.Add(Cat("tail", a, ".", share), std::log(Tail(sample.axes[a], share) + kLeastDifference));
+    }
+    row.Add(Cat("axis", a, ".same"), ShareOfTheSame(sample.axes[a]));
+    row.Add(Cat("axis", a, ".least"), ShareOfTheLeast(sample.axes[a]));
+  }
+}
+
+// Opacity of the thinnest tenth, and how opacity goes with size.
+void AddOpacityBySize(const GaussianCloud& showing, Row& row) {
+  std::vector<std::pair<float, float>> items;  // ln area, opacity
+  const int64_t step = std::max<int64_t>(1, showing.size() / kMostOfStatistics);
+  for (int64_t i = 0; i < showing.size(); i += step) {
+    std::array<float, 3> own;
+    std::copy_n(showing.log_scales.data() + 3 * i, 3, own.begin());
+    std::ranges::sort(own);
+    items.emplace_back(own[1] + own[2], Sigmoid(showing.opacity_logits[static_cast<size_t>(i)]));
+  }
+  std::sort(items.begin(), items.end());
+  for (size_t fifth = 0; fifth < 5; ++fifth) {
+    const size_t begin = fifth * items.size() / 5, end = (fifth + 1) * items.size() / 5;
+    double sum = 0, opaque = 0;
+    for (size_t i = begin; i < end; ++i) {
+      sum += double{items[i].second};
+      opaque += items[i].second > 0.95f ? 1 : 0;
+    }
+    const auto count = static_cast<double>(std::max<size_t>(1, end - begin));
+    row.Add(Cat("opacity.of_fifth", fifth), sum / count);
+    row.Add(Cat("opacity.opaque_of_fifth", fifth), opaque / count);
+  }
+}
+
+void AddColorsAndTurns(const CloudView& whole, const ShowingGaussians& showing, Row& row) {
+  double outside = 0, constant = 0, rest = 0, lengths = 0, count = 0;
+  const auto step = std::max<size_t>(1, showing.rows_of_all.size() / kMostOfStatistics);
+  for (size_t n = 0; n < showing.rows_of_all.size(); n += step) {
+    const int64_t i = showing.rows_of_all[n];
+    const float* const sh = whole.sh.data() + i * whole.sh_stride();
+    bool out = false;
+    for (int64_t k = 0; k < whole.sh_stride(); ++k) {
+      const double value{sh[k]};
+      if (k < 3) out = out || std::abs(value) * double{kSh0} > 0.5;
+      (k < 3 ? constant : rest) += value * value;
+    }
+    outside += out ? 1 : 0;
+    const float* const q = whole.quats.data() + 4 * i;
+    const double length =
+        std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] + double{q[2]} * q[2] + double{q[3]} * q[3]);
+    lengths += std::min(1.0, std::abs(length - 1));
+    ++count;
+  }
+  count = std::max(1.0, count);
+  row.Add("color.outside", outside / count);
+  row.Add("color.harmonics", std::sqrt(rest / std::max(constant, 1e-12)));
+  row.Add("turn.lengths", std::log(lengths / count + 1e-3));
+}
+
+// The logarithm of a Gaussian's covariance, halved: its log-scales along its own axes. xx, yy, zz, √2·xy, √2·xz, √2·yz,
+// so that differences have the norm of the matrix.
+std::array<double, 6> LogCovariance(const GaussianCloud& cloud, size_t i, const std::array<double, 9>& r) {
+  const float* s = cloud.log_scales.data() + 3 * i;
+  const auto entry = [&](size_t a, size_t b) {
+    double sum = 0;
+    for (size_t k = 0; k < 3; ++k) sum += r[3 * a + k] * std::max(-30.0, double{s[k]}) * r[3 * b + k];
+    return sum;
+  };
+  const double root = std::sqrt(2.0);
+  return {entry(0, 0), entry(1, 1), entry(2, 2), root * entry(0, 1), root * entry(0, 2), root * entry(1, 2)};
+}
+
+std::array<double, 9> TurnOf(const GaussianCloud& cloud, size_t i) {
+  const float* q = cloud.quats.data() + 4 * i;
+  return RotationFromQuaternion(double{q[0]}, double{q[1]}, double{q[2]}, double{q[3]});
+}
+
+double Difference(const std::array<double, 6>& a, const std::array<double, 6>& b) {
+  double sum = 0;
+  for (size_t k = 0; k < 6; ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
+  return std::sqrt(sum);
+}
+
+// From i to j, in standard deviations of i.
+double Deviations(const GaussianCloud& cloud, size_t i, size_t j, const std::array<double, 9>& r) {
+  double sum = 0;
+  for (size_t a = 0; a < 3; ++a) {
+    double along = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      along += r[3 * k + a] * (double{cloud.means[3 * j + k]} - double{cloud.means[3 * i + k]});
+    }
+    along *= std::exp(-std::max(-30.0, double{cloud.log_scales[3 * i + a]}));
+    sum += along * along;
+  }
+  return std::min(1e6, std::sqrt(sum));
+}
+
+// Angle between two, radians.
+double TurnBetween(const GaussianCloud& cloud, size_t i, size_t j) {
+  double product = 0, of_i = 0, of_j = 0;
+  for (size_t k = 0; k < 4; ++k) {
+    const double a{cloud.quats[4 * i + k]}, b{cloud.quats[4 * j + k]};
+    product += a * b;
+    of_i += a * a;
+    of_j += b * b;
+  }
+  const double norms = std::sqrt(of_i * of_j);
+  return norms > 0 ? 2 * std::acos(std::min(1.0, std::abs(product) / norms)) : 0;
+}
+
+// Cosine between harmonics of degree 2 and 3: a network multiplies those of a Gaussian for all of its copies.
+double LikenessOfHarmonics(const CloudView& whole, int64_t a, int64_t b) {
+  const auto first = static_cast<size_t>(3 * ShCoefficients(1)), stride = static_cast<size_t>(whole.sh_stride());
+  const float* const x = whole.sh.data() + static_cast<size_t>(a) * stride;
+  const float* const y = whole.sh.data() + static_cast<size_t>(b) * stride;
+  double product = 0, of_x = 0, of_y = 0;
+  for (size_t k = first; k < stride; ++k) {
+    product += double{x[k]} * double{y[k]};
+    of_x += double{x[k]} * double{x[k]};
+    of_y += double{y[k]} * double{y[k]};
+  }
+  const double norms = std::sqrt(of_x * of_y);
+  return norms > 1e-8 && std::isfinite(norms) ? product / norms : kUnknown;
+}
+
+struct Neighbours {
+  std::array<Buffer<float>, 3> difference;                  // of the likest three of eight, rising
+  Buffer<float> distance, color, opacity, turn, harmonics;  // to the likest
+  Buffer<float> side, wide;  // of the square that each has of the surface, of 8 and of 64; ln
+  Buffer<float> own;         // ln √(largest × middle axis) over `side`
+};
+
+Neighbours NeighboursOf(const CloudView& whole, const ShowingGaussians& showing) {
+  const GaussianCloud& cloud = showing.all;
+  const KdTree tree(cloud.means);
+  const auto samples = std::min(kMostOfNeighbours, tree.size());
+  const auto count = static_cast<size_t>(samples);
+  Neighbours out;
+  for (auto* values : {&out.difference[0], &out.difference[1], &out.difference[2], &out.distance, &out.color,
+                       &out.opacity, &out.turn, &out.harmonics, &out.side, &out.wide, &out.own}) {
+    values->assign(count, std::numeric_limits<float>::quiet_NaN());
+  }
+  constexpr int64_t kPerTask = 64;
+  ParallelFor(0, samples, kPerTask, [&](int64_t begin, int64_t end) {
+    for (int64_t k = begin; k < end; ++k) {
+      const auto at = static_cast<size_t>(k);
+      // Places of the tree, and not rows: files may be in any order.
+      const int64_t place = k * tree.size() / samples;
+      const auto own = static_cast<size_t>(tree.PointAt(place));
+      std::array<KdTree::Neighbour, 64> nearest{};
+      const auto found = static_cast<size_t>(tree.Nearest(place, nearest));
+      if (found < 8) continue;
+      const auto side = [&](size_t n) {
+        return 0.5 * std::log(std::numbers::pi * nearest[n - 1].squared_distance / static_cast<double>(n) + 1e-30);
+      };
+      out.side[at] = static_cast<float>(side(8));
+      out.wide[at] = static_cast<float>(side(found));
+      std::array<float, 3> axes;
+      std::copy_n(cloud.log_scales.data() + 3 * own, 3, axes.begin());
+      std::ranges::sort(axes);
+      out.own[at] = 0.5f * (axes[1] + axes[2]) - out.side[at];
+      const auto turn = TurnOf(cloud, own);
+      const auto covariance = LogCovariance(cloud, own, turn);
+      std::array<std::pair<double, size_t>, 8> others{};
+      for (size_t n = 0; n < others.size(); ++n) {
+        const auto other = static_cast<size_t>(nearest[n].index);
+        others[n] = {Difference(covariance, LogCovariance(cloud, other, TurnOf(cloud, other))), other};
+      }
+      std::partial_sort(others.begin(), others.begin() + 3, others.end());
+      for (size_t rank = 0; rank < 3; ++rank) out.difference[rank][at] = static_cast<float>(others[rank].first);
+      const size_t twin = others[0].second;
+      out.distance[at] = static_cast<float>(Deviations(cloud, own, twin, turn));
+      out.turn[at] = static_cast<float>(TurnBetween(cloud, own, twin));
+      double most = 0;
+      for (size_t c = 0; c < 3; ++c) {
+        most = std::max(most, std::abs(double{cloud.sh[3 * own + c]} - double{cloud.sh[3 * twin + c]}));
+      }
+      out.color[at] = static_cast<float>(most);
+      out.opacity[at] = std::abs(std::clamp(cloud.opacity_logits[own], -10.0f, 10.0f) -
+                                 std::clamp(cloud.opacity_logits[twin], -10.0f, 10.0f));
+      if (whole.sh_degree >= 2) {
+        out.harmonics[at] =
+            static_cast<float>(LikenessOfHarmonics(whole, showing.rows_of_all[own], showing.rows_of_all[twin]));
+      }
+    }
+  });
+  return out;
+}
+
+// Known ones, sorted.
+std::span<float> Known(Buffer<float>& values) {
+  std::erase_if(values, [](float x) { return !std::isfinite(x); });
+  std::ranges::sort(values);
+  return values;
+}
+
+void AddNeighbours(Neighbours neighbours, Row& row) {
+  const auto log = [](double x) { return std::log(x + kLeastDifference); };
+  for (size_t rank = 0; rank < 3; ++rank) {
+    const auto values = Known(neighbours.difference[rank]);
+    for (const double q : {0.1, 0.25, 0.5, 0.75, 0.9}) {
+      row.Add(Cat("twin.difference", rank, ".", q), log(SortedQuantile(values, q)));
+    }
+  }
+  const auto add = [&](std::string_view name, Buffer<float>& values) {
+    const auto known = Known(values);
+    for (const double q : {0.1, 0.25, 0.5, 0.75}) row.Add(Cat("twin.", name, ".", q), log(SortedQuantile(known, q)));
+  };
+  add("distance", neighbours.distance);
+  add("color", neighbours.color);
+  add("opacity", neighbours.opacity);
+  add("turn", neighbours.turn);
+  const auto harmonics = Known(neighbours.harmonics);
+  for (const double q : {0.25, 0.5, 0.75}) row.Add(Cat("twin.harmonics.", q), SortedQuantile(harmonics, q));
+  for (auto& [name, values] : {std::pair("side", &neighbours.side), std::pair("wide", &neighbours.wide)}) {
+    const auto known = Known(*values);
+    for (const double q : {0.1, 0.25, 0.5, 0.75, 0.9}) {
+      row.AddLogLength(Cat("near.", name, ".", q), SortedQuantile(known, q));
+    }
+  }
+  const auto own = Known(neighbours.own);
+  for (const double q : {0.1, 0.5, 0.9}) row.Add(Cat("near.own.", q), SortedQuantile(own, q));
+}
+
+// Standard deviations along the principal axes, over the largest.
+void AddShape(const GaussianCloud& showing, Row& row) {
+  std::array<double, 3> mean{};
+  std::array<double, 6> moments{};
+  const auto count = static_cast<double>(std::max<int64_t>(1, showing.size()));
+  for (int64_t i = 0; i < showing.size(); ++i) {
+    for (size_t a = 0; a < 3; ++a) mean[a] += double{showing.means[static_cast<size_t>(3 * i) + a]} / count;
+  }
+  for (int64_t i = 0; i < showing.size(); ++i) {
+    std::array<double, 3> d;
+    for (size_t a = 0; a < 3; ++a) d[a] = double{showing.means[static_cast<size_t>(3 * i) + a]} - mean[a];
+    const std::array<double, 6> products = {d[0] * d[0], d[0] * d[1], d[0] * d[2],
+                                            d[1] * d[1], d[1] * d[2], d[2] * d[2]};
+    for (size_t k = 0; k < 6; ++k) moments[k] += products[k] / count;
+  }
+  std::array<double, 3> variances = EllipsoidOf(moments).variances;
+  std::ranges::sort(variances);
+  const double most = std::max(variances[2], 1e-30);
+  row.Add("shape.thickness", 0.5 * std::log(variances[0] / most + 1e-6));
+  row.Add("shape.width", 0.5 * std::log(variances[1] / most + 1e-6));
+}
+
+void AddPictures(const SplatPictures& pictures, Row& row) {
+  for (size_t k = 0; k < SplatPictures::kSizes; ++k) {
+    const SplatPictures::AtSize& at = pictures.sizes[k];
+    const std::string name = Cat("outline[", static_cast<int>(k) - SplatPictures::kOctaves, "]");
+    for (size_t j = 0; j < kOutlineValues; ++j) row.Add(Cat(name, ".classic", j), at.classic[j]);
+    for (size_t j = 0; j < kOutlineValues && k % 2 == 1; ++j) {
+      row.Add(Cat(name, ".antialiased", j), at.antialiased[j]);
+    }
+    row.Add(name + ".cut", at.cut);
+    row.Add(name + ".coarse", at.coarse);
+  }
+  for (size_t k = 0; k < SplatPictures::kDetails; ++k) {
+    row.Add(Cat("detail.luminance", k), pictures.of_luminance[k]);
+    row.Add(Cat("detail.alpha", k), pictures.of_alpha[k]);
+  }
+}
+
+void AddAll(const CloudView& whole, const ShowingGaussians& showing, const SplatPictures& pictures, Gaussians sample,
+            Neighbours neighbours, Row& row) {
+  AddFile(whole, row);
+  AddCounts(showing, row);
+  AddSizes(sample, row);
+  AddAxes(sample, row);
+  AddOpacityBySize(showing.all, row);
+  AddColorsAndTurns(whole, showing, row);
+  AddNeighbours(std::move(neighbours), row);
+  AddShape(showing.all, row);
+  AddPictures(pictures, row);
+}
+
+}  // namespace
+
+const std::vector<std::string>& FeatureNames() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> out;
+    Row row(out);
+    AddAll({}, {}, {}, {}, {}, row);
+    return out;
+  }();
+  return names;
+}
+
+Result<SplatFeatures> FeaturesOf(const CloudView& whole, const ShowingGaussians& showing) {
+  if (showing.all.size() < kLeastGaussians) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("fewer than ", kLeastGaussians, " Gaussians that show and are small beside the splat")};
+  }
+  LeaveIfAbandoned();
+  Gaussians sample = SampleOf(showing.all);
+  // √(largest × middle axis) of their 10 % quantiles.
+  const double unit = std::exp(0.5 * (sample.weighted[1].Quantile(0.1) + sample.weighted[2].Quantile(0.1)));
+  if (!(unit > 0) || !std::isfinite(unit)) {
+    return Error{ErrorCode::kBadArgument, "the Gaussians that show have no size"};
+  }
+  LeaveIfAbandoned();
+  Neighbours neighbours = NeighboursOf(whole, showing);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatPictures pictures, LookAt(showing.telling, unit));
+  SplatFeatures features{unit, {}};
+  Row row(features.values, unit);
+  AddAll(whole, showing, pictures, std::move(sample), std::move(neighbours), row);
+  return features;
+}
+
+Result<SplatFeatures> FeaturesOf(const CloudView& whole) { return FeaturesOf(whole, FindShowingGaussians(whole)); }
+
+}  // namespace anchorsplat

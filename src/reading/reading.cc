@@ -1,0 +1,46 @@
+#include "reading/reading.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace anchorsplat {
+
+Made Reading::likeliest() const { return static_cast<Made>(std::ranges::max_element(made) - made.begin()); }
+
+Reading ReadFrom(const SplatFeatures& features, const ReadingModel& model) {
+  Reading reading;
+  reading.unit = features.unit;
+  reading.interval = model.interval();
+  reading.strangeness = model.Strangeness(features.values);
+  static const size_t share =
+      static_cast<size_t>(std::ranges::find(FeatureNames(), "count.share_showing") - FeatureNames().begin());
+  reading.showing = features.values[share];
+  reading.opinions = model.OpinionsOf(features.values);
+  const auto members = static_cast<double>(reading.opinions.size());
+  double middle = 0, spread = 0, apart = 0;
+  for (const ReadingOpinion& opinion : reading.opinions) {
+    middle += opinion.log_pixel / members;
+    spread += std::exp(opinion.log_spread) / members;
+    const double most = std::ranges::max(opinion.logits);
+    double sum = 0;
+    for (const double logit : opinion.logits) sum += std::exp(logit - most);
+    for (size_t k = 0; k < kMadeCount; ++k) reading.made[k] += std::exp(opinion.logits[k] - most) / sum / members;
+  }
+  for (const ReadingOpinion& opinion : reading.opinions) {
+    apart += (opinion.log_pixel - middle) * (opinion.log_pixel - middle) / members;
+  }
+  const double half = reading.interval * std::hypot(spread, std::sqrt(apart));
+  reading.pixel = reading.unit * std::exp(middle);
+  reading.low = reading.pixel * std::exp(-half);
+  reading.high = reading.pixel * std::exp(half);
+  return reading;
+}
+
+Result<Reading> Read(const CloudView& cloud, const ShowingGaussians& showing) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatFeatures features, FeaturesOf(cloud, showing));
+  return ReadFrom(features, ReadingModel::Shipped());
+}
+
+Result<Reading> Read(const CloudView& cloud) { return Read(cloud, FindShowingGaussians(cloud)); }
+
+}  // namespace anchorsplat

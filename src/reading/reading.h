@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/cloud_view.h"
+#include "core/result.h"
+#include "reading/features.h"
+#include "reading/reading_model.h"
+#include "reading/showing_gaussians.h"
+
+namespace anchorsplat {
+
+// What a splat says of itself: how it was made, how large its training pixels were, and what would help it. Told by a
+// model that has learned from splats of which all that is known (docs/reading.md).
+struct Reading {
+  double pixel = 0;                       // training pixel at the subject, world units
+  double low = 0, high = 0;               // holds it for four splats in five of kinds that were learned from
+  std::array<double, kMadeCount> made{};  // probabilities of Made
+  double strangeness = 0;  // ReadingModel::Strangeness: above 1, 2 % of splats like those learned from are
+  double unit = 0;         // world units, of `opinions`
+  double interval = 1;     // ReadingModel::interval
+  double showing = 1;      // share of the Gaussians that show, opacity of 10 % or more
+  std::vector<ReadingOpinion> opinions;
+
+  Made likeliest() const;
+  double probability(Made of) const { return made[static_cast<size_t>(of)]; }
+};
+
+// kBadArgument: too little of the splat shows to be read.
+Result<Reading> Read(const CloudView& cloud);
+// `showing`: FindShowingGaussians(cloud).
+Result<Reading> Read(const CloudView& cloud, const ShowingGaussians& showing);
+// Of features that are known, by another model than the program's.
+Reading ReadFrom(const SplatFeatures& features, const ReadingModel& model);
+
+}  // namespace anchorsplat

@@ -1,0 +1,95 @@
+#include "reading/reading.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "core/random.h"
+#include "core/source_dir_for_test.h"
+#include "formats/cloud_io.h"
+#include "reading/treatment.h"
+
+namespace anchorsplat {
+namespace {
+
+constexpr double kTrue = 0.0055013;  // training pixel of the examples: 1.7 / 309.02
+
+GaussianCloud Example(const std::string& name) {
+  return ReadCloud(SourceDirForTest() / "examples" / name / "input.ply").value();
+}
+
+TEST(Reading, OfFitsIsNearTheTruth) {
+  for (const char* name : {"biplane", "stone_lantern"}) {
+    const auto reading = Read(Example(name));
+    ASSERT_TRUE(reading.ok()) << reading.error().message;
+    EXPECT_GT(reading->pixel, 0.75 * kTrue) << name;
+    EXPECT_LT(reading->pixel, 1.25 * kTrue) << name;
+    EXPECT_EQ(reading->likeliest(), Made::kClassic) << name;
+    EXPECT_LT(reading->low, reading->pixel);
+    EXPECT_GT(reading->high, reading->pixel);
+    EXPECT_LT(reading->strangeness, 1) << name;
+    double sum = 0;
+    for (const double probability : reading->made) sum += probability;
+    EXPECT_NEAR(sum, 1, 1e-6);
+    EXPECT_EQ(Treat(*reading, {}).method, TreatmentMethod::kNetwork) << name;
+  }
+}
+
+TEST(Reading, FollowsTheScaleOfTheSplat) {
+  const GaussianCloud cloud = Example("biplane");
+  const auto reading = Read(cloud);
+  ASSERT_TRUE(reading.ok());
+  for (const float factor : {1e-4f, 1e4f}) {
+    GaussianCloud scaled = cloud;
+    for (float& x : scaled.means) x *= factor;
+    for (float& x : scaled.log_scales) x += std::log(factor);
+    const auto other = Read(scaled);
+    ASSERT_TRUE(other.ok());
+    EXPECT_NEAR(other->pixel / reading->pixel / double{factor}, 1, 0.02) << factor;
+    EXPECT_NEAR(other->high / other->low, reading->high / reading->low, 0.05) << factor;
+  }
+}
+
+// What captures of real places have behind their subject must not decide.
+TEST(Reading, IsNotMovedByGiantsAndSkies) {
+  const GaussianCloud example = Example("biplane");
+  const double plain = Read(example)->pixel;
+  struct Addition {
+    int count;
+    float log_scale, distance;
+  };
+  for (const Addition added : {Addition{1, 3, 50}, {1, 5, 0}, {200, 1.5f, 20}, {3, 80, 1}, {100, 0, 8}}) {
+    GaussianCloud cloud = example;
+    std::vector<int64_t> rows(static_cast<size_t>(added.count), 0);
+    GaussianCloud more = *Subset(cloud, rows);
+    Random random(7);
+    for (size_t i = 0; i < rows.size(); ++i) {
+      double direction[3], norm = 0;
+      for (double& d : direction) {
+        d = random.Normal();
+        norm += d * d;
+      }
+      for (size_t a = 0; a < 3; ++a) {
+        more.means[3 * i + a] = static_cast<float>(added.distance * direction[a] / std::sqrt(norm));
+        more.log_scales[3 * i + a] = added.log_scale;
+      }
+      more.opacity_logits[i] = 4;
+    }
+    ASSERT_TRUE(Append(cloud, more).ok());
+    const auto reading = Read(cloud);
+    ASSERT_TRUE(reading.ok()) << reading.error().message;
+    EXPECT_NEAR(reading->pixel / plain, 1, 0.15) << added.count << " of ln scale " << added.log_scale;
+  }
+}
+
+TEST(Reading, NeedsSomethingThatShows) {
+  EXPECT_FALSE(Read(GaussianCloud()).ok());
+  GaussianCloud invisible = Example("biplane");
+  for (float& logit : invisible.opacity_logits) logit = -8;
+  EXPECT_FALSE(Read(invisible).ok());
+}
+
+}  // namespace
+}  // namespace anchorsplat

@@ -1,0 +1,210 @@
+#include "reading/splat_pictures.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "core/activations.h"
+#include "core/camera.h"
+#include "core/framing.h"
+#include "core/parallel.h"
+#include "core/run_context.h"
+#include "core/spherical_harmonics.h"
+#include "core/statistics.h"
+#include "render/rasterizer.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr int kViews = 4;
+constexpr int kSide = 256;             // px: enough of the outline, and quick
+constexpr double kDetailPixel = 0.25;  // of the unit
+constexpr double kFieldOfView = std::numbers::pi / 4;
+constexpr double kNearPlane = 0.01;  // of the distance; everything lies behind
+constexpr double kSamples = 2;       // pixels per size that is tried
+// Times the median footprint: a ground, walls, clutter around an object that no picture shows. Fits of objects seen
+// from all around have at most 0.02 of their outlines of such Gaussians; from five on, photographs have many.
+constexpr float kCoarse = 6;
+
+// ln √(largest × middle axis).
+float LogFootprint(const GaussianCloud& cloud, int64_t i) {
+  const float* const scales = cloud.log_scales.data() + 3 * i;
+  std::array<float, 3> axes = {scales[0], scales[1], scales[2]};  // the smallest may be −∞
+  std::ranges::sort(axes);
+  return 0.5f * (axes[1] + axes[2]);
+}
+
+// LogFootprint from which on a Gaussian is coarse among the others.
+float LogCoarse(const GaussianCloud& cloud) {
+  Buffer<float> showing;
+  for (int64_t i = 0; i < cloud.size(); ++i) {
+    if (Sigmoid(cloud.opacity_logits[static_cast<size_t>(i)]) < kShowingOpacity) continue;
+    if (const float footprint = LogFootprint(cloud, i); std::isfinite(footprint)) showing.push_back(footprint);
+  }
+  return showing.empty() ? std::numeric_limits<float>::infinity() : Quantile(showing, 0.5) + std::log(kCoarse);
+}
+
+// Whether it reaches beyond what was looked at.
+bool IsCut(const TellingGaussians& telling, int64_t i) {
+  if (!telling.reach) return false;
+  double squares = 0;
+  for (size_t a = 0; a < 3; ++a) {
+    const double d = telling.cloud.means[static_cast<size_t>(3 * i) + a] - telling.framing.target[a];
+    squares += d * d;
+  }
+  const float* const scales = telling.cloud.log_scales.data() + 3 * i;
+  return std::sqrt(squares) + 3 * std::exp(double{std::max({scales[0], scales[1], scales[2]})}) > *telling.reach;
+}
+
+class Painter {
+ public:
+  explicit Painter(const TellingGaussians& telling) : cloud_(telling.cloud), colors_(telling.cloud.sh) {
+    const Pinhole intrinsics = PinholeFromFov(kSide, kSide, kFieldOfView);
+    distance_ = FramingDistance({telling.framing.target, telling.radius()}, intrinsics);
+    farthest_pixel_ = distance_ / intrinsics.fx;
+    marked_ = Mark(telling);
+    options_.near_plane = static_cast<float>(kNearPlane * distance_);  // scales with the cloud, as all does
+    options_.far_plane = static_cast<float>(distance_ / kNearPlane);
+  }
+
+  Status Prepare(const TellingGaussians& telling) {
+    const Pinhole intrinsics = PinholeFromFov(kSide, kSide, kFieldOfView);
+    ANCHORSPLAT_ASSIGN_OR_RETURN(cameras_, OrbitCameras(kViews, distance_, telling.framing.target, intrinsics));
+    return {};
+  }
+
+  Status Outlines(double size, RenderMode mode, std::array<double, kOutlineValues>& values, double* cut,
+                  double* coarse) {
+    const double pixel = std::min(farthest_pixel_, size / kSamples);
+    const double in_pixels = size / pixel;
+    options_.dilation = static_cast<float>(kDilation * in_pixels * in_pixels);
+    options_.mode = mode;
+    OutlineProfile profile;
+    for (const Camera& camera : cameras_.cameras) {
+      LeaveIfAbandoned();
+      ANCHORSPLAT_RETURN_IF_ERROR(Draw(camera, pixel));
+      const size_t channel = output_.alpha.pixels.size();
+      const float* const of_cut = marked_ ? output_.color.pixels.data() + channel : nullptr;
+      profile.Add(output_.alpha, pixel / size, of_cut, marked_ ? of_cut + channel : nullptr);
+    }
+    values = profile.Values();
+    if (cut != nullptr) *cut = profile.Cut();
+    if (coarse != nullptr) *coarse = profile.Coarse();
+    return {};
+  }
+
+  // Mean squares of details; the last ones are of all.
+  Status Details(double unit, std::array<double, SplatPictures::kDetails + 1>& of_luminance,
+                 std::array<double, SplatPictures::kDetails + 1>& of_alpha) {
+    cloud_.sh = colors_;
+    options_.dilation = std::nullopt;
+    options_.mode = RenderMode::kClassic;
+    const double pixel = std::min(farthest_pixel_, kDetailPixel * unit);
+    for (const Camera& camera : cameras_.cameras) {
+      LeaveIfAbandoned();
+      ANCHORSPLAT_RETURN_IF_ERROR(Draw(camera, pixel));
+      Buffer<float> luminance(output_.alpha.pixels.size());
+      const float* const color = output_.color.pixels.data();
+      for (size_t i = 0; i < luminance.size(); ++i) {
+        luminance[i] = (color[i] + color[i + luminance.size()] + color[i + 2 * luminance.size()]) / 3;
+      }
+      AddDetails(std::move(luminance), of_luminance);
+      AddDetails(output_.alpha.pixels, of_alpha);
+    }
+    return {};
+  }
+
+ private:
+  Status Draw(const Camera& from, double pixel) {
+    Camera camera = from;
+    camera.intrinsics = {.width = kSide,
+                         .height = kSide,
+                         .fx = distance_ / pixel,
+                         .fy = distance_ / pixel,
+                         .cx = kSide / 2.0,
+                         .cy = kSide / 2.0};
+    return rasterizer_.Render(cloud_, camera, options_, output_);
+  }
+
+  // Instead of green: whether it was cut; instead of blue: whether it is coarse.
+  bool Mark(const TellingGaussians& telling) {
+    const float coarse = LogCoarse(cloud_);
+    std::atomic<bool> any = false;
+    ParallelFor(0, cloud_.size(), 4096, [&](int64_t first, int64_t last) {
+      bool found = false;
+      for (int64_t i = first; i < last; ++i) {
+        const bool is_cut = IsCut(telling, i);
+        const bool is_coarse = !is_cut && LogFootprint(cloud_, i) > coarse;
+        float* const sh = cloud_.sh.data() + 3 * i;
+        sh[0] = 0;
+        sh[1] = ((is_cut ? 1.0f : 0.0f) - 0.5f) / kSh0;
+        sh[2] = ((is_coarse ? 1.0f : 0.0f) - 0.5f) / kSh0;
+        found = found || is_cut || is_coarse;
+      }
+      if (found) any = true;
+    });
+    return any;
+  }
+
+  // Haar details, level by level, of a picture of kSide².
+  static void AddDetails(Buffer<float> values, std::array<double, SplatPictures::kDetails + 1>& sums) {
+    int side = kSide;
+    const double share = 1.0 / (static_cast<double>(kSide) * kSide * kViews);
+    for (const float value : values) sums.back() += share * double{value} * double{value};
+    for (size_t level = 0; level < SplatPictures::kDetails; ++level) {
+      const int half = side / 2;
+      const auto width = static_cast<size_t>(side);
+      double squares = 0;
+      for (size_t y = 0; y < static_cast<size_t>(half); ++y) {
+        for (size_t x = 0; x < static_cast<size_t>(half); ++x) {
+          const float* const at = values.data() + 2 * y * width + 2 * x;
+          const double a{at[0]}, b{at[1]}, c{at[width]}, d{at[width + 1]};
+          const double mean = (a + b + c + d) / 4;
+          squares += (a * a + b * b + c * c + d * d) / 4 - mean * mean;
+          values[y * static_cast<size_t>(half) + x] = static_cast<float>(mean);
+        }
+      }
+      sums[level] += std::max(0.0, squares) / (static_cast<double>(half) * half * kViews);
+      side = half;
+    }
+  }
+
+  GaussianCloud cloud_;
+  Buffer<float> colors_;
+  CameraSet cameras_;
+  double distance_ = 0;
+  double farthest_pixel_ = 0;  // world size of a picture's pixel where the whole cloud is in it
+  bool marked_ = false;
+  RenderOptions options_;
+  Rasterizer rasterizer_;
+  RenderOutput output_;
+};
+
+}  // namespace
+
+Result<SplatPictures> LookAt(const TellingGaussians& telling, double unit) {
+  Painter painter(telling);
+  ANCHORSPLAT_RETURN_IF_ERROR(painter.Prepare(telling));
+  SplatPictures pictures;
+  for (size_t k = 0; k < SplatPictures::kSizes; ++k) {
+    const double size = unit * std::exp2(static_cast<double>(k) - SplatPictures::kOctaves);
+    SplatPictures::AtSize& at = pictures.sizes[k];
+    ANCHORSPLAT_RETURN_IF_ERROR(painter.Outlines(size, RenderMode::kClassic, at.classic, &at.cut, &at.coarse));
+    if (k % 2 == 0) continue;  // what the other rasterizer makes of them hardly changes from octave to octave
+    ANCHORSPLAT_RETURN_IF_ERROR(painter.Outlines(size, RenderMode::kAntialiased, at.antialiased, nullptr, nullptr));
+  }
+  constexpr double kNothing = 1e-7;  // so that logarithms are finite
+  std::array<double, SplatPictures::kDetails + 1> luminance{}, alpha{};
+  ANCHORSPLAT_RETURN_IF_ERROR(painter.Details(unit, luminance, alpha));
+  for (size_t k = 0; k < SplatPictures::kDetails; ++k) {
+    pictures.of_luminance[k] = std::log((luminance[k] + kNothing) / (luminance.back() + kNothing));
+    pictures.of_alpha[k] = std::log((alpha[k] + kNothing) / (alpha.back() + kNothing));
+  }
+  return pictures;
+}
+
+}  // namespace anchorsplat

@@ -227,8 +227,8 @@ void SayWhatIsTaken(const Treatment& treatment, const EnhanceReport& report) {
   const Made made = reading.likeliest();
   std::string text = Cat("looks like ", InWords(made), " (", Percent(reading.probability(made)), ")");
   if (report.pixel_size_source == PixelSizeSource::kRead) {
-    text += Cat(" of pixels of ", reading.pixel, " (", reading.low, " to ", reading.high, "); ", treatment.pixel,
-                " is taken, from which most is expected. --cameras or --pixel-size make it exact");
+    text += Cat(", training pixel ", reading.pixel, " (", reading.low, " to ", reading.high, "); ", treatment.pixel,
+                " is taken, from which most is expected. --cameras or --pixel-size makes it exact");
   }
   LogInfo(text);
 }
@@ -308,6 +308,8 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
                            .pixel = known.pixel,
                            .filter = auto_chosen || !HasNetwork(plan),
                            .network = HasNetwork(plan)};
+  // A strength is one of a splat as its file says it is.
+  if (options.filter_strength) request.mode = cloud.render_mode.value_or(RenderMode::kClassic);
   if (auto_chosen && options.upscale < kLeastUpscaleOfNetworks) request.network = false;
   Treatment treatment;
   if (!lost_nothing.empty()) {

@@ -75,20 +75,6 @@ inline GaussianCloud Ball(double pixel, int64_t n = 6000) {
   return cloud;
 }
 
-// Black veils around a ball, as fits of photographs on black keep them: no picture shows them, but alpha does.
-inline GaussianCloud BallInVeils() {
-  GaussianCloud cloud = Ball(0.01, 3000), veils = Ball(0.01, 3000);
-  Random random(3);
-  for (size_t i = 0; i < size_t{3} * 3000; ++i) {
-    veils.means[i] *= static_cast<float>(random.Uniform(1.1, 1.8));
-    veils.log_scales[i] = std::log(0.08f);
-    veils.sh[i] = -2;
-  }
-  for (float& x : veils.opacity_logits) x = -0.5f;
-  EXPECT_TRUE(Append(cloud, veils).ok());
-  return cloud;
-}
-
 inline CameraSet CamerasForPixel(double pixel) {
   const Pinhole intrinsics = PinholeFromFov(256, 256, std::numbers::pi / 4);
   auto cameras = OrbitCameras(20, pixel * intrinsics.fx + 0.5, {0, 0, 0}, intrinsics);  // nearest point of the ball

@@ -5,7 +5,7 @@
 
 An ensemble of perceptrons looks at what can be seen of a splat and says its training pixel, how it was made, and what the filter
 and a network would gain at multiples of that pixel, each with how sure that is. Rows without gains teach the pixel, rows
-without a pixel (strangers') nothing. --folds: also writes FOLDER/fold-0.safetensors to fold-7, each of which has seen no mesh
+without a pixel (strangers') how they were made. --folds: also writes FOLDER/fold-0.safetensors to fold-7, each of which has seen no mesh
 and no maker of that fold, and prints how good these are; `anchorsplat bench reading --score TABLE --folds FOLDER` decides
 every row by the one that has not seen it. The meshes of HELD_OUT are not in the model that is
 written: a test asks it about them. Needs NumPy and PyTorch; some minutes of a core.

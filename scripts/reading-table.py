@@ -16,7 +16,6 @@ enters no row: they are photographs-1, maker-1 and so on, and stay so (WORK/name
 
 import argparse
 import gzip
-import hashlib
 import json
 import pathlib
 import resource
@@ -26,23 +25,16 @@ import sys
 
 import numpy as np
 
-from reading_edits import COMMON, EDITS, Splat, added, without_harmonics
+from reading_edits import COMMON, EDITS, Splat, added
+from reading_originals import (DOWNSCALE, HERE, LOW_CAMERAS, UNMEASURED, digest, low_pixel, originals, photographs,
+                               strangers)
 
-HERE = pathlib.Path(__file__).resolve().parent.parent
 FOLDS = 8
 EDITS_PER_SPLAT = 8  # besides the splat as it is and without its tag
-UNMEASURED = ("pixels", "pixels-256", "pixels-standard")  # fits of which no gains are measured
 EDITS_OF_STRANGERS = ("crop: half", "crop: ball", "thinned: half", "pruned: faint", "floaters")
 EDITS_UNMEASURED = 4  # of those of which no gains are measured
-DOWNSCALE = 4  # of photographs
 LANDS = {"hills-1": ("hills", 1), "relief-2": ("relief", 2), "town-3": ("town", 3), "town-4": ("town", 4)}
-SPLATS = (".ply", ".spz", ".splat", ".sog", ".ksplat", ".glb", ".gltf", ".npz", ".csv")  # of strangers
-LOW_CAMERAS = [f"transforms_{size}.json" for size in (64, 96, 128, 192, 256, 400, "lr")]  # of the pictures that were fitted
 LABELS = ("original", "mesh", "maker", "kind", "edit", "made")
-
-
-def digest(text):
-    return int(hashlib.sha256(text.encode()).hexdigest(), 16)
 
 
 def run(*command, **more):
@@ -72,134 +64,6 @@ class Clock:
         kept = json.loads(self.path.read_text()) if self.path.exists() else {}
         kept[self.stage] = kept.get(self.stage, 0) + seconds
         self.path.write_text(json.dumps(kept))
-
-
-# Originals.
-
-
-def read_objects(folder, made_of, mesh_of=None):
-    """Fits of a data set; nothing where it was not made."""
-    if not (folder / "manifest.jsonl").exists():
-        return
-    for line in sorted((folder / "manifest.jsonl").read_text().splitlines()):
-        record = json.loads(line)
-        name = record["name"]
-        mesh, kind = (name.split("--") + [record.get("recipe", "")])[:2]
-        yield {"original": name, "mesh": mesh, "maker": "", "kind": kind, "made": made_of(kind), "object": folder / name,
-               "splat": folder / name / "splat.ply"}
-
-
-def made_by(kind):
-    return "antialiased" if kind.startswith("antialiased") else "mip" if kind.startswith("mip") else "classic"
-
-
-class Names:
-    """Numbers instead of names, in the order of a hash at first; who joins later gets the next ones."""
-
-    def __init__(self, work):
-        self.path = work / "names.json"
-        self.known = json.loads(self.path.read_text()) if self.path.exists() else {}
-
-    def of(self, things, word):
-        """{thing: number} of paths, by the names of their files."""
-        numbers = self.known.setdefault(word, {})
-        for thing in sorted(things, key=lambda p: digest(p.name)):
-            numbers.setdefault(thing.name, len(numbers) + 1)
-        self.path.write_text(json.dumps(self.known, indent=1))
-        return {thing: numbers[thing.name] for thing in sorted(things, key=lambda p: numbers[p.name])}
-
-
-def folders(path):
-    return [p for p in path.iterdir() if p.is_dir()]
-
-
-def photographs(arguments):
-    """{project: name}."""
-    if not arguments.photos:
-        return {}
-    return {p: f"photographs-{k}" for p, k in Names(arguments.work).of(folders(arguments.photos), "photographs").items()}
-
-
-def strangers(arguments):
-    """(splat, its name, its maker's, how it was made: what made.txt of the maker's folder says, or nothing)."""
-    if not arguments.strangers:
-        return
-    names = Names(arguments.work)
-    for maker, k in names.of(folders(arguments.strangers), "makers").items():
-        made = (maker / "made.txt").read_text().strip() if (maker / "made.txt").exists() else ""
-        splats = [p for p in maker.iterdir() if p.is_file() and p.name.endswith(SPLATS)]
-        for splat, n in names.of(splats, f"maker-{k}").items():
-            yield splat, f"maker-{k}-{n}", f"maker-{k}", made
-
-
-def originals(arguments):
-    work = arguments.work
-    found = list(read_objects(work / "fits", made_by)) + list(read_objects(work / "land", made_by))
-    for name in UNMEASURED:
-        found += [o | {"measure": False} for o in read_objects(work / name, made_by)]
-    found += list(mesh_splats(work, found))
-    room = work / "scenes/room"
-    if (room / "splat.ply").exists():
-        found.append({"original": "room", "mesh": "room", "maker": "", "kind": "room", "made": "classic", "object": room,
-                      "splat": room / "splat.ply"})
-    for example in sorted((HERE / "examples").iterdir()):
-        if (example / "input.ply").exists():
-            mesh = {"biplane": "BlendSwap-CC-0-cartoon_biplane", "stone_lantern": "BlendSwap-CC-0-stoneLantern"}
-            found.append({"original": example.name, "mesh": mesh.get(example.name, example.name), "maker": "",
-                          "kind": "example", "made": "classic", "object": example, "splat": example / "input.ply"})
-    for project, name in photographs(arguments).items():
-        splat = work / "photographs" / f"{name}.ply"
-        if splat.exists():
-            found.append({"original": name, "mesh": name, "maker": name, "kind": "photographed", "made": "classic",
-                          "object": project, "downscale": DOWNSCALE, "splat": splat})
-    return found
-
-
-def mesh_splats(work, fits):
-    """What converters make of a mesh: a disc on every point of its surface, all alike. Of every third mesh."""
-    for mesh in sorted({fit["mesh"] for fit in fits if "--" in fit["original"]}):
-        if digest("points of " + mesh) % 3:
-            continue
-        fit = next(f for f in fits if f["mesh"] == mesh)
-        low = sorted(p.name for p in fit["object"].iterdir() if p.name.isdigit())
-        low = min(low, key=int)
-        out = work / "meshes" / f"{mesh}.ply"
-        if not out.exists():
-            places, colours = colmap_points(fit["object"] / low / "sparse/0/points3D.bin")
-            splat = Splat(fit["splat"])
-            away = np.sort(((places[:200, None] - places[None]) ** 2).sum(-1), axis=1)[:, 4] ** 0.5
-            scales = np.full((len(places), 3), 0.6 * np.median(away))
-            made = splat.with_rows(splat.gaussians(places, scales, np.full(len(places), 0.99), np.clip(colours, 0.01, 0.99)))
-            made, _ = without_harmonics(made, None, None)
-            made.write(out)
-        yield fit | {"original": f"{mesh}--points", "kind": "points of a mesh", "made": "mesh", "splat": out}
-
-
-def colmap_points(path):
-    data = path.read_bytes()
-    count, at = int(np.frombuffer(data, "<u8", 1)[0]), 8
-    places, colours = np.zeros((count, 3)), np.zeros((count, 3))
-    for i in range(count):
-        places[i] = np.frombuffer(data, "<f8", 3, at + 8)
-        colours[i] = np.frombuffer(data, "u1", 3, at + 32) / 255
-        at += 8 + 24 + 3 + 8
-        at += 8 + 8 * int(np.frombuffer(data, "<u8", 1, at)[0])
-    return places, colours
-
-
-def low_pixel(original):
-    """Of the middle of a mesh's views; of what is no object, a size that is about right."""
-    for name in LOW_CAMERAS:
-        path = original["object"] / name
-        if path.exists():
-            cameras = json.loads(path.read_text())
-            centres = np.array([np.array(f["transform_matrix"])[:3, 3] for f in cameras["frames"]])
-            frame = cameras | cameras["frames"][0]
-            focal = frame.get("fl_x") or 0.5 * frame["w"] / np.tan(0.5 * frame["camera_angle_x"])
-            return float(np.median(np.linalg.norm(centres, axis=1)) / focal)
-    splat = Splat(original["splat"])
-    axes = np.sort(np.exp(splat.get("scale_0", "scale_1", "scale_2")), axis=1)
-    return float(np.median(axes[:, 1]))
 
 
 # Stages.
@@ -357,7 +221,7 @@ def edited(arguments, original, splat, pixel, name, path, random, found):
         beside = Splat(other["splat"])
         rows = beside.rows.copy()
         place, scale = beside.column("x", "y", "z"), beside.column("scale_0", "scale_1", "scale_2")
-        (low, high), (other_low, other_high) = splat.box(), beside.box()
+        (low, high), (other_low, _) = splat.box(), beside.box()
         rows[:, place] *= factor
         rows[:, place] += [high[0] - factor * other_low[0] + 0.15, low[1] - factor * other_low[1], 0]
         rows[:, scale] += np.log(factor)
@@ -520,7 +384,8 @@ def positive(text):
     return int(text)
 
 
-NEEDS = {"measure": ("tasks.jsonl", "the stage `splats`"), "fits": ("objects", "scripts/fetch-objects.sh WORK/objects"), "splats": ("fits", "the stage `fits`"),
+NEEDS = {"fits": ("objects", "scripts/fetch-objects.sh WORK/objects"), "splats": ("fits", "the stage `fits`"),
+         "measure": ("tasks.jsonl", "the stage `splats`"),
          "rows": ("tasks.jsonl", "the stage `splats`"), "pack": ("rows", "the stage `rows`")}
 
 

@@ -206,6 +206,13 @@ def main():
     edited = np.array([row["edit"] != "" for row in table.rows])
     for name, which in (("as they were fitted", judged & ~edited), ("edited", judged & edited)):
         print(f"pixels of splats {name}: off by {np.median(error[which]):.3f} (median), {np.quantile(error[which], 0.9):.3f} (90 %), ln")
+    kinds = np.array([row["kind"] for row in table.rows])
+    print("by kinds of splats that nobody has edited, ln(said / true): median, median size, interval that holds it")
+    for kind in np.unique(kinds[judged & ~edited]):
+        which = judged & ~edited & (kinds == kind)
+        off = (middle - table.pixel)[which]
+        holds = np.mean(np.abs(off) <= calibrated(None)[0] * half[which])
+        print(f"  {kind:24} {which.sum():4} {np.median(off):+.3f} {np.median(np.abs(off)):.3f} {100 * holds:4.0f} %")
     if arguments.folds:
         arguments.folds.mkdir(parents=True, exist_ok=True)
         for fold, ensemble in enumerate(folds):

@@ -42,6 +42,7 @@ struct ReadingFlags {
   std::string tasks, output;
   int views = 4;
   std::string table, decisions, folds;
+  double losses_count = kLossesCount;
 };
 
 Status PrintFeatures(const ReadingFlags& flags, Program& program) {
@@ -218,7 +219,7 @@ Status Score(const ReadingFlags& flags, const SharedFlags& shared) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(ReadingModel model, ReadingModel::Load(file));
       models.push_back(std::move(model));
     }
-    deciders.emplace_back("model", ReadDecisions(rows, models));
+    deciders.emplace_back("model", ReadDecisions(rows, models, flags.losses_count));
   }
   deciders.emplace_back("the list", TodaysDecisions(rows));
   for (const char* method : {"filter", "network"}) {
@@ -307,9 +308,15 @@ void AddReadingBench(CLI::App& bench, Program& program) {
   CLI::Option* const table = verb.add_option(
       "--score", flags->table, "A table: how well the list of rules decided that was there before, and bounds");
   verb.add_option("--decisions", flags->decisions, "JSON lines of another decider, to stand beside it")->needs(table);
-  verb.add_option("--folds", flags->folds,
-                  "Folder of models that have not seen a fold each (scripts/train-reading.py): how they decide it")
-      ->needs(table);
+  CLI::Option* const folds =
+      verb.add_option("--folds", flags->folds,
+                      "Folder of models that have not seen a fold each (scripts/train-reading.py): how they decide it")
+          ->needs(table);
+  verb.add_option("--losses-count", flags->losses_count,
+                  "With --folds: how much more a decibel that is lost counts than one that is gained")
+      ->needs(folds)
+      ->check(NotNegative())
+      ->capture_default_str();
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunReading(*flags, program); }; });
 }
 

@@ -42,8 +42,6 @@ bool ShowsNothing(const GaussianCloud& cloud) {
   return std::ranges::none_of(cloud.opacity_logits, [](float logit) { return Sigmoid(logit) >= kMinAlpha; });
 }
 
-std::string Percent(double share) { return Cat(std::lround(100 * std::min(share, 0.99)), " %"); }
-
 // The splat of which cameras or the caller say the pixel, or of which it is read.
 struct KnownPixels {
   Buffer<float> sizes;          // one or [N]; empty: they are read
@@ -213,19 +211,17 @@ void ReadParts(const MethodPlan& plan, TreatmentRequest request, const Treatment
 
 void SayNothingIsDone(const EnhanceReport& report, std::optional<RenderMode> tag) {
   const Reading& reading = *report.reading;
-  const Made made = reading.likeliest();
   const std::string_view mode = tag ? NameOf(*tag) : "classic";
-  LogWarning(HasItsWidth(made)
-                 ? Cat("left as it is: looks like ", InWords(made), " (", Percent(reading.probability(made)),
-                       "), which has its width. --mode ", mode, " enhances it all the same")
+  LogWarning(HasItsWidth(reading.likeliest())
+                 ? Cat("left as it is: looks like ", LooksInWords(reading), ", which has its width. --mode ", mode,
+                       " enhances it all the same")
                  : Cat("left as it is: nothing is sure to make it better. --cameras, --pixel-size or --mode ", mode,
                        " says more about it"));
 }
 
 void SayWhatIsTaken(const Treatment& treatment, const EnhanceReport& report) {
   const Reading& reading = *report.reading;
-  const Made made = reading.likeliest();
-  std::string text = Cat("looks like ", InWords(made), " (", Percent(reading.probability(made)), ")");
+  std::string text = Cat("looks like ", LooksInWords(reading));
   if (report.pixel_size_source == PixelSizeSource::kRead) {
     text += Cat(", training pixel ", reading.pixel, " (", reading.low, " to ", reading.high, "); ", treatment.pixel,
                 " is taken, from which most is expected. --cameras or --pixel-size makes it exact");

@@ -137,9 +137,11 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
     return bad("a property is missing or has a value of another type");
   }
   if (task.id.empty() || task.splat.empty()) return bad("it needs an id and a splat");
-  if (task.object.empty() && (task.keep || !task.context.empty() || task.others_from > 0)) {
-    return bad("keep, context and others are about gains, which need an object");
+  const bool is_about_gains = task.keep || !task.context.empty() || task.others_from > 0 || !task.method.empty();
+  if (task.object.empty() && is_about_gains) {
+    return bad("keep, context, others and treat are about gains, which need an object");
   }
+  if (!task.measure && !task.method.empty()) return bad("treat is measured, and measure is false");
   if (task.id.size() > kMostOfName || task.id.front() == '.' || task.id.find('/') != std::string::npos ||
       Printable(task.id, kMostOfName) != task.id) {
     return bad(Cat(Printable(task.id), ": an id is the name of a file, of ", kMostOfName, " bytes at most"));
@@ -327,7 +329,8 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   if (cloud.render_mode) row["tag"] = NameOf(*cloud.render_mode);
 
   const Stopwatch reading;
-  auto features = FeaturesOf(cloud);
+  const ShowingGaussians shown = FindShowingGaussians(cloud);
+  const auto features = FeaturesOf(cloud, shown);
   row["seconds_reading"] = Rounded(reading.Total());
   double showing = 1;
   if (features.ok()) {
@@ -367,7 +370,7 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   row["upscale"] = object->upscale;
   // Of what is looked at: a sky is far away, and its pixels are none of the subject's.
   Buffer<float> seen;
-  for (const int64_t i : FindShowingGaussians(cloud).rows_of_all) seen.push_back(pixels[static_cast<size_t>(i)]);
+  for (const int64_t i : shown.rows_of_all) seen.push_back(pixels[static_cast<size_t>(i)]);
   if (seen.empty()) seen = pixels;
   // Where pixels differ many times, as in a room, one for all must be that of the finest.
   const double finest = QuantileOf(seen, 0.1), coarsest = QuantileOf(seen, 0.9);
@@ -395,7 +398,7 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
       const EnhanceMethod* const method = FindMethod(name);
       if (method == nullptr) continue;
       nlohmann::json& gains = row["gains"][NameOf(mode)][word] = nlohmann::json::array();
-      for (const double multiple : kReadingMultiples) {
+      for (const double multiple : kGainMultiples) {
         ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud treated, Treat(*method, as, pixels, multiple, showing, options));
         ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, measuring.Measure(std::move(treated)));
         gains.push_back(Rounded(psnr - raw));

@@ -18,9 +18,6 @@ namespace anchorsplat {
 // Rows of the table of readings (docs/reading-table.md): what a splat looks like, what helps it, and what the program
 // does with it by itself.
 
-// Pixels that are tried, in multiples of the true ones.
-inline constexpr std::array<double, 7> kReadingMultiples = {0.25, 0.35, 0.5, 0.7, 1, 1.4, 2};
-
 // Parts of the table, by mesh or maker: what decides one has learned from the others.
 inline constexpr int kReadingFolds = 8;
 

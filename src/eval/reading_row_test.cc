@@ -67,6 +67,31 @@ TEST_F(ReadingRowMaking, HasGainsOfBothModesAndWhatIsDoneToday) {
   EXPECT_EQ(row["features"].size(), FeatureNames().size());
 }
 
+TEST_F(ReadingRowMaking, HasPixelsAloneWhereNothingElseIsAskedFor) {
+  ReadingTask task = Task(Sparse());
+  const nlohmann::json whole = Make(task);
+  task.measure = false;
+  const nlohmann::json row = Make(task);
+  EXPECT_EQ(row["pixel"], whole["pixel"]);
+  EXPECT_EQ(row["features"], whole["features"]);
+  EXPECT_FALSE(row.contains("gains"));
+}
+
+// One pixel for all is nearly what each has that was seen from all around.
+TEST_F(ReadingRowMaking, SaysWhatOneTreatmentGains) {
+  ReadingTask task = Task(Sparse());
+  const nlohmann::json whole = Make(task);
+  task.method = "filter";
+  task.mode = RenderMode::kClassic;
+  task.pixel = whole["pixel"].get<double>();
+  const nlohmann::json row = Make(task);
+  EXPECT_FALSE(row.contains("gains"));
+  const double expected = whole["gains"]["classic"]["filter"].at(4).get<double>();
+  EXPECT_NEAR(row["gain"].get<double>(), expected, 0.3);
+  task.mode = RenderMode::kAntialiased;
+  EXPECT_NE(Make(task)["gain"], row["gain"]);
+}
+
 TEST_F(ReadingRowMaking, IsOfItsTaskAndItsFiles) {
   const ReadingTask task = Task(Sparse());
   const std::string state = ReadingRows(1).StateOf(task);
@@ -164,6 +189,20 @@ TEST_F(ReadingRowMaking, BadTasksAreRefused) {
       refused(
           R"({"id":"a","splat":"a.ply","moved":{"scale":1,"rotation":[1,0,0,0,1,0,0,0,1,0],"translation":[0,0,0]}})"),
       HasSubstr("nine numbers"));
+  EXPECT_EQ(
+      refused(R"({"id":"an-id-may-be-longer-than-what-messages-quote-of-a-text-of-somebody-else's","splat":"a"})"), "");
+  constexpr const char* kTreat =
+      R"({"id":"a","splat":"a","object":"o","treat":{"method":"filter","mode":"classic","pixel":1}})";
+  EXPECT_EQ(refused(kTreat), "");
+  const auto with = [&](const char* text, const char* in_its_place) {
+    std::string json = kTreat;
+    return refused(json.replace(json.find(text), std::string(text).size(), in_its_place).c_str());
+  };
+  EXPECT_THAT(with("filter", "magic"), HasSubstr("treat: a method"));
+  EXPECT_THAT(with("classic", "modern"), HasSubstr("treat: a method"));
+  EXPECT_THAT(with(":1}", ":0}"), HasSubstr("treat: a method"));
+  EXPECT_THAT(with(R"("object":"o",)", ""), HasSubstr("need an object"));
+  EXPECT_THAT(with(R"("object":"o")", R"("object":"o","measure":false)"), HasSubstr("measure is false"));
   EXPECT_THAT(refused(R"([])"), HasSubstr("not a JSON object"));
   EXPECT_THAT(refused(R"({"id":"a"})"), HasSubstr("a splat"));
   EXPECT_THAT(refused(R"({"id":"a","splat":"a.ply","pixel":3})"), HasSubstr("unknown property pixel"));

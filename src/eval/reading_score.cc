@@ -8,7 +8,6 @@
 #include "core/buffer.h"
 #include "core/statistics.h"
 #include "reading/reading.h"
-#include "reading/treatment.h"
 
 namespace anchorsplat {
 
@@ -111,7 +110,7 @@ Decisions BestDecisions(std::span<const ReadingRow> rows) {
         if (!(gains[k] > *best.gain)) continue;
         best.mode = key.first;
         best.method = key.second;
-        best.pixel = kReadingMultiples[k] * row.pixel;
+        best.pixel = kGainMultiples[k] * row.pixel;
         best.gain = gains[k];
       }
     }
@@ -122,7 +121,7 @@ Decisions BestDecisions(std::span<const ReadingRow> rows) {
 
 Decisions FixedDecisions(std::span<const ReadingRow> rows, const std::string& method, double& multiple) {
   double most = -std::numeric_limits<double>::infinity();
-  for (const double tried : kReadingMultiples) {
+  for (const double tried : kGainMultiples) {
     double sum = 0;
     for (const ReadingRow& row : rows) {
       if (WasMeasured(row, method)) sum += row.GainOf(method, row.TrueMode(), tried);
@@ -151,13 +150,13 @@ Decisions GivenDecisions(std::span<const ReadingRow> rows, const std::map<std::s
   return decisions;
 }
 
-Decisions ReadDecisions(std::span<const ReadingRow> rows, std::span<const ReadingModel> models) {
+Decisions ReadDecisions(std::span<const ReadingRow> rows, std::span<const ReadingModel> models, double losses_count) {
   Decisions decisions;
   for (const ReadingRow& row : rows) {
     ReadingDecision& decision = decisions.emplace_back();
     if (row.features.values.empty()) continue;
     const Reading reading = ReadFrom(row.features, models[static_cast<size_t>(row.fold) % models.size()]);
-    const Treatment treatment = Treat(reading, {.mode = row.tag});
+    const Treatment treatment = Treat(reading, {.mode = row.tag, .losses_count = losses_count});
     decision.low = reading.low;
     decision.high = reading.high;
     decision.made = NameOf(reading.likeliest());

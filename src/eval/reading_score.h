@@ -8,6 +8,7 @@
 
 #include "eval/reading_table.h"
 #include "reading/reading_model.h"
+#include "reading/treatment.h"
 
 namespace anchorsplat {
 
@@ -42,7 +43,9 @@ Decisions FixedDecisions(std::span<const ReadingRow> rows, const std::string& me
 Decisions GivenDecisions(std::span<const ReadingRow> rows, const std::map<std::string, ReadingDecision>& given);
 
 // What Read and Treat say of the rows' features, of each by the model of its fold: models[row.fold] (docs/reading.md).
-Decisions ReadDecisions(std::span<const ReadingRow> rows, std::span<const ReadingModel> models);
+// `losses_count`: TreatmentRequest::losses_count.
+Decisions ReadDecisions(std::span<const ReadingRow> rows, std::span<const ReadingModel> models,
+                        double losses_count = kLossesCount);
 
 // `decisions[i]` is of rows[i]. All rows first, then kinds of splats that nobody has edited, then edits, each in order
 // of their names. Rows without gains count for seconds and for what they are taken for.

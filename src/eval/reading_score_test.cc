@@ -51,8 +51,8 @@ TEST(ReadingTable, GainsAreLinearInTheLogarithm) {
   const auto rows = Read(OneLine(kClassicRow));
   ASSERT_TRUE(rows.ok()) << rows.error().message;
   const ReadingRow& row = rows->at(0);
-  for (size_t k = 0; k < kReadingMultiples.size(); ++k) {
-    EXPECT_DOUBLE_EQ(row.GainOf("filter", RenderMode::kClassic, kReadingMultiples[k]),
+  for (size_t k = 0; k < kGainMultiples.size(); ++k) {
+    EXPECT_DOUBLE_EQ(row.GainOf("filter", RenderMode::kClassic, kGainMultiples[k]),
                      (std::array{1, 2, 3, 4, 5, 4, -1}[k]));
   }
   EXPECT_NEAR(row.GainOf("filter", RenderMode::kClassic, std::sqrt(2.8)), 1.5, 1e-12);
@@ -249,6 +249,28 @@ TEST(ReadingScore, OfNoRowsIsZero) {
   ASSERT_EQ(scores.size(), 1u);
   EXPECT_EQ(scores[0].rows, 0);
   EXPECT_EQ(scores[0].mean, 0);
+}
+
+// Rows that only teach pixels judge no treatment, and refuse none.
+TEST(ReadingTable, DecisionsOfRowsWithoutGainsAreTaken) {
+  const TestFolder folder;
+  const auto rows = Read(R"({"id":"b","kind":"standard","edit":"","made":"classic","tag":"classic","pixel":0.01})"
+                         "\n" +
+                         OneLine(kClassicRow));
+  ASSERT_TRUE(rows.ok()) << rows.error().message;
+  const auto path = folder / "decisions.jsonl";
+  ASSERT_TRUE(WriteWholeFile(path,
+                             R"({"id":"b","method":"network","mode":"classic","pixel":0.01})"
+                             "\n"
+                             R"({"id":"a","method":"filter","mode":"classic","pixel":0.01,"gain":4.5})"
+                             "\n",
+                             true)
+                  .ok());
+  const auto decisions = ReadReadingDecisions(path, *rows);
+  ASSERT_TRUE(decisions.ok()) << decisions.error().message;
+  const ReadingScore score = ScoreReadings(*rows, GivenDecisions(*rows, *decisions))[0];
+  EXPECT_EQ(score.rows, 1);
+  EXPECT_DOUBLE_EQ(score.mean, 4.5) << "as it was measured, not the curve's 5";
 }
 
 // Fails where the model that is part of the program gets worse: of meshes that it has not seen, and what was to be had.

@@ -102,11 +102,11 @@ double ReadingRow::GainOf(const std::string& method, RenderMode mode, double mul
   if (found == gains.end()) return std::numeric_limits<double>::quiet_NaN();
   const ReadingGains& curve = found->second;
   multiple = std::min(multiple, kMostMultiple);
-  if (multiple < kReadingMultiples.front()) return curve.front() * std::pow(multiple / kReadingMultiples.front(), 2);
-  const auto above = std::ranges::upper_bound(kReadingMultiples, multiple);
-  const size_t k = std::clamp<size_t>(static_cast<size_t>(above - kReadingMultiples.begin()), 1, curve.size() - 1);
-  if (multiple > kReadingMultiples.back() && curve.back() >= curve[curve.size() - 2]) return curve.back();
-  const double from = std::log(kReadingMultiples[k - 1]), to = std::log(kReadingMultiples[k]);
+  if (multiple < kGainMultiples.front()) return curve.front() * std::pow(multiple / kGainMultiples.front(), 2);
+  const auto above = std::ranges::upper_bound(kGainMultiples, multiple);
+  const size_t k = std::clamp<size_t>(static_cast<size_t>(above - kGainMultiples.begin()), 1, curve.size() - 1);
+  if (multiple > kGainMultiples.back() && curve.back() >= curve[curve.size() - 2]) return curve.back();
+  const double from = std::log(kGainMultiples[k - 1]), to = std::log(kGainMultiples[k]);
   return curve[k - 1] + (curve[k] - curve[k - 1]) * (std::log(multiple) - from) / (to - from);
 }
 
@@ -118,7 +118,7 @@ Result<std::vector<ReadingRow>> ReadReadingTable(const fs::path& path) {
       const size_t values = row.features.values.size();
       return values == 0 || values == FeatureNames().size() ? "" : "not as many features as the first line names";
     }
-    const std::vector<double> multiples(kReadingMultiples.begin(), kReadingMultiples.end());
+    const std::vector<double> multiples(kGainMultiples.begin(), kGainMultiples.end());
     const bool known = object.at("table") == "readings" && object.at("multiples") == json(multiples) &&
                        object.at("features") == json(FeatureNames());
     return known ? "" : "not a table of readings of this version";
@@ -134,7 +134,7 @@ std::string WrongWith(const ReadingDecision& decision, const ReadingRow& row) {
   if (decision.method == "none") return "";
   if (!(decision.pixel > 0) || !std::isfinite(decision.pixel)) return "a treatment needs a pixel, a length above 0";
   const RenderMode mode = decision.mode.value_or(row.DrawnMode());
-  if (row.pixel > 0 && !row.gains.contains({mode, decision.method})) {
+  if (!row.gains.empty() && !row.gains.contains({mode, decision.method})) {
     return Cat("'", decision.method, "' as ", NameOf(mode), " was not measured of this row",
                row.tag ? Cat(", whose file says ", NameOf(*row.tag)) : "");
   }

@@ -12,11 +12,12 @@
 #include "core/result.h"
 #include "eval/reading_row.h"
 #include "reading/features.h"
+#include "reading/reading_model.h"
 
 namespace anchorsplat {
 
-// Gain in dB over the splat as it is, at kReadingMultiples of its true pixels.
-using ReadingGains = std::array<double, kReadingMultiples.size()>;
+// Gain in dB over the splat as it is, at kGainMultiples of its true pixels.
+using ReadingGains = std::array<double, kGainMultiples.size()>;
 
 // What a decider says of one splat and does with it.
 struct ReadingDecision {
@@ -34,7 +35,7 @@ struct ReadingDecision {
 struct ReadingRow {
   std::string id, original, mesh, maker, kind, edit, made;
   std::optional<RenderMode> tag;
-  double pixel = 0;  // true, median; 0: not known, and there are no gains
+  double pixel = 0;  // true; 0: not known, and there are no gains
   std::map<std::pair<RenderMode, std::string>, ReadingGains> gains;  // by mode and method, "filter" or "network"
   ReadingDecision today;                                             // of the list of rules before there was a model
   int fold = 0;

@@ -14,6 +14,8 @@
 #include "core/ellipsoid.h"
 #include "core/kd_tree.h"
 #include "core/parallel.h"
+#include "core/quaternion_length.h"
+#include "core/render_mode.h"
 #include "core/rotation.h"
 #include "core/run_context.h"
 #include "core/spherical_harmonics.h"
@@ -76,11 +78,20 @@ struct Weighted {
   }
 };
 
+// ln of the axes, the smallest first.
+std::array<float, 3> SortedAxes(const GaussianCloud& cloud, size_t i) {
+  std::array<float, 3> axes;
+  std::copy_n(cloud.log_scales.data() + 3 * i, 3, axes.begin());
+  std::ranges::sort(axes);
+  return axes;
+}
+
 struct Gaussians {
-  // Of a sample of those that show, in one order: ln of the axes, the smallest first; opacity, its logit.
+  // Of a sample of those that show, each rising: ln of the axes, the smallest first; opacity, its logit.
   std::array<Buffer<float>, 3> axes;
   Buffer<float> opacities, logits;
-  std::array<Weighted, 4> weighted;  // ln of the axes, opacity; by opacity × area
+  std::vector<std::pair<float, float>> areas;  // rising: ln of middle × largest axis, opacity
+  std::array<Weighted, 4> weighted;            // ln of the axes, opacity; by opacity × area
 };
 
 Gaussians SampleOf(const GaussianCloud& showing) {
@@ -88,21 +99,23 @@ Gaussians SampleOf(const GaussianCloud& showing) {
   const int64_t step = std::max<int64_t>(1, showing.size() / kMostOfStatistics);
   for (int64_t row = 0; row < showing.size(); row += step) {
     const auto i = static_cast<size_t>(row);
-    std::array<float, 3> own;
-    std::copy_n(showing.log_scales.data() + 3 * i, 3, own.begin());
-    std::ranges::sort(own);
+    const std::array<float, 3> own = SortedAxes(showing, i);
     const float opacity = Sigmoid(showing.opacity_logits[i]);
     const float weight = opacity * std::exp(own[1] + own[2]);
     for (size_t a = 0; a < 3; ++a) {
       if (std::isfinite(own[a])) out.axes[a].push_back(own[a]);
     }
     out.opacities.push_back(opacity);
+    out.areas.emplace_back(own[1] + own[2], opacity);
     out.logits.push_back(std::clamp(showing.opacity_logits[i], -20.0f, 20.0f));
     if (!(weight > 0) || !std::isfinite(weight)) continue;
     for (size_t a = 0; a < 3; ++a) out.weighted[a].Add(std::max(own[a], -80.0f), weight);
     out.weighted[3].Add(opacity, weight);
   }
-  for (Buffer<float>& axis : out.axes) std::ranges::sort(axis);
+  for (Buffer<float>* values : {&out.axes[0], &out.axes[1], &out.axes[2], &out.opacities, &out.logits}) {
+    std::ranges::sort(*values);
+  }
+  std::sort(out.areas.begin(), out.areas.end());
   return out;
 }
 
@@ -147,7 +160,7 @@ double ShareOfTheLeast(std::span<const float> sorted) {
 }
 
 void AddFile(const CloudView& whole, Row& row) {
-  for (const RenderMode mode : {RenderMode::kClassic, RenderMode::kAntialiased, RenderMode::kMip}) {
+  for (const RenderMode mode : kRenderModes) {
     row.Add(Cat("file.", NameOf(mode)), whole.render_mode == mode ? 1 : 0);
   }
   row.Add("file.sh_degree", whole.sh_degree);
@@ -172,16 +185,14 @@ void AddSizes(Gaussians& sample, Row& row) {
   }
   for (const double q : kShares) row.Add(Cat("size.opacity.", q), sample.weighted[3].Quantile(q));
 
-  Buffer<float> opacities = sample.opacities;
-  std::ranges::sort(opacities);
-  for (int decile = 1; decile <= 9; ++decile)
+  const Buffer<float>& opacities = sample.opacities;
+  for (int decile = 1; decile <= 9; ++decile) {
     row.Add(Cat("opacity.", decile), SortedQuantile(opacities, decile / 10.0));
+  }
   const auto faint = std::ranges::lower_bound(opacities, 0.3f) - opacities.begin();
   row.Add("opacity.faint", static_cast<double>(faint) / static_cast<double>(std::max<size_t>(1, opacities.size())));
-  Buffer<float> logits = sample.logits;
-  std::ranges::sort(logits);
-  for (const double q : {0.001, 0.01, 0.05}) row.Add(Cat("opacity.logit.", q), SortedQuantile(logits, q));
-  row.Add("opacity.same", ShareOfTheSame(logits));
+  for (const double q : {0.001, 0.01, 0.05}) row.Add(Cat("opacity.logit.", q), SortedQuantile(sample.logits, q));
+  row.Add("opacity.same", ShareOfTheSame(sample.logits));
 }
 
 void AddAxes(const Gaussians& sample, Row& row) {
@@ -197,17 +208,9 @@ void AddAxes(const Gaussians& sample, Row& row) {
   }
 }
 
-// Opacity of the thinnest tenth, and how opacity goes with size.
-void AddOpacityBySize(const GaussianCloud& showing, Row& row) {
-  std::vector<std::pair<float, float>> items;  // ln area, opacity
-  const int64_t step = std::max<int64_t>(1, showing.size() / kMostOfStatistics);
-  for (int64_t i = 0; i < showing.size(); i += step) {
-    std::array<float, 3> own;
-    std::copy_n(showing.log_scales.data() + 3 * i, 3, own.begin());
-    std::ranges::sort(own);
-    items.emplace_back(own[1] + own[2], Sigmoid(showing.opacity_logits[static_cast<size_t>(i)]));
-  }
-  std::sort(items.begin(), items.end());
+// How opacity goes with size.
+void AddOpacityBySize(const Gaussians& sample, Row& row) {
+  const auto& items = sample.areas;
   for (size_t fifth = 0; fifth < 5; ++fifth) {
     const size_t begin = fifth * items.size() / 5, end = (fifth + 1) * items.size() / 5;
     double sum = 0, opaque = 0;
@@ -234,10 +237,7 @@ void AddColorsAndTurns(const CloudView& whole, const ShowingGaussians& showing, 
       (k < 3 ? constant : rest) += value * value;
     }
     outside += out ? 1 : 0;
-    const float* const q = whole.quats.data() + 4 * i;
-    const double length =
-        std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] + double{q[2]} * q[2] + double{q[3]} * q[3]);
-    lengths += std::min(1.0, std::abs(length - 1));
+    lengths += std::min(1.0, std::abs(QuaternionLength(whole.quats.data() + 4 * i) - 1));
     ++count;
   }
   count = std::max(1.0, count);
@@ -344,9 +344,7 @@ Neighbours NeighboursOf(const CloudView& whole, const ShowingGaussians& showing)
       };
       out.side[at] = static_cast<float>(side(8));
       out.wide[at] = static_cast<float>(side(found));
-      std::array<float, 3> axes;
-      std::copy_n(cloud.log_scales.data() + 3 * own, 3, axes.begin());
-      std::ranges::sort(axes);
+      const std::array<float, 3> axes = SortedAxes(cloud, own);
       out.own[at] = 0.5f * (axes[1] + axes[2]) - out.side[at];
       const auto turn = TurnOf(cloud, own);
       const auto covariance = LogCovariance(cloud, own, turn);
@@ -456,7 +454,7 @@ void AddAll(const CloudView& whole, const ShowingGaussians& showing, const Splat
   AddCounts(showing, row);
   AddSizes(sample, row);
   AddAxes(sample, row);
-  AddOpacityBySize(showing.all, row);
+  AddOpacityBySize(sample, row);
   AddColorsAndTurns(whole, showing, row);
   AddNeighbours(std::move(neighbours), row);
   AddShape(showing.all, row);

@@ -18,7 +18,7 @@ namespace anchorsplat {
 //   file.*      what the file says: render mode (one of three or none), SH degree
 //   count.*     shares of the Gaussians that show, and of these that are not nearly black
 //   size.*      10, 25, 50 and 75 % quantiles of the axes, smallest first, and of opacity, weighted by opacity × area
-//   opacity.*   deciles; share of the thinnest tenth that is opaque; share that is fainter than 0.3
+//   opacity.*   deciles; share that is fainter than 0.3; its mean and the share that is opaque, by fifths of the area
 //   axis*       quantiles of the axes, each Gaussian alike; shares that have one value, and that are the least
 //   tail.*      how far the smallest 2 and 5 % of an axis lie below their quantile, in the mean
 //   color.*     colours that no picture has; harmonics over constant colours

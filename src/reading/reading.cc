@@ -3,14 +3,20 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/text.h"
+
 namespace anchorsplat {
 
 Made Reading::likeliest() const { return static_cast<Made>(std::ranges::max_element(made) - made.begin()); }
 
+std::string LooksInWords(const Reading& reading) {
+  const Made made = reading.likeliest();
+  return Cat(InWords(made), " (", std::lround(100 * std::min(reading.probability(made), 0.99)), " %)");
+}
+
 Reading ReadFrom(const SplatFeatures& features, const ReadingModel& model) {
   Reading reading;
   reading.unit = features.unit;
-  reading.interval = model.interval();
   reading.strangeness = model.Strangeness(features.values);
   static const size_t share =
       static_cast<size_t>(std::ranges::find(FeatureNames(), "count.share_showing") - FeatureNames().begin());
@@ -29,7 +35,7 @@ Reading ReadFrom(const SplatFeatures& features, const ReadingModel& model) {
   for (const ReadingOpinion& opinion : reading.opinions) {
     apart += (opinion.log_pixel - middle) * (opinion.log_pixel - middle) / members;
   }
-  const double half = reading.interval * std::hypot(spread, std::sqrt(apart));
+  const double half = model.interval() * std::hypot(spread, std::sqrt(apart));
   reading.pixel = reading.unit * std::exp(middle);
   reading.low = reading.pixel * std::exp(-half);
   reading.high = reading.pixel * std::exp(half);

@@ -22,13 +22,15 @@ struct Reading {
   std::array<double, kMadeCount> made{};  // probabilities of Made
   double strangeness = 0;  // ReadingModel::Strangeness: above 1, 2 % of splats like those learned from are
   double unit = 0;         // world units, of `opinions`
-  double interval = 1;     // ReadingModel::interval
   double showing = 1;      // share of the Gaussians that show, opacity of 10 % or more
   std::vector<ReadingOpinion> opinions;
 
   Made likeliest() const;
   double probability(Made of) const { return made[static_cast<size_t>(of)]; }
 };
+
+// "a classic splat (98 %)": likeliest() and how sure that is, never wholly.
+std::string LooksInWords(const Reading& reading);
 
 // kBadArgument: too little of the splat shows to be read.
 Result<Reading> Read(const CloudView& cloud);

@@ -10,9 +10,6 @@ namespace anchorsplat {
 
 namespace {
 
-// So much more a lost decibel counts than one that is gained. Measured on the table of readings, meshes left out
-// (docs/reading.md has the curve).
-constexpr double kLossesCount = 4;
 // Pixels that are tried, ln of the unit: a quarter octave apart, four octaves to either side.
 constexpr int kTried = 16;
 constexpr double kTriedStep = 0.25;
@@ -87,7 +84,7 @@ void Try(const Reading& reading, const TreatmentRequest& request, RenderMode mod
   for (int step = request.pixel ? kTried : -kTried; step <= kTried; ++step) {
     const double log_size = request.pixel ? std::log(*request.pixel / reading.unit) : step * kTriedStep * std::log(2.0);
     const Expectation expected = Expect(reading, GainOf(mode, network), log_size, request.pixel.has_value());
-    const double score = expected.gain - kLossesCount * expected.loss;
+    const double score = expected.gain - request.losses_count * expected.loss;
     if (score <= best_score) continue;
     best_score = score;
     best.method = network ? TreatmentMethod::kNetwork : TreatmentMethod::kFilter;

@@ -7,12 +7,17 @@
 
 namespace anchorsplat {
 
+// So much more a decibel that is lost counts than one that is gained: so that no more than about 2 % of the splats lose
+// 0.1 dB (docs/reading.md).
+inline constexpr double kLossesCount = 4;
+
 // What is known besides the splat, and what may be done.
 struct TreatmentRequest {
   std::optional<RenderMode> mode = {};  // of its training: the file's tag, or the caller's
   bool mode_is_said = false;            // by the caller, who wants it enhanced as such whatever it looks like
   std::optional<double> pixel = {};     // training pixel, world units, where that is known
   bool filter = true, network = true;   // which may be chosen
+  double losses_count = kLossesCount;   // others are for measuring what that does
 };
 
 enum class TreatmentMethod { kNone, kFilter, kNetwork };

@@ -13,10 +13,10 @@ Reading ReadingOf(double pixel, double spread, const std::array<double, 7>& netw
                   const std::array<double, 7>& filter, Made made = Made::kClassic) {
   Reading reading;
   reading.unit = 1;
-  reading.interval = std::log(5.0);
+  const double interval = std::log(5.0);  // of a Laplace distribution, 80 %
   reading.pixel = pixel;
-  reading.low = pixel * std::exp(-reading.interval * spread);
-  reading.high = pixel * std::exp(reading.interval * spread);
+  reading.low = pixel * std::exp(-interval * spread);
+  reading.high = pixel * std::exp(interval * spread);
   reading.made[static_cast<size_t>(made)] = 1;
   ReadingOpinion& opinion = reading.opinions.emplace_back();
   opinion.log_pixel = std::log(pixel);

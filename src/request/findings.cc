@@ -55,7 +55,7 @@ std::vector<std::string> Problems(const CloudStatistics& s) {
   return out;
 }
 
-// Goes through the Gaussians two or three times. `whole`: all of them with their harmonics, which are rarely asked for.
+// Goes through the Gaussians twice. `whole`: all of them with their harmonics, or none where that is too much to keep.
 // Errors: of reading.
 Status LookAt(CloudBlocks& blocks, const std::function<CloudView()>& whole, SplatFindings& findings) {
   findings.render_mode = blocks.render_mode();
@@ -72,7 +72,7 @@ Status LookAt(CloudBlocks& blocks, const std::function<CloudView()>& whole, Spla
   ANCHORSPLAT_RETURN_IF_ERROR(Study(blocks, studies));
   findings.statistics = statistics.Find();
   ShowingGaussians showing = study.Take();
-  // Harmonics of all are looked at where all are in memory.
+  // Without them, what shows is read as if it had no harmonics.
   CloudView all = whole();
   if (all.size() != blocks.size()) {
     all = showing.all;
@@ -115,10 +115,7 @@ Result<ModelFindings> LookAtCheckpoint(const std::string& path) {
 }  // namespace
 
 std::string LooksInWords(const SplatFindings& f) {
-  if (!f.reading.ok()) return "nothing: too little of it shows";
-  const Made made = f.reading->likeliest();
-  const double share = std::min(f.reading->probability(made), 0.99);
-  return Cat(InWords(made), " (", std::lround(100 * share), " %)");
+  return f.reading.ok() ? LooksInWords(*f.reading) : "nothing: too little of it shows";
 }
 
 std::string TreatmentInWords(const SplatFindings& f) {

@@ -35,7 +35,7 @@ struct ReadingDecision {
 struct ReadingRow {
   std::string id, original, mesh, maker, kind, edit, made;
   std::optional<RenderMode> tag;
-  double pixel = 0;  // true; 0: not known, and there are no gains
+  double pixel = 0;                                                  // true; 0: not known, and there are no gains
   std::map<std::pair<RenderMode, std::string>, ReadingGains> gains;  // by mode and method, "filter" or "network"
   ReadingDecision today;                                             // of the list of rules before there was a model
   int fold = 0;

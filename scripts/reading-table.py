@@ -15,6 +15,7 @@ enters no row: they are photographs-1, maker-1 and so on, and stay so (WORK/name
 """
 
 import argparse
+import concurrent.futures
 import gzip
 import json
 import pathlib
@@ -26,13 +27,12 @@ import sys
 import numpy as np
 
 from reading_edits import COMMON, EDITS, Splat, added
-from reading_originals import (DOWNSCALE, HERE, LOW_CAMERAS, UNMEASURED, digest, low_pixel, originals, photographs,
-                               strangers)
+from reading_originals import (DOWNSCALE, FEW_EDITS, HERE, LOW_CAMERAS, UNMEASURED, WAYS, digest, fitted_in, low_pixel, originals, scenes,
+                               strangers, write_scene)
 
 FOLDS = 8
 EDITS_PER_SPLAT = 8  # besides the splat as it is and without its tag
 EDITS_OF_STRANGERS = ("crop: half", "crop: ball", "thinned: half", "pruned: faint", "floaters")
-EDITS_UNMEASURED = 4  # of those of which no gains are measured
 LANDS = {"hills-1": ("hills", 1), "relief-2": ("relief", 2), "town-3": ("town", 3), "town-4": ("town", 4)}
 LABELS = ("original", "mesh", "maker", "kind", "edit", "made")
 
@@ -73,11 +73,10 @@ def make_fits(arguments):
     work, program = arguments.work, arguments.program
     objects = work / "objects"
     with Clock(work, "fits"):
-        run(program, "dataset", "build", "--list", HERE / "data/reading-fits.txt", "--objects", objects, "-o",
-            work / "fits", "--recipe", HERE / "data/reading-fits.toml", "--jobs", 1)
-        for name in UNMEASURED:
-            run(program, "dataset", "build", "--list", HERE / f"data/reading-{name}.txt", "--objects", objects, "-o",
-                work / name, "--recipe", HERE / f"data/reading-{name}.toml", "--jobs", 2)
+        for name in ("fits", "more", *UNMEASURED):
+            objects_of = "fits" if name == "more" else name
+            run(program, "dataset", "build", "--list", HERE / f"data/reading-{objects_of}.txt", "--objects", objects, "-o",
+                work / name, "--recipe", HERE / f"data/reading-{name}.toml", "--jobs", arguments.jobs)
         meshes = [work / "land-meshes" / f"{name}.obj" for name in LANDS]
         for mesh, (kind, seed) in zip(meshes, LANDS.values()):
             mesh.parent.mkdir(exist_ok=True)
@@ -85,14 +84,31 @@ def make_fits(arguments):
                 run(sys.executable, HERE / "scripts/make-land.py", kind, mesh, "--seed", seed)
         run(program, "dataset", "build", *meshes, "-o", work / "land", "--recipe", HERE / "data/reading-land.toml",
             "--jobs", 1, "--licence", "Apache-2.0")
-        for project, name in photographs(arguments).items():
-            out = work / "photographs" / f"{name}.ply"
-            if not out.exists():
-                out.parent.mkdir(exist_ok=True)
-                run(program, "fit", project, "-o", out, "--downscale", DOWNSCALE, "--steps", 3000, "--max-gaussians",
-                    60000, "--checkpoint-every", 500, "--resume")
+        for splat, name, _, _ in strangers(arguments):
+            project = work / "scenes-of-strangers" / name
+            if not project.exists():
+                write_scene(Splat(plain_of_stranger(arguments, splat, name)), project, lambda made, of=splat: quietly(
+                    program, "render", of, "-o", made / "images", "--cameras", made / "transforms.json", "-w"))
+        fits = [(project, fitted_in(work, name, way), WAYS[way]) for project, name, _, ways in scenes(arguments) for way in ways]
+        with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
+            list(pool.map(lambda fit: fit_pictures(arguments, *fit), [fit for fit in fits if not fit[1].exists()]))
         run(HERE / "scripts/make-scenes.sh", objects, work / "scenes", program,
             env={"STEPS": "4000", "GAUSSIANS": "60000", "PATH": "/usr/bin:/bin"})
+
+
+def fit_pictures(arguments, project, out, way):
+    out.parent.mkdir(exist_ok=True)
+    quietly(arguments.program, "fit", project, "-o", out, "--downscale", DOWNSCALE, *way, "--threads", 1,
+            "--checkpoint-every", 500, "--resume")
+    print(f"{out.name}: fitted", flush=True)
+
+
+def plain_of_stranger(arguments, splat, name):
+    plain = arguments.work / "edits" / name / "plain.ply"
+    if not plain.exists():
+        plain.parent.mkdir(parents=True, exist_ok=True)
+        quietly(arguments.program, "convert", splat, plain, "-w", "-q")
+    return plain
 
 
 def make_splats(arguments):
@@ -120,9 +136,7 @@ def splats_of_stranger(arguments, splat, name, maker, made):
         return tasks
     plain = folder / "untagged.ply"
     if not plain.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        quietly(arguments.program, "convert", splat, folder / "plain.ply", "-w", "-q")
-        whole = Splat(folder / "plain.ply")
+        whole = Splat(plain_of_stranger(arguments, splat, name))
         whole.with_rows(whole.rows).write(plain)
     whole = Splat(plain)
     axes = np.sort(np.exp(whole.get("scale_0", "scale_1", "scale_2")), axis=1)
@@ -148,7 +162,7 @@ def splats_of(arguments, original, found, failed):
         splat.with_rows(splat.rows).write(plain)
     if any("SplatRenderMode" in line for line in splat.comments):
         tasks.append(labels | where | {"id": original["original"] + "--untagged", "edit": "untagged", "splat": str(plain)})
-    few = 4 if len(splat.rows) > 40000 else EDITS_PER_SPLAT if original.get("measure", True) else EDITS_UNMEASURED
+    few = FEW_EDITS if len(splat.rows) > 40000 else original.get("edits", EDITS_PER_SPLAT)
     names = [name for name in (*EDITS, *COMMON) if applies(name, original)]
     order = sorted(range(len(names)), key=lambda k: digest(f"{original['original']} {names[k]} {k}"))
     chosen = list(dict.fromkeys(names[k] for k in order))[:few]
@@ -169,7 +183,7 @@ def splats_of(arguments, original, found, failed):
 def applies(name, original):
     if original["made"] == "mesh":  # nothing was fitted: what is enhanced or raised of it is nobody's question
         return name.startswith(("crop", "through", "scaled", "on", "before", "floaters", "thinned"))
-    if original["kind"] in ("room", "photographed"):  # what lies around is theirs already
+    if original["kind"] == "room" or "photographed" in original["kind"]:  # what lies around is theirs already
         return name not in ("on ground", "before a sky", "floaters", "merged", "scaled and moved")
     return True
 
@@ -211,7 +225,7 @@ def edited(arguments, original, splat, pixel, name, path, random, found):
         more["made"] = "filtered" if name == "filtered before" else "enhanced"
     elif name == "merged":
         others = [o for o in found if fold_of(o) == fold_of(original) and o["mesh"] != original["mesh"] and
-                  o["kind"] not in ("room", "photographed", "example") and "downscale" not in o and o["made"] == original["made"] and
+                  o["kind"] not in ("room", "example") and "downscale" not in o and o["made"] == original["made"] and
                   o.get("measure") == original.get("measure")]
         others = [o for o in others if Splat(o["splat"]).names == splat.names]
         if not others:
@@ -322,6 +336,7 @@ def pack(arguments):
         rows.append(row)
     if not rows:
         raise SystemExit(f"reading-table: no rows in {work}/rows")
+    rows.sort(key=lambda row: row["id"])
     if missing and not arguments.partial:
         raise SystemExit(f"reading-table: {len(missing)} rows are missing, such as {missing[0]}: the stage `rows` makes them, "
                          "--partial packs those that are there")

@@ -10,8 +10,25 @@ import numpy as np
 from reading_edits import Splat, without_harmonics
 
 HERE = pathlib.Path(__file__).resolve().parent.parent
-UNMEASURED = ("pixels", "pixels-256", "pixels-standard")  # fits of which no gains are measured
+UNMEASURED = ("pixels", "pixels-256", "pixels-standard")  # those of which no gains are measured
 DOWNSCALE = 4  # of photographs
+# How posed pictures are fitted: real photographs the first way, those that are made of strangers' splats two of the others,
+# drawn by a hash.
+WAYS = {
+    "photographed": ["--steps", 3000, "--max-gaussians", 60000],
+    "photographed, 1500 steps": ["--steps", 1500, "--max-gaussians", 20000],
+    "photographed, 6000 steps": ["--steps", 6000, "--max-gaussians", 20000],
+    "photographed, few": ["--steps", 3000, "--max-gaussians", 8000],
+    "photographed, random": ["--steps", 3000, "--max-gaussians", 20000, "--init", "view", "--init-points", 15000],
+    "photographed, absgrad": ["--steps", 3000, "--max-gaussians", 20000, "--strategy", "absgrad"],
+    "photographed, mcmc": ["--steps", 3000, "--max-gaussians", 20000, "--strategy", "mcmc"],
+    "antialiased, photographed": ["--steps", 3000, "--max-gaussians", 20000, "--mode", "antialiased"],
+    "antialiased, photographed, mcmc": ["--steps", 3000, "--max-gaussians", 20000, "--mode", "antialiased", "--strategy", "mcmc"],
+    "mip, photographed": ["--steps", 3000, "--max-gaussians", 20000, "--mip-filter"],
+}
+WAYS_OF_STRANGERS = 2
+FEW_EDITS, LATER_EDITS = 4, 2  # of large splats and those without gains; of those that joined the table later
+SCENE_VIEWS, SCENE_SIZE, SCENE_ANGLE = 64, 512, 40  # of strangers' splats: pictures, their pixels, degrees
 SPLATS = (".ply", ".spz", ".splat", ".sog", ".ksplat", ".glb", ".gltf", ".npz", ".csv")  # of strangers
 LOW_CAMERAS = [f"transforms_{size}.json" for size in (64, 96, 128, 192, 256, 400, "lr")]  # of the pictures that were fitted
 
@@ -75,11 +92,51 @@ def strangers(arguments):
             yield splat, f"maker-{k}-{n}", f"maker-{k}", made
 
 
+def scenes(arguments):
+    """Posed pictures to fit: (project, its name, whose it is, ways to fit it): photographs, and pictures of strangers' splats."""
+    for project, name in photographs(arguments).items():
+        yield project, name, name, ["photographed"]
+    for _, name, maker, _ in strangers(arguments):
+        project = arguments.work / "scenes-of-strangers" / name
+        if project.exists():
+            yield project, f"{name}--refitted", maker, ways_of(name)
+
+
+def ways_of(name):
+    return sorted(list(WAYS)[1:], key=lambda way: digest(f"{name} {way}"))[:WAYS_OF_STRANGERS]
+
+
+def write_scene(splat, project, render):
+    """Cameras around a splat, and what they see of it."""
+    shown = splat.places[splat.opacities > 0.1]
+    middle = np.median(shown, axis=0)
+    away = np.quantile(np.linalg.norm(shown - middle, axis=1), 0.95) / np.sin(np.radians(SCENE_ANGLE / 2))
+    frames = []
+    for k in range(SCENE_VIEWS):
+        height, turn = 1.4 * (k + 0.5) / SCENE_VIEWS - 0.7, k * np.pi * (3 - 5**0.5)
+        back = np.array([np.cos(turn) * (1 - height**2) ** 0.5, height, np.sin(turn) * (1 - height**2) ** 0.5])
+        right = np.cross([0, 1, 0], back)
+        right /= np.linalg.norm(right)
+        pose = np.eye(4)
+        pose[:3, :3] = np.stack([right, np.cross(back, right), back], axis=1)
+        pose[:3, 3] = middle + away * back
+        frames.append({"file_path": f"images/{k:03}.png", "transform_matrix": pose.tolist()})
+    focal = 0.5 * SCENE_SIZE / np.tan(np.radians(SCENE_ANGLE / 2))
+    cameras = {"w": SCENE_SIZE, "h": SCENE_SIZE, "fl_x": focal, "fl_y": focal, "cx": SCENE_SIZE / 2, "cy": SCENE_SIZE / 2,
+               "frames": frames}
+    part = project.with_name(project.name + ".part")
+    part.mkdir(parents=True, exist_ok=True)
+    (part / "transforms.json").write_text(json.dumps(cameras))
+    render(part)
+    part.rename(project)
+
+
 def originals(arguments):
     work = arguments.work
     found = list(read_objects(work / "fits", made_by)) + list(read_objects(work / "land", made_by))
+    found += [o | {"original": o["original"] + "--more", "edits": LATER_EDITS} for o in read_objects(work / "more", made_by)]
     for name in UNMEASURED:
-        found += [o | {"measure": False} for o in read_objects(work / name, made_by)]
+        found += [o | {"measure": False, "edits": FEW_EDITS} for o in read_objects(work / name, made_by)]
     found += list(mesh_splats(work, found))
     room = work / "scenes/room"
     if (room / "splat.ply").exists():
@@ -90,12 +147,19 @@ def originals(arguments):
             mesh = {"biplane": "BlendSwap-CC-0-cartoon_biplane", "stone_lantern": "BlendSwap-CC-0-stoneLantern"}
             found.append({"original": example.name, "mesh": mesh.get(example.name, example.name), "maker": "",
                           "kind": "example", "made": "classic", "object": example, "splat": example / "input.ply"})
-    for project, name in photographs(arguments).items():
-        splat = work / "photographs" / f"{name}.ply"
-        if splat.exists():
-            found.append({"original": name, "mesh": name, "maker": name, "kind": "photographed", "made": "classic",
-                          "object": project, "downscale": DOWNSCALE, "splat": splat})
+    for project, name, maker, ways in scenes(arguments):
+        for way in ways:
+            splat = fitted_in(work, name, way)
+            if splat.exists():
+                kind = way.replace("photographed", "refitted") if "--refitted" in name else way
+                found.append({"original": splat.stem, "mesh": name, "maker": maker, "kind": kind, "made": made_by(way),
+                              "object": project, "downscale": DOWNSCALE, "splat": splat, "edits": LATER_EDITS})
     return found
+
+
+def fitted_in(work, name, way):
+    end = "" if way == "photographed" else "--" + way.replace(",", "").replace(" ", "-")
+    return work / "photographs" / f"{name}{end}.ply"
 
 
 def mesh_splats(work, fits):

@@ -15,6 +15,7 @@
 #include "core/world_up.h"
 #include "fit/checkpoint_guard.h"
 #include "fit/fitter.h"
+#include "model/model_method.h"
 #include "request/enhance_flags.h"
 #include "request/words.h"
 #include "run.h"
@@ -69,7 +70,7 @@ void BindEnhance(nb::module_& module) {
              nb::arg("seed"), nb::arg("run"));
   module.def("enhance_methods", [] {
     std::vector<std::pair<std::string, std::string>> methods;
-    for (const EnhanceMethod& method : EnhanceMethods()) methods.emplace_back(method.name, method.summary);
+    for (const EnhanceMethod& method : AllMethods()) methods.emplace_back(method.name, method.summary);
     nb::list list;
     for (const auto& [name, summary] : methods) list.append(nb::make_tuple(name, summary));
     return list;

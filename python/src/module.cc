@@ -1,5 +1,4 @@
 #include "bindings.h"
-#include "model/model_method.h"
 #include "run.h"
 
 std::vector<std::string> anchorsplat::python::WordsOf(const nanobind::list& words) {
@@ -13,7 +12,6 @@ NB_MODULE(_core, module) {
   module.doc() = "The engine. For anchorsplat's own modules: it may change in every version.";
   module.attr("version") = ANCHORSPLAT_VERSION;
   nanobind::set_leak_warnings(false);  // what a program still holds when it ends is its own affair
-  anchorsplat::RegisterModelMethod();  // beside the methods that enhance/ has itself
   BindRun(module);
   BindFiles(module);
   BindEnhance(module);

@@ -2,8 +2,6 @@
 
 #include <anchorsplat/enhance.h>
 
-#include <mutex>
-
 #include "api/bridge.h"
 #include "core/region.h"
 #include "core/text.h"
@@ -13,17 +11,12 @@ namespace anchorsplat {
 
 namespace {
 
-// The methods that the library has.
-void HaveMethods() {
-  static std::once_flag once;
-  std::call_once(once, RegisterModelMethod);
-}
-
 Result<EnhanceOptions> ToOptions(const EnhanceSettings& settings) {
   EnhanceOptions options;
   const auto given = [&](bool is_given, const char* name) {
     if (is_given) options.given.emplace_back(name);
   };
+  options.methods = &AllMethods();
   options.method = settings.method;
   options.quality = settings.quality;
   options.upscale = settings.upscale;
@@ -67,7 +60,6 @@ Result<EnhanceOptions> ToOptions(const EnhanceSettings& settings) {
 }
 
 Result<EnhanceOutcome> RunMethod(GaussianCloud cloud, const EnhanceSettings& settings) {
-  HaveMethods();
   ANCHORSPLAT_ASSIGN_OR_RETURN(const EnhanceOptions options, ToOptions(settings));
   ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, Enhance(std::move(cloud), options));
   EnhanceReport& report = enhanced.report;
@@ -92,9 +84,8 @@ Result<EnhanceOutcome> RunMethod(GaussianCloud cloud, const EnhanceSettings& set
 }  // namespace
 
 std::vector<EnhanceMethodName> ListEnhanceMethods() {
-  HaveMethods();
   std::vector<EnhanceMethodName> names;
-  for (const EnhanceMethod& method : EnhanceMethods()) names.push_back({method.name, method.summary});
+  for (const EnhanceMethod& method : AllMethods()) names.push_back({method.name, method.summary});
   return names;
 }
 

@@ -17,7 +17,6 @@
 #include "core/run_context.h"
 #include "core/text.h"
 #include "io/input_record.h"
-#include "model/model_method.h"
 #include "request/choice.h"
 
 namespace anchorsplat {
@@ -84,7 +83,6 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
   CLI::App app{"anchorsplat: makes a low-quality 3D Gaussian splat hold up when seen closer", "anchorsplat"};
   app.set_version_flag("--version", std::string("anchorsplat ") + ANCHORSPLAT_VERSION);
   app.require_subcommand(1);
-  RegisterModelMethod();  // beside the methods that enhance/ has itself
   Program program;
   program.words.assign(argv, argv + argc);
   program.trainer = trainer;

@@ -157,10 +157,6 @@ Result<Reading> ReadInside(const Region& region, const GaussianCloud& cloud) {
   return Read(part);
 }
 
-void TakeFilter(MethodPlan& plan) {
-  plan.method = &*std::ranges::find(EnhanceMethods(), std::string("filter"), &EnhanceMethod::name);
-}
-
 bool HasNetwork(const MethodPlan& plan) {
   return plan.method->adds_detail || (plan.start != nullptr && plan.start->adds_detail);
 }
@@ -215,8 +211,9 @@ void SayNothingIsDone(const EnhanceReport& report, std::optional<RenderMode> tag
   LogWarning(HasItsWidth(reading.likeliest())
                  ? Cat("left as it is: looks like ", LooksInWords(reading), ", which has its width. --mode ", mode,
                        " enhances it all the same")
-                 : Cat("left as it is: nothing is sure to make it better. --cameras, --pixel-size or --mode ", mode,
-                       " says more about it"));
+                 : Cat("left as it is: looks like ", LooksInWords(reading),
+                       ", and nothing is sure to make it better. --cameras or --pixel-size says more about it, --mode ",
+                       mode, " enhances it all the same"));
 }
 
 void SayWhatIsTaken(const Treatment& treatment, const EnhanceReport& report) {
@@ -253,7 +250,7 @@ void LeaveNetworkOut(const EnhanceOptions& options, MethodPlan& plan) {
   LogInfo(Cat("the filter instead of ", name, ", as more is expected of it (--method ", name, " takes the network)"));
   SayWhatHasNoEffect(options, {"model", "copies", "merge-cost", "prune-opacity"}, "the filter is taken");
   if (plan.start != nullptr && plan.start->adds_detail) plan.start = nullptr;
-  if (plan.method->adds_detail) TakeFilter(plan);
+  if (plan.method->adds_detail) plan.method = &FilterMethod();
 }
 
 // What the file itself says; empty: nothing.
@@ -320,7 +317,9 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
 
   const bool none = treatment.method == TreatmentMethod::kNone;
   if (treatment.method == TreatmentMethod::kFilter && auto_chosen) LeaveNetworkOut(options, plan);
-  if (!none && !cloud.render_mode && treatment.mode == RenderMode::kAntialiased) cloud.render_mode = treatment.mode;
+  if (closer && !none && !cloud.render_mode && treatment.mode == RenderMode::kAntialiased) {
+    cloud.render_mode = treatment.mode;
+  }
   input.filter_strength =
       options.filter_strength.value_or(none ? 0 : DefaultFilterStrength(options.upscale, cloud.render_mode));
   if (options.filter_strength && closer && *options.filter_strength > 0 &&

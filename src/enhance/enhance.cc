@@ -25,36 +25,6 @@ namespace anchorsplat {
 
 namespace {
 
-std::vector<EnhanceMethod>& Registry() {
-  static std::vector<EnhanceMethod> methods = {
-      {.name = "filter",
-       .summary = "give the width back that the fit absorbed; instant, no weights",
-       .rank = 0,
-       .options =
-           [] {
-             std::vector<MethodOption> options = WidthOptions();
-             options.push_back({"max-gaussians", {}});
-             return options;
-           }(),
-       .expected = [](int64_t count, const EnhanceOptions& options) -> int64_t {
-         return options.max_gaussians > 0 ? std::min(count, options.max_gaussians) : count;
-       },
-       .seconds = [](const EnhanceOptions&) { return 4e-7; },
-       .ready = [](const EnhanceOptions&) { return Status(); },
-       .run = [](EnhanceInput input, const EnhanceOptions& options, StepReport&) -> Result<GaussianCloud> {
-         LeaveRegion(input);
-         ANCHORSPLAT_RETURN_IF_ERROR([&]() -> Status {
-           const auto grown = ApplyFilter(input.cloud, input.pixel_sizes,
-                                          {.upscale = options.upscale, .strength = input.filter_strength});
-           return grown.ok() ? Status() : Status(grown.error());
-         }());
-         return std::move(input.cloud);
-       }},
-      RefineMethod(),
-      RefineImagesMethod()};
-  return methods;
-}
-
 // Drops the rows no method and no viewer can use; says how many.
 Status DropUnusable(GaussianCloud& cloud) {
   if (CountUnusable(cloud) == 0) return {};
@@ -106,15 +76,42 @@ std::string_view NameOf(PixelSizeSource source) {
   return "";
 }
 
-void RegisterEnhanceMethod(EnhanceMethod method) {
-  const auto same = std::ranges::find(Registry(), method.name, &EnhanceMethod::name);
-  if (same == Registry().end()) {
-    Registry().push_back(std::move(method));
-  } else {
-    *same = std::move(method);
-  }
+const EnhanceMethod& FilterMethod() {
+  static const EnhanceMethod method = {
+      .name = "filter",
+      .summary = "give the width back that the fit absorbed; instant, no weights",
+      .rank = 0,
+      .options =
+          [] {
+            std::vector<MethodOption> options = WidthOptions();
+            options.push_back({"max-gaussians", {}});
+            return options;
+          }(),
+      .expected = [](int64_t count, const EnhanceOptions& options) -> int64_t {
+        return options.max_gaussians > 0 ? std::min(count, options.max_gaussians) : count;
+      },
+      .seconds = [](const EnhanceOptions&) { return 4e-7; },
+      .ready = [](const EnhanceOptions&) { return Status(); },
+      .run = [](EnhanceInput input, const EnhanceOptions& options, StepReport&) -> Result<GaussianCloud> {
+        LeaveRegion(input);
+        ANCHORSPLAT_RETURN_IF_ERROR([&]() -> Status {
+          const auto grown = ApplyFilter(input.cloud, input.pixel_sizes,
+                                         {.upscale = options.upscale, .strength = input.filter_strength});
+          return grown.ok() ? Status() : Status(grown.error());
+        }());
+        return std::move(input.cloud);
+      }};
+  return method;
 }
-std::span<const EnhanceMethod> EnhanceMethods() { return Registry(); }
+
+const std::vector<EnhanceMethod>& BasicMethods() {
+  static const std::vector<EnhanceMethod> methods = {FilterMethod(), RefineMethod(), RefineImagesMethod()};
+  return methods;
+}
+
+const std::vector<EnhanceMethod>& MethodsOf(const EnhanceOptions& options) {
+  return options.methods == nullptr ? BasicMethods() : *options.methods;
+}
 
 int64_t ExpectedGaussians(int64_t count, const EnhanceOptions& options) {
   const Result<MethodPlan> plan = PlanEnhancement(options);
@@ -202,7 +199,7 @@ Result<GaussianCloud> RunOnSome(const MethodPlan& plan, EnhanceInput input, Enha
   for (size_t i = 0; i < input.by_network.size(); ++i) (input.by_network[i] != 0 ? others : input).inside[i] = 0;
   const auto left = std::ranges::count(others.inside, 1), taken = std::ranges::count(input.inside, 1);
   MethodPlan filter = plan;
-  filter.method = &*std::ranges::find(EnhanceMethods(), std::string("filter"), &EnhanceMethod::name);
+  filter.method = &FilterMethod();
   if (taken == 0) return RunStep(*filter.method, std::move(others), options, report);
   if (left == 0) return RunStep(*plan.method, std::move(input), options, report);
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud filtered, RunStep(*filter.method, std::move(others), options, report));

@@ -23,10 +23,14 @@
 
 namespace anchorsplat {
 
+struct EnhanceMethod;
+
 // What every method is told. Spaces: the cloud in stored space, lengths in world units.
 struct EnhanceOptions {
-  // A registered name, or "auto": what a reading of the splat says is best, of those that are ready. Or two, "A+B": B
-  // begins where A ended, if it can (EnhanceMethod::takes_start).
+  // Ways to enhance that there are; null: BasicMethods(). model/model_method.h has those with networks. Not owned.
+  const std::vector<EnhanceMethod>* methods = nullptr;
+  // The name of one of them, or "auto": what a reading of the splat says is best, of those that are ready. Or two,
+  // "A+B": B begins where A ended, if it can (EnhanceMethod::takes_start).
   std::string method = "auto";
   // Instead of a method, for those who know none: "fast", an instant one; "good", that and gentle refinement; "best",
   // refinement with the pictures of refine.images, "good" where there are none. Empty: `method` says.
@@ -138,8 +142,6 @@ struct EnhanceInput {
 // For methods that look at no others: leaves those inside.
 void LeaveRegion(EnhanceInput& input);
 
-struct EnhanceMethod;
-
 // How a method is about to be used.
 struct MethodUse {
   const EnhanceOptions& options;
@@ -181,10 +183,10 @@ struct EnhanceMethod {
   std::function<Result<GaussianCloud>(EnhanceInput, const EnhanceOptions&, StepReport&)> run;
 };
 
-// Filter and refinement are always there. What higher rooms have is added by name when the program starts, before the
-// first call of anything else here (model/model_method.h); a method of the same name takes the place of the one before.
-void RegisterEnhanceMethod(EnhanceMethod method);
-std::span<const EnhanceMethod> EnhanceMethods();
+const EnhanceMethod& FilterMethod();
+// Those that need no weights: the filter, and refinement without and with pictures.
+const std::vector<EnhanceMethod>& BasicMethods();
+const std::vector<EnhanceMethod>& MethodsOf(const EnhanceOptions& options);
 
 // --upscale, and those that say pixel sizes and the filter's strength.
 std::vector<MethodOption> WidthOptions(const std::function<std::string(const MethodUse&)>& lacks = {});

@@ -11,7 +11,7 @@ namespace {
 // The best that is ready and takes no time: the filter always is.
 const EnhanceMethod* BestInstant(const EnhanceOptions& options) {
   const EnhanceMethod* best = nullptr;
-  for (const EnhanceMethod& method : EnhanceMethods()) {
+  for (const EnhanceMethod& method : MethodsOf(options)) {
     if (method.takes_start || !method.ready(options).ok()) continue;
     if (best == nullptr || method.rank > best->rank) best = &method;
   }
@@ -27,7 +27,7 @@ const EnhanceMethod* StartWithDetail(const EnhanceOptions& options) {
 Result<const EnhanceMethod*> FindMethod(const EnhanceOptions& options, const std::string& name) {
   const EnhanceMethod* best = nullptr;
   std::string names;
-  for (const EnhanceMethod& method : EnhanceMethods()) {
+  for (const EnhanceMethod& method : MethodsOf(options)) {
     names += ", " + method.name;
     if (method.name == name) {
       ANCHORSPLAT_RETURN_IF_ERROR(method.ready(options));
@@ -134,7 +134,7 @@ Status CheckOptions(const EnhanceOptions& options) {
     if (works) continue;
     if (lack.empty()) {
       std::vector<std::string> owners;
-      for (const EnhanceMethod& method : EnhanceMethods()) {
+      for (const EnhanceMethod& method : MethodsOf(options)) {
         const bool listed = std::find(owners.begin(), owners.end(), method.name) != owners.end();
         if (FindOption(&method, name) != nullptr && !listed) owners.push_back(method.name);
       }

@@ -12,25 +12,16 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-// A network for these tests, where the seed says so: others of this program must not meet it.
+// A network for these tests, where the seed says so.
 constexpr uint64_t kWithNetwork = 20'002;
 
 class Plan : public testing::Test {
  protected:
-  static void SetUpTestSuite() {
-    RegisterEnhanceMethod({.name = "sharpen",
-                           .summary = "for this test",
-                           .rank = 1,
-                           .adds_detail = true,
-                           .options = {{"prune-opacity", {}},
-                                       {"block-gaussians", [](const MethodUse&) { return "with a larger network"; }}},
-                           .ready = [](const EnhanceOptions& options) -> Status {
-                             if (options.seed == kWithNetwork) return {};
-                             return Error{ErrorCode::kBadArgument, "no network"};
-                           },
-                           .run = [](EnhanceInput input, const EnhanceOptions&, StepReport&) -> Result<GaussianCloud> {
-                             return std::move(input.cloud);
-                           }});
+  Plan() { Begin(); }
+  // Options as they are before anybody says anything.
+  void Begin() {
+    options_ = {};
+    options_.methods = &methods_;
   }
   // The methods' name, or what is wrong.
   std::string Name() const {
@@ -43,12 +34,30 @@ class Plan : public testing::Test {
     const Status status = CheckOptions(options_);
     return status.ok() ? "" : status.error().message;
   }
+
   EnhanceOptions options_;
+  const std::vector<EnhanceMethod> methods_ = [] {
+    std::vector<EnhanceMethod> methods = BasicMethods();
+    methods.push_back({.name = "sharpen",
+                       .summary = "for this test",
+                       .rank = 1,
+                       .adds_detail = true,
+                       .options = {{"prune-opacity", {}},
+                                   {"block-gaussians", [](const MethodUse&) { return "with a larger network"; }}},
+                       .ready = [](const EnhanceOptions& options) -> Status {
+                         if (options.seed == kWithNetwork) return {};
+                         return Error{ErrorCode::kBadArgument, "no network"};
+                       },
+                       .run = [](EnhanceInput input, const EnhanceOptions&, StepReport&) -> Result<GaussianCloud> {
+                         return std::move(input.cloud);
+                       }});
+    return methods;
+  }();
 };
 
 TEST_F(Plan, QualityIsAMethodForThoseWhoKnowNone) {
   for (const bool network : {true, false}) {
-    options_ = {};
+    Begin();
     options_.seed = network ? kWithNetwork : 0;
     options_.quality = "fast";
     EXPECT_EQ(Name(), network ? "sharpen" : "filter");
@@ -98,7 +107,7 @@ TEST_F(Plan, WhatHasNoEffectIsRefused) {
   const std::set<std::string> of_filter = {"upscale",     "pixel-size",      "cameras",      "train-width",
                                            "camera-rule", "filter-strength", "max-gaussians"};
   std::set<std::string> all;
-  for (const EnhanceMethod& method : EnhanceMethods()) {
+  for (const EnhanceMethod& method : methods_) {
     for (const MethodOption& option : method.options) all.insert(option.name);
   }
   ASSERT_GT(all.size(), 20u);
@@ -148,7 +157,7 @@ TEST_F(Plan, RefinementSaysWhatItsOptionsNeed) {
   }
   EXPECT_THAT(Given("between"), HasSubstr("without --images"));
   // A network's result has no width to choose, and is not split unless that is said.
-  options_ = {};
+  Begin();
   options_.seed = kWithNetwork;
   options_.method = "sharpen+refine";
   EXPECT_FALSE(Given("filter-strength").empty());

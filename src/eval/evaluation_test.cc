@@ -368,7 +368,8 @@ TEST(Evaluate, RefusesWhatCannotBeMeant) {
 }
 
 TEST(Evaluate, MethodsOfEnhanceComeByThemselves) {
-  RegisterEnhanceMethod(
+  std::vector<EnhanceMethod> methods = BasicMethods();
+  methods.push_back(
       {.name = "thicken",
        .summary = "for this test",
        .options = {},
@@ -379,11 +380,13 @@ TEST(Evaluate, MethodsOfEnhanceComeByThemselves) {
          report.facts = {{"by", 0.4}};
          return std::move(input.cloud);
        }});
+  const auto thicken = MakeEvalMethod("thicken", {.filter_strength = std::nullopt, .enhance_methods = &methods});
+  ASSERT_TRUE(thicken.ok()) << thicken.error().message;
   const TestFolder folder, out;
   GaussianCloud thin = ThinBall();
   thin.render_mode = RenderMode::kClassic;
   MakeExampleObject(folder / "ball", thin, Ball());
-  const auto evaluation = Evaluate(folder.path(), Methods({"thicken"}), out.path(), {});
+  const auto evaluation = Evaluate(folder.path(), {*thicken}, out.path(), {});
   ASSERT_TRUE(evaluation.ok()) << evaluation.error().message;
   ASSERT_EQ(evaluation->results.size(), 1u);
   EXPECT_GT(evaluation->results[0].MeanPsnr(), 50);

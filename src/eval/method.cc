@@ -162,6 +162,7 @@ CameraSet TrainingCameras(const BenchmarkObject& object) {
 struct RegisteredMethod {
   std::string word;  // as the user wrote it
   std::string name;
+  const std::vector<EnhanceMethod>* methods = nullptr;  // of which it is one
   bool auto_pixel_size =
       false;  // NAME-auto: it gets no cameras, p_LR is read off the splat, as for a user who has the splat alone
   RefineOptions refine;
@@ -240,6 +241,7 @@ Status SetOption(RegisteredMethod& method, std::string_view key, std::string_vie
 // Nothing that is set without an effect.
 Status CheckGiven(const RegisteredMethod& method, const std::set<std::string>& keys) {
   EnhanceOptions options;
+  options.methods = method.methods;
   options.method = method.name;
   options.refine = method.refine;
   options.model = method.model;
@@ -252,8 +254,10 @@ Status CheckGiven(const RegisteredMethod& method, const std::set<std::string>& k
 constexpr std::string_view kAuto = "-auto";
 
 // NAME, NAME-auto or either with @KEY=VALUE@KEY=VALUE…; nothing when there is no such method.
-Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word) {
+Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word,
+                                                        const std::vector<EnhanceMethod>& methods) {
   RegisteredMethod method;
+  method.methods = &methods;
   method.word = word;
   const size_t name_end = std::min(word.find('@'), word.size());
   method.name = word.substr(0, name_end);
@@ -262,9 +266,8 @@ Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word)
     method.name.resize(method.name.size() - kAuto.size());
   }
   // One, or two with a plus between them.
-  const auto known = [](const std::string& name) {
-    const auto methods = EnhanceMethods();
-    return std::any_of(methods.begin(), methods.end(), [&](const EnhanceMethod& m) { return m.name == name; });
+  const auto known = [&](const std::string& name) {
+    return std::ranges::find(methods, name, &EnhanceMethod::name) != methods.end();
   };
   const size_t plus = method.name.find('+');
   if (!known(method.name.substr(0, plus)) || (plus != std::string::npos && !known(method.name.substr(plus + 1)))) {
@@ -305,17 +308,20 @@ Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word)
 // Of all threads, seconds.
 double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-bool ChosenByItself(const std::string& name) {
-  const auto plan = PlanEnhancement({});
-  return plan.ok() && plan->Name() == name;
+bool ChosenByItself(const RegisteredMethod& method) {
+  EnhanceOptions options;
+  options.methods = method.methods;
+  const auto plan = PlanEnhancement(options);
+  return plan.ok() && plan->Name() == method.name;
 }
 
 EvalMethod Registered(const RegisteredMethod& method) {
   return {method.word, method.Settings(), [method](const MethodTask& task) -> Result<MethodViews> {
             EnhanceOptions options;
+            options.methods = method.methods;
             options.method = method.name;
             // As for a user who has nothing else: where the program takes this method by itself, it may also leave it.
-            if (method.auto_pixel_size && ChosenByItself(method.name)) options.method = "auto";
+            if (method.auto_pixel_size && ChosenByItself(method)) options.method = "auto";
             options.upscale = task.object.upscale();
             if (!method.auto_pixel_size) options.cameras = TrainingCameras(task.object);
             options.refine = method.refine;
@@ -392,7 +398,9 @@ Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& 
   }
   const std::string extension = fs::path(word).extension().string();
   if (extension == ".safetensors" || extension == ".pth" || extension == ".pt") return Model(word);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<RegisteredMethod> method, ParseRegistered(word));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      const std::optional<RegisteredMethod> method,
+      ParseRegistered(word, options.enhance_methods == nullptr ? AllMethods() : *options.enhance_methods));
   if (method) return Registered(*method);
   return Error{ErrorCode::kBadArgument, Cat("--methods: '", Printable(word),
                                             "' is none of raw, filter, filter@F, filter-auto, filter-best, upsample, "

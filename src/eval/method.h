@@ -44,6 +44,8 @@ struct EvalMethod {
 struct MethodOptions {
   std::optional<double> filter_strength;  // f of "filter"; DefaultFilterStrength otherwise
   int64_t fit_steps = 15000;              // of "bicubic"
+  // Of enhance/enhance.h; null: AllMethods(). Not owned.
+  const std::vector<EnhanceMethod>* enhance_methods = nullptr;
 };
 
 // Methods by what the user calls them:
@@ -56,7 +58,7 @@ struct MethodOptions {
 //   upsample      the low-resolution picture enlarged by cubic convolution, no 3-D at all
 //   bicubic       a splat fitted anew to the enlarged low-resolution pictures (eval/bicubic_fit.h): minutes per object
 //   FILE          the network of a file of weights, .safetensors or .pth, of either kind (model/any_network.h)
-//   NAME          whatever else is registered with enhance/enhance.h, given the training cameras: "model" for example
+//   NAME          another method of `enhance_methods`, given the training cameras: "model" for example
 //                 is the network that is part of the program. NAME+NAME: the second begins where the first ended.
 //                 NAME-auto gets no cameras, the pixel size is read off the splat (fact "pixel_size_ratio").
 //                 Refinement takes options: refine@k=1@steps=400@f=0.6, keys as of SetRefineOption and f of the filter

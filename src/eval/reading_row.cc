@@ -26,6 +26,7 @@
 #include "formats/cloud_io.h"
 #include "io/file_version.h"
 #include "metrics/image_metrics.h"
+#include "model/model_method.h"
 #include "reading/features.h"
 #include "reading/showing_gaussians.h"
 #include "render/rasterizer.h"
@@ -269,8 +270,8 @@ struct Measuring {
 };
 
 const EnhanceMethod* FindMethod(std::string_view name) {
-  const auto found = std::ranges::find(EnhanceMethods(), name, &EnhanceMethod::name);
-  return found == EnhanceMethods().end() ? nullptr : &*found;
+  const auto found = std::ranges::find(AllMethods(), name, &EnhanceMethod::name);
+  return found == AllMethods().end() ? nullptr : &*found;
 }
 
 // What a method of one step makes of the splat at those pixels, told what the splat is.
@@ -372,9 +373,13 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   Buffer<float> seen;
   for (const int64_t i : shown.rows_of_all) seen.push_back(pixels[static_cast<size_t>(i)]);
   if (seen.empty()) seen = pixels;
-  // Where pixels differ many times, as in a room, one for all must be that of the finest.
+  // Where pixels of one scene differ many times, as in photographs, the one that is taken for all is another than any
+  // of them: what it gains is measured with one. What was added to a splat is not looked at, and the finest are the
+  // subject's.
   const double finest = QuantileOf(seen, 0.1), coarsest = QuantileOf(seen, 0.9);
-  row["pixel"] = coarsest > kOnePixel * finest ? finest : QuantileOf(seen, 0.5);
+  const bool differ = coarsest > kOnePixel * finest, is_whole = !task.keep && task.others_from == 0;
+  const double pixel = differ && !is_whole ? finest : QuantileOf(seen, 0.5);
+  row["pixel"] = pixel;
   row["pixel_10"] = finest;
   row["pixel_90"] = coarsest;
   if (!task.measure) return row;
@@ -391,6 +396,7 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
     row["gain"] = Rounded(psnr - raw);
     return row;
   }
+  if (differ && is_whole) pixels = {static_cast<float>(pixel)};
   for (const RenderMode mode : ModesOf(cloud)) {
     GaussianCloud as = cloud;
     as.render_mode = mode;

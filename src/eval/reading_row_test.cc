@@ -10,7 +10,6 @@
 #include "core/text.h"
 #include "formats/cloud_io.h"
 #include "io/folder_for_test.h"
-#include "model/model_method.h"
 #include "reading/features.h"
 
 namespace anchorsplat {
@@ -33,7 +32,6 @@ GaussianCloud Sparse() {
 
 class ReadingRowMaking : public ::testing::Test {
  protected:
-  static void SetUpTestSuite() { RegisterModelMethod(); }
   ReadingTask Task(const GaussianCloud& cloud) {
     ReadingTask task;
     task.id = "it";

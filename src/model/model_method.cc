@@ -169,11 +169,8 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
     if (left_out > 0) report.facts.emplace_back("left_out", left_out);
     return std::move(input.cloud);
   };
-  if (input.filter_strength <= ShownStrength(upscale, input.cloud.render_mode)) {
-    LogInfo(
-        "the network's residuals are on top of the filter, and there is no lost width to give back: the splat stays");
-    return within_budget();
-  }
+  // There is no lost width to give back, and residuals are on top of the filter.
+  if (input.filter_strength <= ShownStrength(upscale, input.cloud.render_mode)) return within_budget();
   if (IsCompensated(input.cloud.render_mode) && !network.config().knows_kind) {
     LogInfo(Cat("the network has learned from classic splats: this ", NameOf(*input.cloud.render_mode),
                 " one is filtered only"));
@@ -241,62 +238,71 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
   return std::move(result.cloud);
 }
 
-void RegisterModelMethod() {
+EnhanceMethod ModelMethod() {
   const auto last = std::make_shared<LastNetwork>(), last_stand_in = std::make_shared<LastNetwork>();
-  RegisterEnhanceMethod(
-      {.name = "model",
-       .summary = HasShippedNetwork() ? "one pass of the network of --model, or of the one that is part of this program"
-                                      : "one pass of the network of --model",
-       .rank = 1,
-       .adds_detail = true,
-       .is_checkpoint = IsCompactCheckpoint,
-       .keeps_when_asked = true,
-       .options = NetworkOptions(),
-       .needs_pixel_size = [](const EnhanceOptions& options) -> Result<bool> {
-         if (options.model.file.empty()) return true;
-         return HoldsCompactNetwork(options.model.file);
-       },
-       .expected = [last](int64_t count, const EnhanceOptions& options) -> int64_t {
-         const auto network = last->Get(options.model);
-         if (!network.ok()) return count;  // which the run will say
-         if (const auto* published = std::get_if<PublishedNetwork>(network->get())) {
-           const int64_t most = options.model.options.max_gaussians;
-           return published->config().copies * (most > 0 ? std::min(count, most) : count);
-         }
-         const int64_t copies = std::get<CompactNetwork>(**network).config().copies;
-         const int64_t all = count * std::clamp<int64_t>(options.model.copies.value_or(copies), 1, copies);
-         const int64_t most = options.model.options.max_gaussians;
-         return most > 0 ? std::min(all, most) : all;
-       },
-       .seconds = [](const EnhanceOptions& options) { return IsPublished(options.model) ? 2e-4 : 2.5e-5; },
-       .ready = [](const EnhanceOptions& options) -> Status {
-         if (!options.model.file.empty() || HasShippedNetwork()) return {};
-         return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};
-       },
-       .run = [last, last_stand_in](EnhanceInput input, const EnhanceOptions& options,
-                                    StepReport& report) -> Result<GaussianCloud> {
-         const Shipped shipped = ShippedFor(input, options.model);
-         ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const AnyNetwork> network,
-                                      last->Get(options.model, shipped));
-         if (const auto* published = std::get_if<PublishedNetwork>(network.get())) {
-           return EnhanceWithPublished(std::move(input), *published, options.model.options, report);
-         }
-         std::shared_ptr<const AnyNetwork> stand_in;
-         if (WantsStandIns(shipped, input, options.model)) {
-           ANCHORSPLAT_ASSIGN_OR_RETURN(stand_in, last_stand_in->Get(options.model, Shipped::kSingle));
-         }
-         ModelSettings model = options.model;
-         if (model.file.empty() && shipped == Shipped::kStandard && !input.is_refined && !model.merge_cost) {
-           model.merge_cost = kMergeCostOfStandard;
-         }
-         Result<GaussianCloud> out = EnhanceWithCompactNetwork(
-             std::move(input), options.upscale, std::get<CompactNetwork>(*network), model, report, options.control,
-             stand_in ? std::get_if<CompactNetwork>(stand_in.get()) : nullptr);
-         if (options.model.file.empty()) {
-           report.facts.emplace_back("network_for_standard_fits", shipped == Shipped::kStandard);
-         }
-         return out;
-       }});
+  return {.name = "model",
+          .summary = HasShippedNetwork()
+                         ? "one pass of the network of --model, or of the one that is part of this program"
+                         : "one pass of the network of --model",
+          .rank = 1,
+          .adds_detail = true,
+          .is_checkpoint = IsCompactCheckpoint,
+          .keeps_when_asked = true,
+          .options = NetworkOptions(),
+          .needs_pixel_size = [](const EnhanceOptions& options) -> Result<bool> {
+            if (options.model.file.empty()) return true;
+            return HoldsCompactNetwork(options.model.file);
+          },
+          .expected = [last](int64_t count, const EnhanceOptions& options) -> int64_t {
+            const auto network = last->Get(options.model);
+            if (!network.ok()) return count;  // which the run will say
+            if (const auto* published = std::get_if<PublishedNetwork>(network->get())) {
+              const int64_t most = options.model.options.max_gaussians;
+              return published->config().copies * (most > 0 ? std::min(count, most) : count);
+            }
+            const int64_t copies = std::get<CompactNetwork>(**network).config().copies;
+            const int64_t all = count * std::clamp<int64_t>(options.model.copies.value_or(copies), 1, copies);
+            const int64_t most = options.model.options.max_gaussians;
+            return most > 0 ? std::min(all, most) : all;
+          },
+          .seconds = [](const EnhanceOptions& options) { return IsPublished(options.model) ? 2e-4 : 2.5e-5; },
+          .ready = [](const EnhanceOptions& options) -> Status {
+            if (!options.model.file.empty() || HasShippedNetwork()) return {};
+            return Error{ErrorCode::kBadArgument, "the method 'model' needs weights: --model FILE"};
+          },
+          .run = [last, last_stand_in](EnhanceInput input, const EnhanceOptions& options,
+                                       StepReport& report) -> Result<GaussianCloud> {
+            const Shipped shipped = ShippedFor(input, options.model);
+            ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const AnyNetwork> network,
+                                         last->Get(options.model, shipped));
+            if (const auto* published = std::get_if<PublishedNetwork>(network.get())) {
+              return EnhanceWithPublished(std::move(input), *published, options.model.options, report);
+            }
+            std::shared_ptr<const AnyNetwork> stand_in;
+            if (WantsStandIns(shipped, input, options.model)) {
+              ANCHORSPLAT_ASSIGN_OR_RETURN(stand_in, last_stand_in->Get(options.model, Shipped::kSingle));
+            }
+            ModelSettings model = options.model;
+            if (model.file.empty() && shipped == Shipped::kStandard && !input.is_refined && !model.merge_cost) {
+              model.merge_cost = kMergeCostOfStandard;
+            }
+            Result<GaussianCloud> out = EnhanceWithCompactNetwork(
+                std::move(input), options.upscale, std::get<CompactNetwork>(*network), model, report, options.control,
+                stand_in ? std::get_if<CompactNetwork>(stand_in.get()) : nullptr);
+            if (options.model.file.empty()) {
+              report.facts.emplace_back("network_for_standard_fits", shipped == Shipped::kStandard);
+            }
+            return out;
+          }};
+}
+
+const std::vector<EnhanceMethod>& AllMethods() {
+  static const std::vector<EnhanceMethod> methods = [] {
+    std::vector<EnhanceMethod> all = BasicMethods();
+    all.push_back(ModelMethod());
+    return all;
+  }();
+  return methods;
 }
 
 }  // namespace anchorsplat

@@ -6,10 +6,11 @@
 
 namespace anchorsplat {
 
-// Adds the method "model" to those of enhance/enhance.h; "auto" prefers it to the filter where there is a network.
-// Called when a program starts. What it works with is EnhanceOptions::model; the last network is kept for the next
-// call.
-void RegisterModelMethod();
+// The method "model", which "auto" prefers to the filter where there is a network. What it works with is
+// EnhanceOptions::model; the last network is kept with the method for the next call.
+EnhanceMethod ModelMethod();
+// All that this program has, made once: those of enhance/enhance.h, and "model".
+const std::vector<EnhanceMethod>& AllMethods();
 
 // Enhances by a compact network, with a word in the log and in report.facts ("copies", "unlike_training",
 // "partly_unlike_training", "output_not_finite", "blocks_resumed", "copies_made", "merged", "unseen", "pruned",

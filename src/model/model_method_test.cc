@@ -62,7 +62,6 @@ void WriteMadeUp(const fs::path& path, const std::vector<TensorSpec>& specs, con
 class SmallModel : public testing::Test {
  protected:
   void SetUp() override {
-    RegisterModelMethod();
     folder_ = fs::path(testing::TempDir()) /
               (std::string("anchorsplat_") + testing::UnitTest::GetInstance()->current_test_info()->name());
     fs::remove_all(folder_);
@@ -94,14 +93,11 @@ GaussianCloud RandomCloud(int64_t n) {
   return cloud;
 }
 
-const EnhanceMethod& Registered() {
-  const auto methods = EnhanceMethods();
-  return *std::find_if(methods.begin(), methods.end(), [](const auto& method) { return method.name == "model"; });
-}
+const EnhanceMethod& Registered() { return AllMethods().back(); }
 
 TEST_F(SmallModel, AutoPrefersTheModelOnceThereIsAFile) {
-  RegisterModelMethod();
   EnhanceOptions options;
+  options.methods = &AllMethods();
   options.mode = RenderMode::kClassic;
   options.pixel_size = 0.01;
   EXPECT_EQ(PlanEnhancement(options)->Name(), HasShippedNetwork() ? "model" : "filter");
@@ -141,11 +137,10 @@ TEST_F(SmallModel, BFloat16IsNeverChosenWhereItIsSlower) {
   options.model.file = file();
   const auto run = [&](WeightPrecision precision) {
     options.model.precision = precision;
-    RegisterModelMethod();  // anew: a network once loaded is kept
     EnhanceInput input;
     input.cloud = RandomCloud(300);
     StepReport report;
-    auto cloud = Registered().run(std::move(input), options, report);
+    auto cloud = ModelMethod().run(std::move(input), options, report);  // anew: a network once loaded is kept
     return cloud.ok() ? cloud->means : Buffer<float>();
   };
   hwy::SetSupportedTargetsForTest(HWY_STATIC_TARGET);  // has none

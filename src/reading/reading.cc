@@ -7,7 +7,17 @@
 
 namespace anchorsplat {
 
-Made Reading::likeliest() const { return static_cast<Made>(std::ranges::max_element(made) - made.begin()); }
+Made Reading::likeliest() const {
+  double have_theirs = 0;
+  for (size_t k = 0; k < kMadeCount; ++k) have_theirs += HasItsWidth(static_cast<Made>(k)) ? made[k] : 0;
+  const bool has_its_width = have_theirs > kLossesCount * (1 - have_theirs);
+  size_t best = kMadeCount;
+  for (size_t k = 0; k < kMadeCount; ++k) {
+    if (HasItsWidth(static_cast<Made>(k)) != has_its_width) continue;
+    if (best == kMadeCount || made[k] > made[best]) best = k;
+  }
+  return static_cast<Made>(best);
+}
 
 std::string LooksInWords(const Reading& reading) {
   const Made made = reading.likeliest();

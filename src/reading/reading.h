@@ -14,6 +14,10 @@
 
 namespace anchorsplat {
 
+// So much more a decibel that is lost counts than one that is gained: so that no more than about 2 % of the splats lose
+// 0.1 dB (docs/reading.md). And a splat that is wrongly left alone than one that is wrongly enhanced.
+inline constexpr double kLossesCount = 8;
+
 // What a splat says of itself: how it was made, how large its training pixels were, and what would help it. Told by a
 // model that has learned from splats of which all that is known (docs/reading.md).
 struct Reading {
@@ -25,6 +29,8 @@ struct Reading {
   double showing = 1;      // share of the Gaussians that show, opacity of 10 % or more
   std::vector<ReadingOpinion> opinions;
 
+  // What it is taken for: the likeliest. A splat of which more could be got is wronged by a word that says that it has
+  // its width, which counts kLossesCount times; such a word needs 89 % for all that have theirs together.
   Made likeliest() const;
   double probability(Made of) const { return made[static_cast<size_t>(of)]; }
 };

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/random.h"
+#include "core/simd_targets_for_test.h"
 #include "core/source_dir_for_test.h"
 #include "formats/cloud_io.h"
 #include "reading/treatment.h"
@@ -52,6 +53,36 @@ TEST(Reading, FollowsTheScaleOfTheSplat) {
   }
 }
 
+// AVX2, AVX-512 and what a page runs on: the pixels that are drawn differ by rounding alone.
+TEST(Reading, LeadsToTheSameTreatmentOnEveryProcessor) {
+  for (const char* name : {"biplane", "stone_lantern", "tankard"}) {
+    const GaussianCloud cloud = Example(name);
+    const Treatment best = Treat(Read(cloud).value(), {});
+    ForEachSimdTarget([&] {
+      const Treatment treatment = Treat(Read(cloud).value(), {});
+      EXPECT_EQ(treatment.method, best.method) << name;
+      EXPECT_EQ(treatment.mode, best.mode) << name;
+      EXPECT_NEAR(treatment.pixel, best.pixel, 1e-4 * best.pixel) << name;
+    });
+  }
+  SkipWhenOnlyOneSimdTarget();
+}
+
+// But for what SPZ clamps: lengths below 4e-5, of which the tankard has thousands.
+TEST(Reading, LeadsToTheSameTreatmentAfterSpz) {
+  for (const char* name : {"biplane", "stone_lantern"}) {
+    const GaussianCloud cloud = Example(name);
+    const std::string file = testing::TempDir() + "reading-" + name + ".spz";
+    ASSERT_TRUE(WriteCloud(file, cloud, {.overwrite = true}).ok());
+    const auto back = ReadCloud(file);
+    ASSERT_TRUE(back.ok()) << back.error().message;
+    const Treatment before = Treat(Read(cloud).value(), {}), after = Treat(Read(*back).value(), {});
+    EXPECT_EQ(after.method, before.method) << name;
+    EXPECT_EQ(after.mode, before.mode) << name;
+    EXPECT_NEAR(std::log2(after.pixel / before.pixel), 0, 0.26) << name;  // no more than one of those that are tried
+  }
+}
+
 // What captures of real places have behind their subject must not decide.
 TEST(Reading, IsNotMovedByGiantsAndSkies) {
   const GaussianCloud example = Example("biplane");
@@ -82,6 +113,21 @@ TEST(Reading, IsNotMovedByGiantsAndSkies) {
     ASSERT_TRUE(reading.ok()) << reading.error().message;
     EXPECT_NEAR(reading->pixel / plain, 1, 0.15) << added.count << " of ln scale " << added.log_scale;
   }
+}
+
+TEST(Reading, AccusesOnlyWithCertainty) {
+  Reading reading;
+  const auto set = [&](Made made, double probability) { reading.made[static_cast<size_t>(made)] = probability; };
+  set(Made::kEnhanced, 0.6);
+  set(Made::kClassic, 0.3);
+  set(Made::kGenerated, 0.1);
+  EXPECT_EQ(reading.likeliest(), Made::kClassic);
+  // Several that have their width are as good as one.
+  set(Made::kEnhanced, 0.5);
+  set(Made::kMip, 0.45);
+  set(Made::kClassic, 0.05);
+  set(Made::kGenerated, 0);
+  EXPECT_EQ(reading.likeliest(), Made::kEnhanced);
 }
 
 TEST(Reading, NeedsSomethingThatShows) {

@@ -99,12 +99,6 @@ void Try(const Reading& reading, const TreatmentRequest& request, RenderMode mod
 Treatment Treat(const Reading& reading, const TreatmentRequest& request) {
   Treatment best;
   best.mode = request.mode.value_or(RenderMode::kClassic);
-  // What the caller says is believed: it has the width to get back that splats of that mode have lost.
-  if (request.mode_is_said && HasItsWidth(reading.likeliest())) {
-    best.method = request.network ? TreatmentMethod::kNetwork : TreatmentMethod::kFilter;
-    best.pixel = request.pixel.value_or(reading.low);
-    return best;
-  }
   double best_score = -std::numeric_limits<double>::infinity();
   for (const RenderMode mode : kRenderModes) {
     // Without a tag those of Mip-Splatting are drawn as classic ones, whatever is known.
@@ -114,9 +108,15 @@ Treatment Treat(const Reading& reading, const TreatmentRequest& request) {
       Try(reading, request, mode, network, best, best_score);
     }
   }
-  // Who knows the pixel, or what the splat is, takes less of a risk.
-  const bool is_better = request.mode_is_said || (request.pixel ? best.gain > 0 : best_score > 0);
-  if (!is_better) best.method = TreatmentMethod::kNone;
+  // Who knows the pixel takes less of a risk.
+  if (request.pixel ? best.gain > 0 : best_score > 0) return best;
+  if (!request.mode_is_said) {
+    best.method = TreatmentMethod::kNone;
+  } else if (!request.pixel) {  // what the caller says is believed: it has the width to get back that such splats have
+                                // lost
+    best.method = request.network ? TreatmentMethod::kNetwork : TreatmentMethod::kFilter;
+    best.pixel = reading.low;
+  }
   return best;
 }
 

@@ -7,10 +7,6 @@
 
 namespace anchorsplat {
 
-// So much more a decibel that is lost counts than one that is gained: so that no more than about 2 % of the splats lose
-// 0.1 dB (docs/reading.md).
-inline constexpr double kLossesCount = 4;
-
 // What is known besides the splat, and what may be done.
 struct TreatmentRequest {
   std::optional<RenderMode> mode = {};  // of its training: the file's tag, or the caller's

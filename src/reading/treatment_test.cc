@@ -75,6 +75,17 @@ TEST(Treatment, EnhancesAsTheCallerSays) {
   EXPECT_EQ(treatment.method, TreatmentMethod::kNetwork);
   EXPECT_GT(treatment.pixel, 1);
   EXPECT_LT(treatment.pixel, 2);  // to be safe
+  EXPECT_EQ(treatment.mode, RenderMode::kClassic);
+}
+
+// What the reading expects nothing of is not answered with a pixel of nothing, whatever it is taken for.
+TEST(Treatment, EnhancesAsTheCallerSaysWhatLooksLikeAnything) {
+  for (const Made made : {Made::kGenerated, Made::kMesh, Made::kClassic}) {
+    const Reading reading = ReadingOf(2, 0.1, kHarm, kHarm, made);
+    const Treatment treatment = Treat(reading, {.mode = RenderMode::kClassic, .mode_is_said = true, .network = false});
+    EXPECT_EQ(treatment.method, TreatmentMethod::kFilter);
+    EXPECT_DOUBLE_EQ(treatment.pixel, reading.low);
+  }
 }
 
 TEST(Treatment, KeepsToTheMethodsAndPixelsThatAreAskedFor) {

@@ -8,6 +8,7 @@
 
 #include "cameras/camera_io.h"
 #include "core/text.h"
+#include "model/model_method.h"
 #include "request/choice.h"
 #include "request/findings.h"
 #include "request/mode_option.h"
@@ -65,7 +66,7 @@ Status FinishModelOptions(const EnhanceFlags& flags, ModelSettings& model) {
 
 std::string MethodHelp() {
   std::string text = "auto: the best one available without further input";
-  for (const EnhanceMethod& method : EnhanceMethods()) text += "; " + method.name + ": " + method.summary;
+  for (const EnhanceMethod& method : AllMethods()) text += "; " + method.name + ": " + method.summary;
   return text;
 }
 
@@ -186,6 +187,7 @@ void EnhanceFlags::AddTo(CLI::App& verb) {
 
 Result<EnhanceOptions> MakeEnhanceOptions(const EnhanceFlags& flags, uint64_t seed, const CameraSet* cameras) {
   EnhanceOptions options = flags.options;
+  options.methods = &AllMethods();
   ANCHORSPLAT_RETURN_IF_ERROR(FinishModelOptions(flags, options.model));
   SetBudget(options, options.max_gaussians);
   if (!flags.region.empty()) {

@@ -5,7 +5,6 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
-#include <mutex>
 #include <new>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -27,7 +26,6 @@
 #include "formats/registry.h"
 #include "io/input_file.h"
 #include "io/output_memory.h"
-#include "model/model_method.h"
 #include "reading/treatment.h"
 #include "render/constants.h"
 #include "render/rasterizer.h"
@@ -159,10 +157,7 @@ Result<CameraSet> OfOneSize(CameraSet set) {
 
 }  // namespace
 
-Engine::Engine(ProgressListener listener) : listener_(std::move(listener)) {
-  static std::once_flag once;
-  std::call_once(once, RegisterModelMethod);  // beside the methods that enhance/ has itself
-}
+Engine::Engine(ProgressListener listener) : listener_(std::move(listener)) {}
 
 Reply Engine::Call(std::string_view request, std::span<const std::byte> data) {
   bytes_ = {};

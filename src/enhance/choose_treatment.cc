@@ -221,7 +221,8 @@ void SayWhatIsTaken(const Treatment& treatment, const EnhanceReport& report) {
   std::string text = Cat("looks like ", LooksInWords(reading));
   if (report.pixel_size_source == PixelSizeSource::kRead) {
     text += Cat(", training pixel ", reading.pixel, " (", reading.low, " to ", reading.high, "); ", treatment.pixel,
-                " is taken, from which most is expected. --cameras or --pixel-size makes it exact");
+                treatment.gain > 0 ? " is taken, from which most is expected" : " is taken, to be safe",
+                ". --cameras or --pixel-size makes it exact");
   }
   LogInfo(text);
 }

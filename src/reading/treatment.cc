@@ -116,6 +116,7 @@ Treatment Treat(const Reading& reading, const TreatmentRequest& request) {
                                 // lost
     best.method = request.network ? TreatmentMethod::kNetwork : TreatmentMethod::kFilter;
     best.pixel = reading.low;
+    best.gain = 0;
   }
   return best;
 }

@@ -23,7 +23,7 @@ struct Treatment {
   TreatmentMethod method = TreatmentMethod::kNone;
   RenderMode mode = RenderMode::kClassic;  // to be drawn as, and to be enhanced as
   double pixel = 0;                        // world units, to be taken for that of the training
-  double gain = 0;                         // dB that are expected of it
+  double gain = 0;                         // dB that are expected of it; 0: nobody knows
 };
 
 // The one policy: of all pixels, methods and modes that are possible the one with the greatest expected gain, where

@@ -85,6 +85,7 @@ TEST(Treatment, EnhancesAsTheCallerSaysWhatLooksLikeAnything) {
     const Treatment treatment = Treat(reading, {.mode = RenderMode::kClassic, .mode_is_said = true, .network = false});
     EXPECT_EQ(treatment.method, TreatmentMethod::kFilter);
     EXPECT_DOUBLE_EQ(treatment.pixel, reading.low);
+    EXPECT_EQ(treatment.gain, 0);
   }
 }
 

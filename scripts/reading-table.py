@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """Makes the table of readings: what splats show before they are enhanced, and what helps them (docs/reading-table.md).
 
-    scripts/reading-table.py fits   --work WORK [--photos FOLDER]       fits of meshes, land, a room, photographs
-    scripts/reading-table.py splats --work WORK [--strangers FOLDER]    edits of them, and a task for every row
+    scripts/reading-table.py fits   --work WORK [--photos FOLDER] [--strangers FOLDER]
+                                                                        of meshes, land, a room, photographs, pictures of splats
+    scripts/reading-table.py splats --work WORK                         edits of them, and a task for every row
     scripts/reading-table.py rows   --work WORK [--jobs N]              features and gains, the most of the work
     scripts/reading-table.py pack   --work WORK -o data/reading.jsonl.gz
 
@@ -15,7 +16,6 @@ enters no row: they are photographs-1, maker-1 and so on, and stay so (WORK/name
 """
 
 import argparse
-import concurrent.futures
 import gzip
 import json
 import pathlib
@@ -27,8 +27,8 @@ import sys
 import numpy as np
 
 from reading_edits import COMMON, EDITS, Splat, added
-from reading_originals import (DOWNSCALE, FEW_EDITS, HERE, LOW_CAMERAS, UNMEASURED, WAYS, digest, fitted_in, low_pixel, originals, scenes,
-                               strangers, write_scene)
+from reading_originals import (DOWNSCALE, FEW_EDITS, HERE, LOW_CAMERAS, UNMEASURED, WAYS, digest, fitted_in, low_pixel,
+                               originals, scenes, strangers, write_scene)
 
 FOLDS = 8
 EDITS_PER_SPLAT = 8  # besides the splat as it is and without its tag
@@ -89,18 +89,15 @@ def make_fits(arguments):
             if not project.exists():
                 write_scene(Splat(plain_of_stranger(arguments, splat, name)), project, lambda made, of=splat: quietly(
                     program, "render", of, "-o", made / "images", "--cameras", made / "transforms.json", "-w"))
-        fits = [(project, fitted_in(work, name, way), WAYS[way]) for project, name, _, ways in scenes(arguments) for way in ways]
-        with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
-            list(pool.map(lambda fit: fit_pictures(arguments, *fit), [fit for fit in fits if not fit[1].exists()]))
+        for project, name, _, ways in scenes(arguments):
+            for way in ways:
+                out = fitted_in(work, name, way)
+                if not out.exists():
+                    out.parent.mkdir(exist_ok=True)
+                    run(program, "fit", project, "-o", out, "--downscale", DOWNSCALE, *WAYS[way], "--checkpoint-every",
+                        500, "--resume")
         run(HERE / "scripts/make-scenes.sh", objects, work / "scenes", program,
             env={"STEPS": "4000", "GAUSSIANS": "60000", "PATH": "/usr/bin:/bin"})
-
-
-def fit_pictures(arguments, project, out, way):
-    out.parent.mkdir(exist_ok=True)
-    quietly(arguments.program, "fit", project, "-o", out, "--downscale", DOWNSCALE, *way, "--threads", 1,
-            "--checkpoint-every", 500, "--resume")
-    print(f"{out.name}: fitted", flush=True)
 
 
 def plain_of_stranger(arguments, splat, name):
@@ -183,7 +180,7 @@ def splats_of(arguments, original, found, failed):
 def applies(name, original):
     if original["made"] == "mesh":  # nothing was fitted: what is enhanced or raised of it is nobody's question
         return name.startswith(("crop", "through", "scaled", "on", "before", "floaters", "thinned"))
-    if original["kind"] == "room" or "photographed" in original["kind"]:  # what lies around is theirs already
+    if original["kind"] in ("room", "photographed"):  # what lies around is theirs already
         return name not in ("on ground", "before a sky", "floaters", "merged", "scaled and moved")
     return True
 

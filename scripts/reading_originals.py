@@ -10,7 +10,7 @@ import numpy as np
 from reading_edits import Splat, without_harmonics
 
 HERE = pathlib.Path(__file__).resolve().parent.parent
-UNMEASURED = ("pixels", "pixels-256", "pixels-standard")  # those of which no gains are measured
+UNMEASURED = ("pixels", "pixels-256", "pixels-standard")  # fits of which no gains are measured
 DOWNSCALE = 4  # of photographs
 # How posed pictures are fitted: real photographs the first way, those that are made of strangers' splats two of the others,
 # drawn by a hash.

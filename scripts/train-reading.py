@@ -7,8 +7,7 @@ An ensemble of perceptrons looks at what can be seen of a splat and says its tra
 and a network would gain at multiples of that pixel, each with how sure that is. Rows without gains teach the pixel, rows
 without a pixel (strangers') how they were made. --folds: also writes FOLDER/fold-0.safetensors to fold-7, each of which has seen no mesh
 and no maker of that fold, and prints how good these are; `anchorsplat bench reading --score TABLE --folds FOLDER` decides
-every row by the one that has not seen it. --left-out FOLDER: models that have not seen a kind of fit, as FOLDER/KIND, laid out as
-folds, for `bench reading --score TABLE --folds FOLDER/KIND`. The meshes of HELD_OUT are not in the model that is
+every row by the one that has not seen it. The meshes of HELD_OUT are not in the model that is
 written: a test asks it about them. Needs NumPy and PyTorch; some minutes of a core.
 """
 
@@ -174,32 +173,15 @@ def pixel_of(said):
     return middle.mean(0), np.hypot(spread.mean(0), middle.std(0))
 
 
-def leave_kinds_out(table, arguments, metadata):
-    """A model for every kind, without it. Nothing calibrates their intervals, and no gain depends on that."""
-    kinds = np.array([row["kind"] for row in table.rows])
-    measured = np.array([bool(row.get("gains")) and row["edit"] == "" for row in table.rows])
-    tasks = [(kind, np.flatnonzero(table.teaches & (kinds != kind))) for kind in np.unique(kinds[measured])]
-    with multiprocessing.get_context("fork").Pool(arguments.jobs, torch.set_num_threads, (1,)) as pool:
-        for (kind, rows), ensemble in zip(tasks, pool.starmap(Ensemble, [(table, rows) for _, rows in tasks], chunksize=1)):
-            folder = arguments.left_out / kind.replace(",", "").replace(" ", "-")
-            folder.mkdir(parents=True, exist_ok=True)
-            for fold in range(FOLDS):
-                ensemble.write(folder / f"fold-{fold}.safetensors", table.names, metadata | {"without": kind})
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("table", type=pathlib.Path)
     parser.add_argument("-o", "--output", type=pathlib.Path, help="the model that has seen all folds")
     parser.add_argument("--folds", type=pathlib.Path, help="folder for those that have not")
-    parser.add_argument("--left-out", type=pathlib.Path, help="folder for those that have not seen a kind")
     parser.add_argument("--jobs", type=int, default=2, help="processes, of a core each")
     arguments = parser.parse_args()
     table = Table(arguments.table)
     metadata = {"table": arguments.table.name, "licence": "Apache-2.0"}
-    if arguments.left_out:
-        leave_kinds_out(table, arguments, metadata)
-        return
 
     kept = [np.flatnonzero((table.fold != fold) & table.teaches) for fold in range(FOLDS)]
     if arguments.output:

@@ -159,7 +159,7 @@ CameraSet TrainingCameras(const BenchmarkObject& object) {
 }
 
 // A method of enhance/enhance.h, and what is set for refinement.
-struct RegisteredMethod {
+struct NamedMethod {
   std::string word;  // as the user wrote it
   std::string name;
   const std::vector<EnhanceMethod>* methods = nullptr;  // of which it is one
@@ -209,7 +209,7 @@ Result<double> ParseCount(const std::string& word, std::string_view key, std::st
                                             key == "merge-cost" ? "number of 0 or more" : "whole number of 1 or more")};
 }
 
-Status SetOption(RegisteredMethod& method, std::string_view key, std::string_view value) {
+Status SetOption(NamedMethod& method, std::string_view key, std::string_view value) {
   if (key == "hold-out") {
     return Error{ErrorCode::kBadArgument,
                  Cat("--methods ", Printable(method.word), ": which views are held out is the benchmark's to say")};
@@ -239,7 +239,7 @@ Status SetOption(RegisteredMethod& method, std::string_view key, std::string_vie
 }
 
 // Nothing that is set without an effect.
-Status CheckGiven(const RegisteredMethod& method, const std::set<std::string>& keys) {
+Status CheckGiven(const NamedMethod& method, const std::set<std::string>& keys) {
   EnhanceOptions options;
   options.methods = method.methods;
   options.method = method.name;
@@ -254,9 +254,8 @@ Status CheckGiven(const RegisteredMethod& method, const std::set<std::string>& k
 constexpr std::string_view kAuto = "-auto";
 
 // NAME, NAME-auto or either with @KEY=VALUE@KEY=VALUE…; nothing when there is no such method.
-Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word,
-                                                        const std::vector<EnhanceMethod>& methods) {
-  RegisteredMethod method;
+Result<std::optional<NamedMethod>> ParseNamed(const std::string& word, const std::vector<EnhanceMethod>& methods) {
+  NamedMethod method;
   method.methods = &methods;
   method.word = word;
   const size_t name_end = std::min(word.find('@'), word.size());
@@ -271,7 +270,7 @@ Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word,
   };
   const size_t plus = method.name.find('+');
   if (!known(method.name.substr(0, plus)) || (plus != std::string::npos && !known(method.name.substr(plus + 1)))) {
-    return std::optional<RegisteredMethod>();
+    return std::optional<NamedMethod>();
   }
   if (method.auto_pixel_size && method.name.ends_with("refine-images")) {
     return Error{ErrorCode::kBadArgument,
@@ -302,20 +301,20 @@ Result<std::optional<RegisteredMethod>> ParseRegistered(const std::string& word,
   if (!valid.ok()) {
     return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(word), ": ", valid.error().message)};
   }
-  return std::optional<RegisteredMethod>(std::move(method));
+  return std::optional<NamedMethod>(std::move(method));
 }
 
 // Of all threads, seconds.
 double ProcessorSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-bool ChosenByItself(const RegisteredMethod& method) {
+bool ChosenByItself(const NamedMethod& method) {
   EnhanceOptions options;
   options.methods = method.methods;
   const auto plan = PlanEnhancement(options);
   return plan.ok() && plan->Name() == method.name;
 }
 
-EvalMethod Registered(const RegisteredMethod& method) {
+EvalMethod Named(const NamedMethod& method) {
   return {method.word, method.Settings(), [method](const MethodTask& task) -> Result<MethodViews> {
             EnhanceOptions options;
             options.methods = method.methods;
@@ -399,9 +398,9 @@ Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& 
   const std::string extension = fs::path(word).extension().string();
   if (extension == ".safetensors" || extension == ".pth" || extension == ".pt") return Model(word);
   ANCHORSPLAT_ASSIGN_OR_RETURN(
-      const std::optional<RegisteredMethod> method,
-      ParseRegistered(word, options.enhance_methods == nullptr ? AllMethods() : *options.enhance_methods));
-  if (method) return Registered(*method);
+      const std::optional<NamedMethod> method,
+      ParseNamed(word, options.enhance_methods == nullptr ? AllMethods() : *options.enhance_methods));
+  if (method) return Named(*method);
   return Error{ErrorCode::kBadArgument, Cat("--methods: '", Printable(word),
                                             "' is none of raw, filter, filter@F, filter-auto, filter-best, upsample, "
                                             "bicubic, a checkpoint of a network or "

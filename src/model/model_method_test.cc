@@ -93,8 +93,6 @@ GaussianCloud RandomCloud(int64_t n) {
   return cloud;
 }
 
-const EnhanceMethod& Registered() { return AllMethods().back(); }
-
 TEST_F(SmallModel, AutoPrefersTheModelOnceThereIsAFile) {
   EnhanceOptions options;
   options.methods = &AllMethods();
@@ -175,12 +173,12 @@ EnhanceInput SheetInput() {
 TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
   EnhanceOptions options;
   options.model.file = Compact(3);
-  const EnhanceMethod registered = Registered();
-  EXPECT_TRUE(*registered.needs_pixel_size(options));
+  const EnhanceMethod& method = AllMethods().back();
+  EXPECT_TRUE(*method.needs_pixel_size(options));
   StepReport report;
   const EnhanceInput input = SheetInput();
   options.model.copies = 3;
-  auto enhanced = registered.run(input, options, report);
+  auto enhanced = method.run(input, options, report);
   ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
   EXPECT_EQ(enhanced->size(), 600);
   const std::map<std::string, FactValue> facts(report.facts.begin(), report.facts.end());
@@ -190,36 +188,36 @@ TEST_F(SmallModel, CompactNetworksGoThroughTheSameDoor) {
   // No lost width, nothing to build on: fitted with antialiasing, or seen no closer.
   EnhanceInput without = input;
   without.filter_strength = 0;
-  enhanced = registered.run(without, options, report);
+  enhanced = method.run(without, options, report);
   ASSERT_TRUE(enhanced.ok());
   EXPECT_EQ(enhanced->log_scales, input.cloud.log_scales);
   options.upscale = 1;
   without.filter_strength = 1;
-  enhanced = registered.run(without, options, report);
+  enhanced = method.run(without, options, report);
   ASSERT_TRUE(enhanced.ok());
   EXPECT_EQ(enhanced->means, input.cloud.means);
   options.upscale = 4;
 
   options.model.options.prune_opacity = 0.3f;
-  enhanced = registered.run(input, options, report);
+  enhanced = method.run(input, options, report);
   ASSERT_TRUE(enhanced.ok());
   EXPECT_LT(enhanced->size(), 600);
   for (const float logit : enhanced->opacity_logits) EXPECT_GE(1 / (1 + std::exp(-logit)), 0.3f);
   options.model.file = file();
-  EXPECT_FALSE(*registered.needs_pixel_size(options));
+  EXPECT_FALSE(*method.needs_pixel_size(options));
 }
 
 TEST_F(SmallModel, CopiesAndBudgetAreCounted) {
   EnhanceOptions options;
   options.model.file = Compact(3);
-  const EnhanceMethod registered = Registered();
+  const EnhanceMethod& method = AllMethods().back();
   EnhanceInput input = SheetInput();
   input.pixel_sizes.assign(200, kSheetPixel);  // one each
   const auto run = [&](std::optional<int64_t> copies, int64_t most) {
     options.model.copies = copies;
     options.model.options.max_gaussians = most;
     StepReport report;
-    const auto enhanced = registered.run(input, options, report);
+    const auto enhanced = method.run(input, options, report);
     if (!enhanced.ok()) return int64_t{-1};
     const std::map<std::string, FactValue> facts(report.facts.begin(), report.facts.end());
     const auto fact = [&](const char* name) { return std::get<int64_t>(facts.at(name)); };
@@ -234,19 +232,19 @@ TEST_F(SmallModel, CopiesAndBudgetAreCounted) {
   EXPECT_EQ(run(4, 0), -1);  // the network makes three
   EXPECT_EQ(run(3, 450), 450);
   EXPECT_EQ(run(3, 150), 150);
-  EXPECT_EQ(registered.expected(200, options), 150);
+  EXPECT_EQ(method.expected(200, options), 150);
 }
 
 // The last network is kept for the next call, and what asks for another one at the same time gets its own.
 TEST_F(SmallModel, ChangedFilesAndRunsSideBySideGetTheirNetworks) {
   const fs::path two = Compact(2), three = Compact(3);
-  const EnhanceMethod registered = Registered();
+  const EnhanceMethod& method = AllMethods().back();
   const EnhanceInput input = SheetInput();
   const auto copies = [&](const fs::path& file) -> int64_t {
     EnhanceOptions options;
     options.model.file = file;
     StepReport report;
-    const auto enhanced = registered.run(input, options, report);
+    const auto enhanced = method.run(input, options, report);
     if (!enhanced.ok()) return -1;
     const std::map<std::string, FactValue> facts(report.facts.begin(), report.facts.end());
     return std::get<int64_t>(facts.at("copies_made")) / input.cloud.size();
@@ -265,7 +263,7 @@ TEST_F(SmallModel, ChangedFilesAndRunsSideBySideGetTheirNetworks) {
 
 // What would change nothing is refused, with the words for where it would.
 TEST_F(SmallModel, EveryOptionBelongsToAnArchitecture) {
-  const std::vector<MethodOption> options = Registered().options;
+  const std::vector<MethodOption> options = AllMethods().back().options;
   EnhanceOptions enhance;
   const auto lacks = [&](const std::string& name) -> std::string {
     const auto found = std::find_if(options.begin(), options.end(), [&](const auto& o) { return o.name == name; });
@@ -319,7 +317,7 @@ TEST_F(SmallModel, TheShippedNetworksOpen) {
 
 // A network that is not told the kind of splat knows classic ones only, and others are filtered.
 TEST_F(SmallModel, AntialiasedSplatsGetTheirOwnShippedNetwork) {
-  const EnhanceMethod registered = Registered();
+  const EnhanceMethod& method = AllMethods().back();
   EnhanceInput input = SheetInput();
   input.cloud.render_mode = RenderMode::kAntialiased;
   input.filter_strength = 0.15;
@@ -327,7 +325,7 @@ TEST_F(SmallModel, AntialiasedSplatsGetTheirOwnShippedNetwork) {
   options.model.copies = 3;
   options.model.file = Compact(3);
   StepReport report;
-  auto enhanced = registered.run(input, options, report);
+  auto enhanced = method.run(input, options, report);
   ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
   EXPECT_EQ(enhanced->size(), input.cloud.size());
   if (!HasShippedNetwork()) return;
@@ -339,7 +337,7 @@ TEST_F(SmallModel, AntialiasedSplatsGetTheirOwnShippedNetwork) {
     either.cloud.render_mode = mode;
     if (mode == RenderMode::kClassic) either.filter_strength = 0.74;
     report = {};
-    enhanced = registered.run(either, options, report);
+    enhanced = method.run(either, options, report);
     ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
     const std::map<std::string, FactValue> facts(report.facts.begin(), report.facts.end());
     ASSERT_TRUE(facts.contains("copies_made")) << static_cast<int>(mode);
@@ -351,7 +349,7 @@ TEST_F(SmallModel, AntialiasedSplatsGetTheirOwnShippedNetwork) {
 // Merging four into one is worse than a network that makes one.
 TEST_F(SmallModel, OneForOneComesFromANetworkOfItsOwn) {
   if (!HasShippedNetwork()) GTEST_SKIP() << "this program was built without weights";
-  const EnhanceMethod registered = Registered();
+  const EnhanceMethod& method = AllMethods().back();
   struct Case {
     double showing;
     std::optional<int64_t> copies;
@@ -365,7 +363,7 @@ TEST_F(SmallModel, OneForOneComesFromANetworkOfItsOwn) {
     EnhanceOptions options;
     options.model.copies = c.copies;
     StepReport report;
-    const auto enhanced = registered.run(input, options, report);
+    const auto enhanced = method.run(input, options, report);
     ASSERT_TRUE(enhanced.ok()) << enhanced.error().message;
     const std::map<std::string, FactValue> facts(report.facts.begin(), report.facts.end());
     EXPECT_EQ(std::get<int64_t>(facts.at("copies")), c.made) << c.showing;
@@ -386,7 +384,7 @@ TEST_F(SmallModel, WhatAMergeMayCostDependsOnTheNetwork) {
     EnhanceOptions options;
     options.model.merge_cost = cost;
     StepReport report;
-    const auto enhanced = Registered().run(input, options, report);
+    const auto enhanced = AllMethods().back().run(input, options, report);
     EXPECT_TRUE(enhanced.ok());
     return enhanced.ok() ? enhanced->size() : 0;
   };

@@ -112,8 +112,7 @@ Treatment Treat(const Reading& reading, const TreatmentRequest& request) {
   if (request.pixel ? best.gain > 0 : best_score > 0) return best;
   if (!request.mode_is_said) {
     best.method = TreatmentMethod::kNone;
-  } else if (!request.pixel) {  // what the caller says is believed: it has the width to get back that such splats have
-                                // lost
+  } else if (!request.pixel) {  // the caller is believed: it has lost the width that such splats have lost
     best.method = request.network ? TreatmentMethod::kNetwork : TreatmentMethod::kFilter;
     best.pixel = reading.low;
     best.gain = 0;

@@ -27,8 +27,8 @@ import sys
 import numpy as np
 
 from reading_edits import COMMON, EDITS, Splat, added
-from reading_originals import (DOWNSCALE, FEW_EDITS, HERE, LOW_CAMERAS, UNMEASURED, WAYS, digest, fitted_in, low_pixel,
-                               originals, scenes, strangers, write_scene)
+from reading_originals import (FEW_EDITS, HERE, LOW_CAMERAS, UNMEASURED, digest, fitted_in, low_pixel, options_of, originals,
+                               scenes, strangers, write_scene)
 
 FOLDS = 8
 EDITS_PER_SPLAT = 8  # besides the splat as it is and without its tag
@@ -94,8 +94,7 @@ def make_fits(arguments):
                 out = fitted_in(work, name, way)
                 if not out.exists():
                     out.parent.mkdir(exist_ok=True)
-                    run(program, "fit", project, "-o", out, "--downscale", DOWNSCALE, *WAYS[way], "--checkpoint-every",
-                        500, "--resume")
+                    run(program, "fit", project, "-o", out, *options_of(way), "--checkpoint-every", 500, "--resume")
         run(HERE / "scripts/make-scenes.sh", objects, work / "scenes", program,
             env={"STEPS": "4000", "GAUSSIANS": "60000", "PATH": "/usr/bin:/bin"})
 
@@ -151,7 +150,7 @@ def splats_of(arguments, original, found, failed):
     work = arguments.work
     labels = {key: original[key] for key in LABELS if key in original} | {"edit": ""}
     where = {"object": str(original["object"])} | {k: original[k] for k in ("downscale", "measure") if k in original}
-    tasks = [labels | where | {"id": original["original"], "splat": str(original["splat"])}]
+    tasks = [labels | where | {"id": original["original"], "splat": str(original["splat"]), "places": places_of(original)}]
     folder = work / "edits" / original["original"]
     splat, pixel = Splat(original["splat"]), low_pixel(original)
     plain = folder / "untagged.ply"
@@ -177,10 +176,19 @@ def splats_of(arguments, original, found, failed):
     return tasks
 
 
+def places_of(original):
+    """How many are looked at one by one: many where pixels differ from place to place."""
+    if original["made"] == "mesh":
+        return 0
+    if original["kind"] == "room" or "photographed" in original["kind"]:
+        return 32
+    return 6 if "downscale" in original else 3
+
+
 def applies(name, original):
     if original["made"] == "mesh":  # nothing was fitted: what is enhanced or raised of it is nobody's question
         return name.startswith(("crop", "through", "scaled", "on", "before", "floaters", "thinned"))
-    if original["kind"] in ("room", "photographed"):  # what lies around is theirs already
+    if original["kind"] == "room" or "photographed" in original["kind"]:  # what lies around is theirs already
         return name not in ("on ground", "before a sky", "floaters", "merged", "scaled and moved")
     return True
 
@@ -254,7 +262,7 @@ def edited(arguments, original, splat, pixel, name, path, random, found):
 
 def cameras_of(original):
     if "downscale" in original:
-        return ["--cameras", original["object"], "--train-width", width_of_photographs(original["object"]) // DOWNSCALE]
+        return ["--cameras", original["object"], "--train-width", width_of_photographs(original["object"]) // original["downscale"]]
     for name in LOW_CAMERAS:
         if (original["object"] / name).exists():
             return ["--cameras", original["object"] / name]
@@ -350,24 +358,25 @@ def pack(arguments):
 
 
 def measure(arguments):
-    """What the decisions of the models of --folds really gain, as `bench reading --decisions` takes them."""
-    work = arguments.work
-    said = json.loads(quietly(arguments.program, "bench", "reading", "--score", arguments.output, "--folds", arguments.folds,
-                              "--json"))
-    decisions = next(d for d in said["deciders"] if d["name"] == "model")["decisions"]
-    tasks = {t["id"]: t for t in map(json.loads, (work / "tasks.jsonl").read_text().splitlines())}
-    wanted = [d for d in decisions if d["method"] != "none" and tasks.get(d["id"], {}).get("object") and
-              tasks[d["id"]].get("measure", True)]
-    run_tasks(arguments, [tasks[d["id"]] | {"treat": {k: d[k] for k in ("method", "mode", "pixel")}} for d in wanted],
-              work / "measured")
-    for decision in decisions:
-        row = work / "measured" / (decision["id"] + ".json")
-        decision["gain"] = json.loads(row.read_text())["gain"] if decision in wanted and row.exists() else 0
-        if decision["method"] != "none" and decision not in wanted:
-            del decision["gain"]
-    path = work / "model.jsonl"
+    """What the program does by itself with the models of --folds, and gains, as `bench reading --decisions` takes it."""
+    if not arguments.folds:
+        raise SystemExit("reading-table: measure needs --folds, the models that scripts/train-reading.py --folds has written")
+    work, folds = arguments.work, arguments.folds.resolve()
+    tasks = [json.loads(t) for t in (work / "tasks.jsonl").read_text().splitlines()]
+    tasks = [{k: v for k, v in t.items() if k != "places"} | {"model": str(folds / f"fold-{fold_of(t)}.safetensors")}
+             for t in tasks if t.get("object") and t.get("measure", True) and t["made"] != "mesh"]
+    codes = run_tasks(arguments, tasks, work / "measured")
+    said = ("id", "method", "mode", "pixel", "low", "high", "made", "gain")
+    path, decisions = work / "model.jsonl", []
+    for task in tasks:
+        row = work / "measured" / (task["id"] + ".json")
+        if row.exists():
+            row = json.loads(row.read_text())
+            decisions.append({key: row[key] for key in said if key in row})
     path.write_text("".join(json.dumps(d) + "\n" for d in decisions))
-    print(f"{path}: {len(wanted)} decisions measured")
+    print(f"{path}: {len(decisions)} decisions of {len(tasks)} measured")
+    if any(codes):
+        raise SystemExit(f"reading-table: some failed: see {work}/measured.*.log")
 
 
 def remember(arguments):

@@ -12,8 +12,8 @@ from reading_edits import Splat, without_harmonics
 HERE = pathlib.Path(__file__).resolve().parent.parent
 UNMEASURED = ("pixels", "pixels-256", "pixels-standard")  # fits of which no gains are measured
 DOWNSCALE = 4  # of photographs
-# How posed pictures are fitted: real photographs the first way, those that are made of strangers' splats two of the others,
-# drawn by a hash.
+# How posed pictures are fitted: real photographs the first way, at an eighth, and in some of the others, drawn by a hash;
+# those that are made of strangers' splats in two of the others.
 WAYS = {
     "photographed": ["--steps", 3000, "--max-gaussians", 60000],
     "photographed, 1500 steps": ["--steps", 1500, "--max-gaussians", 20000],
@@ -26,7 +26,8 @@ WAYS = {
     "antialiased, photographed, mcmc": ["--steps", 3000, "--max-gaussians", 20000, "--mode", "antialiased", "--strategy", "mcmc"],
     "mip, photographed": ["--steps", 3000, "--max-gaussians", 20000, "--mip-filter"],
 }
-WAYS_OF_STRANGERS = 2
+SMALL_WAY = "photographed, eighth"  # the same pictures, other pixels
+WAYS_OF_STRANGERS, WAYS_OF_PHOTOGRAPHS = 2, 2
 FEW_EDITS, LATER_EDITS = 4, 2  # of large splats and those without gains; of those that joined the table later
 SCENE_VIEWS, SCENE_SIZE, SCENE_ANGLE = 64, 512, 40  # of strangers' splats: pictures, their pixels, degrees
 SPLATS = (".ply", ".spz", ".splat", ".sog", ".ksplat", ".glb", ".gltf", ".npz", ".csv")  # of strangers
@@ -95,15 +96,23 @@ def strangers(arguments):
 def scenes(arguments):
     """Posed pictures to fit: (project, its name, whose it is, ways to fit it): photographs, and pictures of strangers' splats."""
     for project, name in photographs(arguments).items():
-        yield project, name, name, ["photographed"]
+        yield project, name, name, ["photographed", SMALL_WAY, *ways_of(name, WAYS_OF_PHOTOGRAPHS)]
     for _, name, maker, _ in strangers(arguments):
         project = arguments.work / "scenes-of-strangers" / name
         if project.exists():
-            yield project, f"{name}--refitted", maker, ways_of(name)
+            yield project, f"{name}--refitted", maker, ways_of(name, WAYS_OF_STRANGERS)
 
 
-def ways_of(name):
-    return sorted(list(WAYS)[1:], key=lambda way: digest(f"{name} {way}"))[:WAYS_OF_STRANGERS]
+def ways_of(name, count):
+    return sorted(list(WAYS)[1:], key=lambda way: digest(f"{name} {way}"))[:count]
+
+
+def downscale_of(way):
+    return 2 * DOWNSCALE if way == SMALL_WAY else DOWNSCALE
+
+
+def options_of(way):
+    return ["--downscale", downscale_of(way), *WAYS["photographed" if way == SMALL_WAY else way]]
 
 
 def write_scene(splat, project, render):
@@ -153,7 +162,7 @@ def originals(arguments):
             if splat.exists():
                 kind = way.replace("photographed", "refitted") if "--refitted" in name else way
                 found.append({"original": splat.stem, "mesh": name, "maker": maker, "kind": kind, "made": made_by(way),
-                              "object": project, "downscale": DOWNSCALE, "splat": splat, "edits": LATER_EDITS})
+                              "object": project, "downscale": downscale_of(way), "splat": splat, "edits": LATER_EDITS})
     return found
 
 

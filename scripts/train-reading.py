@@ -34,12 +34,19 @@ INTERVAL = 0.8  # of the pixels that intervals hold
 FARTHEST = 0.98  # of splats not learned from that are no stranger than this
 
 
+def places_of(row):
+    """Places of a splat are splats of their own, of which nobody knows what helps them, seen without pictures."""
+    labels = {key: row[key] for key in ("id", "mesh", "kind", "fold", "made")} | {"edit": "place"}
+    return [labels | place for place in row.get("places", ())]
+
+
 class Table:
     def __init__(self, path):
         with gzip.open(path, "rt", encoding="utf-8") as lines:
             head = json.loads(next(lines))
             self.names = head["features"]
             self.rows = [row for row in map(json.loads, lines) if "features" in row]
+        self.rows += [place for row in self.rows for place in places_of(row)]
         self.x = np.array([[np.nan if v is None else v for v in row["features"]] for row in self.rows], dtype=np.float64)
         self.fold = np.array([row["fold"] for row in self.rows])
         known = [row.get("pixel") and row["made"] != "mesh" for row in self.rows]
@@ -139,7 +146,7 @@ class Ensemble:
         self.deviation = (np.nan_to_num(np.nanstd(table.x[rows], 0)) + 1e-2).astype(np.float16).astype(np.float64)
         residuals = unseen_residuals(table, rows, self.mean, self.deviation)
         self.nets = [learn(table, rows, self.mean, self.deviation, seed, residuals) for seed in range(members)]
-        self.calibration = (1.0, 1.0)
+        self.calibration = (1.0, 1.0, 0.0)
 
     def say(self, x):
         """[members, rows, outputs]"""
@@ -198,13 +205,23 @@ def main():
     error = np.abs(middle - table.pixel)
     judged = np.isfinite(error)
 
+    edits = np.array([row["edit"] for row in table.rows])
+    splats = np.array([row["id"] for row in table.rows])
+
     def calibrated(without):
         others = table.fold != without
-        return (float(np.quantile((error / half)[judged & others], INTERVAL)),
-                float(np.quantile(far[others & table.teaches], FARTHEST)))
+        return (float(np.quantile((error / half)[judged & others & (edits != "place")], INTERVAL)),
+                float(np.quantile(far[others & table.teaches & (edits != "place")], FARTHEST)), place_error(others))
 
-    edited = np.array([row["edit"] != "" for row in table.rows])
-    for name, which in (("as they were fitted", judged & ~edited), ("edited", judged & edited)):
+    def place_error(others):
+        """Standard deviation of errors around their mean, of places of one splat; every splat counts once."""
+        which = judged & others & (edits == "place")
+        of_splats = [(middle - table.pixel)[which & (splats == splat)] for splat in np.unique(splats[which])]
+        return float(np.sqrt(np.mean([np.var(errors, ddof=1) for errors in of_splats if len(errors) > 1])))
+
+    edited = edits != ""
+    for name, which in (("as they were fitted", judged & ~edited), ("edited", judged & edited & (edits != "place")),
+                        ("place by place", judged & (edits == "place"))):
         print(f"pixels of splats {name}: off by {np.median(error[which]):.3f} (median), {np.quantile(error[which], 0.9):.3f} (90 %), ln")
     kinds = np.array([row["kind"] for row in table.rows])
     print("by kinds of splats that nobody has edited, ln(said / true): median, median size, interval that holds it")
@@ -222,7 +239,8 @@ def main():
         ensemble = ensembles[FOLDS]
         ensemble.calibration = calibrated(None)
         ensemble.write(arguments.output, table.names, metadata | {"held_out": " ".join(HELD_OUT)})
-        print(f"{arguments.output}: {arguments.output.stat().st_size / 1e6:.2f} MB, interval {ensemble.calibration[0]:.2f}")
+        interval, _, of_places = ensemble.calibration
+        print(f"{arguments.output}: {arguments.output.stat().st_size / 1e6:.2f} MB, interval {interval:.2f}, places {of_places:.2f}")
 
 
 if __name__ == "__main__":

@@ -55,4 +55,30 @@ GaussianCloud CopyOf(const CloudView& view) {
   return cloud;
 }
 
+Result<GaussianCloud> Subset(const CloudView& view, std::span<const int64_t> rows) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(view));
+  for (const int64_t row : rows) {
+    if (row < 0 || row >= view.size()) {
+      return Error{ErrorCode::kBadArgument, Cat("row ", row, " of a cloud of ", view.size(), " Gaussians")};
+    }
+  }
+  const auto gather = [&rows](std::span<const float> from, int64_t width, Buffer<float>& to) {
+    to.resize(rows.size() * static_cast<size_t>(width));
+    float* out = to.data();
+    for (const int64_t row : rows) out = std::copy_n(from.data() + row * width, width, out);
+  };
+  GaussianCloud out;
+  out.sh_degree = view.sh_degree;
+  out.render_mode = view.render_mode;
+  out.comments.assign(view.comments.begin(), view.comments.end());
+  out.origin = view.origin;
+  out.double_means = view.double_means;
+  gather(view.means, 3, out.means);
+  gather(view.log_scales, 3, out.log_scales);
+  gather(view.quats, 4, out.quats);
+  gather(view.opacity_logits, 1, out.opacity_logits);
+  gather(view.sh, view.sh_stride(), out.sh);
+  return out;
+}
+
 }  // namespace anchorsplat

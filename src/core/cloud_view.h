@@ -49,7 +49,8 @@ struct CloudView {
 Status Validate(const CloudView& cloud);
 std::optional<Bounds> ComputeBounds(const CloudView& cloud);
 
-// An owner of its own with the same values.
+// Owners of their own, of all of it and of the given rows in that order. Errors: of Validate, rows that are not there.
 GaussianCloud CopyOf(const CloudView& view);
+Result<GaussianCloud> Subset(const CloudView& view, std::span<const int64_t> rows);
 
 }  // namespace anchorsplat

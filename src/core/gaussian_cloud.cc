@@ -16,12 +16,6 @@ namespace anchorsplat {
 
 namespace {
 
-void GatherRows(const Buffer<float>& from, int64_t width, std::span<const int64_t> rows, Buffer<float>& to) {
-  to.resize(rows.size() * static_cast<size_t>(width));
-  float* out = to.data();
-  for (const int64_t row : rows) out = std::copy_n(from.data() + row * width, width, out);
-}
-
 void AppendRows(Buffer<float>& to, const Buffer<float>& from) { to.insert(to.end(), from.begin(), from.end()); }
 
 }  // namespace
@@ -48,24 +42,7 @@ Status Validate(const GaussianCloud& cloud) { return Validate(CloudView(cloud));
 std::optional<Bounds> ComputeBounds(const GaussianCloud& cloud) { return ComputeBounds(CloudView(cloud)); }
 
 Result<GaussianCloud> Subset(const GaussianCloud& cloud, std::span<const int64_t> rows) {
-  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
-  for (const int64_t row : rows) {
-    if (row < 0 || row >= cloud.size()) {
-      return Error{ErrorCode::kBadArgument, Cat("row ", row, " of a cloud of ", cloud.size(), " Gaussians")};
-    }
-  }
-  GaussianCloud out;
-  out.sh_degree = cloud.sh_degree;
-  out.render_mode = cloud.render_mode;
-  out.comments = cloud.comments;
-  out.origin = cloud.origin;
-  out.double_means = cloud.double_means;
-  GatherRows(cloud.means, 3, rows, out.means);
-  GatherRows(cloud.log_scales, 3, rows, out.log_scales);
-  GatherRows(cloud.quats, 4, rows, out.quats);
-  GatherRows(cloud.opacity_logits, 1, rows, out.opacity_logits);
-  GatherRows(cloud.sh, cloud.sh_stride(), rows, out.sh);
-  return out;
+  return Subset(CloudView(cloud), rows);
 }
 
 Status Append(GaussianCloud& cloud, const GaussianCloud& more) {

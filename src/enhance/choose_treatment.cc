@@ -20,6 +20,7 @@
 #include "enhance/pixel_size.h"
 #include "fit/pixel_model.h"
 #include "fit/training_views.h"
+#include "reading/places.h"
 #include "reading/treatment.h"
 #include "render/constants.h"
 
@@ -147,14 +148,14 @@ Status CheckPixelOptions(const EnhanceOptions& options) {
 }
 
 // Outlines of what has been enhanced say nothing about the pixels of the rest.
-Result<Reading> ReadInside(const Region& region, const GaussianCloud& cloud) {
+Result<Reading> ReadInside(const Region& region, const GaussianCloud& cloud, const ReadingModel& model) {
   std::vector<int64_t> inside;
   for (int64_t i = 0; i < cloud.size(); ++i) {
     if (region.Holds(cloud.means.data() + 3 * i)) inside.push_back(i);
   }
-  if (inside.empty()) return Read(cloud);  // which is refused later on
+  if (inside.empty()) return Read(cloud, model);  // which is refused later on
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud part, Subset(cloud, inside));
-  return Read(part);
+  return Read(part, model);
 }
 
 bool HasNetwork(const MethodPlan& plan) {
@@ -163,8 +164,8 @@ bool HasNetwork(const MethodPlan& plan) {
 
 // Things that lie apart, as of merged splats, may each have a training of their own: each is read by itself. Nothing
 // where all is one.
-void ReadParts(const MethodPlan& plan, TreatmentRequest request, const Treatment& of_whole, EnhanceInput& input,
-               EnhanceReport& report) {
+void ReadParts(const MethodPlan& plan, TreatmentRequest request, const Treatment& of_whole, const ReadingModel& model,
+               EnhanceInput& input, EnhanceReport& report) {
   const CloudComponents components = FindComponents(input.cloud);
   if (components.component.empty() || components.count < 2 || static_cast<size_t>(components.count) > kMostParts)
     return;
@@ -180,7 +181,7 @@ void ReadParts(const MethodPlan& plan, TreatmentRequest request, const Treatment
   for (size_t k = 0; k + 1 < rows.size(); ++k) {
     LeaveIfAbandoned();
     const auto part = Subset(input.cloud, rows[k]);
-    const auto reading = part.ok() ? Read(*part) : Result<Reading>(part.error());
+    const auto reading = part.ok() ? Read(*part, model) : Result<Reading>(part.error());
     Treatment& treatment = treatments.emplace_back();
     if (reading.ok()) treatment = Treat(*reading, request);
     if (treatment.method == TreatmentMethod::kNone) treatment.pixel = nothing;
@@ -203,6 +204,17 @@ void ReadParts(const MethodPlan& plan, TreatmentRequest request, const Treatment
     input.by_network = std::move(by_network);
   }
   LogInfo(Cat("made of ", components.count, " things that lie apart, each read by itself"));
+}
+
+// What cameras saw from near has smaller pixels than what they saw from afar.
+void ReadPlaces(const ReadingModel& model, EnhanceInput& input, EnhanceReport& report) {
+  Buffer<float> ratios = PixelRatios(input.cloud, model);
+  if (ratios.empty()) return;
+  for (float& ratio : ratios) ratio *= static_cast<float>(report.pixel_size);
+  input.pixel_sizes = ratios;
+  report.pixel_size_range = {double{Quantile(ratios, 0.1)}, double{Quantile(ratios, 0.9)}};
+  LogInfo(Cat("training pixels differ across the splat: ", report.pixel_size_range->first, " to ",
+              report.pixel_size_range->second, " are taken"));
 }
 
 void SayNothingIsDone(const EnhanceReport& report, std::optional<RenderMode> tag) {
@@ -281,7 +293,8 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
     SayTheSplatStays(options);
   }
   const bool part_alone = options.region && input.partly_enhanced;
-  const auto reading = part_alone ? ReadInside(*options.region, cloud) : Read(cloud);
+  const ReadingModel& model = options.reading_model == nullptr ? ReadingModel::Shipped() : *options.reading_model;
+  const auto reading = part_alone ? ReadInside(*options.region, cloud, model) : Read(cloud, model);
   if (reading.ok()) {
     report.reading = *reading;
     input.showing = reading->showing;
@@ -342,7 +355,8 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
     }
   }
   if (!none && !known.pixel && !part_alone && !options.filter_strength) {
-    ReadParts(plan, request, treatment, input, report);
+    ReadParts(plan, request, treatment, model, input, report);
+    if (report.parts.empty()) ReadPlaces(model, input, report);
   }
   input.pixel_size = report.pixel_size;
   return {};

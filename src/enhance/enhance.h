@@ -29,6 +29,8 @@ struct EnhanceMethod;
 struct EnhanceOptions {
   // Ways to enhance that there are; null: BasicMethods(). model/model_method.h has those with networks. Not owned.
   const std::vector<EnhanceMethod>* methods = nullptr;
+  // What splats are read with; null: the program's own model. Others are for measuring. Not owned.
+  const ReadingModel* reading_model = nullptr;
   // The name of one of them, or "auto": what a reading of the splat says is best, of those that are ready. Or two,
   // "A+B": B begins where A ended, if it can (EnhanceMethod::takes_start).
   std::string method = "auto";
@@ -113,6 +115,8 @@ struct EnhanceReport {
   double upscale = 1;
   double filter_strength = 0;
   double pixel_size = 0;  // p_LR, the median when there is one per Gaussian
+  // 10 and 90 % quantiles where a reading says that pixels differ across the splat.
+  std::optional<std::pair<double, double>> pixel_size_range;
   PixelSizeSource pixel_size_source = PixelSizeSource::kNone;
   std::optional<Reading> reading;    // of the splat, or of its region; nothing where too little shows
   std::vector<PartTreatment> parts;  // things that lie apart, each read by itself; none where all is one

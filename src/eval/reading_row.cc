@@ -28,6 +28,8 @@
 #include "metrics/image_metrics.h"
 #include "model/model_method.h"
 #include "reading/features.h"
+#include "reading/places.h"
+#include "reading/reading_model.h"
 #include "reading/showing_gaussians.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
@@ -70,6 +72,7 @@ std::string StateOfFolder(const fs::path& folder) {
   return Cat(" ", files, " files ", bytes, " ", last.first, " ", last.second);
 }
 
+constexpr uint64_t kMostPlacesOfRow = 1000;
 constexpr double kOnePixel = 2;  // up to which pixels of one splat count as one
 
 double QuantileOf(Buffer<float> values, double q) { return double{Quantile(values, q)}; }
@@ -99,13 +102,11 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
         }
       } else if (name == "measure") {
         task.measure = value.get<bool>();
-      } else if (name == "treat") {
-        task.method = value.at("method").get<std::string>();
-        task.mode = RenderModeNamed(value.at("mode").get<std::string>());
-        task.pixel = value.at("pixel").get<double>();
-        if ((task.method != "filter" && task.method != "network") || !task.mode || !(task.pixel > 0)) {
-          return bad("treat: a method, filter or network, a mode and a pixel");
+      } else if (name == "places") {
+        if (!value.is_number_unsigned() || value.get<uint64_t>() > kMostPlacesOfRow) {
+          return bad(Cat("places: no whole number from 0 to ", kMostPlacesOfRow));
         }
+        task.places = value.get<int>();
       } else if (name == "others") {
         if (value.size() != 2 || !value.at("from").is_number_integer())
           return bad("others are a whole from and a pixel");
@@ -129,6 +130,7 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
         fs::path* const path = name == "splat"     ? &task.splat
                                : name == "object"  ? &task.object
                                : name == "context" ? &task.context
+                               : name == "model"   ? &task.model
                                                    : nullptr;
         if (path == nullptr) return bad(Cat("unknown property ", Printable(name)));
         *path = value.get<std::string>();
@@ -138,11 +140,11 @@ Result<ReadingTask> ReadingTaskFrom(const nlohmann::json& json) {
     return bad("a property is missing or has a value of another type");
   }
   if (task.id.empty() || task.splat.empty()) return bad("it needs an id and a splat");
-  const bool is_about_gains = task.keep || !task.context.empty() || task.others_from > 0 || !task.method.empty();
-  if (task.object.empty() && is_about_gains) {
-    return bad("keep, context, others and treat are about gains, which need an object");
+  const bool is_about_gains = task.keep || !task.context.empty() || task.others_from > 0 || !task.model.empty();
+  if (task.object.empty() && (is_about_gains || task.places > 0)) {
+    return bad("keep, context, others, model and places are about gains or pixels, which need an object");
   }
-  if (!task.measure && !task.method.empty()) return bad("treat is measured, and measure is false");
+  if (!task.measure && !task.model.empty()) return bad("what a model decides is measured, and measure is false");
   if (task.id.size() > kMostOfName || task.id.front() == '.' || task.id.find('/') != std::string::npos ||
       Printable(task.id, kMostOfName) != task.id) {
     return bad(Cat(Printable(task.id), ": an id is the name of a file, of ", kMostOfName, " bytes at most"));
@@ -183,7 +185,7 @@ ReadingRows::~ReadingRows() = default;
 
 std::string ReadingRows::StateOf(const ReadingTask& task) const {
   std::string state = Cat(views_, " views ", task.words);
-  for (const fs::path& path : {task.splat, task.context}) state += StateOfFile(path);
+  for (const fs::path& path : {task.splat, task.context, task.model}) state += StateOfFile(path);
   return task.object.empty() ? state : state + StateOfFolder(task.object);
 }
 
@@ -318,6 +320,59 @@ Result<GaussianCloud> FilteredContext(const ReadingTask& task, const CameraSet& 
 
 }  // namespace
 
+namespace {
+
+nlohmann::json RoundedAll(const std::vector<double>& values) {
+  nlohmann::json out = nlohmann::json::array();
+  for (const double value : values) out.push_back(Rounded(value));
+  return out;
+}
+
+// Of `count` places of the splat what they look like, and their true pixels.
+Result<nlohmann::json> PlacesOf(const GaussianCloud& cloud, const Buffer<float>& pixels, int count) {
+  const SplatPlaces places(cloud);
+  const int64_t all = places.count(), wanted = std::min<int64_t>(count, all);
+  nlohmann::json out = nlohmann::json::array();
+  for (int64_t k = 0; k < wanted; ++k) {
+    const std::vector<int64_t>& rows = places.rows((2 * k + 1) * all / (2 * wanted));
+    Buffer<float> own;
+    for (const int64_t i : rows) own.push_back(pixels[static_cast<size_t>(i)]);
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud part, Subset(cloud, rows));
+    const auto features = FeaturesOf(part, FindShowingGaussians(part), /*with_pictures=*/false);
+    if (!features.ok()) continue;
+    out.push_back({{"unit", features->unit},
+                   {"pixel", QuantileOf(std::move(own), 0.5)},
+                   {"features", RoundedAll(features->values)}});
+  }
+  return out;
+}
+
+// What the program does with the splat by itself, reading it with that model, as `bench reading --decisions` takes it.
+Status AddDecision(const fs::path& path, const GaussianCloud& cloud, double raw, EnhanceOptions options,
+                   Measuring& measuring, nlohmann::json& row) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const TensorFile file, TensorFile::Open(path));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ReadingModel model, ReadingModel::Load(file));
+  options.methods = &AllMethods();
+  options.reading_model = &model;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, Enhance(cloud, options));
+  const EnhanceReport& report = enhanced.report;
+  const bool changed = report.filter_strength > 0;
+  row["method"] = !changed ? "none" : report.method == "filter" ? "filter" : "network";
+  if (report.reading) {
+    row["low"] = report.reading->low, row["high"] = report.reading->high;
+    row["made"] = NameOf(report.reading->likeliest());
+  }
+  if (changed) row["pixel"] = report.pixel_size;
+  if (enhanced.cloud.render_mode) row["mode"] = NameOf(*enhanced.cloud.render_mode);
+  row["gain"] = 0;
+  if (!changed) return {};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, measuring.Measure(std::move(enhanced.cloud)));
+  row["gain"] = Rounded(psnr - raw);
+  return {};
+}
+
+}  // namespace
+
 Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadCloud(task.splat));
   const Object* object = nullptr;
@@ -336,8 +391,7 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   double showing = 1;
   if (features.ok()) {
     row["unit"] = features->unit;
-    nlohmann::json& values = row["features"] = nlohmann::json::array();
-    for (const double value : features->values) values.push_back(Rounded(value));
+    row["features"] = RoundedAll(features->values);
     const auto share = std::ranges::find(FeatureNames(), "count.share_showing");
     showing = features->values[static_cast<size_t>(share - FeatureNames().begin())];
   } else {
@@ -373,30 +427,23 @@ Result<nlohmann::json> ReadingRows::Make(const ReadingTask& task) {
   Buffer<float> seen;
   for (const int64_t i : shown.rows_of_all) seen.push_back(pixels[static_cast<size_t>(i)]);
   if (seen.empty()) seen = pixels;
-  // Where pixels of one scene differ many times, as in photographs, the one that is taken for all is another than any
-  // of them: what it gains is measured with one. What was added to a splat is not looked at, and the finest are the
-  // subject's.
+  // Where something was added to a splat that is not looked at, the finest are the subject's.
   const double finest = QuantileOf(seen, 0.1), coarsest = QuantileOf(seen, 0.9);
   const bool differ = coarsest > kOnePixel * finest, is_whole = !task.keep && task.others_from == 0;
   const double pixel = differ && !is_whole ? finest : QuantileOf(seen, 0.5);
   row["pixel"] = pixel;
   row["pixel_10"] = finest;
   row["pixel_90"] = coarsest;
+  if (task.places > 0) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(row["places"], PlacesOf(cloud, pixels, task.places));
+  }
   if (!task.measure) return row;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const double raw, measuring.Measure(cloud));
   row["raw"] = Rounded(raw);
-  if (!task.method.empty()) {
-    GaussianCloud as = cloud;
-    as.render_mode = task.mode;
-    const EnhanceMethod* const method = FindMethod(task.method == "network" ? "model" : "filter");
-    if (method == nullptr) return Error{ErrorCode::kBadArgument, "there is no network in this program"};
-    const Buffer<float> one = {static_cast<float>(task.pixel)};
-    ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud treated, Treat(*method, as, one, 1, showing, options));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, measuring.Measure(std::move(treated)));
-    row["gain"] = Rounded(psnr - raw);
+  if (!task.model.empty()) {
+    ANCHORSPLAT_RETURN_IF_ERROR(AddDecision(task.model, cloud, raw, options, measuring, row));
     return row;
   }
-  if (differ && is_whole) pixels = {static_cast<float>(pixel)};
   for (const RenderMode mode : ModesOf(cloud)) {
     GaussianCloud as = cloud;
     as.render_mode = mode;

@@ -33,11 +33,9 @@ struct ReadingTask {
   std::filesystem::path object;
   int downscale = 1;
   bool measure = true;  // false: of the object only the true pixels are asked for, which takes no pictures
-  // Only what this treatment gains is asked for: "filter" or "network", drawn as `mode`, one pixel for all, world
-  // units.
-  std::string method;
-  std::optional<RenderMode> mode;
-  double pixel = 0;
+  int places = 0;  // of so many, evenly drawn, the row has what they look like and their true pixels (reading/places.h)
+  // Only what the program does by itself is asked for, with this model, and what it gains.
+  std::filesystem::path model;
   // World size of the training pixels of the rows from `others_from` on, which are of something else that was merged
   // in; all others have those that the cameras say. 0: there are none.
   int64_t others_from = 0;

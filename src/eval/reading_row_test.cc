@@ -75,19 +75,30 @@ TEST_F(ReadingRowMaking, HasPixelsAloneWhereNothingElseIsAskedFor) {
   EXPECT_FALSE(row.contains("gains"));
 }
 
-// One pixel for all is nearly what each has that was seen from all around.
-TEST_F(ReadingRowMaking, SaysWhatOneTreatmentGains) {
-  ReadingTask task = Task(Sparse());
-  const nlohmann::json whole = Make(task);
-  task.method = "filter";
-  task.mode = RenderMode::kClassic;
-  task.pixel = whole["pixel"].get<double>();
+TEST_F(ReadingRowMaking, SaysWhatTheProgramDoesByItself) {
+  ReadingTask task = Task(*ReadCloud(Lantern() / "input.ply"));
+  task.model = SourceDirForTest() / "models/reading.safetensors";
   const nlohmann::json row = Make(task);
   EXPECT_FALSE(row.contains("gains"));
-  const double expected = whole["gains"]["classic"]["filter"].at(4).get<double>();
-  EXPECT_NEAR(row["gain"].get<double>(), expected, 0.3);
-  task.mode = RenderMode::kAntialiased;
-  EXPECT_NE(Make(task)["gain"], row["gain"]);
+  EXPECT_EQ(row["method"], "network");
+  EXPECT_EQ(row["made"], "classic");
+  EXPECT_GT(row["gain"].get<double>(), 1);
+  EXPECT_LT(row["low"], row["high"]);
+  EXPECT_GT(row["pixel"].get<double>(), 0.2 * row["low"].get<double>());
+  task.model = task.splat;
+  EXPECT_FALSE(ReadingRows(1).Make(task).ok());
+}
+
+TEST_F(ReadingRowMaking, HasPlacesWhereTheyAreAskedFor) {
+  ReadingTask task = Task(*ReadCloud(Lantern() / "input.ply"));
+  task.measure = false;
+  task.places = 2;
+  const nlohmann::json row = Make(task);
+  ASSERT_EQ(row["places"].size(), 2u);
+  for (const nlohmann::json& place : row["places"]) {
+    EXPECT_EQ(place["features"].size(), FeatureNames().size());
+    EXPECT_NEAR(place["pixel"].get<double>() / row["pixel"].get<double>(), 1, 0.1);
+  }
 }
 
 TEST_F(ReadingRowMaking, IsOfItsTaskAndItsFiles) {
@@ -189,18 +200,14 @@ TEST_F(ReadingRowMaking, BadTasksAreRefused) {
       HasSubstr("nine numbers"));
   EXPECT_EQ(
       refused(R"({"id":"an-id-may-be-longer-than-what-messages-quote-of-a-text-of-somebody-else's","splat":"a"})"), "");
-  constexpr const char* kTreat =
-      R"({"id":"a","splat":"a","object":"o","treat":{"method":"filter","mode":"classic","pixel":1}})";
-  EXPECT_EQ(refused(kTreat), "");
-  const auto with = [&](const char* text, const char* in_its_place) {
-    std::string json = kTreat;
-    return refused(json.replace(json.find(text), std::string(text).size(), in_its_place).c_str());
-  };
-  EXPECT_THAT(with("filter", "magic"), HasSubstr("treat: a method"));
-  EXPECT_THAT(with("classic", "modern"), HasSubstr("treat: a method"));
-  EXPECT_THAT(with(":1}", ":0}"), HasSubstr("treat: a method"));
-  EXPECT_THAT(with(R"("object":"o",)", ""), HasSubstr("need an object"));
-  EXPECT_THAT(with(R"("object":"o")", R"("object":"o","measure":false)"), HasSubstr("measure is false"));
+  EXPECT_EQ(refused(R"({"id":"a","splat":"a","object":"o","model":"m"})"), "");
+  EXPECT_THAT(refused(R"({"id":"a","splat":"a","model":"m"})"), HasSubstr("need an object"));
+  EXPECT_THAT(refused(R"({"id":"a","splat":"a","object":"o","model":"m","measure":false})"),
+              HasSubstr("measure is false"));
+  EXPECT_EQ(refused(R"({"id":"a","splat":"a","object":"o","places":3})"), "");
+  EXPECT_THAT(refused(R"({"id":"a","splat":"a","places":3})"), HasSubstr("need an object"));
+  EXPECT_THAT(refused(R"({"id":"a","splat":"a","object":"o","places":1.5})"), HasSubstr("whole number"));
+  EXPECT_THAT(refused(R"({"id":"a","splat":"a","object":"o","places":-1})"), HasSubstr("whole number"));
   EXPECT_THAT(refused(R"([])"), HasSubstr("not a JSON object"));
   EXPECT_THAT(refused(R"({"id":"a"})"), HasSubstr("a splat"));
   EXPECT_THAT(refused(R"({"id":"a","splat":"a.ply","pixel":3})"), HasSubstr("unknown property pixel"));

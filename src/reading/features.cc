@@ -431,6 +431,16 @@ void AddShape(const GaussianCloud& showing, Row& row) {
   row.Add("shape.width", 0.5 * std::log(variances[1] / most + 1e-6));
 }
 
+constexpr SplatPictures UnknownPictures() {
+  SplatPictures pictures;
+  for (SplatPictures::AtSize& at : pictures.sizes) {
+    at.classic.fill(kUnknown), at.antialiased.fill(kUnknown);
+    at.cut = at.coarse = kUnknown;
+  }
+  pictures.of_luminance.fill(kUnknown), pictures.of_alpha.fill(kUnknown);
+  return pictures;
+}
+
 void AddPictures(const SplatPictures& pictures, Row& row) {
   for (size_t k = 0; k < SplatPictures::kSizes; ++k) {
     const SplatPictures::AtSize& at = pictures.sizes[k];
@@ -473,7 +483,7 @@ const std::vector<std::string>& FeatureNames() {
   return names;
 }
 
-Result<SplatFeatures> FeaturesOf(const CloudView& whole, const ShowingGaussians& showing) {
+Result<SplatFeatures> FeaturesOf(const CloudView& whole, const ShowingGaussians& showing, bool with_pictures) {
   if (showing.all.size() < kLeastGaussians) {
     return Error{ErrorCode::kBadArgument,
                  Cat("fewer than ", kLeastGaussians, " Gaussians that show and are small beside the splat")};
@@ -487,7 +497,10 @@ Result<SplatFeatures> FeaturesOf(const CloudView& whole, const ShowingGaussians&
   }
   LeaveIfAbandoned();
   Neighbours neighbours = NeighboursOf(whole, showing);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatPictures pictures, LookAt(showing.telling, unit));
+  SplatPictures pictures = UnknownPictures();
+  if (with_pictures) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(pictures, LookAt(showing.telling, unit));
+  }
   SplatFeatures features{unit, {}};
   Row row(features.values, unit);
   AddAll(whole, showing, pictures, std::move(sample), std::move(neighbours), row);

@@ -36,9 +36,10 @@ struct SplatFeatures {
 // The names of `values`, the same of every splat.
 const std::vector<std::string>& FeatureNames();
 
-// `showing`: FindShowingGaussians(whole).
+// `showing`: FindShowingGaussians(whole). Without pictures, which take nearly all of the time, outline and detail are
+// NaN.
 // kBadArgument: fewer than kLeastGaussians that show; others of rendering.
-Result<SplatFeatures> FeaturesOf(const CloudView& whole, const ShowingGaussians& showing);
+Result<SplatFeatures> FeaturesOf(const CloudView& whole, const ShowingGaussians& showing, bool with_pictures = true);
 Result<SplatFeatures> FeaturesOf(const CloudView& whole);
 
 }  // namespace anchorsplat

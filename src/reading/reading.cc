@@ -52,11 +52,13 @@ Reading ReadFrom(const SplatFeatures& features, const ReadingModel& model) {
   return reading;
 }
 
-Result<Reading> Read(const CloudView& cloud, const ShowingGaussians& showing) {
+Result<Reading> Read(const CloudView& cloud, const ShowingGaussians& showing, const ReadingModel& model) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatFeatures features, FeaturesOf(cloud, showing));
-  return ReadFrom(features, ReadingModel::Shipped());
+  return ReadFrom(features, model);
 }
 
-Result<Reading> Read(const CloudView& cloud) { return Read(cloud, FindShowingGaussians(cloud)); }
+Result<Reading> Read(const CloudView& cloud, const ReadingModel& model) {
+  return Read(cloud, FindShowingGaussians(cloud), model);
+}
 
 }  // namespace anchorsplat

@@ -38,11 +38,12 @@ struct Reading {
 // "a classic splat (98 %)": likeliest() and how sure that is, never wholly.
 std::string LooksInWords(const Reading& reading);
 
-// kBadArgument: too little of the splat shows to be read.
-Result<Reading> Read(const CloudView& cloud);
+// kBadArgument: too little of the splat shows to be read. Other models than the program's are for measuring.
+Result<Reading> Read(const CloudView& cloud, const ReadingModel& model = ReadingModel::Shipped());
 // `showing`: FindShowingGaussians(cloud).
-Result<Reading> Read(const CloudView& cloud, const ShowingGaussians& showing);
-// Of features that are known, by another model than the program's.
+Result<Reading> Read(const CloudView& cloud, const ShowingGaussians& showing,
+                     const ReadingModel& model = ReadingModel::Shipped());
+// Of features that are known.
 Reading ReadFrom(const SplatFeatures& features, const ReadingModel& model);
 
 }  // namespace anchorsplat

@@ -96,9 +96,10 @@ Result<ReadingModel> ReadingModel::Load(const TensorFile& file) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(model.mean_, ReadAll(file, "mean", std::array{inputs}));
   ANCHORSPLAT_ASSIGN_OR_RETURN(model.deviation_, ReadAll(file, "deviation", std::array{inputs}));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<float> calibration,
-                               ReadAll(file, "calibration", std::array{int64_t{2}}));
+                               ReadAll(file, "calibration", std::array{int64_t{3}}));
   model.interval_ = double{calibration[0]};
   model.farthest_ = double{calibration[1]};
+  model.place_error_ = double{calibration[2]};
   size_t before = names.size();
   for (size_t k = 0; k < model.layers_.size(); ++k) {
     const std::string name = Cat("layer", k, ".weight");

@@ -60,6 +60,9 @@ class ReadingModel {
   // pixels of splats that were not learned from.
   double interval() const { return interval_; }
 
+  // Standard deviation of ln of what is said of the pixels of places of one splat, less the true ones, around its mean.
+  double place_error() const { return place_error_; }
+
  private:
   struct Layer {
     size_t inputs = 0, outputs = 0;
@@ -70,7 +73,7 @@ class ReadingModel {
   size_t members_ = 0;
   std::vector<float> mean_, deviation_;
   std::array<Layer, 3> layers_;
-  double interval_ = 1, farthest_ = 1;
+  double interval_ = 1, farthest_ = 1, place_error_ = 0;
 };
 
 }  // namespace anchorsplat

@@ -35,7 +35,7 @@ struct Weights {
     add("mean", {inputs}, 1);
     add("deviation", {inputs}, 0);
     for (float& x : tensors["deviation"].second) x = 0.5f + static_cast<float>(random.Uniform());
-    tensors["calibration"] = {{2}, {1.5f, 2.0f}};
+    tensors["calibration"] = {{3}, {1.5f, 2.0f, 0.25f}};
     add("layer0.weight", {kMembers, kHidden, inputs}, 0.1);
     add("layer0.bias", {kMembers, kHidden}, 1);
     add("layer1.weight", {kMembers, kHidden, kHidden}, 0.5);

@@ -231,6 +231,7 @@ nlohmann::json ToJson(const EnhanceReport& r) {
     json["filter_strength"] = r.filter_strength;
     json["pixel_size"] = {{"value", r.pixel_size}, {"source", NameOf(r.pixel_size_source)}};
     if (r.pixel_size_source == PixelSizeSource::kUnknown) json["pixel_size"]["value"] = nullptr;
+    if (r.pixel_size_range) json["pixel_size"]["range"] = {r.pixel_size_range->first, r.pixel_size_range->second};
     if (r.reading) json["reading"] = ToJson(*r.reading);
     for (const PartTreatment& part : r.parts) {
       json["parts"].push_back(

@@ -299,7 +299,7 @@ double TurnBetween(const GaussianCloud& cloud, size_t i, size_t j) {
 
 // Cosine between harmonics of degree 2 and 3: a network multiplies those of a Gaussian for all of its copies.
 double LikenessOfHarmonics(const CloudView& whole, int64_t a, int64_t b) {
-  const auto first = static_cast<size_t>(3 * ShCoefficients(1)), stride = static_cast<size_t>(whole.sh_stride());
+  const auto first = 3 * static_cast<size_t>(ShCoefficients(1)), stride = static_cast<size_t>(whole.sh_stride());
   const float* const x = whole.sh.data() + static_cast<size_t>(a) * stride;
   const float* const y = whole.sh.data() + static_cast<size_t>(b) * stride;
   double product = 0, of_x = 0, of_y = 0;

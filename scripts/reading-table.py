@@ -364,7 +364,7 @@ def measure(arguments):
     work, folds = arguments.work, arguments.folds.resolve()
     tasks = [json.loads(t) for t in (work / "tasks.jsonl").read_text().splitlines()]
     tasks = [{k: v for k, v in t.items() if k != "places"} | {"model": str(folds / f"fold-{fold_of(t)}.safetensors")}
-             for t in tasks if t.get("object") and t.get("measure", True) and t["made"] != "mesh"]
+             for t in tasks if t.get("object") and t.get("measure", True)]
     codes = run_tasks(arguments, tasks, work / "measured")
     said = ("id", "method", "mode", "pixel", "low", "high", "made", "gain")
     path, decisions = work / "model.jsonl", []

@@ -213,11 +213,19 @@ def main():
         return (float(np.quantile((error / half)[judged & others & (edits != "place")], INTERVAL)),
                 float(np.quantile(far[others & table.teaches & (edits != "place")], FARTHEST)), place_error(others))
 
-    def place_error(others):
-        """Standard deviation of errors around their mean, of places of one splat; every splat counts once."""
+    said = middle + np.log([row["unit"] for row in table.rows])  # ln(pixel), world units
+    true = table.pixel + said - middle
+
+    def places_by_splat(others):
+        """{splat: ln of the pixels that are said of its places, and of the true ones}, each less its mean."""
         which = judged & others & (edits == "place")
-        of_splats = [(middle - table.pixel)[which & (splats == splat)] for splat in np.unique(splats[which])]
-        return float(np.sqrt(np.mean([np.var(errors, ddof=1) for errors in of_splats if len(errors) > 1])))
+        of = {splat: np.flatnonzero(which & (splats == splat)) for splat in np.unique(splats[which])}
+        return {splat: (said[own] - said[own].mean(), true[own] - true[own].mean()) for splat, own in of.items() if len(own) > 1}
+
+    def place_error(others):
+        """Standard deviation of errors of the places of one splat, around their mean; every splat counts once."""
+        variances = [((s - t) ** 2).sum() / (len(s) - 1) for s, t in places_by_splat(others).values()]
+        return float(np.sqrt(np.mean(variances)))
 
     edited = edits != ""
     for name, which in (("as they were fitted", judged & ~edited), ("edited", judged & edited & (edits != "place")),
@@ -230,6 +238,14 @@ def main():
         off = (middle - table.pixel)[which]
         holds = np.mean(np.abs(off) <= calibrated(None)[0] * half[which])
         print(f"  {kind:24} {which.sum():4} {np.median(off):+.3f} {np.median(np.abs(off)):.3f} {100 * holds:4.0f} %")
+    print("by splats whose true pixels differ by more than a tenth from place to place: they differ by, what is said of them, error, ln")
+    alike = []
+    for splat, (s, t) in places_by_splat(np.ones_like(judged)).items():
+        if t.std() > 0.1:
+            print(f"  {splat:44} {len(t):3} {t.std():.2f} {s.std():.2f} {(s - t).std():.2f}")
+        else:
+            alike.append(s.std())
+    print(f"  {len(alike)} others: said to differ by {np.median(alike):.3f} in the median")
     if arguments.folds:
         arguments.folds.mkdir(parents=True, exist_ok=True)
         for fold, ensemble in enumerate(folds):

@@ -31,6 +31,15 @@ KdTree::KdTree(std::span<const float> positions) : points_(positions.size() / 3)
   Build(0, size());
 }
 
+std::pair<int64_t, int64_t> KdTree::BoxAround(int64_t place, int64_t most) const {
+  int64_t begin = 0, end = size();
+  while (end - begin > std::max(most, kLeaf)) {
+    const int64_t middle = (begin + end) / 2;
+    place < middle ? end = middle : begin = middle + 1;
+  }
+  return {begin, end};
+}
+
 void KdTree::Build(int64_t begin, int64_t end) {
   if (end - begin <= kLeaf) return;
   std::array<float, 3> low = points_[static_cast<size_t>(begin)].position, high = low;
@@ -107,12 +116,12 @@ class KdTree::Many {
   double farthest_ = std::numeric_limits<double>::infinity();
 };
 
-template <typename Nearest>
+template <typename Found>
 struct KdTree::Search {
   const KdTree& tree;
   int64_t self;
   std::array<double, 3> point;
-  Nearest nearest;
+  Found nearest;
 
   void Look(int64_t place) {
     if (place == self) return;

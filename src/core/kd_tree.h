@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 
 #include "core/buffer.h"
 
@@ -26,6 +27,10 @@ class KdTree {
   // searches in this order find what they need in the cache.
   int64_t PointAt(int64_t place) const { return points_[static_cast<size_t>(place)].index; }
 
+  // Places [first, last) around `place` whose points a box holds that no others are in, but on its sides: at most
+  // `most` of them, or eight, which are not divided.
+  std::pair<int64_t, int64_t> BoxAround(int64_t place, int64_t most) const;
+
   // The points nearest to that at `place`, without itself, by rising distance, as many as fit into `nearest`. Returns
   // how many there are: fewer than asked for when the tree has no more. Which of several equally far ones are taken
   // depends on the order of the positions alone, and many points at one place cost no more than others.
@@ -42,7 +47,7 @@ class KdTree {
   };
   class Few;
   class Many;
-  template <typename Nearest>
+  template <typename Found>
   struct Search;
 
   void Build(int64_t begin, int64_t end);

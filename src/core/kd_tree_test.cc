@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/random.h"
@@ -117,6 +118,36 @@ TEST(KdTree, ManyPointsAtOnePlaceAreNotAllVisited) {
   std::vector<KdTree::Neighbour> nearest(8);
   for (int64_t place = 0; place < kPoints; ++place) ASSERT_EQ(tree.Nearest(place, nearest), 8);
   EXPECT_EQ(nearest.back().squared_distance, 0);
+}
+
+TEST(KdTree, BoxesHoldNoOtherPoints) {
+  Random random(4);
+  std::vector<float> x(3 * 5000);
+  for (float& v : x) v = static_cast<float>(random.Normal());
+  const KdTree tree(x);
+  for (const int64_t place : {int64_t{0}, int64_t{1234}, int64_t{2500}, int64_t{4999}}) {
+    const auto [first, last] = tree.BoxAround(place, 300);
+    ASSERT_GT(last - first, 100);
+    ASSERT_LE(last - first, 300);
+    EXPECT_LE(first, place + 1);
+    EXPECT_GE(last, place);
+    std::array<float, 3> low, high;
+    low.fill(1e9f), high.fill(-1e9f);
+    for (int64_t at = first; at < last; ++at) {
+      for (size_t a = 0; a < 3; ++a) {
+        const float v = x[static_cast<size_t>(3 * tree.PointAt(at)) + a];
+        low[a] = std::min(low[a], v), high[a] = std::max(high[a], v);
+      }
+    }
+    int64_t inside = 0;
+    for (size_t i = 0; i < x.size(); i += 3) {
+      bool is_inside = true;
+      for (size_t a = 0; a < 3; ++a) is_inside = is_inside && x[i + a] >= low[a] && x[i + a] <= high[a];
+      inside += is_inside ? 1 : 0;
+    }
+    EXPECT_EQ(inside, last - first);
+  }
+  EXPECT_EQ(tree.BoxAround(7, 5000), (std::pair<int64_t, int64_t>(0, 5000)));
 }
 
 TEST(KdTree, Empty) { EXPECT_EQ(KdTree({}).size(), 0); }

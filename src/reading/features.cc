@@ -431,16 +431,6 @@ void AddShape(const GaussianCloud& showing, Row& row) {
   row.Add("shape.width", 0.5 * std::log(variances[1] / most + 1e-6));
 }
 
-constexpr SplatPictures UnknownPictures() {
-  SplatPictures pictures;
-  for (SplatPictures::AtSize& at : pictures.sizes) {
-    at.classic.fill(kUnknown), at.antialiased.fill(kUnknown);
-    at.cut = at.coarse = kUnknown;
-  }
-  pictures.of_luminance.fill(kUnknown), pictures.of_alpha.fill(kUnknown);
-  return pictures;
-}
-
 void AddPictures(const SplatPictures& pictures, Row& row) {
   for (size_t k = 0; k < SplatPictures::kSizes; ++k) {
     const SplatPictures::AtSize& at = pictures.sizes[k];
@@ -497,10 +487,8 @@ Result<SplatFeatures> FeaturesOf(const CloudView& whole, const ShowingGaussians&
   }
   LeaveIfAbandoned();
   Neighbours neighbours = NeighboursOf(whole, showing);
-  SplatPictures pictures = UnknownPictures();
-  if (with_pictures) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(pictures, LookAt(showing.telling, unit));
-  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatPictures pictures,
+                               with_pictures ? LookAt(showing.telling, unit) : UnknownPictures());
   SplatFeatures features{unit, {}};
   Row row(features.values, unit);
   AddAll(whole, showing, pictures, std::move(sample), std::move(neighbours), row);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <tuple>
 
 #include "core/activations.h"
 #include "core/parallel.h"
@@ -41,7 +42,8 @@ void Extend(Bounds& box, const float* at, bool is_first) {
   }
 }
 
-// All that shows in each box, not only those of which the tree was made: how near neighbours are says something.
+// All that shows in each box, not only those of which the tree was made: how near neighbours are says something. In
+// boxes without size, as of Gaussians in one place, there may be any number.
 void FillBoxes(const CloudView& cloud, std::span<const int64_t> showing, std::span<const Bounds> boxes,
                std::vector<std::vector<int64_t>>& rows) {
   ParallelFor(0, std::ssize(boxes), 1, [&](int64_t place, int64_t) {
@@ -49,6 +51,7 @@ void FillBoxes(const CloudView& cloud, std::span<const int64_t> showing, std::sp
     std::vector<int64_t>& inside = rows[static_cast<size_t>(place)];
     inside.clear();
     for (const int64_t row : showing) {
+      if (std::ssize(inside) == 2 * kMostOfPlace) break;
       const float* const at = cloud.means.data() + 3 * row;
       bool is_inside = true;
       for (size_t a = 0; a < 3; ++a) is_inside = is_inside && at[a] >= box.min[a] && at[a] <= box.max[a];
@@ -102,10 +105,12 @@ SplatPlaces::SplatPlaces(const CloudView& cloud) {
   std::vector<Bounds> boxes(rows_.size());
   for (int64_t place = 0; place < count; ++place) {
     std::vector<int64_t>& rows = rows_[static_cast<size_t>(place)];
-    const int64_t begin = (place * tree_->size() + count - 1) / count;
-    const int64_t end = ((place + 1) * tree_->size() + count - 1) / count;
-    const int64_t most = std::min(end - begin, kMostOfPlace / static_cast<int64_t>(step));
-    for (int64_t at = begin; at < begin + most; ++at) {
+    int64_t begin = (place * tree_->size() + count - 1) / count;
+    int64_t end = std::min(((place + 1) * tree_->size() + count - 1) / count, begin + kMostOfPlace);
+    if (step > 1) {
+      std::tie(begin, end) = tree_->BoxAround((begin + end) / 2, kMostOfPlace / static_cast<int64_t>(step));
+    }
+    for (int64_t at = begin; at < end; ++at) {
       const auto k = static_cast<size_t>(tree_->PointAt(at));
       rows.push_back(showing[k * step]);
       Extend(boxes[static_cast<size_t>(place)], means.data() + 3 * k, at == begin);

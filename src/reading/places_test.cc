@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -90,6 +91,46 @@ TEST(Places, AreTheSameForAnyNumberOfThreads) {
   SetThreadCount(0);
   EXPECT_FALSE(one.empty());
   EXPECT_EQ(one, three);
+}
+
+// More than the tree is made of: it has every so many, the places have all that lie there.
+GaussianCloud Many(int64_t count, float side) {
+  Random random(1);
+  GaussianCloud cloud;
+  cloud.Resize(count, 0);
+  std::ranges::fill(cloud.quats, 0.5f);
+  std::ranges::fill(cloud.opacity_logits, 3.0f);
+  for (float& x : cloud.means) x = side * static_cast<float>(random.Uniform());
+  return cloud;
+}
+
+TEST(Places, OfManyHaveAllThatLiesThere) {
+  const GaussianCloud cloud = Many(600'000, 1);
+  const SplatPlaces places(cloud);
+  ASSERT_EQ(places.count(), 64);
+  for (int64_t k = 0; k < places.count(); ++k) {
+    const std::vector<int64_t>& rows = places.rows(k);
+    ASSERT_GT(std::ssize(rows), 1500) << k;
+    ASSERT_LT(std::ssize(rows), 5000) << k;
+    std::array<float, 3> low, high;
+    low.fill(1), high.fill(0);
+    for (const int64_t row : rows) {
+      for (size_t a = 0; a < 3; ++a) {
+        low[a] = std::min(low[a], cloud.means[static_cast<size_t>(3 * row) + a]);
+        high[a] = std::max(high[a], cloud.means[static_cast<size_t>(3 * row) + a]);
+      }
+    }
+    const double volume = double{high[0] - low[0]} * (high[1] - low[1]) * (high[2] - low[2]);
+    EXPECT_NEAR(static_cast<double>(rows.size()) / (600'000 * volume), 1, 0.1) << "as dense as the splat";
+  }
+}
+
+TEST(Places, OfManyInOnePointAreBounded) {
+  const SplatPlaces places(Many(600'000, 0));
+  int64_t rows = 0;
+  for (int64_t k = 0; k < places.count(); ++k) rows += std::ssize(places.rows(k));
+  EXPECT_GT(rows, 0);
+  EXPECT_LE(rows, 64 * 8000);
 }
 
 TEST(Places, OfLittleAndOfWhatIsNotFinite) {

@@ -186,6 +186,17 @@ class Painter {
 
 }  // namespace
 
+SplatPictures UnknownPictures() {
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  SplatPictures pictures;
+  for (SplatPictures::AtSize& at : pictures.sizes) {
+    at.classic.fill(kUnknown), at.antialiased.fill(kUnknown);
+    at.cut = at.coarse = kUnknown;
+  }
+  pictures.of_luminance.fill(kUnknown), pictures.of_alpha.fill(kUnknown);
+  return pictures;
+}
+
 Result<SplatPictures> LookAt(const TellingGaussians& telling, double unit) {
   Painter painter(telling);
   ANCHORSPLAT_RETURN_IF_ERROR(painter.Prepare(telling));

@@ -35,5 +35,7 @@ struct SplatPictures {
 
 // `unit`: world length that sizes are counted from. Errors: of rendering.
 Result<SplatPictures> LookAt(const TellingGaussians& telling, double unit);
+// Of what nobody looks at: all NaN.
+SplatPictures UnknownPictures();
 
 }  // namespace anchorsplat

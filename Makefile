@@ -39,8 +39,10 @@ PYTHON_FLAGS = $(if $(wildcard .venv/anchorsplat-python),-DANCHORSPLAT_PYTHON=ON
 dependencies:
 	@scripts/install-dependencies.sh
 
+# Without WebGPU everything can be built and run but what works on a GPU, whose tests say then what is missing.
 test-dependencies:
 	@scripts/install-dependencies.sh --with-tests
+	@scripts/fetch-webgpu.sh || true
 
 torch:
 ifndef LEAN
@@ -58,6 +60,7 @@ python: python-dependencies
 
 wheel: dependencies
 	@scripts/install-dependencies.sh --with-python --with-packaging
+	@scripts/fetch-webgpu.sh
 	@JOBS=$(JOBS) scripts/build-wheel.sh
 
 build: test-dependencies
@@ -177,6 +180,7 @@ INSTALL_CONFIGURE = --preset release $(TORCH_FLAGS)
 endif
 .PHONY: installable install deb
 installable: dependencies
+	@scripts/fetch-webgpu.sh --optional
 	@cmake $(INSTALL_CONFIGURE) $(if $(wildcard $(INSTALL_BUILD)/CMakeCache.txt),,-DANCHORSPLAT_TESTS=OFF) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
 	@rm -f build-configure.log
 	@cmake --build $(INSTALL_BUILD) -j $(JOBS) --target anchorsplat_installable

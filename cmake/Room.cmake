@@ -1,7 +1,8 @@
 # anchorsplat_room(NAME FOLDERS folders... USES rooms... LIBRARIES targets...)
 #
 # One library target `anchorsplat_NAME` of all foo.cc in the folder and in FOLDERS, and, when there are foo_test.cc, one test program
-# `NAME_test` whose cases are found by CTest. Tests find files of the repository by core/source_dir_for_test.h.
+# `NAME_test` whose cases are found by CTest. Tests find files of the repository by core/source_dir_for_test.h. Tests that
+# need a GPU have "gpu" in the file's name.
 #
 # With ANCHORSPLAT_UNITY several files of a room are compiled as one, which halves a build from nothing: reading headers
 # and making the same templates is most of it. A name in an anonymous namespace must then be the only one of its room.
@@ -30,6 +31,12 @@ std::filesystem::path anchorsplat::SourceDirForTest() { return "@CMAKE_SOURCE_DI
 add_library(anchorsplat_source_dir_for_test STATIC EXCLUDE_FROM_ALL "${CMAKE_BINARY_DIR}/source_dir_for_test.cc")
 target_link_libraries(anchorsplat_source_dir_for_test PUBLIC anchorsplat_flags)
 
+# What drivers never free, and what is left to a device that has failed, of which nothing may be called any more.
+file(CONFIGURE OUTPUT "${CMAKE_BINARY_DIR}/driver_leaks_for_test.cc" CONTENT [[
+extern "C" const char* __lsan_default_suppressions() { return "leak:libvulkan\nleak:libwgpu\nleak:libLLVM\n"; }
+extern "C" const char* __lsan_default_options() { return "print_suppressions=0"; }
+]] @ONLY)
+
 function(anchorsplat_room name)
   cmake_parse_arguments(ROOM "" "" "FOLDERS;USES;LIBRARIES" ${ARGN})
   set(patterns "${CMAKE_CURRENT_SOURCE_DIR}/*.cc")
@@ -40,6 +47,9 @@ function(anchorsplat_room name)
   set(tests ${sources})
   list(FILTER sources EXCLUDE REGEX "_test\\.cc$")
   list(FILTER tests INCLUDE REGEX "_test\\.cc$")
+  if(EMSCRIPTEN)  # Node has no GPU
+    list(FILTER tests EXCLUDE REGEX "/[^/]*gpu[^/]*_test\\.cc$")
+  endif()
   if(NOT sources)
     return()
   endif()
@@ -60,12 +70,17 @@ function(anchorsplat_room name)
       target_link_options(${name}_test PRIVATE -O1 -pthread -sPTHREAD_POOL_SIZE=8 -sNODERAWFS=1 -sENVIRONMENT=node -sEXIT_RUNTIME=1 -sALLOW_MEMORY_GROWTH=1
                           -sMAXIMUM_MEMORY=4GB -sSTACK_SIZE=4MB -sINITIAL_MEMORY=64MB)
     endif()
+    if(ANCHORSPLAT_SANITIZE)
+      target_sources(${name}_test PRIVATE "${CMAKE_BINARY_DIR}/driver_leaks_for_test.cc")
+      set_source_files_properties("${CMAKE_BINARY_DIR}/driver_leaks_for_test.cc" PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    endif()
     if(NOT name MATCHES "^(bench|cameras|cli|dataset|formats|images|io|metrics|model.*|render|tensors)$")  # their tests call what they compare alike
       anchorsplat_unity(${name}_test)
     endif()
     target_link_libraries(${name}_test PRIVATE anchorsplat_${name} anchorsplat_source_dir_for_test
                           GTest::gmock GTest::gtest GTest::gtest_main)
-    # A busy machine needs its time to load LibTorch.
-    gtest_discover_tests(${name}_test TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 120)
+    # A busy machine needs its time to load LibTorch. Mesa's drivers look for no screen.
+    gtest_discover_tests(${name}_test TEST_PREFIX "${name}." DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 120
+                         PROPERTIES ENVIRONMENT NODEVICE_SELECT=1)
   endif()
 endfunction()

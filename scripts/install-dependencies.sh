@@ -20,6 +20,7 @@ for option in "$@"; do
   case "$option" in
     --with-tests)
       packages+=(libgtest-dev libgmock-dev)
+      packages+=(mesa-vulkan-drivers libvulkan1 python3-pip)  # a GPU in software, and what fetches the library for it
       headers+=(gtest/gtest.h gmock/gmock.h)
       ;;
     --with-torch) with_torch=1 ;;

@@ -34,6 +34,8 @@ RunScope::RunScope(RunContext context) : before_(internal::CurrentRun()) {
     if (!context.sink) context.sink = before_->context.sink;
     if (context.stop == nullptr) context.stop = before_->context.stop;
     if (context.abandon == nullptr) context.abandon = before_->context.abandon;
+    if (!context.device) context.device = before_->context.device;
+    if (context.max_gpu_memory == 0) context.max_gpu_memory = before_->context.max_gpu_memory;
   }
   run->context = std::move(context);
   run->storage = before_ ? before_->storage : std::make_shared<internal::RunStorage>();
@@ -42,6 +44,16 @@ RunScope::RunScope(RunContext context) : before_(internal::CurrentRun()) {
 }
 
 RunScope::~RunScope() { internal::OwnRun() = std::move(before_); }
+
+DeviceChoice DeviceChoiceOfRun() {
+  const auto& run = internal::CurrentRun();
+  return run ? run->context.device.value_or(DeviceChoice{}) : DeviceChoice{};
+}
+
+uint64_t MaxGpuMemoryOfRun() {
+  const auto& run = internal::CurrentRun();
+  return run && run->context.max_gpu_memory > 0 ? run->context.max_gpu_memory : kDefaultGpuMemory;
+}
 
 bool StopRequested() {
   const auto& run = internal::CurrentRun();

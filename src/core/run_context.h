@@ -1,11 +1,14 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <typeindex>
 #include <unordered_map>
 
+#include "core/device_choice.h"
 #include "core/log.h"
 
 namespace anchorsplat {
@@ -28,7 +31,12 @@ struct RunContext {
   // Becomes true when nothing of the run is wanted any more: its next parallel loop, or the next part of the one that
   // runs, throws RunAbandoned, whatever it is about. Must outlive the scope.
   const std::atomic<bool>* abandon = nullptr;
+  std::optional<DeviceChoice> device = std::nullopt;  // where pictures are rasterized; the CPU where no run says
+  uint64_t max_gpu_memory = 0;                        // bytes of GPU memory at most; 0: kDefaultGpuMemory
 };
+
+// WebGPU cannot be asked how much memory is free.
+inline constexpr uint64_t kDefaultGpuMemory = uint64_t{2} << 30;  // bytes
 
 // Ends a run from inside. What a run holds is given back on the way, and files that are not whole are never named.
 struct RunAbandoned {};
@@ -69,6 +77,10 @@ class RunScope {
  private:
   std::shared_ptr<internal::Run> before_;
 };
+
+// Of the run that this thread takes part in, or the defaults of RunContext.
+DeviceChoice DeviceChoiceOfRun();
+uint64_t MaxGpuMemoryOfRun();  // bytes
 
 // Whether the run that this thread takes part in is asked to end. Cheap: long loops ask at every step.
 bool StopRequested();

@@ -1,0 +1,67 @@
+# anchorsplat_embed(TARGET files...)
+#
+# The text of foo_bar.wgsl beside the caller's CMakeLists.txt becomes the constant wgsl::kFooBarWgsl (std::string_view) of
+# the target, declared in "ROOM/wgsl.h", where ROOM is the caller's folder under src/. An edit of the file compiles one
+# generated source again.
+if(CMAKE_SCRIPT_MODE_FILE)
+  set(text "#include \"${HEADER}\"\n\nnamespace anchorsplat::wgsl {\n")
+  foreach(file IN LISTS FILES)
+    file(READ "${file}" content)
+    get_filename_component(name "${file}" NAME)
+    string(LENGTH "${content}" length)
+    if(length GREATER 65000)
+      message(FATAL_ERROR "${file}: ${length} bytes; compilers need not take strings longer than 65,536")
+    endif()
+    if(content MATCHES "[)]~wgsl~")
+      message(FATAL_ERROR "${file}: holds )~wgsl~, the end of the raw string")
+    endif()
+    list(POP_FRONT NAMES constant)
+    string(APPEND text "\nconstinit const std::string_view ${constant} = R\"~wgsl~(${content})~wgsl~\";\n")
+  endforeach()
+  string(APPEND text "\n}  // namespace anchorsplat::wgsl\n")
+  file(WRITE "${OUTPUT}" "${text}")
+  return()
+endif()
+
+set(ANCHORSPLAT_EMBED_SCRIPT "${CMAKE_CURRENT_LIST_FILE}")
+function(anchorsplat_embed target)
+  file(RELATIVE_PATH room "${CMAKE_SOURCE_DIR}/src" "${CMAKE_CURRENT_SOURCE_DIR}")
+  set(folder "${CMAKE_BINARY_DIR}/embedded")
+  set(declarations "")
+  set(names "")
+  set(paths "")
+  foreach(file IN LISTS ARGN)
+    get_filename_component(words "${file}" NAME)
+    string(REGEX REPLACE "[^A-Za-z0-9]" ";" words "${words}")
+    set(constant k)
+    foreach(word IN LISTS words)
+      string(SUBSTRING "${word}" 0 1 first)
+      string(SUBSTRING "${word}" 1 -1 rest)
+      string(TOUPPER "${first}" first)
+      string(APPEND constant "${first}${rest}")
+    endforeach()
+    list(APPEND names "${constant}")
+    list(APPEND paths "${CMAKE_CURRENT_SOURCE_DIR}/${file}")
+    string(APPEND declarations "extern const std::string_view ${constant};  // ${file}\n")
+  endforeach()
+  # At configuration, so that whoever includes it need not wait for a target.
+  file(CONFIGURE OUTPUT "${folder}/${room}/wgsl.h" @ONLY CONTENT [[
+#pragma once
+
+#include <string_view>
+
+namespace anchorsplat::wgsl {
+
+@declarations@
+}  // namespace anchorsplat::wgsl
+]])
+  add_custom_command(
+    OUTPUT "${folder}/${room}/wgsl.cc"
+    COMMAND ${CMAKE_COMMAND} "-DHEADER=${room}/wgsl.h" "-DNAMES=${names}" "-DFILES=${paths}"
+            "-DOUTPUT=${folder}/${room}/wgsl.cc" -P "${ANCHORSPLAT_EMBED_SCRIPT}"
+    DEPENDS ${paths} "${ANCHORSPLAT_EMBED_SCRIPT}"
+    VERBATIM)
+  target_sources(${target} PRIVATE "${folder}/${room}/wgsl.cc")
+  set_source_files_properties("${folder}/${room}/wgsl.cc" PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+  target_include_directories(${target} PUBLIC "${folder}")
+endfunction()

@@ -1,0 +1,59 @@
+#include "gpu/choose_adapter.h"
+
+#include <optional>
+
+#include "core/text.h"
+
+namespace anchorsplat {
+
+namespace {
+
+int Rank(const GpuAdapter& adapter) {
+  switch (adapter.type) {
+    case GpuAdapter::Type::kDiscrete:
+      return 0;
+    case GpuAdapter::Type::kIntegrated:
+      return 1;
+    case GpuAdapter::Type::kUnknown:
+      return 2;
+    case GpuAdapter::Type::kCpu:
+      break;
+  }
+  return 3;
+}
+
+// One card may be there several times, by several drivers; OpenGL is every card's last resort.
+bool ByOpenGl(const GpuAdapter& adapter) { return adapter.backend.starts_with("OpenGL"); }
+
+}  // namespace
+
+Result<size_t> ChooseAdapter(const std::vector<GpuAdapter>& adapters, const DeviceChoice& choice) {
+  if (adapters.empty()) {
+    return Error{ErrorCode::kNotFound,
+                 "no GPU was found: WebGPU needs the card's Vulkan driver (anchorsplat doctor says more)"};
+  }
+  if (choice.kind == DeviceChoice::Kind::kNumber) {
+    for (size_t i = 0; i < adapters.size(); ++i) {
+      if (adapters[i].number != choice.number) continue;
+      if (adapters[i].unusable.empty()) return i;
+      return Error{ErrorCode::kNotFound, Cat("device ", choice.number, " cannot be used: ", adapters[i].unusable)};
+    }
+    return Error{ErrorCode::kNotFound,
+                 Cat("there is no device ", choice.number, ": the adapters here are numbered from 0 to ",
+                     adapters.back().number, " (anchorsplat doctor lists them)")};
+  }
+  std::optional<size_t> best;
+  for (size_t i = 0; i < adapters.size(); ++i) {
+    const GpuAdapter& adapter = adapters[i];
+    if (!adapter.unusable.empty()) continue;
+    if (choice.kind == DeviceChoice::Kind::kAuto && adapter.type == GpuAdapter::Type::kCpu) continue;
+    if (best && Rank(adapter) > Rank(adapters[*best])) continue;
+    const bool better =
+        !best || Rank(adapter) < Rank(adapters[*best]) || (ByOpenGl(adapters[*best]) && !ByOpenGl(adapter));
+    if (better) best = i;
+  }
+  if (best) return *best;
+  return Error{ErrorCode::kNotFound, "none of the GPUs here can be used (anchorsplat doctor says why)"};
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,256 @@
+#include "gpu/with_webgpu/webgpu_device.h"
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "core/run_context.h"
+#include "core/text.h"
+#include "gpu/with_webgpu/abort_guard.h"
+#include "gpu/with_webgpu/webgpu_buffer.h"
+
+namespace anchorsplat {
+
+namespace {
+
+// Short enough that a desktop's watchdog sees an answer in between.
+constexpr uint32_t kRecorded = 64;  // commands that are handed over at once
+constexpr uint32_t kSubmits = 32;   // until the queue is waited for: what it holds takes memory
+
+}  // namespace
+
+Result<std::shared_ptr<WebGpuDevice>> WebGpuDevice::Open(WebGpuInstance& instance, const FoundAdapter& adapter) {
+  const WebGpuApi& api = *instance.api();
+  // NOLINTNEXTLINE: the constructor is private
+  std::shared_ptr<WebGpuDevice> made(new WebGpuDevice(instance, adapter.description));
+  WGPULimits limits = WGPU_LIMITS_INIT;
+  limits.maxStorageBufferBindingSize = adapter.description.max_binding;
+  limits.maxBufferSize = adapter.description.max_buffer;
+  WGPUDeviceDescriptor descriptor = WGPU_DEVICE_DESCRIPTOR_INIT;
+  descriptor.requiredLimits = &limits;
+  descriptor.uncapturedErrorCallbackInfo.userdata1 = made->failure_;
+  descriptor.uncapturedErrorCallbackInfo.callback = [](WGPUDevice const*, WGPUErrorType type, WGPUStringView message,
+                                                       void* failure, void*) {
+    const char* what = type == WGPUErrorType_OutOfMemory ? "it has no memory left" : "it refused a command";
+    static_cast<GpuFailure*>(failure)->Set(Cat(what, " (", ReasonIn(TextOf(message)), ")"));
+  };
+  descriptor.deviceLostCallbackInfo.mode = WGPUCallbackMode_AllowSpontaneous;
+  descriptor.deviceLostCallbackInfo.userdata1 = made->failure_;
+  descriptor.deviceLostCallbackInfo.callback = [](WGPUDevice const*, WGPUDeviceLostReason, WGPUStringView message,
+                                                  void* failure, void*) {
+    static_cast<GpuFailure*>(failure)->Set(Cat("the device was lost (", ReasonIn(TextOf(message)), ")"));
+  };
+  struct Answer {
+    WGPUDevice device = nullptr;
+    std::string message;
+    bool done = false;
+  };
+  auto* const answer = new Answer;  // freed once it is there
+  WGPURequestDeviceCallbackInfo callback = WGPU_REQUEST_DEVICE_CALLBACK_INFO_INIT;
+  callback.mode = WGPUCallbackMode_AllowProcessEvents;
+  callback.callback = [](WGPURequestDeviceStatus, WGPUDevice device, WGPUStringView message, void* to, void*) {
+    *static_cast<Answer*>(to) = {.device = device, .message = TextOf(message), .done = true};
+  };
+  callback.userdata1 = answer;
+  const WGPUFuture future = api.AdapterRequestDevice(adapter.handle->get(), &descriptor, callback);
+  if (!instance.WaitUntil([&] { return answer->done; }, nullptr, future)) {
+    return Error{ErrorCode::kNotFound, Cat("the driver of ", made->adapter_.name, " does not answer")};
+  }
+  const std::unique_ptr<Answer> answered(answer);
+  if (answered->device == nullptr) {
+    return Error{ErrorCode::kNotFound, Cat(made->adapter_.name, " cannot be opened: ", ReasonIn(answered->message))};
+  }
+  made->device_ = answered->device;
+  made->queue_ = api.DeviceGetQueue(made->device_);
+  ScopedError error;
+  made->parameter_slots_ = made->MakeBuffer(uint64_t{kRecorded} * kParameterBytes,
+                                            WGPUBufferUsage_Uniform | WGPUBufferUsage_CopyDst, "parameters", error);
+  if (made->parameter_slots_ == nullptr) {
+    return Error{ErrorCode::kNotFound, Cat(made->adapter_.name, " cannot be opened: ", error.message)};
+  }
+  return made;
+}
+
+// Devices that could be opened are kept for as long as the program runs (open_gpu.cc).
+WebGpuDevice::~WebGpuDevice() = default;
+
+Status WebGpuDevice::FailureOr() const {
+  if (failure_->happened()) return failure_->error();
+  if (instance_.broken()) return Error{ErrorCode::kIo, kGpuLost};
+  return {};
+}
+
+void WebGpuDevice::PushErrorScopes() {
+  const WebGpuApi& api = *instance_.api();
+  // Internal errors have no scope in wgpu-native; they are failures that stick.
+  api.DevicePushErrorScope(device_, WGPUErrorFilter_OutOfMemory);
+  api.DevicePushErrorScope(device_, WGPUErrorFilter_Validation);
+}
+
+WebGpuDevice::ScopedError WebGpuDevice::PopErrorScopes() {
+  const WebGpuApi& api = *instance_.api();
+  struct Answer : ScopedError {
+    bool done = false;
+  };
+  ScopedError first;
+  for (int scope = 0; scope < 2; ++scope) {
+    auto* const answer = new Answer;  // freed once it is there
+    WGPUPopErrorScopeCallbackInfo callback = WGPU_POP_ERROR_SCOPE_CALLBACK_INFO_INIT;
+    callback.mode = WGPUCallbackMode_AllowProcessEvents;
+    callback.callback = [](WGPUPopErrorScopeStatus, WGPUErrorType type, WGPUStringView message, void* to, void*) {
+      auto& answered = *static_cast<Answer*>(to);
+      answered.type = type;
+      answered.message = TextOf(message);
+      answered.done = true;
+    };
+    callback.userdata1 = answer;
+    const WGPUFuture future = api.DevicePopErrorScope(device_, callback);
+    if (!instance_.WaitUntil([&] { return answer->done; }, nullptr, future)) {
+      failure_->Set("the driver does not answer");
+      return first;
+    }
+    if (first.type == WGPUErrorType_NoError && answer->type > WGPUErrorType_NoError) first = *answer;
+    if (SaysLost(answer->message)) failure_->Set(kGpuLost);
+    delete answer;
+  }
+  return first;
+}
+
+WGPUBuffer WebGpuDevice::MakeBuffer(uint64_t bytes, WGPUBufferUsage usage, std::string_view label, ScopedError& error) {
+  const WebGpuApi& api = *instance_.api();
+  WGPUBufferDescriptor descriptor = WGPU_BUFFER_DESCRIPTOR_INIT;
+  descriptor.label = ViewOf(label);
+  descriptor.size = bytes;
+  descriptor.usage = usage;
+  PushErrorScopes();
+  WGPUBuffer buffer = api.DeviceCreateBuffer(device_, &descriptor);
+  error = PopErrorScopes();
+  error.message = ReasonIn(error.message);
+  if (error.type == WGPUErrorType_NoError && !failed()) return buffer;
+  if (buffer != nullptr && !failed()) api.BufferRelease(buffer);
+  return nullptr;
+}
+
+Result<GpuMemory> WebGpuDevice::Allocate(uint64_t bytes, std::string_view what) {
+  const std::lock_guard lock(mutex_);
+  if (Status failure = FailureOr(); !failure.ok()) return failure.error();
+  const uint64_t limit = adapter_.max_buffer;
+  if (bytes == 0 || bytes > limit) {
+    return Error{ErrorCode::kBadArgument, Cat("the GPU memory for ", what, " would be ", HumanBytes(bytes),
+                                              ", and one buffer has from 1 byte to ", HumanBytes(limit))};
+  }
+  const uint64_t rounded = (bytes + kParameterBytes - 1) / kParameterBytes * kParameterBytes;
+  const auto of_run = internal::CurrentStorage().Get<GpuMemoryOfRun>();
+  const uint64_t allowed = MaxGpuMemoryOfRun();
+  // Added first, so that two threads cannot both take what is left.
+  const uint64_t in_use = of_run->bytes.fetch_add(rounded);
+  if (in_use + rounded > allowed) {
+    of_run->bytes -= rounded;
+    return Error{ErrorCode::kBadArgument,
+                 Cat("the GPU memory for ", what, " (", HumanBytes(rounded), ") is more than --max-gpu-memory leaves (",
+                     HumanBytes(allowed), ", of which ", HumanBytes(in_use), " are in use)")};
+  }
+  constexpr WGPUBufferUsage kUsage = WGPUBufferUsage_Storage | WGPUBufferUsage_CopySrc | WGPUBufferUsage_CopyDst;
+  ScopedError error;
+  WGPUBuffer buffer = MakeBuffer(rounded, kUsage, what, error);
+  if (buffer == nullptr && !failed() && WaitForQueue()) {  // what was retired is free only now
+    buffer = MakeBuffer(rounded, kUsage, what, error);
+  }
+  if (buffer == nullptr) {
+    of_run->bytes -= rounded;
+    if (Status failure = FailureOr(); !failure.ok()) return failure.error();
+    return Error{ErrorCode::kIo,
+                 Cat("the GPU has no memory left for ", what, " (", HumanBytes(rounded), ": ", error.message, ")")};
+  }
+  return GpuMemory(std::make_unique<Buffer>(shared_from_this(), buffer, rounded, of_run));
+}
+
+void WebGpuDevice::Retire(WGPUBuffer buffer, uint64_t last_used) {
+  const std::lock_guard lock(mutex_);
+  if (failed()) return;
+  if (last_used == recording_) {
+    retired_.push_back(buffer);
+    return;
+  }
+  instance_.api()->BufferDestroy(buffer);
+  instance_.api()->BufferRelease(buffer);
+}
+
+void WebGpuDevice::ReleaseRetired() {
+  if (failed()) return;
+  for (WGPUBuffer buffer : retired_) {
+    instance_.api()->BufferDestroy(buffer);
+    instance_.api()->BufferRelease(buffer);
+  }
+  retired_.clear();
+}
+
+void WebGpuDevice::BeginCommands() {
+  if (encoder_ == nullptr) encoder_ = instance_.api()->DeviceCreateCommandEncoder(device_, nullptr);
+}
+
+void WebGpuDevice::CountCommand() {
+  if (++commands_ >= kRecorded) SubmitRecorded();
+}
+
+void WebGpuDevice::EndPass() {
+  if (pass_ == nullptr) return;
+  instance_.api()->ComputePassEncoderEnd(pass_);
+  instance_.api()->ComputePassEncoderRelease(pass_);
+  pass_ = nullptr;
+}
+
+void WebGpuDevice::Clear(const GpuBuffer& buffer, uint64_t offset, uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  if (failed() || bytes == 0) return;
+  EndPass();
+  BeginCommands();
+  instance_.api()->CommandEncoderClearBuffer(encoder_, Buffer::Use(buffer, recording_), offset, bytes);
+  CountCommand();
+}
+
+void WebGpuDevice::Copy(const GpuBuffer& from, uint64_t from_offset, const GpuBuffer& to, uint64_t to_offset,
+                        uint64_t bytes) {
+  const std::lock_guard lock(mutex_);
+  if (failed() || bytes == 0) return;
+  EndPass();
+  BeginCommands();
+  instance_.api()->CommandEncoderCopyBufferToBuffer(encoder_, Buffer::Use(from, recording_), from_offset,
+                                                    Buffer::Use(to, recording_), to_offset, bytes);
+  CountCommand();
+}
+
+bool WebGpuDevice::HandOver(size_t count, const WGPUCommandBuffer* commands) {
+  const bool survived = SurvivesAbort([&] { instance_.api()->QueueSubmit(queue_, count, commands); });
+  if (survived) return true;
+  instance_.Break();
+  failure_->Set(kGpuLost);
+  return false;
+}
+
+void WebGpuDevice::SubmitRecorded() {
+  if (encoder_ == nullptr || failed()) return;
+  const WebGpuApi& api = *instance_.api();
+  EndPass();
+  if (!parameters_.empty()) {
+    api.QueueWriteBuffer(queue_, parameter_slots_, 0, parameters_.data(), parameters_.size());
+    parameters_.clear();
+  }
+  WGPUCommandBuffer commands = api.CommandEncoderFinish(encoder_, nullptr);
+  // What is wrong with a command is told by now, and wgpu-native aborts on commands that are.
+  if (failed() || !HandOver(1, &commands)) return;
+  api.CommandBufferRelease(commands);
+  api.CommandEncoderRelease(encoder_);
+  encoder_ = nullptr;
+  commands_ = 0;
+  ++recording_;
+  ReleaseRetired();
+  if (++submits_ >= kSubmits) WaitForQueue();
+}
+
+void WebGpuDevice::Submit() {
+  const std::lock_guard lock(mutex_);
+  SubmitRecorded();
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <webgpu.h>
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "gpu/device.h"
+#include "gpu/with_webgpu/gpu_failure.h"
+#include "gpu/with_webgpu/webgpu_instance.h"
+
+namespace anchorsplat {
+
+// Commands are recorded into one encoder and handed over every kRecorded commands. One mutex guards all of it, waits
+// included: not every library can be called from several threads.
+class WebGpuDevice final : public GpuDevice, public std::enable_shared_from_this<WebGpuDevice> {
+ public:
+  // Errors (kNotFound): the driver's reason.
+  static Result<std::shared_ptr<WebGpuDevice>> Open(WebGpuInstance& instance, const FoundAdapter& adapter);
+  ~WebGpuDevice() override;
+
+  const GpuAdapter& adapter() const override { return adapter_; }
+  Result<GpuMemory> Allocate(uint64_t bytes, std::string_view what) override;
+  void Write(const GpuBuffer& buffer, uint64_t offset, std::span<const std::byte> data) override;
+  void Clear(const GpuBuffer& buffer, uint64_t offset, uint64_t bytes) override;
+  void Copy(const GpuBuffer& from, uint64_t from_offset, const GpuBuffer& to, uint64_t to_offset,
+            uint64_t bytes) override;
+  void Run(const GpuKernel& kernel, std::span<const std::byte> parameters, std::initializer_list<GpuBinding> bindings,
+           uint32_t groups) override;
+  void Submit() override;
+  Status Read(std::span<const GpuRead> reads) override;
+  Status Wait() override;
+  double seconds_waited() const override { return seconds_waited_.load(); }
+
+  bool failed() const { return failure_->happened() || instance_.broken(); }
+
+ private:
+  class Buffer;                                     // webgpu_buffer.h
+  static constexpr uint32_t kParameterBytes = 256;  // what an offset of a uniform buffer is a multiple of
+
+  struct Pipeline {
+    WGPUComputePipeline pipeline = nullptr;
+    WGPUBindGroupLayout layout = nullptr;  // null: not asked for yet
+  };
+  struct ScopedError {
+    WGPUErrorType type = WGPUErrorType_NoError;
+    std::string message;
+  };
+
+  WebGpuDevice(WebGpuInstance& instance, GpuAdapter adapter) : instance_(instance), adapter_(std::move(adapter)) {}
+
+  // All of these under the mutex.
+  void BeginCommands();
+  void CountCommand();
+  void EndPass();
+  void SubmitRecorded();
+  void ReleaseRetired();
+  bool HandOver(size_t count, const WGPUCommandBuffer* commands);
+  bool WaitForQueue();
+  template <typename Ask>
+  bool WaitForAnswer(const Ask& ask);
+  void PushErrorScopes();
+  ScopedError PopErrorScopes();
+  Pipeline* PipelineOf(const GpuKernel& kernel);
+  Pipeline Compile(const GpuKernel& kernel);
+  bool ReadPieces(std::span<const GpuRead> pieces);
+  bool EnsureStaging(uint64_t bytes);
+  WGPUBuffer MakeBuffer(uint64_t bytes, WGPUBufferUsage usage, std::string_view label, ScopedError& error);
+  void Retire(WGPUBuffer buffer, uint64_t last_used);
+  Status FailureOr() const;
+
+  WebGpuInstance& instance_;
+  GpuAdapter adapter_;
+  GpuFailure* const failure_ = new GpuFailure;  // never freed: the library may call back after the device's end
+  WGPUDevice device_ = nullptr;
+  WGPUQueue queue_ = nullptr;
+
+  std::mutex mutex_;
+  WGPUCommandEncoder encoder_ = nullptr;
+  WGPUComputePassEncoder pass_ = nullptr;
+  uint64_t recording_ = 1;             // number of what is recorded now; counts up when it is handed over
+  uint32_t commands_ = 0;              // recorded
+  uint32_t submits_ = 0;               // since the queue was last waited for
+  uint64_t bytes_written_ = 0;         // that the queue holds copies of
+  std::vector<std::byte> parameters_;  // of the recorded dispatches, kParameterBytes each
+  WGPUBuffer parameter_slots_ = nullptr;
+  std::vector<WGPUBuffer> retired_;  // destroyed by their owners, still used by what is recorded
+  WGPUBuffer staging_ = nullptr;     // to be mapped for reading
+  uint64_t staging_bytes_ = 0;
+  std::unordered_map<const GpuKernel*, Pipeline> pipelines_;
+  std::atomic<double> seconds_waited_ = 0;
+};
+
+}  // namespace anchorsplat

@@ -116,7 +116,7 @@ Result<Shown> FindShown(CloudView cloud, const std::vector<int64_t>& rows, const
     signs.color = output.color;
     signs.box = {0, 0, camera.intrinsics.width, camera.intrinsics.height};
     for (float& sign : signs.color.pixels) sign = random.Below(2) == 0 ? -1.0f : 1.0f;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const SeenGradient gradient, rasterizer.BackwardToSeen(signs));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const SeenGradient gradient, rasterizer.BackwardToSeen(cloud, signs));
     ParallelFor(0, std::ssize(rows), kRowsAtOnce, [&](int64_t first, int64_t last) {
       for (auto k = static_cast<size_t>(first); k < static_cast<size_t>(last); ++k) {
         const int64_t i = rows[k];

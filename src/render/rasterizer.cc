@@ -8,6 +8,7 @@
 #include "core/finite.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "gpu/open_gpu.h"
 #include "render/bin.h"
 #include "render/blend.h"
 #include "render/project.h"
@@ -66,13 +67,9 @@ void Shape(int width, int height, int channels, Image& image) {
 
 }  // namespace
 
-// Projection and colours. Returns how many Gaussians are visible.
-int64_t Rasterizer::State::Project(const CloudView& cloud, const Camera& camera, float near,
-                                   const RenderOptions& options, Stopwatch& watch) {
-  const int64_t n = cloud.size();
-  const int64_t chunks = ProjectChunks(n);
+ProjectParams ProjectInputs(const CloudView& cloud, const Camera& camera, float near, const RenderOptions& options) {
   ProjectParams project{};
-  project.count = n;
+  project.count = cloud.size();
   project.means = cloud.means.data();
   project.log_scales = cloud.log_scales.data();
   project.quats = cloud.quats.data();
@@ -86,6 +83,27 @@ int64_t Rasterizer::State::Project(const CloudView& cloud, const Camera& camera,
   project.dilation = DilationOf(options);
   project.compensated_from = options.compensated_from;
   project.min_alpha = options.min_alpha;
+  return project;
+}
+
+SphericalHarmonicsParams SphericalHarmonicsInputs(const CloudView& cloud, const Camera& camera,
+                                                  const RenderOptions& options) {
+  SphericalHarmonicsParams sh{};
+  sh.count = cloud.size();
+  sh.degree = std::min(options.sh_degree, cloud.sh_degree);
+  sh.stride = cloud.sh_stride();
+  sh.means = cloud.means.data();
+  sh.sh = cloud.sh.data();
+  sh.center = camera.Center();
+  return sh;
+}
+
+// Projection and colours. Returns how many Gaussians are visible.
+int64_t Rasterizer::State::Project(const CloudView& cloud, const Camera& camera, float near,
+                                   const RenderOptions& options, Stopwatch& watch) {
+  const int64_t n = cloud.size();
+  const int64_t chunks = ProjectChunks(n);
+  ProjectParams project = ProjectInputs(cloud, camera, near, options);
   project.projected = Room(projected, n);
   project.tiles = Room(tiles, n);
   project.radii = options.gradient ? Room(radii, 2 * n) : nullptr;
@@ -95,13 +113,7 @@ int64_t Rasterizer::State::Project(const CloudView& cloud, const Camera& camera,
   ProjectCpu(project);
   statistics.project = watch.Lap();
 
-  SphericalHarmonicsParams sh{};
-  sh.count = n;
-  sh.degree = std::min(options.sh_degree, cloud.sh_degree);
-  sh.stride = cloud.sh_stride();
-  sh.means = cloud.means.data();
-  sh.sh = cloud.sh.data();
-  sh.center = camera.Center();
+  SphericalHarmonicsParams sh = SphericalHarmonicsInputs(cloud, camera, options);
   sh.visible = visible.data();
   sh.visible_counts = visible_counts.data();
   sh.tiles = tiles.data();
@@ -176,9 +188,7 @@ void Rasterizer::State::BinAndBlend(int64_t visible_total, const Camera& camera,
   blend.tile_offsets = bin.tile_offsets;
   std::copy(options.background.begin(), options.background.end(), blend.background);
   blend.min_alpha = options.min_alpha;
-  // Below, T would lose its digits, from which the backward pass recovers what it was in front.
-  constexpr float kFewestDigits = 1e-30f;
-  blend.min_transmittance = std::max(options.min_transmittance, kFewestDigits);
+  blend.min_transmittance = LeastTransmittance(options);
   blend.color = output.color.pixels.data();
   blend.alpha = output.alpha.pixels.data();
   blend.depth = options.depth ? output.depth.pixels.data() : nullptr;
@@ -201,6 +211,44 @@ void Rasterizer::State::BinAndBlend(int64_t visible_total, const Camera& camera,
     ++statistics.runs;
   }
   statistics.evaluations = std::accumulate(blend.evaluations, blend.evaluations + tile_count, int64_t{0});
+}
+
+void Rasterizer::State::DrawOnCpu(const CloudView& cloud, const Camera& camera, float near,
+                                  const RenderOptions& options, RenderOutput& output) {
+  Stopwatch watch;
+  const int64_t total = Project(cloud, camera, near, options, watch);
+  statistics.visible = total;
+  Sort(cloud.size(), total);
+  statistics.sort = watch.Lap();
+  BinAndBlend(total, camera, options, output, watch);
+}
+
+bool Rasterizer::State::DrawOnGpu(const CloudView& cloud, const Camera& camera, float near,
+                                  const RenderOptions& options, RenderOutput& output) {
+  Result<std::shared_ptr<GpuDevice>> opened = GpuOfRun();
+  if (!opened.ok()) GiveUpGpu(opened.error());
+  const std::shared_ptr<GpuDevice> device = opened.ok() ? *opened : nullptr;
+  if (device == nullptr || gpu == nullptr || gpu->device != device) {
+    DropGpu();
+    if (device != nullptr) gpu = std::make_unique<GpuRasterizer>(device);
+  }
+  if (gpu == nullptr) return false;
+  Stopwatch watch;
+  const Status uploaded = gpu_cloud.Assign(*device, cloud);
+  const Result<bool> drawn =
+      uploaded.ok() ? gpu->Draw(gpu_cloud, camera, near, options, &output) : Result<bool>(uploaded.error());
+  if (!drawn.ok()) {
+    DropGpu();
+    GiveUpGpu(drawn.error());
+    return false;
+  }
+  if (!*drawn) return false;
+  statistics = {};
+  statistics.blend = watch.Lap();
+  statistics.visible = gpu->visible;
+  statistics.pairs = gpu->total_pairs;
+  statistics.runs = gpu->runs;
+  return true;
 }
 
 Rasterizer::Rasterizer() : state_(std::make_unique<State>()) {}
@@ -235,15 +283,17 @@ Status Rasterizer::Render(const CloudView& cloud, const Camera& world_camera, co
     } else {
       output.depth = Image();
     }
-    Stopwatch watch;
-    const int64_t total = state_->Project(cloud, camera, near, options, watch);
-    state_->statistics.visible = total;
-    state_->Sort(cloud.size(), total);
-    state_->statistics.sort = watch.Lap();
-    state_->BinAndBlend(total, camera, options, output, watch);
+    const bool on_gpu = state_->DrawOnGpu(cloud, camera, near, options, output);
+    if (!on_gpu) state_->DrawOnCpu(cloud, camera, near, options, output);
     if (options.gradient) {
-      state_->kept = {camera.intrinsics, camera.world_to_camera, camera.Center(),
-                      options,           cloud.size(),           cloud.sh_degree};
+      state_->kept = {.intrinsics = camera.intrinsics,
+                      .world_to_camera = camera.world_to_camera,
+                      .center = camera.Center(),
+                      .near = near,
+                      .options = options,
+                      .count = cloud.size(),
+                      .sh_degree = cloud.sh_degree,
+                      .on_gpu = on_gpu};
     }
   } catch (const std::bad_alloc&) {
     return Error{ErrorCode::kIo, Cat("not enough memory for a picture of ", width, " x ", height, " pixels of ",

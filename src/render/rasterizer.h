@@ -99,7 +99,8 @@ struct SeenGradient {
   std::span<const int32_t> radii;                // [N,2] as of CloudGradient
 };
 
-// What the last picture took; the backward stages are those of the last Backward.
+// What the last picture took; the backward stages are those of the last Backward. A GPU does all stages while the host
+// waits: there `blend` is the whole wait, the other stages and `evaluations` are 0.
 struct RenderStatistics {
   double project = 0, spherical_harmonics = 0, sort = 0, bin = 0, blend = 0;  // seconds on the clock, per stage
   double blend_backward = 0, project_backward = 0;                            // the latter with the spherical harmonics
@@ -109,9 +110,12 @@ struct RenderStatistics {
   int runs = 0;             // of tiles, see RenderOptions::max_pairs
 };
 
-// The 3DGS rasterizer on the CPU (Kerbl et al. 2023). Keeps its buffers, so one object per thread of control renders
-// many views without allocating: 100 bytes per Gaussian and 4 per pair listed at once. The result is bit-identical for
-// every number of threads.
+// The 3DGS rasterizer (Kerbl et al. 2023), on the device of the run (RunContext::device in core/run_context.h). The CPU
+// is the reference. A GPU follows its arithmetic: the same order of depths, and the same picture to 1e-4 but where a
+// pixel lies right on a cut-off (min_alpha, min_transmittance). A picture that the GPU's floats cannot hold, and
+// everything after a failure of the GPU, is made on the CPU; the caller need not know. Keeps its buffers, so one object
+// per thread of control renders many views without allocating: 100 bytes per Gaussian and 4 per pair listed at once.
+// The result is bit-identical for every number of threads.
 //
 // Two things follow gsplat in spirit rather than to the letter. Coordinates are calculated in double, and the
 // determinant of a covariance as a sum of squares: gsplat's difference in floats leaves a long thin Gaussian three or
@@ -147,9 +151,9 @@ class Rasterizer {
   Status Backward(const CloudView& cloud, const RenderGradient& output_gradient, CloudGradient& gradient,
                   const CoefficientStep* step = nullptr);
 
-  // The same as far as blending goes, which is a part of Backward's time and takes no memory of its own. The spans are
-  // valid until the next call. Errors: of Backward.
-  Result<SeenGradient> BackwardToSeen(const RenderGradient& output_gradient);
+  // The same as far as blending goes, which is a part of Backward's time and, on the CPU, takes no memory of its own.
+  // The spans are valid until the next call. Errors: of Backward.
+  Result<SeenGradient> BackwardToSeen(const CloudView& cloud, const RenderGradient& output_gradient);
 
   const RenderStatistics& statistics() const;  // of the last Render that succeeded
 

@@ -1,10 +1,14 @@
 #include <algorithm>
+#include <array>
 #include <new>
 #include <numeric>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "core/parallel.h"
 #include "core/text.h"
+#include "gpu/open_gpu.h"
 #include "render/blend_backward.h"
 #include "render/gradient_slots.h"
 #include "render/project.h"
@@ -20,6 +24,18 @@ Error BadGradientArgument(std::string message) { return {ErrorCode::kBadArgument
 
 Error NoPicture() {
   return BadGradientArgument("no picture to take the gradient of: render one with RenderOptions::gradient first");
+}
+
+Error NoMemory(int64_t count) {
+  return {ErrorCode::kIo, Cat("not enough memory for the gradient of ", WithThousands(count), " Gaussians")};
+}
+
+// Of a picture of `count` Gaussians.
+Status CheckCloud(const CloudView& cloud, int64_t count, int sh_degree) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
+  if (cloud.size() == count && cloud.sh_degree == sh_degree) return {};
+  return BadGradientArgument(Cat("the picture is of ", WithThousands(count), " Gaussians of SH degree ", sh_degree,
+                                 ", not of ", WithThousands(cloud.size()), " of degree ", cloud.sh_degree));
 }
 
 Status CheckGradient(const RenderGradient& g, int width, int height) {
@@ -195,55 +211,158 @@ void Rasterizer::State::ProjectBackward(const std::optional<SlotsLeft>& left, co
   });
 }
 
+void Rasterizer::State::DrawAgainOnCpu(const CloudView& cloud) {
+  DropGpu();
+  Camera camera;
+  camera.intrinsics = kept->intrinsics;
+  camera.world_to_camera = kept->world_to_camera;
+  RenderOptions options = kept->options;
+  options.depth = false;
+  RenderOutput again;
+  again.color = Image(camera.intrinsics.width, camera.intrinsics.height, 3);
+  again.alpha = Image(camera.intrinsics.width, camera.intrinsics.height, 1);
+  DrawOnCpu(cloud, camera, kept->near, options, again);
+  kept->on_gpu = false;
+}
+
+Status Rasterizer::State::BackwardOnGpu(const CloudView& cloud, const RenderGradient& output_gradient,
+                                        const CoefficientStep* step, CloudGradient& gradient) {
+  Stopwatch watch;
+  const RenderOptions& options = kept->options;
+  GpuDevice& device = *gpu->device;
+  if (gpu_backward == nullptr) gpu_backward = std::make_unique<GpuRasterizerBackward>(*gpu);
+  ANCHORSPLAT_RETURN_IF_ERROR(gpu_backward->Blend(options, output_gradient));
+  ANCHORSPLAT_RETURN_IF_ERROR(gpu_backward->ReadBackground(gradient.background));
+  statistics.blend_backward = watch.Lap();
+
+  // What is streamed, has been given back or is read on the host is read from this call's cloud.
+  if (gpu_cloud.empty() || !gpu_cloud.resident() || !gpu->unusual_rows.empty()) {
+    ANCHORSPLAT_RETURN_IF_ERROR(gpu_cloud.Assign(device, cloud));
+  }
+  const auto n = static_cast<size_t>(kept->count);
+  const auto stride = static_cast<size_t>(cloud.sh_stride());
+  gradient.means.resize(3 * n);
+  gradient.log_scales.resize(3 * n);
+  gradient.quats.resize(4 * n);
+  gradient.opacity_logits.resize(n);
+  gradient.sh.resize(step == nullptr ? stride * n : 0);
+  gradient.means2d.resize(2 * n);
+  gradient.means2d_abs.resize(options.absgrad ? 2 * n : 0);
+  gradient.radii.resize(2 * n);
+  // The step is taken at the end, when nothing can fail that would have to be done again.
+  float* sh = step == nullptr ? gradient.sh.data() : Room(sh_gradients, static_cast<int64_t>(stride * n));
+  ANCHORSPLAT_RETURN_IF_ERROR(gpu_backward->Project(gpu_cloud, options, [&](const GpuGradient& part) -> Status {
+    std::vector<GpuRead> reads;
+    const auto read = [&](const GpuMemory& memory, float* column, size_t width) {
+      const auto first = static_cast<size_t>(part.first), count = static_cast<size_t>(part.count);
+      reads.push_back({memory.get(), 0, std::as_writable_bytes(std::span(column + first * width, count * width))});
+    };
+    read(part.means, gradient.means.data(), 3);
+    read(part.log_scales, gradient.log_scales.data(), 3);
+    read(part.quats, gradient.quats.data(), 4);
+    read(part.opacity_logits, gradient.opacity_logits.data(), 1);
+    read(part.sh, sh, stride);
+    read(part.means2d, gradient.means2d.data(), 2);
+    if (options.absgrad) read(part.means2d_abs, gradient.means2d_abs.data(), 2);
+    return device.Read(reads);
+  }));
+  if (n > 0) {
+    const GpuRead read = {gpu->radii.get(), 0, std::as_writable_bytes(std::span(gradient.radii))};
+    ANCHORSPLAT_RETURN_IF_ERROR(device.Read({&read, 1}));
+  }
+  if (step != nullptr) StepCoefficients(*step, cloud.sh_stride(), kept->count, sh);
+  statistics.project_backward = watch.Lap();
+  return {};
+}
+
+Status Rasterizer::State::BackwardToSeenOnGpu(const RenderGradient& output_gradient) {
+  constexpr int64_t kRowsRead = int64_t{1} << 18;
+  Stopwatch watch;
+  GpuDevice& device = *gpu->device;
+  if (gpu_backward == nullptr) gpu_backward = std::make_unique<GpuRasterizerBackward>(*gpu);
+  ANCHORSPLAT_RETURN_IF_ERROR(gpu_backward->Blend(kept->options, output_gradient));
+  const int64_t n = kept->count;
+  ProjectedGaussian* to_projected = Room(projected, n);
+  BlendGradient* to_sums = Room(gradients, n);
+  int32_t* to_radii = Room(radii, 2 * n);
+  std::vector<GpuSeen> seen(static_cast<size_t>(std::min(n, kRowsRead)));
+  std::vector<std::array<float, 12>> sums(seen.size());
+  for (int64_t first = 0; first < n; first += kRowsRead) {
+    const auto begin = static_cast<size_t>(first), count = static_cast<size_t>(std::min(kRowsRead, n - first));
+    const std::array<GpuRead, 3> reads = {
+        {{gpu->seen.get(), sizeof(GpuSeen) * begin, std::as_writable_bytes(std::span(seen.data(), count))},
+         {&gpu_backward->sums(), sizeof(sums[0]) * begin, std::as_writable_bytes(std::span(sums.data(), count))},
+         {gpu->radii.get(), 8 * begin, std::as_writable_bytes(std::span(to_radii + 2 * first, 2 * count))}}};
+    ANCHORSPLAT_RETURN_IF_ERROR(device.Read(reads));
+    for (size_t k = 0; k < count; ++k) {
+      to_projected[begin + k] = FromGpu(seen[k]);
+      to_sums[begin + k] = FromGpu(sums[k]);
+    }
+  }
+  statistics.blend_backward = watch.Lap();
+  return {};
+}
+
+void Rasterizer::State::BackwardToSeenOnCpu(const RenderGradient& output_gradient) {
+  Stopwatch watch;
+  CloudGradient unused;
+  // Slots are added up for visible Gaussians alone; all others have learned nothing.
+  BlendGradient* sums = Room(gradients, kept->count);
+  ParallelFor(0, kept->count, int64_t{1} << 16,
+              [&](int64_t first, int64_t last) { std::fill(sums + first, sums + last, BlendGradient{}); });
+  if (const std::optional<SlotsLeft> left = BlendBackward(output_gradient, unused)) {
+    float* absolute = kept->options.absgrad ? unused.means2d_abs.data() : nullptr;
+    ParallelFor(0, ProjectChunks(kept->count), 1, [&](int64_t chunk, int64_t) {
+      SumSlots(left->params, left->slots, chunk, /*first_run=*/true, sums, absolute);
+    });
+  }
+  statistics.blend_backward = watch.Lap();
+}
+
 Status Rasterizer::Backward(const CloudView& cloud, const RenderGradient& output_gradient, CloudGradient& gradient,
                             const CoefficientStep* step) {
   if (!state_->kept) return NoPicture();
-  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   const State::Kept& kept = *state_->kept;
-  if (cloud.size() != kept.count || cloud.sh_degree != kept.sh_degree) {
-    return BadGradientArgument(Cat("the picture is of ", WithThousands(kept.count), " Gaussians of SH degree ",
-                                   kept.sh_degree, ", not of ", WithThousands(cloud.size()), " of degree ",
-                                   cloud.sh_degree));
-  }
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckCloud(cloud, kept.count, kept.sh_degree));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckGradient(output_gradient, kept.intrinsics.width, kept.intrinsics.height));
   if (step != nullptr && (step->values != cloud.sh.data() || step->columns > cloud.sh_stride() ||
                           step->columns < 3 * ShCoefficients(std::min(kept.options.sh_degree, cloud.sh_degree)))) {
     return BadGradientArgument(Cat("a step of ", step->columns, " coefficients that is not of the picture's cloud"));
   }
   try {
+    if (kept.on_gpu) {
+      const Status status = state_->BackwardOnGpu(cloud, output_gradient, step, gradient);
+      if (status.ok()) return {};
+      GiveUpGpu(status.error());
+      state_->DrawAgainOnCpu(cloud);
+    }
     Stopwatch watch;
     const std::optional<State::SlotsLeft> left = state_->BlendBackward(output_gradient, gradient);
     state_->statistics.blend_backward = watch.Lap();
     state_->ProjectBackward(left, cloud, step, gradient);
     state_->statistics.project_backward = watch.Lap();
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::kIo,
-                 Cat("not enough memory for the gradient of ", WithThousands(cloud.size()), " Gaussians")};
+    return NoMemory(cloud.size());
   }
   return {};
 }
 
-Result<SeenGradient> Rasterizer::BackwardToSeen(const RenderGradient& output_gradient) {
+Result<SeenGradient> Rasterizer::BackwardToSeen(const CloudView& cloud, const RenderGradient& output_gradient) {
   if (!state_->kept) return NoPicture();
   const State::Kept& kept = *state_->kept;
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckCloud(cloud, kept.count, kept.sh_degree));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckGradient(output_gradient, kept.intrinsics.width, kept.intrinsics.height));
   try {
-    Stopwatch watch;
-    CloudGradient unused;
-    // Slots are added up for visible Gaussians alone; all others have learned nothing.
-    BlendGradient* sums = Room(state_->gradients, kept.count);
-    ParallelFor(0, kept.count, int64_t{1} << 16,
-                [&](int64_t first, int64_t last) { std::fill(sums + first, sums + last, BlendGradient{}); });
-    if (const std::optional<State::SlotsLeft> left = state_->BlendBackward(output_gradient, unused)) {
-      float* absolute = kept.options.absgrad ? unused.means2d_abs.data() : nullptr;
-      ParallelFor(0, ProjectChunks(kept.count), 1, [&](int64_t chunk, int64_t) {
-        SumSlots(left->params, left->slots, chunk, /*first_run=*/true, sums, absolute);
-      });
+    if (kept.on_gpu) {
+      const Status status = state_->BackwardToSeenOnGpu(output_gradient);
+      if (!status.ok()) {
+        GiveUpGpu(status.error());
+        state_->DrawAgainOnCpu(cloud);
+      }
     }
-    state_->statistics.blend_backward = watch.Lap();
+    if (!kept.on_gpu) state_->BackwardToSeenOnCpu(output_gradient);
   } catch (const std::bad_alloc&) {
-    return Error{ErrorCode::kIo,
-                 Cat("not enough memory for the gradient of ", WithThousands(kept.count), " Gaussians")};
+    return NoMemory(kept.count);
   }
   const auto n = static_cast<size_t>(kept.count);
   return SeenGradient{std::span(state_->gradients.data(), n), std::span(state_->projected.data(), n),

@@ -1,16 +1,23 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 
 #include "core/buffer.h"
 #include "core/camera.h"
 #include "core/stopwatch.h"
 #include "render/bin.h"
+#include "render/gpu_cloud.h"
+#include "render/gpu_rasterizer.h"
+#include "render/gpu_rasterizer_backward.h"
 #include "render/gradient_slots.h"
+#include "render/project.h"
 #include "render/projected_gaussian.h"
 #include "render/rasterizer.h"
+#include "render/spherical_harmonics.h"
 
 namespace anchorsplat {
 
@@ -24,6 +31,15 @@ T* Room(Buffer<T>& buffer, int64_t size) {
   }
   return buffer.data();
 }
+
+// What the first two steps of a picture are given; where their results go is left open.
+ProjectParams ProjectInputs(const CloudView& cloud, const Camera& camera, float near, const RenderOptions& options);
+SphericalHarmonicsParams SphericalHarmonicsInputs(const CloudView& cloud, const Camera& camera,
+                                                  const RenderOptions& options);
+
+// RenderOptions::min_transmittance, but no less than where T would lose its digits, from which the backward pass
+// recovers what it was in front.
+inline float LeastTransmittance(const RenderOptions& options) { return std::max(options.min_transmittance, 1e-30f); }
 
 // The buffers of a Rasterizer.
 struct Rasterizer::State {
@@ -39,11 +55,16 @@ struct Rasterizer::State {
     Pinhole intrinsics;
     Pose world_to_camera;
     std::array<double, 3> center;
+    float near;  // plane
     RenderOptions options;
     int64_t count;
     int sh_degree;
+    bool on_gpu;  // by `gpu`, which has what the CPU would have below
   };
   std::optional<Kept> kept;  // where the last Render was asked to keep it
+  std::unique_ptr<GpuRasterizer> gpu;
+  GpuCloud gpu_cloud;                                   // what `gpu` drew last
+  std::unique_ptr<GpuRasterizerBackward> gpu_backward;  // of `gpu`, once it is needed
   Buffer<float> transmittance;
   Buffer<int32_t> contributors, radii;
   Buffer<int64_t> slot_counts, slot_starts;
@@ -51,6 +72,19 @@ struct Rasterizer::State {
   Buffer<float> slot_absolute;
   Buffer<uint8_t> slot_touched;
   Buffer<double> tile_backgrounds;
+
+  // A picture, by one or the other. False: not by the GPU, because the run has none, because it needs doubles, or
+  // because it failed, after which the run has none.
+  bool DrawOnGpu(const CloudView& cloud, const Camera& camera, float near, const RenderOptions& options,
+                 RenderOutput& output);
+  void DrawOnCpu(const CloudView& cloud, const Camera& camera, float near, const RenderOptions& options,
+                 RenderOutput& output);
+
+  void DropGpu() {
+    gpu_backward.reset();
+    gpu_cloud = GpuCloud();
+    gpu.reset();
+  }
 
   int64_t Project(const CloudView& cloud, const Camera& camera, float near, const RenderOptions& options,
                   Stopwatch& watch);
@@ -67,6 +101,15 @@ struct Rasterizer::State {
   std::optional<SlotsLeft> BlendBackward(const RenderGradient& output_gradient, CloudGradient& gradient);
   void ProjectBackward(const std::optional<SlotsLeft>& left, const CloudView& cloud, const CoefficientStep* step,
                        CloudGradient& gradient);
+  Buffer<float> sh_gradients;  // [N,K,3] of the GPU, where they take a step
+
+  // What the GPU drew, once more by the CPU, which has then kept what it needs.
+  void DrawAgainOnCpu(const CloudView& cloud);
+  // Errors: of GpuRasterizerBackward. Then nothing has changed that cannot be calculated again.
+  Status BackwardOnGpu(const CloudView& cloud, const RenderGradient& output_gradient, const CoefficientStep* step,
+                       CloudGradient& gradient);
+  Status BackwardToSeenOnGpu(const RenderGradient& output_gradient);
+  void BackwardToSeenOnCpu(const RenderGradient& output_gradient);
 };
 
 }  // namespace anchorsplat

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
 
 #include "core/gaussian_cloud.h"
+#include "core/parallel.h"
 #include "core/spherical_harmonics.h"
 #include "render/adam_runs.h"
 #include "render/project.h"
@@ -198,38 +200,56 @@ void BackwardRows(const SphericalHarmonicsBackwardParams& p, int64_t first, int6
   }
 }
 
+// Rows of coefficients that take a step, some at a time.
+struct Steps {
+  Steps(const CoefficientStep& own_step, int64_t own_stride) : step(own_step), stride(own_stride) {
+    runs.stride = stride;
+    runs.period = AdamPeriod(step.columns);
+    runs.rates = rates;
+    runs.numbers = step.numbers;
+    for (int64_t k = 0; k < runs.period; ++k) rates[k] = k % step.columns < 3 ? step.first_rate : step.rate;
+  }
+  Steps(const Steps&) = delete;
+  Steps& operator=(const Steps&) = delete;
+
+  const CoefficientStep& step;
+  int64_t stride;
+  AdamRuns runs{};
+  alignas(64) float rates[kFloatsAtMost * kAdamLanesAtMost];
+};
+
+// Rows [first, last), of which `gradient` is.
+void StepRows(Steps& s, int64_t first, int64_t last, const float* gradient) {
+  const bool whole = s.step.columns == s.stride;  // then all rows are one run
+  s.runs.gradient = gradient;
+  s.runs.runs = whole ? 1 : last - first;
+  s.runs.count = whole ? (last - first) * s.stride : s.step.columns;
+  s.runs.first_moment = s.step.first_moment + first * s.stride;
+  s.runs.second_moment = s.step.second_moment + first * s.stride;
+  s.runs.values = s.step.values + first * s.stride;
+  UpdateAll(s.runs);
+}
+
+void StepRange(const CoefficientStep& step, int64_t stride, int64_t first, int64_t last, const float* gradient) {
+  Steps steps(step, stride);
+  StepRows(steps, first, last, gradient);
+}
+
 void BackwardChunk(const SphericalHarmonicsBackwardParams& p, int64_t chunk) {
   constexpr int64_t kRows = static_cast<int64_t>(kShBatch);
   const int64_t chunk_begin = chunk * kProjectChunk, chunk_end = std::min(chunk_begin + kProjectChunk, p.count);
   const int32_t* visible = p.visible + chunk_begin;
   const int32_t* end = visible + p.visible_counts[chunk];
-  AdamRuns runs{};
-  alignas(64) float rates[kFloatsAtMost * kAdamLanesAtMost];
   alignas(64) float gradients[kShBatch * kFloatsAtMost];
-  const bool whole = p.step != nullptr && p.step->columns == p.stride;  // then all rows are one run
-  if (p.step != nullptr) {
-    runs.stride = p.stride;
-    runs.period = AdamPeriod(p.step->columns);
-    runs.rates = rates;
-    runs.numbers = p.step->numbers;
-    runs.gradient = gradients;
-    for (int64_t k = 0; k < runs.period; ++k) {
-      rates[k] = k % p.step->columns < 3 ? p.step->first_rate : p.step->rate;
-    }
-  }
+  std::optional<Steps> steps;
+  if (p.step != nullptr) steps.emplace(*p.step, p.stride);
   for (int64_t first = chunk_begin; first < chunk_end; first += kRows) {
     const int64_t last = std::min(first + kRows, chunk_end);
     const int32_t* behind = visible;
     while (behind != end && *behind < last) ++behind;
     BackwardRows(p, first, last, visible, behind, p.step != nullptr ? gradients : p.sh_gradients + first * p.stride);
     visible = behind;
-    if (p.step == nullptr) continue;
-    runs.runs = whole ? 1 : last - first;
-    runs.count = whole ? (last - first) * p.stride : p.step->columns;
-    runs.first_moment = p.step->first_moment + first * p.stride;
-    runs.second_moment = p.step->second_moment + first * p.stride;
-    runs.values = p.step->values + first * p.stride;
-    UpdateAll(runs);
+    if (steps) StepRows(*steps, first, last, gradients);
   }
 }
 
@@ -242,9 +262,16 @@ HWY_AFTER_NAMESPACE();
 namespace anchorsplat {
 
 HWY_EXPORT(BackwardChunk);
+HWY_EXPORT(StepRange);
 
 void SphericalHarmonicsBackwardCpu(const SphericalHarmonicsBackwardParams& p, int64_t chunk) {
   HWY_DYNAMIC_DISPATCH(BackwardChunk)(p, chunk);
+}
+
+void StepCoefficients(const CoefficientStep& step, int64_t stride, int64_t count, const float* gradient) {
+  ParallelFor(0, count, kProjectChunk, [&](int64_t first, int64_t last) {
+    HWY_DYNAMIC_DISPATCH(StepRange)(step, stride, first, last, gradient + first * stride);
+  });
 }
 
 }  // namespace anchorsplat

@@ -33,4 +33,7 @@ struct SphericalHarmonicsBackwardParams {
 // Gaussians of one chunk, [chunk·kProjectChunk, …).
 void SphericalHarmonicsBackwardCpu(const SphericalHarmonicsBackwardParams& p, int64_t chunk);
 
+// The step alone, with a gradient [N,stride/3,3] that is at hand: the same bits as where it is made.
+void StepCoefficients(const CoefficientStep& step, int64_t stride, int64_t count, const float* gradient);
+
 }  // namespace anchorsplat

@@ -20,8 +20,9 @@ struct TaskProgress {
   bool ended = false;
 };
 
-// How a call is run; results do not depend on any of it. Every function that may take long takes one as its last
-// argument. Calls of several threads do not see each other: each has its own limit, callbacks and flag.
+// How a call is run; results do not depend on any of it, but for rounding on a GPU. Every function that may take long
+// takes one as its last argument. Calls of several threads do not see each other: each has its own limit, callbacks and
+// flag.
 //
 // Callbacks come from any thread of the call, one at a time. They must not throw. Without them nothing is said: the
 // library writes to neither stdout nor stderr.
@@ -35,6 +36,12 @@ struct RunSettings {
   // Becomes true when nothing of the call is wanted any more: it ends at once and without a result, whatever it is
   // about, as a FailureKind::kStopped. Files appear whole or not at all. Must outlive the call.
   const std::atomic<bool>* abandon = nullptr;
+  // What rasterizes (docs/gpu.md): "cpu"; "gpu", the first that can be used; "auto", a real GPU where there is one,
+  // else the CPU; or the number of an adapter, as `anchorsplat doctor` lists them. What cannot be had is a
+  // FailureKind::kNotFound before the call begins, another word a kBadArgument. A GPU that is lost meanwhile is told by
+  // a message, and the call goes on on the CPU.
+  std::string device = "cpu";
+  uint64_t max_gpu_memory = 0;  // bytes of it at most; 0: 2 GiB
 };
 
 // "0.1.0", of the library that is loaded.

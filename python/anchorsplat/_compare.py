@@ -15,7 +15,7 @@ from ._cloud import Cloud, RenderMode
 from ._errors import BadArgumentError
 from ._files import PathLike
 from ._report import Report
-from ._run import ProgressLike, run
+from ._run import DeviceLike, ProgressLike, run
 from ._words import path_bytes, words_of
 
 #: A splat, pictures [V,H,W,C] or [H,W,C], or a path: a splat's file, a folder of pictures or a picture.
@@ -99,6 +99,8 @@ def compare(
     far: float | None = None,
     mode: RenderMode | None = None,
     profile: Literal["gsplat14", "gsplat15"] = "gsplat14",
+    device: DeviceLike = "cpu",
+    max_gpu_memory: int | str | None = None,
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> Report:
@@ -109,6 +111,8 @@ def compare(
     names: of files, of the cameras, or "000", "001", ….
 
     color_correct: measures again after the affine map of each view's colours that brings it nearest to the pictures.
+    device: what rasterizes: "cpu"; "gpu"; "auto", a real GPU where there is one, else the CPU; or the number of an adapter.
+        max_gpu_memory: of a GPU's memory at most, bytes or "4G"; otherwise 2 GiB (docs/gpu.md).
 
     Returns ``{"mean": {"psnr", "ssim"}, "views": […]}``, with `truth` one for "a" and one for "b"; an infinite PSNR is None.
     Raises as ``read``; BadArgumentError: views that do not match, sizes that differ.
@@ -126,5 +130,5 @@ def compare(
             if len(array) != len(names):
                 raise BadArgumentError(f"{len(array)} pictures and {len(names)} views")
     given = camera_words(cameras, words)
-    with run(threads, progress) as how:
+    with run(threads, progress, device=device, max_gpu_memory=max_gpu_memory) as how:
         return Report._of(_core.compare(sides[0], sides[1], sides[2], names, words, given, how))

@@ -10,7 +10,7 @@ from ._cameras import CamerasLike, Color, camera_words
 from ._cloud import Cloud, RenderMode
 from ._files import PathLike
 from ._report import Report
-from ._run import ProgressLike, run
+from ._run import DeviceLike, ProgressLike, run
 from ._words import natural, words_of
 
 
@@ -67,6 +67,8 @@ def enhance(
     checkpoint_every: int = 0,
     resume: bool = False,
     seed: int = 0,
+    device: DeviceLike = "cpu",
+    max_gpu_memory: int | str | None = None,
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> tuple[Cloud, Report]:
@@ -105,6 +107,9 @@ def enhance(
     checkpoint, resume: file for the state of a refinement when it is stopped (Ctrl-C: it is written, then KeyboardInterrupt; every
         checkpoint_every steps, too), or for what a compact network has made so far, and going on from it.
 
+    device: what rasterizes: "cpu"; "gpu"; "auto", a real GPU where there is one, else the CPU; or the number of an adapter.
+        max_gpu_memory: of a GPU's memory at most, bytes or "4G"; otherwise 2 GiB (docs/gpu.md).
+
     seed: of everything random. threads: at most; 0: all of the machine; the result does not depend on it.
 
     Returns the splat and a :class:`Report`. What was assumed is told by the logger "anchorsplat" and by SplatWarning. Raises
@@ -113,7 +118,9 @@ def enhance(
     """
     words = words_of(enhance, locals(), besides=("cameras",))
     given = camera_words(cameras, words)
-    with run(threads, progress, patient=checkpoint is not None) as how:
+    with run(
+        threads, progress, patient=checkpoint is not None, device=device, max_gpu_memory=max_gpu_memory
+    ) as how:
         parts, report = _core.enhance(cloud, words, given, natural("seed", seed), how)
     return Cloud._of(parts), Report._of(report)
 
@@ -152,6 +159,8 @@ def refine(
     checkpoint_every: int = 0,
     resume: bool = False,
     seed: int = 0,
+    device: DeviceLike = "cpu",
+    max_gpu_memory: int | str | None = None,
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> tuple[Cloud, Report]:

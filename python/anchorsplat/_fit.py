@@ -9,7 +9,7 @@ from ._cameras import Color
 from ._cloud import Cloud, RenderMode
 from ._files import PathLike
 from ._report import Report
-from ._run import ProgressLike, run
+from ._run import DeviceLike, ProgressLike, run
 from ._words import natural, path_bytes, words_of
 
 
@@ -61,6 +61,8 @@ def fit(
     rate_sh0: float = 0.0025,
     rate_sh_rest: float = 0.000125,
     seed: int = 0,
+    device: DeviceLike = "cpu",
+    max_gpu_memory: int | str | None = None,
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> tuple[Cloud, Report]:
@@ -93,6 +95,8 @@ def fit(
     min_opacity, noise_lr: of mcmc.
     opacity_reg, scale_reg: weights of the mean opacity and the mean size in the loss.
     rate_means, rate_means_decay, rate_scales, rate_quats, rate_opacities, rate_sh0, rate_sh_rest: learning rates.
+    device: what rasterizes: "cpu"; "gpu"; "auto", a real GPU where there is one, else the CPU; or the number of an adapter.
+        max_gpu_memory: of a GPU's memory at most, bytes or "4G"; otherwise 2 GiB (docs/gpu.md).
 
     Raises NotFoundError, IoError, BadFileError; BadArgumentError: keywords out of range, at odds or without effect.
     """
@@ -103,6 +107,8 @@ def fit(
         words.append(b"--init-splat=splat in memory")
     elif init_splat is not None:
         words.append(b"--init-splat=" + path_bytes(init_splat))
-    with run(threads, progress, patient=checkpoint is not None) as how:
+    with run(
+        threads, progress, patient=checkpoint is not None, device=device, max_gpu_memory=max_gpu_memory
+    ) as how:
         parts, report = _core.fit(path_bytes(project), words, start, natural("seed", seed), how)
     return Cloud._of(parts), Report._of(report)

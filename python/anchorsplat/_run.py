@@ -1,4 +1,4 @@
-"""How calls of the engine are run: threads, progress, messages."""
+"""How calls of the engine are run: threads, device, progress, messages."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple, Union
+from typing import Any, Literal, NamedTuple, Union
 
 from . import _core
 from ._errors import SplatWarning
-from ._words import whole_number
+from ._gpu import tell_library
+from ._words import option_words, whole_number
 
 LOGGER = logging.getLogger("anchorsplat")
 _HERE = os.path.dirname(__file__) + os.sep
@@ -31,6 +32,10 @@ class Progress(NamedTuple):
 #: ``True``: a bar by tqdm; a class such as ``tqdm.tqdm``, of which each task gets one, or one bar for all of them; a function
 #: that is called with a :class:`Progress`; ``None``, ``False``: nothing.
 ProgressLike = Union[None, bool, Callable[[Progress], object], Any]
+
+#: What rasterizes (docs/gpu.md): "cpu"; "gpu", the first that can be used; "auto", a real GPU where there is one, else the CPU; or
+#: the number of an adapter, as ``anchorsplat doctor`` lists them.
+DeviceLike = Union[Literal["cpu", "gpu", "auto"], int]
 
 
 def warn(sentence: str) -> None:
@@ -89,9 +94,21 @@ def shower(progress: ProgressLike) -> Callable[[Progress], object] | None:
 
 
 @contextlib.contextmanager
-def run(threads: int = 0, progress: ProgressLike = None, *, patient: bool = False) -> Iterator[_core.RunArguments]:
+def run(
+    threads: int = 0,
+    progress: ProgressLike = None,
+    *,
+    patient: bool = False,
+    device: DeviceLike = "cpu",
+    max_gpu_memory: int | str | None = None,
+) -> Iterator[_core.RunArguments]:
     """The arguments of one call of the engine. Messages go to the logger "anchorsplat", warnings to ``warnings``."""
     show = shower(progress)
+    words = option_words("device", device)
+    if max_gpu_memory is not None:
+        words += option_words("max_gpu_memory", max_gpu_memory)
+    if device != "cpu":
+        tell_library()
 
     def tell(events: list[tuple[Any, ...]]) -> None:
         for event in events:
@@ -104,7 +121,7 @@ def run(threads: int = 0, progress: ProgressLike = None, *, patient: bool = Fals
                 warn(event[1])
 
     try:
-        yield _core.RunArguments(whole_number("threads", threads), tell, patient)
+        yield _core.RunArguments(whole_number("threads", threads), tell, patient, words)
     finally:
         if isinstance(show, _Bars):
             show.close()

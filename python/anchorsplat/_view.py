@@ -9,7 +9,7 @@ from . import _core
 from ._cameras import CamerasLike, Color, camera_words
 from ._cloud import Cloud, RenderMode
 from ._files import PathLike
-from ._run import ProgressLike, run
+from ._run import DeviceLike, ProgressLike, run
 from ._words import path_bytes, words_of
 
 
@@ -57,6 +57,8 @@ def view(
     background: Color | None = None,
     title: str | None = None,
     open_your_own: str | None = None,
+    device: DeviceLike = "cpu",
+    max_gpu_memory: int | str | None = None,
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> Page:
@@ -71,10 +73,12 @@ def view(
     background: r, g, b from 0 to 1; otherwise what the camera file says, else black.
     title: heading of the page.
     open_your_own: address of the hosted page (docs/web.md) that a button of this one opens, for readers with a splat.
+    device: what rasterizes: "cpu"; "gpu"; "auto", a real GPU where there is one, else the CPU; or the number of an adapter.
+        max_gpu_memory: of a GPU's memory at most, bytes or "4G"; otherwise 2 GiB (docs/gpu.md).
 
     Raises BadArgumentError: nothing to show, a page above 300 MB; NotFoundError, BadFileError: true pictures.
     """
     words = words_of(view, locals(), besides=("cameras",))
     given = camera_words(cameras, words)
-    with run(threads, progress) as how:
+    with run(threads, progress, device=device, max_gpu_memory=max_gpu_memory) as how:
         return Page(_core.view(after, before, words, given, title or "splat", how))

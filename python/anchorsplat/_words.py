@@ -10,7 +10,7 @@ from typing import Any, Callable
 from ._errors import BadArgumentError
 
 #: Keywords of every function that no word stands for.
-NO_WORDS = ("threads", "seed", "progress", "overwrite")
+NO_WORDS = ("threads", "device", "max_gpu_memory", "seed", "progress", "overwrite")
 
 
 def path_bytes(path: str | os.PathLike[str]) -> bytes:
@@ -50,6 +50,15 @@ def text_of(name: str, value: Any) -> str | bytes:
     return str(value)
 
 
+def option_words(name: str, value: Any) -> list[bytes]:
+    """A keyword with a value as ``--name=value``. Raises BadArgumentError for a NUL."""
+    option = os.fsencode("--" + name.replace("_", "-"))
+    text = os.fsencode(text_of(name, value))
+    if b"\0" in text:
+        raise BadArgumentError(f"{name}: there is a NUL in {value!r}")
+    return [option + b"=" + text] if text else [option, text]
+
+
 def words_of(function: Callable[..., Any], given: Mapping[str, Any], *, besides: Collection[str] = ()) -> list[bytes]:
     """``--name=value`` for every keyword of `function` in `given` that differs from its default."""
     words = []
@@ -59,14 +68,10 @@ def words_of(function: Callable[..., Any], given: Mapping[str, Any], *, besides:
         value = given[name]
         if value is None or value is default or (isinstance(value, type(default)) and value == default):
             continue
-        option = os.fsencode("--" + name.replace("_", "-"))
         if default is False:
             if value is not True:
                 raise BadArgumentError(f"{name}: must be True or False, found {value!r}")
-            words.append(option)
+            words.append(os.fsencode("--" + name.replace("_", "-")))
         else:
-            text = os.fsencode(text_of(name, value))
-            if b"\0" in text:
-                raise BadArgumentError(f"{name}: there is a NUL in {value!r}")
-            words += [option + b"=" + text] if text else [option, text]
+            words += option_words(name, value)
     return words

@@ -14,6 +14,7 @@
 #include "metrics/image_metrics.h"
 #include "metrics/side_by_side.h"
 #include "request/compare_flags.h"
+#include "request/device_flags.h"
 #include "request/words.h"
 #include "run.h"
 
@@ -107,6 +108,7 @@ std::string Compare(nb::handle a, nb::handle b, nb::handle truth, const std::vec
   OrThrow(ParseWords(verb, WordsOf(words)));
   flags.given = GivenOptions(verb);
   return ResultOf(run, [&]() -> Result<std::string> {
+    const DeviceUse device;
     for (const Side* side : {&side_a, &side_b, &side_truth}) {
       if (side->cloud) ANCHORSPLAT_RETURN_IF_ERROR(Validate(side->cloud->view()));
     }
@@ -117,8 +119,8 @@ std::string Compare(nb::handle a, nb::handle b, nb::handle truth, const std::vec
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto results,
                                  CompareToReference(sources, sides.truth ? *sides.truth : *sides.b,
                                                     {.lpips = nullptr, .color_correct = flags.color_correct}));
-    const nlohmann::json json =
-        sides.truth ? nlohmann::json{{"a", ToJson(results[0])}, {"b", ToJson(results[1])}} : ToJson(results[0]);
+    nlohmann::json json = ToJson(results);
+    json["device"] = device.ToJson();
     return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   });
 }

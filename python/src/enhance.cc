@@ -16,6 +16,7 @@
 #include "fit/checkpoint_guard.h"
 #include "fit/fitter.h"
 #include "model/model_method.h"
+#include "request/device_flags.h"
 #include "request/enhance_flags.h"
 #include "request/words.h"
 #include "run.h"
@@ -58,8 +59,16 @@ nb::tuple EnhanceCloud(nb::handle cloud, const nb::list& words, const CameraSet*
                        const RunArguments& run) {
   const Columns columns(cloud);
   const EnhanceFlags flags = FlagsOf(words);
-  Enhanced enhanced = ResultOf(run, [&] { return EnhanceView(columns.view(), flags, cameras, seed); });
-  const std::string report = ToJson(enhanced.report).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  nlohmann::json used;
+  Enhanced enhanced = ResultOf(run, [&]() -> Result<Enhanced> {
+    const DeviceUse device;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced made, EnhanceView(columns.view(), flags, cameras, seed));
+    used = device.ToJson();
+    return made;
+  });
+  nlohmann::json json = ToJson(enhanced.report);
+  json["device"] = used;
+  const std::string report = json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
   return nb::make_tuple(ToPython(std::move(enhanced.cloud)), report);
 }
 

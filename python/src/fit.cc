@@ -14,6 +14,7 @@
 #include "core/text.h"
 #include "fit/checkpoint_guard.h"
 #include "fit/training_views.h"
+#include "request/device_flags.h"
 #include "request/fit_flags.h"
 #include "request/words.h"
 #include "run.h"
@@ -28,6 +29,7 @@ struct Outcome {
 };
 
 Result<Outcome> FitTo(const std::string& project, const FitFlags& flags, const GaussianCloud* start, uint64_t seed) {
+  const DeviceUse device;
   FitControl control;
   control.checkpoint = flags.checkpoint;
   control.checkpoint_every = flags.checkpoint_every;
@@ -51,6 +53,7 @@ Result<Outcome> FitTo(const std::string& project, const FitFlags& flags, const G
   if (fitted.report.interrupted) return Error{ErrorCode::kInterrupted, "stopped"};
   nlohmann::json json = ToJson(options, chosen.origin, first.shell, fitted.report);
   json["project"] = project;
+  json["device"] = device.ToJson();
   return Outcome{std::move(fitted.cloud), json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)};
 }
 

@@ -16,9 +16,13 @@
 #include <thread>
 #include <variant>
 
+#include "bindings.h"
 #include "core/log.h"
 #include "core/run_context.h"
+#include "gpu/open_gpu.h"
 #include "io/input_record.h"
+#include "request/device_flags.h"
+#include "request/words.h"
 
 namespace anchorsplat::python {
 
@@ -199,9 +203,17 @@ void RunEngine(const RunArguments& run, const std::function<Status()>& work) {
   Status status;
   std::thread worker([&] {
     {
-      const RunScope scope({.threads = run.threads, .sink = queue, .stop = &stop, .abandon = &abandon});
+      const RunScope scope({.threads = run.threads,
+                            .sink = queue,
+                            .stop = &stop,
+                            .abandon = &abandon,
+                            .device = run.device,
+                            .max_gpu_memory = run.max_gpu_memory});
       const InputRecord record;
-      status = WithoutExceptions(work);
+      status = WithoutExceptions([&]() -> Status {
+        if (const auto gpu = GpuOfRun(); !gpu.ok()) return gpu.error();  // before the work
+        return work();
+      });
     }
     const std::lock_guard lock(mutex);
     done = true;
@@ -244,14 +256,20 @@ void BindRun(nb::module_& module) {
   nb::class_<RunArguments>(module, "RunArguments")
       .def(
           "__init__",
-          [](RunArguments* self, int threads, nb::object tell, bool patient) {
+          [](RunArguments* self, int threads, nb::object tell, bool patient, const nb::list& words) {
             if (threads < 0 || threads > 1024) {
               throw EngineError(
                   {ErrorCode::kBadArgument, "--threads: must be 0 to 1024, found " + std::to_string(threads)});
             }
-            new (self) RunArguments{threads, std::move(tell), patient};
+            DeviceFlags flags;
+            CLI::App verb;
+            flags.AddTo(verb);
+            OrThrow(ParseWords(verb, WordsOf(words)));
+            new (self) RunArguments{threads, std::move(tell), patient, flags.device, flags.max_gpu_memory};
           },
-          nb::arg("threads"), nb::arg("tell").none(), nb::arg("patient") = false);
+          nb::arg("threads"), nb::arg("tell").none(), nb::arg("patient"), nb::arg("device_words"));
+  module.def(
+      "set_gpu_folder", [](const nb::bytes& path) { SetGpuLibraryHint(PathOf(path)); }, nb::arg("path"));
   nb::register_exception_translator(Raise);
   nb::module_::import_("atexit").attr("register")(nb::cpp_function(&EndCalls));
   ::pthread_atfork(nullptr, nullptr, BeginAfterFork);

@@ -2,12 +2,14 @@
 
 #include <nanobind/nanobind.h>
 
+#include <cstdint>
 #include <exception>
 #include <functional>
 #include <optional>
 #include <type_traits>
 #include <utility>
 
+#include "core/device_choice.h"
 #include "core/result.h"
 
 namespace anchorsplat::python {
@@ -22,6 +24,8 @@ struct RunArguments {
   // The call can end in order with something kept (a checkpoint): the first Ctrl-C asks for that, the second one ends
   // it. Otherwise the first one does.
   bool patient = false;
+  DeviceChoice device;
+  uint64_t max_gpu_memory = 0;  // bytes; 0: the default
 };
 
 // An Error on its way to Python, where it is one of anchorsplat._errors.

@@ -236,6 +236,40 @@ def test_numbers_that_are_none_are_said(cloud):
         anchorsplat.Cameras.orbit(cloud, 2.5)
 
 
+def test_the_device_is_checked_before_the_work_and_named_in_reports(cloud):
+    views = {"orbit": 1, "size": (16, 16)}
+    for word in ("tpu", -1, 1.5, ""):
+        with pytest.raises(anchorsplat.BadArgumentError, match="device"):
+            anchorsplat.render(cloud, **views, device=word)
+    with pytest.raises(anchorsplat.NotFoundError):
+        anchorsplat.render(cloud, **views, device=1000)
+    with pytest.raises(anchorsplat.BadArgumentError, match="max-gpu-memory"):
+        anchorsplat.render(cloud, **views, max_gpu_memory="much")
+    alone = anchorsplat.render(cloud, **views)
+    assert np.array_equal(anchorsplat.render(cloud, **views, device="cpu", max_gpu_memory=10**9), alone)
+    report = anchorsplat.compare(cloud, cloud, **views)
+    assert report["device"] == {"name": "cpu"} and set(report) == {"mean", "views", "device"}
+    _, report = anchorsplat.enhance(cloud, method="filter", pixel_size=0.005, device="auto")
+    assert report["device"]["name"] == "cpu" or report["device"]["type"] != "cpu"
+
+
+def test_without_a_library_there_is_no_gpu(python):
+    """A process of its own: the library is looked for once."""
+    done = python(
+        "import os\n"
+        "os.environ['ANCHORSPLAT_WEBGPU'] = '/none.so'\n"
+        "import numpy as np, anchorsplat\n"
+        "one = np.zeros((1, 3), np.float32)\n"
+        "cloud = anchorsplat.Cloud(one, one - 2, np.ones((1, 4), np.float32), one[:, 0], one[:, None])\n"
+        "try:\n"
+        "    anchorsplat.render(cloud, orbit=1, size=(16, 16), device='gpu')\n"
+        "except anchorsplat.NotFoundError as error:\n"
+        "    print(error)\n"
+        "anchorsplat.render(cloud, orbit=1, size=(16, 16), device='auto')\n"
+    )
+    assert done.returncode == 0 and "/none.so" in done.stdout and done.stderr == ""
+
+
 def test_more_threads_than_the_machine_has_are_no_message(python):
     done = python(
         "import numpy as np, anchorsplat\n"

@@ -64,7 +64,7 @@ FUNCTIONS = {
     "info": ("info", None, {"from": "format"}, {"overwrite": "nothing is written", "seed": "nothing is random"}),
     "refine": (
         "enhance",
-        ("Refinement", "Shared flags", "Options"),
+        ("Refinement", "Shared flags", "Options", "Device"),
         {},
         {
             "view": "anchorsplat.view",

@@ -5,6 +5,7 @@
 
 #include "core/log.h"
 #include "core/text.h"
+#include "gpu/open_gpu.h"
 
 namespace anchorsplat {
 
@@ -140,9 +141,19 @@ Picture ToPicture(const Image& image) {
   return {image.width, image.height, image.channels, {image.pixels.begin(), image.pixels.end()}};
 }
 
-RunContext ToContext(const RunSettings& run) {
-  return {
-      .threads = run.threads, .sink = std::make_shared<CallbackSink>(run), .stop = run.stop, .abandon = run.abandon};
+Result<RunContext> ToContext(const RunSettings& run) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const DeviceChoice device, ParseDeviceChoice(run.device));
+  return RunContext{.threads = run.threads,
+                    .sink = std::make_shared<CallbackSink>(run),
+                    .stop = run.stop,
+                    .abandon = run.abandon,
+                    .device = device,
+                    .max_gpu_memory = run.max_gpu_memory};
+}
+
+Status OpenDevice() {
+  const auto gpu = GpuOfRun();
+  return gpu.ok() ? Status() : gpu.error();
 }
 
 const char* LibraryVersion() { return ANCHORSPLAT_VERSION; }

@@ -43,12 +43,18 @@ PinholeCamera ToPinhole(const Camera& camera);
 // kBadArgument: not as many values as the shape says.
 Result<Image> ToImage(const Picture& picture);
 Picture ToPicture(const Image& image);
-RunContext ToContext(const RunSettings& run);
+// kBadArgument: RunSettings::device.
+Result<RunContext> ToContext(const RunSettings& run);
+// Opens what RunSettings::device asks for. kNotFound: it cannot be.
+Status OpenDevice();
 
 // What a call of ours comes to, as the caller of the library gets it: in a run of its own, and without exceptions.
 template <typename T, typename Call>
 Expected<T> InRun(const RunSettings& run, Call&& call) try {
-  const RunScope scope(ToContext(run));
+  auto context = ToContext(run);
+  if (!context.ok()) return ToFailure(context.error());
+  const RunScope scope(*std::move(context));
+  if (const Status device = OpenDevice(); !device.ok()) return ToFailure(device.error());
   const InputRecord record;  // nothing that the call reads is overwritten by it
   auto result = call();
   if (!result.ok()) return ToFailure(result.error());

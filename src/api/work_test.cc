@@ -353,6 +353,24 @@ TEST(RunSettings, TwoLongCallsSideBySide) {
   EXPECT_TRUE(SameBits(whole.splat, alone->splat));  // neither threads nor neighbours change a bit
 }
 
+TEST(RunSettings, TheDeviceIsThereBeforeTheWorkBegins) {
+  const Splat splat = SmallSplat(50, 0, 1);
+  const auto cameras = OrbitAround(splat, 1, 16, 16);
+  ASSERT_TRUE(cameras.ok());
+  const auto rendered = [&](const std::string& device) {
+    return RenderViews(splat, *cameras, {}, {.device = device, .max_gpu_memory = 500'000'000});
+  };
+  const auto wrong = rendered("tpu");
+  ASSERT_FALSE(wrong.ok());
+  EXPECT_EQ(wrong.failure().kind, FailureKind::kBadArgument);
+  EXPECT_THAT(wrong.failure().message, testing::HasSubstr("'tpu' is not cpu, gpu, auto or the number"));
+  const auto none = rendered("1000");
+  ASSERT_FALSE(none.ok());
+  EXPECT_EQ(none.failure().kind, FailureKind::kNotFound);
+  EXPECT_TRUE(rendered("cpu").ok());
+  EXPECT_TRUE(rendered("auto").ok());
+}
+
 TEST(RunSettings, AnAbandonedCallHasNoResult) {
   const std::atomic<bool> abandon{true};
   const auto splat = ReadSplat(Biplane());

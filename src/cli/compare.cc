@@ -135,6 +135,7 @@ Status WriteSideBySide(const CompareWords& flags, Sides& sides, const std::vecto
 }
 
 Status RunCompare(const CompareWords& flags, const SharedFlags& shared) {
+  const DeviceUse device;
   if (!flags.side_by_side.empty()) {
     if (!IsPngName(flags.side_by_side)) {
       return Error{ErrorCode::kBadArgument,
@@ -155,8 +156,9 @@ Status RunCompare(const CompareWords& flags, const SharedFlags& shared) {
     ANCHORSPLAT_RETURN_IF_ERROR(WriteSideBySide(flags, sides, results, shared));
   }
   if (shared.json) {
-    // Without --truth the document is the comparison itself.
-    PrintJson(sides.truth ? nlohmann::json{{"a", ToJson(results[0])}, {"b", ToJson(results[1])}} : ToJson(results[0]));
+    nlohmann::json json = ToJson(results);
+    json["device"] = device.ToJson();
+    PrintJson(json);
   } else {
     PrintTable(flags, results);
   }
@@ -181,6 +183,7 @@ void AddCompare(CLI::App& app, Program& program) {
       ->check(NotEmpty());
   AddLpipsFlags(verb, flags->lpips, flags->lpips_weights);
   flags->how.AddTo(verb);
+  program.device.AddTo(verb);
   verb.callback([flags, &verb, &program] {
     flags->how.given = GivenOptions(verb);
     program.run = [flags, &program] { return RunCompare(*flags, program.flags); };

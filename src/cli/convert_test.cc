@@ -3,6 +3,7 @@
 #include "cli/small_scan_for_test.h"
 #include "core/text.h"
 #include "io/folder_for_test.h"
+#include "request/parse.h"
 
 namespace anchorsplat {
 namespace {

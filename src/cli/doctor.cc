@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "cli/gpu_report.h"
 #include "cli/verb.h"
 #include "core/companion.h"
 #include "core/file_system.h"
@@ -38,7 +39,7 @@ constexpr const char* kBroken = "broken";    // is there and does not work
 struct Finding {
   std::string name;
   const char* state = kReady;
-  std::string text;
+  std::string text;     // more lines where there is more to say
   std::string command;  // gets what is missing; else empty
 };
 
@@ -152,10 +153,18 @@ Finding FindLpipsWeights() {
   return {"LPIPS weights", kReady, Cat(found, " in ", folder.string()), ""};
 }
 
+Finding FindGpu(const GpuFindings& gpus) {
+  std::string text;
+  for (const std::string& line : LinesOf(gpus)) text += (text.empty() ? "" : "\n") + line;
+  return {"GPU", gpus.ready() ? kReady : kMissing, text, CommandFor(gpus)};
+}
+
 void PrintReport(const Machine& machine, const std::vector<Finding>& findings) {
+  constexpr size_t kColumn = 15;
   const auto line = [](const std::string& name, const std::string& text) {
-    constexpr size_t kColumn = 15;
-    std::cout << name << std::string(name.size() < kColumn ? kColumn - name.size() : 1, ' ') << text << "\n";
+    std::cout << name << std::string(name.size() < kColumn ? kColumn - name.size() : 1, ' ');
+    for (const char c : text) std::cout << c << (c == '\n' ? std::string(kColumn, ' ') : "");
+    std::cout << "\n";
   };
   line("anchorsplat", Cat(ANCHORSPLAT_VERSION, ", ", BuildKind()));
   line("processor", machine.processor);
@@ -174,7 +183,7 @@ void PrintReport(const Machine& machine, const std::vector<Finding>& findings) {
   }
 }
 
-void PrintReportAsJson(const Machine& machine, const std::vector<Finding>& findings) {
+void PrintReportAsJson(const Machine& machine, const std::vector<Finding>& findings, const GpuFindings& gpus) {
   nlohmann::json parts = nlohmann::json::object();
   for (const Finding& finding : findings) {
     nlohmann::json& part = parts[finding.name] = {{"state", finding.state}, {"text", finding.text}};
@@ -190,6 +199,7 @@ void PrintReportAsJson(const Machine& machine, const std::vector<Finding>& findi
              {"memory_bytes", machine.memory},
              {"memory_available_bytes", machine.available},
              {"memory_limit_bytes", machine.limit ? nlohmann::json(*machine.limit) : nlohmann::json()},
+             {"gpu", ToJson(gpus)},
              {"parts", parts}});
 }
 
@@ -202,11 +212,13 @@ void AddDoctor(CLI::App& app, Program& program) {
   verb.callback([&program] {
     program.run = [&program]() -> Status {
       const Machine machine = LookAtMachine();
-      const std::vector<Finding> findings = {FindModel(), FindTraining(), FindLpips(), FindLpipsWeights()};
+      const GpuFindings gpus = LookForGpus();
+      const std::vector<Finding> findings = {FindModel(), FindTraining(), FindLpips(), FindLpipsWeights(),
+                                             FindGpu(gpus)};
       for (const Finding& finding : findings) {
         if (finding.state == std::string(kBroken)) program.exit_code = kPartialExitCode;
       }
-      program.flags.json ? PrintReportAsJson(machine, findings) : PrintReport(machine, findings);
+      program.flags.json ? PrintReportAsJson(machine, findings, gpus) : PrintReport(machine, findings);
       return {};
     };
   });

@@ -35,12 +35,13 @@ TEST(DoctorVerb, EveryPartHasAState) {
   EXPECT_EQ(json["threads"], 1);
   EXPECT_GT(json["memory_bytes"], 0);
   EXPECT_FALSE(json["simd"].get<std::string>().empty());
-  ASSERT_EQ(json["parts"].size(), 4u);
+  ASSERT_EQ(json["parts"].size(), 5u);
   for (const auto& [name, part] : json["parts"].items()) {
     EXPECT_EQ(part["state"] == "ready", !part.contains("command")) << name;
   }
   EXPECT_EQ(json["parts"]["model"]["state"], "ready");
   EXPECT_EQ(json["parts"]["LPIPS weights"]["state"], "missing");
+  EXPECT_EQ(json["parts"]["GPU"]["state"] == "missing", json["gpu"]["adapters"].empty());
   const ProgramRun run = ExpectDone({"doctor"});
   EXPECT_THAT(run.out, AllOf(HasSubstr("anchorsplat    "), HasSubstr("processor"), HasSubstr("SIMD"),
                              HasSubstr("in the program, 4 Gaussians for one"), HasSubstr("fetch-lpips.sh")));

@@ -202,6 +202,7 @@ Error WithWayOn(Error error, const fs::path& checkpoint) {
 // `said`: what will come out.
 Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& shared, EnhanceOptions options,
                                   const std::string& input, const fs::path& output, bool said) {
+  const DeviceUse device;
   const MemoryLimit limit(flags.size.arrays(), output.parent_path());
   std::optional<StopSignal> stop_signal(std::in_place, StopSignal::Leaves::kNothing);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(input));
@@ -263,6 +264,7 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   nlohmann::json json = ToJson(r);
   json["input"] = input;
   json["output"] = output.string();
+  json["device"] = device.ToJson();
   if (flags.view) json["view"] = PagePath(output).string();
   if (!shared.json && !shared.quiet) {
     ResultsBeside(flags.memory()) << OneLine(input) << " -> " << OutputName(output, flags.memory()) << "\n  "
@@ -362,6 +364,7 @@ void AddEnhance(CLI::App& app, Program& program) {
   verb.add_flag("--view", flags->view, "Also write an HTML page beside the output that shows before and after");
   flags->how.AddTo(verb);
   flags->size.AddTo(verb);
+  program.device.AddTo(verb);
   verb.callback([flags, &verb, &program] {
     flags->how.options.given = GivenOptions(verb);
     program.run = [flags, &program] { return RunEnhance(*flags, program); };

@@ -66,6 +66,7 @@ Result<double> ChooseStrength(const std::vector<MethodSummary>& summaries) {
 }
 
 Status RunEval(const EvalFlags& flags, Program& program) {
+  const DeviceUse device;
   const SharedFlags& shared = program.flags;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<EvalMethod> methods, MakeMethods(flags));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Lpips> lpips, OpenLpips(flags.lpips, flags.lpips_weights));
@@ -106,6 +107,7 @@ Status RunEval(const EvalFlags& flags, Program& program) {
     chosen = Cat("\nBest f for all objects alike: ", Fixed(f, 3), "   (--filter-f ", Fixed(f, 3), ")\n");
   }
   if (shared.json) {
+    json["device"] = device.ToJson();
     PrintJson(json);
   } else {
     std::cout << ToMarkdown(evaluation, summaries, title, shared.seed) << chosen;
@@ -163,6 +165,7 @@ void AddEval(CLI::App& app, Program& program) {
                 "Measure nothing: print the objects and methods as JSON (`anchorsplat batch eval` runs them on many "
                 "machines)");
   AddLpipsFlags(verb, flags->lpips, flags->lpips_weights);
+  program.device.AddTo(verb);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunEval(*flags, program); }; });
 }
 

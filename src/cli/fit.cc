@@ -114,6 +114,7 @@ Error Interrupted(const FitWords& flags, const FitReport& report, int64_t steps,
 }
 
 Status RunProject(const FitWords& flags, const SharedFlags& shared) {
+  const DeviceUse device;
   FitControl control;
   control.checkpoint = flags.how.checkpoint;
   // Beside standard output there is nothing.
@@ -143,6 +144,7 @@ Status RunProject(const FitWords& flags, const SharedFlags& shared) {
     nlohmann::json json = ToJson(options, start.origin, first.shell, fitted->report);
     json["project"] = flags.project;
     json["output"] = flags.output;
+    json["device"] = device.ToJson();
     PrintJson(json);
   } else if (!shared.quiet) {
     PrintReport(flags, fitted->report);
@@ -184,6 +186,7 @@ void AddFit(CLI::App& app, Program& program) {
                   "Also write a checkpoint as gsplat's trainer does (.pt)")
       ->check(NotEmpty());
   flags->how.AddTo(verb);
+  program.device.AddTo(verb);
   verb.callback([flags, &verb, &program] {
     flags->how.given = GivenOptions(verb);
     program.run = [flags, &program] { return RunFit(*flags, program.flags); };

@@ -3,17 +3,15 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
-#include <cmath>
 #include <iostream>
-#include <string_view>
 #include <system_error>
 
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/memory_limit.h"
-#include "core/number_text.h"
 #include "core/text.h"
+#include "request/choice.h"
+#include "request/parse.h"
 
 namespace anchorsplat {
 
@@ -34,13 +32,7 @@ void SizeFlags::AddTo(CLI::App& verb) {
   verb.add_option("--max-memory", max_memory,
                   "Memory to work in, as 2G or 500M; what needs more lies in temporary files beside the output "
                   "(default: a quarter of the machine's)")
-      ->transform(CLI::Validator(
-          [](std::string& text) {
-            const Result<uint64_t> bytes = ParseMemory(text);
-            if (bytes.ok()) text = std::to_string(*bytes);
-            return bytes.ok() ? std::string() : bytes.error().message;
-          },
-          "SIZE"))
+      ->transform(MemorySize())
       ->group(group);
   verb.add_flag("--yes", yes, "Do not ask before files of more than 4 GB, or more than the disk has room for")
       ->group(group);
@@ -57,29 +49,6 @@ std::optional<uint64_t> RoomFor(const fs::path& output) {
   while (!Exists(folder) && folder.has_relative_path()) folder = folder.parent_path();
   const fs::space_info space = fs::space(folder, failed);
   return failed || space.capacity == 0 ? std::nullopt : std::optional(static_cast<uint64_t>(space.available));
-}
-
-Result<uint64_t> ParseMemory(const std::string& text) {
-  const Error bad{ErrorCode::kBadArgument, Cat("'", Printable(text), "' is no size; expected one as 2G, 500M or 0.5G")};
-  double number = 0;
-  const char* const last = text.data() + text.size();
-  const auto [end, code] = FromChars(text.data(), last, number);
-  if (code != std::errc() || !std::isfinite(number)) return bad;
-  std::string unit(end, last);
-  std::ranges::transform(unit, unit.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  unit.erase(0, unit.find_first_not_of(' '));
-  const bool binary = unit.size() == 3 && unit.ends_with("ib");
-  if (unit.ends_with('b')) unit.resize(unit.size() - (binary ? 2 : 1));
-  constexpr std::string_view kUnits = "kmgt";
-  const size_t power = unit.empty() ? 0 : kUnits.find(unit) + 1;
-  if (unit.size() > 1 || (power == 0 && !unit.empty())) return bad;
-  const double bytes = number * std::pow(binary ? 1024.0 : 1000.0, static_cast<double>(power));
-  if (!(bytes >= static_cast<double>(kLeastMemory))) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat(Printable(text), " is less than the ", HumanBytes(kLeastMemory), " that work needs at least")};
-  }
-  if (!(bytes < 1e18)) return bad;
-  return static_cast<uint64_t>(bytes);
 }
 
 namespace {

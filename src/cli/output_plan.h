@@ -57,8 +57,4 @@ Status SayAndAsk(std::span<const OutputPlan> plans, const SizeFlags& flags, cons
 // does not say, nor where nothing can be stored at all (/proc), which writing says better.
 std::optional<uint64_t> RoomFor(const std::filesystem::path& output);
 
-// "2G", "500M", "0.5G", "1GiB" or bytes as a number. kBadArgument: none, or less than kLeastMemory.
-Result<uint64_t> ParseMemory(const std::string& text);
-inline constexpr uint64_t kLeastMemory = 64'000'000;
-
 }  // namespace anchorsplat

@@ -76,6 +76,7 @@ Result<std::vector<fs::path>> OutputPaths(const std::string& output, const Camer
 }
 
 Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
+  const DeviceUse device;
   std::optional<StandardOutput> piped;
   if (IsStandardOutput(flags.output)) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(piped, StandardOutput::Open(".png", shared));
@@ -116,7 +117,11 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
             empty_views > 1 ? Cat(" (", empty_views - 1, " more of ", paths.size(), " views are as empty)") : ""));
   }
   if (shared.json) {
-    PrintJson({{"input", flags.input}, {"gaussians", cloud.size()}, {"render_seconds", seconds}, {"views", views}});
+    PrintJson({{"input", flags.input},
+               {"gaussians", cloud.size()},
+               {"render_seconds", seconds},
+               {"device", device.ToJson()},
+               {"views", views}});
   } else if (!shared.quiet) {
     ResultsBeside(write.memory) << "rendered " << paths.size() << (paths.size() == 1 ? " view of " : " views of ")
                                 << WithThousands(cloud.size()) << " Gaussians in " << HumanSeconds(seconds)
@@ -140,6 +145,7 @@ void AddRender(CLI::App& app, Program& program) {
   flags->views.AddTo(verb);
   verb.add_flag("--transparent", flags->transparent, "Write an alpha channel instead of a background")
       ->excludes("--background");
+  program.device.AddTo(verb);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunRender(*flags, program.flags); }; });
 }
 

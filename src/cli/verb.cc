@@ -16,6 +16,7 @@
 #include "core/parallel.h"
 #include "core/run_context.h"
 #include "core/text.h"
+#include "gpu/open_gpu.h"
 #include "io/input_record.h"
 #include "request/choice.h"
 
@@ -107,9 +108,12 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
   const SharedFlags& flags = program.flags;
   SetLogSink(flags.json_progress ? MakeJsonSink(flags.quiet) : MakeTerminalSink(flags.quiet));
   SetThreadCount(flags.threads);
-  const RunScope run({});  // what is put down here is known in the runs that verbs begin to be stopped (stop_signal.h)
+  // What is put down here is known in the runs that verbs begin to be stopped (stop_signal.h).
+  const RunScope run({.device = program.device.device, .max_gpu_memory = program.device.max_gpu_memory});
   const InputRecord record;  // nothing that the verb reads is overwritten by it
   try {
+    // Before hours of work: nobody who asked for a GPU is content with the CPU.
+    if (const auto gpu = GpuOfRun(); !gpu.ok()) return Fail(flags, gpu.error());
     const Status status = program.run();
     if (!status.ok()) return Fail(flags, status.error());
     std::cout.flush();

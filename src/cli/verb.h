@@ -10,6 +10,7 @@
 #include "cli/exit_codes.h"
 #include "core/result.h"
 #include "io/write_options.h"
+#include "request/device_flags.h"
 #include "train/train_request.h"
 
 namespace anchorsplat {
@@ -30,6 +31,7 @@ using Trainer = Result<TrainReport> (*)(const TrainRequest&);
 // What the command line asked for; main runs it once parsing is over.
 struct Program {
   SharedFlags flags;
+  DeviceFlags device;  // of verbs that rasterize, which declare them; the CPU for all others
   std::function<Status()> run;
   // Of a run that succeeds: set to kPartialExitCode by verbs that go on when one of many inputs fails.
   int exit_code = 0;

@@ -81,6 +81,7 @@ bool IsPageName(const fs::path& path) {
 }
 
 Status RunView(const PageWords& flags, const SharedFlags& shared) {
+  const DeviceUse device;
   std::optional<StandardOutput> piped;
   if (IsStandardOutput(flags.output)) {
     if (flags.folder) {
@@ -115,6 +116,7 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
     PrintJson({{"output", flags.output},
                {"bytes", bytes},
                {"views", page.views.size()},
+               {"device", device.ToJson()},
                {"pixel_size", page.pixel_size ? nlohmann::json(*page.pixel_size) : nlohmann::json()}});
   } else if (!shared.quiet) {
     ResultsBeside(page.memory)
@@ -139,6 +141,7 @@ void AddView(CLI::App& app, Program& program) {
                 "Put the splats' data into a folder beside the page, PAGE.data, from which it shows the largest "
                 "Gaussians first: for splats of any size");
   flags->how.AddTo(verb);
+  program.device.AddTo(verb);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunView(*flags, program.flags); }; });
 }
 

@@ -6,6 +6,8 @@
 #include <cstdlib>
 #include <limits>
 
+#include "request/parse.h"
+
 namespace anchorsplat {
 
 namespace {
@@ -44,6 +46,16 @@ CLI::Validator Whole(bool negative_too) {
 }
 
 }  // namespace
+
+CLI::Validator MemorySize() {
+  return CLI::Validator(
+      [](std::string& text) {
+        const Result<uint64_t> bytes = ParseMemory(text);
+        if (bytes.ok()) text = std::to_string(*bytes);
+        return bytes.ok() ? std::string() : bytes.error().message;
+      },
+      "SIZE");
+}
 
 void CheckNumbers(CLI::App& verb) {
   for (CLI::Option* option : verb.get_options([](const CLI::Option*) { return true; })) {

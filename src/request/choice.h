@@ -55,6 +55,9 @@ inline CLI::Validator Fraction() {
       "");
 }
 
+// For an amount of memory: turns "2G" into bytes (ParseMemory in request/parse.h).
+CLI::Validator MemorySize();
+
 // Gives every option of `verb` and of its subcommands that takes a number the check that the number is one: finite and
 // of a size that single precision holds where it is real, within 64 bits where it is whole. The library alone takes
 // "inf" and "nan", and the nearest number of 64 bits for what is beyond them. Done once for all verbs (verb.cc).

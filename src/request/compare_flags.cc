@@ -133,4 +133,9 @@ nlohmann::json ToJson(const Comparison& comparison) {
   return json;
 }
 
+nlohmann::json ToJson(const std::vector<Comparison>& comparisons) {
+  if (comparisons.size() == 1) return ToJson(comparisons[0]);
+  return {{"a", ToJson(comparisons[0])}, {"b", ToJson(comparisons[1])}};
+}
+
 }  // namespace anchorsplat

@@ -50,5 +50,7 @@ ViewScore MeanOf(const Comparison& comparison);
 
 // What was measured, as --json and Python say it: cc_psnr and the like as gsplat and nerfstudio call them.
 nlohmann::json ToJson(const Comparison& comparison);
+// Of one, or of two with the same truth, as "a" and "b".
+nlohmann::json ToJson(const std::vector<Comparison>& comparisons);
 
 }  // namespace anchorsplat

@@ -135,6 +135,29 @@ Result<std::optional<double>> ParsePixelSize(const std::string& option, const st
   return number;
 }
 
+Result<uint64_t> ParseMemory(const std::string& text) {
+  const Error bad{ErrorCode::kBadArgument, Cat("'", Printable(text), "' is no size; expected one as 2G, 500M or 0.5G")};
+  double number = 0;
+  const char* const last = text.data() + text.size();
+  const auto [end, code] = FromChars(text.data(), last, number);
+  if (code != std::errc() || !std::isfinite(number)) return bad;
+  std::string unit(end, last);
+  std::ranges::transform(unit, unit.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  unit.erase(0, unit.find_first_not_of(' '));
+  const bool binary = unit.size() == 3 && unit.ends_with("ib");
+  if (unit.ends_with('b')) unit.resize(unit.size() - (binary ? 2 : 1));
+  constexpr std::string_view kUnits = "kmgt";
+  const size_t power = unit.empty() ? 0 : kUnits.find(unit) + 1;
+  if (unit.size() > 1 || (power == 0 && !unit.empty())) return bad;
+  const double bytes = number * std::pow(binary ? 1024.0 : 1000.0, static_cast<double>(power));
+  if (!(bytes >= static_cast<double>(kLeastMemory))) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat(Printable(text), " is less than the ", HumanBytes(kLeastMemory), " that work needs at least")};
+  }
+  if (!(bytes < 1e18)) return bad;
+  return static_cast<uint64_t>(bytes);
+}
+
 Result<const SplatFormat*> ParseInputFormat(const std::string& option, const std::string& text) {
   const SplatFormat* const none = nullptr;
   if (text.empty()) return none;

@@ -29,6 +29,9 @@ Result<std::array<double, 3>> ParseDirection(const std::string& option, const st
 Result<const SplatFormat*> ParseInputFormat(const std::string& option, const std::string& text);
 inline constexpr const char* kInputFormatHelp =
     "Format of the input by its extension, for what neither content nor name tells: .splat from a pipe";
+// "2G", "500M", "0.5G", "1GiB" or bytes as a number. kBadArgument: none, or less than kLeastMemory.
+Result<uint64_t> ParseMemory(const std::string& text);
+inline constexpr uint64_t kLeastMemory = 64'000'000;  // bytes
 // A whole number of at least 1, or nothing for "auto".
 Result<std::optional<int64_t>> ParseCopies(const std::string& option, const std::string& text);
 // A positive number, or nothing for "auto".

@@ -134,6 +134,33 @@ cp "$work/eval/table.md" "$work/stdout"
 clean
 says stdout '\x1b[2J'
 
+# Devices. What was asked for is had or said; nothing is done on the CPU silently.
+without_library() { env ANCHORSPLAT_WEBGPU="$work/none.so" "$program" "$@"; }
+picture=(render "$scan" --orbit 1 --size 48x48 -w)
+expect 2 "a word that is no device" "$program" "${picture[@]}" -o "$work/cpu.png" --device tpu
+says stderr "'tpu' is not cpu, gpu, auto or the number of an adapter"
+expect 2 "less memory than work needs" "$program" "${picture[@]}" -o "$work/cpu.png" --max-gpu-memory 1M
+expect 3 "no library" without_library "${picture[@]}" -o "$work/gpu.png" --device gpu
+says stderr "none.so"
+expect 1 "nothing was drawn" test -e "$work/gpu.png"
+expect 3 "no library for a number" without_library "${picture[@]}" -o "$work/gpu.png" --device 0 --json
+says stdout '"not_found"'
+expect 0 "the CPU needs none" without_library "${picture[@]}" -o "$work/cpu.png" --device cpu
+expect 0 "auto does without" without_library "${picture[@]}" -o "$work/auto.png" --device auto --json
+says stdout '"name": "cpu"'
+silent stderr
+expect 0 "it is the CPU's picture" cmp "$work/cpu.png" "$work/auto.png"
+expect 0 "doctor without a library" without_library doctor
+says stdout "GPU            missing: "
+expect 0 "a GPU" "$program" "${picture[@]}" -o "$work/gpu.png" --device gpu --json
+says stdout '"backend": '
+expect 3 "no adapter of this number" "$program" "${picture[@]}" -o "$work/gpu.png" --device 1000
+says stderr "1000"
+expect 0 "doctor" "$program" doctor
+says stdout "GPU            0: "
+expect 0 "doctor as JSON" "$program" doctor --json
+says stdout '"max_binding_bytes"'
+
 # train starts another program, where there is LibTorch.
 printf '[optimizer]\nclip = -1\n' >"$work/recipe.toml"
 if [ -x "$(dirname "$program")/anchorsplat-train" ]; then

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -47,16 +48,11 @@ Result<std::string> Settings(const RefineInput& input, const GaussianCloud& star
   return json.dump();
 }
 
-// The last rows of `cloud` as they are in `from`.
-void PutBack(const GaussianCloud& from, int64_t rows, GaussianCloud& cloud) {
-  const auto copy = [&](const Buffer<float>& source, int64_t width, Buffer<float>& target) {
-    std::copy(source.end() - rows * width, source.end(), target.end() - rows * width);
-  };
-  copy(from.means, 3, cloud.means);
-  copy(from.log_scales, 3, cloud.log_scales);
-  copy(from.quats, 4, cloud.quats);
-  copy(from.opacity_logits, 1, cloud.opacity_logits);
-  copy(from.sh, from.sh_stride(), cloud.sh);
+// The last rows alone.
+GaussianCloud Last(const GaussianCloud& cloud, int64_t rows) {
+  std::vector<int64_t> last(static_cast<size_t>(rows));
+  std::iota(last.begin(), last.end(), cloud.size() - rows);
+  return Subset(cloud, last).value();
 }
 
 GaussianCloud WithoutLast(GaussianCloud cloud, int64_t rows) {
@@ -87,12 +83,12 @@ class RefineCheckpoint {
   std::string settings_;
 };
 
-// Steps until they are done, the time is over or the user stops it. The last `fixed` Gaussians stay those of `start`.
-Status MakeSteps(Refiner& refiner, const RefineOptions& options, const GaussianCloud& start, int64_t fixed,
-                 const RefineCheckpoint& checkpoint, RefineReport& report) {
+// Steps until they are done, the time is over or the user stops it.
+Status MakeSteps(Refiner& refiner, const RefineOptions& options, const RefineCheckpoint& checkpoint,
+                 RefineReport& report) {
   const Stopwatch watch;
   const auto done = [&] {
-    if (!options.seconds) return static_cast<double>(refiner.state().step) / static_cast<double>(*options.steps);
+    if (!options.seconds) return static_cast<double>(refiner.step()) / static_cast<double>(*options.steps);
     return watch.Total() / *options.seconds;
   };
   const int64_t total = options.seconds ? kShownSteps : *options.steps;
@@ -100,22 +96,25 @@ Status MakeSteps(Refiner& refiner, const RefineOptions& options, const GaussianC
   int64_t shown = 0;
   double psnr = 0;
   std::string note;
-  for (double part = done(); part < 1; part = done()) {
+  double part = done();
+  while (part < 1) {
     ANCHORSPLAT_RETURN_IF_ERROR(refiner.Step(part));
-    if (fixed > 0) PutBack(start, fixed, refiner.state().cloud);
-    if (refiner.state().step % kNoteEvery == 0) {
+    if (refiner.step() % kNoteEvery == 0) {
       const double last = refiner.LastPsnr();
-      psnr = psnr == 0 ? last : 0.9 * psnr + 0.1 * last;  // single views differ by several dB
+      if (last > 0) psnr = psnr == 0 ? last : 0.9 * psnr + 0.1 * last;  // single views differ by several dB
       const auto now = static_cast<int64_t>(std::min(1.0, done()) * static_cast<double>(total));
-      note = Cat(Fixed(psnr, 2), " dB at low resolution, ", WithThousands(refiner.state().cloud.size()), " Gaussians");
-      progress.Advance(now - shown, note);
-      shown = now;
+      note = Cat(Fixed(psnr, 2), " dB at low resolution, ", WithThousands(refiner.size()), " Gaussians");
+      progress.Advance(std::max<int64_t>(0, now - shown), note);
+      shown = std::max(shown, now);
     }
     report.interrupted = StopRequested() && done() < 1;
     if (report.interrupted) return {};
-    if (checkpoint.IsDue(refiner.state().step) && done() < 1) {
+    if (checkpoint.IsDue(refiner.step()) && done() < 1) {
       checkpoint.Write(refiner.state(), "there is no new checkpoint");
     }
+    part = done();
+    // Steps that are lost with a GPU are made again, as far as there is time.
+    if (part >= 1 && !refiner.MoveOut()) part = done();
   }
   if (shown < total) progress.Advance(total - shown, note);
   return {};
@@ -156,11 +155,11 @@ Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianClou
     state = Fitter::Fresh(std::move(split));
   }
   const RefineCheckpoint checkpoint(control, plan.options.seconds.has_value(), settings);
-  const RefineProblem problem{views.render, input.upscale, views.scene_scale, input.seed};
+  const RefineProblem problem{views.render, input.upscale, views.scene_scale, input.seed, Last(start, input.fixed)};
   ANCHORSPLAT_ASSIGN_OR_RETURN(Refiner refiner,
                                Refiner::Begin(plan.options, problem, std::move(views.train), std::move(state)));
-  ANCHORSPLAT_RETURN_IF_ERROR(MakeSteps(refiner, plan.options, start, input.fixed, checkpoint, report));
-  report.steps = refiner.state().step;
+  ANCHORSPLAT_RETURN_IF_ERROR(MakeSteps(refiner, plan.options, checkpoint, report));
+  report.steps = refiner.step();
   report.times = refiner.times();
   if (report.interrupted && checkpoint.kept()) {
     Leave(refiner.state(), control.outputs);

@@ -40,6 +40,9 @@ class RefineTargets {
   // Rasterizer.
   Status Load(int64_t view, const PixelBox& window, RefineTarget& target);
 
+  // Those that it has instead of what a splat shows, or null.
+  PictureCache* pictures() { return pictures_ ? &*pictures_ : nullptr; }
+
   // `views` are asked for next, see PictureCache.
   void LoadAhead(std::span<const int64_t> views) {
     if (pictures_) pictures_->LoadAhead(views);

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "core/stopwatch.h"
+#include "core/text.h"
 #include "fit/random_streams.h"
 #include "fit/view_exposure.h"
 #include "metrics/image_metrics.h"
@@ -27,17 +30,36 @@ LearningRates Scaled(LearningRates rates, double factor) {
   return rates;
 }
 
+// The last rows of `cloud` become those of `fixed`.
+void PutBack(const GaussianCloud& fixed, GaussianCloud& cloud) {
+  const auto copy = [](const Buffer<float>& from, Buffer<float>& to) {
+    std::copy(from.begin(), from.end(), to.end() - std::ssize(from));
+  };
+  copy(fixed.means, cloud.means);
+  copy(fixed.log_scales, cloud.log_scales);
+  copy(fixed.quats, cloud.quats);
+  copy(fixed.opacity_logits, cloud.opacity_logits);
+  copy(fixed.sh, cloud.sh);
+}
+
 }  // namespace
 
-PixelBox ChooseWindow(const Camera& camera, const GaussianCloud& cloud, uint64_t seed, int64_t step) {
+std::vector<int64_t> RowsForWindow(const Camera& camera, int64_t gaussians, uint64_t seed, int64_t step) {
+  std::vector<int64_t> rows;
+  const Pinhole& k = camera.intrinsics;
+  if (gaussians == 0 || (k.width <= kWindow && k.height <= kWindow)) return rows;
+  Random random = RandomStream(seed, RandomPurpose::kCrop, step);
+  for (int i = 0; i < kTries; ++i) rows.push_back(random.Below(gaussians));
+  return rows;
+}
+
+PixelBox WindowAround(const Camera& camera, std::span<const float> means) {
   const Pinhole& k = camera.intrinsics;
   const int width = std::min(k.width, kWindow), height = std::min(k.height, kWindow);
   if (width == k.width && height == k.height) return {0, 0, width, height};
-  Random random = RandomStream(seed, RandomPurpose::kCrop, step);
   double x = 0.5 * k.width, y = 0.5 * k.height;
-  for (int i = 0; i < kTries && !cloud.empty(); ++i) {
-    const float* p = cloud.means.data() + 3 * random.Below(cloud.size());
-    const auto c = camera.ToCamera({p[0], p[1], p[2]});
+  for (size_t i = 0; i + 2 < means.size(); i += 3) {
+    const auto c = camera.ToCamera({means[i], means[i + 1], means[i + 2]});
     if (!(c[2] > 0)) continue;
     const double u = k.fx * c[0] / c[2] + k.cx, v = k.fy * c[1] / c[2] + k.cy;
     if (!(u >= 0 && u < k.width && v >= 0 && v < k.height)) continue;
@@ -49,6 +71,14 @@ PixelBox ChooseWindow(const Camera& camera, const GaussianCloud& cloud, uint64_t
   return {x0, y0, x0 + width, y0 + height};
 }
 
+PixelBox ChooseWindow(const Camera& camera, const GaussianCloud& cloud, uint64_t seed, int64_t step) {
+  std::vector<float> means;
+  for (const int64_t row : RowsForWindow(camera, cloud.size(), seed, step)) {
+    means.insert(means.end(), cloud.means.data() + 3 * row, cloud.means.data() + 3 * row + 3);
+  }
+  return WindowAround(camera, means);
+}
+
 Result<Refiner> Refiner::Begin(const RefineOptions& options, const RefineProblem& problem, RefineTargets targets,
                                FitState state) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options));
@@ -56,7 +86,9 @@ Result<Refiner> Refiner::Begin(const RefineOptions& options, const RefineProblem
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(state.cloud));
   if (targets.views().empty()) return Error{ErrorCode::kBadArgument, "refine: there are no views to compare with"};
   if (state.cloud.empty()) return Error{ErrorCode::kBadArgument, "refine: there are no Gaussians"};
-  return Refiner(options, problem, std::move(targets), std::move(state));
+  Refiner refiner(options, problem, std::move(targets), std::move(state));
+  if (!options.align) refiner.residence_.MoveIn(refiner.state_);
+  return refiner;
 }
 
 Refiner::Refiner(const RefineOptions& options, const RefineProblem& problem, RefineTargets targets, FitState state)
@@ -66,9 +98,23 @@ Refiner::Refiner(const RefineOptions& options, const RefineProblem& problem, Ref
       state_(std::move(state)),
       order_(static_cast<int64_t>(targets_.views().size()), problem.seed) {}
 
+int64_t Refiner::size() const { return residence_.away() != nullptr ? residence_.away()->size() : state_.cloud.size(); }
+
+FitState& Refiner::state() {
+  if (residence_.away() != nullptr) {
+    if (const Status copied = residence_.CopyHome(state_); !copied.ok()) residence_.MoveOut(state_, copied.error());
+  }
+  return state_;
+}
+
+bool Refiner::MoveOut() {
+  if (residence_.away() == nullptr) return true;
+  const Status home = residence_.MoveOut(state_);
+  return home.ok() || residence_.MoveOut(state_, home.error());
+}
+
 // Where nothing is to be learned the target becomes what is there.
-void Refiner::AdjustTarget(double done) {
-  const Image& rendered = objective_.rendered();
+void Refiner::AdjustTarget(const Image& rendered, double done) {
   Image& picture = target_.picture;
   FillIgnored(target_.ignored, rendered, picture);  // which are not to weigh in what follows
   if (options_.exposure) {
@@ -109,47 +155,115 @@ Result<Camera> Refiner::AlignedView(int64_t view, const PixelBox& window) {
   return placed();
 }
 
+Result<PixelBox> Refiner::WindowAway(const Camera& view) {
+  const std::vector<int64_t> rows = RowsForWindow(view, size(), problem_.seed, state_.step);
+  if (rows.empty()) return WindowAround(view, {});
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud there, residence_.away()->ReadRows(rows));
+  return WindowAround(view, there.means);
+}
+
 Result<FitStep> Refiner::Step(double done) {
   Stopwatch watch;
   const int64_t step = state_.step;
   FitStep out;
   out.view = order_.At(step);
   const Camera& view = targets_.views()[static_cast<size_t>(out.view)];
-  const PixelBox window = ChooseWindow(view, state_.cloud, problem_.seed, step);
-  targets_.LoadAhead(order_.From(step));
-  ANCHORSPLAT_RETURN_IF_ERROR(targets_.Load(out.view, window, target_));
-  times_.load += watch.Lap();
-
   ObjectiveOptions objective;
   objective.render = problem_.render;
   objective.loss.ssim_weight = options_.ssim_weight;
   objective.pixel = PixelModelAt({problem_.upscale, options_.half_from, options_.all_from}, done);
-  Camera camera = Crop(view, window);
-  if (options_.align) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const Camera aligned, AlignedView(out.view, window));
-    camera = Crop(aligned, window);
-  }
-  ANCHORSPLAT_RETURN_IF_ERROR(objective_.Show(objective, state_.cloud, camera));
-  AdjustTarget(done);
   const LearningRates rates = Scaled(LearningRates(), options_.rate.value_or(1) * std::pow(options_.rate_decay, done));
-  const CoefficientStep coefficients = state_.optimizer.BeginStep(rates, kMaxShDegree, state_.cloud);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss,
-                               objective_.Compare(objective, state_.cloud, target_.picture, gradient_, &coefficients));
-
-  watch.Lap();
-  state_.optimizer.FinishStep(rates, rates.means * problem_.scene_scale, gradient_, state_.cloud);
-  times_.adam += watch.Lap();
+  targets_.LoadAhead(order_.From(step));
+  if (residence_.away() != nullptr) {
+    const Result<PixelBox> window = WindowAway(view);
+    const Status learned = window.ok() ? LearnAway(objective, rates, out.view, *window, done) : Status(window.error());
+    if (!learned.ok()) {
+      if (!residence_.MoveOut(state_, learned.error())) return out;  // `done` is of a later step
+      return Step(done);
+    }
+  } else {
+    const PixelBox window = ChooseWindow(view, state_.cloud, problem_.seed, step);
+    ANCHORSPLAT_RETURN_IF_ERROR(targets_.Load(out.view, window, target_));
+    times_.load += watch.Lap();
+    Camera camera = Crop(view, window);
+    if (options_.align) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const Camera aligned, AlignedView(out.view, window));
+      camera = Crop(aligned, window);
+    }
+    ANCHORSPLAT_RETURN_IF_ERROR(Learn(objective, rates, camera, done));
+  }
   ++state_.step;
+  if (residence_.away() != nullptr && Residence::IsCopyDue(state_.step)) state();
   return out;
+}
+
+Status Refiner::Learn(const ObjectiveOptions& objective, const LearningRates& rates, const Camera& camera,
+                      double done) {
+  ANCHORSPLAT_RETURN_IF_ERROR(objective_.Show(objective, state_.cloud, camera));
+  AdjustTarget(objective_.rendered(), done);
+  const CoefficientStep coefficients = state_.optimizer.BeginStep(rates, kMaxShDegree, state_.cloud);
+  ANCHORSPLAT_RETURN_IF_ERROR(objective_.Compare(objective, state_.cloud, target_.picture, gradient_, &coefficients));
+  Stopwatch watch;
+  state_.optimizer.FinishStep(rates, rates.means * problem_.scene_scale, gradient_, state_.cloud);
+  PutBack(problem_.fixed, state_.cloud);
+  times_.adam += watch.Lap();
+  return {};
+}
+
+Status Refiner::LearnAway(const ObjectiveOptions& objective, const LearningRates& rates, int64_t view,
+                          const PixelBox& window, double done) {
+  Stopwatch watch;
+  ResidentFit& fit = *residence_.away();
+  GpuObjective& shown = fit.objective();
+  const Camera& camera = targets_.views()[static_cast<size_t>(view)];
+  const bool whole = window == PixelBox{0, 0, camera.intrinsics.width, camera.intrinsics.height};
+  const bool adjusts = options_.exposure || options_.robust;
+  if (PictureCache* pictures = targets_.pictures(); pictures != nullptr && whole && !adjusts) {
+    if (!shown.Holds(view)) {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const PackedPicture packed, pictures->LoadPacked(view));
+      ANCHORSPLAT_RETURN_IF_ERROR(shown.SetTarget(packed, pictures->background(), view));
+    }
+  } else if (adjusts || !whole || !shown.Holds(view)) {
+    ANCHORSPLAT_RETURN_IF_ERROR(targets_.Load(view, window, target_));
+    if (!adjusts) {
+      ANCHORSPLAT_RETURN_IF_ERROR(
+          shown.SetTarget(target_.picture, target_.ignored, whole ? std::optional(view) : std::nullopt));
+    }
+  }
+  times_.load += watch.Lap();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const bool drawn, fit.Show(objective, Crop(camera, window)));
+  if (!drawn) return Error{ErrorCode::kBadArgument, Cat("a GPU's floats are too few digits for ", camera.name)};
+  if (adjusts) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Image* rendered, shown.Rendered());
+    AdjustTarget(*rendered, done);
+    ANCHORSPLAT_RETURN_IF_ERROR(shown.SetTarget(target_.picture, target_.ignored));
+  }
+  times_.objective.render += watch.Lap();
+  ANCHORSPLAT_RETURN_IF_ERROR(fit.Learn(objective, whole && !adjusts ? view : -1,
+                                        {.rates = rates,
+                                         .means_rate = rates.means * problem_.scene_scale,
+                                         .sh_degree = kMaxShDegree,
+                                         .number = state_.step + 1,
+                                         .learning = fit.size() - problem_.fixed.size()}));
+  residence_.CountStep();
+  times_.objective.backward += watch.Lap();
+  return {};
 }
 
 FitTimes Refiner::times() const {
   FitTimes times = times_;
-  times.objective = objective_.times();
+  const ObjectiveTimes& here = objective_.times();
+  times.objective.render += here.render;
+  times.objective.loss += here.loss;
+  times.objective.backward += here.backward;
   return times;
 }
 
-double Refiner::LastPsnr() const {
+double Refiner::LastPsnr() {
+  if (residence_.away() != nullptr) {
+    const auto loss = residence_.away()->objective().Loss();
+    return loss.ok() ? -10 * std::log10(loss->mean_square) : 0;
+  }
   const auto psnr = Psnr(objective_.rendered(), target_.picture);
   return psnr.ok() ? *psnr : 0;
 }

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "enhance/refine_options.h"
 #include "enhance/refine_targets.h"
 #include "fit/fitter.h"
+#include "fit/residence.h"
 #include "fit/view_objective.h"
 #include "fit/view_order.h"
 #include "fit/view_pose.h"
@@ -19,6 +22,7 @@ struct RefineProblem {
   double upscale = 4;      // u
   double scene_scale = 1;  // world units; as in fits
   uint64_t seed = 0;
+  GaussianCloud fixed = {};  // what the state's last Gaussians are and stay; none: all learn
 };
 
 // The iterations of a refinement, one at a time: a view and a window of it, what the candidate shows there when seen
@@ -28,24 +32,34 @@ struct RefineProblem {
 // With options.align the pictures' cameras move while it runs, a step of fit/view_pose.h whenever a view is looked at.
 //
 // The state is that of a fit (fit/fitter.h) and is written and read like one. Same bits for any number of threads.
+// Where the run has a GPU it stays there, as that of a Fitter does, unless cameras move.
 class Refiner {
  public:
   // Errors (kBadArgument): options that cannot be run, no views, no Gaussians.
   static Result<Refiner> Begin(const RefineOptions& options, const RefineProblem& problem, RefineTargets targets,
                                FitState state);
 
-  // The next step, when the part `done`, 0 to 1, of the run is over. Errors: those of RefineTargets and ViewObjective.
+  // The next step, when the part `done`, 0 to 1, of the run is over. None where the GPU is lost: then step() is that of
+  // an older state. Errors: those of RefineTargets and ViewObjective.
   Result<FitStep> Step(double done);
 
-  const FitState& state() const { return state_; }
-  FitState& state() { return state_; }
+  int64_t step() const { return state_.step; }  // steps done
+  int64_t size() const;                         // Gaussians
+  // As Fitter's. What is changed counts where the state is at home (MoveOut).
+  FitState& state();
+  // The state is in host memory from here on. False: the GPU that had it is lost, and it is that of an earlier step.
+  bool MoveOut();
   RefineTargets& targets() { return targets_; }
   FitTimes times() const;
-  double LastPsnr() const;  // of what the last step saw against its target, before the step
+  double LastPsnr();  // of what the last step saw against its target, before the step
 
  private:
   Refiner(const RefineOptions& options, const RefineProblem& problem, RefineTargets targets, FitState state);
-  void AdjustTarget(double done);
+  void AdjustTarget(const Image& rendered, double done);
+  Status Learn(const ObjectiveOptions& objective, const LearningRates& rates, const Camera& camera, double done);
+  Status LearnAway(const ObjectiveOptions& objective, const LearningRates& rates, int64_t view, const PixelBox& window,
+                   double done);
+  Result<PixelBox> WindowAway(const Camera& view);
   Result<Camera> AlignedView(int64_t view, const PixelBox& window);
 
   RefineOptions options_;
@@ -57,6 +71,7 @@ class Refiner {
   CloudGradient gradient_;
   RefineTarget target_;
   PoseAligner aligner_;
+  Residence residence_;
   FitTimes times_;
 };
 
@@ -64,5 +79,10 @@ class Refiner {
 // around a Gaussian drawn from seed and step.
 inline constexpr int kWindow = 512;
 PixelBox ChooseWindow(const Camera& camera, const GaussianCloud& cloud, uint64_t seed, int64_t step);
+
+// The rows of `gaussians` that ChooseWindow tries, in this order, and the window from their means ([rows,3]): for those
+// who have to fetch them. None where the view is seen as a whole.
+std::vector<int64_t> RowsForWindow(const Camera& camera, int64_t gaussians, uint64_t seed, int64_t step);
+PixelBox WindowAround(const Camera& camera, std::span<const float> means);
 
 }  // namespace anchorsplat

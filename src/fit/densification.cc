@@ -99,13 +99,6 @@ Growth ChooseGrowth(const Rules& rules, const Densification::Gathered& gathered,
   return growth;
 }
 
-// A row to come: a copy of `source`, or one of its halves.
-struct Newcomer {
-  int64_t source;
-  bool half;
-  float offset[3];  // from the source's mean, world
-};
-
 std::vector<Newcomer> MakeNewcomers(const Growth& growth, const GaussianCloud& cloud, Random random) {
   std::vector<Newcomer> newcomers;
   newcomers.reserve(growth.duplicate.size() + kSplitSamples * growth.split.size());
@@ -154,15 +147,14 @@ void ChangeCloud(const DensificationOptions& options, const RowChange& change, c
     for (int64_t k = first; k < last; ++k) {
       const Newcomer& newcomer = newcomers[static_cast<size_t>(k)];
       const int64_t from = newcomer.source, to = kept + k;
+      const NewcomerShape shape = ShapeOf(options, newcomer, old);
       for (int64_t a = 0; a < 3; ++a) {
         const auto out = static_cast<size_t>(3 * to + a), in = static_cast<size_t>(3 * from + a);
         cloud.means[out] = old.means[in] + newcomer.offset[a];
-        cloud.log_scales[out] = newcomer.half ? old.log_scales[in] - std::log(kSplitShrink) : old.log_scales[in];
+        cloud.log_scales[out] = shape.log_scales[static_cast<size_t>(a)];
       }
       std::copy_n(old.quats.data() + 4 * from, 4, cloud.quats.data() + 4 * to);
-      const float logit = old.opacity_logits[static_cast<size_t>(from)];
-      cloud.opacity_logits[static_cast<size_t>(to)] =
-          newcomer.half && options.revised_opacity ? RevisedLogit(logit) : logit;
+      cloud.opacity_logits[static_cast<size_t>(to)] = shape.opacity_logit;
       std::copy_n(old.sh.data() + stride * from, stride, cloud.sh.data() + stride * to);
     }
   });
@@ -180,6 +172,17 @@ DensificationOptions ScaledTo(const DensificationOptions& options, int64_t steps
   out.reset_every = std::max<int64_t>(1, scaled(options.reset_every));
   out.pause_refine_after_reset = scaled(options.pause_refine_after_reset);
   return out;
+}
+
+NewcomerShape ShapeOf(const DensificationOptions& options, const Newcomer& newcomer, const GaussianCloud& cloud) {
+  NewcomerShape shape{};
+  for (size_t a = 0; a < 3; ++a) {
+    const float log_scale = cloud.log_scales[3 * static_cast<size_t>(newcomer.source) + a];
+    shape.log_scales[a] = newcomer.half ? log_scale - std::log(kSplitShrink) : log_scale;
+  }
+  const float logit = cloud.opacity_logits[static_cast<size_t>(newcomer.source)];
+  shape.opacity_logit = newcomer.half && options.revised_opacity ? RevisedLogit(logit) : logit;
+  return shape;
 }
 
 void CapOpacities(GaussianCloud& cloud, double opacity) {
@@ -210,17 +213,20 @@ void Densification::Gather(bool absgrad, int width, int height, const CloudGradi
   });
 }
 
-void Densification::Refine(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed,
-                           const FarUnits& far, GaussianCloud& cloud, DensificationChange& change) {
+RefinementPlan Densification::Plan(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed,
+                                   const FarUnits& far, const GaussianCloud& cloud,
+                                   std::span<const uint8_t> usable) const {
+  RefinementPlan plan;
+  DensificationChange& change = plan.change;
+  std::vector<Newcomer>& newcomers = plan.newcomers;
   const Rules rules = MakeRules(options, far, step, scene_scale);
   const Growth growth = ChooseGrowth(rules, gathered_, cloud);
-  std::vector<Newcomer> newcomers = MakeNewcomers(growth, cloud, RandomStream(seed, RandomPurpose::kSplit, step));
+  newcomers = MakeNewcomers(growth, cloud, RandomStream(seed, RandomPurpose::kSplit, step));
 
-  std::vector<uint8_t> usable(static_cast<size_t>(cloud.size())), pruned(usable.size());
+  std::vector<uint8_t> pruned(usable.size());
   ParallelFor(0, cloud.size(), kGaussiansPerTask, [&](int64_t begin, int64_t end) {
     for (int64_t i = begin; i < end; ++i) {
       const auto k = static_cast<size_t>(i);
-      usable[k] = IsUsable(cloud, i);
       pruned[k] =
           IsPruned(rules, usable[k] != 0, cloud.opacity_logits[k], LargestLogScale(far, cloud, i), gathered_.radii[k]);
     }
@@ -248,23 +254,44 @@ void Densification::Refine(const DensificationOptions& options, int64_t step, do
   const auto left = static_cast<int64_t>(rows.kept.size()) + rows.fresh;
   change.pruned = cloud.size() + change.duplicated + change.split - left;
   rows.any = rows.fresh > 0 || static_cast<int64_t>(rows.kept.size()) < cloud.size();
-  if (rows.any) ChangeCloud(options, rows, newcomers, cloud);
+  return plan;
+}
+
+DensificationChange Densification::Refine(const DensificationOptions& options, int64_t step, double scene_scale,
+                                          uint64_t seed, const FarUnits& far, GaussianCloud& cloud) {
+  std::vector<uint8_t> usable(static_cast<size_t>(cloud.size()));
+  ParallelFor(0, cloud.size(), kGaussiansPerTask, [&](int64_t begin, int64_t end) {
+    for (int64_t i = begin; i < end; ++i) usable[static_cast<size_t>(i)] = IsUsable(cloud, i);
+  });
+  RefinementPlan plan = Plan(options, step, scene_scale, seed, far, cloud, usable);
+  if (plan.change.rows.any) ChangeCloud(options, plan.change.rows, plan.newcomers, cloud);
   Clear(cloud.size());
+  return std::move(plan.change);
+}
+
+bool Densification::Refines(const DensificationOptions& options, int64_t step) {
+  return step < options.refine_stop_iter && step > options.refine_start_iter && step % options.refine_every == 0 &&
+         step % options.reset_every >= options.pause_refine_after_reset;
+}
+
+bool Densification::ResetsOpacities(const DensificationOptions& options, int64_t step) {
+  return step < options.refine_stop_iter && options.opacity_reset != OpacityReset::kNever &&
+         step % options.reset_every == 0 && (step > 0 || options.opacity_reset == OpacityReset::kFromZero);
+}
+
+DensificationChange Densification::AfterGathering(const DensificationOptions& options, int64_t step, double scene_scale,
+                                                  uint64_t seed, GaussianCloud& cloud, const FarUnits& far) {
+  DensificationChange change;
+  if (Refines(options, step)) change = Refine(options, step, scene_scale, seed, far, cloud);
+  change.resets_opacities = ResetsOpacities(options, step);
+  return change;
 }
 
 DensificationChange Densification::AfterStep(const DensificationOptions& options, int64_t step, double scene_scale,
                                              uint64_t seed, int width, int height, const CloudGradient& gradient,
                                              GaussianCloud& cloud, const FarUnits& far) {
-  DensificationChange change;
-  if (step >= options.refine_stop_iter) return change;
-  Gather(options.absgrad, width, height, gradient);
-  if (step > options.refine_start_iter && step % options.refine_every == 0 &&
-      step % options.reset_every >= options.pause_refine_after_reset) {
-    Refine(options, step, scene_scale, seed, far, cloud, change);
-  }
-  change.resets_opacities = options.opacity_reset != OpacityReset::kNever && step % options.reset_every == 0 &&
-                            (step > 0 || options.opacity_reset == OpacityReset::kFromZero);
-  return change;
+  if (Gathers(options, step)) Gather(options.absgrad, width, height, gradient);
+  return AfterGathering(options, step, scene_scale, seed, cloud, far);
 }
 
 }  // namespace anchorsplat

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "core/buffer.h"
 #include "core/gaussian_cloud.h"
@@ -57,6 +60,26 @@ struct DensificationChange {
   int64_t relocated = 0, added = 0;               // of McmcAfterStep
 };
 
+// A row to come: a copy of `source`, or one of its halves.
+struct Newcomer {
+  int64_t source;
+  bool half;
+  float offset[3];  // from the source's mean, world
+};
+
+// What a refinement is going to do with the rows of a cloud: `change.rows.fresh` are the newcomers, in this order.
+struct RefinementPlan {
+  DensificationChange change;
+  std::vector<Newcomer> newcomers;
+};
+
+// What a newcomer has that its source, row of `cloud`, has not.
+struct NewcomerShape {
+  std::array<float, 3> log_scales;
+  float opacity_logit;
+};
+NewcomerShape ShapeOf(const DensificationOptions& options, const Newcomer& newcomer, const GaussianCloud& cloud);
+
 class Densification {
  public:
   Densification() = default;
@@ -71,6 +94,16 @@ class Densification {
                                 int width, int height, const CloudGradient& gradient, GaussianCloud& cloud,
                                 const FarUnits& far = {});
 
+  // Its parts, for those who gather elsewhere: whether there is anything to gather at that step, what comes after it,
+  // and of that what is done when. Plan looks at `usable` [N] (IsUsable) and not at the coefficients of `cloud`.
+  static bool Gathers(const DensificationOptions& options, int64_t step) { return step < options.refine_stop_iter; }
+  static bool Refines(const DensificationOptions& options, int64_t step);
+  static bool ResetsOpacities(const DensificationOptions& options, int64_t step);
+  DensificationChange AfterGathering(const DensificationOptions& options, int64_t step, double scene_scale,
+                                     uint64_t seed, GaussianCloud& cloud, const FarUnits& far = {});
+  RefinementPlan Plan(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed,
+                      const FarUnits& far, const GaussianCloud& cloud, std::span<const uint8_t> usable) const;
+
   // For checkpoints: what was gathered since the last change. [N] each.
   struct Gathered {
     Buffer<float> grad2d;  // Σ ‖∂L/∂mean2d‖ in half pictures
@@ -83,8 +116,8 @@ class Densification {
  private:
   void Clear(int64_t gaussians);
   void Gather(bool absgrad, int width, int height, const CloudGradient& gradient);
-  void Refine(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed, const FarUnits& far,
-              GaussianCloud& cloud, DensificationChange& change);
+  DensificationChange Refine(const DensificationOptions& options, int64_t step, double scene_scale, uint64_t seed,
+                             const FarUnits& far, GaussianCloud& cloud);
 
   Gathered gathered_;
 };

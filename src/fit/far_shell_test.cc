@@ -348,7 +348,7 @@ TEST_F(FarShells, AFitGoesOnWithItsOwnOnly) {
     FitControl control;
     control.checkpoint = folder_ / "state";
     control.resume = resume;
-    control.observe = [&](const Fitter& fitter) { stop = fitter.state().step >= stop_at; };
+    control.observe = [&](const Fitter& fitter) { stop = fitter.step() >= stop_at; };
     stop = false;
     return Fit(views, std::move(cloud), options, control);
   };

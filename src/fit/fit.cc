@@ -77,22 +77,22 @@ class KeptState {
 // All steps that are left, or as many as there are before the user stops it.
 Status MakeSteps(Fitter& fitter, const FitControl& control, KeptState& kept, FitReport& report) {
   Progress progress("fit", fitter.options().steps);
-  int64_t shown = fitter.state().step;
+  int64_t shown = fitter.step();
   progress.Advance(shown);
   double psnr = 0;
   while (!fitter.done()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const FitStep step, fitter.Step());
-    report.loss = step.loss.loss;
     report.duplicated += step.change.duplicated;
     report.split += step.change.split;
     report.pruned += step.change.pruned;
     report.relocated += step.change.relocated;
     report.added += step.change.added;
-    const int64_t done = fitter.state().step;
+    const int64_t done = fitter.step();
     if (done % kNoteEvery == 0 || fitter.done()) {
       Follow(psnr, fitter.LastPsnr());
-      progress.Advance(done - shown, Note(psnr, fitter.state().cloud.size()));
-      shown = done;
+      // Who has lost a GPU makes some steps again.
+      progress.Advance(std::max<int64_t>(0, done - shown), Note(psnr, fitter.size()));
+      shown = std::max(shown, done);
     }
     if (control.observe) control.observe(fitter);
     report.interrupted = StopRequested() && !fitter.done();
@@ -101,6 +101,7 @@ Status MakeSteps(Fitter& fitter, const FitControl& control, KeptState& kept, Fit
     if (due || report.interrupted) kept.Write(fitter.state());
     if (report.interrupted) break;
   }
+  report.loss = fitter.LastLoss();
   return {};
 }
 
@@ -191,7 +192,7 @@ Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitO
   Stopwatch watch;
   if (const Status made = MakeSteps(fitter, control, kept, report); !made.ok()) return failed(made.error());
   report.seconds = watch.Lap();
-  report.steps = fitter.state().step;
+  report.steps = fitter.step();
   report.times = fitter.times();
   if (report.interrupted) report.kept_step = kept.step();
 

@@ -1,11 +1,14 @@
 #include "fit/fitter.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <utility>
 #include <vector>
 
 #include "core/most_visible.h"
 #include "core/stopwatch.h"
+#include "core/text.h"
 #include "fit/exposure_per_view.h"
 #include "metrics/image_metrics.h"
 
@@ -27,7 +30,9 @@ Result<Fitter> Fitter::Begin(const FitOptions& options, PictureCache pictures, d
   if (state.exposures.size() != exposures) {
     return Error{ErrorCode::kBadArgument, "fit: the state is that of a fit with other exposures of its views"};
   }
-  return Fitter(options, std::move(pictures), scene_scale, std::move(state));
+  Fitter fitter(options, std::move(pictures), scene_scale, std::move(state));
+  if (fitter.CanReside() && !fitter.done()) fitter.residence_.MoveIn(fitter.state_);
+  return fitter;
 }
 
 FitState Fitter::Fresh(GaussianCloud cloud) {
@@ -43,54 +48,172 @@ Fitter::Fitter(const FitOptions& options, PictureCache pictures, double scene_sc
       pictures_(std::move(pictures)),
       scene_scale_(scene_scale),
       state_(std::move(state)),
-      order_(static_cast<int64_t>(pictures_.views().size()), options.seed) {
+      order_(static_cast<int64_t>(pictures_.views().size()), options.seed),
+      last_loss_(std::numeric_limits<double>::quiet_NaN()) {
   if (options_.strategy == Strategy::kMcmc) state_.densification = Densification();
   if (options_.mip_filter && state_.step == 0) MeasureMipFilter();
   if (options_.exposure_from >= 0 && state_.exposures.empty())
     state_.exposures = NoExposures(static_cast<int64_t>(pictures_.views().size()));
 }
 
+bool Fitter::CanReside() const {
+  const Regularizers& r = options_.regularizers;
+  return options_.strategy == Strategy::kDefault && !options_.mip_filter && !options_.far.any() && r.opacity_reg == 0 &&
+         r.scale_reg == 0;
+}
+
+int64_t Fitter::size() const { return residence_.away() != nullptr ? residence_.away()->size() : state_.cloud.size(); }
+
+const FitState& Fitter::state() {
+  if (residence_.away() != nullptr) {
+    if (const Status copied = residence_.CopyHome(state_); !copied.ok()) residence_.MoveOut(state_, copied.error());
+  }
+  return state_;
+}
+
 Result<FitStep> Fitter::Step() {
   Stopwatch watch;
   const int64_t step = state_.step;
-  const int degree = ShDegreeAt(options_, step);
   FitStep out;
   out.view = order_.At(step);
   const Camera& camera = pictures_.views()[static_cast<size_t>(out.view)];
-  pictures_.LoadAhead(order_.From(step));
-  ANCHORSPLAT_RETURN_IF_ERROR(pictures_.Load(out.view, picture_, ignored_));
+  ResidentFit* away = residence_.away();
+  if (away == nullptr || FollowsExposure()) {
+    pictures_.LoadAhead(order_.From(step));
+    ANCHORSPLAT_RETURN_IF_ERROR(pictures_.Load(out.view, picture_, ignored_));
+  } else if (!away->objective().Holds(out.view)) {
+    pictures_.LoadAhead(order_.From(step));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const PackedPicture packed, pictures_.LoadPacked(out.view));
+    const Status set = away->objective().SetTarget(packed, pictures_.background(), out.view);
+    if (!set.ok()) {
+      residence_.MoveOut(state_, set.error());
+      return Step();
+    }
+  }
   times_.load += watch.Lap();
 
   ObjectiveOptions objective = options_.objective;
-  objective.render.sh_degree = degree;
+  objective.render.sh_degree = ShDegreeAt(options_, step);
   objective.pixel = PixelModelAt(options_, step);
   objective.render.absgrad = options_.strategy == Strategy::kDefault && options_.densification.absgrad;
+  const Camera rays = RaysOf(objective.pixel, camera);
+  if (away != nullptr) {
+    if (const Status learned = LearnAway(objective, camera, out.view); !learned.ok()) {
+      residence_.MoveOut(state_, learned.error());
+      return Step();
+    }
+  } else {
+    ANCHORSPLAT_RETURN_IF_ERROR(Learn(objective, camera, out.view));
+  }
+
+  watch.Lap();
+  if (away != nullptr) {
+    Result<DensificationChange> change = ChangeAway(rays);
+    if (!change.ok()) {
+      // The state is behind the step, or much older.
+      if (!residence_.MoveOut(state_, change.error())) return Step();
+      change = ChangeGaussians(rays, nullptr);
+    }
+    out.change = std::move(change).value();
+  } else {
+    out.change = ChangeGaussians(rays, &gradient_);
+  }
+  times_.densify += watch.Lap();
+  ++state_.step;
+  if (size() == 0) {
+    return Error{ErrorCode::kBadArgument,
+                 "fit: pruning has left no Gaussian; do the pictures show anything but background?"};
+  }
+  if (residence_.away() != nullptr && done()) {
+    LastPsnr();
+    const Status home = residence_.MoveOut(state_);
+    if (!home.ok()) residence_.MoveOut(state_, home.error());
+  } else if (residence_.away() != nullptr && Residence::IsCopyDue(state_.step)) {
+    state();
+  }
+  return out;
+}
+
+Status Fitter::Learn(const ObjectiveOptions& objective, const Camera& camera, int64_t view) {
+  const int64_t step = state_.step;
   const CloudView shown = options_.mip_filter ? filtered_.Of(state_.cloud, state_.mip_filter) : CloudView(state_.cloud);
   ANCHORSPLAT_RETURN_IF_ERROR(objective_.Show(objective, shown, camera));
   FillIgnored(ignored_, objective_.rendered(), picture_);
-  if (options_.exposure_from >= 0 && step >= options_.exposure_from) {
-    ANCHORSPLAT_RETURN_IF_ERROR(FollowExposure(objective_.rendered(), out.view, picture_, state_.exposures));
+  if (FollowsExposure()) {
+    ANCHORSPLAT_RETURN_IF_ERROR(FollowExposure(objective_.rendered(), view, picture_, state_.exposures));
   }
-  const CoefficientStep coefficients = state_.optimizer.BeginStep(options_.rates, degree, state_.cloud);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(out.loss, objective_.Compare(objective, shown, picture_, gradient_, &coefficients));
-  watch.Lap();
+  const CoefficientStep coefficients =
+      state_.optimizer.BeginStep(options_.rates, objective.render.sh_degree, state_.cloud);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PhotometricLossValue loss,
+                               objective_.Compare(objective, shown, picture_, gradient_, &coefficients));
+  last_loss_ = loss.loss;
+  Stopwatch watch;
   if (options_.mip_filter) MipFilterBackward(state_.cloud, state_.mip_filter, gradient_);
   AddRegularizers(options_.regularizers, UnitOf(scene_scale_), options_.far, state_.cloud, gradient_);
   const double means_rate = MeansRate(options_.rates, scene_scale_, step, options_.steps);
   state_.optimizer.FinishStep(options_.rates, means_rate, gradient_, state_.cloud, options_.far);
   times_.adam += watch.Lap();
-
-  out.change = ChangeGaussians(RaysOf(objective.pixel, camera));
-  times_.densify += watch.Lap();
-  ++state_.step;
-  if (state_.cloud.empty()) {
-    return Error{ErrorCode::kBadArgument,
-                 "fit: pruning has left no Gaussian; do the pictures show anything but background?"};
-  }
-  return out;
+  return {};
 }
 
-DensificationChange Fitter::ChangeGaussians(const Camera& rays) {
+Status Fitter::LearnAway(const ObjectiveOptions& objective, const Camera& camera, int64_t view) {
+  Stopwatch watch;
+  ResidentFit& fit = *residence_.away();
+  GpuObjective& shown = fit.objective();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const bool drawn, fit.Show(objective, camera));
+  if (!drawn) return Error{ErrorCode::kBadArgument, Cat("a GPU's floats are too few digits for ", camera.name)};
+  int64_t compared = view;
+  if (FollowsExposure()) {
+    compared = -1;  // this step's picture is no other's
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Image* rendered, shown.Rendered());
+    FillIgnored(ignored_, *rendered, picture_);
+    ANCHORSPLAT_RETURN_IF_ERROR(FollowExposure(*rendered, view, picture_, state_.exposures));
+    ANCHORSPLAT_RETURN_IF_ERROR(shown.SetTarget(picture_, ignored_));
+  }
+  away_times_.render += watch.Lap();
+  const Camera rays = RaysOf(objective.pixel, camera);
+  ANCHORSPLAT_RETURN_IF_ERROR(
+      fit.Learn(objective, compared,
+                {.rates = options_.rates,
+                 .means_rate = MeansRate(options_.rates, scene_scale_, state_.step, options_.steps),
+                 .sh_degree = objective.render.sh_degree,
+                 .number = state_.step + 1,
+                 .gathers = Densification::Gathers(options_.densification, state_.step),
+                 .absgrad = options_.densification.absgrad,
+                 .width = rays.intrinsics.width,
+                 .height = rays.intrinsics.height}));
+  residence_.CountStep();
+  away_times_.backward += watch.Lap();
+  return {};
+}
+
+Result<DensificationChange> Fitter::ChangeAway(const Camera& rays) {
+  const int64_t step = state_.step;
+  const DensificationOptions& how = options_.densification;
+  ResidentFit& fit = *residence_.away();
+  const auto at_home = [&]() -> Result<DensificationChange> {
+    ANCHORSPLAT_RETURN_IF_ERROR(residence_.MoveOut(state_));
+    DensificationChange change = ChangeGaussians(rays, nullptr);
+    if (state_.cloud.empty()) return change;
+    ++state_.step;  // what the copy is of
+    residence_.MoveIn(state_);
+    --state_.step;
+    return change;
+  };
+  if (CutsToBudget(step)) return at_home();
+  DensificationChange change;
+  if (Densification::Refines(how, step)) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(RefinementPlan plan, fit.Plan(how, step, scene_scale_, options_.seed));
+    if (plan.change.rows.kept.empty() && plan.change.rows.fresh == 0) return at_home();
+    ANCHORSPLAT_RETURN_IF_ERROR(fit.Apply(how, plan));
+    change = std::move(plan.change);
+  }
+  change.resets_opacities = Densification::ResetsOpacities(how, step);
+  if (change.resets_opacities) fit.ResetOpacities(2 * how.prune_opa);
+  return change;
+}
+
+DensificationChange Fitter::ChangeGaussians(const Camera& rays, const CloudGradient* gradient) {
   const int64_t step = state_.step;
   DensificationChange change;
   if (options_.strategy == Strategy::kMcmc) {
@@ -102,10 +225,13 @@ DensificationChange Fitter::ChangeGaussians(const Camera& rays) {
                             .seed = options_.seed,
                             .far = options_.far},
                            state_.cloud);
-  } else {
+  } else if (gradient != nullptr) {
     change =
         state_.densification.AfterStep(options_.densification, step, scene_scale_, options_.seed, rays.intrinsics.width,
-                                       rays.intrinsics.height, gradient_, state_.cloud, options_.far);
+                                       rays.intrinsics.height, *gradient, state_.cloud, options_.far);
+  } else {
+    change = state_.densification.AfterGathering(options_.densification, step, scene_scale_, options_.seed,
+                                                 state_.cloud, options_.far);
   }
   KeepToBudget(step, change);
   state_.optimizer.ForgetRows(change.forgotten);
@@ -127,12 +253,17 @@ DensificationChange Fitter::ChangeGaussians(const Camera& rays) {
   return change;
 }
 
-void Fitter::KeepToBudget(int64_t step, DensificationChange& change) {
+bool Fitter::CutsToBudget(int64_t step) const {
   const bool mcmc = options_.strategy == Strategy::kMcmc;
   const int64_t most = mcmc ? options_.mcmc.cap_max : options_.densification.max_gaussians;
   const int64_t stop = mcmc ? options_.mcmc.refine_stop_iter : options_.densification.refine_stop_iter;
-  if (most <= 0 || state_.cloud.size() <= most) return;
-  if (step != std::min(stop, options_.steps - 1) || change.rows.any) return;
+  return most > 0 && size() > most && step == std::min(stop, options_.steps - 1);
+}
+
+void Fitter::KeepToBudget(int64_t step, DensificationChange& change) {
+  if (!CutsToBudget(step) || change.rows.any) return;
+  const bool mcmc = options_.strategy == Strategy::kMcmc;
+  const int64_t most = mcmc ? options_.mcmc.cap_max : options_.densification.max_gaussians;
   change.rows.kept.clear();
   for (const int64_t row : MostVisible(state_.cloud, most)) change.rows.kept.push_back(row);
   change.rows.any = true;
@@ -148,16 +279,30 @@ void Fitter::MeasureMipFilter() {
 FitTimes Fitter::times() const {
   FitTimes times = times_;
   times.objective = objective_.times();
+  times.objective.render += away_times_.render;
+  times.objective.backward += away_times_.backward;
   return times;
 }
 
-double Fitter::LastPsnr() const {
-  const auto psnr = Psnr(objective_.rendered(), picture_);
-  return psnr.ok() ? *psnr : 0;
+double Fitter::LastLoss() {
+  LastPsnr();
+  return last_loss_;
 }
 
-GaussianCloud Fitter::UsableCloud() const {
-  GaussianCloud cloud = state_.cloud;
+double Fitter::LastPsnr() {
+  if (residence_.away() != nullptr) {
+    const auto loss = residence_.away()->objective().Loss();
+    if (!loss.ok()) return 0;
+    last_loss_ = loss->loss.loss;
+    last_psnr_ = -10 * std::log10(loss->mean_square);
+  } else if (const auto psnr = Psnr(objective_.rendered(), picture_); psnr.ok()) {
+    last_psnr_ = *psnr;
+  }
+  return last_psnr_;
+}
+
+GaussianCloud Fitter::UsableCloud() {
+  GaussianCloud cloud = state().cloud;
   if (options_.mip_filter) FuseMipFilter(state_.mip_filter, cloud);
   std::vector<int64_t> usable;
   for (int64_t i = 0; i < cloud.size(); ++i) {

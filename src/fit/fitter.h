@@ -9,42 +9,28 @@
 #include "core/gaussian_cloud.h"
 #include "core/image.h"
 #include "core/result.h"
-#include "fit/cloud_optimizer.h"
 #include "fit/densification.h"
 #include "fit/fit_options.h"
+#include "fit/fit_state.h"
 #include "fit/mip_filter.h"
 #include "fit/picture_cache.h"
+#include "fit/residence.h"
 #include "fit/view_objective.h"
 #include "fit/view_order.h"
 
 namespace anchorsplat {
-
-// All that changes during a fit.
-struct FitState {
-  int64_t step = 0;  // steps done
-  GaussianCloud cloud;
-  CloudOptimizer optimizer;
-  Densification densification;  // of nothing where the strategy gathers nothing
-  Buffer<float> mip_filter;     // [N] world units, MipFilterSizes; empty where the fit has no such filter
-  // [V,6] of refinements that align their views: how far each has moved from where its camera says (MotionBetween in
-  // fit/view_pose.h). Empty: they stay.
-  Buffer<float> motions;
-  Buffer<float> exposures;  // [V,6] of fits that take them out: gain and bias per channel, as they are measured
-  // Files that an interruption leaves besides its checkpoint, by their AbsoluteName: what goes on may replace them.
-  std::vector<std::string> left;
-};
 
 // Before an interruption writes its results: notes which of these files it will leave besides its checkpoint.
 void Leave(FitState& state, std::span<const std::filesystem::path> files);
 
 // What one step saw.
 struct FitStep {
-  PhotometricLossValue loss;
   int64_t view = 0;
   DensificationChange change;
 };
 
-// Seconds on the clock, of all steps so far.
+// Seconds on the clock, of all steps so far. A GPU works while the host goes on: what it takes counts where the host
+// waits for it, which is mostly in rendering.
 struct FitTimes {
   double load = 0;  // pictures from the cache
   ObjectiveTimes objective;
@@ -53,6 +39,11 @@ struct FitTimes {
 
 // The iterations of a fit, one at a time: view, objective, optimizer, densification. The state after k steps is the
 // same bits for any number of threads, and whether they were made in one go or from a checkpoint.
+//
+// Where the run has a GPU (RunContext::device), the state stays there (fit/residence.h) unless the fit has what the GPU
+// has not: MCMC, a smoothing filter, regularizers, a far shell. Such a fit and one that does not fit draws its pictures
+// there. The state is then that of the CPU up to rounding, and the same bits at every run. A GPU that is lost costs at
+// most kCopyHomeEvery steps, which are made again.
 class Fitter {
  public:
   // `pictures` are the training views (at least one). Begins at `state.step`.
@@ -66,20 +57,34 @@ class Fitter {
   Result<FitStep> Step();
 
   bool done() const { return state_.step >= options_.steps; }
-  const FitState& state() const { return state_; }
+  int64_t step() const { return state_.step; }  // steps done
+  int64_t size() const;                         // Gaussians
+  // May have to come from the GPU. When that is lost, it is an older state, and step() is that of it.
+  const FitState& state();
   void Leave(std::span<const std::filesystem::path> files) { anchorsplat::Leave(state_, files); }
   const FitOptions& options() const { return options_; }
   PictureCache& pictures() { return pictures_; }
   FitTimes times() const;
-  // Peak signal-to-noise ratio of the last step's picture, before the step.
-  double LastPsnr() const;
+  // Of the last step, before the step: its loss, NaN where there is none, and the peak signal-to-noise ratio of its
+  // picture, 0 where there is none.
+  double LastLoss();
+  double LastPsnr();
   // A copy of the cloud as it is rendered, the smoothing filter fused, without rows that are not finite.
-  GaussianCloud UsableCloud() const;
+  GaussianCloud UsableCloud();
 
  private:
   Fitter(const FitOptions& options, PictureCache pictures, double scene_scale, FitState state);
 
-  DensificationChange ChangeGaussians(const Camera& rays);
+  // Whether all of such a fit can be done on the GPU.
+  bool CanReside() const;
+  // The step but for its densification: view `view`, loaded, with what options say for it.
+  Status Learn(const ObjectiveOptions& objective, const Camera& camera, int64_t view);
+  Status LearnAway(const ObjectiveOptions& objective, const Camera& camera, int64_t view);
+  // Densification after the step, whose gradient is at hand unless it was gathered on the GPU.
+  DensificationChange ChangeGaussians(const Camera& rays, const CloudGradient* gradient);
+  Result<DensificationChange> ChangeAway(const Camera& rays);
+  bool FollowsExposure() const { return options_.exposure_from >= 0 && state_.step >= options_.exposure_from; }
+  bool CutsToBudget(int64_t step) const;
   // Where growth ends, what is above the bound goes, least opacity × size first: the start had more, for growth never
   // passes it. The steps that are left make up for it.
   void KeepToBudget(int64_t step, DensificationChange& change);
@@ -95,6 +100,9 @@ class Fitter {
   CloudGradient gradient_;
   Image picture_;
   Buffer<uint8_t> ignored_;  // of it
+  double last_loss_, last_psnr_ = 0;
+  Residence residence_;
+  ObjectiveTimes away_times_;
   FitTimes times_;
 };
 

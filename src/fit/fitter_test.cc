@@ -168,7 +168,7 @@ TEST_F(Fits, AnInterruptionLosesNothing) {
   FitControl control;
   control.checkpoint = folder_ / "state";
   const RunScope run({.stop = &stop});
-  control.observe = [&](const Fitter& fitter) { stop = fitter.state().step >= 31; };
+  control.observe = [&](const Fitter& fitter) { stop = fitter.step() >= 31; };
   const auto first = Fit(views_, Initial(), options_, control);
   ASSERT_TRUE(first.ok());
   EXPECT_TRUE(first->report.interrupted);
@@ -225,7 +225,7 @@ TEST_F(Fits, CheckpointsComeInTime) {
   control.checkpoint_every = 25;
   std::vector<int64_t> seen;
   control.observe = [&](const Fitter& fitter) {
-    if (std::filesystem::exists(control.checkpoint)) seen.push_back(fitter.state().step);
+    if (std::filesystem::exists(control.checkpoint)) seen.push_back(fitter.step());
   };
   ASSERT_TRUE(Fit(views_, Initial(), options_, control).ok());
   ASSERT_FALSE(seen.empty());
@@ -320,9 +320,9 @@ TEST_F(Fits, ACheckpointWithoutRoomCostsNoMoreThanItself) {
   control.checkpoint = folder_ / "state";
   const RunScope run({.stop = &stop});
   control.observe = [&](const Fitter& fitter) {
-    if (fitter.state().step < 25) return;
+    if (fitter.step() < 25) return;
     if (!full) full.emplace();
-    stop = fitter.state().step == 31;
+    stop = fitter.step() == 31;
   };
   const auto first = Fit(views_, Initial(), options_, control);
   full.reset();
@@ -404,7 +404,7 @@ TEST_F(Fits, APictureAtFaultCostsNoCheckpoint) {
   FitControl control;
   control.checkpoint = folder_ / "state";
   const RunScope run({.stop = &stop});
-  control.observe = [&](const Fitter& fitter) { stop = fitter.state().step == 31; };
+  control.observe = [&](const Fitter& fitter) { stop = fitter.step() == 31; };
   ASSERT_TRUE(Fit(views_, Initial(), options_, control).ok());
   stop = false;
   control.observe = nullptr;

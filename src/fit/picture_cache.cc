@@ -53,6 +53,19 @@ Status PictureCache::Load(int64_t view, Image& picture, Buffer<uint8_t>& ignored
   return {};
 }
 
+Result<PackedPicture> PictureCache::LoadPacked(int64_t view) {
+  const auto packed = [](const Stored& stored) {
+    return PackedPicture{stored.channels, stored.pixels, stored.ignored};
+  };
+  const Stored& kept = stored_[static_cast<size_t>(view)];
+  if (kept.channels != 0) return packed(kept);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(passing_, Read(view));
+  const auto bytes = static_cast<int64_t>(passing_.pixels.size() + passing_.ignored.size());
+  if (bytes > left_) return packed(passing_);
+  Keep(view, std::move(passing_));
+  return packed(kept);
+}
+
 void PictureCache::LoadAhead(std::span<const int64_t> views) {
   if (views.empty() || stored_[static_cast<size_t>(views.front())].channels != 0) return;
   const auto most = static_cast<size_t>(ThreadCount());

@@ -12,6 +12,13 @@
 
 namespace anchorsplat {
 
+// A picture as it is kept.
+struct PackedPicture {
+  int channels = 0;                  // 3, or 4 with alpha, which is to be laid over a background
+  std::span<const uint8_t> pixels;   // [channels,H,W]
+  std::span<const uint8_t> ignored;  // [H,W] as of PictureCache::Load
+};
+
 // The pictures of views, decoded and undone of their lens when first asked for (cameras/photograph.h) and kept as bytes
 // while they fit into `budget`. What does not fit is made each time: with views in random order no other choice of what
 // to keep would be asked for more often. One object per thread of control.
@@ -27,6 +34,10 @@ class PictureCache {
   // The picture of views()[view] as [3,H,W] in 0–1, and where it says nothing: [H,W], 1 there, empty for nowhere.
   // Errors: those of ReadPhotograph; kBadFile when the picture has not its camera's size.
   Status Load(int64_t view, Image& picture, Buffer<uint8_t>& ignored);
+
+  // The same as bytes, over no background yet. Valid until the next call.
+  Result<PackedPicture> LoadPacked(int64_t view);
+  const std::array<float, 3>& background() const { return background_; }
 
   // `views` are asked for next, in this order. If the first of them is not kept but would fit, it is decoded at the
   // same time as others after it, as many as there are threads for and kDecodedAtOnce allows: a picture is decoded by
@@ -48,6 +59,7 @@ class PictureCache {
   std::array<float, 3> background_;
   int64_t left_;  // bytes of the budget
   std::vector<Stored> stored_;
+  Stored passing_;  // what LoadPacked gave and there is no room for
 };
 
 // Takes what `shown` has where nothing is asked of `picture`, so that the two do not differ there.

@@ -28,16 +28,7 @@ Status Check(const Image& rendered, const Image& target, const PhotometricLossOp
                            target.width, " x ", target.height, " x ", target.channels,
                            "; the photometric loss compares two of the same size and three channels"));
   }
-  if (rendered.width < 1 || rendered.height < 1) return BadArgument("empty images cannot be compared");
-  if (!(options.ssim_weight >= 0 && options.ssim_weight <= 1)) {
-    return BadArgument(Cat("SSIM weight ", options.ssim_weight, " is not in [0, 1]"));
-  }
-  if (options.padding == SsimPadding::kValid && options.ssim_weight > 0 &&
-      std::min(rendered.width, rendered.height) < kSsimTaps) {
-    return BadArgument(Cat("images of ", rendered.width, " x ", rendered.height,
-                           " have no pixel whose SSIM window of 11 x 11 lies inside"));
-  }
-  return {};
+  return CheckPhotometricLoss(rendered.width, rendered.height, options);
 }
 
 // The first of n numbers that differ, n if none does. NaN differs.
@@ -89,6 +80,18 @@ PixelBox Common(const PixelBox& a, const PixelBox& b) {
 }
 
 }  // namespace
+
+Status CheckPhotometricLoss(int width, int height, const PhotometricLossOptions& options) {
+  if (width < 1 || height < 1) return BadArgument("empty images cannot be compared");
+  if (!(options.ssim_weight >= 0 && options.ssim_weight <= 1)) {
+    return BadArgument(Cat("SSIM weight ", options.ssim_weight, " is not in [0, 1]"));
+  }
+  if (options.padding == SsimPadding::kValid && options.ssim_weight > 0 && std::min(width, height) < kSsimTaps) {
+    return BadArgument(
+        Cat("images of ", width, " x ", height, " have no pixel whose SSIM window of 11 x 11 lies inside"));
+  }
+  return {};
+}
 
 Result<PhotometricLossValue> PhotometricLoss(const Image& rendered, const Image& target,
                                              const PhotometricLossOptions& options, Image& gradient, PixelBox& box) {

@@ -36,4 +36,7 @@ struct PhotometricLossValue {
 Result<PhotometricLossValue> PhotometricLoss(const Image& rendered, const Image& target,
                                              const PhotometricLossOptions& options, Image& gradient, PixelBox& box);
 
+// What of that can be said before there are pictures: the errors of sizes (pixels) and options.
+Status CheckPhotometricLoss(int width, int height, const PhotometricLossOptions& options);
+
 }  // namespace anchorsplat

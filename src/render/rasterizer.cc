@@ -258,16 +258,22 @@ Rasterizer& Rasterizer::operator=(Rasterizer&&) noexcept = default;
 
 const RenderStatistics& Rasterizer::statistics() const { return state_->statistics; }
 
+Status ValidateRender(const Camera& camera, const RenderOptions& options) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckCamera(camera));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
+  const float near = NearPlane(options, camera);
+  if (!(options.far_plane > near)) {
+    return BadArgument(Cat("far plane ", options.far_plane, " must lie behind the near plane, which is at ", near));
+  }
+  return {};
+}
+
 Status Rasterizer::Render(const CloudView& cloud, const Camera& world_camera, const RenderOptions& options,
                           RenderOutput& output) {
   state_->kept.reset();
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckCamera(world_camera));
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckOptions(options));
+  ANCHORSPLAT_RETURN_IF_ERROR(ValidateRender(world_camera, options));
   const float near = NearPlane(options, world_camera);
-  if (!(options.far_plane > near)) {
-    return BadArgument(Cat("far plane ", options.far_plane, " must lie behind the near plane, which is at ", near));
-  }
   if (cloud.size() > std::numeric_limits<int32_t>::max()) {
     return BadArgument(Cat("cloud of ", WithThousands(cloud.size()), " Gaussians; at most 2,147,483,647 can be drawn"));
   }

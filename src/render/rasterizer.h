@@ -110,6 +110,9 @@ struct RenderStatistics {
   int runs = 0;             // of tiles, see RenderOptions::max_pairs
 };
 
+// Whether Render would take the camera and the options: its errors but for those that are about the cloud or memory.
+Status ValidateRender(const Camera& camera, const RenderOptions& options);
+
 // The 3DGS rasterizer (Kerbl et al. 2023), on the device of the run (RunContext::device in core/run_context.h). The CPU
 // is the reference. A GPU follows its arithmetic: the same order of depths, and the same picture to 1e-4 but where a
 // pixel lies right on a cut-off (min_alpha, min_transmittance). A picture that the GPU's floats cannot hold, and

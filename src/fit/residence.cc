@@ -1,0 +1,58 @@
+#include "fit/residence.h"
+
+#include <utility>
+
+#include "core/log.h"
+#include "core/text.h"
+#include "gpu/open_gpu.h"
+
+namespace anchorsplat {
+
+void Residence::MoveIn(const FitState& state) {
+  fit_.reset();
+  Result<std::shared_ptr<GpuDevice>> device = GpuOfRun();
+  if (!device.ok()) GiveUpGpu(device.error());
+  if (!device.ok() || *device == nullptr) return;
+  Result<std::unique_ptr<ResidentFit>> fit =
+      ResidentFit::Begin(*device, state.cloud, state.optimizer, state.densification);
+  if (!fit.ok()) {
+    LogWarning(Cat("The GPU draws the pictures, but the Gaussians stay in main memory: ", fit.error().message));
+    return;
+  }
+  fit_ = std::move(fit).value();
+  learned_ = step_ = state.step;
+  exposures_ = state.exposures;
+}
+
+Status Residence::CopyHome(FitState& state) {
+  ANCHORSPLAT_RETURN_IF_ERROR(fit_->Read(state.cloud, state.optimizer, state.densification));
+  state.optimizer.set_steps(learned_);
+  step_ = state.step;
+  exposures_ = state.exposures;
+  return {};
+}
+
+Status Residence::MoveOut(FitState& state) {
+  ANCHORSPLAT_RETURN_IF_ERROR(CopyHome(state));
+  fit_.reset();
+  return {};
+}
+
+bool Residence::MoveOut(FitState& state, const Error& why) {
+  const Status home = MoveOut(state);
+  if (home.ok()) {
+    LogWarning(Cat("The Gaussians go back to main memory, and the work goes on there: ", why.message));
+    return true;
+  }
+  fit_.reset();
+  GiveUpGpu(home.error());
+  if (state.step != step_) {
+    LogWarning(Cat("It goes on from step ", WithThousands(step_), ", of which there is a copy."));
+  }
+  state.step = step_;
+  state.optimizer.set_steps(step_);
+  state.exposures = exposures_;
+  return false;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <utility>
+
+#include "core/run_context.h"
+#include "gpu/device.h"
+#include "gpu/gpu_of_run.h"
+
+namespace anchorsplat {
+
+// A run whose GPU is the given one.
+class RunOnGpu {
+ public:
+  explicit RunOnGpu(std::shared_ptr<GpuDevice> device, const std::atomic<bool>* stop = nullptr)
+      : scope_({.stop = stop, .device = DeviceChoice{DeviceChoice::Kind::kGpu}}) {
+    internal::CurrentStorage().Get<internal::GpuStateOfRun>()->for_test = std::move(device);
+  }
+
+ private:
+  RunScope scope_;
+};
+
+}  // namespace anchorsplat

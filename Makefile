@@ -70,6 +70,7 @@ build: test-dependencies
 
 # Only the program: what `make demo` needs. A build folder that has the tests keeps them.
 program: dependencies
+	@scripts/fetch-webgpu.sh --optional
 	@cmake --preset release $(if $(wildcard build/release/CMakeCache.txt),,-DANCHORSPLAT_TESTS=OFF) $(TORCH_FLAGS) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
 	@rm -f build-configure.log
 	@cmake --build --preset release -j $(JOBS) --target anchorsplat

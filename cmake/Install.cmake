@@ -49,7 +49,7 @@ else()
     COMMAND anchorsplat manual bash > "${made}/anchorsplat.bash"
     COMMAND anchorsplat manual zsh > "${made}/_anchorsplat"
     COMMAND "${CMAKE_SOURCE_DIR}/scripts/third-party.sh" "$<TARGET_FILE:anchorsplat>" > "${third_party}"
-    DEPENDS anchorsplat scripts/third-party.sh THIRD_PARTY
+    DEPENDS anchorsplat scripts/third-party.sh scripts/webgpu-headers.notice THIRD_PARTY
     VERBATIM)
   add_custom_target(anchorsplat_documents ALL DEPENDS ${documents})
   install(FILES "${made}/anchorsplat.1" DESTINATION "${CMAKE_INSTALL_MANDIR}/man1")

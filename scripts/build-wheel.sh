@@ -59,6 +59,10 @@ for whole in "$work"/whole/*.whl; do
     source=$(dpkg-query -W -f='${source:Package}\n' "$package" | head -n 1)
     grep -q "^=== $source " THIRD_PARTY || fail "$(basename "$whole") holds $library of $source, and THIRD_PARTY has no notice of it"
   done
+  # The package wgpu brings that library, with its own notice (the extra `gpu`).
+  if python -m zipfile -l "$whole" | grep -q libwgpu; then
+    fail "$(basename "$whole") holds wgpu-native, and THIRD_PARTY has no notice of it"
+  fi
   if python -m zipfile -l "$whole" | grep -E '\.(png|jpe?g|webp)|examples/|testdata/'; then
     fail "$(basename "$whole") holds pictures"
   fi

@@ -41,6 +41,10 @@ while read -r package; do
   notices[$source]=$notice
 done < <(sort -u <<<"$wanted")
 
+# webgpu.h is in no package of Debian 12 (scripts/fetch-webgpu.sh). The library that it is the header of is never carried:
+# it is loaded from where its user has it.
+packages[webgpu-headers]=webgpu.h notices[webgpu-headers]=$here/webgpu-headers.notice
+
 sorted=$(printf '%s\n' "${!packages[@]}" | LC_ALL=C sort)
 if [ "${2:-}" = --names ]; then
   echo "$sorted"

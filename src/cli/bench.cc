@@ -8,6 +8,7 @@
 #include "bench/io_bench.h"
 #include "bench/network_bench.h"
 #include "bench/render_bench.h"
+#include "cli/bench_gpu.h"
 #include "cli/bench_reading.h"
 #include "cli/table.h"
 #include "cli/verb.h"
@@ -369,6 +370,7 @@ void AddBench(CLI::App& app, Program& program) {
   AddNetworkBench(verb, program);
   AddConvertBench(verb, program);
   AddIoBench(verb, program);
+  AddGpuBench(verb, program);
   AddReadingBench(verb, program);
 }
 

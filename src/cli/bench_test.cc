@@ -22,7 +22,7 @@ using ::testing::HasSubstr;
 TEST(BenchVerb, TakesAndRefusesWords) {
   const TestFolder folder;
   const std::string none = folder / "none.ply";
-  ExpectRefused({"bench"}, ErrorCode::kBadArgument, {"needs a verb: render, fit, network, convert, io, reading"});
+  ExpectRefused({"bench"}, ErrorCode::kBadArgument, {"needs a verb: render, fit, network, convert, io, gpu, reading"});
   ExpectRefused({"bench", "render", none}, ErrorCode::kNotFound, {"none.ply"});
   ExpectRefused({"bench", "network", none}, ErrorCode::kNotFound, {"none.ply"});
   ExpectRefused({"bench", "convert", none}, ErrorCode::kNotFound, {"none.ply"});
@@ -31,6 +31,34 @@ TEST(BenchVerb, TakesAndRefusesWords) {
   ExpectRefused({"bench", "fit", "--width", "10"}, ErrorCode::kBadArgument, {"--width"});
   ExpectRefused({"bench", "convert", "--gaussians", "999"}, ErrorCode::kBadArgument, {"--gaussians"});
   ExpectRefused({"bench", "io", "--sh-degree", "4"}, ErrorCode::kBadArgument, {"--sh-degree"});
+}
+
+// The table itself needs a GPU and a quiet machine; that it is made, and what other programs are given, does not.
+TEST(BenchVerb, GpuMeasuresAndWritesItsScenes) {
+  const TestFolder folder;
+  const std::string scenes = folder / "scenes";
+  const std::vector<std::string> load = {"--gaussians", "200", "--size", "32x24"};
+  std::vector<std::string> words = {"bench", "gpu", "--small", "--repeats", "1"};
+  words.insert(words.end(), load.begin(), load.end());
+  const nlohmann::json json = ExpectJson(words);
+  EXPECT_FALSE(json["adapter"]["name"].get<std::string>().empty());
+  ASSERT_EQ(json["rows"].size(), 1u);
+  EXPECT_EQ(json["rows"][0]["gaussians"], 200);
+  EXPECT_EQ(json["rows"][0]["width"], 32);
+  EXPECT_GT(json["rows"][0]["backward_seconds"], 0);
+  EXPECT_EQ(json["rows"][0]["cpu"]["out_of_order"], 0);
+  EXPECT_FALSE(json["rows"][0].contains("problem"));
+  EXPECT_THAT(ExpectDone(words).out, HasSubstr("32x24"));
+
+  std::vector<std::string> write = {"bench", "gpu", "--write-scenes", scenes};
+  write.insert(write.end(), load.begin(), load.end());
+  ExpectDone(write);
+  EXPECT_TRUE(std::filesystem::exists(scenes + "/200.ply"));
+  EXPECT_TRUE(std::filesystem::exists(scenes + "/scenes.json"));
+  ExpectRefused(write, ErrorCode::kExists, {"200.ply"});
+  ExpectRefused({"bench", "gpu", "--device", "cpu"}, ErrorCode::kBadArgument, {"--device gpu"});
+  ExpectRefused({"bench", "gpu", "--size", "32"}, ErrorCode::kBadArgument, {"WIDTHxHEIGHT"});
+  ExpectRefused({"bench", "gpu", "--gaussians", "0"}, ErrorCode::kBadArgument, {"--gaussians"});
 }
 
 TEST(BenchVerb, ReadingTellsWhatASplatShows) {

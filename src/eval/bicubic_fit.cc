@@ -123,7 +123,7 @@ Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
   const double before = progress.seconds;
   Status noted;
   control.observe = [&](const Fitter& fitter) {
-    if (fitter.state().step % kCheckpointEvery != 0) return;
+    if (fitter.step() % kCheckpointEvery != 0) return;
     progress.seconds = before + watch.Total();
     noted = WriteProgress(note, progress);
   };

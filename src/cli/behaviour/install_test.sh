@@ -110,7 +110,7 @@ fi
 if command -v dpkg-query >/dev/null; then
   expect 0 "third party" "$source/scripts/third-party.sh" "$installed" --names
   cp "$work/stdout" "$work/names"
-  for name in assimp embree draco onetbb libpng1.6 highway cli11; do
+  for name in assimp embree draco onetbb libpng1.6 highway cli11 webgpu-headers; do
     expect 0 "$name among the third parties" grep -qx "$name" "$work/names"
   done
   while read -r name; do

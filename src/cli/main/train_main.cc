@@ -3,6 +3,7 @@
 
 #include <cstdlib>
 
+#include "cli/main/quiet_driver.h"
 #include "cli/verb.h"
 #include "train/trainer.h"
 
@@ -13,5 +14,6 @@ int main(int argc, char** argv) {
     setenv("OMP_WAIT_POLICY", "passive", /*overwrite=*/0);
     execv("/proc/self/exe", argv);
   }
+  anchorsplat::QuietDriver();
   return anchorsplat::RunProgram(argc, argv, anchorsplat::Train);
 }

@@ -25,7 +25,8 @@ std::string Convert(const nb::bytes& input, const nb::bytes& output, const nb::l
   return ResultOf(run, [&]() -> Result<std::string> {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const ConvertOptions options, MakeConvertOptions(flags, overwrite));
     ANCHORSPLAT_RETURN_IF_ERROR(CheckConvertEffects(flags, {&to, 1}));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const Converted done, ConvertAndMeasure(from, to, options, flags.views));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const EditJob job, MakeEditJob(flags.edits, {from}, 0, options));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Converted done, ConvertAndMeasure(job, to, flags.views));
     nlohmann::json json = ToJson(done);
     json["input"] = from.string();
     json["output"] = to.string();

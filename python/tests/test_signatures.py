@@ -22,6 +22,13 @@ OUTPUT = {"output": "results are values"}
 SIZE = {"max-memory": "arrays are in memory already", "yes": "nobody is asked"}
 PIPED = {"to": "results are values"}
 FILES = {**OUTPUT, **PIPED, **SIZE, "out-dir": "results are values"}
+EDITS = {
+    name: "keywords have no order"
+    for name in (
+        "translate rotate scale mirror up origin filter-box filter-sphere filter-nan filter-value filter-harmonics filter-floaters "
+        "action-axes dry-run"
+    ).split()
+}
 FUNCTIONS = {
     "enhance": ("enhance", None, {}, {"view": "anchorsplat.view", "overwrite": "nothing is written", **FILES}),
     "fit": (
@@ -59,6 +66,7 @@ FUNCTIONS = {
             "lod": "the target's name says it",
             "out-dir": "one at a time",
             "seed": "nothing is random",
+            **EDITS,
         },
     ),
     "info": ("info", None, {"from": "format"}, {"overwrite": "nothing is written", "seed": "nothing is random"}),

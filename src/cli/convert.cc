@@ -77,16 +77,23 @@ std::string WrittenFormats() {
 }
 
 struct Job {
-  fs::path input, output;
+  std::vector<fs::path> inputs;
+  fs::path output;
+  size_t output_at = 0;  // among the paths, from 1; 0: it is none of them
 };
 
 Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
   std::vector<Job> jobs;
   if (flags.out_dir.empty()) {
-    if (flags.paths.size() != 2) {
-      return Error{ErrorCode::kBadArgument, "say IN OUT, or several inputs with --out-dir DIR"};
+    const size_t count = flags.paths.size();
+    if (count < 2 && flags.how.edits.dry_run) {  // nothing is written, so that no name is needed
+      jobs.push_back({{flags.paths[0]}, "dry-run.ply"});
+      return jobs;
     }
-    jobs.push_back({flags.paths[0], flags.piped != nullptr ? flags.piped->path() : fs::path(flags.paths[1])});
+    if (count < 2) return Error{ErrorCode::kBadArgument, "say IN OUT, or several inputs with --out-dir DIR"};
+    jobs.push_back({{flags.paths.begin(), flags.paths.end() - 1},
+                    flags.piped != nullptr ? flags.piped->path() : fs::path(flags.paths.back()),
+                    count});
     if (!flags.lod) return jobs;
     // The folder of a scene, as it is or will be ("scene.v2" is one), stands for the file that programs look for in it.
     fs::path& output = jobs.back().output;
@@ -126,12 +133,13 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
     }
     // Checked for all before the first is read: a batch should not fail half-way on something known at its start.
     for (const fs::path& file : FilesOfCloud(output, kMaxShDegree)) ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(file));
-    if (!overwrite && Exists(output)) {
+    if (!overwrite && !flags.how.edits.dry_run && Exists(output)) {
       return Error{ErrorCode::kExists, Cat(output.string(), " exists; -w replaces it")};
     }
-    jobs.push_back({input, output});
+    jobs.push_back({{input}, output});
   }
   for (const Job& job : jobs) {
+    if (flags.how.edits.dry_run) break;
     std::error_code code;
     fs::create_directories(job.output.parent_path(), code);
     if (code) {
@@ -142,19 +150,42 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
   return jobs;
 }
 
-void Print(const OutputMemory* piped, const Job& job, const ConvertReport& r,
-           const std::optional<ConversionLoss>& loss) {
+// "scan.ply", or "scan.ply and 2 more".
+std::string NamesOf(const Job& job) {
+  std::string names = OneLine(job.inputs[0]);
+  if (job.inputs.size() > 1) names += Cat(" and ", job.inputs.size() - 1, " more");
+  return names;
+}
+
+void PrintSteps(const std::vector<EditStep>& steps, std::ostream& out) {
+  for (const EditStep& step : steps) {
+    if (!step.chooses) continue;
+    out << "  " << OneLine(step.action) << (step.input.empty() ? "" : Cat(" on ", OneLine(step.input))) << ": "
+        << WithThousands(step.taken) << " Gaussians taken away, " << WithThousands(step.left) << " left\n";
+  }
+}
+
+void Print(const OutputMemory* piped, const Job& job, const Converted& done) {
+  const ConvertReport& r = done.report;
   std::ostream& out = ResultsBeside(piped);
-  out << OneLine(job.input) << " (" << r.input_format << ", " << HumanBytes(r.input_bytes) << ") -> "
-      << OutputName(job.output, piped) << " (" << r.output_format << ", " << HumanBytes(r.output_bytes);
+  out << NamesOf(job) << " (" << r.input_format << ", " << HumanBytes(r.input_bytes) << ")";
+  if (done.dry_run) {
+    out << "\n  " << WithThousands(r.gaussians_read) << " Gaussians of SH degree " << r.sh_degree_read << " in, "
+        << WithThousands(r.gaussians_written) << " of degree " << r.sh_degree_written
+        << " would come out; nothing was written\n";
+    PrintSteps(done.steps, out);
+    return;
+  }
+  out << " -> " << OutputName(job.output, piped) << " (" << r.output_format << ", " << HumanBytes(r.output_bytes);
   if (r.predicted_bytes) {
     out << ", predicted " << (r.predicted_roughly ? "about " : "") << HumanBytes(*r.predicted_bytes);
   }
   out << ")\n  " << WithThousands(r.gaussians_read) << " Gaussians of SH degree " << r.sh_degree_read << " in, "
       << WithThousands(r.gaussians_written) << " of degree " << r.sh_degree_written << " out; read in "
       << HumanSeconds(r.read_seconds) << ", written in " << HumanSeconds(r.write_seconds) << '\n';
+  PrintSteps(done.steps, out);
   if (r.error) out << FormatAttributeError(*r.error);
-  if (loss) {
+  if (const auto& loss = done.loss) {
     out << "  pictures    PSNR " << Fixed(loss->mean_psnr, 2) << " dB on average, " << Fixed(loss->min_psnr, 2)
         << " dB at worst, over " << loss->views << " views\n";
   }
@@ -179,25 +210,34 @@ Status ConvertModel(const ConvertWords& flags, const SharedFlags& shared) {
 
 // What will come out, as far as the header tells.
 std::optional<OutputPlan> PlanOf(const ConvertOptions& options, const Job& job) {
-  const std::optional<CloudExtent> extent = ExtentOf(job.input, options.input_format);
   const SplatFormat* const to = FormatOfExtension(job.output);
-  if (!extent || to == nullptr || to->predicted_size == nullptr) return std::nullopt;
-  OutputPlan plan{.input = job.input.string(), .output = job.output, .gaussians_in = extent->gaussians};
-  plan.gaussians = std::min(extent->gaussians, options.max_gaussians.value_or(extent->gaussians));
-  const int degree = options.sh_degree.value_or(extent->sh_degree);
+  if (to == nullptr || to->predicted_size == nullptr) return std::nullopt;
+  CloudExtent all;
+  for (const fs::path& input : job.inputs) {
+    const std::optional<CloudExtent> extent = ExtentOf(input, options.input_format);
+    if (!extent) return std::nullopt;
+    all.gaussians += extent->gaussians;
+    all.sh_degree = std::max(all.sh_degree, extent->sh_degree);
+  }
+  OutputPlan plan{.input = NamesOf(job), .output = job.output, .gaussians_in = all.gaussians};
+  plan.gaussians = std::min(all.gaussians, options.max_gaussians.value_or(all.gaussians));
+  const int degree = options.sh_degree.value_or(all.sh_degree);
   plan.bytes = to->predicted_size(plan.gaussians, degree);
   plan.roughly = to->size_is_estimate;
-  plan.needed = static_cast<uint64_t>(extent->gaussians) * RowBytes(extent->sh_degree);
+  plan.needed = static_cast<uint64_t>(all.gaussians) * RowBytes(all.sh_degree);
   plan.seconds = static_cast<double>(plan.gaussians) * (to->seconds_per_gaussian + kSecondsToRead) / ThreadCount();
   return plan;
 }
 
 // One file: converted, measured where asked for, told. A row of the JSON document.
-Result<nlohmann::json> RunJob(const Job& job, const ConvertOptions& options, int views, const SharedFlags& shared) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Converted done, ConvertAndMeasure(job.input, job.output, options, views));
-  if (!shared.json && !shared.quiet) Print(options.write.memory, job, done.report, done.loss);
+Result<nlohmann::json> RunJob(const Job& job, const EditJob& edits, int views, const SharedFlags& shared) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Converted done, ConvertAndMeasure(edits, job.output, views));
+  if (!shared.json && (!shared.quiet || done.dry_run)) Print(edits.convert.write.memory, job, done);
   nlohmann::json json = ToJson(done);
-  json["input"] = job.input.string();
+  json["input"] = job.inputs[0].string();
+  for (const fs::path& input : job.inputs) {
+    if (job.inputs.size() > 1) json["inputs"].push_back(input.string());
+  }
   json["output"] = job.output.string();
   return json;
 }
@@ -213,10 +253,16 @@ Status RunJobs(const ConvertWords& flags, Program& program) {
   std::vector<fs::path> outputs;
   for (const Job& job : jobs) outputs.push_back(job.output);
   ANCHORSPLAT_RETURN_IF_ERROR(CheckConvertEffects(flags.how, outputs));
+  std::vector<EditJob> edits;
+  for (const Job& job : jobs) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(EditJob edit, MakeEditJob(flags.how.edits, job.inputs, job.output_at, options));
+    edits.push_back(std::move(edit));
+  }
   std::vector<BatchItem> items;
-  for (const Job& job : jobs) items.push_back({job.input.string(), job.output.string()});
+  for (const Job& job : jobs) items.push_back({job.inputs[0].string(), job.output.string()});
   std::vector<OutputPlan> plans;
   for (const Job& job : jobs) {
+    if (flags.how.edits.dry_run) break;
     if (std::optional<OutputPlan> plan = PlanOf(options, job)) plans.push_back(*std::move(plan));
   }
   ANCHORSPLAT_RETURN_IF_ERROR(SayAndAsk(plans, flags.size, shared));
@@ -225,13 +271,13 @@ Status RunJobs(const ConvertWords& flags, Program& program) {
     fs::path folder = jobs[k].output.parent_path();
     if (!folder.empty() && !IsFolder(folder)) folder = folder.parent_path();  // it is made with the output
     const MemoryLimit limit(flags.size.arrays(), folder);
-    return RunJob(jobs[k], options, flags.how.views, shared);
+    return RunJob(jobs[k], edits[k], flags.how.views, shared);
   };
   return RunBatch(items, run, program);
 }
 
 Status RunConvert(const ConvertWords& flags, Program& program) {
-  const bool is_piped = flags.out_dir.empty() && flags.paths.size() == 2 && IsStandardOutput(flags.paths[1]);
+  const bool is_piped = flags.out_dir.empty() && flags.paths.size() >= 2 && IsStandardOutput(flags.paths.back());
   if (!is_piped && flags.out_dir.empty() && flags.to_option->count() > 0) {
     return Error{ErrorCode::kBadArgument, "--to has an effect with --out-dir, and where the output is -"};
   }
@@ -250,13 +296,17 @@ Status RunConvert(const ConvertWords& flags, Program& program) {
 }  // namespace
 
 void AddConvert(CLI::App& app, Program& program) {
-  CLI::App& verb = AddVerb(app, program, "convert", "Change the format of a splat, its size, its order",
-                           "anchorsplat convert scan.ply scan.spz --report");
+  CLI::App& verb =
+      AddVerb(app, program, "convert",
+              "Change the format of a splat, its size, its order; turn, move, scale, crop, clean and merge splats",
+              "anchorsplat convert scan.ply scan.spz --report");
   const auto flags = std::make_shared<ConvertWords>();
-  verb.add_option("paths", flags->paths,
-                  Cat("IN OUT, or inputs for --out-dir; - is standard input or output. Written: ", WrittenFormats(),
-                      ", and .safetensors of a network's weights"))
-      ->required();
+  flags->how.edits.paths =
+      verb.add_option("paths", flags->paths,
+                      Cat("IN OUT, several IN and the OUT that they are merged in, or inputs for --out-dir; - is "
+                          "standard input or output. Written: ",
+                          WrittenFormats(), ", and .safetensors of a network's weights"))
+          ->required();
   verb.add_option("--out-dir", flags->out_dir, "Folder to write to, under the inputs' names");
   flags->to_option =
       verb.add_option("--to", flags->to,

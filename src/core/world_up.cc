@@ -102,6 +102,11 @@ std::optional<Vec3> UpOf(const std::vector<std::string>& comments) {
   return std::nullopt;
 }
 
+void SetUp(const Vec3& up, std::vector<std::string>& comments) {
+  std::erase_if(comments, [](const std::string& text) { return text.starts_with(kMark) || VerticalAxis(text); });
+  comments.push_back(UpComment(up));
+}
+
 void TurnUpComments(const std::array<double, 9>& m, std::vector<std::string>& comments) {
   for (std::string& comment : comments) {
     const auto own = OwnUp(comment);

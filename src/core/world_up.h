@@ -24,6 +24,8 @@ std::string UpComment(const std::array<double, 3>& up);
 // has it, or three numbers, or an axis with its sign. Nothing where there is none or a broken one, nor for the bare
 // "Vertical axis: y": Brush writes that whatever its splat, and the usual up lies along this axis anyway.
 std::optional<std::array<double, 3>> UpOf(const std::vector<std::string>& comments);
+// Leaves no other word of it in them.
+void SetUp(const std::array<double, 3>& up, std::vector<std::string>& comments);
 // Rewrites them for a world that is turned or mirrored by the orthogonal `matrix` (row-major), in our words.
 void TurnUpComments(const std::array<double, 9>& matrix, std::vector<std::string>& comments);
 

@@ -45,12 +45,17 @@ void ForEachArray(GaussianCloud& cloud, Visit&& visit) {
   visit(cloud.sh, cloud.sh_stride());
 }
 
+void TurnBoth(const AxisTurn& axes, GaussianCloud& cloud, ExtraProperties& extras) {
+  TurnAxes(cloud, axes);
+  TurnAxes(extras, axes);
+}
+
+}  // namespace
+
 void KeepRows(GaussianCloud& cloud, ExtraProperties* extras, const std::vector<char>& keep) {
   ForEachArray(cloud, [&keep](Buffer<float>& array, int64_t width) { KeepRows(array, width, keep); });
   if (extras != nullptr) KeepRows(*extras, keep);
 }
-
-}  // namespace
 
 Status ParseAxes(std::string_view text, ConvertOptions& options) {
   const size_t colon = std::min(text.find(':'), text.size());
@@ -126,65 +131,62 @@ Result<GaussianCloud> ReadBack(const fs::path& output, const CloudWriteOptions& 
   return back;
 }
 
-Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output, const ConvertOptions& options,
-                                  GaussianCloud* kept) try {
-  ConvertReport report;
+Result<const SplatFormat*> WrittenFormat(const fs::path& output, const ConvertOptions& options) {
   const SplatFormat* const to = FormatOfExtension(output);
   if (to == nullptr || to->write == nullptr) return WriteCloud(output, GaussianCloud{}, options.write).error();
-  const InputRecord record;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(input, options.input_format));
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(output));
-  const SplatFormat* const from = file.format();
+  return to;
+}
 
+Result<ConvertedSplat> ReadToConvert(const OpenedSplat& file, const std::string& name, const ConvertOptions& options) {
+  ConvertedSplat splat;
+  ConvertReport& report = splat.report;
+  const SplatFormat* const from = file.format();
   if (options.lod_level > 0 && (from == nullptr || from->name != "streamed SOG")) {
     return Error{ErrorCode::kBadArgument,
-                 Cat("--lod-level has no effect on ", input.string(), "; it has one where a lod-meta.json is read")};
+                 Cat("--lod-level has no effect on ", name, "; it has one where a lod-meta.json is read")};
   }
-
   const double begin = Now();
-  ExtraProperties extras;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud cloud, file.Read({.lod_level = options.lod_level}, &extras));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(splat.cloud, file.Read({.lod_level = options.lod_level}, &splat.extras));
   report.read_seconds = Now() - begin;
   report.input_format = from != nullptr ? from->name : "";
-  report.output_format = to->name;
-  report.gaussians_read = cloud.size();
-  report.sh_degree_read = cloud.sh_degree;
+  report.gaussians_read = splat.cloud.size();
+  report.sh_degree_read = splat.cloud.sh_degree;
   report.input_bytes = file.bytes();
-  WarnOfStored(input.string(), cloud, options.stored);
-  MakeStored(cloud, options.stored, extras.full_color);
-  // Without harmonics: looking through them would take longer than all else here. Other formats say what becomes of
-  // such Gaussians when they are written.
-  if (const int64_t bad = to->keeps_all_values ? CountUnusable(cloud, false) : 0; bad > 0) {
-    LogWarning(Cat(input.string(), ": ", WithThousands(bad), " of ", WithThousands(cloud.size()),
-                   " Gaussians have a position, scale, rotation or opacity that no verb draws: ", kWhyUnusable));
-  }
-
-  if (options.render_mode) cloud.render_mode = options.render_mode;
-  cloud.double_means |= options.double_means;
-  if (options.sh_degree) SetShDegree(cloud, *options.sh_degree);
-  DropFaint(cloud, options.min_opacity, &extras);
-  if (options.max_gaussians) KeepMostImportant(cloud, *options.max_gaussians, &extras);
-  if (cloud.empty()) {
-    return Error{ErrorCode::kBadArgument, Cat(input.string(), ": no Gaussian has an opacity of ", options.min_opacity,
-                                              " or more: nothing to write")};
-  }
+  WarnOfStored(name, splat.cloud, options.stored);
+  MakeStored(splat.cloud, options.stored, splat.extras.full_color);
+  splat.cloud.double_means |= options.double_means;
   // Readers and writers follow their formats and what a file declares; what it really is comes on top.
-  const auto turn = [&](const AxisTurn& axes) {
-    TurnAxes(cloud, axes);
-    TurnAxes(extras, axes);
-  };
-  if (options.input_axes || options.output_axes) DropSpzPlaces(input.string(), cloud.comments);
+  if (options.input_axes || options.output_axes) DropSpzPlaces(name, splat.cloud.comments);
   if (options.input_axes) {
     Axes taken = from != nullptr ? from->axes : kRdf;
     if (from != nullptr && from->declared_axes != nullptr) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(taken, from->declared_axes(file.input()));
     }
-    turn(Both(TurnBetween(kRdf, taken), TurnBetween(*options.input_axes, kRdf)));
+    TurnBoth(Both(TurnBetween(kRdf, taken), TurnBetween(*options.input_axes, kRdf)), splat.cloud, splat.extras);
   }
+  return splat;
+}
+
+void WarnOfUnusable(const SplatFormat& to, const std::string& name, const GaussianCloud& cloud) {
+  // Without harmonics: looking through them would take longer than all else here. Other formats say what becomes of
+  // such Gaussians when they are written.
+  if (const int64_t bad = to.keeps_all_values ? CountUnusable(cloud, false) : 0; bad > 0) {
+    LogWarning(Cat(name, ": ", WithThousands(bad), " of ", WithThousands(cloud.size()),
+                   " Gaussians have a position, scale, rotation or opacity that no verb draws: ", kWhyUnusable));
+  }
+}
+
+Result<ConvertReport> WriteConverted(ConvertedSplat splat, const fs::path& output, const ConvertOptions& options,
+                                     GaussianCloud* kept) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatFormat* const to, WrittenFormat(output, options));
+  ConvertReport report = std::move(splat.report);
+  GaussianCloud& cloud = splat.cloud;
+  ExtraProperties& extras = splat.extras;
+  report.output_format = to->name;
   if (options.output_axes) {
     const AxisTurn written = Both(TurnBetween(kRdf, *options.output_axes), TurnBetween(to->axes, kRdf));
     const bool said = UpOf(cloud.comments).has_value();
-    turn(written);
+    TurnBoth(written, cloud, extras);
     // What a reader takes for granted does not hold any more.
     if (!said && written.matrix()[4] != 1 && to->comments != CommentPlace::kNone) {
       cloud.comments.push_back(UpComment(kUsualUp));
@@ -238,6 +240,26 @@ Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output,
   }
   if (kept != nullptr) *kept = std::move(cloud);
   return report;
+}
+
+Result<ConvertReport> ConvertFile(const fs::path& input, const fs::path& output, const ConvertOptions& options,
+                                  GaussianCloud* kept) try {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatFormat* const to, WrittenFormat(output, options));
+  const InputRecord record;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenedSplat file, OpenedSplat::Open(input, options.input_format));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(output));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ConvertedSplat splat, ReadToConvert(file, input.string(), options));
+  GaussianCloud& cloud = splat.cloud;
+  WarnOfUnusable(*to, input.string(), cloud);
+  if (options.render_mode) cloud.render_mode = options.render_mode;
+  if (options.sh_degree) SetShDegree(cloud, *options.sh_degree);
+  DropFaint(cloud, options.min_opacity, &splat.extras);
+  if (options.max_gaussians) KeepMostImportant(cloud, *options.max_gaussians, &splat.extras);
+  if (cloud.empty()) {
+    return Error{ErrorCode::kBadArgument, Cat(input.string(), ": no Gaussian has an opacity of ", options.min_opacity,
+                                              " or more: nothing to write")};
+  }
+  return WriteConverted(std::move(splat), output, options, kept);
 } catch (const NoDiskRoom& none) {
   return Error{ErrorCode::kIo, Cat(input.string(), ": ", none.what())};
 } catch (const std::bad_alloc&) {

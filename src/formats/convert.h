@@ -5,18 +5,19 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
 #include "formats/attribute_error.h"
 #include "formats/axes.h"
 #include "formats/cloud_io.h"
+#include "formats/extra_properties.h"
 #include "formats/opened_splat.h"
 #include "formats/stored_as.h"
 
 namespace anchorsplat {
 
-struct ExtraProperties;
 struct SplatFormat;
 
 struct ConvertOptions {
@@ -55,6 +56,22 @@ struct ConvertReport {
 Result<ConvertReport> ConvertFile(const std::filesystem::path& input, const std::filesystem::path& output,
                                   const ConvertOptions& options, GaussianCloud* kept = nullptr);
 
+// The two halves of it, for who does something else in between.
+struct ConvertedSplat {
+  GaussianCloud cloud;
+  ExtraProperties extras;
+  ConvertReport report;
+};
+// Reads one input and makes of its numbers and axes what the options say they are. `name`: of it, for messages.
+Result<ConvertedSplat> ReadToConvert(const OpenedSplat& file, const std::string& name, const ConvertOptions& options);
+// Turns to the output's axes, sorts, writes and, where asked, measures. `kept` as in ConvertFile.
+Result<ConvertReport> WriteConverted(ConvertedSplat splat, const std::filesystem::path& output,
+                                     const ConvertOptions& options, GaussianCloud* kept = nullptr);
+// The format of a file that can be written, or the error of WriteCloud.
+Result<const SplatFormat*> WrittenFormat(const std::filesystem::path& output, const ConvertOptions& options);
+// Says how many Gaussians of an input nobody draws, where the output has them all the same.
+void WarnOfUnusable(const SplatFormat& to, const std::string& name, const GaussianCloud& cloud);
+
 // What WriteCloud has written there: in a folder or in memory, which has to outlive it.
 Result<OpenedSplat> OpenWritten(const std::filesystem::path& output, const CloudWriteOptions& write);
 // The same, read, for comparisons: positions of a format that keeps no origin are relative to that of `written`.
@@ -66,6 +83,8 @@ Result<GaussianCloud> ReadBack(const std::filesystem::path& output, const CloudW
 void DropFaint(GaussianCloud& cloud, float min_opacity, ExtraProperties* extras = nullptr);
 void KeepMostImportant(GaussianCloud& cloud, int64_t most, ExtraProperties* extras = nullptr);  // their order stays
 void SetShDegree(GaussianCloud& cloud, int degree);
+// The rows for which keep[i] is set; their order stays.
+void KeepRows(GaussianCloud& cloud, ExtraProperties* extras, const std::vector<char>& keep);
 // Row i becomes the old row rows[i]; a permutation.
 void Reorder(GaussianCloud& cloud, const Buffer<uint32_t>& rows, ExtraProperties* extras = nullptr);
 

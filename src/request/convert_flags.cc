@@ -44,6 +44,7 @@ void ConvertFlags::AddTo(CLI::App& verb) {
   verb.add_option("--colors", colors, "What the input's f_dc are: harmonics, or colours 0-1 or 0-255")
       ->check(CLI::IsMember({"harmonics", "0-1", "0-255"}))
       ->capture_default_str();
+  edits.AddTo(verb);
   double_means = verb.add_flag("--double", options.double_means,
                                "PLY: world coordinates in double precision instead of floats from an origin that a "
                                "comment says (default: where the input has them)");
@@ -124,15 +125,43 @@ Status CheckConvertEffects(const ConvertFlags& flags, std::span<const std::files
   return {};
 }
 
-Result<Converted> ConvertAndMeasure(const std::filesystem::path& input, const std::filesystem::path& output,
-                                    const ConvertOptions& options, int views) {
+Result<EditJob> MakeEditJob(const EditFlags& flags, std::vector<std::filesystem::path> inputs, size_t output_at,
+                            const ConvertOptions& options) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto actions, ActionsAmongPaths(flags));
+  EditJob job{.convert = options, .dry_run = flags.dry_run};
+  for (size_t k = 0; k < inputs.size(); ++k) {
+    EditInput input{std::move(inputs[k]), actions[0]};
+    const auto add = [](const std::vector<EditAction>& more, std::vector<EditAction>& to) {
+      to.insert(to.end(), more.begin(), more.end());
+    };
+    if (output_at == 0) {
+      for (size_t at = 1; at < actions.size(); ++at) add(actions[at], input.actions);
+    } else if (k + 1 < actions.size()) {
+      add(actions[k + 1], input.actions);
+    }
+    job.inputs.push_back(std::move(input));
+  }
+  if (output_at > 0 && output_at < actions.size()) job.actions = actions[output_at];
+  return job;
+}
+
+Result<Converted> ConvertAndMeasure(const EditJob& job, const std::filesystem::path& output, int views) {
   GaussianCloud cloud;
   Converted done;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(done.report, ConvertFile(input, output, options, options.measure ? &cloud : nullptr));
+  const ConvertOptions& options = job.convert;
+  GaussianCloud* const kept = options.measure && !job.dry_run ? &cloud : nullptr;
+  if (job.edits()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(EditReport edited, EditFiles(job, output, kept));
+    done.report = std::move(edited.convert);
+    done.steps = std::move(edited.steps);
+    done.dry_run = job.dry_run;
+  } else {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(done.report, ConvertFile(job.inputs[0].path, output, options, kept));
+  }
   if (done.report.error) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadBack(output, options.write, cloud));
     ANCHORSPLAT_ASSIGN_OR_RETURN(done.loss, MeasureConversionLoss(cloud, back, views));
-  } else if (options.measure) {
+  } else if (kept != nullptr) {
     LogWarning(Cat(output.string(), ": ", done.report.output_format,
                    " is only written, not read: --report has nothing to compare"));
   }
@@ -150,6 +179,12 @@ nlohmann::json ToJson(const Converted& converted) {
     json["bytes"]["predicted"] = *r.predicted_bytes;
     json["bytes"]["predicted_roughly"] = r.predicted_roughly;
   }
+  for (const EditStep& step : converted.steps) {
+    nlohmann::json row = {{"action", step.action}, {"taken", step.taken}, {"left", step.left}};
+    if (!step.input.empty()) row["input"] = step.input;
+    json["actions"].push_back(std::move(row));
+  }
+  if (converted.dry_run) json["dry_run"] = true;
   if (r.error) {
     json["error"] = {{"compared", r.error->compared},           {"left_out", r.error->left_out},
                      {"means", ToJson(r.error->means)},         {"log_scales", ToJson(r.error->log_scales)},

@@ -88,6 +88,42 @@ expect 2 "convert over standard input" over_input
 says stderr "write to another name"
 expect 0 "it is what it was" cmp "$scan" "$work/own.ply"
 
+# Edits: their order, several inputs, what is said.
+edit() { "$program" convert "$@"; }
+expect 0 "edits" edit "$scan" "$work/edited.ply" -t 1,0,0 --filter-box 1,-,-,-,-,- -F --filter-harmonics 0
+says stdout "--filter-box 1,-,-,-,-,-: "
+says stdout " Gaussians taken away, "
+expect 0 "the other way round" edit "$scan" "$work/other.ply" --filter-box 0,-,-,-,-,- -t 1,0,0 -F -H 0 --json
+says stdout '"action": "--filter-box 0,-,-,-,-,-"'
+expect 0 "it is the same" cmp "$work/edited.ply" "$work/other.ply"
+expect 0 "forth" edit "$scan" "$work/forth.ply" --mirror x --scale 2 -q
+expect 0 "and back" edit "$work/forth.ply" "$work/back.ply" --scale 0.5 --mirror x -q
+expect 0 "it is where it was" "$program" compare "$scan" "$work/back.ply" --orbit 2 --size 64x64
+expect 0 "merged" edit "$scan" --translate=-1,0,0 "$scan" "$work/merged.ply" --filter-nan
+says stdout "1,000 Gaussians of SH degree 1 in, 1,000 of degree 1 out"
+expect 0 "merged from a pipe to a pipe" bash -c "'$program' convert - '$scan' - --to spz <'$scan' >'$work/out'"
+says stderr "1,000 of degree 1 out"
+expect 0 "only counted" edit "$scan" --dry-run -V opacity,gt,0.5 -q
+says stdout "would come out; nothing was written"
+expect 0 "counted for a name that is there" edit "$scan" "$work/merged.ply" --dry-run
+expect 0 "nothing of it changed" "$program" info "$work/merged.ply"
+says stdout "1,000"
+expect 0 "many" edit "$scan" "$work/merged.ply" --out-dir "$work/many" --scale 2 -q
+expect 0 "as splat-transform counts" edit "$scan" "$work/luf.ply" --action-axes LUF --translate 1,2,3 -q
+expect 0 "as we do" edit "$scan" "$work/rdf.ply" --translate=-1,-2,3 -q
+expect 0 "both are the same" cmp "$work/luf.ply" "$work/rdf.ply"
+for bad in --scale=1,2,3 --scale=0 --scale=-1 --rotate=1,2 --mirror=w --up=0,0,0 --filter-sphere=0,0,0,-1 --filter-value=none,gt,1 \
+  --filter-value=opacity,gt --filter-value=opacity,gt,nan --filter-harmonics=4 --filter-floaters=0 --filter-box=1,1,1,0,0,0 --action-axes=xyz \
+  --translate=1e999,0,0 --translate= --filter-sphere=90,0,0,1; do
+  expect 2 "$bad" edit "$scan" "$work/bad.ply" "$bad"
+  says stderr "${bad%%=*}"
+done
+expect 2 "no value" edit "$scan" "$work/bad.ply" --translate
+expect 2 "an input among several" edit "$scan" "$work/back.ply" "$work/back.ply" -w
+expect 3 "one that is not there" edit "$scan" "$work/none.ply" "$work/bad.ply"
+expect 5 "a file that exists" edit "$scan" "$work/back.ply" --scale 2
+test -e "$work/bad.ply" && echo "FAILED: there is a bad.ply" && failures=$((failures + 1))
+
 # Nothing that is printed commands a terminal: neither names of files nor those of views.
 clean() {
   checks=$((checks + 1))

@@ -70,7 +70,7 @@ Status ReadPlyBody(const InputFile& file, const PlyHeader& header, const PlyElem
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const uint64_t begin, BeginOfPlyRows(file, header, vertex));
   const std::vector<PlyDestination> to = make_room();
-  if (!vertex.has_lists()) return ReadFixedRows(file, vertex, header.encoding, begin, to);
+  if (!vertex.has_lists()) return ReadFixedRows(file, vertex, header.encoding, begin, 0, vertex.count, to);
   SequentialReader reader(file, begin);
   return ReadRowsWithLists(reader, file, vertex, header.encoding, to);
 }

@@ -107,8 +107,9 @@ void Convert(const char* rows, size_t row_size, const std::vector<Column>& colum
 }  // namespace
 
 Status ReadFixedRows(const InputFile& file, const PlyElement& vertex, PlyEncoding encoding, uint64_t begin,
-                     const std::vector<PlyDestination>& to) {
+                     int64_t first_row, int64_t last_row, const std::vector<PlyDestination>& to) {
   const auto row_size = static_cast<size_t>(vertex.row_size());
+  begin += static_cast<uint64_t>(first_row) * row_size;
   const std::vector<Column> columns = Columns(vertex, to);
   const bool swap = NeedsSwap(encoding);
   const bool copy = !swap && std::all_of(columns.begin(), columns.end(), [](const Column& c) {
@@ -117,7 +118,7 @@ Status ReadFixedRows(const InputFile& file, const PlyElement& vertex, PlyEncodin
   // A block and the rows it becomes stay in the L2 cache together; a task is many blocks that share one buffer.
   const auto block = static_cast<int64_t>(std::max<size_t>(1, (size_t{128} << 10) / row_size));
   FirstFailure failure;
-  ParallelFor(0, vertex.count, 32 * block, [&](int64_t first, int64_t last) {
+  ParallelFor(0, last_row - first_row, 32 * block, [&](int64_t first, int64_t last) {
     Buffer<char> rows(static_cast<size_t>(std::min(block, last - first)) * row_size);
     for (int64_t i = first; i < last; i += block) {
       const int64_t end = std::min(last, i + block);

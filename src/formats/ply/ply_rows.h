@@ -13,9 +13,10 @@ namespace anchorsplat {
 // The three kinds of PLY body. The rows of element `vertex` go to `to`, one per property (ply_layout.h), which has room
 // for all of them.
 
-// Binary rows of one size that begin at byte `begin`. In parallel, block by block.
+// Rows [first, last) of binary ones of one size that begin at byte `begin`, to row 0 and on of `to`. In parallel, block
+// by block.
 Status ReadFixedRows(const InputFile& file, const PlyElement& vertex, PlyEncoding encoding, uint64_t begin,
-                     const std::vector<PlyDestination>& to);
+                     int64_t first, int64_t last, const std::vector<PlyDestination>& to);
 
 // Binary rows with lists, whose places are only known by reading the ones before.
 Status ReadRowsWithLists(SequentialReader& reader, const InputFile& file, const PlyElement& vertex,

@@ -4,13 +4,12 @@
 #include <array>
 #include <bit>
 #include <cstring>
-#include <mutex>
 
 #include "core/parallel.h"
 #include "core/text.h"
+#include "formats/first_failure.h"
 #include "formats/ply/ply_header.h"
 #include "formats/ply/render_mode_tag.h"
-#include "io/atomic_file.h"
 
 namespace anchorsplat {
 
@@ -118,53 +117,58 @@ Status WritePly(const std::filesystem::path& path, const CloudView& cloud, const
   return WritePlyWithExtras(path, cloud, options, {});
 }
 
-Status WritePlyWithExtras(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options,
-                          const ExtraProperties& extras) {
-  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
-  if (cloud.empty()) {
-    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": there are no Gaussians to write")};
-  }
-  if (!extras.fits(cloud.size())) {
-    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": the other properties (", extras.names(),
-                                              ") are not of these ", WithThousands(cloud.size()), " Gaussians")};
-  }
+Result<PlyOutput> PlyOutput::Create(const std::filesystem::path& path, const CloudView& head, int64_t count,
+                                    const CloudWriteOptions& options, const ExtraProperties& extras) {
+  if (count == 0) return Error{ErrorCode::kBadArgument, Cat(path.string(), ": there are no Gaussians to write")};
   const std::string comments =
-      PlyComments(cloud.comments, cloud.render_mode, cloud.double_means ? WorldOrigin{} : cloud.origin);
-  const std::string header = Header(cloud.size(), cloud.sh_degree, cloud.double_means, comments, extras);
+      PlyComments(head.comments, head.render_mode, head.double_means ? WorldOrigin{} : head.origin);
+  const std::string header = Header(count, head.sh_degree, head.double_means, comments, extras);
   if (header.size() > kMaxPlyHeader) {
     return Error{ErrorCode::kBadArgument,
                  Cat(path.string(), ": comments and names of properties of ", HumanBytes(header.size()),
                      " do not fit a PLY header, which ends within ", HumanBytes(kMaxPlyHeader))};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
-  const auto floats = static_cast<size_t>(RowFloats(cloud.sh_degree));
-  const size_t row_size = RowSize(cloud.sh_degree, cloud.double_means, extras);
-  const bool wider = !extras.properties.empty() || cloud.double_means;
-  ANCHORSPLAT_RETURN_IF_ERROR(file.Reserve(header.size() + static_cast<uint64_t>(cloud.size()) * row_size));
+  const size_t row_size = RowSize(head.sh_degree, head.double_means, extras);
+  ANCHORSPLAT_RETURN_IF_ERROR(file.Reserve(header.size() + static_cast<uint64_t>(count) * row_size));
   ANCHORSPLAT_RETURN_IF_ERROR(file.WriteAt(0, header.data(), header.size()));
+  return PlyOutput(std::move(file), header.size(), row_size);
+}
 
-  // A block stays in the L2 cache between packing and writing; a task is many blocks that share one buffer.
-  const auto block = static_cast<int64_t>(std::max<size_t>(1, (size_t{256} << 10) / row_size));
-  std::mutex mutex;
-  Status failure;
-  ParallelFor(0, cloud.size(), 16 * block, [&](int64_t first, int64_t last) {
-    const auto most = static_cast<size_t>(std::min(block, last - first));
-    Buffer<float> rows(most * floats);
-    Buffer<std::byte> wide(wider ? most * row_size : 0);
-    for (int64_t i = first; i < last; i += block) {
-      const int64_t end = std::min(last, i + block);
-      Pack(cloud, i, end, rows.data());
-      if (wider || !extras.normals.empty()) PackExtras(cloud, extras, i, end, rows.data(), floats, wide.data());
-      const void* const packed = wider ? static_cast<const void*>(wide.data()) : rows.data();
-      const Status status = file.WriteAt(header.size() + static_cast<uint64_t>(i) * row_size, packed,
-                                         static_cast<size_t>(static_cast<uint64_t>(end - i) * row_size));
-      if (status.ok()) continue;
-      const std::lock_guard lock(mutex);
-      failure = status;
-      return;
-    }
+Status PlyOutput::Write(const CloudView& cloud, const ExtraProperties& extras, int64_t first, int64_t last,
+                        int64_t to) const {
+  const auto floats = static_cast<size_t>(RowFloats(cloud.sh_degree));
+  const bool wider = !extras.properties.empty() || cloud.double_means;
+  // A block stays in the L2 cache between packing and writing.
+  const auto block = static_cast<int64_t>(std::max<size_t>(1, (size_t{256} << 10) / row_size_));
+  const auto most = static_cast<size_t>(std::min(block, last - first));
+  Buffer<float> rows(most * floats);
+  Buffer<std::byte> wide(wider ? most * row_size_ : 0);
+  for (int64_t i = first; i < last; i += block) {
+    const int64_t end = std::min(last, i + block);
+    Pack(cloud, i, end, rows.data());
+    if (wider || !extras.normals.empty()) PackExtras(cloud, extras, i, end, rows.data(), floats, wide.data());
+    const void* const packed = wider ? static_cast<const void*>(wide.data()) : rows.data();
+    ANCHORSPLAT_RETURN_IF_ERROR(file_.WriteAt(header_ + static_cast<uint64_t>(to + i - first) * row_size_, packed,
+                                              static_cast<size_t>(static_cast<uint64_t>(end - i) * row_size_)));
+  }
+  return {};
+}
+
+Status WritePlyWithExtras(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options,
+                          const ExtraProperties& extras) {
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
+  if (!extras.fits(cloud.size())) {
+    return Error{ErrorCode::kBadArgument, Cat(path.string(), ": the other properties (", extras.names(),
+                                              ") are not of these ", WithThousands(cloud.size()), " Gaussians")};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(PlyOutput file, PlyOutput::Create(path, cloud, cloud.size(), options, extras));
+  const auto task = static_cast<int64_t>(std::max<size_t>(1, (size_t{4} << 20) / file.row_size()));
+  FirstFailure failure;
+  ParallelFor(0, cloud.size(), task, [&](int64_t first, int64_t last) {
+    failure.Report(first, file.Write(cloud, extras, first, last, first));
   });
-  if (!failure.ok()) return failure;
+  ANCHORSPLAT_RETURN_IF_ERROR(failure.status());
   return file.Commit();
 }
 

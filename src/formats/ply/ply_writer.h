@@ -5,11 +5,13 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "core/cloud_view.h"
 #include "core/result.h"
 #include "formats/cloud_io.h"
 #include "formats/extra_properties.h"
+#include "io/atomic_file.h"
 
 namespace anchorsplat {
 
@@ -25,6 +27,26 @@ Status WritePly(const std::filesystem::path& path, const CloudView& cloud, const
 // Gaussian; names longer than a header may be.
 Status WritePlyWithExtras(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options,
                           const ExtraProperties& extras);
+
+// The same of a splat of which only some rows are there at a time. Rows may be written in any order and from several
+// threads.
+class PlyOutput {
+ public:
+  // `head`: what the splat is like, whose rows do not count; `extras`: what properties there will be.
+  static Result<PlyOutput> Create(const std::filesystem::path& path, const CloudView& head, int64_t count,
+                                  const CloudWriteOptions& options, const ExtraProperties& extras);
+  // Rows [first, last) of `rows`, which are like the head, become row `to` of the file and on.
+  Status Write(const CloudView& rows, const ExtraProperties& extras, int64_t first, int64_t last, int64_t to) const;
+  Status Commit() { return file_.Commit(); }
+  size_t row_size() const { return row_size_; }
+
+ private:
+  PlyOutput(OutputFile file, size_t header, size_t row_size)
+      : file_(std::move(file)), header_(header), row_size_(row_size) {}
+
+  OutputFile file_;
+  size_t header_, row_size_;  // bytes
+};
 
 // Bytes of the file WritePly makes of `count` Gaussians.
 uint64_t PredictedPlySize(int64_t count, int sh_degree, std::optional<RenderMode> render_mode = {},

@@ -1,0 +1,204 @@
+#include "edit/row_tests.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <string_view>
+
+#include "core/activations.h"
+#include "core/number_text.h"
+#include "core/sh_rotation.h"
+#include "core/statistics.h"
+#include "core/text.h"
+#include "core/vector3.h"
+#include "edit/moved_rows.h"
+
+namespace anchorsplat {
+
+namespace {
+
+template <typename T>
+double LoadAs(const std::byte* from) {
+  T value;
+  std::memcpy(&value, from, sizeof value);
+  return static_cast<double>(value);
+}
+
+double Load(PlyType type, const std::byte* from) {
+  switch (type) {
+    case PlyType::kInt8:
+      return LoadAs<int8_t>(from);
+    case PlyType::kUint8:
+      return LoadAs<uint8_t>(from);
+    case PlyType::kInt16:
+      return LoadAs<int16_t>(from);
+    case PlyType::kUint16:
+      return LoadAs<uint16_t>(from);
+    case PlyType::kInt32:
+      return LoadAs<int32_t>(from);
+    case PlyType::kUint32:
+      return LoadAs<uint32_t>(from);
+    case PlyType::kFloat:
+      return LoadAs<float>(from);
+    case PlyType::kDouble:
+      return LoadAs<double>(from);
+  }
+  return 0;
+}
+
+bool AllFinite(const float* from, int64_t count) {
+  return std::all_of(from, from + count, [](float x) { return std::isfinite(x); });
+}
+
+bool HasNumbers(const RowBlock& block, int64_t i, int sh_degree) {
+  const CloudView& rows = block.rows;
+  const float* quat = rows.quats.data() + 4 * i;
+  if (!AllFinite(rows.means.data() + 3 * i, 3) || !AllFinite(quat, 4)) return false;
+  if (std::all_of(quat, quat + 4, [](float x) { return x == 0; })) return false;
+  const float* scales = rows.log_scales.data() + 3 * i;
+  if (std::any_of(scales, scales + 3, [](float x) { return !std::isfinite(x) && x != -INFINITY; })) return false;
+  const float logit = rows.opacity_logits[static_cast<size_t>(i)];
+  if (!std::isfinite(logit) && logit != INFINITY) return false;
+  const int64_t harmonics = 3 * ShCoefficients(std::min(sh_degree, rows.sh_degree));
+  if (!AllFinite(rows.sh.data() + i * rows.sh_stride(), harmonics)) return false;
+  if (block.extras == nullptr || block.extras->properties.empty()) return true;
+  const std::byte* value =
+      block.extras->rows.data() + static_cast<size_t>(block.extra_first + i) * block.extras->row_size();
+  for (const ExtraProperties::Property& property : block.extras->properties) {
+    if (!std::isfinite(Load(property.type, value))) return false;
+    value += PlyTypeSize(property.type);
+  }
+  return true;
+}
+
+bool Holds(Comparison comparison, double a, double b) {
+  switch (comparison) {
+    case Comparison::kLess:
+      return a < b;
+    case Comparison::kLessOrEqual:
+      return a <= b;
+    case Comparison::kGreater:
+      return a > b;
+    case Comparison::kGreaterOrEqual:
+      return a >= b;
+    case Comparison::kEqual:
+      return a == b;
+    case Comparison::kNotEqual:
+      return a != b;
+  }
+  return false;
+}
+
+// "f_rest_12" behind "f_rest_" is 12; nothing for what is not in `count`.
+std::optional<int64_t> IndexIn(std::string_view name, std::string_view before, int64_t count) {
+  if (!name.starts_with(before)) return std::nullopt;
+  name.remove_prefix(before.size());
+  int64_t index = 0;
+  const auto [end, code] = FromChars(name.data(), name.data() + name.size(), index);
+  if (code != std::errc() || end != name.data() + name.size() || index < 0 || index >= count) return std::nullopt;
+  return index;
+}
+
+constexpr std::array<double, 9> kUnturned = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+
+}  // namespace
+
+Result<std::optional<RowTest>> RowTest::Of(const EditAction& action, const Similarity& world, const WorldOrigin& origin,
+                                           int sh_degree, const ExtraProperties& extras) {
+  const auto& what = action.what;
+  const auto* const value = std::get_if<KeepByValue>(&what);
+  const bool chooses = value != nullptr || std::holds_alternative<KeepBox>(what) ||
+                       std::holds_alternative<KeepSphere>(what) || std::holds_alternative<KeepNumbers>(what) ||
+                       std::holds_alternative<KeepOpaque>(what);
+  if (!chooses) return std::optional<RowTest>();
+  RowTest test;
+  test.what_ = what;
+  test.world_ = world;
+  test.origin_ = origin;
+  test.sh_degree_ = sh_degree;
+  if (value == nullptr) return std::optional(test);
+  const std::string_view name = value->property;
+  const int64_t harmonics = 3 * (ShCoefficients(sh_degree) - 1);
+  if (name.size() == 1 && std::string_view("xyz").find(name[0]) != std::string_view::npos) {
+    test.column_ = Column::kPosition;
+  } else if (name == "opacity") {
+    test.column_ = Column::kOpacity;
+  } else if (const auto scale = IndexIn(name, "scale_", 3)) {
+    test.column_ = Column::kScale;
+    test.component_ = *scale;
+  } else if (const auto color = IndexIn(name, "f_dc_", 3)) {
+    test.column_ = Column::kColor;
+    test.component_ = *color;
+  } else if (const auto rotation = IndexIn(name, "rot_", 4)) {
+    test.column_ = Column::kRotation;
+    test.component_ = *rotation;
+  } else if (const auto harmonic = IndexIn(name, "f_rest_", harmonics)) {
+    test.column_ = Column::kHarmonic;  // channel by channel in a file
+    const int64_t each = harmonics / 3;
+    test.component_ = 3 * (1 + *harmonic % each) + *harmonic / each;
+  } else {
+    test.column_ = Column::kExtra;
+    const auto found = std::ranges::find(extras.properties, value->property, &ExtraProperties::Property::name);
+    if (found == extras.properties.end()) {
+      return Error{ErrorCode::kBadArgument, Cat("has no property '", Printable(value->property), "'")};
+    }
+    test.type_ = found->type;
+    for (auto p = extras.properties.begin(); p != found; ++p) test.component_ += PlyTypeSize(p->type);
+  }
+  return std::optional(test);
+}
+
+double RowTest::ValueOf(const RowBlock& block, int64_t i) const {
+  const CloudView& rows = block.rows;
+  const bool turned = world_.rotation != kUnturned;
+  switch (column_) {
+    case Column::kPosition:
+      return Dot(std::get<KeepByValue>(what_).along, world_.Apply(ToWorld(rows.means.data() + 3 * i, origin_)));
+    case Column::kScale:
+      return double{rows.log_scales[static_cast<size_t>(3 * i + component_)]} + std::log(world_.scale);
+    case Column::kOpacity:
+      return rows.opacity_logits[static_cast<size_t>(i)];
+    case Column::kColor:
+      return rows.sh[static_cast<size_t>(i * rows.sh_stride() + component_)];
+    case Column::kExtra:
+      return Load(type_, block.extras->rows.data() +
+                             static_cast<size_t>(block.extra_first + i) * block.extras->row_size() + component_);
+    case Column::kRotation:
+    case Column::kHarmonic:
+      break;
+  }
+  if (!turned) {
+    return column_ == Column::kRotation ? rows.quats[static_cast<size_t>(4 * i + component_)]
+                                        : rows.sh[static_cast<size_t>(i * rows.sh_stride() + component_)];
+  }
+  GaussianCloud row;
+  row.Resize(1, rows.sh_degree);
+  std::copy_n(rows.means.data() + 3 * i, 3, row.means.data());
+  std::copy_n(rows.log_scales.data() + 3 * i, 3, row.log_scales.data());
+  std::copy_n(rows.quats.data() + 4 * i, 4, row.quats.data());
+  std::copy_n(rows.sh.data() + i * rows.sh_stride(), rows.sh_stride(), row.sh.data());
+  RowMover(world_, {}, {}, rows.sh_degree).Move(row, 0, 1);
+  return column_ == Column::kRotation ? row.quats[static_cast<size_t>(component_)]
+                                      : row.sh[static_cast<size_t>(component_)];
+}
+
+bool RowTest::Keeps(const RowBlock& block, int64_t i) const {
+  if (std::holds_alternative<KeepNumbers>(what_)) return HasNumbers(block, i, sh_degree_);
+  if (const auto* const value = std::get_if<KeepByValue>(&what_)) {
+    return Holds(value->comparison, ValueOf(block, i), value->value);
+  }
+  if (const auto* const opaque = std::get_if<KeepOpaque>(&what_)) {
+    return IsUsable(block.rows, i) && Sigmoid(block.rows.opacity_logits[static_cast<size_t>(i)]) >= opaque->least;
+  }
+  const std::array<double, 3> at = world_.Apply(ToWorld(block.rows.means.data() + 3 * i, origin_));
+  if (const auto* const box = std::get_if<KeepBox>(&what_)) {
+    bool inside = true;
+    for (size_t k = 0; k < 3; ++k) inside = inside && at[k] >= box->low[k] && at[k] <= box->high[k];
+    return inside;
+  }
+  const auto& sphere = std::get<KeepSphere>(what_);
+  const std::array<double, 3> from = Minus(at, sphere.centre);
+  return Dot(from, from) < sphere.radius * sphere.radius;
+}
+
+}  // namespace anchorsplat

@@ -1,0 +1,68 @@
+#include "request/edit_flags.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "core/text.h"
+#include "formats/axes.h"
+#include "request/choice.h"
+
+namespace anchorsplat {
+
+void EditFlags::AddTo(CLI::App& on) {
+  verb = &on;
+  const std::string group = "Edits, in the order in which they stand";
+  for (const ActionName& action : ActionNames()) {
+    const std::string names(action.options), help(action.help);
+    // Nothing is bound: their words are read with their places, once all are known.
+    CLI::Option* const option = !action.form.empty()
+                                    ? on.add_option(names, CLI::callback_t(), help)
+                                          ->type_size(1)
+                                          ->expected(1, CLI::detail::expected_max_vector_size)
+                                          ->allow_extra_args(false)
+                                          ->type_name(std::string(action.form))
+                                    : on.add_flag(names, help)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    option->group(group);
+    options.push_back(option);
+  }
+  axes_option = on.add_option("--action-axes", axes,
+                              "Axes along which the numbers of edits are meant: RDF, those of the splat in info and in "
+                              "every option; LUF as splat-transform 3 has them")
+                    ->check(NotEmpty())
+                    ->capture_default_str()
+                    ->group(group);
+  on.add_flag("--dry-run", dry_run, "Write nothing: say how many Gaussians each edit would take away")->group(group);
+}
+
+Result<std::vector<std::vector<EditAction>>> ActionsAmongPaths(const EditFlags& flags) {
+  const std::optional<Axes> axes = AxesFromName(flags.axes);
+  if (!axes) {
+    return Error{ErrorCode::kBadArgument, Cat("--action-axes: \"", Printable(flags.axes),
+                                              "\" are no axes: expected Right or Left, Up or Down, Front or Back, each "
+                                              "once, for x, y and z, as in RDF or LUF")};
+  }
+  std::vector<std::vector<EditAction>> actions(1);
+  std::map<const CLI::Option*, size_t> seen;
+  bool any = false;
+  for (const CLI::Option* const option : flags.verb->parse_order()) {
+    if (option == flags.paths) {
+      actions.emplace_back();
+      continue;
+    }
+    const auto found = std::ranges::find(flags.options, option);
+    if (found == flags.options.end()) continue;
+    const ActionName& name = ActionNames()[static_cast<size_t>(found - flags.options.begin())];
+    const std::vector<std::string> words = option->results();
+    const size_t at = seen[option]++;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(EditAction action, ParseAction(name.name, at < words.size() ? words[at] : "", *axes));
+    actions.back().push_back(std::move(action));
+    any = true;
+  }
+  if (!any && flags.axes_option->count() > 0) {
+    return Error{ErrorCode::kBadArgument, "--action-axes has no effect here; it has one with edits, as --translate"};
+  }
+  return actions;
+}
+
+}  // namespace anchorsplat

@@ -19,6 +19,7 @@ if(TARGET anchorsplat_shared)
           DESTINATION "${package_dir}")
 endif()
 
+install(PROGRAMS scripts/fetch-upscaler.sh scripts/convert_upscaler.py DESTINATION share/anchorsplat)
 if(ANCHORSPLAT_TORCH)
   get_filename_component(torch_place "${Torch_DIR}" REALPATH)
   string(FIND "${torch_place}/" "${CMAKE_SOURCE_DIR}/" in_checkout)

@@ -27,6 +27,7 @@ from ._info import info
 from ._render import render
 from ._report import Report
 from ._run import Progress
+from ._upscale import upscale
 from ._view import Page, view
 
 __version__: str = _core.version
@@ -60,6 +61,7 @@ __all__ = [
     "sheet",
     "ssim",
     "to_bytes",
+    "upscale",
     "view",
     "write",
 ]

@@ -37,7 +37,28 @@ FUNCTIONS = {
         {},
         {"overwrite": "nothing is written", "gsplat-checkpoint": "Cloud.to_gsplat", **OUTPUT, **PIPED},
     ),
-    "render": ("render", None, {}, {"overwrite": "nothing is written", "seed": "nothing is random", **OUTPUT}),
+    "render": (
+        "render",
+        None,
+        {},
+        {
+            "overwrite": "nothing is written",
+            "seed": "nothing is random",
+            "enlarge-with": "anchorsplat.upscale",
+            **OUTPUT,
+        },
+    ),
+    "upscale": (
+        "upscale",
+        None,
+        {},
+        {
+            "overwrite": "nothing is written",
+            "seed": "nothing is random",
+            "network": "the second argument",
+            **OUTPUT,
+        },
+    ),
     "compare": (
         "compare",
         None,

@@ -4,11 +4,9 @@
 #include <chrono>
 #include <limits>
 
-#include "core/buffer.h"
+#include "bench/plain_product.h"
 #include "core/parallel.h"
-#include "core/random.h"
 #include "model/kernels/bfloat16_tile.h"
-#include "model/kernels/linear.h"
 #include "model/published/enhance_with_published.h"
 
 namespace anchorsplat {
@@ -18,35 +16,6 @@ namespace {
 double Seconds(const std::chrono::steady_clock::time_point& begin) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
-
-// The product that the ratio is against: as many rows as the published demo has Gaussians, the widest layer.
-class PlainProduct {
- public:
-  explicit PlainProduct(WeightPrecision precision) : input_(kRows * kInputs), out_(kRows * kOutputs) {
-    Random random(1);
-    Buffer<float> weights(kInputs * kOutputs);
-    for (float& v : input_) v = static_cast<float>(random.Uniform(-1, 1));
-    for (float& v : weights) v = static_cast<float>(random.Uniform(-1, 1));
-    weights_ = PackedWeights(weights.data(), nullptr, kOutputs, kInputs, 1, precision);
-    Flops();  // touches the pages
-  }
-
-  double Flops() {
-    const auto begin = std::chrono::steady_clock::now();
-    LinearCpu({.rows = kRows,
-               .input = input_.data(),
-               .input_stride = kInputs,
-               .weights = &weights_,
-               .out = out_.data(),
-               .output_stride = kOutputs});
-    return 2.0 * kRows * kInputs * kOutputs / Seconds(begin);
-  }
-
- private:
-  static constexpr int64_t kRows = 17020, kInputs = 512, kOutputs = 2048;
-  Buffer<float> input_, out_;
-  PackedWeights weights_;
-};
 
 }  // namespace
 

@@ -8,6 +8,7 @@
 #include "bench/io_bench.h"
 #include "bench/network_bench.h"
 #include "bench/render_bench.h"
+#include "bench/upscale_bench.h"
 #include "cli/bench_gpu.h"
 #include "cli/bench_reading.h"
 #include "cli/table.h"
@@ -18,6 +19,8 @@
 #include "model/published/published_checkpoint.h"
 #include "model/shared/weights.h"
 #include "request/choice.h"
+#include "request/parse.h"
+#include "request/upscale_flags.h"
 
 namespace anchorsplat {
 
@@ -248,6 +251,39 @@ Status RunNetworkBench(const NetworkBenchFlags& flags, const SharedFlags& shared
   return {};
 }
 
+struct UpscaleBenchFlags {
+  std::string network;
+  std::string size = "200x150";
+  UpscaleBenchOptions options;
+};
+
+Status RunUpscaleBench(const UpscaleBenchFlags& flags, const SharedFlags& shared) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Upscaler network, Upscaler::Read(flags.network));
+  UpscaleBenchOptions options = flags.options;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const SizeOption size, ParseSize("--size", flags.size));
+  options.width = size.width;
+  options.height = size.height;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const UpscaleBenchReport report, BenchUpscale(network, options));
+  if (shared.json) {
+    PrintJson({{"bench", "upscale"},
+               {"threads", report.threads},
+               {"width", options.width},
+               {"height", options.height},
+               {"network", ToJson(network.info())},
+               {"seconds", report.seconds},
+               {"multiply_adds", report.multiply_adds},
+               {"gemm_flops", report.gemm_flops},
+               {"ratio", report.ratio}});
+    return {};
+  }
+  std::cout << network.info().architecture << ", a picture of " << options.width << "x" << options.height
+            << " enlarged " << network.info().scale << " times, " << report.threads
+            << " threads; plain matrix product: " << Fixed(report.gemm_flops / 1e9, 0) << " GFLOP/s\n\n"
+            << HumanSeconds(report.seconds) << ", " << Fixed(report.multiply_adds / 1e9, 1)
+            << " G multiply-adds; ratio to the matrix product's rate " << Fixed(report.ratio, 2) << "\n";
+  return {};
+}
+
 void AddRenderBench(CLI::App& parent, Program& program) {
   CLI::App& render =
       AddVerb(parent, program, "render", "The rasterizer at 256², at 1024², and with every Gaussian split",
@@ -320,6 +356,20 @@ void AddNetworkBench(CLI::App& parent, Program& program) {
   });
 }
 
+void AddUpscaleBench(CLI::App& parent, Program& program) {
+  CLI::App& upscale =
+      AddVerb(parent, program, "upscale", "A network that enlarges pictures against a plain matrix product",
+              "anchorsplat bench upscale --network span.safetensors");
+  const auto flags = std::make_shared<UpscaleBenchFlags>();
+  upscale.add_option("--network", flags->network, "A network's .safetensors")->required()->check(NotEmpty());
+  upscale.add_option("--size", flags->size, "Of the picture that is enlarged")->capture_default_str();
+  upscale.add_option("--repeats", flags->options.repeats, "The fastest counts")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str();
+  upscale.callback(
+      [flags, &program] { program.run = [flags, &program] { return RunUpscaleBench(*flags, program.flags); }; });
+}
+
 void AddConvertBench(CLI::App& parent, Program& program) {
   CLI::App& convert =
       AddVerb(parent, program, "convert", "From PLY to every format against bare reads, writes and copies",
@@ -368,6 +418,7 @@ void AddBench(CLI::App& app, Program& program) {
   AddRenderBench(verb, program);
   AddFitBench(verb, program);
   AddNetworkBench(verb, program);
+  AddUpscaleBench(verb, program);
   AddConvertBench(verb, program);
   AddIoBench(verb, program);
   AddGpuBench(verb, program);

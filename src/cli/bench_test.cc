@@ -22,7 +22,8 @@ using ::testing::HasSubstr;
 TEST(BenchVerb, TakesAndRefusesWords) {
   const TestFolder folder;
   const std::string none = folder / "none.ply";
-  ExpectRefused({"bench"}, ErrorCode::kBadArgument, {"needs a verb: render, fit, network, convert, io, gpu, reading"});
+  ExpectRefused({"bench"}, ErrorCode::kBadArgument,
+                {"needs a verb: render, fit, network, upscale, convert, io, gpu, reading"});
   ExpectRefused({"bench", "render", none}, ErrorCode::kNotFound, {"none.ply"});
   ExpectRefused({"bench", "network", none}, ErrorCode::kNotFound, {"none.ply"});
   ExpectRefused({"bench", "convert", none}, ErrorCode::kNotFound, {"none.ply"});

@@ -20,6 +20,7 @@
 #include "render/shown_range.h"
 #include "request/choice.h"
 #include "request/parse.h"
+#include "request/upscale_flags.h"
 #include "request/views.h"
 
 namespace anchorsplat {
@@ -32,6 +33,7 @@ struct RenderFlags {
   std::string input;
   std::string output;
   bool transparent = false;
+  std::string enlarge_with;  // a network's file; empty: as it is rendered
   ViewFlags views;
 };
 
@@ -75,6 +77,12 @@ Result<std::vector<fs::path>> OutputPaths(const std::string& output, const Camer
   return paths;
 }
 
+// What networks have seen: colours of pictures, and no more light than they hold.
+Image Clamped(Image image) {
+  for (float& value : image.pixels) value = std::clamp(value, 0.0f, 1.0f);
+  return image;
+}
+
 Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
   const DeviceUse device;
   std::optional<StandardOutput> piped;
@@ -84,12 +92,17 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
   WriteOptions write = WriteOptionsFrom(shared);
   write.memory = piped ? piped->memory() : nullptr;
   const std::string output = piped ? piped->path().string() : flags.output;
+  std::optional<Upscaler> network;
+  if (!flags.enlarge_with.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(network, Upscaler::Read(flags.enlarge_with));
+  }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud cloud, ReadToShow(flags.input));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const CameraSet cameras, MakeViews(flags.views, cloud));
   ANCHORSPLAT_ASSIGN_OR_RETURN(RenderOptions options, MakeRenderOptions(flags.views, cloud, cameras));
   if (flags.transparent) options.background = {0, 0, 0};
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto paths, OutputPaths(output, cameras, shared.overwrite || piped));
 
+  const std::string comment = network ? EnlargedComment(network->info(), network->info().scale) : "";
   Rasterizer rasterizer;
   RenderOutput render;
   double seconds = 0;
@@ -105,8 +118,11 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
       seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
       const std::string warning = NothingToSee(cloud, camera, options, rasterizer.statistics().visible);
       if (!warning.empty() && empty_views++ == 0) empty = warning;
-      ANCHORSPLAT_RETURN_IF_ERROR(
-          WriteRendering(paths[i], flags.transparent ? WithAlpha(render) : render.color, write));
+      Image picture = flags.transparent ? WithAlpha(render) : std::move(render.color);
+      if (network) {
+        ANCHORSPLAT_ASSIGN_OR_RETURN(picture, EnlargePicture(*network, Clamped(std::move(picture))));
+      }
+      ANCHORSPLAT_RETURN_IF_ERROR(WriteRendering(paths[i], picture, write, comment));
       views.push_back({{"name", camera.name}, {"file", paths[i].string()}});
       progress.Advance();
     }
@@ -117,16 +133,19 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
             empty_views > 1 ? Cat(" (", empty_views - 1, " more of ", paths.size(), " views are as empty)") : ""));
   }
   if (shared.json) {
-    PrintJson({{"input", flags.input},
-               {"gaussians", cloud.size()},
-               {"render_seconds", seconds},
-               {"device", device.ToJson()},
-               {"views", views}});
+    nlohmann::json json = {{"input", flags.input},
+                           {"gaussians", cloud.size()},
+                           {"render_seconds", seconds},
+                           {"device", device.ToJson()},
+                           {"views", views}};
+    if (network) json["enlarged"] = {{"detail", "invented"}, {"network", ToJson(network->info())}};
+    PrintJson(json);
   } else if (!shared.quiet) {
     ResultsBeside(write.memory) << "rendered " << paths.size() << (paths.size() == 1 ? " view of " : " views of ")
                                 << WithThousands(cloud.size()) << " Gaussians in " << HumanSeconds(seconds)
                                 << " (without reading and "
-                                << "writing) to " << OutputName(output, write.memory) << '\n';
+                                << "writing) to " << OutputName(output, write.memory)
+                                << (network ? ", enlarged by a network, whose invention the detail is" : "") << '\n';
   }
   return piped ? piped->Send() : Status();
 }
@@ -143,6 +162,9 @@ void AddRender(CLI::App& app, Program& program) {
       ->required()
       ->check(NotEmpty());
   flags->views.AddTo(verb);
+  verb.add_option("--enlarge-with", flags->enlarge_with,
+                  "A network's .safetensors (scripts/fetch-upscaler.sh) that enlarges what was rendered")
+      ->check(NotEmpty());
   verb.add_flag("--transparent", flags->transparent, "Write an alpha channel instead of a background")
       ->excludes("--background");
   program.device.AddTo(verb);

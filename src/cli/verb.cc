@@ -61,6 +61,7 @@ void AddVerbs(CLI::App& app, Program& program) {
   AddRender(app, program);
   AddConvert(app, program);
   AddCompare(app, program);
+  AddUpscale(app, program);
   AddEval(app, program);
   AddView(app, program);
   AddViews(app, program);

@@ -50,6 +50,7 @@ void AddRender(CLI::App& app, Program& program);
 void AddCompare(CLI::App& app, Program& program);
 void AddEval(CLI::App& app, Program& program);
 void AddView(CLI::App& app, Program& program);
+void AddUpscale(CLI::App& app, Program& program);
 void AddViews(CLI::App& app, Program& program);
 void AddConvert(CLI::App& app, Program& program);
 void AddFit(CLI::App& app, Program& program);

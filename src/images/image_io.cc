@@ -103,9 +103,10 @@ Result<ImageSize> ReadImageSize(const std::filesystem::path& path) {
   return kind == PictureKind::kWebp ? DecodeWebpSize(name, bytes) : DecodeTiffSize(name, std::move(bytes));
 }
 
-Status WritePng(const std::filesystem::path& path, const Image& image, const WriteOptions& options) {
+Status WritePng(const std::filesystem::path& path, const Image& image, const WriteOptions& options,
+                const std::string& comment) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
-  auto bytes = EncodePng(image);
+  auto bytes = EncodePng(image, false, comment);
   if (!bytes.ok()) return Error{bytes.error().code, Cat(path.string(), ": ", bytes.error().message)};
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(*bytes));
   return file.Commit();

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 
 #include "core/image.h"
 #include "core/result.h"
@@ -24,8 +25,10 @@ struct ImageSize {
 };
 Result<ImageSize> ReadImageSize(const std::filesystem::path& path);
 
-// Writes an 8-bit PNG: value·255 rounded to nearest, clamped; 1 (grey), 3 or 4 channels. Whole or not at all.
-Status WritePng(const std::filesystem::path& path, const Image& image, const WriteOptions& options = {});
+// Writes an 8-bit PNG: value·255 rounded to nearest, clamped; 1 (grey), 3 or 4 channels. Whole or not at all. The file
+// says the `comment`, ASCII, where there is one.
+Status WritePng(const std::filesystem::path& path, const Image& image, const WriteOptions& options = {},
+                const std::string& comment = {});
 
 // rgb·a + background·(1−a); images without alpha come back as they are.
 Image CompositeOver(const Image& image, const std::array<float, 3>& background);

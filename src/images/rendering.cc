@@ -12,9 +12,10 @@
 
 namespace anchorsplat {
 
-Status WriteRendering(const std::filesystem::path& path, const Image& image, const WriteOptions& options) {
+Status WriteRendering(const std::filesystem::path& path, const Image& image, const WriteOptions& options,
+                      const std::string& comment) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path, options.overwrite, options.memory));
-  auto bytes = EncodePng(image, true);
+  auto bytes = EncodePng(image, true, comment);
   if (!bytes.ok()) return Error{bytes.error().code, Cat(path.string(), ": ", bytes.error().message)};
   ANCHORSPLAT_RETURN_IF_ERROR(file.Write(*bytes));
   return file.Commit();

@@ -65,6 +65,13 @@ expect 0 "a page to standard output" out view "$scan" -o -
 expect 0 "it is one" grep -q "<html" "$work/out"
 expect 0 "a picture to standard output" out render "$scan" -o - --orbit 1 --size 32x32
 expect 0 "it is one" grep -qa "PNG" "$work/out"
+cp "$work/out" "$work/picture.png"
+expect 3 "no network to enlarge it with" "$program" upscale "$work/picture.png" -o "$work/large" --network "$work/none"
+says stderr "none"
+expect 4 "no network is a picture" "$program" upscale "$work/picture.png" -o "$work/large" --network "$work/picture.png"
+expect 2 "enlarged with nothing" "$program" upscale "$work/picture.png" -o "$work/large"
+says stderr "--network"
+expect 1 "nothing was made" test -e "$work/large"
 expect 2 "with JSON" "$program" convert "$scan" - --to ply --json
 says stderr "--json and the output - would both go to standard output"
 expect 2 "several files" "$program" convert "$scan" - --to gltf

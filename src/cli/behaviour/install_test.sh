@@ -19,7 +19,8 @@ expect 0 "install" "$cmake" --install "$build" --prefix "$prefix" --strip
 installed=$prefix/bin/anchorsplat
 for file in bin/anchorsplat share/man/man1/anchorsplat.1 share/bash-completion/completions/anchorsplat \
             share/zsh/site-functions/_anchorsplat share/doc/anchorsplat/THIRD_PARTY share/doc/anchorsplat/CHANGELOG.md \
-            share/doc/anchorsplat/copyright share/doc/anchorsplat/model-card.md; do
+            share/doc/anchorsplat/copyright share/doc/anchorsplat/model-card.md share/anchorsplat/fetch-upscaler.sh \
+            share/anchorsplat/convert_upscaler.py; do
   expect 0 "$file" test -s "$prefix/$file"
 done
 # Nothing in it knows where it was built.
@@ -71,7 +72,7 @@ fi
 
 # The manual page knows every verb and option that --help shows, and roff has nothing to say against it.
 page=$(sed 's/\\-/-/g; s/\\f[BIR]//g; s/\\&//g; s/\\e/\\/g' "$prefix/share/man/man1/anchorsplat.1")
-for verb in enhance info render convert compare eval view views fit train doctor "dataset build" "dataset check" "bench network"; do
+for verb in enhance info render convert compare upscale eval view views fit train doctor "dataset build" "dataset check" "bench network"; do
   # shellcheck disable=SC2086
   expect 0 "help of $verb" "$program" $verb --help
   section=$(awk -v title=".SH \"anchorsplat $verb\"" '$0 == title {on = 1; next} /^\.SH/ {on = 0} on' <<<"$page")

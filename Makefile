@@ -18,6 +18,9 @@
 #   make interop  files of ours read by other programs and theirs by us (scripts/interop.py says what it needs)
 #   make lpips-check  LPIPS with its trained weights (fetched once, 64 MB) against the published values
 #   make bench    measured ratios and figures
+#   make gpu-test the GPU's kernels on Debian 13's driver, Dawn and headless Chromium, all in software (scripts/gpu-test.sh)
+#   make gpu-bench   a GPU's times beside the CPU's and gsplat's, and how near its pictures are; GPU_BENCH="--device 1 --small"
+#   make gpu-bench-pack   build/gpu-bench, the same for a machine that reaches no registry (docs/gpu.md)
 
 JOBS ?= $(shell nproc)
 SECONDS ?= 60
@@ -137,6 +140,18 @@ bench: program
 	@build/anchorsplat bench convert
 	@build/anchorsplat bench fit
 	@build/anchorsplat bench network
+
+gpu-test: build
+	@JOBS=$(JOBS) scripts/gpu-test.sh build/release
+
+gpu-bench: program
+	@scripts/gpu-bench.sh $(GPU_BENCH)
+
+gpu-bench-pack: program
+	@scripts/install-missing.sh gpu-bench-pack strip=binutils /usr/lib/$(shell uname -m)-linux-gnu/libvulkan.so.1=libvulkan1
+	@rm -rf build/gpu-bench
+	@scripts/gpu-bench.sh --pack build/gpu-bench
+.PHONY: gpu-test gpu-bench gpu-bench-pack
 
 lint:
 	@scripts/lint.sh

@@ -18,14 +18,14 @@ export function finish() {
   process.exit(failed === 0 ? 0 : 1);
 }
 
-// $CHROMIUM, driven by the playwright-core in $NODE_FOLDER. There need be no graphics card.
-export function launchBrowser() {
+// $CHROMIUM, driven by the playwright-core in $NODE_FOLDER, with more `switches`. There need be no graphics card.
+export function launchBrowser(switches = []) {
   const {chromium} = createRequire(path.join(process.env.NODE_FOLDER, 'package.json'))('playwright-core');
   return chromium.launch({
     executablePath: process.env.CHROMIUM || '/usr/bin/chromium',
     args: ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--no-sandbox',
       '--disable-gpu-sandbox', '--disable-background-networking', '--disable-component-update', '--disable-sync',
-      '--no-first-run'],
+      '--no-first-run', ...switches],
   });
 }
 

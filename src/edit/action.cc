@@ -157,16 +157,16 @@ Result<EditAction> ParseBox(EditAction action, std::string_view name, const std:
   return Finished(std::move(action), turned);
 }
 
-std::optional<Comparison> ComparisonOf(const std::string& word) {
+std::optional<ValueComparison> ComparisonOf(const std::string& word) {
   constexpr std::array<std::string_view, 6> kWords = {"lt", "lte", "gt", "gte", "eq", "neq"};
   const auto found = std::ranges::find(kWords, word);
   if (found == kWords.end()) return std::nullopt;
-  return static_cast<Comparison>(found - kWords.begin());
+  return static_cast<ValueComparison>(found - kWords.begin());
 }
 
 Result<EditAction> ParseValue(EditAction action, std::string_view name, const std::string& text, const Matrix& to_rdf) {
   const std::vector<std::string> parts = Parts(text);
-  const std::optional<Comparison> comparison = parts.size() == 3 ? ComparisonOf(parts[1]) : std::nullopt;
+  const std::optional<ValueComparison> comparison = parts.size() == 3 ? ComparisonOf(parts[1]) : std::nullopt;
   const std::optional<double> value = parts.size() == 3 ? Number(parts[2]) : std::nullopt;
   if (!comparison || !value || parts[0].empty()) {
     return Bad(name, Cat("expected PROPERTY,COMPARISON,VALUE, where the comparison is one of lt, lte, gt, gte, eq and "

@@ -40,10 +40,10 @@ struct KeepSphere {
 // log-scale of −∞), or a quaternion of zero.
 struct KeepNumbers {};
 // Only rows whose property compares so stay. NaN compares with nothing, but is not equal to anything.
-enum class Comparison { kLess, kLessOrEqual, kGreater, kGreaterOrEqual, kEqual, kNotEqual };
+enum class ValueComparison { kLess, kLessOrEqual, kGreater, kGreaterOrEqual, kEqual, kNotEqual };
 struct KeepByValue {
   std::string property;  // x, f_dc_0, opacity, scale_2, rot_3, f_rest_44 or another one of the file
-  Comparison comparison;
+  ValueComparison comparison;
   double value;                             // as stored: a logit, a logarithm, a harmonic
   std::array<double, 3> along = {0, 0, 0};  // of x, y and z: the direction in the world that is meant
 };

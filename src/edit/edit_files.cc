@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <memory>
 #include <new>
 #include <utility>
@@ -37,7 +38,7 @@ void Finish(const EditedSplat& edited, const WorldOrigin& origin, ConvertedSplat
 }
 
 // The first splat with the others behind it.
-Status Merge(std::vector<ConvertedSplat>& splats, std::span<const EditedSplat> edited, ConvertedSplat& all) {
+Status Merge(std::vector<ConvertedSplat>& splats, ConvertedSplat& all) {
   std::vector<std::optional<RenderMode>> modes;
   std::vector<const ExtraProperties*> extras;
   bool has_normals = false;
@@ -102,7 +103,7 @@ Result<EditReport> EditInMemory(const EditJob& job, const std::filesystem::path&
   if (splats.size() == 1) {
     all = std::move(splats[0]);
   } else {
-    ANCHORSPLAT_RETURN_IF_ERROR(Merge(splats, edited, all));
+    ANCHORSPLAT_RETURN_IF_ERROR(Merge(splats, all));
   }
   all.cloud.comments = std::move(comments);
   if (job.convert.render_mode) all.cloud.render_mode = job.convert.render_mode;

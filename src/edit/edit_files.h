@@ -15,14 +15,14 @@ namespace anchorsplat {
 
 // Splats that become one: each with the actions on it alone, then those on all of them.
 struct EditInput {
-  std::filesystem::path path;
-  std::vector<EditAction> actions;
+  std::filesystem::path path = {};
+  std::vector<EditAction> actions = {};
 };
 struct EditJob {
-  std::vector<EditInput> inputs;    // at least one; their Gaussians stand one behind the other in the result
-  std::vector<EditAction> actions;  // on all of them together, afterwards
-  ConvertOptions convert;  // input axes and the like before all actions; degree, opacity and number behind them
-  bool dry_run = false;    // nothing is written
+  std::vector<EditInput> inputs = {};    // at least one; their Gaussians stand one behind the other in the result
+  std::vector<EditAction> actions = {};  // on all of them together, afterwards
+  ConvertOptions convert = {};  // input axes and the like before all actions; degree, opacity and number behind them
+  bool dry_run = false;         // nothing is written
 
   // Whether there is more to do than ConvertFile does.
   bool edits() const;

@@ -21,10 +21,10 @@ struct EditedSplat {
   const ExtraProperties* extras = nullptr;  // what properties the rows have; its own rows are not looked at
   WorldOrigin origin = {0, 0, 0};           // of the rows
   int sh_degree = 0;
-  std::vector<std::string> comments;
+  std::vector<std::string> comments = {};
 
-  Similarity world = {};   // from the world of the rows to that of the result
-  std::vector<char> keep;  // [N], 1: the row is in the result; empty: all of them are
+  Similarity world = {};        // from the world of the rows to that of the result
+  std::vector<char> keep = {};  // [N], 1: the row is in the result; empty: all of them are
   int64_t kept = 0;
   bool has(int64_t i) const { return keep.empty() || keep[static_cast<size_t>(i)] != 0; }
 };

@@ -71,19 +71,19 @@ bool HasNumbers(const RowBlock& block, int64_t i, int sh_degree) {
   return true;
 }
 
-bool Holds(Comparison comparison, double a, double b) {
+bool Holds(ValueComparison comparison, double a, double b) {
   switch (comparison) {
-    case Comparison::kLess:
+    case ValueComparison::kLess:
       return a < b;
-    case Comparison::kLessOrEqual:
+    case ValueComparison::kLessOrEqual:
       return a <= b;
-    case Comparison::kGreater:
+    case ValueComparison::kGreater:
       return a > b;
-    case Comparison::kGreaterOrEqual:
+    case ValueComparison::kGreaterOrEqual:
       return a >= b;
-    case Comparison::kEqual:
+    case ValueComparison::kEqual:
       return a == b;
-    case Comparison::kNotEqual:
+    case ValueComparison::kNotEqual:
       return a != b;
   }
   return false;

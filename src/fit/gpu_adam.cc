@@ -12,7 +12,7 @@ const GpuKernel kAdamStep = {"adam_step", {wgsl::kAdamWgsl}};
 constexpr int64_t kGroup = 256;  // threads
 
 // `Adam` of adam.wgsl.
-struct Parameters {
+struct AdamParameters {
   uint32_t rows, stride, columns, first_columns;
   float first_rate, rate, take1, keep2, take2, inverse_root, epsilon;
   uint32_t unused;
@@ -23,7 +23,7 @@ struct Parameters {
 void RecordAdamStep(const GpuAdamParams& p, GpuDevice& device) {
   if (p.rows <= 0 || p.columns <= 0) return;
   const AdamNumbers numbers = MakeAdamNumbers(p.beta1, p.beta2, static_cast<float>(p.epsilon), p.step);
-  Parameters parameters{};
+  AdamParameters parameters{};
   parameters.stride = static_cast<uint32_t>(p.stride);
   parameters.columns = static_cast<uint32_t>(p.columns);
   parameters.first_columns = static_cast<uint32_t>(p.first_columns);

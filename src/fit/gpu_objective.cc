@@ -23,7 +23,7 @@ constexpr uint64_t kPartForTargets = 4;  // of the run's GPU memory goes to pict
 constexpr uint32_t kThreads = 256;
 
 // `Rays` of pixel_model.wgsl.
-struct Parameters {
+struct RaysParameters {
   std::array<uint32_t, 2> size;
   uint32_t samples, plane;
 };
@@ -65,9 +65,9 @@ Result<bool> GpuObjective::Show(const ObjectiveOptions& options, GpuCloud& cloud
   rays.world_to_camera = FromOrigin(rays.world_to_camera, origin);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const bool drawn, rasterizer_.Draw(cloud, rays, near, render_, nullptr));
   if (!drawn || samples_ == 1) return drawn;
-  const Parameters p = {{static_cast<uint32_t>(width_), static_cast<uint32_t>(height_)},
-                        static_cast<uint32_t>(samples_),
-                        RasterizedPlane()};
+  const RaysParameters p = {{static_cast<uint32_t>(width_), static_cast<uint32_t>(height_)},
+                            static_cast<uint32_t>(samples_),
+                            RasterizedPlane()};
   device_->Run(kAverageRays, AsParameters(p), {{1, rasterizer_.picture.get()}, {2, averages_.get()}},
                GroupsOf(3 * plane));
   return true;
@@ -168,7 +168,7 @@ Status GpuObjective::Compare(const ObjectiveOptions& options, GpuCloud& cloud, i
   ANCHORSPLAT_RETURN_IF_ERROR(
       loss_.Compare(width_, height_, Shown(), {wanted, 1, plane}, options.loss, {gradient_.get(), 4, 1}));
   if (samples_ > 1) {
-    const Parameters p = {
+    const RaysParameters p = {
         {static_cast<uint32_t>(width_), static_cast<uint32_t>(height_)}, static_cast<uint32_t>(samples_), 0};
     device_->Run(kSpreadToRays, AsParameters(p), {{1, gradient_.get()}, {2, rays_gradient_.get()}}, GroupsOf(rays));
   }

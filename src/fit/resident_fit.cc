@@ -19,17 +19,17 @@ const GpuKernel kGatherGradients = {"gather_gradients", {wgsl::kRowsWgsl}};
 const GpuKernel kMarkUsable = {"mark_usable", {wgsl::kRowsWgsl}};
 const GpuKernel kCapOpacities = {"cap_opacities", {wgsl::kRowsWgsl}};
 
-constexpr int64_t kThreads = 256;
+constexpr int64_t kRowThreads = 256;
 constexpr uint64_t kGatheredBytes = 4 * sizeof(float);
 constexpr size_t kNewcomerNumbers = 8;
 
 // `Rows` of rows.wgsl.
-struct Parameters {
+struct RowsParameters {
   uint32_t count, width, first, limit, from_first, from_count;
   std::array<float, 2> numbers;
 };
 
-uint32_t GroupsOf(int64_t threads) { return static_cast<uint32_t>((threads + kThreads - 1) / kThreads); }
+uint32_t RowGroups(int64_t threads) { return static_cast<uint32_t>((threads + kRowThreads - 1) / kRowThreads); }
 
 // A column of a block, and of host memory.
 struct Column {
@@ -157,7 +157,7 @@ void ResidentFit::LearnRows(const ResidentStep& step, const GpuGradient& gradien
 }
 
 void ResidentFit::Gather(const ResidentStep& step, const GpuGradient& gradient) {
-  Parameters p{};
+  RowsParameters p{};
   p.count = static_cast<uint32_t>(gradient.count);
   p.numbers = {0.5f * static_cast<float>(step.width), 0.5f * static_cast<float>(step.height)};
   const auto first = static_cast<uint64_t>(gradient.first), count = static_cast<uint64_t>(gradient.count);
@@ -166,7 +166,7 @@ void ResidentFit::Gather(const ResidentStep& step, const GpuGradient& gradient) 
                {{1, step.absgrad ? gradient.means2d_abs.get() : gradient.means2d.get()},
                 {2, &objective_.radii(), first * kRadiiBytes, count * kRadiiBytes},
                 {3, gathered_.get(), first * kGatheredBytes, count * kGatheredBytes}},
-               GroupsOf(gradient.count));
+               RowGroups(gradient.count));
 }
 
 Status ResidentFit::ReadGathered(Densification::Gathered& gathered) const {
@@ -192,7 +192,7 @@ Result<RefinementPlan> ResidentFit::Plan(const DensificationOptions& options, in
   shapes_.Resize(size(), 0);
   std::vector<GpuRead> reads;
   for (const GpuCloudBlock& block : cloud_.blocks()) {
-    Parameters p{};
+    RowsParameters p{};
     p.count = static_cast<uint32_t>(block.count);
     p.width = static_cast<uint32_t>(cloud_.sh_stride());
     device_->Run(kMarkUsable, AsParameters(p),
@@ -203,7 +203,7 @@ Result<RefinementPlan> ResidentFit::Plan(const DensificationOptions& options, in
                   {5, block.sh.get()},
                   {6, marks.get(), static_cast<uint64_t>(block.first) * sizeof(uint32_t),
                    static_cast<uint64_t>(block.count) * sizeof(uint32_t)}},
-                 GroupsOf(block.count));
+                 RowGroups(block.count));
     for (const Column& column : ColumnsOf(cloud_)) {
       if (column.values != &GaussianCloud::sh) reads.push_back(ReadOf(block, column, shapes_));
     }
@@ -219,7 +219,7 @@ void ResidentFit::TakeRows(const GpuBuffer& source, int64_t limit, const GpuClou
   for (const GpuCloudBlock& fresh : to.blocks()) {
     for (const GpuCloudBlock& old : from.blocks()) {
       for (const Column& column : ColumnsOf(to)) {
-        Parameters p{};
+        RowsParameters p{};
         p.count = static_cast<uint32_t>(fresh.count * column.width);
         p.width = static_cast<uint32_t>(column.width);
         p.first = static_cast<uint32_t>(fresh.first);
@@ -228,7 +228,7 @@ void ResidentFit::TakeRows(const GpuBuffer& source, int64_t limit, const GpuClou
         p.from_count = static_cast<uint32_t>(old.count);
         device_->Run(kTakeRows, AsParameters(p),
                      {{1, &source}, {2, (old.*column.memory).get()}, {3, (fresh.*column.memory).get()}},
-                     GroupsOf(fresh.count * column.width));
+                     RowGroups(fresh.count * column.width));
       }
     }
   }
@@ -272,14 +272,14 @@ Status ResidentFit::Apply(const DensificationOptions& options, const RefinementP
   if (!shapes.empty()) {
     device_->Write(*newcomers, 0, std::as_bytes(std::span(shapes)));
     for (const GpuCloudBlock& block : cloud.blocks()) {
-      Parameters p{};
+      RowsParameters p{};
       p.count = static_cast<uint32_t>(block.count);
       p.first = static_cast<uint32_t>(block.first);
       p.limit = static_cast<uint32_t>(kept);
       device_->Run(
           kPlaceNewcomers, AsParameters(p),
           {{1, newcomers.get()}, {2, block.means.get()}, {3, block.log_scales.get()}, {4, block.opacity_logits.get()}},
-          GroupsOf(block.count));
+          RowGroups(block.count));
     }
   }
   cloud_ = std::move(cloud);
@@ -290,11 +290,11 @@ Status ResidentFit::Apply(const DensificationOptions& options, const RefinementP
 }
 
 void ResidentFit::ResetOpacities(double cap) {
-  Parameters p{};
+  RowsParameters p{};
   p.numbers[0] = static_cast<float>(std::log(cap / (1 - cap)));
   for (const GpuCloudBlock& block : cloud_.blocks()) {
     p.count = static_cast<uint32_t>(block.count);
-    device_->Run(kCapOpacities, AsParameters(p), {{1, block.opacity_logits.get()}}, GroupsOf(block.count));
+    device_->Run(kCapOpacities, AsParameters(p), {{1, block.opacity_logits.get()}}, RowGroups(block.count));
   }
   for (const GpuCloud* moments : {&first_, &second_}) {
     for (const GpuCloudBlock& block : moments->blocks()) {

@@ -11,8 +11,8 @@ namespace anchorsplat {
 
 namespace {
 
-constexpr int kSide = 16;  // of a workgroup's tile, pixels
-constexpr int64_t kChannels = 3, kMaps = 3, kSums = 3;
+constexpr int kTileSide = 16;  // of a workgroup's tile, pixels
+constexpr int64_t kColors = 3, kMaps = 3, kSums = 3;
 
 const GpuKernel kSsimMaps = {"ssim_maps", {wgsl::kSsimWgsl}};
 const GpuKernel kPhotometricGradient = {"photometric_gradient", {wgsl::kSsimWgsl}};
@@ -48,16 +48,16 @@ Status GpuPhotometricLoss::Compare(int width, int height, const GpuPicture& rend
   }
   // Without SSIM there are no maps, but a kernel's binding cannot be empty.
   const bool similarity = options.ssim_weight > 0;
-  const int64_t at_once = kChannels * bytes <= seen ? kChannels : 1;
-  const int64_t tiles_x = (width + kSide - 1) / kSide, tiles_y = (height + kSide - 1) / kSide;
+  const int64_t at_once = kColors * bytes <= seen ? kColors : 1;
+  const int64_t tiles_x = (width + kTileSide - 1) / kTileSide, tiles_y = (height + kTileSide - 1) / kTileSide;
   ANCHORSPLAT_RETURN_IF_ERROR(Grow(*device_, similarity ? at_once * of_a_channel : 1, "maps of the loss", maps_));
-  ANCHORSPLAT_RETURN_IF_ERROR(Grow(*device_, kChannels * tiles_x * tiles_y * kSums, "sums of the loss", sums_));
+  ANCHORSPLAT_RETURN_IF_ERROR(Grow(*device_, kColors * tiles_x * tiles_y * kSums, "sums of the loss", sums_));
 
   const bool valid = options.padding == SsimPadding::kValid;
   const int margin = valid ? kSsimRadius : 0;
   tiles_ = tiles_x * tiles_y;
-  values_ = kChannels * static_cast<double>(plane);
-  windows_ = kChannels * static_cast<double>(width - 2 * margin) * (height - 2 * margin);
+  values_ = kColors * static_cast<double>(plane);
+  windows_ = kColors * static_cast<double>(width - 2 * margin) * (height - 2 * margin);
   ssim_weight_ = options.ssim_weight;
 
   const auto strides = [](const GpuPicture& picture) {
@@ -75,7 +75,7 @@ Status GpuPhotometricLoss::Compare(int width, int height, const GpuPicture& rend
   p.difference_weight = static_cast<float>((1 - options.ssim_weight) / values_);
   std::copy_n(SsimWindow().begin(), kSsimRadius + 1, p.window.begin());
   const auto groups = static_cast<uint32_t>(at_once * tiles_);
-  for (int64_t channel = 0; channel < kChannels; channel += at_once) {
+  for (int64_t channel = 0; channel < kColors; channel += at_once) {
     p.channels = {static_cast<uint32_t>(channel), static_cast<uint32_t>(at_once)};
     if (similarity) {
       device_->Run(kSsimMaps, AsParameters(p),
@@ -89,7 +89,7 @@ Status GpuPhotometricLoss::Compare(int width, int height, const GpuPicture& rend
 }
 
 Result<GpuPhotometricLossValue> GpuPhotometricLoss::Value() {
-  read_.resize(static_cast<size_t>(kChannels * tiles_ * kSums));
+  read_.resize(static_cast<size_t>(kColors * tiles_ * kSums));
   const GpuRead read = {sums_.get(), 0, std::as_writable_bytes(std::span(read_))};
   ANCHORSPLAT_RETURN_IF_ERROR(device_->Read({&read, 1}));
   std::array<double, kSums> sums{};

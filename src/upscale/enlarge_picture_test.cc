@@ -14,14 +14,6 @@ namespace {
 
 using ::testing::HasSubstr;
 
-Upscaler Opened(const SmallUpscaler& network) {
-  const TestFolder folder;
-  EXPECT_TRUE(network.Write(folder / "network.safetensors").ok());
-  auto out = Upscaler::Read(folder / "network.safetensors");
-  EXPECT_TRUE(out.ok()) << out.error().message;
-  return *std::move(out);
-}
-
 // A ball of one colour, transparent around it, with a soft edge.
 Image Ball(const std::array<float, 3>& color) {
   Image out(12, 10, 4);
@@ -36,7 +28,7 @@ Image Ball(const std::array<float, 3>& color) {
 }
 
 TEST(EnlargePicture, RepeatsPixelsWithANetworkThatDoes) {
-  Upscaler upscaler = Opened(RepeatingForTest());
+  Upscaler upscaler = OpenedForTest(RepeatingForTest());
   for (const std::array<float, 3> background : {std::array{0.0f, 0.0f, 0.0f}, {1.0f, 1.0f, 1.0f}, {0.2f, 0.5f, 0.5f}}) {
     for (const int factor : {0, 4}) {
       const Image ball = Ball({0.9f, 0.5f, 0.1f});
@@ -59,7 +51,7 @@ TEST(EnlargePicture, RepeatsPixelsWithANetworkThatDoes) {
 }
 
 TEST(EnlargePicture, AlphaBicubically) {
-  Upscaler upscaler = Opened(RepeatingForTest());
+  Upscaler upscaler = OpenedForTest(RepeatingForTest());
   const Image ball = Ball({1, 1, 1});
   Image alpha(12, 10, 1);
   std::copy_n(ball.channel(3), ball.plane(), alpha.channel(0));
@@ -72,7 +64,7 @@ TEST(EnlargePicture, AlphaBicubically) {
 }
 
 TEST(EnlargePicture, SolidAlphaIsThatOfColoursAlone) {
-  Upscaler upscaler = Opened(SpanForTest(5, 2));
+  Upscaler upscaler = OpenedForTest(SpanForTest(5, 2));
   Image solid = Ball({0.3f, 0.6f, 0.9f});
   for (int c = 0; c < 3; ++c) {
     for (int64_t i = 0; i < solid.plane(); ++i) solid.channel(c)[i] *= solid.channel(3)[i];
@@ -87,7 +79,7 @@ TEST(EnlargePicture, SolidAlphaIsThatOfColoursAlone) {
 }
 
 TEST(EnlargePicture, StaysWithinItsRange) {
-  Upscaler upscaler = Opened(SpanForTest(5, 2));
+  Upscaler upscaler = OpenedForTest(SpanForTest(5, 2));
   const Image out = *EnlargePicture(upscaler, Ball({1, 0, 1}));
   for (const float value : out.pixels) {
     ASSERT_GE(value, 0);

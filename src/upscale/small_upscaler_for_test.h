@@ -1,12 +1,16 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <filesystem>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/text.h"
+#include "io/folder_for_test.h"
 #include "tensors/safetensors.h"
 #include "upscale/plain_layers_for_test.h"
 #include "upscale/upscaler.h"
@@ -26,6 +30,15 @@ struct SmallUpscaler {
     return WriteSafetensors(path, entries, metadata, {.overwrite = true});
   }
 };
+
+// As a program reads it.
+inline Upscaler OpenedForTest(const SmallUpscaler& network) {
+  const TestFolder folder;
+  EXPECT_TRUE(network.Write(folder / "network.safetensors").ok());
+  auto out = Upscaler::Read(folder / "network.safetensors");
+  EXPECT_TRUE(out.ok()) << out.error().message;
+  return *std::move(out);
+}
 
 inline SmallUpscaler UpscalerForTest(const std::string& architecture, int scale, Random& random) {
   SmallUpscaler out;

@@ -98,20 +98,12 @@ std::vector<NetworkCase> Cases() {
           {"srmd", SrmdForTest(), PlainSrmd, 28}};
 }
 
-Upscaler Opened(const SmallUpscaler& network) {
-  const TestFolder folder;
-  EXPECT_TRUE(network.Write(folder / "network.safetensors").ok());
-  auto out = Upscaler::Read(folder / "network.safetensors");
-  EXPECT_TRUE(out.ok()) << out.error().message;
-  return *std::move(out);
-}
-
 TEST(Upscaler, IsWhatThePapersSay) {
   ForEachSimdTarget([] {
     for (const NetworkCase& c : Cases()) {
       SCOPED_TRACE(c.name);
       const Image image = RandomImage(9, 6);
-      Upscaler upscaler = Opened(c.network);
+      Upscaler upscaler = OpenedForTest(c.network);
       const auto out = upscaler.Enlarge(image);
       ASSERT_TRUE(out.ok()) << out.error().message;
       const int scale = upscaler.info().scale;
@@ -133,7 +125,7 @@ TEST(Upscaler, TilesAndThreadsChangeNoBit) {
   const Image image = RandomImage(61, 37);
   for (const NetworkCase& c : Cases()) {
     SCOPED_TRACE(c.name);
-    Upscaler upscaler = Opened(c.network);
+    Upscaler upscaler = OpenedForTest(c.network);
     SetThreadCount(1);
     const auto whole = upscaler.Enlarge(image, 1000);
     ASSERT_TRUE(whole.ok());
@@ -151,7 +143,7 @@ TEST(Upscaler, TilesAndThreadsChangeNoBit) {
 
 TEST(Upscaler, PicturesOfAnySize) {
   for (const NetworkCase& c : Cases()) {
-    Upscaler upscaler = Opened(c.network);
+    Upscaler upscaler = OpenedForTest(c.network);
     for (const auto& [width, height] : {std::pair{1, 1}, std::pair{300, 1}, std::pair{1, 3}, std::pair{2, 40}}) {
       const auto out = upscaler.Enlarge(RandomImage(width, height));
       ASSERT_TRUE(out.ok());
@@ -161,7 +153,7 @@ TEST(Upscaler, PicturesOfAnySize) {
 }
 
 TEST(Upscaler, RefusesPicturesThatItCannotEnlarge) {
-  Upscaler upscaler = Opened(SpanForTest());
+  Upscaler upscaler = OpenedForTest(SpanForTest());
   EXPECT_EQ(upscaler.Enlarge(Image(4, 4, 1)).error().code, ErrorCode::kBadArgument);
   EXPECT_EQ(upscaler.Enlarge(Image()).error().code, ErrorCode::kBadArgument);
   Image huge;
@@ -173,12 +165,12 @@ TEST(Upscaler, RefusesPicturesThatItCannotEnlarge) {
 TEST(Upscaler, SaysWhenNumbersOverflow) {
   SmallUpscaler network = SpanForTest();
   for (float& value : network.tensors["upsampler.weight"].values) value = 3e38f;
-  Upscaler upscaler = Opened(network);
+  Upscaler upscaler = OpenedForTest(network);
   EXPECT_THAT(upscaler.Enlarge(RandomImage(5, 5)).error().message, HasSubstr("overflow"));
 }
 
 TEST(Upscaler, SaysWhereItIsFrom) {
-  const Upscaler upscaler = Opened(SpanForTest());
+  const Upscaler upscaler = OpenedForTest(SpanForTest());
   EXPECT_EQ(upscaler.info().architecture, "span-1");
   EXPECT_EQ(upscaler.info().scale, 3);
   EXPECT_EQ(upscaler.info().source, "a test");

@@ -45,8 +45,9 @@ def with_ncnn(folder, planes, continued, constants, scale, cut):
     net.load_model(str(folder / "net.bin"))
     planes = np.pad(planes, ((0, 0), (continued, continued), (continued, continued)), mode="edge")
     maps = [np.full((1, *planes.shape[1:]), value, np.float32) for value in constants]
+    values = np.ascontiguousarray(np.concatenate([planes, *maps]))  # which a Mat does not keep
     extractor = net.create_extractor()
-    extractor.input(net.input_names()[0], ncnn.Mat(np.ascontiguousarray(np.concatenate([planes, *maps]))).clone())
+    extractor.input(net.input_names()[0], ncnn.Mat(values).clone())
     out = np.array(extractor.extract(net.output_names()[0])[1])
     beyond = cut * scale
     return out[:, beyond : out.shape[1] - beyond, beyond : out.shape[2] - beyond]
@@ -61,7 +62,9 @@ def main():
         with tempfile.TemporaryDirectory() as work:
             folder = pathlib.Path(work)
             subprocess.run(
-                [str(SCRIPTS / "fetch-upscaler.sh"), name, str(folder / "net.safetensors"), "--keep", str(folder)], check=True
+                [str(SCRIPTS / "fetch-upscaler.sh"), name, str(folder / "net.safetensors"), "--keep", str(folder)],
+                check=True,
+                stdout=subprocess.DEVNULL,
             )
             with zipfile.ZipFile(next(folder.glob("*.whl"))) as wheel:
                 for end in ("param", "bin"):

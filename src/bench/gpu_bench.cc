@@ -168,13 +168,13 @@ Status MeasureGpu(const std::shared_ptr<GpuDevice>& device, const Load& load, co
 
   const auto both = [&]() -> Result<BothWays> {
     BothWays times;
-    const double waited = device->seconds_waited();
+    const double waited = device->seconds();
     Stopwatch lap;
     ANCHORSPLAT_RETURN_IF_ERROR(gpu.Forward());
     times.forward = lap.Lap();
     ANCHORSPLAT_RETURN_IF_ERROR(gpu.Backward());
     times.backward = lap.Lap();
-    times.waited = device->seconds_waited() - waited;
+    times.waited = device->seconds() - waited;
     return times;
   };
   ANCHORSPLAT_ASSIGN_OR_RETURN(const BothWays best, FastestBothWays(options, both));

@@ -56,7 +56,7 @@ class KernelClock final : public GpuDevice {
   void Submit() override { gpu_->Submit(); }
   Status Read(std::span<const GpuRead> reads) override { return gpu_->Read(reads); }
   Status Wait() override { return gpu_->Wait(); }
-  double seconds_waited() const override { return gpu_->seconds_waited(); }
+  double seconds() const override { return gpu_->seconds(); }
 
  private:
   std::shared_ptr<GpuDevice> gpu_;

@@ -156,7 +156,7 @@ Finding FindLpipsWeights() {
 Finding FindGpu(const GpuFindings& gpus) {
   std::string text;
   for (const std::string& line : LinesOf(gpus)) text += (text.empty() ? "" : "\n") + line;
-  return {"GPU", gpus.ready() ? kReady : kMissing, text, CommandFor(gpus)};
+  return {"GPU", gpus.ready() ? kReady : gpus.broken() ? kBroken : kMissing, text, CommandFor(gpus)};
 }
 
 void PrintReport(const Machine& machine, const std::vector<Finding>& findings) {

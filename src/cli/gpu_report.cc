@@ -29,6 +29,12 @@ GpuFindings LookForGpus() {
   return findings;
 }
 
+std::string WorkingOn(const GpuAdapter& adapter) {
+  const bool software = adapter.type == GpuAdapter::Type::kCpu;
+  return Cat("working on ", Printable(adapter.name), " (", adapter.backend, ")",
+             software ? ", which is software and slower than --device cpu" : "");
+}
+
 std::string WhyNotTaken(const GpuAdapter& adapter) {
   if (!adapter.unusable.empty()) return adapter.unusable;
   if (adapter.type == GpuAdapter::Type::kCpu) return "it is software, slower than --device cpu";
@@ -53,6 +59,7 @@ std::vector<std::string> LinesOf(const GpuFindings& findings) {
 
 std::string CommandFor(const GpuFindings& findings) {
   if (findings.ready()) return "";
+  if (findings.broken()) return "name a library that is there by ANCHORSPLAT_WEBGPU, or unset it";
   if (!findings.library.path.empty()) return "install the Vulkan driver of your GPU (Debian: mesa-vulkan-drivers)";
   const bool checkout = Exists(ProgramFolder().parent_path() / "scripts" / "fetch-webgpu.sh");
   return checkout ? "scripts/fetch-webgpu.sh" : "pip install wgpu==0.32.0";

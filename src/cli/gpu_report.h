@@ -14,9 +14,13 @@ struct GpuFindings {
   GpuLibrary library;
   std::vector<GpuAdapter> adapters;
 
-  bool ready() const;  // --device gpu has something to take
+  bool ready() const;                                                    // --device gpu has something to take
+  bool broken() const { return library.named && library.path.empty(); }  // the library that was named cannot be used
 };
 GpuFindings LookForGpus();
+
+// What a verb says that works on it.
+std::string WorkingOn(const GpuAdapter& adapter);
 
 // Why --device auto does not take an adapter, as a sentence's end; empty: it does.
 std::string WhyNotTaken(const GpuAdapter& adapter);

@@ -59,6 +59,11 @@ TEST(GpuReport, SaysWhatIsMissing) {
   EXPECT_TRUE(ToJson(none)["library"].is_null());
   EXPECT_EQ(ToJson(none)["problem"], "there is no library");
 
+  const GpuFindings named{{.path = "", .problem = "it is cut short", .named = true}, {}};
+  EXPECT_TRUE(named.broken());
+  EXPECT_FALSE(none.broken());
+  EXPECT_THAT(CommandFor(named), HasSubstr("ANCHORSPLAT_WEBGPU"));
+
   const GpuFindings no_driver = WithAdapters({});
   EXPECT_FALSE(no_driver.ready());
   EXPECT_THAT(LinesOf(no_driver), ElementsAre(HasSubstr("finds no adapter")));

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/clean_output.h"
+#include "cli/gpu_report.h"
 #include "cli/json_sink.h"
 #include "cli/verb_tree.h"
 #include "cli/verb_words.h"
@@ -114,7 +115,9 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
   const InputRecord record;  // nothing that the verb reads is overwritten by it
   try {
     // Before hours of work: nobody who asked for a GPU is content with the CPU.
-    if (const auto gpu = GpuOfRun(); !gpu.ok()) return Fail(flags, gpu.error());
+    const auto gpu = GpuOfRun();
+    if (!gpu.ok()) return Fail(flags, gpu.error());
+    if (*gpu != nullptr) LogInfo(WorkingOn((*gpu)->adapter()));
     const Status status = program.run();
     if (!status.ok()) return Fail(flags, status.error());
     std::cout.flush();

@@ -57,7 +57,7 @@ TEST(CommandLine, WordsThatAreNoVerb) {
   ExpectRefused({}, ErrorCode::kBadArgument, {"'anchorsplat' needs a verb"});
   ExpectRefused(
       {"convrt", "x.ply"}, ErrorCode::kBadArgument,
-      {"did you mean 'convert'?", "enhance, info, render, convert, compare, eval, view, views, fit, dataset"});
+      {"did you mean 'convert'?", "enhance, info, render, convert, compare, upscale, eval, view, views, fit, dataset"});
   ExpectRefused({"dataset", "chekc", "x"}, ErrorCode::kBadArgument, {"did you mean 'check'?"});
   const ProgramRun far = ExpectRefused({"xyzzyxyzzy", "--json"}, ErrorCode::kBadArgument);
   EXPECT_EQ(far.json()["error"]["code"], "bad_argument");

@@ -15,9 +15,8 @@ Result<DeviceChoice> ParseDeviceChoice(std::string_view word) {
   if (error == std::errc() && end == word.data() + word.size() && number >= 0) {
     return DeviceChoice{DeviceChoice::Kind::kNumber, number};
   }
-  return Error{
-      ErrorCode::kBadArgument,
-      Cat("device '", word, "' is not cpu, gpu, auto or the number of an adapter (anchorsplat doctor lists them)")};
+  return Error{ErrorCode::kBadArgument,
+               Cat("'", word, "' is not cpu, gpu, auto or the number of an adapter; anchorsplat doctor lists them")};
 }
 
 std::string DeviceWord(const DeviceChoice& choice) {

@@ -23,7 +23,7 @@ TEST(DeviceChoice, AnythingElseIsRefused) {
     EXPECT_EQ(choice.error().code, ErrorCode::kBadArgument);
   }
   EXPECT_EQ(ParseDeviceChoice("cuda").error().message,
-            "device 'cuda' is not cpu, gpu, auto or the number of an adapter (anchorsplat doctor lists them)");
+            "'cuda' is not cpu, gpu, auto or the number of an adapter; anchorsplat doctor lists them");
 }
 
 TEST(DeviceChoice, RunsCarryItAndItsMemory) {

@@ -103,8 +103,9 @@ class GpuDevice {
   virtual Status Read(std::span<const GpuRead> reads) = 0;
   virtual Status Wait() = 0;
 
-  // Seconds for which the caller waited in Read and Wait since the device was opened.
-  virtual double seconds_waited() const = 0;
+  // Seconds that callers spent in the calls above since the device was opened: recording, transfers, and waiting for
+  // the GPU.
+  virtual double seconds() const = 0;
 };
 
 // Parameters of a kernel: a struct laid out as WGSL does (vec3 and vec4 at multiples of 16 bytes).

@@ -58,7 +58,7 @@ class FaultyDevice final : public GpuDevice {
   }
   Status Read(std::span<const GpuRead> reads) override { return lost_ ? Status(Lost()) : gpu_->Read(reads); }
   Status Wait() override { return lost_ ? Status(Lost()) : gpu_->Wait(); }
-  double seconds_waited() const override { return gpu_->seconds_waited(); }
+  double seconds() const override { return gpu_->seconds(); }
 
   // So far, for tests that let each of them fail.
   int calls() const { return calls_; }

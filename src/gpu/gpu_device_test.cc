@@ -202,7 +202,7 @@ TEST_F(Gpu, ARunStaysWithinItsMemory) {
   Result<GpuMemory> more = gpu_->Allocate((1 << 19) + 1, "splats");
   ASSERT_FALSE(more.ok());
   EXPECT_EQ(more.error().message,
-            "the GPU memory for splats (525 kB) is more than --max-gpu-memory leaves (1.0 MB, of which 524 kB are in "
+            "there is no room for splats (525 kB) within --max-gpu-memory (1.0 MB, of which 524 kB are in "
             "use)");
   GpuMemory rest = Make(1 << 19);
   EXPECT_FALSE(gpu_->Allocate(1, "splats").ok());

@@ -15,6 +15,7 @@ namespace anchorsplat {
 struct GpuLibrary {
   std::string path;     // of the library in use; empty: none
   std::string problem;  // one sentence that says why there is none and what to do; empty: there is one
+  bool named = false;   // by ANCHORSPLAT_WEBGPU, without which others would be looked for
 };
 GpuLibrary FindGpuLibrary();
 

@@ -29,7 +29,7 @@ void DeviceFlags::AddTo(CLI::App& verb) {
 
 DeviceUse::DeviceUse() {
   if (const auto gpu = GpuOfRun(); gpu.ok()) gpu_ = *gpu;
-  if (gpu_ != nullptr) waited_before_ = gpu_->seconds_waited();
+  if (gpu_ != nullptr) spent_before_ = gpu_->seconds();
 }
 
 nlohmann::json DeviceUse::ToJson() const {
@@ -38,14 +38,14 @@ nlohmann::json DeviceUse::ToJson() const {
   if (!gave_up.empty()) json["gave_up"] = gave_up;
   if (gpu_ == nullptr) return json;
   const std::chrono::duration<double> in_all = std::chrono::steady_clock::now() - begin_;
-  const double waited = gpu_->seconds_waited() - waited_before_;
+  const double spent = gpu_->seconds() - spent_before_;
   const GpuAdapter& adapter = gpu_->adapter();
   json["name"] = adapter.name;
   json["backend"] = adapter.backend;
   json["type"] = NameOf(adapter.type);
-  json["seconds"] = waited;
-  // Other runs may wait for the same device at the same time.
-  json["share"] = in_all.count() > 0 ? std::min(1.0, waited / in_all.count()) : 0.0;
+  json["seconds"] = spent;
+  // Other runs may work on the same device at the same time.
+  json["share"] = in_all.count() > 0 ? std::min(1.0, spent / in_all.count()) : 0.0;
   return json;
 }
 

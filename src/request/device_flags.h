@@ -34,7 +34,7 @@ class DeviceUse {
 
  private:
   std::shared_ptr<GpuDevice> gpu_;  // null: the CPU
-  double waited_before_ = 0;        // seconds
+  double spent_before_ = 0;         // seconds
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 

@@ -35,7 +35,7 @@ class Recorder final : public GpuDevice {
   void Submit() override { gpu_->Submit(); }
   Status Read(std::span<const GpuRead> reads) override;
   Status Wait() override { return gpu_->Wait(); }
-  double seconds_waited() const override { return gpu_->seconds_waited(); }
+  double seconds() const override { return gpu_->seconds(); }
 
   // recording.json: {"kernels": [{"entry", "text"}], "buffers": [bytes], "calls": […]}, where a call is one of
   //   ["write", buffer, offset, at, bytes]         at: in recording.bin

@@ -46,22 +46,32 @@ class Candidates {
   // Of a Python whose prefix this is, as the folders of packages are called everywhere.
   void AddPrefix(const fs::path& prefix) {
     if (prefix.empty()) return;
-    std::vector<fs::path> libraries;
-    std::error_code failed;
-    for (fs::directory_iterator entry(prefix / "lib", failed), end; !failed && entry != end; entry.increment(failed)) {
-      if (entry->path().filename().string().starts_with("python3")) libraries.push_back(entry->path());
-    }
-    std::sort(libraries.begin(), libraries.end());
-    for (const fs::path& library : libraries) {
+    for (const fs::path& library : EntriesOf(prefix / "lib")) {
+      if (!library.filename().string().starts_with("python3")) continue;
       for (const char* packages : {"site-packages", "dist-packages"}) {
         AddFolder(library / packages / "wgpu" / "resources");
       }
     }
   }
 
+  void AddPrefixesIn(const fs::path& folder) {
+    for (const fs::path& prefix : EntriesOf(folder)) AddPrefix(prefix);
+  }
+
   std::vector<std::string> Take() { return std::move(found_); }
 
  private:
+  // Sorted; none of a folder that cannot be read.
+  static std::vector<fs::path> EntriesOf(const fs::path& folder) {
+    std::vector<fs::path> entries;
+    std::error_code failed;
+    for (fs::directory_iterator entry(folder, failed), end; !failed && entry != end; entry.increment(failed)) {
+      entries.push_back(entry->path());
+    }
+    std::sort(entries.begin(), entries.end());
+    return entries;
+  }
+
   std::vector<std::string> found_;
 };
 
@@ -72,8 +82,11 @@ LibrarySearch LibrarySearchOfProcess(const fs::path& module_folder) {
                        .module_folder = module_folder,
                        .program_folder = ProgramFolder(),
                        .virtual_environment = Environment("VIRTUAL_ENV"),
+                       .conda_environment = Environment("CONDA_PREFIX"),
+                       .pyenv = Environment("PYENV_ROOT"),
                        .executables = {},
                        .home = Environment("HOME")};
+  if (search.pyenv.empty() && !search.home.empty()) search.pyenv = search.home / ".pyenv";
   std::istringstream path(Environment("PATH"));
   for (std::string folder; std::getline(path, folder, ':');) {
     if (!folder.empty()) search.executables.emplace_back(folder);
@@ -91,9 +104,11 @@ std::vector<std::string> LibraryCandidates(const LibrarySearch& search) {
     candidates.AddFolder(search.program_folder.parent_path().parent_path() / "wgpu" / "resources");
   }
   candidates.AddPrefix(search.virtual_environment);
+  candidates.AddPrefix(search.conda_environment);
   for (const fs::path& folder : search.executables) {
     if (Exists(folder / "python3") || Exists(folder / "python")) candidates.AddPrefix(folder.parent_path());
   }
+  if (!search.pyenv.empty()) candidates.AddPrefixesIn(search.pyenv / "versions");
   if (!search.home.empty()) candidates.AddPrefix(search.home / ".local");
   std::vector<std::string> found = candidates.Take();
   found.emplace_back(kSystemLibrary);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "gpu/open_gpu.h"
 #include "gpu/with_webgpu/webgpu_api.h"
 
 namespace anchorsplat {
@@ -38,6 +39,28 @@ TEST_F(LibrarySearchTest, OnlyTheNamedFileIsTaken) {
   Put("bin/libwgpu_native.so");
   const LibrarySearch search{.named = "/nowhere/libwgpu.so", .program_folder = folder_ / "bin"};
   EXPECT_EQ(LibraryCandidates(search), std::vector<std::string>{"/nowhere/libwgpu.so"});
+}
+
+TEST_F(LibrarySearchTest, CondaAndPyenvAreLookedInto) {
+  const std::string conda = Put("conda/lib/python3.12/site-packages/wgpu/resources/libwgpu_native-release.so");
+  const std::string pyenv = Put("pyenv/versions/3.11.9/lib/python3.11/site-packages/wgpu/resources/libwgpu_native.so");
+  const LibrarySearch search{.conda_environment = folder_ / "conda", .pyenv = folder_ / "pyenv"};
+  EXPECT_EQ(LibraryCandidates(search), (std::vector<std::string>{conda, pyenv, "libwgpu_native.so"}));
+}
+
+TEST_F(LibrarySearchTest, ALibraryThatIsCutShortIsNotLoaded) {
+  const GpuLibrary whole = FindGpuLibrary();
+  ASSERT_FALSE(whole.path.empty()) << whole.problem;
+  std::ifstream file(whole.path, std::ios::binary);
+  std::string bytes(fs::file_size(whole.path), 0);
+  ASSERT_TRUE(file.read(bytes.data(), static_cast<std::streamsize>(bytes.size())));
+  for (const size_t kept : {size_t{64}, size_t{4096}, bytes.size() / 2}) {
+    const std::string cut = Put("cut.so");
+    std::ofstream(cut, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(kept));
+    const auto loaded = LoadWebGpu(cut);
+    ASSERT_FALSE(loaded.ok()) << kept;
+    EXPECT_NE(loaded.error().message.find("is cut short: get it again"), std::string::npos) << loaded.error().message;
+  }
 }
 
 TEST_F(LibrarySearchTest, NearPlacesComeFirst) {

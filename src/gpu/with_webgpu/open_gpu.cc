@@ -1,5 +1,6 @@
 #include "gpu/open_gpu.h"
 
+#include <cstdlib>
 #include <map>
 #include <mutex>
 
@@ -30,7 +31,10 @@ constexpr const char* kBroken = "the WebGPU library stopped when a device was lo
 
 GpuLibrary FindGpuLibrary() {
   const WebGpuInstance& instance = WebGpuInstance::OfProcess();
-  return {.path = instance.api() == nullptr ? "" : instance.api()->path, .problem = instance.problem()};
+  const char* const named = std::getenv("ANCHORSPLAT_WEBGPU");
+  return {.path = instance.api() == nullptr ? "" : instance.api()->path,
+          .problem = instance.problem(),
+          .named = named != nullptr && *named != '\0'};
 }
 
 void SetGpuLibraryHint(const std::filesystem::path& module_folder) { WebGpuInstance::SetModuleFolder(module_folder); }

@@ -1,12 +1,45 @@
 #include "gpu/with_webgpu/webgpu_api.h"
 
 #include <dlfcn.h>
+#include <elf.h>
+
+#include <cstring>
+#include <fstream>
+#include <vector>
 
 #include "core/text.h"
 
 namespace anchorsplat {
 
+namespace {
+
+// Whether the file ends before what its header says is loaded of it. The system's loader maps that without looking,
+// and the process dies of the first page that is not there.
+bool IsCutShort(const std::string& path) {
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  const auto size = file ? static_cast<uint64_t>(file.tellg()) : 0;
+  Elf64_Ehdr header;
+  file.seekg(0);
+  if (size < sizeof(header) || !file.read(reinterpret_cast<char*>(&header), sizeof(header))) return false;
+  if (std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0 || header.e_ident[EI_CLASS] != ELFCLASS64) return false;
+  std::vector<Elf64_Phdr> segments(header.e_phnum);
+  const uint64_t bytes = segments.size() * sizeof(Elf64_Phdr);
+  if (header.e_phentsize != sizeof(Elf64_Phdr) || header.e_phoff > size || bytes > size - header.e_phoff) return true;
+  file.seekg(static_cast<std::streamoff>(header.e_phoff));
+  if (!file.read(reinterpret_cast<char*>(segments.data()), static_cast<std::streamsize>(bytes))) return true;
+  for (const Elf64_Phdr& segment : segments) {
+    if (segment.p_type != PT_LOAD) continue;
+    if (segment.p_offset > size || segment.p_filesz > size - segment.p_offset) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
 Result<WebGpuApi> LoadWebGpu(const std::string& path) {
+  if (IsCutShort(path)) {
+    return Error{ErrorCode::kNotFound, Cat("the WebGPU library ", path, " is cut short: get it again")};
+  }
   void* const library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr) {
     const char* const reason = dlerror();

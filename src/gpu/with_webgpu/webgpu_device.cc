@@ -132,7 +132,7 @@ WGPUBuffer WebGpuDevice::MakeBuffer(uint64_t bytes, WGPUBufferUsage usage, std::
 }
 
 Result<GpuMemory> WebGpuDevice::Allocate(uint64_t bytes, std::string_view what) {
-  const std::lock_guard lock(mutex_);
+  const Working working(*this);
   if (Status failure = FailureOr(); !failure.ok()) return failure.error();
   const uint64_t limit = adapter_.max_buffer;
   if (bytes == 0 || bytes > limit) {
@@ -147,7 +147,7 @@ Result<GpuMemory> WebGpuDevice::Allocate(uint64_t bytes, std::string_view what) 
   if (in_use + rounded > allowed) {
     of_run->bytes -= rounded;
     return Error{ErrorCode::kBadArgument,
-                 Cat("the GPU memory for ", what, " (", HumanBytes(rounded), ") is more than --max-gpu-memory leaves (",
+                 Cat("there is no room for ", what, " (", HumanBytes(rounded), ") within --max-gpu-memory (",
                      HumanBytes(allowed), ", of which ", HumanBytes(in_use), " are in use)")};
   }
   constexpr WGPUBufferUsage kUsage = WGPUBufferUsage_Storage | WGPUBufferUsage_CopySrc | WGPUBufferUsage_CopyDst;
@@ -166,7 +166,7 @@ Result<GpuMemory> WebGpuDevice::Allocate(uint64_t bytes, std::string_view what) 
 }
 
 void WebGpuDevice::Retire(WGPUBuffer buffer, uint64_t last_used) {
-  const std::lock_guard lock(mutex_);
+  const Working working(*this);
   if (failed()) return;
   if (last_used == recording_) {
     retired_.push_back(buffer);
@@ -201,7 +201,7 @@ void WebGpuDevice::EndPass() {
 }
 
 void WebGpuDevice::Clear(const GpuBuffer& buffer, uint64_t offset, uint64_t bytes) {
-  const std::lock_guard lock(mutex_);
+  const Working working(*this);
   if (failed() || bytes == 0) return;
   EndPass();
   BeginCommands();
@@ -211,7 +211,7 @@ void WebGpuDevice::Clear(const GpuBuffer& buffer, uint64_t offset, uint64_t byte
 
 void WebGpuDevice::Copy(const GpuBuffer& from, uint64_t from_offset, const GpuBuffer& to, uint64_t to_offset,
                         uint64_t bytes) {
-  const std::lock_guard lock(mutex_);
+  const Working working(*this);
   if (failed() || bytes == 0) return;
   EndPass();
   BeginCommands();
@@ -249,7 +249,7 @@ void WebGpuDevice::SubmitRecorded() {
 }
 
 void WebGpuDevice::Submit() {
-  const std::lock_guard lock(mutex_);
+  const Working working(*this);
   SubmitRecorded();
 }
 

@@ -10,6 +10,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "core/stopwatch.h"
 #include "gpu/device.h"
 #include "gpu/with_webgpu/gpu_failure.h"
 #include "gpu/with_webgpu/webgpu_instance.h"
@@ -35,7 +36,7 @@ class WebGpuDevice final : public GpuDevice, public std::enable_shared_from_this
   void Submit() override;
   Status Read(std::span<const GpuRead> reads) override;
   Status Wait() override;
-  double seconds_waited() const override { return seconds_waited_.load(); }
+  double seconds() const override { return seconds_.load(); }
 
   bool failed() const { return failure_->happened() || instance_.broken(); }
 
@@ -50,6 +51,20 @@ class WebGpuDevice final : public GpuDevice, public std::enable_shared_from_this
   struct ScopedError {
     WGPUErrorType type = WGPUErrorType_NoError;
     std::string message;
+  };
+
+  // A call at work: alone, and its time counts.
+  class Working {
+   public:
+    explicit Working(WebGpuDevice& device) : device_(device), lock_(device.mutex_) {}
+    ~Working() { device_.seconds_ = device_.seconds_ + watch_.Total(); }
+    Working(const Working&) = delete;
+    Working& operator=(const Working&) = delete;
+
+   private:
+    WebGpuDevice& device_;
+    std::lock_guard<std::mutex> lock_;
+    Stopwatch watch_;
   };
 
   WebGpuDevice(WebGpuInstance& instance, GpuAdapter adapter) : instance_(instance), adapter_(std::move(adapter)) {}
@@ -93,7 +108,7 @@ class WebGpuDevice final : public GpuDevice, public std::enable_shared_from_this
   WGPUBuffer staging_ = nullptr;     // to be mapped for reading
   uint64_t staging_bytes_ = 0;
   std::unordered_map<const GpuKernel*, Pipeline> pipelines_;
-  std::atomic<double> seconds_waited_ = 0;
+  std::atomic<double> seconds_ = 0;
 };
 
 }  // namespace anchorsplat

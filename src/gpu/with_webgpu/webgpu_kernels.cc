@@ -55,7 +55,7 @@ WebGpuDevice::Pipeline* WebGpuDevice::PipelineOf(const GpuKernel& kernel) {
 
 void WebGpuDevice::Run(const GpuKernel& kernel, std::span<const std::byte> parameters,
                        std::initializer_list<GpuBinding> bindings, uint32_t groups) {
-  const std::lock_guard lock(mutex_);
+  const Working working(*this);
   if (failed() || groups == 0) return;
   const WebGpuApi& api = *instance_.api();
   if (parameters.size() > kParameterBytes || bindings.size() + 1 > kMaxBindings) {

@@ -3,7 +3,6 @@
 #include <memory>
 #include <vector>
 
-#include "core/stopwatch.h"
 #include "core/text.h"
 #include "gpu/with_webgpu/webgpu_buffer.h"
 #include "gpu/with_webgpu/webgpu_device.h"
@@ -16,7 +15,7 @@ constexpr uint64_t kMaxWritten = 256 << 20;  // bytes whose copies the queue may
 }  // namespace
 
 void WebGpuDevice::Write(const GpuBuffer& buffer, uint64_t offset, std::span<const std::byte> data) {
-  const std::lock_guard lock(mutex_);
+  const Working working(*this);
   if (failed() || data.empty()) return;
   // The queue writes before all that is still to be handed over.
   if (Buffer::LastUsed(buffer) == recording_) SubmitRecorded();
@@ -35,9 +34,7 @@ bool WebGpuDevice::WaitForAnswer(const Ask& ask) {
   };
   auto* const answer = new Answer;  // freed once it is there
   const WGPUFuture future = ask(answer);
-  const Stopwatch watch;
   const bool answered = instance_.WaitUntil([&] { return answer->done; }, device_, future);
-  seconds_waited_ = seconds_waited_ + watch.Total();
   if (!answered) {
     failure_->Set(instance_.broken() ? kGpuLost : "the device does not answer");
     return false;
@@ -69,7 +66,7 @@ bool WebGpuDevice::WaitForQueue() {
 }
 
 Status WebGpuDevice::Wait() {
-  const std::lock_guard lock(mutex_);
+  const Working working(*this);
   if (!failed()) WaitForQueue();
   return FailureOr();
 }
@@ -138,7 +135,7 @@ bool WebGpuDevice::ReadPieces(std::span<const GpuRead> pieces) {
 }
 
 Status WebGpuDevice::Read(std::span<const GpuRead> reads) {
-  const std::lock_guard lock(mutex_);
+  const Working working(*this);
   std::vector<GpuRead> pieces;
   uint64_t bytes = 0;
   for (const GpuRead& read : reads) {

@@ -83,7 +83,8 @@ struct Tally {
 
 inline bool SameBits(const Image& a, const Image& b) {
   return a.pixels.size() == b.pixels.size() &&
-         std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(float)) == 0;
+         (a.pixels.empty() ||  // whose data() may be null
+          std::memcmp(a.pixels.data(), b.pixels.data(), a.pixels.size() * sizeof(float)) == 0);
 }
 inline bool SameBits(const RenderOutput& a, const RenderOutput& b) {
   return SameBits(a.color, b.color) && SameBits(a.alpha, b.alpha) && SameBits(a.depth, b.depth);

@@ -193,8 +193,8 @@ expect 0 "auto does without" without_library "${picture[@]}" -o "$work/auto.png"
 says stdout '"name": "cpu"'
 silent stderr
 expect 0 "it is the CPU's picture" cmp "$work/cpu.png" "$work/auto.png"
-expect 0 "doctor without a library" without_library doctor
-says stdout "GPU            missing: "
+expect 1 "doctor with a library that is named and not there" without_library doctor
+says stdout "GPU            broken: "
 expect 0 "a GPU" "$program" "${picture[@]}" -o "$work/gpu.png" --device gpu --json
 says stdout '"backend": '
 expect 3 "no adapter of this number" "$program" "${picture[@]}" -o "$work/gpu.png" --device 1000

@@ -18,6 +18,7 @@
 #include "fit/fit.h"
 #include "fit/initial_cloud.h"
 #include "fit/orbit_scene_for_test.h"
+#include "fit/small_fits_for_test.h"
 #include "formats/cloud_io.h"
 #include "formats/random_cloud_for_test.h"
 #include "images/image_io.h"
@@ -34,32 +35,9 @@ using testing::HasSubstr;
 
 constexpr int kSide = 24;
 
-// A tiny project, and a short schedule in which everything happens.
-class Fits : public testing::Test {
+class Fits : public SmallFits {
  protected:
-  void SetUp() override {
-    orbit_scene::Write(folder_.path(), orbit_scene::Ball(20, 1), 10, kSide);
-    views_ = OpenProject(folder_.path(), {.hold_out = 5}).value();
-    options_ = FitOptionsFor(60);
-    options_.seed = 3;
-    options_.densification.refine_start_iter = 5;
-    options_.densification.refine_every = 4;
-    options_.densification.refine_stop_iter = 40;
-    options_.densification.reset_every = 20;
-    options_.densification.max_gaussians = 150;
-  }
-
-  GaussianCloud Initial() const {
-    return InitialCloud(RandomPointsInView(60, views_.train, views_.scene_scale, 3), views_.scene_scale, {.seed = 3})
-        .value();
-  }
-  Fitter Begin(FitState state) const {
-    return Fitter::Begin(options_, PictureCache(views_.train, {0, 0, 0}), views_.scene_scale, std::move(state)).value();
-  }
-
-  TestFolder folder_;
-  TrainingViews views_;
-  FitOptions options_;
+  Fits() : SmallFits(kSide) {}
 };
 
 void ExpectSameState(const FitState& a, const FitState& b) {

@@ -9,8 +9,6 @@ namespace {
 
 const GpuKernel kAdamStep = {"adam_step", {wgsl::kAdamWgsl}};
 
-constexpr int64_t kGroup = 256;  // threads
-
 // `Adam` of adam.wgsl.
 struct AdamParameters {
   uint32_t rows, stride, columns, first_columns;
@@ -43,7 +41,7 @@ void RecordAdamStep(const GpuAdamParams& p, GpuDevice& device) {
               {2, p.first_moment, offset, bytes},
               {3, p.second_moment, offset, bytes},
               {4, p.values, offset, bytes}},
-             static_cast<uint32_t>((p.rows * p.columns + kGroup - 1) / kGroup));
+             GpuGroups(p.rows * p.columns));
 }
 
 }  // namespace anchorsplat

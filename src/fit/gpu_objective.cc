@@ -20,7 +20,6 @@ const GpuKernel kSpreadToRays = {"spread_to_rays", {wgsl::kPixelModelWgsl}};
 const GpuKernel kUnpackPicture = {"unpack_picture", {wgsl::kTargetsWgsl}};
 
 constexpr uint64_t kPartForTargets = 4;  // of the run's GPU memory goes to pictures that are kept
-constexpr uint32_t kThreads = 256;
 
 // `Rays` of pixel_model.wgsl.
 struct RaysParameters {
@@ -34,8 +33,6 @@ struct UnpackParameters {
   uint32_t plane, channels, masked;
   std::array<uint32_t, 2> unused;
 };
-
-uint32_t GroupsOf(int64_t threads) { return static_cast<uint32_t>((threads + kThreads - 1) / kThreads); }
 
 }  // namespace
 
@@ -59,7 +56,7 @@ Result<bool> GpuObjective::Show(const ObjectiveOptions& options, GpuCloud& cloud
   const int64_t plane = int64_t{width_} * height_;
   if (samples_ > 1) {
     ANCHORSPLAT_RETURN_IF_ERROR(
-        rasterizer_.Room(averages_, static_cast<uint64_t>(plane) * 3 * sizeof(float), "averages of rays"));
+        GpuRoom(*device_, averages_, static_cast<uint64_t>(plane) * 3 * sizeof(float), "averages of rays"));
   }
   const float near = NearPlane(render_, rays);
   rays.world_to_camera = FromOrigin(rays.world_to_camera, origin);
@@ -69,7 +66,7 @@ Result<bool> GpuObjective::Show(const ObjectiveOptions& options, GpuCloud& cloud
                             static_cast<uint32_t>(samples_),
                             RasterizedPlane()};
   device_->Run(kAverageRays, AsParameters(p), {{1, rasterizer_.picture.get()}, {2, averages_.get()}},
-               GroupsOf(3 * plane));
+               GpuGroups(3 * plane));
   return true;
 }
 
@@ -106,7 +103,7 @@ Result<GpuObjective::Target*> GpuObjective::RoomForTarget(uint64_t bytes, std::o
     }
     left_ = 0;  // what the rest needs comes first
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Room(passing_.memory, bytes, "a picture to compare with"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device_, passing_.memory, bytes, "a picture to compare with"));
   return &passing_;
 }
 
@@ -143,13 +140,13 @@ Result<const GpuBuffer*> GpuObjective::Unpack(const Target& target) {
   if (target.channels == 0) return &std::as_const(*target.memory);
   const int64_t plane = int64_t{width_} * height_;
   ANCHORSPLAT_RETURN_IF_ERROR(
-      rasterizer_.Room(unpacked_, static_cast<uint64_t>(plane) * 3 * sizeof(float), "a picture to compare with"));
+      GpuRoom(*device_, unpacked_, static_cast<uint64_t>(plane) * 3 * sizeof(float), "a picture to compare with"));
   const UnpackParameters p = {target.background,
                               static_cast<uint32_t>(plane),
                               static_cast<uint32_t>(target.channels),
                               target.masked ? 1u : 0u,
                               {}};
-  device_->Run(kUnpackPicture, AsParameters(p), {{1, target.memory.get()}, {2, unpacked_.get()}}, GroupsOf(plane));
+  device_->Run(kUnpackPicture, AsParameters(p), {{1, target.memory.get()}, {2, unpacked_.get()}}, GpuGroups(plane));
   return &std::as_const(*unpacked_);
 }
 
@@ -159,9 +156,9 @@ Status GpuObjective::Compare(const ObjectiveOptions& options, GpuCloud& cloud, i
   const auto rays = static_cast<uint32_t>(int64_t{plane} * samples_ * samples_);
   constexpr uint64_t kPixelBytes = 4 * sizeof(float);
   // New memory is 0, and the gradient of alpha, of which the loss knows nothing, stays it.
-  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Room(gradient_, plane * kPixelBytes, "the gradient of a picture"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device_, gradient_, plane * kPixelBytes, "the gradient of a picture"));
   if (samples_ > 1) {
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Room(rays_gradient_, rays * kPixelBytes, "the gradient of rays"));
+    ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device_, rays_gradient_, rays * kPixelBytes, "the gradient of rays"));
   }
   const auto kept = kept_.find(view);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const GpuBuffer* wanted, Unpack(kept == kept_.end() ? passing_ : kept->second));
@@ -170,7 +167,7 @@ Status GpuObjective::Compare(const ObjectiveOptions& options, GpuCloud& cloud, i
   if (samples_ > 1) {
     const RaysParameters p = {
         {static_cast<uint32_t>(width_), static_cast<uint32_t>(height_)}, static_cast<uint32_t>(samples_), 0};
-    device_->Run(kSpreadToRays, AsParameters(p), {{1, gradient_.get()}, {2, rays_gradient_.get()}}, GroupsOf(rays));
+    device_->Run(kSpreadToRays, AsParameters(p), {{1, gradient_.get()}, {2, rays_gradient_.get()}}, GpuGroups(rays));
   }
   const GpuPictureGradient of_picture = {samples_ > 1 ? rays_gradient_.get() : gradient_.get(),
                                          {0, 0, width_ * samples_, height_ * samples_}};

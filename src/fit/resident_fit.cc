@@ -19,7 +19,6 @@ const GpuKernel kGatherGradients = {"gather_gradients", {wgsl::kRowsWgsl}};
 const GpuKernel kMarkUsable = {"mark_usable", {wgsl::kRowsWgsl}};
 const GpuKernel kCapOpacities = {"cap_opacities", {wgsl::kRowsWgsl}};
 
-constexpr int64_t kRowThreads = 256;
 constexpr uint64_t kGatheredBytes = 4 * sizeof(float);
 constexpr size_t kNewcomerNumbers = 8;
 
@@ -28,8 +27,6 @@ struct RowsParameters {
   uint32_t count, width, first, limit, from_first, from_count;
   std::array<float, 2> numbers;
 };
-
-uint32_t RowGroups(int64_t threads) { return static_cast<uint32_t>((threads + kRowThreads - 1) / kRowThreads); }
 
 // A column of a block, and of host memory.
 struct Column {
@@ -166,7 +163,7 @@ void ResidentFit::Gather(const ResidentStep& step, const GpuGradient& gradient) 
                {{1, step.absgrad ? gradient.means2d_abs.get() : gradient.means2d.get()},
                 {2, &objective_.radii(), first * kRadiiBytes, count * kRadiiBytes},
                 {3, gathered_.get(), first * kGatheredBytes, count * kGatheredBytes}},
-               RowGroups(gradient.count));
+               GpuGroups(gradient.count));
 }
 
 Status ResidentFit::ReadGathered(Densification::Gathered& gathered) const {
@@ -203,7 +200,7 @@ Result<RefinementPlan> ResidentFit::Plan(const DensificationOptions& options, in
                   {5, block.sh.get()},
                   {6, marks.get(), static_cast<uint64_t>(block.first) * sizeof(uint32_t),
                    static_cast<uint64_t>(block.count) * sizeof(uint32_t)}},
-                 RowGroups(block.count));
+                 GpuGroups(block.count));
     for (const Column& column : ColumnsOf(cloud_)) {
       if (column.values != &GaussianCloud::sh) reads.push_back(ReadOf(block, column, shapes_));
     }
@@ -228,7 +225,7 @@ void ResidentFit::TakeRows(const GpuBuffer& source, int64_t limit, const GpuClou
         p.from_count = static_cast<uint32_t>(old.count);
         device_->Run(kTakeRows, AsParameters(p),
                      {{1, &source}, {2, (old.*column.memory).get()}, {3, (fresh.*column.memory).get()}},
-                     RowGroups(fresh.count * column.width));
+                     GpuGroups(fresh.count * column.width));
       }
     }
   }
@@ -279,7 +276,7 @@ Status ResidentFit::Apply(const DensificationOptions& options, const RefinementP
       device_->Run(
           kPlaceNewcomers, AsParameters(p),
           {{1, newcomers.get()}, {2, block.means.get()}, {3, block.log_scales.get()}, {4, block.opacity_logits.get()}},
-          RowGroups(block.count));
+          GpuGroups(block.count));
     }
   }
   cloud_ = std::move(cloud);
@@ -294,7 +291,7 @@ void ResidentFit::ResetOpacities(double cap) {
   p.numbers[0] = static_cast<float>(std::log(cap / (1 - cap)));
   for (const GpuCloudBlock& block : cloud_.blocks()) {
     p.count = static_cast<uint32_t>(block.count);
-    device_->Run(kCapOpacities, AsParameters(p), {{1, block.opacity_logits.get()}}, RowGroups(block.count));
+    device_->Run(kCapOpacities, AsParameters(p), {{1, block.opacity_logits.get()}}, GpuGroups(block.count));
   }
   for (const GpuCloud* moments : {&first_, &second_}) {
     for (const GpuCloudBlock& block : moments->blocks()) {

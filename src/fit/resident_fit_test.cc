@@ -14,6 +14,7 @@
 #include "fit/initial_cloud.h"
 #include "fit/orbit_scene_for_test.h"
 #include "fit/run_on_gpu_for_test.h"
+#include "fit/small_fits_for_test.h"
 #include "formats/random_cloud_for_test.h"
 #include "gpu/faulty_device_for_test.h"
 #include "gpu/gpu_for_test.h"
@@ -30,30 +31,16 @@ using testing::IsEmpty;
 constexpr int kSide = 32;
 constexpr double kAlike = 0.1;  // dB
 
-// A tiny project, and a short schedule in which everything happens.
-class ResidentFits : public testing::Test {
+class ResidentFits : public SmallFits {
  protected:
+  ResidentFits() : SmallFits(kSide) {}
+
   void SetUp() override {
     device_ = GpuForTest();
     ASSERT_NE(device_, nullptr);
-    orbit_scene::Write(folder_.path(), orbit_scene::Ball(20, 1), 10, kSide);
-    views_ = OpenProject(folder_.path(), {.hold_out = 5}).value();
-    options_ = FitOptionsFor(60);
-    options_.seed = 3;
-    options_.densification.refine_start_iter = 5;
-    options_.densification.refine_every = 4;
-    options_.densification.refine_stop_iter = 40;
-    options_.densification.reset_every = 20;
-    options_.densification.max_gaussians = 150;
+    SmallFits::SetUp();
   }
 
-  GaussianCloud Initial() const {
-    return InitialCloud(RandomPointsInView(60, views_.train, views_.scene_scale, 3), views_.scene_scale, {.seed = 3})
-        .value();
-  }
-  Fitter Begin(FitState state) const {
-    return Fitter::Begin(options_, PictureCache(views_.train, {0, 0, 0}), views_.scene_scale, std::move(state)).value();
-  }
   Fitted OnGpu(std::shared_ptr<GpuDevice> device, const FitControl& control = {}) const {
     const RunOnGpu run(std::move(device));
     return Fit(views_, Initial(), options_, control).value();
@@ -71,9 +58,6 @@ class ResidentFits : public testing::Test {
   }
 
   std::shared_ptr<GpuDevice> device_;
-  TestFolder folder_;
-  TrainingViews views_;
-  FitOptions options_;
 };
 
 double LargestDifference(const Buffer<float>& a, const Buffer<float>& b) {

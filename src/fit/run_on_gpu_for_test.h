@@ -6,7 +6,7 @@
 
 #include "core/run_context.h"
 #include "gpu/device.h"
-#include "gpu/gpu_of_run.h"
+#include "gpu/gpu_for_test.h"
 
 namespace anchorsplat {
 
@@ -14,12 +14,11 @@ namespace anchorsplat {
 class RunOnGpu {
  public:
   explicit RunOnGpu(std::shared_ptr<GpuDevice> device, const std::atomic<bool>* stop = nullptr)
-      : scope_({.stop = stop, .device = DeviceChoice{DeviceChoice::Kind::kGpu}}) {
-    internal::CurrentStorage().Get<internal::GpuStateOfRun>()->for_test = std::move(device);
-  }
+      : scope_({.stop = stop, .device = DeviceChoice{DeviceChoice::Kind::kGpu}}), gpu_(std::move(device)) {}
 
  private:
   RunScope scope_;
+  ScopedGpuForTest gpu_;
 };
 
 }  // namespace anchorsplat

@@ -108,6 +108,16 @@ class GpuDevice {
   virtual double seconds() const = 0;
 };
 
+// Makes `memory` hold at least `bytes` that one binding can see. What was in it is lost where it grows. Errors: more
+// than a binding or a buffer of the device has (kIo); those of GpuDevice::Allocate.
+Status GpuRoom(GpuDevice& device, GpuMemory& memory, uint64_t bytes, std::string_view what);
+
+// Threads of a workgroup of all kernels in which each thread sees to one thing, and how many such workgroups it takes.
+inline constexpr uint32_t kGpuGroup = 256;
+inline constexpr uint32_t GpuGroups(uint64_t threads) {
+  return static_cast<uint32_t>((threads + kGpuGroup - 1) / kGpuGroup);
+}
+
 // Parameters of a kernel: a struct laid out as WGSL does (vec3 and vec4 at multiples of 16 bytes).
 template <typename T>
 std::span<const std::byte> AsParameters(const T& parameters) {

@@ -27,14 +27,6 @@ struct Parameters {
   std::array<float, 8> window;
 };
 
-Status Grow(GpuDevice& device, int64_t floats, std::string_view what, GpuMemory& memory) {
-  const auto bytes = static_cast<uint64_t>(floats) * sizeof(float);
-  if (memory != nullptr && memory->bytes() >= bytes) return {};
-  memory.reset();  // first: both need not fit
-  ANCHORSPLAT_ASSIGN_OR_RETURN(memory, device.Allocate(bytes, what));
-  return {};
-}
-
 }  // namespace
 
 Status GpuPhotometricLoss::Compare(int width, int height, const GpuPicture& rendered, const GpuPicture& wanted,
@@ -50,8 +42,11 @@ Status GpuPhotometricLoss::Compare(int width, int height, const GpuPicture& rend
   const bool similarity = options.ssim_weight > 0;
   const int64_t at_once = kColors * bytes <= seen ? kColors : 1;
   const int64_t tiles_x = (width + kTileSide - 1) / kTileSide, tiles_y = (height + kTileSide - 1) / kTileSide;
-  ANCHORSPLAT_RETURN_IF_ERROR(Grow(*device_, similarity ? at_once * of_a_channel : 1, "maps of the loss", maps_));
-  ANCHORSPLAT_RETURN_IF_ERROR(Grow(*device_, kColors * tiles_x * tiles_y * kSums, "sums of the loss", sums_));
+  const auto room = [&](GpuMemory& memory, int64_t floats, std::string_view what) {
+    return GpuRoom(*device_, memory, static_cast<uint64_t>(floats) * sizeof(float), what);
+  };
+  ANCHORSPLAT_RETURN_IF_ERROR(room(maps_, similarity ? at_once * of_a_channel : 1, "maps of the loss"));
+  ANCHORSPLAT_RETURN_IF_ERROR(room(sums_, kColors * tiles_x * tiles_y * kSums, "sums of the loss"));
 
   const bool valid = options.padding == SsimPadding::kValid;
   const int margin = valid ? kSsimRadius : 0;

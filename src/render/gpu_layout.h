@@ -44,8 +44,7 @@ enum GpuSize : uint32_t {
   kSizeGaussians = 2,  // N
 };
 
-// Threads of a workgroup, and items of a block of the sorts and scans.
-inline constexpr uint32_t kGpuGroup = 256;
+// Items of a block of the sorts and scans.
 inline constexpr uint32_t kGpuBlock = 2048;
 
 }  // namespace anchorsplat

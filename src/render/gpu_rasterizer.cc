@@ -41,48 +41,30 @@ std::span<std::byte> Bytes(T* values, size_t count) {
 
 }  // namespace
 
-Status GpuRasterizer::Room(GpuMemory& memory, uint64_t bytes, std::string_view what) const {
-  bytes = std::max<uint64_t>(bytes, 4);
-  if (memory != nullptr && memory->bytes() >= bytes) return {};
-  const GpuAdapter& adapter = device->adapter();
-  const uint64_t largest = std::min(adapter.max_binding, adapter.max_buffer) / 256 * 256;
-  if (bytes > largest) {
-    return Error{ErrorCode::kIo,
-                 Cat(what, " would take ", WithThousands(static_cast<int64_t>(bytes)),
-                     " bytes in one piece, and the GPU allows ", WithThousands(static_cast<int64_t>(largest)))};
-  }
-  memory.reset();  // first, as there may not be memory for both
-  Result<GpuMemory> made = device->Allocate(std::min(largest, bytes + bytes / 8), what);
-  if (!made.ok()) made = device->Allocate(bytes, what);
-  if (!made.ok()) return made.error();
-  memory = std::move(made).value();
-  return {};
-}
-
 // All but the pairs.
 Status GpuRasterizer::MakeRoom(bool whole_picture) {
   const auto n = static_cast<uint64_t>(count), tiles = static_cast<uint64_t>(tile_count);
-  ANCHORSPLAT_RETURN_IF_ERROR(Room(seen, n * sizeof(GpuSeen), "projected Gaussians"));
-  ANCHORSPLAT_RETURN_IF_ERROR(Room(rects, n * 8, "tiles of Gaussians"));
-  ANCHORSPLAT_RETURN_IF_ERROR(Room(radii, n * 8, "radii of Gaussians"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, seen, n * sizeof(GpuSeen), "projected Gaussians"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, rects, n * 8, "tiles of Gaussians"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, radii, n * 8, "radii of Gaussians"));
   for (size_t k = 0; k < 2; ++k) {
-    ANCHORSPLAT_RETURN_IF_ERROR(Room(keys[k], n * 4, "depths of Gaussians"));
-    ANCHORSPLAT_RETURN_IF_ERROR(Room(rows[k], n * 4, "the order of Gaussians"));
+    ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, keys[k], n * 4, "depths of Gaussians"));
+    ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, rows[k], n * 4, "the order of Gaussians"));
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(Room(unusual, n * 4 + 4, "unusual Gaussians"));
-  ANCHORSPLAT_RETURN_IF_ERROR(Room(places, GpuScanBytes(n), "the places of Gaussians"));
-  ANCHORSPLAT_RETURN_IF_ERROR(Room(tables, GpuSortTableBytes(n), "tables of a sort"));
-  ANCHORSPLAT_RETURN_IF_ERROR(Room(sizes, 64, "sizes"));
-  ANCHORSPLAT_RETURN_IF_ERROR(Room(totals, 64, "totals"));
-  ANCHORSPLAT_RETURN_IF_ERROR(Room(tile_counts, tiles * 4 + 4, "counts of tiles"));
-  ANCHORSPLAT_RETURN_IF_ERROR(Room(ranges, tiles * 4 + 4, "ranges of tiles"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, unusual, n * 4 + 4, "unusual Gaussians"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, places, GpuScanBytes(n), "the places of Gaussians"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, tables, GpuSortTableBytes(n), "tables of a sort"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, sizes, 64, "sizes"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, totals, 64, "totals"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, tile_counts, tiles * 4 + 4, "counts of tiles"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, ranges, tiles * 4 + 4, "ranges of tiles"));
 
   // A picture that does not fit is made in bands, unless all of it is wanted there.
   const uint64_t tile_row_pixels = uint64_t{view.size[0]} * kTile;
   const auto room_for_band = [&]() -> Status {
     const uint64_t pixels = static_cast<uint64_t>(tile_rows_per_band) * tile_row_pixels;
-    ANCHORSPLAT_RETURN_IF_ERROR(Room(kept, pixels * 8, "pixels"));
-    return Room(picture, pixels * kPixelBytes, "pixels");
+    ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, kept, pixels * 8, "pixels"));
+    return GpuRoom(*device, picture, pixels * kPixelBytes, "pixels");
   };
   tile_rows_per_band = view.size[3];
   Status room = room_for_band();
@@ -147,15 +129,15 @@ Status GpuRasterizer::MakeRoomForPairs(GpuCloud& cloud, int64_t max_pairs) {
     Status room;
     const uint64_t bytes = 4 * static_cast<uint64_t>(wanted);
     for (size_t k = 0; k < 2 && room.ok(); ++k) {
-      room = Room(pairs[k], bytes, "pairs of tiles and Gaussians");
-      if (room.ok()) room = Room(pair_keys[k], bytes, "pairs of tiles and Gaussians");
+      room = GpuRoom(*device, pairs[k], bytes, "pairs of tiles and Gaussians");
+      if (room.ok()) room = GpuRoom(*device, pair_keys[k], bytes, "pairs of tiles and Gaussians");
     }
     if (room.ok()) {
       pair_capacity = static_cast<int64_t>(
           std::min({pairs[0]->bytes(), pairs[1]->bytes(), pair_keys[0]->bytes(), pair_keys[1]->bytes()}) / 4);
       run_pairs = std::max(longest, std::min(max_pairs, pair_capacity));
-      room =
-          Room(tables, GpuSortTableBytes(static_cast<uint64_t>(std::min(run_pairs, total_pairs))), "tables of a sort");
+      room = GpuRoom(*device, tables, GpuSortTableBytes(static_cast<uint64_t>(std::min(run_pairs, total_pairs))),
+                     "tables of a sort");
     }
     if (room.ok()) return {};
     for (size_t k = 0; k < 2; ++k) pairs[k].reset(), pair_keys[k].reset();

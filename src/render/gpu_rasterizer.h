@@ -40,9 +40,6 @@ class GpuRasterizer {
   // Pixels of a plane of `picture`: whole rows of tiles, so some more than the picture's own.
   int64_t PlanePixels() const { return tile_rows_per_band * kTile * int64_t{view.size[0]}; }
 
-  // Makes `memory` hold at least `bytes` as one binding. What was in it is lost where it grows.
-  Status Room(GpuMemory& memory, uint64_t bytes, std::string_view what) const;
-
   const std::shared_ptr<GpuDevice> device;
 
   // Of the last picture; render/gpu_layout.h has the shapes.

@@ -69,7 +69,7 @@ uint64_t LargestBinding(const GpuDevice& device) {
 // Of a gradient with this many Gaussians' rows.
 Status MakeRoom(const GpuRasterizer& rasterizer, int64_t rows, int64_t sh_stride, bool absolute, GpuGradient& g) {
   const auto room = [&](GpuMemory& memory, int64_t floats) {
-    return rasterizer.Room(memory, static_cast<uint64_t>(4 * floats * rows), "the gradient of a splat");
+    return GpuRoom(*rasterizer.device, memory, static_cast<uint64_t>(4 * floats * rows), "the gradient of a splat");
   };
   ANCHORSPLAT_RETURN_IF_ERROR(room(g.means, 3));
   ANCHORSPLAT_RETURN_IF_ERROR(room(g.log_scales, 3));
@@ -118,13 +118,13 @@ struct GpuRasterizerBackward::Run {
 Status GpuRasterizerBackward::MakeRoomForSums() {
   GpuRasterizer& r = *rasterizer_;
   const auto n = static_cast<uint64_t>(r.count);
-  ANCHORSPLAT_RETURN_IF_ERROR(r.Room(sums_, 48 * n, "what pixels say of the Gaussians"));
-  ANCHORSPLAT_RETURN_IF_ERROR(r.Room(starts_, GpuScanBytes(n), "the places of sums"));
-  ANCHORSPLAT_RETURN_IF_ERROR(r.Room(lengths_, 64, "the length of a scan"));
-  ANCHORSPLAT_RETURN_IF_ERROR(r.Room(totals_, 64, "the total of a scan"));
-  ANCHORSPLAT_RETURN_IF_ERROR(r.Room(many_, 4, "the total of a scan"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*r.device, sums_, 48 * n, "what pixels say of the Gaussians"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*r.device, starts_, GpuScanBytes(n), "the places of sums"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*r.device, lengths_, 64, "the length of a scan"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*r.device, totals_, 64, "the total of a scan"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*r.device, many_, 4, "the total of a scan"));
   ANCHORSPLAT_RETURN_IF_ERROR(
-      r.Room(backgrounds_, static_cast<uint64_t>(16 * r.tile_count), "the gradient of the background"));
+      GpuRoom(*r.device, backgrounds_, static_cast<uint64_t>(16 * r.tile_count), "the gradient of the background"));
   const std::array<uint32_t, 1> length = {Word(r.count)};
   r.device->Write(*lengths_, 4 * kSizeGaussians, std::as_bytes(std::span(length)));
   return {};
@@ -135,7 +135,7 @@ Status GpuRasterizerBackward::Upload(const RenderGradient& gradient, int first_r
   const PixelBox& box = gradient.box;
   const int64_t across = box.x1 - box.x0, rows = last_row - first_row;
   const size_t floats = static_cast<size_t>(4 * across * rows);
-  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_->Room(pixels_, 4 * floats, "the gradient of a picture"));
+  ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*rasterizer_->device, pixels_, 4 * floats, "the gradient of a picture"));
   if (staging_.size() < floats) staging_.resize(floats);
   const int64_t width = gradient.color.width, plane = gradient.color.plane();
   const float* color = gradient.color.pixels.data();
@@ -169,7 +169,7 @@ Status GpuRasterizerBackward::PlaceSlots(Run& run) {
   GpuRasterizer& r = *rasterizer_;
   const auto room = [&](int64_t slots) {
     run.slots = (std::max<int64_t>(slots, 1) + kSlotAlignment - 1) / kSlotAlignment * kSlotAlignment;
-    return r.Room(slots_, static_cast<uint64_t>(kSlotBytes * run.slots), "the sums of tiles");
+    return GpuRoom(*r.device, slots_, static_cast<uint64_t>(kSlotBytes * run.slots), "the sums of tiles");
   };
   const auto fit = static_cast<int64_t>(LargestBinding(*r.device) / kSlotBytes);
   int64_t most = std::min(kMaxGpuSlots, fit / kSlotAlignment * kSlotAlignment);

@@ -152,7 +152,7 @@ Status GpuRasterizer::ProjectOnCpu(const GpuCloud& cloud, const Camera& camera, 
   const std::span<const std::byte> data[4] = {std::as_bytes(std::span(left)), std::as_bytes(std::span(seen_by_cpu)),
                                               std::as_bytes(std::span(packed)), std::as_bytes(std::span(pixels))};
   for (size_t k = 0; k < 4; ++k) {
-    ANCHORSPLAT_RETURN_IF_ERROR(Room(memory[k], data[k].size(), "unusual Gaussians"));
+    ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, memory[k], data[k].size(), "unusual Gaussians"));
     device->Write(*memory[k], 0, data[k]);
   }
   const PatchParameters parameters = {static_cast<uint32_t>(n), {}};

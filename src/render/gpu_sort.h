@@ -11,9 +11,6 @@ namespace anchorsplat {
 inline constexpr uint32_t GpuBlocks(uint64_t items) {
   return static_cast<uint32_t>((items + kGpuBlock - 1) / kGpuBlock);
 }
-inline constexpr uint32_t GpuGroups(uint64_t threads) {
-  return static_cast<uint32_t>((threads + kGpuGroup - 1) / kGpuGroup);
-}
 
 // Bytes of `at_most` u32 that are scanned, with the blocks' totals behind them.
 inline constexpr uint64_t GpuScanBytes(uint64_t at_most) { return 4 * (at_most + GpuBlocks(at_most)); }

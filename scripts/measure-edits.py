@@ -6,8 +6,8 @@
     measure-edits.py floaters PROGRAM FOLDER SPLAT…                     3 % planted in each: how many are found, what else goes
     measure-edits.py memory PROGRAM FOLDER LARGE.ply                    the most memory of its own
 
-FOLDER is for what comes out. SPLAT_TRANSFORM is a command: version 3.7 of the npm package @playcanvas/splat-transform, in Node 22. Its
-actions count along LUF. Needs NumPy."""
+FOLDER is for what comes out. SPLAT_TRANSFORM is a command: version 3.7 of the npm package @playcanvas/splat-transform, in Node 22. Needs
+NumPy."""
 
 import json
 import os
@@ -26,6 +26,9 @@ ACTIONS = {
     "sphere": ["--filter-sphere", "SPHERE"],
     "nan": ["--filter-nan"],
     "value": ["--filter-value", "opacity,gt,0.5"],
+    "value x": ["--filter-value", "x,gt,MIDDLE"],
+    "value rot": ["--filter-value", "rot_0,gt,0.1"],
+    "value rest": ["--filter-value", "f_rest_4,gt,0.01"],
     "harmonics": ["--filter-harmonics", "1"],
     "chain": ["--rotate", "10,20,30", "--scale", "0.5", "--translate", "0.1,0,0.2", "--filter-sphere", "HALF"],
 }
@@ -54,10 +57,6 @@ def run(*command):
     return done.stdout
 
 
-def count_of(program, path):
-    return json.loads(run(program, "info", path, "--json"))[0]["gaussians"] if os.path.getsize(path) else 0
-
-
 def as_ply(program, folder, splat):
     path = os.path.join(folder, "input.ply")
     run(program, "convert", splat, path, "-w", "-q")
@@ -79,7 +78,7 @@ def filled(action, middle, radius):
     about_x, about_y = [[1, 0, 0], [0, cx, -sx], [0, sx, cx]], [[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]]
     turn = numpy.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]]) @ about_y @ about_x
     half = ",".join(f"{x:.6g}" for x in [*(0.5 * turn @ middle + [0.1, 0, 0.2]), 0.35 * radius])
-    return [word.replace("BOX", box).replace("SPHERE", sphere).replace("HALF", half) for word in action]
+    return [word.replace("BOX", box).replace("SPHERE", sphere).replace("HALF", half).replace("MIDDLE", f"{middle[0]:.6g}") for word in action]
 
 
 def joined(action):
@@ -106,8 +105,10 @@ def equal(program, other, folder, splats):
         middle, radius = places(names, rows)
         cases = {name: ([source], joined(filled(action, middle, radius))) for name, action in ACTIONS.items()}
         cases["merge"] = ([source, "--translate=1,0,0", source, "--scale=0.5"], [])
+        if "f_rest_4" not in names:
+            del cases["value rest"]
         for name, (inputs, action) in cases.items():
-            run(program, "convert", "--action-axes", "LUF", *inputs, *action, ours, "-w", "-q")
+            run(program, "convert", *inputs, *action, ours, "-w", "-q")
             run(other, "-w", "-q", *inputs, *action, theirs)
             counts = len(rows_of(ours)[1]), len(rows_of(theirs)[1])
             psnr = compare(program, ours, theirs)
@@ -128,7 +129,7 @@ def speed(program, other, folder, source):
         seconds = {"ours": [], "theirs": []}
         for _ in range(3):
             for who, command in (
-                ("ours", [program, "convert", "--action-axes", "LUF", *inputs, *action, out, "-w", "-q", "--yes"]),
+                ("ours", [program, "convert", *inputs, *action, out, "-w", "-q", "--yes"]),
                 ("theirs", [other, "-w", "-q", *inputs, *action, out]),
             ):
                 begin = time.perf_counter()

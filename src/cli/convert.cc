@@ -1,6 +1,7 @@
 #include "formats/convert.h"
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -19,6 +20,7 @@
 #include "core/memory_limit.h"
 #include "core/parallel.h"
 #include "core/text.h"
+#include "formats/axes.h"
 #include "formats/cloud_output.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
@@ -157,7 +159,20 @@ std::string NamesOf(const Job& job) {
   return names;
 }
 
+// "LUF: x left, y up, z forward".
+std::string DescribeAxes(const std::string& name) {
+  constexpr std::array<std::string_view, 3> kTo = {"right", "down", "forward"}, kFrom = {"left", "up", "backward"};
+  const Axes axes = AxesFromName(name).value_or(kRdf);
+  std::string text = name;
+  for (size_t k = 0; k < 3; ++k) {
+    text += Cat(k == 0 ? ": " : ", ", "xyz"[k], " ", (axes.sign[k] > 0 ? kTo : kFrom)[axes.along[k]]);
+  }
+  return text;
+}
+
 void PrintSteps(const std::vector<EditStep>& steps, std::ostream& out) {
+  const auto directed = std::ranges::find_if(steps, [](const EditStep& step) { return !step.axes.empty(); });
+  if (directed != steps.end()) out << "  edits count along " << DescribeAxes(directed->axes) << '\n';
   for (const EditStep& step : steps) {
     if (!step.chooses) continue;
     out << "  " << OneLine(step.action) << (step.input.empty() ? "" : Cat(" on ", OneLine(step.input))) << ": "
@@ -171,8 +186,12 @@ void Print(const OutputMemory* piped, const Job& job, const Converted& done) {
   out << NamesOf(job) << " (" << r.input_format << ", " << HumanBytes(r.input_bytes) << ")";
   if (done.dry_run) {
     out << "\n  " << WithThousands(r.gaussians_read) << " Gaussians of SH degree " << r.sh_degree_read << " in, "
-        << WithThousands(r.gaussians_written) << " of degree " << r.sh_degree_written
-        << " would come out; nothing was written\n";
+        << WithThousands(r.gaussians_written) << " of degree " << r.sh_degree_written << " would come out";
+    if (r.predicted_bytes) {
+      out << " (" << r.output_format << ", " << (r.predicted_roughly ? "about " : "") << HumanBytes(*r.predicted_bytes)
+          << ")";
+    }
+    out << "; nothing was written\n";
     PrintSteps(done.steps, out);
     return;
   }

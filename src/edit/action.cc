@@ -28,7 +28,9 @@ constexpr std::array kActionNames = {
     ActionName{"-s,--scale", "--scale", "Scale it about the world's origin by a factor", "FACTOR"},
     ActionName{"--mirror", "--mirror", "Mirror it along an axis, x, y or z: the plane through the origin stays",
                "AXIS"},
-    ActionName{"--up", "--up", "Turn it so that a direction X,Y,Z, or an axis as -z, becomes up (-y)", "DIRECTION"},
+    ActionName{"--up", "--up",
+               "Turn it so that a direction X,Y,Z, or an axis as -z, becomes up: y, which is -y in the file",
+               "DIRECTION"},
     ActionName{"--origin", "--origin", "Move it so that a point becomes 0,0,0", "X,Y,Z"},
     ActionName{"-B,--filter-box", "--filter-box", "Keep what lies in a box; a number left out, or -, is no border",
                "X0,Y0,Z0,X1,Y1,Z1"},
@@ -164,7 +166,8 @@ std::optional<ValueComparison> ComparisonOf(const std::string& word) {
   return static_cast<ValueComparison>(found - kWords.begin());
 }
 
-Result<EditAction> ParseValue(EditAction action, std::string_view name, const std::string& text, const Matrix& to_rdf) {
+Result<EditAction> ParseValue(EditAction action, std::string_view name, const std::string& text,
+                              const Matrix& from_rdf) {
   const std::vector<std::string> parts = Parts(text);
   const std::optional<ValueComparison> comparison = parts.size() == 3 ? ComparisonOf(parts[1]) : std::nullopt;
   const std::optional<double> value = parts.size() == 3 ? Number(parts[2]) : std::nullopt;
@@ -190,9 +193,10 @@ Result<EditAction> ParseValue(EditAction action, std::string_view name, const st
       keep.value = (*value - 0.5) / kHarmonicOfColor;
     }
   }
-  if (const std::optional<Vec3> axis = plain.size() == 1 ? Axis(plain) : std::nullopt) {
-    keep.along = Times(to_rdf, *axis);
-  }
+  keep.turn = from_rdf;
+  const bool is_directed =
+      (plain.size() == 1 && Axis(plain)) || plain.starts_with("rot_") || plain.starts_with("f_rest_");
+  if (!is_directed) action.axes.clear();
   return Finished(std::move(action), std::move(keep));
 }
 
@@ -218,12 +222,34 @@ std::span<const ActionName> ActionNames() { return kActionNames; }
 
 Result<EditAction> ParseAction(std::string_view name, const std::string& text, const Axes& axes) {
   EditAction action{Cat(name, text.empty() || text == "true" ? "" : " ", text == "true" ? "" : text), KeepNumbers{}};
+  if (name == "--filter-nan") {
+    if (text.empty() || text == "true") return action;
+    return Bad(name, Cat("takes no value", Found(text)));
+  }
+  if (name == "--scale") return ParseScale(std::move(action), name, text);
+  if (name == "--filter-harmonics") {
+    if (text.size() != 1 || text[0] < '0' || text[0] > '0' + kMaxShDegree) {
+      return Bad(name, Cat("expected a degree, 0 to 3", Found(text)));
+    }
+    return Finished(std::move(action), LowerShDegree{text[0] - '0'});
+  }
+  if (name == "--filter-floaters") {
+    FloaterOptions options;
+    if (text.empty() || text == "true") return Finished(std::move(action), DropFloaters{options});
+    const std::optional<double> factor = Number(text);
+    if (!factor || !(*factor > 0)) {
+      return Bad(name, Cat("takes one factor above 0, which makes the distance from others longer or shorter that a "
+                           "floater has, or none",
+                           Found(text)));
+    }
+    options.factor = *factor;
+    return Finished(std::move(action), DropFloaters{options});
+  }
+  action.axes = NameOfAxes(axes);
   const Matrix to_rdf = TurnBetween(axes, kRdf).matrix(), from_rdf = TurnBetween(kRdf, axes).matrix();
   const auto in_rdf = [&](const Matrix& m) { return Times(to_rdf, Times(m, from_rdf)); };
-  if (name == "--filter-nan") return action;
-  if (name == "--scale") return ParseScale(std::move(action), name, text);
   if (name == "--filter-box") return ParseBox(std::move(action), name, text, to_rdf);
-  if (name == "--filter-value") return ParseValue(std::move(action), name, text, to_rdf);
+  if (name == "--filter-value") return ParseValue(std::move(action), name, text, from_rdf);
   if (name == "--translate" || name == "--origin") {
     const auto by = Numbers<3>(text);
     if (!by) return Bad(name, Cat("expected X,Y,Z", Found(text)));
@@ -261,24 +287,6 @@ Result<EditAction> ParseAction(std::string_view name, const std::string& text, c
     }
     const auto& n = *numbers;
     return Finished(std::move(action), KeepSphere{Times(to_rdf, Vec3{n[0], n[1], n[2]}), n[3]});
-  }
-  if (name == "--filter-harmonics") {
-    if (text.size() != 1 || text[0] < '0' || text[0] > '0' + kMaxShDegree) {
-      return Bad(name, Cat("expected a degree, 0 to 3", Found(text)));
-    }
-    return Finished(std::move(action), LowerShDegree{text[0] - '0'});
-  }
-  if (name == "--filter-floaters") {
-    FloaterOptions options;
-    if (text.empty() || text == "true") return Finished(std::move(action), DropFloaters{options});
-    const std::optional<double> factor = Number(text);
-    if (!factor || !(*factor > 0)) {
-      return Bad(name, Cat("takes one factor above 0, which makes the distance from others longer or shorter that a "
-                           "floater has, or none",
-                           Found(text)));
-    }
-    options.factor = *factor;
-    return Finished(std::move(action), DropFloaters{options});
   }
   return Error{ErrorCode::kBadArgument, Cat("'", Printable(std::string(name)), "' is no action on a splat")};
 }

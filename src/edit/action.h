@@ -44,8 +44,9 @@ enum class ValueComparison { kLess, kLessOrEqual, kGreater, kGreaterOrEqual, kEq
 struct KeepByValue {
   std::string property;  // x, f_dc_0, opacity, scale_2, rot_3, f_rest_44 or another one of the file
   ValueComparison comparison;
-  double value;                             // as stored: a logit, a logarithm, a harmonic
-  std::array<double, 3> along = {0, 0, 0};  // of x, y and z: the direction in the world that is meant
+  double value;  // as stored: a logit, a logarithm, a harmonic
+  // Row-major, from the world's axes to those along which x, y, z, rot_* and f_rest_* are meant.
+  std::array<double, 9> turn = {1, 0, 0, 0, 1, 0, 0, 0, 1};
 };
 // What IsUsable (core/gaussian_cloud.h), of at least this opacity.
 struct KeepOpaque {
@@ -65,7 +66,11 @@ struct EditAction {
   std::variant<MoveWorld, TurnToUp, KeepBox, KeepSphere, KeepNumbers, KeepByValue, KeepOpaque, LowerShDegree,
                DropFloaters>
       what;
+  std::string axes = {};  // along which its numbers are, "LUF"; empty: they are along none
 };
+
+// Those of the numbers that people type, unless they say others: splat-transform's, for any file.
+inline constexpr std::string_view kTypedActionAxes = "LUF";
 
 // An action as the command line knows it; what `convert --help` shows.
 struct ActionName {
@@ -77,7 +82,8 @@ struct ActionName {
 std::span<const ActionName> ActionNames();
 
 // The action of that name ("--translate") with a value in words; `text` is empty or "true" where none was given. The
-// numbers are along `axes`. Errors (kBadArgument) name the action and say what is expected.
+// numbers are along `axes`, RDF being those that a cloud has in memory. Errors (kBadArgument) name the action and say
+// what is expected.
 Result<EditAction> ParseAction(std::string_view name, const std::string& text, const Axes& axes = kRdf);
 
 }  // namespace anchorsplat

@@ -31,13 +31,26 @@ TEST(EditAction, NumbersCountAlongTheAxesThatAreSaid) {
   const auto box = Parsed<KeepBox>("--filter-box", "-1,-2,-3,4,,6", luf);
   EXPECT_EQ(box.low, (std::array<double, 3>{-4, -INFINITY, -3}));
   EXPECT_EQ(box.high, (std::array<double, 3>{1, 2, 6}));
-  EXPECT_EQ(Parsed<KeepByValue>("--filter-value", "y,gt,1", luf).along, (std::array<double, 3>{0, -1, 0}));
+  EXPECT_EQ(Parsed<KeepByValue>("--filter-value", "y,gt,1", luf).turn,
+            (std::array<double, 9>{-1, 0, 0, 0, -1, 0, 0, 0, 1}));
   // A turn about y is one about −y, the other way.
   const auto turned = Parsed<MoveWorld>("--rotate", "0,90,0", luf).map.Apply({1, 0, 0});
   EXPECT_EQ(turned, (std::array<double, 3>{0, 0, 1}));
   const Axes rfu = *AxesFromName("RFU");
   EXPECT_EQ(Parsed<MoveWorld>("--translate", "1,2,3", rfu).map.translation, (std::array<double, 3>{1, -3, 2}));
   EXPECT_EQ(Parsed<TurnToUp>("--up", "z", rfu).up, (std::array<double, 3>{0, -1, 0}));
+}
+
+TEST(EditAction, SaysTheAxesWhereItsNumbersAreAlongSome) {
+  for (const auto& [name, text] :
+       {std::pair("--translate", "1,2,3"), std::pair("--up", "z"), std::pair("--filter-value", "x,gt,1"),
+        std::pair("--filter-value", "rot_2,gt,1"), std::pair("--filter-value", "f_rest_7,gt,1")}) {
+    EXPECT_EQ(ParseAction(name, text, kLuf)->axes, "LUF") << name << text;
+  }
+  for (const auto& [name, text] : {std::pair("--scale", "2"), std::pair("--filter-nan", ""),
+                                   std::pair("--filter-value", "opacity,gt,0.5"), std::pair("--filter-floaters", "")}) {
+    EXPECT_EQ(ParseAction(name, text, kLuf)->axes, "") << name << text;
+  }
 }
 
 TEST(EditAction, ValuesMayBeSaidAsPeopleThinkOfThem) {
@@ -73,6 +86,7 @@ TEST(EditAction, WhatMakesNoSenseIsNamed) {
                         Case{"--filter-value", "opacity,>,1", "lt, lte, gt"},
                         Case{"--filter-value", "opacity,gt,2", "0 to 1, not 2"},
                         Case{"--filter-value", "scale_0,gt,-1", "a length of 0 or more"},
+                        Case{"--filter-nan", "false", "--filter-nan: takes no value, found 'false'"},
                         Case{"--filter-harmonics", "4", "a degree"},
                         Case{"--filter-harmonics", "1.5", "a degree"},
                         Case{"--filter-floaters", "0.05,0.1,0.004", "takes one factor"},

@@ -119,6 +119,7 @@ Result<EditReport> EditInMemory(const EditJob& job, const std::filesystem::path&
     report.convert.output_format = to.name;
     report.convert.gaussians_written = all.cloud.size();
     report.convert.sh_degree_written = std::min(all.cloud.sh_degree, to.range.sh_degree);
+    PredictBytes(to, all.cloud, all.cloud.size(), all.extras, report.convert);
     return report;
   }
   if (to.keeps_all_values) WarnOfUndrawn(output, CountUnusable(all.cloud, false), all.cloud.size());
@@ -161,6 +162,17 @@ Result<std::vector<EditStep>> ApplyJob(const EditJob& job, std::span<EditedSplat
     if (step.taken > 0) last = Cat(step.action, " takes away the last ", WithThousands(step.taken), " Gaussians");
   }
   return Error{ErrorCode::kBadArgument, Cat(splats[0].name, ": ", last, ": nothing to write")};
+}
+
+std::vector<int64_t> PlacesOfBlocks(const EditedSplat& splat, int64_t begin) {
+  std::vector<int64_t> places = {begin};
+  for (int64_t first = 0; first < splat.rows->size(); first += kRowsPerBlock) {
+    const int64_t last = std::min(first + kRowsPerBlock, splat.rows->size());
+    const int64_t kept =
+        splat.keep.empty() ? last - first : std::count(splat.keep.begin() + first, splat.keep.begin() + last, char{1});
+    places.push_back(places.back() + kept);
+  }
+  return places;
 }
 
 void DropPlaces(std::span<EditedSplat> splats) {

@@ -27,10 +27,10 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using Words = std::vector<std::pair<const char*, const char*>>;
 
-std::vector<EditAction> Actions(const Words& words) {
+std::vector<EditAction> Actions(const Words& words, const Axes& axes = kRdf) {
   std::vector<EditAction> actions;
   for (const auto& [name, text] : words) {
-    const auto action = ParseAction(name, text);
+    const auto action = ParseAction(name, text, axes);
     EXPECT_TRUE(action.ok()) << (action.ok() ? "" : action.error().message);
     actions.push_back(*action);
   }
@@ -130,6 +130,33 @@ TEST(EditFiles, TheOrderCounts) {
   EXPECT_EQ(left({{"--rotate", "0,0,90"}, {"--filter-value", "y,gt,0.5"}}), left({{"--filter-value", "x,gt,0.5"}}));
   EXPECT_EQ(left({{"--scale", "2"}, {"--filter-value", "scale_0,lt,0.1"}}),
             left({{"--filter-value", "scale_0,lt,0.05"}}));
+}
+
+// As splat-transform 3.7 bakes a PLY into its own axes first: turned by half about z, quaternion (0, 0, 0, 1)·q.
+TEST(EditFiles, DirectionsInValuesAreAlongTheAxes) {
+  const TestFolder folder;
+  const GaussianCloud cloud = Splat(2'000, 2, 1);
+  const auto input = WithLabels(folder, "a.ply", cloud);
+  const auto left = [&](const Words& words, const Axes& axes) {
+    const auto report =
+        EditFiles({.inputs = {{input, {}}}, .actions = Actions(words, axes), .dry_run = true}, folder / "o.ply");
+    EXPECT_TRUE(report.ok());
+    return report->convert.gaussians_written;
+  };
+  for (const char* value : {"x,gt,0.2", "z,gt,0.2", "rot_0,gt,0.1", "rot_3,lt,0.2", "f_rest_4,gt,0.1", "f_rest_11,lt,0",
+                            "scale_1,gt,0.01", "opacity,lt,0.4"}) {
+    SCOPED_TRACE(value);
+    EXPECT_EQ(left({{"--filter-value", value}}, kLuf),
+              left({{"--rotate", "0,0,180"}, {"--filter-value", value}}, kRdf));
+  }
+  const auto above = [&](size_t column, float sign) {
+    int64_t count = 0;
+    for (size_t i = column; i < cloud.quats.size(); i += 4) count += sign * cloud.quats[i] > 0.1f ? 1 : 0;
+    return count;
+  };
+  EXPECT_EQ(left({{"--filter-value", "rot_0,gt,0.1"}}, kLuf), above(3, -1));
+  EXPECT_EQ(left({{"--filter-value", "rot_2,gt,0.1"}}, kLuf), above(1, 1));
+  EXPECT_EQ(left({{"--filter-value", "rot_2,gt,0.1"}}, kRdf), above(2, 1));
 }
 
 TEST(EditFiles, EachActionSaysWhatItTook) {

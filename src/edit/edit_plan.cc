@@ -192,7 +192,7 @@ Result<std::vector<EditStep>> ApplyActions(std::span<EditedSplat> splats, std::s
     int64_t left = before;
     for (size_t k = first; k < last; ++k) {
       left -= taken[k - first];
-      steps.push_back({actions[k].words, input, taken[k - first], left, TakesAway(actions[k])});
+      steps.push_back({actions[k].words, input, taken[k - first], left, TakesAway(actions[k]), actions[k].axes});
     }
     first = last;
   }

@@ -31,11 +31,12 @@ struct EditedSplat {
 
 // What an action did.
 struct EditStep {
-  std::string action;    // in words
-  std::string input;     // of one input alone; empty: of all
-  int64_t taken = 0;     // Gaussians that it took away
-  int64_t left = 0;      // of these splats, after it
-  bool chooses = false;  // it is of the kind that takes away
+  std::string action;     // in words
+  std::string input;      // of one input alone; empty: of all
+  int64_t taken = 0;      // Gaussians that it took away
+  int64_t left = 0;       // of these splats, after it
+  bool chooses = false;   // it is of the kind that takes away
+  std::string axes = {};  // along which its numbers are; empty: they are along none
 };
 
 // Applies the actions to all of the splats, as if they were one, in their order; `step.input` becomes `input`. Looks at

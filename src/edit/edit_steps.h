@@ -15,6 +15,10 @@ namespace anchorsplat {
 // files have them. Errors: those of ApplyActions; kBadArgument where nothing is left.
 Result<std::vector<EditStep>> ApplyJob(const EditJob& job, std::span<EditedSplat> splats);
 
+// Where in a result whose row `begin` is the splat's first one the rows that are kept begin, of each kRowsPerBlock rows
+// of the splat; then where they end.
+std::vector<int64_t> PlacesOfBlocks(const EditedSplat& splat, int64_t begin);
+
 // Drops comments that hold only where a splat was before. Called once all actions are applied.
 void DropPlaces(std::span<EditedSplat> splats);
 

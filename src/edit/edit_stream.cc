@@ -99,13 +99,7 @@ Status WriteBlock(const PlyInput& input, const EditedSplat& splat, const RowMove
 
 Status WriteRows(const PlyInput& input, const EditedSplat& splat, const RowMover& mover, int64_t begin,
                  Writing& writing) {
-  std::vector<int64_t> places = {begin};  // of each block's first row that is kept
-  for (int64_t first = 0; first < input.size(); first += kRowsPerBlock) {
-    const int64_t last = std::min(first + kRowsPerBlock, input.size());
-    const int64_t kept =
-        splat.keep.empty() ? last - first : std::count(splat.keep.begin() + first, splat.keep.begin() + last, char{1});
-    places.push_back(places.back() + kept);
-  }
+  const std::vector<int64_t> places = PlacesOfBlocks(splat, begin);
   FirstFailure failure;
   ParallelFor(0, input.size(), kRowsPerBlock, [&](int64_t first, int64_t last) {
     const auto block = static_cast<size_t>(first / kRowsPerBlock);
@@ -115,27 +109,35 @@ Status WriteRows(const PlyInput& input, const EditedSplat& splat, const RowMover
   return failure.status();
 }
 
-Status Write(const EditJob& job, const std::filesystem::path& output, const std::vector<PlyInput>& inputs,
-             std::span<EditedSplat> splats, ConvertReport& report) {
+// What the result is like, without rows.
+Result<GaussianCloud> HeadOf(const EditJob& job, const std::vector<PlyInput>& inputs, std::span<EditedSplat> splats) {
   GaussianCloud head;
   std::vector<std::optional<RenderMode>> modes;
-  std::vector<const ExtraProperties*> extras;
   for (size_t k = 0; k < inputs.size(); ++k) {
     head.sh_degree = std::max(head.sh_degree, splats[k].sh_degree);
     modes.push_back(inputs[k].head().render_mode);
-    extras.push_back(&inputs[k].extras());
   }
   head.sh_degree = std::max(head.sh_degree, job.convert.sh_degree.value_or(0));
   head.render_mode = job.convert.render_mode ? job.convert.render_mode : MergedMode(modes);
   head.comments = MergedComments(splats);
   head.double_means = job.convert.double_means;
   ANCHORSPLAT_ASSIGN_OR_RETURN(head.origin, ChooseEditedOrigin(splats));
-  const bool merges = inputs.size() > 1;
-  const ExtraProperties properties = merges ? MergedProperties(extras) : inputs[0].extras();
-  CloudView view = head;
+  return head;
+}
+
+ExtraProperties PropertiesOf(const std::vector<PlyInput>& inputs) {
+  if (inputs.size() == 1) return inputs[0].extras();
+  std::vector<const ExtraProperties*> extras;
+  for (const PlyInput& input : inputs) extras.push_back(&input.extras());
+  return MergedProperties(extras);
+}
+
+Status Write(const EditJob& job, const std::filesystem::path& output, const std::vector<PlyInput>& inputs,
+             std::span<const EditedSplat> splats, const CloudView& head, const ExtraProperties& properties,
+             ConvertReport& report) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(
-      PlyOutput file, PlyOutput::Create(output, view, report.gaussians_written, job.convert.write, properties));
-  Writing writing{file, view, properties, merges};
+      PlyOutput file, PlyOutput::Create(output, head, report.gaussians_written, job.convert.write, properties));
+  Writing writing{file, head, properties, inputs.size() > 1};
   int64_t begin = 0;
   for (size_t k = 0; k < inputs.size(); ++k) {
     const RowMover mover(splats[k].world, splats[k].origin, head.origin, splats[k].sh_degree);
@@ -147,7 +149,6 @@ Status Write(const EditJob& job, const std::filesystem::path& output, const std:
   if (const std::string lost = properties.lost(true); !lost.empty()) {
     LogWarning(Cat(output.string(), ": other properties of the input are dropped: ", lost));
   }
-  report.sh_degree_written = head.sh_degree;
   if (const Result<OpenedSplat> written = OpenWritten(output, job.convert.write); written.ok()) {
     report.output_bytes = written->bytes();
   }
@@ -202,13 +203,14 @@ Result<EditReport> EditStreams(const EditJob& job, const std::filesystem::path& 
   ANCHORSPLAT_ASSIGN_OR_RETURN(report.steps, ApplyJob(job, splats));
   DropPlaces(splats);
   report.convert.read_seconds = SecondsNow() - begin;
-  for (const EditedSplat& splat : splats) {
-    report.convert.gaussians_written += splat.kept;
-    report.convert.sh_degree_written = std::max(report.convert.sh_degree_written, splat.sh_degree);
-  }
+  for (const EditedSplat& splat : splats) report.convert.gaussians_written += splat.kept;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud head, HeadOf(job, inputs, splats));
+  report.convert.sh_degree_written = head.sh_degree;
+  const ExtraProperties properties = PropertiesOf(inputs);
+  PredictBytes(*FormatOfExtension(output), head, report.convert.gaussians_written, properties, report.convert);
   if (job.dry_run) return report;
   const double written = SecondsNow();
-  ANCHORSPLAT_RETURN_IF_ERROR(Write(job, output, inputs, splats, report.convert));
+  ANCHORSPLAT_RETURN_IF_ERROR(Write(job, output, inputs, splats, head, properties, report.convert));
   report.convert.write_seconds = SecondsNow() - written;
   return report;
 }

@@ -1,5 +1,6 @@
 #include "edit/moved_rows.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/rotation.h"
@@ -14,22 +15,13 @@ double Determinant(const std::array<double, 9>& m) {
   return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
 }
 
-// a ⊗ b, wxyz: first the rotation b, then a. The zero quaternion is no rotation (core/rotation.h).
-void TurnQuaternion(const std::array<double, 4>& a, float* q) {
-  std::array<double, 4> b = {q[0], q[1], q[2], q[3]};
-  if (b == std::array<double, 4>{}) b[0] = 1;
-  q[0] = static_cast<float>(a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]);
-  q[1] = static_cast<float>(a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]);
-  q[2] = static_cast<float>(a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]);
-  q[3] = static_cast<float>(a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]);
-}
-
 }  // namespace
 
 RowMover::RowMover(const Similarity& world, const WorldOrigin& from, const WorldOrigin& to, int sh_degree)
     : world_(world),
       linear_(world.rotation),
       log_scale_(std::log(world.scale)),
+      sh_degree_(sh_degree),
       turns_(world.rotation != kIdentity),
       scales_(world.scale != 1) {
   for (double& x : linear_) x *= world.scale;
@@ -60,9 +52,24 @@ void RowMover::Move(GaussianCloud& rows, int64_t first, int64_t last) const {
       for (int64_t k = 3 * i; k < 3 * i + 3; ++k) rows.log_scales[static_cast<size_t>(k)] += added;
     }
     if (!turns_) continue;
-    TurnQuaternion(quat_, rows.quats.data() + 4 * i);
-    if (harmonics_) harmonics_->Apply(rows.sh.data() + i * rows.sh_stride(), rows.sh_degree);
+    TurnQuaternion(rows.quats.data() + 4 * i);
+    TurnHarmonics(rows.sh.data() + i * rows.sh_stride(), rows.sh_degree);
   }
+}
+
+// a ⊗ b, wxyz: first the rotation b, then a. The zero quaternion is no rotation (core/rotation.h).
+void RowMover::TurnQuaternion(float* q) const {
+  const std::array<double, 4>& a = quat_;
+  std::array<double, 4> b = {q[0], q[1], q[2], q[3]};
+  if (b == std::array<double, 4>{}) b[0] = 1;
+  q[0] = static_cast<float>(a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]);
+  q[1] = static_cast<float>(a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]);
+  q[2] = static_cast<float>(a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]);
+  q[3] = static_cast<float>(a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]);
+}
+
+void RowMover::TurnHarmonics(float* sh, int degree) const {
+  if (harmonics_) harmonics_->Apply(sh, std::min(degree, sh_degree_));
 }
 
 void RowMover::Move(ExtraProperties& extras, int64_t first, int64_t last) const {

@@ -24,9 +24,14 @@ class RowMover {
   RowMover(const Similarity& world, const WorldOrigin& from, const WorldOrigin& to, int sh_degree);
 
   bool changes_nothing() const { return !turns_ && !scales_ && !shifts_; }
-  // Rows [first, last) in place. `rows` are of the SH degree of the constructor or a lower one.
+  // Rows [first, last) in place. Harmonics above the SH degree of the constructor stay.
   void Move(GaussianCloud& rows, int64_t first, int64_t last) const;
   void Move(ExtraProperties& extras, int64_t first, int64_t last) const;
+
+  bool turns() const { return turns_; }
+  // Of one row, where turns(): its quaternion, wxyz, and its harmonics [K,3] of some degree, in place.
+  void TurnQuaternion(float* quat) const;
+  void TurnHarmonics(float* sh, int degree) const;
 
  private:
   Similarity world_;
@@ -34,6 +39,7 @@ class RowMover {
   std::array<double, 3> shift_;
   std::array<double, 4> quat_;  // wxyz, of det(M)·M
   double log_scale_;
+  int sh_degree_;
   bool turns_, scales_, shifts_;
   std::optional<ShRotation> harmonics_;
 };

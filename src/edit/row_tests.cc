@@ -11,7 +11,6 @@
 #include "core/statistics.h"
 #include "core/text.h"
 #include "core/vector3.h"
-#include "edit/moved_rows.h"
 
 namespace anchorsplat {
 
@@ -99,8 +98,6 @@ std::optional<int64_t> IndexIn(std::string_view name, std::string_view before, i
   return index;
 }
 
-constexpr std::array<double, 9> kUnturned = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-
 }  // namespace
 
 Result<std::optional<RowTest>> RowTest::Of(const EditAction& action, const Similarity& world, const WorldOrigin& origin,
@@ -117,10 +114,12 @@ Result<std::optional<RowTest>> RowTest::Of(const EditAction& action, const Simil
   test.origin_ = origin;
   test.sh_degree_ = sh_degree;
   if (value == nullptr) return std::optional(test);
+  test.world_ = After({.rotation = value->turn}, world);
   const std::string_view name = value->property;
   const int64_t harmonics = 3 * (ShCoefficients(sh_degree) - 1);
   if (name.size() == 1 && std::string_view("xyz").find(name[0]) != std::string_view::npos) {
     test.column_ = Column::kPosition;
+    test.component_ = name[0] - 'x';
   } else if (name == "opacity") {
     test.column_ = Column::kOpacity;
   } else if (const auto scale = IndexIn(name, "scale_", 3)) {
@@ -145,15 +144,18 @@ Result<std::optional<RowTest>> RowTest::Of(const EditAction& action, const Simil
     test.type_ = found->type;
     for (auto p = extras.properties.begin(); p != found; ++p) test.component_ += PlyTypeSize(p->type);
   }
+  if (test.column_ == Column::kRotation || test.column_ == Column::kHarmonic) {
+    const RowMover mover(test.world_, {}, {}, sh_degree);
+    if (mover.turns()) test.mover_ = mover;
+  }
   return std::optional(test);
 }
 
 double RowTest::ValueOf(const RowBlock& block, int64_t i) const {
   const CloudView& rows = block.rows;
-  const bool turned = world_.rotation != kUnturned;
   switch (column_) {
     case Column::kPosition:
-      return Dot(std::get<KeepByValue>(what_).along, world_.Apply(ToWorld(rows.means.data() + 3 * i, origin_)));
+      return world_.Apply(ToWorld(rows.means.data() + 3 * i, origin_))[static_cast<size_t>(component_)];
     case Column::kScale:
       return double{rows.log_scales[static_cast<size_t>(3 * i + component_)]} + std::log(world_.scale);
     case Column::kOpacity:
@@ -163,23 +165,19 @@ double RowTest::ValueOf(const RowBlock& block, int64_t i) const {
     case Column::kExtra:
       return Load(type_, block.extras->rows.data() +
                              static_cast<size_t>(block.extra_first + i) * block.extras->row_size() + component_);
-    case Column::kRotation:
+    case Column::kRotation: {
+      std::array<float, 4> quat;
+      std::copy_n(rows.quats.data() + 4 * i, 4, quat.data());
+      if (mover_) mover_->TurnQuaternion(quat.data());
+      return quat[static_cast<size_t>(component_)];
+    }
     case Column::kHarmonic:
       break;
   }
-  if (!turned) {
-    return column_ == Column::kRotation ? rows.quats[static_cast<size_t>(4 * i + component_)]
-                                        : rows.sh[static_cast<size_t>(i * rows.sh_stride() + component_)];
-  }
-  GaussianCloud row;
-  row.Resize(1, rows.sh_degree);
-  std::copy_n(rows.means.data() + 3 * i, 3, row.means.data());
-  std::copy_n(rows.log_scales.data() + 3 * i, 3, row.log_scales.data());
-  std::copy_n(rows.quats.data() + 4 * i, 4, row.quats.data());
-  std::copy_n(rows.sh.data() + i * rows.sh_stride(), rows.sh_stride(), row.sh.data());
-  RowMover(world_, {}, {}, rows.sh_degree).Move(row, 0, 1);
-  return column_ == Column::kRotation ? row.quats[static_cast<size_t>(component_)]
-                                      : row.sh[static_cast<size_t>(component_)];
+  std::array<float, 3 * ShCoefficients(kMaxShDegree)> sh;
+  std::copy_n(rows.sh.data() + i * rows.sh_stride(), rows.sh_stride(), sh.data());
+  if (mover_) mover_->TurnHarmonics(sh.data(), rows.sh_degree);
+  return sh[static_cast<size_t>(component_)];
 }
 
 bool RowTest::Keeps(const RowBlock& block, int64_t i) const {

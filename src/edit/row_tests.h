@@ -7,6 +7,7 @@
 #include "core/similarity.h"
 #include "core/world_origin.h"
 #include "edit/action.h"
+#include "edit/moved_rows.h"
 #include "edit/row_source.h"
 
 namespace anchorsplat {
@@ -27,13 +28,14 @@ class RowTest {
   double ValueOf(const RowBlock& block, int64_t i) const;
 
   decltype(EditAction::what) what_;
-  Similarity world_;
+  Similarity world_;  // for KeepByValue along its axes
   WorldOrigin origin_ = {0, 0, 0};
   int sh_degree_ = 0;
   // KeepByValue: the column that it is of.
   enum class Column { kPosition, kScale, kOpacity, kColor, kRotation, kHarmonic, kExtra } column_ = Column::kPosition;
   int64_t component_ = 0;  // of the column's row: bytes of kExtra
   PlyType type_ = PlyType::kFloat;
+  std::optional<RowMover> mover_;  // of kRotation and kHarmonic, where these turn
 };
 
 }  // namespace anchorsplat

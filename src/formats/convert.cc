@@ -176,6 +176,14 @@ void WarnOfUnusable(const SplatFormat& to, const std::string& name, const Gaussi
   }
 }
 
+void PredictBytes(const SplatFormat& to, const CloudView& head, int64_t gaussians, const ExtraProperties& extras,
+                  ConvertReport& report) {
+  report.predicted_roughly = to.size_is_estimate;
+  if (to.predicted_size == nullptr) return;
+  report.predicted_bytes = to.predicted_size(gaussians, head.sh_degree);
+  if (to.write_with_extras != nullptr) *report.predicted_bytes += ExtraPlyBytes(head, gaussians, extras);
+}
+
 Result<ConvertReport> WriteConverted(ConvertedSplat splat, const fs::path& output, const ConvertOptions& options,
                                      GaussianCloud* kept) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const SplatFormat* const to, WrittenFormat(output, options));
@@ -209,11 +217,7 @@ Result<ConvertReport> WriteConverted(ConvertedSplat splat, const fs::path& outpu
   if (const Result<OpenedSplat> written_file = OpenWritten(output, write); written_file.ok()) {
     report.output_bytes = written_file->bytes();
   }
-  if (to->predicted_size != nullptr) {
-    report.predicted_bytes = to->predicted_size(cloud.size(), cloud.sh_degree);
-    if (to->write_with_extras != nullptr) *report.predicted_bytes += ExtraPlyBytes(cloud, extras);
-  }
-  report.predicted_roughly = to->size_is_estimate;
+  PredictBytes(*to, cloud, cloud.size(), extras, report);
   if (options.measure && to->read != nullptr) {
     ExtraProperties written_extras;
     ANCHORSPLAT_ASSIGN_OR_RETURN(const GaussianCloud back, ReadBack(output, write, cloud, &written_extras));

@@ -69,6 +69,9 @@ Result<ConvertReport> WriteConverted(ConvertedSplat splat, const std::filesystem
                                      const ConvertOptions& options, GaussianCloud* kept = nullptr);
 // The format of a file that can be written, or the error of WriteCloud.
 Result<const SplatFormat*> WrittenFormat(const std::filesystem::path& output, const ConvertOptions& options);
+// How large a file of so many Gaussians like `head`, whose rows do not count, will be, where its format tells.
+void PredictBytes(const SplatFormat& to, const CloudView& head, int64_t gaussians, const ExtraProperties& extras,
+                  ConvertReport& report);
 // Says how many Gaussians of an input nobody draws, where the output has them all the same.
 void WarnOfUnusable(const SplatFormat& to, const std::string& name, const GaussianCloud& cloud);
 

@@ -173,18 +173,19 @@ nlohmann::json ToJson(const Converted& converted) {
   nlohmann::json json = {{"formats", {r.input_format, r.output_format}},
                          {"gaussians", {{"in", r.gaussians_read}, {"out", r.gaussians_written}}},
                          {"sh_degree", {{"in", r.sh_degree_read}, {"out", r.sh_degree_written}}},
-                         {"bytes", {{"in", r.input_bytes}, {"out", r.output_bytes}}},
-                         {"seconds", {{"read", r.read_seconds}, {"write", r.write_seconds}}}};
+                         {"bytes", {{"in", r.input_bytes}}},
+                         {"seconds", {{"read", r.read_seconds}}}};
+  if (converted.dry_run) {
+    json["dry_run"] = true;
+  } else {
+    json["bytes"]["out"] = r.output_bytes;
+    json["seconds"]["write"] = r.write_seconds;
+  }
   if (r.predicted_bytes) {
     json["bytes"]["predicted"] = *r.predicted_bytes;
     json["bytes"]["predicted_roughly"] = r.predicted_roughly;
   }
-  for (const EditStep& step : converted.steps) {
-    nlohmann::json row = {{"action", step.action}, {"taken", step.taken}, {"left", step.left}};
-    if (!step.input.empty()) row["input"] = step.input;
-    json["actions"].push_back(std::move(row));
-  }
-  if (converted.dry_run) json["dry_run"] = true;
+  if (!converted.steps.empty()) json["actions"] = ToJson(std::span<const EditStep>(converted.steps));
   if (r.error) {
     json["error"] = {{"compared", r.error->compared},           {"left_out", r.error->left_out},
                      {"means", ToJson(r.error->means)},         {"log_scales", ToJson(r.error->log_scales)},

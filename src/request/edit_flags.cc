@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "core/text.h"
@@ -27,21 +28,34 @@ void EditFlags::AddTo(CLI::App& on) {
     options.push_back(option);
   }
   axes_option = on.add_option("--action-axes", axes,
-                              "Axes along which the numbers of edits are meant: RDF, those of the splat in info and in "
-                              "every option; LUF as splat-transform 3 has them")
+                              "Axes along which the numbers of edits are: LUF, x left, y up and z forward, as "
+                              "splat-transform counts; RDF as info, --region and --target count")
                     ->check(NotEmpty())
                     ->capture_default_str()
                     ->group(group);
   on.add_flag("--dry-run", dry_run, "Write nothing: say how many Gaussians each edit would take away")->group(group);
 }
 
-Result<std::vector<std::vector<EditAction>>> ActionsAmongPaths(const EditFlags& flags) {
-  const std::optional<Axes> axes = AxesFromName(flags.axes);
-  if (!axes) {
-    return Error{ErrorCode::kBadArgument, Cat("--action-axes: \"", Printable(flags.axes),
-                                              "\" are no axes: expected Right or Left, Up or Down, Front or Back, each "
-                                              "once, for x, y and z, as in RDF or LUF")};
+Result<Axes> ParseActionAxes(const std::string& name) {
+  if (const std::optional<Axes> axes = AxesFromName(name)) return *axes;
+  return Error{ErrorCode::kBadArgument, Cat("--action-axes: \"", Printable(name),
+                                            "\" are no axes: expected Right or Left, Up or Down, Front or Back, each "
+                                            "once, for x, y and z, as in RDF or LUF")};
+}
+
+nlohmann::json ToJson(std::span<const EditStep> steps) {
+  nlohmann::json json = nlohmann::json::array();
+  for (const EditStep& step : steps) {
+    nlohmann::json row = {{"action", step.action}, {"taken", step.taken}, {"left", step.left}};
+    if (!step.input.empty()) row["input"] = step.input;
+    if (!step.axes.empty()) row["axes"] = step.axes;
+    json.push_back(std::move(row));
   }
+  return json;
+}
+
+Result<std::vector<std::vector<EditAction>>> ActionsAmongPaths(const EditFlags& flags) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Axes axes, ParseActionAxes(flags.axes));
   std::vector<std::vector<EditAction>> actions(1);
   std::map<const CLI::Option*, size_t> seen;
   bool any = false;
@@ -55,7 +69,7 @@ Result<std::vector<std::vector<EditAction>>> ActionsAmongPaths(const EditFlags& 
     const ActionName& name = ActionNames()[static_cast<size_t>(found - flags.options.begin())];
     const std::vector<std::string> words = option->results();
     const size_t at = seen[option]++;
-    ANCHORSPLAT_ASSIGN_OR_RETURN(EditAction action, ParseAction(name.name, at < words.size() ? words[at] : "", *axes));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(EditAction action, ParseAction(name.name, at < words.size() ? words[at] : "", axes));
     actions.back().push_back(std::move(action));
     any = true;
   }

@@ -98,6 +98,7 @@ expect 0 "it is what it was" cmp "$scan" "$work/own.ply"
 # Edits: their order, several inputs, what is said.
 edit() { "$program" convert "$@"; }
 expect 0 "edits" edit "$scan" "$work/edited.ply" -t 1,0,0 --filter-box 1,-,-,-,-,- -F --filter-harmonics 0
+says stdout "edits count along LUF: x left, y up, z forward"
 says stdout "--filter-box 1,-,-,-,-,-: "
 says stdout " Gaussians taken away, "
 expect 0 "the other way round" edit "$scan" "$work/other.ply" --filter-box 0,-,-,-,-,- -t 1,0,0 -F -H 0 --json
@@ -111,13 +112,17 @@ says stdout "1,000 Gaussians of SH degree 1 in, 1,000 of degree 1 out"
 expect 0 "merged from a pipe to a pipe" bash -c "'$program' convert - '$scan' - --to spz <'$scan' >'$work/out'"
 says stderr "1,000 of degree 1 out"
 expect 0 "only counted" edit "$scan" --dry-run -V opacity,gt,0.5 -q
-says stdout "would come out; nothing was written"
+says stdout " would come out (PLY, "
+says stdout "; nothing was written"
+expect 0 "how large it would be" bash -c "'$program' convert '$scan' '$work/sized.ply' -H 0 -q && '$program' convert '$scan' --dry-run -H 0 --json | grep -q \"\\\"predicted\\\": \$(stat -c %s '$work/sized.ply')\""
 expect 0 "counted for a name that is there" edit "$scan" "$work/merged.ply" --dry-run
 expect 0 "nothing of it changed" "$program" info "$work/merged.ply"
 says stdout "1,000"
 expect 0 "many" edit "$scan" "$work/merged.ply" --out-dir "$work/many" --scale 2 -q
-expect 0 "as splat-transform counts" edit "$scan" "$work/luf.ply" --action-axes LUF --translate 1,2,3 -q
-expect 0 "as we do" edit "$scan" "$work/rdf.ply" --translate=-1,-2,3 -q
+expect 0 "as splat-transform counts" edit "$scan" "$work/luf.ply" --translate 1,2,3 --json
+says stdout '"axes": "LUF"'
+expect 0 "as info counts" edit "$scan" "$work/rdf.ply" --action-axes RDF --translate=-1,-2,3 --scale 1
+says stdout "edits count along RDF: x right, y down, z forward"
 expect 0 "both are the same" cmp "$work/luf.ply" "$work/rdf.ply"
 for bad in --scale=1,2,3 --scale=0 --scale=-1 --rotate=1,2 --mirror=w --up=0,0,0 --filter-sphere=0,0,0,-1 --filter-value=none,gt,1 \
   --filter-value=opacity,gt --filter-value=opacity,gt,nan --filter-harmonics=4 --filter-floaters=0 --filter-box=1,1,1,0,0,0 --action-axes=xyz \

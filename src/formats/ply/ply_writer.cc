@@ -107,10 +107,10 @@ uint64_t PredictedPlySize(int64_t count, int sh_degree, std::optional<RenderMode
          static_cast<uint64_t>(count) * RowSize(sh_degree, false, {});
 }
 
-uint64_t ExtraPlyBytes(const CloudView& cloud, const ExtraProperties& extras) {
-  const size_t more = RowSize(cloud.sh_degree, cloud.double_means, extras) - RowSize(cloud.sh_degree, false, {});
-  return static_cast<uint64_t>(cloud.size()) * more +
-         (cloud.double_means ? 3 : 0);  // "double" has a letter more than "float", in x, y and z
+uint64_t ExtraPlyBytes(const CloudView& head, int64_t count, const ExtraProperties& extras) {
+  const size_t more = RowSize(head.sh_degree, head.double_means, extras) - RowSize(head.sh_degree, false, {});
+  return static_cast<uint64_t>(count) * more +
+         (head.double_means ? 3 : 0);  // "double" has a letter more than "float", in x, y and z
 }
 
 Status WritePly(const std::filesystem::path& path, const CloudView& cloud, const CloudWriteOptions& options) {

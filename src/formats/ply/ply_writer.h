@@ -52,7 +52,8 @@ class PlyOutput {
 uint64_t PredictedPlySize(int64_t count, int sh_degree, std::optional<RenderMode> render_mode = {},
                           std::span<const std::string> comments = {});
 
-// Bytes that WritePlyWithExtras writes beyond those, but for the names of properties and the comments.
-uint64_t ExtraPlyBytes(const CloudView& cloud, const ExtraProperties& extras);
+// Bytes that WritePlyWithExtras writes beyond those of `count` Gaussians like `head`, whose rows do not count, but for
+// the names of properties and the comments.
+uint64_t ExtraPlyBytes(const CloudView& head, int64_t count, const ExtraProperties& extras);
 
 }  // namespace anchorsplat

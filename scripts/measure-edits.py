@@ -2,7 +2,8 @@
 """Edits beside those of splat-transform, planted floaters, and memory: measure-edits.py equal|speed|floaters|memory …
 
     measure-edits.py equal PROGRAM SPLAT_TRANSFORM FOLDER SPLAT…       the same actions: counts, and PSNR of pictures of both
-    measure-edits.py speed PROGRAM SPLAT_TRANSFORM FOLDER LARGE.ply     seconds of both in turn, the middle of three
+    measure-edits.py speed PROGRAM SPLAT_TRANSFORM FOLDER LARGE.ply CASE…  seconds of both in turn, the middle of three; of all cases
+                                                                       where none is named
     measure-edits.py floaters PROGRAM FOLDER SPLAT…                     3 % planted in each: how many are found, what else goes
     measure-edits.py memory PROGRAM FOLDER LARGE.ply                    the most memory of its own
 
@@ -118,7 +119,7 @@ def equal(program, other, folder, splats):
         print(f"{name:10} counts equal {all(same for same, _ in results)}, worst {min(psnr for _, psnr in results):.1f} dB")
 
 
-def speed(program, other, folder, source):
+def speed(program, other, folder, source, *chosen):
     names, rows, _ = rows_of(source)
     middle, radius = places(names, rows[:: max(1, len(rows) // 100_000)])
     del rows
@@ -126,6 +127,8 @@ def speed(program, other, folder, source):
     cases = {name: ([source], joined(filled(action, middle, radius))) for name, action in ACTIONS.items()}
     cases["merge"] = ([source, source], [])
     for name, (inputs, action) in cases.items():
+        if chosen and name not in chosen:
+            continue
         seconds = {"ours": [], "theirs": []}
         for _ in range(3):
             for who, command in (

@@ -10,6 +10,7 @@ from ._cameras import Cameras
 from ._cloud import Cloud
 from ._compare import compare, psnr, sheet, ssim
 from ._convert import convert
+from ._edit import Edit, edit
 from ._enhance import enhance, methods, refine
 from ._errors import (
     BadArgumentError,
@@ -37,6 +38,7 @@ __all__ = [
     "BadFileError",
     "Cameras",
     "Cloud",
+    "Edit",
     "Error",
     "ExistsError",
     "Format",
@@ -49,6 +51,7 @@ __all__ = [
     "StoppedError",
     "compare",
     "convert",
+    "edit",
     "enhance",
     "fit",
     "formats",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from ._edit import Edit, Edits
 from ._errors import BadArgumentError, Error
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def _point(name: str, values: Sequence[float]) -> tuple[float, float, float]:
     return point
 
 
-class Cloud:
+class Cloud(Edits["Cloud"]):
     """A splat: N Gaussians as five NumPy arrays of float32, row i of each belonging to Gaussian i.
 
     Values are *stored* ones, before activation, exactly as an INRIA PLY keeps them. The arrays of what this package returns
@@ -57,6 +58,8 @@ class Cloud:
 
     A Cloud of your own arrays borrows those that are float32 and C-contiguous in the CPU's memory and copies the others. No
     array may be changed while a call works with it; any number of calls may look at it at the same time.
+
+    Edits, as :meth:`translate` and :meth:`crop`, give a new Cloud each; :meth:`edit` gathers several, for a single copy.
 
     Raises BadArgumentError for arrays that do not fit together.
     """
@@ -227,6 +230,18 @@ class Cloud:
             comments=self._comments,
             origin=self._origin,
         )
+
+    def edit(self, *, axes: str = "RDF") -> Edit:
+        """Begins a chain of edits, which copies once: :func:`anchorsplat.edit`."""
+        return Edit((self,), axes)
+
+    def merge(self, *others: Cloud) -> Cloud:
+        """A new one with the Gaussians of others behind these, of the higher SH degree. Marks and render modes are those of all
+        (docs/edit.md)."""
+        return self.edit().merge(*others).apply()[0]
+
+    def _edited(self, name: str, text: str, axes: str | None) -> Cloud:
+        return self.edit()._edited(name, text, axes).apply()[0]
 
     @classmethod
     def from_gsplat(cls, params: Mapping[str, Any]) -> Cloud:

@@ -15,6 +15,7 @@ void BindCameras(nanobind::module_& module);
 void BindRender(nanobind::module_& module);
 void BindFit(nanobind::module_& module);
 void BindConvert(nanobind::module_& module);
+void BindEdit(nanobind::module_& module);
 void BindUpscale(nanobind::module_& module);
 void BindView(nanobind::module_& module);
 void BindCompare(nanobind::module_& module);

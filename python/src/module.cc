@@ -19,6 +19,7 @@ NB_MODULE(_core, module) {
   BindRender(module);
   BindFit(module);
   BindConvert(module);
+  BindEdit(module);
   BindUpscale(module);
   BindView(module);
   BindCompare(module);

@@ -22,12 +22,25 @@ OUTPUT = {"output": "results are values"}
 SIZE = {"max-memory": "arrays are in memory already", "yes": "nobody is asked"}
 PIPED = {"to": "results are values"}
 FILES = {**OUTPUT, **PIPED, **SIZE, "out-dir": "results are values"}
+#: Edits have an order, and keywords have none: the methods of Cloud and Edit.
+METHODS = {
+    "translate": "translate",
+    "rotate": "rotate",
+    "scale": "scale",
+    "mirror": "mirror",
+    "up": "turn_up",
+    "origin": "move_origin",
+    "filter-box": "crop",
+    "filter-sphere": "crop",
+    "filter-nan": "filter_nan",
+    "filter-value": "filter_value",
+    "filter-harmonics": "filter_harmonics",
+    "filter-floaters": "filter_floaters",
+}
 EDITS = {
-    name: "keywords have no order"
-    for name in (
-        "translate rotate scale mirror up origin filter-box filter-sphere filter-nan filter-value filter-harmonics filter-floaters "
-        "action-axes dry-run"
-    ).split()
+    **{option: f"Cloud.{method}" for option, method in METHODS.items()},
+    "action-axes": "axes of edit",
+    "dry-run": "nothing is written",
 }
 FUNCTIONS = {
     "enhance": ("enhance", None, {}, {"view": "anchorsplat.view", "overwrite": "nothing is written", **FILES}),
@@ -186,6 +199,16 @@ def test_named_choices(declared):
     convert = options_of(declared, "convert", None)
     assert list(get_args(RenderMode)) == convert["mode"]["choices"]
     assert list(get_args(Order)) == convert["sort"]["choices"]
+
+
+def test_every_edit_is_a_method(declared):
+    group = {
+        name for option in declared["convert"]["options"] if option["group"].startswith("Edits") for name in option["names"]
+    }
+    assert {name[2:] for name in group if name.startswith("--")} == set(EDITS)
+    for method in METHODS.values():
+        for kind in (anchorsplat.Cloud, anchorsplat.Edit):
+            assert getattr(kind, method).__doc__
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

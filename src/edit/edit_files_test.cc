@@ -108,6 +108,9 @@ TEST(EditFiles, StreamsGiveTheSameBitsAsMemory) {
       const auto dry = EditFiles(job, folder / "none.ply");
       ASSERT_TRUE(dry.ok());
       EXPECT_EQ(dry->convert.gaussians_written, whole->convert.gaussians_written);
+      EXPECT_TRUE(whole->convert.predicted_bytes.has_value());
+      EXPECT_EQ(dry->convert.predicted_bytes, whole->convert.predicted_bytes);
+      EXPECT_EQ(streamed->convert.predicted_bytes, whole->convert.predicted_bytes);
       EXPECT_FALSE(std::filesystem::exists(folder / "none.ply"));
     }
   }

@@ -63,9 +63,15 @@ class ApiError(Exception):
 
 
 def bad_options(error: ValidationError) -> ApiError:
-    details = [{"option": ".".join(map(str, e["loc"])) or "options", "message": e["msg"]} for e in error.errors()]
-    # A union complains once for each of its kinds; the first name of the place is the option.
-    sentences = dict.fromkeys(f"{d['option'].split('.')[0]}: {d['message']}" for d in details)
+    details = [
+        {"option": ".".join(map(str, e["loc"])) or "options", "message": e["msg"].removeprefix("Value error, ")}
+        for e in error.errors()
+    ]
+    # A union complains once for each of its kinds; the first name of the place is the option. Without a place the sentence
+    # names it.
+    sentences = dict.fromkeys(
+        d["message"] if d["option"] == "options" else f"{d['option'].split('.')[0]}: {d['message']}" for d in details
+    )
     return ApiError(422, "bad_option", "; ".join(sentences), details=details)
 
 
@@ -221,11 +227,20 @@ class Service:
 
 
 def validate(kind: str, pairs: list[tuple[str, str]]) -> Options:
-    given: dict[str, str] = {}
-    for name, value in pairs:
+    given: dict[str, str | list[tuple[str, str]]] = {}
+    edits = []
+    for said, value in pairs:
+        name = said.replace("-", "_")  # as on the command line, or as in a form
+        if name in KINDS[kind].in_order:
+            edits.append((name, value))
+            continue
         if name in given:
             raise ApiError(422, "bad_option", f"{name}: given more than once")
         given[name] = value
+    if edits:
+        if "edits" in given:
+            raise ApiError(422, "bad_option", "edits: each has a name of its own, as translate")
+        given["edits"] = edits
     try:
         return KINDS[kind].model_validate(given)
     except ValidationError as error:

@@ -37,7 +37,7 @@ _ISOLATED = {"cross-origin-opener-policy": "same-origin", "cross-origin-embedder
 _PAGES = {"/": "index.html", "/docs": "api.html"}
 _SUMMARIES = {
     "enhance": "Make a splat hold up when seen closer",
-    "convert": "Change the format of a splat, its size, its order",
+    "convert": "Change the format of a splat, its size, its order; turn, move, scale, crop and clean it",
     "render": "Pictures of a splat on an orbit around it",
 }
 
@@ -135,7 +135,19 @@ def _add_submission(app: FastAPI, service: Service, kind: str) -> None:
     parameters = [
         {"name": name, "in": "query", "required": False, "description": value.pop("description", ""), "schema": value}
         for name, value in schema["properties"].items()
+        if name != "edits"
     ]
+    for name, (about, value_form) in KINDS[kind].in_order.items():
+        shape = f" {value_form}." if value_form else ""
+        parameters.append(
+            {
+                "name": name,
+                "in": "query",
+                "required": False,
+                "description": f"{about}.{shape} Done in the order in which they stand; may stand several times",
+                "schema": {"type": "array", "items": {"type": "string"}},
+            }
+        )
     parameters.append(
         {
             "name": "name",

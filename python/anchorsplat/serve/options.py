@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-from typing import Annotated, Literal, Union
+from typing import Annotated, ClassVar, Literal, Union
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from .. import _core
+from .._errors import BadArgumentError
 
 #: Formats that results come in, and the type that HTTP knows them by.
 FORMATS = {
@@ -31,6 +34,8 @@ _REGION = rf"^{_NUMBER}(,{_NUMBER}){{3}}((,{_NUMBER}){{2}})?$"
 
 class Options(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, validate_default=False)
+    #: What is done in its order and may stand several times, with a line about each and the form of its value.
+    in_order: ClassVar[dict[str, tuple[str, str]]] = {}
 
     def canonical(self) -> str:
         """The same text for the same wish: what was said and what goes without saying are one."""
@@ -96,6 +101,8 @@ class EnhanceOptions(Options):
 
 
 class ConvertOptions(Options):
+    in_order = {name[2:].replace("-", "_"): (help, form) for name, help, form in _core.edit_names()}
+
     to: Format = Field("spz", description="format of the result")
     mode: Mode | None = Field(
         None, description="how the splat is rasterized, for a tag in the result; default: as the input says"
@@ -114,6 +121,28 @@ class ConvertOptions(Options):
         pattern=r"^([LRUDFB]{3})?:([LRUDFB]{3})?$",
         description="what the axes really are where they do not follow the format, as IN:OUT",
     )
+
+    edits: list[tuple[str, str]] = Field([], max_length=64, description="in their order: name and value")
+    action_axes: str | None = Field(
+        None,
+        description="axes along which the numbers of edits are: LUF (the default), x left, y up and z forward; RDF as region "
+        "and target count",
+    )
+
+    @model_validator(mode="after")
+    def _edits_are_some(self):
+        if self.action_axes is not None and not self.edits:
+            raise ValueError("action_axes has an effect with edits only, as translate")
+        for name, value in self.edits:
+            if name not in self.in_order:
+                raise ValueError(f"{name} is no edit")
+            if not value.isprintable():
+                raise ValueError(f"{name}: there are control characters in its value")
+            try:
+                _core.check_edit(_option(name), value, self.action_axes or "LUF")
+            except BadArgumentError as error:
+                raise ValueError(str(error)) from None
+        return self
 
     @field_validator("spz_version", mode="before")
     @classmethod
@@ -134,7 +163,15 @@ class ConvertOptions(Options):
             out += ["--max-gaussians", str(self.max_gaussians)]
         if self.coords is not None:
             out += ["--coords", self.coords]
+        if self.action_axes is not None:
+            out += ["--action-axes", self.action_axes]
+        for name, value in self.edits:  # one word: a value may begin with a minus
+            out += [f"{_option(name)}={value}" if value else _option(name)]
         return out
+
+
+def _option(name: str) -> str:
+    return "--" + name.replace("_", "-")
 
 
 class RenderOptions(Options):

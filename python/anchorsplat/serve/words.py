@@ -121,6 +121,12 @@ def _converted(row: dict) -> list[str]:
     out = [f"{formats[0]} to {formats[1]}: {_count(sizes.get('in'))} bytes became {_count(sizes.get('out'))}."]
     if gaussians.get("in") != gaussians.get("out"):
         out.append(f"{_count(gaussians.get('out'))} of {_count(gaussians.get('in'))} Gaussians were kept.")
+    for step in row.get("actions") or []:
+        if step.get("taken"):
+            out.append(f"{step['action']}: {_count(step['taken'])} taken away, {_count(step['left'])} left.")
+    axes = next((step["axes"] for step in row.get("actions") or [] if "axes" in step), None)
+    if axes:
+        out.append(f"The numbers of edits counted along {axes}.")
     if degrees.get("in") != degrees.get("out"):
         out.append(f"Spherical harmonics of degree {degrees.get('in')} became degree {degrees.get('out')}.")
     return out

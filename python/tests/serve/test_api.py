@@ -7,6 +7,7 @@ import json
 import subprocess
 import zipfile
 from pathlib import Path
+from urllib.parse import urlencode
 
 import anchorsplat
 import pytest
@@ -103,6 +104,78 @@ def test_converting(server: Server) -> None:
     assert result(server, table).count(b"\n") == 61
     assert "view" not in table["links"]
     assert server.http.get(f"{table['links']['self']}/view").status_code == 409
+
+
+def test_edits_are_the_command_lines_in_their_order(server: Server, tmp_path: Path) -> None:
+    (tmp_path / "in.ply").write_bytes(SPLAT)
+    edits = [
+        ("rotate", "10,20,30"),
+        ("filter_sphere", "0.5,0,0,1"),
+        ("translate", "-1,0,0"),
+        ("filter-nan", ""),
+        ("translate", "0,2,0"),
+        ("filter_value", "opacity,gt,0.6"),
+    ]
+    words = [f"--{name.replace('_', '-')}" + (f"={value}" if value else "") for name, value in edits]
+    for axes in ([], ["--action-axes=RDF"]):
+        query = urlencode([("to", "ply"), *edits, *(("action_axes", "RDF") for _ in axes)])  # httpx puts equal names together
+        answer = server.http.post(f"/v1/convert?{query}", content=SPLAT)
+        done = server.wait(answer.json())
+        assert done["state"] == "done", done
+        subprocess.run(
+            [program(), "convert", tmp_path / "in.ply", tmp_path / "out.ply", "-w", "-q", *words, *axes], check=True
+        )
+        assert result(server, done) == (tmp_path / "out.ply").read_bytes()
+        steps = done["report"]["details"]["actions"]
+        assert [step["action"].split()[0] for step in steps] == [word.split("=")[0] for word in words]
+        said = " ".join(done["report"]["sentences"])
+        assert f"--filter-sphere 0.5,0,0,1: {steps[1]['taken']} taken away, {steps[1]['left']} left." in said
+        assert f"along {'RDF' if axes else 'LUF'}" in said
+    # Another order is another wish.
+    other = server.http.post(f"/v1/convert?{urlencode([('to', 'ply'), edits[1], edits[0], *edits[2:]])}", content=SPLAT)
+    assert other.status_code == 202
+    assert result(server, server.wait(other.json())) != (tmp_path / "out.ply").read_bytes()
+    form = {"to": "ply", "mirror": "x", "filter-harmonics": "0"}
+    mirrored = server.http.post("/v1/convert", data=form, files={"file": ("a.ply", SPLAT)})
+    assert server.wait(mirrored.json())["options"]["edits"] == [["mirror", "x"], ["filter_harmonics", "0"]]
+
+
+@pytest.mark.parametrize(
+    "edits, says",
+    [
+        ({"translate": "1,2"}, "--translate: expected X,Y,Z, found '1,2'"),
+        ({"translate": "1,2,3 -o x"}, "expected X,Y,Z"),
+        ({"translate": "1,2,1e999"}, "expected X,Y,Z"),
+        ({"scale": "1,2,3"}, "one factor for all axes"),
+        ({"scale": "-1"}, "--mirror mirrors"),
+        ({"filter_nan": "banana"}, "takes no value"),
+        ({"filter_value": "x\0y,gt,1"}, "control characters"),
+        ({"filter_value": "opacity,gt,1\n"}, "control characters"),
+        ({"filter_floaters": "0"}, "one factor above 0"),
+        ({"mirror": ""}, "an axis"),
+        ({"action_axes": "LUF"}, "has an effect with edits only"),
+        ({"action_axes": "XYZ", "translate": "1,2,3"}, "are no axes"),
+        ({"edits": "translate"}, "edits"),
+        ({"edits": "translate", "translate": "1,2,3"}, "a name of its own"),
+        ({"dry_run": "true"}, "dry_run"),
+        ([("scale", "2")] * 65, "edits"),
+    ],
+)
+def test_edits_that_make_no_sense(server: Server, edits: dict, says: str) -> None:
+    answer = server.http.post("/v1/convert", params=edits, content=SPLAT)
+    assert answer.status_code == 422, answer.text
+    assert answer.json()["error"]["code"] == "bad_option" and says in answer.json()["error"]["message"]
+    assert server.http.post("/v1/render", params={"scale": "2"}, content=SPLAT).status_code == 422
+
+
+def test_edits_that_this_splat_refuses(server: Server) -> None:
+    for query, says in (
+        ({"filter_sphere": "90,0,0,1"}, "takes away the last 60 Gaussians"),
+        ({"filter_value": "label,gt,1"}, "has no property 'label'"),
+    ):
+        failed = server.wait(server.http.post("/v1/convert", params=query, content=SPLAT).json())
+        assert failed["state"] == "failed" and failed["error"]["code"] == "bad_option"
+        assert says in failed["error"]["message"]
 
 
 def test_rendering(server: Server) -> None:

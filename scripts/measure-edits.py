@@ -1,17 +1,19 @@
 #!/usr/bin/env python3
-"""Edits beside those of splat-transform, planted floaters, and memory: measure-edits.py equal|speed|floaters|memory …
+"""Edits beside those of splat-transform, planted floaters, and memory: measure-edits.py equal|speed|floaters|memory|python …
 
     measure-edits.py equal PROGRAM SPLAT_TRANSFORM FOLDER SPLAT…       the same actions: counts, and PSNR of pictures of both
     measure-edits.py speed PROGRAM SPLAT_TRANSFORM FOLDER LARGE.ply CASE…  seconds of both in turn, the middle of three; of all cases
                                                                        where none is named
     measure-edits.py floaters PROGRAM FOLDER SPLAT…                     3 % planted in each: how many are found, what else goes
     measure-edits.py memory PROGRAM FOLDER LARGE.ply                    the most memory of its own
+    measure-edits.py python LARGE.ply                                  a chain in Python, whose package PYTHONPATH has: time and memory
 
 FOLDER is for what comes out. SPLAT_TRANSFORM is a command: version 3.7 of the npm package @playcanvas/splat-transform, in Node 22. Needs
 NumPy."""
 
 import json
 import os
+import resource
 import statistics
 import subprocess
 import sys
@@ -213,6 +215,19 @@ def memory(program, folder, source):
         print(f"{name:10} {most / 1e6:.2f} GB of its own, exit code {process.returncode}", flush=True)
 
 
+def python(source):
+    import anchorsplat
+
+    cloud = anchorsplat.read(source)
+    before = next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmRSS"))
+    chain = anchorsplat.edit(cloud).translate((1, 0, 0)).rotate((10, 20, 30)).scale(2)
+    begin = time.perf_counter()
+    made, _ = chain.filter_value("opacity", "gt", 0.5).filter_harmonics(1).apply()
+    seconds = time.perf_counter() - begin
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    print(f"{seconds:.2f} s; {cloud.nbytes / 1e6:.0f} MB became {made.nbytes / 1e6:.0f} MB, and {(most - before) / 1e3:.0f} MB came on top")
+
+
 what, *words = sys.argv[1:]
 if what == "equal":
     equal(words[0], words[1], words[2], words[3:])
@@ -222,5 +237,7 @@ elif what == "floaters":
     floaters(words[0], words[1], words[2:])
 elif what == "memory":
     memory(*words)
+elif what == "python":
+    python(*words)
 else:
     raise SystemExit(__doc__)

@@ -212,6 +212,11 @@ void Print(const OutputMemory* piped, const Job& job, const Converted& done) {
 
 // A network's weights, which only become .safetensors.
 Status ConvertModel(const ConvertWords& flags, const SharedFlags& shared) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto edits, ActionsAmongPaths(flags.how.edits));
+  if (flags.how.edits.dry_run || std::ranges::any_of(edits, [](const auto& actions) { return !actions.empty(); })) {
+    return Error{ErrorCode::kBadArgument,
+                 "edits and --dry-run are for splats, and .safetensors has a network's weights"};
+  }
   const fs::path from = flags.paths[0], to = flags.paths[1];
   RecordInput(from);
   ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(to, shared.overwrite));

@@ -40,6 +40,13 @@ TEST(WorldOrigin, LiesInRoundNumbersNearTheMiddle) {
   }
 }
 
+TEST(WorldOrigin, IsZeroWhereNobodyCouldReadIt) {
+  for (const double x : {2e15, 1e20, 1e39, 1e300}) {
+    EXPECT_TRUE(IsZero(ChooseOrigin(std::vector<double>{x, 0, 0, x, 1, 0}, 0.01))) << x;
+  }
+  EXPECT_FALSE(IsZero(ChooseOrigin(std::vector<double>{9e14, 0, 0, 9e14, 1, 0}, 0.01)));
+}
+
 TEST(WorldOrigin, DoesNotMindStraysAndWhatIsNoNumber) {
   std::vector<double> points = PointsAround({500012, 4500017, 120}, 5);
   for (const double x : {1e30, -1e30, 1e30, std::nan(""), 0.0, kInfinity}) points.push_back(x);

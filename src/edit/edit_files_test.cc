@@ -162,6 +162,26 @@ TEST(EditFiles, DirectionsInValuesAreAlongTheAxes) {
   EXPECT_EQ(left({{"--filter-value", "rot_2,gt,0.1"}}, kRdf), above(2, 1));
 }
 
+TEST(EditFiles, NormalsAndOtherPropertiesAreNumbersToo) {
+  const TestFolder folder;
+  const GaussianCloud cloud = Splat(100, 0, 1);
+  ExtraProperties extras;
+  extras.properties = {{"weight", PlyType::kFloat}};
+  extras.normals.resize(300);
+  extras.normals[3 * 7 + 1] = NAN;
+  std::vector<float> weights(100, 1.0f);
+  weights[9] = INFINITY;
+  extras.rows.resize(400);
+  std::memcpy(extras.rows.data(), weights.data(), 400);
+  ASSERT_TRUE(WritePlyWithExtras(folder / "a.ply", cloud, {}, extras).ok());
+  EditJob job{.inputs = {{folder / "a.ply", Actions({{"--filter-nan", ""}})}}};
+  GaussianCloud kept;
+  for (GaussianCloud* const whole : {static_cast<GaussianCloud*>(nullptr), &kept}) {
+    job.convert.write.overwrite = true;
+    EXPECT_EQ(EditFiles(job, folder / "o.ply", whole)->convert.gaussians_written, 98);
+  }
+}
+
 TEST(EditFiles, EachActionSaysWhatItTook) {
   const TestFolder folder;
   GaussianCloud cloud = Splat(1'000, 0, 1);

@@ -60,7 +60,10 @@ bool HasNumbers(const RowBlock& block, int64_t i, int sh_degree) {
   if (!std::isfinite(logit) && logit != INFINITY) return false;
   const int64_t harmonics = 3 * ShCoefficients(std::min(sh_degree, rows.sh_degree));
   if (!AllFinite(rows.sh.data() + i * rows.sh_stride(), harmonics)) return false;
-  if (block.extras == nullptr || block.extras->properties.empty()) return true;
+  if (block.extras == nullptr) return true;
+  const auto& normals = block.extras->normals;
+  if (!normals.empty() && !AllFinite(normals.data() + 3 * (block.extra_first + i), 3)) return false;
+  if (block.extras->properties.empty()) return true;
   const std::byte* value =
       block.extras->rows.data() + static_cast<size_t>(block.extra_first + i) * block.extras->row_size();
   for (const ExtraProperties::Property& property : block.extras->properties) {

@@ -131,6 +131,8 @@ for bad in --scale=1,2,3 --scale=0 --scale=-1 --rotate=1,2 --mirror=w --up=0,0,0
   expect 2 "$bad" edit "$scan" "$work/bad.ply" "$bad"
   says stderr "${bad%%=*}"
 done
+expect 2 "weights" edit "$scan" "$work/bad.safetensors" --scale 2
+says stderr "edits and --dry-run are for splats"
 expect 2 "no value" edit "$scan" "$work/bad.ply" --translate
 expect 2 "an input among several" edit "$scan" "$work/back.ply" "$work/back.ply" -w
 expect 3 "one that is not there" edit "$scan" "$work/none.ply" "$work/bad.ply"

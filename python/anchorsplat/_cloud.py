@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ._edit import Edit, Edits
+from ._edit import Edit, Edits, edit
 from ._errors import BadArgumentError, Error
 
 if TYPE_CHECKING:
@@ -233,9 +233,9 @@ class Cloud(Edits["Cloud"]):
 
     def edit(self, *, axes: str = "RDF") -> Edit:
         """Begins a chain of edits, which copies once: :func:`anchorsplat.edit`."""
-        return Edit((self,), axes)
+        return edit(self, axes=axes)
 
-    def merge(self, *others: Cloud) -> Cloud:
+    def merge(self, *others: Cloud | Edit) -> Cloud:
         """A new one with the Gaussians of others behind these, of the higher SH degree. Marks and render modes are those of all
         (docs/edit.md)."""
         return self.edit().merge(*others).apply()[0]

@@ -29,7 +29,7 @@ class _Step(NamedTuple):
 def _numbers(name: str, values: Any, what: str, count: int) -> str:
     """"1,2.5,0": every digit of them. Raises BadArgumentError."""
     try:
-        numbers = [float(value) for value in values]
+        numbers = [] if isinstance(values, (str, bytes, dict)) else [float(value) for value in values]
     except (TypeError, ValueError):
         numbers = []
     if len(numbers) != count or not all(map(math.isfinite, numbers)):
@@ -38,7 +38,10 @@ def _numbers(name: str, values: Any, what: str, count: int) -> str:
 
 
 def _number(name: str, value: Any) -> str:
-    return _numbers(name, (value,), "a finite number", 1)
+    try:
+        return _numbers(name, (value,), "", 1)
+    except BadArgumentError:
+        raise BadArgumentError(f"{name}: expected a finite number, found {value!r}") from None
 
 
 def _box(values: Any) -> str:
@@ -143,7 +146,7 @@ class Edit(Edits["Edit"]):
         self._steps = tuple(steps)
 
     def _edited(self, name: str, text: str, axes: str | None) -> Edit:
-        step = _Step(0, len(self._clouds), name, text, self._axes if axes is None else axes)
+        step = _Step(0, len(self._clouds), name, text, self._axes if axes is None else str(axes))
         _core.check_edit(step.name, step.text, step.axes)
         return Edit(self._clouds, self._axes, (*self._steps, step))
 
@@ -154,7 +157,10 @@ class Edit(Edits["Edit"]):
         for other in others:
             if isinstance(other, Edit):
                 steps += [step._replace(first=step.first + len(clouds)) for step in other._steps]
-            clouds += other._clouds if isinstance(other, Edit) else (other,)
+                clouds += other._clouds
+            else:
+                _check_is_cloud(other)
+                clouds.append(other)
         return Edit(clouds, self._axes, steps)
 
     def apply(self, *, threads: int = 0, progress: ProgressLike = None) -> tuple[Cloud, Report]:
@@ -175,6 +181,13 @@ class Edit(Edits["Edit"]):
         return f"<anchorsplat.Edit: {len(self._steps)} edits of {gaussians:,} Gaussians>"
 
 
+def _check_is_cloud(thing: object) -> None:
+    from ._cloud import Cloud
+
+    if not isinstance(thing, Cloud):
+        raise TypeError(f"expected an anchorsplat.Cloud, found {type(thing).__name__}")
+
+
 def edit(*clouds: Cloud, axes: str = "RDF") -> Edit:
     """Begins edits of a splat, or of several that become one.
 
@@ -183,8 +196,11 @@ def edit(*clouds: Cloud, axes: str = "RDF") -> Edit:
     axes: those along which the numbers of the edits are, for x, y and z each Right or Left, Up or Down, Front or Back: "RDF",
     those of the arrays; "LUF", those of the command line.
 
-    Raises BadArgumentError: no splat.
+    Raises BadArgumentError: no splat, axes that are none.
     """
     if not clouds:
         raise BadArgumentError("edit: expected a splat, or several that become one")
+    for cloud in clouds:
+        _check_is_cloud(cloud)
+    _core.check_edit("--mirror", "x", str(axes))  # says what is wrong with axes
     return Edit(clouds, axes)

@@ -109,6 +109,9 @@ def test_nothing_may_be_left(cloud):
         (lambda c: c.translate((1, 2)), "translate: expected x, y, z"),
         (lambda c: c.translate((1, 2, np.nan)), "translate: expected x, y, z"),
         (lambda c: c.translate(1), "translate: expected x, y, z"),
+        (lambda c: c.translate("123"), "translate: expected x, y, z"),
+        (lambda c: c.crop(box=(np.inf, 0, 0, 1, 1, 1)), "box: expected a finite number, found inf"),
+        (lambda c: c.edit(axes="XYZ"), "no axes"),
         (lambda c: c.rotate("abc"), "rotate: expected degrees"),
         (lambda c: c.scale(-1), "a factor above 0"),
         (lambda c: c.scale((1, 2, 3)), "scale: expected a finite number"),
@@ -132,8 +135,9 @@ def test_what_makes_no_sense_is_said(cloud, call, says):
 
 
 def test_what_is_no_splat(cloud):
-    with pytest.raises(TypeError, match="expected an anchorsplat.Cloud"):
-        cloud.merge(cloud.means)
+    for call in (lambda: cloud.merge(cloud.means), lambda: anchorsplat.edit("scan.ply"), lambda: cloud.merge(None)):
+        with pytest.raises(TypeError, match="expected an anchorsplat.Cloud, found"):
+            call()
 
 
 def test_a_box_of_two_corners(cloud):

@@ -123,7 +123,7 @@ def test_nothing_may_be_left(cloud):
         (lambda c: c.crop(box=(1, 0, 0, 0, 1, 1)), "first corner must be the lower"),
         (lambda c: c.crop(sphere=(0, 0, 0, -1)), "radius above 0"),
         (lambda c: c.filter_value("opacity", "above", 1), "lt, lte, gt"),
-        (lambda c: c.filter_value("label", "gt", 1), "the cloud has no property 'label'"),
+        (lambda c: c.filter_value("label", "gt", 1), "the cloud: --filter-value label,gt,1: there is no property 'label'"),
         (lambda c: c.filter_harmonics(4), "a degree, 0 to 3"),
         (lambda c: c.filter_floaters(0), "one factor above 0"),
         (lambda c: anchorsplat.edit(), "expected a splat"),

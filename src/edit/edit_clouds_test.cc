@@ -103,8 +103,9 @@ TEST(EditClouds, NamesTheCloudThatHasNotAProperty) {
   const GaussianCloud cloud = Splat(10, 0, 1);
   const std::vector<CloudView> one = {cloud}, two = {cloud, cloud};
   const std::vector<EditRun> runs = {{0, 1, Actions({{"--filter-value", "label,gt,1"}})}};
-  EXPECT_THAT(EditClouds(one, runs).error().message, HasSubstr("the cloud has no property 'label'"));
-  EXPECT_THAT(EditClouds(two, runs).error().message, HasSubstr("cloud 1 has no property 'label'"));
+  EXPECT_THAT(EditClouds(one, runs).error().message,
+              HasSubstr("the cloud: --filter-value label,gt,1: there is no property 'label'"));
+  EXPECT_THAT(EditClouds(two, runs).error().message, HasSubstr("cloud 1: --filter-value"));
 }
 
 }  // namespace

@@ -309,8 +309,9 @@ TEST(EditFiles, ErrorsNameTheActionAndTheFile) {
     return report.ok() ? "" : report.error().message;
   };
   EXPECT_THAT(error({{"--filter-value", "confidence,gt,1"}}, folder / "o.ply"),
-              HasSubstr("--filter-value confidence,gt,1: " + input.string() + " has no property 'confidence'"));
-  EXPECT_THAT(error({{"--filter-value", "f_rest_9,gt,1"}}, folder / "o.ply"), HasSubstr("has no property 'f_rest_9'"));
+              HasSubstr(input.string() + ": --filter-value confidence,gt,1: there is no property 'confidence'"));
+  EXPECT_THAT(error({{"--filter-value", "f_rest_9,gt,1"}}, folder / "o.ply"),
+              HasSubstr("there is no property 'f_rest_9'"));
   EXPECT_THAT(error({{"--filter-sphere", "50,0,0,1"}}, folder / "o.ply"),
               HasSubstr("--filter-sphere 50,0,0,1 takes away the last 20 Gaussians: nothing to write"));
   EXPECT_THAT(error({{"--scale", "2"}}, input), HasSubstr("a.ply"));

@@ -67,7 +67,7 @@ Status TakeAway(EditedSplat& splat, std::span<const EditAction> actions, std::sp
   for (size_t k = 0; k < actions.size(); ++k) {
     auto test = RowTest::Of(actions[k], splat.world, splat.origin, splat.sh_degree, *splat.extras);
     if (!test.ok()) {
-      return Error{test.error().code, Cat(actions[k].words, ": ", splat.name, " ", test.error().message)};
+      return Error{test.error().code, Cat(splat.name, ": ", actions[k].words, ": ", test.error().message)};
     }
     if (*test) tests.emplace_back(k, **test);
     ApplyToWhole(actions[k], splat);

@@ -142,7 +142,7 @@ Result<std::optional<RowTest>> RowTest::Of(const EditAction& action, const Simil
     test.column_ = Column::kExtra;
     const auto found = std::ranges::find(extras.properties, value->property, &ExtraProperties::Property::name);
     if (found == extras.properties.end()) {
-      return Error{ErrorCode::kBadArgument, Cat("has no property '", Printable(value->property), "'")};
+      return Error{ErrorCode::kBadArgument, Cat("there is no property '", Printable(value->property), "'")};
     }
     test.type_ = found->type;
     for (auto p = extras.properties.begin(); p != found; ++p) test.component_ += PlyTypeSize(p->type);

@@ -22,13 +22,13 @@ namespace {
 using ::testing::HasSubstr;
 using Words = std::vector<std::pair<const char*, const char*>>;
 
-std::vector<EditAction> Actions(const Words& words) {
+std::vector<EditAction> AlongLuf(const Words& words) {
   std::vector<EditAction> actions;
   for (const auto& [name, text] : words) actions.push_back(*ParseAction(name, text, kLuf));
   return actions;
 }
 
-GaussianCloud Splat(int64_t n, int degree, uint64_t seed) {
+GaussianCloud SplatOf(int64_t n, int degree, uint64_t seed) {
   GaussianCloud cloud = RandomCloud(n, degree, seed);
   for (float& x : cloud.log_scales) x -= 3;
   return cloud;
@@ -53,7 +53,7 @@ void ExpectSame(const GaussianCloud& a, const GaussianCloud& b) {
 
 TEST(EditClouds, GivesTheBitsOfFiles) {
   const TestFolder folder;
-  GaussianCloud a = TroubledCloud(9'001, 2), b = Splat(5'003, 1, 5);
+  GaussianCloud a = TroubledCloud(9'001, 2), b = SplatOf(5'003, 1, 5);
   a.origin = {1000, 2000, 30};
   a.comments = {"credit: somebody"};
   b.comments = {"world up: 0 0 1"};
@@ -62,8 +62,8 @@ TEST(EditClouds, GivesTheBitsOfFiles) {
   const Words of_one = {{"--filter-nan", ""}, {"--rotate", "10,20,30"}, {"--filter-harmonics", "1"}};
   const Words of_other = {{"--translate", "-1000,-2000,30"}, {"--filter-floaters", ""}, {"--mirror", "x"}};
   const Words of_both = {{"--scale", "0.5"}, {"--filter-value", "f_rest_2,lt,0.2"}, {"--filter-value", "x,gt,-600"}};
-  EditJob job{.inputs = {{folder / "a.ply", Actions(of_one)}, {folder / "b.ply", Actions(of_other)}},
-              .actions = Actions(of_both)};
+  EditJob job{.inputs = {{folder / "a.ply", AlongLuf(of_one)}, {folder / "b.ply", AlongLuf(of_other)}},
+              .actions = AlongLuf(of_both)};
   const auto files = EditFiles(job, folder / "o.ply");
   ASSERT_TRUE(files.ok()) << files.error().message;
   const auto written = OpenedSplat::Open(folder / "o.ply")->Read();
@@ -71,7 +71,7 @@ TEST(EditClouds, GivesTheBitsOfFiles) {
   for (const int threads : {1, 3}) {
     const RunScope run({.threads = threads});
     const std::vector<CloudView> clouds = {a, b};
-    const std::vector<EditRun> runs = {{0, 1, Actions(of_one)}, {1, 1, Actions(of_other)}, {0, 2, Actions(of_both)}};
+    const std::vector<EditRun> runs = {{0, 1, AlongLuf(of_one)}, {1, 1, AlongLuf(of_other)}, {0, 2, AlongLuf(of_both)}};
     const auto edited = EditClouds(clouds, runs);
     ASSERT_TRUE(edited.ok()) << edited.error().message;
     ExpectSame(edited->cloud, *written);
@@ -89,10 +89,10 @@ TEST(EditClouds, GivesTheBitsOfFiles) {
 }
 
 TEST(EditClouds, WithoutRunsIsACopyAndOneOfNothingIsNothing) {
-  const GaussianCloud cloud = Splat(3'000, 3, 1);
+  const GaussianCloud cloud = SplatOf(3'000, 3, 1);
   const std::vector<CloudView> one = {cloud};
   ExpectSame(EditClouds(one, {})->cloud, cloud);
-  const std::vector<EditRun> runs = {{0, 1, Actions({{"--filter-sphere", "90,0,0,1"}, {"--translate", "1,2,3"}})}};
+  const std::vector<EditRun> runs = {{0, 1, AlongLuf({{"--filter-sphere", "90,0,0,1"}, {"--translate", "1,2,3"}})}};
   const auto nothing = EditClouds(one, runs);
   ASSERT_TRUE(nothing.ok());
   EXPECT_TRUE(nothing->cloud.empty());
@@ -100,9 +100,9 @@ TEST(EditClouds, WithoutRunsIsACopyAndOneOfNothingIsNothing) {
 }
 
 TEST(EditClouds, NamesTheCloudThatHasNotAProperty) {
-  const GaussianCloud cloud = Splat(10, 0, 1);
+  const GaussianCloud cloud = SplatOf(10, 0, 1);
   const std::vector<CloudView> one = {cloud}, two = {cloud, cloud};
-  const std::vector<EditRun> runs = {{0, 1, Actions({{"--filter-value", "label,gt,1"}})}};
+  const std::vector<EditRun> runs = {{0, 1, AlongLuf({{"--filter-value", "label,gt,1"}})}};
   EXPECT_THAT(EditClouds(one, runs).error().message,
               HasSubstr("the cloud: --filter-value label,gt,1: there is no property 'label'"));
   EXPECT_THAT(EditClouds(two, runs).error().message, HasSubstr("cloud 1: --filter-value"));

@@ -21,10 +21,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// What the objects of a benchmark are made from.
+enum class EvalRecipe { kNone, kReal };
+
 struct EvalFlags {
   std::string benchmark;
   std::string out;
-  std::vector<std::string> methods = {"raw", "upsample", "filter"};
+  EvalRecipe recipe = EvalRecipe::kNone;
+  std::vector<std::string> methods;  // empty: MethodsOf the recipe
+  std::optional<int64_t> fit_steps;
   Protocol protocol = Protocol::kHeldOut;
   MethodOptions method_options;
   std::string split;
@@ -36,6 +41,11 @@ struct EvalFlags {
   bool choose_f = false;
   bool plan = false;
 };
+
+std::vector<std::string> MethodsOf(EvalRecipe recipe) {
+  if (recipe == EvalRecipe::kReal) return {"raw", "upsample", "filter", "model", "auto", "good", "best"};
+  return {"raw", "upsample", "filter"};
+}
 
 Result<std::vector<EvalMethod>> MakeMethods(const EvalFlags& flags) {
   std::vector<EvalMethod> methods;
@@ -65,8 +75,10 @@ Result<double> ChooseStrength(const std::vector<MethodSummary>& summaries) {
   return TopOfParabola(strengths, psnr);
 }
 
-Status RunEval(const EvalFlags& flags, Program& program) {
+Status RunEval(EvalFlags flags, Program& program) {
   const DeviceUse device;
+  if (flags.methods.empty()) flags.methods = MethodsOf(flags.recipe);
+  flags.method_options.fit_steps = flags.fit_steps.value_or(flags.method_options.fit_steps);
   const SharedFlags& shared = program.flags;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<EvalMethod> methods, MakeMethods(flags));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Lpips> lpips, OpenLpips(flags.lpips, flags.lpips_weights));
@@ -77,9 +89,18 @@ Status RunEval(const EvalFlags& flags, Program& program) {
   options.kinds = flags.kinds;
   options.max_views = flags.max_views;
   options.lpips = lpips ? &*lpips : nullptr;
+  if (flags.recipe == EvalRecipe::kReal) {
+    if (!flags.split.empty())
+      return Error{ErrorCode::kBadArgument, "--split: captures have none; --objects names some"};
+    options.captures.emplace();
+    options.captures->steps = flags.fit_steps.value_or(options.captures->steps);
+  }
   options.seed = shared.seed;
   options.again = shared.overwrite;
   if (flags.plan) {
+    if (options.captures) {
+      return Error{ErrorCode::kBadArgument, "--plan: the methods of --recipe real share the fits that one run keeps"};
+    }
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<std::string> objects, ObjectsToEvaluate(flags.benchmark, options));
     nlohmann::json words = nlohmann::json::array();
     for (size_t k = 0; k < methods.size(); ++k) {
@@ -133,13 +154,16 @@ void AddEval(CLI::App& app, Program& program) {
                   "(-w measures it again)")
       ->required()
       ->check(NotEmpty());
+  AddChoice(
+      verb, "--recipe", flags->recipe, {{"none", EvalRecipe::kNone}, {"real", EvalRecipe::kReal}},
+      "real: the folder has captures, photographs with cameras; a splat is fitted to each at a quarter of its size");
   auto* methods =
       verb.add_option("--methods", flags->methods,
-                      "raw, filter, filter@F, filter-auto, filter-best, upsample, bicubic, checkpoints of networks, "
-                      "methods of enhance (refine@k=1@steps=400: with options; model-auto: without cameras); separated "
-                      "by commas")
-          ->delimiter(',')
-          ->capture_default_str();
+                      "raw, filter, filter@F, filter-auto, filter-best, upsample, bicubic, files of networks, also of "
+                      "those that enlarge pictures, auto, fast, good, best, methods of enhance (refine@k=1@steps=400: "
+                      "with options; model-auto: without cameras); separated by commas (default: raw,upsample,filter; "
+                      "with --recipe real also model,auto,good,best)")
+          ->delimiter(',');
   AddChoice(verb, "--protocol", flags->protocol, {{"heldout", Protocol::kHeldOut}, {"upstream", Protocol::kUpstream}},
             "heldout: views no fit has seen; upstream: as the published evaluation");
   auto* strength = verb.add_option("--filter-f", flags->method_options.filter_strength,
@@ -149,9 +173,9 @@ void AddEval(CLI::App& app, Program& program) {
                 "Measure the filter at several strengths and say which is best; for a validation split")
       ->excludes(methods)
       ->excludes(strength);
-  verb.add_option("--fit-steps", flags->method_options.fit_steps, "Of 'bicubic'")
-      ->check(CLI::Range(int64_t{1}, int64_t{1'000'000}))
-      ->capture_default_str();
+  verb.add_option("--fit-steps", flags->fit_steps,
+                  "Of 'bicubic' (default: 15000) and of the fits of --recipe real (default: 1000)")
+      ->check(CLI::Range(int64_t{1}, int64_t{1'000'000}));
   verb.add_option("--split", flags->split, "Only the objects of this split of the data set: train, validation or test");
   verb.add_option("--objects", flags->objects, "Only these, by name; separated by commas")->delimiter(',');
   verb.add_option(

@@ -91,6 +91,30 @@ TEST_F(EvalVerb, OneBadObjectDoesNotStopTheOthers) {
   EXPECT_EQ(run.json()["failures"].size(), 1u);
 }
 
+// A capture beside an object that has its splat; what is there is not measured again, and a method added later is.
+TEST_F(EvalVerb, RealCaptures) {
+  const fs::path captures = folder_ / "captures";
+  WriteProject(captures / "ball");
+  fs::copy(Biplane(), captures / "biplane", fs::copy_options::recursive);
+  const auto eval = [&](const std::string& methods) {
+    return std::vector<std::string>{"eval",        captures, "-o",        folder_ / "out", "--recipe",    "real",
+                                    "--fit-steps", "2",      "--methods", methods,         "--max-views", "1"};
+  };
+  const nlohmann::json json = ExpectJson(eval("raw,upsample"));
+  EXPECT_EQ(json["objects"], nlohmann::json({"ball", "biplane"}));
+  EXPECT_EQ(json["results"].size(), 4u);
+  EXPECT_TRUE(fs::exists(folder_ / "out/objects/ball/fit/splat.ply"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/objects/biplane/fit"));
+  EXPECT_EQ(ExpectJson(eval("raw,filter,upsample"))["resumed"], 4);
+  EXPECT_THAT(ExpectDone(eval("raw,filter,upsample")).out, HasSubstr("Seconds of a method per object"));
+  std::vector<std::string> plan = eval("raw");
+  plan.emplace_back("--plan");
+  ExpectRefused(plan, ErrorCode::kBadArgument, {"--recipe real"});
+  std::vector<std::string> split = eval("raw");
+  split.insert(split.end(), {"--split", "test"});
+  ExpectRefused(split, ErrorCode::kBadArgument, {"--split"});
+}
+
 TEST_F(EvalVerb, RefusesWhatMakesNoSense) {
   ExpectRefused(Eval({"--methods", "magic"}), ErrorCode::kBadArgument, {"filter-auto"});
   ExpectRefused(Eval({"--methods", "none.safetensors"}), ErrorCode::kNotFound, {"none.safetensors"});

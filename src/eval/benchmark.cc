@@ -38,8 +38,6 @@ std::vector<fs::path> Entries(const fs::path& folder) {
   return entries;
 }
 
-bool HasExampleLayout(const fs::path& folder) { return IsFile(folder / kHighTransforms); }
-
 // By the names of pictures, extension included, as data sets have them.
 void SortByName(std::vector<Camera>& cameras) {
   const auto key = [](const Camera& camera) { return camera.name + (camera.image.extension().string()); };
@@ -71,7 +69,10 @@ Status ReadScene(const BenchmarkEntry& entry, BenchmarkObject& object) {
   object.low_project = scene->fitted_project();
   object.hold_out = scene->record() ? scene->record()->settings.hold_out : kHeldOutEvery;
   if (const fs::path mesh = entry.folder / kMeshName; IsFile(mesh)) object.mesh = mesh;
-  object.picture = [scene](size_t view) { return scene->HighPicture(view); };
+  object.picture = [scene](size_t view) -> Result<ViewPicture> {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, scene->HighPicture(view));
+    return ViewPicture{std::move(image), {}};
+  };
   return {};
 }
 
@@ -95,10 +96,7 @@ Status ReadExample(const fs::path& folder, BenchmarkObject& object) {
     if (!trained.contains(label(camera))) object.held_out.push_back(i);
   }
   object.views = std::move(high.cameras);
-  object.picture = [views = object.views](size_t view) -> Result<Image> {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(ViewPicture picture, ReadPhotograph(views.at(view)));
-    return std::move(picture.image);
-  };
+  object.picture = [views = object.views](size_t view) { return ReadPhotograph(views.at(view)); };
   return {};
 }
 
@@ -118,25 +116,28 @@ Status CheckObject(const fs::path& folder, const BenchmarkObject& object) {
 
 }  // namespace
 
+bool HasExampleLayout(const fs::path& folder) { return IsFile(folder / kHighTransforms); }
+
 double BenchmarkObject::upscale() const {
-  return static_cast<double>(views[0].intrinsics.width) / low_cameras.cameras[0].intrinsics.width;
+  return static_cast<double>(views[0].intrinsics.width) / LowCamera(0).intrinsics.width;
 }
 
 Camera BenchmarkObject::LowCamera(size_t view) const {
   Camera camera = views[view];
-  camera.intrinsics = low_cameras.cameras[0].intrinsics;
+  camera.intrinsics = low_intrinsics.empty() ? low_cameras.cameras[0].intrinsics : low_intrinsics[view];
   return camera;
 }
 
-Result<Image> BenchmarkObject::Truth(size_t view) const {
+Result<ViewPicture> BenchmarkObject::Truth(size_t view) const {
   const Camera& camera = views[view];
-  ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, picture(view));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(ViewPicture truth, picture(view));
+  Image& image = truth.image;
   if (image.width != camera.intrinsics.width || image.height != camera.intrinsics.height) {
     return Bad(Cat(camera.image.string(), ": ", image.width, " x ", image.height, " pixels, the camera has ",
                    camera.intrinsics.width, " x ", camera.intrinsics.height));
   }
-  if (image.channels == 4) return CompositeOver(image, background);
-  return image;
+  if (image.channels == 4) image = CompositeOver(image, background);
+  return truth;
 }
 
 Result<std::vector<BenchmarkEntry>> ListBenchmark(const fs::path& folder, const std::string& split) {

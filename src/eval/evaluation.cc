@@ -5,6 +5,7 @@
 #include <chrono>
 #include <new>
 #include <set>
+#include <span>
 #include <utility>
 
 #include "core/credit.h"
@@ -12,6 +13,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "eval/object_state.h"
+#include "fit/picture_cache.h"
 #include "images/image_io.h"
 #include "metrics/image_metrics.h"
 #include "metrics/side_by_side.h"
@@ -52,12 +54,14 @@ struct Excerpt {
   ViewRegion region;
 };
 
-Result<Excerpt> ChooseExcerpt(const BenchmarkObject& object, const std::vector<size_t>& views, Protocol protocol) {
+Result<Excerpt> ChooseExcerpt(const BenchmarkObject& object, std::span<const size_t> views, Protocol protocol) {
   Excerpt excerpt;
   excerpt.view = views[views.size() / 2];
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Image truth, object.Truth(excerpt.view));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewPicture picture, object.Truth(excerpt.view));
+  const Image& truth = picture.image;
   ANCHORSPLAT_ASSIGN_OR_RETURN(Image low, SplatViews(object, object.low).render(excerpt.view));
   TreatRender(protocol, low);
+  FillIgnored(picture.ignored, truth, low);
   const int side = std::max(1, static_cast<int>(kCrop * std::min(truth.width, truth.height)));
   excerpt.region = MostDifferentRegion(low, truth, side, side);
   return excerpt;
@@ -76,15 +80,16 @@ struct Pending {
 Status MeasureView(const BenchmarkObject& object, size_t view, const std::optional<Excerpt>& excerpt,
                    const fs::path& folder, const EvaluationOptions& options, std::vector<Pending>& pending,
                    EvaluationTimes& times) {
-  Result<Image> truth = [&] {
+  const Result<ViewPicture> picture = [&] {
     const Timed timed(times.truth);
     return object.Truth(view);
   }();
-  if (!truth.ok()) return truth.error();
+  if (!picture.ok()) return picture.error();
+  const Image& truth = picture->image;
   const bool shown = excerpt && excerpt->view == view;
   if (shown) {
     ANCHORSPLAT_RETURN_IF_ERROR(
-        WritePng(folder / Cat(kTruthStem, ".png"), Crop(*truth, excerpt->region.box()), {.overwrite = true}));
+        WritePng(folder / Cat(kTruthStem, ".png"), Crop(truth, excerpt->region.box()), {.overwrite = true}));
   }
   for (Pending& p : pending) {
     if (p.failure) continue;
@@ -101,12 +106,15 @@ Status MeasureView(const BenchmarkObject& object, size_t view, const std::option
       {
         const Timed timed(times.metrics);
         TreatRender(options.protocol, *image);
-        ANCHORSPLAT_ASSIGN_OR_RETURN(score.psnr, Psnr(*image, *truth));
-        ANCHORSPLAT_ASSIGN_OR_RETURN(score.ssim, Ssim(*image, *truth));
+        FillIgnored(picture->ignored, truth, *image);
+        ANCHORSPLAT_ASSIGN_OR_RETURN(const MaskedQuality quality, MeasureMasked(*image, truth, picture->ignored));
+        score.psnr = quality.psnr;
+        score.ssim = quality.ssim;
+        if (quality.counted == 0) return {};  // the mask leaves nothing of it
       }
       if (options.lpips != nullptr) {
         const Timed timed(times.lpips);
-        ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, options.lpips->Distance(*image, *truth));
+        ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, options.lpips->Distance(*image, truth));
       }
       ++times.pictures;
       p.result.views.push_back(std::move(score));
@@ -119,66 +127,93 @@ Status MeasureView(const BenchmarkObject& object, size_t view, const std::option
   return {};
 }
 
-// All that is still to be measured on one object. An error is one of the object itself.
-Status EvaluateObject(const BenchmarkEntry& entry, const std::string& place, const std::vector<EvalMethod>& methods,
-                      const fs::path& out, const EvaluationOptions& options, Evaluation& evaluation) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const BenchmarkObject object, OpenObject(entry));
-  evaluation.credits.back() = CreditsOf(object.low.comments);
-  const std::vector<size_t> views =
-      Thinned(options.protocol == Protocol::kUpstream ? UpstreamViews(object.views.size()) : object.held_out,
-              options.max_views);
-  if (views.empty()) return Error{ErrorCode::kBadFile, "every high-resolution view was trained on: none is held out"};
-  const fs::path folder = ObjectFolder(out, entry.name);
-  std::error_code code;
-  fs::create_directories(folder, code);
-  if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": ", code.message())};
-
-  std::vector<MethodResult> done;
-  std::vector<Pending> pending;
-  for (const EvalMethod& method : methods) {
-    Pending p;
-    p.method = &method;
-    p.key = Key(object, method, views, options);
-    std::optional<MethodResult> known;
-    const bool shown = Exists(folder / (FileStem(method.name) + ".png")) && Exists(folder / Cat(kTruthStem, ".png"));
-    if (!options.again && shown) known = ReadMethodResult(folder / (FileStem(method.name) + ".json"), p.key);
-    if (known) {
-      ++evaluation.resumed;
-      done.push_back(*std::move(known));
-      continue;
-    }
-    auto prepared = method.prepare({object, views, options.protocol, folder / FileStem(method.name), options.seed});
-    if (!prepared.ok()) {
-      p.failure = prepared.error().message;
-    } else {
-      p.views = *std::move(prepared);
-      p.result.object = entry.name;
-      p.result.method = method.name;
-      p.result.seconds = p.views.seconds;
-      p.result.gaussians = p.views.gaussians;
-      p.result.facts = {p.views.facts.begin(), p.views.facts.end()};
-    }
-    pending.push_back(std::move(p));
+// What a method makes of the object, to be measured.
+Pending Prepare(const EvalMethod& method, const MethodTask& task, std::string key) {
+  Pending p;
+  p.method = &method;
+  p.key = std::move(key);
+  auto prepared = method.prepare(task);
+  if (!prepared.ok()) {
+    p.failure = prepared.error().message;
+    return p;
   }
+  p.views = *std::move(prepared);
+  p.result.object = task.object.name;
+  p.result.method = method.name;
+  p.result.seconds = p.views.seconds;
+  p.result.gaussians = p.views.gaussians;
+  p.result.facts = {p.views.facts.begin(), p.views.facts.end()};
+  return p;
+}
 
+// Measures those that are prepared, all on one view after the other, and keeps their results. An error is one of the
+// object itself.
+Status MeasureAndKeep(const MethodTask& task, const std::string& place, const fs::path& folder,
+                      const EvaluationOptions& options, std::vector<Pending> pending, std::vector<MethodResult>& done,
+                      Evaluation& evaluation) {
   Status measured;
   if (std::any_of(pending.begin(), pending.end(), [](const Pending& p) { return !p.failure; })) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const Excerpt excerpt, ChooseExcerpt(object, views, options.protocol));
-    Progress progress(place, static_cast<int64_t>(views.size()));
-    for (const size_t view : views) {
-      measured = MeasureView(object, view, excerpt, folder, options, pending, evaluation.times);
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const Excerpt excerpt, ChooseExcerpt(task.object, task.views, options.protocol));
+    Progress progress(place, std::ssize(task.views));
+    for (const size_t view : task.views) {
+      measured = MeasureView(task.object, view, excerpt, folder, options, pending, evaluation.times);
       if (!measured.ok()) break;
       progress.Advance();
     }
   }
   // Results that are known stay so when the truth of a view turns out to be broken.
   for (Pending& p : pending) {
-    if (!p.failure && measured.ok()) {
+    if (!p.failure && measured.ok() && p.result.views.empty()) p.failure = "the masks leave nothing of any view";
+    if (p.failure) {
+      evaluation.failures.push_back({task.object.name, p.method->name, *p.failure});
+    } else if (measured.ok()) {
       ANCHORSPLAT_RETURN_IF_ERROR(WriteMethodResult(folder / (FileStem(p.method->name) + ".json"), p.key, p.result));
       done.push_back(std::move(p.result));
-    } else if (p.failure) {
-      evaluation.failures.push_back({entry.name, p.method->name, *p.failure});
     }
+  }
+  return measured;
+}
+
+// All that is still to be measured on one object. An error is one of the object itself.
+Status EvaluateObject(const BenchmarkEntry& entry, const std::string& place, const std::vector<EvalMethod>& methods,
+                      const fs::path& out, const EvaluationOptions& options, Evaluation& evaluation) {
+  const fs::path folder = ObjectFolder(out, entry.name);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(
+      const BenchmarkObject object,
+      entry.is_capture ? OpenCapture(entry, *options.captures, options.seed, folder / "fit") : OpenObject(entry));
+  evaluation.credits.back() = CreditsOf(object.low.comments);
+  const std::vector<size_t> views =
+      Thinned(options.protocol == Protocol::kUpstream ? UpstreamViews(object.views.size()) : object.held_out,
+              options.max_views);
+  if (views.empty()) return Error{ErrorCode::kBadFile, "every high-resolution view was trained on: none is held out"};
+  std::error_code code;
+  fs::create_directories(folder, code);
+  if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": ", code.message())};
+
+  std::vector<MethodResult> done;
+  std::vector<Pending> pending;
+  Status measured;
+  for (const EvalMethod& method : methods) {
+    std::string key = Key(object, method, views, options);
+    std::optional<MethodResult> known;
+    const bool shown = Exists(folder / (FileStem(method.name) + ".png")) && Exists(folder / Cat(kTruthStem, ".png"));
+    if (!options.again && shown) known = ReadMethodResult(folder / (FileStem(method.name) + ".json"), key);
+    if (known) {
+      ++evaluation.resumed;
+      done.push_back(*std::move(known));
+      continue;
+    }
+    const MethodTask task{object, views, options.protocol, folder / FileStem(method.name), options.seed};
+    pending.push_back(Prepare(method, task, std::move(key)));
+    if (!options.captures) continue;
+    measured =
+        MeasureAndKeep(task, Cat(place, ", ", method.name), folder, options, std::move(pending), done, evaluation);
+    pending.clear();
+    if (!measured.ok()) break;
+  }
+  if (measured.ok()) {
+    const MethodTask task{object, views, options.protocol, {}, options.seed};
+    measured = MeasureAndKeep(task, place, folder, options, std::move(pending), done, evaluation);
   }
   for (const EvalMethod& method : methods) {
     for (MethodResult& result : done) {
@@ -245,7 +280,8 @@ Result<std::vector<BenchmarkEntry>> ChooseObjects(std::vector<BenchmarkEntry> en
 }
 
 Result<std::vector<BenchmarkEntry>> ChooseEntries(const fs::path& benchmark, const EvaluationOptions& options) {
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<BenchmarkEntry> all, ListBenchmark(benchmark, options.split));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<BenchmarkEntry> all,
+                               options.captures ? ListCaptures(benchmark) : ListBenchmark(benchmark, options.split));
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::vector<BenchmarkEntry> entries, ChooseKinds(all, options.kinds));
   return ChooseObjects(std::move(entries), all, options);
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/result.h"
+#include "eval/capture.h"
 #include "eval/method.h"
 #include "eval/method_result.h"
 #include "perceptual/lpips.h"
@@ -18,6 +19,9 @@ struct EvaluationOptions {
   std::string split = {};                 // of the data set; empty: all objects
   std::vector<std::string> objects = {};  // names; empty: all
   std::vector<std::string> kinds = {};    // of objects (BenchmarkEntry::kind); empty: all
+  // The benchmark is a folder of captures, of which this makes objects; each method's result is kept as soon as it is
+  // measured, not all of an object at once.
+  std::optional<CaptureRecipe> captures = std::nullopt;
   size_t max_views = 0;  // per object, evenly spread over the protocol's; 0: all, which the protocol means
   const Lpips* lpips = nullptr;
   uint64_t seed = 0;
@@ -56,7 +60,7 @@ struct Evaluation {
 // Measures `methods` on the objects of `benchmark`. In `out` each result becomes out/objects/OBJECT/METHOD.json as soon
 // as the object is done, beside METHOD.png and truth.png: the same part of the same view, where the low-quality splat
 // is farthest from the truth. Results that are there, and were made from the same splat in the same way, are not made
-// again.
+// again. Fits of captures lie in out/objects/OBJECT/fit/.
 //
 // An object or method that fails is listed in `failures` and does not stop the others. Errors: kNotFound, kBadArgument
 // (no objects, names or kinds that are not there, two methods of one name), kIo (`out` cannot be written).

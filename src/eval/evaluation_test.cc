@@ -130,7 +130,7 @@ TEST(Benchmark, ReadsThePublishedLayout) {
   Rasterizer rasterizer;
   RenderOutput output;
   ASSERT_TRUE(rasterizer.Render(Ball(), object->views[5], {}, output).ok());
-  const Image truth = *object->Truth(5);
+  const Image truth = object->Truth(5)->image;
   for (size_t i = 0; i < truth.pixels.size(); ++i) {
     ASSERT_NEAR(std::min(1.0f, output.color.pixels[i]), truth.pixels[i], 0.003);
   }

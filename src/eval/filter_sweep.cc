@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "enhance/filter.h"
+#include "fit/picture_cache.h"
 #include "metrics/image_metrics.h"
 
 namespace anchorsplat {
@@ -18,7 +19,7 @@ constexpr size_t kMostViews = 20;
 std::span<const double> FilterStrengths() { return kStrengths; }
 
 Result<CameraPixelSizes> TruePixelSizes(const BenchmarkObject& object) {
-  return PixelSizesFromCameras(object.low, object.low_cameras, std::nullopt, CameraPixelRule::kMedian);
+  return PixelSizesFromCameras(object.low, object.low_cameras, std::nullopt, object.camera_rule);
 }
 
 double TopOfParabola(std::span<const double> x, std::span<const double> y) {
@@ -43,12 +44,13 @@ Result<double> BestFilterStrength(const MethodTask& task) {
   }
   std::vector<double> psnr(candidates.size());
   for (const size_t view : Thinned({task.views.begin(), task.views.end()}, kMostViews)) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const Image truth, object.Truth(view));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const ViewPicture truth, object.Truth(view));
     for (size_t k = 0; k < candidates.size(); ++k) {
       ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, candidates[k].render(view));
       TreatRender(task.protocol, image);
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const double value, Psnr(image, truth));
-      psnr[k] += value;
+      FillIgnored(truth.ignored, truth.image, image);
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const MaskedQuality quality, MeasureMasked(image, truth.image, truth.ignored));
+      psnr[k] += quality.psnr;
     }
   }
   return TopOfParabola(kStrengths, psnr);

@@ -25,6 +25,9 @@
 #include "reading/reading_model.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
+#include "tensors/tensor_file.h"
+#include "upscale/enlarge_picture.h"
+#include "upscale/upscaler.h"
 
 namespace anchorsplat {
 
@@ -69,22 +72,29 @@ EvalMethod FilterBest() {
           }};
 }
 
-EvalMethod Upsample() {
-  return {"upsample", "", [](const MethodTask& task) -> Result<MethodViews> {
+// What the splat shows at the low resolution, enlarged to the camera's size.
+using Enlarger = std::function<Result<Image>(const Image&, const Pinhole& high)>;
+
+EvalMethod Enlarged(const std::string& name, const std::string& settings, const Enlarger& enlarge) {
+  return {name, settings, [enlarge](const MethodTask& task) -> Result<MethodViews> {
             const BenchmarkObject& object = task.object;
             const auto rasterizer = std::make_shared<Rasterizer>();
             MethodViews views;
-            views.render = [&object, rasterizer](size_t view) -> Result<Image> {
+            views.render = [&object, rasterizer, enlarge](size_t view) -> Result<Image> {
               RenderOptions options = OptionsFor(object.low);
               options.background = object.background;
               RenderOutput output;
               ANCHORSPLAT_RETURN_IF_ERROR(rasterizer->Render(object.low, object.LowCamera(view), options, output));
               Clamp01(output.color);
-              const Pinhole& high = object.views[view].intrinsics;
-              return EnlargeBicubic(output.color, high.width, high.height);
+              return enlarge(output.color, object.views[view].intrinsics);
             };
             return views;
           }};
+}
+
+EvalMethod Upsample() {
+  return Enlarged("upsample", "",
+                  [](const Image& low, const Pinhole& high) { return EnlargeBicubic(low, high.width, high.height); });
 }
 
 EvalMethod Bicubic(int64_t steps) {
@@ -103,6 +113,28 @@ Result<std::string> Identity(const fs::path& path) {
   const auto size = fs::file_size(path, code);
   if (code) return Error{ErrorCode::kNotFound, Cat(path.string(), ": there is no such file")};
   return Cat(path.string(), " ", size, " ", fs::last_write_time(path, code).time_since_epoch().count());
+}
+
+// Enlarged by a network that has seen pictures.
+Result<EvalMethod> Upscaled(const fs::path& file) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::string identity, Identity(file));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Upscaler read, Upscaler::Read(file));
+  const auto upscaler = std::make_shared<Upscaler>(std::move(read));
+  return Enlarged(file.stem().string(), identity, [upscaler](const Image& low, const Pinhole& high) -> Result<Image> {
+    const int factor = high.width / low.width;
+    if (factor * low.width != high.width || factor * low.height != high.height) {
+      return Error{ErrorCode::kBadArgument, Cat("an upscaler makes whole pixels of each: ", low.width, " x ",
+                                                low.height, " do not become ", high.width, " x ", high.height)};
+    }
+    return EnlargePicture(*upscaler, low, {.factor = factor});
+  });
+}
+
+bool IsUpscaler(const fs::path& file) {
+  const auto opened = TensorFile::Open(file);
+  if (!opened.ok()) return false;
+  const auto format = opened->metadata().find("format");
+  return format != opened->metadata().end() && format->second == kUpscalerFormat;
 }
 
 // What becomes of a network's copies.
@@ -149,6 +181,7 @@ Result<EvalMethod> Model(const fs::path& file) {
 
 // The low-resolution cameras without those of views that the fit did not see.
 CameraSet TrainingCameras(const BenchmarkObject& object) {
+  if (!object.low_intrinsics.empty()) return object.low_cameras;  // a capture's
   const auto label = [](const Camera& camera) { return fs::path(camera.name).filename(); };
   std::set<fs::path> held_out;
   for (const size_t view : object.held_out) held_out.insert(label(object.views[view]));
@@ -163,18 +196,23 @@ struct NamedMethod {
   std::string word;  // as the user wrote it
   std::string name;
   const std::vector<EnhanceMethod>* methods = nullptr;  // of which it is one
+  bool by_default = false;                              // the program chooses, which so comes to `name`
+  std::string quality;                                  // asked of it; empty where it is asked for nothing
   bool auto_pixel_size =
       false;  // NAME-auto: it gets no cameras, p_LR is read off the splat, as for a user who has the splat alone
   RefineOptions refine;
   ModelSettings model;
   std::optional<double> filter_strength;
 
+  bool TakesPictures() const { return quality == "best" || name.ends_with("refine-images"); }
+
   // What it depends on besides the object; nothing of it for other methods than refinement.
   std::string Settings() const {
     RefineOptions with_pictures = refine;
-    if (name.ends_with("refine-images")) with_pictures.images = "the object's";
+    if (TakesPictures()) with_pictures.images = "the object's";
     const bool refines = name.find("refine") != std::string::npos;
-    std::string settings = refines ? Cat(ToJsonText(with_pictures), " revision ", kRefineRevision) : "";
+    std::string settings = by_default ? Cat(name, " ") : "";
+    settings += refines ? Cat(ToJsonText(with_pictures), " revision ", kRefineRevision) : "";
     if (refine.seconds) settings += Cat(" ", *refine.seconds, " s");
     if (filter_strength) settings += Cat(" f ", *filter_strength);
     settings += Cat(" reading ", ReadingModel::ShippedIdentity(), " ");  // which may leave a splat alone
@@ -320,18 +358,20 @@ EvalMethod Named(const NamedMethod& method) {
             options.methods = method.methods;
             options.method = method.name;
             // As for a user who has nothing else: where the program takes this method by itself, it may also leave it.
-            if (method.auto_pixel_size && ChosenByItself(method)) options.method = "auto";
+            if (method.by_default || (method.auto_pixel_size && ChosenByItself(method))) options.method = "auto";
+            options.quality = method.quality;
             options.upscale = task.object.upscale();
             if (!method.auto_pixel_size) options.cameras = TrainingCameras(task.object);
             options.refine = method.refine;
             options.model = method.model;
             options.max_gaussians = method.refine.max_gaussians;
             options.filter_strength = method.filter_strength;
-            if (method.name.ends_with("refine-images")) {
+            if (method.TakesPictures()) {
               options.refine.images = task.object.low_project;
               options.refine.hold_out = task.object.hold_out;
+              options.refine.downscale = task.object.downscale;
             }
-            options.camera_rule = CameraPixelRule::kMedian;
+            options.camera_rule = task.object.camera_rule;
             options.seed = task.seed;
             const double begin = ProcessorSeconds();
             ANCHORSPLAT_ASSIGN_OR_RETURN(Enhanced enhanced, Enhance(task.object.low, options));
@@ -352,6 +392,23 @@ EvalMethod Named(const NamedMethod& method) {
             }
             return views;
           }};
+}
+
+// The word for what a user gets who names no method, or a quality; nothing for others.
+Result<std::optional<NamedMethod>> ParseDefault(const std::string& word, const std::vector<EnhanceMethod>& methods) {
+  if (word != "auto" && word != "fast" && word != "good" && word != "best") return std::optional<NamedMethod>();
+  NamedMethod method;
+  method.word = word;
+  method.methods = &methods;
+  method.by_default = true;
+  if (word != "auto") method.quality = word;
+  EnhanceOptions options;
+  options.methods = &methods;
+  options.quality = method.quality;
+  if (method.TakesPictures()) options.refine.images = "the object's";
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const MethodPlan plan, PlanEnhancement(options));
+  method.name = plan.Name();
+  return std::optional<NamedMethod>(std::move(method));
 }
 
 }  // namespace
@@ -396,14 +453,18 @@ Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& 
     return Filter(word, f);
   }
   const std::string extension = fs::path(word).extension().string();
+  if (extension == ".safetensors" && IsUpscaler(word)) return Upscaled(word);
   if (extension == ".safetensors" || extension == ".pth" || extension == ".pt") return Model(word);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(
-      const std::optional<NamedMethod> method,
-      ParseNamed(word, options.enhance_methods == nullptr ? AllMethods() : *options.enhance_methods));
+  const std::vector<EnhanceMethod>& methods =
+      options.enhance_methods == nullptr ? AllMethods() : *options.enhance_methods;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::optional<NamedMethod> method, ParseDefault(word, methods));
+  if (!method) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(method, ParseNamed(word, methods));
+  }
   if (method) return Named(*method);
   return Error{ErrorCode::kBadArgument, Cat("--methods: '", Printable(word),
                                             "' is none of raw, filter, filter@F, filter-auto, filter-best, upsample, "
-                                            "bicubic, a checkpoint of a network or "
+                                            "bicubic, a network's file, auto, fast, good, best or "
                                             "a method of enhance, NAME or NAME-auto")};
 }
 

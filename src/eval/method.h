@@ -57,7 +57,10 @@ struct MethodOptions {
 //   filter-best   the f that measures best on this very object (fact "f"): not a method, the most a filter could do
 //   upsample      the low-resolution picture enlarged by cubic convolution, no 3-D at all
 //   bicubic       a splat fitted anew to the enlarged low-resolution pictures (eval/bicubic_fit.h): minutes per object
-//   FILE          the network of a file of weights, .safetensors or .pth, of either kind (model/any_network.h)
+//   FILE          the network of a file of weights, .safetensors or .pth, of either kind (model/any_network.h); of an
+//                 upscaler (upscale/upscaler.h) as `upsample`, but enlarged by that
+//   auto          what the program does with the training cameras when nobody names a method
+//   fast, good, best   what it does for that quality; best sees the training pictures
 //   NAME          another method of `enhance_methods`, given the training cameras: "model" for example
 //                 is the network that is part of the program. NAME+NAME: the second begins where the first ended.
 //                 NAME-auto gets no cameras, the pixel size is read off the splat (fact "pixel_size_ratio").

@@ -33,16 +33,26 @@ void AddCamera(std::string& state, const Camera& camera) {
   add(camera.world_to_camera.translation);
 }
 
+void AddCameras(std::string& state, std::span<const Camera> cameras) {
+  for (const Camera& camera : cameras) {
+    AddCamera(state, camera);
+    if (!camera.image.empty()) AddFile(state, camera.image);
+  }
+}
+
 }  // namespace
+
+std::string CamerasState(std::span<const Camera> cameras) {
+  std::string state;
+  AddCameras(state, cameras);
+  return Cat(StableHash(state));
+}
 
 std::string ObjectState(const BenchmarkObject& object, const std::vector<size_t>& views) {
   std::string state;
   AddFile(state, object.splat);
   if (!object.mesh.empty()) AddFile(state, object.mesh);
-  for (const Camera& camera : object.low_cameras.cameras) {
-    AddCamera(state, camera);
-    if (!camera.image.empty()) AddFile(state, camera.image);
-  }
+  AddCameras(state, object.low_cameras.cameras);
   // Those of a fit that saw other pictures and poses: methods may read them.
   if (const fs::path poses = object.low_project / "sparse" / "0" / "images.bin";
       object.low_project.filename() == kCapturedName) {
@@ -51,10 +61,7 @@ std::string ObjectState(const BenchmarkObject& object, const std::vector<size_t>
       AddFile(state, object.low_project / "images" / camera.image.filename());
     }
   }
-  for (const size_t view : views) {
-    AddCamera(state, object.views[view]);
-    if (!object.views[view].image.empty()) AddFile(state, object.views[view].image);
-  }
+  for (const size_t view : views) AddCameras(state, {&object.views[view], 1});
   return Cat(object.splat.filename().string(), " ", StableHash(state));
 }
 

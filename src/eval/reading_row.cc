@@ -224,7 +224,9 @@ Result<const ReadingRows::Object*> ReadingRows::Open(const ReadingTask& task) {
     for (const size_t i : task.measure ? Thinned(opened.held_out, most) : std::vector<size_t>()) {
       Object::View& view = object->views.emplace_back();
       view.camera = opened.views[i];
-      ANCHORSPLAT_ASSIGN_OR_RETURN(view.truth, opened.Truth(i));
+      ANCHORSPLAT_ASSIGN_OR_RETURN(ViewPicture truth, opened.Truth(i));
+      view.truth = std::move(truth.image);
+      view.ignored = std::move(truth.ignored);
     }
   }
   if (task.measure && object->views.empty())

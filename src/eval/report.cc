@@ -116,6 +116,7 @@ void AddKindTable(const Evaluation& evaluation, const std::vector<KindSummary>& 
 }
 
 void AddObjectTable(const Evaluation& evaluation, const std::vector<MethodSummary>& summaries, std::string& text) {
+  text += Cat("\nPSNR / SSIM", evaluation.lpips ? " / LPIPS" : "", " per object:\n\n");
   const bool sizes = SummarisePixelSizes(evaluation).has_value();
   std::vector<std::string> heading = {"object"};
   for (const MethodSummary& s : summaries) heading.push_back(Cell(s.method));
@@ -126,13 +127,36 @@ void AddObjectTable(const Evaluation& evaluation, const std::vector<MethodSummar
     std::string ratio;
     for (const MethodSummary& s : summaries) {
       const MethodResult* result = evaluation.Find(object, s.method);
-      row.push_back(result == nullptr ? "failed"
-                                      : Cat(Fixed(result->MeanPsnr(), 2), " / ", Fixed(result->MeanSsim(), 4)));
-      if (result != nullptr && result->facts.contains("pixel_size_ratio")) {
+      if (result == nullptr) {
+        row.emplace_back("failed");
+        continue;
+      }
+      const auto lpips = result->MeanLpips();
+      row.push_back(Cat(Fixed(result->MeanPsnr(), 2), " / ", Fixed(result->MeanSsim(), 4),
+                        lpips ? Cat(" / ", Fixed(*lpips, 3)) : ""));
+      if (result->facts.contains("pixel_size_ratio")) {
         ratio = Fixed(NumberOf(result->facts.at("pixel_size_ratio")), 2);
       }
     }
     if (sizes) row.push_back(ratio);
+    text += Row(row);
+  }
+}
+
+// Of the methods that take any.
+void AddSecondsTable(const Evaluation& evaluation, std::vector<MethodSummary> summaries, std::string& text) {
+  std::erase_if(summaries, [](const MethodSummary& s) { return s.seconds <= 0; });
+  if (summaries.empty()) return;
+  text += "\nSeconds of a method per object:\n\n";
+  std::vector<std::string> heading = {"object"};
+  for (const MethodSummary& s : summaries) heading.push_back(Cell(s.method));
+  text += Row(heading) + Rule(heading.size());
+  for (const std::string& object : evaluation.objects) {
+    std::vector<std::string> row = {Cell(object)};
+    for (const MethodSummary& s : summaries) {
+      const MethodResult* result = evaluation.Find(object, s.method);
+      row.push_back(result == nullptr ? "failed" : Fixed(result->seconds, result->seconds < 10 ? 1 : 0));
+    }
     text += Row(row);
   }
 }
@@ -219,8 +243,8 @@ std::string ToMarkdown(const Evaluation& evaluation, const std::vector<MethodSum
     text += Cat("\nPixel size read off the splat alone (`filter-auto`): off by ", Fixed(100 * error->median, 1),
                 " % in the median, ", Fixed(100 * error->percentile95, 1), " % at the 95th percentile.\n");
   }
-  text += "\nPSNR / SSIM per object:\n\n";
   AddObjectTable(evaluation, summaries, text);
+  AddSecondsTable(evaluation, summaries, text);
   if (!evaluation.failures.empty()) {
     text += "\nNot measured:\n\n";
     for (const EvaluationFailure& failure : evaluation.failures) {

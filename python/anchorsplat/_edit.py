@@ -112,6 +112,10 @@ class Edits(Generic[_Made]):
             return self._edited("--filter-box", _box(box), axes)
         return self._edited("--filter-sphere", _numbers("sphere", sphere, "x, y, z, radius", 4), axes)
 
+    def remove_box(self, box: Sequence[float | None] | Sequence[Sequence[float]], *, axes: str | None = None) -> _Made:
+        """Drops what lies in a box, which is said as for :meth:`crop`."""
+        return self._edited("--remove-box", _box(box), axes)
+
     def filter_nan(self) -> _Made:
         """Drops Gaussians with a value that is no number or infinite, or a quaternion of zero."""
         return self._edited("--filter-nan", "", None)

@@ -21,6 +21,7 @@ def test_each_edit_is_the_command_lines(cloud, program, tmp_path):
         "--up=0.1,0.2,0.3": cloud.turn_up((0.1, 0.2, 0.3)),
         "--origin=0.5,0,0": cloud.move_origin([0.5, 0, 0]),
         "--filter-box=-0.2,-,-,0.3,0.5,-": cloud.crop(box=(-0.2, None, -np.inf, 0.3, 0.5, np.inf)),
+        "--remove-box=-0.2,-,-,0.3,0.5,-": cloud.remove_box((-0.2, None, -np.inf, 0.3, 0.5, np.inf)),
         "--filter-sphere=0,0.1,0,0.5": cloud.crop(sphere=(0, 0.1, 0, 0.5)),
         "--filter-nan": cloud.filter_nan(),
         "--filter-value=opacity,gt,0.5": cloud.filter_value("opacity", "gt", 0.5),

@@ -31,6 +31,7 @@ METHODS = {
     "up": "turn_up",
     "origin": "move_origin",
     "filter-box": "crop",
+    "remove-box": "remove_box",
     "filter-sphere": "crop",
     "filter-nan": "filter_nan",
     "filter-value": "filter_value",
@@ -42,6 +43,8 @@ EDITS = {
     "action-axes": "axes of edit",
     "dry-run": "nothing is written",
 }
+#: `view` takes edits as `convert` does, to show them.
+VIEWED_EDITS = {**{option: f"Cloud.{method}" for option, method in METHODS.items()}, "action-axes": "axes of edit"}
 FUNCTIONS = {
     "enhance": ("enhance", None, {}, {"view": "anchorsplat.view", "overwrite": "nothing is written", **FILES}),
     "fit": (
@@ -88,7 +91,7 @@ FUNCTIONS = {
         "view",
         None,
         {},
-        {"overwrite": "Page.save", "seed": "nothing is random", "folder": "a page is one value", **OUTPUT},
+        {"overwrite": "Page.save", "seed": "nothing is random", "folder": "a page is one value", **VIEWED_EDITS, **OUTPUT},
     ),
     "convert": (
         "convert",

@@ -54,6 +54,7 @@ page('index.html', filled(read('web/page/index.html'), {
   worker: inline(worker, 'the worker'),
   client: inline(client.replace(/^export /gm, ''), 'client.js'),
   app: inline(read('web/page/app.js'), 'app.js'),
+  edit: inline(read('web/page/edit.js'), 'edit.js'),
 }));
 page('sw.js', filled(read('web/page/sw.js'), {version}));
 page('worker-threads.js', threads.worker);

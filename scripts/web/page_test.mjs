@@ -10,8 +10,8 @@ import {ISOLATED, expect, finish, launchBrowser, serve, watchedTab} from '../bro
 const [dist, splat, out] = process.argv.slice(2).map((p) => path.resolve(p));
 const browser = await launchBrowser();
 
-async function openPage(url, allowed, {width = 1200, height = 800, scheme = 'dark'} = {}) {
-  const context = await browser.newContext({viewport: {width, height}, colorScheme: scheme, acceptDownloads: true});
+async function openPage(url, allowed, {width = 1200, height = 800, scheme = 'dark', touch = false} = {}) {
+  const context = await browser.newContext({viewport: {width, height}, colorScheme: scheme, hasTouch: touch, acceptDownloads: true});
   // The viewer's help has a button that wants the focus, which a frame does not get.
   const tab = await watchedTab(context, {allowed, hushed: /autofocus/i});
   await tab.goto(url);
@@ -146,15 +146,159 @@ const settled = (tab) => stageOf(tab).waitForFunction(() => document.documentEle
   await tab.close();
 }
 
+// Edits: a box that is dragged, what it takes away, steps back to the bit.
+{
+  const {tab} = await openPage(pathToFileURL(path.join(dist, 'index.html')).href, /^(file|blob|data):/);
+  await tab.setInputFiles('#file', splat);
+  await state(tab, 'shown');
+  const text = (id) => tab.locator(id).innerText();
+  const numbers = (words) => [...words.matchAll(/\d[\d,]*/g)].map(([word]) => Number(word.replaceAll(',', '')));
+  const said = async (pattern) => {
+    await tab.waitForFunction((source) => document.getElementById('busy').hidden && (document.documentElement.dataset.trouble ||
+      new RegExp(source).test(document.getElementById('edited').textContent)), pattern.source);
+    await settled(tab);
+  };
+  const handle = (kind) => tab.frameLocator('#viewer').locator(`#box button.${kind}`);
+  const saved = async () => {
+    await tab.waitForFunction(() => document.getElementById('busy').hidden);
+    await tab.selectOption('#format', 'ply');
+    const [download] = await Promise.all([tab.waitForEvent('download'), tab.locator('#download').click()]);
+    const chunks = [];
+    for await (const chunk of await download.createReadStream()) chunks.push(chunk);
+    return {name: download.suggestedFilename(), bytes: Buffer.concat(chunks)};
+  };
+  const steps = [await saved()];
+  expect('what is not edited is called as it was', steps[0].name === path.basename(splat), steps[0].name);
+  expect('there is nothing to undo', await tab.locator('#undo').isDisabled() && await tab.locator('#redo').isDisabled());
+
+  await tab.locator('#crop').click();
+  await tab.waitForFunction(() => /are inside/.test(document.getElementById('inside').textContent));
+  expect('a box has a handle on each side and one in the middle', await tab.frameLocator('#viewer').locator('#box button').count() === 7);
+  const [inside, all] = numbers(await text('#inside'));
+  expect('the box is around the most of it', inside > 0.9 * all && inside < all, await text('#inside'));
+  const middle = await handle('middle').boundingBox();
+  const side = await handle('x').nth(1).boundingBox();
+  const center = ({x, y, width, height}) => [x + width / 2, y + height / 2];
+  await tab.mouse.move(...center(side));
+  await tab.mouse.down();
+  await tab.mouse.move(...center(side).map((x, k) => 0.4 * x + 0.6 * center(middle)[k]), {steps: 5});
+  const dragged = center(await handle('x').nth(1).boundingBox());
+  expect('a handle follows the mouse', Math.hypot(...center(side).map((x, k) => 0.4 * x + 0.6 * center(middle)[k] - dragged[k])) < 3, String(dragged));
+  await tab.mouse.up();
+  await tab.waitForFunction((before) => document.getElementById('inside').textContent !== before, `${inside.toLocaleString('en')} of ${all.toLocaleString('en')} Gaussians are inside.`);
+  const [fewer] = numbers(await text('#inside'));
+  expect('fewer are inside', fewer < 0.9 * inside && fewer > 0, `${inside} ${fewer}`);
+  await settled(tab);
+  await tab.screenshot({path: path.join(out, 'crop.png')});
+  await handle('y').first().focus();
+  const before = await text('#inside');
+  await tab.keyboard.press('Shift+ArrowRight');
+  await tab.waitForFunction((old) => document.getElementById('inside').textContent !== old, before);
+  const [least] = numbers(await text('#inside'));
+  expect('a key moves a side', least < fewer, `${fewer} ${least}`);
+  await tab.locator('#keep').click();
+  await said(/removed/);
+  const [removed, left] = numbers(await text('#edited'));
+  expect('what the box said is what it took away', removed === all - least && left === least, `${await text('#edited')} ${least} of ${all}`);
+  expect('the splat is described as it is', (await text('#about')).startsWith(`${left.toLocaleString('en')} Gaussians, edited`), await text('#about'));
+  expect('the box is gone', !(await tab.locator('#crop-how').isVisible()) && await tab.frameLocator('#viewer').locator('#box').count() === 0);
+  await tab.screenshot({path: path.join(out, 'cropped.png')});
+  steps.push(await saved());
+  expect('what was edited says so in its name', /-edited\.ply$/.test(steps[1].name), steps[1].name);
+
+  // Turned until it stands upright, from where one looks.
+  const lookAt = () => tab.evaluate(() => new Promise((resolve) => {
+    addEventListener('message', ({data}) => { if (data && data.look) resolve(data.look); });
+    document.getElementById('viewer').contentWindow.postMessage({tell: 'look'}, '*');
+  }));
+  await tab.locator('#turn').click();
+  await tab.locator('#tilt').fill('30');
+  await settled(tab);
+  await tab.screenshot({path: path.join(out, 'turning.png')});
+  const tilted = await lookAt();
+  await tab.locator('#upright').click();
+  await said(/Turned upright/);
+  await tab.screenshot({path: path.join(out, 'turned.png')});
+  const upright = await lookAt();
+  expect('it is seen from the same place', Math.abs(upright.distance - tilted.distance) < 1e-9 && upright.axes.every((axis, k) =>
+    Math.abs(axis.reduce((sum, x, j) => sum + x * upright.up[j], 0) - tilted.axes[k].reduce((sum, x, j) => sum + x * tilted.up[j], 0)) < 1e-6));
+  expect('up is up', Math.abs(upright.up[1] + 1) < 1e-9, String(upright.up));
+  steps.push(await saved());
+  await tab.locator('#centre').click();
+  await said(/0, 0, 0/);
+  const ply = (await saved()).bytes;
+  const head = ply.indexOf('end_header\n') + 11;
+  const width = 4 * [...ply.subarray(0, head).toString('latin1').matchAll(/property float/g)].length;
+  // Roughly: what is faint counts here.
+  const middleNow = [0, 1, 2].map((axis) => {
+    const along = Array.from({length: (ply.length - head) / width}, (_, k) => ply.readFloatLE(head + k * width + 4 * axis)).sort((a, b) => a - b);
+    return 0.5 * (along[Math.floor(0.01 * along.length)] + along[Math.floor(0.99 * along.length)]);
+  });
+  expect('its middle is at 0, 0, 0', Math.hypot(...middleNow) < 0.02, String(middleNow));
+  await tab.locator('#floaters').click();
+  await said(/Nothing was removed|removed, /);
+  console.log(`floaters of the example: ${await text('#edited')}`);
+
+  // Back and forth: the same bits.
+  while (await tab.locator('#undo').isEnabled()) {
+    const told = await text('#edited');
+    await tab.locator('#undo').click();
+    await tab.waitForFunction((old) => document.getElementById('edited').textContent !== old && document.getElementById('busy').hidden, told);
+  }
+  expect('all undone, it is the file', (await saved()).bytes.equals(steps[0].bytes));
+  for (const key of ['Control+y', 'Control+Shift+z']) {
+    const told = await text('#edited');
+    await tab.locator('#panel h2').click();
+    await tab.keyboard.press(key);
+    await tab.waitForFunction((old) => document.getElementById('edited').textContent !== old && document.getElementById('busy').hidden, told);
+    expect(`${key} does it again`, (await saved()).bytes.equals(steps[key === 'Control+y' ? 1 : 2].bytes));
+  }
+  await tab.keyboard.press('Control+z');
+  await said(/Undone: turn upright/);
+  expect('undone to the bit', (await saved()).bytes.equals(steps[1].bytes));
+
+  // What was made of another state is not its result.
+  await tab.selectOption('#quality', 'filter');
+  await tab.locator('#enhance').click();
+  await state(tab, 'enhanced');
+  await tab.locator('#undo').click();
+  await tab.waitForFunction(() => /enhance it again/.test(document.getElementById('done').textContent));
+  expect('the file as it was is open again', (await text('#about')).startsWith(`${all.toLocaleString('en')} Gaussians, PLY`));
+
+  // The other way round, and nothing at all.
+  await tab.waitForFunction(() => document.getElementById('busy').hidden);
+  await tab.locator('#crop').click();
+  await tab.waitForFunction(() => /are inside/.test(document.getElementById('inside').textContent));
+  await tab.locator('#remove').click();
+  await said(/removed/);
+  expect('the inside is removed', numbers(await text('#edited'))[0] === inside, `${await text('#edited')} ${inside}`);
+  expect('no trouble', (await troubles(tab)) === '', await troubles(tab));
+  await tab.close();
+}
+
 // On a phone, light.
 {
   const {tab} = await openPage(pathToFileURL(path.join(dist, 'index.html')).href, /^(file|blob|data):/,
-    {width: 390, height: 780, scheme: 'light'});
+    {width: 390, height: 780, scheme: 'light', touch: true});
   await tab.setInputFiles('#file', splat);
   await state(tab, 'shown');
   await settled(tab);
   expect('nothing is wider than a phone', await tab.evaluate(() => document.documentElement.scrollWidth <= innerWidth));
   await tab.screenshot({path: path.join(out, 'phone.png')});
+  // A finger drags a side of the box.
+  await tab.locator('#crop').tap();
+  await tab.waitForFunction(() => /are inside/.test(document.getElementById('inside').textContent));
+  const inside = await tab.locator('#inside').innerText();
+  const {x, y, width, height} = await tab.frameLocator('#viewer').locator('#box button.y').first().boundingBox();
+  const fingers = await tab.context().newCDPSession(tab);
+  const finger = (type, ...points) => fingers.send('Input.dispatchTouchEvent', {type, touchPoints: points.map(([px, py]) => ({x: px, y: py}))});
+  await finger('touchStart', [x + width / 2, y + height / 2]);
+  await finger('touchMove', [x + width / 2, y + height / 2 + 30]);
+  await finger('touchEnd');
+  await tab.waitForFunction((before) => document.getElementById('inside').textContent !== before, inside);
+  await settled(tab);
+  await tab.screenshot({path: path.join(out, 'phone-crop.png')});
+  await tab.locator('#crop-end').tap();
   await tab.setInputFiles('#file', {name: 'broken.ply', mimeType: 'application/octet-stream', buffer: Buffer.from('ply\nformat ascii 1.0\n')});
   await tab.waitForFunction(() => document.documentElement.dataset.trouble);
   expect('an error can be seen on a phone', await inSight(tab));

@@ -1,7 +1,6 @@
 #include "formats/convert.h"
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -11,6 +10,7 @@
 
 #include "cli/batch.h"
 #include "cli/clean_output.h"
+#include "cli/edit_steps_report.h"
 #include "cli/output_plan.h"
 #include "cli/standard_output.h"
 #include "cli/stop_signal.h"
@@ -20,7 +20,6 @@
 #include "core/memory_limit.h"
 #include "core/parallel.h"
 #include "core/text.h"
-#include "formats/axes.h"
 #include "formats/cloud_output.h"
 #include "formats/opened_splat.h"
 #include "formats/registry.h"
@@ -157,27 +156,6 @@ std::string NamesOf(const Job& job) {
   std::string names = OneLine(job.inputs[0]);
   if (job.inputs.size() > 1) names += Cat(" and ", job.inputs.size() - 1, " more");
   return names;
-}
-
-// "LUF: x left, y up, z forward".
-std::string DescribeAxes(const std::string& name) {
-  constexpr std::array<std::string_view, 3> kTo = {"right", "down", "forward"}, kFrom = {"left", "up", "backward"};
-  const Axes axes = AxesFromName(name).value_or(kRdf);
-  std::string text = name;
-  for (size_t k = 0; k < 3; ++k) {
-    text += Cat(k == 0 ? ": " : ", ", "xyz"[k], " ", (axes.sign[k] > 0 ? kTo : kFrom)[axes.along[k]]);
-  }
-  return text;
-}
-
-void PrintSteps(const std::vector<EditStep>& steps, std::ostream& out) {
-  const auto directed = std::ranges::find_if(steps, [](const EditStep& step) { return !step.axes.empty(); });
-  if (directed != steps.end()) out << "  edits count along " << DescribeAxes(directed->axes) << '\n';
-  for (const EditStep& step : steps) {
-    if (!step.chooses) continue;
-    out << "  " << OneLine(step.action) << (step.input.empty() ? "" : Cat(" on ", OneLine(step.input))) << ": "
-        << WithThousands(step.taken) << " Gaussians taken away, " << WithThousands(step.left) << " left\n";
-  }
 }
 
 void Print(const OutputMemory* piped, const Job& job, const Converted& done) {

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <filesystem>
 #include <iostream>
@@ -7,15 +8,18 @@
 #include <optional>
 
 #include "cli/clean_output.h"
+#include "cli/edit_steps_report.h"
 #include "cli/standard_output.h"
 #include "cli/stop_signal.h"
 #include "cli/verb.h"
 #include "core/log.h"
 #include "core/statistics.h"
 #include "core/text.h"
+#include "edit/edit_clouds.h"
 #include "formats/opened_splat.h"
 #include "io/atomic_file.h"
 #include "io/input_record.h"
+#include "request/edit_flags.h"
 #include "request/page_flags.h"
 #include "request/views.h"
 #include "viewer/page_writer.h"
@@ -32,6 +36,7 @@ struct PageWords {
   std::string output;
   bool folder = false;
   PageFlags how;
+  EditFlags edits;
 };
 
 // More Gaussians than this make a single file that browsers take long to show.
@@ -73,6 +78,31 @@ Result<Shown> ReadShown(const fs::path& path, const std::optional<RenderMode>& m
                                         WithThousands(shown.cloud.size()), " Gaussians have NaN or infinite values")};
 }
 
+// The edits that were asked for, in their order. Cameras stay where they are: they fit no splat that has moved.
+Result<std::vector<EditAction>> EditsOf(const PageWords& flags) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(auto actions, ActionsAmongPaths(flags.edits));
+  for (const EditAction& action : actions[0]) {
+    const bool moves = std::holds_alternative<MoveWorld>(action.what) || std::holds_alternative<TurnToUp>(action.what);
+    if (moves && !flags.how.cameras.empty()) {
+      return Error{ErrorCode::kBadArgument,
+                   Cat(action.words, " moves the splat away from its cameras: leave out --cameras")};
+    }
+  }
+  return std::move(actions[0]);
+}
+
+// What edits make of a splat, and what each of them did.
+Result<Shown> EditShown(const Shown& shown, const std::vector<EditAction>& actions, std::vector<EditStep>& steps) {
+  const std::array<CloudView, 1> clouds = {shown.cloud};
+  const std::array<EditRun, 1> runs = {EditRun{0, 1, actions}};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(EditedCloud edited, EditClouds(clouds, runs));
+  steps = std::move(edited.steps);
+  if (CountUnusable(edited.cloud) == edited.cloud.size()) {
+    return Error{ErrorCode::kBadArgument, Cat(shown.name, ": the edits leave nothing to show")};
+  }
+  return Shown{std::move(edited.cloud), Cat(shown.name, ", edited")};
+}
+
 // A page written over a splat by a slip of the keyboard would be a loss.
 bool IsPageName(const fs::path& path) {
   std::string extension = path.extension().string();
@@ -98,14 +128,21 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
   page.folder = flags.folder;
   page.smaller = flags.folder ? "leave out some of the true pictures (--views)"
                               : Cat("--folder writes a page of any size with its data beside it; or ", page.smaller);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<EditAction> actions, EditsOf(flags));
   const StopSignal stop_signal(StopSignal::Leaves::kNothing);
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Shown after, ReadShown(flags.after, flags.how.mode));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Shown after, ReadShown(flags.after, flags.how.mode));
   Shown before;
+  std::vector<EditStep> steps;
+  if (!actions.empty()) {
+    before = std::move(after);
+    ANCHORSPLAT_ASSIGN_OR_RETURN(after, EditShown(before, actions, steps));
+  }
   if (!flags.before.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(before, ReadShown(flags.before, flags.how.mode));
-    page.before = ViewerSplat{&before.cloud, before.name, before.bytes};
   }
-  page.after = {&after.cloud, after.name, after.bytes};
+  if (before.cloud.size() > 0) page.before = ViewerSplat{&before.cloud, before.name, before.bytes};
+  page.after = {&after.cloud, after.name, {}};
+  if (actions.empty()) page.after.file_bytes = after.bytes;
   ANCHORSPLAT_RETURN_IF_ERROR(CheckPageSize(output, page));
   LookAtSplats(page);
   ANCHORSPLAT_RETURN_IF_ERROR(WriteViewerPage(output, page, WriteOptionsFrom(shared)));
@@ -113,17 +150,20 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
   const uint64_t bytes = piped ? piped->memory()->files.at(output).size() : FileBytes(output);
   WarnOfLargePage(flags, after.cloud.size() + before.cloud.size(), bytes);
   if (shared.json) {
-    PrintJson({{"output", flags.output},
-               {"bytes", bytes},
-               {"views", page.views.size()},
-               {"device", device.ToJson()},
-               {"pixel_size", page.pixel_size ? nlohmann::json(*page.pixel_size) : nlohmann::json()}});
+    nlohmann::json json = {{"output", flags.output},
+                           {"bytes", bytes},
+                           {"views", page.views.size()},
+                           {"device", device.ToJson()},
+                           {"pixel_size", page.pixel_size ? nlohmann::json(*page.pixel_size) : nlohmann::json()}};
+    if (!steps.empty()) json["actions"] = ToJson(steps);
+    PrintJson(json);
   } else if (!shared.quiet) {
     ResultsBeside(page.memory)
         << OutputName(output, page.memory) << ": " << HumanBytes(bytes)
         << (piped          ? ", a page for any browser\n"
             : flags.folder ? ", with its data in the folder beside it: they belong together; open it in any browser\n"
                            : ", open it in any browser\n");
+    PrintSteps(steps, ResultsBeside(page.memory));
   }
   return piped ? piped->Send() : Status();
 }
@@ -136,11 +176,14 @@ void AddView(CLI::App& app, Program& program) {
   const auto flags = std::make_shared<PageWords>();
   verb.add_option("after", flags->after, "Splat file")->required();
   verb.add_option("-o,--output", flags->output, "HTML file to write; - is standard output")->required();
-  verb.add_option("--before", flags->before, "Splat to compare with");
+  verb.add_option("--before", flags->before,
+                  "Splat to compare with; with edits, the splat as it is where none is said");
   verb.add_flag("--folder", flags->folder,
                 "Put the splats' data into a folder beside the page, PAGE.data, from which it shows the largest "
                 "Gaussians first: for splats of any size");
   flags->how.AddTo(verb);
+  flags->edits.AddTo(verb);
+  verb.remove_option(verb.get_option("--dry-run"));  // of `convert`: here the page shows it
   program.device.AddTo(verb);
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunView(*flags, program.flags); }; });
 }

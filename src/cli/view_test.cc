@@ -53,6 +53,28 @@ TEST_F(ViewVerb, HasAButtonForReadersWithASplat) {
   EXPECT_THAT(FileBytes(page_), HasSubstr(R"("ownPage":"https://splats.example/")"));
 }
 
+TEST_F(ViewVerb, ShowsEditsBesideTheSplatAsItIs) {
+  const std::string as_it_was = FileBytes(scan_);
+  const nlohmann::json json =
+      ExpectJson({"view", scan_, "--filter-box", "0,-,-,-,-,-", "--up", "z", "-o", page_, "--sh-degree", "0"});
+  ASSERT_EQ(json["actions"].size(), 2u);
+  const auto taken = json["actions"][0]["taken"].get<int64_t>(), left = json["actions"][0]["left"].get<int64_t>();
+  EXPECT_GT(taken, 0);
+  EXPECT_GT(left, 0);
+  const std::string page = FileBytes(page_);
+  EXPECT_THAT(page, AllOf(HasSubstr(R"("name":"scan.ply")"), HasSubstr(R"("name":"scan.ply, edited")"),
+                          HasSubstr("\"fileCount\":" + std::to_string(left)),
+                          HasSubstr("\"fileCount\":" + std::to_string(left + taken))));
+  EXPECT_THAT(page, HasSubstr(R"("up":[0.0,-1.0,0.0])"));
+  EXPECT_EQ(FileBytes(scan_), as_it_was);
+  const ProgramRun run = ExpectDone({"view", scan_, "--filter-box", "0,-,-,-,-,-", "-o", page_, "-w"});
+  EXPECT_THAT(run.out, HasSubstr("--filter-box 0,-,-,-,-,-: "));
+  // Beside another splat, where one is named.
+  ExpectDone({"convert", scan_, folder_ / "other.ply"});
+  ExpectDone({"view", scan_, "--before", folder_ / "other.ply", "--filter-harmonics", "0", "-o", page_, "-w"});
+  EXPECT_THAT(FileBytes(page_), AllOf(HasSubstr(R"("name":"other.ply")"), Not(HasSubstr(R"("name":"scan.ply")"))));
+}
+
 TEST_F(ViewVerb, AFolderBesideThePage) {
   const ProgramRun run = ExpectDone({"view", scan_, "--before", scan_, "--folder", "-o", page_});
   EXPECT_THAT(run.out, HasSubstr("they belong together"));
@@ -91,6 +113,10 @@ TEST_F(ViewVerb, RefusesWhatMakesNoSense) {
   refused({"--views", "0"}, ErrorCode::kBadArgument, "1 or more");
   refused({"--pixel-size", "0"}, ErrorCode::kBadArgument, "--pixel-size");
   refused({"--background", "white"}, ErrorCode::kBadArgument, "--background");
+  refused({"--filter-box", "1"}, ErrorCode::kBadArgument, "--filter-box: expected a box");
+  refused({"--filter-box", "1000,-,-,-,-,-"}, ErrorCode::kBadArgument, "the edits leave nothing to show");
+  refused({"--up", "z", "--cameras", cameras}, ErrorCode::kBadArgument, "moves the splat away from its cameras");
+  refused({"--dry-run"}, ErrorCode::kBadArgument, "--dry-run");
   refused({"--before", folder_ / "none.ply"}, ErrorCode::kNotFound, "none.ply");
   const std::string before = FileBytes(scan_);
   ExpectRefused({"view", scan_, "-o", folder_ / "other.spz", "-w"}, ErrorCode::kBadArgument, {".html"});

@@ -136,7 +136,9 @@ Framing FrameRows(const Buffer<float>& means, const Rows& rows, double reach) {
   Buffer<float> values(rows.size());
   for (size_t a = 0; a < 3; ++a) {
     for (size_t k = 0; k < rows.size(); ++k) values[k] = means[3 * size_t{rows[k]} + a];
-    framing.target[a] = 0.5 * (double{Quantile(values, 0.01)} + Quantile(values, 0.99));
+    const double low = Quantile(values, 0.01), high = Quantile(values, 0.99);
+    framing.target[a] = 0.5 * (low + high);
+    framing.half[a] = 0.5 * (high - low);
   }
   for (size_t k = 0; k < rows.size(); ++k) {
     const float* p = means.data() + 3 * size_t{rows[k]};

@@ -21,6 +21,7 @@ namespace anchorsplat {
 struct Framing {
   std::array<double, 3> target = {0, 0, 0};  // world
   double radius = 1;                         // world; always positive
+  std::array<double, 3> half = {0, 0, 0};    // world; half the lengths of the box
 };
 Framing FrameCloud(const CloudView& cloud);
 // The same with the target from the cloud's origin on, as means are.

@@ -34,6 +34,8 @@ constexpr std::array kActionNames = {
     ActionName{"--origin", "--origin", "Move it so that a point becomes 0,0,0", "X,Y,Z"},
     ActionName{"-B,--filter-box", "--filter-box", "Keep what lies in a box; a number left out, or -, is no border",
                "X0,Y0,Z0,X1,Y1,Z1"},
+    ActionName{"--remove-box", "--remove-box", "Drop what lies in a box; a number left out, or -, is no border",
+               "X0,Y0,Z0,X1,Y1,Z1"},
     ActionName{"-S,--filter-sphere", "--filter-sphere", "Keep what lies in a sphere", "X,Y,Z,RADIUS"},
     ActionName{"-N,--filter-nan", "--filter-nan",
                "Drop Gaussians with a value that is no number or infinite, or a quaternion of zero", ""},
@@ -135,7 +137,7 @@ std::optional<Vec3> Axis(std::string text) {
 Result<EditAction> ParseBox(EditAction action, std::string_view name, const std::string& text, const Matrix& to_rdf) {
   const std::vector<std::string> parts = Parts(text);
   if (parts.size() != 6) return Bad(name, Cat("expected a box X0,Y0,Z0,X1,Y1,Z1", Found(text)));
-  KeepBox box{{-kInf, -kInf, -kInf}, {kInf, kInf, kInf}};
+  KeepBox box{{-kInf, -kInf, -kInf}, {kInf, kInf, kInf}, name == "--remove-box"};
   for (size_t k = 0; k < 6; ++k) {
     if (parts[k].empty() || parts[k] == "-") continue;
     const std::optional<double> number = Number(parts[k]);
@@ -248,7 +250,7 @@ Result<EditAction> ParseAction(std::string_view name, const std::string& text, c
   action.axes = NameOfAxes(axes);
   const Matrix to_rdf = TurnBetween(axes, kRdf).matrix(), from_rdf = TurnBetween(kRdf, axes).matrix();
   const auto in_rdf = [&](const Matrix& m) { return Times(to_rdf, Times(m, from_rdf)); };
-  if (name == "--filter-box") return ParseBox(std::move(action), name, text, to_rdf);
+  if (name == "--filter-box" || name == "--remove-box") return ParseBox(std::move(action), name, text, to_rdf);
   if (name == "--filter-value") return ParseValue(std::move(action), name, text, from_rdf);
   if (name == "--translate" || name == "--origin") {
     const auto by = Numbers<3>(text);

@@ -27,9 +27,10 @@ struct TurnToUp {
   std::array<double, 3> up;
 };
 
-// Only what lies in the box or on its border stays.
+// Only what lies in the box or on its border stays; with `outside` only the rest does.
 struct KeepBox {
   std::array<double, 3> low, high;  // −∞ and +∞: no border
+  bool outside = false;
 };
 // Only what is nearer to the centre than the radius stays.
 struct KeepSphere {

@@ -31,6 +31,10 @@ TEST(EditAction, NumbersCountAlongTheAxesThatAreSaid) {
   const auto box = Parsed<KeepBox>("--filter-box", "-1,-2,-3,4,,6", luf);
   EXPECT_EQ(box.low, (std::array<double, 3>{-4, -INFINITY, -3}));
   EXPECT_EQ(box.high, (std::array<double, 3>{1, 2, 6}));
+  EXPECT_FALSE(box.outside);
+  const auto removed = Parsed<KeepBox>("--remove-box", "-1,-2,-3,4,,6", luf);
+  EXPECT_EQ(removed.low, box.low);
+  EXPECT_TRUE(removed.outside);
   EXPECT_EQ(Parsed<KeepByValue>("--filter-value", "y,gt,1", luf).turn,
             (std::array<double, 9>{-1, 0, 0, 0, -1, 0, 0, 0, 1}));
   // A turn about y is one about −y, the other way.
@@ -82,6 +86,7 @@ TEST(EditAction, WhatMakesNoSenseIsNamed) {
                         Case{"--filter-box", "0,0,0,1,1", "a box"},
                         Case{"--filter-box", "2,0,0,1,1,1", "along x 2 is above 1"},
                         Case{"--filter-box", "0,0,0,1,1,x", "a box"},
+                        Case{"--remove-box", "0,0,0,1,1", "--remove-box: expected a box"},
                         Case{"--filter-sphere", "0,0,0,0", "above 0"},
                         Case{"--filter-value", "opacity,>,1", "lt, lte, gt"},
                         Case{"--filter-value", "opacity,gt,2", "0 to 1, not 2"},

@@ -99,6 +99,20 @@ TEST(EditClouds, WithoutRunsIsACopyAndOneOfNothingIsNothing) {
   EXPECT_EQ(nothing->steps[0].taken, 3'000);
 }
 
+TEST(EditClouds, WhatABoxRemovesIsWhatItWouldKeep) {
+  const GaussianCloud cloud = SplatOf(2'000, 1, 3);
+  const std::vector<CloudView> one = {cloud};
+  const char* const box = "-0.5,-0.5,-0.5,0.5,0.5,-";
+  const std::vector<EditRun> keeps = {{0, 1, AlongLuf({{"--filter-box", box}})}},
+                             removes = {{0, 1, AlongLuf({{"--remove-box", box}})}};
+  const auto kept = EditClouds(one, keeps), rest = EditClouds(one, removes);
+  ASSERT_TRUE(kept.ok() && rest.ok());
+  EXPECT_GT(kept->cloud.size(), 0);
+  EXPECT_GT(rest->cloud.size(), 0);
+  EXPECT_EQ(kept->cloud.size() + rest->cloud.size(), cloud.size());
+  EXPECT_EQ(kept->steps[0].taken, rest->cloud.size());
+}
+
 TEST(EditClouds, NamesTheCloudThatHasNotAProperty) {
   const GaussianCloud cloud = SplatOf(10, 0, 1);
   const std::vector<CloudView> one = {cloud}, two = {cloud, cloud};

@@ -195,7 +195,7 @@ bool RowTest::Keeps(const RowBlock& block, int64_t i) const {
   if (const auto* const box = std::get_if<KeepBox>(&what_)) {
     bool inside = true;
     for (size_t k = 0; k < 3; ++k) inside = inside && at[k] >= box->low[k] && at[k] <= box->high[k];
-    return inside;
+    return inside != box->outside;
   }
   const auto& sphere = std::get<KeepSphere>(what_);
   const std::array<double, 3> from = Minus(at, sphere.centre);

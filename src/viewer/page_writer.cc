@@ -55,6 +55,8 @@ Json SplatJson(const ViewerSplat& splat, const QuantizedCloud& q, const WorldOri
   const Framing framing = FrameCloud(*splat.cloud);
   std::array<double, 3> center = FromOrigin(splat.cloud->origin, origin);
   for (size_t k = 0; k < 3; ++k) center[k] += q.center[k];
+  const Json subject = {
+      {"target", FromOrigin(framing.target, origin)}, {"radius", framing.radius}, {"half", framing.half}};
   const RenderMode mode = splat.cloud->render_mode.value_or(RenderMode::kClassic);
   return Json{{"name", splat.name},
               {"fileBytes", splat.file_bytes ? Json(*splat.file_bytes) : Json()},
@@ -69,7 +71,7 @@ Json SplatJson(const ViewerSplat& splat, const QuantizedCloud& q, const WorldOri
               {"radius", q.radius},
               {"spread", q.spread},
               {"reach", q.reach},
-              {"subject", {{"target", FromOrigin(framing.target, origin)}, {"radius", framing.radius}}},
+              {"subject", subject},
               {"logScale", q.log_scale},
               {"dc", q.dc},
               {"shMax", q.sh_max},
@@ -167,7 +169,7 @@ void Substitute(std::string& text, std::string_view mark, std::string_view value
 std::string InlineScripts() {
   std::string out;
   for (const char* name :
-       {"payload.js", "camera.js", "shaders.js", "pictures.js", "renderer.js", "interface.js", "app.js"}) {
+       {"payload.js", "camera.js", "shaders.js", "pictures.js", "renderer.js", "box.js", "interface.js", "app.js"}) {
     out += Cat("<script>\n", PageFile(name), "</script>\n");
   }
   return out;

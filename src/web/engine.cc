@@ -39,6 +39,7 @@
 #include "request/write_flags.h"
 #include "viewer/page_writer.h"
 #include "web/addresses.h"
+#include "web/edits.h"
 #include "web/request.h"
 
 namespace anchorsplat::web {
@@ -200,6 +201,7 @@ Result<Engine::Answer> Engine::Run(const Json& request, std::span<const std::byt
   if (verb == "put") return Put(request, data);
   if (verb == "info") return Info(request);
   if (verb == "enhance") return Enhance(request);
+  if (verb == "edit") return Edit(request);
   if (verb == "filter") return Filter(request);
   if (verb == "write") return Write(request);
   if (verb == "page") return Page(request);
@@ -325,6 +327,20 @@ Result<Engine::Answer> Engine::Enhance(const Json& request) {
   kept.cloud = std::move(enhanced.cloud);
   Answer answer = Keep(std::move(kept));
   answer.json["report"] = report;
+  return answer;
+}
+
+Result<Engine::Answer> Engine::Edit(const Json& request) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const OpenCloud* const open, FindCloud(request, "cloud"));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Edits edits, EditsOf(request));
+  Answer answer;
+  if (edits.count_only) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(answer.json["actions"], CountEdits(open->cloud, edits.actions));
+    return answer;
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Edited edited, EditCloud(open->cloud, edits.actions));
+  answer = Keep({std::move(edited.cloud), open->name, open->format, {}, 0});
+  answer.json.update(edited.report);
   return answer;
 }
 

@@ -34,6 +34,10 @@ using ProgressListener = std::function<void(std::string_view task, int64_t done,
 //   {"verb": "open", "name": "scan.ply"} + the file         → {"cloud": 1, "gaussians": …, …}
 //   {"verb": "info", "cloud": 1}                            → what `anchorsplat info --json` says
 //   {"verb": "enhance", "cloud": 1, "words": ["--upscale=4"], "seed": 0, "cameras": 1}  → {"cloud": 2, "report": {…}}
+//   {"verb": "edit", "cloud": 1, "words": ["--up=z", "--filter-floaters"]}
+//        → as open, and {"actions": [{"action", "taken", "left"}], "world": {"rotation": [9], "translation": [3],
+//        "scale": s}}: what each took away, and where points of the old world are in the new one. With --dry-run
+//        among the words the actions alone
 //   {"verb": "filter", "cloud": 1, "upscale": 4}            → {"gain": g}: variance that the filter adds, training
 //   pixels²
 //   {"verb": "write", "cloud": 2, "format": "spz", "words": []}  → one block: the file
@@ -73,6 +77,7 @@ class Engine {
   Result<Answer> Put(const nlohmann::json& request, std::span<const std::byte> data);
   Result<Answer> Info(const nlohmann::json& request);
   Result<Answer> Enhance(const nlohmann::json& request);
+  Result<Answer> Edit(const nlohmann::json& request);
   Result<Answer> Filter(const nlohmann::json& request);
   Result<Answer> Write(const nlohmann::json& request);
   Result<Answer> Page(const nlohmann::json& request);

@@ -126,6 +126,34 @@ TEST_F(EngineTest, EnhancesARegionWithinABudget) {
   EXPECT_NE(refused.at("error").at("message").get<std::string>().find("--region"), std::string::npos);
 }
 
+TEST_F(EngineTest, EditsAreThoseOfTheCommandLineInTheirOrder) {
+  const int64_t cloud = OpenExample();
+  const auto written = [&](const Json& number) {
+    Ask({{"verb", "write"}, {"cloud", number}, {"format", "ply"}});
+    return Block(0);
+  };
+  const std::string as_it_was = written(cloud);
+  const Json words = {"--action-axes=RDF", "--filter-box=-0.2,-,-,-,-,-", "--up=z", "--filter-floaters"};
+  const Json edited = Ask({{"verb", "edit"}, {"cloud", cloud}, {"words", words}});
+  ASSERT_FALSE(edited.contains("error")) << edited;
+  ASSERT_EQ(edited.at("actions").size(), 3u);
+  EXPECT_EQ(edited.at("actions")[0].at("action"), "--filter-box -0.2,-,-,-,-,-");
+  EXPECT_GT(edited.at("actions")[0].at("taken"), 0);
+  EXPECT_EQ(edited.at("gaussians"), edited.at("actions")[2].at("left"));
+  EXPECT_EQ(edited.at("world").at("rotation"), Json({1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0}));
+  // The same again: what was edited before has not changed.
+  const Json again = Ask({{"verb", "edit"}, {"cloud", cloud}, {"words", words}});
+  EXPECT_EQ(written(edited.at("cloud")), written(again.at("cloud")));
+  EXPECT_EQ(written(cloud), as_it_was);
+  const Json counted = Ask({{"verb", "edit"},
+                            {"cloud", cloud},
+                            {"words", {"--action-axes=RDF", "--filter-box=-0.2,-,-,-,-,-", "--dry-run"}}});
+  EXPECT_EQ(counted.at("actions")[0], edited.at("actions")[0]);
+  EXPECT_FALSE(counted.contains("cloud"));
+  const Json refused = Ask({{"verb", "edit"}, {"cloud", cloud}, {"words", {"--filter-box=9,9,9,10,10,10"}}});
+  EXPECT_EQ(refused.at("error").at("code"), "bad_argument");
+}
+
 // The page previews the filter by this number.
 TEST_F(EngineTest, TheGainIsWhatTheFilterAdds) {
   const int64_t cloud = OpenExample();
@@ -190,14 +218,26 @@ TEST_F(EngineTest, InfoIsThatOfTheCommandLineAndChangesNothing) {
 
 TEST_F(EngineTest, WhateverIsAskedIsAnswered) {
   const int64_t cloud = OpenExample();
-  for (const char* request :
-       {"", "[]", "{", "{}", R"({"verb": 1})", R"({"verb": "none"})", R"({"verb": "info"})",
-        R"({"verb": "info", "cloud": "x"})", R"({"verb": "info", "cloud": 99})", R"({"verb": "info", "cloud": -1})",
-        R"({"verb": "write", "cloud": 1, "format": "x"})",
-        R"({"verb": "write", "cloud": 1, "format": "ply", "words": 3})",
-        R"({"verb": "enhance", "cloud": 1, "words": [3]})",
-        R"({"verb": "render", "cloud": 1, "words": ["--size=100000x100000", "--orbit=100"]})", R"({"verb": "open"})",
-        R"({"verb": "put"})", R"({"verb": "cameras"})", R"({"verb": "filter", "cloud": 1, "upscale": 0})"}) {
+  for (const char* request : {"",
+                              "[]",
+                              "{",
+                              "{}",
+                              R"({"verb": 1})",
+                              R"({"verb": "none"})",
+                              R"({"verb": "info"})",
+                              R"({"verb": "info", "cloud": "x"})",
+                              R"({"verb": "info", "cloud": 99})",
+                              R"({"verb": "info", "cloud": -1})",
+                              R"({"verb": "write", "cloud": 1, "format": "x"})",
+                              R"({"verb": "write", "cloud": 1, "format": "ply", "words": 3})",
+                              R"({"verb": "enhance", "cloud": 1, "words": [3]})",
+                              R"({"verb": "edit"})",
+                              R"({"verb": "edit", "cloud": 1, "words": ["--filter-box=1"]})",
+                              R"({"verb": "render", "cloud": 1, "words": ["--size=100000x100000", "--orbit=100"]})",
+                              R"({"verb": "open"})",
+                              R"({"verb": "put"})",
+                              R"({"verb": "cameras"})",
+                              R"({"verb": "filter", "cloud": 1, "upscale": 0})"}) {
     const Json answer = Json::parse(engine_.Call(request, {}).json);
     if (std::string(request) == R"({"verb": "put"})") continue;  // an empty splat is one
     EXPECT_TRUE(answer.contains("error")) << request << ": " << answer;

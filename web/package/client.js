@@ -87,7 +87,7 @@ export function wordsOf(options, besides = []) {
     if (key === 'help') throw badArgument('help is in index.d.mts');
     if (besides.includes(key) || value === undefined || value === null || value === false) continue;
     const option = `--${key.replace(/[A-Z]/g, (letter) => `-${letter.toLowerCase()}`)}`;
-    const text = Array.isArray(value) ? value.join(key === 'size' ? 'x' : ',') : String(value);
+    const text = Array.isArray(value) ? value.map((x) => x ?? '-').join(key === 'size' ? 'x' : ',') : String(value);
     words.push(...(value === true ? [option] : text === '' ? [option, ''] : [`${option}=${text}`]));
   }
   return words;
@@ -104,6 +104,16 @@ function optionsOf(options, what) {
   if (signal !== undefined && signal !== null && typeof signal.addEventListener !== 'function') throw badArgument('signal is an AbortSignal');
   if (cameras !== undefined && cameras !== null && !(cameras instanceof Cameras)) throw badArgument('cameras are what readCameras() has read');
   return options;
+}
+
+// Edits in their order, [{up: 'z'}, {filterFloaters: true}], as words. Numbers count along the axes of the columns.
+function wordsOfEdits(actions, axes = 'RDF') {
+  const list = Array.isArray(actions) ? actions : [actions];
+  if (!list.every((action) => typeof action === 'object' && action !== null && !Array.isArray(action))) {
+    throw badArgument("edits are a list of objects, like [{up: 'z'}, {filterFloaters: true}]");
+  }
+  const words = list.flatMap((action) => wordsOf(action, ['dryRun', 'actionAxes']));
+  return words.length > 0 ? [`--action-axes=${axes}`, ...words] : words;
 }
 
 const bytesOf = (data) => {
@@ -261,6 +271,21 @@ export class Splat {
       if (signal) signal.removeEventListener('abort', stop);
       work.end(stopped());
     }
+  }
+
+  // Turned, moved, scaled, cropped, cleaned, in this order; `world` says where points of this one are in the new one.
+  async edit(actions, options) {
+    const {axes, onMessage} = optionsOf(options, 'edit');
+    const {answer} = await this.ask({verb: 'edit', words: wordsOfEdits(actions, axes ?? undefined)});
+    tellMessages(answer, onMessage);
+    return {splat: new Splat(this.engine, this.worker, answer), actions: answer.actions, world: answer.world};
+  }
+
+  // What each edit would take away.
+  async countEdits(actions, options) {
+    const {axes} = optionsOf(options, 'countEdits');
+    const words = [...wordsOfEdits(actions, axes ?? undefined), '--dry-run'];
+    return (await this.ask({verb: 'edit', words})).answer.actions;
   }
 
   // Variance that the filter adds to a Gaussian whose training pixel has the size 1: world units², times that size squared.

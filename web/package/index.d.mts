@@ -90,6 +90,55 @@ export interface EnhanceOptions {
   onMessage?: (message: Message) => void;
 }
 
+type Vector = [number, number, number];
+type Box = [number | null, number | null, number | null, number | null, number | null, number | null];
+
+/** An edit of `anchorsplat convert`. */
+export interface Edit {
+  translate?: Vector;
+  /** Degrees about x, then y, then z. */
+  rotate?: Vector;
+  scale?: number;
+  mirror?: 'x' | 'y' | 'z';
+  /** Turns so that this direction becomes up, −y: three numbers, or an axis as "-z". */
+  up?: Vector | string;
+  /** Moves so that this point becomes 0, 0, 0. */
+  origin?: Vector;
+  /** Keeps what lies in the box between two corners; null: no border. */
+  filterBox?: Box;
+  /** Drops what lies in the box. */
+  removeBox?: Box;
+  /** Keeps what is nearer to x, y, z than the radius. */
+  filterSphere?: [number, number, number, number];
+  filterNan?: boolean;
+  /** Property, comparison, value: ["opacity", "gte", 0.1]. */
+  filterValue?: [string, 'lt' | 'lte' | 'gt' | 'gte' | 'eq' | 'neq', number];
+  filterHarmonics?: 0 | 1 | 2 | 3;
+  /** true, or a factor: above 1 finds fewer. */
+  filterFloaters?: boolean | number;
+}
+
+export interface EditOptions {
+  /** Along which numbers count: "RDF", the default, as in the columns (x right, y down, z forward); "LUF" as the command line has them. */
+  axes?: string;
+  onMessage?: (message: Message) => void;
+}
+
+export interface EditCount {
+  /** In the words of the command line. */
+  action: string;
+  /** Gaussians that it took away. */
+  taken: number;
+  left: number;
+}
+
+/** Where points are: scale · rotation · p + translation; the rotation is row-major. */
+export interface World {
+  rotation: number[];
+  translation: number[];
+  scale: number;
+}
+
 export interface WriteOptions {
   sort?: 'format' | 'keep' | 'morton' | 'importance';
   spzVersion?: 3 | 4;
@@ -145,6 +194,10 @@ export class Splat {
   /** What `anchorsplat info --json` says; `reading` and `treatment` are what it looks like and what would help it. */
   info(): Promise<Record<string, unknown>>;
   enhance(options?: EnhanceOptions): Promise<{splat: Splat; report: Record<string, unknown>}>;
+  /** Turned, moved, scaled, cropped and cleaned, in this order; this splat stays as it is. */
+  edit(edits: Edit | Edit[], options?: EditOptions): Promise<{splat: Splat; actions: EditCount[]; world: World}>;
+  /** What each edit would take away. */
+  countEdits(edits: Edit | Edit[], options?: EditOptions): Promise<EditCount[]>;
   /** Variance that the filter adds to every axis, for a training pixel of size 1. */
   filterGain(upscale?: number): Promise<number>;
   /** The bytes of a file: "ply", "compressed.ply", "spz", "sog", "splat", "glb", … */

@@ -54,7 +54,7 @@ const platform = {
 };
 const engine = new Engine(platform);
 
-let input = null;     // {splat, info, name, bytes}
+let input = null;     // {splat, info, name, bytes, original, originalInfo}: the splat as it is edited, and as it was opened
 let result = null;    // {splat, report}
 let cameras = null;
 let gain = 0;         // of the filter at this zoom
@@ -78,8 +78,7 @@ function trouble(error) {
   document.documentElement.dataset.trouble = text;
   if (error && !input) {
     show(byId('panel'), true);
-    show(byId('work'), false);
-    show(byId('save'), false);
+    for (const id of ['edit', 'work', 'save']) show(byId(id), false);
   }
 }
 
@@ -94,16 +93,18 @@ const viewer = byId('viewer');
 let stageUrl = null;
 let look = null;
 
-// Shows a page in the frame, from where the one before it looked if that was of the same splat.
-async function stage(bytes, {same = true} = {}) {
+// Shows a page in the frame, from where the one before it looked if that was of the same splat, or `change` says where
+// that is now.
+async function stage(bytes, {same = true, change = (before) => before} = {}) {
   look = viewer.hidden || !same ? null : await lookOfStage();
+  if (look) look = change(look);
   if (stageUrl) URL.revokeObjectURL(stageUrl);
   stageUrl = URL.createObjectURL(new Blob([bytes], {type: 'text/html'}));
   const ready = heard((data) => data.ready);
   show(viewer, true);
   show(byId('welcome'), false);
   viewer.src = stageUrl;
-  await ready;
+  stageIsNew(await ready);
   if (look) viewer.contentWindow.postMessage({look}, '*');
 }
 
@@ -178,7 +179,7 @@ function tellPixelSize() {
 
 // What the file is, in words.
 
-function describe({info, name, bytes}) {
+function describe({info, originalInfo, name, bytes}) {
   byId('name').textContent = name;
   const about = byId('about');
   about.replaceChildren();
@@ -188,7 +189,9 @@ function describe({info, name, bytes}) {
     line.className = className;
     about.append(line);
   };
-  say(`${number(info.gaussians)} Gaussians, ${info.format}, ${sizeText(bytes)}, colour of SH degree ${info.sh_degree}.`);
+  say(isEdited()
+    ? `${number(info.gaussians)} Gaussians, edited; the file has ${number(originalInfo.gaussians)} (${info.format}, ${sizeText(bytes)}). Colour of SH degree ${info.sh_degree}.`
+    : `${number(info.gaussians)} Gaussians, ${info.format}, ${sizeText(bytes)}, colour of SH degree ${info.sh_degree}.`);
   if (info.render_mode) say(`It says that it was trained as ${info.render_mode}.`);
   else say(`It looks like ${info.looks_in_words}.`);
   say(sentence(`Enhance ${info.treatment.method === 'none' ? 'does' : 'takes'} ${info.treatment_in_words}`));
@@ -224,8 +227,9 @@ async function openFile(file) {
     if (mine !== openings) return await splat.close();
     ++session;
     if (running) running.abort();
-    const old = [input && input.splat, result && result.splat];
-    input = {splat, info, name: file.name, bytes: file.size};
+    const old = new Set(input ? [input.splat, input.original, result && result.splat] : []);
+    input = {splat, info, name: file.name, bytes: file.size, original: splat, originalInfo: info};
+    forgetEdits();
     result = null;
     chosen = false;
     dropCameras();
@@ -237,8 +241,7 @@ async function openFile(file) {
     gain = await splat.filterGain(Number(byId('upscale').value));
     describe(input);
     show(byId('panel'), true);
-    show(byId('work'), true);
-    show(byId('save'), true);
+    for (const id of ['edit', 'work', 'save']) show(byId(id), true);
     tellPixelSize();
     offer();
     await showInput({same: false});
@@ -274,12 +277,14 @@ async function takeFiles(files) {
 
 function offer() {
   byId('which').querySelector('[value="result"]').disabled = !result;
+  byId('which').querySelector('[value="input"]').textContent = isEdited() ? 'the edited splat' : 'the splat as it is';
   byId('which').value = result ? 'result' : 'input';
   byId('enhance').disabled = !input || running !== null;
   // What is being made is made with these.
-  for (const id of ['upscale', 'quality', 'pixel', 'pixel-auto', 'cameras', 'region', 'most']) byId(id).disabled = running !== null;
+  for (const id of ['upscale', 'quality', 'pixel', 'pixel-auto', 'cameras', 'region', 'most']) byId(id).disabled = running !== null || working;
   show(byId('stop'), running !== null);
   show(byId('progress'), running !== null);
+  offerEdits();
 }
 
 function told({task, done, total, note}) {
@@ -296,6 +301,7 @@ async function enhance() {
   running = new AbortController();
   const byKeyboard = document.activeElement === byId('enhance');
   told({task: 'starting', done: 0, total: 0, note: ''});
+  useTool(null);
   offer();
   if (byKeyboard) byId('stop').focus();
   const began = performance.now();
@@ -353,14 +359,15 @@ async function save() {
     const splat = enhanced ? result.splat : input.splat;
     const format = byId('format').value;
     const stem = input.name.replace(/(\.compressed)?\.[a-z0-9]+$/i, '') || 'splat';
-    const zoom = enhanced ? `-${byId('upscale').value}x` : '';
+    const what = `${isEdited() ? '-edited' : ''}${enhanced ? `-${byId('upscale').value}x` : ''}`;
+    const before = enhanced ? input.splat : isEdited() ? input.original : undefined;
     const bytes = format === 'html'
-      ? await splat.page({before: enhanced ? input.splat : undefined, name: input.name, title: input.name,
+      ? await splat.page({before, name: input.name, title: input.name,
         openYourOwn: location.protocol.startsWith('http') ? location.href.split(/[?#]/)[0] : undefined})
       : await splat.write(format);
     const link = document.createElement('a');
     link.href = URL.createObjectURL(new Blob([bytes]));
-    link.download = `${stem}${zoom}.${format}`;
+    link.download = `${stem}${what}.${format}`;
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 60000);
   } catch (error) {
@@ -376,6 +383,11 @@ async function takeCameras(files) {
   byId('cameras-about').textContent = '';
   tellPixelSize();
   if (files.length === 0) return;
+  if (isMoved()) {
+    byId('cameras').value = '';
+    byId('cameras-about').textContent = 'The splat has been turned or moved away from its cameras: undo that to use them.';
+    return;
+  }
   try {
     cameras = await engine.readCameras([...files].map((file) => ({name: file.name, data: file})));
     chosen = false;

@@ -37,13 +37,12 @@ class Viewer {
     this.lens = null;     // [x, y] in CSS pixels
     this.view = null;     // index of the view the camera is still at
     this.truths = new Map();
-    const same = (a, b) => a.every((x, k) => Math.abs(x - b[k]) < 0.02);
     this.backgrounds = [description.background];
     for (const shade of [0, 1, 0.5, 0.16]) {
-      const color = [shade, shade, shade];
-      if (!this.backgrounds.some((b) => same(b, color))) this.backgrounds.push(color);
+      if (!this.backgrounds.some((b) => b.every((x) => Math.abs(x - shade) < 0.02))) this.backgrounds.push([shade, shade, shade]);
     }
     this.backgroundIndex = 0;
+    this.box = new CropBox(this, (box) => window.parent.postMessage({box}, '*'));
     this.widening = 0;    // of `after`, beside itself as `before`: the filter, while a person looks for its width
     this.frameRequested = false;
     this.stale = true;    // something was asked for that is not on screen
@@ -98,7 +97,7 @@ class Viewer {
     return Math.max(0, level);
   }
 
-  get comparing() { return this.pairs[this.pair][0] !== this.pairs[this.pair][1]; }
+  get comparing() { return !this.box.shown && this.pairs[this.pair][0] !== this.pairs[this.pair][1]; }  // the box is of one splat
   get ratio() { return Math.min(devicePixelRatio || 1, 2); }
   get lensRadius() { return Math.round(Math.max(78, Math.min(150, 0.23 * Math.min(innerWidth, innerHeight)))); }
 
@@ -116,6 +115,13 @@ class Viewer {
 
   orbit(yaw, pitch) {
     this.camera.orbit(yaw, pitch);
+    this.leaveView();
+  }
+
+  // `angle` null: back to the up of the page.
+  roll(angle) {
+    if (angle === null) this.camera.level(this.description.up);
+    else this.camera.roll(angle);
     this.leaveView();
   }
 
@@ -352,7 +358,8 @@ class Viewer {
   wanted(k, name, intrinsics, tangents, clip, width, height) {
     const {axes, eye} = this.camera;
     const see = name === 'truth' ? {texture: this.truthTexture(), intrinsics}
-      : {axes, eye, intrinsics, tangents, near: this.near(this.splats[name]), widening: name === 'after' ? this.widening : 0};
+      : {axes, eye, intrinsics, tangents, near: this.near(this.splats[name]), widening: name === 'after' ? this.widening : 0,
+        box: this.box.seenFrom(this.splats[name].description.center)};
     const splat = name === 'truth' ? null : this.splats[name];
     const key = JSON.stringify([name, width, height, ...(splat ? [splat.orders, see] : [this.view, see.texture !== null, intrinsics])]);
     return {k, key, clip, width, height, count: splat ? splat.visible : 0, splat, see};

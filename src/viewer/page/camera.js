@@ -71,6 +71,22 @@ class OrbitCamera {
     this.axes = [right, cross(forward, right), forward];
   }
 
+  // Turns the picture clockwise, and what counts as up along with it.
+  roll(angle) {
+    const {forward} = this;
+    this.axes = [...this.axes.slice(0, 2).map((a) => turn(a, forward, -angle)), forward];
+    this.up = turn(this.up, forward, -angle);
+  }
+
+  // Holds `up` upright, looking where it looks.
+  level(up) {
+    const {forward} = this;
+    this.up = up;
+    if (Math.abs(dot(forward, up)) > 0.999) return;
+    const right = unit(cross(forward, up));
+    this.axes = [right, cross(forward, right), forward];
+  }
+
   // By screen pixels, of the plane through the target.
   pan(dx, dy, region) {
     const {fx, fy} = this.intrinsics(region);

@@ -225,6 +225,7 @@ function placeRing(ring, x, y, radius) {
 
 // The page over the picture.
 function placeOverlay(viewer) {
+  viewer.box.place();
   const mode = viewer.comparing ? viewer.mode : 'blink';
   const places = viewer.lens ? viewer.lensPlaces() : [];
   const divider = byId('divider');
@@ -273,14 +274,25 @@ function placeOverlay(viewer) {
   }
 }
 
-// The page that has this one as its stage (web/), if there is one: {widening} and {look} set these, {tell: 'look'} asks.
+// The page that has this one as its stage (web/), if there is one: {widening} and {look} set these, {tell: 'look'} asks,
+// {box: true} and {box: false} begin and end a box to crop with, {roll} turns the picture clockwise, in radians, or back (null). It hears
+// {ready, subject}, {look}, {box} (CropBox) and {undo} or {redo} from keys.
 function listenToParent(viewer) {
   if (window.parent === window) return;
   addEventListener('message', ({source, data}) => {
     if (source !== window.parent || typeof data !== 'object' || data === null) return;
     if (typeof data.widening === 'number') viewer.preview(data.widening);
     if (data.look) viewer.look = data.look;
+    if (data.roll !== undefined) viewer.roll(data.roll);
+    if (data.box === true) viewer.box.begin();
+    if (data.box === false) viewer.box.end();
     if (data.tell === 'look') window.parent.postMessage({look: viewer.look}, '*');
   });
-  window.parent.postMessage({ready: true}, '*');
+  addEventListener('keydown', (event) => {
+    const key = event.key.toLowerCase();
+    if (!(event.ctrlKey || event.metaKey) || !['z', 'y'].includes(key)) return;
+    event.preventDefault();
+    window.parent.postMessage(key === 'y' || event.shiftKey ? {redo: true} : {undo: true}, '*');
+  });
+  window.parent.postMessage({ready: true, subject: viewer.splats.after.description.subject}, '*');
 }

@@ -177,7 +177,8 @@ class Renderer {
   }
 
   // `seen`: intrinsics in pixels of the target; `tangents` as the shader wants them; nothing is drawn before camera z
-  // `near`; `widening` as the smoothing filter adds it to variances; of the Gaussians in order the `count` ones from
+  // `near`; `widening` as the smoothing filter adds it to variances; `box` as
+  // CropBox.seenFrom has it; of the Gaussians in order the `count` ones from
   // `first` on; `share` of the screen's pixels is in the target.
   drawSplat(k, splat, {first, count, ...seen}) {
     this.lookAt(k, splat, seen);
@@ -189,7 +190,7 @@ class Renderer {
   }
 
   // Tells the program that projects how the splat is seen in target k.
-  lookAt(k, splat, {axes, eye, intrinsics, tangents, near, widening, share}) {
+  lookAt(k, splat, {axes, eye, intrinsics, tangents, near, widening, box, share}) {
     const gl = this.gl;
     const d = splat.description;
     const {program, uniforms: u} = this.projectionPrograms.get(d.degree);
@@ -216,6 +217,9 @@ class Renderer {
     gl.uniform1f(u.uSoftening, d.dilation * (1 - share));
     gl.uniform1f(u.uMinAlpha, this.constants.minAlpha);
     gl.uniform1f(u.uNear, near);
+    gl.uniform3fv(u.uBoxLow, box.low);
+    gl.uniform3fv(u.uBoxHigh, box.high);
+    gl.uniform1f(u.uOutside, box.outside);
     gl.uniform1i(u.uCompensated, d.compensated ? 1 : 0);
   }
 

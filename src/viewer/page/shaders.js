@@ -62,6 +62,9 @@ uniform float uSoftening;     // px², where the target has fewer pixels than th
 uniform float uMinAlpha;
 uniform float uNear;
 uniform bool uCompensated;    // opacity, for the dilation
+uniform vec3 uBoxLow;         // relative to the splat's centre
+uniform vec3 uBoxHigh;
+uniform float uOutside;       // of the opacity of what is outside of the box
 
 layout(location = 0) out uvec4 placed;
 layout(location = 1) out uvec4 painted;
@@ -102,6 +105,7 @@ void main() {
   vec3 p = uRotation * mean + uTranslation;
   if (!(p.z >= uNear)) return;
   float opacity = float(g1.y >> 16) / uScalarTop;
+  if (any(lessThan(mean, uBoxLow)) || any(greaterThan(mean, uBoxHigh))) opacity *= uOutside;
   if (opacity < uMinAlpha) return;
 
   vec3 s = exp(mix(vec3(uLogScale.x), vec3(uLogScale.y),

@@ -148,7 +148,7 @@ gpu-bench: program
 	@scripts/gpu-bench.sh $(GPU_BENCH)
 
 gpu-bench-pack: program
-	@scripts/install-missing.sh gpu-bench-pack strip=binutils /usr/lib/$(shell uname -m)-linux-gnu/libvulkan.so.1=libvulkan1
+	@scripts/install-missing.sh gpu-bench-pack strip=binutils cc=gcc /usr/lib/$(shell uname -m)-linux-gnu/libvulkan.so.1=libvulkan1
 	@rm -rf build/gpu-bench
 	@scripts/gpu-bench.sh --pack build/gpu-bench
 .PHONY: gpu-test gpu-bench gpu-bench-pack

@@ -1,10 +1,10 @@
-# anchorsplat_embed(TARGET files...)
+# anchorsplat_embed(TARGET NAMESPACE files...)
 #
-# The text of foo_bar.wgsl beside the caller's CMakeLists.txt becomes the constant wgsl::kFooBarWgsl (std::string_view) of
-# the target, declared in "ROOM/wgsl.h", where ROOM is the caller's folder under src/. An edit of the file compiles one
-# generated source again.
+# The text of foo_bar.wgsl beside the caller's CMakeLists.txt becomes the constant NAMESPACE::kFooBarWgsl
+# (std::string_view) of the target, declared in "ROOM/NAMESPACE.h", where ROOM is the caller's folder under src/. An edit
+# of the file compiles one generated source again.
 if(CMAKE_SCRIPT_MODE_FILE)
-  set(text "#include \"${HEADER}\"\n\nnamespace anchorsplat::wgsl {\n")
+  set(text "#include \"${HEADER}\"\n\nnamespace anchorsplat::${NAMESPACE} {\n")
   foreach(file IN LISTS FILES)
     file(READ "${file}" content)
     get_filename_component(name "${file}" NAME)
@@ -12,19 +12,19 @@ if(CMAKE_SCRIPT_MODE_FILE)
     if(length GREATER 65000)
       message(FATAL_ERROR "${file}: ${length} bytes; compilers need not take strings longer than 65,536")
     endif()
-    if(content MATCHES "[)]~wgsl~")
-      message(FATAL_ERROR "${file}: holds )~wgsl~, the end of the raw string")
+    if(content MATCHES "[)]~text~")
+      message(FATAL_ERROR "${file}: holds )~text~, the end of the raw string")
     endif()
     list(POP_FRONT NAMES constant)
-    string(APPEND text "\nconstinit const std::string_view ${constant} = R\"~wgsl~(${content})~wgsl~\";\n")
+    string(APPEND text "\nconstinit const std::string_view ${constant} = R\"~text~(${content})~text~\";\n")
   endforeach()
-  string(APPEND text "\n}  // namespace anchorsplat::wgsl\n")
+  string(APPEND text "\n}  // namespace anchorsplat::${NAMESPACE}\n")
   file(WRITE "${OUTPUT}" "${text}")
   return()
 endif()
 
 set(ANCHORSPLAT_EMBED_SCRIPT "${CMAKE_CURRENT_LIST_FILE}")
-function(anchorsplat_embed target)
+function(anchorsplat_embed target namespace)
   file(RELATIVE_PATH room "${CMAKE_SOURCE_DIR}/src" "${CMAKE_CURRENT_SOURCE_DIR}")
   set(folder "${CMAKE_BINARY_DIR}/embedded")
   set(declarations "")
@@ -45,23 +45,23 @@ function(anchorsplat_embed target)
     string(APPEND declarations "extern const std::string_view ${constant};  // ${file}\n")
   endforeach()
   # At configuration, so that whoever includes it need not wait for a target.
-  file(CONFIGURE OUTPUT "${folder}/${room}/wgsl.h" @ONLY CONTENT [[
+  file(CONFIGURE OUTPUT "${folder}/${room}/${namespace}.h" @ONLY CONTENT [[
 #pragma once
 
 #include <string_view>
 
-namespace anchorsplat::wgsl {
+namespace anchorsplat::@namespace@ {
 
 @declarations@
-}  // namespace anchorsplat::wgsl
+}  // namespace anchorsplat::@namespace@
 ]])
   add_custom_command(
-    OUTPUT "${folder}/${room}/wgsl.cc"
-    COMMAND ${CMAKE_COMMAND} "-DHEADER=${room}/wgsl.h" "-DNAMES=${names}" "-DFILES=${paths}"
-            "-DOUTPUT=${folder}/${room}/wgsl.cc" -P "${ANCHORSPLAT_EMBED_SCRIPT}"
+    OUTPUT "${folder}/${room}/${namespace}.cc"
+    COMMAND ${CMAKE_COMMAND} "-DHEADER=${room}/${namespace}.h" "-DNAMESPACE=${namespace}" "-DNAMES=${names}"
+            "-DFILES=${paths}" "-DOUTPUT=${folder}/${room}/${namespace}.cc" -P "${ANCHORSPLAT_EMBED_SCRIPT}"
     DEPENDS ${paths} "${ANCHORSPLAT_EMBED_SCRIPT}"
     VERBATIM)
-  target_sources(${target} PRIVATE "${folder}/${room}/wgsl.cc")
-  set_source_files_properties("${folder}/${room}/wgsl.cc" PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+  target_sources(${target} PRIVATE "${folder}/${room}/${namespace}.cc")
+  set_source_files_properties("${folder}/${room}/${namespace}.cc" PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   target_include_directories(${target} PUBLIC "${folder}")
 endfunction()

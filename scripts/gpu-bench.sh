@@ -23,14 +23,20 @@ pack() {
   strip "$folder/anchorsplat"
   cp "$library" "$folder/libwgpu_native.so"
   cp -L "$loader" "$folder/lib/libvulkan.so.1"
+  # Embree is half of it and traces rays, which this does not: its functions only have to be there.
+  local without
+  without=$(mktemp -d)
+  nm -D --undefined-only "$program" | sed -n 's/^ *U \(rtc[A-Za-z0-9_]*\)$/void \1(void) { __builtin_trap(); }/p' >"$without/embree.c"
   # Of glibc there must be only one, the machine's; the compiler's libraries it may have, and then they are newer.
   while read -r library file; do
     case "$library" in
+      libembree*.so.*) cc -shared -fPIC -O1 -s -Wl,-soname,"$library" -o "$folder/lib/$library" "$without/embree.c" ;;
       libc.so.* | libm.so.* | libdl.so.* | libpthread.so.* | librt.so.*) ;;
       libstdc++.so.* | libgcc_s.so.*) cp -L "$file" "$folder/lib-compiler/$library" ;;
       *) cp -L "$file" "$folder/lib/$library" ;;
     esac
   done < <(ldd "$program" | sed -n 's/^\s*\(\S*\) => \(\/\S*\) .*/\1 \2/p')
+  rm -rf "$without"
   du -sh "$folder"
 }
 

@@ -10,6 +10,7 @@
 #include "core/world_up.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
+#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -53,18 +54,15 @@ Result<std::vector<Rendering>> Draw(const CloudView& cloud, std::span<const Pinh
                                     const RenderSettings& settings) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   const RenderOptions options = ToOptions(cloud, settings);
+  StillCloud still(cloud);
   Rasterizer rasterizer;
-  RenderOutput output;
+  std::vector<Camera> views;
+  for (const PinholeCamera& camera : cameras) views.push_back(ToCamera(camera));
   std::vector<Rendering> renderings;
   Progress progress("render", static_cast<int64_t>(cameras.size()));
-  for (const PinholeCamera& pinhole : cameras) {
-    if (StopRequested()) {
-      return Error{ErrorCode::kInterrupted, Cat("stopped after ", renderings.size(), " of ", cameras.size(), " views")};
-    }
-    const Camera camera = ToCamera(pinhole);
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, camera, options, output));
+  const auto keep = [&](size_t k, RenderOutput& output) -> Status {
     const int64_t visible = rasterizer.statistics().visible;
-    if (const std::string nothing = NothingToSee(cloud, camera, options, visible); !nothing.empty()) {
+    if (const std::string nothing = NothingToSee(cloud, views[k], options, visible); !nothing.empty()) {
       LogWarning(nothing);
     }
     renderings.push_back({.color = ToPicture(output.color),
@@ -72,7 +70,11 @@ Result<std::vector<Rendering>> Draw(const CloudView& cloud, std::span<const Pinh
                           .depth = ToPicture(output.depth),
                           .visible = visible});
     progress.Advance();
-  }
+    if (!StopRequested() || renderings.size() == cameras.size()) return {};
+    return Error{ErrorCode::kInterrupted, Cat("stopped after ", renderings.size(), " of ", cameras.size(), " views")};
+  };
+  if (StopRequested()) return Error{ErrorCode::kInterrupted, Cat("stopped after 0 of ", cameras.size(), " views")};
+  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.RenderEach(still, views, options, keep));
   return renderings;
 }
 

@@ -23,6 +23,8 @@ namespace anchorsplat {
 
 namespace {
 
+constexpr int kViews = 8;
+constexpr uint64_t kViewBytes = uint64_t{48} << 20;  // of all their pictures
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 Error Stopped() { return {ErrorCode::kInterrupted, "stopped"}; }
@@ -132,6 +134,44 @@ class OnGpu {
     return order;
   }
 
+  // Pictures by the same camera, either way.
+  Result<GpuBenchViews> Views(const RenderOptions& options, int count) {
+    GpuBenchViews views;
+    views.count = count;
+    const Pinhole& k = load_.camera.intrinsics;
+    std::vector<RenderOutput> alone(static_cast<size_t>(count)), together(static_cast<size_t>(count));
+    std::vector<GpuRasterizer::Picture> pictures;
+    for (size_t v = 0; v < alone.size(); ++v) {
+      for (RenderOutput* output : {&alone[v], &together[v]}) {
+        output->color = Image(k.width, k.height, 3);
+        output->alpha = Image(k.width, k.height, 1);
+      }
+      pictures.push_back({.camera = load_.camera, .near = options.near_plane, .output = together[v]});
+    }
+    for (int pass = 0; pass < 2; ++pass) {  // the first one allocates
+      int64_t waits = device_->waits();
+      Stopwatch watch;
+      for (RenderOutput& output : alone) {
+        ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Draw(cloud_, load_.camera, options.near_plane, options, &output));
+      }
+      views.seconds = watch.Lap() / count;
+      views.waits = static_cast<double>(device_->waits() - waits) / count;
+      waits = device_->waits();
+      const int64_t pairs = std::max<int64_t>(1, rasterizer_.total_pairs);
+      watch.Lap();
+      ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.DrawTogether(cloud_, pictures, options, pairs));
+      views.seconds_together = watch.Lap() / count;
+      views.waits_together = static_cast<double>(device_->waits() - waits) / count;
+    }
+    rasterizer_.ForgetTogether();
+    for (size_t v = 0; v < alone.size(); ++v) {
+      const auto& expected = alone[v].color.pixels;
+      const auto& drawn = together[v].color.pixels;
+      for (size_t i = 0; i < expected.size(); ++i) views.differing += expected[i] != drawn[i] ? 1 : 0;
+    }
+    return views;
+  }
+
   const GpuCloud& cloud() const { return cloud_; }
   const GpuRasterizer& rasterizer() const { return rasterizer_; }
 
@@ -199,11 +239,13 @@ Status MeasureGpu(const std::shared_ptr<GpuDevice>& device, const Load& load, co
     return lap.Total();
   };
   ANCHORSPLAT_ASSIGN_OR_RETURN(row.picture, Fastest<double>(options, picture, seconds));
+  const bool small = kViews * GpuRasterizer::BytesTogether(load.camera.intrinsics, shown) <= kViewBytes;
+  if (!small || !row.resident || row.runs > 1) return {};
+  ANCHORSPLAT_ASSIGN_OR_RETURN(row.views, gpu.Views(shown, kViews));
   return {};
 }
 
-Status MeasureKernels(const std::shared_ptr<GpuDevice>& device, const Load& load, GpuBenchRow& row) {
-  const auto clock = std::make_shared<KernelClock>(device);
+Result<std::vector<KernelTime>> TimeKernels(const std::shared_ptr<KernelClock>& clock, const Load& load) {
   OnGpu gpu(clock, load);
   ANCHORSPLAT_RETURN_IF_ERROR(gpu.Upload());
   ANCHORSPLAT_RETURN_IF_ERROR(gpu.UploadWeights());
@@ -213,7 +255,27 @@ Status MeasureKernels(const std::shared_ptr<GpuDevice>& device, const Load& load
     ANCHORSPLAT_RETURN_IF_ERROR(gpu.Forward());
     ANCHORSPLAT_RETURN_IF_ERROR(gpu.Backward());
   }
-  row.kernels = clock->times();
+  return clock->times();
+}
+
+Status MeasureKernels(const DeviceChoice& choice, const std::shared_ptr<GpuDevice>& device, const Load& load,
+                      GpuBenchRow& row) {
+  const auto clock = std::make_shared<KernelClock>(device);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(row.kernels, TimeKernels(clock, load));
+  row.kernels_by_gpu = clock->by_gpu();
+  // What this cannot do is no failure of the row.
+  const Result<std::shared_ptr<GpuDevice>> unchecked = OpenUncheckedGpu(choice);
+  const Result<std::vector<KernelTime>> times =
+      unchecked.ok() ? TimeKernels(std::make_shared<KernelClock>(*unchecked), load) : unchecked.error();
+  if (!times.ok()) {
+    if (times.error().code == ErrorCode::kInterrupted) return times.error();
+    row.no_unchecked = times.error().message;
+    return {};
+  }
+  for (const KernelTime& time : *times) {
+    const auto same = std::ranges::find(row.kernels, time.entry, &KernelTime::entry);
+    if (same != row.kernels.end()) same->unchecked = time.seconds;
+  }
   return {};
 }
 
@@ -320,7 +382,7 @@ Status MeasureRow(const DeviceChoice& choice, const GaussianCloud& cloud, const 
       ANCHORSPLAT_RETURN_IF_ERROR(MeasureCpu(load, options, gpu, output, row));
     }
   }
-  if (options.kernels) ANCHORSPLAT_RETURN_IF_ERROR(MeasureKernels(device, load, row));
+  if (options.kernels) ANCHORSPLAT_RETURN_IF_ERROR(MeasureKernels(choice, device, load, row));
   return {};
 }
 
@@ -390,6 +452,10 @@ Result<GpuBenchReport> BenchGpu(const DeviceChoice& choice, const GpuBenchOption
 }
 
 std::string BrokenPromise(const GpuBenchRow& row) {
+  if (row.views && row.views->differing > 0) {
+    return Cat(WithThousands(row.views->differing),
+               " numbers of pictures drawn together have other bits than one by one");
+  }
   if (!row.cpu) return "";
   const GpuBenchReference& cpu = *row.cpu;
   if (cpu.out_of_order > 0) {

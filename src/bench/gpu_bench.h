@@ -39,6 +39,15 @@ struct GpuBenchReference {
 inline constexpr std::array<const char*, 6> kGpuBenchGradients = {"means",          "log_scales", "quats",
                                                                   "opacity_logits", "sh",         "means2d"};
 
+// Some views of a splat that is on the GPU, to pictures in host memory: one by one, and without a look of the host in
+// between (GpuRasterizer::DrawTogether). Of one view.
+struct GpuBenchViews {
+  int count = 0;
+  double seconds = 0, seconds_together = 0;
+  double waits = 0, waits_together = 0;  // of the host, for the GPU
+  int64_t differing = 0;                 // numbers of the pictures that are not the same bits
+};
+
 // One splat at one size. Seconds are of one picture, warm. What was not reached is 0.
 struct GpuBenchRow {
   int64_t gaussians = 0;
@@ -55,13 +64,16 @@ struct GpuBenchRow {
   int64_t pairs = 0;          // (tile, Gaussian)
   int runs = 0;               // of tiles (RenderOptions::max_pairs)
   std::optional<GpuBenchReference> cpu;
-  std::string no_cpu;               // why there is no `cpu`
-  std::vector<KernelTime> kernels;  // of one picture and its gradient
+  std::string no_cpu;                  // why there is no `cpu`
+  std::optional<GpuBenchViews> views;  // where they are small
+  std::vector<KernelTime> kernels;     // of one picture and its gradient
+  bool kernels_by_gpu = false;         // timed by the GPU's clock; otherwise by the host's, with a round trip each
+  std::string no_unchecked;            // why there are no times without checks at run time
 };
 
 struct GpuBenchReport {
   GpuAdapter adapter;
-  double round_trip = 0;  // seconds from a command to its completion: what each kernel's time begins with
+  double round_trip = 0;  // seconds from a command to its completion
   std::vector<GpuBenchRow> rows;
   bool interrupted = false;  // there are rows of what was done until then
 };

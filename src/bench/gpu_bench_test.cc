@@ -55,11 +55,18 @@ TEST(GpuBench, MeasuresBothAndHowFarTheyAreApart) {
   EXPECT_EQ(row.cpu->values, 4 * 40 * 24);
   EXPECT_EQ(BrokenPromise(row), "");
   EXPECT_TRUE(std::ranges::any_of(row.cpu->gradient_l2, [](double l2) { return l2 > 0; })) << "compared with itself";
+  ASSERT_TRUE(row.views.has_value());
+  EXPECT_EQ(row.views->count, 8);
+  EXPECT_EQ(row.views->waits, 2);
+  EXPECT_EQ(row.views->waits_together, 1.0 / 8);
+  EXPECT_EQ(row.views->differing, 0);
+  EXPECT_GT(row.views->seconds_together, 0);
   EXPECT_GT(row.kernels.size(), 5u);
   for (const KernelTime& time : row.kernels) {
     EXPECT_FALSE(time.entry.empty());
     EXPECT_GE(time.calls, 1) << time.entry;
-    EXPECT_GT(time.seconds, 0) << time.entry;
+    EXPECT_GE(time.seconds, 0) << time.entry;
+    EXPECT_EQ(time.unchecked.has_value(), row.no_unchecked.empty()) << time.entry;
   }
 }
 

@@ -106,11 +106,20 @@ nlohmann::json ToJson(const GpuBenchRow& row) {
   } else if (!row.no_cpu.empty()) {
     json["no_cpu"] = row.no_cpu;
   }
+  if (row.views) {
+    json["views"] = {{"count", row.views->count},
+                     {"seconds", row.views->seconds},
+                     {"waits", row.views->waits},
+                     {"together", {{"seconds", row.views->seconds_together}, {"waits", row.views->waits_together}}}};
+  }
   if (!row.kernels.empty()) {
     nlohmann::json& kernels = json["kernels"] = nlohmann::json::array();
     for (const KernelTime& time : row.kernels) {
       kernels.push_back({{"entry", time.entry}, {"calls", time.calls}, {"seconds", time.seconds}});
+      if (time.unchecked) kernels.back()["unchecked_seconds"] = *time.unchecked;
     }
+    json["kernels_clock"] = row.kernels_by_gpu ? "gpu" : "host";
+    if (!row.no_unchecked.empty()) json["no_unchecked"] = row.no_unchecked;
   }
   return json;
 }
@@ -120,15 +129,20 @@ void PrintKernels(const GpuBenchReport& report) {
   const auto row = std::find_if(report.rows.rbegin(), report.rows.rend(),
                                 [](const GpuBenchRow& candidate) { return !candidate.kernels.empty(); });
   if (row == report.rows.rend()) return;
-  std::vector<std::vector<std::string>> table = {{"kernel", "calls", "ms"}};
+  std::vector<std::vector<std::string>> table = {{"kernel", "calls", "ms", "unchecked"}};
   std::vector<KernelTime> kernels = row->kernels;
   std::ranges::stable_sort(kernels, std::greater<>(), &KernelTime::seconds);
   for (const KernelTime& time : kernels) {
-    table.push_back({time.entry, Cat(time.calls), Fixed(1e3 * time.seconds, 2)});
+    table.push_back({time.entry, Cat(time.calls), Fixed(1e3 * time.seconds, 2),
+                     time.unchecked ? Fixed(1e3 * *time.unchecked, 2) : "-"});
   }
   std::cout << "\n"
-            << NameOf(*row) << ", kernel by kernel, each with a round trip of " << Milliseconds(report.round_trip)
-            << " ms a call\n\n"
+            << NameOf(*row) << ", kernel by kernel, by "
+            << (row->kernels_by_gpu ? "the GPU's clock"
+                                    : Cat("the host's clock, which adds a round trip of ",
+                                          Milliseconds(report.round_trip), " ms a call"))
+            << "\nunchecked: without the checks that the library compiles into kernels"
+            << (row->no_unchecked.empty() ? "" : Cat("; ", row->no_unchecked)) << "\n\n"
             << FormatTable(table);
 }
 
@@ -157,6 +171,11 @@ void PrintTable(const GpuBenchReport& report, const GpuBenchOptions& options) {
     if (!row.no_cpu.empty()) std::cout << NameOf(row) << ": not on the CPU, " << row.no_cpu << "\n";
     if (!row.resident && row.problem.empty()) {
       std::cout << NameOf(row) << ": uploaded in blocks, more --max-gpu-memory would keep it there\n";
+    }
+    if (row.views) {
+      std::cout << NameOf(row) << ", " << row.views->count << " views: " << Fixed(row.views->waits, 1) << " waits and "
+                << Milliseconds(row.views->seconds) << " ms each one by one, " << Fixed(row.views->waits_together, 1)
+                << " and " << Milliseconds(row.views->seconds_together) << " ms together\n";
     }
     if (const std::string broken = BrokenPromise(row); !broken.empty())
       std::cout << NameOf(row) << ": " << broken << "\n";

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -13,11 +12,13 @@
 #include "cli/verb.h"
 #include "core/file_system.h"
 #include "core/log.h"
+#include "core/stopwatch.h"
 #include "core/text.h"
 #include "images/rendering.h"
 #include "io/input_record.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
+#include "render/still_cloud.h"
 #include "request/choice.h"
 #include "request/parse.h"
 #include "request/upscale_flags.h"
@@ -103,19 +104,18 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto paths, OutputPaths(output, cameras, shared.overwrite || piped));
 
   const std::string comment = network ? EnlargedComment(network->info(), network->info().scale) : "";
-  Rasterizer rasterizer;
-  RenderOutput render;
   double seconds = 0;
   nlohmann::json views = nlohmann::json::array();
   std::string empty;  // what is wrong with the first view that shows nothing
   int64_t empty_views = 0;
   {
+    StillCloud still(cloud);
+    Rasterizer rasterizer;
     Progress progress("render", static_cast<int64_t>(paths.size()));
-    for (size_t i = 0; i < paths.size(); ++i) {
+    Stopwatch watch;
+    const auto keep = [&](size_t i, RenderOutput& render) -> Status {
+      seconds += watch.Lap();
       const Camera& camera = cameras.cameras[i];
-      const auto begin = std::chrono::steady_clock::now();
-      ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, camera, options, render));
-      seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
       const std::string warning = NothingToSee(cloud, camera, options, rasterizer.statistics().visible);
       if (!warning.empty() && empty_views++ == 0) empty = warning;
       Image picture = flags.transparent ? WithAlpha(render) : std::move(render.color);
@@ -125,7 +125,10 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
       ANCHORSPLAT_RETURN_IF_ERROR(WriteRendering(paths[i], picture, write, comment));
       views.push_back({{"name", camera.name}, {"file", paths[i].string()}});
       progress.Advance();
-    }
+      watch.Lap();
+      return {};
+    };
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.RenderEach(still, cameras.cameras, options, keep));
   }
   if (empty_views > 0) {
     LogWarning(
@@ -142,7 +145,8 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
     PrintJson(json);
   } else if (!shared.quiet) {
     ResultsBeside(write.memory) << "rendered " << paths.size() << (paths.size() == 1 ? " view of " : " views of ")
-                                << WithThousands(cloud.size()) << " Gaussians in " << HumanSeconds(seconds)
+                                << WithThousands(cloud.size())
+                                << (cloud.size() == 1 ? " Gaussian in " : " Gaussians in ") << HumanSeconds(seconds)
                                 << " (without reading and "
                                 << "writing) to " << OutputName(output, write.memory)
                                 << (network ? ", enlarged by a network, whose invention the detail is" : "") << '\n';

@@ -6,6 +6,8 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "enhance/refine_poses.h"
+#include "render/rasterizer.h"
+#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -20,9 +22,9 @@ Result<ViewDensity> MeasureDensity(const GaussianCloud& cloud, const RenderOptio
   ViewDensity density;
   const std::vector<Camera> views = Thinned(cameras, kDensityViews);
   Rasterizer rasterizer;
-  RenderOutput output;
-  for (const Camera& view : views) {
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, view, render, output));
+  StillCloud still(cloud);
+  const auto add = [&](size_t at, const RenderOutput& output) -> Status {
+    const Camera& view = views[at];
     const auto shown = [](float alpha) { return alpha >= kShown; };
     density.pixels += static_cast<double>(std::count_if(output.alpha.pixels.begin(), output.alpha.pixels.end(), shown));
     const Pinhole& k = view.intrinsics;
@@ -33,7 +35,9 @@ Result<ViewDensity> MeasureDensity(const GaussianCloud& cloud, const RenderOptio
       const double u = k.fx * c[0] / c[2] + k.cx, v = k.fy * c[1] / c[2] + k.cy;
       if (u >= 0 && u < k.width && v >= 0 && v < k.height) density.gaussians += 1;
     }
-  }
+    return {};
+  };
+  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.RenderEach(still, views, render, add));
   const double count = std::max<double>(1, static_cast<double>(views.size()));
   density.pixels /= count;
   density.gaussians /= count;

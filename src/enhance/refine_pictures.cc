@@ -10,6 +10,8 @@
 #include "core/text.h"
 #include "enhance/refine_targets.h"
 #include "metrics/image_metrics.h"
+#include "render/rasterizer.h"
+#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -57,15 +59,14 @@ double PsnrMoved(const Image& shown, const Image& truth, int dx, int dy) {
 
 // By how many dB the picture is nearer to the splat when it is moved by a pixel, or when the camera's focal length is
 // another, by so much that borders move as far; 0 at least.
-Result<double> GainElsewhere(const GaussianCloud& cloud, const RenderOptions& render, const Camera& camera,
-                             const Image& shown, const Image& truth) {
+Result<double> GainElsewhere(StillCloud& cloud, Rasterizer& rasterizer, const RenderOptions& render,
+                             const Camera& camera, const Image& shown, const Image& truth) {
   if (std::min(truth.width, truth.height) < kLeastSide) return 0.0;
   const double own = PsnrMoved(shown, truth, 0, 0);
   double best = own;
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) best = std::max(best, PsnrMoved(shown, truth, dx, dy));
   }
-  Rasterizer rasterizer;
   RenderOutput output;
   const double zoom = 2 * kZoomPixels / std::max(truth.width, truth.height);
   for (const double factor : {1 - zoom, 1 + zoom}) {
@@ -103,20 +104,22 @@ Camera Halved(const Camera& camera) {
 }
 
 // Fills in `smaller_psnr` and `smaller`. `cameras` and `pictures` become the last sizes that were looked at.
-Status MeasureSmaller(const GaussianCloud& cloud, const RenderOptions& render, std::vector<Camera>& cameras,
+Status MeasureSmaller(StillCloud& cloud, const RenderOptions& render, std::vector<Camera>& cameras,
                       std::vector<Image>& pictures, PictureAgreement& agreement) {
   Rasterizer rasterizer;
-  RenderOutput output;
   for (int part = 2;; part *= 2) {
     double psnr = 0;
     for (size_t i = 0; i < pictures.size(); ++i) {
       if (std::min(pictures[i].width, pictures[i].height) < 2 * kLeastSide) return {};
       pictures[i] = Halved(pictures[i]);
       cameras[i] = Halved(cameras[i]);
-      ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, cameras[i], render, output));
+    }
+    const auto add = [&](size_t i, RenderOutput& output) -> Status {
       Clamp01(output.color);
       psnr += Capped(Psnr(output.color, pictures[i])) / static_cast<double>(pictures.size());
-    }
+      return {};
+    };
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.RenderEach(cloud, cameras, render, add));
     if (agreement.smaller > 1 && psnr <= agreement.smaller_psnr) continue;
     agreement.smaller = part;
     agreement.smaller_psnr = psnr;
@@ -130,6 +133,7 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
   const auto count = static_cast<int64_t>(pictures.views().size());
   PictureAgreement agreement;
   agreement.views = std::min(count, kMostViews);
+  StillCloud still(cloud);
   Rasterizer rasterizer;
   RenderOutput output;
   std::vector<Image> shown, truth;
@@ -146,7 +150,7 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
       masked.push_back(camera.name);
       continue;
     }
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, camera, render, output));
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(still, camera, render, output));
     Clamp01(output.color);
     cameras.push_back(camera);
     shown.push_back(output.color);
@@ -159,7 +163,8 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
   std::vector<double> each;
   for (size_t i = 0; i < shown.size(); ++i) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double own, Psnr(shown[i], truth[i]));
-    ANCHORSPLAT_ASSIGN_OR_RETURN(const double gain, GainElsewhere(cloud, render, cameras[i], shown[i], truth[i]));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const double gain,
+                                 GainElsewhere(still, rasterizer, render, cameras[i], shown[i], truth[i]));
     each.push_back(std::min(own, kIdentical));
     if (gain >= kMisplaced) {
       ++agreement.misplaced;
@@ -180,7 +185,7 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
     if (each[i] < sorted[sorted.size() / 2] - kFarBelow) agreement.far_below.push_back(cameras[i].name);
   }
   if (render.mode == RenderMode::kClassic) {
-    ANCHORSPLAT_RETURN_IF_ERROR(MeasureSmaller(cloud, render, cameras, truth, agreement));
+    ANCHORSPLAT_RETURN_IF_ERROR(MeasureSmaller(still, render, cameras, truth, agreement));
   }
   return agreement;
 }

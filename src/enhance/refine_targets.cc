@@ -50,7 +50,11 @@ RefineTargets::RefineTargets(PictureCache pictures) : pictures_(std::move(pictur
 
 RefineTargets::RefineTargets(std::shared_ptr<const GaussianCloud> splat, const RenderOptions& render,
                              std::vector<Camera> views)
-    : splat_(std::move(splat)), render_(render), views_(std::move(views)), kept_(views_.size()) {}
+    : splat_(std::move(splat)),
+      still_(std::make_unique<StillCloud>(*splat_)),
+      render_(render),
+      views_(std::move(views)),
+      kept_(views_.size()) {}
 
 const std::vector<Camera>& RefineTargets::views() const { return pictures_ ? pictures_->views() : views_; }
 
@@ -76,7 +80,7 @@ Status RefineTargets::Load(int64_t view, const PixelBox& window, RefineTarget& t
     target = kept;
     return {};
   }
-  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(*splat_, Crop(camera, window), render_, output_));
+  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(*still_, Crop(camera, window), render_, output_));
   target.picture = output_.color;
   Clamp01(target.picture);
   target.ignored = FaintPixels(output_.alpha);

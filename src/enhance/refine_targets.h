@@ -13,6 +13,7 @@
 #include "core/result.h"
 #include "fit/picture_cache.h"
 #include "render/rasterizer.h"
+#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -55,6 +56,7 @@ class RefineTargets {
   Image whole_;
 
   std::shared_ptr<const GaussianCloud> splat_;
+  std::unique_ptr<StillCloud> still_;  // of it
   RenderOptions render_;
   std::vector<Camera> views_;
   std::vector<RefineTarget> kept_;  // of whole pictures; empty ones are not there yet

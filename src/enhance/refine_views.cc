@@ -18,6 +18,7 @@
 #include "fit/view_pose.h"
 #include "metrics/image_metrics.h"
 #include "render/shown_range.h"
+#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -114,6 +115,7 @@ Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOption
 Result<Consistency> MeasureConsistency(const GaussianCloud& cloud, double upscale, const GaussianCloud& input,
                                        const RefineOptions& options, RefineViews& views) {
   RefineTargets& targets = views.check;
+  StillCloud still(cloud);
   ViewObjective objective;
   PoseAligner aligner;
   RefineTarget target;
@@ -127,13 +129,13 @@ Result<Consistency> MeasureConsistency(const GaussianCloud& cloud, double upscal
     const ObjectiveOptions as_seen{.render = views.render, .loss = {}, .pixel = AreaModel(upscale)};
     if (options.align) {
       if (!target.ignored.empty()) {
-        ANCHORSPLAT_RETURN_IF_ERROR(objective.Show(as_seen, cloud, seen));
+        ANCHORSPLAT_RETURN_IF_ERROR(objective.Show(as_seen, still, seen));
         FillIgnored(target.ignored, objective.rendered(), target.picture);
       }
       ANCHORSPLAT_ASSIGN_OR_RETURN(seen, aligner.Align(cloud, RaysOf(PixelModel{1, upscale}, views.render), seen, seen,
                                                        target.picture, options.exposure, kCheckAlignSteps));
     }
-    ANCHORSPLAT_RETURN_IF_ERROR(objective.Show(as_seen, cloud, seen));
+    ANCHORSPLAT_RETURN_IF_ERROR(objective.Show(as_seen, still, seen));
     Image shown = objective.rendered();
     FillIgnored(target.ignored, shown, target.picture);
     if (options.exposure) {
@@ -159,6 +161,7 @@ Result<std::vector<double>> Residuals(const GaussianCloud& cloud, double upscale
   RenderOptions render = RaysOf(one_ray, views.render);
   render.gradient = true;
 
+  StillCloud still(cloud);
   Rasterizer rasterizer;
   RenderOutput output;
   RenderGradient off;
@@ -173,7 +176,7 @@ Result<std::vector<double>> Residuals(const GaussianCloud& cloud, double upscale
     const Camera& camera = views.train.views()[static_cast<size_t>(view)];
     const PixelBox window = ChooseWindow(camera, cloud, 0, view);
     ANCHORSPLAT_RETURN_IF_ERROR(views.train.Load(view, window, target));
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, Crop(camera, window), render, output));
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(still, Crop(camera, window), render, output));
     off.color = output.color;
     for (size_t k = 0; k < off.color.pixels.size(); ++k) {
       off.color.pixels[k] = std::abs(off.color.pixels[k] - target.picture.pixels[k]);
@@ -182,7 +185,7 @@ Result<std::vector<double>> Residuals(const GaussianCloud& cloud, double upscale
       for (int c = 0; c < 3 && target.ignored[k] != 0; ++c) off.color.channel(c)[k] = 0;
     }
     off.box = {0, 0, off.color.width, off.color.height};
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Backward(cloud, off, weighted));
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Backward(still, off, weighted));
     for (size_t k = 0; k < residuals.size(); ++k) {
       for (size_t c = 0; c < 3; ++c) residuals[k] += double{weighted.sh[k * stride + c]};
     }

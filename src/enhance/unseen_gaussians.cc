@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <span>
@@ -19,6 +20,7 @@
 #include "metrics/image_metrics.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
+#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -104,6 +106,7 @@ Result<Shown> FindShown(CloudView cloud, const std::vector<int64_t>& rows, const
   Shown shown{.additions = std::vector<double>(rows.size(), -1.0),
               .reaches = std::vector<double>(rows.size()),
               .footprints = std::vector<double>(rows.size())};
+  StillCloud still(cloud);
   Rasterizer rasterizer;
   RenderOutput output;
   RenderGradient signs;
@@ -111,7 +114,7 @@ Result<Shown> FindShown(CloudView cloud, const std::vector<int64_t>& rows, const
   Progress progress("look for what nobody misses", static_cast<int64_t>(views.size()));
   for (const Camera& camera : views) {
     if (StopRequested()) return Stopped();
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, camera, options, output));
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(still, camera, options, output));
     shown.anything = shown.anything || rasterizer.statistics().visible > 0;
     signs.color = output.color;
     signs.box = {0, 0, camera.intrinsics.width, camera.intrinsics.height};
@@ -144,11 +147,10 @@ class Comparison {
  public:
   static Result<Comparison> Make(const GaussianCloud& cloud, std::vector<Camera> views, const RenderOptions& options) {
     Comparison comparison(cloud, std::move(views), options);
-    for (const Camera& camera : comparison.views_) {
-      if (StopRequested()) return Stopped();
-      ANCHORSPLAT_RETURN_IF_ERROR(comparison.Render(camera));
-      comparison.before_.push_back(comparison.output_.color);
-    }
+    ANCHORSPLAT_RETURN_IF_ERROR(comparison.Render([&](size_t, RenderOutput& output) -> Status {
+      comparison.before_.push_back(std::move(output.color));
+      return {};
+    }));
     return comparison;
   }
 
@@ -166,22 +168,24 @@ class Comparison {
   Comparison(const GaussianCloud& cloud, std::vector<Camera> views, const RenderOptions& options)
       : cloud_(&cloud), logits_(cloud.opacity_logits), views_(std::move(views)), options_(options) {}
 
-  Status Render(const Camera& camera) {
+  Status Render(const std::function<Status(size_t, RenderOutput&)>& use) {
     CloudView view(*cloud_);
     view.opacity_logits = logits_;
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(view, camera, options_, output_));
-    Clamp01(output_.color);
-    return {};
+    StillCloud still(view);
+    return rasterizer_.RenderEach(still, views_, options_, [&](size_t k, RenderOutput& output) -> Status {
+      if (StopRequested()) return Stopped();
+      Clamp01(output.color);
+      return use(k, output);
+    });
   }
 
   Result<double> WorstPsnr() {
     double worst = std::numeric_limits<double>::infinity();
-    for (size_t k = 0; k < views_.size(); ++k) {
-      if (StopRequested()) return Stopped();
-      ANCHORSPLAT_RETURN_IF_ERROR(Render(views_[k]));
-      ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, Psnr(before_[k], output_.color));
+    ANCHORSPLAT_RETURN_IF_ERROR(Render([&](size_t k, const RenderOutput& output) -> Status {
+      ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, Psnr(before_[k], output.color));
       worst = std::min(worst, psnr);
-    }
+      return {};
+    }));
     return worst;
   }
 
@@ -191,7 +195,6 @@ class Comparison {
   RenderOptions options_;
   std::vector<Image> before_;
   Rasterizer rasterizer_;
-  RenderOutput output_;
 };
 
 // Places of what some view draws; those that add least come first.

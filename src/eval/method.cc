@@ -25,6 +25,7 @@
 #include "reading/reading_model.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
+#include "render/still_cloud.h"
 #include "tensors/tensor_file.h"
 #include "upscale/enlarge_picture.h"
 #include "upscale/upscaler.h"
@@ -79,12 +80,13 @@ EvalMethod Enlarged(const std::string& name, const std::string& settings, const 
   return {name, settings, [enlarge](const MethodTask& task) -> Result<MethodViews> {
             const BenchmarkObject& object = task.object;
             const auto rasterizer = std::make_shared<Rasterizer>();
+            const auto still = std::make_shared<StillCloud>(object.low);
             MethodViews views;
-            views.render = [&object, rasterizer, enlarge](size_t view) -> Result<Image> {
+            views.render = [&object, rasterizer, still, enlarge](size_t view) -> Result<Image> {
               RenderOptions options = OptionsFor(object.low);
               options.background = object.background;
               RenderOutput output;
-              ANCHORSPLAT_RETURN_IF_ERROR(rasterizer->Render(object.low, object.LowCamera(view), options, output));
+              ANCHORSPLAT_RETURN_IF_ERROR(rasterizer->Render(*still, object.LowCamera(view), options, output));
               Clamp01(output.color);
               return enlarge(output.color, object.views[view].intrinsics);
             };
@@ -415,21 +417,21 @@ Result<std::optional<NamedMethod>> ParseDefault(const std::string& word, const s
 
 MethodViews SplatViews(const BenchmarkObject& object, GaussianCloud cloud) {
   struct State {
+    explicit State(GaussianCloud splat) : cloud(std::move(splat)), options(OptionsFor(cloud)) {}
     GaussianCloud cloud;
+    StillCloud still{cloud};
     Rasterizer rasterizer;
     RenderOptions options;
     bool warned = false;  // of views with nothing in them: one is enough
   };
-  const auto state = std::make_shared<State>();
-  state->options = OptionsFor(cloud);
+  const auto state = std::make_shared<State>(std::move(cloud));
   state->options.background = object.background;
-  state->cloud = std::move(cloud);
   MethodViews views;
   views.gaussians = state->cloud.size();
   views.render = [&object, state](size_t view) -> Result<Image> {
     RenderOutput output;
     const Camera& camera = object.views[view];
-    ANCHORSPLAT_RETURN_IF_ERROR(state->rasterizer.Render(state->cloud, camera, state->options, output));
+    ANCHORSPLAT_RETURN_IF_ERROR(state->rasterizer.Render(state->still, camera, state->options, output));
     if (!state->warned) {
       const std::string warning =
           NothingToSee(state->cloud, camera, state->options, state->rasterizer.statistics().visible);

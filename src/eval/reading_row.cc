@@ -33,6 +33,7 @@
 #include "reading/showing_gaussians.h"
 #include "render/rasterizer.h"
 #include "render/shown_range.h"
+#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -246,7 +247,6 @@ struct Measuring {
   GaussianCloud context;
   std::optional<Region> keep;  // from the cloud's origin on
   Rasterizer rasterizer;
-  RenderOutput output;
 
   // Mean PSNR over the views, dB.
   Result<double> Measure(GaussianCloud cloud) {
@@ -262,13 +262,15 @@ struct Measuring {
     RenderOptions options = OptionsFor(cloud);
     options.background = background;
     double sum = 0;
-    for (size_t v = 0; v < cameras.size(); ++v) {
-      ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(cloud, cameras[v], options, output));
+    StillCloud still(cloud);
+    const auto add = [&](size_t v, RenderOutput& output) -> Status {
       Clamp01(output.color);
       FillIgnored(*ignored[v], *truths[v], output.color);
       ANCHORSPLAT_ASSIGN_OR_RETURN(const double psnr, Psnr(output.color, *truths[v]));
       sum += psnr;
-    }
+      return {};
+    };
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.RenderEach(still, cameras, options, add));
     return sum / static_cast<double>(cameras.size());
   }
 };

@@ -20,6 +20,7 @@
 #include "metrics/compare.h"
 #include "metrics/image_metrics.h"
 #include "render/shown_range.h"
+#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -40,7 +41,7 @@ class SplatViewSource : public ViewSource {
   }
   Result<Image> Load(size_t view) override {
     const Camera& camera = cameras_.cameras[view];
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud_, camera, options_, output_));
+    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(still_, camera, options_, output_));
     if (!warned_) {
       const std::string warning = NothingToSee(cloud_, camera, options_, rasterizer_.statistics().visible);
       if (!warning.empty()) LogWarning(warning + " --near and --far say what is in range");
@@ -58,6 +59,7 @@ class SplatViewSource : public ViewSource {
 
  private:
   GaussianCloud cloud_;
+  StillCloud still_{cloud_};
   CameraSet cameras_;
   RenderOptions options_;
   bool warned_ = false;  // of a view with nothing in it: one is enough

@@ -124,16 +124,28 @@ void WarnUnlessNoted(const Status& noted) {
   if (!noted.ok()) LogWarning(Cat("going on will need -w for what is left here: ", noted.error().message));
 }
 
-// What comes after the steps: the result is brought to safety, then its quality is measured.
-Status Finish(const TrainingViews& views, const FitOptions& options, const FitControl& control, Fitter& fitter,
-              Fitted& out) {
-  if (control.deliver) ANCHORSPLAT_RETURN_IF_ERROR(control.deliver(out));
-  if (out.report.interrupted) return {};
+Status MeasureQualities(const TrainingViews& views, const FitOptions& options, Fitter& fitter, Fitted& out) {
   const PixelModel pixel = PixelModelAt(options, options.steps);
   const RenderOptions& render = options.objective.render;
   ANCHORSPLAT_ASSIGN_OR_RETURN(out.report.train, MeasureQuality(out.cloud, render, fitter.pictures(), pixel));
   PictureCache held_out(views.held_out, render.background, 0);
   ANCHORSPLAT_ASSIGN_OR_RETURN(out.report.held_out, MeasureQuality(out.cloud, render, held_out, pixel));
+  return {};
+}
+
+// What comes after the steps: the result is brought to safety, then its quality is measured.
+Status Finish(const TrainingViews& views, const FitOptions& options, const FitControl& control, Fitter& fitter,
+              KeptState& kept, Fitted& out) {
+  if (control.deliver) ANCHORSPLAT_RETURN_IF_ERROR(control.deliver(out));
+  if (out.report.interrupted) return {};
+  const Status measured = MeasureQualities(views, options, fitter, out);
+  if (measured.ok() || measured.error().code != ErrorCode::kInterrupted) return measured;
+  // With all steps done: resumed, it is measured.
+  out.report.interrupted = true;
+  out.report.train = out.report.held_out = {};
+  fitter.Leave(control.outputs);
+  kept.Write(fitter.state());
+  out.report.kept_step = kept.step();
   return {};
 }
 
@@ -206,7 +218,7 @@ Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitO
   if (const auto up = WorldUp(views.train)) out.cloud.comments.push_back(UpComment(*up));
   out.report.gaussians_out = out.cloud.size();
   WarnWhereNothingIsLeft(out);
-  if (const Status finished = Finish(views, options, control, fitter, out); !finished.ok()) {
+  if (const Status finished = Finish(views, options, control, fitter, kept, out); !finished.ok()) {
     return failed(finished.error());
   }
   if (!out.report.interrupted && !control.checkpoint.empty()) RemoveFitCheckpoint(control.checkpoint);

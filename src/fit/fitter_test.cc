@@ -166,6 +166,36 @@ TEST_F(Fits, AnInterruptionLosesNothing) {
   EXPECT_FALSE(std::filesystem::exists(control.checkpoint)) << "a finished fit has no state to keep";
 }
 
+TEST_F(Fits, AnInterruptionWhileItIsMeasuredLosesNothing) {
+  const auto whole = Fit(views_, Initial(), options_);
+  ASSERT_TRUE(whole.ok());
+  std::atomic<bool> stop{false};
+  FitControl control;
+  control.checkpoint = folder_ / "state";
+  control.deliver = [&](const Fitted&) -> Status {
+    stop = true;
+    return {};
+  };
+  const RunScope run({.stop = &stop});
+  const auto first = Fit(views_, Initial(), options_, control);
+  ASSERT_TRUE(first.ok()) << first.error().message;
+  EXPECT_TRUE(first->report.interrupted);
+  EXPECT_EQ(first->report.steps, 60);
+  EXPECT_EQ(first->report.kept_step, 60);
+  EXPECT_EQ(first->report.train.views, 0);
+  ExpectSameCloud(first->cloud, whole->cloud);
+
+  control.deliver = nullptr;
+  stop = false;
+  control.resume = true;
+  const auto second = Fit(views_, Initial(), options_, control);
+  ASSERT_TRUE(second.ok()) << second.error().message;
+  EXPECT_FALSE(second->report.interrupted);
+  EXPECT_EQ(second->report.train.psnr, whole->report.train.psnr);
+  ExpectSameCloud(second->cloud, whole->cloud);
+  EXPECT_FALSE(std::filesystem::exists(control.checkpoint));
+}
+
 // What an interruption left may be replaced when the run goes on; another file of the name, or one that somebody wrote
 // to, may not.
 TEST_F(Fits, WhatItLeftIsKnownAgain) {

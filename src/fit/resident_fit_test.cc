@@ -197,7 +197,8 @@ TEST_F(ResidentFits, ALostDeviceCostsSteps) {
     const Fitted fitted = OnGpu(faulty, control);
     EXPECT_EQ(fitted.report.steps, 60);
     EXPECT_NEAR(fitted.report.train.psnr, expected, kAlike) << part;
-    EXPECT_THAT(messages.warnings(), Contains(HasSubstr("The GPU gave up: the device was lost (a test says so)")));
+    EXPECT_THAT(messages.warnings(),
+                Contains(HasSubstr("because the GPU gave up: the device was lost (a test says so)")));
     if (part > 0.5 && part < 0.9) {
       EXPECT_THAT(messages.warnings(), Contains("It goes on from step 25, of which there is a copy."));
     }

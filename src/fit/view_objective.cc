@@ -4,16 +4,25 @@
 
 namespace anchorsplat {
 
-Status ViewObjective::Show(const ObjectiveOptions& options, const CloudView& cloud, const Camera& camera) {
+template <typename Cloud>
+Status ViewObjective::ShowCloud(const ObjectiveOptions& options, bool gradient, Cloud& cloud, const Camera& camera) {
   Stopwatch watch;
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options.pixel));
   RenderOptions render = RaysOf(options.pixel, options.render);
-  render.gradient = true;
+  render.gradient = gradient;
   averaged_ = options.pixel.samples > 1;
   ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(cloud, RaysOf(options.pixel, camera), render, output_));
   if (averaged_) AverageRays(output_.color, options.pixel.samples, average_);
   times_.render += watch.Lap();
   return {};
+}
+
+Status ViewObjective::Show(const ObjectiveOptions& options, const CloudView& cloud, const Camera& camera) {
+  return ShowCloud(options, /*gradient=*/true, cloud, camera);
+}
+
+Status ViewObjective::Show(const ObjectiveOptions& options, StillCloud& cloud, const Camera& camera) {
+  return ShowCloud(options, /*gradient=*/false, cloud, camera);
 }
 
 Result<PhotometricLossValue> ViewObjective::Compare(const ObjectiveOptions& options, const CloudView& cloud,

@@ -7,6 +7,7 @@
 #include "fit/pixel_model.h"
 #include "metrics/photometric_loss.h"
 #include "render/rasterizer.h"
+#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -34,6 +35,8 @@ class ViewObjective {
   // The two halves of it, for those who look at rendered() before they decide what to compare it with. Compare takes
   // the options and the cloud of the last Show.
   Status Show(const ObjectiveOptions& options, const CloudView& cloud, const Camera& camera);
+  // Only to look at.
+  Status Show(const ObjectiveOptions& options, StillCloud& cloud, const Camera& camera);
   // `step`: that of Rasterizer::Backward.
   Result<PhotometricLossValue> Compare(const ObjectiveOptions& options, const CloudView& cloud, const Image& picture,
                                        CloudGradient& gradient, const CoefficientStep* step = nullptr);
@@ -43,6 +46,9 @@ class ViewObjective {
   const ObjectiveTimes& times() const { return times_; }  // of all calls
 
  private:
+  template <typename Cloud>
+  Status ShowCloud(const ObjectiveOptions& options, bool gradient, Cloud& cloud, const Camera& camera);
+
   Rasterizer rasterizer_;
   RenderOutput output_;  // of rays
   Image average_;        // of them, where a pixel has several

@@ -4,15 +4,15 @@
 #include <vector>
 
 #include "core/log.h"
+#include "core/run_context.h"
 #include "metrics/image_metrics.h"
+#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
 Result<ViewQuality> MeasureQuality(const GaussianCloud& cloud, const RenderOptions& options, PictureCache& pictures,
                                    const PixelModel& pixel) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(pixel));
-  Rasterizer rasterizer;
-  RenderOutput output;
   Image picture, average;
   Buffer<uint8_t> ignored;
   ViewQuality sum;
@@ -20,23 +20,28 @@ Result<ViewQuality> MeasureQuality(const GaussianCloud& cloud, const RenderOptio
   CloudView from_origin = cloud;
   from_origin.origin = {};
   const auto count = static_cast<int64_t>(pictures.views().size());
-  for (int64_t view = 0; view < count; ++view) {
-    const Camera& camera = pictures.views()[static_cast<size_t>(view)];
-    ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(view, picture, ignored));
-    ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(from_origin, RaysOf(pixel, camera), RaysOf(pixel, options), output));
+  std::vector<Camera> rays;
+  for (const Camera& camera : pictures.views()) rays.push_back(RaysOf(pixel, camera));
+  const auto add = [&](size_t view, RenderOutput& output) -> Status {
+    if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped while the result was measured"};
+    ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(static_cast<int64_t>(view), picture, ignored));
     if (pixel.samples > 1) AverageRays(output.color, pixel.samples, average);
     Image& shown = pixel.samples > 1 ? average : output.color;
     Clamp01(shown);
     FillIgnored(ignored, shown, picture);
     ANCHORSPLAT_ASSIGN_OR_RETURN(const MaskedQuality quality, MeasureMasked(shown, picture, ignored));
     if (quality.counted == 0) {
-      masked.push_back(camera.name);
-      continue;
+      masked.push_back(rays[view].name);
+      return {};
     }
     ++sum.views;
     sum.psnr += quality.psnr;
     sum.ssim += quality.ssim;
-  }
+    return {};
+  };
+  StillCloud still(from_origin);
+  Rasterizer rasterizer;
+  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.RenderEach(still, rays, RaysOf(pixel, options), add));
   if (sum.views > 0) {
     sum.psnr /= static_cast<double>(sum.views);
     sum.ssim /= static_cast<double>(sum.views);

@@ -19,7 +19,7 @@ struct ViewQuality {
 
 // Over all views of `pictures`, which are seen from the cloud's origin as TrainingViews are, pixels as `pixel` says;
 // ignored ones do not count. Views of which a mask leaves nothing are left out and named in a warning. Errors: those of
-// Rasterizer and PictureCache.
+// Rasterizer and PictureCache; kInterrupted.
 Result<ViewQuality> MeasureQuality(const GaussianCloud& cloud, const RenderOptions& options, PictureCache& pictures,
                                    const PixelModel& pixel = {});
 

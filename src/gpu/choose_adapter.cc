@@ -1,5 +1,6 @@
 #include "gpu/choose_adapter.h"
 
+#include <algorithm>
 #include <optional>
 
 #include "core/text.h"
@@ -53,6 +54,12 @@ Result<size_t> ChooseAdapter(const std::vector<GpuAdapter>& adapters, const Devi
     if (better) best = i;
   }
   if (best) return *best;
+  const auto usable_software = [](const GpuAdapter& adapter) {
+    return adapter.unusable.empty() && adapter.type == GpuAdapter::Type::kCpu;
+  };
+  if (std::ranges::any_of(adapters, usable_software)) {
+    return Error{ErrorCode::kNotFound, "there are only software adapters here, and auto takes none (gpu does)"};
+  }
   return Error{ErrorCode::kNotFound, "none of the GPUs here can be used (anchorsplat doctor says why)"};
 }
 

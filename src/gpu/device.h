@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <initializer_list>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -95,6 +96,11 @@ class GpuDevice {
   virtual void Run(const GpuKernel& kernel, std::span<const std::byte> parameters,
                    std::initializer_list<GpuBinding> bindings, uint32_t groups) = 0;
 
+  // Run, alone and waited for: the seconds it took by the GPU's own clock. None where it has none
+  // (GpuAdapter::timestamps) or has failed.
+  virtual std::optional<double> RunTimed(const GpuKernel& kernel, std::span<const std::byte> parameters,
+                                         std::initializer_list<GpuBinding> bindings, uint32_t groups) = 0;
+
   // Hands over what was recorded so far, so that the GPU works while more is recorded. Recorded work is also handed
   // over by itself from time to time.
   virtual void Submit() = 0;
@@ -106,6 +112,8 @@ class GpuDevice {
   // Seconds that callers spent in the calls above since the device was opened: recording, transfers, and waiting for
   // the GPU.
   virtual double seconds() const = 0;
+  // How often a call has waited for the GPU since then.
+  virtual int64_t waits() const = 0;
 };
 
 // Makes `memory` hold at least `bytes` that one binding can see. What was in it is lost where it grows. Errors: more

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <initializer_list>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -36,6 +37,7 @@ class FaultyDevice final : public GpuDevice {
     return gpu_->Allocate(bytes, what);
   }
   void Write(const GpuBuffer& buffer, uint64_t offset, std::span<const std::byte> data) override {
+    bytes_written_ += static_cast<int64_t>(data.size());
     if (Works()) gpu_->Write(buffer, offset, data);
   }
   void Clear(const GpuBuffer& buffer, uint64_t offset, uint64_t bytes) override {
@@ -53,16 +55,22 @@ class FaultyDevice final : public GpuDevice {
     }
     if (Works()) gpu_->Run(kernel, parameters, bindings, groups);
   }
+  std::optional<double> RunTimed(const GpuKernel& kernel, std::span<const std::byte> parameters,
+                                 std::initializer_list<GpuBinding> bindings, uint32_t groups) override {
+    return Works() ? gpu_->RunTimed(kernel, parameters, bindings, groups) : std::nullopt;
+  }
   void Submit() override {
     if (!lost_) gpu_->Submit();
   }
   Status Read(std::span<const GpuRead> reads) override { return lost_ ? Status(Lost()) : gpu_->Read(reads); }
   Status Wait() override { return lost_ ? Status(Lost()) : gpu_->Wait(); }
   double seconds() const override { return gpu_->seconds(); }
+  int64_t waits() const override { return gpu_->waits(); }
 
   // So far, for tests that let each of them fail.
   int calls() const { return calls_; }
   int allocations() const { return allocations_; }
+  int64_t bytes_written() const { return bytes_written_; }
 
  private:
   bool Works() {
@@ -79,6 +87,7 @@ class FaultyDevice final : public GpuDevice {
   GpuAdapter adapter_;
   GpuFaults faults_;
   std::atomic<int> calls_ = 0, allocations_ = 0;
+  std::atomic<int64_t> bytes_written_ = 0;
   std::atomic<bool> lost_ = false, too_large_ = false;
 };
 

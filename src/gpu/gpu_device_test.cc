@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -12,6 +13,7 @@
 #include "core/run_context.h"
 #include "gpu/device.h"
 #include "gpu/gpu_for_test.h"
+#include "gpu/open_gpu.h"
 
 namespace anchorsplat {
 namespace {
@@ -85,6 +87,35 @@ TEST_F(Gpu, AddsToWhatWasWritten) {
 TEST_F(Gpu, MemoryBeginsAtZero) {
   const GpuMemory buffer = Make(4096);
   EXPECT_EQ(Values(*gpu_, *buffer, 1024), std::vector<uint32_t>(1024, 0));
+}
+
+TEST_F(Gpu, ItsOwnClockTimesAKernel) {
+  const GpuMemory buffer = Make(1 << 20);
+  Add(*gpu_, *buffer, 1 << 18, 1);
+  const int64_t waits = gpu_->waits();
+  for (int k = 0; k < 2; ++k) {
+    const std::optional<double> seconds =
+        gpu_->RunTimed(kAdd, AsParameters(AddParameters{1 << 18, 2}), {{1, buffer.get()}}, (1 << 18) / 64);
+    EXPECT_TRUE(gpu_->adapter().timestamps || !seconds.has_value());
+    if (seconds) {  // SwiftShader's clock gives none
+      EXPECT_GE(*seconds, 0);
+      EXPECT_LT(*seconds, 60);
+    }
+  }
+  EXPECT_EQ(gpu_->waits(), waits + 2);
+  EXPECT_EQ(Values(*gpu_, *buffer, 1 << 18), std::vector<uint32_t>(1 << 18, 5));
+}
+
+TEST_F(Gpu, WithoutChecksItCalculatesTheSame) {
+  const Result<std::shared_ptr<GpuDevice>> opened = OpenUncheckedGpu({DeviceChoice::Kind::kGpu});
+  if (!opened.ok()) {  // Dawn
+    EXPECT_NE(opened.error().message.find("without checks"), std::string::npos) << opened.error().message;
+    return;
+  }
+  Result<GpuMemory> buffer = (*opened)->Allocate(4096, "a test");
+  ASSERT_TRUE(buffer.ok());
+  Add(**opened, **buffer, 1024, 7);
+  EXPECT_EQ(Values(**opened, **buffer, 1024), std::vector<uint32_t>(1024, 7));
 }
 
 TEST_F(Gpu, MoreThan65535GroupsAreRows) {

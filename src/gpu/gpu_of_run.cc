@@ -31,7 +31,7 @@ void GiveUpGpu(const Error& reason) {
     state->given_up = reason.message;
     state->opened.reset();
   }
-  LogWarning(Cat("The GPU gave up: ", reason.message, ". The work goes on on the CPU."));
+  LogWarning(Cat("The work goes on on the CPU, because the GPU gave up: ", reason.message));
 }
 
 std::string WhyGpuWasGivenUp() {

@@ -31,6 +31,10 @@ std::vector<GpuAdapter> ListGpuAdapters();
 // for the same adapter returns the same one, unless that is lost.
 // Errors (kNotFound): no library, no adapter, no such number, or the driver's reason.
 Result<std::shared_ptr<GpuDevice>> OpenGpu(const DeviceChoice& choice);
+// A device of its own whose kernels are compiled without the checks of the library at run time: for measuring what
+// these cost. A kernel that reads beyond a buffer may do anything there. Errors: of OpenGpu; the library knows no such
+// thing.
+Result<std::shared_ptr<GpuDevice>> OpenUncheckedGpu(const DeviceChoice& choice);
 
 // The device that the run of this thread is to work on (RunContext::device), opened on first use; null: the CPU. What
 // cannot be opened is an error where the choice is kGpu or a number, and the CPU where it is kAuto. After GiveUpGpu it

@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "core/activations.h"
 #include "core/camera.h"
@@ -15,6 +18,7 @@
 #include "core/spherical_harmonics.h"
 #include "core/statistics.h"
 #include "render/rasterizer.h"
+#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -67,6 +71,7 @@ class Painter {
     distance_ = FramingDistance({telling.framing.target, telling.radius()}, intrinsics);
     farthest_pixel_ = distance_ / intrinsics.fx;
     marked_ = Mark(telling);
+    still_.emplace(cloud_);
     options_.near_plane = static_cast<float>(kNearPlane * distance_);  // scales with the cloud, as all does
     options_.far_plane = static_cast<float>(distance_ / kNearPlane);
   }
@@ -84,13 +89,11 @@ class Painter {
     options_.dilation = static_cast<float>(kDilation * in_pixels * in_pixels);
     options_.mode = mode;
     OutlineProfile profile;
-    for (const Camera& camera : cameras_.cameras) {
-      LeaveIfAbandoned();
-      ANCHORSPLAT_RETURN_IF_ERROR(Draw(camera, pixel));
-      const size_t channel = output_.alpha.pixels.size();
-      const float* const of_cut = marked_ ? output_.color.pixels.data() + channel : nullptr;
-      profile.Add(output_.alpha, pixel / size, of_cut, marked_ ? of_cut + channel : nullptr);
-    }
+    ANCHORSPLAT_RETURN_IF_ERROR(Draw(pixel, [&](const RenderOutput& output) {
+      const size_t channel = output.alpha.pixels.size();
+      const float* const of_cut = marked_ ? output.color.pixels.data() + channel : nullptr;
+      profile.Add(output.alpha, pixel / size, of_cut, marked_ ? of_cut + channel : nullptr);
+    }));
     values = profile.Values();
     if (cut != nullptr) *cut = profile.Cut();
     if (coarse != nullptr) *coarse = profile.Coarse();
@@ -100,34 +103,41 @@ class Painter {
   // Mean squares of details; the last ones are of all.
   Status Details(double unit, std::array<double, SplatPictures::kDetails + 1>& of_luminance,
                  std::array<double, SplatPictures::kDetails + 1>& of_alpha) {
+    still_.reset();
     cloud_.sh = colors_;
+    still_.emplace(cloud_);
     options_.dilation = std::nullopt;
     options_.mode = RenderMode::kClassic;
     const double pixel = std::min(farthest_pixel_, kDetailPixel * unit);
-    for (const Camera& camera : cameras_.cameras) {
-      LeaveIfAbandoned();
-      ANCHORSPLAT_RETURN_IF_ERROR(Draw(camera, pixel));
-      Buffer<float> luminance(output_.alpha.pixels.size());
-      const float* const color = output_.color.pixels.data();
+    return Draw(pixel, [&](const RenderOutput& output) {
+      Buffer<float> luminance(output.alpha.pixels.size());
+      const float* const color = output.color.pixels.data();
       for (size_t i = 0; i < luminance.size(); ++i) {
         luminance[i] = (color[i] + color[i + luminance.size()] + color[i + 2 * luminance.size()]) / 3;
       }
       AddDetails(std::move(luminance), of_luminance);
-      AddDetails(output_.alpha.pixels, of_alpha);
-    }
-    return {};
+      AddDetails(output.alpha.pixels, of_alpha);
+    });
   }
 
  private:
-  Status Draw(const Camera& from, double pixel) {
-    Camera camera = from;
-    camera.intrinsics = {.width = kSide,
-                         .height = kSide,
-                         .fx = distance_ / pixel,
-                         .fy = distance_ / pixel,
-                         .cx = kSide / 2.0,
-                         .cy = kSide / 2.0};
-    return rasterizer_.Render(cloud_, camera, options_, output_);
+  // By all cameras.
+  Status Draw(double pixel, const std::function<void(const RenderOutput&)>& look) {
+    std::vector<Camera> cameras = cameras_.cameras;
+    for (Camera& camera : cameras) {
+      camera.intrinsics = {.width = kSide,
+                           .height = kSide,
+                           .fx = distance_ / pixel,
+                           .fy = distance_ / pixel,
+                           .cx = kSide / 2.0,
+                           .cy = kSide / 2.0};
+    }
+    LeaveIfAbandoned();
+    return rasterizer_.RenderEach(*still_, cameras, options_, [&](size_t, RenderOutput& output) -> Status {
+      look(output);
+      LeaveIfAbandoned();
+      return {};
+    });
   }
 
   // Instead of green: whether it was cut; instead of blue: whether it is coarse.
@@ -174,6 +184,7 @@ class Painter {
   }
 
   GaussianCloud cloud_;
+  std::optional<StillCloud> still_;  // as `cloud_` is
   Buffer<float> colors_;
   CameraSet cameras_;
   double distance_ = 0;
@@ -181,7 +192,6 @@ class Painter {
   bool marked_ = false;
   RenderOptions options_;
   Rasterizer rasterizer_;
-  RenderOutput output_;
 };
 
 }  // namespace

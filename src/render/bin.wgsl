@@ -79,7 +79,7 @@ fn Columns(e: Ellipse, tile_y: u32, columns: vec2u) -> vec2u {
 @compute @workgroup_size(256)
 fn visit_tiles(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
   let place = GroupNumber(group) * 256u + lane;
-  if (place >= sizes[0]) { return; }
+  if (place >= sizes[0] || (bin.step == LIST_PAIRS && sizes[1] == 0u)) { return; }
   let row = order[place];
   let rect = rects[row];
   let columns = vec2u(rect.x & 0xffffu, rect.y & 0xffffu);

@@ -44,6 +44,9 @@ enum GpuSize : uint32_t {
   kSizeGaussians = 2,  // N
 };
 
+// What render/bin.wgsl does with the tiles of a run.
+enum class GpuBinStep : uint32_t { kCountTiles = 0, kCountPairs = 1, kListPairs = 2 };
+
 // Items of a block of the sorts and scans.
 inline constexpr uint32_t kGpuBlock = 2048;
 

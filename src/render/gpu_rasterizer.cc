@@ -23,8 +23,6 @@ struct VisibleParameters {
   uint32_t count, sums_at, unused[2];
 };
 
-// Steps of render/bin.wgsl.
-constexpr uint32_t kCountTiles = 0, kCountPairs = 1, kListPairs = 2;
 struct BinParameters {
   uint32_t tiles_x, first_tile, last_tile, step, sums_at;
   float log2_min_alpha;
@@ -95,7 +93,7 @@ void GpuRasterizer::SortAndCount() {
                       n,
                       32});  // eight passes: ends in rows[0]
   device->Clear(*tile_counts, 0, 4 * static_cast<uint64_t>(tile_count) + 4);
-  VisitTiles(0, tile_count, kCountTiles, n);
+  VisitTiles(0, tile_count, GpuBinStep::kCountTiles, n);
   counts_are_of_all = true;
 }
 
@@ -115,6 +113,24 @@ Status GpuRasterizer::ReadCounts() {
   return {};
 }
 
+// What other pictures have left behind, so that there is room for this one.
+void GpuRasterizer::DropSpare() {
+  for (size_t k = 0; k < 2; ++k) pairs[k].reset(), pair_keys[k].reset();
+  pair_capacity = 0;
+  together.reset();
+}
+
+Status GpuRasterizer::RoomForPairs(int64_t wanted) {
+  const uint64_t bytes = 4 * static_cast<uint64_t>(wanted);
+  for (size_t k = 0; k < 2; ++k) {
+    ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, pairs[k], bytes, "pairs of tiles and Gaussians"));
+    ANCHORSPLAT_RETURN_IF_ERROR(GpuRoom(*device, pair_keys[k], bytes, "pairs of tiles and Gaussians"));
+  }
+  pair_capacity = static_cast<int64_t>(
+      std::min({pairs[0]->bytes(), pairs[1]->bytes(), pair_keys[0]->bytes(), pair_keys[1]->bytes()}) / 4);
+  return {};
+}
+
 Status GpuRasterizer::MakeRoomForPairs(GpuCloud& cloud, int64_t max_pairs) {
   int64_t longest = 1;
   for (size_t t = 0; t + 1 < tile_offsets.size(); ++t)
@@ -126,22 +142,14 @@ Status GpuRasterizer::MakeRoomForPairs(GpuCloud& cloud, int64_t max_pairs) {
   int64_t wanted = std::max(longest, std::min({total_pairs, max_pairs, largest}));
   for (;;) {
     run_pairs = std::max(longest, std::min(max_pairs, std::max(wanted, pair_capacity)));
-    Status room;
-    const uint64_t bytes = 4 * static_cast<uint64_t>(wanted);
-    for (size_t k = 0; k < 2 && room.ok(); ++k) {
-      room = GpuRoom(*device, pairs[k], bytes, "pairs of tiles and Gaussians");
-      if (room.ok()) room = GpuRoom(*device, pair_keys[k], bytes, "pairs of tiles and Gaussians");
-    }
+    Status room = RoomForPairs(wanted);
     if (room.ok()) {
-      pair_capacity = static_cast<int64_t>(
-          std::min({pairs[0]->bytes(), pairs[1]->bytes(), pair_keys[0]->bytes(), pair_keys[1]->bytes()}) / 4);
       run_pairs = std::max(longest, std::min(max_pairs, pair_capacity));
       room = GpuRoom(*device, tables, GpuSortTableBytes(static_cast<uint64_t>(std::min(run_pairs, total_pairs))),
                      "tables of a sort");
     }
     if (room.ok()) return {};
-    for (size_t k = 0; k < 2; ++k) pairs[k].reset(), pair_keys[k].reset();
-    pair_capacity = 0;
+    DropSpare();
     if (cloud.can_drop()) {
       cloud.Drop();  // it has been projected
     } else if (wanted > fewest) {
@@ -152,17 +160,17 @@ Status GpuRasterizer::MakeRoomForPairs(GpuCloud& cloud, int64_t max_pairs) {
   }
 }
 
-void GpuRasterizer::VisitTiles(int64_t first, int64_t last, uint32_t step, uint64_t at_most) {
+void GpuRasterizer::VisitTiles(int64_t first, int64_t last, GpuBinStep step, uint64_t at_most) {
   const BinParameters parameters = {.tiles_x = view.size[2],
                                     .first_tile = static_cast<uint32_t>(first),
                                     .last_tile = static_cast<uint32_t>(last),
-                                    .step = step,
+                                    .step = static_cast<uint32_t>(step),
                                     .sums_at = static_cast<uint32_t>(at_most),
                                     .log2_min_alpha = view.cuts[1],
                                     .tiles = static_cast<uint32_t>(tile_count),
                                     .unused = 0};
   // What only counts writes no pairs.
-  const bool lists = step == kListPairs;
+  const bool lists = step == GpuBinStep::kListPairs;
   device->Run(kVisitTiles, AsParameters(parameters),
               {{1, sizes.get()},
                {2, rows[0].get()},
@@ -195,10 +203,10 @@ void GpuRasterizer::ListRun(int64_t first, int64_t last) {
   listed = 0;
   if (total == 0) return;
   const auto at_most = static_cast<uint64_t>(visible);
-  if (!counts_are_of_all || first != 0 || last != tile_count) VisitTiles(first, last, kCountPairs, at_most);
+  if (!counts_are_of_all || first != 0 || last != tile_count) VisitTiles(first, last, GpuBinStep::kCountPairs, at_most);
   counts_are_of_all = false;
   ScanOnGpu(*device, {*sizes, kSizeVisible, *places, *totals, at_most});
-  VisitTiles(first, last, kListPairs, at_most);
+  VisitTiles(first, last, GpuBinStep::kListPairs, at_most);
   listed = SortOnGpu(*device, {*sizes,
                                kSizePairs,
                                {pair_keys[0].get(), pair_keys[1].get()},
@@ -241,6 +249,10 @@ Result<bool> GpuRasterizer::Draw(GpuCloud& cloud, const Camera& camera, float ne
   if (!MakeView(cloud, camera, near, options)) return false;
   const bool whole = output == nullptr || options.gradient;
   Status room = MakeRoom(whole);
+  if (!room.ok()) {
+    DropSpare();
+    room = MakeRoom(whole);
+  }
   if (!room.ok() && cloud.can_stream()) {
     ANCHORSPLAT_RETURN_IF_ERROR(cloud.Stream(*device));
     room = MakeRoom(whole);

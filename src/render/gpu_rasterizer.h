@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "core/camera.h"
@@ -31,6 +32,22 @@ class GpuRasterizer {
   // or the run's memory, or the device has failed; nothing is drawn.
   Result<bool> Draw(GpuCloud& cloud, const Camera& camera, float near, const RenderOptions& options,
                     RenderOutput* output);
+
+  // One of several pictures that are drawn without a look of the host in between.
+  struct Picture {
+    const Camera& camera;  // as of Draw
+    float near;
+    RenderOutput& output;  // shaped
+    bool drawn = false;    // false: it does not fit, or needs the CPU, and Draw has to see to it
+    int64_t visible = 0, total_pairs = 0;
+  };
+  // Draws pictures of a resident cloud, without what a gradient needs, with the bits that they have by Draw. The host
+  // waits once, for all of them; each may have `pairs` pairs, for which there is memory. Errors: as of Draw; nothing is
+  // drawn.
+  Status DrawTogether(GpuCloud& cloud, std::span<Picture> pictures, const RenderOptions& options, int64_t pairs);
+  // Bytes that DrawTogether takes for a picture of this size.
+  static uint64_t BytesTogether(const Pinhole& intrinsics, const RenderOptions& options);
+  void ForgetTogether() { together.reset(); }
 
   // The lists of tiles [first, last) to `pairs[listed]` and `ranges`, where EndOfRun allows that many.
   void ListRun(int64_t first, int64_t last);
@@ -66,7 +83,10 @@ class GpuRasterizer {
   Status ReadCounts();
   Status ProjectOnCpu(const GpuCloud& cloud, const Camera& camera, float near, const RenderOptions& options);
   Status MakeRoomForPairs(GpuCloud& cloud, int64_t max_pairs);
-  void VisitTiles(int64_t first, int64_t last, uint32_t step, uint64_t at_most);
+  Status RoomForPairs(int64_t wanted);
+  void DropSpare();
+  void RecordAhead(GpuCloud& cloud, int64_t most_pairs, int64_t most_slots, int64_t report);
+  void VisitTiles(int64_t first, int64_t last, GpuBinStep step, uint64_t at_most);
   void Blend(int64_t first, int64_t last, int64_t band_row);
   Status ReadPicture(int64_t band_row, bool depth, RenderOutput& output);
 
@@ -75,6 +95,8 @@ class GpuRasterizer {
   GpuMemory tables;       // u32, of sorts
   GpuMemory totals;       // u32 [16], of scans
   GpuMemory tile_counts;  // u32 [T]
+  GpuMemory reports;      // vec4u, of pictures drawn without a look: render/tile_ranges.wgsl
+  GpuMemory together;     // f32, such pictures, plane by plane
   uint32_t unusual_count = 0;
   bool counts_are_of_all = false;  // `places` holds the pairs of the whole picture, not scanned
   int64_t tile_rows_per_band = 0;  // of `picture`; all of them, or else it is read band by band

@@ -67,6 +67,17 @@ void Shape(int width, int height, int channels, Image& image) {
 
 }  // namespace
 
+void ShapeFor(const Camera& camera, const RenderOptions& options, RenderOutput& output) {
+  const int width = camera.intrinsics.width, height = camera.intrinsics.height;
+  Shape(width, height, 3, output.color);
+  Shape(width, height, 1, output.alpha);
+  if (options.depth) {
+    Shape(width, height, 1, output.depth);
+  } else {
+    output.depth = Image();
+  }
+}
+
 ProjectParams ProjectInputs(const CloudView& cloud, const Camera& camera, float near, const RenderOptions& options) {
   ProjectParams project{};
   project.count = cloud.size();
@@ -223,8 +234,7 @@ void Rasterizer::State::DrawOnCpu(const CloudView& cloud, const Camera& camera, 
   BinAndBlend(total, camera, options, output, watch);
 }
 
-bool Rasterizer::State::DrawOnGpu(const CloudView& cloud, const Camera& camera, float near,
-                                  const RenderOptions& options, RenderOutput& output) {
+GpuRasterizer* Rasterizer::State::OpenGpu() {
   Result<std::shared_ptr<GpuDevice>> opened = GpuOfRun();
   if (!opened.ok()) GiveUpGpu(opened.error());
   const std::shared_ptr<GpuDevice> device = opened.ok() ? *opened : nullptr;
@@ -232,13 +242,31 @@ bool Rasterizer::State::DrawOnGpu(const CloudView& cloud, const Camera& camera, 
     DropGpu();
     if (device != nullptr) gpu = std::make_unique<GpuRasterizer>(device);
   }
-  if (gpu == nullptr) return false;
+  return gpu.get();
+}
+
+Result<GpuCloud*> Rasterizer::State::Upload(const Subject& subject) {
+  if (subject.still != nullptr) {
+    gpu_cloud = GpuCloud();
+    return subject.still->On(gpu->device);
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(gpu_cloud.Assign(*gpu->device, subject.cloud));
+  return &gpu_cloud;
+}
+
+bool Rasterizer::State::DrawOnGpu(const Subject& subject, const Camera& camera, float near,
+                                  const RenderOptions& options, RenderOutput& output) {
+  if (OpenGpu() == nullptr) {
+    if (subject.still != nullptr) subject.still->Leave();
+    return false;
+  }
   Stopwatch watch;
-  const Status uploaded = gpu_cloud.Assign(*device, cloud);
+  const Result<GpuCloud*> uploaded = Upload(subject);
   const Result<bool> drawn =
-      uploaded.ok() ? gpu->Draw(gpu_cloud, camera, near, options, &output) : Result<bool>(uploaded.error());
+      uploaded.ok() ? gpu->Draw(**uploaded, camera, near, options, &output) : Result<bool>(uploaded.error());
   if (!drawn.ok()) {
     DropGpu();
+    if (subject.still != nullptr) subject.still->Leave();
     GiveUpGpu(drawn.error());
     return false;
   }
@@ -248,6 +276,7 @@ bool Rasterizer::State::DrawOnGpu(const CloudView& cloud, const Camera& camera, 
   statistics.visible = gpu->visible;
   statistics.pairs = gpu->total_pairs;
   statistics.runs = gpu->runs;
+  if (subject.still != nullptr) subject.still->NotePairs(gpu->total_pairs);
   return true;
 }
 
@@ -268,8 +297,18 @@ Status ValidateRender(const Camera& camera, const RenderOptions& options) {
   return {};
 }
 
-Status Rasterizer::Render(const CloudView& cloud, const Camera& world_camera, const RenderOptions& options,
+Status Rasterizer::Render(const CloudView& cloud, const Camera& camera, const RenderOptions& options,
                           RenderOutput& output) {
+  return RenderSubject({cloud}, camera, options, output);
+}
+
+Status Rasterizer::Render(StillCloud& cloud, const Camera& camera, const RenderOptions& options, RenderOutput& output) {
+  return RenderSubject({cloud.view(), &cloud}, camera, options, output);
+}
+
+Status Rasterizer::RenderSubject(const Subject& subject, const Camera& world_camera, const RenderOptions& options,
+                                 RenderOutput& output) {
+  const CloudView& cloud = subject.cloud;
   state_->kept.reset();
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   ANCHORSPLAT_RETURN_IF_ERROR(ValidateRender(world_camera, options));
@@ -282,14 +321,8 @@ Status Rasterizer::Render(const CloudView& cloud, const Camera& world_camera, co
   camera.world_to_camera = FromOrigin(world_camera.world_to_camera, cloud.origin);
   const int width = camera.intrinsics.width, height = camera.intrinsics.height;
   try {
-    Shape(width, height, 3, output.color);
-    Shape(width, height, 1, output.alpha);
-    if (options.depth) {
-      Shape(width, height, 1, output.depth);
-    } else {
-      output.depth = Image();
-    }
-    const bool on_gpu = state_->DrawOnGpu(cloud, camera, near, options, output);
+    ShapeFor(camera, options, output);
+    const bool on_gpu = state_->DrawOnGpu(subject, camera, near, options, output);
     if (!on_gpu) state_->DrawOnCpu(cloud, camera, near, options, output);
     if (options.gradient) {
       state_->kept = {.intrinsics = camera.intrinsics,

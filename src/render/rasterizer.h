@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -19,6 +20,8 @@
 #include "render/projected_gaussian.h"
 
 namespace anchorsplat {
+
+class StillCloud;
 
 struct RenderOptions {
   RasterProfile profile = RasterProfile::kGsplat14;
@@ -137,6 +140,15 @@ class Rasterizer {
   // SH coefficients of a degree that is not used are not looked at. −Inf is legal as a log-scale (a flat Gaussian),
   // ±Inf as an opacity logit.
   Status Render(const CloudView& cloud, const Camera& camera, const RenderOptions& options, RenderOutput& output);
+  // The same of one that does not change (render/still_cloud.h), so that a GPU need not be given it again.
+  Status Render(StillCloud& cloud, const Camera& camera, const RenderOptions& options, RenderOutput& output);
+
+  // A picture by each camera, with the bits that Render gives it. They are given to `use` in turn, with the place of
+  // the camera; statistics() are then of that picture, and `use` may take it away. A GPU draws several before the host
+  // waits for them, where they are small. No gradient of them can be asked for. Errors: of Render and of `use`, after
+  // which no more are drawn.
+  Status RenderEach(StillCloud& cloud, std::span<const Camera> cameras, const RenderOptions& options,
+                    const std::function<Status(size_t, RenderOutput&)>& use);
 
   // The gradient of the last Render, which must have been asked to keep what this needs (RenderOptions::gradient), with
   // the same values in `cloud`. Exact for what Render calculates: cut-offs and the order of depths count as constant,
@@ -153,6 +165,7 @@ class Rasterizer {
   // that is written down and followed by the same step of Adam, bit by bit.
   Status Backward(const CloudView& cloud, const RenderGradient& output_gradient, CloudGradient& gradient,
                   const CoefficientStep* step = nullptr);
+  Status Backward(StillCloud& cloud, const RenderGradient& output_gradient, CloudGradient& gradient);
 
   // The same as far as blending goes, which is a part of Backward's time and, on the CPU, takes no memory of its own.
   // The spans are valid until the next call. Errors: of Backward.
@@ -161,7 +174,12 @@ class Rasterizer {
   const RenderStatistics& statistics() const;  // of the last Render that succeeded
 
  private:
+  struct Subject;
   struct State;
+  Status RenderSubject(const Subject& subject, const Camera& camera, const RenderOptions& options,
+                       RenderOutput& output);
+  Status BackwardOfSubject(const Subject& subject, const RenderGradient& output_gradient, CloudGradient& gradient,
+                           const CoefficientStep* step);
   std::unique_ptr<State> state_;
 };
 

@@ -211,8 +211,9 @@ void Rasterizer::State::ProjectBackward(const std::optional<SlotsLeft>& left, co
   });
 }
 
-void Rasterizer::State::DrawAgainOnCpu(const CloudView& cloud) {
+void Rasterizer::State::DrawAgainOnCpu(const Subject& subject) {
   DropGpu();
+  if (subject.still != nullptr) subject.still->Leave();
   Camera camera;
   camera.intrinsics = kept->intrinsics;
   camera.world_to_camera = kept->world_to_camera;
@@ -221,12 +222,13 @@ void Rasterizer::State::DrawAgainOnCpu(const CloudView& cloud) {
   RenderOutput again;
   again.color = Image(camera.intrinsics.width, camera.intrinsics.height, 3);
   again.alpha = Image(camera.intrinsics.width, camera.intrinsics.height, 1);
-  DrawOnCpu(cloud, camera, kept->near, options, again);
+  DrawOnCpu(subject.cloud, camera, kept->near, options, again);
   kept->on_gpu = false;
 }
 
-Status Rasterizer::State::BackwardOnGpu(const CloudView& cloud, const RenderGradient& output_gradient,
+Status Rasterizer::State::BackwardOnGpu(const Subject& subject, const RenderGradient& output_gradient,
                                         const CoefficientStep* step, CloudGradient& gradient) {
+  const CloudView& cloud = subject.cloud;
   Stopwatch watch;
   const RenderOptions& options = kept->options;
   GpuDevice& device = *gpu->device;
@@ -236,8 +238,9 @@ Status Rasterizer::State::BackwardOnGpu(const CloudView& cloud, const RenderGrad
   statistics.blend_backward = watch.Lap();
 
   // What is streamed, has been given back or is read on the host is read from this call's cloud.
-  if (gpu_cloud.empty() || !gpu_cloud.resident() || !gpu->unusual_rows.empty()) {
-    ANCHORSPLAT_RETURN_IF_ERROR(gpu_cloud.Assign(device, cloud));
+  GpuCloud* drawn = &gpu_cloud;
+  if (subject.still != nullptr || gpu_cloud.empty() || !gpu_cloud.resident() || !gpu->unusual_rows.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(drawn, Upload(subject));
   }
   const auto n = static_cast<size_t>(kept->count);
   const auto stride = static_cast<size_t>(cloud.sh_stride());
@@ -251,7 +254,7 @@ Status Rasterizer::State::BackwardOnGpu(const CloudView& cloud, const RenderGrad
   gradient.radii.resize(2 * n);
   // The step is taken at the end, when nothing can fail that would have to be done again.
   float* sh = step == nullptr ? gradient.sh.data() : Room(sh_gradients, static_cast<int64_t>(stride * n));
-  ANCHORSPLAT_RETURN_IF_ERROR(gpu_backward->Project(gpu_cloud, options, [&](const GpuGradient& part) -> Status {
+  ANCHORSPLAT_RETURN_IF_ERROR(gpu_backward->Project(*drawn, options, [&](const GpuGradient& part) -> Status {
     std::vector<GpuRead> reads;
     const auto read = [&](const GpuMemory& memory, float* column, size_t width) {
       const auto first = static_cast<size_t>(part.first), count = static_cast<size_t>(part.count);
@@ -321,6 +324,16 @@ void Rasterizer::State::BackwardToSeenOnCpu(const RenderGradient& output_gradien
 
 Status Rasterizer::Backward(const CloudView& cloud, const RenderGradient& output_gradient, CloudGradient& gradient,
                             const CoefficientStep* step) {
+  return BackwardOfSubject({cloud}, output_gradient, gradient, step);
+}
+
+Status Rasterizer::Backward(StillCloud& cloud, const RenderGradient& output_gradient, CloudGradient& gradient) {
+  return BackwardOfSubject({cloud.view(), &cloud}, output_gradient, gradient, nullptr);
+}
+
+Status Rasterizer::BackwardOfSubject(const Subject& subject, const RenderGradient& output_gradient,
+                                     CloudGradient& gradient, const CoefficientStep* step) {
+  const CloudView& cloud = subject.cloud;
   if (!state_->kept) return NoPicture();
   const State::Kept& kept = *state_->kept;
   ANCHORSPLAT_RETURN_IF_ERROR(CheckCloud(cloud, kept.count, kept.sh_degree));
@@ -331,10 +344,10 @@ Status Rasterizer::Backward(const CloudView& cloud, const RenderGradient& output
   }
   try {
     if (kept.on_gpu) {
-      const Status status = state_->BackwardOnGpu(cloud, output_gradient, step, gradient);
+      const Status status = state_->BackwardOnGpu(subject, output_gradient, step, gradient);
       if (status.ok()) return {};
       GiveUpGpu(status.error());
-      state_->DrawAgainOnCpu(cloud);
+      state_->DrawAgainOnCpu(subject);
     }
     Stopwatch watch;
     const std::optional<State::SlotsLeft> left = state_->BlendBackward(output_gradient, gradient);
@@ -357,7 +370,7 @@ Result<SeenGradient> Rasterizer::BackwardToSeen(const CloudView& cloud, const Re
       const Status status = state_->BackwardToSeenOnGpu(output_gradient);
       if (!status.ok()) {
         GiveUpGpu(status.error());
-        state_->DrawAgainOnCpu(cloud);
+        state_->DrawAgainOnCpu({cloud});
       }
     }
     if (!kept.on_gpu) state_->BackwardToSeenOnCpu(output_gradient);

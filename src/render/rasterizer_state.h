@@ -18,6 +18,7 @@
 #include "render/projected_gaussian.h"
 #include "render/rasterizer.h"
 #include "render/spherical_harmonics.h"
+#include "render/still_cloud.h"
 
 namespace anchorsplat {
 
@@ -41,6 +42,15 @@ SphericalHarmonicsParams SphericalHarmonicsInputs(const CloudView& cloud, const 
 // recovers what it was in front.
 inline float LeastTransmittance(const RenderOptions& options) { return std::max(options.min_transmittance, 1e-30f); }
 
+// Gives the pictures the sizes of what is drawn.
+void ShapeFor(const Camera& camera, const RenderOptions& options, RenderOutput& output);
+
+// What is drawn: arrays, or those of a splat that does not change, whose copy on a GPU is its own.
+struct Rasterizer::Subject {
+  const CloudView& cloud;
+  StillCloud* still = nullptr;
+};
+
 // The buffers of a Rasterizer.
 struct Rasterizer::State {
   Buffer<ProjectedGaussian> projected;
@@ -63,7 +73,7 @@ struct Rasterizer::State {
   };
   std::optional<Kept> kept;  // where the last Render was asked to keep it
   std::unique_ptr<GpuRasterizer> gpu;
-  GpuCloud gpu_cloud;                                   // what `gpu` drew last
+  GpuCloud gpu_cloud;                                   // what `gpu` drew last, unless that is a StillCloud's
   std::unique_ptr<GpuRasterizerBackward> gpu_backward;  // of `gpu`, once it is needed
   Buffer<float> transmittance;
   Buffer<int32_t> contributors, radii;
@@ -73,12 +83,19 @@ struct Rasterizer::State {
   Buffer<uint8_t> slot_touched;
   Buffer<double> tile_backgrounds;
 
+  // `gpu`, as the run has one now.
+  GpuRasterizer* OpenGpu();
+  // What is drawn, on it. Errors: of GpuCloud::Assign.
+  Result<GpuCloud*> Upload(const Subject& subject);
   // A picture, by one or the other. False: not by the GPU, because the run has none, because it needs doubles, or
   // because it failed, after which the run has none.
-  bool DrawOnGpu(const CloudView& cloud, const Camera& camera, float near, const RenderOptions& options,
+  bool DrawOnGpu(const Subject& subject, const Camera& camera, float near, const RenderOptions& options,
                  RenderOutput& output);
   void DrawOnCpu(const CloudView& cloud, const Camera& camera, float near, const RenderOptions& options,
                  RenderOutput& output);
+  // How many of the cameras, from the first one on, can be drawn together on the GPU: 0, or at least two.
+  size_t CountTogether(StillCloud& cloud, std::span<const Camera> cameras, const RenderOptions& options);
+  int64_t PairsTogether(const StillCloud& cloud, const RenderOptions& options) const;
 
   void DropGpu() {
     gpu_backward.reset();
@@ -104,9 +121,9 @@ struct Rasterizer::State {
   Buffer<float> sh_gradients;  // [N,K,3] of the GPU, where they take a step
 
   // What the GPU drew, once more by the CPU, which has then kept what it needs.
-  void DrawAgainOnCpu(const CloudView& cloud);
+  void DrawAgainOnCpu(const Subject& subject);
   // Errors: of GpuRasterizerBackward. Then nothing has changed that cannot be calculated again.
-  Status BackwardOnGpu(const CloudView& cloud, const RenderGradient& output_gradient, const CoefficientStep* step,
+  Status BackwardOnGpu(const Subject& subject, const RenderGradient& output_gradient, const CoefficientStep* step,
                        CloudGradient& gradient);
   Status BackwardToSeenOnGpu(const RenderGradient& output_gradient);
   void BackwardToSeenOnCpu(const RenderGradient& output_gradient);

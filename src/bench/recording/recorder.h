@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -32,10 +33,16 @@ class Recorder final : public GpuDevice {
             uint64_t bytes) override;
   void Run(const GpuKernel& kernel, std::span<const std::byte> parameters, std::initializer_list<GpuBinding> bindings,
            uint32_t groups) override;
+  std::optional<double> RunTimed(const GpuKernel& kernel, std::span<const std::byte> parameters,
+                                 std::initializer_list<GpuBinding> bindings, uint32_t groups) override {
+    Run(kernel, parameters, bindings, groups);
+    return std::nullopt;
+  }
   void Submit() override { gpu_->Submit(); }
   Status Read(std::span<const GpuRead> reads) override;
   Status Wait() override { return gpu_->Wait(); }
   double seconds() const override { return gpu_->seconds(); }
+  int64_t waits() const override { return gpu_->waits(); }
 
   // recording.json: {"kernels": [{"entry", "text"}], "buffers": [bytes], "calls": […]}, where a call is one of
   //   ["write", buffer, offset, at, bytes]         at: in recording.bin

@@ -4,6 +4,7 @@
 #include <map>
 #include <mutex>
 
+#include "core/text.h"
 #include "gpu/choose_adapter.h"
 #include "gpu/with_webgpu/webgpu_device.h"
 #include "gpu/with_webgpu/webgpu_instance.h"
@@ -15,7 +16,7 @@ namespace {
 // Never given back: work may still be under way when the program ends.
 struct OpenDevices {
   std::mutex mutex;
-  std::map<int, std::shared_ptr<WebGpuDevice>> by_adapter;
+  std::map<int, std::shared_ptr<WebGpuDevice>> by_adapter, unchecked_by_adapter;
   std::vector<std::shared_ptr<WebGpuDevice>> failed;  // the library may still call back about them
   std::vector<GpuAdapter> adapters;                   // as they were found; empty: not looked yet
 };
@@ -46,9 +47,14 @@ std::vector<GpuAdapter> ListGpuAdapters() {
   return adapters;
 }
 
-Result<std::shared_ptr<GpuDevice>> OpenGpu(const DeviceChoice& choice) {
+namespace {
+
+Result<std::shared_ptr<GpuDevice>> Open(const DeviceChoice& choice, bool unchecked) {
   WebGpuInstance& instance = WebGpuInstance::OfProcess();
   if (instance.api() == nullptr) return Error{ErrorCode::kNotFound, instance.problem()};
+  if (unchecked && instance.api()->DeviceCreateShaderModuleTrusted == nullptr) {
+    return Error{ErrorCode::kNotFound, Cat(instance.api()->path, " compiles no kernel without checks at run time")};
+  }
   OpenDevices& devices = Devices();
   const std::lock_guard lock(devices.mutex);
   if (instance.broken()) return Error{ErrorCode::kNotFound, kBroken};
@@ -58,15 +64,23 @@ Result<std::shared_ptr<GpuDevice>> OpenGpu(const DeviceChoice& choice) {
     for (const FoundAdapter& adapter : found) devices.adapters.push_back(adapter.description);
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const size_t index, ChooseAdapter(devices.adapters, choice));
-  std::shared_ptr<WebGpuDevice>& kept = devices.by_adapter[static_cast<int>(index)];
+  auto& by_adapter = unchecked ? devices.unchecked_by_adapter : devices.by_adapter;
+  std::shared_ptr<WebGpuDevice>& kept = by_adapter[static_cast<int>(index)];
   if (kept && !kept->failed()) return std::shared_ptr<GpuDevice>(kept);
   if (kept) devices.failed.push_back(std::move(kept));
   // An adapter gives one device (Dawn), so it is looked for anew.
   if (found.empty()) found = instance.Adapters();
   if (index >= found.size()) return Error{ErrorCode::kNotFound, "the GPU is gone"};
-  ANCHORSPLAT_ASSIGN_OR_RETURN(std::shared_ptr<WebGpuDevice> opened, WebGpuDevice::Open(instance, found[index]));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(std::shared_ptr<WebGpuDevice> opened,
+                               WebGpuDevice::Open(instance, found[index], unchecked));
   kept = std::move(opened);
   return std::shared_ptr<GpuDevice>(kept);
 }
+
+}  // namespace
+
+Result<std::shared_ptr<GpuDevice>> OpenGpu(const DeviceChoice& choice) { return Open(choice, false); }
+
+Result<std::shared_ptr<GpuDevice>> OpenUncheckedGpu(const DeviceChoice& choice) { return Open(choice, true); }
 
 }  // namespace anchorsplat

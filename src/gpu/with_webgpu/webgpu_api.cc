@@ -62,6 +62,10 @@ Result<WebGpuApi> LoadWebGpu(const std::string& path) {
   };
   optional(api.DevicePoll, "wgpuDevicePoll");
   optional(api.InstanceEnumerateAdapters, "wgpuInstanceEnumerateAdapters");
+  optional(api.DeviceCreateQuerySet, "wgpuDeviceCreateQuerySet");
+  optional(api.CommandEncoderResolveQuerySet, "wgpuCommandEncoderResolveQuerySet");
+  optional(api.QueueGetTimestampPeriod, "wgpuQueueGetTimestampPeriod");
+  optional(api.DeviceCreateShaderModuleTrusted, "wgpuDeviceCreateShaderModuleTrusted");
   if (api.DevicePoll == nullptr) {
     optional(api.InstanceWaitAny, "wgpuInstanceWaitAny");
     optional(api.HasInstanceFeature, "wgpuHasInstanceFeature");

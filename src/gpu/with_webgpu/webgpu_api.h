@@ -33,9 +33,15 @@ struct WebGpuApi {
   // Standard, but a stub in wgpu-native, whose own way to wait is DevicePoll.
   WGPUProcInstanceWaitAny InstanceWaitAny = nullptr;
   WGPUProcHasInstanceFeature HasInstanceFeature = nullptr;
+  // Standard, for the GPU's clock.
+  WGPUProcDeviceCreateQuerySet DeviceCreateQuerySet = nullptr;
+  WGPUProcCommandEncoderResolveQuerySet CommandEncoderResolveQuerySet = nullptr;
   // wgpu-native's own, null in others; declared in its wgpu.h, which is not needed for them.
   WGPUBool (*DevicePoll)(WGPUDevice device, WGPUBool wait, const uint64_t* submission) = nullptr;
   size_t (*InstanceEnumerateAdapters)(WGPUInstance instance, const void* options, WGPUAdapter* adapters) = nullptr;
+  float (*QueueGetTimestampPeriod)(WGPUQueue queue) = nullptr;  // nanoseconds; others count in these
+  WGPUShaderModule (*DeviceCreateShaderModuleTrusted)(WGPUDevice device, const WGPUShaderModuleDescriptor* descriptor,
+                                                      WGPUFlags checks) = nullptr;
 
   std::string path;
 };

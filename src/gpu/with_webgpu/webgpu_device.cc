@@ -19,15 +19,22 @@ constexpr uint32_t kSubmits = 32;   // until the queue is waited for: what it ho
 
 }  // namespace
 
-Result<std::shared_ptr<WebGpuDevice>> WebGpuDevice::Open(WebGpuInstance& instance, const FoundAdapter& adapter) {
+Result<std::shared_ptr<WebGpuDevice>> WebGpuDevice::Open(WebGpuInstance& instance, const FoundAdapter& adapter,
+                                                         bool unchecked) {
   const WebGpuApi& api = *instance.api();
   // NOLINTNEXTLINE: the constructor is private
   std::shared_ptr<WebGpuDevice> made(new WebGpuDevice(instance, adapter.description));
+  made->unchecked_ = unchecked;
   WGPULimits limits = WGPU_LIMITS_INIT;
   limits.maxStorageBufferBindingSize = adapter.description.max_binding;
   limits.maxBufferSize = adapter.description.max_buffer;
   WGPUDeviceDescriptor descriptor = WGPU_DEVICE_DESCRIPTOR_INIT;
   descriptor.requiredLimits = &limits;
+  const WGPUFeatureName timestamps = WGPUFeatureName_TimestampQuery;
+  if (adapter.description.timestamps) {
+    descriptor.requiredFeatures = &timestamps;
+    descriptor.requiredFeatureCount = 1;
+  }
   descriptor.uncapturedErrorCallbackInfo.userdata1 = made->failure_;
   descriptor.uncapturedErrorCallbackInfo.callback = [](WGPUDevice const*, WGPUErrorType type, WGPUStringView message,
                                                        void* failure, void*) {
@@ -167,21 +174,27 @@ Result<GpuMemory> WebGpuDevice::Allocate(uint64_t bytes, std::string_view what) 
 
 void WebGpuDevice::Retire(WGPUBuffer buffer, uint64_t last_used) {
   const Working working(*this);
-  if (failed()) return;
-  if (last_used == recording_) {
+  if (last_used == recording_ && !failed()) {
     retired_.push_back(buffer);
     return;
   }
-  instance_.api()->BufferDestroy(buffer);
-  instance_.api()->BufferRelease(buffer);
+  Destroy(buffer);
+}
+
+// Also of a device that has failed, whose memory others may need.
+void WebGpuDevice::Destroy(WGPUBuffer buffer) {
+  if (instance_.broken()) return;
+  const WebGpuApi& api = *instance_.api();
+  const auto destroy = [&] {
+    api.BufferDestroy(buffer);
+    api.BufferRelease(buffer);
+  };
+  if (!failure_->happened()) return destroy();
+  if (!SurvivesAbort(destroy)) instance_.Break();
 }
 
 void WebGpuDevice::ReleaseRetired() {
-  if (failed()) return;
-  for (WGPUBuffer buffer : retired_) {
-    instance_.api()->BufferDestroy(buffer);
-    instance_.api()->BufferRelease(buffer);
-  }
+  for (WGPUBuffer buffer : retired_) Destroy(buffer);
   retired_.clear();
 }
 

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -21,8 +22,9 @@ namespace anchorsplat {
 // included: not every library can be called from several threads.
 class WebGpuDevice final : public GpuDevice, public std::enable_shared_from_this<WebGpuDevice> {
  public:
-  // Errors (kNotFound): the driver's reason.
-  static Result<std::shared_ptr<WebGpuDevice>> Open(WebGpuInstance& instance, const FoundAdapter& adapter);
+  // `unchecked`: as of OpenUncheckedGpu, which the library can do. Errors (kNotFound): the driver's reason.
+  static Result<std::shared_ptr<WebGpuDevice>> Open(WebGpuInstance& instance, const FoundAdapter& adapter,
+                                                    bool unchecked = false);
   ~WebGpuDevice() override;
 
   const GpuAdapter& adapter() const override { return adapter_; }
@@ -33,10 +35,13 @@ class WebGpuDevice final : public GpuDevice, public std::enable_shared_from_this
             uint64_t bytes) override;
   void Run(const GpuKernel& kernel, std::span<const std::byte> parameters, std::initializer_list<GpuBinding> bindings,
            uint32_t groups) override;
+  std::optional<double> RunTimed(const GpuKernel& kernel, std::span<const std::byte> parameters,
+                                 std::initializer_list<GpuBinding> bindings, uint32_t groups) override;
   void Submit() override;
   Status Read(std::span<const GpuRead> reads) override;
   Status Wait() override;
   double seconds() const override { return seconds_.load(); }
+  int64_t waits() const override { return waits_.load(); }
 
   bool failed() const { return failure_->happened() || instance_.broken(); }
 
@@ -70,6 +75,9 @@ class WebGpuDevice final : public GpuDevice, public std::enable_shared_from_this
   WebGpuDevice(WebGpuInstance& instance, GpuAdapter adapter) : instance_(instance), adapter_(std::move(adapter)) {}
 
   // All of these under the mutex.
+  void Record(const GpuKernel& kernel, std::span<const std::byte> parameters,
+              std::initializer_list<GpuBinding> bindings, uint32_t groups);
+  bool EnsureClock();
   void BeginCommands();
   void CountCommand();
   void EndPass();
@@ -84,9 +92,11 @@ class WebGpuDevice final : public GpuDevice, public std::enable_shared_from_this
   Pipeline* PipelineOf(const GpuKernel& kernel);
   Pipeline Compile(const GpuKernel& kernel);
   bool ReadPieces(std::span<const GpuRead> pieces);
+  const std::byte* MapStaging(uint64_t bytes);
   bool EnsureStaging(uint64_t bytes);
   WGPUBuffer MakeBuffer(uint64_t bytes, WGPUBufferUsage usage, std::string_view label, ScopedError& error);
   void Retire(WGPUBuffer buffer, uint64_t last_used);
+  void Destroy(WGPUBuffer buffer);
   Status FailureOr() const;
 
   WebGpuInstance& instance_;
@@ -108,7 +118,11 @@ class WebGpuDevice final : public GpuDevice, public std::enable_shared_from_this
   WGPUBuffer staging_ = nullptr;     // to be mapped for reading
   uint64_t staging_bytes_ = 0;
   std::unordered_map<const GpuKernel*, Pipeline> pipelines_;
+  bool unchecked_ = false;
+  WGPUQuerySet ticks_ = nullptr;  // before and after a kernel
+  WGPUBuffer resolved_ticks_ = nullptr;
   std::atomic<double> seconds_ = 0;
+  std::atomic<int64_t> waits_ = 0;
 };
 
 }  // namespace anchorsplat

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cstring>
+#include <optional>
 #include <string>
 
 #include "core/text.h"
@@ -25,7 +26,8 @@ WebGpuDevice::Pipeline WebGpuDevice::Compile(const GpuKernel& kernel) {
   module_descriptor.nextInChain = &source.chain;
   module_descriptor.label = ViewOf(kernel.entry);
   PushErrorScopes();
-  WGPUShaderModule module = api.DeviceCreateShaderModule(device_, &module_descriptor);
+  WGPUShaderModule module = unchecked_ ? api.DeviceCreateShaderModuleTrusted(device_, &module_descriptor, 0)
+                                       : api.DeviceCreateShaderModule(device_, &module_descriptor);
   ScopedError error = PopErrorScopes();
   Pipeline made;
   if (error.type == WGPUErrorType_NoError && !failed()) {
@@ -56,6 +58,11 @@ WebGpuDevice::Pipeline* WebGpuDevice::PipelineOf(const GpuKernel& kernel) {
 void WebGpuDevice::Run(const GpuKernel& kernel, std::span<const std::byte> parameters,
                        std::initializer_list<GpuBinding> bindings, uint32_t groups) {
   const Working working(*this);
+  Record(kernel, parameters, bindings, groups);
+}
+
+void WebGpuDevice::Record(const GpuKernel& kernel, std::span<const std::byte> parameters,
+                          std::initializer_list<GpuBinding> bindings, uint32_t groups) {
   if (failed() || groups == 0) return;
   const WebGpuApi& api = *instance_.api();
   if (parameters.size() > kParameterBytes || bindings.size() + 1 > kMaxBindings) {
@@ -111,6 +118,60 @@ void WebGpuDevice::Run(const GpuKernel& kernel, std::span<const std::byte> param
   const uint32_t rows = (groups + kRowGroups - 1) / kRowGroups;
   api.ComputePassEncoderDispatchWorkgroups(pass_, std::min(groups, kRowGroups), rows, 1);
   CountCommand();
+}
+
+bool WebGpuDevice::EnsureClock() {
+  const WebGpuApi& api = *instance_.api();
+  if (!adapter_.timestamps || api.DeviceCreateQuerySet == nullptr || api.CommandEncoderResolveQuerySet == nullptr) {
+    return false;
+  }
+  if (ticks_ != nullptr) return true;
+  WGPUQuerySetDescriptor descriptor = WGPU_QUERY_SET_DESCRIPTOR_INIT;
+  descriptor.type = WGPUQueryType_Timestamp;
+  descriptor.count = 2;
+  ScopedError error;
+  resolved_ticks_ = MakeBuffer(256, WGPUBufferUsage_QueryResolve | WGPUBufferUsage_CopySrc, "ticks", error);
+  if (resolved_ticks_ == nullptr || !EnsureStaging(256)) return false;
+  PushErrorScopes();
+  ticks_ = api.DeviceCreateQuerySet(device_, &descriptor);
+  if (PopErrorScopes().type != WGPUErrorType_NoError) ticks_ = nullptr;
+  return ticks_ != nullptr;
+}
+
+std::optional<double> WebGpuDevice::RunTimed(const GpuKernel& kernel, std::span<const std::byte> parameters,
+                                             std::initializer_list<GpuBinding> bindings, uint32_t groups) {
+  const Working working(*this);
+  if (failed()) return std::nullopt;
+  const WebGpuApi& api = *instance_.api();
+  if (groups == 0 || !EnsureClock()) {
+    Record(kernel, parameters, bindings, groups);
+    if (!failed()) WaitForQueue();
+    return std::nullopt;
+  }
+  SubmitRecorded();
+  if (PipelineOf(kernel) == nullptr) return std::nullopt;
+  WGPUPassTimestampWrites writes = WGPU_PASS_TIMESTAMP_WRITES_INIT;
+  writes.querySet = ticks_;
+  writes.beginningOfPassWriteIndex = 0;
+  writes.endOfPassWriteIndex = 1;
+  WGPUComputePassDescriptor descriptor = WGPU_COMPUTE_PASS_DESCRIPTOR_INIT;
+  descriptor.timestampWrites = &writes;
+  BeginCommands();
+  pass_ = api.CommandEncoderBeginComputePass(encoder_, &descriptor);
+  Record(kernel, parameters, bindings, groups);
+  if (failed()) return std::nullopt;
+  EndPass();
+  constexpr uint64_t kBytes = 2 * sizeof(uint64_t);
+  api.CommandEncoderResolveQuerySet(encoder_, ticks_, 0, 2, resolved_ticks_, 0);
+  api.CommandEncoderCopyBufferToBuffer(encoder_, resolved_ticks_, 0, staging_, 0, kBytes);
+  const std::byte* const from = MapStaging(kBytes);
+  if (from == nullptr) return std::nullopt;
+  uint64_t ticks[2];
+  std::memcpy(ticks, from, kBytes);
+  api.BufferUnmap(staging_);
+  const double period = api.QueueGetTimestampPeriod == nullptr ? 1.0 : double{api.QueueGetTimestampPeriod(queue_)};
+  if (ticks[1] < ticks[0]) return std::nullopt;  // the clock was set back
+  return 1e-9 * period * static_cast<double>(ticks[1] - ticks[0]);
 }
 
 }  // namespace anchorsplat

@@ -33,6 +33,7 @@ bool WebGpuDevice::WaitForAnswer(const Ask& ask) {
     bool done = false, good = false;
   };
   auto* const answer = new Answer;  // freed once it is there
+  ++waits_;
   const WGPUFuture future = ask(answer);
   const bool answered = instance_.WaitUntil([&] { return answer->done; }, device_, future);
   if (!answered) {
@@ -91,6 +92,30 @@ bool WebGpuDevice::EnsureStaging(uint64_t bytes) {
   return true;
 }
 
+// Hands over what was recorded and waits for the first bytes of `staging_`, which are to be unmapped afterwards. Null:
+// the device has failed.
+const std::byte* WebGpuDevice::MapStaging(uint64_t bytes) {
+  SubmitRecorded();
+  if (failed()) return nullptr;
+  const bool mapped = WaitForAnswer([&](auto* answer) {
+    WGPUBufferMapCallbackInfo callback = WGPU_BUFFER_MAP_CALLBACK_INFO_INIT;
+    callback.mode = WGPUCallbackMode_AllowProcessEvents;
+    callback.callback = [](WGPUMapAsyncStatus status, WGPUStringView, void* to, void*) {
+      auto& answered = *static_cast<decltype(answer)>(to);
+      answered.good = status == WGPUMapAsyncStatus_Success;
+      answered.done = true;
+    };
+    callback.userdata1 = answer;
+    return instance_.api()->BufferMapAsync(staging_, WGPUMapMode_Read, 0, bytes, callback);
+  });
+  if (!mapped) return nullptr;
+  submits_ = 0;  // all that was handed over is done
+  bytes_written_ = 0;
+  const void* const from = instance_.api()->BufferGetConstMappedRange(staging_, 0, bytes);
+  if (from == nullptr) failure_->Set("what was calculated cannot be read");
+  return static_cast<const std::byte*>(from);
+}
+
 // Together at most kPiece.
 bool WebGpuDevice::ReadPieces(std::span<const GpuRead> pieces) {
   const WebGpuApi& api = *instance_.api();
@@ -105,32 +130,13 @@ bool WebGpuDevice::ReadPieces(std::span<const GpuRead> pieces) {
                                          piece.to.size());
     at += piece.to.size();
   }
-  SubmitRecorded();
-  if (failed()) return false;
-  const bool mapped = WaitForAnswer([&](auto* answer) {
-    WGPUBufferMapCallbackInfo callback = WGPU_BUFFER_MAP_CALLBACK_INFO_INIT;
-    callback.mode = WGPUCallbackMode_AllowProcessEvents;
-    callback.callback = [](WGPUMapAsyncStatus status, WGPUStringView, void* to, void*) {
-      auto& answered = *static_cast<decltype(answer)>(to);
-      answered.good = status == WGPUMapAsyncStatus_Success;
-      answered.done = true;
-    };
-    callback.userdata1 = answer;
-    return api.BufferMapAsync(staging_, WGPUMapMode_Read, 0, bytes, callback);
-  });
-  if (!mapped) return false;
-  const auto* from = static_cast<const std::byte*>(api.BufferGetConstMappedRange(staging_, 0, bytes));
-  if (from == nullptr) {
-    failure_->Set("what was calculated cannot be read");
-    return false;
-  }
+  const std::byte* from = MapStaging(bytes);
+  if (from == nullptr) return false;
   for (const GpuRead& piece : pieces) {
     std::memcpy(piece.to.data(), from, piece.to.size());
     from += piece.to.size();
   }
   api.BufferUnmap(staging_);
-  submits_ = 0;  // all that was handed over is done
-  bytes_written_ = 0;
   return true;
 }
 

@@ -16,4 +16,6 @@ Result<std::shared_ptr<GpuDevice>> OpenGpu(const DeviceChoice& /*choice*/) {
   return Error{ErrorCode::kNotFound, kProblem};
 }
 
+Result<std::shared_ptr<GpuDevice>> OpenUncheckedGpu(const DeviceChoice& choice) { return OpenGpu(choice); }
+
 }  // namespace anchorsplat

@@ -40,6 +40,7 @@ struct EnhanceSettings {
   std::optional<Rasterization> rasterization = std::nullopt;
   std::vector<PinholeCamera> cameras = {};  // the training cameras, with the size that was trained at
   std::filesystem::path images = {};        // project with the training pictures, for refinement
+  std::filesystem::path enlarge_with = {};  // a network that enlarges pictures, for the method "detail"
   // Of refinement, by the names of the program's options: {"steps", "200"}, {"seconds", "30"}, {"k", "4"}.
   std::map<std::string, std::string> refine = {};
   std::filesystem::path model = {};  // weights of a network; empty: the one that is part of the library

@@ -48,6 +48,7 @@ def enhance(
     prune_opacity: float = 0,
     block_gaussians: int = 200_000,
     images: PathLike | None = None,
+    enlarge_with: PathLike | None = None,
     hold_out: int | None = None,
     downscale: int = 1,
     steps: int | None = None,
@@ -96,6 +97,8 @@ def enhance(
     block_gaussians: larger splats are enhanced in overlapping blocks of this many.
     precision: of the network's arithmetic.
     compat, normalisation, attention_rounding, curve_depth, shuffles: of the published architecture (docs/network.md).
+
+    enlarge_with: of the method "detail": a network that enlarges pictures, as of :func:`upscale`; what it adds is invented.
 
     Of refinement: images: the project with the pictures it was fitted to. hold_out: every Nth view is not trained on
     (None: 8, or 0 where the splat was fitted to all of them, as it looks). downscale: N × N pixels of the pictures become

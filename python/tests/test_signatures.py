@@ -117,6 +117,7 @@ FUNCTIONS = {
             "method": "it is refine",
             "quality": "it is refine",
             "clean": "of enhance",
+            "enlarge-with": "of the method detail",
             **FILES,
         },
     ),

@@ -24,6 +24,7 @@ Result<EnhanceOptions> ToOptions(const EnhanceSettings& settings) {
   options.pixel_size = settings.pixel_size;
   options.mode = ToMode(settings.rasterization);
   options.refine.images = settings.images;
+  options.refine.enlarge_with = settings.enlarge_with;
   options.model.file = settings.model;
   options.model.copies = settings.copies;
   SetBudget(options, settings.max_gaussians);
@@ -34,6 +35,7 @@ Result<EnhanceOptions> ToOptions(const EnhanceSettings& settings) {
   given(settings.rasterization.has_value(), "mode");
   given(!settings.cameras.empty(), "cameras");
   given(!settings.images.empty(), "images");
+  given(!settings.enlarge_with.empty(), "enlarge-with");
   given(!settings.model.empty(), "model");
   given(settings.copies.has_value(), "copies");
   given(settings.max_gaussians != 0, "max-gaussians");

@@ -165,7 +165,8 @@ int64_t CountOutside(const std::optional<Region>& region, const GaussianCloud& c
 // What the method worked with, where it is the filter's business.
 std::string Details(const EnhanceReport& r) {
   if (r.pixel_size_source == PixelSizeSource::kNone) return "";
-  if (r.pixel_size_source == PixelSizeSource::kUnknown || r.filter_strength == 0) return ": left as it is";
+  if (r.pixel_size_source == PixelSizeSource::kUnknown) return ": left as it is";
+  if (r.filter_strength == 0) return IsInvented(r) ? Cat(" x", r.upscale) : ": left as it is";
   return Cat(" x", r.upscale, ", strength ", Fixed(r.filter_strength, 3), ", pixel size ", r.pixel_size, " (",
              NameOf(r.pixel_size_source), ")");
 }

@@ -179,7 +179,7 @@ TEST_F(EnhanceVerb, OptionsThatWouldChangeNothing) {
           "--model has no effect with --method filter; it has one with --method model");
   refused({"--prune-opacity", "0.1", "--method", "filter"}, "--prune-opacity has no effect");
   refused({"--precision", "bf16", "--method", "filter"}, "--precision has no effect");
-  refused({"--poses", "5"}, "which auto chose; it has one with --method refine or refine-images");
+  refused({"--poses", "5"}, "which auto chose; it has one with --method refine, refine-images or detail");
   refused({"--steps", "5", "--method", "filter"}, "--steps has no effect");
   const std::string cameras = Biplane() / "transforms_hr.json";
   ExpectRefused(Enhance({"--poses", "5", "--method", "refine", "--cameras", cameras}, "bad.ply", ""),

@@ -288,7 +288,8 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
   const bool closer = options.upscale > 1;
   const bool said = options.mode.has_value() || options.filter_strength.has_value();
   const std::string_view lost_nothing = options.filter_strength ? "" : LostNothing(cloud);
-  if (!lost_nothing.empty() && closer) {
+  const bool stays = closer && !plan.method->invents;  // where there is no width to give back
+  if (!lost_nothing.empty() && stays) {
     LogWarning(Cat("left as it is: ", lost_nothing, ". --filter-strength F enhances it all the same"));
     SayTheSplatStays(options);
   }
@@ -347,7 +348,9 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
   input.pixel_sizes = std::move(known.sizes);
   if (input.pixel_sizes.empty()) input.pixel_sizes.assign(1, static_cast<float>(taken));
   if (closer && lost_nothing.empty() && reading.ok()) {
-    if (none && !options.filter_strength) {
+    if (none && !stays) {
+      LogInfo(Cat("looks like ", LooksInWords(*reading), ": no width is given back"));
+    } else if (none && !options.filter_strength) {
       SayNothingIsDone(report, cloud.render_mode);
       SayTheSplatStays(options);
     } else if (!(said && known.pixel)) {  // else nothing was taken from the reading

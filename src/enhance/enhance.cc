@@ -105,12 +105,19 @@ const EnhanceMethod& FilterMethod() {
 }
 
 const std::vector<EnhanceMethod>& BasicMethods() {
-  static const std::vector<EnhanceMethod> methods = {FilterMethod(), RefineMethod(), RefineImagesMethod()};
+  static const std::vector<EnhanceMethod> methods = {FilterMethod(), RefineMethod(), RefineImagesMethod(),
+                                                     DetailMethod()};
   return methods;
 }
 
 const std::vector<EnhanceMethod>& MethodsOf(const EnhanceOptions& options) {
   return options.methods == nullptr ? BasicMethods() : *options.methods;
+}
+
+bool IsInvented(const EnhanceReport& report) {
+  return std::ranges::any_of(report.steps, [](const StepReport& step) {
+    return std::ranges::find(step.facts, Fact("invented", true)) != step.facts.end();
+  });
 }
 
 int64_t ExpectedGaussians(int64_t count, const EnhanceOptions& options) {
@@ -276,9 +283,10 @@ Result<Enhanced> EnhanceFromOrigin(GaussianCloud cloud, const EnhanceOptions& op
   report.seconds_in_all = in_all.Total();
   report.gaussians_out = out.size();
   out.comments.insert(out.comments.end(), marks_of_parts.begin(), marks_of_parts.end());
-  if (!sized.any || GivesWidth(report.filter_strength, options.upscale, out.render_mode)) {
-    std::string mark = options.region ? PartEnhancedComment(report.method, options.upscale)
-                                      : EnhancedComment(report.method, options.upscale);
+  const bool invented = IsInvented(report);
+  if (!sized.any || invented || GivesWidth(report.filter_strength, options.upscale, out.render_mode)) {
+    std::string mark = options.region ? PartEnhancedComment(report.method, options.upscale, invented)
+                                      : EnhancedComment(report.method, options.upscale, invented);
     if (std::ranges::find(out.comments, mark) == out.comments.end()) out.comments.push_back(std::move(mark));
   }
   return Enhanced{std::move(out), std::move(report)};

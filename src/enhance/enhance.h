@@ -128,6 +128,9 @@ struct EnhanceReport {
   double seconds_in_all = 0;         // with what is found out before, without reading and writing
 };
 
+// Whether a method that invents did so.
+bool IsInvented(const EnhanceReport& report);
+
 // The cloud as methods get it: rows that are not finite are gone; p_LR is known to those that need it.
 struct EnhanceInput {
   GaussianCloud cloud;
@@ -169,6 +172,7 @@ struct EnhanceMethod {
   // Named alone it begins with the best instant method, if that one adds detail.
   std::function<bool(const EnhanceOptions&)> begins_with_best = [](const EnhanceOptions&) { return false; };
   bool adds_detail = false;  // shows more than the splat does, not only what it shows with other widths
+  bool invents = false;  // also where a splat has lost nothing there is something to do: what it adds was never seen
   // Keeps what EnhanceOptions::control names: null for methods that keep nothing. Tells such a file from others, and
   // the file is the command's own from then on.
   bool (*is_checkpoint)(const std::filesystem::path&) = nullptr;

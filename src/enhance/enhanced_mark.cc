@@ -6,14 +6,22 @@
 
 namespace anchorsplat {
 
-std::string EnhancedComment(const std::string& method, double upscale) {
-  return Cat(kEnhancedMark, method, ", ", upscale, " times closer");
+namespace {
+
+std::string Words(const std::string& method, double upscale, bool invented) {
+  return Cat(method, ", ", upscale, " times closer", invented ? ", detail invented" : "");
+}
+
+}  // namespace
+
+std::string EnhancedComment(const std::string& method, double upscale, bool invented) {
+  return Cat(kEnhancedMark, Words(method, upscale, invented));
 }
 
 bool IsMarkedEnhanced(const CloudView& cloud) { return HasMark(cloud.comments, kEnhancedMark); }
 
-std::string PartEnhancedComment(const std::string& method, double upscale) {
-  return Cat(kPartEnhancedMark, method, ", ", upscale, " times closer");
+std::string PartEnhancedComment(const std::string& method, double upscale, bool invented) {
+  return Cat(kPartEnhancedMark, Words(method, upscale, invented));
 }
 
 bool IsMarkedPartEnhanced(const CloudView& cloud) { return HasMark(cloud.comments, kPartEnhancedMark); }

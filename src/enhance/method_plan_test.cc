@@ -121,7 +121,8 @@ TEST_F(Plan, WhatHasNoEffectIsRefused) {
   EXPECT_EQ(Given("out-dir"), "") << "no method's business";
 
   options_.method = "auto";
-  EXPECT_THAT(Given("steps"), HasSubstr("filter, which auto chose; it has one with --method refine or refine-images"));
+  EXPECT_THAT(Given("steps"),
+              HasSubstr("filter, which auto chose; it has one with --method refine, refine-images or detail"));
   EXPECT_THAT(Given("prune-opacity"), HasSubstr("with --method sharpen"));
   options_.refine.images = "pictures";
   EXPECT_THAT(Given("prune-opacity"), HasSubstr("refine-images, which auto chose; it has one with --method sharpen"));

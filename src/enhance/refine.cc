@@ -135,7 +135,7 @@ GaussianCloud Pruned(GaussianCloud cloud, int64_t fixed, RefineReport& report) {
 }
 
 // The iterations, from the start or from a checkpoint, to the last or until the user stops them.
-Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianCloud& start, bool resumes,
+Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianCloud& start, bool resumes, double upscale,
                                     const RefineControl& control, RefineViews& views, RefineReport& report) {
   RefinePlan& plan = report.plan;
   std::string settings;
@@ -155,7 +155,7 @@ Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianClou
     state = Fitter::Fresh(std::move(split));
   }
   const RefineCheckpoint checkpoint(control, plan.options.seconds.has_value(), settings);
-  const RefineProblem problem{views.render, input.upscale, views.scene_scale, input.seed, Last(start, input.fixed)};
+  const RefineProblem problem{views.render, upscale, views.scene_scale, input.seed, Last(start, input.fixed)};
   ANCHORSPLAT_ASSIGN_OR_RETURN(Refiner refiner,
                                Refiner::Begin(plan.options, problem, std::move(views.train), std::move(state)));
   ANCHORSPLAT_RETURN_IF_ERROR(MakeSteps(refiner, plan.options, checkpoint, report));
@@ -232,11 +232,21 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
   GaussianCloud start = plan.from_input ? as_it_is : std::move(input.start);
   if (plan.nothing_to_do) return timed(KeptStart(WithoutLast(std::move(start), input.fixed), std::move(report)));
   report.copies = *plan.options.copies;
+  double upscale = input.upscale;
+  if (!plan.options.enlarge_with.empty()) {
+    ANCHORSPLAT_RETURN_IF_ERROR(EnlargeViews(plan.options.enlarge_with, static_cast<int>(upscale), start, views));
+    upscale = 1;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(report.plan.start,
+                                 MeasureConsistency(start, upscale, input.cloud, plan.options, views));
+    report.plan.least_gain = 0;  // what it knows more than the pictures is in the views now
+    report.before = plan.start.psnr;
+  }
 
-  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud result, RunRefinement(input, start, resumes, control, views, report));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud result,
+                               RunRefinement(input, start, resumes, upscale, control, views, report));
 
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Consistency after,
-                               MeasureConsistency(result, input.upscale, input.cloud, plan.options, views));
+                               MeasureConsistency(result, upscale, input.cloud, plan.options, views));
   report.after = after.psnr;
   if (!IsWorthIt(plan, after)) {
     return timed(KeptStart(WithoutLast(std::move(start), input.fixed), std::move(report)));

@@ -1,6 +1,7 @@
 #include "enhance/refine_method.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/log.h"
@@ -41,6 +42,10 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
                                               "pixel and side and goes up to ",
                                               kMostSamples)};
   }
+  if (!options.refine.enlarge_with.empty() && options.upscale != std::floor(options.upscale)) {
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--upscale ", options.upscale, ": with --enlarge-with it has to be a whole number")};
+  }
   RefineInput refine;
   refine.upscale = options.upscale;
   refine.pixel_size = input.pixel_size;
@@ -64,7 +69,8 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
   // No more than what the closer view's own pixels add.
   const std::optional<RenderMode> mode = input.cloud.render_mode;
   const bool lost_none = input.filter_strength <= ShownStrength(options.upscale, mode);
-  if ((lost_none || IsCompensated(mode)) && options.refine.images.empty()) {
+  const bool detail = !options.refine.enlarge_with.empty();
+  if ((lost_none || IsCompensated(mode)) && options.refine.images.empty() && !detail) {
     RefinePlan& plan = report.plan.emplace();
     plan.options = options.refine;
     plan.nothing_to_do = true;
@@ -92,6 +98,7 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
   if (options.background) how.background = options.background;
   ANCHORSPLAT_ASSIGN_OR_RETURN(Refined refined, Refine(std::move(refine), how, options.control));
   AddFacts(refined.report, report);
+  if (detail) report.facts.emplace_back("invented", !refined.report.kept_start);
   return std::move(refined.cloud);
 }
 
@@ -161,6 +168,27 @@ EnhanceMethod RefineMethod() {
           .options = RefinementOptions(),
           .expected = Expected,
           .ready = [](const EnhanceOptions& options) { return Validate(options.refine); },
+          .run = RunRefine};
+}
+
+EnhanceMethod DetailMethod() {
+  std::vector<MethodOption> looked_at = RefinementOptions();
+  looked_at.push_back({"enlarge-with", {}});
+  return {.name = "detail",
+          .summary = "refine against what the splat shows at low resolution, or --images, enlarged by --enlarge-with",
+          .rank = -1,
+          .takes_start = true,
+          .begins_with_best = [](const EnhanceOptions&) { return true; },
+          .invents = true,
+          .is_checkpoint = IsFitCheckpoint,
+          .options = std::move(looked_at),
+          .expected = Expected,
+          .ready = [](const EnhanceOptions& options) -> Status {
+            if (!options.refine.enlarge_with.empty()) return Validate(options.refine);
+            return Error{ErrorCode::kBadArgument,
+                         "the method 'detail' needs a network that enlarges pictures: --enlarge-with FILE "
+                         "(scripts/fetch-upscaler.sh gets one)"};
+          },
           .run = RunRefine};
 }
 

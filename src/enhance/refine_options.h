@@ -16,7 +16,10 @@ namespace anchorsplat {
 // What a refinement does (enhance/refine.h). Values that are not given depend on whether there are pictures, on where
 // it begins and on how many Gaussians there are.
 struct RefineOptions {
-  std::filesystem::path images;    // project with the training pictures (fit/training_views.h); empty: without any
+  std::filesystem::path images;  // project with the training pictures (fit/training_views.h); empty: without any
+  // A network's file (upscale/upscaler.h): the views to compare with are those of `images`, or of the splat, enlarged
+  // by it (enhance/enlarged_targets.h). Empty: as they are.
+  std::filesystem::path enlarge_with;
   WorldOrigin origin = {0, 0, 0};  // of the splat's means, for the pictures' cameras; set by Enhance()
   // What the pictures' alpha is laid over, and the splat; otherwise what the cameras' file says, else the splat's own
   // comment (core/training_background.h), else black.

@@ -19,6 +19,9 @@ constexpr int kCopiesWithPictures = 8, kCopiesWithout = 4;
 // steps bring what both know. Chosen on the validation objects (docs/refine.md).
 constexpr int64_t kStepsGentle = 100;
 constexpr double kRate = 1, kRateGentle = 0.1;
+// Against enlarged views, of which no two say quite the same.
+constexpr int64_t kStepsOfDetail = 300;
+constexpr double kRateOfDetail = 0.3;
 constexpr double kIndistinguishable = 58.9;  // dB: what rounding to 8 bits makes, 1/√12 of a step
 constexpr double kGainOverFine = 2;          // dB at low resolution, see below
 
@@ -26,6 +29,7 @@ bool HasPictures(const RefineOptions& options) { return !options.images.empty();
 bool IsGentle(const RefineInput& input, const RefineOptions& options) {
   return !HasPictures(options) && input.start_has_detail;
 }
+bool IsDetail(const RefineOptions& options) { return !options.enlarge_with.empty(); }
 
 // What becomes of a splat within `max_gaussians`: the last `fixed` stay one, and what is left of it goes to the largest
 // opacity × size. Nothing where there is room for all.
@@ -66,10 +70,13 @@ Result<RefineOptions> ChooseRefineOptions(const RefineInput& input, const Refine
   }
   RefineOptions options = given;
   if (!options.seconds) {
-    options.steps = given.steps.value_or(pictures ? kStepsWithPictures : gentle ? kStepsGentle : kStepsWithout);
+    options.steps = given.steps.value_or(IsDetail(given) ? kStepsOfDetail
+                                         : pictures      ? kStepsWithPictures
+                                         : gentle        ? kStepsGentle
+                                                         : kStepsWithout);
   }
-  options.rate = given.rate.value_or(gentle ? kRateGentle : kRate);
-  if (gentle && !given.copies) options.copies = 1;
+  options.rate = given.rate.value_or(IsDetail(given) ? kRateOfDetail : gentle ? kRateGentle : kRate);
+  if ((gentle || IsDetail(given)) && !given.copies) options.copies = 1;
   return options;
 }
 
@@ -94,7 +101,7 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const GaussianCloud&
       plan.from_input = true;
       plan.least_gain = kGainOverFine;
     }
-  } else if (plan.start.psnr >= kIndistinguishable) {
+  } else if (plan.start.psnr >= kIndistinguishable && !IsDetail(chosen)) {
     plan.why = "the start shows what the splat does already, and is kept";
     plan.nothing_to_do = true;
     return plan;

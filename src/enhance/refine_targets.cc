@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/parallel.h"
+#include "enhance/enlarged_targets.h"
 #include "metrics/image_metrics.h"
 
 namespace anchorsplat {
@@ -48,6 +49,12 @@ Buffer<uint8_t> FaintPixels(const Image& alpha) {
 
 RefineTargets::RefineTargets(PictureCache pictures) : pictures_(std::move(pictures)) {}
 
+RefineTargets::RefineTargets(std::unique_ptr<EnlargedTargets> enlarged) : enlarged_(std::move(enlarged)) {}
+
+RefineTargets::RefineTargets(RefineTargets&&) noexcept = default;
+RefineTargets& RefineTargets::operator=(RefineTargets&&) noexcept = default;
+RefineTargets::~RefineTargets() = default;
+
 RefineTargets::RefineTargets(std::shared_ptr<const GaussianCloud> splat, const RenderOptions& render,
                              std::vector<Camera> views)
     : splat_(std::move(splat)),
@@ -56,9 +63,18 @@ RefineTargets::RefineTargets(std::shared_ptr<const GaussianCloud> splat, const R
       views_(std::move(views)),
       kept_(views_.size()) {}
 
-const std::vector<Camera>& RefineTargets::views() const { return pictures_ ? pictures_->views() : views_; }
+const std::vector<Camera>& RefineTargets::views() const {
+  if (enlarged_) return enlarged_->views();
+  return pictures_ ? pictures_->views() : views_;
+}
+
+void RefineTargets::LoadAhead(std::span<const int64_t> views) {
+  if (enlarged_) enlarged_->LoadAhead(views);
+  if (pictures_) pictures_->LoadAhead(views);
+}
 
 Status RefineTargets::Load(int64_t view, const PixelBox& window, RefineTarget& target) {
+  if (enlarged_) return enlarged_->Load(view, window, target);
   const Camera& camera = views()[static_cast<size_t>(view)];
   const bool whole = IsWhole(window, camera.intrinsics);
   if (pictures_) {

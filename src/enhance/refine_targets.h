@@ -30,10 +30,16 @@ struct RefineTarget {
 inline constexpr float kFaint = 0.3f;
 inline constexpr int kFaintReach = 2;
 
+class EnlargedTargets;
+
 class RefineTargets {
  public:
   explicit RefineTargets(PictureCache pictures);
+  explicit RefineTargets(std::unique_ptr<EnlargedTargets> enlarged);  // enhance/enlarged_targets.h
   RefineTargets(std::shared_ptr<const GaussianCloud> splat, const RenderOptions& render, std::vector<Camera> views);
+  RefineTargets(RefineTargets&&) noexcept;
+  RefineTargets& operator=(RefineTargets&&) noexcept;
+  ~RefineTargets();
 
   const std::vector<Camera>& views() const;
 
@@ -45,13 +51,12 @@ class RefineTargets {
   PictureCache* pictures() { return pictures_ ? &*pictures_ : nullptr; }
 
   // `views` are asked for next, see PictureCache.
-  void LoadAhead(std::span<const int64_t> views) {
-    if (pictures_) pictures_->LoadAhead(views);
-  }
+  void LoadAhead(std::span<const int64_t> views);
 
  private:
   static constexpr int64_t kBudget = int64_t{1} << 30;  // bytes of rendered targets that are kept
 
+  std::unique_ptr<EnlargedTargets> enlarged_;
   std::optional<PictureCache> pictures_;
   Image whole_;
 

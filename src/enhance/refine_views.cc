@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/text.h"
 #include "core/training_background.h"
+#include "enhance/enlarged_targets.h"
 #include "enhance/refine_pictures.h"
 #include "enhance/refine_poses.h"
 #include "enhance/refiner.h"
@@ -110,6 +111,18 @@ Result<RefineViews> OpenSplat(const RefineInput& input, const RefineOptions& opt
 Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOptions& options) {
   const RenderOptions render = OptionsFor(input.cloud);
   return options.images.empty() ? OpenSplat(input, options, render) : OpenPictures(input, options, render);
+}
+
+Status EnlargeViews(const std::filesystem::path& file, int factor, const GaussianCloud& start, RefineViews& views) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Upscaler network, Upscaler::Read(file));
+  ANCHORSPLAT_RETURN_IF_ERROR(CheckFactor(factor, network.info().scale));
+  const auto shared = std::make_shared<Upscaler>(std::move(network));
+  const auto splat = std::make_shared<const GaussianCloud>(start);
+  for (RefineTargets* targets : {&views.train, &views.check}) {
+    *targets =
+        RefineTargets(std::make_unique<EnlargedTargets>(std::move(*targets), shared, factor, splat, views.render));
+  }
+  return {};
 }
 
 Result<Consistency> MeasureConsistency(const GaussianCloud& cloud, double upscale, const GaussianCloud& input,

@@ -212,9 +212,10 @@ struct NamedMethod {
   std::string Settings() const {
     RefineOptions with_pictures = refine;
     if (TakesPictures()) with_pictures.images = "the object's";
-    const bool refines = name.find("refine") != std::string::npos;
+    const bool refines = name.find("refine") != std::string::npos || name.ends_with("detail");
     std::string settings = by_default ? Cat(name, " ") : "";
     settings += refines ? Cat(ToJsonText(with_pictures), " revision ", kRefineRevision) : "";
+    if (!refine.enlarge_with.empty()) settings += Cat(" enlarged with ", refine.enlarge_with.string());
     if (refine.seconds) settings += Cat(" ", *refine.seconds, " s");
     if (filter_strength) settings += Cat(" f ", *filter_strength);
     settings += Cat(" reading ", ReadingModel::ShippedIdentity(), " ");  // which may leave a splat alone
@@ -266,6 +267,10 @@ Status SetOption(NamedMethod& method, std::string_view key, std::string_view val
       method.model.options.max_gaussians = method.refine.max_gaussians = static_cast<int64_t>(number);
     }
     if (key == "merge-cost") method.model.merge_cost = number;
+    return {};
+  }
+  if (key == "enlarge-with") {
+    method.refine.enlarge_with = value;
     return {};
   }
   if (key != "f") {

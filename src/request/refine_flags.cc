@@ -13,6 +13,11 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
           "Project with the pictures it was fitted to (as of `fit`): the best there is to refine against")
       ->check(NotEmpty())
       ->group(group);
+  verb.add_option_function<std::string>("--enlarge-with", path(options.enlarge_with),
+                                        "Of --method detail: a network's .safetensors "
+                                        "(scripts/fetch-upscaler.sh) that enlarges what is compared with")
+      ->check(NotEmpty())
+      ->group(group);
   verb.add_option("--hold-out", options.hold_out,
                   "Of --images: every Nth view is not trained on; 0: all are (default: 8, or 0 where the splat was "
                   "fitted to all of them, as it looks)")

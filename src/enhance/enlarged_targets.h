@@ -28,9 +28,10 @@ Status CheckFactor(int factor, int scale);
 // convolution: back-projection (Irani and Peleg 1991), once. Clamped to 0 to 1 afterwards.
 Status ProjectBack(const Image& low, Image& enlarged);
 
-// Views u times larger than those of a refinement: the mean of what a network that enlarges pictures makes of them and
-// of what `start` shows there, projected back onto the view, so that at its own resolution it is what it was. The
-// network knows what edges look like and not what is there; the splat's own part keeps detail that all views agree on.
+// Views u times larger than those of a refinement: in part (kInvented) what a network that enlarges pictures makes of
+// them, in part what `start` shows there, projected back onto the view, so that at its own resolution it is what it
+// was. The network knows what edges look like and not what is there; the splat's own part keeps detail that all views
+// agree on.
 class EnlargedTargets {
  public:
   // `start`, `render`: what is refined, and how. `factor`: u.
@@ -51,7 +52,7 @@ class EnlargedTargets {
     Buffer<uint8_t> ignored;  // as RefineTarget's
   };
   static constexpr int64_t kBudget = int64_t{1} << 30;  // bytes that are kept
-  static constexpr float kInvented = 0.5f;              // the network's part of the mean
+  static constexpr float kInvented = 0.3f;
   static constexpr int kMargin = 16;  // pixels of the low view around a window, where a view is not kept as a whole
 
   // What the larger view shows where the low one has `low_window`, into made_.

@@ -23,7 +23,7 @@ using Report = std::array<uint32_t, 4>;  // visible, pairs, unusual, cut
 
 constexpr int64_t kAny = std::numeric_limits<uint32_t>::max();
 
-uint32_t Word(int64_t value) { return static_cast<uint32_t>(std::min(value, kAny)); }
+uint32_t BoundedWord(int64_t value) { return static_cast<uint32_t>(std::min(value, kAny)); }
 
 int64_t PlanesOf(const RenderOptions& options) { return options.depth ? 5 : 4; }
 
@@ -34,7 +34,8 @@ void GpuRasterizer::RecordAhead(GpuCloud& cloud, int64_t most_pairs, int64_t mos
   const auto at_most = static_cast<uint64_t>(count);
   Project(cloud);
   SortAndCount();
-  const TileRangesParameters room = {Word(tile_count), Word(most_pairs), Word(most_slots), Word(report)};
+  const TileRangesParameters room = {BoundedWord(tile_count), BoundedWord(most_pairs), BoundedWord(most_slots),
+                                     BoundedWord(report)};
   device->Run(kPlaceTiles, AsParameters(room),
               {{1, tile_counts.get()}, {2, unusual.get()}, {3, sizes.get()}, {4, ranges.get()}, {5, reports.get()}}, 1);
   counts_are_of_all = false;

@@ -8,7 +8,8 @@
 namespace anchorsplat {
 
 std::string_view PageFile(std::string_view name) {
-  const std::array<std::pair<std::string_view, std::string_view>, 10> files = {{{"app.js", page::kAppJs},
+  const std::array<std::pair<std::string_view, std::string_view>, 11> files = {{{"app.js", page::kAppJs},
+                                                                                {"box.js", page::kBoxJs},
                                                                                 {"camera.js", page::kCameraJs},
                                                                                 {"interface.js", page::kInterfaceJs},
                                                                                 {"page.css", page::kPageCss},

@@ -276,12 +276,13 @@ TEST(PageWriter, TheGuardComesFirstAndTheStartLast) {
   EXPECT_LT(text.find("id=\"description\""), start);
   EXPECT_EQ(Count(text, "\nmain();"), 1u);
   EXPECT_GT(text.find("\nmain();"), said);
+  EXPECT_EQ(Count(text, "<script>\n</script>"), 0u) << "a file that the program does not carry";
   // What follows it is nothing that a cut could take away.
   EXPECT_EQ(text.substr(text.find("</script>", said)), "</script>\n</body>\n</html>\n");
 }
 
 TEST(PageWriter, ItsOwnFilesStayInsideTheirElements) {
-  for (const char* name : {"page.css", "payload.js", "camera.js", "shaders.js", "pictures.js", "renderer.js",
+  for (const char* name : {"page.css", "payload.js", "camera.js", "shaders.js", "pictures.js", "renderer.js", "box.js",
                            "interface.js", "app.js", "worker.js"}) {
     const std::string text(PageFile(name));
     EXPECT_GT(text.size(), 500u) << name;

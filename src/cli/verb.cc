@@ -6,6 +6,8 @@
 #include <iostream>
 #include <new>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "cli/clean_output.h"
 #include "cli/gpu_report.h"
@@ -97,8 +99,11 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
     return Fail(flags, error);
   };
   if (const Status verbs = CheckVerbWords(app, program.words); !verbs.ok()) return usage_error(verbs.error());
+  const std::vector<std::string> words = WithLongNames(app, program.words);
+  std::vector<const char*> pointers;
+  for (const std::string& word : words) pointers.push_back(word.c_str());
   try {
-    app.parse(argc, argv);
+    app.parse(argc, pointers.data());
   } catch (const CLI::ParseError& error) {
     // CLI11 answers --help and --version through this path with exit code 0.
     if (error.get_exit_code() == 0) return app.exit(error);

@@ -1,7 +1,6 @@
 #include "cli/verb_words.h"
 
 #include <algorithm>
-#include <vector>
 
 #include "core/text.h"
 
@@ -57,6 +56,21 @@ Status CheckVerbWords(const CLI::App& app, std::span<const std::string> words) {
     at = next;
     said += " " + words[k];
   }
+}
+
+std::vector<std::string> WithLongNames(const CLI::App& app, std::span<const std::string> words) {
+  std::vector<std::string> said(words.begin(), words.end());
+  const CLI::App* verb = &app;
+  for (std::string& word : said) {
+    if (word == "--") break;
+    for (const CLI::App* next : verb->get_subcommands([&](const CLI::App* v) { return v->check_name(word); })) {
+      verb = next;
+    }
+    if (word.size() < 3 || word[0] != '-' || word[1] == '-' || word[2] != '=') continue;
+    const CLI::Option* const option = verb->get_option_no_throw(word.substr(0, 2));
+    if (option != nullptr && !option->get_lnames().empty()) word = Cat("--", option->get_lnames()[0], word.substr(2));
+  }
+  return said;
 }
 
 size_t EditDistance(std::string_view a, std::string_view b) {

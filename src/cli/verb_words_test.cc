@@ -44,6 +44,21 @@ TEST_F(VerbWords, OthersAreNamedWithTheNearest) {
   EXPECT_EQ(Message({}), "'anchorsplat' needs a verb: enhance, info, convert, compare, dataset (--help shows more)");
 }
 
+TEST_F(VerbWords, AShortNameTakesAnEqualsSign) {
+  CLI::App* const convert = app_.get_subcommand("convert");
+  convert->add_option("-t,--translate");
+  convert->add_flag("-F,--filter-floaters");
+  convert->add_flag("-q");
+  using Words = std::vector<std::string>;
+  EXPECT_EQ(
+      WithLongNames(app_, Words{"anchorsplat", "convert", "-t=-1,0,0", "-F=0.5", "-F", "-t", "-1", "--", "-t=1"}),
+      (Words{"anchorsplat", "convert", "--translate=-1,0,0", "--filter-floaters=0.5", "-F", "-t", "-1", "--", "-t=1"}));
+  for (const Words& same :
+       {Words{"anchorsplat", "info", "-t=1"}, {"anchorsplat", "convert", "-q=1", "-x=2", "-", "-t1="}}) {
+    EXPECT_EQ(WithLongNames(app_, same), same);
+  }
+}
+
 TEST(EditDistance, CountsLetters) {
   EXPECT_EQ(EditDistance("", "abc"), 3u);
   EXPECT_EQ(EditDistance("abc", ""), 3u);

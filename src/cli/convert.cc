@@ -80,7 +80,8 @@ std::string WrittenFormats() {
 struct Job {
   std::vector<fs::path> inputs;
   fs::path output;
-  size_t output_at = 0;  // among the paths, from 1; 0: it is none of them
+  size_t output_at = 0;    // among the paths, from 1; 0: it is none of them
+  bool has_output = true;  // else `output` only says what would be written
 };
 
 Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
@@ -88,7 +89,7 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
   if (flags.out_dir.empty()) {
     const size_t count = flags.paths.size();
     if (count < 2 && flags.how.edits.dry_run) {  // nothing is written, so that no name is needed
-      jobs.push_back({{flags.paths[0]}, "dry-run.ply"});
+      jobs.push_back({.inputs = {flags.paths[0]}, .output = "dry-run.ply", .has_output = false});
       return jobs;
     }
     if (count < 2) return Error{ErrorCode::kBadArgument, "say IN OUT, or several inputs with --out-dir DIR"};
@@ -163,6 +164,7 @@ void Print(const OutputMemory* piped, const Job& job, const Converted& done) {
   std::ostream& out = ResultsBeside(piped);
   out << NamesOf(job) << " (" << r.input_format << ", " << HumanBytes(r.input_bytes) << ")";
   if (done.dry_run) {
+    if (job.has_output) out << " -> " << OutputName(job.output, piped);
     out << "\n  " << WithThousands(r.gaussians_read) << " Gaussians of SH degree " << r.sh_degree_read << " in, "
         << WithThousands(r.gaussians_written) << " of degree " << r.sh_degree_written << " would come out";
     if (r.predicted_bytes) {
@@ -240,7 +242,7 @@ Result<nlohmann::json> RunJob(const Job& job, const EditJob& edits, int views, c
   for (const fs::path& input : job.inputs) {
     if (job.inputs.size() > 1) json["inputs"].push_back(input.string());
   }
-  json["output"] = job.output.string();
+  if (job.has_output) json["output"] = job.output.string();
   return json;
 }
 

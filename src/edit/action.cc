@@ -213,7 +213,8 @@ Result<EditAction> ParseScale(EditAction action, std::string_view name, const st
   // Floats end there, and so do lengths that are drawn.
   constexpr double kMost = 1e18;
   if (!factor || !(*factor >= 1 / kMost && *factor <= kMost)) {
-    return Bad(name, Cat("expected a factor above 0", factor && *factor < 0 ? "; --mirror mirrors" : "", Found(text)));
+    return Bad(name, Cat("expected a factor above 0", factor && *factor < 0 ? "; --mirror mirrors" : "",
+                         factor && *factor > 0 ? Cat(", ", 1 / kMost, " to ", kMost) : "", Found(text)));
   }
   return Finished(std::move(action), MoveWorld{{.scale = *factor}});
 }

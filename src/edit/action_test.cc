@@ -79,6 +79,7 @@ TEST(EditAction, WhatMakesNoSenseIsNamed) {
                         Case{"--rotate", "", "in degrees"},
                         Case{"--scale", "0", "a factor above 0"},
                         Case{"--scale", "-1", "--mirror mirrors"},
+                        Case{"--scale", "1e30", "1e-18 to 1e+18"},
                         Case{"--scale", "1,2,3", "takes one factor for all axes"},
                         Case{"--scale", "inf", "a factor"},
                         Case{"--mirror", "w", "an axis"},

@@ -45,7 +45,7 @@ Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
   const fs::path pictures = task.cache / "pictures";
   const std::string key = Cat(ToJsonText(options), " ", high.width, " x ", high.height, " ", views.train.size(),
                               " views of ", AbsolutePath(object.low_project).string());
-  const auto start = [&]() -> Result<FitStart> {
+  const auto start = [&]() -> Result<FitTask> {
     std::error_code code;
     fs::create_directories(pictures, code);
     if (code) return Error{ErrorCode::kIo, Cat(pictures.string(), ": cannot make this folder: ", code.message())};
@@ -68,7 +68,7 @@ Result<BicubicFit> FitEnlargedPictures(const MethodTask& task, int64_t steps) {
         GaussianCloud initial,
         InitialCloud(points, views.scene_scale, {.sh_degree = options.objective.render.sh_degree, .seed = task.seed}));
     LogInfo(Cat(object.name, ": fitting ", WithThousands(steps), " steps at ", high.width, " x ", high.height));
-    return FitStart{std::move(views), std::move(initial), options};
+    return FitTask{std::move(views), std::move(initial), options};
   };
   ANCHORSPLAT_ASSIGN_OR_RETURN(KeptFit fit, FitAndKeep(task.cache, key, start));
   std::error_code code;

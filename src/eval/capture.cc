@@ -48,14 +48,14 @@ Result<ViewPicture> FullPicture(const Camera& camera) {
   return picture;
 }
 
-Result<FitStart> StartOfFit(TrainingViews views, FitOptions options) {
+Result<FitTask> TaskOfFit(TrainingViews views, FitOptions options) {
   const bool points_tell = views.points.size() > 0;
   ANCHORSPLAT_ASSIGN_OR_RETURN(const InitialPoints points,
                                InitialPointsOf(FitInit::kAuto, views, std::nullopt, options.seed));
   ANCHORSPLAT_ASSIGN_OR_RETURN(GaussianCloud initial, InitialCloud(points, views.scene_scale, StartOptions(options)));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const AddedShell shell,
                                AddFarShell(views, points, std::nullopt, points_tell, options, initial));
-  return FitStart{std::move(views), std::move(initial), options};
+  return FitTask{std::move(views), std::move(initial), options};
 }
 
 }  // namespace
@@ -113,7 +113,7 @@ Result<BenchmarkObject> OpenCapture(const BenchmarkEntry& entry, const CaptureRe
   ANCHORSPLAT_ASSIGN_OR_RETURN(KeptFit fit, FitAndKeep(fit_folder, key, [&] {
                                  LogInfo(Cat(object.name, ": fitting ", WithThousands(recipe.steps), " steps to ",
                                              views.train.size(), " views at 1/", recipe.downscale, " of their size"));
-                                 return StartOfFit(std::move(views), options);
+                                 return TaskOfFit(std::move(views), options);
                                }));
   object.low = std::move(fit.cloud);
   object.splat = KeptSplat(fit_folder);

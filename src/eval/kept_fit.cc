@@ -54,7 +54,7 @@ Status WriteProgress(const fs::path& path, const Progressed& progress) {
 fs::path KeptSplat(const fs::path& folder) { return folder / "splat.ply"; }
 
 Result<KeptFit> FitAndKeep(const fs::path& folder, const std::string& key,
-                           const std::function<Result<FitStart>()>& start) {
+                           const std::function<Result<FitTask>()>& start) {
   const Stopwatch watch;
   const fs::path splat = KeptSplat(folder), note = folder / "fit.json";
   std::error_code code;
@@ -72,7 +72,7 @@ Result<KeptFit> FitAndKeep(const fs::path& folder, const std::string& key,
   if (code) return Error{ErrorCode::kIo, Cat(folder.string(), ": cannot make this folder: ", code.message())};
   ANCHORSPLAT_RETURN_IF_ERROR(WriteProgress(note, progress));
 
-  ANCHORSPLAT_ASSIGN_OR_RETURN(FitStart begin, start());
+  ANCHORSPLAT_ASSIGN_OR_RETURN(FitTask begin, start());
   FitControl control;
   control.checkpoint = folder / "fit.checkpoint";
   control.checkpoint_every = kCheckpointEvery;

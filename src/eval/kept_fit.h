@@ -13,7 +13,7 @@
 namespace anchorsplat {
 
 // What a fit begins with.
-struct FitStart {
+struct FitTask {
   TrainingViews views;
   GaussianCloud initial;
   FitOptions options;
@@ -34,6 +34,6 @@ std::filesystem::path KeptSplat(const std::filesystem::path& folder);
 //
 // Errors: kIo: the folder; those of `start` and Fit.
 Result<KeptFit> FitAndKeep(const std::filesystem::path& folder, const std::string& key,
-                           const std::function<Result<FitStart>()>& start);
+                           const std::function<Result<FitTask>()>& start);
 
 }  // namespace anchorsplat

@@ -164,10 +164,14 @@ class OnGpu {
       views.waits_together = static_cast<double>(device_->waits() - waits) / count;
     }
     rasterizer_.ForgetTogether();
+    const auto count_differing = [&](const Image& expected, const Image& drawn) {
+      for (size_t i = 0; i < expected.pixels.size(); ++i) {
+        views.differing += expected.pixels[i] != drawn.pixels[i] ? 1 : 0;
+      }
+    };
     for (size_t v = 0; v < alone.size(); ++v) {
-      const auto& expected = alone[v].color.pixels;
-      const auto& drawn = together[v].color.pixels;
-      for (size_t i = 0; i < expected.size(); ++i) views.differing += expected[i] != drawn[i] ? 1 : 0;
+      count_differing(alone[v].color, together[v].color);
+      count_differing(alone[v].alpha, together[v].alpha);
     }
     return views;
   }

@@ -137,12 +137,13 @@ void PrintKernels(const GpuBenchReport& report) {
                      time.unchecked ? Fixed(1e3 * *time.unchecked, 2) : "-"});
   }
   std::cout << "\n"
-            << NameOf(*row) << ", kernel by kernel, by "
+            << NameOf(*row) << ", one picture and its gradient, kernel by kernel: milliseconds of all calls by "
             << (row->kernels_by_gpu ? "the GPU's clock"
                                     : Cat("the host's clock, which adds a round trip of ",
                                           Milliseconds(report.round_trip), " ms a call"))
-            << "\nunchecked: without the checks that the library compiles into kernels"
-            << (row->no_unchecked.empty() ? "" : Cat("; ", row->no_unchecked)) << "\n\n"
+            << "\nunchecked: the same without the checks that the library compiles into kernels, for comparison only"
+            << (row->no_unchecked.empty() ? "" : Cat("\nthere is nothing to compare with: ", row->no_unchecked))
+            << "\n\n"
             << FormatTable(table);
 }
 
@@ -162,10 +163,14 @@ void PrintTable(const GpuBenchReport& report, const GpuBenchOptions& options) {
                      row.pairs > 0 ? WithThousands(row.pairs) : "", there ? WithThousands(row.cpu->out_of_order) : "",
                      there ? WithThousands(row.cpu->beyond) : "", there ? Small(Worst(*row.cpu)) : ""});
   }
-  std::cout << FormatTable(table)
-            << "\nforward, backward: of a splat that is on the GPU, with nothing read back; CPU, CPU': the same there\n"
-               "to host: a picture of a splat in host memory, with its upload; waiting: share of time of the host\n"
-               "order: Gaussians out of order by depth; > 1e-4: values of the picture; gradients: worst relative L2\n";
+  std::cout
+      << FormatTable(table)
+      << "\nforward, backward: of a splat that is on the GPU, with nothing read back; CPU, CPU': the same on the CPU\n"
+         "upload: of the splat; to host: from a splat to a picture, both in host memory\n"
+         "waiting: share of forward and backward for which the host waits; pairs: of tiles and Gaussians\n"
+         "order: Gaussians that stand elsewhere by depth than on the CPU; > 1e-4: values further than that from the "
+         "CPU's\n"
+         "gradients: relative L2 distance from the CPU's, the worst of six\n";
   for (const GpuBenchRow& row : report.rows) {
     if (!row.problem.empty()) std::cout << NameOf(row) << ": " << row.problem << "\n";
     if (!row.no_cpu.empty()) std::cout << NameOf(row) << ": not on the CPU, " << row.no_cpu << "\n";
@@ -173,9 +178,12 @@ void PrintTable(const GpuBenchReport& report, const GpuBenchOptions& options) {
       std::cout << NameOf(row) << ": uploaded in blocks, more --max-gpu-memory would keep it there\n";
     }
     if (row.views) {
-      std::cout << NameOf(row) << ", " << row.views->count << " views: " << Fixed(row.views->waits, 1) << " waits and "
-                << Milliseconds(row.views->seconds) << " ms each one by one, " << Fixed(row.views->waits_together, 1)
-                << " and " << Milliseconds(row.views->seconds_together) << " ms together\n";
+      // Of all views: a wait that is shared is not a tenth of one.
+      const auto waits = [&](double of_one) { return Fixed(of_one * row.views->count, 0); };
+      std::cout << NameOf(row) << ", " << row.views->count << " views: one by one " << Milliseconds(row.views->seconds)
+                << " ms a view and " << waits(row.views->waits) << " waits for the GPU in all, together "
+                << Milliseconds(row.views->seconds_together) << " ms a view and " << waits(row.views->waits_together)
+                << "\n";
     }
     if (const std::string broken = BrokenPromise(row); !broken.empty())
       std::cout << NameOf(row) << ": " << broken << "\n";

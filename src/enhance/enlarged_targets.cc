@@ -8,6 +8,7 @@
 #include "fit/pixel_model.h"
 #include "metrics/bicubic.h"
 #include "metrics/image_metrics.h"
+#include "upscale/enlarge_picture.h"
 
 namespace anchorsplat {
 
@@ -18,31 +19,21 @@ PixelBox WholeOf(const Camera& camera) { return {0, 0, camera.intrinsics.width, 
 // [3,H,W] to [3,H·factor,W·factor], within 0 to 1.
 Result<Image> EnlargeBy(Upscaler& upscaler, const Image& low, int factor) {
   const int scale = upscaler.info().scale;
-  Image image = low;
-  int reached = 1;
-  do {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(image, upscaler.Enlarge(image));
-    Clamp01(image);
-    reached *= scale;
-  } while (reached * scale <= factor);
-  if (reached > factor) {
-    Image averages;
-    AverageRays(image, reached / factor, averages);
-    return averages;
-  }
+  int reached = scale;
+  while (reached * scale <= factor) reached *= scale;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Image image, EnlargePicture(upscaler, low, {.factor = reached}));
   if (reached == factor) return image;
-  ANCHORSPLAT_ASSIGN_OR_RETURN(image, EnlargeBicubic(image, low.width * factor, low.height * factor));
-  Clamp01(image);
-  return image;
+  Image out;
+  if (reached > factor) {
+    AverageRays(image, reached / factor, out);
+  } else {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(out, EnlargeBicubic(image, low.width * factor, low.height * factor));
+    Clamp01(out);
+  }
+  return out;
 }
 
 }  // namespace
-
-Camera Enlarged(const Camera& camera, int factor) {
-  Camera larger = camera;
-  larger.intrinsics = Scaled(camera.intrinsics, factor);
-  return larger;
-}
 
 Status CheckFactor(int factor, int scale) {
   if (factor >= 1 && factor <= kMostSamples && (factor >= scale || scale % factor == 0)) return {};
@@ -66,11 +57,12 @@ EnlargedTargets::EnlargedTargets(RefineTargets low, std::shared_ptr<Upscaler> up
       upscaler_(std::move(upscaler)),
       factor_(factor),
       start_(std::move(start)),
+      still_(std::make_unique<StillCloud>(*start_)),
       render_(render),
       kept_(low_.views().size()) {
   int64_t left = kBudget;
   for (size_t i = 0; i < kept_.size(); ++i) {
-    views_.push_back(Enlarged(low_.views()[i], factor));
+    views_.push_back(RaysOf(PixelModel{factor}, low_.views()[i]));
     const int64_t pixels = int64_t{views_[i].intrinsics.width} * views_[i].intrinsics.height;
     kept_[i].has_room = 4 * pixels <= left;
     if (kept_[i].has_room) left -= 4 * pixels;
@@ -83,7 +75,7 @@ Status EnlargedTargets::Make(int64_t view, const PixelBox& low_window) {
   const int u = factor_;
   const PixelBox window = {low_window.x0 * u, low_window.y0 * u, low_window.x1 * u, low_window.y1 * u};
   const Camera camera = Crop(views_[static_cast<size_t>(view)], window);
-  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(*start_, camera, render_, output_));
+  ANCHORSPLAT_RETURN_IF_ERROR(rasterizer_.Render(*still_, camera, render_, output_));
   Clamp01(output_.color);
   for (size_t i = 0; i < made_.picture.pixels.size(); ++i) {
     made_.picture.pixels[i] = std::lerp(output_.color.pixels[i], made_.picture.pixels[i], kInvented);
@@ -111,14 +103,7 @@ Status EnlargedTargets::Load(int64_t view, const PixelBox& window, RefineTarget&
                              std::min(low.y1, (window.y1 + factor_ - 1) / factor_ + kMargin)};
     ANCHORSPLAT_RETURN_IF_ERROR(Make(view, around));
     const int x0 = window.x0 - around.x0 * factor_, y0 = window.y0 - around.y0 * factor_;
-    CropInto(made_.picture, {x0, y0, x0 + width, y0 + height}, target.picture);
-    target.ignored.clear();
-    if (made_.ignored.empty()) return {};
-    target.ignored.resize(static_cast<size_t>(target.picture.plane()));
-    for (int y = 0; y < height; ++y) {
-      std::copy_n(made_.ignored.data() + int64_t{y0 + y} * made_.picture.width + x0, width,
-                  target.ignored.data() + int64_t{y} * width);
-    }
+    CutOut(made_.picture, made_.ignored, {x0, y0, x0 + width, y0 + height}, target);
     return {};
   }
   const int whole_width = low.x1 * factor_, whole_height = low.y1 * factor_;

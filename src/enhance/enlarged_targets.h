@@ -12,12 +12,10 @@
 #include "core/result.h"
 #include "enhance/refine_targets.h"
 #include "render/rasterizer.h"
+#include "render/still_cloud.h"
 #include "upscale/upscaler.h"
 
 namespace anchorsplat {
-
-// Of `camera`, one whose pixels are `factor` times smaller in the same directions.
-Camera Enlarged(const Camera& camera, int factor);
 
 // How a network's passes make a picture `factor` times larger: as many as do not go beyond it, then cubic convolution
 // for the rest, or one pass averaged down where the network's own scale is a multiple of the factor. Errors
@@ -62,6 +60,7 @@ class EnlargedTargets {
   std::shared_ptr<Upscaler> upscaler_;
   int factor_;
   std::shared_ptr<const GaussianCloud> start_;
+  std::unique_ptr<StillCloud> still_;  // of start_
   RenderOptions render_;
   std::vector<Camera> views_;
   std::vector<Kept> kept_;

@@ -1,5 +1,6 @@
 #include "enhance/enlarged_targets.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -144,6 +145,25 @@ TEST_F(Detail, SameBitsForAnyNumberOfThreads) {
     ExpectSameCloud(refined->cloud, expected);
   }
   SetThreadCount(0);
+}
+
+TEST_F(Detail, GoesOnWithTheSameNetworkOnly) {
+  RefineControl control;
+  control.checkpoint = folder_ / "run.checkpoint";
+  control.checkpoint_every = 5;
+  options_.steps = 8;
+  ASSERT_TRUE(Refine(input_, options_, control).ok());
+  control.resume = true;
+  const auto same = Refine(input_, options_, control);
+  ASSERT_TRUE(same.ok()) << same.error().message;
+  EXPECT_EQ(same->report.resumed_at, 5);
+  options_.enlarge_with = folder_ / "other.safetensors";
+  SmallUpscaler other = RepeatingForTest();
+  other.metadata["source"] = "another test";
+  ASSERT_TRUE(other.Write(options_.enlarge_with).ok());
+  const auto refused = Refine(input_, options_, control);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_THAT(refused.error().message, testing::HasSubstr("network that enlarges is another one"));
 }
 
 TEST_F(Detail, SaysThatItIsInvented) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/file_system.h"
+#include "core/fingerprint.h"
 #include "core/log.h"
 #include "core/run_context.h"
 #include "core/stopwatch.h"
@@ -20,6 +21,7 @@
 #include "enhance/refiner.h"
 #include "enhance/split_gaussians.h"
 #include "fit/fingerprints.h"
+#include "io/mapped_file.h"
 
 namespace anchorsplat {
 
@@ -44,6 +46,12 @@ Result<std::string> Settings(const RefineInput& input, const GaussianCloud& star
   json["set of cameras"] = FingerprintOf(views.train.views(), views.scene_scale);
   if (!options.images.empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(json["set of pictures"], FingerprintOfPictures(views.train.views()));
+  }
+  if (!options.enlarge_with.empty()) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(const MappedFile network, MappedFile::Open(options.enlarge_with));
+    Fingerprint print;
+    print.Add(network.bytes());
+    json["network that enlarges"] = print.text();
   }
   return json.dump();
 }

@@ -6,6 +6,7 @@
 
 #include "core/log.h"
 #include "core/text.h"
+#include "enhance/enlarged_targets.h"
 #include "enhance/filter.h"
 #include "enhance/gaussian_budget.h"
 #include "enhance/refine.h"
@@ -41,10 +42,6 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
                                               ": refinement renders that many rays per "
                                               "pixel and side and goes up to ",
                                               kMostSamples)};
-  }
-  if (!options.refine.enlarge_with.empty() && options.upscale != std::floor(options.upscale)) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("--upscale ", options.upscale, ": with --enlarge-with it has to be a whole number")};
   }
   RefineInput refine;
   refine.upscale = options.upscale;
@@ -171,8 +168,30 @@ EnhanceMethod RefineMethod() {
           .run = RunRefine};
 }
 
+namespace {
+
+// Also what its file says, so that nothing is done before that is known.
+Status CheckDetail(const EnhanceOptions& options) {
+  const std::filesystem::path& file = options.refine.enlarge_with;
+  if (file.empty()) {
+    return Error{ErrorCode::kBadArgument,
+                 "the method 'detail' needs a network that enlarges pictures: --enlarge-with FILE "
+                 "(scripts/fetch-upscaler.sh gets one)"};
+  }
+  ANCHORSPLAT_RETURN_IF_ERROR(Validate(options.refine));
+  if (!(options.upscale <= kMostSamples) || options.upscale != std::floor(options.upscale)) {
+    return Error{ErrorCode::kBadArgument, Cat("--upscale ", options.upscale, ": of the method 'detail' it is 1 to ",
+                                              kMostSamples, ", and whole")};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const Upscaler network, Upscaler::Read(file));
+  return CheckFactor(static_cast<int>(options.upscale), network.info().scale);
+}
+
+}  // namespace
+
 EnhanceMethod DetailMethod() {
   std::vector<MethodOption> looked_at = RefinementOptions();
+  std::erase_if(looked_at, [](const MethodOption& option) { return option.name.ends_with("-from"); });  // all rays are
   looked_at.push_back({"enlarge-with", {}});
   return {.name = "detail",
           .summary = "refine against what the splat shows at low resolution, or --images, enlarged by --enlarge-with",
@@ -183,12 +202,7 @@ EnhanceMethod DetailMethod() {
           .is_checkpoint = IsFitCheckpoint,
           .options = std::move(looked_at),
           .expected = Expected,
-          .ready = [](const EnhanceOptions& options) -> Status {
-            if (!options.refine.enlarge_with.empty()) return Validate(options.refine);
-            return Error{ErrorCode::kBadArgument,
-                         "the method 'detail' needs a network that enlarges pictures: --enlarge-with FILE "
-                         "(scripts/fetch-upscaler.sh gets one)"};
-          },
+          .ready = CheckDetail,
           .run = RunRefine};
 }
 

@@ -47,6 +47,17 @@ Buffer<uint8_t> FaintPixels(const Image& alpha) {
   return faint;
 }
 
+void CutOut(const Image& picture, const Buffer<uint8_t>& ignored, const PixelBox& window, RefineTarget& part) {
+  CropInto(picture, window, part.picture);
+  part.ignored.clear();
+  if (ignored.empty()) return;
+  part.ignored.resize(static_cast<size_t>(part.picture.plane()));
+  for (int y = 0; y < part.picture.height; ++y) {
+    std::copy_n(ignored.data() + int64_t{window.y0 + y} * picture.width + window.x0, part.picture.width,
+                part.ignored.data() + int64_t{y} * part.picture.width);
+  }
+}
+
 RefineTargets::RefineTargets(PictureCache pictures) : pictures_(std::move(pictures)) {}
 
 RefineTargets::RefineTargets(std::unique_ptr<EnlargedTargets> enlarged) : enlarged_(std::move(enlarged)) {}
@@ -81,14 +92,7 @@ Status RefineTargets::Load(int64_t view, const PixelBox& window, RefineTarget& t
     if (whole) return pictures_->Load(view, target.picture, target.ignored);
     Buffer<uint8_t> ignored;
     ANCHORSPLAT_RETURN_IF_ERROR(pictures_->Load(view, whole_, ignored));
-    CropInto(whole_, window, target.picture);
-    target.ignored.clear();
-    if (ignored.empty()) return {};
-    target.ignored.resize(static_cast<size_t>(target.picture.plane()));
-    for (int y = 0; y < target.picture.height; ++y) {
-      std::copy_n(ignored.data() + int64_t{window.y0 + y} * whole_.width + window.x0, target.picture.width,
-                  target.ignored.data() + int64_t{y} * target.picture.width);
-    }
+    CutOut(whole_, ignored, window, target);
     return {};
   }
   RefineTarget& kept = kept_[static_cast<size_t>(view)];

@@ -30,6 +30,9 @@ struct RefineTarget {
 inline constexpr float kFaint = 0.3f;
 inline constexpr int kFaintReach = 2;
 
+// The part `window` of a picture and of what is ignored in it (empty: nothing), which has its size.
+void CutOut(const Image& picture, const Buffer<uint8_t>& ignored, const PixelBox& window, RefineTarget& part);
+
 class EnlargedTargets;
 
 class RefineTargets {

@@ -115,7 +115,6 @@ Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOption
 
 Status EnlargeViews(const std::filesystem::path& file, int factor, const GaussianCloud& start, RefineViews& views) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(Upscaler network, Upscaler::Read(file));
-  ANCHORSPLAT_RETURN_IF_ERROR(CheckFactor(factor, network.info().scale));
   const auto shared = std::make_shared<Upscaler>(std::move(network));
   const auto splat = std::make_shared<const GaussianCloud>(start);
   for (RefineTargets* targets : {&views.train, &views.check}) {

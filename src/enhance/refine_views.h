@@ -24,8 +24,8 @@ struct RefineViews {
 // Those that `options` and `input` name: pictures, cameras, or places around the splat. Errors: see Refine.
 Result<RefineViews> OpenRefineViews(const RefineInput& input, const RefineOptions& options);
 
-// The same views `factor` times larger, enlarged by the network in `file`. `start`: what is about to be refined.
-// Errors: those of Upscaler::Read and CheckFactor.
+// The same views `factor` times larger, enlarged by the network in `file`, which can do that (CheckFactor of
+// enhance/enlarged_targets.h). `start`: what is about to be refined. Errors: those of Upscaler::Read.
 Status EnlargeViews(const std::filesystem::path& file, int factor, const GaussianCloud& start, RefineViews& views);
 
 // How well `cloud`, seen closer and averaged down, agrees with views.check, means over the views. `input` is the splat

@@ -18,6 +18,7 @@
 #include "formats/random_cloud_for_test.h"
 #include "images/image_io.h"
 #include "io/folder_for_test.h"
+#include "upscale/small_upscaler_for_test.h"
 
 namespace anchorsplat {
 namespace {
@@ -281,6 +282,12 @@ TEST(EvalMethods, RefinementTakesOptions) {
   };
   EXPECT_EQ(error("refine"), "");
   EXPECT_EQ(error("filter+refine@rate=0.5"), "");
+  const fs::path network = out / "network.safetensors";
+  ASSERT_TRUE(RepeatingForTest().Write(network).ok());
+  EXPECT_EQ(error(network.string()), "") << "as `upsample`";
+  EXPECT_EQ(error("detail@enlarge-with=" + network.string()), "");
+  EXPECT_THAT(error("detail@enlarge-with=none.safetensors"), HasSubstr("no such file"));
+  EXPECT_THAT(error("detail"), HasSubstr("--enlarge-with"));
   EXPECT_THAT(error("refine@speed=1"), HasSubstr("ssim-weight"));
   EXPECT_THAT(error("refine@k=x"), HasSubstr("k cannot be 'x'"));
   EXPECT_THAT(error("refine@k=0"), HasSubstr("K must be"));

@@ -205,6 +205,7 @@ struct NamedMethod {
   RefineOptions refine;
   ModelSettings model;
   std::optional<double> filter_strength;
+  std::string upscaler;  // Identity of refine.enlarge_with
 
   bool TakesPictures() const { return quality == "best" || name.ends_with("refine-images"); }
 
@@ -215,7 +216,7 @@ struct NamedMethod {
     const bool refines = name.find("refine") != std::string::npos || name.ends_with("detail");
     std::string settings = by_default ? Cat(name, " ") : "";
     settings += refines ? Cat(ToJsonText(with_pictures), " revision ", kRefineRevision) : "";
-    if (!refine.enlarge_with.empty()) settings += Cat(" enlarged with ", refine.enlarge_with.string());
+    if (!upscaler.empty()) settings += Cat(" enlarged with ", upscaler);
     if (refine.seconds) settings += Cat(" ", *refine.seconds, " s");
     if (filter_strength) settings += Cat(" f ", *filter_strength);
     settings += Cat(" reading ", ReadingModel::ShippedIdentity(), " ");  // which may leave a splat alone
@@ -271,6 +272,7 @@ Status SetOption(NamedMethod& method, std::string_view key, std::string_view val
   }
   if (key == "enlarge-with") {
     method.refine.enlarge_with = value;
+    ANCHORSPLAT_ASSIGN_OR_RETURN(method.upscaler, Identity(method.refine.enlarge_with));
     return {};
   }
   if (key != "f") {
@@ -342,7 +344,7 @@ Result<std::optional<NamedMethod>> ParseNamed(const std::string& word, const std
     at = end;
   }
   Status valid = Validate(method.refine);
-  if (valid.ok() && !keys.empty()) valid = CheckGiven(method, keys);
+  if (valid.ok()) valid = CheckGiven(method, keys);
   if (!valid.ok()) {
     return Error{ErrorCode::kBadArgument, Cat("--methods ", Printable(word), ": ", valid.error().message)};
   }
@@ -459,9 +461,6 @@ Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& 
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double f, ParseStrength(word, std::string_view(word).substr(at.size())));
     return Filter(word, f);
   }
-  const std::string extension = fs::path(word).extension().string();
-  if (extension == ".safetensors" && IsUpscaler(word)) return Upscaled(word);
-  if (extension == ".safetensors" || extension == ".pth" || extension == ".pt") return Model(word);
   const std::vector<EnhanceMethod>& methods =
       options.enhance_methods == nullptr ? AllMethods() : *options.enhance_methods;
   ANCHORSPLAT_ASSIGN_OR_RETURN(std::optional<NamedMethod> method, ParseDefault(word, methods));
@@ -469,6 +468,9 @@ Result<EvalMethod> MakeEvalMethod(const std::string& word, const MethodOptions& 
     ANCHORSPLAT_ASSIGN_OR_RETURN(method, ParseNamed(word, methods));
   }
   if (method) return Named(*method);
+  const std::string extension = fs::path(word).extension().string();
+  if (extension == ".safetensors" && IsUpscaler(word)) return Upscaled(word);
+  if (extension == ".safetensors" || extension == ".pth" || extension == ".pt") return Model(word);
   return Error{ErrorCode::kBadArgument, Cat("--methods: '", Printable(word),
                                             "' is none of raw, filter, filter@F, filter-auto, filter-best, upsample, "
                                             "bicubic, a network's file, auto, fast, good, best or "

@@ -29,7 +29,8 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
       ->capture_default_str()
       ->group(group);
   auto* steps = verb.add_option("--steps", options.steps,
-                                "Steps (default: 1500 with --images, 600 without, 100 of a network's result without)")
+                                "Steps (default: 1500 with --images, 600 without, 100 of a network's result without; "
+                                "300 of --method detail)")
                     ->check(CLI::Range(int64_t{1}, int64_t{1} << 40))
                     ->group(group);
   verb.add_option("--seconds", options.seconds,
@@ -40,7 +41,7 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
   verb.add_option(
           "--k", options.copies,
           "Gaussians that each becomes at first (default: 8 of the input's with --images, 4 without, 1 of a network's "
-          "result without; fewer where a closer view has no room for more)")
+          "result without and of --method detail; fewer where a closer view has no room for more)")
       ->check(CLI::Range(1, kMostCopies))
       ->group(group);
   verb.add_option("--poses", options.poses, "Without --images and --cameras: places around the object to look from")
@@ -59,9 +60,9 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
       ->check(Fraction())
       ->capture_default_str()
       ->group(group);
-  verb.add_option(
-          "--rate", options.rate,
-          "Learning rates, as a part of those of `fit` (default: 1; 0.1 of a network's result without --images)")
+  verb.add_option("--rate", options.rate,
+                  "Learning rates, as a part of those of `fit` (default: 1; 0.1 of a network's result without "
+                  "--images; 0.3 of --method detail)")
       ->check(Positive())
       ->group(group);
   verb.add_option("--rate-decay", options.rate_decay, "What is left of them at the end")

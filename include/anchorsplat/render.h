@@ -34,7 +34,7 @@ ANCHORSPLAT_PUBLIC Expected<std::vector<PinholeCamera>> OrbitAround(const SplatV
 
 // The cameras of a transforms.json, an INRIA cameras.json, a poses_bounds.npy, a COLMAP model, or a file of Metashape,
 // OpenSfM or Bundler, or of a folder with one of them, in their order. Of a lens it is the pinhole that its pictures
-// are undone to (docs/cameras.md). Failures: kNotFound, kIo, kBadFile; kBadArgument: a folder with several.
+// are undone to (docs/fit.md). Failures: kNotFound, kIo, kBadFile; kBadArgument: a folder with several.
 ANCHORSPLAT_PUBLIC Expected<std::vector<PinholeCamera>> ReadCameraFile(const std::filesystem::path& path);
 
 struct RenderSettings {

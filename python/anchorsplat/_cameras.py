@@ -32,7 +32,7 @@ def _numbers(name: str, values: Any) -> npt.NDArray[np.float64]:
 
 class Cameras:
     """V cameras without distortion in OpenCV axes (x right, y down, z forward), which do not change. Of a file with a lens they
-    are those of the pinholes that its pictures are undone to (docs/cameras.md).
+    are those of the pinholes that its pictures are undone to (docs/fit.md).
 
     Pixel (0,0) covers [0,1)², its centre is at 0.5. ``cameras[3]`` and ``cameras[::8]`` are cameras, too.
     """

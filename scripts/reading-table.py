@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the table of readings: what splats show before they are enhanced, and what helps them (docs/reading-table.md).
+"""Makes the table of readings: what splats show before they are enhanced, and what helps them (docs/reading.md).
 
     scripts/reading-table.py fits   --work WORK [--photos FOLDER] [--strangers FOLDER]
                                                                         of meshes, land, a room, photographs, pictures of splats

@@ -15,7 +15,7 @@
 
 namespace anchorsplat {
 
-// Rows of the table of readings (docs/reading-table.md): what a splat looks like, what helps it, and what the program
+// Rows of the table of readings (docs/reading.md): what a splat looks like, what helps it, and what the program
 // does with it by itself.
 
 // Parts of the table, by mesh or maker: what decides one has learned from the others.

@@ -1,7 +1,7 @@
 # anchorsplat_embed(TARGET NAMESPACE files...)
 #
 # The text of foo_bar.wgsl beside the caller's CMakeLists.txt becomes the constant NAMESPACE::kFooBarWgsl
-# (std::string_view) of the target, declared in "ROOM/NAMESPACE.h", where ROOM is the caller's folder under src/. An edit
+# (std::string_view) of the target, declared in "ROOM/NAMESPACE.h", where ROOM is the caller's folder in its wing. An edit
 # of the file compiles one generated source again.
 if(CMAKE_SCRIPT_MODE_FILE)
   set(text "#include \"${HEADER}\"\n\nnamespace anchorsplat::${NAMESPACE} {\n")
@@ -26,6 +26,7 @@ endif()
 set(ANCHORSPLAT_EMBED_SCRIPT "${CMAKE_CURRENT_LIST_FILE}")
 function(anchorsplat_embed target namespace)
   file(RELATIVE_PATH room "${CMAKE_SOURCE_DIR}/src" "${CMAKE_CURRENT_SOURCE_DIR}")
+  string(REGEX REPLACE "^[^/]+/(.*)$" "\\1" room "${room}")  # without its wing, as in every include
   set(folder "${CMAKE_BINARY_DIR}/embedded")
   set(declarations "")
   set(names "")

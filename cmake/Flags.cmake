@@ -1,6 +1,8 @@
 # Compile flags of our own code, as one interface target that every room links.
 add_library(anchorsplat_flags INTERFACE)
-target_include_directories(anchorsplat_flags INTERFACE "${CMAKE_SOURCE_DIR}/src")
+# A file is named by its room ("render/rasterizer.h"), whichever wing that is in.
+target_include_directories(anchorsplat_flags INTERFACE "${CMAKE_SOURCE_DIR}/src/engine" "${CMAKE_SOURCE_DIR}/src/lab"
+                                                       "${CMAKE_SOURCE_DIR}/src/doors")
 target_compile_definitions(anchorsplat_flags INTERFACE ANCHORSPLAT_VERSION="${PROJECT_VERSION}")
 target_compile_options(anchorsplat_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wnon-virtual-dtor

@@ -80,12 +80,12 @@ endif()
 
 if(NOT ANCHORSPLAT_SANITIZE)
   add_test(NAME cli.install
-           COMMAND ${CMAKE_SOURCE_DIR}/src/cli/behaviour/install_test.sh $<TARGET_FILE:anchorsplat> ${CMAKE_SOURCE_DIR}
+           COMMAND ${CMAKE_SOURCE_DIR}/src/doors/cli/behaviour/install_test.sh $<TARGET_FILE:anchorsplat> ${CMAKE_SOURCE_DIR}
                    ${CMAKE_BINARY_DIR} ${CMAKE_COMMAND})
   set_tests_properties(cli.install PROPERTIES COST 100)
   if(TARGET anchorsplat_shared)
     add_test(NAME api.installed_package
-             COMMAND ${CMAKE_SOURCE_DIR}/src/api/installed_package_test.sh ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}
+             COMMAND ${CMAKE_SOURCE_DIR}/src/doors/api/installed_package_test.sh ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}
                      ${CMAKE_COMMAND} ${CMAKE_CXX_COMPILER} ${CMAKE_NM})
   endif()
 endif()

@@ -65,7 +65,7 @@ def included(path, above=()):
     text, headers = text_of(path), set()
     headers.update(re.findall(r"^#include <([a-z_]+)>", text, re.M))
     for name in re.findall(r'^#include "([^"]+)"', text, re.M):
-        for folder in (pathlib.Path("src"), pathlib.Path("include"), path.parent):
+        for folder in (*pathlib.Path("src").iterdir(), pathlib.Path("include"), path.parent):
             ours = folder / name
             if ours.is_file() and ours not in above:
                 headers |= included(ours, above + (path,))

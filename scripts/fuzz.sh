@@ -7,5 +7,5 @@ seconds="${1:-60}"
 seed="${2:-$(date +%s)}"
 mkdir -p build/fuzz
 echo "fuzzing all readers for $seconds s with seed $seed"
-build/debug/src/formats/fuzz_readers --seconds "$((seconds - seconds / 4))" --seed "$seed" --save-in build/fuzz
-exec build/debug/src/scene/fuzz_meshes --seconds "$((seconds / 4 + 1))" --seed "$seed" --save-in build/fuzz
+build/debug/src/engine/formats/fuzz_readers --seconds "$((seconds - seconds / 4))" --seed "$seed" --save-in build/fuzz
+exec build/debug/src/lab/scene/fuzz_meshes --seconds "$((seconds / 4 + 1))" --seed "$seed" --save-in build/fuzz

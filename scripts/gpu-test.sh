@@ -22,7 +22,7 @@ filter='*Gpu*:*Resident*'                     # their tests
 run_tests() {
   local room program count=0 failed=()
   for room in "${rooms[@]}"; do
-    program=$1/src/$room/${room}_test
+    program=$(echo "$1"/src/*/"$room/${room}_test")
     [ -x "$program" ] || { echo "gpu-test: there is no $program (cmake -DANCHORSPLAT_TESTS=ON)" >&2; return 1; }
     [ -n "$("$program" --gtest_list_tests --gtest_filter="$filter")" ] || continue
     count=$((count + 1))
@@ -73,7 +73,7 @@ chromium() {
   browser_tools gpu-test playwright-core@1.65.1
   mkdir -p "$folder/recording"
   cmake --build "$build" -j "${JOBS:-$(nproc)}" --target gpu_recording
-  NODEVICE_SELECT=1 "$build/src/bench/gpu_recording" "$folder/recording"
+  NODEVICE_SELECT=1 "$build/src/lab/bench/gpu_recording" "$folder/recording"
   node scripts/gpu_browser_test.mjs "$folder/recording"
 }
 

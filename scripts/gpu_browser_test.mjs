@@ -18,7 +18,7 @@ function constantOf(text, name) {
 // beside it.
 function kernelsOfSources() {
   const kernels = [];
-  const prelude = fs.readFileSync(path.join(root, 'src/gpu/prelude.wgsl'), 'utf8');
+  const prelude = fs.readFileSync(path.join(root, 'src/engine/gpu/prelude.wgsl'), 'utf8');
   for (const file of fs.readdirSync(path.join(root, 'src'), {recursive: true})) {
     if (!file.endsWith('.cc') || file.endsWith('_test.cc')) continue;
     const text = fs.readFileSync(path.join(root, 'src', file), 'utf8');

@@ -25,7 +25,7 @@ FOLDS = 8
 MADE = ["classic", "antialiased", "mip", "filtered", "enhanced", "raised", "mesh", "generated"]
 TREATMENTS = [(mode, method) for mode in ("classic", "antialiased", "mip") for method in ("filter", "network")]
 MULTIPLES = 7
-MOST_DEVIATIONS = 4  # that count, of a feature; kMostDeviations in src/reading/reading_model.cc
+MOST_DEVIATIONS = 4  # that count, of a feature; kMostDeviations in src/engine/reading/reading_model.cc
 HIDDEN, MEMBERS, EPOCHS, BATCH = 96, 4, 90, 96
 # Of which the model that is written has seen nothing, so that a test can ask it about them.
 HELD_OUT = ["Scopia-spiceTower", "BlendSwap-CC-BY-wardrobe2", "Scopia-futon", "Scopia-bathroom_vanity",

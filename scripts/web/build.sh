@@ -10,7 +10,7 @@ sudo=()
 scripts/install-missing.sh web debootstrap=debootstrap
 mkdir -p build/web
 "${sudo[@]}" scripts/bare-debian.sh --suite trixie --keep "$PWD/build/web/root" --env "JOBS=${JOBS:-$(nproc)}" -- \
-  bash -c 'scripts/web/compile.sh anchorsplat_module anchorsplat_module_threads && node scripts/web/assemble.mjs build/web/src/web build/web-libraries/prefix/notices build/web'
+  bash -c 'scripts/web/compile.sh anchorsplat_module anchorsplat_module_threads && node scripts/web/assemble.mjs build/web/src/doors/web build/web-libraries/prefix/notices build/web'
 made=build/web/root/root/anchorsplat/build/web
 for name in dist npm; do
   rm -rf "build/web/$name"

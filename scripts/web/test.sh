@@ -18,7 +18,7 @@ cmake --build "$native" -j "${JOBS:-$(nproc)}" --target web_reference web_mutant
 browser_tools web-test playwright-core@1.65.1 three@0.165.0 \
   @mkkellogg/gaussian-splats-3d@0.4.7  # the viewer of examples/web
 
-"$native/src/web/web_mutants" build/web/mutants 4000 1
-WEB_REFERENCE=$native/src/web/web_reference node scripts/web/test.mjs build/web/npm build/web/reference build/web/mutants
+"$native/src/doors/web/web_mutants" build/web/mutants 4000 1
+WEB_REFERENCE=$native/src/doors/web/web_reference node scripts/web/test.mjs build/web/npm build/web/reference build/web/mutants
 mkdir -p build/web/pictures
 node scripts/web/page_test.mjs build/web/dist examples/biplane/input.ply build/web/pictures

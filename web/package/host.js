@@ -4,7 +4,7 @@
 //
 // in   {module: WebAssembly.Module, threads}              first; threads: 1, or as many as a module with threads is to have
 //      {compile: url}                                      instead of it: of a module that lies beside this script
-//      {id, request, data: [Uint8Array | Blob]}            src/web/engine.h says what a request is; data is one after the other
+//      {id, request, data: [Uint8Array | Blob]}            src/doors/web/engine.h says what a request is; data is one after the other
 // out  {id, answer, blocks: [ArrayBuffer]}
 //      {id, progress: {task, done, total, note}}
 //      {compiled: WebAssembly.Module}

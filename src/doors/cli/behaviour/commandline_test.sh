@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # What a shell and a terminal see of the program, whatever the verb: exit codes, streams, pipes, characters:
-# commandline_test.sh PROGRAM SOURCE_DIR. What verbs do is tested in src/cli/*_test.cc.
+# commandline_test.sh PROGRAM SOURCE_DIR. What verbs do is tested in src/doors/cli/*_test.cc.
 . "$(dirname "$0")/expectations.sh"
 scan=$work/scan.ply
 "$program" convert "$input" "$scan" --max-gaussians 500 --sh-degree 1 -q || exit 1

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "core/log.h"
+#include "core/row_arrays.h"
 #include "core/text.h"
 #include "enhance/gaussian_budget.h"
-#include "formats/row_arrays.h"
 
 namespace anchorsplat {
 

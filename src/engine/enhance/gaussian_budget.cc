@@ -2,8 +2,8 @@
 
 #include "core/log.h"
 #include "core/most_visible.h"
+#include "core/row_arrays.h"
 #include "core/text.h"
-#include "formats/row_arrays.h"
 
 namespace anchorsplat {
 

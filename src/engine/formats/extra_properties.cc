@@ -4,8 +4,8 @@
 #include <numeric>
 
 #include "core/parallel.h"
+#include "core/row_arrays.h"
 #include "core/text.h"
-#include "formats/row_arrays.h"
 
 namespace anchorsplat {
 

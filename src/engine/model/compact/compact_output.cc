@@ -5,9 +5,9 @@
 #include <bit>
 #include <utility>
 
+#include "core/row_arrays.h"
 #include "core/row_scatter.h"
 #include "enhance/gaussian_budget.h"
-#include "formats/row_arrays.h"
 
 namespace anchorsplat {
 

@@ -5,6 +5,7 @@
 #include "api/bridge.h"
 #include "core/region.h"
 #include "core/text.h"
+#include "enhance/gaussian_budget.h"
 #include "model/model_method.h"
 
 namespace anchorsplat {

@@ -22,6 +22,7 @@
 #include "core/row_arrays.h"
 #include "core/text.h"
 #include "core/world_up.h"
+#include "enhance/gaussian_budget.h"
 #include "fit/checkpoint_guard.h"
 #include "fit/fitter.h"
 #include "formats/cloud_output.h"

@@ -8,6 +8,7 @@
 
 #include "cameras/camera_io.h"
 #include "core/text.h"
+#include "enhance/gaussian_budget.h"
 #include "model/model_method.h"
 #include "request/choice.h"
 #include "request/findings.h"

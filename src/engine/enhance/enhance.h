@@ -56,7 +56,8 @@ struct EnhanceOptions {
   // Before all else: Gaussians that nobody misses over the training background are taken out. Of the views of `cameras`
   // or of the pictures to refine against, else of views all around.
   bool clean = false;
-  // Gaussians of the result at most; 0: no bound. SetBudget tells the methods' own options.
+  // Gaussians of the result at most; 0: no bound. SetBudget (enhance/gaussian_budget.h) tells the methods'
+  // own options.
   int64_t max_gaussians = 0;
   // Only what lies in there is enhanced. The rest stays bit by bit, behind it, and a splat of which only a part was is
   // marked as enhanced in part.
@@ -68,8 +69,6 @@ struct EnhanceOptions {
 
 // Whether the caller named the option, by its name without dashes.
 bool IsGiven(const EnhanceOptions& options, std::string_view name);
-
-void SetBudget(EnhanceOptions& options, int64_t max_gaussians);
 
 // Where pixel sizes are from.
 enum class PixelSizeSource {
@@ -145,9 +144,6 @@ struct EnhanceInput {
   bool start_has_detail = false;  // EnhanceMethod::adds_detail of that method
   bool is_refined = false;        // refinement goes on from what the method makes
 };
-
-// For methods that look at no others: leaves those inside.
-void LeaveRegion(EnhanceInput& input);
 
 // How a method is about to be used.
 struct MethodUse {

@@ -10,10 +10,6 @@
 
 namespace anchorsplat {
 
-void SetBudget(EnhanceOptions& options, int64_t max_gaussians) {
-  options.max_gaussians = options.model.options.max_gaussians = options.refine.max_gaussians = max_gaussians;
-}
-
 void LeaveRegion(EnhanceInput& input) {
   if (input.inside.empty()) return;
   KeepMarked(input.inside, input.cloud);

@@ -10,4 +10,7 @@ namespace anchorsplat {
 Result<GaussianCloud> SetRestAside(const EnhanceOptions& options, EnhanceInput& input, EnhanceOptions& within,
                                    EnhanceReport& report);
 
+// For methods that look at no others: leaves those inside.
+void LeaveRegion(EnhanceInput& input);
+
 }  // namespace anchorsplat

@@ -13,6 +13,7 @@
 #include "core/source_dir_for_test.h"
 #include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
+#include "enhance/gaussian_budget.h"
 #include "enhance/refine.h"
 #include "enhance/refinement_for_test.h"
 #include "formats/cloud_io.h"

@@ -4,8 +4,13 @@
 #include "core/most_visible.h"
 #include "core/row_arrays.h"
 #include "core/text.h"
+#include "enhance/enhance.h"
 
 namespace anchorsplat {
+
+void SetBudget(EnhanceOptions& options, int64_t max_gaussians) {
+  options.max_gaussians = options.model.options.max_gaussians = options.refine.max_gaussians = max_gaussians;
+}
 
 void KeepMarked(const std::vector<char>& keep, GaussianCloud& cloud) {
   KeepRows(cloud.means, 3, keep);

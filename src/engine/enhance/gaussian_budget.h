@@ -7,6 +7,11 @@
 
 namespace anchorsplat {
 
+struct EnhanceOptions;
+
+// The bound of the result and of the methods' own options, which are one.
+void SetBudget(EnhanceOptions& options, int64_t max_gaussians);
+
 // Closes up the rows for which keep[i] is set.
 void KeepMarked(const std::vector<char>& keep, GaussianCloud& cloud);
 

@@ -6,6 +6,7 @@
 
 #include "core/log.h"
 #include "core/text.h"
+#include "enhance/enhance_region.h"
 #include "enhance/enlarged_targets.h"
 #include "enhance/filter.h"
 #include "enhance/gaussian_budget.h"

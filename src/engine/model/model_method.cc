@@ -13,6 +13,7 @@
 #include "core/log.h"
 #include "core/stopwatch.h"
 #include "core/text.h"
+#include "enhance/enhance_region.h"
 #include "enhance/filter.h"
 #include "enhance/gaussian_budget.h"
 #include "enhance/unseen_gaussians.h"

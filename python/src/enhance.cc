@@ -12,6 +12,7 @@
 
 #include "bindings.h"
 #include "columns.h"
+#include "core/splat_comments.h"
 #include "core/world_up.h"
 #include "fit/checkpoint_guard.h"
 #include "fit/fitter.h"

@@ -6,6 +6,7 @@
 #include "cameras/camera_io.h"
 #include "core/framing.h"
 #include "core/log.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
 #include "core/world_up.h"
 #include "render/rasterizer.h"

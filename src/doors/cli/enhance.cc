@@ -20,6 +20,7 @@
 #include "core/memory_limit.h"
 #include "core/parallel.h"
 #include "core/row_arrays.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
 #include "core/world_up.h"
 #include "enhance/gaussian_budget.h"

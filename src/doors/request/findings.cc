@@ -10,11 +10,9 @@
 #include <string_view>
 #include <utility>
 
-#include "core/credit.h"
 #include "core/file_system.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
-#include "core/world_up.h"
-#include "enhance/enhanced_mark.h"
 #include "formats/gsplat_checkpoint/gsplat_checkpoint.h"
 #include "formats/registry.h"
 #include "io/input_file.h"

@@ -28,7 +28,7 @@ struct SplatFindings {
   std::optional<RenderMode> render_mode;  // as the file says
   std::vector<std::string> comments;
   WorldOrigin origin = {0, 0, 0};  // of the means
-  bool lost_no_width = false;      // HasLostNoWidth (enhance/enhanced_mark.h)
+  bool lost_no_width = false;      // HasLostNoWidth (core/splat_comments.h)
   CloudStatistics statistics;
   Result<Reading> reading = Error{};  // of what shows
   Treatment treatment;                // what `enhance` would do by itself, at kInfoUpscale

@@ -8,6 +8,7 @@
 #include "cameras/camera_io.h"
 #include "core/framing.h"
 #include "core/log.h"
+#include "core/splat_comments.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "core/world_up.h"

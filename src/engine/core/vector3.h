@@ -1,6 +1,8 @@
 #pragma once
 
 #include <array>
+#include <cmath>
+#include <optional>
 
 namespace anchorsplat {
 
@@ -25,6 +27,13 @@ std::array<T, 3> Cross(const std::array<T, 3>& a, const std::array<T, 3>& b) {
 template <typename T>
 std::array<T, 3> Minus(const std::array<T, 3>& a, const std::array<T, 3>& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+
+// `v` with a length of 1; nothing where its length is not finite or `least` at most.
+inline std::optional<std::array<double, 3>> UnitVector(const std::array<double, 3>& v, double least) {
+  const double length = std::hypot(v[0], v[1], v[2]);
+  if (!(length > least) || !std::isfinite(length)) return std::nullopt;
+  return std::array{v[0] / length, v[1] / length, v[2] / length};
 }
 
 }  // namespace anchorsplat

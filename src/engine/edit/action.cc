@@ -10,7 +10,6 @@
 #include "core/number_text.h"
 #include "core/text.h"
 #include "core/vector3.h"
-#include "core/world_up.h"
 
 namespace anchorsplat {
 

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "core/lost_nothing_mark.h"
 #include "core/messages_for_test.h"
 #include "core/parallel.h"
+#include "core/splat_comments.h"
 #include "core/world_up.h"
 #include "formats/opened_splat.h"
 #include "formats/ply/ply_writer.h"

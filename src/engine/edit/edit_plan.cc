@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/buffer.h"
+#include "core/splat_comments.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "core/vector3.h"

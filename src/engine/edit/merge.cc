@@ -3,10 +3,8 @@
 #include <algorithm>
 
 #include "core/log.h"
-#include "core/lost_nothing_mark.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
-#include "core/training_background.h"
-#include "core/world_up.h"
 
 namespace anchorsplat {
 

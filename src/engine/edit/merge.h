@@ -14,7 +14,7 @@ namespace anchorsplat {
 // What several splats that become one say together. All of it is said in warnings where something is lost.
 
 // Comments of all, each once. Where up is, is what the first one says that says it; what they were trained over counts
-// where all agree. Marks (core/lost_nothing_mark.h) that not all have become those of a part.
+// where all agree. Marks (core/splat_comments.h) that not all have become those of a part.
 std::vector<std::string> MergedComments(std::span<const EditedSplat> splats);
 
 // That of all; nothing where they differ.

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "core/log.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
-#include "core/training_background.h"
 #include "fit/training_views.h"
 
 namespace anchorsplat {

@@ -229,7 +229,7 @@ struct Enhanced {
 
 // Runs the method. Logs what it assumed: what the splat was read as, training width, why one is left alone, how many
 // rows were dropped. A result that was given
-// width back says so in its comments (enhance/enhanced_mark.h). kBadArgument: that of CheckOptions, both pixel_size and
+// width back says so in its comments (core/splat_comments.h). kBadArgument: that of CheckOptions, both pixel_size and
 // cameras, upscale < 1; kBadFile: no usable Gaussian; and whatever the method reports.
 Result<Enhanced> Enhance(GaussianCloud cloud, const EnhanceOptions& options);
 

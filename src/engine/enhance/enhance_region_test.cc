@@ -9,9 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/lost_nothing_mark.h"
 #include "core/source_dir_for_test.h"
-#include "enhance/enhanced_mark.h"
+#include "core/splat_comments.h"
 #include "enhance/filter.h"
 #include "enhance/gaussian_budget.h"
 #include "enhance/refine.h"

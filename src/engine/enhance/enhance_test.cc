@@ -6,9 +6,9 @@
 #include <limits>
 
 #include "core/source_dir_for_test.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
 #include "enhance/enhance_door_for_test.h"
-#include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
 #include "formats/cloud_io.h"
 

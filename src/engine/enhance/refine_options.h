@@ -22,7 +22,7 @@ struct RefineOptions {
   std::filesystem::path enlarge_with;
   WorldOrigin origin = {0, 0, 0};  // of the splat's means, for the pictures' cameras; set by Enhance()
   // What the pictures' alpha is laid over, and the splat; otherwise what the cameras' file says, else the splat's own
-  // comment (core/training_background.h), else black.
+  // comment (core/splat_comments.h), else black.
   std::optional<std::array<float, 3>> background;
   // Every Nth view is not trained on, as in fits; 0: all are. Nothing: every eighth, or, where the splat agrees with
   // those as well as with the others, so that its fit has seen them, all: then they could not tell what is better.

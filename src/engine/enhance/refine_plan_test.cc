@@ -8,7 +8,7 @@
 #include <filesystem>
 
 #include "core/random.h"
-#include "core/training_background.h"
+#include "core/splat_comments.h"
 #include "enhance/enhance.h"
 #include "enhance/refinement_for_test.h"
 #include "fit/orbit_scene_for_test.h"

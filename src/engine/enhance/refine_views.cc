@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "core/log.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
-#include "core/training_background.h"
 #include "enhance/enlarged_targets.h"
 #include "enhance/refine_pictures.h"
 #include "enhance/refine_poses.h"

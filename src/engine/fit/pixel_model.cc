@@ -4,7 +4,6 @@
 #include <cmath>
 #include <string_view>
 
-#include "core/lost_nothing_mark.h"
 #include "core/parallel.h"
 #include "core/text.h"
 
@@ -49,10 +48,6 @@ Status Validate(const PixelModel& model) {
 }
 
 PixelModel AreaModel(double upscale) { return {static_cast<int>(std::ceil(upscale)), upscale}; }
-
-std::string PixelAreaComment(double upscale) { return Cat(kPixelAreaMark, upscale, " times closer"); }
-
-bool IsFittedToPixelAreas(const CloudView& cloud) { return HasMark(cloud.comments, kPixelAreaMark); }
 
 Status Validate(const PixelSchedule& schedule) {
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(PixelModel{1, schedule.upscale}));

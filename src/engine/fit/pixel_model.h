@@ -37,11 +37,6 @@ Status Validate(const PixelModel& model);
 // The model that renders all rays: samples = upscale, rounded up.
 PixelModel AreaModel(double upscale);
 
-// What a splat fitted with that model says about itself in its comments (GaussianCloud::comments), and whether one says
-// so: it has not lost the width that standard fits lose.
-std::string PixelAreaComment(double upscale);
-bool IsFittedToPixelAreas(const CloudView& cloud);
-
 // From few rays to all of them while an optimisation runs: one, then half as many per side as there will be, then all.
 // Early on the cheap model is good enough, and the last part undoes its bias.
 struct PixelSchedule {

@@ -156,14 +156,5 @@ TEST(PixelSchedule, GoesFromOneRayToAll) {
   EXPECT_FALSE(Validate(PixelSchedule{0, 0.5, 0.7}).ok());
 }
 
-TEST(PixelAreaComment, SaysSo) {
-  GaussianCloud cloud;
-  cloud.comments = {"a splat", "areas"};
-  EXPECT_FALSE(IsFittedToPixelAreas(cloud));
-  cloud.comments.push_back(PixelAreaComment(2.5));
-  EXPECT_EQ(cloud.comments.back(), "fitted to pixel areas, seen 2.5 times closer");
-  EXPECT_TRUE(IsFittedToPixelAreas(cloud));
-}
-
 }  // namespace
 }  // namespace anchorsplat

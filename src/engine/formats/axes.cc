@@ -6,7 +6,7 @@
 
 #include "core/parallel.h"
 #include "core/sh_rotation.h"
-#include "core/world_up.h"
+#include "core/splat_comments.h"
 
 namespace anchorsplat {
 

@@ -15,7 +15,7 @@
 #include <thread>
 
 #include "core/source_dir_for_test.h"
-#include "core/world_up.h"
+#include "core/splat_comments.h"
 #include "formats/ply/ply_writer.h"
 #include "formats/random_cloud_for_test.h"
 #include "formats/registry.h"

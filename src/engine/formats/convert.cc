@@ -14,6 +14,7 @@
 #include "core/log.h"
 #include "core/memory_limit.h"
 #include "core/row_arrays.h"
+#include "core/splat_comments.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "core/world_up.h"

@@ -18,6 +18,7 @@
 #include "core/messages_for_test.h"
 #include "core/random.h"
 #include "core/spherical_harmonics.h"
+#include "core/splat_comments.h"
 #include "core/world_up.h"
 #include "formats/opened_splat.h"
 #include "formats/ply/ply_writer.h"

@@ -7,11 +7,9 @@
 #include <optional>
 #include <string_view>
 
-#include "core/credit.h"
 #include "core/log.h"
-#include "core/lost_nothing_mark.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
-#include "core/world_up.h"
 
 namespace anchorsplat {
 

@@ -13,9 +13,9 @@
 namespace anchorsplat {
 
 // The member "asset" of a file that is JSON, as glTF defines it and SOG took it over: what made the file, and whose it
-// is. `generator` is ours; `copyright` are the credits, a line each, and `extras.comments` the
-// marks of core/lost_nothing_mark.h, where up is (core/world_up.h) and, where it is not zero, the origin of the means
-// (core/world_origin.h); neither is there where there are none.
+// is. `generator` is ours; `copyright` are the credits, a line each, and `extras.comments` the marks, where up is
+// (core/splat_comments.h) and, where it is not zero, the origin of the means (core/world_origin.h); neither is there
+// where there are none.
 nlohmann::json AssetOf(std::span<const std::string> comments, const WorldOrigin& origin);
 
 // The credits, marks, ups and origin that such a file says, as comments; none where it says nothing, or no text.

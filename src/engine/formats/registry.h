@@ -42,7 +42,7 @@ enum class ModeTag {
 // Which of a splat's comments go into a file of the format and come back.
 enum class CommentPlace {
   kNone,
-  kCredits,  // those that say whose it is (core/credit.h) or that it has all its width (core/lost_nothing_mark.h)
+  kCredits,  // those that say whose it is or that it has all its width (core/splat_comments.h)
   kAll,
 };
 

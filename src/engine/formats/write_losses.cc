@@ -5,9 +5,8 @@
 #include <cstdint>
 #include <span>
 
-#include "core/credit.h"
-#include "core/lost_nothing_mark.h"
 #include "core/parallel.h"
+#include "core/splat_comments.h"
 #include "core/statistics.h"
 #include "core/text.h"
 #include "core/world_up.h"

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "core/credit.h"
 #include "core/framing.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
 #include "core/world_up.h"
 #include "io/atomic_file.h"

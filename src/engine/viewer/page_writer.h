@@ -51,9 +51,9 @@ struct ViewerPage {
 // One HTML file that shows the splats in any browser with WebGL 2, from disk, with no network: the clouds quantised
 // (quantized_cloud.h), deflated and in base64, the page's own code beside them. The modes of rendering follow each
 // cloud's `render_mode`. With ViewerPage::folder that page and a folder beside it (page_folder.h). Credits in the
-// clouds' comments (core/credit.h) stand on the page. Errors: kExists; kIo; kNotFound or kBadFile (a picture that is
-// missing or neither PNG nor JPEG); kBadArgument: a cloud without usable Gaussians, a pixel size that is not positive,
-// an `own_page` that is no such address, a page above `max_bytes`.
+// clouds' comments (core/splat_comments.h) stand on the page. Errors: kExists; kIo; kNotFound or kBadFile (a picture
+// that is missing or neither PNG nor JPEG); kBadArgument: a cloud without usable Gaussians, a pixel size that is not
+// positive, an `own_page` that is no such address, a page above `max_bytes`.
 Status WriteViewerPage(const std::filesystem::path& path, const ViewerPage& page, const WriteOptions& options = {});
 
 // kBadArgument: a sample of the splats shows already that a single file of them would be above `max_bytes`. The splats

@@ -11,8 +11,8 @@
 #include <string_view>
 
 #include "core/framing.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
-#include "core/world_up.h"
 #include "formats/splat_order.h"
 #include "images/image_io.h"
 #include "io/file_bytes_for_test.h"

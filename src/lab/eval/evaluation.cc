@@ -8,9 +8,9 @@
 #include <span>
 #include <utility>
 
-#include "core/credit.h"
 #include "core/file_system.h"
 #include "core/log.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
 #include "eval/object_state.h"
 #include "fit/picture_cache.h"

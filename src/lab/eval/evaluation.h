@@ -45,11 +45,12 @@ struct Evaluation {
   Protocol protocol = Protocol::kHeldOut;
   size_t max_views = 0;
   std::optional<LpipsNet> lpips;
-  std::vector<std::string> methods;               // in the order asked for
-  std::vector<std::string> objects;               // in order of their names
-  std::vector<std::string> kinds;                 // of each object; empty words where nothing says
-  std::vector<std::vector<std::string>> credits;  // of each object: whose it is, as its splat says (core/credit.h)
-  std::vector<MethodResult> results;              // object by object, method by method; those that failed are not there
+  std::vector<std::string> methods;  // in the order asked for
+  std::vector<std::string> objects;  // in order of their names
+  std::vector<std::string> kinds;    // of each object; empty words where nothing says
+  std::vector<std::vector<std::string>>
+      credits;                        // of each object: whose it is, as its splat says (core/splat_comments.h)
+  std::vector<MethodResult> results;  // object by object, method by method; those that failed are not there
   std::vector<EvaluationFailure> failures;
   EvaluationTimes times;
   int64_t resumed = 0;  // results that were there already

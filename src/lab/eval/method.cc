@@ -9,9 +9,9 @@
 #include <set>
 
 #include "core/log.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
 #include "enhance/enhance.h"
-#include "enhance/enhanced_mark.h"
 #include "enhance/filter.h"
 #include "eval/bicubic_fit.h"
 #include "eval/filter_sweep.h"

@@ -9,9 +9,9 @@
 
 #include "cameras/photograph.h"
 #include "cameras/view_labels.h"
-#include "core/credit.h"
 #include "core/file_system.h"
 #include "core/log.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
 #include "images/image_io.h"
 #include "images/orientation.h"

@@ -30,7 +30,7 @@ class ViewSource {
     static const Buffer<uint8_t> nowhere;
     return nowhere;
   }
-  // Whose what is shown is, as far as its file says so (core/credit.h).
+  // Whose what is shown is, as far as its file says so (core/splat_comments.h).
   virtual std::vector<std::string> credits() const { return {}; }
   // Forgets all views but this one.
   virtual void KeepOnly(size_t view) = 0;

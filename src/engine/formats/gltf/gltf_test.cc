@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "core/lost_nothing_mark.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
 #include "formats/attribute_error.h"
 #include "formats/both_ways_for_test.h"

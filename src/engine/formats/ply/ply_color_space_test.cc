@@ -8,8 +8,8 @@
 
 #include "core/messages_for_test.h"
 #include "core/spherical_harmonics.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
-#include "core/world_up.h"
 #include "formats/both_ways_for_test.h"
 #include "formats/extra_properties.h"
 #include "formats/ply/ply_blocks.h"

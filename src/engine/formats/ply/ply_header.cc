@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "core/log.h"
+#include "core/splat_comments.h"
 #include "core/text.h"
 #include "core/words.h"
-#include "core/world_up.h"
 #include "formats/ply/render_mode_tag.h"
 
 namespace anchorsplat {

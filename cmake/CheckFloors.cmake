@@ -6,7 +6,7 @@ endif()
 # The floors of each wing, lowest first. The first floor of a wing is above the last one of the wing before, so that the
 # engine includes nothing of the other two, and the lab nothing of the doors.
 set(engine "core" "gpu io model/kernels" "images tensors render" "cameras model/shared" "formats metrics model/published"
-           "viewer reading edit upscale" "fit" "enhance" "model/compact" "model model/torch")
+           "viewer reading compare edit upscale" "fit" "enhance" "model/compact" "model model/torch")
 set(lab "scene perceptual" "dataset" "train eval bench")
 set(doors "api request" "cli web")
 set(floor 0)

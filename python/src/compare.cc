@@ -9,8 +9,8 @@
 
 #include "bindings.h"
 #include "columns.h"
+#include "compare/comparison.h"
 #include "core/run_context.h"
-#include "eval/comparison.h"
 #include "metrics/image_metrics.h"
 #include "metrics/side_by_side.h"
 #include "request/compare_flags.h"
@@ -118,7 +118,7 @@ std::string Compare(nb::handle a, nb::handle b, nb::handle truth, const std::vec
     if (sides.truth) sources.push_back(sides.b.get());
     ANCHORSPLAT_ASSIGN_OR_RETURN(const auto results,
                                  CompareToReference(sources, sides.truth ? *sides.truth : *sides.b,
-                                                    {.lpips = nullptr, .color_correct = flags.color_correct}));
+                                                    {.lpips = {}, .color_correct = flags.color_correct}));
     nlohmann::json json = ToJson(results);
     json["device"] = device.ToJson();
     return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);

@@ -12,8 +12,8 @@
 #include "cli/lpips_flags.h"
 #include "cli/table.h"
 #include "cli/verb.h"
+#include "compare/view_source.h"
 #include "core/text.h"
-#include "eval/view_source.h"
 #include "images/image_io.h"
 #include "io/atomic_file.h"
 #include "io/input_record.h"
@@ -149,9 +149,10 @@ Status RunCompare(const CompareWords& flags, const SharedFlags& shared) {
   std::vector<ViewSource*> sources = {sides.a.get()};
   if (sides.truth) sources.push_back(sides.b.get());
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Lpips> lpips, OpenLpips(flags.lpips, flags.lpips_weights));
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto results, CompareToReference(sources, sides.truth ? *sides.truth : *sides.b,
-                                                                      {.lpips = lpips ? &*lpips : nullptr,
-                                                                       .color_correct = flags.how.color_correct}));
+  CompareOptions measured{.lpips = {}, .color_correct = flags.how.color_correct};
+  if (lpips) measured.lpips = [&](const Image& picture, const Image& truth) { return lpips->Distance(picture, truth); };
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const auto results,
+                               CompareToReference(sources, sides.truth ? *sides.truth : *sides.b, measured));
   if (!flags.side_by_side.empty()) {
     ANCHORSPLAT_RETURN_IF_ERROR(WriteSideBySide(flags, sides, results, shared));
   }

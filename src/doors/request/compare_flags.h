@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "compare/comparison.h"
+#include "compare/view_source.h"
 #include "core/camera.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
-#include "eval/comparison.h"
-#include "eval/view_source.h"
 #include "request/views.h"
 
 namespace anchorsplat {

@@ -11,6 +11,7 @@
 #include "core/random.h"
 #include "fit/orbit_scene_for_test.h"
 #include "gpu/gpu_for_test.h"
+#include "metrics/image_metrics.h"
 
 namespace anchorsplat {
 namespace {

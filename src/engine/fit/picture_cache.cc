@@ -92,13 +92,6 @@ void PictureCache::LoadAhead(std::span<const int64_t> views) {
   }
 }
 
-void FillIgnored(const Buffer<uint8_t>& ignored, const Image& shown, Image& picture) {
-  for (size_t i = 0; i < ignored.size(); ++i) {
-    if (ignored[i] == 0) continue;
-    for (int c = 0; c < picture.channels; ++c) picture.channel(c)[i] = shown.channel(c)[i];
-  }
-}
-
 void PictureCache::Unpack(const Stored& stored, const Pinhole& size, Image& picture) const {
   if (picture.width != size.width || picture.height != size.height || picture.channels != 3) {
     picture = Image(size.width, size.height, 3);

@@ -62,7 +62,4 @@ class PictureCache {
   Stored passing_;  // what LoadPacked gave and there is no room for
 };
 
-// Takes what `shown` has where nothing is asked of `picture`, so that the two do not differ there.
-void FillIgnored(const Buffer<uint8_t>& ignored, const Image& shown, Image& picture);
-
 }  // namespace anchorsplat

@@ -13,6 +13,7 @@
 #include "core/run_context.h"
 #include "images/image_io.h"
 #include "io/folder_for_test.h"
+#include "metrics/image_metrics.h"
 
 namespace anchorsplat {
 namespace {

@@ -139,4 +139,11 @@ void Clamp01(Image& image) {
   });
 }
 
+void FillIgnored(const Buffer<uint8_t>& ignored, const Image& shown, Image& picture) {
+  for (size_t i = 0; i < ignored.size(); ++i) {
+    if (ignored[i] == 0) continue;
+    for (int c = 0; c < picture.channels; ++c) picture.channel(c)[i] = shown.channel(c)[i];
+  }
+}
+
 }  // namespace anchorsplat

@@ -25,7 +25,7 @@ struct MaskedQuality {
 };
 
 // The same two over the pixels whose `ignored` ([H,W]) is 0; empty: all. What is ignored has to be the same in both
-// pictures, as FillIgnored (fit/picture_cache.h) makes it, so that the windows of others see no difference there.
+// pictures, as FillIgnored makes it, so that the windows of others see no difference there.
 // kBadArgument as above, or `ignored` is of another size.
 Result<MaskedQuality> MeasureMasked(const Image& a, const Image& b, std::span<const uint8_t> ignored);
 
@@ -34,5 +34,8 @@ std::string WhollyMasked(std::span<const std::string> names, int64_t count);
 
 // max(0, min(1, x)) everywhere.
 void Clamp01(Image& image);
+
+// Takes what `shown` has where nothing is asked of `picture`, so that the two do not differ there.
+void FillIgnored(const Buffer<uint8_t>& ignored, const Image& shown, Image& picture);
 
 }  // namespace anchorsplat

@@ -8,9 +8,9 @@
 #include <variant>
 #include <vector>
 
+#include "compare/comparison.h"
 #include "core/result.h"
 #include "enhance/enhance.h"
-#include "eval/comparison.h"
 
 namespace anchorsplat {
 

@@ -1,4 +1,4 @@
-#include "eval/view_source.h"
+#include "compare/view_source.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@
 
 #include "cameras/camera_io.h"
 #include "cameras/undistortion.h"
+#include "compare/comparison.h"
 #include "core/messages_for_test.h"
 #include "core/source_dir_for_test.h"
-#include "eval/comparison.h"
 #include "formats/cloud_io.h"
 #include "images/image_io.h"
 #include "io/folder_for_test.h"

@@ -1,4 +1,4 @@
-#include "eval/view_source.h"
+#include "compare/view_source.h"
 
 #include <algorithm>
 #include <functional>

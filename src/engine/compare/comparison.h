@@ -1,13 +1,14 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "compare/view_source.h"
+#include "core/image.h"
 #include "core/result.h"
-#include "eval/view_source.h"
-#include "perceptual/lpips.h"
 
 namespace anchorsplat {
 
@@ -38,7 +39,7 @@ struct Comparison {
 
 // What is measured beside PSNR and SSIM.
 struct CompareOptions {
-  const Lpips* lpips = nullptr;
+  std::function<Result<double>(const Image& picture, const Image& truth)> lpips;  // measures it; none: nobody asks
   bool color_correct = false;  // of every source to the reference, view by view
 };
 

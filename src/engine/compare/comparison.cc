@@ -1,4 +1,4 @@
-#include "eval/comparison.h"
+#include "compare/comparison.h"
 
 #include <algorithm>
 #include <optional>
@@ -7,7 +7,6 @@
 #include "cameras/view_labels.h"
 #include "core/log.h"
 #include "core/text.h"
-#include "fit/picture_cache.h"
 #include "metrics/color_correction.h"
 #include "metrics/compare.h"
 #include "metrics/image_metrics.h"
@@ -100,14 +99,14 @@ Buffer<uint8_t> EitherIgnored(const Buffer<uint8_t>& a, const Buffer<uint8_t>& b
 }
 
 Result<CorrectedScore> CorrectColors(Image image, const Image& truth, const Buffer<uint8_t>& ignored,
-                                     const Lpips* lpips) {
+                                     const CompareOptions& options) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const ColorMap map, FitColors(image, truth));
   ApplyColors(map, image);
   FillIgnored(ignored, truth, image);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const MaskedQuality quality, MeasureMasked(image, truth, ignored));
   CorrectedScore score{quality.psnr, quality.ssim, std::nullopt};
-  if (lpips != nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, lpips->Distance(image, truth));
+  if (options.lpips) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, options.lpips(image, truth));
   }
   return score;
 }
@@ -121,18 +120,18 @@ Result<std::optional<ViewScore>> Score(Image image, const Image& truth, const Bu
   ViewScore score;
   score.psnr = quality.psnr;
   score.ssim = quality.ssim;
-  if (options.lpips != nullptr) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, options.lpips->Distance(image, truth));
+  if (options.lpips) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(score.lpips, options.lpips(image, truth));
   }
   if (options.color_correct) {
-    ANCHORSPLAT_ASSIGN_OR_RETURN(score.corrected, CorrectColors(std::move(image), truth, ignored, options.lpips));
+    ANCHORSPLAT_ASSIGN_OR_RETURN(score.corrected, CorrectColors(std::move(image), truth, ignored, options));
   }
   return std::optional<ViewScore>(std::move(score));
 }
 
 void TakeMeans(const CompareOptions& options, Comparison& comparison) {
   const auto n = static_cast<double>(comparison.views.size());
-  if (options.lpips != nullptr) comparison.mean_lpips = 0;
+  if (options.lpips) comparison.mean_lpips = 0;
   if (options.color_correct) comparison.mean_corrected = CorrectedScore{0, 0, comparison.mean_lpips};
   for (const ViewScore& view : comparison.views) {
     if (view.lpips) *comparison.mean_lpips += *view.lpips / n;

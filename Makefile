@@ -3,7 +3,7 @@
 #   make demo     from a bare Debian 12 machine to an enhanced splat and a picture
 #   make test     everything that is checked: all tests, and the rooms that handle input and memory by hand under sanitizers
 #   make test-all the same with every room under sanitizers (half an hour more)
-#   make build    the program (build/anchorsplat) and its tests
+#   make build    the program (build/anchorsplat) and its tests; LAB=0 without data sets, training, evaluation, benchmarks
 #   make install PREFIX=/usr/local   program, manual page, completions; make deb: build/anchorsplat_VERSION_ARCHITECTURE.deb
 #   make wheel    build/wheels/anchorsplat-*.whl, the Python package with all that it needs; make python: one to import, for tests
 #   make lint     clang-tidy and clang-format
@@ -35,16 +35,19 @@ TORCH_FLAGS = -DANCHORSPLAT_TORCH=OFF
 else
 TORCH_FLAGS = -DANCHORSPLAT_TORCH=$(if $(wildcard .venv/anchorsplat-torch),ON,OFF)
 endif
+# LAB=0 builds the program without src/lab: no data sets from meshes, no training, no evaluation, no benchmarks.
+LAB_FLAGS = -DANCHORSPLAT_LAB=$(if $(filter 0,$(LAB)),OFF,ON)
+WITHOUT_LAB = $(if $(filter 0,$(LAB)),--without-lab)
 # The Python package is built, and tested, where .venv has what that takes, which `make test` puts there.
 PYTHON_FLAGS = $(if $(wildcard .venv/anchorsplat-python),-DANCHORSPLAT_PYTHON=ON -DPython_EXECUTABLE=$(CURDIR)/.venv/bin/python)
 
 .PHONY: dependencies test-dependencies torch
 dependencies:
-	@scripts/install-dependencies.sh
+	@scripts/install-dependencies.sh $(WITHOUT_LAB)
 
 # Without WebGPU everything can be built and run but what works on a GPU, whose tests say then what is missing.
 test-dependencies:
-	@scripts/install-dependencies.sh --with-tests
+	@scripts/install-dependencies.sh --with-tests $(WITHOUT_LAB)
 	@scripts/fetch-webgpu.sh || true
 
 torch:
@@ -67,14 +70,14 @@ wheel: dependencies
 	@JOBS=$(JOBS) scripts/build-wheel.sh
 
 build: test-dependencies
-	@cmake --preset release -DANCHORSPLAT_TESTS=ON $(TORCH_FLAGS) $(PYTHON_FLAGS) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
+	@cmake --preset release -DANCHORSPLAT_TESTS=ON $(TORCH_FLAGS) $(LAB_FLAGS) $(PYTHON_FLAGS) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
 	@rm -f build-configure.log
 	@cmake --build --preset release -j $(JOBS)
 
 # Only the program: what `make demo` needs. A build folder that has the tests keeps them.
 program: dependencies
 	@scripts/fetch-webgpu.sh --optional
-	@cmake --preset release $(if $(wildcard build/release/CMakeCache.txt),,-DANCHORSPLAT_TESTS=OFF) $(TORCH_FLAGS) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
+	@cmake --preset release $(if $(wildcard build/release/CMakeCache.txt),,-DANCHORSPLAT_TESTS=OFF) $(TORCH_FLAGS) $(LAB_FLAGS) $(CMAKE_FLAGS) >build-configure.log 2>&1 || { cat build-configure.log; rm -f build-configure.log; exit 1; }
 	@rm -f build-configure.log
 	@cmake --build --preset release -j $(JOBS) --target anchorsplat
 .PHONY: program

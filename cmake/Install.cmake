@@ -78,7 +78,7 @@ if(TARGET anchorsplat_shared)
   add_dependencies(anchorsplat_installable anchorsplat_shared)
 endif()
 
-if(NOT ANCHORSPLAT_SANITIZE)
+if(NOT ANCHORSPLAT_SANITIZE AND ANCHORSPLAT_LAB)  # it asks for the verbs of the lab, too
   add_test(NAME cli.install
            COMMAND ${CMAKE_SOURCE_DIR}/src/doors/cli/behaviour/install_test.sh $<TARGET_FILE:anchorsplat> ${CMAKE_SOURCE_DIR}
                    ${CMAKE_BINARY_DIR} ${CMAKE_COMMAND})

@@ -2,15 +2,18 @@
 # Makes sure that everything the build needs is there: on Debian and its relatives by apt (sudo only when not root),
 # elsewhere it says what is missing. Quick when nothing is missing. With --with-tests also what the tests take, with
 # --with-torch what installing LibTorch takes, with --with-python what the Python package takes, with --with-packaging what
-# `make deb` takes; --list only names the packages.
+# `make deb` takes; with --without-lab not what only src/lab takes; --list only names the packages.
 # They are called the same in Debian 12 and 13.
 set -euo pipefail
 
 packages=(g++ cmake ninja-build pkg-config
   libhwy-dev libtbb-dev libcli11-dev nlohmann-json3-dev libpugixml-dev libpng-dev libjpeg-dev zlib1g-dev libzstd-dev libwebp-dev libtiff-dev
-  libassimp-dev libstb-dev libembree-dev libtomlplusplus-dev)
+  libstb-dev)
+lab_packages=(libassimp-dev libembree-dev libtomlplusplus-dev)
 headers=(hwy/highway.h tbb/parallel_for.h CLI/CLI.hpp nlohmann/json.hpp pugixml.hpp png.h jpeglib.h zlib.h zstd.h webp/decode.h tiffio.h
-  assimp/scene.h stb/stb_image.h toml++/toml.h)
+  stb/stb_image.h)
+lab_headers=(assimp/scene.h toml++/toml.h)
+with_lab=1
 list=
 with_torch=
 with_python=
@@ -26,6 +29,7 @@ for option in "$@"; do
     --with-torch) with_torch=1 ;;
     --with-python) with_python=1 ;;
     --with-packaging) packages+=(dpkg-dev file) ;;  # by which `make deb` reads the libraries of the program
+    --without-lab) with_lab= ;;
     --list) list=1 ;;
     *)
       echo "anchorsplat: install-dependencies.sh has no option $option" >&2
@@ -34,6 +38,10 @@ for option in "$@"; do
   esac
 done
 
+if [ -n "$with_lab" ]; then
+  packages+=("${lab_packages[@]}")
+  headers+=("${lab_headers[@]}")
+fi
 # LibTorch comes in a Python wheel (scripts/install-torch.sh) without the headers of Gloo, which training on several
 # machines needs.
 if [ -n "$with_torch" ]; then
@@ -55,7 +63,7 @@ if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
   for header in "${headers[@]}"; do
     have_header "$header" || missing+=("<$header>")
   done
-  have_header embree4/rtcore.h || have_header embree3/rtcore.h || missing+=("<embree4/rtcore.h>")
+  [ -z "$with_lab" ] || have_header embree4/rtcore.h || have_header embree3/rtcore.h || missing+=("<embree4/rtcore.h>")
   [ ${#missing[@]} -eq 0 ] && exit 0
   echo "anchorsplat: this is not a Debian system, so nothing was installed. Missing: ${missing[*]}" >&2
   echo "Install a C++20 compiler, CMake >= 3.22, Ninja and the development packages of Highway (>= 1.0.3), oneTBB," >&2

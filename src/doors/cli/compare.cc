@@ -9,7 +9,7 @@
 #include <numeric>
 
 #include "cli/clean_output.h"
-#include "cli/lpips_flags.h"
+#include "cli/lab.h"
 #include "cli/table.h"
 #include "cli/verb.h"
 #include "compare/view_source.h"
@@ -148,11 +148,10 @@ Status RunCompare(const CompareWords& flags, const SharedFlags& shared) {
   if (!flags.side_by_side.empty()) ANCHORSPLAT_RETURN_IF_ERROR(CheckIsNoInput(flags.side_by_side));
   std::vector<ViewSource*> sources = {sides.a.get()};
   if (sides.truth) sources.push_back(sides.b.get());
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::optional<Lpips> lpips, OpenLpips(flags.lpips, flags.lpips_weights));
-  CompareOptions measured{.lpips = {}, .color_correct = flags.how.color_correct};
-  if (lpips) measured.lpips = [&](const Image& picture, const Image& truth) { return lpips->Distance(picture, truth); };
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureDistance lpips, OpenLpipsDistance(flags.lpips, flags.lpips_weights));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto results,
-                               CompareToReference(sources, sides.truth ? *sides.truth : *sides.b, measured));
+                               CompareToReference(sources, sides.truth ? *sides.truth : *sides.b,
+                                                  {.lpips = lpips, .color_correct = flags.how.color_correct}));
   if (!flags.side_by_side.empty()) {
     ANCHORSPLAT_RETURN_IF_ERROR(WriteSideBySide(flags, sides, results, shared));
   }

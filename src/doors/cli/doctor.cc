@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <limits>
@@ -13,35 +12,19 @@
 #include <utility>
 #include <vector>
 
+#include "cli/finding.h"
 #include "cli/gpu_report.h"
+#include "cli/lab.h"
 #include "cli/verb.h"
-#include "core/companion.h"
-#include "core/file_system.h"
 #include "core/memory_limit.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "model/compact/shipped_network.h"
 #include "model/kernels/bfloat16_tile.h"
-#include "perceptual/lpips.h"
-#include "perceptual/lpips_weights.h"
 
 namespace anchorsplat {
 
 namespace {
-
-namespace fs = std::filesystem;
-
-constexpr const char* kReady = "ready";
-constexpr const char* kMissing = "missing";  // an extra that was not asked for when this was built or set up
-constexpr const char* kBroken = "broken";    // is there and does not work
-
-// One line of the report.
-struct Finding {
-  std::string name;
-  const char* state = kReady;
-  std::string text;     // more lines where there is more to say
-  std::string command;  // gets what is missing; else empty
-};
 
 // The kernel's files say that they are empty, so that io/'s readers would take them for that.
 std::string ProcessorName() {
@@ -97,18 +80,6 @@ const char* BuildKind() {
 #endif
 }
 
-// How to come by LibTorch, for a program in the build folder of a checkout and for an installed one.
-std::string TorchCommand() {
-  const fs::path folder = ProgramFolder();
-  if (Exists(folder.parent_path() / "scripts" / "install-torch.sh")) return "make torch build";
-  return "in a checkout of the sources: make install TORCH_DIR=<libtorch>/share/cmake/Torch";
-}
-
-std::string FetchCommand() {
-  const fs::path installed = CompanionFile("fetch-lpips.sh");
-  return Exists(installed) ? installed.string() : "scripts/fetch-lpips.sh";
-}
-
 Finding FindModel() {
   if (!HasShippedNetwork()) {
     return {"model", kMissing, "this program was built without the weights in models/",
@@ -121,36 +92,6 @@ Finding FindModel() {
     copies = std::max(copies, network->config().copies);
   }
   return {"model", kReady, Cat("in the program, ", copies, " Gaussians for one"), ""};
-}
-
-Finding FindTraining() {
-  const fs::path program = CompanionFile("anchorsplat-train");
-  if (!Exists(program)) return {"training", kMissing, "built without LibTorch", TorchCommand()};
-  return {"training", kReady, program.string(), ""};
-}
-
-Finding FindLpips() {
-  const Status status = Lpips::CheckPlugin();
-  if (status.ok()) return {"LPIPS", kReady, Lpips::PluginPath().string(), ""};
-  if (status.error().code == ErrorCode::kNotFound) {
-    return {"LPIPS", kMissing, "built without LibTorch", TorchCommand()};
-  }
-  return {"LPIPS", kBroken, status.error().message, TorchCommand()};
-}
-
-Finding FindLpipsWeights() {
-  const fs::path folder = LpipsFolder();
-  std::string found;
-  for (const LpipsNet net : {LpipsNet::kAlex, LpipsNet::kVgg, LpipsNet::kSqueeze}) {
-    const auto weights = ReadLpipsWeights(net, folder);
-    if (weights.ok()) {
-      found += Cat(found.empty() ? "" : ", ", LpipsNetName(net));
-    } else if (weights.error().code != ErrorCode::kNotFound) {
-      return {"LPIPS weights", kBroken, weights.error().message, FetchCommand()};
-    }
-  }
-  if (found.empty()) return {"LPIPS weights", kMissing, Cat("none in ", folder.string()), FetchCommand()};
-  return {"LPIPS weights", kReady, Cat(found, " in ", folder.string()), ""};
 }
 
 Finding FindGpu(const GpuFindings& gpus) {
@@ -213,8 +154,9 @@ void AddDoctor(CLI::App& app, Program& program) {
     program.run = [&program]() -> Status {
       const Machine machine = LookAtMachine();
       const GpuFindings gpus = LookForGpus();
-      const std::vector<Finding> findings = {FindModel(), FindTraining(), FindLpips(), FindLpipsWeights(),
-                                             FindGpu(gpus)};
+      std::vector<Finding> findings = LabFindings();
+      findings.insert(findings.begin(), FindModel());
+      findings.push_back(FindGpu(gpus));
       for (const Finding& finding : findings) {
         if (finding.state == std::string(kBroken)) program.exit_code = kPartialExitCode;
       }

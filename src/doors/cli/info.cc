@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "cli/clean_output.h"
-#include "cli/mesh_info.h"
+#include "cli/lab.h"
 #include "cli/table.h"
 #include "cli/verb.h"
 #include "core/splat_comments.h"

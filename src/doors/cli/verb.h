@@ -11,7 +11,6 @@
 #include "core/result.h"
 #include "io/write_options.h"
 #include "request/device_flags.h"
-#include "train/train_request.h"
 
 namespace anchorsplat {
 
@@ -25,6 +24,8 @@ struct SharedFlags {
   uint64_t seed = 0;
 };
 
+struct TrainReport;
+struct TrainRequest;
 // The training, in the program that has it (train/trainer.h).
 using Trainer = Result<TrainReport> (*)(const TrainRequest&);
 

@@ -14,6 +14,7 @@
 #include "core/file_system.h"
 #include "core/text.h"
 #include "request/choice.h"
+#include "train/train_request.h"
 
 namespace anchorsplat {
 

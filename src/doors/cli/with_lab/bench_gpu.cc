@@ -1,4 +1,4 @@
-#include "cli/bench_gpu.h"
+#include "cli/with_lab/bench_gpu.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "cli/bench_reading.h"
+#include "cli/with_lab/bench_reading.h"
 
 #include <cmath>
 #include <filesystem>

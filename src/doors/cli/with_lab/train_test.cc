@@ -2,6 +2,7 @@
 #include "core/companion.h"
 #include "core/file_system.h"
 #include "io/folder_for_test.h"
+#include "train/train_request.h"
 
 namespace anchorsplat {
 namespace {

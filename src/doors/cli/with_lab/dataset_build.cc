@@ -4,10 +4,10 @@
 #include <optional>
 
 #include "cli/clean_output.h"
-#include "cli/dataset.h"
-#include "cli/mesh_views.h"
 #include "cli/stop_signal.h"
 #include "cli/verb.h"
+#include "cli/with_lab/dataset.h"
+#include "cli/with_lab/mesh_views.h"
 #include "core/parallel.h"
 #include "core/text.h"
 #include "dataset/dataset_builder.h"

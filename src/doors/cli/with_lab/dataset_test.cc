@@ -1,4 +1,4 @@
-#include "cli/dataset.h"
+#include "cli/with_lab/dataset.h"
 
 #include <fstream>
 

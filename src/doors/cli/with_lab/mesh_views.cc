@@ -1,4 +1,4 @@
-#include "cli/mesh_views.h"
+#include "cli/with_lab/mesh_views.h"
 
 #include <iostream>
 #include <memory>

@@ -1,5 +1,3 @@
-#include "cli/mesh_info.h"
-
 #include <zlib.h>
 
 #include <filesystem>
@@ -9,6 +7,7 @@
 #include <vector>
 
 #include "cli/clean_output.h"
+#include "cli/lab.h"
 #include "cli/table.h"
 #include "core/file_system.h"
 #include "core/log.h"

@@ -6,8 +6,8 @@
 #include <system_error>
 
 #include "cli/clean_output.h"
-#include "cli/dataset.h"
 #include "cli/stop_signal.h"
+#include "cli/with_lab/dataset.h"
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"

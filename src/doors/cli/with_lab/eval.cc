@@ -4,8 +4,9 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/clean_output.h"
-#include "cli/lpips_flags.h"
+#include "cli/lab.h"
 #include "cli/verb.h"
+#include "cli/with_lab/open_lpips.h"
 #include "core/log.h"
 #include "core/text.h"
 #include "enhance/filter.h"

@@ -1,0 +1,126 @@
+#include "reading/splat_findings.h"
+
+#include <functional>
+#include <memory>
+#include <string_view>
+#include <utility>
+
+#include "core/cloud_blocks.h"
+#include "core/splat_comments.h"
+#include "core/text.h"
+#include "formats/registry.h"
+#include "reading/showing_gaussians.h"
+
+namespace anchorsplat {
+
+namespace {
+
+constexpr int64_t kMostReadWhole = 2'000'000;  // half a gigabyte; of more, harmonics count as unknown
+
+std::string Rows(int64_t count, int64_t of) {
+  return Cat(WithThousands(count), " of ", WithThousands(of), of == 1 ? " Gaussian" : " Gaussians");
+}
+
+std::vector<std::string> Problems(const CloudStatistics& s) {
+  std::vector<std::string> out;
+  const auto add = [&](int64_t count, std::string_view what) {
+    if (count > 0) out.push_back(Cat(Rows(count, s.gaussians), " ", what));
+  };
+  add(s.not_finite, Cat("with ", kWhyUnusable, "; no verb draws them, and enhance drops them"));
+  add(s.zero_quaternions, "with a zero quaternion; rendered without rotation");
+  add(s.zero_scales, "with a scale of zero (log-scale -Inf) on some axis; legal, flat or a point");
+  add(s.outliers, "more than ten times farther out than what an orbit shows; sky, floaters or strays");
+  add(s.unnormalised_quaternions, "with quaternions that are not normalised; legal, as trainers leave them so");
+  add(s.implausible, "farther out or longer than a million units: is the file damaged, or of another kind?");
+  add(s.invisible, "with an opacity below 1/255; never drawn");
+  const auto suspect = [&out](bool is_so, const char* what, const char* option) {
+    if (is_so) out.push_back(Cat(what, ": was the file converted wrongly? convert ", option, " reads it so"));
+  };
+  suspect(s.linear_looking_scales, "scales look like lengths, not logarithms", "--scales lengths");
+  suspect(s.linear_looking_opacities, "opacities look like 0 to 1, not logits", "--opacities 0-1");
+  suspect(s.color_looking_harmonics == 1, "f_dc look like colours from 0 to 1, not harmonics", "--colors 0-1");
+  suspect(s.color_looking_harmonics == 255, "f_dc look like colours from 0 to 255, not harmonics", "--colors 0-255");
+  return out;
+}
+
+// Goes through the Gaussians twice. `whole`: all of them with their harmonics, or none where that is too much to keep.
+// Errors: of reading.
+Status Inspect(CloudBlocks& blocks, const std::function<CloudView()>& whole, SplatFindings& findings) {
+  findings.render_mode = blocks.render_mode();
+  findings.comments = blocks.comments();
+  findings.origin = blocks.origin();
+  CloudView said;  // all but the Gaussians
+  said.render_mode = findings.render_mode;
+  said.comments = findings.comments;
+  findings.lost_no_width = HasLostNoWidth(said);
+
+  StatisticsStudy statistics(blocks);
+  ShowingStudy study(blocks);
+  RowStudy* const studies[] = {&statistics, &study};
+  ANCHORSPLAT_RETURN_IF_ERROR(Study(blocks, studies));
+  findings.statistics = statistics.Find();
+  ShowingGaussians showing = study.Take();
+  // Without them, what shows is read as if it had no harmonics.
+  CloudView all = whole();
+  if (all.size() != blocks.size()) {
+    all = showing.all;
+    for (size_t i = 0; i < showing.rows_of_all.size(); ++i) showing.rows_of_all[i] = static_cast<int64_t>(i);
+  }
+  all.render_mode = findings.render_mode;
+  findings.reading = Read(all, showing);
+  if (findings.reading.ok() && !findings.lost_no_width) {
+    findings.treatment = Treat(*findings.reading, {.mode = findings.render_mode});
+  }
+  findings.problems = Problems(findings.statistics);
+  return {};
+}
+
+}  // namespace
+
+std::string LooksInWords(const SplatFindings& f) {
+  return f.reading.ok() ? LooksInWords(*f.reading) : "nothing: too little of it shows";
+}
+
+std::string TreatmentInWords(const SplatFindings& f) {
+  if (f.lost_no_width) return "nothing: its comments say that it has lost no width";
+  if (!f.reading.ok()) return "nothing without --pixel-size or --cameras: too little of it shows";
+  if (f.treatment.method == TreatmentMethod::kNone) {
+    return HasItsWidth(f.reading->likeliest()) ? "nothing: it has its width"
+                                               : "nothing, as nothing is sure to make it better";
+  }
+  return Cat(f.treatment.method == TreatmentMethod::kNetwork ? "a network" : "the filter", " at pixels of ",
+             f.treatment.pixel, "; ", Fixed(f.treatment.gain, 1), " dB are expected at ", kInfoUpscale, "x");
+}
+
+Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& name) {
+  SplatFindings findings;
+  findings.file = name;
+  findings.file_bytes = file.bytes();
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::unique_ptr<CloudBlocks> blocks, file.Blocks());
+  findings.format = file.format()->name;
+  std::optional<GaussianCloud> whole;
+  const auto read = [&] {
+    if (!whole) {
+      whole.emplace();
+      auto cloud = blocks->size() <= kMostReadWhole ? file.Read() : Result<GaussianCloud>(GaussianCloud());
+      if (cloud.ok() && cloud->size() == blocks->size()) whole = *std::move(cloud);  // nobody has changed the file
+    }
+    return CloudView(*whole);
+  };
+  ANCHORSPLAT_RETURN_IF_ERROR(Inspect(*blocks, read, findings));
+  if (file.format()->describe != nullptr) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(findings.facts, file.format()->describe(file.input()));
+  }
+  if (!file.packed().empty()) findings.facts.Add("packed", file.packed());
+  return findings;
+}
+
+SplatFindings InspectSplat(const CloudView& cloud) {
+  SplatFindings findings;
+  MemoryBlocks blocks(cloud);
+  (void)Inspect(
+      blocks, [&] { return cloud; }, findings);  // memory can be read
+  return findings;
+}
+
+}  // namespace anchorsplat

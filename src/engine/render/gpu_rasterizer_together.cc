@@ -14,7 +14,7 @@ namespace anchorsplat {
 
 namespace {
 
-const GpuKernel kPlaceTiles = {"place_tiles", {wgsl::kTileRangesWgsl}};
+const GpuKernel kPlaceTiles = {"place_tiles", {wgsl::kWorkgroupSumsWgsl, wgsl::kTileRangesWgsl}};
 
 struct TileRangesParameters {
   uint32_t tiles, pairs, slots, report_at;

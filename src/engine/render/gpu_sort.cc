@@ -6,8 +6,8 @@ namespace anchorsplat {
 
 namespace {
 
-const GpuKernel kScanBlocks = {"scan_blocks", {wgsl::kScanWgsl}};
-const GpuKernel kScanSums = {"scan_sums", {wgsl::kScanWgsl}};
+const GpuKernel kScanBlocks = {"scan_blocks", {wgsl::kWorkgroupSumsWgsl, wgsl::kScanWgsl}};
+const GpuKernel kScanSums = {"scan_sums", {wgsl::kWorkgroupSumsWgsl, wgsl::kScanWgsl}};
 const GpuKernel kSortCount = {"sort_count", {wgsl::kSortWgsl}};
 const GpuKernel kSortScatter = {"sort_scatter", {wgsl::kSortWgsl}};
 

@@ -1,5 +1,6 @@
 // Exclusive sums of u32, in place, of any length up to 2^32: every block of 2048 by a workgroup of its own, then the
 // blocks' totals by one. What comes before item i is items[i] + items[scan.sums_at + i / 2048].
+// Compiled behind workgroup_sums.wgsl.
 
 struct Scan {
   size_at: u32,   // how many items there are: `tables`·⌈sizes[size_at] / 2048⌉ or, where that is 0, sizes[size_at]
@@ -19,22 +20,6 @@ fn Length() -> u32 {
   let size = sizes[scan.size_at];
   if (scan.tables == 0u) { return size; }
   return scan.tables * ((size + BLOCK - 1u) / BLOCK);
-}
-
-var<workgroup> sums: array<u32, 256>;
-
-// Exclusive sums of one number per thread; `sums` ends as the inclusive ones.
-fn SumBefore(lane: u32, own: u32) -> u32 {
-  sums[lane] = own;
-  workgroupBarrier();
-  for (var step = 1u; step < 256u; step *= 2u) {
-    var before = 0u;
-    if (lane >= step) { before = sums[lane - step]; }
-    workgroupBarrier();
-    sums[lane] += before;
-    workgroupBarrier();
-  }
-  return sums[lane] - own;
 }
 
 @compute @workgroup_size(256)

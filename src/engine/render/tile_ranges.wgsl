@@ -1,6 +1,7 @@
 // The ranges of all tiles from their counts, by one workgroup: what the host does where it looks on between the counts
 // and the lists (GpuRasterizer::ListRun). Where there is more than there is room for, or a Gaussian that only the CPU can
 // project, all ranges are empty and nothing is listed. What is written down tells the host afterwards.
+// Compiled behind workgroup_sums.wgsl.
 
 struct TileRanges {
   tiles: u32,
@@ -15,14 +16,6 @@ struct TileRanges {
 @group(0) @binding(4) var<storage, read_write> ranges: array<u32>;
 @group(0) @binding(5) var<storage, read_write> reports: array<vec4u>;  // visible, pairs, unusual, cut
 
-var<workgroup> sums: array<u32, 256>;
-
-// No further than the largest number.
-fn Sum(a: u32, b: u32) -> u32 {
-  let sum = a + b;
-  return select(sum, 0xffffffffu, sum < a);
-}
-
 @compute @workgroup_size(256)
 fn place_tiles(@builtin(local_invocation_index) lane: u32) {
   let each = (room.tiles + 255u) / 256u;
@@ -30,19 +23,11 @@ fn place_tiles(@builtin(local_invocation_index) lane: u32) {
   let last = min(first + each, room.tiles);
   var own = 0u;
   for (var tile = first; tile < last; tile++) { own = Sum(own, tile_counts[tile]); }
-  sums[lane] = own;
-  workgroupBarrier();
-  for (var step = 1u; step < 256u; step *= 2u) {
-    var before = 0u;
-    if (lane >= step) { before = sums[lane - step]; }
-    workgroupBarrier();
-    sums[lane] = Sum(sums[lane], before);
-    workgroupBarrier();
-  }
+  let before = SumBefore(lane, own);
   let total = sums[255];
   let cut = tile_counts[room.tiles];
   let fits = unusual[0] == 0u && total <= room.pairs && total <= room.slots && cut <= (room.slots - total) / 32u;
-  var at = select(0u, sums[lane] - own, fits);
+  var at = select(0u, before, fits);
   for (var tile = first; tile < last; tile++) {
     ranges[tile] = at;
     if (fits) { at += tile_counts[tile]; }

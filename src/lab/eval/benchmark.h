@@ -21,7 +21,7 @@ struct BenchmarkEntry {
   std::string name;  // of the folder
   std::filesystem::path folder;
   std::string kind = {};    // entry of the recipe that the data set's object was made by; empty where nothing says so
-  bool is_capture = false;  // pictures and cameras alone: OpenCapture (eval/capture.h) opens it
+  bool is_capture = false;  // pictures and cameras alone: OpenCapturedObject (eval/capture.h) opens it
 };
 
 // The objects of a benchmark, in order of their names. The folder holds data sets as dataset/scene_reader.h reads them

@@ -7,7 +7,7 @@
 #include "core/file_system.h"
 #include "core/log.h"
 #include "core/text.h"
-#include "eval/kept_fit.h"
+#include "dataset/kept_fit.h"
 #include "fit/initial_cloud.h"
 #include "fit/initial_points.h"
 #include "fit/training_views.h"

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <string>
 
-#include "cameras/colmap_writer.h"
 #include "core/text.h"
+#include "dataset/small_capture_for_test.h"
 #include "eval/evaluation.h"
 #include "fit/orbit_scene_for_test.h"
 #include "fit/picture_cache.h"
@@ -27,36 +27,15 @@ using ::testing::HasSubstr;
 
 constexpr CaptureRecipe kQuick = {.steps = 8};
 
-// A COLMAP project: nine pictures of a ball, of a width and height that four does not divide, and points.
-void MakeCapture(const fs::path& folder) {
-  CameraSet cameras = orbit_scene::Cameras(9, 66, 51);
-  const GaussianCloud ball = orbit_scene::Ball(150, 3);
-  fs::create_directories(folder / "images");
-  fs::create_directories(folder / "sparse" / "0");
-  Rasterizer rasterizer;
-  for (Camera& camera : cameras.cameras) {
-    camera.name = fs::path(camera.name).filename().string();
-    RenderOutput output;
-    ASSERT_TRUE(rasterizer.Render(ball, camera, {}, output).ok());
-    ASSERT_TRUE(WritePng(folder / "images" / (camera.name + ".png"), output.color).ok());
-  }
-  ASSERT_TRUE(WriteColmapCameras(folder / "sparse" / "0", cameras, ColmapForm::kBinary).ok());
-  std::vector<ColmapPoint> points;
-  for (size_t i = 0; i < 150; ++i) {
-    points.push_back({{ball.means[3 * i], ball.means[3 * i + 1], ball.means[3 * i + 2]}, {200, 150, 100}});
-  }
-  ASSERT_TRUE(WriteColmapPoints(folder / "sparse" / "0", points, ColmapForm::kBinary).ok());
-}
-
-Result<BenchmarkObject> Open(const TestFolder& folder, const CaptureRecipe& recipe = kQuick, uint64_t seed = 0) {
+Result<BenchmarkObject> Open(const TestFolder& folder, const CaptureRecipe& recipe = kQuick) {
   const auto entries = ListCaptures(folder / "captures");
   if (!entries.ok()) return entries.error();
-  return OpenCapture(entries->front(), recipe, seed, folder / "fit");
+  return OpenCapturedObject(entries->front(), recipe, folder / "fit");
 }
 
 TEST(Capture, BecomesAnObject) {
   const TestFolder folder;
-  MakeCapture(folder / "captures" / "ball");
+  WriteSmallCapture(folder / "captures" / "ball");
   const auto entries = ListCaptures(folder / "captures");
   ASSERT_TRUE(entries.ok());
   ASSERT_EQ(entries->size(), 1u);
@@ -88,7 +67,7 @@ TEST(Capture, BecomesAnObject) {
 
 TEST(Capture, IsFittedOnce) {
   const TestFolder folder;
-  MakeCapture(folder / "captures" / "ball");
+  WriteSmallCapture(folder / "captures" / "ball");
   const auto first = Open(folder);
   ASSERT_TRUE(first.ok()) << first.error().message;
   const auto time = fs::last_write_time(first->splat);
@@ -100,7 +79,7 @@ TEST(Capture, IsFittedOnce) {
   const auto longer = Open(folder, {.steps = 9});
   ASSERT_TRUE(longer.ok());
   EXPECT_NE(longer->low.means, first->low.means);
-  EXPECT_NE(Open(folder, kQuick, 1)->low.means, first->low.means);
+  EXPECT_NE(Open(folder, {.steps = 8, .seed = 1})->low.means, first->low.means);
   EXPECT_EQ(Open(folder)->low.means, first->low.means);
   Image picture = *ReadImage(folder / "captures/ball/images/001.png");
   for (float& value : picture.pixels) value = 1 - value;
@@ -111,7 +90,7 @@ TEST(Capture, IsFittedOnce) {
 TEST(Capture, MaskedPixelsDoNotCount) {
   const TestFolder folder;
   const fs::path capture = folder / "captures" / "ball";
-  MakeCapture(capture);
+  WriteSmallCapture(capture);
   Image mask(66, 51, 3);
   for (int c = 0; c < 3; ++c) {
     for (int y = 0; y < 51; ++y) {
@@ -144,7 +123,7 @@ TEST(Capture, MaskedPixelsDoNotCount) {
 
 TEST(Capture, EveryRowIsKeptAsSoonAsItIsMeasured) {
   const TestFolder folder;
-  MakeCapture(folder / "captures" / "ball");
+  WriteSmallCapture(folder / "captures" / "ball");
   const std::string network = folder / "repeating.safetensors";
   ASSERT_TRUE(RepeatingForTest().Write(network).ok());
   std::vector<EvalMethod> methods;
@@ -171,7 +150,7 @@ TEST(Capture, EveryRowIsKeptAsSoonAsItIsMeasured) {
 
   // Pixels four times as large, by cubic convolution and by a network that repeats them twice.
   const BenchmarkObject object =
-      *OpenCapture({"ball", folder / "captures/ball"}, kQuick, 0, folder / "out/objects/ball/fit");
+      *OpenCapturedObject({"ball", folder / "captures/ball"}, kQuick, folder / "out/objects/ball/fit");
   RenderOutput output;
   Rasterizer rasterizer;
   ASSERT_TRUE(rasterizer.Render(object.low, object.LowCamera(8), OptionsFor(object.low), output).ok());
@@ -190,7 +169,7 @@ TEST(Capture, EveryRowIsKeptAsSoonAsItIsMeasured) {
 // With pictures at a quarter of their size, and nothing but what a user would say.
 TEST(Capture, BestSeesTheTrainingPictures) {
   const TestFolder folder;
-  MakeCapture(folder / "captures" / "ball");
+  WriteSmallCapture(folder / "captures" / "ball");
   std::vector<EnhanceMethod> methods = BasicMethods();
   int calls = 0;
   for (EnhanceMethod& method : methods) {

@@ -180,7 +180,7 @@ Status EvaluateObject(const BenchmarkEntry& entry, const std::string& place, con
   const fs::path folder = ObjectFolder(out, entry.name);
   ANCHORSPLAT_ASSIGN_OR_RETURN(
       const BenchmarkObject object,
-      entry.is_capture ? OpenCapture(entry, *options.captures, options.seed, folder / "fit") : OpenObject(entry));
+      entry.is_capture ? OpenCapturedObject(entry, *options.captures, folder / "fit") : OpenObject(entry));
   evaluation.credits.back() = CreditsOf(object.low.comments);
   const std::vector<size_t> views =
       Thinned(options.protocol == Protocol::kUpstream ? UpstreamViews(object.views.size()) : object.held_out,

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <span>
 #include <string>
 #include <vector>
 
@@ -12,8 +11,5 @@ namespace anchorsplat {
 // of the measured `views` (or the mesh they are rendered from). Files count by size and time of their last change, so
 // that nothing has to be read. Another word: results that were kept are not those of this object any more.
 std::string ObjectState(const BenchmarkObject& object, const std::vector<size_t>& views);
-
-// The same for cameras and their pictures alone.
-std::string CamerasState(std::span<const Camera> cameras);
 
 }  // namespace anchorsplat

@@ -35,6 +35,9 @@ void FlipLeftRight(TrueView& view) {
     float* begin = image.pixels.data() + row * image.width;
     std::reverse(begin, begin + image.width);
   }
+  for (auto row = view.ignored.begin(); row != view.ignored.end(); row += image.width) {
+    std::reverse(row, row + image.width);
+  }
   const auto flip = [&](PixelBox& box) {
     if (!box.empty()) box = {image.width - box.x1, box.y0, image.width - box.x0, box.y1};
   };

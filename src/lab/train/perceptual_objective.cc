@@ -36,7 +36,7 @@ torch::Tensor PerceptualObjective::operator()(std::span<const torch::Tensor> ren
   int64_t counted = 0;
   for (size_t v = 0; v < rendered.size(); ++v) {
     const PixelBox& box = truth[v].perceptual;
-    if (box.empty()) continue;
+    if (box.empty() || !truth[v].ignored.empty()) continue;  // a network sees what a mask hides
     ++counted;
     const torch::Tensor part = Part(rendered[v].unsqueeze(0), box).clamp_max(1);
     sum = sum + network_.Distance(part, Part(AsTensor(truth[v].picture), box)).squeeze();

@@ -36,7 +36,18 @@ struct ViewLoss {
   Status status;
 };
 
-// `target` is the truth; the gradient of everything at once.
+// The truth, and the render itself where the truth says nothing, so that there is neither loss nor gradient.
+Image TargetOf(const TrueView& truth, const Image& rendered) {
+  Image target = truth.picture;
+  for (int c = 0; c < 3; ++c) {
+    for (size_t i = 0; i < truth.ignored.size(); ++i) {
+      if (truth.ignored[i] != 0) target.channel(c)[i] = rendered.channel(c)[i];
+    }
+  }
+  return target;
+}
+
+// The terms of one view, and the gradient of everything at once.
 void EvaluateView(const torch::Tensor& picture, const TrueView& truth, const LossConfig& weights, ViewLoss& out) {
   const int height = static_cast<int>(picture.size(1)), width = static_cast<int>(picture.size(2));
   Image clamped(width, height, 3);
@@ -45,6 +56,8 @@ void EvaluateView(const torch::Tensor& picture, const TrueView& truth, const Los
   PhotometricTerms& terms = out.terms;
   terms.foreground = CountForeground(clamped, truth);
   if (terms.foreground == 0) return;
+  const Image masked = truth.ignored.empty() ? Image() : TargetOf(truth, clamped);
+  const Image& target = truth.ignored.empty() ? truth.picture : masked;
 
   const double foreground = static_cast<double>(terms.foreground), values = 3.0 * static_cast<double>(clamped.plane());
   const bool windows_fit = std::min(width, height) >= kSsimTaps;
@@ -55,7 +68,7 @@ void EvaluateView(const torch::Tensor& picture, const TrueView& truth, const Los
   const double scale = l1_part + ssim_part;
   Image gradient;
   PixelBox box;
-  const auto value = PhotometricLoss(clamped, truth.picture,
+  const auto value = PhotometricLoss(clamped, target,
                                      {.ssim_weight = scale > 0 ? ssim_part / scale : 0, .padding = SsimPadding::kValid},
                                      gradient, box);
   if (!value.ok()) {
@@ -69,7 +82,7 @@ void EvaluateView(const torch::Tensor& picture, const TrueView& truth, const Los
   for (int c = 0; c < 3; ++c) {
     for (int y = box.y0; y < box.y1; ++y) {
       const float* a = clamped.channel(c) + int64_t{y} * width;
-      const float* b = truth.picture.channel(c) + int64_t{y} * width;
+      const float* b = target.channel(c) + int64_t{y} * width;
       double row = 0;
       for (int x = box.x0; x < box.x1; ++x) row += double{a[x] - b[x]} * (a[x] - b[x]);
       squares += row;
@@ -89,7 +102,7 @@ void EvaluateView(const torch::Tensor& picture, const TrueView& truth, const Los
   for (int c = 0; c < 3; ++c) {
     for (int y = box.y0; y < box.y1; ++y) {
       const int64_t at = (int64_t{c} * height + y) * width;
-      const float *r = rendered + at, *b = truth.picture.pixels.data() + at, *g = gradient.pixels.data() + at;
+      const float *r = rendered + at, *b = target.pixels.data() + at, *g = gradient.pixels.data() + at;
       for (int x = box.x0; x < box.x1; ++x) {
         // Above 1 the clamped value does not move.
         to[at + x] = r[x] > 1 ? 0 : photometric * g[x] + square * (r[x] - b[x]);

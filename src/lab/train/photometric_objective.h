@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "core/buffer.h"
 #include "core/image.h"
 #include "train/train_config.h"
 
@@ -18,6 +19,7 @@ struct TrueView {
   std::array<float, 3> background{};  // that the render has, too
   PixelBox object;                    // of pixels that differ from the background; empty: none does
   PixelBox perceptual;                // what LPIPS looks at; empty: nothing
+  Buffer<uint8_t> ignored;  // [H,W] not 0: the picture says nothing there; empty: it says something everywhere
 };
 
 // The terms of one view, for people. With d = min(render, 1) − truth, W·H pixels of three channels, and F the

@@ -132,5 +132,30 @@ TEST(PhotometricObjective, BitsDoNotDependOnThreads) {
   EXPECT_TRUE(gradient(1).equal(gradient(3)));
 }
 
+// Whatever the truth has where it says nothing.
+TEST(PhotometricObjective, IgnoredPixelsHaveNeitherLossNorGradient) {
+  TrueView truth = NoisyTruth(3, 40, 30);
+  truth.ignored.resize(40 * 30);
+  for (size_t i = 0; i < truth.ignored.size(); ++i) truth.ignored[i] = i % 40 < 20 ? 1 : 0;
+  TrueView other = truth;
+  for (int y = 0; y < 30; ++y) {
+    for (int x = 0; x < 20; ++x) other.picture.at(1, y, x) = 0.9f;
+  }
+  const LossConfig weights = {.l1 = 1, .ssim = 0.5, .mse = 1};
+  const auto evaluate = [&](const TrueView& view) {
+    torch::Tensor picture = torch::full({3, 30, 40}, 0.5f).requires_grad_();
+    const auto sum = PhotometricObjective(std::vector{picture}, std::vector{view}, weights);
+    sum.loss.backward();
+    return std::pair(sum.loss.item<double>(), picture.grad());
+  };
+  const auto [loss, gradient] = evaluate(truth);
+  const auto [same, same_gradient] = evaluate(other);
+  EXPECT_EQ(loss, same);
+  EXPECT_TRUE(torch::equal(gradient, same_gradient));
+  // L1 and squares reach no pixel of the hidden half, SSIM no farther than its window does.
+  EXPECT_EQ(gradient.narrow(2, 0, 10).abs().max().item<float>(), 0);
+  EXPECT_GT(gradient.narrow(2, 20, 20).abs().max().item<float>(), 0);
+}
+
 }  // namespace
 }  // namespace anchorsplat

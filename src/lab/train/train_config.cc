@@ -47,6 +47,22 @@ class TableReader {
       Complain(key, *node, Cat("expected a whole number from ", low, " to ", high));
     }
   }
+  void Ints(const char* key, int64_t low, int64_t high, std::vector<int64_t>& values) {
+    const toml::node* node = Take(key);
+    if (node == nullptr) return;
+    std::vector<int64_t> given;
+    if (const toml::array* array = node->as_array()) {
+      for (const toml::node& element : *array) {
+        const auto value = element.value_exact<int64_t>();
+        if (value && *value >= low && *value <= high) given.push_back(*value);
+      }
+      if (!given.empty() && given.size() == array->size()) {
+        values = std::move(given);
+        return;
+      }
+    }
+    Complain(key, *node, Cat("expected a list of whole numbers from ", low, " to ", high));
+  }
   void Flag(const char* key, bool& value) {
     const toml::node* node = Take(key);
     if (node == nullptr) return;
@@ -217,6 +233,13 @@ Status TakeData(const std::string& file, TableReader table, DataConfig& data) {
   return {};
 }
 
+Status TakeCaptures(TableReader table, CapturesConfig& captures) {
+  table.Int("downscale", 2, kMostUpscale, captures.downscale);
+  table.Int("hold_out", 2, 1000, captures.hold_out);
+  table.Ints("fit_steps", 1, 1'000'000, captures.fit_steps);
+  return table.Finish();
+}
+
 Status TakeAugmentation(TableReader table, AugmentationConfig& a) {
   table.Flag("rotate", a.rotate);
   table.Flag("mirror", a.mirror);
@@ -254,6 +277,7 @@ Result<TrainConfig> ConfigFrom(const std::string& file, const toml::table& root)
   ANCHORSPLAT_RETURN_IF_ERROR(TakeLoss(file, table.Table("loss"), config.loss));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeOptimizer(file, table.Table("optimizer"), config.optimizer));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeData(file, table.Table("data"), config.data));
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeCaptures(table.Table("captures"), config.captures));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeAugmentation(table.Table("augmentation"), config.augmentation));
   ANCHORSPLAT_RETURN_IF_ERROR(TakeValidation(table.Table("validation"), config.validation));
   ANCHORSPLAT_RETURN_IF_ERROR(table.Finish());
@@ -328,6 +352,11 @@ nlohmann::json Settings(const TrainConfig& c) {
   if (c.data.greatest_merge_cost > 0) {
     json["data.least_merge_cost"] = c.data.least_merge_cost;
     json["data.greatest_merge_cost"] = c.data.greatest_merge_cost;
+  }
+  if (c.captures != CapturesConfig()) {
+    json["captures.downscale"] = c.captures.downscale;
+    json["captures.hold_out"] = c.captures.hold_out;
+    json["captures.fit_steps"] = c.captures.fit_steps;
   }
   for (const auto& [group, rate] : c.optimizer.groups) json[Cat("optimizer.groups.", group)] = rate;
   for (const auto& [key, value] : c.network) json[Cat("network.", key)] = ToJson(value);

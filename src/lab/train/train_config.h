@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "core/result.h"
 #include "model/shared/torch/network_options.h"
@@ -57,6 +58,15 @@ struct DataConfig {
   double least_upscale = 0, greatest_upscale = 0;
 };
 
+// How captures become pairs (dataset/capture.h).
+struct CapturesConfig {
+  int downscale = 4;
+  int hold_out = 4;                         // every so many views train the network and not the fit
+  std::vector<int64_t> fit_steps = {1000};  // of each capture's fits
+
+  bool operator==(const CapturesConfig&) const = default;
+};
+
 // What is drawn anew each time a splat is used. Standard deviations and largest values; 0: not at all.
 struct AugmentationConfig {
   bool rotate = false;          // the world, SH and cameras with it
@@ -94,6 +104,7 @@ struct TrainConfig {
   LossConfig loss;
   OptimizerConfig optimizer;
   DataConfig data;
+  CapturesConfig captures;
   AugmentationConfig augmentation;
   ValidationConfig validation;
 

@@ -80,6 +80,10 @@ TEST(TrainConfig, ComplaintsNameFileLineAndKey) {
             "x.toml: line 2: loss.lpips_net: expected one of \"alex\", \"vgg\", \"squeeze\", not \"resnet\"");
   EXPECT_EQ(complaint("[optimizer.groups]\nmeans = \"fast\"\n"),
             "x.toml: line 2: optimizer.groups.means: expected a number from 0 to 10");
+  EXPECT_EQ(complaint("[captures]\nfit_steps = [1000, 0]\n"),
+            "x.toml: line 2: captures.fit_steps: expected a list of whole numbers from 1 to 1000000");
+  EXPECT_EQ(complaint("[captures]\nhold_out = 1\n"),
+            "x.toml: line 2: captures.hold_out: expected a whole number from 2 to 1000");
   EXPECT_THAT(complaint("[data]\npart = 100\n[augmentation]\ndrop = 0.1\n"),
               HasSubstr("x.toml: data.part: not together with augmentation.drop"));
   for (const char* range : {"least_upscale = 2", "greatest_upscale = 4", "least_upscale = 4\ngreatest_upscale = 2",

@@ -14,6 +14,7 @@ struct TrainRequest {
   std::vector<std::filesystem::path> datasets;    // folders of dataset/scene_reader.h
   std::string split;                              // of each of them: "train", …; empty: all objects
   std::vector<std::filesystem::path> validation;  // folders; empty: the split "validation" of the datasets, or none
+  std::filesystem::path captures;  // folder of captures (dataset/capture.h) to train on, too; may be empty
   std::filesystem::path config;
   std::filesystem::path out;    // folder of everything that comes of it
   std::filesystem::path cache;  // true pictures of views, shared by trainings; empty: out / "cache"

@@ -136,13 +136,13 @@ Status Trainer::Begin() {
   at::globalContext().setDeterministicAlgorithms(true, /*warn_only=*/true);
   at::globalContext().setDeterministicFillUninitializedMemory(false);
 
-  ANCHORSPLAT_ASSIGN_OR_RETURN(data_, FindTrainingData(request_));
+  const fs::path cache = request_.cache.empty() ? request_.out / "cache" : request_.cache;
+  ANCHORSPLAT_ASSIGN_OR_RETURN(data_, FindTrainingData(request_, config_.captures, cache));
   if (config_.data.least_upscale > 0) {
     ANCHORSPLAT_RETURN_IF_ERROR(
         DrawUpscales(config_.data.least_upscale, config_.data.greatest_upscale, data_.training));
   }
-  const fs::path cache = request_.cache.empty() ? request_.out / "cache" : request_.cache;
-  objects_ = std::make_unique<ObjectStore>(data_.training, config_.data.views_per_object, cache,
+  objects_ = std::make_unique<ObjectStore>(data_.training, data_.captures, config_.data.views_per_object, cache,
                                            static_cast<size_t>(config_.data.objects_in_memory));
   if (config_.loss.lpips > 0) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(perceptual_, PerceptualObjective::Open(config_.loss.lpips_net));
@@ -189,7 +189,7 @@ Status Trainer::Begin() {
   agreed_elapsed_ = progress_.seconds;
 
   report_.resumed_at = progress_.step;
-  report_.objects = static_cast<int64_t>(data_.training.size());
+  report_.objects = static_cast<int64_t>(objects_->size());
   report_.validation_objects = validation_ ? static_cast<int64_t>(validation_->objects()) : 0;
   report_.parameters = optimizer_->parameters();
   report_.file = request_.out / "model.safetensors";

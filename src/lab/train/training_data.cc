@@ -35,9 +35,26 @@ Status AppendScenes(const fs::path& dataset, const std::string& split, std::vect
   return {};
 }
 
+// A fit of each capture for every number of steps; those that are missing are made now, one after the other.
+Status AppendCaptures(const fs::path& folder, const CapturesConfig& config, const fs::path& cache,
+                      std::vector<TrainingCapture>& captures) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<CaptureFolder> found, FindCaptures(folder));
+  for (const CaptureFolder& capture : found) {
+    for (size_t fit = 0; fit < config.fit_steps.size(); ++fit) {
+      const CaptureRecipe recipe = {
+          .downscale = config.downscale, .hold_out = config.hold_out, .steps = config.fit_steps[fit], .seed = fit};
+      captures.push_back({capture, recipe, cache / "fits" / Cat(capture.name, "-", fit)});
+      const auto opened = OpenCapture(capture.name, capture.folder, recipe, captures.back().fit_folder);
+      if (!opened.ok()) return Error{opened.error().code, Cat(capture.name, ": ", opened.error().message)};
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
-Result<TrainingData> FindTrainingData(const TrainRequest& request) {
+Result<TrainingData> FindTrainingData(const TrainRequest& request, const CapturesConfig& captures,
+                                      const fs::path& cache) {
   TrainingData data;
   for (const fs::path& dataset : request.validation) {
     // A whole data set is meant when it has no splits.
@@ -61,11 +78,15 @@ Result<TrainingData> FindTrainingData(const TrainRequest& request) {
   if (data.training.size() != before) {
     LogWarning(Cat(before - data.training.size(), " objects are for validation, too, and not trained on"));
   }
-  if (data.training.empty()) {
+  if (!request.captures.empty()) {
+    ANCHORSPLAT_RETURN_IF_ERROR(AppendCaptures(request.captures, captures, cache, data.captures));
+  }
+  if (data.training.empty() && data.captures.empty()) {
     return Error{ErrorCode::kNotFound, "no objects to train on: none of the data sets has one with a splat"};
   }
   nlohmann::json names = nlohmann::json::array();
   for (const SceneEntry& entry : data.training) names.push_back(entry.name);
+  for (size_t i = 0; i < data.captures.size(); ++i) names.push_back(Cat("capture ", i + 1));
   data.names = names.dump();
   return data;
 }

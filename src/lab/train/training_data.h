@@ -6,7 +6,9 @@
 
 #include "core/result.h"
 #include "dataset/scene_reader.h"
+#include "train/train_config.h"
 #include "train/train_request.h"
+#include "train/training_object.h"
 
 namespace anchorsplat {
 
@@ -14,11 +16,14 @@ namespace anchorsplat {
 struct TrainingData {
   std::vector<SceneEntry> training;    // in order of data sets and names
   std::vector<SceneEntry> validation;  // none of them in `training`, by folder or by name
-  std::string names;                   // JSON: those of `training`
+  std::vector<TrainingCapture> captures;
+  std::string names;  // JSON: those of `training`, and "capture 1", … of captures, whose owners may want no other
 };
 
-// Objects without a splat are left out with a warning. Errors: those of ListScenes; kNotFound: nothing to train on.
-Result<TrainingData> FindTrainingData(const TrainRequest& request);
+// Objects without a splat are left out with a warning. Errors: those of ListScenes, FindCaptures and OpenCapture;
+// kNotFound: nothing to train on. Captures are fitted here where `cache` has no fit of theirs.
+Result<TrainingData> FindTrainingData(const TrainRequest& request, const CapturesConfig& captures,
+                                      const std::filesystem::path& cache);
 
 // Draws SceneEntry::high_size of every object, by its name alone: `least` to `greatest` times the low views' pixels,
 // evenly in the logarithm. Errors: those of Scene::Open, which has to be able to make such views.

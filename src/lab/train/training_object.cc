@@ -26,6 +26,24 @@ std::vector<size_t> Drawn(std::vector<size_t> values, size_t count, const std::s
   return values;
 }
 
+// The splat without rows that are not finite, and what follows from it and its cameras.
+Status TakeSplat(const GaussianCloud& all, std::vector<Camera> fitted, CameraPixelRule rule, TrainingObject& object) {
+  std::vector<int64_t> rows;
+  for (int64_t i = 0; i < all.size(); ++i) {
+    if (IsFinite(all, i)) rows.push_back(i);
+  }
+  if (rows.empty()) {
+    return Error{ErrorCode::kBadFile, Cat(object.name, ": its splat has no Gaussian whose values are all finite")};
+  }
+  ANCHORSPLAT_ASSIGN_OR_RETURN(object.cloud, Subset(all, rows));
+  object.strength = DefaultFilterStrength(object.upscale, object.cloud.render_mode);
+  CameraSet low;
+  low.cameras = std::move(fitted);
+  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes, PixelSizesFromCameras(object.cloud, low, std::nullopt, rule));
+  object.pixel_sizes = std::move(sizes.sizes);
+  return {};
+}
+
 }  // namespace
 
 std::vector<size_t> EvenlySpread(const std::vector<size_t>& values, size_t most) {
@@ -33,6 +51,26 @@ std::vector<size_t> EvenlySpread(const std::vector<size_t>& values, size_t most)
   std::vector<size_t> chosen;
   for (size_t i = 0; i < most; ++i) chosen.push_back(values[(2 * i + 1) * values.size() / (2 * most)]);
   return chosen;
+}
+
+Result<std::shared_ptr<TrainingObject>> OpenTrainingCapture(const TrainingCapture& entry) {
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Capture capture,
+                               OpenCapture(entry.capture.name, entry.capture.folder, entry.recipe, entry.fit_folder));
+  if (capture.held_out.empty()) {
+    return Error{ErrorCode::kBadFile,
+                 Cat(entry.capture.folder.string(), ": no view is held out, so none is left to ", "train on")};
+  }
+  auto object = std::make_shared<TrainingObject>();
+  object->name = capture.name;
+  object->background = capture.background;
+  object->upscale = entry.recipe.downscale;
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeSplat(capture.cloud, capture.FittedViews(), CameraPixelRule::kAuto, *object));
+  object->low_views = std::move(capture.low_views);
+  object->training = object->validation = std::move(capture.held_out);
+  object->truth = std::make_shared<TrueViews>(
+      capture.views, [views = capture.views](size_t view) { return FullPicture(views.at(view)); });
+  object->views = std::move(capture.views);
+  return object;
 }
 
 Result<std::shared_ptr<TrainingObject>> OpenTrainingObject(const SceneEntry& entry, int views_per_object,
@@ -48,21 +86,10 @@ Result<std::shared_ptr<TrainingObject>> OpenTrainingObject(const SceneEntry& ent
   object->background = scene.background();
   object->views = scene.high_views();
   object->low_views = scene.low_views();
-  std::vector<int64_t> rows;
-  for (int64_t i = 0; i < all.size(); ++i) {
-    if (IsFinite(all, i)) rows.push_back(i);
-  }
-  if (rows.empty()) return bad("its splat has no Gaussian whose values are all finite");
-  ANCHORSPLAT_ASSIGN_OR_RETURN(object->cloud, Subset(all, rows));
   object->upscale = static_cast<double>(scene.high_views()[0].intrinsics.width) /
                     static_cast<double>(scene.low_views()[0].intrinsics.width);
   if (!(object->upscale >= 1)) return bad("its high views are smaller than its low ones");
-  object->strength = DefaultFilterStrength(object->upscale, object->cloud.render_mode);
-  CameraSet low;
-  low.cameras = scene.low_views();
-  ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes,
-                               PixelSizesFromCameras(object->cloud, low, std::nullopt, CameraPixelRule::kMedian));
-  object->pixel_sizes = std::move(sizes.sizes);
+  ANCHORSPLAT_RETURN_IF_ERROR(TakeSplat(all, scene.low_views(), CameraPixelRule::kMedian, *object));
 
   object->validation = scene.held_out();
   std::vector<size_t> fitted(object->views.size());
@@ -86,7 +113,9 @@ Result<std::shared_ptr<TrainingObject>> ObjectStore::Get(size_t index) {
       return used_.front().second;
     }
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(auto object, OpenTrainingObject(entries_.at(index), views_per_object_, cache_));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(auto object, index < entries_.size()
+                                                ? OpenTrainingObject(entries_[index], views_per_object_, cache_)
+                                                : OpenTrainingCapture(captures_.at(index - entries_.size())));
   const std::lock_guard<std::mutex> lock(mutex_);
   used_.emplace_front(index, object);
   if (used_.size() > capacity_) used_.pop_back();

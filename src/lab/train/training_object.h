@@ -10,11 +10,19 @@
 #include "core/buffer.h"
 #include "core/gaussian_cloud.h"
 #include "core/result.h"
+#include "dataset/capture.h"
 #include "dataset/scene_reader.h"
 #include "train/seen_gaussians.h"
 #include "train/true_views.h"
 
 namespace anchorsplat {
+
+// A capture and how it becomes a pair.
+struct TrainingCapture {
+  CaptureFolder capture;
+  CaptureRecipe recipe;
+  std::filesystem::path fit_folder;
+};
 
 // An object of a data set, ready to be trained on or measured with.
 struct TrainingObject {
@@ -41,24 +49,32 @@ struct TrainingObject {
 Result<std::shared_ptr<TrainingObject>> OpenTrainingObject(const SceneEntry& entry, int views_per_object,
                                                            const std::filesystem::path& cache);
 
+// The same of a capture. Its photographs at full size are the truth, and training sees the views that the fit has not
+// seen: what a network does to the others may be what the fit has learned by heart.
+//
+// Errors: those of OpenCapture and PixelSizesFromCameras; kBadFile: no view is held out.
+Result<std::shared_ptr<TrainingObject>> OpenTrainingCapture(const TrainingCapture& entry);
+
 // `most` of `values`, evenly spread; all when there are not as many or `most` is 0.
 std::vector<size_t> EvenlySpread(const std::vector<size_t>& values, size_t most);
 
 // The objects used last, by number. May be used by several threads.
 class ObjectStore {
  public:
-  ObjectStore(std::vector<SceneEntry> entries, int views_per_object, std::filesystem::path cache, size_t capacity)
+  ObjectStore(std::vector<SceneEntry> entries, std::vector<TrainingCapture> captures, int views_per_object,
+              std::filesystem::path cache, size_t capacity)
       : entries_(std::move(entries)),
+        captures_(std::move(captures)),
         views_per_object_(views_per_object),
         cache_(std::move(cache)),
         capacity_(capacity) {}
 
-  size_t size() const { return entries_.size(); }
-  const std::vector<SceneEntry>& entries() const { return entries_; }
+  size_t size() const { return entries_.size() + captures_.size(); }
   Result<std::shared_ptr<TrainingObject>> Get(size_t index);
 
  private:
   const std::vector<SceneEntry> entries_;
+  const std::vector<TrainingCapture> captures_;  // numbered after them
   const int views_per_object_;
   const std::filesystem::path cache_;
   const size_t capacity_;

@@ -73,10 +73,14 @@ TrueViews::TrueViews(SceneEntry entry, const Scene& scene, const fs::path& cache
   for (const Camera& camera : scene.high_views()) {
     stored_.push_back(camera.image);
     names_.push_back(fs::path(camera.name).filename().string());
-    width_ = camera.intrinsics.width;
-    height_ = camera.intrinsics.height;
+    sizes_.push_back({camera.intrinsics.width, camera.intrinsics.height});
   }
   kept_.resize(names_.size());
+}
+
+TrueViews::TrueViews(const std::vector<Camera>& views, std::function<Result<ViewPicture>(size_t view)> picture)
+    : photograph_(std::move(picture)), kept_(views.size()) {
+  for (const Camera& camera : views) sizes_.push_back({camera.intrinsics.width, camera.intrinsics.height});
 }
 
 // 8 bits a channel, [y][x][c].
@@ -84,14 +88,15 @@ struct TrueViews::Kept {
   PixelBox box;
   int channels = 0;
   std::vector<uint8_t> values;
+  Buffer<uint8_t> ignored;  // as Part's
 };
 
 namespace {
 
 // Over the background; `window` and the part's box are pixels of the view. value(c, y, x) is of the part.
 template <typename Value>
-TrueView Compose(const PixelBox& window, const PixelBox& box, int channels, const std::array<float, 3>& background,
-                 Value&& value) {
+TrueView Compose(const PixelBox& window, const PixelBox& box, int channels, const Buffer<uint8_t>& ignored,
+                 const std::array<float, 3>& background, Value&& value) {
   TrueView view;
   view.background = background;
   view.picture = Image(window.x1 - window.x0, window.y1 - window.y0, 3);
@@ -114,6 +119,14 @@ TrueView Compose(const PixelBox& window, const PixelBox& box, int channels, cons
       }
     }
   }
+  if (!ignored.empty()) {
+    view.ignored.resize(static_cast<size_t>(view.picture.plane()));
+    for (int y = inside.y0; y < inside.y1; ++y) {
+      const uint8_t* from = ignored.data() + int64_t{y - box.y0} * (box.x1 - box.x0) + inside.x0 - box.x0;
+      std::copy(from, from + (inside.x1 - inside.x0),
+                view.ignored.data() + int64_t{y - window.y0} * view.picture.width + inside.x0 - window.x0);
+    }
+  }
   if (!inside.empty()) {
     view.object = {inside.x0 - window.x0, inside.y0 - window.y0, inside.x1 - window.x0, inside.y1 - window.y0};
   }
@@ -123,25 +136,30 @@ TrueView Compose(const PixelBox& window, const PixelBox& box, int channels, cons
 }  // namespace
 
 Result<TrueViews::Part> TrueViews::Read(size_t view) const {
+  const auto [width, height] = sizes_.at(view);
+  if (photograph_) {
+    ANCHORSPLAT_ASSIGN_OR_RETURN(ViewPicture picture, photograph_(view));
+    return Part{std::move(picture.image), {0, 0, width, height}, std::move(picture.ignored)};
+  }
   if (!stored_.at(view).empty()) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Image picture, ReadImage(stored_[view]));
-    if (picture.width != width_ || picture.height != height_) {
+    if (picture.width != width || picture.height != height) {
       return Error{ErrorCode::kBadFile, Cat(stored_[view].string(), ": has ", picture.width, " x ", picture.height,
-                                            " pixels, its camera ", width_, " x ", height_)};
+                                            " pixels, its camera ", width, " x ", height)};
     }
     const PixelBox box = ObjectBox(picture, background_);
-    return Part{CutOut(picture, box), box};
+    return Part{CutOut(picture, box), box, {}};
   }
   ANCHORSPLAT_RETURN_IF_ERROR(Make({&view, 1}));
   const auto file = Find(view);
   if (!file) return Error{ErrorCode::kIo, Cat(folder_.string(), ": view ", names_[view], " is gone again")};
   ANCHORSPLAT_ASSIGN_OR_RETURN(Image part, ReadImage(file->path));
-  if (part.width > width_ - file->x || part.height > height_ - file->y) {
+  if (part.width > width - file->x || part.height > height - file->y) {
     return Error{ErrorCode::kBadFile, Cat(file->path.string(), ": reaches out of its view; remove the folder ",
                                           folder_.string(), " to have it made again")};
   }
   const PixelBox box = {file->x, file->y, file->x + part.width, file->y + part.height};
-  return Part{std::move(part), box};
+  return Part{std::move(part), box, {}};
 }
 
 std::optional<TrueViews::File> TrueViews::Find(size_t view) const {
@@ -158,6 +176,7 @@ std::optional<TrueViews::File> TrueViews::Find(size_t view) const {
 }
 
 Status TrueViews::Make(std::span<const size_t> views) const {
+  if (photograph_) return {};
   // The mesh and what is made of it for rays leave the memory again: with many objects it would not hold them all.
   std::optional<Scene> scene;
   for (const size_t view : views) {
@@ -181,7 +200,8 @@ Status TrueViews::Make(std::span<const size_t> views) const {
 Result<TrueView> TrueViews::Load(size_t view) const {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Part part, Read(view));
   const Image& picture = part.picture;
-  return Compose({0, 0, width_, height_}, part.box, picture.channels, background_,
+  const auto [width, height] = sizes_.at(view);
+  return Compose({0, 0, width, height}, part.box, picture.channels, part.ignored, background_,
                  [&](int c, int y, int x) { return picture.at(c, y, x); });
 }
 
@@ -190,10 +210,11 @@ Result<std::shared_ptr<const TrueViews::Kept>> TrueViews::Keep(size_t view) cons
     const std::lock_guard<std::mutex> lock(mutex_);
     if (kept_[view]) return kept_[view];
   }
-  ANCHORSPLAT_ASSIGN_OR_RETURN(const Part part, Read(view));
+  ANCHORSPLAT_ASSIGN_OR_RETURN(Part part, Read(view));
   const auto kept = std::make_shared<Kept>();
   kept->box = part.box;
   kept->channels = part.picture.channels;
+  kept->ignored = std::move(part.ignored);
   kept->values.reserve(part.picture.pixels.size());
   for (int y = 0; y < part.picture.height; ++y) {
     for (int x = 0; x < part.picture.width; ++x) {
@@ -211,7 +232,7 @@ Result<std::shared_ptr<const TrueViews::Kept>> TrueViews::Keep(size_t view) cons
 Result<TrueView> TrueViews::LoadWindow(size_t view, const PixelBox& window) const {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::shared_ptr<const Kept> kept, Keep(view));
   const int64_t width = kept->box.x1 - kept->box.x0, channels = kept->channels;
-  return Compose(window, kept->box, kept->channels, background_, [&](int c, int y, int x) {
+  return Compose(window, kept->box, kept->channels, kept->ignored, background_, [&](int c, int y, int x) {
     return static_cast<float>(kept->values[static_cast<size_t>((y * width + x) * channels + c)]) / 255.0f;
   });
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -10,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "cameras/undistortion.h"
+#include "core/camera.h"
 #include "core/result.h"
 #include "dataset/scene_reader.h"
 #include "train/photometric_objective.h"
@@ -24,6 +27,10 @@ class TrueViews {
  public:
   // `cache`: folder for all objects of all trainings. Nothing is made before the first view is asked for.
   TrueViews(SceneEntry entry, const Scene& scene, const std::filesystem::path& cache);
+
+  // Photographs that `picture` opens, of the sizes of `views`, without an object on a background: all of them counts,
+  // but for pixels that are masked.
+  TrueViews(const std::vector<Camera>& views, std::function<Result<ViewPicture>(size_t view)> picture);
 
   // Pixels over the object's background. Errors: those of Scene::HighPicture, ReadImage and WritePng.
   Result<TrueView> Load(size_t view) const;
@@ -42,7 +49,8 @@ class TrueViews {
   // The pixels that show something, 3 or 4 channels.
   struct Part {
     Image picture;
-    PixelBox box;  // where in the view; as large as the picture
+    PixelBox box;             // where in the view; as large as the picture
+    Buffer<uint8_t> ignored;  // [H,W] of the picture, not 0: it says nothing there; empty: nowhere
   };
   struct Kept;
   struct File {
@@ -58,7 +66,8 @@ class TrueViews {
   std::filesystem::path folder_;
   std::vector<std::filesystem::path> stored_;  // pictures of the data set by view; empty where it has none
   std::vector<std::string> names_;
-  int width_ = 0, height_ = 0;
+  std::vector<std::array<int, 2>> sizes_;                       // width and height
+  std::function<Result<ViewPicture>(size_t view)> photograph_;  // of a capture; else empty
   std::array<float, 3> background_{};
   mutable std::mutex mutex_;
   mutable std::vector<std::shared_ptr<const Kept>> kept_;  // by view

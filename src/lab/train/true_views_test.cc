@@ -149,7 +149,7 @@ TEST(TrainingObject, HeldOutViewsAreNeverTrainedOn) {
   EXPECT_EQ((*all)->upscale, 2);
   EXPECT_EQ((*all)->pixel_sizes.size(), static_cast<size_t>((*all)->cloud.size()));
 
-  ObjectStore store({entry, entry, entry}, 2, folder / "cache", 2);
+  ObjectStore store({entry, entry, entry}, {}, 2, folder / "cache", 2);
   const auto kept = store.Get(0);
   ASSERT_TRUE(kept.ok());
   EXPECT_EQ(*store.Get(0), *kept);

@@ -94,6 +94,7 @@ Status RunEval(EvalFlags flags, Program& program) {
     if (!flags.split.empty())
       return Error{ErrorCode::kBadArgument, "--split: captures have none; --objects names some"};
     options.captures.emplace();
+    options.captures->seed = shared.seed;
     options.captures->steps = flags.fit_steps.value_or(options.captures->steps);
   }
   options.seed = shared.seed;

@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 struct TrainFlags {
   TrainRequest request;
   std::vector<std::string> datasets, validation;
-  std::string config, out, cache, start;
+  std::string captures, config, out, cache, start;
 };
 
 // The program that brings LibTorch along: loading it takes half a second, so the others do without. It is this program
@@ -83,6 +83,7 @@ Status RunTrain(TrainFlags& flags, const Program& program) {
   TrainRequest& request = flags.request;
   request.datasets.assign(flags.datasets.begin(), flags.datasets.end());
   request.validation.assign(flags.validation.begin(), flags.validation.end());
+  request.captures = flags.captures;
   request.config = flags.config;
   request.out = flags.out;
   request.cache = flags.cache;
@@ -112,8 +113,12 @@ void AddTrain(CLI::App& app, Program& program) {
   const auto flags = std::make_shared<TrainFlags>();
   TrainRequest& request = flags->request;
   verb.add_option("datasets", flags->datasets, "Folders that `dataset build` made, or in the published layout")
-      ->required()
       ->check(NotEmpty());
+  verb.add_option(
+          "--captures", flags->captures,
+          "Folder of captures to train on too, photographs with cameras: splats are fitted to small pictures of "
+          "some views, and the others at full size are the truth")
+      ->check(CLI::ExistingDirectory);
   verb.add_option("--config", flags->config, "The recipe, a TOML file (docs/training.md)")
       ->required()
       ->check(CLI::ExistingFile);

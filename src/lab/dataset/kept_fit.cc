@@ -1,4 +1,4 @@
-#include "eval/kept_fit.h"
+#include "dataset/kept_fit.h"
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int64_t kCheckpointEvery = 500;  // steps: about half a minute at 1024²
+constexpr int64_t kKeptFitEvery = 500;  // steps: about half a minute at 1024²
 
 // What was made, or is being made, in a folder, and for how long.
 struct Progressed {
@@ -75,7 +75,7 @@ Result<KeptFit> FitAndKeep(const fs::path& folder, const std::string& key,
   ANCHORSPLAT_ASSIGN_OR_RETURN(FitTask begin, start());
   FitControl control;
   control.checkpoint = folder / "fit.checkpoint";
-  control.checkpoint_every = kCheckpointEvery;
+  control.checkpoint_every = kKeptFitEvery;
   control.resume = true;
   control.anew_if_unfit = true;  // it is of another version then
   control.deliver = [&](const Fitted& fitted) { return WriteCloud(splat, fitted.cloud, {.overwrite = true}); };
@@ -83,7 +83,7 @@ Result<KeptFit> FitAndKeep(const fs::path& folder, const std::string& key,
   const double before = progress.seconds;
   Status noted;
   control.observe = [&](const Fitter& fitter) {
-    if (fitter.step() % kCheckpointEvery != 0) return;
+    if (fitter.step() % kKeptFitEvery != 0) return;
     progress.seconds = before + watch.Total();
     noted = WriteProgress(note, progress);
   };

@@ -111,8 +111,8 @@ def compare(
     names: of files, of the cameras, or "000", "001", ….
 
     color_correct: measures again after the affine map of each view's colours that brings it nearest to the pictures.
-    device: what rasterizes: "cpu"; "gpu"; "auto", a real GPU where there is one, else the CPU; or the number of an adapter.
-        max_gpu_memory: of a GPU's memory at most, bytes or "4G"; otherwise 2 GiB (docs/gpu.md).
+    device: rasterize on "cpu", "gpu", "auto" (a hardware GPU, else the CPU) or an adapter by number.
+        max_gpu_memory: most GPU memory to use, bytes or "4G"; default: 2 GiB (docs/gpu.md).
 
     Returns ``{"mean": {"psnr", "ssim"}, "views": […]}``, with `truth` one for "a" and one for "b"; an infinite PSNR is None.
     Raises as ``read``; BadArgumentError: views that do not match, sizes that differ.

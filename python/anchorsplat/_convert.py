@@ -40,24 +40,24 @@ def convert(
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> Report:
-    """Changes the format of a splat's file, its size, its order. Other properties of its Gaussians come along where the format
-    has a place for them, which ``write(target, read(source))`` would lose.
+    """Converts, shrinks or sorts a splat file. Keeps extra properties of the Gaussians where the format has room for them, unlike
+    ``write(target, read(source))``.
 
-    format: of the input by its extension, for what neither content nor name tells (the command line's --from).
-    mode: how the splat is rasterized, for a tag in the output; otherwise as the input says.
-    sh_degree: spherical harmonics to keep, 0 to 3.
-    min_opacity: drops Gaussians that are fainter, 0 to 1.
-    max_gaussians: keeps at most so many, those of the largest size × opacity.
-    coords: what the files' axes really are where they do not follow their format, as "IN:OUT", for example "RUB:".
-    scales, opacities, colors: what the source's numbers are, whatever its format wants: "logarithms" or "lengths", "logits" or
+    format: format of the source, by its extension, if neither name nor content shows it (--from on the command line).
+    mode: rasterization to note in the output; default: as in the source.
+    sh_degree: highest degree of spherical harmonics to keep, 0 to 3.
+    min_opacity: drop Gaussians with less opacity, 0 to 1.
+    max_gaussians: keep at most so many, the largest by size × opacity.
+    coords: axes of files that break the rule of their format, as "IN:OUT", for example "RUB:".
+    scales, opacities, colors: how the source stores them, if not as its format requires: "logarithms" or "lengths", "logits" or
     "0-1", "harmonics" or colours "0-1" or "0-255".
-    double: a PLY with world coordinates in double precision (see Cloud.origin); otherwise as the source has them.
-    sort: order of the Gaussians in the file. spz_version: 4, or 3 for programs that only know gzip.
-    lod_levels, lod_ratio, lod_chunk_count, lod_chunk_extent: of a target named lod-meta.json, a scene at several levels of
-    detail: their number, the Gaussians of each to those of the finer one, Gaussians in a chunk in units of 1,024, and the
-    longest side of what changes its level as one. lod_level: the level to read of such a source; 0 is the finest.
-    report: reads the output back: attribute errors, and PSNR of pictures of both, of `report_views` views.
-    overwrite: replaces a file that exists.
+    double: PLY: write world coordinates as doubles (see Cloud.origin); default: as in the source.
+    sort: order of the Gaussians in the file. spz_version: 4, or 3 for programs that only read gzip.
+    lod_levels, lod_ratio, lod_chunk_count, lod_chunk_extent: for a target named lod-meta.json: levels, Gaussians in each level as
+    a fraction of the finer one, most Gaussians in a chunk in units of 1,024, and longest side of a chunk. lod_level: level to
+    read from such a source; 0 is the finest.
+    report: read the output back and report errors per attribute and PSNR of renders from `report_views` views.
+    overwrite: replace an existing file.
 
     Raises as ``read`` and ``write``.
     """

@@ -73,51 +73,49 @@ def enhance(
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> tuple[Cloud, Report]:
-    """Makes a splat that was trained on small pictures hold up when it is seen closer. `cloud` stays as it is.
+    """Returns a splat that holds up when seen closer, and a :class:`Report`. `cloud` is not changed.
 
-    method: "auto", the best that is ready; one of :func:`methods`; or two, "model+refine".
-    quality: instead of a method, by the time there is: "fast", a second; "good", several; "best", minutes with `images`.
-    upscale: how many times closer it will be seen, at least 1.
-    max_gaussians: of the result at most, spent where the closer view shows it; 0: no bound. most_gaussians: its old name.
-    region: only what lies in there is enhanced, the rest stays bit by bit: a box (x0, y0, z0, x1, y1, z1) or a sphere
-        (x, y, z, radius) in the splat's unit.
+    method: "auto" (the best for what is given), one of :func:`methods`, or two such as "model+refine".
+    quality: how much time to spend, instead of a method: "fast", about a second; "good", several; "best", minutes with `images`.
+    upscale: zoom to prepare for, at least 1.
+    max_gaussians: budget for the result, spent where the closer view shows it; 0: no limit. most_gaussians: its old name.
+    region: enhance only this part, a box (x0, y0, z0, x1, y1, z1) or a sphere (x, y, z, radius) in world units. The rest
+        stays bit-identical.
 
-    pixel_size: world size of a pixel of the training views, or "auto": from the cameras, the pictures or the splat.
-    mode: how the splat was rasterized in training; otherwise as it says, else as it looks.
-    cameras: the training cameras: exact pixel size for every Gaussian.
-    train_width: pixels of the pictures in training where they were smaller than the cameras say.
-    camera_rule: which of the views that hold a Gaussian says its pixel size.
-    filter_strength: share of the absorbed 0.3 px² to give back; otherwise 1 − (1 − 1/upscale²)/3.6.
-    background: r, g, b from 0 to 1, of the training views; otherwise what the camera file says, else the splat, else black.
-    clean: first takes out Gaussians of that colour that no training view would miss.
+    pixel_size: world size of a training pixel, or "auto": from the cameras, the pictures or the splat.
+    mode: rasterization in training; default: the splat's tag, else estimated.
+    cameras: training cameras, for the exact pixel size of every Gaussian.
+    train_width: image width in training, if smaller than in `cameras`.
+    camera_rule: which view of a Gaussian sets its pixel size.
+    filter_strength: share of the absorbed 0.3 px² to give back; default: 1 − (1 − 1/upscale²)/3.6.
+    background: r, g, b from 0 to 1 of the training views; default: from the camera file, else the splat, else black.
+    clean: first remove background-coloured Gaussians that no training view would miss.
 
-    model: weights of a network, .pth or .safetensors; otherwise the one in the box.
-    copies, merge_cost: Gaussians that a compact network makes of each, at most, or "auto"; what a merge may cost then.
-    prune_opacity: fainter Gaussians are left out of a network's result.
-    block_gaussians: larger splats are enhanced in overlapping blocks of this many.
-    precision: of the network's arithmetic.
-    compat, normalisation, attention_rounding, curve_depth, shuffles: of the published architecture (docs/network.md).
+    model: weights of a network, .pth or .safetensors; default: the built-in one.
+    copies: most Gaussians that a compact network makes of each, or "auto". merge_cost: most error per merged Gaussian with "auto".
+    prune_opacity: drop network output fainter than this.
+    block_gaussians: enhance larger splats in overlapping blocks of this size.
+    precision: arithmetic of the network.
+    compat, normalisation, attention_rounding, curve_depth, shuffles: options of the published network (docs/network.md).
 
-    enlarge_with: of the method "detail": a network that enlarges pictures, as of :func:`upscale`; what it adds is invented.
+    enlarge_with: for the method "detail": a network that enlarges pictures, as for :func:`upscale`. The detail it adds is invented.
 
-    Of refinement: images: the project with the pictures it was fitted to. hold_out: every Nth view is not trained on
-    (None: 8, or 0 where the splat was fitted to all of them, as it looks). downscale: N × N pixels of the pictures become
-    one. steps or seconds: how long. k: Gaussians that each becomes at first. poses, between: where to look from without
-    pictures. half_from, all_from: parts of the run from which on more rays are rendered. rate, rate_decay: learning rates,
-    as a part of those of ``fit``. ssim_weight: of the loss. exposure, robust, align: pictures that differ in brightness,
-    show what is not in the scene, or whose poses are a little off.
+    Refinement: images: project with the training pictures. hold_out: hold out every Nth view (None: 8, or 0 if the splat was
+    fitted to all). downscale: average N × N pixels. steps or seconds: how long to run. k: Gaussians to split each into first.
+    poses, between: views to use without pictures. half_from, all_from: fractions of the run after which half and all of the
+    rays are rendered. rate, rate_decay: factor on the learning rates of ``fit``, and on that by the end. ssim_weight: weight
+    of SSIM in the loss. exposure, robust, align: for pictures that differ in brightness, show passers-by, or have inexact poses.
 
-    checkpoint, resume: file for the state of a refinement when it is stopped (Ctrl-C: it is written, then KeyboardInterrupt; every
-        checkpoint_every steps, too), or for what a compact network has made so far, and going on from it.
+    checkpoint: file for the state of an interrupted refinement (Ctrl-C writes it, then raises KeyboardInterrupt) or of a compact
+        network. checkpoint_every: also write it every so many steps. resume: continue from it.
 
-    device: what rasterizes: "cpu"; "gpu"; "auto", a real GPU where there is one, else the CPU; or the number of an adapter.
-        max_gpu_memory: of a GPU's memory at most, bytes or "4G"; otherwise 2 GiB (docs/gpu.md).
+    device: rasterize on "cpu", "gpu", "auto" (a hardware GPU, else the CPU) or an adapter by number.
+        max_gpu_memory: most GPU memory to use, bytes or "4G"; default: 2 GiB (docs/gpu.md).
 
-    seed: of everything random. threads: at most; 0: all of the machine; the result does not depend on it.
+    seed: random seed. threads: CPU threads; 0: all. The result does not depend on them.
 
-    Returns the splat and a :class:`Report`. What was assumed is told by the logger "anchorsplat" and by SplatWarning. Raises
-    BadArgumentError: keywords out of range or without effect, a method that is not ready; BadFileError: no Gaussian is usable,
-    and files that keywords name; NotFoundError; IoError.
+    Messages go to the logger "anchorsplat", warnings to SplatWarning. Raises BadArgumentError: keywords out of range or without
+    effect, or a method that cannot run; BadFileError: no usable Gaussian, or a bad file among the keywords; NotFoundError; IoError.
     """
     words = words_of(enhance, locals(), besides=("cameras",))
     given = camera_words(cameras, words)
@@ -167,10 +165,10 @@ def refine(
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> tuple[Cloud, Report]:
-    """Optimises a splat for a closer look, against the pictures it was fitted to or, without them, against itself:
-    ``enhance(cloud, method="refine", …)``, whose keywords these are.
+    """Optimises a splat for a closer view, against its training pictures or, without them, its own low-resolution renders. The
+    same as ``enhance(cloud, method="refine", …)``, with its keywords.
 
-    images: project with the pictures, as of ``fit``.
+    images: project with the training pictures, as for ``fit``.
     """
     given = {name: value for name, value in locals().items() if name != "cloud"}
     return enhance(cloud, method="refine", **given)

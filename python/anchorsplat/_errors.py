@@ -4,32 +4,32 @@ line, the property and what was expected. Settings are called as the command lin
 
 
 class Error(Exception):
-    """All that this package raises by itself."""
+    """Base class of all errors of this package."""
 
 
 class BadArgumentError(Error, ValueError):
-    """Asked for something impossible."""
+    """An invalid argument."""
 
 
 class NotFoundError(Error, FileNotFoundError):
-    """A file or folder is not there."""
+    """A file or folder was not found."""
 
 
 class BadFileError(Error, ValueError):
-    """Bytes that are malformed, truncated, hostile or of an unsupported kind."""
+    """A malformed, truncated or unsupported file."""
 
 
 class ExistsError(Error, FileExistsError):
-    """Would overwrite a file and was not told to (``overwrite=True``)."""
+    """The file exists, and ``overwrite=True`` was not given."""
 
 
 class IoError(Error, OSError):
-    """The system refused to read, to write or to give memory."""
+    """Reading, writing or memory allocation failed."""
 
 
 class StoppedError(Error):
-    """The call was asked to end. Ctrl-C itself is Python's KeyboardInterrupt."""
+    """The call was stopped. Ctrl-C raises KeyboardInterrupt instead."""
 
 
 class SplatWarning(UserWarning):
-    """What a call assumed, left out or could not keep. Filter it as any warning of Python's."""
+    """A warning of the engine: what it assumed, dropped or could not keep."""

@@ -69,36 +69,36 @@ def fit(
     """Optimises a splat from the pictures of a project (standard 3DGS): a COLMAP project, a folder with a transforms.json, a
     NeRF-synthetic scene.
 
-    steps: of the optimisation; all schedules follow.
-    max_gaussians: growth stops there, and a start with more is cut to it; 0: no bound. Otherwise none, a million with mcmc.
-    strategy: who comes and goes: Kerbl et al.; the same by absolute gradients; a number of Gaussians that move.
-    mip_filter: smooths every Gaussian by the pixel of the closest camera, as Mip-Splatting does; implies mode="mip".
-    exposure: pictures differ in brightness and tint; each has a gain and a bias per channel of its own.
-    hold_out: every Nth view, by name, is not trained on; 0: all are.
-    downscale: N × N pixels of the pictures become one, their mean.
-    init: first Gaussians: the project's points, random where many cameras look, random in gsplat's cube.
-    init_splat: a Cloud or a file: first Gaussians at the centres of this splat.
-    init_points: how many first Gaussians; otherwise all points, 100,000 random ones.
-    init_extent: of init="random": half a side of the cube, in scene scales; 0.3 as INRIA's around one object.
-    shell: Gaussians on a sphere far beyond cameras and points, for what is seen there; 0: none. "auto": some where the
-        project's points leave much of the pictures open.
-    background: r, g, b from 0 to 1; otherwise what the project says, else black.
+    steps: optimisation steps; all schedules scale with them.
+    max_gaussians: most Gaussians; 0: no limit. Default: 0, with mcmc a million.
+    strategy: densification: "default", Kerbl et al.; "absgrad", by absolute gradients; "mcmc", relocation of a fixed number.
+    mip_filter: smooth every Gaussian by the pixel of its closest camera, as Mip-Splatting does; implies mode="mip".
+    exposure: fit a gain and a bias per channel and picture.
+    hold_out: hold out every Nth view, by name; 0: none.
+    downscale: average N × N pixels of the pictures.
+    init: where the first Gaussians are: "points" of the project, "view" (random, where many cameras look) or "random".
+    init_splat: a Cloud or a file: start with Gaussians at the centres of this splat.
+    init_points: number of first Gaussians; default: all points, or 100,000 random ones.
+    init_extent: with init="random": half the side of the cube, in scene scales; INRIA uses 0.3 for single objects.
+    shell: Gaussians on a far sphere, for sky and distant background; 0: none. "auto": some if the project's points leave much of
+        the pictures empty.
+    background: r, g, b from 0 to 1; default: from the project, else black.
     sh_degree: highest degree of spherical harmonics, 0 to 3.
     ssim_weight: w of the loss (1 − w)·L1 + w·(1 − SSIM).
-    mode: of the fit, and so of the splat.
-    pixel, upscale: "area" takes a pixel for the mean over its area, for splats that will be seen `upscale` times closer.
-    profile: extent of a Gaussian, as gsplat 1.0 to 1.4 or as 1.5 has it.
-    checkpoint: file for the state when the fit ends before its end (Ctrl-C: it is written, then KeyboardInterrupt); without
-        one nothing is kept. checkpoint_every: also every so many steps. resume: goes on from it where it is there.
-    refine_start, refine_stop, refine_every, reset_every, sh_degree_interval: steps of the schedule, otherwise gsplat's, scaled.
-    opacity_reset, grow_grad2d, grow_scale3d, prune_opa, prune_scale3d, revised_opacity: densification, as gsplat calls it.
-    min_opacity, noise_lr: of mcmc.
+    mode: rasterization of the fit.
+    pixel, upscale: "area" fits the mean over each pixel, for splats to be seen `upscale` times closer.
+    profile: cut-off of a Gaussian, as in gsplat 1.0 to 1.4 or as in 1.5.
+    checkpoint: file for the state of an interrupted fit (Ctrl-C writes it, then raises KeyboardInterrupt). checkpoint_every: also
+        write it every so many steps. resume: continue from it.
+    refine_start, refine_stop, refine_every, reset_every, sh_degree_interval: steps of the schedule; default: gsplat's, scaled.
+    opacity_reset, grow_grad2d, grow_scale3d, prune_opa, prune_scale3d, revised_opacity: densification, named as in gsplat.
+    min_opacity, noise_lr: for mcmc.
     opacity_reg, scale_reg: weights of the mean opacity and the mean size in the loss.
     rate_means, rate_means_decay, rate_scales, rate_quats, rate_opacities, rate_sh0, rate_sh_rest: learning rates.
-    device: what rasterizes: "cpu"; "gpu"; "auto", a real GPU where there is one, else the CPU; or the number of an adapter.
-        max_gpu_memory: of a GPU's memory at most, bytes or "4G"; otherwise 2 GiB (docs/gpu.md).
+    device: rasterize on "cpu", "gpu", "auto" (a hardware GPU, else the CPU) or an adapter by number.
+        max_gpu_memory: most GPU memory to use, bytes or "4G"; default: 2 GiB (docs/gpu.md).
 
-    Raises NotFoundError, IoError, BadFileError; BadArgumentError: keywords out of range, at odds or without effect.
+    Raises NotFoundError, IoError, BadFileError; BadArgumentError: keywords out of range, in conflict or without effect.
     """
     words = words_of(fit, locals(), besides=("init_splat",))
     start = None

@@ -16,8 +16,8 @@ from ._words import path_bytes
 def info(
     source: PathLike | Cloud, *, format: str | None = None, threads: int = 0, progress: ProgressLike = None
 ) -> dict[str, Any]:
-    """What is in `source`, a Cloud, a splat's file or the weights of a network, and what is wrong with it: what
-    ``anchorsplat info --json`` prints. `format` as of ``read``. Of a Cloud "file", "format" and "bytes" are None.
+    """Inspects `source`, a Cloud, a splat file or the weights of a network, and reports problems, as ``anchorsplat info --json``
+    does. `format` as for ``read``. For a Cloud, "file", "format" and "bytes" are None.
 
     Raises as ``read``.
     """

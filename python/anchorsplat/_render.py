@@ -41,26 +41,26 @@ def render(
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> npt.NDArray[np.float32]:
-    """Draws a splat with the 3DGS rasterizer: float32 [V,H,W,3], red, green and blue as in a PNG of it (no conversion of
-    colour space), not clamped above 1. The same bits for any number of threads on one device.
+    """Renders a splat with the 3DGS rasterizer: float32 [V,H,W,3], RGB as in a PNG of it (no conversion of colour space), not
+    clamped above 1. The same bits for any number of threads on one device.
 
-    `cameras`: :class:`Cameras`, or a file or folder with them. Otherwise views all around: `orbit` says how many, `radius`
-    (world units), `target` (x, y, z), `fov` (horizontal, degrees) and `up` (x, y, z or an axis) from where. Of both, the
-    cameras only say where up is, and the background.
+    `cameras`: :class:`Cameras`, or a file or folder with them. Without: `orbit` views around the splat, at
+    `radius` (world units) from `target` (x, y, z), with `fov` (horizontal, degrees) and `up` (x, y, z or an axis). With both,
+    the cameras only give the up direction and the background.
 
-    view: only the one of this name.
-    size: width and height in pixels; of cameras their ratio has to stay.
-    background: r, g, b from 0 to 1; otherwise what the camera file says, else black.
-    near, far: world units in front of the camera where the picture begins and ends.
-    mode: how it is rasterized; otherwise as the splat says, else classic.
-    profile: extent of a Gaussian, as gsplat 1.0 to 1.4 or as 1.5 has it.
+    view: only the view with this name.
+    size: width and height in pixels; must keep the aspect ratio of the cameras.
+    background: r, g, b from 0 to 1; default: from the camera file, else black.
+    near, far: near and far plane, world units.
+    mode: rasterization; default: the splat's tag, else classic.
+    profile: cut-off of a Gaussian, as in gsplat 1.0 to 1.4 or as in 1.5.
     transparent: [V,H,W,4] with coverage as the fourth channel and colours not premultiplied, without a background.
-    device: what rasterizes: "cpu"; "gpu"; "auto", a real GPU where there is one, else the CPU; or the number of an adapter.
-        max_gpu_memory: of a GPU's memory at most, bytes or "4G"; otherwise 2 GiB (docs/gpu.md).
+    device: rasterize on "cpu", "gpu", "auto" (a hardware GPU, else the CPU) or an adapter by number.
+        max_gpu_memory: most GPU memory to use, bytes or "4G"; default: 2 GiB (docs/gpu.md).
 
-    Gaussians with values that are not finite are not drawn. Where a picture shows nothing, a SplatWarning says why. Raises
-    BadArgumentError: settings out of range, cameras of different sizes; NotFoundError: a
-    device that is not there; IoError: not enough memory.
+    Gaussians with values that are not finite are not drawn. A SplatWarning says why a picture is empty. Raises
+    BadArgumentError: settings out of range, cameras of different sizes; NotFoundError: no such device; IoError: not enough
+    memory.
     """
     words = words_of(render, locals(), besides=("transparent",))
     given = camera_words(cameras, words)

@@ -62,21 +62,21 @@ def view(
     threads: int = 0,
     progress: ProgressLike = None,
 ) -> Page:
-    """A page that shows a splat, `after`, and what it looked like before.
+    """A page that shows the splat `after`, and optionally one before it.
 
     before: a splat to compare with.
-    cameras: views to jump to, at most `views` of them, evenly chosen; the first one opens the page.
-    truth: folder of true pictures with the cameras' names.
-    pixel_size: world units of a training pixel, for the scale bar; "auto": read from `before`.
-    sh_degree: keeps view-dependent colour up to this degree; 0 makes small pages.
-    mode: how both are rasterized; otherwise as each says, else classic.
-    background: r, g, b from 0 to 1; otherwise what the camera file says, else black.
+    cameras: views to jump to, at most `views`, evenly chosen; the page opens at the first.
+    truth: folder of ground-truth pictures, named as the cameras.
+    pixel_size: world size of a training pixel, for the scale bar; "auto": estimated from `before`.
+    sh_degree: highest degree of spherical harmonics to keep; 0 makes small pages.
+    mode: rasterization of both; default: the tag of each, else classic.
+    background: r, g, b from 0 to 1; default: from the camera file, else black.
     title: heading of the page.
-    open_your_own: address of the hosted page (docs/web.md) that a button of this one opens, for readers with a splat.
-    device: what rasterizes: "cpu"; "gpu"; "auto", a real GPU where there is one, else the CPU; or the number of an adapter.
-        max_gpu_memory: of a GPU's memory at most, bytes or "4G"; otherwise 2 GiB (docs/gpu.md).
+    open_your_own: add a button to open another splat, in the hosted page at this address (docs/web.md).
+    device: rasterize on "cpu", "gpu", "auto" (a hardware GPU, else the CPU) or an adapter by number.
+        max_gpu_memory: most GPU memory to use, bytes or "4G"; default: 2 GiB (docs/gpu.md).
 
-    Raises BadArgumentError: nothing to show, a page above 300 MB; NotFoundError, BadFileError: true pictures.
+    Raises BadArgumentError: nothing to show, a page above 300 MB; NotFoundError, BadFileError: of the ground-truth pictures.
     """
     words = words_of(view, locals(), besides=("cameras",))
     given = camera_words(cameras, words)

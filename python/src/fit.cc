@@ -36,7 +36,7 @@ Result<Outcome> FitTo(const std::string& project, const FitFlags& flags, const G
   control.resume = flags.resume;
   if (flags.checkpoint.empty() && (flags.resume || flags.checkpoint_every > 0)) {
     return Error{ErrorCode::kBadArgument, Cat(flags.resume ? "--resume" : "--checkpoint-every",
-                                              " has no effect here; it has one with --checkpoint")};
+                                              " has no effect here; it works only with --checkpoint")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const TrainingViews views,
                                OpenProject(project, {.hold_out = flags.hold_out, .downscale = flags.downscale}));

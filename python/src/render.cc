@@ -73,7 +73,7 @@ Result<Pictures> Draw(const CloudView& cloud, const ViewFlags& flags, bool trans
     progress.Advance();
   }
   if (empty_views > 0) {
-    LogWarning(Cat(empty, " --near and --far say what is in range",
+    LogWarning(Cat(empty, " Check --near and --far",
                    empty_views > 1 ? Cat(" (", empty_views - 1, " more of ", out.views, " views are as empty)") : ""));
   }
   return out;

@@ -137,7 +137,7 @@ def test_comparisons(cloud, tmp_path):
     assert both["b"]["mean"]["psnr"] is None and both["a"]["mean"]["cc_psnr"] >= both["a"]["mean"]["psnr"]
     files = anchorsplat.compare(worse, tmp_path, cameras=tmp_path)
     assert files["mean"]["psnr"] == pytest.approx(one["mean"]["psnr"], abs=0.2)
-    with pytest.raises(anchorsplat.BadArgumentError, match="needs views: --cameras FILE, or --orbit N"):
+    with pytest.raises(anchorsplat.BadArgumentError, match="needs views: pass --cameras FILE or --orbit N"):
         anchorsplat.compare(worse, cloud)
     with pytest.raises(anchorsplat.BadArgumentError, match="4 pictures and 2 views"):
         anchorsplat.compare(worse, pictures, cameras=cameras[:2])

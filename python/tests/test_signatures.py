@@ -109,7 +109,7 @@ FUNCTIONS = {
     "info": ("info", None, {"from": "format"}, {"overwrite": "nothing is written", "seed": "nothing is random"}),
     "refine": (
         "enhance",
-        ("Refinement", "Shared flags", "Options", "Device"),
+        ("Refinement", "Shared flags", "Options", "Pixel size", "Device"),
         {},
         {
             "view": "anchorsplat.view",

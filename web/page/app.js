@@ -147,9 +147,8 @@ function preview() {
 
 // What the engine says as the command line does, in words of this page, a sentence each.
 function sentence(text) {
-  const here = text.replace('--pixel-size or --cameras tells', 'The slider or training cameras tell')
-    .replace(/--cameras, --pixel-size or --mode \w+ says more about it/, 'The slider or training cameras say more about it')
-    .replace(/[.?]? --(filter-strength F|mode \w+) enhances it all the same/, '').replace(/ --mode says that they are$/, '')
+  const here = text.replace(/Pass --cameras or --pixel-size(, or --mode \w+ to enhance it anyway)?/, 'Use the slider or training cameras')
+    .replace(/\. --(filter-strength F|mode \w+) enhances it anyway/, '').replace(/, or pass --mode to trust them$/, '')
     .replace(/ \(--[^)]*\)/g, '').replace(/--pixel-size/g, 'the slider').replace(/--cameras/g, 'training cameras')
     .replace(/--region/g, 'only a part').replace(/--max-gaussians/g, 'Gaussians at most');
   return here.charAt(0).toUpperCase() + here.slice(1) + (/[.?!]$/.test(here) ? '' : '.');
@@ -194,7 +193,7 @@ function describe({info, originalInfo, name, bytes}) {
     : `${number(info.gaussians)} Gaussians, ${info.format}, ${sizeText(bytes)}, colour of SH degree ${info.sh_degree}.`);
   if (info.render_mode) say(`It says that it was trained as ${info.render_mode}.`);
   else say(`It looks like ${info.looks_in_words}.`);
-  say(sentence(`Enhance ${info.treatment.method === 'none' ? 'does' : 'takes'} ${info.treatment_in_words}`));
+  say(sentence(`Can be sharpened: ${info.treatment_in_words}`));
   if (info.reading) {
     const {pixel, low, high, strangeness} = info.reading;
     say(`A pixel of its training pictures covered about ${pixel.toPrecision(3)} of its units ` +

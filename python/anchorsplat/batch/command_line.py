@@ -104,7 +104,7 @@ def _parser(verb: str) -> argparse.ArgumentParser:
     add("-q", "--quiet", action="store_true", help="only errors on stderr, no summary")
     add("--json", action="store_true", help="the result as one JSON document on stdout")
     native = _native_verb(verb)
-    group = parser.add_argument_group(f"passed on (anchorsplat {' '.join(native)} --help explains them)")
+    group = parser.add_argument_group(f"passed on (anchorsplat {' '.join(native)} --help-all explains them)")
     for option in options(*native).values():
         if option.name in _own(verb):
             continue

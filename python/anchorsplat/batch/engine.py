@@ -8,7 +8,6 @@ import functools
 import hashlib
 import json
 import os
-import re
 import resource
 import shutil
 import signal
@@ -16,6 +15,7 @@ import subprocess
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from .._errors import BadArgumentError, BadFileError, Error, ExistsError, IoError, NotFoundError
 
@@ -155,7 +155,7 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
 
 @dataclass(frozen=True)
 class Option:
-    """An option of a verb, as the program's --help has it."""
+    """An option of a verb, as the program declares it."""
 
     name: str  # "--pixel-size"
     short: str  # "-w" or ""
@@ -163,19 +163,21 @@ class Option:
     several: bool  # takes more than one value
 
 
-# A name, and the older ones behind it: "--max-gaussians,--most-gaussians INT:NONNEGATIVE=0".
-_OPTION = re.compile(r"^ {2}(?:(-\w),)?(--[a-z][a-z0-9-]*(?:,--[a-z][a-z0-9-]*)*)(?: (TEXT|INT|UINT|FLOAT)(\S*.*))?")
+@functools.cache
+def _verbs() -> dict[str, Any]:
+    return json.loads(subprocess.run([program(), "manual", "json"], capture_output=True, text=True, check=True).stdout)
 
 
 @functools.cache
 def options(*verb: str) -> dict[str, Option]:
-    """What `anchorsplat VERB` takes, from its own --help: the one description of it."""
-    told = subprocess.run([program(), *verb, "--help"], capture_output=True, text=True, check=True).stdout
+    """What `anchorsplat VERB` takes, from `anchorsplat manual json`. An option is there by each of its long names."""
+    declared = _verbs()[verb[0]]
+    for word in verb[1:]:
+        declared = declared["verbs"][word]
     found = {}
-    for line in told.splitlines():
-        match = _OPTION.match(line)
-        if match and match[2] != "--help":
-            several = "..." in (match[4] or "")
-            for name in match[2].split(","):
-                found[name] = Option(name, match[1] or "", match[3] or "", several)
+    for option in declared["options"]:
+        short = next((name for name in option["names"] if not name.startswith("--")), "")
+        for name in option["names"]:
+            if name.startswith("--"):
+                found[name] = Option(name, short, option["value"], option["many"])
     return found

@@ -10,13 +10,14 @@ _METHODS = {
     "refine": "refinement",
 }
 _LOOKS = {
-    "classic": "a classic splat",
-    "antialiased": "an antialiased splat",
-    "mip": "a splat of Mip-Splatting",
-    "filtered": "a splat that was widened before",
-    "enhanced": "a splat that a network has enhanced before",
-    "raised": "a splat whose opacities were raised",
-    "mesh": "points of a mesh",
+    "classic": "a classic 3DGS fit",
+    "antialiased": "an antialiased fit",
+    "mip": "a Mip-Splatting fit",
+    "filtered": "an already filtered splat",
+    "enhanced": "an already enhanced splat",
+    "raised": "a fit with raised opacities",
+    "mesh": "a sampled mesh",
+    "generated": "the output of a generator",
 }
 
 
@@ -95,12 +96,12 @@ def _pixel_size(row: dict) -> list[str]:
     if not source:
         return []
     if value is None:
-        return ["The splat stays as it is: nothing tells how large a training pixel was."]
+        return ["The splat was left unchanged: the size of a training pixel is unknown."]
     parts = row.get("parts") or []
     if parts:
         of_each = ", ".join(f"{p['pixel_size']:.4g} ({_count(p['gaussians'])} Gaussians)" for p in parts[:_MOST_NAMED])
         more = f" and {len(parts) - _MOST_NAMED} more" if len(parts) > _MOST_NAMED else ""
-        return [f"The splat is made of {len(parts)} things that lie apart, each treated by itself: pixels of {of_each}{more}."]
+        return [f"The splat has {len(parts)} separate parts, with pixels of {of_each}{more}."]
     if source == "read" and reading:
         taken = f"; {value:.4g} was taken" if row.get("filter_strength") else ""  # else a warning says why
         return [

@@ -20,7 +20,7 @@ from anchorsplat.batch.engine import engine, program
 _WRAPPER = """#!/bin/sh
 control={control}
 case "$1 ${{2##*/}}" in
-"enhance --help" | "enhance none.ply" | "enhance one.ply") ;;  # how the batch asks about options
+"enhance none.ply" | "enhance one.ply") ;;
 "enhance "*)
   name="${{2##*/}}"
   echo "$name" >> "$control/calls"

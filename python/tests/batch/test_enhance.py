@@ -238,7 +238,7 @@ def test_what_makes_no_sense_is_said_before_any_work(control: Control, scans: Pa
 
     refused("--upscale 0.5 must be at least 1", upscale=0.5)
     refused("--steps has no effect with --method model", method="model", steps=5)
-    refused("there is no method 'nope'", method="nope")
+    refused("unknown method 'nope'", method="nope")
     refused("output: enhance has no such option for batches", output="x.ply")
     refused("clean='yes': expected True or False", clean="yes")
     refused("--format gltf", format="gltf")

@@ -14,7 +14,7 @@ def _said(**row) -> str:
 
 def test_what_was_read_and_taken_is_said() -> None:
     said = _said(reading=_READING, pixel_size={"value": 0.009, "source": "read"})
-    assert "It looks like a classic splat (98 %)." in said
+    assert "It looks like a classic 3DGS fit (98 %)." in said
     assert "0.01 world units" in said and "0.009 was taken" in said
 
 
@@ -27,9 +27,9 @@ def test_each_thing_has_its_pixel() -> None:
     sizes = [(700, 0.01, True), (300, 0.04, False)]
     parts = [{"gaussians": n, "pixel_size": size, "by_network": network} for n, size, network in sizes]
     said = _said(reading=_READING, pixel_size={"value": 0.01, "source": "read"}, parts=parts)
-    assert "2 things that lie apart" in said and "0.04 (300 Gaussians)" in said
+    assert "2 separate parts" in said and "0.04 (300 Gaussians)" in said
 
 
 def test_a_pixel_that_nothing_tells_is_none() -> None:
     said = _said(pixel_size={"value": None, "source": "unknown"}, filter_strength=0)
-    assert "nothing tells how large" in said and "looks like" not in said
+    assert "pixel is unknown" in said and "looks like" not in said

@@ -73,7 +73,7 @@ TEST(Enhance, FilterAndDefault) {
   ASSERT_EQ(enhanced->steps.size(), 1u);
   EXPECT_EQ(enhanced->steps[0].method, "model");
   EXPECT_FALSE(enhanced->steps[0].facts.empty());
-  EXPECT_THAT(said, testing::Contains(HasSubstr("looks like a classic splat")));
+  EXPECT_THAT(said, testing::Contains(HasSubstr("looks like a classic 3DGS fit")));
 
   // The owner may be given away; what comes of it is the same.
   auto given = Enhance(*Splat::CopyOf(*splat));

@@ -61,8 +61,7 @@ Status WritePage(const fs::path& input, const GaussianCloud& before, const fs::p
   page.smaller = kSmaller;
   const Status written = WriteViewerPage(PagePath(output), page, options);
   if (written.ok()) return {};
-  return Error{written.error().code,
-               Cat(output.string(), " is written, but its page is not: ", written.error().message)};
+  return Error{written.error().code, Cat(output.string(), " was written, but not its page: ", written.error().message)};
 }
 
 }  // namespace anchorsplat

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "cli/clean_output.h"
+#include "cli/help.h"
 #include "cli/lab.h"
 #include "cli/table.h"
 #include "cli/verb.h"
@@ -173,17 +174,19 @@ void AddCompare(CLI::App& app, Program& program) {
               "anchorsplat compare before.ply after.ply --truth photos/ --cameras transforms.json");
   const auto flags = std::make_shared<CompareWords>();
   verb.add_option("a", flags->a, "Splat, folder of pictures or picture")->required()->check(NotEmpty());
-  verb.add_option("b", flags->b, "The same; what A is compared with, unless there is a --truth")
+  verb.add_option("b", flags->b, "The same; the reference for A, unless --truth is given")
       ->required()
       ->check(NotEmpty());
-  verb.add_option("--truth", flags->truth, "Compare both A and B with this instead, and show the gain")
+  verb.add_option("--truth", flags->truth, "Ground truth: compare both A and B with this, and show the gain")
       ->check(NotEmpty());
   verb.add_option("--side-by-side", flags->side_by_side,
-                  "Write a PNG of the view with the median score: pictures, zoomed crop, difference")
+                  "PNG of the view with the median score: pictures, zoomed crop, difference")
       ->check(NotEmpty());
   AddLpipsFlags(verb, flags->lpips, flags->lpips_weights);
   flags->how.AddTo(verb);
   program.device.AddTo(verb);
+  ShortenHelp(verb, {"--truth", "--cameras", "--orbit", "--view", "--size", "--background", "--side-by-side", "--lpips",
+                     "--color-correct", "--device", "--overwrite", "--quiet", "--json"});
   verb.callback([flags, &verb, &program] {
     flags->how.given = GivenOptions(verb);
     program.run = [flags, &program] { return RunCompare(*flags, program.flags); };

@@ -20,7 +20,7 @@ std::string Joined(const std::vector<std::string>& words) {
 
 // The words after `verb` that are options or verbs below it.
 std::vector<std::string> NextWords(const DeclaredVerb& verb) {
-  std::vector<std::string> words = {"--help"};
+  std::vector<std::string> words = {"--help", "--help-all"};
   for (const DeclaredVerb& below : verb.verbs) words.push_back(below.words.back());
   for (const DeclaredOption& option : verb.options) words.insert(words.end(), option.names.begin(), option.names.end());
   return words;
@@ -77,7 +77,7 @@ void AddZshVerb(const DeclaredVerb& verb, std::string& out) {
     for (const DeclaredVerb& below : verb.verbs) AddZshVerb(below, out);
     return;
   }
-  out += "  _arguments -s '--help[Print what the verb does and exit]'";
+  out += "  _arguments -s '--help[Show the options most often used]' '--help-all[Show all options]'";
   for (const DeclaredOption& option : verb.options) {
     if (option.names.empty()) {
       const std::string prefix = option.many ? "*" : "";
@@ -97,7 +97,7 @@ void AddZshVerb(const DeclaredVerb& verb, std::string& out) {
 
 std::string BashCompletion(const CLI::App& app) {
   std::string path, words, values;
-  std::vector<std::string> first = {"--help", "--version"};
+  std::vector<std::string> first = {"--help", "--help-all", "--version"};
   for (const DeclaredVerb& verb : DeclaredVerbs(app)) {
     AddBashVerb(verb, path, words, values);
     first.push_back(verb.words.back());

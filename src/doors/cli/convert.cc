@@ -11,6 +11,7 @@
 #include "cli/batch.h"
 #include "cli/clean_output.h"
 #include "cli/edit_steps_report.h"
+#include "cli/help.h"
 #include "cli/output_plan.h"
 #include "cli/standard_output.h"
 #include "cli/stop_signal.h"
@@ -92,7 +93,7 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
       jobs.push_back({.inputs = {flags.paths[0]}, .output = "dry-run.ply", .has_output = false});
       return jobs;
     }
-    if (count < 2) return Error{ErrorCode::kBadArgument, "say IN OUT, or several inputs with --out-dir DIR"};
+    if (count < 2) return Error{ErrorCode::kBadArgument, "pass IN OUT, or inputs with --out-dir DIR"};
     jobs.push_back({{flags.paths.begin(), flags.paths.end() - 1},
                     flags.piped != nullptr ? flags.piped->path() : fs::path(flags.paths.back()),
                     count});
@@ -102,7 +103,7 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
     if (IsFolder(output) || FormatOfExtension(output) == nullptr) output /= kStreamedName;
     if (output.filename() == kStreamedName) return jobs;
     return Error{ErrorCode::kBadArgument,
-                 Cat("--lod writes a folder or the lod-meta.json in one, not ", output.string())};
+                 Cat("--lod needs a folder, or lod-meta.json in one, as OUT, not ", output.string())};
   }
   ANCHORSPLAT_RETURN_IF_ERROR(CheckOutDir(flags.out_dir));
   // Folders of pictures get one folder each; ".spz" may be said without its dot. A slash would lead out of --out-dir.
@@ -115,7 +116,7 @@ Result<std::vector<Job>> Jobs(const ConvertWords& flags, bool overwrite) {
   const SplatFormat* const format = leads_away ? nullptr : FormatOfExtension(fs::path("x" + extension));
   if (format == nullptr || format->write == nullptr) {
     return Error{ErrorCode::kBadArgument,
-                 Cat("--to: '", Printable(flags.to), "' is no format that is written; written are ", WrittenFormats())};
+                 Cat("--to: '", Printable(flags.to), "' cannot be written; supported: ", WrittenFormats())};
   }
   std::vector<fs::path> inputs, outputs;
   for (const std::string& input : flags.paths) {
@@ -166,7 +167,7 @@ void Print(const OutputMemory* piped, const Job& job, const Converted& done) {
   if (done.dry_run) {
     if (job.has_output) out << " -> " << OutputName(job.output, piped);
     out << "\n  " << WithThousands(r.gaussians_read) << " Gaussians of SH degree " << r.sh_degree_read << " in, "
-        << WithThousands(r.gaussians_written) << " of degree " << r.sh_degree_written << " would come out";
+        << WithThousands(r.gaussians_written) << " of degree " << r.sh_degree_written << " out";
     if (r.predicted_bytes) {
       out << " (" << r.output_format << ", " << (r.predicted_roughly ? "about " : "") << HumanBytes(*r.predicted_bytes)
           << ")";
@@ -194,8 +195,7 @@ void Print(const OutputMemory* piped, const Job& job, const Converted& done) {
 Status ConvertModel(const ConvertWords& flags, const SharedFlags& shared) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto edits, ActionsAmongPaths(flags.how.edits));
   if (flags.how.edits.dry_run || std::ranges::any_of(edits, [](const auto& actions) { return !actions.empty(); })) {
-    return Error{ErrorCode::kBadArgument,
-                 "edits and --dry-run are for splats, and .safetensors has a network's weights"};
+    return Error{ErrorCode::kBadArgument, "edits and --dry-run work on splats, not on a network's .safetensors"};
   }
   const fs::path from = flags.paths[0], to = flags.paths[1];
   RecordInput(from);
@@ -283,11 +283,11 @@ Status RunJobs(const ConvertWords& flags, Program& program) {
 Status RunConvert(const ConvertWords& flags, Program& program) {
   const bool is_piped = flags.out_dir.empty() && flags.paths.size() >= 2 && IsStandardOutput(flags.paths.back());
   if (!is_piped && flags.out_dir.empty() && flags.to_option->count() > 0) {
-    return Error{ErrorCode::kBadArgument, "--to has an effect with --out-dir, and where the output is -"};
+    return Error{ErrorCode::kBadArgument, "--to works only with --out-dir or the output -"};
   }
   if (!is_piped) return RunJobs(flags, program);
   if (flags.to_option->count() == 0) {
-    return Error{ErrorCode::kBadArgument, "the output - has no name that tells a format: say one, as --to .ply"};
+    return Error{ErrorCode::kBadArgument, "the output - needs a format, such as --to .ply"};
   }
   if (flags.lod) return Error{ErrorCode::kBadArgument, "--lod writes several files, and standard output is one"};
   ANCHORSPLAT_ASSIGN_OR_RETURN(const StandardOutput piped, StandardOutput::ForSplat(flags.to, program.flags));
@@ -300,28 +300,29 @@ Status RunConvert(const ConvertWords& flags, Program& program) {
 }  // namespace
 
 void AddConvert(CLI::App& app, Program& program) {
-  CLI::App& verb =
-      AddVerb(app, program, "convert",
-              "Change the format of a splat, its size, its order; turn, move, scale, crop, clean and merge splats",
-              "anchorsplat convert scan.ply scan.spz --report");
+  CLI::App& verb = AddVerb(app, program, "convert", "Convert, shrink, sort, transform, crop, clean and merge splats",
+                           "anchorsplat convert scan.ply scan.spz --report");
   const auto flags = std::make_shared<ConvertWords>();
   flags->how.edits.paths =
       verb.add_option("paths", flags->paths,
-                      Cat("IN OUT, several IN and the OUT that they are merged in, or inputs for --out-dir; - is "
-                          "standard input or output. Written: ",
-                          WrittenFormats(), ", and .safetensors of a network's weights"))
+                      Cat("IN OUT; several IN and OUT to merge them; or only inputs, with --out-dir. - is standard "
+                          "input or output. Writes ",
+                          WrittenFormats(), ", and a network's weights as .safetensors"))
           ->required();
-  verb.add_option("--out-dir", flags->out_dir, "Folder to write to, under the inputs' names");
+  verb.add_option("--out-dir", flags->out_dir, "Output folder; files keep the names of the inputs");
   flags->to_option =
       verb.add_option("--to", flags->to,
-                      "Extension of the files in --out-dir, or of the output -; meta.json and lod-meta.json make a "
-                      "folder of each")
+                      "Format of files in --out-dir or of standard output, by extension; meta.json and lod-meta.json "
+                      "make a folder each")
           ->capture_default_str();
-  verb.add_flag("--lod", flags->lod,
-                "Write levels of detail in chunks, a streamed SOG: OUT is a folder, or the lod-meta.json in one, which "
-                "says the same without this flag");
+  verb.add_flag(
+      "--lod", flags->lod,
+      "Write a streamed SOG with levels of detail: OUT is a folder. An OUT named lod-meta.json needs no --lod");
   flags->how.AddTo(verb);
   flags->size.AddTo(verb);
+  ShortenHelp(verb, {"--out-dir", "--to", "--sh-degree", "--min-opacity", "--max-gaussians", "--lod", "--report",
+                     "--translate", "--rotate", "--scale", "--up", "--filter-box", "--filter-sphere",
+                     "--filter-floaters", "--dry-run", "--overwrite", "--quiet", "--json"});
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunConvert(*flags, program); }; });
 }
 

@@ -114,7 +114,7 @@ TEST(OutputPlan, MemoryIsAPositiveSize) {
        {"", "G", "much", "-1", "-2G", "0", "1", "63M", "1e40", "nan", "inf", "2X", "2GG", "2 G B", "1bb", "5ib"}) {
     EXPECT_FALSE(ParseMemory(bad).ok()) << bad;
   }
-  EXPECT_THAT(ParseMemory("10M").error().message, HasSubstr("10M is less than the 64.0 MB that work needs at least"));
+  EXPECT_THAT(ParseMemory("10M").error().message, HasSubstr("10M is less than the minimum of 64.0 MB"));
 }
 
 TEST_F(ConvertVerb, MaxMemoryIsASize) {
@@ -201,7 +201,7 @@ TEST_F(ConvertVerb, OverwritesOnlyWhenTold) {
 
 TEST_F(ConvertVerb, RefusesWhatMakesNoSense) {
   const std::string out = folder_ / "out.ply";
-  ExpectRefused({"convert", scan_}, ErrorCode::kBadArgument, {"say IN OUT"});
+  ExpectRefused({"convert", scan_}, ErrorCode::kBadArgument, {"pass IN OUT"});
   ExpectRefused({"convert", scan_, "-"}, ErrorCode::kBadArgument, {"as --to .ply"});
   ExpectRefused({"convert", scan_, folder_ / "out.obj"}, ErrorCode::kBadArgument, {"out.obj"});
   ExpectRefused({"convert", scan_, out, "--coords", "XYZ"}, ErrorCode::kBadArgument, {"--coords"});

@@ -33,7 +33,7 @@ std::string ProcessorName() {
     const size_t colon = line.find(": ");
     if (line.starts_with("model name") && colon != std::string::npos) return Printable(line.substr(colon + 2));
   }
-  return "a processor without a name";
+  return "unknown processor";
 }
 
 // Bytes by /proc/meminfo, 0 where it does not say.
@@ -112,8 +112,8 @@ void PrintReport(const Machine& machine, const std::vector<Finding>& findings) {
   std::string lesser;
   for (const std::string& name : machine.lesser) lesser += (lesser.empty() ? "" : ", ") + name;
   line("SIMD", Cat(machine.simd, lesser.empty() ? "" : Cat(" (also built: ", lesser, ")")));
-  line("bfloat16", machine.bfloat16_products ? "products in hardware: --precision bf16 is faster than fp32"
-                                             : "no products in hardware: slower than fp32, so fp32 is taken instead");
+  line("bfloat16", machine.bfloat16_products ? "supported: --precision bf16 is faster than fp32"
+                                             : "not supported: --precision bf16 falls back to fp32");
   line("threads", Cat(machine.threads));
   line("memory", Cat(HumanBytes(machine.memory), ", ", HumanBytes(machine.available), " free",
                      machine.limit ? Cat("; this container may use ", HumanBytes(*machine.limit)) : ""));
@@ -148,7 +148,7 @@ void PrintReportAsJson(const Machine& machine, const std::vector<Finding>& findi
 
 void AddDoctor(CLI::App& app, Program& program) {
   CLI::App& verb =
-      AddVerb(app, program, "doctor", "What this program and this machine have, and how to get what is missing",
+      AddVerb(app, program, "doctor", "Check the program and the machine, and say how to get what is missing",
               "anchorsplat doctor");
   verb.callback([&program] {
     program.run = [&program]() -> Status {

@@ -28,11 +28,11 @@ std::string DescribeAxes(const std::string& name) {
 
 void PrintSteps(const std::vector<EditStep>& steps, std::ostream& out) {
   const auto directed = std::ranges::find_if(steps, [](const EditStep& step) { return !step.axes.empty(); });
-  if (directed != steps.end()) out << "  edits count along " << DescribeAxes(directed->axes) << '\n';
+  if (directed != steps.end()) out << "  axes of edits: " << DescribeAxes(directed->axes) << '\n';
   for (const EditStep& step : steps) {
     if (!step.chooses) continue;
     out << "  " << OneLine(step.action) << (step.input.empty() ? "" : Cat(" on ", OneLine(step.input))) << ": "
-        << WithThousands(step.taken) << " Gaussians taken away, " << WithThousands(step.left) << " left\n";
+        << WithThousands(step.taken) << " Gaussians removed, " << WithThousands(step.left) << " left\n";
   }
 }
 

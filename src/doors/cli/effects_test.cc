@@ -31,17 +31,17 @@ TEST_F(Effects, OfRenderingOnPictures) {
   ExpectDone({"compare", views, views});
   ExpectNoEffect({"compare", scan_, scan_, "--orbit", "1", "--color-correct"}, "--color-correct has no effect");
   ExpectNoEffect({"compare", views, views, "--truth", scan_, "--orbit", "1", "--size", "48x48", "--color-correct"},
-                 "it has one against pictures");
+                 "it works only against pictures");
   ExpectRefused({"render", scan_, "-o", folder_ / "one.png", "--orbit", "1", "--transparent", "--background", "1,1,1"},
                 ErrorCode::kBadArgument, {"--transparent"});
 }
 
 TEST_F(Effects, OfReportsAndFormats) {
   ExpectRefused({"convert", scan_, folder_ / "o.spz", "--report-views", "3"}, ErrorCode::kBadArgument, {"--report"});
-  ExpectNoEffect({"convert", scan_, folder_ / "o.ply", "--spz-version", "3"}, "where a .spz is written");
+  ExpectNoEffect({"convert", scan_, folder_ / "o.ply", "--spz-version", "3"}, "with a .spz output");
   ExpectDone({"convert", scan_, folder_ / "o.spz", "--spz-version", "3", "-q"});
-  ExpectNoEffect({"convert", scan_, folder_ / "o.ply", "--lod-levels", "3"}, "where a lod-meta.json is written");
-  ExpectNoEffect({"convert", scan_, folder_ / "o.ply", "--lod-level", "1"}, "where a lod-meta.json is read");
+  ExpectNoEffect({"convert", scan_, folder_ / "o.ply", "--lod-levels", "3"}, "with a lod-meta.json output");
+  ExpectNoEffect({"convert", scan_, folder_ / "o.ply", "--lod-level", "1"}, "with a lod-meta.json input");
   ExpectNoEffect({"convert", scan_, "--lod", folder_ / "o", "--sort", "keep"}, "--sort has no effect here");
   ExpectNoEffect({"convert", scan_, folder_ / "o.splat", "--mode", "mip"}, "--mode has no effect here");
   ExpectRefused({"view", scan_, "-o", folder_ / "o.html", "--views", "3"}, ErrorCode::kBadArgument, {"--cameras"});
@@ -77,12 +77,12 @@ TEST_F(Effects, OfTheStrategyOfAFit) {
                                                  {"--revised-opacity"}}) {
     std::vector<std::string> words = {"--strategy", "mcmc"};
     words.insert(words.end(), option.begin(), option.end());
-    ExpectNoEffect(fit(words), option[0] + " has no effect here; it has one with --strategy default or absgrad");
+    ExpectNoEffect(fit(words), option[0] + " has no effect here; it works only with --strategy default or absgrad");
   }
-  ExpectNoEffect(fit({"--noise-lr", "1"}), "--noise-lr has no effect here; it has one with --strategy mcmc");
-  ExpectNoEffect(fit({"--strategy", "absgrad", "--min-opacity", "0.1"}), "it has one with --strategy mcmc");
-  ExpectNoEffect(fit({"--mip-filter", "--mode", "antialiased"}), "--mode has no effect here; it has one without");
-  ExpectNoEffect(fit({"--strategy", "mcmc", "--max-gaussians", "0"}), "say how many");
+  ExpectNoEffect(fit({"--noise-lr", "1"}), "--noise-lr has no effect here; it works only with --strategy mcmc");
+  ExpectNoEffect(fit({"--strategy", "absgrad", "--min-opacity", "0.1"}), "it works only with --strategy mcmc");
+  ExpectNoEffect(fit({"--mip-filter", "--mode", "antialiased"}), "--mode has no effect here; it works only without");
+  ExpectNoEffect(fit({"--strategy", "mcmc", "--max-gaussians", "0"}), "needs a number to grow to");
   ExpectNoEffect(fit({"--mip-filter", "--pixel", "area"}), "--mip-filter and --pixel area");
   // What has no meaning names the option as it is written.
   for (const char* option : {"--prune-opa", "--grow-scale3d", "--prune-scale3d", "--rate-means-decay"}) {
@@ -98,7 +98,7 @@ TEST_F(Effects, OfCamerasThatSeeNothing) {
   WriteText(cameras, R"({"w": 64, "h": 64, "fl_x": 60, "fl_y": 60, "cx": 32, "cy": 32, "frames": [{"file_path": "a",
       "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,-50],[0,0,0,1]]}]})");
   ExpectRefused({"enhance", scan_, "-o", folder_ / "o.ply", "--method", "filter", "--cameras", cameras},
-                ErrorCode::kBadArgument, {"no Gaussian lies in any of the cameras' views"});
+                ErrorCode::kBadArgument, {"no camera sees any of the Gaussians"});
   const ProgramRun page = ExpectDone({"view", scan_, "-o", folder_ / "o.html", "--cameras", cameras});
   EXPECT_THAT(page.err, HasSubstr("behind the camera"));
   WriteProject(folder_ / "project");
@@ -115,7 +115,7 @@ TEST_F(Effects, OneRunForACheckpoint) {
   {
     const auto other = FileLock::TakeAndRemove(folder_ / "fit.ply.checkpoint.lock");
     ASSERT_TRUE(other.ok());
-    ExpectRefused(words, ErrorCode::kExists, {"another run that keeps its state there is at work"});
+    ExpectRefused(words, ErrorCode::kExists, {"in use by another run"});
   }
   const ProgramRun run = ExpectDone(words);
   EXPECT_THAT(run.err, Not(HasSubstr("warning")));

@@ -10,6 +10,7 @@
 #include "cli/batch.h"
 #include "cli/before_after_page.h"
 #include "cli/clean_output.h"
+#include "cli/help.h"
 #include "cli/named_messages.h"
 #include "cli/output_plan.h"
 #include "cli/standard_output.h"
@@ -77,7 +78,7 @@ Status CheckOutput(const fs::path& output, const CloudWriteOptions& write) {
     for (const SplatFormat& f : Formats()) {
       if (f.write != nullptr) known += Cat(" ", f.extensions.front());
     }
-    return Error{ErrorCode::kBadArgument, Cat(output.string(), ": not a format that is written; known are", known)};
+    return Error{ErrorCode::kBadArgument, Cat(output.string(), ": cannot write this format; supported:", known)};
   }
   return CheckCanWriteCloud(output, 0, write);
 }
@@ -106,12 +107,13 @@ std::vector<fs::path> OutputFiles(const EnhanceWords& flags, const fs::path& out
 // Where each input goes. Nothing may be written twice.
 Result<std::vector<fs::path>> OutputPaths(const EnhanceWords& flags) {
   if (flags.output.empty() == flags.out_dir.empty()) {
-    return Error{ErrorCode::kBadArgument, "say where to write: -o FILE for one input, --out-dir DIR for several"};
+    return Error{ErrorCode::kBadArgument, "no output: pass -o FILE for one input, --out-dir DIR for several"};
   }
   for (const std::string& input : flags.inputs) RecordSplat(input);
   if (!flags.output.empty()) {
     if (flags.inputs.size() > 1) {
-      return Error{ErrorCode::kBadArgument, Cat(flags.inputs.size(), " inputs and one -o file: use --out-dir DIR")};
+      return Error{ErrorCode::kBadArgument,
+                   Cat(flags.inputs.size(), " inputs but one -o file: pass --out-dir DIR instead")};
     }
     return std::vector<fs::path>{flags.output};
   }
@@ -134,7 +136,7 @@ Status MakeOutDir(const EnhanceWords& flags) {
   if (flags.out_dir.empty()) return {};
   std::error_code code;
   fs::create_directories(flags.out_dir, code);
-  if (code) return Error{ErrorCode::kIo, Cat(flags.out_dir, ": cannot make this folder: ", code.message())};
+  if (code) return Error{ErrorCode::kIo, Cat(flags.out_dir, ": cannot create this folder: ", code.message())};
   return {};
 }
 
@@ -167,9 +169,9 @@ int64_t CountOutside(const std::optional<Region>& region, const GaussianCloud& c
 // What the method worked with, where it is the filter's business.
 std::string Details(const EnhanceReport& r) {
   if (r.pixel_size_source == PixelSizeSource::kNone) return "";
-  if (r.pixel_size_source == PixelSizeSource::kUnknown) return ": left as it is";
-  if (r.filter_strength == 0) return IsInvented(r) ? Cat(" x", r.upscale) : ": left as it is";
-  return Cat(" x", r.upscale, ", strength ", Fixed(r.filter_strength, 3), ", pixel size ", r.pixel_size, " (",
+  if (r.pixel_size_source == PixelSizeSource::kUnknown) return ", left unchanged";
+  if (r.filter_strength == 0) return IsInvented(r) ? Cat(" ", r.upscale, "x") : ", left unchanged";
+  return Cat(" ", r.upscale, "x, strength ", Fixed(r.filter_strength, 3), ", pixel size ", r.pixel_size, " (",
              NameOf(r.pixel_size_source), ")");
 }
 
@@ -196,7 +198,7 @@ Error Of(const std::string& input, Error error) {
 // An interruption says how to go on.
 Error WithWayOn(Error error, const fs::path& checkpoint) {
   if (error.code == ErrorCode::kInterrupted && !checkpoint.empty() && Exists(checkpoint)) {
-    error.message += Cat(", the same command with --resume goes on from ", checkpoint.string());
+    error.message += Cat("; to continue, add --resume, which reads ", checkpoint.string());
   }
   return error;
 }
@@ -244,8 +246,7 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   }
   if (!extras.empty() && enhanced.cloud.means != means) {
     if (const std::string lost = extras.lost(/*writer_keeps=*/false); !lost.empty()) {
-      LogWarning(
-          Cat(input, ": other properties of its Gaussians are dropped, as those of the result are others: ", lost));
+      LogWarning(Cat(input, ": extra properties dropped, as the Gaussians changed: ", lost));
     }
     extras = {};
   }
@@ -259,9 +260,10 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
   if (r.interrupted) {
     if (!checkpoint.empty() && Exists(checkpoint)) {
       const Status noted = NoteFilesLeft(checkpoint);
-      if (!noted.ok()) LogWarning(Cat("going on will need -w for what is left here: ", noted.error().message));
+      if (!noted.ok()) LogWarning(Cat("--resume will need -w for the files left here: ", noted.error().message));
     }
-    return WithWayOn({ErrorCode::kInterrupted, Cat("stopped; ", output.string(), " is as far as it came")}, checkpoint);
+    return WithWayOn({ErrorCode::kInterrupted, Cat("stopped; ", output.string(), " holds the result so far")},
+                     checkpoint);
   }
   if (!checkpoint.empty()) RemoveCheckpoint(checkpoint, is_checkpoint);
   nlohmann::json json = ToJson(r);
@@ -273,13 +275,14 @@ Result<nlohmann::json> EnhanceOne(const EnhanceWords& flags, const SharedFlags& 
     ResultsBeside(flags.memory()) << OneLine(input) << " -> " << OutputName(output, flags.memory()) << "\n  "
                                   << WithThousands(r.gaussians_in)
                                   << (r.gaussians_in == 1 ? " Gaussian in, " : " Gaussians in, ")
-                                  << WithThousands(r.gaussians_out) << " out; " << r.method << Details(r) << ", "
-                                  << HumanSeconds(r.seconds) << " (" << HumanSeconds(r.seconds_in_all)
-                                  << " with what is found out before)\n";
+                                  << WithThousands(r.gaussians_out) << " out; " << r.method << Details(r) << "; "
+                                  << HumanSeconds(r.seconds_in_all) << " (analysis "
+                                  << HumanSeconds(r.seconds_in_all - r.seconds) << ", " << r.method << " "
+                                  << HumanSeconds(r.seconds) << ")\n";
     if (flags.view) {
       std::error_code unknown;
       std::cout << "  " << OneLine(PagePath(output)) << ": " << HumanBytes(fs::file_size(PagePath(output), unknown))
-                << ", open it in any browser\n";
+                << "; open it in any browser\n";
     }
   }
   return json;
@@ -289,11 +292,10 @@ Status RunInputs(const EnhanceWords& flags, Program& program) {
   const SharedFlags& shared = program.flags;
   const EnhanceOptions& asked = flags.how.options;
   if (!asked.refine.images.empty() && flags.inputs.size() > 1) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("--images are the pictures of one splat, and there are ", flags.inputs.size(), " inputs")};
+    return Error{ErrorCode::kBadArgument, Cat("--images works with one input only, not ", flags.inputs.size())};
   }
   if (!asked.control.checkpoint.empty() && flags.inputs.size() > 1) {
-    return Error{ErrorCode::kBadArgument, Cat("--checkpoint is for one input, and there are ", flags.inputs.size())};
+    return Error{ErrorCode::kBadArgument, Cat("--checkpoint works with one input only, not ", flags.inputs.size())};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const EnhanceOptions options, MakeEnhanceOptions(flags.how, shared.seed));
   ANCHORSPLAT_ASSIGN_OR_RETURN(const auto outputs, OutputPaths(flags));
@@ -340,11 +342,11 @@ Status RunInputs(const EnhanceWords& flags, Program& program) {
 Status RunEnhance(const EnhanceWords& flags, Program& program) {
   if (!IsStandardOutput(flags.output)) {
     if (flags.to_option->count() == 0) return RunInputs(flags, program);
-    return Error{ErrorCode::kBadArgument, "--to has an effect where the output is -"};
+    return Error{ErrorCode::kBadArgument, "--to works only with -o -"};
   }
-  if (flags.view) return Error{ErrorCode::kBadArgument, "--view writes a page beside the output, and that is -"};
+  if (flags.view) return Error{ErrorCode::kBadArgument, "--view cannot write a page beside standard output"};
   if (flags.how.options.control.resume && flags.how.options.control.checkpoint.empty()) {
-    return Error{ErrorCode::kBadArgument, "--resume needs --checkpoint where the output is -"};
+    return Error{ErrorCode::kBadArgument, "--resume with -o - needs --checkpoint"};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const StandardOutput piped, StandardOutput::ForSplat(flags.to, program.flags));
   EnhanceWords words = flags;
@@ -361,12 +363,14 @@ void AddEnhance(CLI::App& app, Program& program) {
                            "anchorsplat enhance scan.ply -o scan-4x.ply --cameras transforms.json");
   const auto flags = std::make_shared<EnhanceWords>();
   verb.add_option("inputs", flags->inputs, "Splat files")->required()->check(NotEmpty());
-  auto* output = verb.add_option("-o,--output", flags->output, "File to write (one input); - is standard output");
+  auto* output = verb.add_option("-o,--output", flags->output, "Output file, for one input; - is standard output");
   flags->to_option = verb.add_option("--to", flags->to, kPipedFormatHelp)->capture_default_str();
-  verb.add_option("--out-dir", flags->out_dir, "Folder to write to, under the inputs' names")->excludes(output);
+  verb.add_option("--out-dir", flags->out_dir, "Output folder; files keep the names of the inputs")->excludes(output);
   verb.add_flag("--view", flags->view, "Also write an HTML page beside the output that shows before and after");
   flags->how.AddTo(verb);
   flags->size.AddTo(verb);
+  ShortenHelp(verb, {"--output", "--out-dir", "--upscale", "--quality", "--cameras", "--images", "--region",
+                     "--max-gaussians", "--view", "--device", "--overwrite", "--quiet", "--json"});
   program.device.AddTo(verb);
   verb.callback([flags, &verb, &program] {
     flags->how.options.given = GivenOptions(verb);

@@ -36,7 +36,7 @@ class EnhanceVerb : public testing::Test {
 
 TEST_F(EnhanceVerb, Filter) {
   const ProgramRun run = ExpectDone(Enhance({"--method", "filter"}));
-  EXPECT_THAT(run.out, AllOf(HasSubstr("scan.ply -> "), HasSubstr("200 Gaussians in, 200 out; filter x4, strength "),
+  EXPECT_THAT(run.out, AllOf(HasSubstr("scan.ply -> "), HasSubstr("200 Gaussians in, 200 out; filter 4x, strength "),
                              HasSubstr("pixel size 0.02 (given)")));
   EXPECT_THAT(run.err, IsEmpty());
   const nlohmann::json row =
@@ -90,12 +90,12 @@ TEST_F(EnhanceVerb, PixelSizeOfTheCamerasOrOfTheSplat) {
   const ProgramRun run =
       RunWords({"enhance", input, "-o", folder_ / "cameras.ply", "--method", "filter", "--cameras", cameras, "--json"});
   EXPECT_EQ(run.code, 0);
-  EXPECT_THAT(run.err, HasSubstr("--camera-rule median: the cameras look at one thing from all around"));
+  EXPECT_THAT(run.err, HasSubstr("--camera-rule median: the cameras surround the subject"));
   EXPECT_EQ(run.json()[0]["pixel_size"]["source"], "cameras");
   EXPECT_EQ(run.json()[0]["camera_rule"], "median");
   EXPECT_THAT(FileBytes(folder_ / "cameras.ply").substr(0, 500), HasSubstr("\ncomment world up: 0 "));
   const ProgramRun read = ExpectDone({"enhance", input, "-o", folder_ / "auto.ply", "--method", "filter"});
-  EXPECT_THAT(read.err, AllOf(HasSubstr("looks like a classic splat"), HasSubstr(" is taken, from which most is")));
+  EXPECT_THAT(read.err, AllOf(HasSubstr("looks like a classic 3DGS fit"), HasSubstr("using ")));
   EXPECT_THAT(read.out, HasSubstr("(read)"));
 
   WriteText(folder_ / "wide.json", R"([{"id":0,"img_name":"a","width":4096,"height":4096,"position":[0,0,-1.7],)"
@@ -148,7 +148,7 @@ TEST_F(EnhanceVerb, NetworkThatIsPartOfTheProgram) {
   const ProgramRun twice =
       RunWords({"enhance", folder_ / "pruned.ply", "-o", folder_ / "twice.ply", "--pixel-size", "0.02"});
   EXPECT_EQ(twice.code, 0);
-  EXPECT_THAT(twice.err, HasSubstr("enhanced before"));
+  EXPECT_THAT(twice.err, HasSubstr("already enhanced"));
   EXPECT_EQ(FileBytes(folder_ / "twice.ply"), FileBytes(folder_ / "pruned.ply"));
 }
 
@@ -172,14 +172,14 @@ TEST_F(EnhanceVerb, OptionsThatWouldChangeNothing) {
     ExpectRefused(Enhance(words, "bad.ply"), ErrorCode::kBadArgument, {why});
   };
   refused({"--model", compact_, "--normalisation", "bbox"},
-          "--normalisation has no effect with --method model, which auto chose; it has one with a network of the "
+          "--normalisation has no effect with --method model (chosen by auto); it works only with a network of the "
           "published architecture");
   refused({"--model", compact_, "--block-gaussians", "5000"}, "--block-gaussians has no effect");
   refused({"--model", compact_, "--method", "filter"},
-          "--model has no effect with --method filter; it has one with --method model");
+          "--model has no effect with --method filter; it works only with --method model");
   refused({"--prune-opacity", "0.1", "--method", "filter"}, "--prune-opacity has no effect");
   refused({"--precision", "bf16", "--method", "filter"}, "--precision has no effect");
-  refused({"--poses", "5"}, "which auto chose; it has one with --method refine, refine-images or detail");
+  refused({"--poses", "5"}, "(chosen by auto); it works only with --method refine, refine-images or detail");
   refused({"--steps", "5", "--method", "filter"}, "--steps has no effect");
   const std::string cameras = Biplane() / "transforms_hr.json";
   ExpectRefused(Enhance({"--poses", "5", "--method", "refine", "--cameras", cameras}, "bad.ply", ""),
@@ -188,7 +188,7 @@ TEST_F(EnhanceVerb, OptionsThatWouldChangeNothing) {
       Enhance({"--prune-opacity", "0.1", "--method", "filter+refine-images", "--images", cameras, "--steps", "1"},
               "bad.ply", ""),
       ErrorCode::kBadArgument,
-      {"--prune-opacity has no effect with --method filter+refine-images; it has one with --method model"});
+      {"--prune-opacity has no effect with --method filter+refine-images; it works only with --method model"});
   EXPECT_FALSE(Exists("bad.ply"));
 }
 
@@ -240,7 +240,7 @@ TEST_F(EnhanceVerb, RefinementWithPictures) {
   ExpectRefused(Enhance({"--method", "filter", "--images", project}, "x.ply"), ErrorCode::kBadArgument);
   ExpectRefused(
       {"enhance", scan_, folder_ / "out.ply", "--method", "refine", "--out-dir", folder_ / "two", "--images", project},
-      ErrorCode::kBadArgument, {"the pictures of one splat"});
+      ErrorCode::kBadArgument, {"one input only"});
 }
 
 TEST_F(EnhanceVerb, RefinementsThatMakeNoSense) {
@@ -281,8 +281,8 @@ TEST_F(EnhanceVerb, Batches) {
   ExpectRefused({"enhance", scan_, Biplane() / "input.ply", Biplane() / "../stone_lantern/input.ply", "--out-dir",
                  folder_ / "same"},
                 ErrorCode::kBadArgument, {"would both become"});
-  ExpectRefused(Enhance({other}, "bad.ply"), ErrorCode::kBadArgument, {"2 inputs and one -o file"});
-  ExpectRefused({"enhance", scan_}, ErrorCode::kBadArgument, {"say where to write"});
+  ExpectRefused(Enhance({other}, "bad.ply"), ErrorCode::kBadArgument, {"2 inputs but one -o file"});
+  ExpectRefused({"enhance", scan_}, ErrorCode::kBadArgument, {"no output"});
 }
 
 TEST_F(EnhanceVerb, Cleans) {

@@ -25,12 +25,12 @@ int ExitCode(ErrorCode code) {
 std::span<const ExitCodeMeaning> ExitCodeMeanings() {
   static const std::array meanings = {
       ExitCodeMeaning{0, "done"},
-      ExitCodeMeaning{kPartialExitCode, "done, but not for all inputs; of doctor: something is broken"},
-      ExitCodeMeaning{kUsageExitCode, "the command line or a value on it makes no sense"},
-      ExitCodeMeaning{ExitCode(ErrorCode::kNotFound), "a file or folder is not there"},
-      ExitCodeMeaning{ExitCode(ErrorCode::kBadFile), "a file is malformed, truncated or of a kind that is not read"},
-      ExitCodeMeaning{ExitCode(ErrorCode::kExists), "a file exists and -w was not given"},
-      ExitCodeMeaning{ExitCode(ErrorCode::kIo), "the system refused to read, write or give memory"},
+      ExitCodeMeaning{kPartialExitCode, "done for some inputs only; doctor: a part is broken"},
+      ExitCodeMeaning{kUsageExitCode, "invalid command line or value"},
+      ExitCodeMeaning{ExitCode(ErrorCode::kNotFound), "file or folder not found"},
+      ExitCodeMeaning{ExitCode(ErrorCode::kBadFile), "malformed, truncated or unsupported file"},
+      ExitCodeMeaning{ExitCode(ErrorCode::kExists), "file exists and -w was not given"},
+      ExitCodeMeaning{ExitCode(ErrorCode::kIo), "reading, writing or memory allocation failed"},
       ExitCodeMeaning{ExitCode(ErrorCode::kInterrupted), "interrupted"},
   };
   return meanings;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "cli/clean_output.h"
+#include "cli/help.h"
 #include "cli/standard_output.h"
 #include "cli/stop_signal.h"
 #include "cli/verb.h"
@@ -102,15 +103,15 @@ Status WriteResults(const FitWords& flags, const Fitted& fitted, bool overwrite)
 }
 
 Error Interrupted(const FitWords& flags, const FitReport& report, int64_t steps, const fs::path& checkpoint) {
-  std::string after = "there is nothing to resume from";
+  std::string after = "no checkpoint to resume from";
   if (report.kept_step == report.steps) {
-    after = Cat("--resume goes on from ", checkpoint.string());
+    after = Cat("--resume continues from ", checkpoint.string());
   } else if (report.kept_step) {
-    after = Cat("--resume goes on at step ", WithThousands(*report.kept_step), " from ", checkpoint.string());
+    after = Cat("--resume continues at step ", WithThousands(*report.kept_step), " from ", checkpoint.string());
   }
   return {ErrorCode::kInterrupted,
           Cat("stopped after ", WithThousands(report.steps), " of ", WithThousands(steps), " steps; ", flags.output,
-              flags.piped != nullptr ? " got nothing, " : " is what there was, ", after)};
+              flags.piped != nullptr ? " was not written; " : " holds the result so far; ", after)};
 }
 
 Status RunProject(const FitWords& flags, const SharedFlags& shared) {
@@ -155,10 +156,10 @@ Status RunProject(const FitWords& flags, const SharedFlags& shared) {
 Status RunFit(const FitWords& flags, const SharedFlags& shared) {
   if (!IsStandardOutput(flags.output)) {
     if (flags.to_option->count() == 0) return RunProject(flags, shared);
-    return Error{ErrorCode::kBadArgument, "--to has an effect where the output is -"};
+    return Error{ErrorCode::kBadArgument, "--to works only with -o -"};
   }
   if ((flags.how.resume || flags.how.checkpoint_every > 0) && flags.how.checkpoint.empty()) {
-    return Error{ErrorCode::kBadArgument, "--resume and --checkpoint-every need --checkpoint where the output is -"};
+    return Error{ErrorCode::kBadArgument, "--resume and --checkpoint-every with -o - need --checkpoint"};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const StandardOutput piped, StandardOutput::ForSplat(flags.to, shared));
   FitWords words = flags;
@@ -177,16 +178,18 @@ void AddFit(CLI::App& app, Program& program) {
   verb.add_option(
           "project", flags->project,
           "Folder with pictures and cameras: COLMAP, NeRF-synthetic, transforms.json, Metashape, OpenSfM, Bundler, "
-          "our data sets")
+          "or of `dataset build`")
       ->required()
       ->check(NotEmpty());
-  verb.add_option("-o,--output", flags->output, "Splat to write; - is standard output")->required()->check(NotEmpty());
+  verb.add_option("-o,--output", flags->output, "Output file; - is standard output")->required()->check(NotEmpty());
   flags->to_option = verb.add_option("--to", flags->to, kPipedFormatHelp)->capture_default_str();
-  verb.add_option("--gsplat-checkpoint", flags->gsplat_checkpoint,
-                  "Also write a checkpoint as gsplat's trainer does (.pt)")
+  verb.add_option("--gsplat-checkpoint", flags->gsplat_checkpoint, "Also write a checkpoint of gsplat's trainer (.pt)")
       ->check(NotEmpty());
   flags->how.AddTo(verb);
   program.device.AddTo(verb);
+  ShortenHelp(verb,
+              {"--output", "--steps", "--max-gaussians", "--strategy", "--downscale", "--hold-out", "--background",
+               "--exposure", "--mip-filter", "--resume", "--to", "--device", "--overwrite", "--quiet", "--json"});
   verb.callback([flags, &verb, &program] {
     flags->how.given = GivenOptions(verb);
     program.run = [flags, &program] { return RunFit(*flags, program.flags); };

@@ -57,8 +57,8 @@ TEST_F(FitVerb, SaysWhatItDid) {
 TEST_F(FitVerb, SaysWhereNothingIsLeft) {
   const ProgramRun run = ExpectDone(Fit(
       "faded.ply", {"--strategy", "mcmc", "--max-gaussians", "200", "--opacity-reg", "1000", "--rate-opacities", "1"}));
-  EXPECT_THAT(run.err, HasSubstr("next to nothing is left of this fit: 0 of "));
-  EXPECT_THAT(ExpectDone(Fit("fit.ply", {})).err, Not(HasSubstr("next to nothing")));
+  EXPECT_THAT(run.err, HasSubstr("the fit failed: only 0 of "));
+  EXPECT_THAT(ExpectDone(Fit("fit.ply", {})).err, Not(HasSubstr("the fit failed")));
 }
 
 TEST_F(FitVerb, BeginsWhereItIsTold) {

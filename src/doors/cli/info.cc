@@ -24,7 +24,7 @@ namespace anchorsplat {
 namespace {
 
 std::string_view ModeName(std::optional<RenderMode> mode) {
-  return mode ? NameOf(*mode) : "not said (render, compare and view take it for classic)";
+  return mode ? NameOf(*mode) : "not tagged (render, compare and view assume classic)";
 }
 
 std::string Number(double value) {
@@ -54,18 +54,18 @@ void PrintTable(const SplatFindings& f) {
   if (!f.render_mode && !f.lost_no_width) {
     std::cout << "  looks like   " << LooksInWords(f) << "\n";
   }
-  std::cout << "  enhance does " << TreatmentInWords(f) << "\n";
+  std::cout << "  can sharpen  " << TreatmentInWords(f) << "\n";
   for (const std::string& credit : CreditsOf(f.comments)) {
     std::cout << "  credit       " << Printable(credit, kMostCredit) << "\n";
   }
   if (const auto up = UpOf(f.comments)) {
     std::cout << "  up           " << Number((*up)[0]) << " " << Number((*up)[1]) << " " << Number((*up)[2])
-              << ", as its comments say\n";
+              << " (from the comments)\n";
   }
   for (const auto& [name, value] : f.facts.all()) std::cout << "  " << name << "  " << value << "\n";
   if (!IsZero(f.origin)) {
     std::cout << "  origin       " << TextOf(f.origin)
-              << " (positions are kept relative to it; all others are in the world)\n";
+              << " (positions are stored relative to it; bounds are in the world)\n";
   }
   if (s.bounds) {
     std::cout << "  bounds      ";
@@ -93,7 +93,7 @@ void PrintTable(const SplatFindings& f) {
                             row("smallest axis", s.smallest_axis),
                             row("axis ratio", s.axis_ratio),
                             row("opacity", s.opacity)});
-  std::cout << "\nwritten as:";
+  std::cout << "\nsize as:";
   for (const SplatFormat& format : Formats()) {
     if (format.write == nullptr || format.predicted_size == nullptr) continue;
     std::cout << "  " << format.name << (format.size_is_estimate ? " about " : " ")
@@ -140,12 +140,10 @@ Status RunInfo(const InfoFlags& flags, const SharedFlags& shared) {
 }  // namespace
 
 void AddInfo(CLI::App& app, Program& program) {
-  CLI::App& verb =
-      AddVerb(app, program, "info", "What is in a splat file, a model or a mesh, and what is wrong with it",
-              "anchorsplat info scan.ply --json");
+  CLI::App& verb = AddVerb(app, program, "info", "Inspect a splat, a network or a mesh, and report problems",
+                           "anchorsplat info scan.ply --json");
   const auto flags = std::make_shared<InfoFlags>();
-  verb.add_option("file", flags->file, "Splat file, checkpoint of a network, mesh, or library.sh3f[#object]")
-      ->required();
+  verb.add_option("file", flags->file, "Splat, network weights, mesh, or library.sh3f[#object]")->required();
   verb.add_option("--from", flags->from, kInputFormatHelp)->check(NotEmpty());
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunInfo(*flags, program.flags); }; });
 }

@@ -28,7 +28,7 @@ TEST_F(InfoVerb, OfASplat) {
   const std::string input = Biplane() / "input.ply";
   const ProgramRun table = ExpectDone({"info", input});
   EXPECT_THAT(table.out, AllOf(HasSubstr("20,000, SH degree 3"), HasSubstr("training pixel  0.00"),
-                               HasSubstr("written as:"), HasSubstr("largest axis")));
+                               HasSubstr("size as:"), HasSubstr("largest axis")));
   EXPECT_THAT(table.err, IsEmpty());
   const nlohmann::json json = ExpectJson({"info", input});
   EXPECT_EQ(json["file"], input);
@@ -39,8 +39,7 @@ TEST_F(InfoVerb, OfASplat) {
   EXPECT_NEAR(json["predicted_bytes"]["PLY"].get<double>(), json["bytes"].get<double>(), 1000);  // comments
   EXPECT_EQ(json["counts"]["not_finite"], 0);
   EXPECT_THAT(table.out, Not(HasSubstr("looks like"))) << "as the file says its render mode";
-  EXPECT_THAT(table.out,
-              ContainsRegex("enhance does a network at pixels of 0.00[0-9]+; [0-9.]+ dB are expected at 4x"));
+  EXPECT_THAT(table.out, ContainsRegex("can sharpen  yes: network, pixel size 0.00[0-9]+, about .[0-9.]+ dB at 4x"));
   EXPECT_EQ(json["reading"]["looks"], "classic");
   EXPECT_EQ(json["reading"]["probabilities"].size(), kMadeCount);
   EXPECT_NEAR(json["reading"]["pixel"].get<double>(), 0.0055, 0.002);
@@ -63,7 +62,7 @@ TEST_F(InfoVerb, OfThingsThatLieApart) {
   ASSERT_TRUE(WriteCloud(input, merged).ok());
   const ProgramRun run =
       ExpectDone({"enhance", input, "-o", folder_ / "out.ply", "--method", "filter", "--mode", "classic", "--json"});
-  EXPECT_THAT(run.err, HasSubstr("made of 2 things that lie apart, each read by itself"));
+  EXPECT_THAT(run.err, HasSubstr("2 separate parts"));
   const nlohmann::json enhanced = run.json()[0];
   EXPECT_EQ(enhanced["pixel_size"]["source"], "read");
   EXPECT_GE(enhanced["seconds_in_all"].get<double>(), enhanced["seconds"].get<double>());
@@ -158,7 +157,7 @@ void ExpectLittleIsDone(const std::string& splat, const std::string& output) {
   const nlohmann::json enhanced = run.json()[0];
   if (info["method"] == "none") {
     EXPECT_EQ(enhanced["filter_strength"], 0);
-    EXPECT_THAT(run.err, AllOf(HasSubstr("left as it is: "), HasSubstr("--mode classic")));
+    EXPECT_THAT(run.err, AllOf(HasSubstr("left unchanged: "), HasSubstr("--mode classic")));
     return;
   }
   EXPECT_LT(info["pixel"], 0.5 * 0.0055);
@@ -170,7 +169,7 @@ void ExpectLittleIsDone(const std::string& splat, const std::string& output) {
 TEST_F(InfoVerb, OfUntaggedSplats) {
   const std::string fit = folder_ / "fit.splat", filtered = folder_ / "filtered.splat";
   ExpectDone({"convert", Biplane() / "input.ply", fit});  // has no place for tags
-  EXPECT_THAT(ExpectDone({"info", fit}).out, HasSubstr("looks like   a classic splat ("));
+  EXPECT_THAT(ExpectDone({"info", fit}).out, HasSubstr("looks like   a classic 3DGS fit ("));
   ExpectDone({"enhance", fit, "-o", filtered, "--method", "filter", "--pixel-size", "0.0055"});
   EXPECT_EQ(ExpectJson({"info", filtered})["reading"]["looks"], "filtered");
   ExpectLittleIsDone(filtered, folder_ / "again.ply");
@@ -179,11 +178,11 @@ TEST_F(InfoVerb, OfUntaggedSplats) {
       ExpectDone({"enhance", fit, "-o", folder_ / "filtered.ply", "--method", "filter", "--pixel-size", "0.0055"}).out,
       HasSubstr("strength 0.740"));
   EXPECT_THAT(ExpectDone({"info", folder_ / "filtered.ply"}).out,
-              AllOf(HasSubstr("enhance does nothing: its comments say"), Not(HasSubstr("looks like"))));
+              AllOf(HasSubstr("can sharpen  no: its comments say"), Not(HasSubstr("looks like"))));
   const ProgramRun twice =
       ExpectDone({"enhance", folder_ / "filtered.ply", "-o", folder_ / "twice.ply", "--copies", "2"});
-  EXPECT_THAT(twice.err, AllOf(HasSubstr("enhanced before"), HasSubstr("--copies has no effect")));
-  EXPECT_THAT(twice.out, HasSubstr("left as it is"));
+  EXPECT_THAT(twice.err, AllOf(HasSubstr("already enhanced"), HasSubstr("--copies has no effect")));
+  EXPECT_THAT(twice.out, HasSubstr("left unchanged"));
 }
 
 // Formats that keep no comments keep what networks leave: Gaussians in twins.

@@ -95,7 +95,8 @@ std::string ManPage(const CLI::App& app) {
   out += ".SH NAME\nanchorsplat \\- " + Roff(colon == std::string::npos ? purpose : purpose.substr(colon + 2)) + "\n";
   out +=
       ".SH SYNOPSIS\n\\fBanchorsplat\\fR \\fIVERB\\fR [\\fIOPTIONS\\fR] ...\n.br\n"
-      "\\fBanchorsplat\\fR \\fIVERB\\fR \\fB\\-\\-help\\fR\n.br\n\\fBanchorsplat \\-\\-version\\fR\n";
+      "\\fBanchorsplat\\fR \\fIVERB\\fR \\fB\\-\\-help\\fR | \\fB\\-\\-help\\-all\\fR\n.br\n\\fBanchorsplat "
+      "\\-\\-version\\fR\n";
   out += ".SH VERBS\n";
   for (const DeclaredVerb& verb : verbs) AddSummary(verb, out);
   out += ".SH \"FLAGS OF EVERY VERB\"\n";

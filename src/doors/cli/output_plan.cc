@@ -30,12 +30,11 @@ bool IsYes(const std::string& answer) { return answer == "y" || answer == "Y" ||
 void SizeFlags::AddTo(CLI::App& verb) {
   const std::string group = "Large splats";
   verb.add_option("--max-memory", max_memory,
-                  "Memory to work in, as 2G or 500M; what needs more lies in temporary files beside the output "
+                  "Most memory for large arrays, such as 2G or 500M; beyond it, temporary files beside the output "
                   "(default: a quarter of the machine's)")
       ->transform(MemorySize())
       ->group(group);
-  verb.add_flag("--yes", yes, "Do not ask before files of more than 4 GB, or more than the disk has room for")
-      ->group(group);
+  verb.add_flag("--yes", yes, "Write without asking, even more than 4 GB or than the disk has room for")->group(group);
 }
 
 uint64_t SizeFlags::memory() const { return max_memory > 0 ? max_memory : DefaultMaxMemory(); }
@@ -96,19 +95,19 @@ Status SayAndAsk(std::span<const OutputPlan> plans, const SizeFlags& flags, cons
   if (!why.empty() && !flags.yes && !can_ask) {
     const auto largest = std::ranges::max_element(plans, {}, &OutputPlan::bytes);
     return Error{ErrorCode::kBadArgument, Cat(Spoken(*largest, flags), "; ", why,
-                                              ": nothing was done. --yes does it all the same; --max-gaussians N "
-                                              "makes it smaller")};
+                                              ". Nothing was written; pass --yes to write it anyway, or "
+                                              "--max-gaussians N to make it smaller")};
   }
   for (const OutputPlan& plan : plans) {
     const bool worth_a_word = plan.bytes >= kWorthAWord || plan.seconds.value_or(0) >= kLongWait;
     if (!why.empty() || worth_a_word) LogInfo(Spoken(plan, flags));
   }
   if (why.empty() || flags.yes) return {};
-  std::cerr << why << ". Go on? [y/N] " << std::flush;
+  std::cerr << why << ". Continue? [y/N] " << std::flush;
   std::string answer;
   std::getline(std::cin, answer);
   if (IsYes(answer)) return {};
-  return Error{ErrorCode::kBadArgument, Cat(plans.front().output.string(), ": not written, as nobody said yes")};
+  return Error{ErrorCode::kBadArgument, Cat(plans.front().output.string(), ": not written, as the answer was not yes")};
 }
 
 }  // namespace anchorsplat

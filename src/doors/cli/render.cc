@@ -8,6 +8,7 @@
 
 #include "cameras/view_labels.h"
 #include "cli/clean_output.h"
+#include "cli/help.h"
 #include "cli/standard_output.h"
 #include "cli/verb.h"
 #include "core/file_system.h"
@@ -45,8 +46,8 @@ Result<std::vector<fs::path>> OutputPaths(const std::string& output, const Camer
     return Error{ErrorCode::kBadArgument, Cat("-o ", output, ": pictures are written as .png")};
   }
   if (to_file && cameras.cameras.size() > 1) {
-    return Error{ErrorCode::kBadArgument, Cat("-o ", output, " is one picture and there are ", cameras.cameras.size(),
-                                              " views: give a folder, or choose one with --view NAME")};
+    return Error{ErrorCode::kBadArgument, Cat("-o ", output, " is one picture, but there are ", cameras.cameras.size(),
+                                              " views: pass a folder, or choose one with --view NAME")};
   }
   std::vector<fs::path> paths;
   std::map<fs::path, std::string> taken;
@@ -132,7 +133,7 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
   }
   if (empty_views > 0) {
     LogWarning(
-        Cat(empty, " --near and --far say what is in range",
+        Cat(empty, " Check --near and --far",
             empty_views > 1 ? Cat(" (", empty_views - 1, " more of ", paths.size(), " views are as empty)") : ""));
   }
   if (shared.json) {
@@ -149,7 +150,7 @@ Status RunRender(const RenderFlags& flags, const SharedFlags& shared) {
                                 << (cloud.size() == 1 ? " Gaussian in " : " Gaussians in ") << HumanSeconds(seconds)
                                 << " (without reading and "
                                 << "writing) to " << OutputName(output, write.memory)
-                                << (network ? ", enlarged by a network, whose invention the detail is" : "") << '\n';
+                                << (network ? ", enlarged by a network, which invents detail" : "") << '\n';
   }
   return piped ? piped->Send() : Status();
 }
@@ -161,17 +162,18 @@ void AddRender(CLI::App& app, Program& program) {
                            "anchorsplat render scan.ply -o views/ --orbit 8 --size 800x600 --background 1,1,1");
   const auto flags = std::make_shared<RenderFlags>();
   verb.add_option("input", flags->input, "Splat file")->required();
-  verb.add_option("-o,--output", flags->output,
-                  "A .png file for one view, or - for standard output; a folder for several")
+  verb.add_option("-o,--output", flags->output, "One view: a .png file, or - for standard output. Several: a folder")
       ->required()
       ->check(NotEmpty());
   flags->views.AddTo(verb);
   verb.add_option("--enlarge-with", flags->enlarge_with,
-                  "A network's .safetensors (scripts/fetch-upscaler.sh) that enlarges what was rendered")
+                  "Network that enlarges the renders, a .safetensors of scripts/fetch-upscaler.sh")
       ->check(NotEmpty());
   verb.add_flag("--transparent", flags->transparent, "Write an alpha channel instead of a background")
       ->excludes("--background");
   program.device.AddTo(verb);
+  ShortenHelp(verb, {"--output", "--cameras", "--orbit", "--radius", "--up", "--view", "--size", "--background",
+                     "--transparent", "--device", "--overwrite", "--quiet", "--json"});
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunRender(*flags, program.flags); }; });
 }
 

@@ -101,7 +101,7 @@ TEST_F(RenderVerb, UpOfAnOrbit) {
 TEST_F(RenderVerb, SaysWhatIsNotToBeSeen) {
   EXPECT_THAT(ExpectDone(Render("far", {"--orbit", "10", "--size", "32x32", "--near", "100"})).err,
               AllOf(HasSubstr("shows nothing of the 200 Gaussians: 200 before the near plane (100)"),
-                    HasSubstr("--near and --far say what is in range (9 more of 10 views are as empty)")));
+                    HasSubstr("Check --near and --far (9 more of 10 views are as empty)")));
   EXPECT_THAT(ExpectDone({"compare", scan_, scan_, "--orbit", "2", "--size", "32x32", "--far", "0.1"}).err,
               HasSubstr("200 beyond the far plane (0.1)"));
   WriteNanScan(folder_ / "nan.ply");
@@ -114,7 +114,7 @@ TEST_F(RenderVerb, RefusesWhatMakesNoSense) {
   const auto refused = [&](const std::string& out, const std::vector<std::string>& words, const std::string& why) {
     ExpectRefused(Render(out, words), ErrorCode::kBadArgument, {why});
   };
-  refused("two.png", {"--orbit", "2"}, "is one picture and there are 2 views");
+  refused("two.png", {"--orbit", "2"}, "is one picture, but there are 2 views");
   refused("x.jpg", {"--orbit", "1"}, "written as .png");
   refused("x.png", {"--orbit", "1", "--size", "0x5"}, "--size");
   refused("x.png", {"--orbit", "1", "--size", "32768x32768"}, "pixels");

@@ -42,11 +42,10 @@ bool IsStandardOutput(const std::filesystem::path& output) { return output == "-
 
 Result<StandardOutput> StandardOutput::Open(const std::string& extension, const SharedFlags& shared) {
   if (shared.json) {
-    return Error{ErrorCode::kBadArgument, "--json and the output - would both go to standard output: name a file"};
+    return Error{ErrorCode::kBadArgument, "--json and -o - both need standard output: write to a file"};
   }
   if (::isatty(STDOUT_FILENO) == 1) {
-    return Error{ErrorCode::kBadArgument,
-                 "the output - is a terminal, which binary data would garble: send it to a file or a program (> or |)"};
+    return Error{ErrorCode::kBadArgument, "standard output is a terminal: redirect it to a file or a program (> or |)"};
   }
   return StandardOutput(kName + extension);
 }
@@ -58,14 +57,13 @@ Result<StandardOutput> StandardOutput::ForSplat(const std::string& name, const S
     for (const SplatFormat& one : Formats()) {
       if (one.write != nullptr) written += Cat(" ", one.extensions.front());
     }
-    return Error{ErrorCode::kBadArgument,
-                 Cat("--to: '", Printable(name), "' is no format that is written; written are", written)};
+    return Error{ErrorCode::kBadArgument, Cat("--to: '", Printable(name), "' cannot be written; supported:", written)};
   }
   const std::string extension(format->extensions.front());
   const bool is_folder = name.ends_with(".json");
   if (format->several_files || is_folder || FilesOfCloud("x" + extension, kMaxShDegree).size() > 1) {
     return Error{ErrorCode::kBadArgument,
-                 Cat("--to ", Printable(name), ": that is several files, and standard output is one")};
+                 Cat("--to ", Printable(name), " writes several files, and standard output is one")};
   }
   return Open(extension, shared);
 }

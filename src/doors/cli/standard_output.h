@@ -12,7 +12,7 @@
 
 namespace anchorsplat {
 
-inline constexpr const char* kPipedFormatHelp = "Extension of what goes to standard output, where the output is -";
+inline constexpr const char* kPipedFormatHelp = "With -o -: format, by its extension";
 
 // Whether an output is called so that it goes to standard output: "-" or /dev/stdout.
 bool IsStandardOutput(const std::filesystem::path& output);

@@ -1,9 +1,14 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace anchorsplat {
+
+// Columns that `text` takes on a terminal.
+size_t DisplayWidth(std::string_view text);
 
 // Rows of text as aligned columns, two spaces apart: the first column left-aligned, the others right-aligned. The first
 // row is the heading and gets a rule below it. Cells may hold any bytes: what could command a terminal or end the line

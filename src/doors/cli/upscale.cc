@@ -52,7 +52,7 @@ Result<std::vector<BatchItem>> Items(const UpscaleWords& flags, bool overwrite) 
   }
   if (to_file && found.size() > 1) {
     return Error{ErrorCode::kBadArgument,
-                 Cat("-o ", flags.output, " is one picture and there are ", found.size(), ": give a folder")};
+                 Cat("-o ", flags.output, " is one picture, but there are ", found.size(), ": pass a folder")};
   }
   std::vector<BatchItem> items;
   std::map<fs::path, fs::path> taken;
@@ -131,8 +131,7 @@ Status RunUpscale(UpscaleWords flags, Program& program) {
   if (!program.flags.json && !program.flags.quiet) {
     ResultsBeside(write.memory) << "enlarged " << done << (done == 1 ? " picture " : " pictures ") << options.factor
                                 << " times in " << HumanSeconds(seconds) << " (without reading and writing) to "
-                                << OutputName(flags.output, write.memory)
-                                << "; the detail is the network's invention\n";
+                                << OutputName(flags.output, write.memory) << "; the network invents detail\n";
   }
   return piped ? piped->Send() : Status();
 }
@@ -140,14 +139,14 @@ Status RunUpscale(UpscaleWords flags, Program& program) {
 }  // namespace
 
 void AddUpscale(CLI::App& app, Program& program) {
-  CLI::App& verb = AddVerb(app, program, "upscale", "Enlarge pictures by a network that you have",
+  CLI::App& verb = AddVerb(app, program, "upscale", "Enlarge pictures with a network",
                            "anchorsplat upscale renders/ -o large/ --network span.safetensors");
   const auto flags = std::make_shared<UpscaleWords>();
   verb.add_option("pictures", flags->pictures, "PNG, JPEG, WebP or TIFF files, or folders of them")
       ->required()
       ->check(NotEmpty());
   verb.add_option("-o,--output", flags->output,
-                  "A folder for PNGs; for one picture a .png file, or - for standard output")
+                  "Folder for PNGs; for one picture also a .png file, or - for standard output")
       ->required()
       ->check(NotEmpty());
   flags->how.AddTo(verb);

@@ -54,7 +54,7 @@ class UpscaleVerb : public testing::Test {
 TEST_F(UpscaleVerb, OnePictureAndAFolder) {
   const std::string one = folder_ / "one.png", in = folder_ / "in", a = folder_ / "in/a.png";
   EXPECT_THAT(ExpectDone(Upscale({a, "-o", one})).out,
-              testing::AllOf(HasSubstr("enlarged 1 picture 2 times"), HasSubstr("invention")));
+              testing::AllOf(HasSubstr("enlarged 1 picture 2 times"), HasSubstr("invents")));
   EXPECT_EQ(ReadImage(one)->pixels, Repeated(*ReadImage(a), 2).pixels);
   EXPECT_THAT(FileBytes(one), HasSubstr("Enlarged 2 times by a network (srmd-1), which invented the detail."));
   EXPECT_FALSE(IsOwnRendering(one));
@@ -122,7 +122,7 @@ TEST_F(UpscaleVerb, RefusesWhatMakesNoSense) {
   const auto refused = [&](const std::vector<std::string>& words, const std::string& why) {
     ExpectRefused(Upscale(words), ErrorCode::kBadArgument, {why});
   };
-  refused({in, "-o", folder_ / "x.png"}, "is one picture and there are 2");
+  refused({in, "-o", folder_ / "x.png"}, "is one picture, but there are 2");
   refused({a, "-o", folder_ / "x.jpg"}, "written as .png");
   refused({a, "-o", x, "--factor", "3"}, "--factor: a network that enlarges 2 times");
   refused({a, "-o", x, "--background", "red"}, "--background");

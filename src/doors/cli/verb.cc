@@ -11,6 +11,7 @@
 
 #include "cli/clean_output.h"
 #include "cli/gpu_report.h"
+#include "cli/help.h"
 #include "cli/json_sink.h"
 #include "cli/verb_tree.h"
 #include "cli/verb_words.h"
@@ -41,24 +42,22 @@ CLI::App& AddVerb(CLI::App& app, Program& program, const std::string& name, cons
   verb.footer("Example:\n  " + example);
   SharedFlags& flags = program.flags;
   const std::string group = kSharedFlagsGroup;
-  verb.add_flag("-w,--overwrite", flags.overwrite, "Replace files that exist (else refuse)")->group(group);
-  verb.add_flag("-q,--quiet", flags.quiet, "Only warnings and errors on stderr")->group(group);
-  verb.add_flag("--json", flags.json, "Results as one JSON document on stdout")->group(group);
+  verb.add_flag("-w,--overwrite", flags.overwrite, "Replace existing files (default: refuse)")->group(group);
+  verb.add_flag("-q,--quiet", flags.quiet, "Print only warnings and errors")->group(group);
+  verb.add_flag("--json", flags.json, "Print the result as JSON on stdout")->group(group);
   AddChoice(verb, "--progress", flags.json_progress, {{"bar", false}, {"json", true}},
-            "bar: messages to read and bars on a terminal; json: a line of JSON on stderr for each message and step")
+            "On stderr. bar: text, with progress bars on a terminal; json: one JSON line per message and step")
       ->group(group);
-  verb.add_option("--threads", flags.threads, "Threads to use; 0 is the whole machine")
+  verb.add_option("--threads", flags.threads, "CPU threads; 0: all")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--seed", flags.seed, "Seed of everything random")
-      ->check(NotNegative())
-      ->capture_default_str()
-      ->group(group);
+  verb.add_option("--seed", flags.seed, "Random seed")->check(NotNegative())->capture_default_str()->group(group);
   return verb;
 }
 
 void AddVerbs(CLI::App& app, Program& program) {
+  AddHelp(app);
   AddEnhance(app, program);
   AddInfo(app, program);
   AddRender(app, program);
@@ -129,7 +128,7 @@ int RunProgram(int argc, const char* const* argv, Trainer trainer) {
     if (!std::cout) return Fail(flags, {ErrorCode::kIo, "standard output could not be written"});
     return program.exit_code;
   } catch (const RunAbandoned&) {
-    return Fail(flags, {ErrorCode::kInterrupted, "stopped; what was being written is gone"});
+    return Fail(flags, {ErrorCode::kInterrupted, "stopped; unfinished output was removed"});
   } catch (const NoDiskRoom& none) {
     return Fail(flags, {ErrorCode::kIo, none.what()});
   } catch (const std::bad_alloc&) {

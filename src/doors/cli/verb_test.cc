@@ -6,6 +6,7 @@
 
 #include "cli/run_for_test.h"
 #include "cli/small_scan_for_test.h"
+#include "cli/table.h"
 #include "cli/verb_tree.h"
 #include "core/text.h"
 #include "io/folder_for_test.h"
@@ -33,6 +34,13 @@ std::vector<DeclaredVerb> VerbsWithOptions() {
   return out;
 }
 
+std::vector<std::string> HelpLines(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  return lines;
+}
+
 TEST(CommandLine, Version) {
   const ProgramRun run = ExpectDone({"--version"});
   EXPECT_EQ(run.out, Cat("anchorsplat ", ANCHORSPLAT_VERSION, "\n"));
@@ -48,9 +56,36 @@ TEST(CommandLine, HelpListsEveryVerbAndEachHasItsOwn) {
     std::vector<std::string> words = verb.words;
     words.emplace_back("--help");
     const ProgramRun run = ExpectDone(words);
-    EXPECT_THAT(run.out, AllOf(HasSubstr("Example:\n  anchorsplat " + verb.name()), HasSubstr("--overwrite")));
+    EXPECT_THAT(run.out, AllOf(HasSubstr("Example:\n  anchorsplat " + verb.name()), HasSubstr("--json")));
     EXPECT_THAT(run.err, IsEmpty());
+    EXPECT_LE(HelpLines(run.out).size(), 40u) << verb.name();
+    for (const std::string& line : HelpLines(run.out))
+      EXPECT_LE(DisplayWidth(line), 100u) << verb.name() << ": " << line;
+    words.back() = "--help-all";
+    const std::string all = ExpectDone(words).out;
+    for (const DeclaredOption& option : verb.options) {
+      EXPECT_THAT(all, HasSubstr(option.names.empty() ? option.positional : option.names.back())) << verb.name();
+    }
   }
+}
+
+TEST(CommandLine, HelpOfEnhanceIsShortAndHelpAllHasGroups) {
+  const std::string brief = ExpectDone({"enhance", "--help"}).out, all = ExpectDone({"enhance", "--help-all"}).out;
+  for (const char* option : {"--output", "--upscale", "--quality", "--cameras", "--images", "--region",
+                             "--max-gaussians", "--device", "--help-all"}) {
+    EXPECT_THAT(brief, HasSubstr(option));
+  }
+  EXPECT_THAT(brief, Not(HasSubstr("--shuffles")));
+  EXPECT_THAT(all, AllOf(HasSubstr("\nRefinement:\n"), HasSubstr("\nNetwork:\n"), HasSubstr("\nShared flags:\n")));
+  const std::string script = all.substr(all.find("\nPublished network, as its script runs it:\n"));
+  for (const char* option : {"--compat", "--normalisation", "--attention-rounding", "--curve-depth", "--shuffles"}) {
+    EXPECT_LT(script.find(option), script.find("\n\n", 1)) << option;
+  }
+}
+
+TEST(CommandLine, HelpAllOfTheProgramHasEveryVerb) {
+  const std::string all = ExpectDone({"--help-all"}).out;
+  for (const DeclaredVerb& verb : VerbsWithOptions()) EXPECT_THAT(all, HasSubstr("Usage: anchorsplat " + verb.name()));
 }
 
 TEST(CommandLine, WordsThatAreNoVerb) {

@@ -49,7 +49,8 @@ DeclaredVerb Declared(const CLI::App& app, std::vector<std::string> words) {
     out.verbs.push_back(Declared(*verb, std::move(below)));
   }
   for (const CLI::Option* option : app.get_options()) {
-    if (option != app.get_help_ptr() && !option->get_group().empty()) out.options.push_back(Declared(*option));
+    const bool help = option == app.get_help_ptr() || option == app.get_help_all_ptr();
+    if (!help && !option->get_group().empty()) out.options.push_back(Declared(*option));
   }
   return out;
 }
@@ -63,5 +64,13 @@ std::string DeclaredVerb::name(const char* between) const {
 }
 
 std::vector<DeclaredVerb> DeclaredVerbs(const CLI::App& app) { return Declared(app, {}).verbs; }
+
+DeclaredVerb DeclaredBy(const CLI::App& verb) {
+  std::vector<std::string> words;
+  for (const CLI::App* at = &verb; at->get_parent() != nullptr; at = at->get_parent()) {
+    words.insert(words.begin(), at->get_name());
+  }
+  return Declared(verb, std::move(words));
+}
 
 }  // namespace anchorsplat

@@ -34,8 +34,10 @@ struct DeclaredVerb {
 
 inline constexpr const char* kSharedFlagsGroup = "Shared flags";
 
-// Hidden verbs and options are left out, --help too.
+// Hidden verbs and options are left out, --help and --help-all too.
 std::vector<DeclaredVerb> DeclaredVerbs(const CLI::App& app);
+// `verb` itself; the program has no words.
+DeclaredVerb DeclaredBy(const CLI::App& verb);
 
 // roff of the manual page anchorsplat(1).
 std::string ManPage(const CLI::App& app);

@@ -9,6 +9,7 @@
 
 #include "cli/clean_output.h"
 #include "cli/edit_steps_report.h"
+#include "cli/help.h"
 #include "cli/standard_output.h"
 #include "cli/stop_signal.h"
 #include "cli/verb.h"
@@ -52,8 +53,7 @@ uint64_t FileBytes(const fs::path& path) {
 void WarnOfLargePage(const PageWords& flags, int64_t gaussians, uint64_t bytes) {
   if (flags.folder || gaussians <= kManyGaussians) return;
   LogWarning(Cat(flags.output, ": ", WithThousands(gaussians), " Gaussians in one file of ", HumanBytes(bytes),
-                 ": a browser shows nothing before it has all of it, and needs several times that in memory; --folder "
-                 "writes the data beside the page, which shows them as they come"));
+                 ", which a browser loads whole and slowly. --folder writes a page that streams"));
 }
 
 struct Shown {
@@ -74,8 +74,8 @@ Result<Shown> ReadShown(const fs::path& path, const std::optional<RenderMode>& m
     WarnOfUnusable(path.string(), shown.cloud);
     return shown;
   }
-  return Error{ErrorCode::kBadFile, Cat(path.string(), ": there is nothing to show: all of its ",
-                                        WithThousands(shown.cloud.size()), " Gaussians have NaN or infinite values")};
+  return Error{ErrorCode::kBadFile, Cat(path.string(), ": nothing to show: all ", WithThousands(shown.cloud.size()),
+                                        " Gaussians have NaN or infinite values")};
 }
 
 // The edits that were asked for, in their order. Cameras stay where they are: they fit no splat that has moved.
@@ -85,7 +85,7 @@ Result<std::vector<EditAction>> EditsOf(const PageWords& flags) {
     const bool moves = std::holds_alternative<MoveWorld>(action.what) || std::holds_alternative<TurnToUp>(action.what);
     if (moves && !flags.how.cameras.empty()) {
       return Error{ErrorCode::kBadArgument,
-                   Cat(action.words, " moves the splat away from its cameras: leave out --cameras")};
+                   Cat(action.words, " moves the splat away from its cameras: drop --cameras")};
     }
   }
   return std::move(actions[0]);
@@ -119,15 +119,15 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
     }
     ANCHORSPLAT_ASSIGN_OR_RETURN(piped, StandardOutput::Open(".html", shared));
   } else if (!IsPageName(flags.output)) {
-    return Error{ErrorCode::kBadArgument, Cat("--output: ", flags.output, " is no name for a page, expected .html")};
+    return Error{ErrorCode::kBadArgument, Cat("--output: ", flags.output, " is not a .html file")};
   }
   if (!piped) ANCHORSPLAT_RETURN_IF_ERROR(CheckWritable(flags.output, shared.overwrite));
   ANCHORSPLAT_ASSIGN_OR_RETURN(ViewerPage page, MakePage(flags.how));
   page.memory = piped ? piped->memory() : nullptr;
   const fs::path output = piped ? piped->path() : fs::path(flags.output);
   page.folder = flags.folder;
-  page.smaller = flags.folder ? "leave out some of the true pictures (--views)"
-                              : Cat("--folder writes a page of any size with its data beside it; or ", page.smaller);
+  page.smaller = flags.folder ? "use fewer ground-truth pictures (--views)"
+                              : Cat("pass --folder for a page with its data beside it; or ", page.smaller);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<EditAction> actions, EditsOf(flags));
   const StopSignal stop_signal(StopSignal::Leaves::kNothing);
   ANCHORSPLAT_ASSIGN_OR_RETURN(Shown after, ReadShown(flags.after, flags.how.mode));
@@ -161,7 +161,7 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
     ResultsBeside(page.memory)
         << OutputName(output, page.memory) << ": " << HumanBytes(bytes)
         << (piped          ? ", a page for any browser\n"
-            : flags.folder ? ", with its data in the folder beside it: they belong together; open it in any browser\n"
+            : flags.folder ? ", with its data in the folder beside it; keep them together. Open it in any browser\n"
                            : ", open it in any browser\n");
     PrintSteps(steps, ResultsBeside(page.memory));
   }
@@ -171,20 +171,22 @@ Status RunView(const PageWords& flags, const SharedFlags& shared) {
 }  // namespace
 
 void AddView(CLI::App& app, Program& program) {
-  CLI::App& verb = AddVerb(app, program, "view", "Write one HTML file that shows a splat, before and after, anywhere",
-                           "anchorsplat view scan-4x.ply --before scan.ply -o page.html");
+  CLI::App& verb =
+      AddVerb(app, program, "view", "Write an HTML page that shows a splat in any browser, before and after",
+              "anchorsplat view scan-4x.ply --before scan.ply -o page.html");
   const auto flags = std::make_shared<PageWords>();
   verb.add_option("after", flags->after, "Splat file")->required();
   verb.add_option("-o,--output", flags->output, "HTML file to write; - is standard output")->required();
-  verb.add_option("--before", flags->before,
-                  "Splat to compare with; with edits, the splat as it is where none is said");
+  verb.add_option("--before", flags->before, "Splat to compare with (default with edits: the unedited splat)");
   verb.add_flag("--folder", flags->folder,
-                "Put the splats' data into a folder beside the page, PAGE.data, from which it shows the largest "
-                "Gaussians first: for splats of any size");
+                "Store the splats in a folder beside the page, PAGE.data, and stream the largest Gaussians first; for "
+                "large splats");
   flags->how.AddTo(verb);
   flags->edits.AddTo(verb);
   verb.remove_option(verb.get_option("--dry-run"));  // of `convert`: here the page shows it
   program.device.AddTo(verb);
+  ShortenHelp(verb, {"--output", "--before", "--cameras", "--truth", "--title", "--background", "--sh-degree",
+                     "--folder", "--filter-box", "--filter-floaters", "--overwrite", "--quiet", "--json"});
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunView(*flags, program.flags); }; });
 }
 

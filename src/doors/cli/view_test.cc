@@ -77,7 +77,7 @@ TEST_F(ViewVerb, ShowsEditsBesideTheSplatAsItIs) {
 
 TEST_F(ViewVerb, AFolderBesideThePage) {
   const ProgramRun run = ExpectDone({"view", scan_, "--before", scan_, "--folder", "-o", page_});
-  EXPECT_THAT(run.out, HasSubstr("they belong together"));
+  EXPECT_THAT(run.out, HasSubstr("keep them together"));
   EXPECT_TRUE(fs::is_regular_file(folder_ / "page.data/after-0.js"));
   EXPECT_TRUE(fs::is_regular_file(folder_ / "page.data/before-0.js"));
   EXPECT_THAT(FileBytes(page_), HasSubstr(R"("file":"page.data/after-0.js")"));
@@ -121,7 +121,7 @@ TEST_F(ViewVerb, RefusesWhatMakesNoSense) {
   const std::string before = FileBytes(scan_);
   ExpectRefused({"view", scan_, "-o", folder_ / "other.spz", "-w"}, ErrorCode::kBadArgument, {".html"});
   const std::string nan = WriteNanScan(folder_ / "nan.ply");
-  ExpectRefused({"view", nan, "-o", page_}, ErrorCode::kBadFile, {"nan.ply: there is nothing to show"});
+  ExpectRefused({"view", nan, "-o", page_}, ErrorCode::kBadFile, {"nan.ply: nothing to show"});
   EXPECT_EQ(FileBytes(scan_), before);
   EXPECT_FALSE(fs::exists(page_));
 }

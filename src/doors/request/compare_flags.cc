@@ -23,7 +23,7 @@ Status CheckNothingIsRendered(const CompareFlags& flags) {
   for (const std::string& option : flags.given) {
     for (const char* name : {"orbit", "radius", "target", "fov", "size", "near", "far", "mode", "up", "profile"}) {
       if (option == name) {
-        return Error{ErrorCode::kBadArgument, Cat("--", name, " has no effect on pictures; it has one on splats")};
+        return Error{ErrorCode::kBadArgument, Cat("--", name, " has no effect on pictures; it works only with splats")};
       }
     }
   }
@@ -56,8 +56,8 @@ bool NeedsPhotographs(const SideInput* side) {
 
 void CompareFlags::AddTo(CLI::App& verb) {
   verb.add_flag("--color-correct", color_correct,
-                "Measure again after the affine map of each view's colours (3x3 and an offset) that brings it nearest "
-                "to the pictures: what is left of photographs' exposure and white balance is taken out");
+                "Also measure after an affine colour correction of each view (3x3 and an offset), which removes "
+                "differences in exposure and white balance");
   views.AddTo(verb);
 }
 
@@ -66,7 +66,7 @@ Result<Sides> OpenSides(const CompareFlags& flags, SideInput a, SideInput b, Sid
   if (flags.color_correct && !IsPictures(reference)) {
     return Error{ErrorCode::kBadArgument, Cat("--color-correct has no effect against ",
                                               reference.cloud ? "a splat" : reference.path + ", which is a splat",
-                                              "; it has one against pictures (--truth, or B without it)")};
+                                              "; it works only against pictures (--truth, else B)")};
   }
   const std::array<SideInput*, 3> inputs = {&a, &b, &truth};
   const GaussianCloud* first = nullptr;
@@ -90,8 +90,7 @@ Result<Sides> OpenSides(const CompareFlags& flags, SideInput a, SideInput b, Sid
   std::optional<CameraSet> cameras;
   if (first != nullptr) {
     if (!has_cameras && flags.views.orbit == 0) {
-      return Error{ErrorCode::kBadArgument,
-                   "comparing a splat needs views: --cameras FILE, or --orbit N for views around it"};
+      return Error{ErrorCode::kBadArgument, "comparing a splat needs views: pass --cameras FILE or --orbit N"};
     }
     ANCHORSPLAT_ASSIGN_OR_RETURN(cameras, MakeViews(flags.views, *first, given));
   } else if (has_cameras) {

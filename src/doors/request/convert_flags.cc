@@ -23,52 +23,52 @@ nlohmann::json ToJson(const Deviation& deviation) { return {{"rms", deviation.rm
 
 void ConvertFlags::AddTo(CLI::App& verb) {
   verb.add_option("--from", from, kInputFormatHelp)->check(NotEmpty());
-  AddModeOption(verb, options.render_mode,
-                "How the splat is rasterized, for a tag in the output (default: as the input says)");
-  verb.add_option("--sh-degree", options.sh_degree, "Spherical harmonics to keep, 0 to 3")->check(CLI::Range(0, 3));
-  verb.add_option("--min-opacity", options.min_opacity, "Drop Gaussians that are fainter, 0 to 1")
+  AddModeOption(verb, options.render_mode, "Rasterization to note in the output (default: as in the input)");
+  verb.add_option("--sh-degree", options.sh_degree, "Highest degree of spherical harmonics to keep, 0 to 3")
+      ->check(CLI::Range(0, 3));
+  verb.add_option("--min-opacity", options.min_opacity, "Drop Gaussians with less opacity, 0 to 1")
       ->check(Fraction())
       ->capture_default_str();
-  verb.add_option("--max-gaussians", options.max_gaussians, "Keep at most so many, those of the largest size x opacity")
+  verb.add_option("--max-gaussians", options.max_gaussians, "Keep at most so many, the largest by size x opacity")
       ->check(AtLeastOne());
-  verb.add_option("--coords", axes,
-                  "What the files' axes really are where they do not follow their format, as IN:OUT, for example RUB: "
-                  "for a PLY with y up, RFU: for one with z up, :RDF for an SPZ as careless programs expect it")
+  verb.add_option(
+          "--coords", axes,
+          "Axes of files that break the rule of their format, as IN:OUT. RUB: is a PLY with y up, RFU: one with "
+          "z up, :RDF writes an SPZ without turning it")
       ->check(NotEmpty());
-  verb.add_option("--scales", scales, "What the input's scales are, whatever its format wants: logarithms or lengths")
+  verb.add_option("--scales", scales, "How the input stores scales, if not as its format requires")
       ->check(CLI::IsMember({"logarithms", "lengths"}))
       ->capture_default_str();
-  verb.add_option("--opacities", opacities, "What the input's opacities are, whatever its format wants: logits or 0-1")
+  verb.add_option("--opacities", opacities, "How the input stores opacities, if not as its format requires")
       ->check(CLI::IsMember({"logits", "0-1"}))
       ->capture_default_str();
-  verb.add_option("--colors", colors, "What the input's f_dc are: harmonics, or colours 0-1 or 0-255")
+  verb.add_option("--colors", colors, "How the input stores f_dc: as harmonics, or as colours 0-1 or 0-255")
       ->check(CLI::IsMember({"harmonics", "0-1", "0-255"}))
       ->capture_default_str();
   edits.AddTo(verb);
   double_means = verb.add_flag("--double", options.double_means,
-                               "PLY: world coordinates in double precision instead of floats from an origin that a "
-                               "comment says (default: where the input has them)");
+                               "PLY: write world coordinates as doubles, not as floats relative to an origin in a "
+                               "comment (default: as in the input)");
   spz_version = AddWriteFlags(verb, options.write);
   LodOptions& lod = options.write.lod;
   const std::string group = "Levels of detail";
   of_streamed = {
-      verb.add_option("--lod-levels", lod.levels, "Levels in a lod-meta.json, with the splat itself, 1 to 16")
+      verb.add_option("--lod-levels", lod.levels, "Levels in a lod-meta.json including the full splat, 1 to 16")
           ->check(CLI::Range(1, 16)),
-      verb.add_option("--lod-ratio", lod.ratio, "Gaussians of each level to those of the finer one, 0.01 to 0.99")
+      verb.add_option("--lod-ratio", lod.ratio, "Gaussians in each level as a fraction of the finer one, 0.01 to 0.99")
           ->check(CLI::Range(0.01, 0.99)),
-      verb.add_option("--lod-chunk-count", lod.chunk_count, "Gaussians in a chunk at most, in units of 1,024")
+      verb.add_option("--lod-chunk-count", lod.chunk_count, "Most Gaussians in a chunk, in units of 1,024")
           ->check(CLI::Range(1, 1 << 17)),
-      verb.add_option("--lod-chunk-extent", lod.chunk_extent,
-                      "Longest side of what changes its level as one, in world units")
+      verb.add_option("--lod-chunk-extent", lod.chunk_extent, "Longest side of a chunk, in world units")
           ->check(Positive())};
   for (CLI::Option* option : of_streamed) option->capture_default_str()->group(group);
-  verb.add_option("--lod-level", options.lod_level, "Level to read of a lod-meta.json: 0 is the finest")
+  verb.add_option("--lod-level", options.lod_level, "Level to read from a lod-meta.json; 0 is the finest")
       ->check(NotNegative())
       ->capture_default_str()
       ->group(group);
   auto* report_option =
-      verb.add_flag("--report", report, "Read the output back: attribute errors, and PSNR of pictures of both");
-  verb.add_option("--report-views", views, "Views around the splat for the PSNR")
+      verb.add_flag("--report", report, "Read the output back and report errors per attribute and PSNR of renders");
+  verb.add_option("--report-views", views, "With --report: views around the splat for the PSNR")
       ->check(CLI::Range(1, 1000))
       ->needs(report_option)
       ->capture_default_str();
@@ -94,24 +94,24 @@ Result<ConvertOptions> MakeConvertOptions(const ConvertFlags& flags, bool overwr
 Status CheckConvertEffects(const ConvertFlags& flags, std::span<const std::filesystem::path> outputs) {
   const auto is_spz = [](const std::filesystem::path& output) { return output.extension() == ".spz"; };
   if (flags.spz_version->count() > 0 && std::ranges::none_of(outputs, is_spz)) {
-    return Error{ErrorCode::kBadArgument, "--spz-version has no effect here; it has one where a .spz is written"};
+    return Error{ErrorCode::kBadArgument, "--spz-version has no effect here; it works only with a .spz output"};
   }
   const auto is_ply = [](const std::filesystem::path& output) {
     const SplatFormat* const format = FormatOfExtension(output);
     return format != nullptr && format->write_with_extras != nullptr;
   };
   if (flags.double_means->count() > 0 && std::ranges::none_of(outputs, is_ply)) {
-    return Error{ErrorCode::kBadArgument, "--double has no effect here; it has one where a .ply is written"};
+    return Error{ErrorCode::kBadArgument, "--double has no effect here; it works only with a .ply output"};
   }
   const auto is_streamed = [](const std::filesystem::path& output) { return output.filename() == "lod-meta.json"; };
   for (const CLI::Option* option : flags.of_streamed) {
     if (option->count() > 0 && std::ranges::none_of(outputs, is_streamed)) {
       return Error{ErrorCode::kBadArgument,
-                   Cat(option->get_name(), " has no effect here; it has one where a lod-meta.json is written")};
+                   Cat(option->get_name(), " has no effect here; it works only with a lod-meta.json output")};
     }
   }
   if (flags.options.write.order != SplatOrder::kFormat && std::ranges::all_of(outputs, is_streamed)) {
-    return Error{ErrorCode::kBadArgument, "--sort has no effect here: a lod-meta.json has an order of its own"};
+    return Error{ErrorCode::kBadArgument, "--sort has no effect here: lod-meta.json has its own order"};
   }
   const auto says_mode = [](const std::filesystem::path& output) {
     const SplatFormat* const format = FormatOfExtension(output);
@@ -119,8 +119,8 @@ Status CheckConvertEffects(const ConvertFlags& flags, std::span<const std::files
   };
   if (flags.options.render_mode && std::ranges::none_of(outputs, says_mode)) {
     return Error{ErrorCode::kBadArgument,
-                 "--mode has no effect here; it has one where a file is written that has a place for it (.ply, "
-                 ".compressed.ply, .spz, .sog)"};
+                 "--mode has no effect here; it works only with an output that stores it (.ply, .compressed.ply, .spz, "
+                 ".sog)"};
   }
   return {};
 }
@@ -163,7 +163,7 @@ Result<Converted> ConvertAndMeasure(const EditJob& job, const std::filesystem::p
     ANCHORSPLAT_ASSIGN_OR_RETURN(done.loss, MeasureConversionLoss(cloud, back, views));
   } else if (kept != nullptr) {
     LogWarning(Cat(output.string(), ": ", done.report.output_format,
-                   " is only written, not read: --report has nothing to compare"));
+                   " cannot be read back, so --report has nothing to compare"));
   }
   return done;
 }

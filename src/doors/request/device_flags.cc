@@ -11,9 +11,9 @@ namespace anchorsplat {
 void DeviceFlags::AddTo(CLI::App& verb) {
   verb.add_option_function<std::string>(
           "--device", [this](const std::string& word) { device = *ParseDeviceChoice(word); },
-          "What rasterizes: cpu; gpu, the first that can be used; auto, a real GPU where there is one, else the CPU; "
-          "or "
-          "the number of an adapter (doctor lists them)")
+          "Rasterize on cpu, gpu (the first usable one), auto (a hardware GPU, else the CPU) or adapter number N "
+          "(listed by "
+          "`doctor`)")
       ->check(CLI::Validator(
           [](const std::string& word) {
             const auto choice = ParseDeviceChoice(word);
@@ -22,7 +22,7 @@ void DeviceFlags::AddTo(CLI::App& verb) {
           ""))
       ->default_str(DeviceWord(device))
       ->group(kDeviceGroup);
-  verb.add_option("--max-gpu-memory", max_gpu_memory, "GPU memory to work in at most, as 4G or 500M (default: 2 GiB)")
+  verb.add_option("--max-gpu-memory", max_gpu_memory, "Most GPU memory to use, such as 4G or 500M (default: 2 GiB)")
       ->transform(MemorySize())
       ->group(kDeviceGroup);
 }

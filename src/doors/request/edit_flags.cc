@@ -13,7 +13,7 @@ namespace anchorsplat {
 
 void EditFlags::AddTo(CLI::App& on) {
   verb = &on;
-  const std::string group = "Edits, in the order in which they stand";
+  const std::string group = "Edits, applied in the order given";
   for (const ActionName& action : ActionNames()) {
     const std::string names(action.options), help(action.help);
     // Nothing is bound: their words are read with their places, once all are known.
@@ -28,19 +28,19 @@ void EditFlags::AddTo(CLI::App& on) {
     options.push_back(option);
   }
   axes_option = on.add_option("--action-axes", axes,
-                              "Axes along which the numbers of edits are: LUF, x left, y up and z forward, as "
-                              "splat-transform counts; RDF as info, --region and --target count")
+                              "Axes of the edits' numbers. LUF: x left, y up, z forward, as in splat-transform. "
+                              "RDF: as in info, --region and --target")
                     ->check(NotEmpty())
                     ->capture_default_str()
                     ->group(group);
-  on.add_flag("--dry-run", dry_run, "Write nothing: say how many Gaussians each edit would take away")->group(group);
+  on.add_flag("--dry-run", dry_run, "Write nothing; report how many Gaussians each edit would remove")->group(group);
 }
 
 Result<Axes> ParseActionAxes(const std::string& name) {
   if (const std::optional<Axes> axes = AxesFromName(name)) return *axes;
   return Error{ErrorCode::kBadArgument, Cat("--action-axes: \"", Printable(name),
-                                            "\" are no axes: expected Right or Left, Up or Down, Front or Back, each "
-                                            "once, for x, y and z, as in RDF or LUF")};
+                                            "\" is not a set of axes. Expected one each of R or L, U or D and F or B, "
+                                            "such as RDF or LUF")};
 }
 
 nlohmann::json ToJson(std::span<const EditStep> steps) {
@@ -74,7 +74,8 @@ Result<std::vector<std::vector<EditAction>>> ActionsAmongPaths(const EditFlags& 
     any = true;
   }
   if (!any && flags.axes_option->count() > 0) {
-    return Error{ErrorCode::kBadArgument, "--action-axes has no effect here; it has one with edits, as --translate"};
+    return Error{ErrorCode::kBadArgument,
+                 "--action-axes has no effect here; it works only with edits such as --translate"};
   }
   return actions;
 }

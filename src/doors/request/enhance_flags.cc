@@ -66,7 +66,7 @@ Status FinishModelOptions(const EnhanceFlags& flags, ModelSettings& model) {
 }
 
 std::string MethodHelp() {
-  std::string text = "auto: the best one available without further input";
+  std::string text = "auto: the best for what is given";
   for (const EnhanceMethod& method : AllMethods()) text += "; " + method.name + ": " + method.summary;
   return text;
 }
@@ -74,101 +74,112 @@ std::string MethodHelp() {
 void AddMethodFlags(CLI::App& verb, EnhanceFlags& flags) {
   EnhanceOptions& options = flags.options;
   verb.add_option("--method", options.method, MethodHelp())->capture_default_str();
-  verb.add_option(
-          "--quality", options.quality,
-          "Instead of a method, by the time there is. fast: the filter and the network, as auto, a second; good: "
-          "the network, then a little refinement, several seconds; best: refinement with the pictures of "
-          "--images, minutes, and good where there are none")
+  verb.add_option("--quality", options.quality,
+                  "How much time to spend. fast: filter or network, about a second. good: then a short refinement, "
+                  "several seconds. best: refinement against --images, minutes; without --images as good. Replaces "
+                  "--method")
       ->check(CLI::IsMember({"fast", "good", "best"}));
-  verb.add_option("--upscale", options.upscale, "How many times closer it will be seen; at least 1")
-      ->capture_default_str();
+  verb.add_option("--upscale", options.upscale, "Zoom to prepare for; at least 1")->capture_default_str();
   verb.add_option("--max-gaussians,--most-gaussians", options.max_gaussians,
-                  "Budget of the result, spent where the closer view shows it: the cheapest copies of a network are "
-                  "merged, refinement splits what is seen most. Of the published architecture: anchors at most, the "
-                  "largest by opacity x size. 0 is all")
+                  "Budget for the output, spent where the closer view shows it; 0: no limit. With a published network: "
+                  "the largest anchors by opacity x size")
       ->check(NotNegative())
       ->capture_default_str();
   verb.add_option("--region", flags.region,
-                  "Only what lies in there is enhanced, the rest stays as it is: a box X0,Y0,Z0,X1,Y1,Z1 or a sphere "
-                  "X,Y,Z,RADIUS, in the splat's unit")
+                  "Enhance only this part: a box X0,Y0,Z0,X1,Y1,Z1 or a sphere X,Y,Z,RADIUS in world units")
       ->check(NotEmpty());
 }
 
 void AddPixelSizeFlags(CLI::App& verb, EnhanceFlags& flags) {
+  const std::string group = "Pixel size";
   EnhanceOptions& options = flags.options;
-  verb.add_option("--pixel-size", flags.pixel_size,
-                  "World size of one pixel of the training views (depth / focal length), or auto: it is read off the "
-                  "splat")
-      ->capture_default_str();
-  AddModeOption(verb, flags.mode,
-                "How the inputs were rasterized in training (default: a file's tag, else as its Gaussians look)");
-  auto* cameras = verb.add_option("--cameras", flags.cameras, "Training cameras: exact pixel size for every Gaussian")
+  auto* cameras = verb.add_option("--cameras", flags.cameras,
+                                  "Training cameras (COLMAP, transforms.json, ...): the exact pixel size of every "
+                                  "Gaussian")
                       ->check(NotEmpty());
-  verb.add_option("--train-width", options.train_width,
-                  "Image width in training where it was less than the cameras say")
+  verb.add_option("--pixel-size", flags.pixel_size,
+                  "World size of a training pixel (depth / focal length); auto: estimate it from the splat")
+      ->capture_default_str()
+      ->group(group);
+  AddModeOption(verb, flags.mode,
+                "Rasterization in training (default: the file's tag, else estimated from the Gaussians)")
+      ->group(group);
+  verb.add_option("--train-width", options.train_width, "Image width in training, if smaller than in --cameras")
       ->check(Positive())
-      ->needs(cameras);
+      ->needs(cameras)
+      ->group(group);
   AddChoice(verb, "--camera-rule", options.camera_rule,
             {{"auto", CameraPixelRule::kAuto},
              {"smallest", CameraPixelRule::kSmallest},
              {"median", CameraPixelRule::kMedian}},
-            "Which of the views that hold a Gaussian says its pixel size: the smallest never blurs, the median suits "
-            "objects seen from all around; auto: by where the cameras stand and look")
-      ->needs(cameras);
+            "Which view of a Gaussian sets its pixel size. smallest: never blurs. median: for objects seen from all "
+            "around. auto: by the camera layout")
+      ->needs(cameras)
+      ->group(group);
   verb.add_option("--filter-strength", options.filter_strength,
-                  "Share of the absorbed 0.3 px² to give back (default: 1 - (1 - 1/upscale²)/3.6)");
+                  "Share of the absorbed 0.3 px² to give back (default: 1 - (1 - 1/upscale²)/3.6)")
+      ->group(group);
 }
 
-void AddModelFlags(CLI::App& verb, EnhanceFlags& flags) {
-  const std::string group = "Model";
+void AddNetworkFlags(CLI::App& verb, EnhanceFlags& flags) {
+  const std::string group = "Network";
   PublishedOptions& model = flags.options.model.options;
-  verb.add_option("--model", flags.model_file,
-                  "Weights of an AnchorSplat network or of a compact one, .pth or .safetensors")
+  verb.add_option("--model", flags.model_file, "Weights of a compact or AnchorSplat network, .safetensors or .pth")
       ->check(NotEmpty())
       ->group(group);
-  const auto model_option = [&](CLI::Option* option) { return option->group(group); };
-  model_option(verb.add_option("--compat", flags.compat,
-                               "upstream: do what the published script does, quirks included (its fp16 attention by "
-                               "--attention-rounding fp16)"))
-      ->check(CLI::IsMember({"upstream"}));
-  model_option(AddChoice(verb, "--normalisation", model.normalisation,
-                         {{"auto", NormalisationMode::kAuto},
-                          {"centered", NormalisationMode::kCentered},
-                          {"bbox", NormalisationMode::kBbox},
-                          {"unit", NormalisationMode::kUnit}},
-                         "How the splat is brought into the network's cube"));
-  model_option(AddChoice(verb, "--precision", flags.options.model.precision,
-                         {{"fp32", WeightPrecision::kFloat}, {"bf16", WeightPrecision::kBFloat16}},
-                         "Of matrix products, convolutions and attention; bf16 only where the processor has products "
-                         "of it (`doctor` says), else fp32"));
-  model_option(AddChoice(verb, "--attention-rounding", model.rounding,
-                         {{"none", Rounding::kNone}, {"fp16", Rounding::kHalf}, {"bf16", Rounding::kBFloat16}},
-                         "Of queries, keys, values and probabilities; the release: fp16"));
-  model_option(AddChoice(verb, "--curve-depth", model.depth_rule,
-                         {{"v1.5", DepthRule::kLargest}, {"v1.6", DepthRule::kLargestPlusOne}},
-                         "Bits of the space-filling curves as Pointcept's release counted them"));
-  model_option(
-      verb.add_option("--shuffles", flags.shuffles,
-                      "Orders of the space-filling curves: identity, a seed of PyTorch's, or five permutations"))
-      ->capture_default_str();
-  model_option(verb.add_option("--copies", flags.copies,
-                               "Gaussians that a compact network makes of each, at most; auto: fewer where hardly "
-                               "anybody would see the difference"))
-      ->capture_default_str();
-  model_option(verb.add_option("--merge-cost", flags.options.model.merge_cost,
-                               "Of --copies auto: what each Gaussian less may cost, in pixels of the closer view times "
-                               "the square of the difference; more is fewer Gaussians (default: 0.001 for "
-                               "standard fits, 0.0001 for others)"))
-      ->check(NotNegative());
+  verb.add_option("--copies", flags.copies,
+                  "Most Gaussians that a compact network makes of each; auto: fewer where the difference is invisible")
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--merge-cost", flags.options.model.merge_cost,
+                  "With --copies auto: most error per merged Gaussian, in closer-view pixels x squared difference "
+                  "(default: 0.001 for standard fits, else 0.0001)")
+      ->check(NotNegative())
+      ->group(group);
   verb.add_option("--prune-opacity", model.prune_opacity,
-                  "Leave Gaussians of less opacity out of what the model makes; 1/255 = 0.0039 is invisible")
+                  "Drop network output fainter than this; 1/255 = 0.0039 is invisible")
       ->check(Fraction())
-      ->group(group)
-      ->capture_default_str();
-  model_option(verb.add_option("--block-gaussians", model.block_gaussians,
-                               "Larger splats are enhanced in overlapping blocks of this many"))
+      ->capture_default_str()
+      ->group(group);
+  verb.add_option("--block-gaussians", model.block_gaussians,
+                  "Enhance larger splats in overlapping blocks of this size")
       ->check(CLI::Range(int64_t{1000}, int64_t{100'000'000}))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->group(group);
+  AddChoice(verb, "--precision", flags.options.model.precision,
+            {{"fp32", WeightPrecision::kFloat}, {"bf16", WeightPrecision::kBFloat16}},
+            "Of matrix products, convolutions and attention; bf16 needs processor support (`doctor` reports it)")
+      ->group(group);
+}
+
+// What the published script does otherwise than this program.
+void AddPublishedScriptFlags(CLI::App& verb, EnhanceFlags& flags) {
+  const std::string group = "Published network, as its script runs it";
+  PublishedOptions& model = flags.options.model.options;
+  verb.add_option("--compat", flags.compat,
+                  "upstream: repeat the published script, quirks included; its fp16 attention is "
+                  "--attention-rounding fp16")
+      ->check(CLI::IsMember({"upstream"}))
+      ->group(group);
+  AddChoice(verb, "--normalisation", model.normalisation,
+            {{"auto", NormalisationMode::kAuto},
+             {"centered", NormalisationMode::kCentered},
+             {"bbox", NormalisationMode::kBbox},
+             {"unit", NormalisationMode::kUnit}},
+            "How to fit the splat into the network's unit cube")
+      ->group(group);
+  AddChoice(verb, "--attention-rounding", model.rounding,
+            {{"none", Rounding::kNone}, {"fp16", Rounding::kHalf}, {"bf16", Rounding::kBFloat16}},
+            "Rounding of queries, keys, values and probabilities; the release uses fp16")
+      ->group(group);
+  AddChoice(verb, "--curve-depth", model.depth_rule,
+            {{"v1.5", DepthRule::kLargest}, {"v1.6", DepthRule::kLargestPlusOne}},
+            "Bits of the space-filling curves, by Pointcept release")
+      ->group(group);
+  verb.add_option("--shuffles", flags.shuffles,
+                  "Order of the space-filling curves: identity, a PyTorch seed, or five permutations")
+      ->capture_default_str()
+      ->group(group);
 }
 
 }  // namespace
@@ -177,12 +188,13 @@ void EnhanceFlags::AddTo(CLI::App& verb) {
   AddMethodFlags(verb, *this);
   AddPixelSizeFlags(verb, *this);
   verb.add_flag("--clean", options.clean,
-                "First take out Gaussians of the background's colour that none of up to 48 training views would miss, "
-                "as black dust around objects on black; dark parts of the object may go, too");
+                "First remove background-coloured Gaussians that no training view would miss (dust around objects on "
+                "black). May remove dark parts of the object");
   verb.add_option("--background", background,
-                  "R,G,B from 0 to 1, of the training views, for --clean and refinement (default: what the camera file "
-                  "says, else the splat's own comment, else black)");
-  AddModelFlags(verb, *this);
+                  "Background of the training views for --clean and refinement, R,G,B from 0 to 1 (default: from the "
+                  "camera file, else the splat's comment, else black)");
+  AddNetworkFlags(verb, *this);
+  AddPublishedScriptFlags(verb, *this);
   AddRefineFlags(verb, options.refine, options.control);
 }
 

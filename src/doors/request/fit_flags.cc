@@ -36,15 +36,14 @@ void AddShellFlag(CLI::App& verb, std::optional<int64_t>& count) {
     count = text != "auto" && CLI::detail::lexical_cast(text, value) ? std::optional(value) : std::nullopt;
   };
   verb.add_option_function<std::string>("--shell", assign,
-                                        "Gaussians on a sphere far beyond cameras and points, for what is seen "
-                                        "there: how many, 0: none; auto: some where the project's points leave "
-                                        "much of the pictures open")
+                                        "Gaussians on a far sphere, for sky and distant background: how many; 0: "
+                                        "none; auto: some if the project's points leave much of the pictures empty")
       ->check(CLI::Validator(check, ""))
       ->default_str("auto");
 }
 
 void AddScheduleFlags(CLI::App& verb, FitFlags& f) {
-  const std::string group = "Densification (names of gsplat's strategies; steps default to their schedules, scaled)";
+  const std::string group = "Densification (names as in gsplat; steps default to its schedules, scaled to --steps)";
   DensificationOptions& d = f.standard.densification;
   const auto steps = [&](const char* name, std::optional<int64_t>& value, const char* help) {
     verb.add_option(name, value, help)->check(CLI::Range(int64_t{1}, kMostSteps))->group(group);
@@ -52,10 +51,10 @@ void AddScheduleFlags(CLI::App& verb, FitFlags& f) {
   const auto number = [&](const char* name, double& value, const char* help, const CLI::Validator& check) {
     verb.add_option(name, value, help)->check(check)->capture_default_str()->group(group);
   };
-  steps("--refine-start", f.refine_start, "First growth after this step");
-  steps("--refine-stop", f.refine_stop, "No growth from this step on");
-  steps("--refine-every", f.refine_every, "Steps between growths");
-  steps("--reset-every", f.reset_every, "Steps between resets of opacity");
+  steps("--refine-start", f.refine_start, "Grow after this step");
+  steps("--refine-stop", f.refine_stop, "Stop growing at this step");
+  steps("--refine-every", f.refine_every, "Steps between rounds of growth");
+  steps("--reset-every", f.reset_every, "Steps between opacity resets");
   steps("--sh-degree-interval", f.sh_degree_interval, "Steps per degree of spherical harmonics");
   AddChoice(
       verb, "--opacity-reset", d.opacity_reset,
@@ -63,23 +62,24 @@ void AddScheduleFlags(CLI::App& verb, FitFlags& f) {
       "positive: gsplat's main branch; from-zero: up to 1.5.2, at step 0 too; never: 1.5.3")
       ->group(group);
   verb.add_option("--grow-grad2d", f.grow_grad2d,
-                  "Gradient in the picture above which a Gaussian grows (default: 0.0002; 0.0008 with absgrad)")
+                  "Grow Gaussians with a larger image-plane gradient (default: 0.0002; absgrad: 0.0008)")
       ->check(NotNegative())
       ->group(group);
-  number("--grow-scale3d", d.grow_scale3d, "Size, in scene scales, above which it is split, not duplicated",
+  number("--grow-scale3d", d.grow_scale3d, "Split, not duplicate, Gaussians larger than this (scene scales)",
          Positive());
-  number("--prune-opa", d.prune_opa, "Opacity below which it goes; 1e-9 keeps all", FaintOpacity());
-  number("--prune-scale3d", d.prune_scale3d, "Size, in scene scales, above which it goes", Positive());
-  verb.add_flag("--revised-opacity", d.revised_opacity, "Halves of a split share its opacity")->group(group);
+  number("--prune-opa", d.prune_opa, "Prune Gaussians fainter than this; 1e-9 keeps all", FaintOpacity());
+  number("--prune-scale3d", d.prune_scale3d, "Prune Gaussians larger than this (scene scales)", Positive());
+  verb.add_flag("--revised-opacity", d.revised_opacity, "Divide the opacity of a split between its halves")
+      ->group(group);
   number("--min-opacity", f.standard.mcmc.min_opacity,
-         "With mcmc: opacity up to which a Gaussian moves elsewhere; 1e-9 leaves all where they are", FaintOpacity());
-  number("--noise-lr", f.standard.mcmc.noise_lr, "With mcmc: noise of centres, times their learning rate",
+         "With mcmc: relocate Gaussians up to this opacity; 1e-9 relocates none", FaintOpacity());
+  number("--noise-lr", f.standard.mcmc.noise_lr, "With mcmc: noise on centres, times their learning rate",
          NotNegative());
   const auto regularizer = [&](const char* name, std::optional<double>& value, const char* help) {
     verb.add_option(name, value, help)->check(NotNegative())->group(group);
   };
-  regularizer("--opacity-reg", f.opacity_reg, "Weight of the mean opacity in the loss (default: 0; 0.01 with mcmc)");
-  regularizer("--scale-reg", f.scale_reg, "Weight of the mean size in the loss (default: 0; 0.01 with mcmc)");
+  regularizer("--opacity-reg", f.opacity_reg, "Weight of the mean opacity in the loss (default: 0; mcmc: 0.01)");
+  regularizer("--scale-reg", f.scale_reg, "Weight of the mean size in the loss (default: 0; mcmc: 0.01)");
 }
 
 void AddRateFlags(CLI::App& verb, FitFlags& f) {
@@ -89,7 +89,7 @@ void AddRateFlags(CLI::App& verb, FitFlags& f) {
     return verb.add_option(name, value, help)->check(NotNegative())->capture_default_str()->group(group);
   };
   rate("--rate-means", r.means, "Of centres, in scene scales");
-  rate("--rate-means-decay", r.means_decay, "What is left of it at the last step, up to 1")
+  rate("--rate-means-decay", r.means_decay, "Factor on it by the last step, up to 1")
       ->check(Positive())
       ->check(Fraction());
   rate("--rate-scales", r.scales, "Of log-scales");
@@ -102,42 +102,42 @@ void AddRateFlags(CLI::App& verb, FitFlags& f) {
 }  // namespace
 
 void FitFlags::AddTo(CLI::App& verb) {
-  verb.add_option("--steps", steps, "Optimisation steps; all schedules follow")
+  verb.add_option("--steps", steps, "Optimisation steps; all schedules scale with them")
       ->check(CLI::Range(int64_t{1}, kMostSteps))
       ->capture_default_str();
-  verb.add_option("--max-gaussians", max_gaussians,
-                  "Growth stops there, and a start with more is cut to it; 0: no bound (default: 0; 1000000 with mcmc)")
+  verb.add_option("--max-gaussians", max_gaussians, "Most Gaussians; 0: no limit (default: 0; mcmc: 1000000)")
       ->check(NotNegative());
   AddChoice(verb, "--strategy", strategy,
             {{"default", FitPreset::kDefault}, {"absgrad", FitPreset::kAbsgrad}, {"mcmc", FitPreset::kMcmc}},
-            "Who comes and goes: default: Kerbl et al.; absgrad: the same by absolute gradients, for fine detail "
-            "(AbsGS); mcmc: a number of Gaussians that move to where they are needed");
+            "Densification. default: Kerbl et al. absgrad: by absolute gradients, for fine detail (AbsGS). mcmc: "
+            "relocation of a fixed number");
   verb.add_flag("--mip-filter", mip_filter,
-                "Smooth every Gaussian by the pixel of the closest camera, as Mip-Splatting does; implies --mode mip");
+                "Mip-Splatting: smooth every Gaussian by the pixel of its closest camera; implies --mode mip");
   verb.add_flag("--exposure", exposure,
-                "Pictures differ in brightness and tint: each has a gain and a bias per channel of its own");
+                "Fit a gain and a bias per channel and picture, for pictures that differ in brightness or tint");
   verb.add_option("--hold-out", hold_out, "Hold out every Nth view, by name; 0: none")
       ->check(CLI::Range(0, 1 << 30))
       ->capture_default_str();
-  verb.add_option("--downscale", downscale, "N x N pixels of the pictures become one, their mean")
+  verb.add_option("--downscale", downscale, "Average N x N pixels of the pictures")
       ->check(CLI::Range(1, kMostDownscale))
       ->capture_default_str();
   auto* init_option = AddChoice(
       verb, "--init", init,
       {{"auto", FitInit::kAuto}, {"points", FitInit::kPoints}, {"view", FitInit::kView}, {"random", FitInit::kRandom}},
-      "First Gaussians: the project's points, random where many cameras look, random in "
-      "gsplat's cube; auto: points, else view");
-  verb.add_option("--init-splat", init_splat, "First Gaussians at the centres of this splat")
+      "Where the first Gaussians are. points: the project's. view: random, where many cameras look. random: in "
+      "gsplat's cube. auto: points, else view");
+  verb.add_option("--init-splat", init_splat, "Start with Gaussians at the centres of this splat")
       ->check(NotEmpty())
       ->excludes(init_option);
-  verb.add_option("--init-points", init_points, "How many (default: all points; 100000 random ones)")
+  verb.add_option("--init-points", init_points,
+                  "Number of first Gaussians (default: all points, or 100000 random ones)")
       ->check(CLI::Range(int64_t{1}, int64_t{1} << 28));
   verb.add_option("--init-extent", init_extent,
-                  "With --init random: half a side of the cube, scene scales; 0.3 as INRIA's around one object")
+                  "With --init random: half the side of the cube, scene scales; INRIA uses 0.3 for single objects")
       ->check(CLI::Range(1e-3, 1e3))
       ->capture_default_str();
   AddShellFlag(verb, shell);
-  verb.add_option("--background", background, "R,G,B from 0 to 1 (default: what the project says, else black)");
+  verb.add_option("--background", background, "R,G,B from 0 to 1 (default: from the project, else black)");
   verb.add_option("--sh-degree", standard.objective.render.sh_degree, "Highest degree of spherical harmonics")
       ->check(CLI::Range(0, kMaxShDegree))
       ->capture_default_str();
@@ -146,23 +146,23 @@ void FitFlags::AddTo(CLI::App& verb) {
       ->capture_default_str();
   AddChoice(verb, "--mode", standard.objective.render.mode,
             {{"classic", RenderMode::kClassic}, {"antialiased", RenderMode::kAntialiased}, {"mip", RenderMode::kMip}},
-            "Rasterization: antialiased and mip compensate opacity for a dilation of 0.3 and 0.1 px²");
+            "Rasterization. antialiased and mip compensate opacity for the dilation of 0.3 and 0.1 px²");
   auto* pixel_option = AddChoice(
       verb, "--pixel", pixel, {{"point", FitPixel::kPoint}, {"area", FitPixel::kArea}},
-      "point: what the ray through its centre meets, as 3DGS has it; area: the mean over the pixel, for splats that "
-      "will be seen --upscale times closer");
-  verb.add_option("--upscale", upscale, "How many times closer, with --pixel area")
+      "What a pixel measures. point: its centre, as 3DGS. area: its mean, for splats to be seen --upscale times "
+      "closer");
+  verb.add_option("--upscale", upscale, "With --pixel area: zoom to prepare for")
       ->check(CLI::Range(1.0, double{kMostSamples}))
       ->needs(pixel_option)
       ->capture_default_str();
   AddChoice(verb, "--profile", standard.objective.render.profile,
             {{"gsplat14", RasterProfile::kGsplat14}, {"gsplat15", RasterProfile::kGsplat15}},
-            "Extent of a Gaussian: 3 sigma as gsplat 1.0-1.4, or opacity-aware as 1.5");
-  verb.add_option("--checkpoint", checkpoint, "State to resume from (default: OUTPUT.checkpoint)")->check(NotEmpty());
+            "Cut-off of a Gaussian: 3 sigma as in gsplat 1.0-1.4, or by opacity as in 1.5");
+  verb.add_option("--checkpoint", checkpoint, "File to resume from (default: OUTPUT.checkpoint)")->check(NotEmpty());
   verb.add_option("--checkpoint-every", checkpoint_every, "Steps between checkpoints; 0: only when interrupted")
       ->check(CLI::Range(int64_t{0}, kMostSteps))
       ->capture_default_str();
-  verb.add_flag("--resume", resume, "Go on from the checkpoint if there is one");
+  verb.add_flag("--resume", resume, "Continue from the checkpoint, if there is one");
   AddScheduleFlags(verb, *this);
   AddRateFlags(verb, *this);
 }
@@ -199,15 +199,15 @@ Status CheckEffects(const FitFlags& flags, const FitOptions& options) {
       {"rate-sh-rest", harmonics, "with --sh-degree above 0"},
       {"sh-degree-interval", harmonics, "with --sh-degree above 0"},
       {"reset-every", resets, "with --opacity-reset positive or from-zero"},
-      {"refine-start", grows, "where it comes before --refine-stop and the last step"},
-      {"refine-every", grows, "where --refine-start comes before --refine-stop and the last step"},
-      {"grow-grad2d", grows, "where --refine-start comes before --refine-stop and the last step"},
-      {"grow-scale3d", grows, "where --refine-start comes before --refine-stop and the last step"},
-      {"min-opacity", grows, "where --refine-start comes before --refine-stop and the last step"},
+      {"refine-start", grows, "before --refine-stop and the last step"},
+      {"refine-every", grows, "with --refine-start before --refine-stop and the last step"},
+      {"grow-grad2d", grows, "with --refine-start before --refine-stop and the last step"},
+      {"grow-scale3d", grows, "with --refine-start before --refine-stop and the last step"},
+      {"min-opacity", grows, "with --refine-start before --refine-stop and the last step"},
   };
   for (const Need& need : needs) {
     if (need.met || std::find(flags.given.begin(), flags.given.end(), need.option) == flags.given.end()) continue;
-    return Error{ErrorCode::kBadArgument, Cat("--", need.option, " has no effect here; it has one ", need.with)};
+    return Error{ErrorCode::kBadArgument, Cat("--", need.option, " has no effect here; it works only ", need.with)};
   }
   return {};
 }
@@ -238,8 +238,7 @@ Result<FitOptions> MakeFitOptions(const FitFlags& flags, const std::optional<std
   if (options.strategy == Strategy::kMcmc) {
     m.cap_max = flags.max_gaussians.value_or(m.cap_max);
     if (m.cap_max < 1) {
-      return Error{ErrorCode::kBadArgument,
-                   "--max-gaussians 0: --strategy mcmc grows until it has as many, say how many"};
+      return Error{ErrorCode::kBadArgument, "--max-gaussians 0: --strategy mcmc needs a number to grow to"};
     }
   }
   options.regularizers.opacity_reg = flags.opacity_reg.value_or(scaled.regularizers.opacity_reg);
@@ -247,7 +246,7 @@ Result<FitOptions> MakeFitOptions(const FitFlags& flags, const std::optional<std
   options.mip_filter_every = scaled.mip_filter_every;
   if (flags.mip_filter && flags.pixel == FitPixel::kArea) {
     return Error{ErrorCode::kBadArgument,
-                 "--mip-filter and --pixel area are two answers to one question, how large a pixel is; leave one out"};
+                 "--mip-filter and --pixel area exclude each other: both set the size of a pixel"};
   }
   if (flags.mip_filter) UseMipFilter(options);
   options.exposure_from = flags.exposure ? ExposureFrom(flags.steps) : -1;

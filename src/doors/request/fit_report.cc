@@ -25,12 +25,12 @@ Result<ChosenStart> ChooseFitStart(const FitFlags& flags, const TrainingViews& v
     InitialPoints points = PointsOf(cloud, views.origin);
     if (points.size() < cloud.size()) {
       LogWarning(Cat(flags.init_splat, ": ", WithThousands(cloud.size() - points.size()), " of ",
-                     WithThousands(cloud.size()), " Gaussians are not usable and begin nothing (`info` says why)"));
+                     WithThousands(cloud.size()), " Gaussians are unusable and skipped (see `info`)"));
     }
     return ChosenStart{Thinned(points, flags.init_points), "splat"};
   }
   if (flags.init == FitInit::kPoints && views.points.size() == 0) {
-    return Error{ErrorCode::kBadArgument, Cat(project, ": --init points, but the project has none")};
+    return Error{ErrorCode::kBadArgument, Cat(project, " has no points for --init points; use --init view or random")};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(InitialPoints points,
                                InitialPointsOf(flags.init, views, flags.init_points, seed, flags.init_extent));

@@ -51,17 +51,17 @@ Result<std::vector<ViewerView>> ChooseViews(const PageFlags& flags, const Camera
       ANCHORSPLAT_ASSIGN_OR_RETURN(const fs::path picture, FindPictureOf(flags.truth, camera, labels[i]));
       if (picture.empty()) continue;
       if (!camera.photograph.lens.IsStraight()) {
-        return Error{ErrorCode::kBadArgument,
-                     Cat("--truth: the pictures of ", flags.cameras,
-                         " were taken through a lens, and the page shows pictures as they are; give undistorted ones "
-                         "with their cameras")};
+        return Error{
+            ErrorCode::kBadArgument,
+            Cat("--truth: the pictures of ", flags.cameras,
+                " have lens distortion, which the page cannot show; pass undistorted pictures and their cameras")};
       }
       view.picture = picture;
     }
     all.push_back(std::move(view));
   }
   if (all.empty() && !flags.truth.empty()) {
-    return Error{ErrorCode::kNotFound, Cat(flags.truth, ": no picture has the name of a camera in ", flags.cameras)};
+    return Error{ErrorCode::kNotFound, Cat(flags.truth, ": no picture is named as a camera in ", flags.cameras)};
   }
   const size_t count = std::min(all.size(), static_cast<size_t>(flags.views));
   std::vector<ViewerView> chosen;
@@ -72,23 +72,23 @@ Result<std::vector<ViewerView>> ChooseViews(const PageFlags& flags, const Camera
 }  // namespace
 
 void PageFlags::AddTo(CLI::App& verb) {
-  auto* cameras_option = verb.add_option("--cameras", cameras, "Views to jump to; the first one opens the page");
-  verb.add_option("--truth", truth, "Folder of true pictures with the cameras' names")->needs(cameras_option);
-  verb.add_option("--views", views, "How many of the cameras at most, evenly chosen")
+  auto* cameras_option = verb.add_option("--cameras", cameras, "Views to jump to; the page opens at the first");
+  verb.add_option("--truth", truth, "Folder of ground-truth pictures, named as the cameras")->needs(cameras_option);
+  verb.add_option("--views", views, "Most cameras to use, evenly chosen")
       ->check(AtLeastOne())
       ->capture_default_str()
       ->needs(cameras_option);
   verb.add_option("--pixel-size", pixel_size,
-                  "World size of one training pixel, for the scale bar; auto: read off BEFORE")
+                  "World size of a training pixel, for the scale bar; auto: estimate it from --before")
       ->capture_default_str();
-  verb.add_option("--sh-degree", sh_degree, "Keep view-dependent colour up to this degree: 0 makes small pages")
+  verb.add_option("--sh-degree", sh_degree, "Highest degree of spherical harmonics to keep; 0 makes small pages")
       ->check(CLI::Range(0, kMaxShDegree))
       ->capture_default_str();
-  AddModeOption(verb, mode, "Rasterization of both (default: each file's tag, else classic)");
-  verb.add_option("--background", background, "R,G,B, each 0-1 (default: what the camera file says, else black)");
+  AddModeOption(verb, mode, "Rasterization of both splats (default: each file's tag, else classic)");
+  verb.add_option("--background", background, "R,G,B from 0 to 1 (default: from the camera file, else black)");
   verb.add_option("--open-your-own", open_your_own,
-                  "Address of the hosted page (make web) that a button of this page opens, for readers with a splat");
-  verb.add_option("--title", title, "Heading of the page (default: the file's name)");
+                  "Add a button to open another splat, in the hosted page at this address (make web)");
+  verb.add_option("--title", title, "Heading of the page (default: the file name)");
 }
 
 Result<ViewerPage> MakePage(const PageFlags& flags, const CameraSet* given) {
@@ -107,8 +107,7 @@ Result<ViewerPage> MakePage(const PageFlags& flags, const CameraSet* given) {
   page.title = flags.title;
   page.own_page = flags.open_your_own;
   page.max_sh_degree = flags.sh_degree;
-  page.smaller =
-      "leave out view-dependent colour (--sh-degree 0), --before or the true pictures, or show a part of the scene";
+  page.smaller = "drop view-dependent colour (--sh-degree 0), --before or --truth, or show part of the scene";
   ANCHORSPLAT_ASSIGN_OR_RETURN(page.views, ChooseViews(flags, cameras));
   if (cameras.background) page.background = *cameras.background;
   if (!flags.background.empty()) {

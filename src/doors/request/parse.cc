@@ -136,7 +136,7 @@ Result<std::optional<double>> ParsePixelSize(const std::string& option, const st
 }
 
 Result<uint64_t> ParseMemory(const std::string& text) {
-  const Error bad{ErrorCode::kBadArgument, Cat("'", Printable(text), "' is no size; expected one as 2G, 500M or 0.5G")};
+  const Error bad{ErrorCode::kBadArgument, Cat("'", Printable(text), "' is not a size such as 2G, 500M or 0.5G")};
   double number = 0;
   const char* const last = text.data() + text.size();
   const auto [end, code] = FromChars(text.data(), last, number);
@@ -152,7 +152,7 @@ Result<uint64_t> ParseMemory(const std::string& text) {
   const double bytes = number * std::pow(binary ? 1024.0 : 1000.0, static_cast<double>(power));
   if (!(bytes >= static_cast<double>(kLeastMemory))) {
     return Error{ErrorCode::kBadArgument,
-                 Cat(Printable(text), " is less than the ", HumanBytes(kLeastMemory), " that work needs at least")};
+                 Cat(Printable(text), " is less than the minimum of ", HumanBytes(kLeastMemory))};
   }
   if (!(bytes < 1e18)) return bad;
   return static_cast<uint64_t>(bytes);
@@ -168,7 +168,7 @@ Result<const SplatFormat*> ParseInputFormat(const std::string& option, const std
     if (f.read != nullptr) known += Cat(" ", f.extensions.front());
   }
   return Error{ErrorCode::kBadArgument,
-               Cat(option, ": '", Printable(text), "' is no format that is read; read are", known)};
+               Cat(option, ": '", Printable(text), "' is not a readable format; readable are", known)};
 }
 
 }  // namespace anchorsplat

@@ -28,7 +28,7 @@ Result<std::array<double, 3>> ParseDirection(const std::string& option, const st
 // A format that is read, by an extension of it with or without its dot; null for "".
 Result<const SplatFormat*> ParseInputFormat(const std::string& option, const std::string& text);
 inline constexpr const char* kInputFormatHelp =
-    "Format of the input by its extension, for what neither content nor name tells: .splat from a pipe";
+    "Format of the input, by its extension, if neither name nor content shows it (.splat from a pipe)";
 // "2G", "500M", "0.5G", "1GiB" or bytes as a number. kBadArgument: none, or less than kLeastMemory.
 Result<uint64_t> ParseMemory(const std::string& text);
 inline constexpr uint64_t kLeastMemory = 64'000'000;  // bytes

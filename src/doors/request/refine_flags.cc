@@ -10,62 +10,63 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
   const auto path = [](std::filesystem::path& value) { return [&value](const std::string& text) { value = text; }; };
   verb.add_option_function<std::string>(
           "--images", path(options.images),
-          "Project with the pictures it was fitted to (as of `fit`): the best there is to refine against")
+          "Project with the training pictures (as for `fit`): the best reference for refinement")
       ->check(NotEmpty())
       ->group(group);
   verb.add_option_function<std::string>("--enlarge-with", path(options.enlarge_with),
-                                        "Of --method detail: a network's .safetensors "
-                                        "(scripts/fetch-upscaler.sh) that enlarges what is compared with")
+                                        "With --method detail: network that enlarges the reference, a .safetensors of "
+                                        "scripts/fetch-upscaler.sh")
       ->check(NotEmpty())
       ->group(group);
   verb.add_option("--hold-out", options.hold_out,
-                  "Of --images: every Nth view is not trained on; 0: all are (default: 8, or 0 where the splat was "
-                  "fitted to all of them, as it looks)")
+                  "With --images: hold out every Nth view; 0: none (default: 8, or 0 if the splat seems fitted to all)")
       ->check(CLI::Range(0, 1 << 30))
       ->group(group);
   verb.add_option("--downscale", options.downscale,
-                  "Of --images: N x N pixels become one, where the splat was fitted to smaller pictures")
+                  "With --images: average N x N pixels, if the splat was fitted to smaller pictures")
       ->check(CLI::Range(1, kMostDownscale))
       ->capture_default_str()
       ->group(group);
-  auto* steps = verb.add_option("--steps", options.steps,
-                                "Steps (default: 1500 with --images, 600 without, 100 of a network's result without; "
-                                "300 of --method detail)")
-                    ->check(CLI::Range(int64_t{1}, int64_t{1} << 40))
-                    ->group(group);
-  verb.add_option("--seconds", options.seconds,
-                  "As many steps as there are in that time; then the result is not the same each time")
+  auto* steps =
+      verb.add_option("--steps", options.steps,
+                      "Steps (default: 1500 with --images; without: 600, after a network 100; with --method detail: "
+                      "300)")
+          ->check(CLI::Range(int64_t{1}, int64_t{1} << 40))
+          ->group(group);
+  verb.add_option("--seconds", options.seconds, "Run for this time instead of --steps; not reproducible")
       ->check(Positive())
       ->excludes(steps)
       ->group(group);
-  verb.add_option(
-          "--k", options.copies,
-          "Gaussians that each becomes at first (default: 8 of the input's with --images, 4 without, 1 of a network's "
-          "result without and of --method detail; fewer where a closer view has no room for more)")
+  verb.add_option("--k", options.copies,
+                  "Split each Gaussian into so many first (default: 8 with --images; without: 4, after a network 1; "
+                  "with --method "
+                  "detail: 1; fewer if the closer view has too few pixels)")
       ->check(CLI::Range(1, kMostCopies))
       ->group(group);
-  verb.add_option("--poses", options.poses, "Without --images and --cameras: places around the object to look from")
+  verb.add_option("--poses", options.poses, "Without --images and --cameras: views around the object")
       ->check(CLI::Range(1, 1 << 20))
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--between", options.between, "With --cameras, without --images: poses towards so many neighbours")
+  verb.add_option("--between", options.between,
+                  "With --cameras, without --images: extra views per camera, half-way to its neighbours")
       ->check(CLI::Range(0, 64))
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--half-from", options.half_from, "Part of the run from which on half of the rays are rendered")
+  verb.add_option("--half-from", options.half_from, "Fraction of the run after which half of the rays are rendered")
       ->check(Fraction())
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--all-from", options.all_from, "Part of the run from which on all rays are rendered")
+  verb.add_option("--all-from", options.all_from, "Fraction of the run after which all rays are rendered")
       ->check(Fraction())
       ->capture_default_str()
       ->group(group);
-  verb.add_option("--rate", options.rate,
-                  "Learning rates, as a part of those of `fit` (default: 1; 0.1 of a network's result without "
-                  "--images; 0.3 of --method detail)")
+  verb.add_option(
+          "--rate", options.rate,
+          "Factor on the learning rates of `fit` (default: 1; after a network without --images: 0.1; with --method "
+          "detail: 0.3)")
       ->check(Positive())
       ->group(group);
-  verb.add_option("--rate-decay", options.rate_decay, "What is left of them at the end")
+  verb.add_option("--rate-decay", options.rate_decay, "Factor on --rate by the end of the run")
       ->check(Fraction())
       ->capture_default_str()
       ->group(group);
@@ -73,22 +74,20 @@ void AddRefineFlags(CLI::App& verb, RefineOptions& options, RefineControl& contr
       ->check(Fraction())
       ->capture_default_str()
       ->group(group);
-  verb.add_flag("--exposure", options.exposure, "Pictures of --images differ in brightness and tint")->group(group);
-  verb.add_flag("--robust", options.robust, "Ignore what differs grossly from --images: passers-by, flares")
-      ->group(group);
-  verb.add_flag("--align", options.align, "Poses of --images are a little off: optimise them, too")->group(group);
+  verb.add_flag("--exposure", options.exposure, "Fit brightness and tint of each picture of --images")->group(group);
+  verb.add_flag("--robust", options.robust, "Ignore gross differences from --images: passers-by, flares")->group(group);
+  verb.add_flag("--align", options.align, "Optimise the poses of --images, too")->group(group);
   verb.add_option_function<std::string>(
           "--checkpoint", path(control.checkpoint),
-          "State to resume from (default: OUTPUT.checkpoint); of a network only where this or --resume "
-          "is given")
+          "File to resume from (default: OUTPUT.checkpoint); a network writes one only with this or --resume")
       ->check(NotEmpty())
       ->group(group);
   verb.add_option("--checkpoint-every", control.checkpoint_every,
-                  "Of refinement: steps between checkpoints; 0: only when interrupted")
+                  "Refinement steps between checkpoints; 0: only when interrupted")
       ->check(NotNegative())
       ->capture_default_str()
       ->group(group);
-  verb.add_flag("--resume", control.resume, "Go on from the checkpoint if there is one")->group(group);
+  verb.add_flag("--resume", control.resume, "Continue from the checkpoint, if there is one")->group(group);
 }
 
 }  // namespace anchorsplat

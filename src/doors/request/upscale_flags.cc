@@ -9,15 +9,14 @@
 namespace anchorsplat {
 
 void UpscaleFlags::AddTo(CLI::App& verb) {
-  verb.add_option("--network", network, "A network's .safetensors, as scripts/fetch-upscaler.sh makes it")
+  verb.add_option("--network", network, "Network to use, a .safetensors of scripts/fetch-upscaler.sh")
       ->required()
       ->check(NotEmpty());
-  verb.add_option("--factor", factor, "How many times larger; the network is applied again and again (default: once)")
+  verb.add_option("--factor", factor, "Enlargement, a power of the network's factor (default: the network's factor)")
       ->check(CLI::Range(2, 16));
-  verb.add_option("--background", background,
-                  "R,G,B from 0 to 1 that pictures with alpha are enlarged over (default: black)");
+  verb.add_option("--background", background, "R,G,B from 0 to 1 behind pictures with alpha (default: black)");
   AddChoice(verb, "--alpha", alpha, {{"network", AlphaEnlargement::kNetwork}, {"bicubic", AlphaEnlargement::kBicubic}},
-            "How alpha is enlarged: bicubic takes half the time and has softer edges");
+            "How to enlarge alpha; bicubic takes half the time and has softer edges");
 }
 
 Result<EnlargeOptions> MakeEnlargeOptions(const UpscaleFlags& flags, const UpscalerInfo& network) {

@@ -66,8 +66,8 @@ Status Resize(CameraSet& cameras, const std::string& text) {
     Pinhole& k = camera.intrinsics;
     const double factor = static_cast<double>(size.width) / k.width;
     if (std::abs(k.height * factor - size.height) >= 1) {
-      return Error{ErrorCode::kBadArgument, Cat("--size ", text, " has another shape than camera ", camera.name, " (",
-                                                k.width, "x", k.height, "): keep the ratio of width to height")};
+      return Error{ErrorCode::kBadArgument, Cat("--size ", text, " has another aspect ratio than camera ", camera.name,
+                                                " (", k.width, "x", k.height, "); keep its ratio of width to height")};
     }
     const double fy = k.fy * size.height / k.height, cy = k.cy * size.height / k.height;
     k = {size.width, size.height, k.fx * factor, fy, k.cx * factor, cy};
@@ -85,18 +85,19 @@ void ViewFlags::AddTo(CLI::App& verb) {
   auto* orbit_option =
       verb.add_option(
               "--orbit", orbit,
-              "Views on a sphere around the splat instead; --cameras then only say where up is, and the background")
+              "N views on a sphere around the splat; --cameras then only give the up direction and the background")
           ->check(CLI::Range(1, 100000));
   auto* radius_option =
-      verb.add_option("--radius", radius, "Orbit: distance, world units (default: what frames the splat)")
+      verb.add_option("--radius", radius, "Orbit: distance in world units (default: the splat fills the picture)")
           ->check(Positive());
-  auto* target_option = verb.add_option("--target", target, "Orbit: X,Y,Z to look at (default: the splat's middle)");
+  auto* target_option =
+      verb.add_option("--target", target, "Orbit: point to look at, X,Y,Z (default: the centre of the splat)");
   auto* fov_option = verb.add_option("--fov", fov, "Orbit: horizontal field of view, degrees")
                          ->check(CLI::Range(1.0, 170.0))
                          ->capture_default_str();
   auto* up_option = verb.add_option("--up", up,
-                                    "Orbit: where up is, X,Y,Z or an axis as in --up=-z (default: what the cameras or "
-                                    "the splat's own comment say, else -y as captures have it)")
+                                    "Orbit: up direction, X,Y,Z or an axis as in --up=-z (default: from the cameras "
+                                    "or the splat's comment, else -y)")
                         ->check(NotEmpty());
   verb.parse_complete_callback([=] {
     if (!*cameras_option || *orbit_option) return;
@@ -104,15 +105,14 @@ void ViewFlags::AddTo(CLI::App& verb) {
       if (*option) throw CLI::ExcludesError(option->get_name(), cameras_option->get_name());
     }
   });
-  verb.add_option("--view", view, "Only the view of this name");
-  verb.add_option("--size", size, "WxH in pixels (default: the cameras' own; 1024x1024 for an orbit)");
-  verb.add_option("--background", background, "R,G,B from 0 to 1 (default: what the camera file says, else black)");
+  verb.add_option("--view", view, "Only the view with this name");
+  verb.add_option("--size", size, "WxH in pixels (default: as the cameras; orbit: 1024x1024)");
+  verb.add_option("--background", background, "R,G,B from 0 to 1 (default: from the camera file, else black)");
   verb.add_option("--near", near_plane,
-                  "World units in front of the camera where the picture begins (default: 0.01, or a thousandth of the "
-                  "distance to the splat where that is nearer)");
-  verb.add_option("--far", far_plane, "World units where it ends (default: nowhere)");
+                  "Near plane, world units (default: 0.01, or 1/1000 of the distance to the splat if that is less)");
+  verb.add_option("--far", far_plane, "Far plane, world units (default: none)");
   AddModeOption(verb, mode, "Rasterization (default: the file's tag, else classic)");
-  verb.add_option("--profile", profile, "Extent of a Gaussian: 3 sigma as gsplat 1.0-1.4, or opacity-aware as 1.5")
+  verb.add_option("--profile", profile, "Cut-off of a Gaussian: 3 sigma as in gsplat 1.0-1.4, or by opacity as in 1.5")
       ->check(CLI::IsMember({"gsplat14", "gsplat15"}))
       ->capture_default_str();
 }
@@ -155,7 +155,7 @@ Result<RenderOptions> MakeRenderOptions(const ViewFlags& flags, const CloudView&
   RenderOptions options = OptionsFor(cloud);
   const auto beyond = [](const std::optional<double>& plane) { return plane && !(*plane > 0 && *plane <= kNoFar); };
   if (beyond(flags.near_plane) || beyond(flags.far_plane)) {
-    return Error{ErrorCode::kBadArgument, "--near and --far are distances in world units, more than 0"};
+    return Error{ErrorCode::kBadArgument, "--near and --far must be above 0 (world units)"};
   }
   if (flags.near_plane) {
     options.near_plane = static_cast<float>(*flags.near_plane);
@@ -164,7 +164,7 @@ Result<RenderOptions> MakeRenderOptions(const ViewFlags& flags, const CloudView&
   if (flags.far_plane) options.far_plane = static_cast<float>(*flags.far_plane);
   if (flags.near_plane && !(options.far_plane > options.near_plane)) {
     return Error{ErrorCode::kBadArgument,
-                 Cat("--near ", options.near_plane, " does not lie before --far ", options.far_plane)};
+                 Cat("--near ", options.near_plane, " must be less than --far ", options.far_plane)};
   }
   options.mode = flags.mode.value_or(options.mode);
   options.profile = flags.profile == "gsplat15" ? RasterProfile::kGsplat15 : RasterProfile::kGsplat14;

@@ -22,29 +22,27 @@ constexpr double kInf = std::numeric_limits<double>::infinity();
 
 constexpr std::array kActionNames = {
     ActionName{"-t,--translate", "--translate", "Move the splat", "X,Y,Z"},
-    ActionName{"-r,--rotate", "--rotate", "Turn it about the world's origin by degrees about x first, then y, then z",
-               "X,Y,Z"},
-    ActionName{"-s,--scale", "--scale", "Scale it about the world's origin by a factor", "FACTOR"},
-    ActionName{"--mirror", "--mirror", "Mirror it along an axis, x, y or z: the plane through the origin stays",
-               "AXIS"},
+    ActionName{"-r,--rotate", "--rotate", "Rotate about the origin, in degrees: about x, then y, then z", "X,Y,Z"},
+    ActionName{"-s,--scale", "--scale", "Scale about the origin", "FACTOR"},
+    ActionName{"--mirror", "--mirror", "Mirror along x, y or z, through the origin", "AXIS"},
     ActionName{"--up", "--up",
-               "Turn it so that a direction X,Y,Z, or an axis as -z, becomes up: y, which is -y in the file",
-               "DIRECTION"},
-    ActionName{"--origin", "--origin", "Move it so that a point becomes 0,0,0", "X,Y,Z"},
-    ActionName{"-B,--filter-box", "--filter-box", "Keep what lies in a box; a number left out, or -, is no border",
+               "Rotate so that this direction, X,Y,Z or an axis such as -z, becomes up (-y in the file)", "DIRECTION"},
+    ActionName{"--origin", "--origin", "Move this point to 0,0,0", "X,Y,Z"},
+    ActionName{"-B,--filter-box", "--filter-box", "Keep what lies in a box; an empty number or - is no bound",
                "X0,Y0,Z0,X1,Y1,Z1"},
-    ActionName{"--remove-box", "--remove-box", "Drop what lies in a box; a number left out, or -, is no border",
+    ActionName{"--remove-box", "--remove-box", "Drop what lies in a box; an empty number or - is no bound",
                "X0,Y0,Z0,X1,Y1,Z1"},
     ActionName{"-S,--filter-sphere", "--filter-sphere", "Keep what lies in a sphere", "X,Y,Z,RADIUS"},
-    ActionName{"-N,--filter-nan", "--filter-nan",
-               "Drop Gaussians with a value that is no number or infinite, or a quaternion of zero", ""},
+    ActionName{"-N,--filter-nan", "--filter-nan", "Drop Gaussians with NaN or infinite values or a zero quaternion",
+               ""},
     ActionName{"-V,--filter-value", "--filter-value",
-               "Keep those of which it holds: lt, lte, gt, gte, eq or neq; opacity 0-1, scale_* as "
-               "lengths, f_dc_* as colours 0-1, and as stored behind _raw, as in opacity_raw",
+               "Keep Gaussians that pass: lt, lte, gt, gte, eq or neq. Opacity is 0-1, scale_* lengths, f_dc_* "
+               "colours 0-1; with _raw (opacity_raw) as stored",
                "PROPERTY,COMPARISON,VALUE"},
-    ActionName{"-H,--filter-harmonics", "--filter-harmonics", "Drop harmonics above this degree, 0 to 3", "DEGREE"},
-    ActionName{"-F,--filter-floaters", "--filter-floaters",
-               "Drop Gaussians that hang in the air; =FACTOR above 1 finds fewer, below 1 more of them", ""},
+    ActionName{"-H,--filter-harmonics", "--filter-harmonics", "Drop spherical harmonics above this degree, 0 to 3",
+               "DEGREE"},
+    ActionName{"-F,--filter-floaters", "--filter-floaters", "Drop floaters; =FACTOR above 1 drops fewer, below 1 more",
+               ""},
 };
 
 Error Bad(std::string_view name, const std::string& what) { return {ErrorCode::kBadArgument, Cat(name, ": ", what)}; }
@@ -240,9 +238,7 @@ Result<EditAction> ParseAction(std::string_view name, const std::string& text, c
     if (text.empty() || text == "true") return Finished(std::move(action), DropFloaters{options});
     const std::optional<double> factor = Number(text);
     if (!factor || !(*factor > 0)) {
-      return Bad(name, Cat("takes one factor above 0, which makes the distance from others longer or shorter that a "
-                           "floater has, or none",
-                           Found(text)));
+      return Bad(name, Cat("takes one factor above 0, or none", Found(text)));
     }
     options.factor = *factor;
     return Finished(std::move(action), DropFloaters{options});

@@ -64,7 +64,7 @@ CameraRuleChoice ChooseCameraRule(const GaussianCloud& cloud, const CameraSet& s
   const auto smallest = [](std::string why) { return CameraRuleChoice{CameraPixelRule::kSmallest, std::move(why)}; };
   if (cameras.size() < kLeastCameras) return smallest(Cat("there are only ", cameras.size(), " cameras"));
   const std::optional<Vector> point = NearestToAxes(cameras);
-  if (!point) return smallest("the cameras look the same way");
+  if (!point) return smallest("the cameras face the same way");
 
   Buffer<float> distances, pixels, asides;
   Vector mean{};
@@ -72,7 +72,7 @@ CameraRuleChoice ChooseCameraRule(const GaussianCloud& cloud, const CameraSet& s
   for (const Camera& camera : cameras) {
     const Vector to = Minus(*point, camera.Center());
     const double distance = Norm(to), along = Dot(to, AxisOf(camera));
-    if (!(distance > 0) || !std::isfinite(distance)) return smallest("the cameras do not look at one thing");
+    if (!(distance > 0) || !std::isfinite(distance)) return smallest("the cameras do not face one point");
     if (along > 0) ++in_front;
     distances.push_back(static_cast<float>(distance));
     pixels.push_back(static_cast<float>(distance / std::sqrt(camera.intrinsics.fx * camera.intrinsics.fy)));
@@ -81,12 +81,12 @@ CameraRuleChoice ChooseCameraRule(const GaussianCloud& cloud, const CameraSet& s
   }
   if (static_cast<double>(in_front) < kLeastInFront * static_cast<double>(cameras.size()) ||
       Quantile(asides, 0.9) > kMostAside) {
-    return smallest("the cameras do not look at one thing");
+    return smallest("the cameras do not face one point");
   }
-  if (Norm(mean) > kMostOneSided) return smallest("the cameras look from one side");
+  if (Norm(mean) > kMostOneSided) return smallest("the cameras stand on one side");
   const float near = Quantile(distances, 0.05), far = Quantile(distances, 0.95), typical = Quantile(distances, 0.5);
   if (far > kMostDistant * near) {
-    return smallest(Cat("some cameras stand ", Fixed(far / near, 1), " times closer to what they look at than others"));
+    return smallest(Cat("some cameras stand ", Fixed(far / near, 1), " times closer to the subject than others"));
   }
 
   // Others may be zoomed in from where they stand.
@@ -104,9 +104,9 @@ CameraRuleChoice ChooseCameraRule(const GaussianCloud& cloud, const CameraSet& s
     if (Norm(Minus(Vector{p[0], p[1], p[2]}, *point)) < kInside * typical) ++inside;
   }
   if (static_cast<double>(inside) < kLeastInside * static_cast<double>(visible)) {
-    return smallest("much of the splat lies nearer to the cameras than to what they look at");
+    return smallest("much of the splat is nearer to the cameras than to the subject");
   }
-  return {CameraPixelRule::kMedian, "the cameras look at one thing from all around"};
+  return {CameraPixelRule::kMedian, "the cameras surround the subject"};
 }
 
 }  // namespace anchorsplat

@@ -56,27 +56,28 @@ Result<CameraPixelSizes> PixelsOfCameras(const EnhanceOptions& options, const En
     int widest = 0;
     for (const Camera& camera : options.cameras->cameras) widest = std::max(widest, camera.intrinsics.width);
     if (*train_width > widest) {
-      return Error{ErrorCode::kBadArgument, Cat("--train-width ", *train_width,
-                                                " has no effect: the cameras' views are only ", widest, " wide")};
+      return Error{ErrorCode::kBadArgument,
+                   Cat("--train-width ", *train_width, " has no effect: the views of --cameras are only ", widest,
+                       " pixels wide")};
     }
   } else {
     train_width = AssumedTrainWidth(*options.cameras);
     if (train_width) {
-      LogWarning(Cat("the cameras are wider than ", *train_width, " pixels; assuming that training shrank them to ",
-                     *train_width, " as INRIA's trainer does. If not, give the true width with --train-width"));
+      LogWarning(Cat("assuming that training shrank the views to ", *train_width,
+                     " pixels, as INRIA's trainer does. If it did not, pass their width with --train-width"));
     }
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes,
                                PixelSizesFromCameras(input.cloud, *options.cameras, train_width, options.camera_rule));
   if (sizes.unseen == input.cloud.size()) {
-    return Error{
-        ErrorCode::kBadArgument,
-        "no Gaussian lies in any of the cameras' views: are these cameras of this splat, in its unit and axes?"};
+    return Error{ErrorCode::kBadArgument,
+                 "no camera sees any of the Gaussians: pass the cameras of this splat, in its unit and axes"};
   }
   if (sizes.unseen > 0) {
     const std::string text = Cat(WithThousands(sizes.unseen), " of ", WithThousands(input.cloud.size()),
-                                 " Gaussians lie outside all views; their pixel size is that of the nearest camera");
-    2 * sizes.unseen > input.cloud.size() ? LogWarning(text + ". Are these cameras of this splat?") : LogInfo(text);
+                                 " Gaussians lie outside all views; using the pixel size of the nearest camera");
+    2 * sizes.unseen > input.cloud.size() ? LogWarning(text + ". Check that --cameras belong to this splat")
+                                          : LogInfo(text);
   }
   report.camera_rule = sizes.rule == CameraPixelRule::kMedian ? "median" : "smallest";
   if (!sizes.why.empty()) LogInfo(Cat("--camera-rule ", report.camera_rule, ": ", sizes.why));
@@ -96,9 +97,9 @@ Result<KnownPixels> PixelsFrom(const EnhanceOptions& options, bool said, const R
   KnownPixels known;
   ANCHORSPLAT_ASSIGN_OR_RETURN(CameraPixelSizes sizes, PixelsOfCameras(options, input, report));
   if (!said && AreFarOff(double{sizes.median}, reading)) {
-    LogWarning(Cat("the cameras say a training pixel of ", sizes.median, ", the splat itself ", reading->pixel,
-                   ", which is taken. Are they its training cameras, in its unit and at the width of its training "
-                   "(--train-width)? --mode says that they are"));
+    LogWarning(Cat("ignoring the cameras: their training pixel, ", sizes.median,
+                   ", is far larger than the splat's own, ", reading->pixel,
+                   ". Check their unit and width (--train-width), or pass --mode to trust them"));
     report.pixel_size_source = PixelSizeSource::kRead;
     return known;
   }
@@ -139,10 +140,10 @@ Status CheckPixelOptions(const EnhanceOptions& options) {
   }
   if (options.pixel_size && options.cameras) {
     return Error{ErrorCode::kBadArgument,
-                 "a pixel size and cameras were given; the cameras already say the pixel size"};
+                 "a pixel size and cameras exclude each other: cameras already give the pixel size"};
   }
   if (options.train_width && !options.cameras) {
-    return Error{ErrorCode::kBadArgument, "--train-width says how cameras were shrunk; it needs --cameras"};
+    return Error{ErrorCode::kBadArgument, "--train-width needs --cameras"};
   }
   return {};
 }
@@ -203,7 +204,7 @@ void ReadParts(const MethodPlan& plan, TreatmentRequest request, const Treatment
   if (plan.start == nullptr && plan.method->adds_detail && taken < std::ssize(by_network)) {
     input.by_network = std::move(by_network);
   }
-  LogInfo(Cat("made of ", components.count, " things that lie apart, each read by itself"));
+  LogInfo(Cat("found ", components.count, " separate parts; each gets its own pixel size"));
 }
 
 // What cameras saw from near has smaller pixels than what they saw from afar.
@@ -213,64 +214,68 @@ void ReadPlaces(const ReadingModel& model, EnhanceInput& input, EnhanceReport& r
   for (float& ratio : ratios) ratio *= static_cast<float>(report.pixel_size);
   input.pixel_sizes = ratios;
   report.pixel_size_range = {double{Quantile(ratios, 0.1)}, double{Quantile(ratios, 0.9)}};
-  LogInfo(Cat("training pixels differ across the splat: ", report.pixel_size_range->first, " to ",
-              report.pixel_size_range->second, " are taken"));
+  LogInfo(Cat("pixel size varies across the splat: using ", report.pixel_size_range->first, " to ",
+              report.pixel_size_range->second));
 }
 
-void SayNothingIsDone(const EnhanceReport& report, std::optional<RenderMode> tag) {
+// ". --model and --copies have no effect", of those that were given; empty: none was.
+std::string WithoutEffect(const EnhanceOptions& options, std::initializer_list<const char*> of) {
+  std::vector<std::string> names;
+  for (const char* name : of) {
+    if (IsGiven(options, name)) names.push_back(Cat("--", name));
+  }
+  std::string text;
+  for (size_t k = 0; k < names.size(); ++k) text += (k == 0 ? "" : k + 1 < names.size() ? ", " : " and ") + names[k];
+  return text.empty() ? text : Cat(". ", text, names.size() > 1 ? " have" : " has", " no effect");
+}
+
+// A splat that has lost nothing stays as it is, whatever was asked for.
+void SayTheSplatStays(const EnhanceOptions& options, const std::string& why) {
+  LogWarning(Cat("left unchanged: ", why,
+                 WithoutEffect(options, {"pixel-size", "model", "copies", "merge-cost", "prune-opacity"})));
+}
+
+void SayNothingIsDone(const EnhanceOptions& options, const EnhanceReport& report, std::optional<RenderMode> tag) {
   const Reading& reading = *report.reading;
   const std::string_view mode = tag ? NameOf(*tag) : "classic";
-  LogWarning(HasItsWidth(reading.likeliest())
-                 ? Cat("left as it is: looks like ", LooksInWords(reading), ", which has its width. --mode ", mode,
-                       " enhances it all the same")
-                 : Cat("left as it is: looks like ", LooksInWords(reading),
-                       ", and nothing is sure to make it better. --cameras or --pixel-size says more about it, --mode ",
-                       mode, " enhances it all the same"));
+  SayTheSplatStays(options, HasItsWidth(reading.likeliest())
+                                ? Cat("looks like ", LooksInWords(reading), ", which needs no sharpening. --mode ",
+                                      mode, " enhances it anyway")
+                                : Cat("looks like ", LooksInWords(reading),
+                                      ", which no method is sure to improve. Pass --cameras or --pixel-size, or "
+                                      "--mode ",
+                                      mode, " to enhance it anyway"));
 }
 
 void SayWhatIsTaken(const Treatment& treatment, const EnhanceReport& report) {
   const Reading& reading = *report.reading;
   std::string text = Cat("looks like ", LooksInWords(reading));
   if (report.pixel_size_source == PixelSizeSource::kRead) {
-    text += Cat(", training pixel ", reading.pixel, " (", reading.low, " to ", reading.high, "); ", treatment.pixel,
-                treatment.gain > 0 ? " is taken, from which most is expected" : " is taken, to be safe",
+    text += Cat("; training pixel estimated at ", reading.pixel, " (", reading.low, " to ", reading.high, "), using ",
+                treatment.pixel, treatment.gain > 0 ? " for the best expected result" : " to be safe",
                 ". --cameras or --pixel-size makes it exact");
   }
   LogInfo(text);
-}
-
-// Of options that were given.
-void SayWhatHasNoEffect(const EnhanceOptions& options, std::initializer_list<const char*> of, std::string_view why) {
-  std::string names;
-  int count = 0;
-  for (const char* name : of) {
-    if (!IsGiven(options, name)) continue;
-    names += Cat(count++ > 0 ? ", --" : "--", name);
-  }
-  if (count > 0) LogWarning(Cat(names, count > 1 ? " have" : " has", " no effect: ", why));
-}
-
-// A splat that has lost nothing stays as it is, whatever was asked for.
-void SayTheSplatStays(const EnhanceOptions& options) {
-  SayWhatHasNoEffect(options, {"pixel-size", "model", "copies", "merge-cost", "prune-opacity"},
-                     "the splat stays as it is");
 }
 
 // The filter in the place of a network that nobody asked for.
 void LeaveNetworkOut(const EnhanceOptions& options, MethodPlan& plan) {
   if (!HasNetwork(plan)) return;
   const std::string name = plan.Name();
-  LogInfo(Cat("the filter instead of ", name, ", as more is expected of it (--method ", name, " takes the network)"));
-  SayWhatHasNoEffect(options, {"model", "copies", "merge-cost", "prune-opacity"}, "the filter is taken");
+  const std::string text =
+      Cat("using the filter, which should do better here than ", name, ". --method ", name, " forces the network");
+  const std::string pointless = WithoutEffect(options, {"model", "copies", "merge-cost", "prune-opacity"});
+  pointless.empty() ? LogInfo(text) : LogWarning(text + pointless);
   if (plan.start != nullptr && plan.start->adds_detail) plan.start = nullptr;
   if (plan.method->adds_detail) plan.method = &FilterMethod();
 }
 
 // What the file itself says; empty: nothing.
 std::string_view LostNothing(const GaussianCloud& cloud) {
-  if (IsFittedToPixelAreas(cloud)) return "it says that it was fitted to the areas of pixels and has lost no width";
-  if (IsMarkedEnhanced(cloud)) return "it says that it has been enhanced before";
-  if (IsMarkedPartEnhanced(cloud)) return "it says that a part of it has been enhanced before (--region takes another)";
+  if (IsFittedToPixelAreas(cloud)) return "its comments say it was fitted with --pixel area and needs no sharpening";
+  if (IsMarkedEnhanced(cloud)) return "its comments say it is already enhanced";
+  if (IsMarkedPartEnhanced(cloud))
+    return "its comments say part of it is already enhanced (--region enhances another part)";
   return "";
 }
 
@@ -280,8 +285,8 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
   ANCHORSPLAT_RETURN_IF_ERROR(CheckPixelOptions(options));
   GaussianCloud& cloud = input.cloud;
   if (ShowsNothing(cloud)) {
-    LogWarning(Cat("left as it is: all of its ", WithThousands(cloud.size()),
-                   " Gaussians are less opaque than 1/255, and nothing of it shows"));
+    LogWarning(
+        Cat("left unchanged: all ", WithThousands(cloud.size()), " Gaussians are invisible (opacity below 1/255)"));
     report.pixel_size_source = PixelSizeSource::kUnknown;
     return {};
   }
@@ -290,8 +295,7 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
   const std::string_view lost_nothing = options.filter_strength ? "" : LostNothing(cloud);
   const bool stays = closer && !plan.method->invents;  // where there is no width to give back
   if (!lost_nothing.empty() && stays) {
-    LogWarning(Cat("left as it is: ", lost_nothing, ". --filter-strength F enhances it all the same"));
-    SayTheSplatStays(options);
+    SayTheSplatStays(options, Cat(lost_nothing, ". --filter-strength F enhances it anyway"));
   }
   const bool part_alone = options.region && input.partly_enhanced;
   const ReadingModel& model = options.reading_model == nullptr ? ReadingModel::Shipped() : *options.reading_model;
@@ -304,8 +308,8 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
   ANCHORSPLAT_ASSIGN_OR_RETURN(KnownPixels known,
                                FindKnownPixels(options, with_pictures, said, reading, input, report));
   if (!reading.ok() && !known.pixel) {
-    LogWarning(
-        Cat("left as it is: ", reading.error().message, ", too little to read. --pixel-size or --cameras tells"));
+    LogWarning(Cat("left unchanged: the pixel size cannot be estimated (", reading.error().message,
+                   "). Pass --cameras or --pixel-size"));
     report.pixel_size_source = PixelSizeSource::kUnknown;
     return {};
   }
@@ -339,8 +343,10 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
       options.filter_strength.value_or(none ? 0 : DefaultFilterStrength(options.upscale, cloud.render_mode));
   if (options.filter_strength && closer && *options.filter_strength > 0 &&
       *options.filter_strength <= ShownStrength(options.upscale, cloud.render_mode)) {
-    LogWarning(Cat("a strength of ", input.filter_strength, " is no more than what the closer view's own pixels add (",
-                   ShownStrength(options.upscale, cloud.render_mode), "): nothing changes"));
+    LogWarning(Cat("a filter strength of ", input.filter_strength,
+                   " changes nothing: the pixels of the closer view already "
+                   "add ",
+                   ShownStrength(options.upscale, cloud.render_mode), ". Pass more"));
   }
   report.filter_strength = input.filter_strength;
   const double taken = !none ? treatment.pixel : reading.ok() ? reading->pixel : 0;
@@ -349,10 +355,9 @@ Status ChooseTreatment(const EnhanceOptions& options, MethodPlan& plan, EnhanceI
   if (input.pixel_sizes.empty()) input.pixel_sizes.assign(1, static_cast<float>(taken));
   if (closer && lost_nothing.empty() && reading.ok()) {
     if (none && !stays) {
-      LogInfo(Cat("looks like ", LooksInWords(*reading), ": no width is given back"));
+      LogInfo(Cat("looks like ", LooksInWords(*reading), ", which needs no sharpening; only detail is added"));
     } else if (none && !options.filter_strength) {
-      SayNothingIsDone(report, cloud.render_mode);
-      SayTheSplatStays(options);
+      SayNothingIsDone(options, report, cloud.render_mode);
     } else if (!(said && known.pixel)) {  // else nothing was taken from the reading
       SayWhatIsTaken(treatment, report);
     }

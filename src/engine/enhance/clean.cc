@@ -23,8 +23,8 @@ Status Clean(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport&
   }
   if (set.cameras.empty()) {
     LogWarning(
-        "--clean looks from outside only, as there are no cameras; of a scene seen from within it may take what only "
-        "its training views show (--cameras)");
+        "--clean without --cameras checks views from outside only, and may remove parts of a scene that was seen from "
+        "within. Pass --cameras");
   }
   UnseenOptions unseen{.seed = options.seed};
   unseen.background =
@@ -35,16 +35,14 @@ Status Clean(const EnhanceOptions& options, GaussianCloud& cloud, EnhanceReport&
   }
   const UnseenGaussians& found = *report.cleaned;
   const auto count = static_cast<int64_t>(found.rows.size());
-  LogInfo(Cat("cleaned: ", WithThousands(count), " of ", WithThousands(cloud.size()),
-              " Gaussians taken out, which have the background's colour",
-              count == 0 ? std::string()
-                         : Cat("; over it each of ", found.views, " views agrees without them to ",
-                               Fixed(found.psnr, 1), " dB or more")));
+  LogInfo(Cat(
+      "cleaned: ", WithThousands(count), " of ", WithThousands(cloud.size()), " background-coloured Gaussians removed",
+      count == 0 ? std::string()
+                 : Cat("; each of ", found.views, " views still matches with ", Fixed(found.psnr, 1), " dB or more")));
   if (count == 0) return {};
   if (count == cloud.size()) {
-    return Error{
-        ErrorCode::kBadArgument,
-        "--clean would take out every Gaussian: is the background another one than in training (--background)?"};
+    return Error{ErrorCode::kBadArgument,
+                 "--clean would remove every Gaussian. Pass the background of the training views with --background"};
   }
   std::vector<int64_t> kept;
   auto gone = found.rows.begin();

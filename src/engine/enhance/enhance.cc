@@ -35,10 +35,10 @@ Status DropUnusable(GaussianCloud& cloud) {
   if (dropped == 0) return {};
   if (kept.empty()) {
     return Error{ErrorCode::kBadFile,
-                 Cat(kNoneUsable, WithThousands(cloud.size()), " Gaussians can be drawn: each has ", kWhyUnusable)};
+                 Cat(kNoneUsable, WithThousands(cloud.size()), " Gaussians can be drawn: all have ", kWhyUnusable)};
   }
-  LogWarning(Cat("dropped ", WithThousands(dropped), " of ", WithThousands(cloud.size()), " Gaussians: ", kWhyUnusable,
-                 ", so that nobody draws them"));
+  LogWarning(
+      Cat("dropped ", WithThousands(dropped), " of ", WithThousands(cloud.size()), " Gaussians with ", kWhyUnusable));
   ANCHORSPLAT_ASSIGN_OR_RETURN(cloud, Subset(cloud, kept));
   return {};
 }
@@ -78,7 +78,7 @@ std::string_view NameOf(PixelSizeSource source) {
 const EnhanceMethod& FilterMethod() {
   static const EnhanceMethod method = {
       .name = "filter",
-      .summary = "give the width back that the fit absorbed; instant, no weights",
+      .summary = "undo the thinning of a standard fit; instant, no network",
       .rank = 0,
       .options =
           [] {
@@ -143,14 +143,14 @@ Status CheckTask(const GaussianCloud& cloud, const EnhanceOptions& options) {
   }
   for (const float channel : options.background.value_or(std::array<float, 3>{})) {
     if (!(channel >= 0 && channel <= 1)) {
-      return Error{ErrorCode::kBadArgument, Cat("the background's ", channel, " is not from 0 to 1")};
+      return Error{ErrorCode::kBadArgument, Cat("background ", channel, " is not from 0 to 1")};
     }
   }
   if (options.background && !options.clean) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const MethodPlan plan, PlanEnhancement(options));
     const auto looks = [](const MethodOption& option) { return option.name == "background"; };
     if (std::ranges::none_of(plan.method->options, looks)) {
-      return Error{ErrorCode::kBadArgument, "a background has no effect without cleaning (--clean) or refinement"};
+      return Error{ErrorCode::kBadArgument, "a background has no effect without --clean or refinement"};
     }
   }
   if (options.filter_strength && !(*options.filter_strength >= 0 && *options.filter_strength <= kMaxFilterStrength)) {
@@ -257,7 +257,7 @@ Result<Enhanced> EnhanceFromOrigin(GaussianCloud cloud, const EnhanceOptions& op
   if (sized.any) {
     ANCHORSPLAT_RETURN_IF_ERROR(ChooseTreatment(options, plan, input, report));
   } else if (IsMarkedEnhanced(input.cloud)) {
-    LogWarning("the splat says that it has been enhanced already; networks learn from splats that have not");
+    LogWarning("the splat is already enhanced, unlike the training data of the network. Pass the original");
   }
   report.method = plan.Name();
 

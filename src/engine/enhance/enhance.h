@@ -154,7 +154,7 @@ struct MethodUse {
 // An option that changes what a method does.
 struct MethodOption {
   std::string name;  // as in EnhanceOptions::given
-  // What it still needs for that, as the end of "it has an effect …": "with --images". Nothing, empty: it has one.
+  // What it still needs for that, as the end of "it works only …": "with --images". Nothing, empty: it works.
   std::function<std::string(const MethodUse&)> lacks;
 };
 

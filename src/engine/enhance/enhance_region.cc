@@ -38,18 +38,18 @@ Result<GaussianCloud> SetRestAside(const EnhanceOptions& options, EnhanceInput& 
       std::ranges::replace(world, ' ', ',');
       return world;
     };
-    return Error{ErrorCode::kBadArgument, Cat("--region: no Gaussian lies in it; the splat reaches from ",
-                                              corner(box.min), " to ", corner(box.max))};
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--region: no Gaussian lies in it; the splat spans ", corner(box.min), " to ", corner(box.max))};
   }
   if (options.max_gaussians > 0) {
     if (options.max_gaussians <= kept) {
-      return Error{ErrorCode::kBadArgument, Cat("--max-gaussians ", WithThousands(options.max_gaussians),
-                                                " leaves nothing for the region: ", WithThousands(kept),
-                                                " Gaussians outside of it stay as they are")};
+      return Error{ErrorCode::kBadArgument,
+                   Cat("--max-gaussians ", WithThousands(options.max_gaussians),
+                       " leaves nothing for the region: ", WithThousands(kept), " Gaussians outside of it are kept")};
     }
     SetBudget(within, options.max_gaussians - kept);
   }
-  LogInfo(Cat(WithThousands(n - kept), " of ", WithThousands(n), " Gaussians lie in the region and are enhanced"));
+  LogInfo(Cat(WithThousands(n - kept), " of ", WithThousands(n), " Gaussians lie in the region"));
   return Subset(input.cloud, outside);
 }
 

@@ -101,13 +101,13 @@ TEST_F(EnhanceDoor, LeavesWhatItMadeAlone) {
   auto once = Enhance(Ball(0.01), options);
   ASSERT_TRUE(once.ok());
   EXPECT_TRUE(IsMarkedEnhanced(once->cloud));
-  EXPECT_FALSE(log_->Says("enhanced before"));
+  EXPECT_FALSE(log_->Says("already enhanced"));
   const auto twice = Enhance(once->cloud, options);
   ASSERT_TRUE(twice.ok());
   EXPECT_EQ(twice->cloud.log_scales, once->cloud.log_scales);
   EXPECT_EQ(twice->cloud.comments, once->cloud.comments);
   EXPECT_EQ(twice->report.filter_strength, 0);
-  EXPECT_TRUE(log_->Says("enhanced before")) << log_->text();
+  EXPECT_TRUE(log_->Says("already enhanced")) << log_->text();
   options.filter_strength = 0.7;
   const auto forced = Enhance(once->cloud, options);
   ASSERT_TRUE(forced.ok());
@@ -128,7 +128,7 @@ TEST_F(EnhanceDoor, PixelSizeFromCameras) {
   EXPECT_EQ(enhanced->report.pixel_size_source, PixelSizeSource::kCameras);
   EXPECT_NEAR(enhanced->report.pixel_size, 0.0041, 0.0002);  // of the median view: they stand all around
   EXPECT_EQ(enhanced->report.camera_rule, "median");
-  EXPECT_TRUE(log_->Says("--camera-rule median: the cameras look at one thing")) << log_->text();
+  EXPECT_TRUE(log_->Says("--camera-rule median: the cameras surround the subject")) << log_->text();
   options.camera_rule = CameraPixelRule::kSmallest;
   const auto smallest = Enhance(Ball(0.01), options);
   ASSERT_TRUE(smallest.ok()) << smallest.error().message;
@@ -172,7 +172,7 @@ TEST_F(EnhanceDoor, WarnsWhenCamerasAreNotThoseOfTheSplat) {
   options.cameras = CamerasForPixel(0.05);
   const auto cautious = Enhance(cloud, options);
   ASSERT_TRUE(cautious.ok());
-  EXPECT_TRUE(log_->Says("Are they its training cameras")) << log_->text();
+  EXPECT_TRUE(log_->Says("ignoring the cameras")) << log_->text();
   EXPECT_EQ(cautious->report.pixel_size_source, PixelSizeSource::kRead);
   EXPECT_LT(cautious->report.pixel_size, 0.01) << "as it looks, so that nothing is blurred";
   // Whoever says a strength, or the mode, means these cameras.

@@ -38,7 +38,7 @@ Result<Image> EnlargeBy(Upscaler& upscaler, const Image& low, int factor) {
 Status CheckFactor(int factor, int scale) {
   if (factor >= 1 && factor <= kMostSamples && (factor >= scale || scale % factor == 0)) return {};
   return Error{ErrorCode::kBadArgument,
-               Cat("a network that enlarges pictures ", scale, " times cannot give detail for --upscale ", factor)};
+               Cat("--enlarge-with: a network for ", scale, "x cannot add detail at --upscale ", factor)};
 }
 
 Status ProjectBack(const Image& low, Image& enlarged) {

@@ -31,7 +31,7 @@ Result<int64_t> ApplyFilter(GaussianCloud& cloud, std::span<const float> pixel_s
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(cloud));
   if (!(options.upscale >= 1) || !std::isfinite(options.upscale)) {
     return Error{ErrorCode::kBadArgument,
-                 Cat("upscale ", options.upscale, " is below 1: the filter is for seeing a splat closer, not farther")};
+                 Cat("upscale ", options.upscale, " is below 1; the filter is for closer views")};
   }
   const double strength = options.strength.value_or(DefaultFilterStrength(options.upscale, cloud.render_mode));
   if (!(strength >= 0) || strength > kMaxFilterStrength) {

@@ -25,8 +25,8 @@ int64_t LeaveOutLeastVisible(int64_t most, GaussianCloud& cloud) {
   if (most == 0 || over <= 0) return 0;
   std::vector<char> keep(static_cast<size_t>(cloud.size()), 0);
   for (const int64_t row : MostVisible(cloud, most)) keep[static_cast<size_t>(row)] = 1;
-  LogWarning(Cat("--max-gaussians ", WithThousands(most), " are fewer than there are without any copies: the ",
-                 WithThousands(over), " Gaussians of the least opacity × size are left out"));
+  LogWarning(Cat("--max-gaussians ", WithThousands(most), ": dropped the ", WithThousands(over),
+                 " Gaussians with the least opacity × size"));
   KeepMarked(keep, cloud);
   return over;
 }

@@ -36,19 +36,18 @@ Result<const EnhanceMethod*> FindMethod(const EnhanceOptions& options, const std
     if ((best == nullptr || method.rank > best->rank) && method.ready(options).ok()) best = &method;
   }
   if (name == "auto") return best;
-  return Error{ErrorCode::kBadArgument, Cat("there is no method '", Printable(name), "' (known: auto", names, ")")};
+  return Error{ErrorCode::kBadArgument, Cat("unknown method '", Printable(name), "' (known: auto", names, ")")};
 }
 
 Result<MethodPlan> PlanQuality(const EnhanceOptions& options) {
   const std::string& quality = options.quality;
   if (quality != "fast" && quality != "good" && quality != "best") {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("there is no quality '", Printable(quality), "' (known: fast, good, best)")};
+    return Error{ErrorCode::kBadArgument, Cat("unknown quality '", Printable(quality), "' (known: fast, good, best)")};
   }
   const bool pictures = !options.refine.images.empty();
   if (pictures && quality != "best") {
     return Error{ErrorCode::kBadArgument,
-                 Cat("--images have no effect with --quality ", quality, "; they have one with --quality best")};
+                 Cat("--images has no effect with --quality ", quality, "; it works only with --quality best")};
   }
   MethodPlan plan;
   plan.chosen_by = "--quality " + quality;
@@ -59,8 +58,8 @@ Result<MethodPlan> PlanQuality(const EnhanceOptions& options) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(plan.method, FindMethod(options, pictures ? "refine-images" : "refine"));
   }
   if (options.method != "auto" && options.method != plan.Name()) {
-    return Error{ErrorCode::kBadArgument, Cat(plan.chosen_by, " is --method ", plan.Name(), ", and --method ",
-                                              Printable(options.method), " was given: give one of the two")};
+    return Error{ErrorCode::kBadArgument, Cat(plan.chosen_by, " is --method ", plan.Name(),
+                                              ", so it excludes --method ", Printable(options.method))};
   }
   return plan;
 }
@@ -112,8 +111,7 @@ Result<MethodPlan> PlanEnhancement(const EnhanceOptions& options) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(plan.start, FindMethod(options, options.method.substr(0, plus)));
   ANCHORSPLAT_ASSIGN_OR_RETURN(plan.method, FindMethod(options, options.method.substr(plus + 1)));
   if (!plan.method->takes_start) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("the method '", plan.method->name, "' cannot go on from the result of another")};
+    return Error{ErrorCode::kBadArgument, Cat("the method '", plan.method->name, "' cannot follow another method")};
   }
   return plan;
 }
@@ -143,7 +141,7 @@ Status CheckOptions(const EnhanceOptions& options) {
     }
     return Error{ErrorCode::kBadArgument,
                  Cat("--", name, " has no effect with --method ", plan.Name(),
-                     plan.chosen_by.empty() ? "" : Cat(", which ", plan.chosen_by, " chose"), "; it has one ", lack)};
+                     plan.chosen_by.empty() ? "" : Cat(" (chosen by ", plan.chosen_by, ")"), "; it works only ", lack)};
   }
   return {};
 }

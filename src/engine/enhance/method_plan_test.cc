@@ -116,27 +116,27 @@ TEST_F(Plan, WhatHasNoEffectIsRefused) {
     const std::string said = Given(name);
     EXPECT_EQ(said.empty(), of_filter.contains(name)) << name << ": " << said;
     if (said.empty()) continue;
-    EXPECT_THAT(said, HasSubstr("--" + name + " has no effect with --method filter; it has one with"));
+    EXPECT_THAT(said, HasSubstr("--" + name + " has no effect with --method filter; it works only with"));
   }
   EXPECT_EQ(Given("out-dir"), "") << "no method's business";
 
   options_.method = "auto";
   EXPECT_THAT(Given("steps"),
-              HasSubstr("filter, which auto chose; it has one with --method refine, refine-images or detail"));
+              HasSubstr("filter (chosen by auto); it works only with --method refine, refine-images or detail"));
   EXPECT_THAT(Given("prune-opacity"), HasSubstr("with --method sharpen"));
   options_.refine.images = "pictures";
-  EXPECT_THAT(Given("prune-opacity"), HasSubstr("refine-images, which auto chose; it has one with --method sharpen"));
+  EXPECT_THAT(Given("prune-opacity"), HasSubstr("refine-images (chosen by auto); it works only with --method sharpen"));
   options_.seed = kWithNetwork;
   EXPECT_EQ(Given("prune-opacity"), "") << "it begins with the network";
   EXPECT_THAT(Given("block-gaussians"), HasSubstr("with a larger network"));
   options_.quality = "best";
-  EXPECT_THAT(Given("poses"), HasSubstr("which --quality best chose; it has one without --images"));
+  EXPECT_THAT(Given("poses"), HasSubstr("(chosen by --quality best); it works only without --images"));
 }
 
 TEST_F(Plan, RefinementSaysWhatItsOptionsNeed) {
   options_.method = "refine";
   for (const char* name : {"hold-out", "downscale", "exposure", "robust", "align"}) {
-    EXPECT_THAT(Given(name), HasSubstr("it has one with --images")) << name;
+    EXPECT_THAT(Given(name), HasSubstr("it works only with --images")) << name;
   }
   EXPECT_EQ(Given("poses"), "");
   EXPECT_THAT(Given("between"), HasSubstr("with --cameras"));

@@ -118,7 +118,7 @@ Status MakeSteps(Refiner& refiner, const RefineOptions& options, const RefineChe
     report.interrupted = StopRequested() && done() < 1;
     if (report.interrupted) return {};
     if (checkpoint.IsDue(refiner.step()) && done() < 1) {
-      checkpoint.Write(refiner.state(), "there is no new checkpoint");
+      checkpoint.Write(refiner.state(), "no new checkpoint");
     }
     part = done();
     // Steps that are lost with a GPU are made again, as far as there is time.
@@ -154,7 +154,7 @@ Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianClou
   if (resumes) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(state, ReadFitCheckpoint(control.checkpoint, settings));
     report.resumed_at = state.step;
-    LogInfo(Cat("going on at step ", WithThousands(state.step), " of ", control.checkpoint.string()));
+    LogInfo(Cat("resuming at step ", WithThousands(state.step), " from ", control.checkpoint.string()));
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(
         GaussianCloud split,
@@ -171,7 +171,7 @@ Result<GaussianCloud> RunRefinement(const RefineInput& input, const GaussianClou
   report.times = refiner.times();
   if (report.interrupted && checkpoint.kept()) {
     Leave(refiner.state(), control.outputs);
-    checkpoint.Write(refiner.state(), "there is nothing to resume from");
+    checkpoint.Write(refiner.state(), "no checkpoint to resume from");
   }
   GaussianCloud result = Pruned(std::move(refiner.state().cloud), input.fixed, report);
   result.render_mode = input.cloud.render_mode;
@@ -189,11 +189,11 @@ bool IsWorthIt(const RefinePlan& plan, const Consistency& after) {
     return true;
   }
   const std::string numbers = Cat(Fixed(before.psnr, 2), " dB and SSIM ", Fixed(before.ssim, 4), " before, ",
-                                  Fixed(after.psnr, 2), " and ", Fixed(after.ssim, 4), " after, at their resolution");
-  LogInfo(after.psnr > before.psnr ? Cat("the splat had lost no width, and the pictures gain it little (", numbers,
-                                         "): it knows more than they show, and is kept")
-                                   : Cat("the start agreed with the views at least as well as the result does (",
-                                         numbers, "), and is kept"));
+                                  Fixed(after.psnr, 2), " and ", Fixed(after.ssim, 4), " after, at low resolution");
+  LogInfo(after.psnr > before.psnr
+              ? Cat("refinement discarded: the splat holds more detail than the pictures, and gained little (", numbers,
+                    ")")
+              : Cat("refinement discarded: the start matches the views at least as well (", numbers, ")"));
   return false;
 }
 
@@ -225,9 +225,8 @@ Result<Refined> Refine(RefineInput input, const RefineOptions& given, const Refi
   }
   const GaussianCloud& as_it_is = fewer ? *fewer : input.cloud;
   if (left_out > 0) {
-    LogWarning(Cat("--max-gaussians ", WithThousands(options.max_gaussians),
-                   " are fewer than there are before any is split: the ", WithThousands(left_out),
-                   " of the least opacity × size are left out"));
+    LogWarning(Cat("--max-gaussians ", WithThousands(options.max_gaussians), ": dropped the ", WithThousands(left_out),
+                   " Gaussians with the least opacity × size"));
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(RefineViews views, OpenRefineViews(input, options));
   const bool resumes = control.resume && Exists(control.checkpoint);

@@ -50,10 +50,10 @@ int ChooseCopies(const ViewDensity& density, double upscale, int wanted, int64_t
   const double pixels = density.pixels * upscale * upscale, gaussians = density.gaussians * each;
   const int most = static_cast<int>(std::clamp(kMostPerPixel * pixels / std::max(1.0, gaussians), 1.0, 1e6));
   const int chosen = std::min(copies, most);
-  LogInfo(Cat(chosen == 1 ? "no Gaussian is split" : Cat("every Gaussian becomes ", chosen),
-              chosen < copies ? Cat(" instead of ", copies, ", which nobody would see") : "",
-              ": a closer view shows the splat in about ", WithThousands(std::llround(pixels)), " pixels, by ",
-              WithThousands(std::llround(gaussians)), " Gaussians before that; --k says otherwise"));
+  LogInfo(Cat(chosen == 1 ? "splitting no Gaussian" : Cat("splitting every Gaussian into ", chosen),
+              chosen < copies ? Cat(", not ", copies) : "", ": a closer view has about ",
+              WithThousands(std::llround(pixels)), " pixels for ", WithThousands(std::llround(gaussians)),
+              " Gaussians. --k overrides"));
   return chosen;
 }
 

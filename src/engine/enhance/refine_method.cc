@@ -39,10 +39,8 @@ void AddFacts(const RefineReport& r, StepReport& report) {
 
 Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& options, StepReport& report) {
   if (options.upscale > kMostSamples) {
-    return Error{ErrorCode::kBadArgument, Cat("--upscale ", options.upscale,
-                                              ": refinement renders that many rays per "
-                                              "pixel and side and goes up to ",
-                                              kMostSamples)};
+    return Error{ErrorCode::kBadArgument,
+                 Cat("--upscale ", options.upscale, " is too much for refinement; the most is ", kMostSamples)};
   }
   RefineInput refine;
   refine.upscale = options.upscale;
@@ -72,10 +70,10 @@ Result<GaussianCloud> RunRefine(EnhanceInput input, const EnhanceOptions& option
     RefinePlan& plan = report.plan.emplace();
     plan.options = options.refine;
     plan.nothing_to_do = true;
-    plan.why = lost_none
-                   ? "there is no lost width to give back, and without pictures nothing else to learn: the splat stays"
-                   : Cat("without pictures there is nothing to learn about ", NameOf(*mode),
-                         refine.start_has_detail ? " splats: the network's result stays" : " splats: filtered only");
+    plan.why = lost_none ? "nothing to refine: the splat needs no sharpening. Pass its training pictures with --images"
+                         : Cat("nothing to refine: ", NameOf(*mode),
+                               " splats need their training pictures (--images). Keeping the ",
+                               refine.start_has_detail ? "network's" : "filter's", " result");
     LogInfo(plan.why);
     report.facts.emplace_back("kept_start", true);
     return std::move(refine.start);
@@ -158,7 +156,7 @@ int64_t Expected(int64_t count, const EnhanceOptions& options) {
 
 EnhanceMethod RefineMethod() {
   return {.name = "refine",
-          .summary = "a minute of optimisation against what the splat shows at low resolution, or --images",
+          .summary = "optimise against low-resolution renders of the splat, or --images; a minute",
           .rank = -1,  // never without being asked: it takes its time
           .takes_start = true,
           .begins_with_best = WithPictures,
@@ -176,13 +174,13 @@ Status CheckDetail(const EnhanceOptions& options) {
   const std::filesystem::path& file = options.refine.enlarge_with;
   if (file.empty()) {
     return Error{ErrorCode::kBadArgument,
-                 "the method 'detail' needs a network that enlarges pictures: --enlarge-with FILE "
-                 "(scripts/fetch-upscaler.sh gets one)"};
+                 "the method 'detail' needs --enlarge-with FILE, a network that enlarges pictures "
+                 "(scripts/fetch-upscaler.sh fetches one)"};
   }
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(options.refine));
   if (!(options.upscale <= kMostSamples) || options.upscale != std::floor(options.upscale)) {
-    return Error{ErrorCode::kBadArgument, Cat("--upscale ", options.upscale, ": of the method 'detail' it is 1 to ",
-                                              kMostSamples, ", and whole")};
+    return Error{ErrorCode::kBadArgument, Cat("--upscale ", options.upscale,
+                                              ": the method 'detail' needs a whole number from 1 to ", kMostSamples)};
   }
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Upscaler network, Upscaler::Read(file));
   return CheckFactor(static_cast<int>(options.upscale), network.info().scale);
@@ -195,7 +193,7 @@ EnhanceMethod DetailMethod() {
   std::erase_if(looked_at, [](const MethodOption& option) { return option.name.ends_with("-from"); });  // all rays are
   looked_at.push_back({"enlarge-with", {}});
   return {.name = "detail",
-          .summary = "refine against what the splat shows at low resolution, or --images, enlarged by --enlarge-with",
+          .summary = "refine against views enlarged by --enlarge-with; invents detail",
           .rank = -1,
           .takes_start = true,
           .begins_with_best = [](const EnhanceOptions&) { return true; },
@@ -209,7 +207,7 @@ EnhanceMethod DetailMethod() {
 
 EnhanceMethod RefineImagesMethod() {
   return {.name = "refine-images",
-          .summary = "refine with the pictures of --images",
+          .summary = "refine against --images",
           .rank = 2,
           .takes_start = true,
           .begins_with_best = WithPictures,
@@ -218,7 +216,7 @@ EnhanceMethod RefineImagesMethod() {
           .expected = Expected,
           .ready = [](const EnhanceOptions& options) -> Status {
             if (!options.refine.images.empty()) return Validate(options.refine);
-            return Error{ErrorCode::kBadArgument, "the method 'refine-images' needs pictures: --images PROJECT"};
+            return Error{ErrorCode::kBadArgument, "the method 'refine-images' needs --images PROJECT"};
           },
           .run = RunRefine};
 }

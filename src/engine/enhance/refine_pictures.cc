@@ -192,47 +192,43 @@ Result<PictureAgreement> MeasureAgreement(const GaussianCloud& cloud, const Rend
 
 Status CheckAgreement(const PictureAgreement& agreement, double least_psnr, bool aligned) {
   const std::string suspicions =
-      "; are these the pictures it was fitted to, in the order of their cameras, and is the splat in the cameras' "
-      "coordinates?";
+      ". Check that these are its training pictures, in the order of their cameras, and that the splat is in the "
+      "coordinates of the cameras";
   if (agreement.views == 0) {
-    return Error{
-        ErrorCode::kBadArgument,
-        "--images: the masks leave nothing of any picture that was looked at: black is left out, white counts"};
+    return Error{ErrorCode::kBadArgument, "--images: the masks hide all of the pictures; black hides, white counts"};
   }
   if (!(agreement.psnr >= least_psnr)) {
     return Error{ErrorCode::kBadArgument,
-                 Cat("--images: the splat's own renders agree with the pictures to ", Fixed(agreement.psnr, 1),
+                 Cat("--images: renders of the splat match the pictures with ", Fixed(agreement.psnr, 1),
                      " dB only, mean of ", agreement.views, " views (at least ", least_psnr, " expected)", suspicions)};
   }
   if (2 * agreement.plain > agreement.views) {
     return Error{ErrorCode::kBadArgument,
                  Cat("--images: ", agreement.plain, " of ", agreement.views,
-                     " pictures are as near to a picture of one colour as to what the splat shows there", suspicions)};
+                     " pictures match a single colour as well as they match the splat", suspicions)};
   }
   if (agreement.smaller > 1 && agreement.smaller_psnr > agreement.psnr + kSmallerIsRight) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("--images: the splat's own renders agree with the pictures to ", Fixed(agreement.psnr, 1),
-                     " dB, and to ", Fixed(agreement.smaller_psnr, 1), " dB with the pictures at 1/", agreement.smaller,
-                     " of their size, which must be the size that it was fitted to; give these pictures")};
+    return Error{ErrorCode::kBadArgument, Cat("--images: the splat was fitted to pictures at 1/", agreement.smaller,
+                                              " of their size (match ", Fixed(agreement.smaller_psnr, 1), " dB, not ",
+                                              Fixed(agreement.psnr, 1), " dB). Pass --downscale ", agreement.smaller)};
   }
   const std::string mismatched = Cat("--images: ", agreement.mismatched, " of ", agreement.views,
-                                     " views look more like the picture of another view than like their own");
+                                     " views match the picture of another view better than their own");
   if (4 * agreement.mismatched > agreement.views) return Error{ErrorCode::kBadArgument, mismatched + suspicions};
   if (!aligned && 2 * agreement.misplaced > agreement.views) {
     return Error{
         ErrorCode::kBadArgument,
-        Cat("--images: ", agreement.misplaced, " of ", agreement.views, " pictures agree better with the splat, by ",
+        Cat("--images: ", agreement.misplaced, " of ", agreement.views, " pictures match the splat better by ",
             Fixed(agreement.misplaced_gain, 1),
-            " dB, when they are moved or enlarged by a pixel: these are not quite the cameras that it "
-            "was fitted with (principal point, focal length, positions); --align moves poses that are a little "
-            "off")};
+            " dB when moved or enlarged by a pixel: the cameras are slightly off (principal point, focal length, "
+            "positions). Pass --align to correct poses")};
   }
   if (agreement.mismatched > 0) LogWarning(mismatched + suspicions);
   if (!agreement.far_below.empty()) {
     std::string names;
     for (const std::string& name : agreement.far_below) names += Cat(names.empty() ? "" : ", ", Printable(name));
     LogWarning(Cat("--images: ", agreement.far_below.size(), " of ", agreement.views,
-                   " pictures that were looked at agree with the splat much less than the others do: ", names));
+                   " pictures match the splat far worse than the others; check or remove them: ", names));
   }
   return {};
 }

@@ -61,7 +61,7 @@ TEST_F(Refinement, BadPicturesAreRefusedAtOnce) {
   GaussianCloud dark = input_.cloud;
   for (size_t i = 0; i < dark.sh.size(); ++i) dark.sh[i] = 0.3f * dark.sh[i] - 1.2f;
   input_.cloud = dark;
-  EXPECT_THAT(message(), HasSubstr("9 of 9 pictures are as near to a picture of one colour"));
+  EXPECT_THAT(message(), HasSubstr("9 of 9 pictures match a single colour"));
 }
 
 TEST_F(Refinement, PicturesOfSomethingElseAreRefused) {

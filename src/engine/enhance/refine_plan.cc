@@ -66,7 +66,7 @@ Result<RefineOptions> ChooseRefineOptions(const RefineInput& input, const Refine
   ANCHORSPLAT_RETURN_IF_ERROR(Validate(given));
   const bool pictures = HasPictures(given), gentle = IsGentle(input, given);
   if (!pictures && (given.exposure || given.robust || given.align)) {
-    return Error{ErrorCode::kBadArgument, "exposure, robust and align are about photographs; they need --images"};
+    return Error{ErrorCode::kBadArgument, "--exposure, --robust and --align need --images"};
   }
   RefineOptions options = given;
   if (!options.seconds) {
@@ -96,13 +96,13 @@ Result<RefinePlan> PlanRefinement(const RefineInput& input, const GaussianCloud&
     ANCHORSPLAT_ASSIGN_OR_RETURN(const Consistency agreement,
                                  MeasureConsistency(as_it_is, input.upscale, input.cloud, chosen, views));
     if (agreement.psnr > plan.start.psnr) {
-      plan.why = "the splat agrees better with the pictures as it is: the refinement begins with that";
+      plan.why = "starting from the input, which matches the pictures better";
       plan.start = agreement;
       plan.from_input = true;
       plan.least_gain = kGainOverFine;
     }
   } else if (plan.start.psnr >= kIndistinguishable && !IsDetail(chosen)) {
-    plan.why = "the start shows what the splat does already, and is kept";
+    plan.why = "nothing to refine: the start already matches the splat";
     plan.nothing_to_do = true;
     return plan;
   }

@@ -116,8 +116,8 @@ Result<std::vector<Camera>> PosesAround(const GaussianCloud& cloud, double pixel
   const double distance = FramingDistance(framing, PinholeFromFov(100, 100, kPoseFieldOfView));
   const double side = 2 * std::tan(kPoseFieldOfView / 2) * distance / pixel_size;
   if (side > kMaxImageSide) {
-    return Error{ErrorCode::kBadArgument, Cat("with pixels of ", pixel_size, " a picture of this splat would have ",
-                                              side, " of them per side: is that the size of a training pixel?")};
+    return Error{ErrorCode::kBadArgument, Cat("pixel size ", pixel_size, " makes pictures of ", side,
+                                              " pixels per side: check that it is the size of a training pixel")};
   }
   Pinhole intrinsics = PinholeFromFov(100, 100, kPoseFieldOfView);
   intrinsics.width = intrinsics.height = std::max(kSmallestSide, static_cast<int>(std::lround(side)));
@@ -146,8 +146,8 @@ Result<std::vector<Camera>> PosesAround(const GaussianCloud& cloud, double pixel
   if (2 * static_cast<int64_t>(poses.size()) < count) {
     return Error{ErrorCode::kBadArgument,
                  Cat(count - static_cast<int64_t>(poses.size()), " of ", count,
-                     " places around the splat are inside "
-                     "of it: a scene can only be refined from where it was seen; give --cameras")};
+                     " views around the splat are inside it. Pass --cameras: a scene can only be refined from "
+                     "where it was seen")};
   }
   return poses;
 }

@@ -50,14 +50,14 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
     return Error{ErrorCode::kBadArgument,
                  Cat("--images ", options.images.string(), ": ", project.without_picture.size(), " of its ",
                      project.without_picture.size() + project.train.size() + project.held_out.size(),
-                     " cameras have no picture, the first is ", Printable(project.without_picture.front()),
-                     "; are these the pictures of these cameras? If so, take those out that have none")};
+                     " cameras have no picture, such as ", Printable(project.without_picture.front()),
+                     ". Remove cameras without a picture, or pass the right project")};
   }
   render.background = BackgroundFor(options, project.background, input.cloud);
   PictureCache pictures(project.train, render.background);
   ANCHORSPLAT_ASSIGN_OR_RETURN(const PictureAgreement agreement, MeasureAgreement(input.cloud, render, pictures));
   LogInfo(Cat(project.train.size(), " views with pictures, ", project.held_out.size(),
-              " held out; the splat's own renders agree with them to ", Fixed(agreement.psnr, 2), " dB"));
+              " held out; renders of the splat match them with ", Fixed(agreement.psnr, 2), " dB"));
   ANCHORSPLAT_RETURN_IF_ERROR(CheckAgreement(agreement, kLeastInputPsnr, options.align));
   if (!options.hold_out && !project.held_out.empty()) {
     PictureCache held_out(project.held_out, render.background);
@@ -68,9 +68,8 @@ Result<RefineViews> OpenPictures(const RefineInput& input, const RefineOptions& 
           OpenProject(options.images, {.hold_out = 0, .downscale = options.downscale, .origin = options.origin}));
       // A project with test views of its own has them held out for good.
       if (all.held_out.empty()) {
-        LogInfo(Cat("with those held out they agree as well, to ", Fixed(others.psnr, 2),
-                    " dB: the splat was fitted to them, too, and all views are learned from (--hold-out N holds some "
-                    "out)"));
+        LogInfo(Cat("training on all views: the splat was fitted to the held-out ones, too (they match with ",
+                    Fixed(others.psnr, 2), " dB). --hold-out N holds some out"));
         project = std::move(all);
         pictures = PictureCache(project.train, render.background);
       }
@@ -88,7 +87,7 @@ Result<RefineViews> OpenSplat(const RefineInput& input, const RefineOptions& opt
   if (input.cameras && !input.cameras->cameras.empty()) {
     poses = RefinePosesAlong(input.cameras->cameras, options.between, kCheckViews);
     if (!poses.apart) {
-      LogInfo("there is no place between these cameras: whether it helps is looked at where it is learned from");
+      LogInfo("no room between these cameras for extra views: checking the result on the training views");
     }
   } else {
     ANCHORSPLAT_ASSIGN_OR_RETURN(
@@ -97,7 +96,7 @@ Result<RefineViews> OpenSplat(const RefineInput& input, const RefineOptions& opt
   for (const Camera& camera : poses.check) {
     const std::string warning = NothingToSee(input.cloud, camera, render, std::nullopt);
     if (warning.empty()) continue;
-    LogWarning(Cat(warning, " Refinement learns nothing from such views"));
+    LogWarning(Cat(warning, " Refinement cannot use such views"));
     break;
   }
   const double scale = SceneScale(poses.train);

@@ -84,7 +84,7 @@ std::vector<int64_t> RowsLikeBackground(const GaussianCloud& cloud, const Buffer
   return rows;
 }
 
-Error Stopped() { return Error{ErrorCode::kInterrupted, "stopped while looking for what nobody misses"}; }
+Error Stopped() { return Error{ErrorCode::kInterrupted, "stopped while cleaning"}; }
 
 // Of some Gaussians, over the pixels of the views: in squares, by the gradient of the picture times random signs.
 struct Shown {
@@ -111,7 +111,7 @@ Result<Shown> FindShown(CloudView cloud, const std::vector<int64_t>& rows, const
   RenderOutput output;
   RenderGradient signs;
   Random random(seed);
-  Progress progress("look for what nobody misses", static_cast<int64_t>(views.size()));
+  Progress progress("find invisible Gaussians", static_cast<int64_t>(views.size()));
   for (const Camera& camera : views) {
     if (StopRequested()) return Stopped();
     ANCHORSPLAT_RETURN_IF_ERROR(rasterizer.Render(still, camera, options, output));
@@ -241,7 +241,7 @@ Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector
   if (!shown.anything) {
     return Error{ErrorCode::kBadArgument,
                  Cat("cleaning: none of ", views.size(),
-                     " views shows anything of the splat: are the cameras of this splat, in its unit and axes?")};
+                     " views shows any of the splat. Pass the cameras of this splat, in its unit and axes")};
   }
   std::vector<size_t> order = Candidates(shown);
   SortByAddition(shown, order);
@@ -256,7 +256,7 @@ Result<UnseenGaussians> FindUnseen(const GaussianCloud& cloud, const std::vector
   size_t enough = 0, too_many = candidates.size() + 1;
   // What all views together would allow, which is about the most that the worst can.
   size_t count = Predicted(order, shown, values * std::pow(10, -options.least_psnr / 10));
-  Progress progress("try without it", kMostTrials);
+  Progress progress("verify", kMostTrials);
   for (int trial = 0; trial < kMostTrials && enough + 1 < too_many; ++trial) {
     if (static_cast<double>(too_many - enough) <= kCloseEnough * static_cast<double>(enough)) break;
     if (count <= enough || count >= too_many) count = (enough + too_many) / 2;

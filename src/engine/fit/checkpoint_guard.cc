@@ -92,8 +92,7 @@ Status CompareSettings(const std::string& file, const std::string& theirs, const
       if (found == a.end() || own == b.end() || *found == *own) continue;
       const nlohmann::json& value = *own;
       const std::string how =
-          IsFingerprint(value) ? "another one"
-                               : Cat(SpokenValue(key, *found), ", and of this command it is ", SpokenValue(key, value));
+          IsFingerprint(value) ? "another one" : Cat(SpokenValue(key, *found), ", here ", SpokenValue(key, value));
       return Error{ErrorCode::kBadArgument,
                    Cat(file, ": is a checkpoint of another run: its ", Spoken(key), " is ", how)};
     }
@@ -118,13 +117,11 @@ Status CheckCheckpoint(const fs::path& checkpoint, std::span<const fs::path> out
   if (!Exists(checkpoint) || resume) return {};  // what a checkpoint is, reading it shows
   if (!(is_checkpoint ? is_checkpoint : IsFitCheckpoint)(checkpoint)) {
     return Error{ErrorCode::kExists,
-                 Cat(checkpoint.string(),
-                     " is there and is no checkpoint; name a file with --checkpoint for what an interruption leaves")};
+                 Cat(checkpoint.string(), " exists and is not a checkpoint; pass another file with --checkpoint")};
   }
   if (overwrite) return {};
-  return Error{ErrorCode::kExists, Cat(checkpoint.string(),
-                                       " is left from a run that was interrupted: --resume goes on from it, -w begins "
-                                       "anew")};
+  return Error{ErrorCode::kExists,
+               Cat(checkpoint.string(), " was left by an interrupted run; --resume continues it, -w starts over")};
 }
 
 void RemoveCheckpoint(const fs::path& checkpoint, bool (*is_checkpoint)(const fs::path&)) {
@@ -144,9 +141,8 @@ Result<std::optional<FileLock>> HoldCheckpoint(const fs::path& checkpoint) {
   auto lock = FileLock::TakeAndRemove(checkpoint.string() + ".lock");
   if (lock.ok()) return std::optional<FileLock>(*std::move(lock));
   if (lock.error().code != ErrorCode::kExists) return lock.error();
-  return Error{ErrorCode::kExists, Cat(checkpoint.string(),
-                                       ": another run that keeps its state there is at work; give this one another "
-                                       "output, or another --checkpoint")};
+  return Error{ErrorCode::kExists,
+               Cat(checkpoint.string(), ": in use by another run; pass another output or another --checkpoint")};
 }
 
 }  // namespace anchorsplat

@@ -57,7 +57,7 @@ class KeptState {
     if (written.ok()) {
       step_ = state.step;
     } else if (!warned_) {
-      LogWarning(Cat("there is no new checkpoint: ", written.error().message));
+      LogWarning(Cat("no new checkpoint: ", written.error().message));
     }
     warned_ = !written.ok();
   }
@@ -115,13 +115,12 @@ Status CheckSomethingCounts(PictureCache& pictures) {
     ANCHORSPLAT_RETURN_IF_ERROR(pictures.Load(view, picture, ignored));
     if (ignored.empty() || std::ranges::find(ignored, 0) != ignored.end()) return {};
   }
-  return Error{ErrorCode::kBadArgument,
-               Cat("the masks leave nothing of any of the ", views.size(), " pictures to learn from, as in ",
-                   views.front().photograph.mask.string(), ": black is left out, white counts")};
+  return Error{ErrorCode::kBadArgument, Cat("the masks hide all of the ", views.size(), " pictures, such as ",
+                                            views.front().photograph.mask.string(), "; black hides, white counts")};
 }
 
 void WarnUnlessNoted(const Status& noted) {
-  if (!noted.ok()) LogWarning(Cat("going on will need -w for what is left here: ", noted.error().message));
+  if (!noted.ok()) LogWarning(Cat("--resume will need -w for the files left here: ", noted.error().message));
 }
 
 Status MeasureQualities(const TrainingViews& views, const FitOptions& options, Fitter& fitter, Fitted& out) {
@@ -155,10 +154,9 @@ void WarnWhereNothingIsLeft(const Fitted& fitted) {
   const auto shows =
       std::ranges::count_if(fitted.cloud.opacity_logits, [](float logit) { return Sigmoid(logit) >= kMinAlpha; });
   if (static_cast<double>(shows) >= kNextToNothing * static_cast<double>(fitted.report.gaussians_in)) return;
-  LogWarning(Cat("next to nothing is left of this fit: ", WithThousands(shows), " of ",
-                 WithThousands(fitted.cloud.size()), " Gaussians show, and it began with ",
-                 WithThousands(fitted.report.gaussians_in),
-                 ". First Gaussians nearer to what the pictures show (--init view, --init-extent) may help"));
+  LogWarning(Cat("the fit failed: only ", WithThousands(shows), " of ", WithThousands(fitted.cloud.size()),
+                 " Gaussians are visible, and it began with ", WithThousands(fitted.report.gaussians_in),
+                 ". Try --init view or another --init-extent"));
 }
 
 }  // namespace
@@ -181,12 +179,12 @@ Result<Fitted> Fit(const TrainingViews& views, GaussianCloud initial, const FitO
       state = *std::move(earlier);
       report.resumed_at = state.step;
       kept.FoundAt(state.step);
-      LogInfo(Cat("going on at step ", WithThousands(state.step), " of ", control.checkpoint.string()));
+      LogInfo(Cat("resuming at step ", WithThousands(state.step), " from ", control.checkpoint.string()));
     } else {
       const ErrorCode code = earlier.error().code;
       unfit = control.anew_if_unfit && (code == ErrorCode::kBadFile || code == ErrorCode::kBadArgument);
       if (!unfit) return earlier.error();
-      LogWarning(Cat("the fit begins anew: ", earlier.error().message));
+      LogWarning(Cat("starting over: ", earlier.error().message));
     }
   }
   if (report.resumed_at == 0) state = Fitter::Fresh(std::move(initial));

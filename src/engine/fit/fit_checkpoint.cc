@@ -160,7 +160,7 @@ Result<FitState> ReadFitCheckpoint(const std::filesystem::path& path, const std:
     return found == file.metadata().end() ? std::string() : found->second;
   };
   if (IsFormatBefore(text("format"))) {
-    return bad("is a checkpoint of an earlier version, which noted less than this one needs; -w begins anew");
+    return bad("is a checkpoint of an earlier version, which cannot be resumed; -w starts over");
   }
   if (text("format") != kFormat) return bad("is not a checkpoint of a fit (metadata \"format\")");
   ANCHORSPLAT_RETURN_IF_ERROR(VerifyChecksum(file));

@@ -122,7 +122,7 @@ Result<FitStep> Fitter::Step() {
   ++state_.step;
   if (size() == 0) {
     return Error{ErrorCode::kBadArgument,
-                 "fit: pruning has left no Gaussian; do the pictures show anything but background?"};
+                 "fit: pruning removed every Gaussian; check that the pictures show more than background"};
   }
   if (residence_.away() != nullptr && done()) {
     LastPsnr();

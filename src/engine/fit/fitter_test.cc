@@ -251,7 +251,7 @@ TEST_F(Fits, ACheckpointOfAnotherFitIsRefused) {
   auto fitted = Fit(views_, Initial(), options_, control);
   ASSERT_FALSE(fitted.ok());
   EXPECT_EQ(fitted.error().code, ErrorCode::kBadArgument);
-  EXPECT_THAT(fitted.error().message, HasSubstr("its --grow-grad2d is 0.0002, and of this command it is 0.0003"));
+  EXPECT_THAT(fitted.error().message, HasSubstr("its --grow-grad2d is 0.0002, here 0.0003"));
   options_.densification.grow_grad2d = 0.0002;
   views_.train.pop_back();
   EXPECT_THAT(Fit(views_, Initial(), options_, control).error().message, HasSubstr("its set of cameras is another"));

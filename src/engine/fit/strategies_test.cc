@@ -183,14 +183,14 @@ TEST(FitStrategies, AStateOfAnotherStrategyIsRefused) {
     return resumed.ok() ? "accepted" : resumed.error().message;
   };
   EXPECT_THAT(refused([](FitOptions& o) { o.objective.render.mode = RenderMode::kAntialiased; }, initial),
-              HasSubstr("its --mode is \"classic\", and of this command it is \"antialiased\""));
+              HasSubstr("its --mode is \"classic\", here \"antialiased\""));
   EXPECT_THAT(refused([](FitOptions& o) { o.pixel.upscale = 4; }, initial),
-              HasSubstr("its --pixel is \"point\", and of this command it is \"area\""));
+              HasSubstr("its --pixel is \"point\", here \"area\""));
   EXPECT_THAT(refused([](FitOptions& o) { o.strategy = Strategy::kDefault; }, initial),
-              HasSubstr("its --strategy is \"mcmc\", and of this command it is \"default\""));
+              HasSubstr("its --strategy is \"mcmc\", here \"default\""));
   EXPECT_THAT(refused([](FitOptions& o) { o.mcmc.cap_max = 6000; }, initial), HasSubstr("its --max-gaussians is "));
   EXPECT_THAT(refused([](FitOptions& o) { o.exposure_from = 5; }, initial),
-              HasSubstr("its --exposure is off, and of this command it is on from step 5"));
+              HasSubstr("its --exposure is off, here on from step 5"));
   EXPECT_THAT(refused([](FitOptions& o) { o.steps += 1, o.exposure_from = 5; }, initial), HasSubstr("its --steps is "))
       << "what others follow from comes first";
   GaussianCloud elsewhere = initial;

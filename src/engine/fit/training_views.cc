@@ -70,14 +70,14 @@ Result<std::vector<Camera>> WithPictures(CameraSet set, const fs::path& source, 
       left_out.push_back(camera.name);
     }
   }
-  const std::string looked = missing.empty() ? "" : Cat("; the first was looked for at ", missing.string());
+  const std::string looked = missing.empty() ? "" : Cat("; the first was expected at ", missing.string());
   if (views.empty()) {
     return Error{ErrorCode::kNotFound,
-                 Cat(source.string(), ": none of the ", set.cameras.size(), " views has its picture", looked)};
+                 Cat(source.string(), ": none of the ", set.cameras.size(), " views has a picture", looked)};
   }
   if (!left_out.empty()) {
     LogWarning(Cat(source.string(), ": ", left_out.size(), " of ", set.cameras.size(),
-                   " views have no picture and are left out: ", FirstFew(left_out), looked));
+                   " views have no picture and are skipped: ", FirstFew(left_out), looked));
   }
   without.insert(without.end(), left_out.begin(), left_out.end());
   std::stable_sort(views.begin(), views.end(), [](const Camera& a, const Camera& b) { return a.name < b.name; });
@@ -95,7 +95,7 @@ void TellOfOtherCameras(const fs::path& folder, const fs::path& used) {
     others += Cat(others.empty() ? "" : ", ", model.folder.string());
   }
   if (others.empty()) return;
-  LogWarning(Cat(used.string(), " is used, of several sets of cameras here; to use another, name it: ", others));
+  LogWarning(Cat("using ", used.string(), "; to use other cameras of this project, pass one of: ", others));
 }
 
 // The sparse model that ReadCameras takes for a project, if it takes one; else nothing.
@@ -143,7 +143,7 @@ void MoveToOrigin(const fs::path& source, const ProjectOptions& options, std::ve
                   TrainingViews& out) {
   out.origin = options.origin ? *options.origin : ChooseOrigin(views);
   if (!options.origin && !IsZero(out.origin)) {
-    LogInfo(Cat(source.string(), ": coordinates are too large for 32-bit floats; positions are kept relative to ",
+    LogInfo(Cat(source.string(), ": coordinates exceed 32-bit floats; positions are stored relative to ",
                 TextOf(out.origin)));
   }
   for (Camera& view : views) view = FromOrigin(std::move(view), out.origin);
@@ -227,7 +227,7 @@ Result<TrainingViews> OpenProject(const fs::path& project, const ProjectOptions&
   }
   if (out.train.empty()) {
     return Error{ErrorCode::kBadArgument,
-                 Cat(source.string(), ": holding out one view in ", options.hold_out, " leaves none to train on")};
+                 Cat(source.string(), ": --hold-out ", options.hold_out, " leaves no view to train on")};
   }
   return out;
 }
@@ -241,8 +241,7 @@ Result<InitialPoints> InitialPointsOf(FitInit init, const TrainingViews& views, 
                                       uint64_t seed, double extent) {
   const bool has_points = views.points.size() > 0;
   if (init == FitInit::kPoints && !has_points) {
-    return Error{ErrorCode::kBadArgument,
-                 "the fit is to begin at the project's points, but it has none; random ones do without"};
+    return Error{ErrorCode::kBadArgument, "the project has no points to start from; use random ones"};
   }
   if (init == FitInit::kPoints || (init == FitInit::kAuto && has_points)) return Thinned(views.points, count);
   const int64_t random = count.value_or(kRandomPoints);

@@ -144,7 +144,7 @@ Result<ConvertedSplat> ReadToConvert(const OpenedSplat& file, const std::string&
   const SplatFormat* const from = file.format();
   if (options.lod_level > 0 && (from == nullptr || from->name != "streamed SOG")) {
     return Error{ErrorCode::kBadArgument,
-                 Cat("--lod-level has no effect on ", name, "; it has one where a lod-meta.json is read")};
+                 Cat("--lod-level has no effect on ", name, "; it works only with a lod-meta.json input")};
   }
   const double begin = Now();
   ANCHORSPLAT_ASSIGN_OR_RETURN(splat.cloud, file.Read({.lod_level = options.lod_level}, &splat.extras));

@@ -100,7 +100,7 @@ Result<GaussianCloud> EnhanceWithPublished(EnhanceInput input, const PublishedNe
 // exact one.
 WeightPrecision FastPrecision(WeightPrecision asked) {
   if (asked != WeightPrecision::kBFloat16 || UsesBFloat16Dot()) return asked;
-  LogWarning("this processor has no bfloat16 products, so that bf16 would be slower than fp32: fp32 is taken");
+  LogWarning("using fp32: bf16 would be slower, as this processor has no bfloat16 products");
   return WeightPrecision::kFloat;
 }
 
@@ -173,8 +173,8 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
   // There is no lost width to give back, and residuals are on top of the filter.
   if (input.filter_strength <= ShownStrength(upscale, input.cloud.render_mode)) return within_budget();
   if (IsCompensated(input.cloud.render_mode) && !network.config().knows_kind) {
-    LogInfo(Cat("the network has learned from classic splats: this ", NameOf(*input.cloud.render_mode),
-                " one is filtered only"));
+    LogInfo(Cat("filtering only: the network was trained on classic splats, and this is ",
+                NameOf(*input.cloud.render_mode)));
     const auto grown =
         ApplyFilter(input.cloud, input.pixel_sizes, {.upscale = upscale, .strength = input.filter_strength});
     if (!grown.ok()) return grown.error();
@@ -203,22 +203,21 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
   if (outside + partly > kNotable * n) {
     const auto [least, greatest] = network.TrainedUpscales();
     const bool other_upscale = least <= greatest && (upscale < 0.99 * least || upscale > 1.01 * greatest);
-    const std::string text =
-        Cat(Fixed(100 * (outside + partly) / n, 1),
-            " % of the Gaussians are unlike those the network was trained on: ", Fixed(100 * outside / n, 1),
-            " % are filtered only, ", Fixed(100 * partly / n, 1), " % get a part of what it says",
-            other_upscale ? Cat(". It was trained for views ", Fixed(std::sqrt(least * greatest), 1),
-                                " times closer, this is ", upscale)
-                          : "");
+    const std::string text = Cat(
+        Fixed(100 * (outside + partly) / n, 1),
+        " % of the Gaussians are unlike the network's training data: ", Fixed(100 * outside / n, 1),
+        " % are filtered only, ", Fixed(100 * partly / n, 1), " % partly enhanced",
+        other_upscale ? Cat(". It was trained for --upscale ", Fixed(std::sqrt(least * greatest), 1), ", not ", upscale)
+                      : "");
     outside + partly > kMost* n ? LogWarning(text) : LogInfo(text);
   }
   if (result.not_finite > 0 && result.not_finite == count - result.outside) {
     return Error{ErrorCode::kBadFile,
-                 "the network says NaN or infinite values for every Gaussian: its weights are damaged"};
+                 "the network returned NaN or infinite values for every Gaussian: its weights are damaged"};
   }
   if (result.not_finite > 0) {
-    LogWarning(Cat("the network says NaN or infinite values for ", WithThousands(result.not_finite),
-                   " Gaussians: filtered only. Are its weights damaged?"));
+    LogWarning(Cat("the network returned NaN or infinite values for ", WithThousands(result.not_finite),
+                   " Gaussians, which are filtered only. Its weights may be damaged"));
   }
   const int64_t before = result.cloud.size();
   if (choice.invisible > 0) {
@@ -242,9 +241,8 @@ Result<GaussianCloud> EnhanceWithCompactNetwork(EnhanceInput input, double upsca
 EnhanceMethod ModelMethod() {
   const auto last = std::make_shared<LastNetwork>(), last_stand_in = std::make_shared<LastNetwork>();
   return {.name = "model",
-          .summary = HasShippedNetwork()
-                         ? "one pass of the network of --model, or of the one that is part of this program"
-                         : "one pass of the network of --model",
+          .summary = HasShippedNetwork() ? "one pass of the network (built in, or --model FILE)"
+                                         : "one pass of the network --model FILE",
           .rank = 1,
           .adds_detail = true,
           .is_checkpoint = IsCompactCheckpoint,

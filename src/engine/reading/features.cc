@@ -475,15 +475,14 @@ const std::vector<std::string>& FeatureNames() {
 
 Result<SplatFeatures> FeaturesOf(const CloudView& whole, const ShowingGaussians& showing, bool with_pictures) {
   if (showing.all.size() < kLeastGaussians) {
-    return Error{ErrorCode::kBadArgument,
-                 Cat("fewer than ", kLeastGaussians, " Gaussians that show and are small beside the splat")};
+    return Error{ErrorCode::kBadArgument, Cat("fewer than ", kLeastGaussians, " visible, small Gaussians")};
   }
   LeaveIfAbandoned();
   Gaussians sample = SampleOf(showing.all);
   // √(largest × middle axis) of their 10 % quantiles.
   const double unit = std::exp(0.5 * (sample.weighted[1].Quantile(0.1) + sample.weighted[2].Quantile(0.1)));
   if (!(unit > 0) || !std::isfinite(unit)) {
-    return Error{ErrorCode::kBadArgument, "the Gaussians that show have no size"};
+    return Error{ErrorCode::kBadArgument, "the visible Gaussians have zero size"};
   }
   LeaveIfAbandoned();
   Neighbours neighbours = NeighboursOf(whole, showing);

@@ -58,21 +58,21 @@ std::string_view NameOf(Made made) {
 std::string_view InWords(Made made) {
   switch (made) {
     case Made::kClassic:
-      return "a classic splat";
+      return "a classic 3DGS fit";
     case Made::kAntialiased:
-      return "an antialiased splat";
+      return "an antialiased fit";
     case Made::kMip:
-      return "a splat of Mip-Splatting";
+      return "a Mip-Splatting fit";
     case Made::kFiltered:
-      return "a splat that was widened before";
+      return "an already filtered splat";
     case Made::kEnhanced:
-      return "a splat that a network has enhanced before";
+      return "an already enhanced splat";
     case Made::kRaised:
-      return "a splat whose opacities were raised";
+      return "a fit with raised opacities";
     case Made::kMesh:
-      return "points of a mesh";
+      return "a sampled mesh";
     case Made::kGenerated:
-      return "a splat of a generator";
+      return "the output of a generator";
   }
   return "";
 }
@@ -90,7 +90,8 @@ Result<ReadingModel> ReadingModel::Load(const TensorFile& file) {
   for (const std::string& name : names) expected += (expected.empty() ? "" : " ") + name;
   const auto features = file.metadata().find("features");
   if (features == file.metadata().end() || features->second != expected) {
-    return Error{ErrorCode::kBadFile, Cat(file.name(), ": has learned from other features than this program looks at")};
+    return Error{ErrorCode::kBadFile,
+                 Cat(file.name(), ": this program does not compute the features it was trained on")};
   }
   const auto inputs = static_cast<int64_t>(names.size());
   ANCHORSPLAT_ASSIGN_OR_RETURN(model.mean_, ReadAll(file, "mean", std::array{inputs}));

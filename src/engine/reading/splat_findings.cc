@@ -26,15 +26,15 @@ std::vector<std::string> Problems(const CloudStatistics& s) {
   const auto add = [&](int64_t count, std::string_view what) {
     if (count > 0) out.push_back(Cat(Rows(count, s.gaussians), " ", what));
   };
-  add(s.not_finite, Cat("with ", kWhyUnusable, "; no verb draws them, and enhance drops them"));
-  add(s.zero_quaternions, "with a zero quaternion; rendered without rotation");
-  add(s.zero_scales, "with a scale of zero (log-scale -Inf) on some axis; legal, flat or a point");
-  add(s.outliers, "more than ten times farther out than what an orbit shows; sky, floaters or strays");
-  add(s.unnormalised_quaternions, "with quaternions that are not normalised; legal, as trainers leave them so");
-  add(s.implausible, "farther out or longer than a million units: is the file damaged, or of another kind?");
+  add(s.not_finite, Cat("with ", kWhyUnusable, "; never drawn, and dropped by enhance"));
+  add(s.zero_quaternions, "with a zero quaternion; drawn unrotated");
+  add(s.zero_scales, "with a zero scale (log-scale -Inf); valid, flat or a point");
+  add(s.outliers, "more than ten times farther out than an orbit shows; sky or floaters");
+  add(s.unnormalised_quaternions, "with quaternions that are not normalised; valid, common in training output");
+  add(s.implausible, "farther out or longer than a million units; the file may be damaged or misread");
   add(s.invisible, "with an opacity below 1/255; never drawn");
   const auto suspect = [&out](bool is_so, const char* what, const char* option) {
-    if (is_so) out.push_back(Cat(what, ": was the file converted wrongly? convert ", option, " reads it so"));
+    if (is_so) out.push_back(Cat(what, "; read it with convert ", option));
   };
   suspect(s.linear_looking_scales, "scales look like lengths, not logarithms", "--scales lengths");
   suspect(s.linear_looking_opacities, "opacities look like 0 to 1, not logits", "--opacities 0-1");
@@ -78,18 +78,17 @@ Status Inspect(CloudBlocks& blocks, const std::function<CloudView()>& whole, Spl
 }  // namespace
 
 std::string LooksInWords(const SplatFindings& f) {
-  return f.reading.ok() ? LooksInWords(*f.reading) : "nothing: too little of it shows";
+  return f.reading.ok() ? LooksInWords(*f.reading) : "unknown: too few visible Gaussians";
 }
 
 std::string TreatmentInWords(const SplatFindings& f) {
-  if (f.lost_no_width) return "nothing: its comments say that it has lost no width";
-  if (!f.reading.ok()) return "nothing without --pixel-size or --cameras: too little of it shows";
+  if (f.lost_no_width) return "no: its comments say it is already sharp";
+  if (!f.reading.ok()) return "only with --pixel-size or --cameras: too few visible Gaussians";
   if (f.treatment.method == TreatmentMethod::kNone) {
-    return HasItsWidth(f.reading->likeliest()) ? "nothing: it has its width"
-                                               : "nothing, as nothing is sure to make it better";
+    return HasItsWidth(f.reading->likeliest()) ? "no: it looks already sharp" : "no: no method is sure to help";
   }
-  return Cat(f.treatment.method == TreatmentMethod::kNetwork ? "a network" : "the filter", " at pixels of ",
-             f.treatment.pixel, "; ", Fixed(f.treatment.gain, 1), " dB are expected at ", kInfoUpscale, "x");
+  return Cat("yes: ", f.treatment.method == TreatmentMethod::kNetwork ? "network" : "filter", ", pixel size ",
+             f.treatment.pixel, ", about +", Fixed(f.treatment.gain, 1), " dB at ", kInfoUpscale, "x");
 }
 
 Result<SplatFindings> InspectSplat(const OpenedSplat& file, const std::string& name) {

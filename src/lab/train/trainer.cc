@@ -119,7 +119,7 @@ Status CheckFolder(const TrainRequest& request) {
   }
   const fs::path checkpoint = request.out / "checkpoint.safetensors";
   if (Exists(checkpoint) && !request.resume && !request.overwrite) {
-    return Error{ErrorCode::kExists, Cat(checkpoint.string(), " is there: --resume goes on from it, -w begins anew")};
+    return Error{ErrorCode::kExists, Cat(checkpoint.string(), " exists; --resume continues it, -w starts over")};
   }
   return {};
 }
@@ -196,7 +196,7 @@ Status Trainer::Begin() {
   if (!Leads()) return {};
   LogInfo(Cat(WithThousands(report_.parameters), " parameters, ", report_.objects, " objects, ",
               report_.validation_objects, " for validation", group_ ? Cat(", ", group_->size(), " processes") : "",
-              progress_.step > 0 ? Cat(", going on after step ", WithThousands(progress_.step)) : ""));
+              progress_.step > 0 ? Cat(", resuming after step ", WithThousands(progress_.step)) : ""));
   return {};
 }
 

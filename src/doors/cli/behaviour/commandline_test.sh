@@ -73,9 +73,9 @@ expect 2 "enlarged with nothing" "$program" upscale "$work/picture.png" -o "$wor
 says stderr "--network"
 expect 1 "nothing was made" test -e "$work/large"
 expect 2 "with JSON" "$program" convert "$scan" - --to ply --json
-says stderr "--json and the output - would both go to standard output"
+says stderr "--json and -o - both need standard output"
 expect 2 "several files" "$program" convert "$scan" - --to gltf
-says stderr "that is several files"
+says stderr "writes several files"
 expect 2 "levels of detail" "$program" convert "$scan" - --to ply --lod
 expect 2 "no format" "$program" convert "$scan" - --to obj
 expect 2 "a format for a file" "$program" enhance "$scan" -o "$work/x.ply" --to spz
@@ -98,9 +98,9 @@ expect 0 "it is what it was" cmp "$scan" "$work/own.ply"
 # Edits: their order, several inputs, what is said.
 edit() { "$program" convert "$@"; }
 expect 0 "edits" edit "$scan" "$work/edited.ply" -t 1,0,0 --filter-box 1,-,-,-,-,- -F --filter-harmonics 0
-says stdout "edits count along LUF: x left, y up, z forward"
+says stdout "axes of edits: LUF: x left, y up, z forward"
 says stdout "--filter-box 1,-,-,-,-,-: "
-says stdout " Gaussians taken away, "
+says stdout " Gaussians removed, "
 expect 0 "the other way round" edit "$scan" "$work/other.ply" --filter-box 0,-,-,-,-,- -t 1,0,0 -F -H 0 --json
 says stdout '"action": "--filter-box 0,-,-,-,-,-"'
 expect 0 "it is the same" cmp "$work/edited.ply" "$work/other.ply"
@@ -112,7 +112,7 @@ says stdout "1,000 Gaussians of SH degree 1 in, 1,000 of degree 1 out"
 expect 0 "merged from a pipe to a pipe" bash -c "'$program' convert - '$scan' - --to spz <'$scan' >'$work/out'"
 says stderr "1,000 of degree 1 out"
 expect 0 "only counted" edit "$scan" --dry-run -V opacity,gt,0.5 -q
-says stdout " would come out (PLY, "
+says stdout " out (PLY, "
 says stdout "; nothing was written"
 expect 0 "how large it would be" edit "$scan" --dry-run -H 0 --json
 says stdout '"predicted": '
@@ -123,7 +123,7 @@ expect 0 "many" edit "$scan" "$work/merged.ply" --out-dir "$work/many" --scale 2
 expect 0 "as splat-transform counts" edit "$scan" "$work/luf.ply" --translate 1,2,3 --json
 says stdout '"axes": "LUF"'
 expect 0 "as info counts" edit "$scan" "$work/rdf.ply" --action-axes RDF --translate=-1,-2,3 --scale 1
-says stdout "edits count along RDF: x right, y down, z forward"
+says stdout "axes of edits: RDF: x right, y down, z forward"
 expect 0 "both are the same" cmp "$work/luf.ply" "$work/rdf.ply"
 for bad in --scale=1,2,3 --scale=0 --scale=-1 --rotate=1,2 --mirror=w --up=0,0,0 --filter-sphere=0,0,0,-1 --filter-value=none,gt,1 \
   --filter-value=opacity,gt --filter-value=opacity,gt,nan --filter-harmonics=4 --filter-floaters=0 --filter-box=1,1,1,0,0,0 --action-axes=xyz \
@@ -220,7 +220,7 @@ if [ -x "$(dirname "$program")/anchorsplat-train" ]; then
   expect 0 "help of the training program" "$(dirname "$program")/anchorsplat-train" train --help
 else
   expect 3 "no LibTorch" "$program" train "$work" --config "$work/recipe.toml" -o "$work/run" --json
-  says stderr "training is missing: this program was built without LibTorch"
+  says stderr "this program was built without LibTorch"
 fi
 
 finish

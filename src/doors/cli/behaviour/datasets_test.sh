@@ -33,7 +33,7 @@ says stdout '"there_already": 1'
 says stdout '"failed": 1'
 expect 0 "the checkpoint is a splat" "$program" info "$work/set/quad/12/gaussian_splatting/ckpts/ckpt_59_rank0.pt"
 expect 0 "check" "$program" dataset check "$work/set" --decode
-says stdout "everything is there"
+says stdout "complete and consistent"
 says stdout "1 object failed"
 expect 0 "info of a data set" "$program" dataset info "$work/set" --json
 says stdout '"objects": 2'
@@ -49,7 +49,7 @@ expect 0 "kinds of splats" "${kinds[@]}"
 says stdout '"built": 5'
 expect 0 "what the fit saw" test -s "$work/kinds/ramp--noisy/captured/images/003.png"
 expect 0 "check of kinds" "$program" dataset check "$work/kinds" --decode
-says stdout "everything is there"
+says stdout "complete and consistent"
 expect 0 "kinds again" "${kinds[@]}"
 says stdout '"there_already": 5'
 expect 0 "evaluation by kind" "$program" eval "$work/kinds" -o "$work/kinds-eval" --methods raw,filter --kinds plain,packed
@@ -102,7 +102,7 @@ fit=(--objects quad --methods bicubic --fit-steps 800)
 expect 0 "a fit in one go" "$program" eval "$work/killed" -o "$work/whole" "${fit[@]}"
 kill_when "$work/parts/objects/quad/bicubic/fit.checkpoint" "$program" eval "$work/killed" -o "$work/parts" "${fit[@]}"
 expect 0 "a fit that was killed" "$program" eval "$work/killed" -o "$work/parts" "${fit[@]}"
-says stderr "going on at step"
+says stderr "resuming at step"
 expect 0 "comes to the same splat" cmp "$work/whole/objects/quad/bicubic/splat.ply" "$work/parts/objects/quad/bicubic/splat.ply"
 
 finish

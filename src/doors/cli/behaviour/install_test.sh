@@ -70,13 +70,13 @@ if [ ! -e "$prefix/lib/anchorsplat/anchorsplat-lpips.so" ]; then
   says stderr "doctor"
 fi
 
-# The manual page knows every verb and option that --help shows, and roff has nothing to say against it.
+# The manual page knows every verb and option that --help-all shows, and roff has nothing to say against it.
 page=$(sed 's/\\-/-/g; s/\\f[BIR]//g; s/\\&//g; s/\\e/\\/g' "$prefix/share/man/man1/anchorsplat.1")
 for verb in enhance info render convert compare upscale eval view views fit train doctor "dataset build" "dataset check" "bench network"; do
   # shellcheck disable=SC2086
-  expect 0 "help of $verb" "$program" $verb --help
+  expect 0 "help of $verb" "$program" $verb --help-all
   section=$(awk -v title=".SH \"anchorsplat $verb\"" '$0 == title {on = 1; next} /^\.SH/ {on = 0} on' <<<"$page")
-  for option in $(grep -oE '^  (-[a-zA-Z],)?--[a-z0-9-]+' "$work/stdout" | grep -oE -- '--[a-z0-9-]+' | sort -u); do
+  for option in $(grep -oE '^  (-[a-zA-Z], |    )--[a-z0-9-]+' "$work/stdout" | grep -oE -- '--[a-z0-9-]+' | sort -u); do
     case "$option" in --help | --overwrite | --quiet | --json | --progress | --threads | --seed) continue ;; esac
     expect 0 "$option of $verb in the manual page" grep -qF -- "$option" <(printf '%s' "$section")
   done

@@ -124,7 +124,7 @@ says stderr "error: stopped"
 expect 0 "there is no splat of it" gone "$work/gone.ply"
 expect 130 "and levels of detail" stopped_by INT '"levels of detail"' "$program" convert "$work/large.ply" "$work/lod" --lod \
   --progress json
-says stderr "stopped; what was being written is gone"
+says stderr "stopped; unfinished output was removed"
 expect 0 "there is no folder of them" gone "$work/lod"
 # While a pipe is read that nobody ends; from when on the signal is heard, the system knows (bit 1 is SIGINT).
 mkfifo "$work/pipe"
@@ -193,7 +193,7 @@ cp "$work/net.ply.checkpoint" "$work/notes" && printf 'notes' | dd of="$work/not
 expect 4 "it does not go on from what is no checkpoint" network -o "$work/net.ply" --resume --checkpoint "$work/notes"
 expect 0 "which stays" test -e "$work/notes"
 expect 0 "a killed network goes on" network -o "$work/net.ply" --resume
-says stderr "going on after block"
+says stderr "resuming after block"
 expect 0 "a kill does not change the splat" cmp "$work/net-whole.ply" "$work/net.ply"
 expect 1 "its state is gone" test -e "$work/net.ply.checkpoint"
 rm -f "$work"/net*.ply "$work/notes" "$work/blocks.ply"
@@ -202,11 +202,11 @@ rm -f "$work"/net*.ply "$work/notes" "$work/blocks.ply"
 limited() { ulimit -f 200 && exec "$@"; }
 no_room() { (limited "$program" fit "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 "$@"); }
 expect 0 "a fit without room for its checkpoints" no_room -o "$work/room.ply" --steps 30 --checkpoint-every 1
-says stderr "there is no new checkpoint"
+says stderr "no new checkpoint"
 expect 0 "its splat" "$program" info "$work/room.ply"
-expect 130 "an interrupted fit without room for its state" stopped_by INT "there is no new checkpoint" limited "$program" fit \
+expect 130 "an interrupted fit without room for its state" stopped_by INT "no new checkpoint" limited "$program" fit \
   "$work/project" --init-points 300 --max-gaussians 300 --hold-out 5 -o "$work/room2.ply" --steps $long --checkpoint-every 1
-says stderr "there is nothing to resume from"
+says stderr "no checkpoint to resume from"
 expect 0 "its splat as it was" "$program" info "$work/room2.ply"
 
 # Nowhere to write the splat: the state is kept.

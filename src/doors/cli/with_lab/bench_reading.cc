@@ -98,7 +98,7 @@ Status MakeRows(const ReadingFlags& flags, Program& program) {
   {
     Progress progress("rows", std::ssize(tasks));
     for (const ReadingTask& task : tasks) {
-      if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped; the same command goes on from here"};
+      if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped; run the same command to continue"};
       const fs::path path = fs::path(flags.output) / (task.id + ".json");
       if (!program.flags.overwrite && IsRowOf(path, rows.StateOf(task))) {
         ++there;
@@ -276,7 +276,7 @@ Status RunReading(const ReadingFlags& flags, Program& program) {
   const int asked = (flags.features ? 1 : 0) + (flags.tasks.empty() ? 0 : 1) + (flags.table.empty() ? 0 : 1);
   if (asked != 1) {
     return Error{ErrorCode::kBadArgument,
-                 "one of --features (of splats), --tasks (rows of the table) or --score (a table) has to be asked for"};
+                 "pass --features (of splats), --tasks (rows of the table) or --score (a table)"};
   }
   if (flags.features && flags.splats.empty()) return Error{ErrorCode::kBadArgument, "--features needs a splat"};
   if (!flags.features && !flags.splats.empty()) {

@@ -93,16 +93,16 @@ Status RunCheck(const CheckFlags& flags, const SharedFlags& shared) {
     return Error{ErrorCode::kBadFile,
                  Cat(flags.dataset, ": ", problems.size(), problems.size() == 1 ? " problem" : " problems")};
   }
-  if (!shared.json && !shared.quiet) std::cout << OneLine(flags.dataset) << ": everything is there and fits together\n";
+  if (!shared.json && !shared.quiet) std::cout << OneLine(flags.dataset) << ": complete and consistent\n";
   return {};
 }
 
 void AddDatasetCheck(CLI::App& parent, Program& program) {
-  CLI::App& verb = AddVerb(parent, program, "check", "See whether a data set is whole and consistent",
+  CLI::App& verb = AddVerb(parent, program, "check", "Check that a data set is complete and consistent",
                            "anchorsplat dataset check data/ --decode");
   const auto flags = std::make_shared<CheckFlags>();
   verb.add_option("dataset", flags->dataset, "Folder of the data set")->required()->check(NotEmpty());
-  verb.add_flag("--decode", flags->options.decode, "Read every picture, not only its size");
+  verb.add_flag("--decode", flags->options.decode, "Decode every picture, not only its header");
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunCheck(*flags, program.flags); }; });
 }
 

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "cli/clean_output.h"
+#include "cli/help.h"
 #include "cli/stop_signal.h"
 #include "cli/verb.h"
 #include "cli/with_lab/dataset.h"
@@ -113,7 +114,7 @@ Status RunBuild(const BuildFlags& flags, Program& program) {
     if (r.failed > 0) std::cout << "why: " << OneLine(flags.output) << "/failures.jsonl; --retry tries them again\n";
   }
   if (r.interrupted) {
-    return Error{ErrorCode::kInterrupted, Cat(flags.output, ": stopped; the same command goes on from here")};
+    return Error{ErrorCode::kInterrupted, Cat(flags.output, ": stopped; run the same command to continue")};
   }
   if (r.failed > 0) program.exit_code = kPartialExitCode;
   return {};
@@ -122,47 +123,50 @@ Status RunBuild(const BuildFlags& flags, Program& program) {
 }  // namespace
 
 void AddDatasetBuild(CLI::App& parent, Program& program) {
-  CLI::App& verb = AddVerb(parent, program, "build", "Make a low-/high-quality pair of every mesh",
+  CLI::App& verb = AddVerb(parent, program, "build", "Make a low- and a high-quality splat of every mesh",
                            "anchorsplat dataset build models/*.obj furniture.sh3f -o data/ --recipe mix.toml");
   const auto flags = std::make_shared<BuildFlags>();
   verb.add_option("meshes", flags->meshes,
                   "Mesh files, furniture libraries, catalog.sh3f#object, or folders of pictures with cameras");
-  auto* objects =
-      verb.add_option("--objects", flags->objects, "Folder in which --list's meshes are")->check(NotEmpty());
-  verb.add_option("--list", flags->list, "Text file of meshes, one a line, such as data/test-30.txt")
+  auto* objects = verb.add_option("--objects", flags->objects, "Folder of the meshes in --list")->check(NotEmpty());
+  verb.add_option("--list", flags->list, "Text file with a mesh per line, such as data/test-30.txt")
       ->check(NotEmpty())
       ->needs(objects);
   verb.add_option("-o,--output", flags->output, "Folder of the data set")->required()->check(NotEmpty());
-  verb.add_option("--recipe", flags->recipe, "TOML file that mixes fit schedules and resolutions")->check(NotEmpty());
-  verb.add_option("--steps", flags->settings.fit_steps, "Iterations of the low-quality fits")
+  verb.add_option("--recipe", flags->recipe, "TOML file with a mix of fit schedules and resolutions")
+      ->check(NotEmpty());
+  verb.add_option("--steps", flags->settings.fit_steps, "Steps of the low-quality fits")
       ->check(CLI::Range(1, 10'000'000))
       ->capture_default_str();
-  verb.add_option("--hold-out", flags->settings.hold_out, "Every n-th view is not trained on; 0: none")
+  verb.add_option("--hold-out", flags->settings.hold_out, "Hold out every Nth view; 0: none")
       ->check(CLI::Range(0, 100000))
       ->capture_default_str();
-  verb.add_option("--downscale", flags->settings.downscale, "Folders of pictures: how much smaller the low views are")
+  verb.add_option("--downscale", flags->settings.downscale,
+                  "For folders of pictures: downscale of the low-resolution views")
       ->check(CLI::Range(2, 64))
       ->capture_default_str();
-  verb.add_option("--max-gaussians", flags->settings.max_gaussians, "Bound on a fit's size; 0: none")
+  verb.add_option("--max-gaussians", flags->settings.max_gaussians, "Most Gaussians of a fit; 0: no limit")
       ->check(NotNegative())
       ->capture_default_str();
   verb.add_option("--min-psnr", flags->settings.min_train_psnr,
-                  "Objects whose fit is further from its own training views are rejected, dB")
+                  "Reject objects whose fit has less PSNR on its training views, dB")
       ->capture_default_str();
-  verb.add_option("--jobs", flags->jobs, "Objects at the same time (default: one per core)")
+  verb.add_option("--jobs", flags->jobs, "Objects made at the same time (default: one per core)")
       ->check(CLI::Range(1, 1024));
-  verb.add_option("--timeout", flags->timeout, "Seconds an object may take; 0: any")
+  verb.add_option("--timeout", flags->timeout, "Most seconds per object; 0: no limit")
       ->check(NotNegative())
       ->capture_default_str();
   verb.add_option("--licence", flags->licence, "Licence of meshes that name none, such as GPL-2.0-or-later")
       ->check(NotEmpty());
   verb.add_option("--creator", flags->creator, "Creator of meshes that name none")->check(NotEmpty());
-  verb.add_flag("--retry", flags->retry, "Try again what failed in an earlier run");
+  verb.add_flag("--retry", flags->retry, "Retry objects that failed in an earlier run");
   verb.add_flag(
       "--plan", flags->plan,
-      "Make nothing: bring the lists up to date, write a job per object that is wanted, and print them as JSON "
-      "(`anchorsplat batch dataset` runs them on many machines)");
+      "Only update the lists, write a job per missing object and print the jobs as JSON, for `anchorsplat batch "
+      "dataset`");
   flags->views.AddTo(verb);
+  ShortenHelp(verb, {"--output", "--recipe", "--list", "--objects", "--views", "--size", "--low-size", "--steps",
+                     "--jobs", "--retry", "--quiet", "--json"});
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunBuild(*flags, program); }; });
 }
 

@@ -116,13 +116,13 @@ Status RunRoom(const RoomFlags& given, const SharedFlags& shared) {
 }  // namespace
 
 void AddDatasetRoom(CLI::App& parent, Program& program) {
-  CLI::App& verb = AddVerb(parent, program, "room", "Make views of a furnished room from within, at two sizes",
+  CLI::App& verb = AddVerb(parent, program, "room", "Render views inside a furnished room, at two sizes",
                            "anchorsplat dataset room data/room.txt --objects objects -o scenes/room");
   const auto flags = std::make_shared<RoomFlags>();
-  verb.add_option("furniture", flags->furniture, "Text file of the furniture: mesh, x, y, z, turn, height a line")
+  verb.add_option("furniture", flags->furniture, "Text file with mesh, x, y, z, turn and height per line")
       ->required()
       ->check(NotEmpty());
-  verb.add_option("--objects", flags->objects, "Folder in which its meshes are")->required()->check(NotEmpty());
+  verb.add_option("--objects", flags->objects, "Folder of the meshes")->required()->check(NotEmpty());
   verb.add_option("-o,--output", flags->output, "Folder for the views")->required()->check(NotEmpty());
   verb.add_option("--views", flags->count, "Cameras in the room")->check(CLI::Range(1, 10000))->capture_default_str();
   verb.add_option("--size", flags->views.high_size, "Width of the high-resolution views; a multiple of 4")
@@ -134,10 +134,10 @@ void AddDatasetRoom(CLI::App& parent, Program& program) {
   verb.add_option("--samples", flags->views.trace.samples, "Rays per pixel and side: 3 is 9 rays a pixel")
       ->check(CLI::Range(1, kMaxTraceSamples))
       ->capture_default_str();
-  verb.add_option("--light-every", flags->light_every, "Metres between the places whose light is computed")
+  verb.add_option("--light-every", flags->light_every, "Spacing of the light samples, metres")
       ->check(CLI::Range(0.01, 10.0))
       ->capture_default_str();
-  verb.add_option("--points", flags->views.points, "Samples of the surface, as initial points of a fit")
+  verb.add_option("--points", flags->views.points, "Surface samples to start a fit from")
       ->check(CLI::Range(0, 10'000'000))
       ->capture_default_str();
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunRoom(*flags, program.flags); }; });

@@ -96,7 +96,7 @@ TEST_F(DatasetVerb, RoomGoesOnWhereItWasStopped) {
 
 TEST_F(DatasetVerb, Check) {
   Make({"a"});
-  EXPECT_THAT(ExpectDone({"dataset", "check", set_, "--decode"}).out, HasSubstr("everything is there"));
+  EXPECT_THAT(ExpectDone({"dataset", "check", set_, "--decode"}).out, HasSubstr("complete and consistent"));
   EXPECT_EQ(ExpectJson({"dataset", "check", set_})["problems"], nlohmann::json::array());
   fs::remove(fs::path(set_) / "a/24/images/000.png");
   EXPECT_THAT(ExpectRefused({"dataset", "check", set_}, ErrorCode::kBadFile, {"set: 1 problem"}).out,

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/clean_output.h"
+#include "cli/help.h"
 #include "cli/lab.h"
 #include "cli/verb.h"
 #include "cli/with_lab/open_lpips.h"
@@ -71,7 +72,7 @@ Result<double> ChooseStrength(const std::vector<MethodSummary>& summaries) {
   psnr.reserve(summaries.size());
   for (const MethodSummary& summary : summaries) psnr.push_back(summary.psnr.mean);
   if (psnr.size() != strengths.size()) {
-    return Error{ErrorCode::kBadFile, "no f can be chosen: not every strength was measured"};
+    return Error{ErrorCode::kBadFile, "cannot choose a strength: some were not measured"};
   }
   return TopOfParabola(strengths, psnr);
 }
@@ -92,7 +93,7 @@ Status RunEval(EvalFlags flags, Program& program) {
   options.lpips = lpips ? &*lpips : nullptr;
   if (flags.recipe == EvalRecipe::kReal) {
     if (!flags.split.empty())
-      return Error{ErrorCode::kBadArgument, "--split: captures have none; --objects names some"};
+      return Error{ErrorCode::kBadArgument, "--split has no effect on captures; select some with --objects"};
     options.captures.emplace();
     options.captures->seed = shared.seed;
     options.captures->steps = flags.fit_steps.value_or(options.captures->steps);
@@ -101,7 +102,7 @@ Status RunEval(EvalFlags flags, Program& program) {
   options.again = shared.overwrite;
   if (flags.plan) {
     if (options.captures) {
-      return Error{ErrorCode::kBadArgument, "--plan: the methods of --recipe real share the fits that one run keeps"};
+      return Error{ErrorCode::kBadArgument, "--plan does not work with --recipe real, whose methods share fits"};
     }
     ANCHORSPLAT_ASSIGN_OR_RETURN(const std::vector<std::string> objects, ObjectsToEvaluate(flags.benchmark, options));
     nlohmann::json words = nlohmann::json::array();
@@ -115,7 +116,7 @@ Status RunEval(EvalFlags flags, Program& program) {
   ANCHORSPLAT_ASSIGN_OR_RETURN(const Evaluation evaluation, Evaluate(flags.benchmark, methods, flags.out, options));
   if (!evaluation.failures.empty()) program.exit_code = kPartialExitCode;
   if (evaluation.results.empty()) {
-    return Error{ErrorCode::kBadFile, Cat("nothing could be measured; ", evaluation.failures.size(), " failures")};
+    return Error{ErrorCode::kBadFile, Cat("no object could be measured: ", evaluation.failures.size(), " failures")};
   }
   const std::vector<MethodSummary> summaries = Summarise(evaluation, shared.seed);
   const fs::path folder(flags.benchmark);
@@ -127,7 +128,7 @@ Status RunEval(EvalFlags flags, Program& program) {
   if (flags.choose_f) {
     ANCHORSPLAT_ASSIGN_OR_RETURN(const double f, ChooseStrength(summaries));
     json["chosen_f"] = f;
-    chosen = Cat("\nBest f for all objects alike: ", Fixed(f, 3), "   (--filter-f ", Fixed(f, 3), ")\n");
+    chosen = Cat("\nBest strength over all objects: ", Fixed(f, 3), "   (--filter-f ", Fixed(f, 3), ")\n");
   }
   if (shared.json) {
     json["device"] = device.ToJson();
@@ -145,53 +146,51 @@ Status RunEval(EvalFlags flags, Program& program) {
 }  // namespace
 
 void AddEval(CLI::App& app, Program& program) {
-  CLI::App& verb = AddVerb(app, program, "eval", "Tables of quality over a benchmark: methods against ground truth",
+  CLI::App& verb = AddVerb(app, program, "eval", "Measure methods against the ground truth of a benchmark",
                            "anchorsplat eval test-30 -o results --methods raw,upsample,filter,model.safetensors");
   const auto flags = std::make_shared<EvalFlags>();
   verb.add_option("benchmark", flags->benchmark, "Folder with a folder per object (docs/eval.md)")
       ->required()
       ->check(NotEmpty());
   verb.add_option("-o,--output", flags->out,
-                  "Folder for tables and results; what is there already is not measured again "
-                  "(-w measures it again)")
+                  "Folder for tables and results; existing results are kept (-w: measured again)")
       ->required()
       ->check(NotEmpty());
   AddChoice(
       verb, "--recipe", flags->recipe, {{"none", EvalRecipe::kNone}, {"real", EvalRecipe::kReal}},
-      "real: the folder has captures, photographs with cameras; a splat is fitted to each at a quarter of its size");
+      "real: the benchmark holds captures (photographs with cameras); fit a splat to each at a quarter of its size");
   auto* methods =
       verb.add_option("--methods", flags->methods,
-                      "raw, filter, filter@F, filter-auto, filter-best, upsample, bicubic, files of networks, also of "
-                      "those that enlarge pictures, auto, fast, good, best, methods of enhance (refine@k=1@steps=400: "
-                      "with options; model-auto: without cameras); separated by commas (default: raw,upsample,filter; "
+                      "Comma-separated: raw, filter, filter@F, filter-auto, filter-best, upsample, bicubic, network "
+                      "files (also upscalers), auto, fast, good, best, methods of enhance (refine@k=1@steps=400: "
+                      "with options; model-auto: without cameras) (default: raw,upsample,filter; "
                       "with --recipe real also model,auto,good,best)")
           ->delimiter(',');
   AddChoice(verb, "--protocol", flags->protocol, {{"heldout", Protocol::kHeldOut}, {"upstream", Protocol::kUpstream}},
-            "heldout: views no fit has seen; upstream: as the published evaluation");
+            "heldout: views that no fit has seen; upstream: as the published evaluation");
   auto* strength = verb.add_option("--filter-f", flags->method_options.filter_strength,
-                                   "Strength of 'filter', the same for all objects (default: 1 - (1 - 1/upscale²)/3.6)")
+                                   "Strength of 'filter' (default: 1 - (1 - 1/upscale²)/3.6)")
                        ->check(CLI::Range(0.0, kMaxFilterStrength));
   verb.add_flag("--choose-f", flags->choose_f,
-                "Measure the filter at several strengths and say which is best; for a validation split")
+                "Measure the filter at several strengths and report the best; for a validation split")
       ->excludes(methods)
       ->excludes(strength);
   verb.add_option("--fit-steps", flags->fit_steps,
-                  "Of 'bicubic' (default: 15000) and of the fits of --recipe real (default: 1000)")
+                  "Fit steps of 'bicubic' (default: 15000) and of --recipe real (default: 1000)")
       ->check(CLI::Range(int64_t{1}, int64_t{1'000'000}));
-  verb.add_option("--split", flags->split, "Only the objects of this split of the data set: train, validation or test");
-  verb.add_option("--objects", flags->objects, "Only these, by name; separated by commas")->delimiter(',');
-  verb.add_option(
-          "--kinds", flags->kinds,
-          "Only objects of these kinds, entries of the recipe that the data set was made by; separated by commas")
+  verb.add_option("--split", flags->split, "Only objects of this split: train, validation or test");
+  verb.add_option("--objects", flags->objects, "Only these objects, comma-separated")->delimiter(',');
+  verb.add_option("--kinds", flags->kinds,
+                  "Only objects of these kinds (entries of the data set's recipe), comma-separated")
       ->delimiter(',');
-  verb.add_option("--max-views", flags->max_views, "At most so many views per object, for a quick look; 0: all")
+  verb.add_option("--max-views", flags->max_views, "Most views per object; 0: all")
       ->check(NotNegative())
       ->capture_default_str();
-  verb.add_flag("--plan", flags->plan,
-                "Measure nothing: print the objects and methods as JSON (`anchorsplat batch eval` runs them on many "
-                "machines)");
+  verb.add_flag("--plan", flags->plan, "Only print the objects and methods as JSON, for `anchorsplat batch eval`");
   AddLpipsFlags(verb, flags->lpips, flags->lpips_weights);
   program.device.AddTo(verb);
+  ShortenHelp(verb, {"--output", "--methods", "--recipe", "--split", "--objects", "--max-views", "--lpips", "--device",
+                     "--overwrite", "--quiet", "--json"});
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunEval(*flags, program); }; });
 }
 

@@ -77,7 +77,7 @@ TEST_F(EvalVerb, ChoosesF) {
   const nlohmann::json json = ExpectJson(Eval({"--max-views", "1", "--choose-f"}));
   EXPECT_GT(json["chosen_f"], 0);
   EXPECT_LE(json["chosen_f"], 1);
-  EXPECT_THAT(ExpectDone(Eval({"--max-views", "1", "--choose-f"})).out, HasSubstr("Best f for all objects alike: "));
+  EXPECT_THAT(ExpectDone(Eval({"--max-views", "1", "--choose-f"})).out, HasSubstr("Best strength over all objects: "));
 }
 
 TEST_F(EvalVerb, OneBadObjectDoesNotStopTheOthers) {

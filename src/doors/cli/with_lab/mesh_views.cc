@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/clean_output.h"
+#include "cli/help.h"
 #include "cli/verb.h"
 #include "core/log.h"
 #include "core/text.h"
@@ -99,13 +100,13 @@ void ViewSetFlags::AddTo(CLI::App& verb) {
   verb.add_option("--samples", views.trace.samples, "Rays per pixel and side: 4 is 16 rays a pixel")
       ->check(CLI::Range(1, kMaxTraceSamples))
       ->capture_default_str();
-  verb.add_option("--points", views.points, "Samples of the surface, as initial points of a fit")
+  verb.add_option("--points", views.points, "Surface samples to start a fit from")
       ->check(CLI::Range(0, 10'000'000))
       ->capture_default_str();
   verb.add_option("--background", background, "R,G,B from 0 to 1 (default: black)");
-  verb.add_flag("--opaque", views.opaque, "RGB pictures on the background instead of RGBA");
+  verb.add_flag("--opaque", views.opaque, "Write RGB over the background instead of RGBA");
   AddChoice<bool>(verb, "--hr", views.store_high, {{"stored", true}, {"on-demand", false}},
-                  "Whether the high-resolution pictures are written");
+                  "Whether to write the high-resolution pictures");
 }
 
 Result<ViewSetOptions> ViewSetFlags::Options(const SharedFlags& shared) const {
@@ -126,6 +127,8 @@ void AddViews(CLI::App& app, Program& program) {
   verb.add_option("mesh", flags->mesh, "Mesh file, or catalog.sh3f#object")->required()->check(NotEmpty());
   verb.add_option("-o,--output", flags->output, "Folder for the views")->required()->check(NotEmpty());
   flags->views.AddTo(verb);
+  ShortenHelp(verb, {"--output", "--views", "--size", "--low-size", "--rig", "--background", "--opaque", "--overwrite",
+                     "--quiet", "--json"});
   verb.callback([flags, &program] { program.run = [flags, &program] { return RunViews(*flags, program.flags); }; });
 }
 

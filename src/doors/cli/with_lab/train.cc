@@ -33,9 +33,8 @@ struct TrainFlags {
 Status RunInTrainingProgram(const std::vector<std::string>& words) {
   const fs::path program = CompanionFile("anchorsplat-train");
   if (!Exists(program)) {
-    return Error{
-        ErrorCode::kNotFound,
-        "training is missing: this program was built without LibTorch (`anchorsplat doctor` says how to get it)"};
+    return Error{ErrorCode::kNotFound,
+                 "this program was built without LibTorch, which training needs (see `anchorsplat doctor`)"};
   }
   std::vector<char*> arguments;
   for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
@@ -95,7 +94,7 @@ Status RunTrain(TrainFlags& flags, const Program& program) {
   if (!report.ok()) return report.error();
   if (report->interrupted) {
     return Error{ErrorCode::kInterrupted, Cat("stopped after step ", WithThousands(report->steps), "; ",
-                                              report->file.string(), " is what there was, --resume goes on")};
+                                              report->file.string(), " is saved, --resume continues")};
   }
   if (program.flags.json) {
     PrintJson(ToJson(*report));
@@ -112,32 +111,28 @@ void AddTrain(CLI::App& app, Program& program) {
                            "anchorsplat train data/ --config configs/compact-k4.toml -o run");
   const auto flags = std::make_shared<TrainFlags>();
   TrainRequest& request = flags->request;
-  verb.add_option("datasets", flags->datasets, "Folders that `dataset build` made, or in the published layout")
+  verb.add_option("datasets", flags->datasets, "Folders of `dataset build`, or in the published layout")
       ->check(NotEmpty());
-  verb.add_option(
-          "--captures", flags->captures,
-          "Folder of captures to train on too, photographs with cameras: splats are fitted to small pictures of "
-          "some views, and the others at full size are the truth")
+  verb.add_option("--captures", flags->captures,
+                  "Folder of captures to train on as well: a splat is fitted to most views, the others are the truth")
       ->check(CLI::ExistingDirectory);
-  verb.add_option("--config", flags->config, "The recipe, a TOML file (docs/training.md)")
+  verb.add_option("--config", flags->config, "Training recipe, a TOML file (docs/training.md)")
       ->required()
       ->check(CLI::ExistingFile);
-  verb.add_option("-o,--output,--out", flags->out, "Folder for the network, its log and what --resume needs")
+  verb.add_option("-o,--output,--out", flags->out, "Folder for the network, its log and its checkpoint")
       ->required()
       ->check(NotEmpty());
   verb.add_option("--validation", flags->validation,
-                  "Data sets to measure with (their split \"validation\", if they have splits); default: that split of "
-                  "the data sets");
-  verb.add_option("--split", request.split,
-                  "Objects of this split; default: \"train\" where there are splits, else all");
-  verb.add_option("--cache", flags->cache, "Folder for true pictures of views, for several trainings [OUT/cache]");
-  verb.add_option("--start", flags->start, "Begin with the weights of another training's checkpoint.safetensors")
+                  "Data sets to validate on, or their split \"validation\" (default: that split of the training data)");
+  verb.add_option("--split", request.split, "Train on this split (default: \"train\" if there are splits, else all)");
+  verb.add_option("--cache", flags->cache,
+                  "Folder of ground-truth pictures that trainings can share (default: OUT/cache)");
+  verb.add_option("--start", flags->start, "Start from the weights of another training, its checkpoint.safetensors")
       ->check(CLI::ExistingFile);
-  verb.add_flag("--resume", request.resume, "Go on where the training in the folder stopped");
-  verb.add_option("--steps", request.steps, "Steps in all, instead of the recipe's")
+  verb.add_flag("--resume", request.resume, "Continue the training in the output folder");
+  verb.add_option("--steps", request.steps, "Total steps (default: from the recipe)")
       ->check(CLI::Range(int64_t{1}, int64_t{1'000'000'000}));
-  verb.add_option("--minutes", request.minutes,
-                  "Stop after so many minutes of training, with the schedule fitted to them")
+  verb.add_option("--minutes", request.minutes, "Train for so many minutes, with the schedule scaled to them")
       ->check(Positive());
   verb.callback([flags, &program, &verb] {
     if (verb.get_option("--seed")->count() > 0) flags->request.seed = program.flags.seed;

@@ -103,7 +103,7 @@ TEST_F(TrainVerb, RefusesWhatMakesNoSense) {
 TEST_F(TrainVerb, NeedsTheProgramWithTheTraining) {
   ASSERT_FALSE(Exists(CompanionFile("anchorsplat-train"))) << "beside the tests, which it would replace";
   const ProgramRun run =
-      ExpectRefused(Words({"--json"}), ErrorCode::kNotFound, {"training is missing: this program was built without"});
+      ExpectRefused(Words({"--json"}), ErrorCode::kNotFound, {"this program was built without LibTorch"});
   EXPECT_EQ(run.json()["error"]["code"], "not_found");
 }
 

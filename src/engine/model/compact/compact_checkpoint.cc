@@ -101,7 +101,7 @@ Result<std::string> ReadSettings(const fs::path& path, int descriptor, uint64_t 
     if (text.compare(0, end + 1, HeaderOf(settings)) == 0) return settings;
   }
   return Error{ErrorCode::kBadFile,
-               Cat(path.string(), ": byte ", kMagic.size(), ": the checkpoint's settings are damaged; -w begins anew")};
+               Cat(path.string(), ": byte ", kMagic.size(), ": the checkpoint's settings are damaged; -w starts over")};
 }
 
 }  // namespace
@@ -241,8 +241,8 @@ void CompactCheckpoint::Append(const CompactBlockResult& result) {
   full_ = true;
   const std::string why = std::generic_category().message(errno);
   (void)!::ftruncate(descriptor_, static_cast<off_t>(at_));
-  LogWarning(Cat(path_.string(), ": the checkpoint cannot be written: ", why,
-                 "; the run goes on without, and --resume would go on from what it holds"));
+  LogWarning(Cat(path_.string(), ": cannot write the checkpoint: ", why,
+                 "; continuing without. --resume would use what it holds"));
 }
 
 bool IsCompactCheckpoint(const fs::path& path) {

@@ -176,7 +176,7 @@ TEST_F(CompactCheckpointTest, OfAnotherRunItIsRefusedByName) {
   };
   CompactTask task = Task();
   task.upscale = 3;
-  EXPECT_THAT(refused(task), HasSubstr("its upscale is 4.0, and of this command it is 3.0"));
+  EXPECT_THAT(refused(task), HasSubstr("its upscale is 4.0, here 3.0"));
   task = Task();
   const float other_pixel = 2 * kPixel;
   task.pixel_sizes = {&other_pixel, 1};

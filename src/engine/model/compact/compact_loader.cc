@@ -134,8 +134,9 @@ Result<CompactNetwork> LoadCompactNetwork(const TensorFile& file) {
   });
   if (!network.ok()) return bad(network.error().message);
   if (!network->KnowsItsDomain()) {
-    LogWarning(Cat(file.name(), ": says nothing about the range of its training data (domain.low above domain.high), ",
-                   "so no Gaussian will count as unlike them"));
+    LogWarning(
+        Cat(file.name(),
+            ": has no range of training data (domain.low is above domain.high), so all Gaussians count as like them"));
   }
   return network;
 }

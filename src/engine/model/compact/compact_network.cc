@@ -389,7 +389,7 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
         if (of_block.block < next || of_block.block >= blocks.count() ||
             !IsOfBlock(of_block, at, task.block_gaussians, copies, output.waits(), stand_ins)) {
           return Error{ErrorCode::kBadFile, Cat(task.checkpoint.string(), ": block ", of_block.block,
-                                                " is none of this run's; -w begins anew")};
+                                                " is none of this run's; -w starts over")};
         }
         CopyGroups groups;
         if (output.waits()) {
@@ -404,7 +404,7 @@ Result<CompactResult> CompactNetwork::Apply(GaussianCloud cloud, const CompactTa
         progress.Advance(std::min(n, next * task.block_gaussians) - before);
       }
       if (next > 0)
-        LogInfo(Cat("going on after block ", next, " of ", blocks.count(), " of ", task.checkpoint.string()));
+        LogInfo(Cat("resuming after block ", next, " of ", blocks.count(), " from ", task.checkpoint.string()));
     }
     for (int64_t b = next; b < blocks.count(); ++b) {
       if (StopRequested()) return Error{ErrorCode::kInterrupted, "stopped"};

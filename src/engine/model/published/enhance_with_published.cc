@@ -204,14 +204,14 @@ Result<std::vector<int64_t>> ChooseAnchors(const GaussianCloud& cloud, const Pub
   report.not_finite = cloud.size() - static_cast<int64_t>(anchors.size());
   if (report.not_finite > 0) {
     LogWarning(Cat("dropped ", WithThousands(report.not_finite), " of ", WithThousands(cloud.size()),
-                   " Gaussians with values that are not finite: the network cannot read them"));
+                   " Gaussians with NaN or infinite values"));
   }
   if (options.max_gaussians > 0 && static_cast<int64_t>(anchors.size()) > options.max_gaussians) {
     report.over_limit = static_cast<int64_t>(anchors.size()) - options.max_gaussians;
-    LogWarning(Cat("only ", WithThousands(options.max_gaussians), " of ",
-                   WithThousands(static_cast<int64_t>(anchors.size())), " Gaussians are enhanced, ",
+    LogWarning(Cat("--max-gaussians: using ", WithThousands(options.max_gaussians), " of ",
+                   WithThousands(static_cast<int64_t>(anchors.size())), " Gaussians, ",
                    options.upstream ? "chosen at random" : "those with the most opacity × size",
-                   "; the others are left out"));
+                   ", and dropping the others"));
     anchors = options.upstream ? RandomChoice(std::move(anchors), options.max_gaussians)
                                : MostVisible(cloud, anchors, options.max_gaussians);
   }
@@ -263,8 +263,8 @@ Result<GaussianCloud> EnhanceBlocks(const GaussianCloud& cloud, std::span<const 
   report.blocks = static_cast<int64_t>(blocks.size());
   positions = {};
   if (report.blocks > 1) {
-    LogInfo(Cat(WithThousands(report.anchors), " Gaussians are enhanced in ", report.blocks,
-                " overlapping blocks of at most ", WithThousands(block_options.most)));
+    LogInfo(Cat(WithThousands(report.anchors), " Gaussians in ", report.blocks, " overlapping blocks of at most ",
+                WithThousands(block_options.most)));
   }
   GaussianCloud out;
   out.Resize(report.anchors * network.config().copies, kMaxShDegree);
@@ -290,10 +290,10 @@ void FinishRows(const GaussianCloud& cloud, std::span<const int64_t> anchors, co
   DropRows(out, options, report);
   if (report.output_not_finite > 0) {
     LogWarning(
-        Cat("the network gave ", WithThousands(report.output_not_finite), " Gaussians that are not finite; dropped"));
+        Cat("dropped ", WithThousands(report.output_not_finite), " NaN or infinite Gaussians of the network's output"));
   }
   if (report.pruned > 0) {
-    LogInfo(Cat("left out ", WithThousands(report.pruned), " Gaussians of opacity below ", options.prune_opacity));
+    LogInfo(Cat("pruned ", WithThousands(report.pruned), " Gaussians with opacity below ", options.prune_opacity));
   }
   report.gaussians_out = out.size();
 }

@@ -59,7 +59,7 @@ struct ProgramRun {
 };
 
 // Runs `anchorsplat WORDS`.
-inline ProgramRun RunWords(const std::vector<std::string>& words, Trainer trainer = nullptr) {
+inline ProgramRun RunWords(const std::vector<std::string>& words, Trainer trainer = {}) {
   ProgramRun run;
   run.command = "anchorsplat";
   std::vector<const char*> arguments = {"anchorsplat"};

@@ -27,7 +27,9 @@ struct SharedFlags {
 struct TrainReport;
 struct TrainRequest;
 // The training, in the program that has it (train/trainer.h).
-using Trainer = Result<TrainReport> (*)(const TrainRequest&);
+struct Trainer {
+  Result<TrainReport> (*run)(const TrainRequest&) = nullptr;
+};
 
 // What the command line asked for; main runs it once parsing is over.
 struct Program {
@@ -37,7 +39,7 @@ struct Program {
   // Of a run that succeeds: set to kPartialExitCode by verbs that go on when one of many inputs fails.
   int exit_code = 0;
   std::vector<std::string> words;  // argv
-  Trainer trainer = nullptr;
+  Trainer trainer;
 };
 
 // A subcommand with the shared flags, its description and an example for --help.
@@ -71,6 +73,6 @@ inline WriteOptions WriteOptionsFrom(const SharedFlags& flags) { return {.overwr
 void PrintJson(const nlohmann::json& json);
 
 // Runs the program. Never throws.
-int RunProgram(int argc, const char* const* argv, Trainer trainer = nullptr);
+int RunProgram(int argc, const char* const* argv, Trainer trainer = {});
 
 }  // namespace anchorsplat

@@ -15,5 +15,5 @@ int main(int argc, char** argv) {
     execv("/proc/self/exe", argv);
   }
   anchorsplat::QuietDriver();
-  return anchorsplat::RunProgram(argc, argv, anchorsplat::Train);
+  return anchorsplat::RunProgram(argc, argv, {anchorsplat::Train});
 }

@@ -78,7 +78,7 @@ void PrintReport(const TrainReport& r) {
 }
 
 Status RunTrain(TrainFlags& flags, const Program& program) {
-  if (program.trainer == nullptr) return RunInTrainingProgram(program.words);
+  if (program.trainer.run == nullptr) return RunInTrainingProgram(program.words);
   TrainRequest& request = flags.request;
   request.datasets.assign(flags.datasets.begin(), flags.datasets.end());
   request.validation.assign(flags.validation.begin(), flags.validation.end());
@@ -89,7 +89,7 @@ Status RunTrain(TrainFlags& flags, const Program& program) {
   request.start = flags.start;
   request.overwrite = program.flags.overwrite;
   std::optional<StopSignal> stop_signal(std::in_place);
-  const auto report = program.trainer(request);
+  const auto report = program.trainer.run(request);
   stop_signal.reset();
   if (!report.ok()) return report.error();
   if (report->interrupted) {

@@ -38,7 +38,7 @@ class TrainVerb : public testing::Test {
 TEST_F(TrainVerb, AsksForWhatTheWordsSay) {
   ASSERT_EQ(
       RunWords(Words({"--validation", "lamps", "--steps", "50", "--resume", "--cache", "kept", "--split", "test"}),
-               Train)
+               {Train})
           .code,
       0);
   EXPECT_THAT(asked.datasets, testing::ElementsAre("chairs", "tables"));
@@ -52,7 +52,7 @@ TEST_F(TrainVerb, AsksForWhatTheWordsSay) {
   EXPECT_FALSE(asked.overwrite);
   EXPECT_FALSE(asked.minutes);
   EXPECT_FALSE(asked.seed);  // the recipe's
-  ASSERT_EQ(RunWords(Words({"--seed", "0", "-w", "--minutes", "2.5"}), Train).code, 0);
+  ASSERT_EQ(RunWords(Words({"--seed", "0", "-w", "--minutes", "2.5"}), {Train}).code, 0);
   EXPECT_EQ(asked.seed, 0u);
   EXPECT_TRUE(asked.overwrite);
   EXPECT_EQ(asked.minutes, 2.5);
@@ -68,11 +68,11 @@ TEST_F(TrainVerb, SaysWhatItDid) {
   report.filter = {21.5, 0.6, {}};
   report.model = {23.25, 0.75, 0.125};
   answer = report;
-  EXPECT_THAT(RunWords(Words({}), Train).out,
+  EXPECT_THAT(RunWords(Words({}), {Train}).out,
               AllOf(HasSubstr("run/network.safetensors: 4,675 parameters after 1,200 steps on 30 objects"),
                     HasSubstr("23.250  0.7500  0.1250")));
-  EXPECT_THAT(RunWords(Words({"-q"}), Train).out, IsEmpty());
-  const nlohmann::json json = RunWords(Words({"--json"}), Train).json();
+  EXPECT_THAT(RunWords(Words({"-q"}), {Train}).out, IsEmpty());
+  const nlohmann::json json = RunWords(Words({"--json"}), {Train}).json();
   EXPECT_EQ(json["steps"], 1200);
   EXPECT_EQ(json["validation"]["model"], nlohmann::json({{"psnr", 23.25}, {"ssim", 0.75}, {"lpips", 0.125}}));
   EXPECT_EQ(json["validation"]["raw"]["lpips"], nullptr);
@@ -80,14 +80,14 @@ TEST_F(TrainVerb, SaysWhatItDid) {
 
 TEST_F(TrainVerb, PassesFailuresOn) {
   answer = Error{ErrorCode::kBadFile, "recipe.toml: line 2: no"};
-  const ProgramRun run = RunWords(Words({}), Train);
+  const ProgramRun run = RunWords(Words({}), {Train});
   EXPECT_EQ(run.code, ExitCode(ErrorCode::kBadFile));
   EXPECT_THAT(run.err, HasSubstr("recipe.toml: line 2: no"));
   TrainReport stopped;
   stopped.steps = 7;
   stopped.interrupted = true;
   answer = stopped;
-  const ProgramRun interrupted = RunWords(Words({}), Train);
+  const ProgramRun interrupted = RunWords(Words({}), {Train});
   EXPECT_EQ(interrupted.code, ExitCode(ErrorCode::kInterrupted));
   EXPECT_THAT(interrupted.err, HasSubstr("stopped after step 7"));
 }
